@@ -1,0 +1,1 @@
+"""Design problems as data, their formulations, and their solution by IPOPT."""

@@ -1,0 +1,49 @@
+"""Bad input as data: every fault found, with its place, and one exception that carries them all."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing wrong with a problem.
+
+    Attributes:
+        message: what was found, what is accepted, and what to do.
+        key: where, as a path of keys, e.g. ``("parameters", "Fr", "min")``.
+        file, line: the file and line, where the problem came from a file.
+    """
+
+    message: str
+    key: tuple[str, ...] = ()
+    file: str = ""
+    line: int = 0
+
+    def at(self, file: str, line: int) -> "Fault":
+        """The same fault, placed in a file."""
+        return replace(self, file=file, line=line)
+
+    def __str__(self) -> str:
+        place = f"{self.file}:{self.line}" if self.line else self.file
+        return ": ".join(part for part in (place, ".".join(self.key), self.message) if part)
+
+
+class InputError(ValueError):
+    """A problem that is not well posed; `faults` lists everything found wrong with it."""
+
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        self.faults = tuple(faults)
+        super().__init__("\n".join(str(f) for f in self.faults))
+
+    def __reduce__(self) -> tuple[type["InputError"], tuple[tuple[Fault, ...]]]:
+        return InputError, (self.faults,)
+
+
+def suggest(name: str, accepted: Iterable[str]) -> str:
+    """A sentence that offers the nearest accepted name, if one is near, and lists all of them."""
+    names = list(accepted)
+    by_case = [n for n in names if n.lower() == name.lower()]
+    near = by_case or get_close_matches(name, names, n=1, cutoff=0.5)
+    hint = f"did you mean '{near[0]}'? " if near else ""
+    return f"{hint}accepted: {' '.join(names)}"

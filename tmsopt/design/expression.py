@@ -1,0 +1,210 @@
+"""Expressions of a problem file: parsed to a small checked tree, never run as Python."""
+
+import ast
+import math
+import operator
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from tmsopt.design.errors import suggest
+
+FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "exp", "log", "abs", "min", "max")
+CONSTANTS: Mapping[str, float] = {"pi": math.pi}
+COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
+
+_LONGEST = 2000  # characters; longer texts could exhaust the parser's stack
+_DEEPEST = 100
+
+_BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+}
+_SYMBOLIC: Mapping[str, Callable[..., Any]] = {
+    **{name: getattr(ca, name) for name in FUNCTIONS[:9]},
+    "abs": ca.fabs,
+    "min": ca.fmin,
+    "max": ca.fmax,
+}
+_NUMERIC: Mapping[str, Callable[..., Any]] = {
+    **{name: getattr(np, name) for name in ("sin", "cos", "tan", "sqrt", "exp", "log", "abs")},
+    "asin": np.arcsin,
+    "acos": np.arccos,
+    "atan": np.arctan,
+    "min": np.minimum,
+    "max": np.maximum,
+}
+
+
+class ExpressionError(ValueError):
+    """An expression that cannot be used, with the reason."""
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A parsed expression.
+
+    Attributes:
+        text: as written.
+        names: parameters and quantities that it uses, in order of appearance.
+        comparison: ``<=``, ``>=`` or ``==`` for a constraint, empty for a plain value.
+    """
+
+    text: str
+    names: tuple[str, ...]
+    comparison: str = ""
+
+    def __call__(self, values: Mapping[str, Any]) -> Any:
+        """Value for floats or arrays; of a comparison, left minus right."""
+        with np.errstate(all="ignore"):
+            return self._evaluate(values, _NUMERIC)
+
+    def symbolic(self, values: Mapping[str, Any]) -> Any:
+        """CasADi expression; of a comparison, left minus right."""
+        return self._evaluate(values, _SYMBOLIC)
+
+    def _evaluate(self, values: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]]) -> Any:
+        body = ast.parse(self.text.strip(), mode="eval").body
+        if isinstance(body, ast.Compare):
+            body = ast.BinOp(body.left, ast.Sub(), body.comparators[0])
+        return _value(body, values, functions)
+
+
+def parse_value(text: str, accepted: Iterable[str]) -> Expression:
+    """Parse an expression for a value, such as an objective.
+
+    Raises:
+        ExpressionError: with what was found and what is accepted.
+    """
+    body = _parse(text)
+    if isinstance(body, ast.Compare):
+        raise ExpressionError(f"'{text}' is a comparison; accepted: a value, such as 'abscissa'")
+    return Expression(text, _checked_names(body, text, list(accepted)))
+
+
+def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
+    """Parse a constraint, two values joined by one of ``<= >= ==``.
+
+    Raises:
+        ExpressionError: with what was found and what is accepted.
+    """
+    body = _parse(text)
+    if not isinstance(body, ast.Compare):
+        raise ExpressionError(f"'{text}' is not a comparison; write e.g. 'nu_H >= 0.02' with <=, >= or ==")
+    if len(body.ops) > 1:
+        raise ExpressionError(f"'{text}' joins several comparisons; write one constraint for each")
+    symbol = COMPARISONS.get(type(body.ops[0]))
+    if symbol is None:
+        raise ExpressionError(f"'{text}' compares with another sign than <=, >= or ==; use one of these")
+    known = list(accepted)
+    left, right = _checked_names(body.left, text, known), _checked_names(body.comparators[0], text, known)
+    names = tuple(dict.fromkeys(left + right))
+    if not names:
+        raise ExpressionError(f"'{text}' uses no parameter or quantity, so nothing can satisfy or violate it")
+    return Expression(text, names, symbol)
+
+
+def _parse(text: str) -> ast.expr:
+    if len(text) > _LONGEST:
+        raise ExpressionError(f"expression of {len(text)} characters; accepted: up to {_LONGEST}")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the tokenizer warns of texts like 1if, which fail below
+            return ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        column = f" at character {error.offset}" if isinstance(error, SyntaxError) and error.offset else ""
+        raise ExpressionError(
+            f"'{text}' does not parse{column}; write numbers, names, + - * / **, parentheses and {' '.join(FUNCTIONS)}"
+        ) from None
+
+
+def _checked_names(node: ast.expr, text: str, accepted: list[str], depth: int = 0) -> tuple[str, ...]:
+    """Names that an expression uses; raises on anything but the accepted arithmetic."""
+    if depth > _DEEPEST:
+        raise ExpressionError(f"'{text[:60]}…' is nested deeper than {_DEEPEST} levels")
+
+    def names_in(*nodes: ast.expr) -> tuple[str, ...]:
+        found = [name for n in nodes for name in _checked_names(n, text, accepted, depth + 1)]
+        return tuple(dict.fromkeys(found))
+
+    match node:
+        case ast.Constant(value=bool()):
+            raise ExpressionError(f"'{text}' uses {node.value}; accepted: numbers and names")
+        case ast.Constant(value=int() | float()):
+            _number(node, text)
+            return ()
+        case ast.Name(id=name):
+            if name in CONSTANTS:
+                return ()
+            if name in FUNCTIONS:
+                raise ExpressionError(f"'{text}' names the function {name} without its argument; write {name}(…)")
+            if name not in accepted:
+                raise ExpressionError(f"'{text}' uses the unknown name '{name}'; {suggest(name, accepted)}")
+            return (name,)
+        case ast.UnaryOp(op=ast.UAdd() | ast.USub(), operand=operand):
+            return names_in(operand)
+        case ast.BinOp(left=left, op=op, right=right):
+            if type(op) not in _BINARY:
+                hint = "; write a power as **" if isinstance(op, ast.BitXor) else ""
+                raise ExpressionError(f"'{text}' uses an operator other than + - * / **{hint}")
+            return names_in(left, right)
+        case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in FUNCTIONS:
+            fewest, most = (2, 99) if name in ("min", "max") else (1, 1)
+            if not fewest <= len(args) <= most:
+                wanted = "two or more arguments" if fewest == 2 else "one argument"
+                raise ExpressionError(f"'{text}' calls {name} with {len(args)} arguments; accepted: {wanted}")
+            return names_in(*args)
+        case ast.Call():
+            raise ExpressionError(f"'{text}' calls '{ast.unparse(node.func)}'; accepted: {' '.join(FUNCTIONS)}")
+        case ast.Attribute():
+            raise ExpressionError(f"'{text}' uses the attribute '{ast.unparse(node)}'; accepted: plain names")
+        case _:
+            raise ExpressionError(
+                f"'{text}' contains '{ast.unparse(node)}'; accepted: numbers, names, + - * / ** and {' '.join(FUNCTIONS)}"
+            )
+
+
+def _number(node: ast.Constant, text: str) -> float:
+    value = node.value
+    assert isinstance(value, int | float)
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise ExpressionError(f"'{text}' contains a number beyond double precision")
+    return number
+
+
+def _value(node: ast.expr, values: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]]) -> Any:
+    """Value of a checked tree."""
+    match node:
+        case ast.Constant():
+            return _number(node, "")
+        case ast.Name(id=name):
+            return CONSTANTS[name] if name in CONSTANTS else values[name]
+        case ast.UnaryOp(op=op, operand=operand):
+            value = _value(operand, values, functions)
+            return -value if isinstance(op, ast.USub) else value
+        case ast.BinOp(left=left, op=op, right=right):
+            a, b = _value(left, values, functions), _value(right, values, functions)
+            return _BINARY[type(op)](_as_array(a), _as_array(b))
+        case ast.Call(func=ast.Name(id=name), args=args):
+            operands = [_as_array(_value(a, values, functions)) for a in args]
+            result = functions[name](*operands[:2]) if len(operands) > 1 else functions[name](operands[0])
+            for operand in operands[2:]:
+                result = functions[name](result, operand)
+            return result
+    raise AssertionError(ast.dump(node))  # unreachable: the tree was checked when parsed
+
+
+def _as_array(value: Any) -> Any:
+    """Python floats as NumPy's, which give nan and inf where Python raises."""
+    return np.float64(value) if isinstance(value, float | int) else value

@@ -1,0 +1,220 @@
+"""Problem files: TOML to a Problem, with every fault placed at its line."""
+
+import re
+import tomllib
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, StrictStr, ValidationError
+
+from tmsopt.design.errors import Fault, InputError, suggest
+from tmsopt.design.problem import Problem, guess_parameter_set
+from tmsopt.design.units import with_unit
+from tmsopt.models import MODELS, Model
+
+LARGEST = 1_000_000
+"""Bytes; a longer file is not a problem file."""
+
+_Number = StrictFloat | StrictInt | StrictStr
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class _FreeParameter(_Table):
+    min: _Number
+    max: _Number
+    start: _Number | None = None
+
+
+class _Objective(_Table):
+    minimize: StrictStr | None = None
+    maximize: StrictStr | None = None
+    locate: StrictStr | None = None
+
+
+class _File(_Table):
+    """The shape of a problem file."""
+
+    title: StrictStr = ""
+    model: StrictStr = "tms"
+    parameters: dict[str, _FreeParameter | StrictFloat | StrictInt | StrictStr]
+    objective: _Objective = Field(default_factory=_Objective)
+    constraints: dict[str, StrictStr] = Field(default_factory=dict)
+
+
+def load(path: str | PathLike[str]) -> Problem:
+    """Read a problem file.
+
+    Raises:
+        InputError: listing every fault with file, line, key, what was found and what is accepted.
+    """
+    file = str(path)
+    text = _text(file)
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        place = re.search(r"line (\d+)", str(error))
+        message = f"not TOML: {error}"
+        raise InputError([Fault(message).at(file, int(place[1]) if place else text.count("\n") + 1)]) from None
+    except RecursionError:
+        raise InputError([Fault("not TOML: nested too deeply", file=file)]) from None
+    lines = _lines(text)
+
+    def placed(faults: list[Fault]) -> InputError:
+        return InputError(f.at(file, _line_of(lines, f.key)) for f in faults)
+
+    shape_faults, parsed = _shape(data)
+    model = MODELS.get(str(data.get("model", "tms")))
+    if model is None:
+        name = str(data["model"])
+        shape_faults.append(Fault(f"unknown model '{name}'; {suggest(name, MODELS)}", ("model",)))
+    if model is None or parsed is None:
+        raise placed(shape_faults)
+    unit_faults, fixed, free, start = _numbers(parsed.parameters, model)
+    try:
+        problem = Problem(
+            model=model,
+            fixed=fixed,
+            free=free,
+            start=start,
+            constraints=parsed.constraints,
+            minimize=parsed.objective.minimize,
+            maximize=parsed.objective.maximize,
+            locate=parsed.objective.locate,
+            title=parsed.title or Path(file).stem,
+        )
+    except InputError as error:
+        known = {f.key for f in unit_faults}
+        raise placed(unit_faults + [f for f in error.faults if f.key not in known]) from None
+    if unit_faults:
+        raise placed(unit_faults)
+    return problem
+
+
+def _text(file: str) -> str:
+    path = Path(file)
+    try:
+        if path.is_dir():
+            raise InputError([Fault("is a directory; accepted: a TOML problem file", file=file)])
+        if not path.exists():
+            near = suggest(path.name, [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else [])
+            hint = f"; {near}" if "did you mean" in near else ""
+            raise InputError([Fault(f"no such file{hint}", file=file)])
+        if not path.is_file():
+            raise InputError([Fault("is not a regular file; accepted: a TOML problem file", file=file)])
+        with path.open("rb") as stream:
+            raw = stream.read(LARGEST + 1)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        if isinstance(error, InputError):
+            raise
+        raise InputError([Fault(f"cannot be read: {reason}", file=file)]) from None
+    if len(raw) > LARGEST:
+        raise InputError([Fault(f"is larger than {LARGEST} bytes; accepted: a problem file of a few lines", file=file)])
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw[: error.start].count(b"\n") + 1
+        raise InputError([Fault(f"not TOML: byte {raw[error.start]:#x} is not UTF-8").at(file, line)]) from None
+
+
+def _shape(data: Mapping[str, Any]) -> tuple[list[Fault], _File | None]:
+    try:
+        return [], _File.model_validate(dict(data))
+    except ValidationError as error:
+        faults: dict[tuple[str, ...], Fault] = {}
+        for detail in error.errors(include_url=False):
+            fault = _shape_fault(detail["loc"], detail["type"], detail.get("input"))
+            faults.setdefault(fault.key, fault)
+        return list(faults.values()), None
+
+
+def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:
+    """One pydantic complaint in the words of the problem file."""
+    tags = ("_FreeParameter", "float", "int", "str")
+    key = tuple(str(k) for k in where if k not in tags)
+    match key:
+        case (section,) if kind == "extra_forbidden":
+            return Fault(f"unknown key '{section}'; {suggest(section, _File.model_fields)}", key)
+        case ("parameters",) if kind == "missing":
+            return Fault("missing section [parameters]", key)
+        case ("parameters", name, end) if kind == "extra_forbidden":
+            return Fault(f"unknown key '{end}' of {name}; {suggest(end, _FreeParameter.model_fields)}", key)
+        case ("parameters", name, end) if kind == "missing":
+            return Fault(f"missing {end} of {name}; write e.g. {name} = {{ min = 0.5, max = 2 }}", key)
+        case ("parameters", _, *_):
+            accepted = "a number, a text with a unit such as '5 deg', or { min = …, max = …, start = … }"
+            return Fault(f"found {_short(found)}; accepted: {accepted}", key[:3])
+        case ("objective", sense, *_) if kind == "extra_forbidden":
+            return Fault(f"unknown key '{sense}'; {suggest(sense, _Objective.model_fields)}", key)
+        case ("constraints", *_):
+            return Fault(f"found {_short(found)}; accepted: a comparison in quotes, such as 'nu_H >= 0.02'", key)
+        case _:
+            table = key in (("parameters",), ("objective",))
+            return Fault(f"found {_short(found)}; accepted: {'a table' if table else 'a text in quotes'}", key)
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "…"
+
+
+def _numbers(
+    written: Mapping[str, Any], model: Model
+) -> tuple[list[Fault], dict[str, Any], dict[str, tuple[Any, Any]], dict[str, Any]]:
+    """Faults, fixed values, free ranges and starts, with written units converted."""
+    faults: list[Fault] = []
+    of = guess_parameter_set(model, written)
+
+    def number(name: str, value: Any, *end: str) -> Any:
+        if not isinstance(value, str):
+            return value
+        unit = of[name].unit if name in of.names else "1"
+        try:
+            return with_unit(value, unit)
+        except ValueError as error:
+            faults.append(Fault(str(error), ("parameters", name, *end)))
+            return value
+
+    fixed, free, start = {}, {}, {}
+    for name, value in written.items():
+        if isinstance(value, _FreeParameter):
+            free[name] = (number(name, value.min, "min"), number(name, value.max, "max"))
+            if value.start is not None:
+                start[name] = number(name, value.start, "start")
+        else:
+            fixed[name] = number(name, value)
+    return faults, fixed, free, start
+
+
+_HEADER = re.compile(r"\s*\[+\s*([^\]]+?)\s*\]+")
+_KEY = re.compile(r"\s*([A-Za-z0-9_\-.\"' ]+?)\s*=")
+
+
+def _lines(text: str) -> dict[tuple[str, ...], int]:
+    """Line number of every section and key that begins a line."""
+    section: tuple[str, ...] = ()
+    lines: dict[tuple[str, ...], int] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        if header := _HEADER.match(line):
+            section = _path(header[1])
+            lines.setdefault(section, number)
+        elif key := _KEY.match(line):
+            lines.setdefault((*section, *_path(key[1])), number)
+    return lines
+
+
+def _path(dotted: str) -> tuple[str, ...]:
+    return tuple(part.strip().strip("\"'") for part in dotted.split("."))
+
+
+def _line_of(lines: Mapping[tuple[str, ...], int], key: tuple[str, ...]) -> int:
+    """Line of the longest part of a key path that the file has; 1 for something missing altogether."""
+    for end in range(len(key), 0, -1):
+        if key[:end] in lines:
+            return lines[key[:end]]
+    return 1

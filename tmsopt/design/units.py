@@ -1,0 +1,66 @@
+"""Text such as "40 cm" or "1 deg" as a number in the parameter's own unit."""
+
+import re
+from functools import cache
+from typing import Any
+
+_QUANTITY = re.compile(r"\s*(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.+-].*?)?\s*")
+_UNIT = re.compile(r"[A-Za-zµμ°%_ */^()²³0-9-]{1,40}")
+_BIG_POWER = re.compile(r"\d\d|\^\s*\^")
+
+_EXAMPLES = {
+    "1": "a number",
+    "rad": "'5 deg' or '0.1 rad'",
+    "m": "'40 cm' or '1.2 m'",
+    "kg": "'10 kg' or '500 g'",
+    "m/s": "'15 km/h' or '4 m/s'",
+    "m/s^2": "'9.81 m/s^2'",
+}
+
+
+def with_unit(text: str, unit: str) -> float:
+    """The number that a text with a unit stands for, in `unit`.
+
+    Raises:
+        ValueError: saying what was found and what is accepted.
+    """
+    accepted = f"accepted: {_EXAMPLES.get(unit, unit)}"
+    if unit != "1":
+        accepted += f", or a number without quotes in {unit}"
+    parts = _QUANTITY.fullmatch(text)
+    if parts is None:
+        raise ValueError(f"found '{text}', not a number with a unit; {accepted}")
+    number, written = float(parts["number"]), parts["unit"]
+    if not written:
+        raise ValueError(f"found '{text}', a number in quotes without a unit; {accepted}")
+    if unit == "1":
+        raise ValueError(f"found '{text}', but the parameter is dimensionless; {accepted}")
+    if not _UNIT.fullmatch(written) or _BIG_POWER.search(written):
+        raise ValueError(f"found the unit '{written}', which does not read as a unit; {accepted}")
+    factor = _factor(written.replace("²", "^2").replace("³", "^3").replace("°", "deg"), unit)
+    if factor is None:
+        raise ValueError(f"found the unit '{written}', which is not known or not a unit of {unit}; {accepted}")
+    return number * factor
+
+
+@cache
+def _factor(written: str, unit: str) -> float | None:
+    """How many `unit` one written unit is, or None where it is not one."""
+    registry = _registry()
+    try:
+        # Angles carry no dimension for pint, so only units built of radian pass as angles.
+        found = registry.parse_units(written)
+        if (unit == "rad") != (str(registry.get_base_units(found)[1]) == "radian"):
+            return None
+        quantity = registry.Quantity(2.0, found).to(unit)
+        offset = registry.Quantity(0.0, found).to(unit)
+    except Exception:  # pint raises AssertionError, tokenizer and attribute errors on malformed text
+        return None
+    return float(quantity.magnitude) / 2 if offset.magnitude == 0 else None
+
+
+@cache
+def _registry() -> Any:
+    import pint  # a third of a second, paid only where a unit is written
+
+    return pint.UnitRegistry()

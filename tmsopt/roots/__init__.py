@@ -1,0 +1,31 @@
+"""Real polynomials and their roots: factored forms, stability, numeric and exact roots, multiplicity."""
+
+from tmsopt.roots.exact import exact_abscissa, exact_roots
+from tmsopt.roots.numeric import abscissa, backward_error, rebuilt, roots
+from tmsopt.roots.patterns import PATTERNS, Pattern
+from tmsopt.roots.polynomial import determinant, evaluate, product, quadratic_pencil, shift
+from tmsopt.roots.stability import discriminant, hurwitz_minors, is_stable, lienard_chipart
+from tmsopt.roots.structure import Root, Structure, structure
+
+__all__ = [
+    "PATTERNS",
+    "Pattern",
+    "Root",
+    "Structure",
+    "abscissa",
+    "backward_error",
+    "determinant",
+    "discriminant",
+    "evaluate",
+    "exact_abscissa",
+    "exact_roots",
+    "hurwitz_minors",
+    "is_stable",
+    "lienard_chipart",
+    "product",
+    "quadratic_pencil",
+    "rebuilt",
+    "roots",
+    "shift",
+    "structure",
+]

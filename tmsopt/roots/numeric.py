@@ -1,0 +1,158 @@
+"""Numeric roots that are jointly right: their elementary symmetric functions give back the coefficients.
+
+Next to a k-fold root each single root is uncertain by the k-th root of the rounding unit, so roots are judged
+together, by the coefficients that they rebuild.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+_POLISHED = 4e-16  # backward error below which one more Newton step can only add rounding
+_STEPS = 6  # Newton doubles the digits at each step; companion eigenvalues start with 4 or more
+
+
+def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
+    """All roots of real polynomials: coefficients of shape (…, n + 1), descending; roots of shape (…, n).
+
+    Companion eigenvalues, then Newton's method on the quadratic factors (and one linear factor for odd n) with
+    the step kept only where it lowers the backward error. Conjugate pairs are exact and adjacent.
+
+    Raises:
+        ValueError: for a leading coefficient 0 or coefficients that are not finite.
+    """
+    c = np.asarray(coefficients, dtype=float)
+    if c.shape[-1] < 2 or not np.all(np.isfinite(c)) or np.any(c[..., 0] == 0):
+        raise ValueError("roots takes finite coefficients, two or more, with a leading one other than 0")
+    monic = (c / c[..., :1]).reshape(-1, c.shape[-1])
+    n = monic.shape[-1] - 1
+    scale = _scale(monic)
+    scaled = monic / scale[:, None] ** np.arange(n + 1)
+    factors = _factors(_companion_eigenvalues(scaled))
+    factors = _newton(factors, scaled)
+    found = _factor_roots(factors)[:, :n] * scale[:, None]
+    return found.reshape(*c.shape[:-1], n)
+
+
+def abscissa(coefficients: ArrayLike) -> Array:
+    """Largest real part of the roots, in double precision: shape (…, n + 1) in, (…) out."""
+    return np.asarray(roots(coefficients).real.max(axis=-1))
+
+
+def rebuilt(values: NDArray[np.complex128]) -> Array:
+    """Monic real coefficients of the polynomials with these roots: shape (…, n) in, (…, n + 1) out."""
+    return _elementary(values).real
+
+
+def backward_error(coefficients: ArrayLike, values: NDArray[np.complex128]) -> Array:
+    """Largest relative error of the coefficients rebuilt from the roots, shape (…).
+
+    Each coefficient's error is measured against the same symmetric function of |roots|, which is the size of
+    the terms it is summed from: a coefficient that cancels to nearly 0 has no relative accuracy of its own.
+    """
+    c = np.asarray(coefficients, dtype=float)
+    size = _elementary(-np.abs(values)).real
+    error = np.abs(_elementary(values).real - c / c[..., :1])
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.max(np.where(error == 0, 0.0, error / size), axis=-1))
+
+
+def _scale(monic: Array) -> Array:
+    """Geometric mean of |roots| where no root is 0, else the largest term of the Fujiwara bound."""
+    n = monic.shape[-1] - 1
+    powers = np.abs(monic[:, 1:]) ** (1 / np.arange(1, n + 1))
+    scale = np.where(powers[:, -1] > 0, powers[:, -1], powers.max(axis=-1))
+    return np.where(scale > 0, scale, 1.0)
+
+
+def _companion_eigenvalues(monic: Array) -> NDArray[np.complex128]:
+    n = monic.shape[-1] - 1
+    companion = np.zeros((len(monic), n, n))
+    companion[:, 0, :] = -monic[:, 1:]
+    companion[:, np.arange(1, n), np.arange(n - 1)] = 1
+    return np.linalg.eigvals(companion).astype(complex)
+
+
+def _factors(values: NDArray[np.complex128]) -> Array:
+    """Coefficients (p, q) of s² + p s + q per pair, shape (rows, ⌈n/2⌉, 2); a lone real root r has p = −r, q = 0."""
+    order = np.lexsort((values.imag, np.abs(values.imag), values.real, values.imag == 0), axis=-1)
+    values = np.take_along_axis(values, order, axis=-1)
+    if values.shape[-1] % 2:
+        values = np.concatenate([values, np.zeros_like(values[:, :1])], axis=-1)
+    first, second = values[:, 0::2], values[:, 1::2]
+    return np.stack([-(first + second).real, (first * second).real], axis=-1)
+
+
+def _newton(factors: Array, monic: Array) -> Array:
+    """Newton's method on the factor coefficients, on the rows that need it."""
+    n = monic.shape[-1] - 1
+    error = backward_error(monic, _factor_roots(factors)[:, :n])
+    for _ in range(_STEPS):
+        rows = np.flatnonzero(error > _POLISHED)
+        if not rows.size:
+            break
+        trial = factors[rows] + _newton_step(factors[rows], monic[rows])
+        trial_error = backward_error(monic[rows], _factor_roots(trial)[:, :n])
+        better = trial_error < error[rows]
+        if not better.any():
+            break
+        factors[rows[better]] = trial[better]
+        error[rows[better]] = trial_error[better]
+    return factors
+
+
+def _newton_step(factors: Array, monic: Array) -> Array:
+    """Least-squares Newton step: at coinciding factors the Jacobian is singular and the shortest step is taken."""
+    rows, half, _ = factors.shape
+    n = monic.shape[-1] - 1
+    others = [_multiply(np.delete(factors, k, axis=1)) for k in range(half)]
+    residual = monic[:, 1:] - _multiply(factors)[:, 1 : n + 1]
+    jacobian = np.zeros((rows, n, 2 * half))
+    for k, other in enumerate(others):
+        for column in (0, 1):  # d/dp multiplies by s, d/dq by 1
+            width = min(n - column, other.shape[-1])
+            jacobian[:, column : column + width, 2 * k + column] = other[:, :width]
+    size = _elementary(-np.abs(_factor_roots(factors)[:, :n])).real[:, 1:] + 1e-300
+    unit = np.abs(_factor_roots(factors)).reshape(rows, half, 2).max(axis=-1) + 1e-300
+    columns = np.stack([unit, unit**2], axis=-1).reshape(rows, 2 * half)
+    if n % 2:
+        jacobian[:, :, -1] = 0  # the lone root's q stays 0
+    balanced = jacobian * columns[:, None, :] / size[:, :, None]
+    step = np.linalg.pinv(balanced) @ (residual / size)[:, :, None]
+    return np.asarray((step[:, :, 0] * columns).reshape(rows, half, 2))
+
+
+def _multiply(factors: Array) -> Array:
+    result = np.ones((len(factors), 1))
+    for k in range(factors.shape[1]):
+        padded = np.pad(result, ((0, 0), (0, 2)))
+        padded[:, 1:-1] += factors[:, k, :1] * result
+        padded[:, 2:] += factors[:, k, 1:] * result
+        result = padded
+    return result
+
+
+def _factor_roots(factors: Array) -> NDArray[np.complex128]:
+    """Both roots of each quadratic, without cancellation; the padding root 0 of an odd degree comes last."""
+    p, q = factors[..., 0], factors[..., 1]
+    half = -p / 2
+    disc = half * half - q
+    root = np.sqrt(np.abs(disc))
+    large = half + np.where(half < 0, -root, root)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        small = np.where(large == 0, 0.0, q / large)
+    real = disc >= 0
+    first = np.where(real, large, half + 1j * root)
+    second = np.where(real, small, half - 1j * root)
+    return np.stack([first, second], axis=-1).reshape(len(factors), -1)
+
+
+def _elementary(values: NDArray[np.complex128] | Array) -> NDArray[np.complex128]:
+    """Coefficients of ∏ (s − value)."""
+    result = np.ones((*values.shape[:-1], 1), dtype=complex)
+    for k in range(values.shape[-1]):
+        grown = np.concatenate([result, np.zeros_like(result[..., :1])], axis=-1)
+        grown[..., 1:] -= values[..., k : k + 1] * result
+        result = grown
+    return result

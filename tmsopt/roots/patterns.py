@@ -1,0 +1,134 @@
+"""Root patterns of a quartic as products of monic factors with unknown coefficients.
+
+``p(s) = a0 · product(factors(unknowns))`` is a smooth system in the parameters and the unknowns, regular where
+the roots themselves are not.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.roots.polynomial import product
+
+Roots = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """A set of quartics given by a factored form.
+
+    Attributes:
+        name: as written in a problem file.
+        meaning: one line.
+        unknowns: names of the unknown factor coefficients.
+        factors: the monic factors for given unknowns, any numbers.
+        guesses: unknowns to start from, for numeric roots.
+        nonnegative: expressions of the unknowns that must be ≥ 0.
+    """
+
+    name: str
+    meaning: str
+    unknowns: tuple[str, ...]
+    factors: Callable[[Sequence[Any]], list[list[Any]]]
+    guesses: Callable[[Roots], list[list[float]]]
+    nonnegative: Callable[[Sequence[Any]], list[Any]] = lambda u: []
+
+    @property
+    def codimension(self) -> int:
+        """Number of conditions on the parameters: four coefficients less the unknowns."""
+        return 4 - len(self.unknowns)
+
+    def monic(self, unknowns: Sequence[Any]) -> list[Any]:
+        """The five coefficients of the product of the factors, descending from 1."""
+        return product(*self.factors(unknowns))
+
+
+def _quadratic(pair: Roots) -> list[float]:
+    return [float(-pair.sum().real), float(pair.prod().real)]
+
+
+def _splits(size: int) -> Callable[[Roots], list[tuple[Roots, Roots]]]:
+    """Every choice of `size` of the roots that is closed under conjugation, with the rest."""
+
+    def split(roots: Roots) -> list[tuple[Roots, Roots]]:
+        every = range(len(roots))
+        chosen = [(roots[list(c)], roots[[k for k in every if k not in c]]) for c in combinations(every, size)]
+        close = 1e-9 * (np.abs(roots).max() + 1e-300)
+        return [(a, b) for a, b in chosen if abs(a.sum().imag) <= close and abs(a.prod().imag) <= close * np.abs(a).max()]
+
+    return split
+
+
+_one, _two = _splits(1), _splits(2)
+
+
+def _double_quadratic_guess(roots: Roots) -> list[list[float]]:
+    """(s² + bs + c)² from its first two coefficients."""
+    mean = roots.mean().real
+    square = (roots**2).sum().real
+    b = -2 * mean
+    return [[b, (b * b - square / 2) / 2]]
+
+
+def _triple_guesses(roots: Roots) -> list[list[float]]:
+    simple = roots[np.abs(roots.imag) <= 1e-2 * np.abs(roots) + 1e-300].real
+    return [[(roots.sum().real - t) / 3, float(t)] for t in simple] or [[float(roots.mean().real)] * 2]
+
+
+PATTERNS: Mapping[str, Pattern] = MappingProxyType(
+    {
+        p.name: p
+        for p in (
+            Pattern(
+                "EP4", "4-fold real root", ("r",),
+                lambda u: [[1, -u[0]]] * 4,
+                lambda z: [[float(z.mean().real)]],
+            ),
+            Pattern(
+                "EP3", "3-fold real root and a simple one", ("r", "t"),
+                lambda u: [[1, -u[0]]] * 3 + [[1, -u[1]]],
+                _triple_guesses,
+            ),
+            Pattern(
+                "2EP2", "two real double roots", ("b", "c"),
+                lambda u: [[1, u[0], u[1]]] * 2,
+                _double_quadratic_guess,
+                lambda u: [u[0] * u[0] - 4 * u[1]],
+            ),
+            Pattern(
+                "CEP2", "a complex double pair", ("b", "c"),
+                lambda u: [[1, u[0], u[1]]] * 2,
+                _double_quadratic_guess,
+                lambda u: [4 * u[1] - u[0] * u[0]],
+            ),
+            Pattern(
+                "EP2", "a real double root: the discriminant surface", ("r", "b", "c"),
+                lambda u: [[1, -u[0]]] * 2 + [[1, u[1], u[2]]],
+                lambda z: [[float(a.mean().real), *_quadratic(b)] for a, b in _two(z)],
+            ),
+            Pattern(
+                "weave", "a pair on the imaginary axis", ("W", "b", "c"),
+                lambda u: [[1, 0, u[0]], [1, u[1], u[2]]],
+                lambda z: [[abs(float(a.prod().real)), *_quadratic(b)] for a, b in _two(z)],
+                lambda u: [u[0]],
+            ),
+            Pattern(
+                "capsize", "a root at 0", ("b", "c", "d"),
+                lambda u: [[1, 0], [1, u[0], u[1], u[2]]],
+                lambda z: [[float(x) for x in np.poly(b)[1:].real] for _, b in _one(z)],
+            ),
+            Pattern(
+                "resonance", "a double imaginary pair (1:1 resonance)", ("W",),
+                lambda u: [[1, 0, u[0]]] * 2,
+                lambda z: [[float(np.abs(z).mean()) ** 2]],
+                lambda u: [u[0]],
+            ),
+        )
+    }
+)
+"""Every pattern that ``locate`` knows, by name."""

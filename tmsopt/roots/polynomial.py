@@ -1,0 +1,71 @@
+"""Real polynomials as lists of coefficients in descending powers, over any numbers.
+
+Only ``+ - *`` are used, so one formula serves CasADi expressions, NumPy arrays, exact fractions and balls.
+"""
+
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+Coefficients = Sequence[Any]
+
+
+def product(*factors: Coefficients) -> list[Any]:
+    """Coefficients of the product of polynomials given by their coefficients."""
+    result: list[Any] = [1]
+    for factor in factors:
+        terms: list[Any] = [0] * (len(result) + len(factor) - 1)
+        for i, a in enumerate(result):
+            for j, b in enumerate(factor):
+                terms[i + j] = terms[i + j] + a * b
+        result = terms
+    return result
+
+
+def shift(coefficients: Coefficients, gamma: Any) -> list[Any]:
+    """Coefficients of p(t + gamma) as a polynomial in t (Taylor shift by repeated Horner division)."""
+    c = list(coefficients)
+    for end in range(len(c), 1, -1):
+        for k in range(1, end):
+            c[k] = c[k] + gamma * c[k - 1]
+    return c
+
+
+def evaluate(coefficients: Coefficients, s: Any) -> Any:
+    """Value of the polynomial at s, by Horner's rule."""
+    value: Any = 0
+    for c in coefficients:
+        value = value * s + c
+    return value
+
+
+def quadratic_pencil(M: Sequence[Coefficients], D: Sequence[Coefficients], K: Sequence[Coefficients]) -> list[Any]:
+    """Coefficients of det(M s² + D s + K) for square matrices given as nested sequences."""
+    size = range(len(M))
+    return determinant([[[M[i][j], D[i][j], K[i][j]] for j in size] for i in size])
+
+
+def determinant(matrix: Sequence[Sequence[Coefficients]]) -> list[Any]:
+    """Coefficients of the determinant of a square matrix whose entries are polynomials.
+
+    Laplace expansion with every minor computed once: no division, n 2ⁿ products.
+    """
+
+    @cache
+    def minor(columns: tuple[int, ...]) -> list[Any]:
+        if not columns:
+            return [1]
+        row = matrix[len(matrix) - len(columns)]
+        total: list[Any] = [0]
+        for k, j in enumerate(columns):
+            term = product(row[j], minor(columns[:k] + columns[k + 1 :]))
+            total = _sum(total, term if k % 2 == 0 else [-t for t in term])
+        return total
+
+    return minor(tuple(range(len(matrix))))
+
+
+def _sum(a: Coefficients, b: Coefficients) -> list[Any]:
+    n = max(len(a), len(b))
+    left, right = [0] * (n - len(a)) + list(a), [0] * (n - len(b)) + list(b)
+    return [x + y for x, y in zip(left, right, strict=True)]
