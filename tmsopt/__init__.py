@@ -1,0 +1,53 @@
+"""tmsopt: self-stable bicycles under your own constraints, and exceptional points of small dissipative systems."""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tmsopt import laws, models, roots
+    from tmsopt.design.errors import InputError
+    from tmsopt.design.files import load
+    from tmsopt.design.problem import Problem
+    from tmsopt.design.solution import NotSolved, Solution
+    from tmsopt.design.solve import solve
+    from tmsopt.study.compare import Comparison, compare
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Comparison",
+    "InputError",
+    "NotSolved",
+    "Problem",
+    "Solution",
+    "compare",
+    "laws",
+    "load",
+    "models",
+    "roots",
+    "solve",
+]
+
+# Imported when first used, so that `tmsopt --help` need not wait for CasADi.
+_HOMES = {
+    "Comparison": "tmsopt.study.compare",
+    "InputError": "tmsopt.design.errors",
+    "NotSolved": "tmsopt.design.solution",
+    "Problem": "tmsopt.design.problem",
+    "Solution": "tmsopt.design.solution",
+    "compare": "tmsopt.study.compare",
+    "load": "tmsopt.design.files",
+    "solve": "tmsopt.design.solve",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
+    if name in __all__:
+        return import_module(f"tmsopt.{name}")
+    raise AttributeError(f"module 'tmsopt' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])

@@ -1,25 +1,27 @@
 """Closed-form laws of the two-mass-skate (TMS) bicycle, each named after its equation label in the source.
 
 Source: O. N. Kirillov, *Localizing EP sets in dissipative systems and the self-stability of bicycles* (2018).
-This module imports nothing from the package: it is an oracle, and an oracle shares no code with what it checks.
+It imports nothing from the package: it is an oracle, and an oracle shares no code with what it checks.
 
-Symbols, all dimensionless (lengths over the wheelbase w, time over sqrt(w/g)): ``Fr`` Froude number v/sqrt(g w),
-``mu`` mass ratio m_H/m_B, ``chi_B, chi_H`` horizontal and ``zeta_B, zeta_H`` vertical positions of the two masses
-(z points down, so zeta < 0), ``lambda_s`` steer axis tilt in rad, ``omega0`` the multiple root (negative).
+Symbols, all dimensionless (lengths over the wheelbase w, time over sqrt(w/g)): `Fr` Froude number
+v/sqrt(g w), `mu` mass ratio m_H/m_B, `chi_B`, `chi_H` horizontal and `zeta_B`, `zeta_H` vertical positions
+of the two masses (z points down, so zeta < 0), `lambda_s` steer axis tilt in rad, `omega0` the multiple root
+(negative). In the notes r = sqrt(zeta_B/zeta_H) and h = sqrt(zeta_B zeta_H).
 
-Every function takes floats or arrays, broadcasts them, and returns float64 of the broadcast shape (with a leading
-axis where it says so). None raises on values: a pole gives inf or nan, and the root of a negative number nan, without
-a warning. "chi_H = 1" in a docstring is a condition, not an argument.
+Every function takes floats or arrays, broadcasts them, and returns float64 of the broadcast shape, with a
+leading axis where it says so. None raises on values: a pole gives inf or nan, and the root of a negative
+number nan, without a warning. "chi_H = 1" in a docstring is a condition, not an argument.
 """
 
 from collections.abc import Callable
 from functools import wraps
-from typing import Any, NamedTuple, ParamSpec, TypeAlias, TypeVar, cast
+from typing import NamedTuple, ParamSpec, TypeAlias, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
 
 Array: TypeAlias = npt.NDArray[np.float64]
+Truth: TypeAlias = npt.NDArray[np.bool_]
 Real: TypeAlias = float | Array
 
 P = ParamSpec("P")
@@ -70,8 +72,18 @@ def _law(formula: Callable[P, R]) -> Callable[P, R]:
     return evaluate
 
 
-def _stack(*parts: Any, axis: int) -> Any:
-    return np.stack(np.broadcast_arrays(*parts), axis=axis)
+def _stack(*parts: Real) -> Array:
+    return np.stack(np.broadcast_arrays(*parts))
+
+
+def _tan(angle: Real) -> Real:
+    tangent: Real = np.tan(angle)
+    return tangent
+
+
+def _sqrt(square: Real) -> Real:
+    root: Real = np.sqrt(square)
+    return root
 
 
 # The model and its stability
@@ -81,85 +93,70 @@ def _stack(*parts: Any, axis: int) -> Any:
 def matrices(
     Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real
 ) -> tuple[Array, Array, Array]:
-    """M, V and P of M q'' + V q' + P q = 0, q = (lean, steer); each of shape (..., 2, 2). Equation `matrices`."""
+    """M, V, P of M q'' + V q' + P q = 0, q = (lean, steer); of shape (..., 2, 2). Equation `matrices`."""
     cos, sin = np.cos(lambda_s), np.sin(lambda_s)
     nu_H = (chi_H - 1) * cos - zeta_H * sin
-    zero = np.zeros(np.broadcast(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s).shape)
+    weight = mu * zeta_H + zeta_B
+    gyro = -mu * chi_H * zeta_H - chi_B * zeta_B
+    mass = mu * zeta_H**2 + zeta_B**2, -mu * zeta_H * nu_H, -mu * zeta_H * nu_H, mu * nu_H**2
+    velocity = 0.0, gyro * Fr * cos, 0.0, mu * chi_H * nu_H * Fr * cos
+    position = weight, -(Fr**2) * cos * weight - mu * nu_H, -mu * nu_H, mu * (Fr**2 * cos - sin) * nu_H
 
-    def matrix(a: Real, b: Real, c: Real, d: Real) -> Array:
-        entries = [entry + zero for entry in (a, b, c, d)]
-        return cast(Array, _stack(*entries, axis=-1).reshape(*zero.shape, 2, 2))
-
-    mass = matrix(mu * zeta_H**2 + zeta_B**2, -mu * zeta_H * nu_H, -mu * zeta_H * nu_H, mu * nu_H**2)
-    velocity = matrix(
-        0.0, (-mu * chi_H * zeta_H - chi_B * zeta_B) * Fr * cos, 0.0, mu * chi_H * nu_H * Fr * cos
-    )
-    position = matrix(
-        mu * zeta_H + zeta_B,
-        -(Fr**2) * cos * (mu * zeta_H + zeta_B) - mu * nu_H,
-        -mu * nu_H,
-        mu * (Fr**2 * cos - sin) * nu_H,
-    )
-    return mass, velocity, position
+    entries = _stack(*mass, *velocity, *position)
+    shape = (3, 2, 2, *entries.shape[1:])
+    M, V, P = np.moveaxis(entries.reshape(shape), (1, 2), (-2, -1))
+    return M, V, P
 
 
 @_law
 def copo(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Array:
-    """Coefficients a0, ..., a4 of the characteristic polynomial, shape (5, ...), for `np.polyval` or unpacking.
+    """Coefficients a0, ..., a4 of the characteristic polynomial, shape (5, ...). Equation `copo`.
 
-    They are det(M s^2 + V s + P) / (mu nu_H cos(lambda_s)): not monic, and a0 < 0 where nu_H < 0. Equation `copo`.
+    They are det(M s^2 + V s + P) / (mu nu_H cos(lambda_s)): not monic, and a0 < 0 where nu_H < 0. The order
+    is that of `np.polyval`.
     """
-    T = np.tan(lambda_s)
+    T, k = _tan(lambda_s), chi_H - 1
     a0 = -(zeta_H * T - chi_H + 1) * zeta_B**2
     a1 = Fr * (zeta_B * chi_H - zeta_H * chi_B) * zeta_B
-    a2 = (
-        Fr**2 * (zeta_B - zeta_H) * zeta_B
-        - zeta_B * (zeta_B + zeta_H) * T
-        - (chi_H - 1) * (mu * zeta_H - zeta_B)
-    )
+    a2 = Fr**2 * (zeta_B - zeta_H) * zeta_B - zeta_B * (zeta_B + zeta_H) * T - k * (mu * zeta_H - zeta_B)
     a3 = -Fr * (chi_B - chi_H) * zeta_B
-    a4 = -zeta_B * T - mu * (chi_H - 1)
-    return cast(Array, _stack(a0, a1, a2, a3, a4, axis=0))
+    a4 = -zeta_B * T - mu * k
+    return _stack(a0, a1, a2, a3, a4)
 
 
 @_law
 def flus(mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
-    """Square of the critical Froude number of weaving; negative where no speed gives an imaginary pair.
+    """Square of the critical Froude number of weaving; not finite at chi_B = chi_H. Equation `flus`.
 
-    It is the zero of a1 a2 a3 - a0 a3^2 - a1^2 a4 in Fr^2, for every chi_H and either sign of lambda_s. It bounds
-    the stable speeds only where a1 and a3 have the sign of a0; elsewhere it can be positive and mean nothing (the
-    pair of roots +-s is then real, or the other roots are unstable). Infinite at chi_B = chi_H. Equation `flus`.
+    It is the zero of a1 a2 a3 - a0 a3^2 - a1^2 a4 in Fr^2, for every chi_H and either sign of lambda_s;
+    negative where no speed gives one. It bounds the stable speeds only where a0, a1, a3, a4 have one sign,
+    and is positive there for chi_H > 0. Elsewhere a positive value is no boundary of stability.
     """
-    T = np.tan(lambda_s)
-    skew = zeta_B * chi_H - zeta_H * chi_B
-    return cast(
-        Real,
+    T, k, skew = _tan(lambda_s), chi_H - 1, zeta_B * chi_H - zeta_H * chi_B
+    return (
         (zeta_B - zeta_H) / (chi_B - chi_H) * chi_B * chi_H / skew * T
-        + (chi_H - 1) / (chi_B - chi_H) * chi_H / zeta_B * mu
-        - (chi_H - 1) / skew * chi_B,
+        + k / (chi_B - chi_H) * chi_H / zeta_B * mu
+        - k / skew * chi_B
     )
 
 
 @_law
 def Fr_c(mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
     """Critical Froude number, the root of `flus`; nan where that square is negative."""
-    return cast(Real, np.sqrt(flus(mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s)))
+    return _sqrt(flus(mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s))
 
 
 @_law
-def lscf(
-    Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real
-) -> npt.NDArray[np.bool_]:
+def lscf(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Truth:
     """The five printed stability conditions in printed order, boolean of shape (5, ...). Equation `lscf`.
 
-    For lambda_s > 0 all five are necessary, and with chi_H >= 1 sufficient. With chi_H < 1 they are NOT sufficient
-    although printed so: a1 > 0, that is zeta_B chi_H < zeta_H chi_B, is missing. Counterexample: chi_H = 0.9,
-    chi_B = 1.2, zeta_B = -0.5, zeta_H = -0.4, mu = 5, tan(lambda_s) = 0.5, so Fr_c = 1, and any Fr > 1.
-    They never hold for lambda_s < 0; there every stable design has the first four reversed, a1 < 0 and Fr > Fr_c.
-    `lscf_complete` holds in all regimes.
+    For lambda_s > 0 all five are necessary, and with chi_H >= 1 sufficient. With chi_H < 1 they are NOT
+    sufficient, although printed so: a1 > 0, that is zeta_B chi_H < zeta_H chi_B, is missing. Counterexample:
+    chi_H = 0.9, chi_B = 1.2, zeta_B = -0.5, zeta_H = -0.4, mu = 5, tan(lambda_s) = 0.5, where Fr_c = 1:
+    unstable at every Fr > 1. For lambda_s < 0 they never hold together; there a bicycle is stable exactly if
+    the first four are reversed, zeta_B chi_H > zeta_H chi_B and Fr > Fr_c. `lscf_complete` holds everywhere.
     """
-    T = np.tan(lambda_s)
-    critical = Fr_c(mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s)
+    T, critical = _tan(lambda_s), Fr_c(mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s)
     conditions = (
         chi_H > 1 + zeta_H * T,
         chi_H < 1 - zeta_B / mu * T,
@@ -167,30 +164,29 @@ def lscf(
         zeta_H > zeta_B,
         (Fr > critical) & (critical > 0),
     )
-    return cast(npt.NDArray[np.bool_], _stack(*conditions, axis=0))
+    return np.stack(np.broadcast_arrays(*conditions))
 
 
 @_law
 def lscf_complete(
     Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real
-) -> npt.NDArray[np.bool_]:
+) -> Truth:
     """Whether the bicycle is asymptotically stable, by the complete Lienard-Chipart conditions on `copo`.
 
-    Holds for any chi_H and either sign of lambda_s, because the coefficients are first divided by the sign of a0.
+    Holds for any chi_H and either sign of lambda_s: the coefficients are first divided by the sign of a0.
     """
     a = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s)
     a0, a1, a2, a3, a4 = a * np.sign(a[0])
-    stable = (
-        (a0 > 0) & (a1 > 0) & (a2 > 0) & (a3 > 0) & (a4 > 0) & (a1 * a2 * a3 - a0 * a3**2 - a1**2 * a4 > 0)
-    )
-    return cast(npt.NDArray[np.bool_], stable)
+    hurwitz = a1 * a2 * a3 - a0 * a3**2 - a1**2 * a4
+    stable: Truth = (a0 > 0) & (a1 > 0) & (a2 > 0) & (a3 > 0) & (a4 > 0) & (hurwitz > 0)
+    return stable
 
 
 # The exceptional point of order 4, any chi_H
 
 
 class EP4(NamedTuple):
-    """A design with a four-fold root `omega0`. `mu` is nan where the mass ratio does not matter (chi_H = 1)."""
+    """A design with a four-fold root `omega0`; `mu` is nan where the mass ratio is free (chi_H = 1)."""
 
     omega0: Real
     chi_B: Real
@@ -201,21 +197,21 @@ class EP4(NamedTuple):
     @property
     def lambda_s(self) -> Real:
         """Steer axis tilt in rad, in (-pi/2, pi/2)."""
-        return cast(Real, np.arctan(self.tan_lambda_s))
+        angle: Real = np.arctan(self.tan_lambda_s)
+        return angle
 
 
 @_law
 def w0(mu: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
     """-(a4/a0)^(1/4), the lower bound of the spectral abscissa; nan where a4/a0 < 0. Equation `w0`."""
-    T = np.tan(lambda_s)
-    product = (zeta_B * T + mu * (chi_H - 1)) / (zeta_H * T - (chi_H - 1)) / zeta_B**2
-    return cast(Real, -(product**0.25))
+    T, k = _tan(lambda_s), chi_H - 1
+    return -_sqrt(_sqrt((zeta_B * T + mu * k) / (zeta_H * T - k) / zeta_B**2))
 
 
 @_law
 def poly4(omega0: Real) -> Array:
-    """Coefficients of (s - omega0)^4, shape (5, ...). Label `4poly`: there p(s) is the monic copo / a0."""
-    return cast(Array, _stack(omega0**0, -4 * omega0, 6 * omega0**2, -4 * omega0**3, omega0**4, axis=0))
+    """Coefficients of (s - omega0)^4, shape (5, ...). Label `4poly`, where p(s) means the monic copo / a0."""
+    return _stack(omega0**0, -4 * omega0, 6 * omega0**2, -4 * omega0**3, omega0**4)
 
 
 @_law
@@ -223,10 +219,8 @@ def a1a3(
     Fr: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real, omega0: Real
 ) -> Array:
     """Residuals a1 + 4 omega0 a0 and a3 + 4 omega0^3 a0, shape (2, ...); both 0 at EP4. Equation `a1a3`."""
-    a0 = -(zeta_H * np.tan(lambda_s) - chi_H + 1) * zeta_B**2
-    a1 = Fr * (zeta_B * chi_H - zeta_H * chi_B) * zeta_B
-    a3 = -Fr * (chi_B - chi_H) * zeta_B
-    return cast(Array, _stack(a1 + 4 * omega0 * a0, a3 + 4 * omega0**3 * a0, axis=0))
+    a0, a1, _, a3, _ = copo(Fr, 0, chi_B, chi_H, zeta_B, zeta_H, lambda_s)
+    return _stack(a1 + 4 * omega0 * a0, a3 + 4 * omega0**3 * a0)
 
 
 @_law
@@ -238,59 +232,60 @@ def chib(omega0: Real, chi_H: Real, zeta_B: Real, zeta_H: Real) -> Real:
 @_law
 def a2(Fr: Real, mu: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real, omega0: Real) -> Real:
     """Left minus right side of the EP4 condition a2 = 6 omega0^2 a0, divided by zeta_B. Equation `a2`."""
-    left = Fr**2 * (zeta_B - zeta_H) + (6 * omega0**2 * zeta_H * zeta_B - zeta_B - zeta_H) * np.tan(lambda_s)
-    return cast(Real, left - (chi_H - 1) * (6 * omega0**2 * zeta_B**2 + mu * zeta_H - zeta_B) / zeta_B)
+    left = Fr**2 * (zeta_B - zeta_H) + (6 * omega0**2 * zeta_H * zeta_B - zeta_B - zeta_H) * _tan(lambda_s)
+    return left - (chi_H - 1) * (6 * omega0**2 * zeta_B**2 + mu * zeta_H - zeta_B) / zeta_B
 
 
 @_law
 def e1(Fr: Real, mu: Real, lambda_s: Real) -> Real:
-    """Left side of `e1`: a2 - 6 a0 at zeta_B = -0.4, zeta_H = -0.2, chi_H = 1.02, chi_B = 1.19, omega0 = -1."""
-    return cast(Real, -0.432 * np.tan(lambda_s) - 0.0272 + 0.08 * Fr**2 + 0.004 * mu)
+    """Left side of `e1`: a2 - 6 a0 at chi_B, chi_H, zeta_B, zeta_H = 1.19, 1.02, -0.4, -0.2, omega0 = -1."""
+    return -0.432 * _tan(lambda_s) - 0.0272 + 0.08 * Fr**2 + 0.004 * mu
 
 
 @_law
 def e2(mu: Real, lambda_s: Real) -> Real:
     """Left side of `e2`: a4 - a0 for the geometry of `e1`."""
-    return cast(Real, 0.368 * np.tan(lambda_s) - 0.02 * mu - 0.0032)
+    return 0.368 * _tan(lambda_s) - 0.02 * mu - 0.0032
 
 
 @_law
 def e3(Fr: Real, mu: Real, lambda_s: Real) -> Real:
     """Left side of `e3`: p(-1) for the geometry of `e1`."""
-    return cast(Real, 0.192 * np.tan(lambda_s) - 0.0048 - 0.136 * Fr + 0.08 * Fr**2 - 0.016 * mu)
+    return 0.192 * _tan(lambda_s) - 0.0048 - 0.136 * Fr + 0.08 * Fr**2 - 0.016 * mu
 
 
 @_law
 def ep4(omega0: Real, zeta_B: Real, zeta_H: Real, chi_H: Real) -> tuple[EP4, EP4]:
-    """Both designs with the four-fold root `omega0`, from `chib`, `a1a3`, `a2` and `w0`; fields broadcast together.
+    """Both designs with the four-fold root `omega0`, from `chib`, `a1a3`, `a2` and `w0`; fields of one shape.
 
-    For zeta_B, zeta_H < 0 both are real. The first is the bicycle (Fr > 0 for omega0 < 0 < chi_H), and its mu may
-    still be negative; the second always has mu < 0. nan where they are complex (zeta_H > 0), at zeta_B = zeta_H
-    (there is no EP4), and at chi_H = 1, where omega0 must be `w01` and mu is free: use `ep4_chi_H_1`.
+    For zeta_B, zeta_H < 0 both are real. The first is the bicycle: Fr > 0 if omega0 < 0 < chi_H, and mu > 0
+    requires (chi_H - 1) (zeta_H - zeta_B) (|w01| - |omega0|) > 0. The second has mu < 0 always. Fr, mu and
+    tan_lambda_s are nan where complex (possible for zeta_H > 0), at zeta_B = zeta_H (no EP4 exists), and at
+    chi_H = 1, where omega0 must be `w01` and mu is free: use `ep4_chi_H_1`.
     """
-    # With u = zeta_H T - (chi_H - 1) the conditions leave a quadratic in u. Its discriminant, which looks like a
-    # difference, is a sum of squares in y = -omega0^2 zeta_H; so nothing below cancels but what the data themselves do.
+    # With u = zeta_H T - k the conditions leave a quadratic in u. Its discriminant looks like a difference
+    # but is a sum of squares in y = -omega0^2 zeta_H, and S > 2: neither root cancels, however close they
+    # are. The second has u + k = k lift / (zeta_B S), again without a difference.
     k, y, fall = chi_H - 1, -(omega0**2) * zeta_H, zeta_B - zeta_H
-    S = 1 + 6 * y + y**2 + np.sqrt((1 - y) ** 4 + 16 * y * (1 + y) ** 2 * (1 - 2 / chi_H) ** 2)
+    S = 1 + 6 * y + y**2 + _sqrt((1 - y) ** 4 + 16 * y * (1 + y) ** 2 * (1 - 2 / chi_H) ** 2)
+    u = -S * fall * chi_H**2 / (32 * y * (1 + y) ** 2 * zeta_B)
+    lift = zeta_B * (S - 2) + 2 * zeta_H
+
+    tilts = (u + k) / zeta_H, k * lift / (zeta_B * zeta_H * S)
+    froudes = -omega0 * S * chi_H / (8 * y * (1 + y)), -8 * omega0 * (1 + y) * k / (chi_H * S)
+    mass_ratios = (
+        -zeta_B / zeta_H * (u * (1 - omega0**4 * zeta_B * zeta_H) / k + 1),
+        -(lift / zeta_H + 2 * omega0**4 * zeta_B * fall) / S,
+    )
     exists = np.where((k != 0) & (fall != 0), 1.0, np.nan)
 
-    u = -S * fall * chi_H**2 / (32 * y * (1 + y) ** 2 * zeta_B)
-    T = (u + k) / zeta_H
-    first = T, -omega0 * S * chi_H / (8 * y * (1 + y)), zeta_B * (omega0**4 * zeta_B * u - T) / k
-
-    # S - 2 > 0 and the product -k of both roots' sign are used so that T and mu of the small root keep all digits.
-    lift = zeta_B * (S - 2) + 2 * zeta_H
-    T = k * lift / (zeta_B * zeta_H * S)
-    mass_ratio = -(lift / zeta_H + 2 * omega0**4 * zeta_B * fall) / S
-    second = T, -8 * omega0 * (1 + y) * k / (chi_H * S), mass_ratio
-
-    chi_B = chib(omega0, chi_H, zeta_B, zeta_H)
-
     def branch(T: Real, Fr: Real, mu: Real) -> EP4:
+        chi_B = chib(omega0, chi_H, zeta_B, zeta_H)
         fields = np.broadcast_arrays(omega0, chi_B, T * exists, Fr * exists, mu * exists)
         return EP4(*(field[()] for field in fields))
 
-    return branch(*first), branch(*second)
+    first, second = map(branch, tilts, froudes, mass_ratios)
+    return first, second
 
 
 # chi_H = 1
@@ -299,40 +294,40 @@ def ep4(omega0: Real, zeta_B: Real, zeta_H: Real, chi_H: Real) -> tuple[EP4, EP4
 @_law
 def Frc1(chi_B: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
     """Square of the critical Froude number for chi_H = 1; negative where `flus` is. Equation `Frc1`."""
-    return cast(Real, (zeta_B - zeta_H) / (zeta_B - chi_B * zeta_H) * chi_B / (chi_B - 1) * np.tan(lambda_s))
+    return (zeta_B - zeta_H) / (zeta_B - chi_B * zeta_H) * chi_B / (chi_B - 1) * _tan(lambda_s)
 
 
 @_law
 def chibm(zeta_B: Real, zeta_H: Real) -> Real:
     """chi_B that minimises `Frc1` between its poles chi_B = 1 and zeta_B/zeta_H. Equation `chibm`."""
-    return cast(Real, np.sqrt(zeta_B / zeta_H))
+    return _sqrt(zeta_B / zeta_H)
 
 
 @_law
 def frm(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
     """The least critical Froude number over chi_B (not its square), at `chibm`. Equation `frm`.
 
-    nan unless |zeta_B| > |zeta_H| with lambda_s >= 0, or both reversed.
+    nan unless |zeta_B| > |zeta_H| and lambda_s >= 0, or both reversed.
     """
-    b, h = np.sqrt(np.abs(zeta_B)), np.sqrt(np.abs(zeta_H))
-    return cast(Real, np.sqrt((b + h) / (b - h) * np.tan(lambda_s)))
+    b, h = _sqrt(np.abs(zeta_B)), _sqrt(np.abs(zeta_H))
+    return _sqrt((b + h) / (b - h) * _tan(lambda_s))
 
 
 @_law
 def w01(zeta_B: Real, zeta_H: Real) -> Real:
     """The four-fold root -(zeta_B zeta_H)^(-1/4), also the bound `w0`, for chi_H = 1. Equation `w01`."""
-    return cast(Real, -((zeta_B * zeta_H) ** -0.25))
+    return -_sqrt(_sqrt(1 / (zeta_B * zeta_H)))
 
 
 @_law
 def chib1(zeta_B: Real, zeta_H: Real) -> Real:
     """chi_B at EP4 and on the EP set; the same value as `chibm`. Equation `chib1`."""
-    return cast(Real, np.sqrt(zeta_B / zeta_H))
+    return _sqrt(zeta_B / zeta_H)
 
 
 @_law
 def tls(zeta_B: Real, zeta_H: Real) -> Real:
-    """tan(lambda_s), as printed, not lambda_s itself, at EP4. Negative for |zeta_B| < |zeta_H|. Equation `tls`."""
+    """tan(lambda_s) at EP4, as printed, not lambda_s; negative for |zeta_B| < |zeta_H|. Equation `tls`."""
     w2 = w01(zeta_B, zeta_H) ** 2
     total = (zeta_B + zeta_H) * w2
     return w2 * (zeta_B - zeta_H) / (16 * zeta_H) * (total - 6) / (total - 2)
@@ -340,68 +335,63 @@ def tls(zeta_B: Real, zeta_H: Real) -> Real:
 
 @_law
 def frep4(zeta_B: Real, zeta_H: Real) -> tuple[Real, Real]:
-    """Both roots of the printed quadratic for the Froude number at EP4: the true one, then the spurious one.
+    """Both roots of the printed quadratic for Fr at EP4: the true one, then the spurious. Equation `frep4`.
 
-    With r = sqrt(zeta_B/zeta_H) the spurious root is -(r - 1)^2 |omega0| / (4 (r + 1)), never positive, and no
-    EP4. Equation `frep4`, with `tls` for its tan(lambda_s).
+    tan(lambda_s) in it is `tls`. The true root is positive; the spurious one, no EP4, is never positive:
+    -(r - 1)^2 |omega0| / (4 (r + 1)).
     """
     w = w01(zeta_B, zeta_H)
     a, half_b, c = w**2 * zeta_B - 1, w**3 * zeta_B, -(w**2 * zeta_B + 1) * tls(zeta_B, zeta_H)
-    far = -(half_b + np.sqrt(half_b**2 - a * c))  # half_b > 0 and a c <= 0, so this sum does not cancel
+    far = -(half_b + _sqrt(half_b**2 - a * c))  # half_b > 0 and a c <= 0, so this sum does not cancel
     return far / a, c / far
 
 
 @_law
 def epset(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
-    """Froude number at which a design with chi_H = 1 and chi_B = `chib1` has two double roots. Equation `epset`.
+    """Froude number at which chi_H = 1 and chi_B = `chib1` give two double roots. Equation `epset`.
 
-    nan unless tan(lambda_s) (r + 1)/(r - 1) > r/(4 h), r = sqrt(zeta_B/zeta_H), h = sqrt(zeta_B zeta_H); inf at that
-    pole. The double roots are real (2EP2) for |tan(lambda_s)| below |`tls`| and complex (CEP2) above.
+    nan unless tan(lambda_s) (r + 1)/(r - 1) > r/(4 h), which is its pole. The double roots are real (2EP2)
+    for |tan(lambda_s)| below |`tls`| and complex (CEP2) above.
     """
-    w, T = w01(zeta_B, zeta_H), np.tan(lambda_s)
+    w, T = w01(zeta_B, zeta_H), _tan(lambda_s)
     ratio = (w**2 * zeta_B - 1) / (w**2 * zeta_B + 1)
-    return cast(Real, ratio * 2 * T / np.sqrt(w**4 * zeta_B + 4 * T * ratio))
+    return ratio * 2 * T / _sqrt(w**4 * zeta_B + 4 * T * ratio)
 
 
 @_law
 def dp(zeta_B: Real, zeta_H: Real) -> tuple[Real, Real]:
-    """chi_B and the largest tan(lambda_s) with which some speed gives heavy damping. Equation `dp`.
+    """chi_B and the largest tan(lambda_s) for which some speed gives heavy damping. Equation `dp`.
 
-    The printed range 0 < tan(lambda_s) <= bound is empty for |zeta_B| < |zeta_H|; its `dual` holds there, with the
-    range bound <= tan(lambda_s) < 0.
+    The printed range 0 < tan(lambda_s) <= bound is empty for |zeta_B| < |zeta_H|; by `dual` the range there
+    is bound <= tan(lambda_s) < 0.
     """
     return chib1(zeta_B, zeta_H), tls(zeta_B, zeta_H)
 
 
-# Compact forms, not printed: with r = sqrt(zeta_B/zeta_H) and h = sqrt(zeta_B zeta_H) the laws above shorten
+# chi_H = 1, compact forms that are not printed
 
 
 @_law
 def ep4_chi_H_1(zeta_B: Real, zeta_H: Real) -> EP4:
-    """The EP4 of chi_H = 1 in compact form; mu is nan, as any mass ratio serves. zeta_B, zeta_H < 0, unequal."""
-    r, h = np.sqrt(zeta_B / zeta_H), np.sqrt(zeta_B * zeta_H)
-    step = np.where(r == 1, np.nan, (r**2 + 6 * r + 1) / (r + 1))[()]  # r = 1: a1 = a3 = 0, there is no EP4
-    return EP4(-(h**-0.5), r, (r - 1) * step / (16 * h), step / (4 * np.sqrt(h)), np.nan * r)
+    """The EP4 for chi_H = 1 in compact form; mu is nan, as any mass ratio serves. nan at zeta_B = zeta_H."""
+    r, h = _sqrt(zeta_B / zeta_H), _sqrt(zeta_B * zeta_H)
+    step = np.where(r == 1, np.nan, (r**2 + 6 * r + 1) / (r + 1))[()]  # r = 1 has a1 = a3 = 0, so no EP4
+    return EP4(-1 / _sqrt(h), r, (r - 1) * step / (16 * h), step / (4 * _sqrt(h)), np.nan * r)
 
 
 @_law
 def Fr_c2_chi_H_1(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
     """Square of the critical Froude number for chi_H = 1 and chi_B = `chib1`; it is `frm` squared."""
-    r = np.sqrt(zeta_B / zeta_H)
-    return cast(Real, np.tan(lambda_s) * (r + 1) / (r - 1))
+    r = _sqrt(zeta_B / zeta_H)
+    return _tan(lambda_s) * (r + 1) / (r - 1)
 
 
 @_law
 def dual(Fr: Real, chi_B: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> dict[str, Real]:
-    """The other design with the same spectrum, chi_H = 1, as keywords of `copo`; applying it twice restores the first.
+    """The other design with the same spectrum for chi_H = 1, by keyword; applied twice it restores the first.
 
-    It exchanges the heights of the masses and the sign of lambda_s, which maps the two classes of stable bicycles
-    onto each other.
+    It exchanges the heights of the masses and the sign of lambda_s, and so maps the two classes of stable
+    bicycles onto each other. Pass it to `copo` with chi_H = 1 and any mu.
     """
-    return {
-        "Fr": Fr / chi_B,
-        "chi_B": 1 / chi_B,
-        "zeta_B": zeta_H,
-        "zeta_H": zeta_B,
-        "lambda_s": cast(Real, np.arctan(-np.tan(lambda_s) / chi_B**2)),
-    }
+    tilt: Real = np.arctan(-_tan(lambda_s) / chi_B**2)
+    return {"Fr": Fr / chi_B, "chi_B": 1 / chi_B, "zeta_B": zeta_H, "zeta_H": zeta_B, "lambda_s": tilt}

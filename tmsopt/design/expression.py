@@ -70,11 +70,21 @@ class Expression:
         """CasADi expression; of a comparison, left minus right."""
         return self._evaluate(values, _SYMBOLIC)
 
+    def violation(self, values: Mapping[str, Any]) -> float:
+        """By how much a numeric design violates a comparison, relative to the size of its sides; nan if undefined."""
+        with np.errstate(all="ignore"):
+            left, right = (float(_value(side, values, _NUMERIC)) for side in self._sides())
+        difference = left - right
+        excess = {"<=": max(difference, 0.0), ">=": max(-difference, 0.0), "==": abs(difference)}[self.comparison]
+        return excess / max(1.0, abs(left), abs(right)) if math.isfinite(difference) else math.nan
+
+    def _sides(self) -> list[ast.expr]:
+        body = _parse(self.text)
+        return [body.left, *body.comparators] if isinstance(body, ast.Compare) else [body]
+
     def _evaluate(self, values: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]]) -> Any:
-        body = ast.parse(self.text.strip(), mode="eval").body
-        if isinstance(body, ast.Compare):
-            body = ast.BinOp(body.left, ast.Sub(), body.comparators[0])
-        return _value(body, values, functions)
+        sides = [_value(side, values, functions) for side in self._sides()]
+        return sides[0] - sides[1] if len(sides) == 2 else sides[0]
 
 
 def parse_value(text: str, accepted: Iterable[str]) -> Expression:

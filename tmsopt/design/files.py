@@ -1,5 +1,6 @@
 """Problem files: TOML to a Problem, with every fault placed at its line."""
 
+import math
 import re
 import tomllib
 from collections.abc import Mapping
@@ -64,34 +65,36 @@ def load(path: str | PathLike[str]) -> Problem:
         raise InputError([Fault("not TOML: nested too deeply", file=file)]) from None
     lines = _lines(text)
 
-    def placed(faults: list[Fault]) -> InputError:
-        return InputError(f.at(file, _line_of(lines, f.key)) for f in faults)
-
     shape_faults, parsed = _shape(data)
     model = MODELS.get(str(data.get("model", "tms")))
     if model is None:
         name = str(data["model"])
         shape_faults.append(Fault(f"unknown model '{name}'; {suggest(name, MODELS)}", ("model",)))
-    if model is None or parsed is None:
-        raise placed(shape_faults)
-    unit_faults, fixed, free, start = _numbers(parsed.parameters, model)
-    try:
-        problem = Problem(
-            model=model,
-            fixed=fixed,
-            free=free,
-            start=start,
-            constraints=parsed.constraints,
-            minimize=parsed.objective.minimize,
-            maximize=parsed.objective.maximize,
-            locate=parsed.objective.locate,
-            title=parsed.title or Path(file).stem,
-        )
-    except InputError as error:
-        known = {f.key for f in unit_faults}
-        raise placed(unit_faults + [f for f in error.faults if f.key not in known]) from None
-    if unit_faults:
-        raise placed(unit_faults)
+    faults, problem = shape_faults, None
+    if model is not None and parsed is not None:
+        unit_faults, fixed, free, start = _numbers(parsed.parameters, model)
+        faults = shape_faults + unit_faults
+        for fault in shape_faults:
+            if fault.key[:1] == ("parameters",) and len(fault.key) > 1:
+                fixed[fault.key[1]] = math.nan  # known to be given, and already reported
+        try:
+            problem = Problem(
+                model=model,
+                fixed=fixed,
+                free=free,
+                start=start,
+                constraints=parsed.constraints,
+                minimize=parsed.objective.minimize,
+                maximize=parsed.objective.maximize,
+                locate=parsed.objective.locate,
+                title=parsed.title or Path(file).stem,
+            )
+        except InputError as error:
+            reported = {f.key[:2] for f in faults} | {f.key[:1] for f in faults if f.key[:1] == ("objective",)}
+            faults = faults + [f for f in error.faults if f.key[:2] not in reported]
+    if problem is None or faults:
+        placed = [f.at(file, _line_of(lines, f.key)) for f in faults]
+        raise InputError(sorted(placed, key=lambda f: f.line))
     return problem
 
 
@@ -123,14 +126,28 @@ def _text(file: str) -> str:
 
 
 def _shape(data: Mapping[str, Any]) -> tuple[list[Fault], _File | None]:
-    try:
-        return [], _File.model_validate(dict(data))
-    except ValidationError as error:
-        faults: dict[tuple[str, ...], Fault] = {}
-        for detail in error.errors(include_url=False):
-            fault = _shape_fault(detail["loc"], detail["type"], detail.get("input"))
-            faults.setdefault(fault.key, fault)
-        return list(faults.values()), None
+    """Faults of shape, and what is left of the file without the faulty keys."""
+    faults: dict[tuple[str, ...], Fault] = {}
+    pruned: dict[str, Any] = dict(data)
+    for _ in range(2):
+        try:
+            return list(faults.values()), _File.model_validate(pruned)
+        except ValidationError as error:
+            found = [_shape_fault(d["loc"], d["type"], d.get("input")) for d in error.errors(include_url=False)]
+            deepest = {f.key[:2]: max(len(g.key) for g in found if g.key[:2] == f.key[:2]) for f in found}
+            for fault in found:
+                if len(fault.key) == deepest[fault.key[:2]]:
+                    faults.setdefault(fault.key, fault)
+        for key in faults:
+            pruned = _without(pruned, key[:2])
+    return list(faults.values()), None
+
+
+def _without(data: Mapping[str, Any], key: tuple[str, ...]) -> dict[str, Any]:
+    inner = data.get(key[0])
+    if len(key) == 2 and isinstance(inner, dict):
+        return {**data, key[0]: {k: v for k, v in inner.items() if k != key[1]}}
+    return {k: v for k, v in data.items() if k != key[0]}
 
 
 def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:

@@ -7,11 +7,34 @@ from typing import Any
 
 from tmsopt.design.errors import Fault, InputError, suggest
 from tmsopt.design.expression import Expression, ExpressionError, parse_comparison, parse_value
-from tmsopt.models import Model, ParameterSet
-from tmsopt.roots import PATTERNS, Pattern
+from tmsopt.models import Model, ParameterSet, Quantity, Values
+from tmsopt.roots import PATTERNS, Pattern, Structure, structure
 
-ROOT_QUANTITIES = ("abscissa", "damping_ratio")
-"""Quantities of the roots, for any model: largest real part; smallest −Re s/|s|."""
+
+def _abscissa(values: Mapping[str, Any]) -> float:
+    return structured(values).abscissa
+
+
+def _damping_ratio(values: Mapping[str, Any]) -> float:
+    return min(-r.re / math.hypot(r.re, r.im) if r.re or r.im else 0.0 for r in structured(values).roots)
+
+
+def structured(values: Mapping[str, Any]) -> Structure:
+    """Structure of the roots of a numeric design, multiple roots recognised."""
+    assert isinstance(values, Values)
+    return structure(values.coefficients, STRUCTURE_TOLERANCE)
+
+
+STRUCTURE_TOLERANCE = 1e-11
+"""Relative change of a coefficient within which roots count as multiple: a polished optimum is within 1e-14."""
+
+ROOT_QUANTITIES = (
+    Quantity("abscissa", "1", "largest real part of the roots", r"\alpha", _abscissa),
+    Quantity("damping_ratio", "1", "least −Re s/|s| over the roots", r"\zeta", _damping_ratio),
+)
+"""Quantities of the roots, for any model."""
+
+_ROOT_NAMES = tuple(q.name for q in ROOT_QUANTITIES)
 
 
 @dataclass(frozen=True)
@@ -46,9 +69,12 @@ class Problem:
         faults = list(_faults(self))
         if faults:
             raise InputError(faults)
+        of = guess_parameter_set(self.model, {**self.fixed, **self.free})
+        given = {p.name: p.default for p in of.parameters if p.default is not None} | dict(self.fixed)
+        given = {n: v for n, v in given.items() if n not in self.free}
         pinned = {n: lo for n, (lo, hi) in self.free.items() if lo == hi}
         ends = {n: (float(lo), float(hi)) for n, (lo, hi) in self.free.items() if n not in pinned}
-        object.__setattr__(self, "fixed", {n: float(v) for n, v in {**self.fixed, **pinned}.items()})
+        object.__setattr__(self, "fixed", {n: float(v) for n, v in {**given, **pinned}.items()})
         object.__setattr__(self, "free", ends)
         object.__setattr__(self, "constraints", dict(self.constraints))
         object.__setattr__(self, "start", {n: float(v) for n, v in self.start.items() if n in ends})
@@ -87,7 +113,11 @@ class Problem:
     def vocabulary(self) -> tuple[str, ...]:
         """Every name that an expression may use."""
         of = self.parameter_set
-        return (*of.names, *self.model.quantity_names(of), *ROOT_QUANTITIES)
+        return (*of.names, *self.model.quantity_names(of), *_ROOT_NAMES)
+
+    def values(self, parameters: Mapping[str, float]) -> Values:
+        """Everything derived from a numeric design, root quantities included."""
+        return Values(self.model, self.parameter_set, parameters, extra=ROOT_QUANTITIES)
 
     def ordered(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Every parameter in the model's order: the given values of the free ones, and the fixed ones."""
@@ -111,8 +141,7 @@ def _faults(problem: Problem) -> Iterator[Fault]:
     for name in of.names:
         yield from _value_faults(problem, of, name)
     yield from _objective_faults(problem)
-    if all(n in names for n in of.names):
-        yield from _expression_faults(problem, of)
+    yield from _expression_faults(problem, of)
 
 
 def _name_faults(problem: Problem, of: ParameterSet) -> Iterator[Fault]:
@@ -131,13 +160,18 @@ def _name_faults(problem: Problem, of: ParameterSet) -> Iterator[Fault]:
     for name in problem.fixed:
         if name in problem.free:
             yield Fault(f"'{name}' is both fixed and free; keep one", ("parameters", name))
-    missing = [n for n in of.names if n not in problem.fixed and n not in problem.free]
+    missing = _missing(problem, of)
     if missing:
         example = f"{missing[0]} = 1.0, or {missing[0]} = {{ min = 0.5, max = 2 }}"
         yield Fault(f"missing parameter {', '.join(missing)}; write e.g. {example}", ("parameters",))
     for name in problem.start:
         if name not in problem.free:
             yield Fault(f"start for '{name}', which is not a free parameter", ("parameters", name, "start"))
+
+
+def _missing(problem: Problem, of: ParameterSet) -> list[str]:
+    given = {*problem.fixed, *problem.free}
+    return [p.name for p in of.parameters if p.name not in given and p.default is None]
 
 
 def _value_faults(problem: Problem, of: ParameterSet, name: str) -> Iterator[Fault]:
@@ -192,7 +226,7 @@ def _objective_faults(problem: Problem) -> Iterator[Fault]:
 
 
 def _expression_faults(problem: Problem, of: ParameterSet) -> Iterator[Fault]:
-    accepted = (*of.names, *problem.model.quantity_names(of), *ROOT_QUANTITIES)
+    accepted = (*of.names, *problem.model.quantity_names(of), *_ROOT_NAMES)
     for sense, text in (("minimize", problem.minimize), ("maximize", problem.maximize)):
         if text is not None:
             yield from _parse_faults(parse_value, text, accepted, ("objective", sense))

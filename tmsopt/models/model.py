@@ -1,7 +1,7 @@
 """A model as data: named parameters, derived quantities, and a characteristic polynomial in them."""
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -42,6 +42,8 @@ class Parameter:
         meaning: one phrase.
         latex: symbol for figures.
         range: physically possible values.
+        default: value of a parameter that is left out, if it may be.
+        tangent: whether the coefficients are polynomial in the tangent, so that an optimiser moves that.
     """
 
     name: str
@@ -49,6 +51,8 @@ class Parameter:
     meaning: str
     latex: str
     range: Range = Range()
+    default: float | None = None
+    tangent: bool = False
 
 
 @dataclass(frozen=True)
@@ -107,10 +111,10 @@ class Model:
     name: str
     title: str
     degree: int
-    sets: tuple[ParameterSet, ...]
-    algebraic: Callable[[Mapping[str, Any]], dict[str, Any]]
-    polynomial: Callable[..., list[Any]]
-    quantities: tuple[Quantity, ...] = ()
+    sets: tuple[ParameterSet, ...] = field(repr=False)
+    algebraic: Callable[[Mapping[str, Any]], dict[str, Any]] = field(repr=False)
+    polynomial: Callable[..., list[Any]] = field(repr=False)
+    quantities: tuple[Quantity, ...] = field(default=(), repr=False)
 
     def coefficients(self, parameters: Mapping[str, Any], of: ParameterSet | None = None) -> list[Any]:
         """Coefficients a0 … aₙ, descending, for values of any kind: floats, arrays, CasADi, balls."""
@@ -137,8 +141,8 @@ class Values(Mapping[str, Any]):
 
     Args:
         parameters: a value for every parameter of the set `of`.
-        given: further names with their values, which take precedence over formulas.
-        lift: called for a quantity that has an equation; returns the variable that stands for it.
+        extra: quantities beside those of the model, e.g. of the roots.
+        lift: asked first for each quantity; returns a variable that stands for it, or None for its formula.
     """
 
     def __init__(
@@ -146,26 +150,24 @@ class Values(Mapping[str, Any]):
         model: Model,
         of: ParameterSet,
         parameters: Mapping[str, Any],
-        given: Mapping[str, Any] | None = None,
-        lift: Callable[[Quantity, Mapping[str, Any]], Any] | None = None,
+        extra: Iterable[Quantity] = (),
+        lift: Callable[[Quantity, "Values"], Any] | None = None,
     ) -> None:
         native = of.native(parameters)
-        coefficients = model.polynomial(**model.algebraic(native))
-        self._known = (
-            {**native, **dict(zip(model.coefficient_names(), coefficients, strict=True))}
-            | dict(parameters)
-            | dict(given or {})
-        )
-        self._formulas = {q.name: q for q in (*model.quantities, *of.quantities)}
+        self.coefficients = model.polynomial(**model.algebraic(native))
+        self._known = {
+            **native,
+            **dict(zip(model.coefficient_names(), self.coefficients, strict=True)),
+            **parameters,
+        }
+        self._formulas = {q.name: q for q in (*model.quantities, *of.quantities, *extra)}
         self._lift = lift
 
     def __getitem__(self, name: str) -> Any:
         if name not in self._known:
             quantity = self._formulas[name]
-            if quantity.equation is not None and self._lift is not None:
-                self._known[name] = self._lift(quantity, self)
-            else:
-                self._known[name] = quantity.value(self)
+            lifted = self._lift(quantity, self) if self._lift else None
+            self._known[name] = quantity.value(self) if lifted is None else lifted
         return self._known[name]
 
     def __iter__(self) -> Iterator[str]:

@@ -16,7 +16,7 @@ _NOT_NEGATIVE = Range(lower=0.0)
 _NOT_POSITIVE = Range(upper=0.0)
 _TILT = Range(-np.pi / 2, np.pi / 2, closed=False)
 
-_LAMBDA_S = Parameter("lambda_s", "rad", "steer axis tilt", r"\lambda_s", _TILT)
+_LAMBDA_S = Parameter("lambda_s", "rad", "steer axis tilt", r"\lambda_s", _TILT, tangent=True)
 
 
 def copo(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, T: Any) -> list[Any]:
@@ -71,6 +71,14 @@ def _omega0(v: Mapping[str, Any]) -> Any:
         return -sqrt(sqrt(np.divide(v["a4"], v["a0"])))
 
 
+def _omega0_equation(v: Mapping[str, Any], x: Any) -> Any:
+    return x * x * x * x * v["a0"] - v["a4"]
+
+
+def _chi_T(v: Mapping[str, Any]) -> Any:
+    return (v["chi_B"] + v["mu"] * v["chi_H"]) / (1 + v["mu"])
+
+
 def _weave_condition(v: Mapping[str, Any]) -> tuple[Any, Any]:
     """Numerator and denominator of Fr_c².
 
@@ -96,6 +104,14 @@ def _Fr_c(v: Mapping[str, Any]) -> Any:
 def _Fr_c_equation(v: Mapping[str, Any], x: Any) -> Any:
     numerator, denominator = _weave_condition(v)
     return x * x * denominator - numerator
+
+
+def _v_c(v: Mapping[str, Any]) -> Any:
+    return v["Fr_c"] * sqrt(v["g"] * v["w"])
+
+
+def _u_H(v: Mapping[str, Any]) -> Any:
+    return v["nu_H"] * v["w"]
 
 
 _NATIVE = ParameterSet(
@@ -147,7 +163,7 @@ _SI = ParameterSet(
     (
         Parameter("w", "m", "wheelbase", "w", _POSITIVE),
         Parameter("v", "m/s", "forward speed", "v", _NOT_NEGATIVE),
-        Parameter("g", "m/s^2", "gravity", "g", _POSITIVE),
+        Parameter("g", "m/s^2", "gravity", "g", _POSITIVE, default=GRAVITY),
         _LAMBDA_S,
         Parameter("m_B", "kg", "mass of the rear frame", "m_B", _POSITIVE),
         Parameter("x_B", "m", "rear frame centre of mass, forward of the rear contact", "x_B"),
@@ -159,11 +175,11 @@ _SI = ParameterSet(
     native=from_si,
     quantities=(
         Quantity(
-            "v_c", "m/s", "speed at the weave boundary", "v_c", lambda v: v["Fr_c"] * sqrt(v["g"] * v["w"])
+            "v_c", "m/s", "speed at the weave boundary", "v_c", _v_c
         ),
         Quantity(
             "u_H", "m", "distance of the front centre of mass from the steer axis", "u_H",
-            lambda v: v["nu_H"] * v["w"],
+            _u_H,
         ),
     ),
 )  # fmt: skip
@@ -179,7 +195,7 @@ tms = Model(
         Quantity("nu_H", "1", "distance of the front centre of mass from the steer axis", r"\nu_H", _nu_H),
         Quantity(
             "omega0", "1", "−(a4/a0)^(1/4), the mean decay of the roots (equation w0)", r"\omega_0", _omega0,
-            equation=lambda v, x: x * x * x * x * v["a0"] - v["a4"],
+            equation=_omega0_equation,
             range=_NOT_POSITIVE,
         ),
         Quantity(
@@ -189,7 +205,7 @@ tms = Model(
         ),
         Quantity(
             "chi_T", "1", "centre of mass of the whole bicycle, forward of the rear contact", r"\chi_T",
-            lambda v: (v["chi_B"] + v["mu"] * v["chi_H"]) / (1 + v["mu"]),
+            _chi_T,
         ),
     ),
 )  # fmt: skip

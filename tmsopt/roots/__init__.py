@@ -5,7 +5,7 @@ from tmsopt.roots.numeric import abscissa, backward_error, rebuilt, roots
 from tmsopt.roots.patterns import PATTERNS, Pattern
 from tmsopt.roots.polynomial import determinant, evaluate, product, quadratic_pencil, shift
 from tmsopt.roots.stability import discriminant, hurwitz_minors, is_stable, lienard_chipart
-from tmsopt.roots.structure import Root, Structure, structure
+from tmsopt.roots.structure import Root, Structure, pattern_distance, structure
 
 __all__ = [
     "PATTERNS",
@@ -22,6 +22,7 @@ __all__ = [
     "hurwitz_minors",
     "is_stable",
     "lienard_chipart",
+    "pattern_distance",
     "product",
     "quadratic_pencil",
     "rebuilt",

@@ -2,11 +2,14 @@
 
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 
 def tan(x: Any) -> Any:
-    """Tangent of x (radians)."""
+    """Tangent of x (radians); of a symbolic arctangent, its argument, so that formulas in tan stay polynomial."""
+    if hasattr(x, "is_op") and x.is_op(ca.OP_ATAN):
+        return x.dep(0)
     return x.tan() if hasattr(x, "tan") else np.tan(x)
 
 

@@ -197,3 +197,12 @@ _CANDIDATES: tuple[tuple[Pattern, Callable[[Roots, float], bool]], ...] = (
     (_LINES[0], _rightmost_line(3)),
     (_LINES[1], _rightmost_line(4)),
 )
+
+
+def pattern_distance(pattern: Pattern, coefficients: ArrayLike) -> float:
+    """Largest relative change of a coefficient that takes a quartic to the pattern; inf if none was found."""
+    c = np.asarray(coefficients, dtype=float)
+    if not np.all(np.isfinite(c)) or c[0] == 0:
+        return float("inf")
+    nearest = _nearest(pattern, _always, c, numeric_roots(c))
+    return nearest.distance if nearest else float("inf")

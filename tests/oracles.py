@@ -1,0 +1,256 @@
+"""Independent oracles: 60-digit and exact arithmetic on the two-mass-skate model and on polynomials.
+
+Nothing here imports the package. Polynomials are lists of coefficients, highest power first. Floats are taken
+exactly, so the 60 digits refer to the very numbers the package was given.
+
+Source of the model: O. N. Kirillov (2018), equation `matrices`.
+"""
+
+from collections.abc import Sequence
+from fractions import Fraction
+from math import prod
+from typing import Any
+
+import flint
+import mpmath  # type: ignore[import-untyped]
+import sympy  # type: ignore[import-untyped]
+from mpmath import mp
+
+DIGITS = 60
+GUARD = 20  # digits carried and not promised
+
+
+# The model at 60 digits, from its matrices
+
+
+def polynomial_60(
+    Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, lambda_s: Any
+) -> list[mpmath.mpf]:
+    """a0, ..., a4 of det(M s^2 + V s + P) / (mu nu_H cos(lambda_s)); mu, nu_H and cos(lambda_s) not 0."""
+    with mp.workdps(DIGITS + GUARD):
+        Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s = map(
+            _mpf, (Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s)
+        )
+        cos, sin = mp.cos(lambda_s), mp.sin(lambda_s)
+        M, V, P, nu_H = _matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, cos, sin)
+        return _rounded(a / (mu * nu_H * cos) for a in _determinant(M, V, P))
+
+
+def polynomial_exact(
+    Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, tan_lambda_s: Any
+) -> list[Fraction]:
+    """The same coefficients as Fractions, for rational data and a rational tan(lambda_s).
+
+    cos(lambda_s) may be irrational, but with sin = T cos the second row and the second column of the matrices
+    each have it as a factor, and it leaves the quotient. So cos = 1 and sin = T serve.
+    """
+    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = map(
+        Fraction, (Fr, mu, chi_B, chi_H, zeta_B, zeta_H, tan_lambda_s)
+    )
+    M, V, P, nu_H = _matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, Fraction(1), T)
+    return [a / (mu * nu_H) for a in _determinant(M, V, P)]
+
+
+def symbolic_copo() -> tuple[list[sympy.Expr], dict[str, sympy.Symbol]]:
+    """The coefficients a0, ..., a4 as expanded SymPy expressions, and their symbols by name.
+
+    The symbols are Fr, mu, chi_B, chi_H, zeta_B, zeta_H and T = tan(lambda_s).
+    """
+    names = "Fr mu chi_B chi_H zeta_B zeta_H T"
+    symbols = dict(zip(names.split(), sympy.symbols(names, real=True), strict=True))
+    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = symbols.values()
+    cos = sympy.Symbol("c", positive=True)
+    M, V, P, nu_H = _matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, cos, T * cos)
+    return [sympy.expand(sympy.cancel(a / (mu * nu_H * cos))) for a in _determinant(M, V, P)], symbols
+
+
+def _matrices(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, cos: Any, sin: Any) -> Any:
+    """M, V, P as printed, and nu_H, in whatever arithmetic the arguments bring."""
+    nu_H = (chi_H - 1) * cos - zeta_H * sin
+    M = [[mu * zeta_H**2 + zeta_B**2, -mu * zeta_H * nu_H], [-mu * zeta_H * nu_H, mu * nu_H**2]]
+    V = [[0 * Fr, (-mu * chi_H * zeta_H - chi_B * zeta_B) * Fr * cos], [0 * Fr, mu * chi_H * nu_H * Fr * cos]]
+    P = [
+        [mu * zeta_H + zeta_B, -(Fr**2) * cos * (mu * zeta_H + zeta_B) - mu * nu_H],
+        [-mu * nu_H, mu * (Fr**2 * cos - sin) * nu_H],
+    ]
+    return M, V, P, nu_H
+
+
+def _determinant(M: Any, V: Any, P: Any) -> list[Any]:
+    """Coefficients of det(M s^2 + V s + P) for 2x2 matrices."""
+    entry = [[(M[i][j], V[i][j], P[i][j]) for j in range(2)] for i in range(2)]
+    main, cross = _product(entry[0][0], entry[1][1]), _product(entry[0][1], entry[1][0])
+    return [a - b for a, b in zip(main, cross, strict=True)]
+
+
+# Roots at 60 digits
+
+
+def roots_60(coefficients: Sequence[Any]) -> list[mpmath.mpc]:
+    """All roots with multiplicity, sorted by real then imaginary part; the leading coefficient must not be 0.
+
+    Raises mpmath.NoConvergence rather than returning roots that are not settled.
+    """
+    with mp.workdps(DIGITS + GUARD):
+        a = [_mpf(c) for c in coefficients]
+        if a[0] == 0:
+            raise ValueError("the leading coefficient is 0: drop it, the degree is lower")
+        zeros = 0
+        while len(a) > 1 and a[-1] == 0:
+            a.pop()
+            zeros += 1
+        found = [mp.mpc(0)] * zeros
+        if len(a) > 1:
+            # n-fold roots converge linearly and lose a factor n of the digits: hence steps and precision
+            found += mp.polyroots(a, maxsteps=5000, extraprec=mp.prec * len(a))
+        found = [mp.mpc(root) for root in found]
+    return sorted((+root for root in _at_60(found)), key=lambda root: (root.real, root.imag))
+
+
+def abscissa_60(coefficients: Sequence[Any]) -> mpmath.mpf:
+    """The largest real part of the roots."""
+    return max(root.real for root in roots_60(coefficients))
+
+
+def is_stable_60(coefficients: Sequence[Any]) -> bool:
+    """Whether every root has a negative real part, by the roots; on the axis only `routh_exact` can tell."""
+    return bool(abscissa_60(coefficients) < 0)
+
+
+def elementary(roots: Sequence[Any]) -> list[Any]:
+    """Coefficients of the monic polynomial with these roots, at 60 digits."""
+    with mp.workdps(DIGITS + GUARD):
+        monic = [mp.mpc(1)]
+        for root in roots:
+            monic = _product(monic, (mp.mpc(1), -mp.mpmathify(root)))
+    return _at_60(monic)
+
+
+def weave_Fr_60(
+    mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, lambda_s: Any
+) -> mpmath.mpf | None:
+    """The Froude number in (1e-3, 1e3) where the Hurwitz determinant of the 60-digit polynomial vanishes.
+
+    By root finding on the speed alone; no formula for it is used. None where the determinant keeps its sign.
+    """
+
+    def determinant(logarithm: Any) -> Any:
+        Fr = mp.exp(logarithm)
+        a0, a1, a2, a3, a4 = polynomial_60(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s)
+        return (
+            a1 * a2 * a3 - a0 * a3**2 - a1**2 * a4
+        ) / Fr**2  # the factor Fr^2 hides the zero from bisection
+
+    with mp.workdps(DIGITS):
+        low, high = mp.log(mp.mpf("1e-3")), mp.log(mp.mpf("1e3"))
+        if determinant(low) * determinant(high) >= 0:
+            return None
+        for _ in range(20):  # a bracket narrow enough for the fast iteration to stay inside
+            middle = (low + high) / 2
+            low, high = (low, middle) if determinant(low) * determinant(middle) <= 0 else (middle, high)
+        return mp.exp(mp.findroot(determinant, (low, high), solver="anderson", tol=mp.mpf(10) ** -100))
+
+
+# Exact arithmetic
+
+
+def exact_multiplicities(coefficients: Sequence[Any]) -> list[tuple[int, int]]:
+    """(multiplicity, degree) of each square-free part over the rationals, sorted.
+
+    [(1, 2), (3, 1)] is one triple root and two simple ones. Coefficients are rational; floats are exact.
+    """
+    exact = [Fraction(c) for c in coefficients]
+    s = sympy.Symbol("s")
+    polynomial = sympy.Poly([sympy.Rational(c.numerator, c.denominator) for c in exact], s, domain="QQ")
+    return sorted((multiplicity, factor.degree()) for factor, multiplicity in polynomial.sqf_list()[1])
+
+
+def certified_roots(coefficients: Sequence[Any]) -> list[tuple[mpmath.mpc, int]]:
+    """Each distinct root once, with its exact multiplicity, from balls that provably isolate it (FLINT)."""
+    exact = [Fraction(c) for c in coefficients]
+    polynomial = flint.fmpq_poly([flint.fmpq(c.numerator, c.denominator) for c in reversed(exact)])
+    before = flint.ctx.dps
+    flint.ctx.dps = DIGITS + GUARD
+    try:
+        balls: Any = polynomial.complex_roots()
+        with mp.workdps(DIGITS + GUARD):
+            return [(mp.mpc(_middle(ball.real), _middle(ball.imag)), count) for ball, count in balls]
+    finally:
+        flint.ctx.dps = before
+
+
+def routh_exact(coefficients: Sequence[Any]) -> bool:
+    """Whether all roots lie in the open left half plane, by the Routh table in Fractions.
+
+    Any degree and either sign of the leading coefficient, which must not be 0.
+    """
+    a = [Fraction(c) for c in coefficients]
+    if a[0] == 0:
+        raise ValueError("the leading coefficient is 0: drop it, the degree is lower")
+    upper = [c / a[0] for c in a[0::2]]
+    lower = [c / a[0] for c in a[1::2]]
+    while lower:
+        if lower[0] <= 0:
+            return False
+        ratio = upper[0] / lower[0]
+        padded = lower[1:] + [Fraction(0)] * (len(upper) - len(lower))
+        upper, lower = lower, [p - ratio * q for p, q in zip(upper[1:], padded, strict=True)]
+    return True
+
+
+def discriminant_exact(coefficients: Sequence[Any]) -> Fraction:
+    """Discriminant (-1)^(n(n-1)/2) Res(p, p') / a0 by the Sylvester determinant in Fractions; degree >= 1."""
+    a = [Fraction(c) for c in coefficients]
+    n = len(a) - 1
+    slope = [c * (n - i) for i, c in enumerate(a[:-1])]
+    zero = Fraction(0)
+    rows = [[zero] * i + a + [zero] * (n - 2 - i) for i in range(n - 1)]
+    rows += [[zero] * i + slope + [zero] * (n - 1 - i) for i in range(n)]
+    resultant = _determinant_exact(rows)
+    return (-resultant if n * (n - 1) // 2 % 2 else resultant) / a[0]
+
+
+def _determinant_exact(rows: list[list[Fraction]]) -> Fraction:
+    rows, sign = [list(row) for row in rows], 1
+    for i in range(len(rows)):
+        pivot = next((j for j in range(i, len(rows)) if rows[j][i] != 0), None)
+        if pivot is None:
+            return Fraction(0)
+        if pivot != i:
+            rows[i], rows[pivot], sign = rows[pivot], rows[i], -sign
+        for j in range(i + 1, len(rows)):
+            ratio = rows[j][i] / rows[i][i]
+            rows[j] = [x - ratio * y for x, y in zip(rows[j], rows[i], strict=True)]
+    return sign * prod((rows[i][i] for i in range(len(rows))), start=Fraction(1))
+
+
+# Small change
+
+
+def _product(p: Sequence[Any], q: Sequence[Any]) -> list[Any]:
+    total: list[Any] = [0] * (len(p) + len(q) - 1)
+    for i, x in enumerate(p):
+        for j, y in enumerate(q):
+            total[i + j] += x * y
+    return total
+
+
+def _mpf(value: Any) -> mpmath.mpf:
+    """Exact for floats (NumPy's too) and mpf; Fractions are rounded to the working precision."""
+    if isinstance(value, Fraction):
+        return mp.mpf(value.numerator) / value.denominator
+    return value if isinstance(value, mp.mpf) else mp.mpf(float(value) if isinstance(value, float) else value)
+
+
+def _middle(ball: Any) -> mpmath.mpf:
+    mantissa, exponent = ball.mid().man_exp()
+    return mp.ldexp(mp.mpf(int(mantissa)), int(exponent))
+
+
+def _at_60(values: Any) -> list[Any]:
+    with mp.workdps(DIGITS):
+        return [+value for value in values]
+
+
+def _rounded(values: Any) -> list[mpmath.mpf]:
+    return _at_60(list(values))

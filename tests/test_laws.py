@@ -1,0 +1,693 @@
+"""The closed-form laws against the paper's printed numbers, exact algebra and 60-digit arithmetic.
+
+An EP4 or EP2 is judged by its coefficients, in exact arithmetic on the very floats the law returned, never by
+recomputed roots: those scatter by 4e-4 around a four-fold root.
+"""
+
+import ast
+import inspect
+from fractions import Fraction
+from math import comb
+
+import numpy as np
+import oracles
+import pytest
+import sympy
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from mpmath import mp
+
+from tmsopt import laws
+
+BENCH = {
+    "mu": laws.bench["m_H"] / laws.bench["m_B"],
+    "chi_B": laws.bench["x_B"] / laws.bench["w"],
+    "chi_H": laws.bench["x_H"] / laws.bench["w"],
+    "zeta_B": laws.bench["z_B"] / laws.bench["w"],
+    "zeta_H": laws.bench["z_H"] / laws.bench["w"],
+    "lambda_s": laws.bench["lambda_s"],
+}
+ZB, ZH = -0.4, -0.2  # the heights of every design in the paper
+EP4_TILT = np.arctan(15 / 4 - 75 / 32 * np.sqrt(2))  # Table 1
+
+repeatable = settings(max_examples=100, deadline=None, derandomize=True)
+depth = st.floats(-2.0, -0.05)
+tangent = st.floats(0.05, 5.0)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _sixty_digits():
+    """Arithmetic on what the oracles return keeps their digits."""
+    with mp.workdps(60):
+        yield
+
+
+def designs(count: int, seed: int) -> dict[str, np.ndarray]:
+    """Random designs of both signs of lambda_s, half of them with chi_H near 1, as floats."""
+    rng = np.random.default_rng(seed)
+    near = rng.uniform(size=count) < 0.5
+    return {
+        "Fr": rng.uniform(0.05, 6, count),
+        "mu": 10 ** rng.uniform(-1.5, 1.5, count),
+        "chi_B": rng.uniform(-1, 3, count),
+        "chi_H": np.where(near, rng.uniform(0.8, 1.2, count), rng.uniform(-1, 3, count)),
+        "zeta_B": -(10 ** rng.uniform(-1.3, 0.3, count)),
+        "zeta_H": -(10 ** rng.uniform(-1.3, 0.3, count)),
+        "lambda_s": np.arctan(rng.uniform(-3, 3, count)),
+    }
+
+
+def one(parameters: dict[str, np.ndarray], i: int) -> dict[str, float]:
+    return {name: float(values[i]) for name, values in parameters.items()}
+
+
+def exact(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s):
+    """Exact coefficients, with the double that NumPy takes for the tangent."""
+    return oracles.polynomial_exact(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, np.tan(lambda_s))
+
+
+EXPRESSIONS, SYMBOLS = oracles.symbolic_copo()
+TERM_SIZES = [sympy.lambdify(list(SYMBOLS.values()), sum(map(abs, e.args))) for e in EXPRESSIONS]
+
+
+def term_sizes(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T) -> list[float]:
+    """Sum of the absolute terms of each coefficient: what rounding of the parameters is relative to."""
+    return [float(size(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)) for size in TERM_SIZES]
+
+
+def ep4_defect(design: laws.EP4, mu: float, chi_H: float, zeta_B: float, zeta_H: float) -> float:
+    """Largest |a_i - a0 C(4, i) (-omega0)^i| over the sizes of the terms in it, computed exactly."""
+    values = (design.Fr, mu, design.chi_B, chi_H, zeta_B, zeta_H, design.tan_lambda_s)
+    a, sizes = oracles.polynomial_exact(*values), term_sizes(*values)
+    powers = [comb(4, i) * Fraction(-float(design.omega0)) ** i for i in range(5)]
+    return max(
+        abs(float(a[i] - a[0] * powers[i])) / (sizes[i] + sizes[0] * float(abs(powers[i]))) for i in range(5)
+    )
+
+
+# The polynomial
+
+
+def test_the_printed_coefficients_are_the_determinant() -> None:
+    """`copo` against det(M s^2 + V s + P)/(mu nu_H cos) from the printed matrices, at 60 digits."""
+    parameters = designs(200, seed=1)
+    a = laws.copo(**parameters)
+    for i in range(200):
+        design = one(parameters, i)
+        sizes = term_sizes(*list(design.values())[:-1], np.tan(design["lambda_s"]))
+        for mine, true, size in zip(a[:, i], oracles.polynomial_60(**design), sizes, strict=True):
+            # a dozen roundings; the tangent of a tilt below 72 degrees loses no more
+            assert abs(float(mine - true)) <= 16 * np.finfo(float).eps * size
+
+
+def test_the_printed_coefficients_are_the_determinant_symbolically() -> None:
+    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = SYMBOLS.values()
+    printed = [
+        -(zeta_H * T - chi_H + 1) * zeta_B**2,
+        Fr * (zeta_B * chi_H - zeta_H * chi_B) * zeta_B,
+        Fr**2 * (zeta_B - zeta_H) * zeta_B
+        - zeta_B * (zeta_B + zeta_H) * T
+        - (chi_H - 1) * (mu * zeta_H - zeta_B),
+        -Fr * (chi_B - chi_H) * zeta_B,
+        -zeta_B * T - mu * (chi_H - 1),
+    ]
+    assert [sympy.expand(p - e) for p, e in zip(printed, EXPRESSIONS, strict=True)] == [0] * 5
+
+
+def test_matrices_give_copo() -> None:
+    parameters = designs(50, seed=2)
+    M, V, P = laws.matrices(**parameters)
+    assert M.shape == V.shape == P.shape == (50, 2, 2)
+    nu_H = (parameters["chi_H"] - 1) * np.cos(parameters["lambda_s"]) - parameters["zeta_H"] * np.sin(
+        parameters["lambda_s"]
+    )
+    for s in (0.7, -1.3 + 0.4j):
+        determinant = np.linalg.det(M * s**2 + V * s + P)
+        scale = np.linalg.norm(M * s**2 + V * s + P, axis=(1, 2)) ** 2
+        value = (
+            np.polyval(laws.copo(**parameters), s) * parameters["mu"] * nu_H * np.cos(parameters["lambda_s"])
+        )
+        assert np.all(abs(determinant - value) < 1e-13 * scale)
+
+
+def test_poly4_is_the_product_of_its_roots() -> None:
+    assert np.array_equal(laws.poly4(-1.5), [complex(c).real for c in oracles.elementary([-1.5] * 4)])
+
+
+# Printed numbers. `units` is how many units of the last printed digit the paper may be off: 1/2, and more where
+# its ten-digit arithmetic has spoilt the last one.
+
+PRINTED = [
+    ("fr1 Fr_c", laws.Fr_c(**BENCH), "0.9070641497", 1.6),
+    ("fr1 v_c", laws.Fr_c(**BENCH) * np.sqrt(9.81 * laws.bench["w"]), "2.841008324", 0.7),
+    ("chi_B of omega0 = -1", laws.chib(-1, 1.02, ZB, ZH), "1.19", 0.5),
+    ("optimised Fr", laws.ep4(-1, ZB, ZH, 1.02)[0].Fr, "2.337214017", 0.5),
+    ("optimised mu", laws.ep4(-1, ZB, ZH, 1.02)[0].mu, "20.84626701", 0.5),
+    ("optimised lambda_s", laws.ep4(-1, ZB, ZH, 1.02)[0].lambda_s, "0.8514403685", 0.5),
+    ("EP4 Fr_EP", laws.frep4(ZB, ZH)[0], "2.236317517", 1.4),
+    ("2EP2 Fr_c", laws.frm(ZB, ZH, EP4_TILT - 0.05), "1.482682090", 2.5),
+    ("2EP2 Fr_EP", laws.epset(ZB, ZH, EP4_TILT - 0.05), "2.257421384", 5.1),
+    ("CEP2 Fr_c", laws.frm(ZB, ZH, EP4_TILT + 0.80), "3.934331969", 5.8),
+    ("CEP2 Fr_EP", laws.epset(ZB, ZH, EP4_TILT + 0.80), "4.103508160", 3.2),
+    ("experimental machine", laws.chib1(-1.158, -0.526), "1.484", 0.5),
+]
+
+
+@pytest.mark.parametrize(
+    ("value", "printed", "units"), [row[1:] for row in PRINTED], ids=[row[0] for row in PRINTED]
+)
+def test_printed_decimals(value: float, printed: str, units: float) -> None:
+    unit = 10.0 ** -len(printed.partition(".")[2])
+    assert abs(value - float(printed)) <= units * unit
+
+
+@pytest.mark.parametrize(
+    ("value", "printed"),
+    [
+        (laws.w01(ZB, ZH), -np.sqrt(5) / 2**0.25),
+        (laws.chib1(ZB, ZH), np.sqrt(2)),
+        (laws.tls(ZB, ZH), 15 / 4 - 75 / 32 * np.sqrt(2)),
+        (laws.frm(ZB, ZH, EP4_TILT), np.sqrt(30 * np.sqrt(2) + 120) / 8),
+        (laws.frep4(ZB, ZH)[0], 3 * np.sqrt(110 * np.sqrt(2) - 120) / 8),
+        (laws.epset(ZB, ZH, EP4_TILT), 3 * np.sqrt(110 * np.sqrt(2) - 120) / 8),
+    ],
+    ids=["omega0", "chi_B", "tan lambda_s", "Fr_c", "Fr_EP4", "EP4 on the EP set"],
+)
+def test_printed_radicals(value: float, printed: float) -> None:
+    """Table 1, first row."""
+    assert value == pytest.approx(printed, rel=1e-14)  # some ten roundings
+
+
+def test_the_benchmark_equations_are_the_general_ones() -> None:
+    """`e1`, `e2`, `e3` are a2 - 6 a0, a4 - a0 and p(-1): their decimals are exact, so only rounding."""
+    rng = np.random.default_rng(3)
+    Fr, mu, lambda_s = rng.uniform(0, 4, 20), rng.uniform(0, 30, 20), rng.uniform(0, 1.2, 20)
+    a = laws.copo(Fr, mu, 1.19, 1.02, ZB, ZH, lambda_s)
+    for law, general in (
+        (laws.e1(Fr, mu, lambda_s), a[2] - 6 * a[0]),
+        (laws.e2(mu, lambda_s), a[4] - a[0]),
+        (laws.e3(Fr, mu, lambda_s), np.polyval(a, -1)),
+    ):
+        assert np.allclose(law, general, rtol=0, atol=1e-14)
+    assert np.allclose(
+        laws.e1(Fr, mu, lambda_s), ZB * laws.a2(Fr, mu, 1.02, ZB, ZH, lambda_s, -1), atol=1e-14
+    )
+
+
+def test_the_benchmark_equations_have_two_solutions_one_with_positive_mass_ratio() -> None:
+    """The paper's uniqueness claim, by exact elimination; `ep4` returns both solutions."""
+    Fr, mu, T = sympy.symbols("Fr mu T")
+    decimal = sympy.Rational
+    system = [
+        decimal("-0.432") * T - decimal("0.0272") + decimal("0.08") * Fr**2 + decimal("0.004") * mu,
+        decimal("0.368") * T - decimal("0.02") * mu - decimal("0.0032"),
+        decimal("0.192") * T
+        - decimal("0.0048")
+        - decimal("0.136") * Fr
+        + decimal("0.08") * Fr**2
+        - decimal("0.016") * mu,
+    ]
+    solutions = sorted(sympy.solve(system, [Fr, mu, T], dict=True), key=lambda solution: -solution[mu])
+    assert [solution[mu] > 0 for solution in solutions] == [True, False]
+    for design, solution in zip(laws.ep4(-1, ZB, ZH, 1.02), solutions, strict=True):
+        for value, true in ((design.Fr, Fr), (design.mu, mu), (design.tan_lambda_s, T)):
+            assert value == pytest.approx(float(solution[true].evalf(30)), rel=2e-14)
+
+
+def test_the_optimised_benchmark_to_twelve_digits() -> None:
+    """Digits beyond the paper's ten, from the exact solution of its equations (the test above)."""
+    design, other = laws.ep4(omega0=-1, zeta_B=ZB, zeta_H=ZH, chi_H=1.02)
+    values = (design.Fr, design.mu, design.lambda_s, design.chi_B)
+    assert values == pytest.approx((2.337214016650773, 20.8462670127613, 0.8514403685251676, 1.19), rel=1e-13)
+    assert other.mu < 0
+
+
+# Stability
+
+
+def test_flus_is_where_the_60_digit_determinant_vanishes() -> None:
+    """Every chi_H, both signs of lambda_s; where the square is negative there is no root to find."""
+    parameters = designs(60, seed=4)
+    del parameters["Fr"]
+    squares = laws.flus(**parameters)
+    inside = (squares > 1e-6) & (squares < 1e6)
+    assert 15 < inside.sum() < 45
+    for i in range(60):
+        found = oracles.weave_Fr_60(**one(parameters, i))
+        if inside[i]:
+            assert laws.Fr_c(**one(parameters, i)) == pytest.approx(float(found), rel=1e-12)
+        else:
+            assert found is None
+
+
+def test_stability_begins_at_Fr_c() -> None:
+    """The paper's claim, decided by 60-digit roots 1e-8 of it below and above; both classes of design."""
+    parameters = designs(4000, seed=5)
+    above = laws.lscf_complete(**parameters)
+    assert {-1.0, 1.0} == set(np.sign(parameters["lambda_s"][above]))
+    for i in np.flatnonzero(above)[:16]:
+        design = one(parameters, i)
+        del design["Fr"]
+        Fr = laws.Fr_c(**design)
+        assert oracles.is_stable_60(oracles.polynomial_60(Fr * (1 + 1e-8), **design))
+        assert not oracles.is_stable_60(oracles.polynomial_60(Fr * (1 - 1e-8), **design))
+
+
+@pytest.fixture(scope="module")
+def judged():
+    """Random designs, and whether each is stable by the exact Routh table."""
+    parameters = designs(5000, seed=6)
+    routh = np.array([oracles.routh_exact(exact(**one(parameters, i))) for i in range(5000)])
+    return parameters, routh
+
+
+def test_the_complete_conditions_are_exact(judged) -> None:
+    parameters, routh = judged
+    assert routh.sum() > 100
+    assert np.array_equal(laws.lscf_complete(**parameters), routh)
+
+
+def test_the_printed_conditions_hold_for_positive_tilt_and_chi_H_from_1(judged) -> None:
+    parameters, routh = judged
+    regime = (parameters["lambda_s"] > 0) & (parameters["chi_H"] >= 1)
+    assert routh[regime].sum() > 20
+    assert np.array_equal(laws.lscf(**parameters).all(axis=0)[regime], routh[regime])
+
+
+def test_the_printed_conditions_miss_a1_for_chi_H_below_1(judged) -> None:
+    """Necessary, not sufficient: a third of the designs they admit are unstable. With a1 > 0 none is."""
+    parameters, routh = judged
+    regime = (parameters["lambda_s"] > 0) & (parameters["chi_H"] < 1)
+    printed = laws.lscf(**parameters).all(axis=0)
+    assert printed[regime & routh].all()
+    wrong = regime & printed & ~routh
+    assert wrong.sum() > 0.3 * (regime & printed).sum() > 10
+    a1 = laws.copo(**parameters)[1]
+    assert (a1[wrong] < 0).all()
+    assert np.array_equal((printed & (a1 > 0))[regime], routh[regime])
+
+
+def test_the_printed_conditions_mirrored_hold_for_negative_tilt(judged) -> None:
+    """As printed they admit no design there; with the first four and a1 reversed, just the stable ones."""
+    parameters, routh = judged
+    regime = parameters["lambda_s"] < 0
+    conditions = laws.lscf(**parameters)
+    assert not conditions.all(axis=0)[regime].any()
+    assert routh[regime].sum() > 20
+    mirrored = ~conditions[:4].any(axis=0) & conditions[4] & (laws.copo(**parameters)[1] < 0)
+    assert np.array_equal(mirrored[regime], routh[regime])
+
+
+def test_flus_is_positive_where_a0_a1_a3_a4_agree_and_chi_H_is_positive(judged) -> None:
+    parameters, _ = judged
+    a = laws.copo(**parameters)
+    agree = (np.abs(np.sign(a[[0, 1, 3, 4]]).sum(axis=0)) == 4) & (parameters["chi_H"] > 0)
+    del (without := dict(parameters))["Fr"]
+    assert agree.sum() > 100
+    assert (laws.flus(**without)[agree] > 0).all()
+
+
+def test_a_design_the_printed_conditions_wrongly_admit() -> None:
+    """All rational: Fr_c = 1 exactly, Fr = 2, and a1 = -3/100."""
+    design = {"Fr": 2.0, "mu": 5.0, "chi_B": 1.2, "chi_H": 0.9, "zeta_B": -0.5, "zeta_H": -0.4}
+    assert laws.lscf(**design, lambda_s=np.arctan(0.5)).all()
+    assert not laws.lscf_complete(**design, lambda_s=np.arctan(0.5))
+    a = oracles.polynomial_exact(2, 5, "1.2", "0.9", "-0.5", "-0.4", "0.5")
+    assert a[1] == Fraction(-3, 100)
+    assert not oracles.routh_exact(a)
+    at_1 = oracles.polynomial_exact(1, 5, "1.2", "0.9", "-0.5", "-0.4", "0.5")
+    assert at_1[1] * at_1[2] * at_1[3] - at_1[0] * at_1[3] ** 2 - at_1[1] ** 2 * at_1[4] == 0
+
+
+def test_w0_bounds_the_abscissa() -> None:
+    """The product of the roots is a4/a0: no abscissa lies left of `w0`, nan where that is negative."""
+    parameters = designs(300, seed=7)
+    bound = laws.w0(*(parameters[name] for name in ("mu", "chi_H", "zeta_B", "zeta_H", "lambda_s")))
+    for i in range(300):
+        a = exact(**one(parameters, i))
+        assert np.isnan(bound[i]) == (a[4] / a[0] < 0)
+        if a[4] / a[0] > 0:
+            assert bound[i] == pytest.approx(-(float(a[4] / a[0]) ** 0.25), rel=1e-12)
+            assert max(root.real for root, _ in oracles.certified_roots(a)) >= bound[i]
+
+
+# EP4, any chi_H
+
+
+@repeatable
+@given(omega0=st.floats(-5, -0.2), zeta_B=depth, zeta_H=depth, chi_H=st.floats(0.2, 3))
+def test_ep4_is_a_fourfold_root_on_both_branches(omega0, zeta_B, zeta_H, chi_H) -> None:
+    assume(abs(chi_H - 1) > 1e-6 and abs(zeta_B - zeta_H) > 1e-6)
+    first, second = laws.ep4(omega0, zeta_B, zeta_H, chi_H)
+    for design in (first, second):
+        assert ep4_defect(design, design.mu, chi_H, zeta_B, zeta_H) < 1e-13
+    assert first.Fr > 0
+    assert second.mu < 0  # so the paper's uniqueness claim holds for every geometry
+    if first.mu > 0:
+        assert (chi_H - 1) * (zeta_H - zeta_B) * (omega0 - laws.w01(zeta_B, zeta_H)) > 0
+        at_it = oracles.polynomial_exact(
+            first.Fr, first.mu, first.chi_B, chi_H, zeta_B, zeta_H, first.tan_lambda_s
+        )
+        assert at_it[0] * Fraction(float(first.tan_lambda_s)) > 0  # one class per sign of lambda_s
+
+
+@pytest.mark.parametrize(
+    ("omega0", "zeta_B", "zeta_H", "chi_H", "tilt_sign"),
+    [
+        (-1, -0.4, -0.2, 1.02, 1),
+        (-3, -0.4, -0.2, 0.9, 1),
+        (-3, -0.2, -0.4, 1.02, -1),
+        (-1, -0.2, -0.4, 0.9, -1),
+    ],
+)
+def test_ep4_in_the_four_regimes(omega0, zeta_B, zeta_H, chi_H, tilt_sign) -> None:
+    """chi_H on either side of 1, either sign of lambda_s: a stable bicycle with mu > 0 and just this EP4."""
+    design, other = laws.ep4(omega0, zeta_B, zeta_H, chi_H)
+    assert design.mu > 0 > other.mu
+    assert np.sign(design.lambda_s) == tilt_sign
+    assert design.lambda_s == pytest.approx(np.arctan(design.tan_lambda_s), rel=1e-15)
+    geometry = {"chi_H": chi_H, "zeta_B": zeta_B, "zeta_H": zeta_H, "lambda_s": design.lambda_s}
+    a = oracles.polynomial_60(design.Fr, design.mu, design.chi_B, **geometry)
+    assert oracles.routh_exact([_fraction(c) for c in a])
+    monic = [float(c / a[0]) for c in a]
+    assert monic == pytest.approx(list(laws.poly4(omega0)), rel=1e-12)  # 1/a0 magnifies the rounding tenfold
+    assert laws.chib(omega0, chi_H, zeta_B, zeta_H) == design.chi_B
+    assert laws.a1a3(design.Fr, design.chi_B, omega0=omega0, **geometry) == pytest.approx(0, abs=1e-14)
+    assert laws.a2(design.Fr, design.mu, omega0=omega0, **geometry) == pytest.approx(0, abs=1e-13)
+    assert laws.w0(design.mu, **geometry) == pytest.approx(omega0, rel=1e-12)
+
+
+def test_ep4_has_no_value_where_no_EP4_or_no_mass_ratio_exists() -> None:
+    for omega0, zeta_B, zeta_H, chi_H in ((-1, ZB, ZH, 1), (laws.w01(ZB, ZH), ZB, ZH, 1), (-1, ZB, ZB, 1.02)):
+        for design in laws.ep4(omega0, zeta_B, zeta_H, chi_H):
+            assert np.isnan([design.Fr, design.mu, design.tan_lambda_s]).all()
+    # zeta_H > 0, a hanging front mass: y = -1/2 and chi_H = 1/2 give the square 81/16 - 18
+    assert np.isnan(laws.ep4(-1, ZB, 0.5, 0.5)[0].Fr)
+
+
+def test_ep4_tends_to_the_compact_form() -> None:
+    """At omega0 = `w01` the first branch reaches the chi_H = 1 design, at a rate linear in chi_H - 1."""
+    limit = laws.ep4_chi_H_1(ZB, ZH)
+    for step in (1e-3, -1e-3, 1e-6, -1e-6):
+        near = laws.ep4(laws.w01(ZB, ZH), ZB, ZH, 1 + step)[0]
+        for value, true in zip(near[:4], limit[:4], strict=True):
+            assert abs(value - true) < 10 * abs(step)
+
+
+# EP4, chi_H = 1
+
+
+@repeatable
+@given(zeta_B=depth, zeta_H=depth, mu=st.floats(0.01, 30))
+def test_compact_ep4_is_a_fourfold_root_for_any_mass_ratio(zeta_B, zeta_H, mu) -> None:
+    assume(abs(zeta_B - zeta_H) > 1e-6)
+    design = laws.ep4_chi_H_1(zeta_B, zeta_H)
+    assert ep4_defect(design, mu, 1.0, zeta_B, zeta_H) < 1e-14
+    assert np.isnan(design.mu)
+    printed = (laws.w01, laws.chib1, laws.tls)
+    assert design[:3] == pytest.approx([law(zeta_B, zeta_H) for law in printed], rel=1e-8, abs=1e-14)
+
+
+@repeatable
+@given(zeta_B=depth, zeta_H=depth)
+def test_frep4_has_one_true_and_one_spurious_root(zeta_B, zeta_H) -> None:
+    assume(abs(zeta_B / zeta_H - 1) > 1e-2)
+    true, spurious = laws.frep4(zeta_B, zeta_H)
+    design = laws.ep4_chi_H_1(zeta_B, zeta_H)
+    assert true == pytest.approx(design.Fr, rel=1e-12)
+    r = laws.chib1(zeta_B, zeta_H)
+    assert spurious == pytest.approx(-((r - 1) ** 2) * abs(design.omega0) / (4 * (r + 1)), rel=1e-9)
+    assert spurious < 0 < true
+    # it solves the printed quadratic
+    w, T = laws.w01(zeta_B, zeta_H), laws.tls(zeta_B, zeta_H)
+    for Fr in (true, spurious):
+        terms = np.array([(w**2 * zeta_B - 1) * Fr**2, 2 * w**3 * zeta_B * Fr, -(w**2 * zeta_B + 1) * T])
+        assert abs(terms.sum()) < 1e-13 * abs(terms).sum()
+    # and with it p is no fourth power: a1 has the wrong sign
+    assert ep4_defect(design._replace(Fr=spurious), 0.1, 1.0, zeta_B, zeta_H) > 1e-4
+
+
+def test_compact_ep4_needs_unequal_heights() -> None:
+    design = laws.ep4_chi_H_1(ZB, ZB)
+    assert np.isnan([design.Fr, design.tan_lambda_s]).all()
+
+
+# The critical Froude number, chi_H = 1
+
+
+@repeatable
+@given(zeta_B=depth, zeta_H=depth, chi_B=st.floats(0.2, 5), T=tangent, mu=st.floats(0.01, 30))
+def test_Frc1_is_flus(zeta_B, zeta_H, chi_B, T, mu) -> None:
+    assume(abs(chi_B - 1) > 1e-3 and abs(zeta_B - zeta_H * chi_B) > 1e-3 and abs(zeta_B - zeta_H) > 1e-3)
+    lambda_s = np.arctan(T)
+    general = laws.flus(mu, chi_B, 1, zeta_B, zeta_H, lambda_s)
+    assert laws.Frc1(chi_B, zeta_B, zeta_H, lambda_s) == pytest.approx(general, rel=1e-13)
+
+
+@repeatable
+@given(zeta_B=depth, ratio=st.floats(0.05, 0.95), T=tangent)
+def test_frm_is_the_least_critical_Froude_number(zeta_B, ratio, T) -> None:
+    zeta_H, lambda_s = zeta_B * ratio, np.arctan(T)
+    least = laws.frm(zeta_B, zeta_H, lambda_s)
+    best = laws.chibm(zeta_B, zeta_H)
+    assert laws.Frc1(best, zeta_B, zeta_H, lambda_s) == pytest.approx(least**2, rel=1e-10)
+    assert laws.Fr_c2_chi_H_1(zeta_B, zeta_H, lambda_s) == pytest.approx(least**2, rel=1e-10)
+    inside = 1 + (1 / ratio - 1) * np.linspace(0.001, 0.999, 400)  # between the poles 1 and zeta_B/zeta_H
+    assert (laws.Frc1(inside, zeta_B, zeta_H, lambda_s) >= least**2 * (1 - 1e-10)).all()
+    assert laws.Frc1(1 / ratio + 0.1, zeta_B, zeta_H, lambda_s) < 0  # beyond, no speed is critical
+
+
+# The EP set and the design principle, chi_H = 1
+
+
+@repeatable
+@given(zeta_B=depth, zeta_H=depth, excess=st.floats(1.1, 30))
+def test_epset_is_a_squared_quadratic(zeta_B, zeta_H, excess) -> None:
+    """p/a0 = (s^2 + b s + c)^2, stable; real roots below the EP4 tilt, complex above."""
+    assume(abs(zeta_B / zeta_H - 1) > 1e-2)
+    r, h = np.sqrt(zeta_B / zeta_H), np.sqrt(zeta_B * zeta_H)
+    lambda_s = np.arctan(excess * (r - 1) / (r + 1) * r / (4 * h))
+    Fr = laws.epset(zeta_B, zeta_H, lambda_s)
+    a = oracles.polynomial_60(Fr, 0.1, laws.chib1(zeta_B, zeta_H), 1, zeta_B, zeta_H, lambda_s)
+    a0, a1, a2, a3, a4 = a
+    b = a1 / a0 / 2
+    c = a3 / a1
+    assert b > 0
+    assert c > 0
+    # heights, tilt and speed are rounded, and near the pole or r = 1 that is magnified
+    loss = 1e-13 * (1 + 1 / (excess - 1)) / abs(r - 1)
+    assert abs(a2 / a0 / (b**2 + 2 * c) - 1) < loss
+    assert abs(a4 / a0 / c**2 - 1) < loss
+    tilt_ratio = np.tan(lambda_s) / laws.tls(zeta_B, zeta_H)
+    if abs(tilt_ratio - 1) > 1e-6:
+        assert (b**2 > 4 * c) == (tilt_ratio < 1)
+
+
+def test_epset_ends_at_its_pole() -> None:
+    """No EP set below |tan| = (r - 1)/(r + 1) r/(4 h), and none for the wrong sign of lambda_s."""
+    r, h = np.sqrt(2), np.sqrt(0.08)
+    pole = (r - 1) / (r + 1) * r / (4 * h)
+    assert np.isnan(laws.epset(ZB, ZH, np.arctan([0.999 * pole, 0.1, -0.4, -3]))).all()
+    assert laws.epset(ZB, ZH, np.arctan(pole * (1 + 1e-6))) > 100
+
+
+@pytest.mark.parametrize(("zeta_B", "zeta_H"), [(-0.4, -0.2), (-1.3, -0.3), (-0.2, -0.4)])
+def test_dp_bounds_the_tilt_of_heavy_damping(zeta_B, zeta_H) -> None:
+    """Below the bound some speed makes all roots real and negative, above none does; certified roots."""
+    chi_B, bound = laws.dp(zeta_B, zeta_H)
+
+    def heavily_damped(tilt: float) -> bool:
+        speeds = laws.ep4_chi_H_1(zeta_B, zeta_H).Fr * np.linspace(0.5, 2, 101)
+        end = laws.epset(
+            zeta_B, zeta_H, np.arctan(tilt)
+        )  # near the EP4 the range of speeds is short and ends here
+        speeds = np.append(speeds, [] if np.isnan(end) else end * (1 - np.geomspace(1e-6, 0.1, 50)))
+        spectra = (
+            oracles.certified_roots(oracles.polynomial_exact(Fr, 1, chi_B, 1, zeta_B, zeta_H, tilt))
+            for Fr in speeds
+        )
+        return any(all(root.imag == 0 and root.real < 0 for root, _ in spectrum) for spectrum in spectra)
+
+    assert heavily_damped(0.3 * bound)
+    assert heavily_damped(0.95 * bound)
+    assert not heavily_damped(1.01 * bound)
+    assert not heavily_damped(-0.5 * bound)
+
+
+def test_complex_roots_run_on_a_circle() -> None:
+    """For chi_B = `chib1` every complex root below the EP set has modulus |omega0| (text)."""
+    lambda_s, chi_B, radius = EP4_TILT + 0.8, laws.chib1(ZB, ZH), -laws.w01(ZB, ZH)
+    for Fr in (2.0, laws.frm(ZB, ZH, lambda_s), 4.0):
+        roots = oracles.roots_60(oracles.polynomial_60(Fr, 0.1, chi_B, 1, ZB, ZH, lambda_s))
+        turning = [root for root in roots if root.imag != 0]
+        assert len(turning) >= 2
+        for root in turning:
+            assert float(abs(root)) == pytest.approx(radius, rel=1e-13)
+
+
+# Duality
+
+
+@repeatable
+@given(
+    Fr=st.floats(0.1, 6),
+    chi_B=st.floats(0.2, 5),
+    zeta_B=depth,
+    zeta_H=depth,
+    T=st.floats(-5, 5),
+    mu=st.floats(0.1, 10),
+)
+def test_the_dual_has_the_same_spectrum(Fr, chi_B, zeta_B, zeta_H, T, mu) -> None:
+    assume(abs(T) > 1e-3)
+    design = {"Fr": Fr, "chi_B": chi_B, "zeta_B": zeta_B, "zeta_H": zeta_H, "lambda_s": np.arctan(T)}
+    dual = laws.dual(**design)
+    ours = oracles.polynomial_60(mu=mu, chi_H=1, **design)
+    theirs = oracles.polynomial_60(mu=2 * mu, chi_H=1, **dual)
+    sizes = term_sizes(Fr, mu, chi_B, 1, zeta_B, zeta_H, T)
+    for a, b, size in zip(ours, theirs, sizes, strict=True):
+        # the tilt is stored as an angle, whose rounding moves a tangent up to 125 by 1e-14 of itself
+        assert abs(float(a - b * ours[0] / theirs[0])) < 1e-12 * size
+    again = laws.dual(**dual)
+    assert [again[name] for name in design] == pytest.approx(list(design.values()), rel=1e-12)
+
+
+def test_the_dual_of_EP4_is_EP4() -> None:
+    """It maps the lambda_s > 0 class onto the lambda_s < 0 class."""
+    ours, theirs = laws.ep4_chi_H_1(ZB, ZH), laws.ep4_chi_H_1(ZH, ZB)
+    dual = laws.dual(ours.Fr, ours.chi_B, ZB, ZH, ours.lambda_s)
+    assert (dual["zeta_B"], dual["zeta_H"]) == (ZH, ZB)
+    assert [dual["Fr"], dual["chi_B"], dual["lambda_s"]] == pytest.approx(
+        [theirs.Fr, theirs.chi_B, theirs.lambda_s]
+    )
+    assert ours.lambda_s > 0 > theirs.lambda_s
+
+
+# Arrays, numbers and names
+
+
+def _calls():
+    rng = np.random.default_rng(8)
+    for name, law in vars(laws).items():
+        if inspect.isfunction(law) and not name.startswith("_") and law.__module__ == laws.__name__:
+            names = inspect.signature(law).parameters
+            yield pytest.param(
+                law,
+                {
+                    n: -v if n in ("zeta_B", "zeta_H", "omega0") else v
+                    for n, v in zip(names, rng.uniform(0.3, 0.9, len(names)), strict=True)
+                },
+                id=name,
+            )
+
+
+def _leaves(answer):
+    """The arrays or floats in an answer, whatever holds them."""
+    if isinstance(answer, dict):
+        answer = tuple(answer.values())
+    return [leaf for part in answer for leaf in _leaves(part)] if isinstance(answer, tuple) else [answer]
+
+
+@pytest.mark.parametrize(("law", "arguments"), list(_calls()))
+def test_every_law_broadcasts(law, arguments) -> None:
+    """An array for one argument gives, entry by entry, what the floats give; lists are taken too."""
+    plain = _leaves(law(**arguments))
+    for leaf in plain:
+        assert isinstance(leaf, np.ndarray) == (law.__name__ in ("matrices", "copo", "lscf", "poly4", "a1a3"))
+    for name in arguments:
+        varied = arguments | {name: np.array([[arguments[name]] * 3, [1.1 * arguments[name]] * 3])}
+        for leaf, part in zip(_leaves(law(**varied)), plain, strict=True):
+            if np.ndim(leaf) == np.ndim(part):  # an output this argument does not enter
+                assert np.array_equal(leaf, part, equal_nan=True)
+                continue
+            own = leaf[0, 0] if law.__name__ == "matrices" else leaf[..., 0, 0]
+            assert leaf.shape == (
+                (2, 3, *np.shape(part)) if law.__name__ == "matrices" else (*np.shape(part), 2, 3)
+            )
+            assert np.array_equal(own, part, equal_nan=True)
+    listed = {name: [value] for name, value in arguments.items()}
+    for leaf, part in zip(_leaves(law(**listed)), plain, strict=True):
+        assert np.array_equal(np.squeeze(leaf), part, equal_nan=True)
+
+
+def test_poles_are_silent() -> None:
+    """Division by zero and roots of negative numbers answer inf and nan; any warning is an error here."""
+    assert np.isinf(laws.Frc1(1, ZB, ZH, 0.3))
+    assert not np.isfinite(laws.flus(0.1, 1.02, 1.02, ZB, ZH, 0.3))
+    assert np.isnan(laws.Fr_c(0.1, 0.5, 1, ZB, ZH, 0.3))
+    assert np.isnan(laws.frm(ZH, ZB, 0.3))
+    assert np.isnan(laws.w0(30, 1.02, ZB, ZH, 0.3))
+    assert np.isnan(laws.w01(ZB, -ZH))
+    assert not laws.lscf(1, 0.1, 0.5, 1, ZB, ZH, 0.3)[4]
+
+
+def test_every_label_is_a_law() -> None:
+    for label in laws.LABELS:
+        assert hasattr(laws, {"4poly": "poly4"}.get(label, label))
+
+
+def test_laws_stand_alone() -> None:
+    """An oracle shares no code with what it checks."""
+    tree = ast.parse(inspect.getsource(laws))
+    imported = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+    imported |= {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    assert imported == {"numpy", "numpy.typing", "functools", "typing", "collections.abc"}
+
+
+# The oracles themselves
+
+
+def _fraction(number) -> Fraction:
+    """An mpf as it is stored, a dyadic rational."""
+    sign, mantissa, exponent, _ = number._mpf_
+    return (-1) ** sign * Fraction(int(mantissa)) * Fraction(2) ** exponent
+
+
+def test_the_oracles_agree_with_each_other() -> None:
+    """mpmath with FLINT's balls, roots with coefficients, Routh with roots, Sylvester with SymPy."""
+    rng = np.random.default_rng(9)
+    s = sympy.Symbol("s")
+    verdicts = []
+    for degree in (1, 2, 3, 4, 4, 4, 5, 6) * 2:
+        a = [int(c) for c in rng.integers(1, 30, degree + 1)]
+        a = a if rng.uniform() < 0.7 else [-c for c in a]
+        roots = oracles.roots_60(a)
+        certified = [root for root, count in oracles.certified_roots(a) for _ in range(count)]
+        for root in roots:
+            assert min(abs(root - other) for other in certified) < mp.mpf(10) ** -55
+        assert all(abs(c * a[0] - d) < 1e-55 for c, d in zip(oracles.elementary(roots), a, strict=True))
+        verdicts.append(oracles.routh_exact(a))
+        assert verdicts[-1] == oracles.is_stable_60(a)
+        if degree > 1:
+            true = sympy.discriminant(sympy.Poly(a, s))
+            assert oracles.discriminant_exact(a) == Fraction(int(true))
+    assert {True, False} == set(verdicts)
+
+
+@pytest.mark.parametrize(
+    ("coefficients", "structure", "stable"),
+    [
+        ([1, 4, 6, 4, 1], [(4, 1)], True),
+        ([1, 0, 2, 0, 1], [(2, 2)], False),
+        ([-1, -5, -9, -7, -2], [(1, 1), (3, 1)], True),
+        ([1, -3, 3, -1, 0, 0], [(2, 1), (3, 1)], False),
+        ([1, 1, 1, 1], [(1, 3)], False),
+    ],
+    ids=["EP4", "double imaginary pair", "EP3 with a0 < 0", "zeros and a triple", "on the axis"],
+)
+def test_the_oracles_on_multiple_roots(coefficients, structure, stable) -> None:
+    assert oracles.exact_multiplicities(coefficients) == structure
+    assert oracles.routh_exact(coefficients) is stable
+    rebuilt = oracles.elementary(oracles.roots_60(coefficients))
+    assert all(abs(c * coefficients[0] - d) < 1e-55 for c, d in zip(rebuilt, coefficients, strict=True))
+    assert (oracles.discriminant_exact(coefficients) == 0) == (structure[-1][0] > 1)
+
+
+def test_the_exact_polynomial_is_the_60_digit_one() -> None:
+    parameters = designs(20, seed=10)
+    for i in range(20):
+        design = one(parameters, i)
+        with mp.workdps(60):
+            T = _fraction(mp.tan(mp.mpf(design["lambda_s"])))
+        rational = oracles.polynomial_exact(*list(design.values())[:-1], T)
+        for a, b in zip(rational, oracles.polynomial_60(**design), strict=True):
+            assert abs(a - _fraction(b)) < Fraction(1, 10**55)

@@ -1,0 +1,98 @@
+"""All solutions of a square system that Newton's method finds, box or no box: the algebraic branches."""
+
+from collections.abc import Mapping
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.design.formulations import NLP
+from tmsopt.design.frozen import Table
+from tmsopt.design.problem import Problem
+from tmsopt.design.solution import Branch
+from tmsopt.design.starts import complete
+
+_STEPS = 60
+_SAME = 1e-6
+
+
+def other_branches(
+    problem: Problem, nlp: NLP, starting: list[dict[str, float]], found: Mapping[str, float]
+) -> tuple[Branch, ...]:
+    """Solutions of the equations other than the one found, each with the bounds and rows that it violates.
+
+    Damped Newton from the given designs and their mirror images outside the box; a count, not a proof, of all.
+    """
+    of = problem.parameter_set
+    x = ca.SX.sym("x", len(nlp.variables))
+    g = nlp.functions(x)[1]
+    equalities = [k for k in range(len(nlp.rows)) if nlp.row_lower[k] == nlp.row_upper[k]]
+    if len(equalities) != len(nlp.variables):
+        return ()
+    equations = ca.vertcat(*[g[k] for k in equalities])
+    system = ca.Function("system", [x], [equations, ca.jacobian(equations, x), g])
+    branches: list[Branch] = []
+    known = [np.array([found[n] for n in problem.free])]
+    for start in starting:
+        origin = complete(nlp, problem, start)
+        for mirrored in (origin, *_mirrors(problem, origin)):
+            end = _newton(system, mirrored)
+            if end is None:
+                continue
+            values = np.array(
+                [np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, end, strict=False)]
+            )
+            if any(np.abs(values - k).max() <= _SAME * (1 + np.abs(k).max()) for k in known):
+                continue
+            known.append(values)
+            parameters = problem.ordered(dict(zip(problem.free, values.tolist(), strict=True)))
+            branches.append(Branch(Table(parameters), _excluded(problem, nlp, end, system)))
+    return tuple(sorted(branches, key=lambda b: len(b.excluded_by)))
+
+
+def _mirrors(problem: Problem, x: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """The start with one free parameter at a time of the other sign, where its physical range would forbid it."""
+    images = []
+    for k in range(len(problem.free)):
+        image = x.copy()
+        image[k] = -image[k]
+        images.append(image)
+    return images
+
+
+def _newton(system: ca.Function, x: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    residual = np.inf
+    for _ in range(_STEPS):
+        value, jacobian, _ = (np.array(part) for part in system(x))
+        if not (np.all(np.isfinite(value)) and np.all(np.isfinite(jacobian))):
+            return None
+        residual = float(np.abs(value).max())
+        step = np.linalg.lstsq(jacobian, -value.ravel(), rcond=None)[0]
+        if np.abs(step).max() <= 1e-14 * (1 + np.abs(x).max()):
+            break
+        damping = 1.0
+        while damping > 1e-3:
+            trial = np.array(system(x + damping * step)[0])
+            if np.all(np.isfinite(trial)) and np.abs(trial).max() < residual:
+                break
+            damping /= 2
+        x = x + damping * step
+    return x if residual <= 1e-11 * (1 + np.abs(x).max()) else None
+
+
+def _excluded(problem: Problem, nlp: NLP, x: NDArray[np.float64], system: ca.Function) -> tuple[str, ...]:
+    """Names of the bounds and inequality rows that a solution violates."""
+    g = np.array(system(x)[2]).ravel()
+    names = []
+    for k, name in enumerate(problem.free):
+        if x[k] < nlp.lower[k] - 1e-9:
+            names.append(f"{name}.min")
+        if x[k] > nlp.upper[k] + 1e-9:
+            names.append(f"{name}.max")
+    for k in range(len(problem.free), len(nlp.variables)):
+        if x[k] < nlp.lower[k] - 1e-9 or x[k] > nlp.upper[k] + 1e-9:
+            names.append(nlp.variables[k])
+    for k, name in enumerate(nlp.rows):
+        if g[k] < nlp.row_lower[k] - 1e-9 or g[k] > nlp.row_upper[k] + 1e-9:
+            names.append(name)
+    return tuple(dict.fromkeys(names))

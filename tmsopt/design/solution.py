@@ -1,0 +1,161 @@
+"""The solution of a design problem as data."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from tmsopt.design.formulations import Freedom
+from tmsopt.design.frozen import Table
+from tmsopt.design.problem import Problem
+from tmsopt.roots import Root
+
+SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A value that no design in the box can beat.
+
+    Attributes:
+        value: the bound, −inf where there is none.
+        gap: objective minus bound.
+        proven: whether the gap is closed, so that the design is globally optimal, up to rounding.
+        method: how the bound was found, e.g. ``omega0``; ``none``.
+    """
+
+    value: float = -math.inf
+    gap: float = math.inf
+    proven: bool = False
+    method: str = "none"
+
+
+@dataclass(frozen=True)
+class Starts:
+    """How many starts were tried, converged to a feasible point, and ended at the best one."""
+
+    tried: int = 0
+    converged: int = 0
+    at_best: int = 0
+
+
+@dataclass(frozen=True)
+class Branch:
+    """Another solution of a square system, and the limits that exclude it."""
+
+    parameters: Table[float]
+    excluded_by: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What `solve` found.
+
+    Attributes:
+        status: ``optimal``, ``infeasible`` or ``not_converged``; always decided by an independent recheck.
+        value: value of the objective expression; nan where there is none.
+        parameters: every parameter of the set the problem is written in (rad, SI units).
+        abscissa: largest real part of the roots of the ideal design, dimensionless (per √(w/g)).
+        abscissa_realised: the same for the parameters exactly as stored in double precision.
+        roots: roots of the ideal design with multiplicities.
+        structure: which roots stand on the rightmost line, e.g. ``EP4``.
+        active: constraint or bound (``Fr.max``) → gain of the objective per unit that the limit is relaxed.
+        violations: name → violation relative to the size of the two sides, where beyond tolerance.
+        quantities: derived quantities; nan where one does not exist.
+        dimensionless: the native parameters.
+        formulation: ``abscissa``, ``matching`` or ``none``.
+        freedom: parameters against conditions, before solving.
+        branches: other solutions of a square system.
+        notes: sentences for the reader.
+    """
+
+    problem: Problem
+    status: str
+    value: float
+    parameters: Table[float]
+    abscissa: float
+    abscissa_realised: float
+    roots: tuple[Root, ...]
+    structure: str
+    active: Table[float]
+    violations: Table[float]
+    bound: Bound
+    starts: Starts
+    seconds: float
+    quantities: Table[float]
+    dimensionless: Table[float]
+    formulation: str
+    freedom: Freedom
+    branches: tuple[Branch, ...] = ()
+    notes: tuple[str, ...] = field(default=())
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``; numbers that do not exist are None."""
+        problem = self.problem
+        text = problem.minimize or problem.maximize or problem.locate or "abscissa"
+        objective: dict[str, Any] = {"sense": problem.sense, "expression": text, "value": _number(self.value)}
+        if problem.locate:
+            objective["locate"] = problem.locate
+        return {
+            "schema": SCHEMA,
+            "title": problem.title,
+            "model": problem.model.name,
+            "status": self.status,
+            "objective": objective,
+            "parameters": _numbers(self.parameters),
+            "abscissa": _number(self.abscissa),
+            "abscissa_realised": _number(self.abscissa_realised),
+            "roots": [{"re": r.re, "im": r.im, "multiplicity": r.multiplicity} for r in self.roots],
+            "structure": self.structure,
+            "active": _numbers(self.active),
+            "violations": _numbers(self.violations),
+            "bound": {
+                "value": _number(self.bound.value),
+                "gap": _number(self.bound.gap),
+                "proven": self.bound.proven,
+                "method": self.bound.method,
+            },
+            "starts": {
+                "tried": self.starts.tried,
+                "converged": self.starts.converged,
+                "at_best": self.starts.at_best,
+            },
+            "seconds": round(self.seconds, 4),
+            "quantities": _numbers(self.quantities),
+            "dimensionless": _numbers(self.dimensionless),
+            "formulation": self.formulation,
+            "freedom": {
+                "free": self.freedom.free,
+                "conditions": self.freedom.conditions,
+                "count": self.freedom.count,
+                "kind": self.freedom.kind,
+            },
+            "branches": [
+                {"parameters": _numbers(b.parameters), "excluded_by": list(b.excluded_by)} for b in self.branches
+            ],
+            "notes": list(self.notes),
+        }
+
+
+class NotSolved(RuntimeError):
+    """Raised by `solve` when there is no optimal design; `solution` holds the best point found."""
+
+    def __init__(self, solution: Solution) -> None:
+        self.solution = solution
+        violated = ", ".join(f"{name} by {value:.3g}" for name, value in solution.violations.items())
+        super().__init__(
+            f"{solution.problem.title or 'problem'}: {solution.status}"
+            + (f"; violated: {violated}" if violated else "")
+            + "".join(f"; {note}" for note in solution.notes)
+        )
+
+    def __reduce__(self) -> tuple[type["NotSolved"], tuple[Solution]]:
+        return NotSolved, (self.solution,)
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _numbers(table: Mapping[str, float]) -> dict[str, float | None]:
+    return {name: _number(value) for name, value in table.items()}

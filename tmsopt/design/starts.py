@@ -1,0 +1,120 @@
+"""Designs to start from, spread over the box, and starting values of the lifted variables that fit them."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.design.formulations import NLP, middle, variables_of
+from tmsopt.design.problem import ROOT_QUANTITIES, Problem
+from tmsopt.models import Values
+from tmsopt.roots import roots
+
+Array = NDArray[np.float64]
+
+_CANDIDATES = 8
+"""Designs looked at for each that is started from: a start near the good ones needs half the iterations."""
+
+
+def designs(problem: Problem, seed: int, count: int) -> list[dict[str, float]]:
+    """`count` designs to start from: the given start, if any, then the most promising of each few of a
+    quasi-random sequence over the box."""
+    names = list(problem.free)
+    pool = list(islice(_spread(problem, seed), _CANDIDATES * count))
+    columns = {n: np.array([d[n] for d in pool]) for n in names}
+    merit = _merit(problem, columns).reshape(count, _CANDIDATES)
+    chosen = [pool[row * _CANDIDATES + int(np.argmin(merit[row]))] for row in range(count)]
+    return [middle(problem), *chosen[: count - 1]] if problem.start else chosen
+
+
+def complete(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Array:
+    """Start of all variables of an NLP: the design, and lifted variables that satisfy their equations with it."""
+    values = problem.values(problem.ordered(design))
+    z = roots(_regular(np.array([float(c) for c in values.coefficients])))
+    x = variables_of(problem, design)
+    for lift in nlp.lifts:
+        guesses = lift.guess(values, z)
+        x += guesses[0] if len(guesses) == 1 else min(guesses, key=lambda g: _mismatch(nlp, x, g))
+    return np.array(x)
+
+
+def _spread(problem: Problem, seed: int) -> Iterator[dict[str, float]]:
+    """The middle of the box, then a quasi-random sequence without end.
+
+    The sequence adds powers of the generalised golden ratio modulo 1; scipy.stats.qmc has others, but importing
+    it takes longer than solving.
+    """
+    yield middle(problem)
+    names = list(problem.free)
+    ratio = 2.0
+    for _ in range(60):  # fixed point of φ^(d+1) = φ + 1
+        ratio = (1 + ratio) ** (1 / (len(names) + 1))
+    steps = ratio ** -np.arange(1.0, len(names) + 1)
+    offset = np.random.default_rng(seed).random(len(names))
+    lower, upper = np.array([problem.free[n] for n in names]).reshape(-1, 2).T
+    k = 1
+    while True:
+        point = lower + (upper - lower) * ((offset + k * steps) % 1.0)
+        yield dict(zip(names, point.tolist(), strict=True))
+        k += 1
+
+
+def _merit(problem: Problem, columns: Mapping[str, Array]) -> Array:
+    """Objective plus violated constraints of many designs, each in units of its own spread; small is good."""
+    parameters = problem.ordered(columns)
+    shape = next(iter(columns.values())).shape
+    arrays = {name: np.broadcast_to(np.asarray(value, dtype=float), shape) for name, value in parameters.items()}
+    values = Values(problem.model, problem.parameter_set, arrays, extra=_ARRAY_ROOT_QUANTITIES)
+    merit = np.zeros(shape)
+    if problem.objective is not None:
+        sign = -1.0 if problem.sense == "maximize" else 1.0
+        merit += _in_spreads(sign * np.broadcast_to(problem.objective(values), shape))
+    for condition in problem.conditions.values():
+        difference = np.broadcast_to(np.asarray(condition(values), dtype=float), shape)
+        sides = {"<=": np.maximum(difference, 0), ">=": np.maximum(-difference, 0), "==": np.abs(difference)}
+        merit += 3 * _in_spreads(sides[condition.comparison])
+    return merit
+
+
+def _in_spreads(column: Array) -> Array:
+    """A column in units of its interquartile range, huge where it does not exist."""
+    known = column[np.isfinite(column)]
+    spread = float(np.subtract(*np.percentile(known, [75, 25]))) if known.size else 0.0
+    return np.where(np.isfinite(column), column, 1e6) / (spread or 1.0)
+
+
+def _regular(coefficients: Array) -> Array:
+    """Coefficients with a leading 0, of a singular mass matrix, moved a little off: one root at infinity."""
+    size = np.abs(coefficients).max(axis=-1, initial=0.0) + 1e-300
+    lead = coefficients[..., 0]
+    return np.concatenate([np.where(lead == 0, 1e-12 * size, lead)[..., None], coefficients[..., 1:]], axis=-1)
+
+
+def _mismatch(nlp: NLP, x: list[float], guess: list[float]) -> float:
+    """Size of the rows when the lifts that follow are still unknown (at 0)."""
+    trial = np.zeros(len(nlp.variables))
+    trial[: len(x) + len(guess)] = x + guess
+    g = np.array(nlp.functions(trial)[1]).ravel()
+    return float(np.abs(g[np.isfinite(g)]).sum())
+
+
+def _array_roots(values: Mapping[str, Any]) -> NDArray[np.complex128]:
+    assert isinstance(values, Values)
+    return roots(_regular(np.stack(np.broadcast_arrays(*values.coefficients), axis=-1)))
+
+
+def _array_abscissa(values: Mapping[str, Any]) -> Array:
+    return np.asarray(_array_roots(values).real.max(axis=-1))
+
+
+def _array_damping(values: Mapping[str, Any]) -> Array:
+    z = _array_roots(values)
+    return np.asarray(np.min(-z.real / (np.abs(z) + 1e-300), axis=-1))
+
+
+_ARRAY_ROOT_QUANTITIES = tuple(
+    replace(q, value={"abscissa": _array_abscissa, "damping_ratio": _array_damping}[q.name]) for q in ROOT_QUANTITIES
+)
