@@ -196,7 +196,8 @@ def _value_faults(problem: Problem, of: ParameterSet, name: str) -> Iterator[Fau
         yield Fault(f"min = {lower:.6g} is greater than max = {upper:.6g}; swap them", key)
     elif name in problem.start and not lower <= problem.start[name] <= upper:
         yield Fault(
-            f"start = {problem.start[name]:.6g} lies outside the bounds {lower:.6g} … {upper:.6g}", (*key, "start")
+            f"start = {problem.start[name]:.6g} lies outside the bounds {lower:.6g} … {upper:.6g}",
+            (*key, "start"),
         )
 
 
@@ -211,7 +212,8 @@ def _number_faults(of: ParameterSet, name: str, value: Any, key: tuple[str, ...]
         yield Fault(f"found {value!r}; accepted: a finite number{unit and ' in' + unit}", key)
     elif number not in parameter.range:
         yield Fault(
-            f"{name} = {number:.6g}{unit} is not physical; {parameter.meaning} is {parameter.range}{unit}", key
+            f"{name} = {number:.6g}{unit} is not physical; {parameter.meaning} is {parameter.range}{unit}",
+            key,
         )
 
 
@@ -220,9 +222,13 @@ def _objective_faults(problem: Problem) -> Iterator[Fault]:
     if problem.minimize is not None and problem.maximize is not None:
         yield Fault("minimize and maximize together; keep one of them", key)
     if problem.locate is not None and problem.locate not in PATTERNS:
-        yield Fault(f"unknown pattern {problem.locate!r}; {suggest(str(problem.locate), PATTERNS)}", (*key, "locate"))
+        yield Fault(
+            f"unknown pattern {problem.locate!r}; {suggest(str(problem.locate), PATTERNS)}", (*key, "locate")
+        )
     if problem.free and problem.minimize is None and problem.maximize is None and problem.locate is None:
-        yield Fault("parameters are free, but nothing is asked of them; write minimize, maximize or locate", key)
+        yield Fault(
+            "parameters are free, but nothing is asked of them; write minimize, maximize or locate", key
+        )
 
 
 def _expression_faults(problem: Problem, of: ParameterSet) -> Iterator[Fault]:

@@ -128,7 +128,9 @@ def _searched(
         active=_active(problem, nlp, point),
         starts=Starts(len(candidates), sum(c.feasible for c in candidates), at_best),
         formulation=nlp.formulation,
-        branches=other_branches(problem, nlp, starting, parameters) if freedom(problem).kind == "square" else (),
+        branches=other_branches(problem, nlp, starting, parameters)
+        if freedom(problem).kind == "square"
+        else (),
         notes=tuple(notes),
     )
 
@@ -221,9 +223,15 @@ def _unsolved(
     parameters = problem.ordered(design)
     checked = recheck(problem, parameters)
     if checked.violations:
-        status, note = "infeasible", f"none of {len(candidates)} starts can satisfy all constraints; relax one of those named"
+        status, note = (
+            "infeasible",
+            f"none of {len(candidates)} starts can satisfy all constraints; relax one of those named",
+        )
     else:
-        status, note = "not_converged", "feasible designs exist, but no start converged; try more starts or give one"
+        status, note = (
+            "not_converged",
+            "feasible designs exist, but no start converged; try more starts or give one",
+        )
     return _solution(
         problem,
         parameters,
@@ -278,6 +286,8 @@ def _remarks(problem: Problem, checked: Checked, feasible: bool) -> list[str]:
     if feasible and checked.structure.abscissa >= 0 and problem.sense in ("minimize", "evaluate"):
         asked = (problem.minimize or "").strip() == "abscissa" and problem.free
         remarks.append(
-            "no stable design was found in the box; this is the least unstable one" if asked else "the design is unstable"
+            "no stable design was found in the box; this is the least unstable one"
+            if asked
+            else "the design is unstable"
         )
     return remarks

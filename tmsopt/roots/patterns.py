@@ -57,9 +57,15 @@ def _splits(size: int) -> Callable[[Roots], list[tuple[Roots, Roots]]]:
 
     def split(roots: Roots) -> list[tuple[Roots, Roots]]:
         every = range(len(roots))
-        chosen = [(roots[list(c)], roots[[k for k in every if k not in c]]) for c in combinations(every, size)]
+        chosen = [
+            (roots[list(c)], roots[[k for k in every if k not in c]]) for c in combinations(every, size)
+        ]
         close = 1e-9 * (np.abs(roots).max() + 1e-300)
-        return [(a, b) for a, b in chosen if abs(a.sum().imag) <= close and abs(a.prod().imag) <= close * np.abs(a).max()]
+        return [
+            (a, b)
+            for a, b in chosen
+            if abs(a.sum().imag) <= close and abs(a.prod().imag) <= close * np.abs(a).max()
+        ]
 
     return split
 
@@ -85,45 +91,61 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
         p.name: p
         for p in (
             Pattern(
-                "EP4", "4-fold real root", ("r",),
+                "EP4",
+                "4-fold real root",
+                ("r",),
                 lambda u: [[1, -u[0]]] * 4,
                 lambda z: [[float(z.mean().real)]],
             ),
             Pattern(
-                "EP3", "3-fold real root and a simple one", ("r", "t"),
+                "EP3",
+                "3-fold real root and a simple one",
+                ("r", "t"),
                 lambda u: [[1, -u[0]]] * 3 + [[1, -u[1]]],
                 _triple_guesses,
             ),
             Pattern(
-                "2EP2", "two real double roots", ("b", "c"),
+                "2EP2",
+                "two real double roots",
+                ("b", "c"),
                 lambda u: [[1, u[0], u[1]]] * 2,
                 _double_quadratic_guess,
                 lambda u: [u[0] * u[0] - 4 * u[1]],
             ),
             Pattern(
-                "CEP2", "a complex double pair", ("b", "c"),
+                "CEP2",
+                "a complex double pair",
+                ("b", "c"),
                 lambda u: [[1, u[0], u[1]]] * 2,
                 _double_quadratic_guess,
                 lambda u: [4 * u[1] - u[0] * u[0]],
             ),
             Pattern(
-                "EP2", "a real double root: the discriminant surface", ("r", "b", "c"),
+                "EP2",
+                "a real double root: the discriminant surface",
+                ("r", "b", "c"),
                 lambda u: [[1, -u[0]]] * 2 + [[1, u[1], u[2]]],
                 lambda z: [[float(a.mean().real), *_quadratic(b)] for a, b in _two(z)],
             ),
             Pattern(
-                "weave", "a pair on the imaginary axis", ("W", "b", "c"),
+                "weave",
+                "a pair on the imaginary axis",
+                ("W", "b", "c"),
                 lambda u: [[1, 0, u[0]], [1, u[1], u[2]]],
                 lambda z: [[abs(float(a.prod().real)), *_quadratic(b)] for a, b in _two(z)],
                 lambda u: [u[0]],
             ),
             Pattern(
-                "capsize", "a root at 0", ("b", "c", "d"),
+                "capsize",
+                "a root at 0",
+                ("b", "c", "d"),
                 lambda u: [[1, 0], [1, u[0], u[1], u[2]]],
                 lambda z: [[float(x) for x in np.poly(b)[1:].real] for _, b in _one(z)],
             ),
             Pattern(
-                "resonance", "a double imaginary pair (1:1 resonance)", ("W",),
+                "resonance",
+                "a double imaginary pair (1:1 resonance)",
+                ("W",),
                 lambda u: [[1, 0, u[0]]] * 2,
                 lambda z: [[float(np.abs(z).mean()) ** 2]],
                 lambda u: [u[0]],
