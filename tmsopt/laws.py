@@ -168,9 +168,7 @@ def lscf(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Rea
 
 
 @_law
-def lscf_complete(
-    Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real
-) -> Truth:
+def lscf_complete(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Truth:
     """Whether the bicycle is asymptotically stable, by the complete Lienard-Chipart conditions on `copo`.
 
     Holds for any chi_H and either sign of lambda_s: the coefficients are first divided by the sign of a0.
@@ -215,9 +213,7 @@ def poly4(omega0: Real) -> Array:
 
 
 @_law
-def a1a3(
-    Fr: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real, omega0: Real
-) -> Array:
+def a1a3(Fr: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real, omega0: Real) -> Array:
     """Residuals a1 + 4 omega0 a0 and a3 + 4 omega0^3 a0, shape (2, ...); both 0 at EP4. Equation `a1a3`."""
     a0, a1, _, a3, _ = copo(Fr, 0, chi_B, chi_H, zeta_B, zeta_H, lambda_s)
     return _stack(a1 + 4 * omega0 * a0, a3 + 4 * omega0**3 * a0)

@@ -70,9 +70,7 @@ def _algebraic_box(problem: Problem) -> dict[str, tuple[float, float]]:
     """Range of each algebraic parameter: they are monotone in every parameter of a set, so corners suffice."""
     ends = [problem.free.get(n) or (problem.fixed[n],) for n in problem.parameter_set.names]
     corners = [
-        problem.model.algebraic(
-            problem.parameter_set.native(dict(zip(problem.parameter_set.names, c, strict=True)))
-        )
+        problem.model.algebraic(problem.parameter_set.native(dict(zip(problem.parameter_set.names, c, strict=True))))
         for c in itertools.product(*ends)
     ]
     return {n: (float(min(c[n] for c in corners)), float(max(c[n] for c in corners))) for n in corners[0]}
@@ -83,9 +81,7 @@ def _plays_no_role(model: Model, name: str, box: Mapping[str, tuple[float, float
 
     def ends(numbers: tuple[Fraction, Fraction], part: Fraction) -> tuple[Any, Any]:
         at = {
-            n: Fraction(lo)
-            if lo == hi
-            else Fraction(lo) + (Fraction(hi) - Fraction(lo)) * part * Fraction(k, 13)
+            n: Fraction(lo) if lo == hi else Fraction(lo) + (Fraction(hi) - Fraction(lo)) * part * Fraction(k, 13)
             for k, (n, (lo, hi)) in enumerate(box.items(), start=3)
         }
         first, second = (model.polynomial(**{**at, name: x}) for x in numbers)

@@ -39,9 +39,7 @@ def other_branches(
             end = _newton(system, mirrored)
             if end is None:
                 continue
-            values = np.array(
-                [np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, end, strict=False)]
-            )
+            values = np.array([np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, end, strict=False)])
             if any(np.abs(values - k).max() <= _SAME * (1 + np.abs(k).max()) for k in known):
                 continue
             known.append(values)

@@ -24,9 +24,7 @@ def least_violating(
     for design in starting[:_TRIED]:
         x = complete(nlp, problem, design)
         g = np.array(nlp.functions(x)[1]).ravel()[rows]
-        slack = np.maximum(
-            np.maximum(np.array(nlp.row_lower)[rows] - g, g - np.array(nlp.row_upper)[rows]), 0.0
-        )
+        slack = np.maximum(np.maximum(np.array(nlp.row_lower)[rows] - g, g - np.array(nlp.row_upper)[rows]), 0.0)
         ended = run(np.concatenate([x, np.where(np.isfinite(slack), slack, 1.0) + 1e-3])).x
         if not np.all(np.isfinite(ended)):
             continue
@@ -61,9 +59,7 @@ def _elastic(problem: Problem, nlp: NLP) -> tuple[NLP, list[int]]:
         NLP(
             formulation="elastic",
             variables=(*nlp.variables, *(f"slack of {nlp.rows[k]}" for k in rows)),
-            functions=ca.Function(
-                "elastic", [variables], [ca.sum1(slack), ca.vertcat(*parts)], ["x"], ["f", "g"]
-            ),
+            functions=ca.Function("elastic", [variables], [ca.sum1(slack), ca.vertcat(*parts)], ["x"], ["f", "g"]),
             lower=(*nlp.lower, *(0.0 for _ in rows)),
             upper=(*nlp.upper, *(np.inf for _ in rows)),
             rows=tuple(names),

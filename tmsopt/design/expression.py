@@ -75,9 +75,7 @@ class Expression:
         with np.errstate(all="ignore"):
             left, right = (float(_value(side, values, _NUMERIC)) for side in self._sides())
         difference = left - right
-        excess = {"<=": max(difference, 0.0), ">=": max(-difference, 0.0), "==": abs(difference)}[
-            self.comparison
-        ]
+        excess = {"<=": max(difference, 0.0), ">=": max(-difference, 0.0), "==": abs(difference)}[self.comparison]
         return excess / max(1.0, abs(left), abs(right)) if math.isfinite(difference) else math.nan
 
     def _sides(self) -> list[ast.expr]:
@@ -156,9 +154,7 @@ def _checked_names(node: ast.expr, text: str, accepted: list[str], depth: int = 
             if name in CONSTANTS:
                 return ()
             if name in FUNCTIONS:
-                raise ExpressionError(
-                    f"'{text}' names the function {name} without its argument; write {name}(…)"
-                )
+                raise ExpressionError(f"'{text}' names the function {name} without its argument; write {name}(…)")
             if name not in accepted:
                 raise ExpressionError(f"'{text}' uses the unknown name '{name}'; {suggest(name, accepted)}")
             return (name,)
@@ -176,9 +172,7 @@ def _checked_names(node: ast.expr, text: str, accepted: list[str], depth: int = 
                 raise ExpressionError(f"'{text}' calls {name} with {len(args)} arguments; accepted: {wanted}")
             return names_in(*args)
         case ast.Call():
-            raise ExpressionError(
-                f"'{text}' calls '{ast.unparse(node.func)}'; accepted: {' '.join(FUNCTIONS)}"
-            )
+            raise ExpressionError(f"'{text}' calls '{ast.unparse(node.func)}'; accepted: {' '.join(FUNCTIONS)}")
         case ast.Attribute():
             raise ExpressionError(f"'{text}' uses the attribute '{ast.unparse(node)}'; accepted: plain names")
         case _:

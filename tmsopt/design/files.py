@@ -60,9 +60,7 @@ def load(path: str | PathLike[str]) -> Problem:
     except tomllib.TOMLDecodeError as error:
         place = re.search(r"line (\d+)", str(error))
         message = f"not TOML: {error}"
-        raise InputError(
-            [Fault(message).at(file, int(place[1]) if place else text.count("\n") + 1)]
-        ) from None
+        raise InputError([Fault(message).at(file, int(place[1]) if place else text.count("\n") + 1)]) from None
     except RecursionError:
         raise InputError([Fault("not TOML: nested too deeply", file=file)]) from None
     lines = _lines(text)
@@ -92,9 +90,7 @@ def load(path: str | PathLike[str]) -> Problem:
                 title=parsed.title or Path(file).stem,
             )
         except InputError as error:
-            reported = {f.key[:2] for f in faults} | {
-                f.key[:1] for f in faults if f.key[:1] == ("objective",)
-            }
+            reported = {f.key[:2] for f in faults} | {f.key[:1] for f in faults if f.key[:1] == ("objective",)}
             faults = faults + [f for f in error.faults if f.key[:2] not in reported]
     if problem is None or faults:
         placed = [f.at(file, _line_of(lines, f.key)) for f in faults]
@@ -108,9 +104,7 @@ def _text(file: str) -> str:
         if path.is_dir():
             raise InputError([Fault("is a directory; accepted: a TOML problem file", file=file)])
         if not path.exists():
-            near = suggest(
-                path.name, [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
-            )
+            near = suggest(path.name, [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else [])
             hint = f"; {near}" if "did you mean" in near else ""
             raise InputError([Fault(f"no such file{hint}", file=file)])
         if not path.is_file():
@@ -123,16 +117,12 @@ def _text(file: str) -> str:
             raise
         raise InputError([Fault(f"cannot be read: {reason}", file=file)]) from None
     if len(raw) > LARGEST:
-        raise InputError(
-            [Fault(f"is larger than {LARGEST} bytes; accepted: a problem file of a few lines", file=file)]
-        )
+        raise InputError([Fault(f"is larger than {LARGEST} bytes; accepted: a problem file of a few lines", file=file)])
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = raw[: error.start].count(b"\n") + 1
-        raise InputError(
-            [Fault(f"not TOML: byte {raw[error.start]:#x} is not UTF-8").at(file, line)]
-        ) from None
+        raise InputError([Fault(f"not TOML: byte {raw[error.start]:#x} is not UTF-8").at(file, line)]) from None
 
 
 def _shape(data: Mapping[str, Any]) -> tuple[list[Fault], _File | None]:
@@ -143,9 +133,7 @@ def _shape(data: Mapping[str, Any]) -> tuple[list[Fault], _File | None]:
         try:
             return list(faults.values()), _File.model_validate(pruned)
         except ValidationError as error:
-            found = [
-                _shape_fault(d["loc"], d["type"], d.get("input")) for d in error.errors(include_url=False)
-            ]
+            found = [_shape_fault(d["loc"], d["type"], d.get("input")) for d in error.errors(include_url=False)]
             deepest = {f.key[:2]: max(len(g.key) for g in found if g.key[:2] == f.key[:2]) for f in found}
             for fault in found:
                 if len(fault.key) == deepest[fault.key[:2]]:
@@ -181,14 +169,10 @@ def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:
         case ("objective", sense, *_) if kind == "extra_forbidden":
             return Fault(f"unknown key '{sense}'; {suggest(sense, _Objective.model_fields)}", key)
         case ("constraints", *_):
-            return Fault(
-                f"found {_short(found)}; accepted: a comparison in quotes, such as 'nu_H >= 0.02'", key
-            )
+            return Fault(f"found {_short(found)}; accepted: a comparison in quotes, such as 'nu_H >= 0.02'", key)
         case _:
             table = key in (("parameters",), ("objective",))
-            return Fault(
-                f"found {_short(found)}; accepted: {'a table' if table else 'a text in quotes'}", key
-            )
+            return Fault(f"found {_short(found)}; accepted: {'a table' if table else 'a text in quotes'}", key)
 
 
 def _short(value: Any) -> str:

@@ -132,9 +132,7 @@ def variables_of(problem: Problem, design: Mapping[str, float]) -> list[float]:
 def design_of(problem: Problem, x: Sequence[float]) -> dict[str, float]:
     """The free parameters for variables of the NLP, inside their ranges."""
     of = problem.parameter_set
-    plain = {
-        n: float(np.arctan(v)) if of[n].tangent else float(v) for n, v in zip(problem.free, x, strict=False)
-    }
+    plain = {n: float(np.arctan(v)) if of[n].tangent else float(v) for n, v in zip(problem.free, x, strict=False)}
     return {n: min(max(v, problem.free[n][0]), problem.free[n][1]) for n, v in plain.items()}
 
 
@@ -245,9 +243,7 @@ class _Builder:
         gamma = self.variable("abscissa")
         pairs = self._factors("abscissa", ("beta", "kappa"))
         self.lifts.append(Lift("abscissa", 1 + 2 * len(pairs), _abscissa_guess))
-        self.equal(
-            "abscissa", shift(self.a, gamma), [self.a[0] * c for c in product(*([1, *p] for p in pairs))]
-        )
+        self.equal("abscissa", shift(self.a, gamma), [self.a[0] * c for c in product(*([1, *p] for p in pairs))])
         return gamma
 
     def _damping_ratio(self) -> Any:
@@ -262,9 +258,7 @@ class _Builder:
 
     def _factors(self, name: str, symbols: tuple[str, str]) -> list[tuple[Any, Any]]:
         half = range(1, self.problem.model.degree // 2 + 1)
-        return [
-            (self.variable(f"{symbols[0]}{k}", 0.0), self.variable(f"{symbols[1]}{k}", 0.0)) for k in half
-        ]
+        return [(self.variable(f"{symbols[0]}{k}", 0.0), self.variable(f"{symbols[1]}{k}", 0.0)) for k in half]
 
 
 def _finite(value: Any) -> float:

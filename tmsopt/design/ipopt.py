@@ -61,9 +61,7 @@ def ipopt(nlp: NLP, linear_solver: str = "mumps", max_iterations: int = 300) -> 
     lower, upper = np.array(nlp.lower), np.array(nlp.upper)
 
     def run(start: Array) -> Run:
-        answer = solver(
-            x0=start, lbx=lower, ubx=upper, lbg=np.array(nlp.row_lower), ubg=np.array(nlp.row_upper)
-        )
+        answer = solver(x0=start, lbx=lower, ubx=upper, lbg=np.array(nlp.row_lower), ubg=np.array(nlp.row_upper))
         stats = solver.stats()
         return Run(
             x=np.clip(np.array(answer["x"]).ravel(), lower, upper),

@@ -51,9 +51,7 @@ def polisher(nlp: NLP) -> Callable[[Run], Point]:
         outside = np.concatenate([row_lower - g, g - row_upper, lower - x, x - upper, [0.0]])
         stationarity = gradient.ravel() + jacobian.T @ rows + bounds
         violation = float(outside.max()) if np.all(np.isfinite(g)) else np.inf
-        return Point(
-            x, float(f.item()), violation, float(np.abs(stationarity).max(initial=0.0)), rows, bounds
-        )
+        return Point(x, float(f.item()), violation, float(np.abs(stationarity).max(initial=0.0)), rows, bounds)
 
     def newton(run: Run, loose: bool) -> Point | None:
         at_lower, at_upper = _active(run.x, lower, upper, run.bound_multipliers, loose)

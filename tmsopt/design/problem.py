@@ -222,13 +222,9 @@ def _objective_faults(problem: Problem) -> Iterator[Fault]:
     if problem.minimize is not None and problem.maximize is not None:
         yield Fault("minimize and maximize together; keep one of them", key)
     if problem.locate is not None and problem.locate not in PATTERNS:
-        yield Fault(
-            f"unknown pattern {problem.locate!r}; {suggest(str(problem.locate), PATTERNS)}", (*key, "locate")
-        )
+        yield Fault(f"unknown pattern {problem.locate!r}; {suggest(str(problem.locate), PATTERNS)}", (*key, "locate"))
     if problem.free and problem.minimize is None and problem.maximize is None and problem.locate is None:
-        yield Fault(
-            "parameters are free, but nothing is asked of them; write minimize, maximize or locate", key
-        )
+        yield Fault("parameters are free, but nothing is asked of them; write minimize, maximize or locate", key)
 
 
 def _expression_faults(problem: Problem, of: ParameterSet) -> Iterator[Fault]:

@@ -43,11 +43,7 @@ def recheck(problem: Problem, parameters: Mapping[str, float]) -> Checked:
             violations[problem.locate] = distance
     objective = float(problem.objective(values)) if problem.objective else math.nan
     of = problem.parameter_set
-    names = [
-        n
-        for n in (*problem.model.quantity_names(of), "damping_ratio")
-        if n not in problem.model.sets[0].names
-    ]
+    names = [n for n in (*problem.model.quantity_names(of), "damping_ratio") if n not in problem.model.sets[0].names]
     return Checked(
         structure=found,
         realised=realised_abscissa(problem, parameters),

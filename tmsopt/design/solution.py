@@ -131,8 +131,7 @@ class Solution:
                 "kind": self.freedom.kind,
             },
             "branches": [
-                {"parameters": _numbers(b.parameters), "excluded_by": list(b.excluded_by)}
-                for b in self.branches
+                {"parameters": _numbers(b.parameters), "excluded_by": list(b.excluded_by)} for b in self.branches
             ],
             "notes": list(self.notes),
         }

@@ -128,9 +128,7 @@ def _searched(
         active=_active(problem, nlp, point),
         starts=Starts(len(candidates), sum(c.feasible for c in candidates), at_best),
         formulation=nlp.formulation,
-        branches=other_branches(problem, nlp, starting, parameters)
-        if freedom(problem).kind == "square"
-        else (),
+        branches=other_branches(problem, nlp, starting, parameters) if freedom(problem).kind == "square" else (),
         notes=tuple(notes),
     )
 

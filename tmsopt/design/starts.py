@@ -66,9 +66,7 @@ def _merit(problem: Problem, columns: Mapping[str, Array]) -> Array:
     """Objective plus violated constraints of many designs, each in units of its own spread; small is good."""
     parameters = problem.ordered(columns)
     shape = next(iter(columns.values())).shape
-    arrays = {
-        name: np.broadcast_to(np.asarray(value, dtype=float), shape) for name, value in parameters.items()
-    }
+    arrays = {name: np.broadcast_to(np.asarray(value, dtype=float), shape) for name, value in parameters.items()}
     values = Values(problem.model, problem.parameter_set, arrays, extra=_ARRAY_ROOT_QUANTITIES)
     merit = np.zeros(shape)
     if problem.objective is not None:
@@ -92,9 +90,7 @@ def _regular(coefficients: Array) -> Array:
     """Coefficients with a leading 0, of a singular mass matrix, moved a little off: one root at infinity."""
     size = np.abs(coefficients).max(axis=-1, initial=0.0) + 1e-300
     lead = coefficients[..., 0]
-    return np.concatenate(
-        [np.where(lead == 0, 1e-12 * size, lead)[..., None], coefficients[..., 1:]], axis=-1
-    )
+    return np.concatenate([np.where(lead == 0, 1e-12 * size, lead)[..., None], coefficients[..., 1:]], axis=-1)
 
 
 def _mismatch(nlp: NLP, x: list[float], guess: list[float]) -> float:
@@ -120,6 +116,5 @@ def _array_damping(values: Mapping[str, Any]) -> Array:
 
 
 _ARRAY_ROOT_QUANTITIES = tuple(
-    replace(q, value={"abscissa": _array_abscissa, "damping_ratio": _array_damping}[q.name])
-    for q in ROOT_QUANTITIES
+    replace(q, value={"abscissa": _array_abscissa, "damping_ratio": _array_damping}[q.name]) for q in ROOT_QUANTITIES
 )

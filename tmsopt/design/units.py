@@ -39,9 +39,7 @@ def with_unit(text: str, unit: str) -> float:
         raise ValueError(f"found the unit '{written}', which does not read as a unit; {accepted}")
     factor = _factor(written.replace("²", "^2").replace("³", "^3").replace("°", "deg"), unit)
     if factor is None:
-        raise ValueError(
-            f"found the unit '{written}', which is not known or not a unit of {unit}; {accepted}"
-        )
+        raise ValueError(f"found the unit '{written}', which is not known or not a unit of {unit}; {accepted}")
     return number * factor
 
 

@@ -27,9 +27,7 @@ def copo(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, T: 
     return [
         (chi_H - 1 - zeta_H * T) * zeta_B * zeta_B,
         Fr * (zeta_B * chi_H - zeta_H * chi_B) * zeta_B,
-        Fr * Fr * (zeta_B - zeta_H) * zeta_B
-        - zeta_B * (zeta_B + zeta_H) * T
-        - (chi_H - 1) * (mu * zeta_H - zeta_B),
+        Fr * Fr * (zeta_B - zeta_H) * zeta_B - zeta_B * (zeta_B + zeta_H) * T - (chi_H - 1) * (mu * zeta_H - zeta_B),
         Fr * (chi_H - chi_B) * zeta_B,
         -zeta_B * T - mu * (chi_H - 1),
     ]

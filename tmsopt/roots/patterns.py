@@ -57,14 +57,10 @@ def _splits(size: int) -> Callable[[Roots], list[tuple[Roots, Roots]]]:
 
     def split(roots: Roots) -> list[tuple[Roots, Roots]]:
         every = range(len(roots))
-        chosen = [
-            (roots[list(c)], roots[[k for k in every if k not in c]]) for c in combinations(every, size)
-        ]
+        chosen = [(roots[list(c)], roots[[k for k in every if k not in c]]) for c in combinations(every, size)]
         close = 1e-9 * (np.abs(roots).max() + 1e-300)
         return [
-            (a, b)
-            for a, b in chosen
-            if abs(a.sum().imag) <= close and abs(a.prod().imag) <= close * np.abs(a).max()
+            (a, b) for a, b in chosen if abs(a.sum().imag) <= close and abs(a.prod().imag) <= close * np.abs(a).max()
         ]
 
     return split

@@ -39,9 +39,7 @@ def evaluate(coefficients: Coefficients, s: Any) -> Any:
     return value
 
 
-def quadratic_pencil(
-    M: Sequence[Coefficients], D: Sequence[Coefficients], K: Sequence[Coefficients]
-) -> list[Any]:
+def quadratic_pencil(M: Sequence[Coefficients], D: Sequence[Coefficients], K: Sequence[Coefficients]) -> list[Any]:
     """Coefficients of det(M s² + D s + K) for square matrices given as nested sequences."""
     size = range(len(M))
     return determinant([[[M[i][j], D[i][j], K[i][j]] for j in size] for i in size])

@@ -54,13 +54,7 @@ def discriminant(coefficients: Coefficients) -> Any:
         case [a, b, c]:
             return b * b - 4 * a * c
         case [a, b, c, d]:
-            return (
-                b * b * c * c
-                - 4 * a * c * c * c
-                - 4 * b * b * b * d
-                - 27 * a * a * d * d
-                + 18 * a * b * c * d
-            )
+            return b * b * c * c - 4 * a * c * c * c - 4 * b * b * b * d - 27 * a * a * d * d + 18 * a * b * c * d
         case [a, b, c, d, e]:
             i = 12 * a * e - 3 * b * d + c * c
             j = 72 * a * c * e + 9 * b * c * d - 27 * a * d * d - 27 * e * b * b - 2 * c * c * c

@@ -53,9 +53,7 @@ def structure(coefficients: ArrayLike, tolerance: float = 1e-12) -> Structure:
     """
     c = np.asarray(coefficients, dtype=float)
     if c.shape != (5,):
-        raise ValueError(
-            f"structure takes the five coefficients of a quartic, not an array of shape {c.shape}"
-        )
+        raise ValueError(f"structure takes the five coefficients of a quartic, not an array of shape {c.shape}")
     found = numeric_roots(c)
     undecided: Structure | None = None
     for candidate, on_the_line in _CANDIDATES:
@@ -94,9 +92,7 @@ def _nearest(
         roots = _merged(pattern, unknowns)
         line = max(r.re for r in roots)
         width = 1e-6 * (np.abs(found).max() + 1e-300)
-        right = np.array(
-            [complex(r.re, r.im) for r in roots for _ in range(r.multiplicity) if r.re >= line - width]
-        )
+        right = np.array([complex(r.re, r.im) for r in roots for _ in range(r.multiplicity) if r.re >= line - width])
         if on_the_line(right, width):
             best = Structure(pattern.name, roots, distance)
     return best

@@ -1,0 +1,140 @@
+"""Solutions and comparisons as text for a reader."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+
+from tmsopt.design.solution import Solution
+from tmsopt.models.tms import GRAVITY, to_si
+from tmsopt.roots import Root
+from tmsopt.study.compare import Comparison
+
+_SI_OF = {"Fr": "v", "mu": "m_H", "chi_B": "x_B", "chi_H": "x_H", "zeta_B": "z_B", "zeta_H": "z_H"}
+_UNITS = {"v": "m/s", "x_B": "m", "x_H": "m", "z_B": "m", "z_H": "m", "m_H": "kg", "m_B": "kg", "w": "m"}
+
+
+def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> Mapping[str, float]:
+    """SI parameters: as solved for, or for the given wheelbase, rear mass and gravity."""
+    own = solution.problem.parameter_set.name == "SI"
+    return solution.parameters if own else to_si(solution.dimensionless, w, m_B, g)
+
+
+def solution_table(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> str:
+    """A design, dimensionless and in SI side by side, with its roots, bound, limits and remarks."""
+    si = si_parameters(solution, w, m_B, g)
+    lines = [solution.problem.title or "untitled problem", _headline(solution), ""]
+    lines += _columns(_parameter_rows(solution, si)) + [""]
+    lines += _columns(_result_rows(solution, si)) + [""]
+    lines += _facts(solution)
+    return "\n".join(line.rstrip() for line in lines).rstrip()
+
+
+def comparison_table(comparison: Comparison) -> str:
+    """Law beside number, then the two formulations beside each other."""
+    design = comparison.design
+    lines = [design.problem.title or "untitled problem", _headline(design), ""]
+    rows = [("law", "of", "numeric", "law says", "relative", "")]
+    for row in comparison.laws:
+        verdict = row.reason or ("agrees" if row.agrees else "DIFFERS")
+        relative = f"{row.relative:.1e}" if row.applies else ""
+        law = _number(row.law) if row.applies else ""
+        rows.append((row.label, row.subject, _number(row.numeric), law, relative, verdict))
+    lines += _columns(rows)
+    lines.append("")
+    if comparison.other is None:
+        lines.append(f"other formulation: none, {comparison.reason}")
+    else:
+        names = f"{comparison.other.formulation} minus {design.formulation}"
+        rows2 = [("formulations", names)] + [(n, f"{d:.1e}") for n, d in comparison.differences.items()]
+        lines += _columns(rows2)
+    lines += [line for line in _facts(design) if line.startswith("also solved")]
+    return "\n".join(line.rstrip() for line in lines).rstrip()
+
+
+def _headline(solution: Solution) -> str:
+    problem = solution.problem
+    text = problem.minimize or problem.maximize
+    asked = f"{problem.sense} {text} = {_number(solution.value)}" if text else ""
+    located = f"locate {problem.locate}" if problem.locate else ""
+    proven = ", proven globally" if solution.bound.proven else ""
+    words = solution.status.replace("_", " ")
+    return "   ".join(part for part in (f"{words}{proven}", located, asked, f"structure {solution.structure}") if part)
+
+
+def _parameter_rows(solution: Solution, si: Mapping[str, float]) -> list[Sequence[str]]:
+    own = solution.problem.parameter_set.name == "SI"
+    scale = "SI" if own else f"SI for w = {si['w']:g} m, m_B = {si['m_B']:g} kg"
+    rows: list[Sequence[str]] = [("", "dimensionless", "", scale, "", "")]
+    for name, value in solution.dimensionless.items():
+        if name == "lambda_s":
+            free = _freedom(solution, "lambda_s")
+            rows.append((name, _number(value), "lambda_s", _number(math.degrees(value)), "deg", free))
+            continue
+        symbol = _SI_OF[name]
+        free = _freedom(solution, symbol if own else name)
+        rows.append((name, _number(value), symbol, _number(si[symbol]), _UNITS[symbol], free))
+    if own:
+        rows += [("", "", n, _number(si[n]), _UNITS[n], _freedom(solution, n)) for n in ("w", "m_B")]
+    return rows
+
+
+def _freedom(solution: Solution, name: str) -> str:
+    return "free" if name in solution.problem.free else "fixed"
+
+
+def _result_rows(solution: Solution, si: Mapping[str, float]) -> list[Sequence[str]]:
+    rate = math.sqrt(si["g"] / si["w"])
+    q = solution.quantities
+    rows: list[Sequence[str]] = []
+    for name, value in (("abscissa", solution.abscissa), ("  as stored", solution.abscissa_realised)):
+        time = f"{1 / (-value * rate):.4g}" if value < 0 else ""
+        rows.append((name, _number(value), "decay time" if time else "", time, "s" if time else ""))
+    rows.append(("damping_ratio", _number(q["damping_ratio"]), "", "", ""))
+    critical = q["Fr_c"]
+    speed = f"{critical * math.sqrt(si['g'] * si['w']):.8g}" if math.isfinite(critical) else ""
+    rows.append(("Fr_c", _number(critical), "v_c" if speed else "", speed, "m/s" if speed else ""))
+    rows.append(("nu_H", _number(q["nu_H"]), "u_H", _number(q["nu_H"] * si["w"]), "m"))
+    rows.append(("chi_T", _number(q["chi_T"]), "x_T", _number(q["chi_T"] * si["w"]), "m"))
+    return rows
+
+
+def _facts(solution: Solution) -> list[str]:
+    lines = ["roots: " + ", ".join(_roots(solution.roots))]
+    bound = solution.bound
+    if math.isfinite(bound.value):
+        lines.append(f"bound: no design in the box is below {_number(bound.value)} ({bound.method}); gap {bound.gap:.1e}")
+    free = solution.freedom
+    if solution.problem.locate:
+        lines.append(f"freedom: {free.kind}, {free.free} free parameters and {free.conditions} conditions")
+    if solution.active:
+        gains = ", ".join(f"{name} ({value:.4g})" for name, value in solution.active.items())
+        lines.append(f"limits that bind (gain per unit relaxed): {gains}")
+    for name, value in solution.violations.items():
+        text = solution.problem.constraints.get(name, "pattern")
+        lines.append(f"violated: {name} ({text}) by {value:.4g}")
+    for branch in solution.branches:
+        where = ", ".join(f"{n} = {branch.parameters[n]:.10g}" for n in solution.problem.free)
+        lines.append(f"also solved by {where}; excluded by {', '.join(branch.excluded_by) or 'nothing'}")
+    if solution.starts.tried:
+        s = solution.starts
+        lines.append(f"starts: {s.tried} tried, {s.converged} converged, {s.at_best} at the best; {solution.seconds:.2f} s")
+    return lines + [f"note: {note}" for note in solution.notes]
+
+
+def _roots(roots: Iterable[Root]) -> list[str]:
+    """Roots as text, a conjugate pair as one entry."""
+    words = []
+    for root in roots:
+        if root.im < 0:
+            continue
+        value = f"{root.re:.8g}" + (f" ± {root.im:.8g}i" if root.im else "")
+        words.append(value + (f" ({root.multiplicity}-fold)" if root.multiplicity > 1 else ""))
+    return words
+
+
+def _number(value: float) -> str:
+    return f"{value:.12g}" if math.isfinite(value) else "none"
+
+
+def _columns(rows: Sequence[Sequence[str]]) -> list[str]:
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    return ["  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]

@@ -1,0 +1,1 @@
+"""Studies over designs: beside the laws, over speeds."""
