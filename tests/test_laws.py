@@ -80,9 +80,7 @@ def ep4_defect(design: laws.EP4, mu: float, chi_H: float, zeta_B: float, zeta_H:
     values = (design.Fr, mu, design.chi_B, chi_H, zeta_B, zeta_H, design.tan_lambda_s)
     a, sizes = oracles.polynomial_exact(*values), term_sizes(*values)
     powers = [comb(4, i) * Fraction(-float(design.omega0)) ** i for i in range(5)]
-    return max(
-        abs(float(a[i] - a[0] * powers[i])) / (sizes[i] + sizes[0] * float(abs(powers[i]))) for i in range(5)
-    )
+    return max(abs(float(a[i] - a[0] * powers[i])) / (sizes[i] + sizes[0] * float(abs(powers[i]))) for i in range(5))
 
 
 # The polynomial
@@ -105,9 +103,7 @@ def test_the_printed_coefficients_are_the_determinant_symbolically() -> None:
     printed = [
         -(zeta_H * T - chi_H + 1) * zeta_B**2,
         Fr * (zeta_B * chi_H - zeta_H * chi_B) * zeta_B,
-        Fr**2 * (zeta_B - zeta_H) * zeta_B
-        - zeta_B * (zeta_B + zeta_H) * T
-        - (chi_H - 1) * (mu * zeta_H - zeta_B),
+        Fr**2 * (zeta_B - zeta_H) * zeta_B - zeta_B * (zeta_B + zeta_H) * T - (chi_H - 1) * (mu * zeta_H - zeta_B),
         -Fr * (chi_B - chi_H) * zeta_B,
         -zeta_B * T - mu * (chi_H - 1),
     ]
@@ -124,9 +120,7 @@ def test_matrices_give_copo() -> None:
     for s in (0.7, -1.3 + 0.4j):
         determinant = np.linalg.det(M * s**2 + V * s + P)
         scale = np.linalg.norm(M * s**2 + V * s + P, axis=(1, 2)) ** 2
-        value = (
-            np.polyval(laws.copo(**parameters), s) * parameters["mu"] * nu_H * np.cos(parameters["lambda_s"])
-        )
+        value = np.polyval(laws.copo(**parameters), s) * parameters["mu"] * nu_H * np.cos(parameters["lambda_s"])
         assert np.all(abs(determinant - value) < 1e-13 * scale)
 
 
@@ -153,9 +147,7 @@ PRINTED = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("value", "printed", "units"), [row[1:] for row in PRINTED], ids=[row[0] for row in PRINTED]
-)
+@pytest.mark.parametrize(("value", "printed", "units"), [row[1:] for row in PRINTED], ids=[row[0] for row in PRINTED])
 def test_printed_decimals(value: float, printed: str, units: float) -> None:
     unit = 10.0 ** -len(printed.partition(".")[2])
     assert abs(value - float(printed)) <= units * unit
@@ -179,7 +171,7 @@ def test_printed_radicals(value: float, printed: float) -> None:
 
 
 def test_the_benchmark_equations_are_the_general_ones() -> None:
-    """`e1`, `e2`, `e3` are a2 - 6 a0, a4 - a0 and p(-1): their decimals are exact, so only rounding."""
+    """`e1`, `e2`, `e3` are a2 - 6 a0, a4 - a0, p(-1) with exact decimals: they differ by rounding only."""
     rng = np.random.default_rng(3)
     Fr, mu, lambda_s = rng.uniform(0, 4, 20), rng.uniform(0, 30, 20), rng.uniform(0, 1.2, 20)
     a = laws.copo(Fr, mu, 1.19, 1.02, ZB, ZH, lambda_s)
@@ -189,9 +181,7 @@ def test_the_benchmark_equations_are_the_general_ones() -> None:
         (laws.e3(Fr, mu, lambda_s), np.polyval(a, -1)),
     ):
         assert np.allclose(law, general, rtol=0, atol=1e-14)
-    assert np.allclose(
-        laws.e1(Fr, mu, lambda_s), ZB * laws.a2(Fr, mu, 1.02, ZB, ZH, lambda_s, -1), atol=1e-14
-    )
+    assert np.allclose(laws.e1(Fr, mu, lambda_s), ZB * laws.a2(Fr, mu, 1.02, ZB, ZH, lambda_s, -1), atol=1e-14)
 
 
 def test_the_benchmark_equations_have_two_solutions_one_with_positive_mass_ratio() -> None:
@@ -345,9 +335,7 @@ def test_ep4_is_a_fourfold_root_on_both_branches(omega0, zeta_B, zeta_H, chi_H) 
     assert second.mu < 0  # so the paper's uniqueness claim holds for every geometry
     if first.mu > 0:
         assert (chi_H - 1) * (zeta_H - zeta_B) * (omega0 - laws.w01(zeta_B, zeta_H)) > 0
-        at_it = oracles.polynomial_exact(
-            first.Fr, first.mu, first.chi_B, chi_H, zeta_B, zeta_H, first.tan_lambda_s
-        )
+        at_it = oracles.polynomial_exact(first.Fr, first.mu, first.chi_B, chi_H, zeta_B, zeta_H, first.tan_lambda_s)
         assert at_it[0] * Fraction(float(first.tan_lambda_s)) > 0  # one class per sign of lambda_s
 
 
@@ -452,6 +440,9 @@ def test_frm_is_the_least_critical_Froude_number(zeta_B, ratio, T) -> None:
     best = laws.chibm(zeta_B, zeta_H)
     assert laws.Frc1(best, zeta_B, zeta_H, lambda_s) == pytest.approx(least**2, rel=1e-10)
     assert laws.Fr_c2_chi_H_1(zeta_B, zeta_H, lambda_s) == pytest.approx(least**2, rel=1e-10)
+    # Frc1(chi) = Frc1(zeta_B/(zeta_H chi)): the minimiser is the fixed point, found sharper than any minimum
+    mirrored = [laws.Frc1(best * q, zeta_B, zeta_H, lambda_s) for q in (ratio**0.25, ratio**-0.25)]
+    assert mirrored[0] == pytest.approx(mirrored[1], rel=1e-11)
     inside = 1 + (1 / ratio - 1) * np.linspace(0.001, 0.999, 400)  # between the poles 1 and zeta_B/zeta_H
     assert (laws.Frc1(inside, zeta_B, zeta_H, lambda_s) >= least**2 * (1 - 1e-10)).all()
     assert laws.Frc1(1 / ratio + 0.1, zeta_B, zeta_H, lambda_s) < 0  # beyond, no speed is critical
@@ -495,16 +486,15 @@ def test_epset_ends_at_its_pole() -> None:
 def test_dp_bounds_the_tilt_of_heavy_damping(zeta_B, zeta_H) -> None:
     """Below the bound some speed makes all roots real and negative, above none does; certified roots."""
     chi_B, bound = laws.dp(zeta_B, zeta_H)
+    design = laws.ep4_chi_H_1(zeta_B, zeta_H)
+    assert (chi_B, bound) == pytest.approx((design.chi_B, design.tan_lambda_s), rel=1e-13)
 
     def heavily_damped(tilt: float) -> bool:
-        speeds = laws.ep4_chi_H_1(zeta_B, zeta_H).Fr * np.linspace(0.5, 2, 101)
-        end = laws.epset(
-            zeta_B, zeta_H, np.arctan(tilt)
-        )  # near the EP4 the range of speeds is short and ends here
+        speeds = design.Fr * np.linspace(0.5, 2, 101)
+        end = laws.epset(zeta_B, zeta_H, np.arctan(tilt))  # near the EP4 the range of speeds is short and ends here
         speeds = np.append(speeds, [] if np.isnan(end) else end * (1 - np.geomspace(1e-6, 0.1, 50)))
         spectra = (
-            oracles.certified_roots(oracles.polynomial_exact(Fr, 1, chi_B, 1, zeta_B, zeta_H, tilt))
-            for Fr in speeds
+            oracles.certified_roots(oracles.polynomial_exact(Fr, 1, chi_B, 1, zeta_B, zeta_H, tilt)) for Fr in speeds
         )
         return any(all(root.imag == 0 and root.real < 0 for root, _ in spectrum) for spectrum in spectra)
 
@@ -556,9 +546,7 @@ def test_the_dual_of_EP4_is_EP4() -> None:
     ours, theirs = laws.ep4_chi_H_1(ZB, ZH), laws.ep4_chi_H_1(ZH, ZB)
     dual = laws.dual(ours.Fr, ours.chi_B, ZB, ZH, ours.lambda_s)
     assert (dual["zeta_B"], dual["zeta_H"]) == (ZH, ZB)
-    assert [dual["Fr"], dual["chi_B"], dual["lambda_s"]] == pytest.approx(
-        [theirs.Fr, theirs.chi_B, theirs.lambda_s]
-    )
+    assert [dual["Fr"], dual["chi_B"], dual["lambda_s"]] == pytest.approx([theirs.Fr, theirs.chi_B, theirs.lambda_s])
     assert ours.lambda_s > 0 > theirs.lambda_s
 
 
@@ -600,9 +588,7 @@ def test_every_law_broadcasts(law, arguments) -> None:
                 assert np.array_equal(leaf, part, equal_nan=True)
                 continue
             own = leaf[0, 0] if law.__name__ == "matrices" else leaf[..., 0, 0]
-            assert leaf.shape == (
-                (2, 3, *np.shape(part)) if law.__name__ == "matrices" else (*np.shape(part), 2, 3)
-            )
+            assert leaf.shape == ((2, 3, *np.shape(part)) if law.__name__ == "matrices" else (*np.shape(part), 2, 3))
             assert np.array_equal(own, part, equal_nan=True)
     listed = {name: [value] for name, value in arguments.items()}
     for leaf, part in zip(_leaves(law(**listed)), plain, strict=True):

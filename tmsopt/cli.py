@@ -46,7 +46,7 @@ def _common(command: Command) -> Command:
     for option in (
         click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table."),
         click.option("--starts", type=click.IntRange(min=1), default=None, help="Starts tried at most. [default: 32]"),
-        click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starting designs."),
+        click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts."),
         click.option(
             "--linear-solver", type=click.Choice(["mumps", "spral"]), default="mumps", show_default=True,
             help="Inside IPOPT.",
@@ -74,9 +74,21 @@ def main() -> None:
 @main.command(epilog=_SOLVE_EXAMPLES)
 @click.argument("file", type=click.Path(path_type=Path))
 @_common
-@click.option("--plot", type=click.Path(path_type=Path), help="Draw growth rates and frequencies over Fr (png, pdf, svg).")
-@click.option("--wheelbase", default="1 m", show_default=True, help="For SI numbers of a dimensionless problem.")
-@click.option("--rear-mass", default="1 kg", show_default=True, help="Likewise, the mass m_B of the rear frame.")
+@click.option(
+    "--plot", type=click.Path(path_type=Path), help="Draw growth rates and frequencies over Fr (png, pdf, svg)."
+)
+@click.option(
+    "--wheelbase",
+    default="1",
+    show_default=True,
+    help="For SI numbers of a dimensionless problem, in m or with a unit.",
+)
+@click.option(
+    "--rear-mass",
+    default="1",
+    show_default=True,
+    help="Likewise, the mass m_B of the rear frame, in kg or with a unit.",
+)
 def solve(
     file: Path,
     as_json: bool,
@@ -94,7 +106,7 @@ def solve(
         w, m_B = _scale("--wheelbase", wheelbase, "m"), _scale("--rear-mass", rear_mass, "kg")
         _check_plot(plot)
         problem = load(file)
-    from tmsopt.design.solve import STARTS
+    from tmsopt.design.search import STARTS
     from tmsopt.design.solve import solve as solve_problem
 
     with _progress() as progress:
@@ -121,7 +133,7 @@ def compare(file: Path, as_json: bool, starts: int | None, seed: int, linear_sol
         from tmsopt.design.files import load
 
         problem = load(file)
-    from tmsopt.design.solve import STARTS
+    from tmsopt.design.search import STARTS
     from tmsopt.show.tables import comparison_table
     from tmsopt.study.compare import compare as compare_design
 

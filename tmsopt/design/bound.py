@@ -123,4 +123,4 @@ def _critical(
 def _inside(found: NDArray[Any]) -> NDArray[np.float64]:
     """The real ones among roots that lie in [-1, 1], with a margin for rounding."""
     close = (np.abs(found.imag) < 1e-6) & (np.abs(found.real) <= 1 + 1e-6)
-    return np.clip(found.real[close], -1.0, 1.0)
+    return np.asarray(np.clip(found.real[close], -1.0, 1.0))

@@ -10,18 +10,18 @@ from tmsopt.design.formulations import NLP
 from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Branch
-from tmsopt.design.starts import complete
+from tmsopt.design.starts import complete, designs
 
 _STEPS = 60
 _SAME = 1e-6
+_ISOLATED = 1e-9  # ratio of singular values below which a solution is one of a continuum, such as p = 0
+_STARTS = 12
 
 
-def other_branches(
-    problem: Problem, nlp: NLP, starting: list[dict[str, float]], found: Mapping[str, float]
-) -> tuple[Branch, ...]:
+def other_branches(problem: Problem, nlp: NLP, found: Mapping[str, float]) -> tuple[Branch, ...]:
     """Solutions of the equations other than the one found, each with the bounds and rows that it violates.
 
-    Damped Newton from the given designs and their mirror images outside the box; a count, not a proof, of all.
+    Damped Newton from a few designs and their mirror images outside the box: what it finds exists, but more may.
     """
     of = problem.parameter_set
     x = ca.SX.sym("x", len(nlp.variables))
@@ -33,7 +33,7 @@ def other_branches(
     system = ca.Function("system", [x], [equations, ca.jacobian(equations, x), g])
     branches: list[Branch] = []
     known = [np.array([found[n] for n in problem.free])]
-    for start in starting:
+    for start in designs(problem, 0, _STARTS):
         origin = complete(nlp, problem, start)
         for mirrored in (origin, *_mirrors(problem, origin)):
             end = _newton(system, mirrored)
@@ -59,6 +59,7 @@ def _mirrors(problem: Problem, x: NDArray[np.float64]) -> list[NDArray[np.float6
 
 
 def _newton(system: ca.Function, x: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """An isolated solution of the equations, or None."""
     residual = np.inf
     for _ in range(_STEPS):
         value, jacobian, _ = (np.array(part) for part in system(x))
@@ -75,7 +76,9 @@ def _newton(system: ca.Function, x: NDArray[np.float64]) -> NDArray[np.float64] 
                 break
             damping /= 2
         x = x + damping * step
-    return x if residual <= 1e-11 * (1 + np.abs(x).max()) else None
+    spread = np.linalg.svd(jacobian, compute_uv=False)
+    isolated = spread[-1] > _ISOLATED * spread[0]
+    return x if isolated and residual <= 1e-11 * (1 + np.abs(x).max()) else None
 
 
 def _excluded(problem: Problem, nlp: NLP, x: NDArray[np.float64], system: ca.Function) -> tuple[str, ...]:

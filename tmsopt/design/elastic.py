@@ -9,19 +9,18 @@ from tmsopt.design.formulations import NLP, design_of
 from tmsopt.design.ipopt import ipopt
 from tmsopt.design.problem import Problem
 from tmsopt.design.recheck import recheck
-from tmsopt.design.starts import complete
+from tmsopt.design.starts import complete, designs
 
 _TRIED = 6
 
 
-def least_violating(
-    problem: Problem, nlp: NLP, linear_solver: str, starting: list[dict[str, float]]
-) -> dict[str, float]:
+def least_violating(problem: Problem, nlp: NLP, seed: int, linear_solver: str) -> dict[str, float]:
     """Free parameters with the smallest sum of violations that a few starts reach."""
     relaxed, rows = _elastic(problem, nlp)
     run = ipopt(relaxed, linear_solver)
+    starting = designs(problem, seed, _TRIED)
     best, least = starting[0], math.inf
-    for design in starting[:_TRIED]:
+    for design in starting:
         x = complete(nlp, problem, design)
         g = np.array(nlp.functions(x)[1]).ravel()[rows]
         slack = np.maximum(np.maximum(np.array(nlp.row_lower)[rows] - g, g - np.array(nlp.row_upper)[rows]), 0.0)

@@ -135,7 +135,9 @@ def _parse(text: str) -> ast.expr:
         ) from None
 
 
-def _checked_names(node: ast.expr, text: str, accepted: list[str], depth: int = 0) -> tuple[str, ...]:
+def _checked_names(  # noqa: PLR0912 - one case per kind of node
+    node: ast.expr, text: str, accepted: list[str], depth: int = 0
+) -> tuple[str, ...]:
     """Names that an expression uses; raises on anything but the accepted arithmetic."""
     if depth > _DEEPEST:
         raise ExpressionError(f"'{text[:60]}…' is nested deeper than {_DEEPEST} levels")
@@ -146,7 +148,7 @@ def _checked_names(node: ast.expr, text: str, accepted: list[str], depth: int = 
 
     match node:
         case ast.Constant(value=bool()):
-            raise ExpressionError(f"'{text}' uses {node.value}; accepted: numbers and names")
+            raise ExpressionError(f"'{text}' uses {node.value!r}; accepted: numbers and names")
         case ast.Constant(value=int() | float()):
             _number(node, text)
             return ()
@@ -176,9 +178,8 @@ def _checked_names(node: ast.expr, text: str, accepted: list[str], depth: int = 
         case ast.Attribute():
             raise ExpressionError(f"'{text}' uses the attribute '{ast.unparse(node)}'; accepted: plain names")
         case _:
-            raise ExpressionError(
-                f"'{text}' contains '{ast.unparse(node)}'; accepted: numbers, names, + - * / ** and {' '.join(FUNCTIONS)}"
-            )
+            accepted_words = f"numbers, names, + - * / ** and {' '.join(FUNCTIONS)}"
+            raise ExpressionError(f"'{text}' contains '{ast.unparse(node)}'; accepted: {accepted_words}")
 
 
 def _number(node: ast.Constant, text: str) -> float:

@@ -150,7 +150,7 @@ def _without(data: Mapping[str, Any], key: tuple[str, ...]) -> dict[str, Any]:
     return {k: v for k, v in data.items() if k != key[0]}
 
 
-def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:
+def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:  # noqa: PLR0911 - one per case
     """One pydantic complaint in the words of the problem file."""
     tags = ("_FreeParameter", "float", "int", "str")
     key = tuple(str(k) for k in where if k not in tags)

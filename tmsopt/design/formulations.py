@@ -113,8 +113,8 @@ def matching(problem: Problem, pattern: Pattern | None = None) -> NLP:
     if pattern is None:
         raise ValueError("matching needs a pattern; give the problem locate = 'EP4' or another")
     build = _Builder(problem)
-    build.constraints()
     build.pattern(pattern)
+    build.constraints()
     left = freedom(problem).count
     if problem.objective is not None and left >= 0:
         build.optimise(problem)
@@ -198,6 +198,8 @@ class _Builder:
     def pattern(self, pattern: Pattern) -> None:
         unknowns = [self.variable(f"{pattern.name}.{u}") for u in pattern.unknowns]
         self.lifts.append(Lift(pattern.name, len(unknowns), lambda v, z: pattern.guesses(z)))
+        if pattern.abscissa is not None:
+            self.values.define("abscissa", pattern.abscissa(unknowns))
         matched = [self.a[0] * c for c in pattern.monic(unknowns)]
         if freedom(self.problem).count >= 0:
             self.equal(pattern.name, self.a, matched)

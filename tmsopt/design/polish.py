@@ -56,12 +56,12 @@ def polisher(nlp: NLP) -> Callable[[Run], Point]:
     def newton(run: Run, loose: bool) -> Point | None:
         at_lower, at_upper = _active(run.x, lower, upper, run.bound_multipliers, loose)
         x = np.where(at_lower, lower, np.where(at_upper, upper, run.x))
-        free = ~(at_lower | at_upper)
+        free = np.logical_not(np.logical_or(at_lower, at_upper))
         g = np.array(expand(x, run.row_multipliers)[2]).ravel()
         if not np.all(np.isfinite(g)):
             return None
         row_at_lower, row_at_upper = _active(g, row_lower, row_upper, run.row_multipliers, loose)
-        rows = row_at_lower | row_at_upper
+        rows = np.logical_or(row_at_lower, row_at_upper)
         target = np.where(row_at_lower, row_lower, row_upper)[rows]
         dual = np.where(rows, run.row_multipliers, 0.0)
         n, m = int(free.sum()), int(rows.sum())

@@ -10,29 +10,31 @@ from tmsopt.design.expression import Expression, ExpressionError, parse_comparis
 from tmsopt.models import Model, ParameterSet, Quantity, Values
 from tmsopt.roots import PATTERNS, Pattern, Structure, structure
 
-
-def _abscissa(values: Mapping[str, Any]) -> float:
-    return structured(values).abscissa
-
-
-def _damping_ratio(values: Mapping[str, Any]) -> float:
-    return min(-r.re / math.hypot(r.re, r.im) if r.re or r.im else 0.0 for r in structured(values).roots)
+STRUCTURE_TOLERANCE = 1e-11
+"""Relative change of a coefficient within which roots count as multiple: a polished optimum is within 1e-14."""
 
 
-def structured(values: Mapping[str, Any]) -> Structure:
-    """Structure of the roots of a numeric design, multiple roots recognised."""
+def _structure(values: Mapping[str, Any]) -> Structure:
     assert isinstance(values, Values)
     return structure(values.coefficients, STRUCTURE_TOLERANCE)
 
 
-STRUCTURE_TOLERANCE = 1e-11
-"""Relative change of a coefficient within which roots count as multiple: a polished optimum is within 1e-14."""
+def _abscissa(values: Mapping[str, Any]) -> float:
+    return float(values["structure"].abscissa)
+
+
+def _damping_ratio(values: Mapping[str, Any]) -> float:
+    roots = values["structure"].roots
+    return min(-r.re / math.hypot(r.re, r.im) if r.re or r.im else 0.0 for r in roots)
+
 
 ROOT_QUANTITIES = (
     Quantity("abscissa", "1", "largest real part of the roots", r"\alpha", _abscissa),
     Quantity("damping_ratio", "1", "least −Re s/|s| over the roots", r"\zeta", _damping_ratio),
 )
 """Quantities of the roots, for any model."""
+
+_STRUCTURE = Quantity("structure", "", "structure of the roots, multiple roots recognised", "", _structure)
 
 _ROOT_NAMES = tuple(q.name for q in ROOT_QUANTITIES)
 
@@ -117,7 +119,7 @@ class Problem:
 
     def values(self, parameters: Mapping[str, float]) -> Values:
         """Everything derived from a numeric design, root quantities included."""
-        return Values(self.model, self.parameter_set, parameters, extra=ROOT_QUANTITIES)
+        return Values(self.model, self.parameter_set, parameters, extra=(*ROOT_QUANTITIES, _STRUCTURE))
 
     def ordered(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Every parameter in the model's order: the given values of the free ones, and the fixed ones."""

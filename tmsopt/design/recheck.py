@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import flint
 
 from tmsopt.design.frozen import Table
-from tmsopt.design.problem import Problem, structured
+from tmsopt.design.problem import Problem
 from tmsopt.roots import PATTERNS, Structure, exact_abscissa, pattern_distance
 
 FEASIBLE = 1e-9
@@ -34,7 +34,6 @@ class Checked:
 def recheck(problem: Problem, parameters: Mapping[str, float]) -> Checked:
     """Evaluate a design independently of any solver: constraints, pattern, roots and objective."""
     values = problem.values(parameters)
-    found = structured(values)
     conditions = {name: c.violation(values) for name, c in problem.conditions.items()}
     violations = {name: v for name, v in conditions.items() if not v <= FEASIBLE}
     if problem.locate:
@@ -45,7 +44,7 @@ def recheck(problem: Problem, parameters: Mapping[str, float]) -> Checked:
     of = problem.parameter_set
     names = [n for n in (*problem.model.quantity_names(of), "damping_ratio") if n not in problem.model.sets[0].names]
     return Checked(
-        structure=found,
+        structure=values["structure"],
         realised=realised_abscissa(problem, parameters),
         objective=objective,
         violations=Table(violations),
@@ -59,7 +58,7 @@ def realised_abscissa(problem: Problem, parameters: Mapping[str, float]) -> floa
     with flint.ctx.workdps(_DIGITS):
         exact = {name: flint.arb(value) for name, value in parameters.items()}
         coefficients = problem.model.coefficients(exact, problem.parameter_set)
-    leading = next((k for k, c in enumerate(coefficients) if not c.mid() == 0), None)
+    leading = next((k for k, c in enumerate(coefficients) if c.mid() != 0), None)
     if leading is None or leading == len(coefficients) - 1:
         return math.nan
     return exact_abscissa(coefficients[leading:])

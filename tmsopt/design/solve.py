@@ -1,44 +1,25 @@
-"""Multi-start solution of a design problem, rechecked before it is believed."""
+"""The solution of a design problem, rechecked before it is believed."""
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-
-import numpy as np
 
 from tmsopt.design.bound import omega0_bound
 from tmsopt.design.branches import other_branches
 from tmsopt.design.elastic import least_violating
 from tmsopt.design.formulations import NLP, design_of, formulate, freedom
 from tmsopt.design.frozen import Table
-from tmsopt.design.ipopt import Run, ipopt
 from tmsopt.design.polish import Point, polisher
 from tmsopt.design.problem import Problem
 from tmsopt.design.recheck import Checked, recheck
+from tmsopt.design.search import STARTS, Candidate, Progress, same, search
 from tmsopt.design.solution import Bound, Branch, NotSolved, Solution, Starts
-from tmsopt.design.starts import complete, designs
 
-STARTS = 32
-"""Starts tried at most, unless fewer agree earlier."""
-
-_ENOUGH = 8  # starts tried before agreement counts
-_AGREE = 5  # starts at the best value that end the search
-_SAME = 1e-7  # relative difference of objectives that counts as the same
-_STATIONARY = 1e-6
-_FEASIBLE = 1e-8  # of the rows, before polishing; the recheck has the last word
+_STATIONARY = 1e-6  # gradient of the Lagrangian at which a point counts as converged whatever IPOPT says
 _POLISHED = 4  # candidates looked at closely
-
 _CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found")
-
-Progress = Callable[[int, int], None]
-
-
-@dataclass(frozen=True)
-class _Candidate:
-    run: Run
-    objective: float
-    feasible: bool
+_MULTIPLIER = 1e-9  # below it a limit does not bind
 
 
 def solve(
@@ -69,121 +50,102 @@ def solve(
         raise ValueError(f"starts = {starts}; accepted: 1 or more")
     began = time.perf_counter()
     if problem.free:
-        solution = _searched(problem, starts, seed, exhaustive, linear_solver, progress, began)
+        nlp = formulate(problem)
+        candidates = search(
+            problem,
+            nlp,
+            starts=starts,
+            seed=seed,
+            exhaustive=exhaustive,
+            linear_solver=linear_solver,
+            progress=progress,
+        )
+        finding = _best(problem, nlp, candidates) or _least_violating(problem, nlp, candidates, seed, linear_solver)
     else:
-        solution = _evaluated(problem, began)
+        finding = _evaluated(problem)
+    solution = _assembled(problem, finding, began)
     if throw and solution.status != "optimal":
         raise NotSolved(solution)
     return solution
 
 
-def _evaluated(problem: Problem, began: float) -> Solution:
+@dataclass(frozen=True)
+class _Finding:
+    """A design with its standing, ready to be reported."""
+
+    parameters: Mapping[str, float]
+    checked: Checked
+    status: str
+    active: Mapping[str, float]
+    starts: Starts
+    formulation: str
+    branches: tuple[Branch, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def _evaluated(problem: Problem) -> _Finding:
     """Nothing is free: the design is what it is."""
     parameters = problem.ordered({})
     checked = recheck(problem, parameters)
-    status = "infeasible" if checked.violations else "optimal"
-    return _solution(problem, parameters, checked, status, began)
+    return _Finding(parameters, checked, "infeasible" if checked.violations else "optimal", {}, Starts(), "none")
 
 
-def _searched(
-    problem: Problem,
-    starts: int,
-    seed: int,
-    exhaustive: bool,
-    linear_solver: str,
-    progress: Progress | None,
-    began: float,
-) -> Solution:
-    nlp = formulate(problem)
-    run = ipopt(nlp, linear_solver)
-    polish = polisher(nlp)
-    candidates: list[_Candidate] = []
-    starting = designs(problem, seed, starts)
-    for design in starting:
-        candidates.append(_candidate(nlp, run(complete(nlp, problem, design))))
-        if progress:
-            progress(len(candidates), starts)
-        if not exhaustive and _settled(problem, candidates):
-            break
-    best, point, checked = _best(problem, nlp, candidates, polish)
-    if best is None or point is None or checked is None:
-        return _unsolved(problem, nlp, linear_solver, candidates, starting, began)
+def _best(problem: Problem, nlp: NLP, candidates: list[Candidate]) -> _Finding | None:
+    """The best feasible candidate, polished and rechecked; None if no candidate is feasible."""
+    trial = _survivor(problem, nlp, candidates)
+    if trial is None:
+        return None
+    candidate, point, checked = trial
     parameters = problem.ordered(design_of(problem, point.x.tolist()))
-    converged = best.run.status in _CONVERGED or point.stationarity <= _STATIONARY
+    converged = candidate.run.status in _CONVERGED or point.stationarity <= _STATIONARY
+    notes: tuple[str, ...] = ()
     claimed = -point.objective if problem.sense == "maximize" else point.objective
-    notes: list[str] = []
     if problem.objective and not math.isclose(claimed, checked.objective, rel_tol=1e-6, abs_tol=1e-6):
         converged = False
-        notes.append(
+        notes = (
             f"the solver's objective {claimed:.9g} is not the design's, {checked.objective:.9g}: abscissa can only be "
-            "minimised or bounded above, damping_ratio only maximised or bounded below"
+            "minimised or bounded above, damping_ratio only maximised or bounded below",
         )
-    at_best = sum(c.feasible and _close(c.objective, best.objective) for c in candidates)
-    return _solution(
-        problem,
+    square = freedom(problem).kind == "square"
+    return _Finding(
         parameters,
         checked,
         "optimal" if converged and not checked.violations else "not_converged",
-        began,
-        active=_active(problem, nlp, point),
-        starts=Starts(len(candidates), sum(c.feasible for c in candidates), at_best),
-        formulation=nlp.formulation,
-        branches=other_branches(problem, nlp, starting, parameters) if freedom(problem).kind == "square" else (),
-        notes=tuple(notes),
+        _active(problem, nlp, point),
+        Starts(
+            tried=len(candidates),
+            converged=sum(c.feasible for c in candidates),
+            at_best=sum(c.feasible and same(c.objective, candidate.objective) for c in candidates),
+        ),
+        nlp.formulation,
+        other_branches(problem, nlp, parameters) if square else (),
+        notes,
     )
 
 
-def _candidate(nlp: NLP, run: Run) -> _Candidate:
-    f, g = nlp.functions(run.x)
-    rows = np.array(g).ravel()
-    if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(run.x))):
-        return _Candidate(run, math.inf, False)
-    outside = np.concatenate([np.array(nlp.row_lower) - rows, rows - np.array(nlp.row_upper), [0.0]])
-    feasible = bool(outside.max() <= _FEASIBLE) and run.status != "Infeasible_Problem_Detected"
-    return _Candidate(run, float(f), feasible)
+_Trial = tuple[Candidate, Point, Checked]
 
 
-def _close(a: float, b: float) -> bool:
-    return abs(a - b) <= _SAME * (1 + abs(b))
-
-
-def _settled(problem: Problem, candidates: list[_Candidate]) -> bool:
-    """Whether more starts would be waste: the bound is reached, or enough of them agree on the best."""
-    feasible = [c for c in candidates if c.feasible]
-    if not feasible:
-        return False
-    best = min(c.objective for c in feasible)
-    if feasible[-1].objective == best and omega0_bound(problem, best).gap <= 1e-8:
-        return True
-    agreeing = sum(_close(c.objective, best) for c in feasible)
-    if problem.objective is None:  # a located point is as good as another
-        return agreeing >= 1 if freedom(problem).count <= 0 else agreeing >= _AGREE
-    return len(candidates) >= _ENOUGH and agreeing >= _AGREE
-
-
-def _best(
-    problem: Problem, nlp: NLP, candidates: list[_Candidate], polish: Callable[[Run], Point]
-) -> tuple[_Candidate | None, Point | None, Checked | None]:
-    """The best candidate that survives polishing and the recheck; ties go to the smaller violation."""
-    ranked = sorted((c for c in candidates if c.feasible), key=lambda c: c.objective)
-    kept: tuple[_Candidate, Point, Checked] | None = None
-    for candidate in ranked[:_POLISHED]:
-        if kept and not kept[2].violations and not _close(candidate.objective, kept[0].objective):
+def _survivor(problem: Problem, nlp: NLP, candidates: list[Candidate]) -> _Trial | None:
+    """The first of the best candidates to pass the recheck once polished, or the one that fails it least."""
+    polish = polisher(nlp)
+    kept: _Trial | None = None
+    for candidate in sorted((c for c in candidates if c.feasible), key=lambda c: c.objective)[:_POLISHED]:
+        if kept and not kept[2].violations and not same(candidate.objective, kept[0].objective):
             break
         point = polish(candidate.run)
         checked = recheck(problem, problem.ordered(design_of(problem, point.x.tolist())))
         trial = (candidate, point, checked)
-        if kept is None or _rank(problem, trial) < _rank(problem, kept):
+        if kept is None or _rank(trial) < _rank(kept):
             kept = trial
         if not checked.violations and point.stationarity <= _STATIONARY:
             break
-    return kept or (None, None, None)
+    return kept
 
 
-def _rank(problem: Problem, trial: tuple[_Candidate, Point, Checked]) -> tuple[float, float]:
-    value = trial[2].objective
-    objective = trial[1].objective if math.isnan(value) else -value if problem.sense == "maximize" else value
-    return (sum(trial[2].violations.values()), objective)
+def _rank(trial: _Trial) -> tuple[float, float]:
+    _, point, checked = trial
+    return sum(checked.violations.values()), point.objective
 
 
 def _active(problem: Problem, nlp: NLP, point: Point) -> dict[str, float]:
@@ -194,98 +156,62 @@ def _active(problem: Problem, nlp: NLP, point: Point) -> dict[str, float]:
     active: dict[str, float] = {}
     if problem.objective is None:
         return active
-    for row, multiplier, lower, upper in zip(
-        nlp.rows, point.row_multipliers, nlp.row_lower, nlp.row_upper, strict=True
-    ):
-        if row in problem.constraints and abs(multiplier) > 1e-9:
-            active[row] = float(-multiplier if lower == upper else abs(multiplier))
+    sign = -1.0 if problem.sense == "maximize" else 1.0
+    rows = zip(nlp.rows, point.row_multipliers.tolist(), nlp.row_lower, nlp.row_upper, strict=True)
+    for row, multiplier, lower, upper in rows:
+        if row in problem.constraints and abs(multiplier) > _MULTIPLIER:
+            active[row] = -sign * multiplier if lower == upper else abs(multiplier)
     of = problem.parameter_set
     for k, name in enumerate(problem.free):
         multiplier, x = float(point.bound_multipliers[k]), float(point.x[k])
-        if abs(multiplier) > 1e-9 and x in (nlp.lower[k], nlp.upper[k]):
+        if abs(multiplier) > _MULTIPLIER and x in (nlp.lower[k], nlp.upper[k]):
             slope = 1 + x * x if of[name].tangent else 1.0  # d tan λ / dλ
             active[f"{name}.{'max' if multiplier > 0 else 'min'}"] = abs(multiplier) * slope
     return active
 
 
-def _unsolved(
-    problem: Problem,
-    nlp: NLP,
-    linear_solver: str,
-    candidates: list[_Candidate],
-    starting: list[dict[str, float]],
-    began: float,
-) -> Solution:
+def _least_violating(
+    problem: Problem, nlp: NLP, candidates: list[Candidate], seed: int, linear_solver: str
+) -> _Finding:
     """No start ended feasible: the least-violating point, and whether feasible ones exist at all."""
-    design = least_violating(problem, nlp, linear_solver, starting)
-    parameters = problem.ordered(design)
+    parameters = problem.ordered(least_violating(problem, nlp, seed, linear_solver))
     checked = recheck(problem, parameters)
+    tried = f"of {len(candidates)} starts, none"
     if checked.violations:
-        status, note = (
-            "infeasible",
-            f"none of {len(candidates)} starts can satisfy all constraints; relax one of those named",
-        )
+        status, note = "infeasible", f"{tried} satisfies all constraints; relax one of those violated"
     else:
-        status, note = (
-            "not_converged",
-            "feasible designs exist, but no start converged; try more starts or give one",
-        )
-    return _solution(
-        problem,
-        parameters,
-        checked,
-        status,
-        began,
-        starts=Starts(len(candidates), 0, 0),
-        formulation=nlp.formulation,
-        notes=(note,),
-    )
+        status, note = "not_converged", f"feasible designs exist, but {tried} converged; try more starts or give one"
+    return _Finding(parameters, checked, status, {}, Starts(tried=len(candidates)), nlp.formulation, notes=(note,))
 
 
-def _solution(
-    problem: Problem,
-    parameters: Mapping[str, float],
-    checked: Checked,
-    status: str,
-    began: float,
-    *,
-    active: Mapping[str, float] | None = None,
-    starts: Starts | None = None,
-    formulation: str = "none",
-    branches: tuple[Branch, ...] = (),
-    notes: tuple[str, ...] = (),
-) -> Solution:
-    feasible = status == "optimal"
+def _assembled(problem: Problem, finding: _Finding, began: float) -> Solution:
+    checked, optimal = finding.checked, finding.status == "optimal"
     return Solution(
         problem=problem,
-        status=status,
+        status=finding.status,
         value=checked.objective,
-        parameters=Table(parameters),
+        parameters=Table(finding.parameters),
         abscissa=checked.structure.abscissa,
         abscissa_realised=checked.realised,
         roots=checked.structure.roots,
         structure=checked.structure.name,
-        active=Table(active or {}),
+        active=Table(finding.active),
         violations=checked.violations,
-        bound=omega0_bound(problem, checked.objective) if feasible else Bound(),
-        starts=starts or Starts(),
+        bound=omega0_bound(problem, checked.objective) if optimal else Bound(),
+        starts=finding.starts,
         seconds=time.perf_counter() - began,
         quantities=checked.quantities,
         dimensionless=checked.dimensionless,
-        formulation=formulation,
+        formulation=finding.formulation,
         freedom=freedom(problem),
-        branches=branches,
-        notes=(*notes, *_remarks(problem, checked, feasible)),
+        branches=finding.branches,
+        notes=(*finding.notes, *_stability_note(problem, checked, optimal)),
     )
 
 
-def _remarks(problem: Problem, checked: Checked, feasible: bool) -> list[str]:
-    remarks = []
-    if feasible and checked.structure.abscissa >= 0 and problem.sense in ("minimize", "evaluate"):
-        asked = (problem.minimize or "").strip() == "abscissa" and problem.free
-        remarks.append(
-            "no stable design was found in the box; this is the least unstable one"
-            if asked
-            else "the design is unstable"
-        )
-    return remarks
+def _stability_note(problem: Problem, checked: Checked, optimal: bool) -> tuple[str, ...]:
+    if not optimal or checked.structure.abscissa < 0:
+        return ()
+    if problem.free and (problem.minimize or "").strip() == "abscissa":
+        return ("no stable design was found in the box; this is the least unstable one",)
+    return ("the design is not stable: abscissa >= 0",)

@@ -12,6 +12,7 @@ from tmsopt.design.formulations import NLP, middle, variables_of
 from tmsopt.design.problem import ROOT_QUANTITIES, Problem
 from tmsopt.models import Values
 from tmsopt.roots import roots
+from tmsopt.roots.structure import guess_distance
 
 Array = NDArray[np.float64]
 
@@ -37,7 +38,8 @@ def complete(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Array:
     x = variables_of(problem, design)
     for lift in nlp.lifts:
         guesses = lift.guess(values, z)
-        x += guesses[0] if len(guesses) == 1 else min(guesses, key=lambda g: _mismatch(nlp, x, g))
+        mismatches = [_mismatch(nlp, x, guess) for guess in guesses] if len(guesses) > 1 else [0.0]
+        x = x + guesses[int(np.argmin(mismatches))]
     return np.array(x)
 
 
@@ -72,6 +74,10 @@ def _merit(problem: Problem, columns: Mapping[str, Array]) -> Array:
     if problem.objective is not None:
         sign = -1.0 if problem.sense == "maximize" else 1.0
         merit += _in_spreads(sign * np.broadcast_to(problem.objective(values), shape))
+    if problem.pattern is not None:
+        a = _regular(np.stack(np.broadcast_arrays(*values.coefficients), axis=-1))
+        mismatch = [guess_distance(problem.pattern, c, z) for c, z in zip(a, roots(a), strict=True)]
+        merit += 3 * _in_spreads(np.array(mismatch))
     for condition in problem.conditions.values():
         difference = np.broadcast_to(np.asarray(condition(values), dtype=float), shape)
         sides = {"<=": np.maximum(difference, 0), ">=": np.maximum(-difference, 0), "==": np.abs(difference)}

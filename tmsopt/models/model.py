@@ -170,6 +170,10 @@ class Values(Mapping[str, Any]):
             self._known[name] = quantity.value(self) if lifted is None else lifted
         return self._known[name]
 
+    def define(self, name: str, value: Any) -> None:
+        """Give a quantity a value that is known otherwise, instead of its formula."""
+        self._known[name] = value
+
     def __iter__(self) -> Iterator[str]:
         return iter(dict.fromkeys((*self._known, *self._formulas)))
 

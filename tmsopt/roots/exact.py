@@ -34,7 +34,8 @@ def exact_roots(coefficients: Sequence[Any], digits: int = DIGITS) -> tuple[Root
         common = common.lcm(term.q)
     with flint.ctx.workdps(digits):
         polynomial = flint.fmpz_poly([int(t.p * (common // t.q)) for t in reversed(terms)])
-        found = [Root(float(z.real.mid()), float(z.imag.mid()), int(m)) for z, m in polynomial.complex_roots()]
+        isolated: Any = polynomial.complex_roots()  # pairs (ball, multiplicity)
+        found = [Root(float(z.real.mid()), float(z.imag.mid()), int(m)) for z, m in isolated]
     return tuple(sorted(found, key=lambda r: (-r.re, -r.im)))
 
 

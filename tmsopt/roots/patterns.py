@@ -29,6 +29,7 @@ class Pattern:
         factors: the monic factors for given unknowns, any numbers.
         guesses: unknowns to start from, for numeric roots.
         nonnegative: expressions of the unknowns that must be ≥ 0.
+        abscissa: largest real part of the roots, where one smooth expression of the unknowns gives it.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Pattern:
     factors: Callable[[Sequence[Any]], list[list[Any]]]
     guesses: Callable[[Roots], list[list[float]]]
     nonnegative: Callable[[Sequence[Any]], list[Any]] = lambda u: []
+    abscissa: Callable[[Sequence[Any]], Any] | None = None
 
     @property
     def codimension(self) -> int:
@@ -48,7 +50,8 @@ class Pattern:
         return product(*self.factors(unknowns))
 
 
-def _quadratic(pair: Roots) -> list[float]:
+def quadratic(pair: Roots) -> list[float]:
+    """p and q of s² + p s + q for its two roots."""
     return [float(-pair.sum().real), float(pair.prod().real)]
 
 
@@ -92,6 +95,7 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
                 ("r",),
                 lambda u: [[1, -u[0]]] * 4,
                 lambda z: [[float(z.mean().real)]],
+                abscissa=lambda u: u[0],
             ),
             Pattern(
                 "EP3",
@@ -115,20 +119,21 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
                 lambda u: [[1, u[0], u[1]]] * 2,
                 _double_quadratic_guess,
                 lambda u: [4 * u[1] - u[0] * u[0]],
+                abscissa=lambda u: -u[0] / 2,
             ),
             Pattern(
                 "EP2",
                 "a real double root: the discriminant surface",
                 ("r", "b", "c"),
                 lambda u: [[1, -u[0]]] * 2 + [[1, u[1], u[2]]],
-                lambda z: [[float(a.mean().real), *_quadratic(b)] for a, b in _two(z)],
+                lambda z: [[float(a.mean().real), *quadratic(b)] for a, b in _two(z)],
             ),
             Pattern(
                 "weave",
                 "a pair on the imaginary axis",
                 ("W", "b", "c"),
                 lambda u: [[1, 0, u[0]], [1, u[1], u[2]]],
-                lambda z: [[abs(float(a.prod().real)), *_quadratic(b)] for a, b in _two(z)],
+                lambda z: [[abs(float(a.prod().real)), *quadratic(b)] for a, b in _two(z)],
                 lambda u: [u[0]],
             ),
             Pattern(
@@ -150,3 +155,46 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
     }
 )
 """Every pattern that ``locate`` knows, by name."""
+
+
+LINES: Mapping[str, Pattern] = MappingProxyType(
+    {
+        p.name: p
+        for p in (
+            Pattern(
+                "EP2+pair",
+                "a double real root and a pair on one vertical line",
+                ("g", "W"),
+                lambda u: [[1, -2 * u[0], u[0] * u[0] + u[1]], [1, -u[0]], [1, -u[0]]],
+                lambda z: [[float(z.mean().real), float(np.abs(z.imag).max() ** 2)]],
+                lambda u: [u[1]],
+            ),
+            Pattern(
+                "pair+real",
+                "a pair and a real root on one vertical line",
+                ("g", "W", "t"),
+                lambda u: [[1, -2 * u[0], u[0] * u[0] + u[1]], [1, -u[0]], [1, -u[2]]],
+                lambda z: [
+                    [float(a.mean().real), float(np.abs(a.imag).max() ** 2), float(t.real)]
+                    for a, b in _two(z)
+                    for t in b
+                    if a.imag.any() and not b.imag.any()
+                ],
+                lambda u: [u[1]],
+            ),
+            Pattern(
+                "two pairs",
+                "two pairs on one vertical line",
+                ("g", "W", "X"),
+                lambda u: [[1, -2 * u[0], u[0] * u[0] + u[1]], [1, -2 * u[0], u[0] * u[0] + u[2]]],
+                lambda z: [
+                    [float(z.mean().real), float(a.imag[0] ** 2), float(b.imag[0] ** 2)]
+                    for a, b in _two(z)
+                    if a.imag.all() and b.imag.all()
+                ],
+                lambda u: [u[1], u[2]],
+            ),
+        )
+    }
+)
+"""Ties of the rightmost line: patterns that a structure may show, beside those that can be located."""

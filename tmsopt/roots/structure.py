@@ -1,6 +1,6 @@
 """The multiplicity structure of a quartic within a stated tolerance, decided on coefficients."""
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,10 +8,28 @@ from numpy.typing import ArrayLike, NDArray
 
 from tmsopt.roots.numeric import rebuilt
 from tmsopt.roots.numeric import roots as numeric_roots
-from tmsopt.roots.patterns import PATTERNS, Pattern, Roots, _quadratic, _two
+from tmsopt.roots.patterns import LINES, PATTERNS, Pattern, Roots
 
 ROUNDING = 8 * np.finfo(float).eps
 """Relative error that coefficients computed in double precision carry anyway."""
+
+# Most degenerate first: pattern, multiplicity of its rightmost root, roots on its rightmost line.
+_CANDIDATES = (
+    (PATTERNS["EP4"], 4, 4),
+    (PATTERNS["2EP2"], 2, 2),
+    (PATTERNS["CEP2"], 2, 4),
+    (PATTERNS["EP3"], 3, 3),
+    (LINES["EP2+pair"], 1, 4),
+    (PATTERNS["EP2"], 2, 2),
+    (LINES["pair+real"], 1, 3),
+    (LINES["two pairs"], 1, 4),
+)
+
+_NEAR = 0.05  # relative distance of a guess that can still lead to a pattern within any sensible tolerance
+_STEPS = 20
+_LINE = 1e-6  # relative difference of real parts on one vertical line, for roots of an exact pattern
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -50,157 +68,108 @@ def structure(coefficients: ArrayLike, tolerance: float = 1e-12) -> Structure:
     A structure holds when a polynomial that has it exactly lies within `tolerance`, the largest relative
     change of a coefficient. The most degenerate one that holds is named. ``undecided`` says that the distance
     differs from the tolerance by less than rounding does, as it must for tolerance 0 at an exceptional point.
+
+    Raises:
+        ValueError: for another shape, coefficients that are not finite, or a leading 0.
     """
-    c = np.asarray(coefficients, dtype=float)
-    if c.shape != (5,):
-        raise ValueError(f"structure takes the five coefficients of a quartic, not an array of shape {c.shape}")
+    c = _quartic(coefficients)
     found = numeric_roots(c)
     undecided: Structure | None = None
-    for candidate, on_the_line in _CANDIDATES:
-        nearest = _nearest(candidate, on_the_line, c, found)
-        if nearest is None or nearest.distance > tolerance + ROUNDING:
-            continue
-        if nearest.distance < tolerance - ROUNDING or (nearest.distance == 0 and tolerance > 0):
-            return nearest
-        undecided = undecided or Structure("undecided", _simple(found), nearest.distance)
+    for pattern, multiplicity, on_line in _CANDIDATES:
+        for candidate in _fits(pattern, c, found, _NEAR):
+            line = [r for r in candidate.roots if r.re >= candidate.abscissa - _LINE * np.abs(found).max()]
+            if line[0].multiplicity < multiplicity or sum(r.multiplicity for r in line) < on_line:
+                continue
+            if candidate.distance < tolerance - ROUNDING:
+                return candidate
+            if candidate.distance <= tolerance + ROUNDING and undecided is None:
+                undecided = Structure("undecided", _simple(found), candidate.distance)
     if undecided:
         return undecided
     rightmost = found[np.argmax(found.real)]
     return Structure("pair" if rightmost.imag else "real", _simple(found), 0.0)
 
 
+def pattern_distance(pattern: Pattern, coefficients: ArrayLike) -> float:
+    """Largest relative change of a coefficient that takes a quartic to a pattern; inf if no fit was found."""
+    try:
+        c = _quartic(coefficients)
+    except ValueError:
+        return float("inf")
+    return min((fit.distance for fit in _fits(pattern, c, numeric_roots(c), np.inf)), default=float("inf"))
+
+
+def guess_distance(pattern: Pattern, coefficients: Array, found: Roots) -> float:
+    """Relative distance of a quartic with known roots from its best guess of a pattern, cheaply; inf without one."""
+    guesses = pattern.guesses(found)
+    return min((_distance(pattern, np.array(g), coefficients, found) for g in guesses), default=float("inf"))
+
+
+def _distance(pattern: Pattern, unknowns: Array, c: Array, found: Roots) -> float:
+    return float(np.max(np.abs(np.array(pattern.monic(list(unknowns)), dtype=float) - c / c[0]) / _size(found)))
+
+
+def _size(found: Roots) -> Array:
+    """Size of the terms that each monic coefficient is summed from; tiny where roots at 0 make it exactly 0."""
+    return np.maximum(rebuilt((-np.abs(found)).astype(complex)), 1e-100)
+
+
+def _quartic(coefficients: ArrayLike) -> Array:
+    c = np.asarray(coefficients, dtype=float)
+    if c.shape != (5,):
+        raise ValueError(f"found coefficients of shape {c.shape}; accepted: the five of a quartic, descending")
+    if not np.all(np.isfinite(c)) or c[0] == 0:
+        raise ValueError("found a coefficient that is not finite, or a leading 0; accepted: a quartic")
+    return c
+
+
 def _simple(found: Roots) -> tuple[Root, ...]:
-    return tuple(Root(float(z.real), float(z.imag)) for z in sorted(found, key=lambda z: (-z.real, -z.imag)))
+    return _sorted([Root(float(z.real), float(z.imag)) for z in found])
 
 
-def _nearest(
-    pattern: Pattern, on_the_line: Callable[[Roots, float], bool], c: NDArray[np.float64], found: Roots
-) -> Structure | None:
-    """The polynomial of a pattern nearest to c in the largest relative change of a coefficient."""
-    best: Structure | None = None
-    size = rebuilt((-np.abs(found)).astype(complex))
-    target = c / c[0]
+def _sorted(roots: list[Root]) -> tuple[Root, ...]:
+    return tuple(sorted(roots, key=lambda r: (-r.re, -r.im)))
+
+
+def _fits(pattern: Pattern, c: Array, found: Roots, near: float) -> Iterator[Structure]:
+    """Polynomials of a pattern close to c, one per guess that starts within `near`, the nearest first."""
+    fits = []
     for guess in pattern.guesses(found):
-        unknowns = _fit(pattern, guess, target, size)
-        if unknowns is None or any(value < 0 for value in pattern.nonnegative(unknowns)):
+        if _distance(pattern, np.array(guess), c, found) > near:
             continue
-        monic = np.array(pattern.monic(unknowns), dtype=float)
-        error = np.abs(monic - target)
-        distance = float(np.max(np.where(error == 0, 0.0, error / np.where(size > 0, size, 1e-300))))
-        if best is not None and best.distance <= distance:
-            continue
-        roots = _merged(pattern, unknowns)
-        line = max(r.re for r in roots)
-        width = 1e-6 * (np.abs(found).max() + 1e-300)
-        right = np.array([complex(r.re, r.im) for r in roots for _ in range(r.multiplicity) if r.re >= line - width])
-        if on_the_line(right, width):
-            best = Structure(pattern.name, roots, distance)
-    return best
+        unknowns = _gauss_newton(pattern, np.array(guess), c / c[0], _size(found))
+        if all(value >= 0 for value in pattern.nonnegative(list(unknowns))):
+            distance = _distance(pattern, unknowns, c, found)
+            fits.append(Structure(pattern.name, _roots_of(pattern, unknowns), distance))
+    yield from sorted(fits, key=lambda fit: fit.distance)
 
 
-def _fit(
-    pattern: Pattern, guess: list[float], target: NDArray[np.float64], size: NDArray[np.float64]
-) -> NDArray[np.float64] | None:
-    """Gauss–Newton on the relative coefficient residuals, with a complex-step Jacobian."""
-    u = np.array(guess, dtype=float)
-    weight = 1 / np.where(size[1:] > 0, size[1:], 1e-300)
+def _gauss_newton(pattern: Pattern, guess: Array, target: Array, size: Array) -> Array:
+    """Least squares of the relative coefficient residuals, with a complex-step Jacobian."""
+    u = guess
 
     def residual(v: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        return np.asarray((np.array(pattern.monic(v)[1:], dtype=complex) - target[1:]) * weight)
+        return np.asarray((np.array(pattern.monic(list(v)), dtype=complex) - target.astype(complex)) / size)
 
-    for _ in range(20):
-        jacobian = np.stack([residual(u + 1e-100j * e).imag / 1e-100 for e in np.eye(len(u))], axis=1)
-        if not np.all(np.isfinite(jacobian)):
-            return None
-        step = np.linalg.lstsq(jacobian, -residual(u.astype(complex)).real, rcond=None)[0]
+    for _ in range(_STEPS):
+        columns = [residual(u + 1e-100j * unit).imag / 1e-100 for unit in np.eye(len(u))]
+        step = np.linalg.lstsq(np.stack(columns, axis=1), -residual(u.astype(complex)).real, rcond=None)[0]
         u = u + step
         if np.all(np.abs(step) <= 1e-15 * np.abs(u)):
             break
     return u
 
 
-def _merged(pattern: Pattern, unknowns: NDArray[np.float64]) -> tuple[Root, ...]:
+def _roots_of(pattern: Pattern, unknowns: Array) -> tuple[Root, ...]:
     """Roots of the factors, equal factors counted as multiplicity."""
     counted: dict[tuple[float, ...], int] = {}
-    for factor in pattern.factors(unknowns):
+    for factor in pattern.factors(list(unknowns)):
         key = tuple(float(x) for x in factor)
         counted[key] = counted.get(key, 0) + 1
-    merged = [
-        Root(float(z.real), float(z.imag), count)
-        for factor, count in counted.items()
-        for z in numeric_roots(np.array(factor))
-    ]
-    return tuple(sorted(merged, key=lambda r: (-r.re, -r.im)))
-
-
-def _line(name: str, unknowns: tuple[str, ...], factors: Callable[..., list[list[float]]],
-          guesses: Callable[[Roots], list[list[float]]]) -> Pattern:  # fmt: skip
-    return Pattern(name, "roots sharing the rightmost line", unknowns, factors, guesses)
-
-
-_LINES = (
-    # a pair and a real root at real part g
-    _line(
-        "pair+real", ("g", "W", "t"),
-        lambda u: [[1, -2 * u[0], u[0] * u[0] + u[1]], [1, -u[0]], [1, -u[2]]],
-        lambda z: [
-            [float(a.mean().real), float((np.abs(a.imag).max()) ** 2), float(t.real)]
-            for a, b in _two(z) if a.imag.any() for t in b if not b.imag.any()
-        ],
-    ),
-    # two pairs at real part g
-    _line(
-        "two pairs", ("g", "W", "X"),
-        lambda u: [[1, -2 * u[0], u[0] * u[0] + u[1]], [1, -2 * u[0], u[0] * u[0] + u[2]]],
-        lambda z: [
-            [float(z.mean().real), float(a.imag[0] ** 2), float(b.imag[0] ** 2)]
-            for a, b in _two(z) if a.imag.all() and b.imag.all()
-        ],
-    ),
-    # a double real root and a pair at real part g
-    _line(
-        "EP2+pair", ("g", "W"),
-        lambda u: [[1, -2 * u[0], u[0] * u[0] + u[1]], [1, -u[0]], [1, -u[0]]],
-        lambda z: [[float(z.mean().real), float(np.abs(z.imag).max() ** 2)]],
-    ),
-)  # fmt: skip
-
-
-def _always(right: Roots, width: float) -> bool:
-    return True
-
-
-def _rightmost_multiple(multiplicity: int) -> Callable[[Roots, float], bool]:
-    def on_the_line(right: Roots, width: float) -> bool:
-        return sum(abs(z.imag) <= width for z in right) >= multiplicity
-
-    return on_the_line
-
-
-def _rightmost_line(count: int) -> Callable[[Roots, float], bool]:
-    def on_the_line(right: Roots, width: float) -> bool:
-        return len(right) >= count
-
-    return on_the_line
-
-
-# Most degenerate first.
-_CANDIDATES: tuple[tuple[Pattern, Callable[[Roots, float], bool]], ...] = (
-    (PATTERNS["EP4"], _always),
-    (PATTERNS["2EP2"], _always),
-    (PATTERNS["CEP2"], _always),
-    (PATTERNS["EP3"], _rightmost_multiple(3)),
-    (_LINES[2], _rightmost_line(4)),
-    (PATTERNS["EP2"], _rightmost_multiple(2)),
-    (_LINES[0], _rightmost_line(3)),
-    (_LINES[1], _rightmost_line(4)),
-)
-
-
-def pattern_distance(pattern: Pattern, coefficients: ArrayLike) -> float:
-    """Largest relative change of a coefficient that takes a quartic to the pattern; inf if none was found."""
-    c = np.asarray(coefficients, dtype=float)
-    if not np.all(np.isfinite(c)) or c[0] == 0:
-        return float("inf")
-    nearest = _nearest(pattern, _always, c, numeric_roots(c))
-    return nearest.distance if nearest else float("inf")
+    return _sorted(
+        [
+            Root(float(z.real), float(z.imag), count)
+            for factor, count in counted.items()
+            for z in numeric_roots(np.array(factor))
+        ]
+    )

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from tmsopt.study.growth import Growth
 
@@ -87,7 +88,7 @@ def _marks(ax: Axes, data: Growth) -> None:
     ax.axvline(data.Fr_design, color=_MARK, linewidth=1.2, linestyle=":", label=rf"${name} = {data.Fr_design:.4g}$")
 
 
-def _focus(ax: Axes, values: np.ndarray, data: Growth) -> None:  # type: ignore[type-arg]
+def _focus(ax: Axes, values: NDArray[np.float64], data: Growth) -> None:
     """Limits that show the roots around the design even where others run away at low speed."""
     near = values[np.abs(data.Fr - data.Fr_design) <= 0.75 * data.Fr_design + 0.1]
     low, high = float(np.percentile(near, 1)), float(np.percentile(near, 99))

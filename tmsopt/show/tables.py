@@ -22,8 +22,8 @@ def solution_table(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: floa
     """A design, dimensionless and in SI side by side, with its roots, bound, limits and remarks."""
     si = si_parameters(solution, w, m_B, g)
     lines = [solution.problem.title or "untitled problem", _headline(solution), ""]
-    lines += _columns(_parameter_rows(solution, si)) + [""]
-    lines += _columns(_result_rows(solution, si)) + [""]
+    lines += [*_columns(_parameter_rows(solution, si)), ""]
+    lines += [*_columns(_result_rows(solution, si)), ""]
     lines += _facts(solution)
     return "\n".join(line.rstrip() for line in lines).rstrip()
 
@@ -101,7 +101,9 @@ def _facts(solution: Solution) -> list[str]:
     lines = ["roots: " + ", ".join(_roots(solution.roots))]
     bound = solution.bound
     if math.isfinite(bound.value):
-        lines.append(f"bound: no design in the box is below {_number(bound.value)} ({bound.method}); gap {bound.gap:.1e}")
+        lines.append(
+            f"bound: no design in the box is below {_number(bound.value)} ({bound.method}); gap {bound.gap:.1e}"
+        )
     free = solution.freedom
     if solution.problem.locate:
         lines.append(f"freedom: {free.kind}, {free.free} free parameters and {free.conditions} conditions")
@@ -116,8 +118,10 @@ def _facts(solution: Solution) -> list[str]:
         lines.append(f"also solved by {where}; excluded by {', '.join(branch.excluded_by) or 'nothing'}")
     if solution.starts.tried:
         s = solution.starts
-        lines.append(f"starts: {s.tried} tried, {s.converged} converged, {s.at_best} at the best; {solution.seconds:.2f} s")
-    return lines + [f"note: {note}" for note in solution.notes]
+        lines.append(
+            f"starts: {s.tried} tried, {s.converged} converged, {s.at_best} at the best; {solution.seconds:.2f} s"
+        )
+    return [*lines, *(f"note: {note}" for note in solution.notes)]
 
 
 def _roots(roots: Iterable[Root]) -> list[str]:

@@ -9,8 +9,9 @@ import numpy as np
 
 from tmsopt import laws
 from tmsopt.design.problem import Problem
+from tmsopt.design.search import STARTS, Progress
 from tmsopt.design.solution import Solution
-from tmsopt.design.solve import STARTS, Progress, solve
+from tmsopt.design.solve import solve
 from tmsopt.models import tms
 from tmsopt.roots import PATTERNS, is_stable
 
@@ -132,9 +133,7 @@ def compare(
     """
 
     def solved(problem: Problem) -> Solution:
-        return solve(
-            problem, starts=starts, seed=seed, linear_solver=linear_solver, throw=False, progress=progress
-        )
+        return solve(problem, starts=starts, seed=seed, linear_solver=linear_solver, throw=False, progress=progress)
 
     if isinstance(design, Problem):
         design = solved(design)
@@ -144,9 +143,7 @@ def compare(
     return Comparison(design, tuple(_law_rows(design)), other, reason)
 
 
-def _other_formulation(
-    design: Solution, solved: Callable[[Problem], Solution]
-) -> tuple[Solution | None, str]:
+def _other_formulation(design: Solution, solved: Callable[[Problem], Solution]) -> tuple[Solution | None, str]:
     problem = design.problem
     if design.status != "optimal":
         return None, f"the design is {design.status}"
@@ -158,8 +155,9 @@ def _other_formulation(
         return None, f"the structure '{design.structure}' is not a pattern that can be matched"
     else:
         square = len(problem.free) == PATTERNS[design.structure].codimension and not problem.constraints
-        objective = {"minimize": None, "maximize": None} if square else {}
-        restated = replace(problem, locate=design.structure, start={}, **objective)
+        restated = replace(problem, locate=design.structure, start={})
+        if square:
+            restated = replace(restated, minimize=None, maximize=None)
     other = solved(restated)
     if other.status != "optimal":
         return None, f"the {other.formulation} formulation ended {other.status}"
@@ -186,7 +184,8 @@ def _law_rows(design: Solution) -> Iterator[LawRow]:
 
     general = not_ep4 or ("" if not_one else "at chi_H = 1 the mass ratio is free; see the laws for chi_H = 1")
     branch = _nearest(laws.ep4(r, **heights, chi_H=p["chi_H"]), p)
-    for subject, numeric, law in (("Fr", p["Fr"], branch.Fr), ("mu", p["mu"], branch.mu), ("tan(lambda_s)", T, branch.tan_lambda_s)):  # fmt: skip
+    closed = (("Fr", p["Fr"], branch.Fr), ("mu", p["mu"], branch.mu), ("tan(lambda_s)", T, branch.tan_lambda_s))
+    for subject, numeric, law in closed:
         yield LawRow("a1a3, a2, w0", f"{subject}, closed form for any chi_H", numeric, _f(law), general)
 
     yield from _speed_rows(design, p, not_one)

@@ -1,0 +1,100 @@
+"""Multi-start: IPOPT from many designs, ended early when enough of them agree."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tmsopt.design.bound import omega0_bound
+from tmsopt.design.formulations import NLP, abscissa, design_of, freedom
+from tmsopt.design.ipopt import Run, ipopt
+from tmsopt.design.problem import Problem
+from tmsopt.design.starts import complete, designs
+
+STARTS = 32
+"""Starts tried at most, unless fewer agree earlier."""
+
+_ENOUGH = 8  # starts tried before agreement counts
+_AGREE = 5  # starts at the best value that end the search
+_SAME = 1e-7  # relative difference of objectives that counts as the same
+_FEASIBLE = 1e-8  # of the rows, before polishing; the recheck has the last word
+_RESCUES = 4  # starts from abscissa optima, for a pattern that no start reached
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Where one start ended.
+
+    Attributes:
+        objective: of the NLP; inf unless finite.
+        feasible: whether rows and bounds hold as IPOPT left them.
+    """
+
+    run: Run
+    objective: float
+    feasible: bool
+
+
+def search(
+    problem: Problem,
+    nlp: NLP,
+    *,
+    starts: int,
+    seed: int,
+    exhaustive: bool,
+    linear_solver: str,
+    progress: Progress | None,
+) -> list[Candidate]:
+    """Where every start ended that was tried, in order."""
+    run = ipopt(nlp, linear_solver)
+    candidates: list[Candidate] = []
+    for design in designs(problem, seed, starts):
+        candidates.append(_candidate(nlp, run(complete(nlp, problem, design))))
+        if progress:
+            progress(len(candidates), starts)
+        if not exhaustive and _settled(problem, candidates):
+            break
+    if problem.pattern is not None and not any(c.feasible for c in candidates):
+        candidates += _rescued(problem, nlp, seed, linear_solver)
+    return candidates
+
+
+def same(a: float, b: float) -> bool:
+    """Whether two objectives count as the same optimum."""
+    return abs(a - b) <= _SAME * (1 + abs(b))
+
+
+def _candidate(nlp: NLP, run: Run) -> Candidate:
+    f, g = nlp.functions(run.x)
+    rows = np.array(g).ravel()
+    if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(run.x)) and math.isfinite(float(f))):
+        return Candidate(run, math.inf, False)
+    outside = np.concatenate([np.array(nlp.row_lower) - rows, rows - np.array(nlp.row_upper), [0.0]])
+    return Candidate(run, float(f), bool(outside.max() <= _FEASIBLE) and run.status != "Infeasible_Problem_Detected")
+
+
+def _settled(problem: Problem, candidates: list[Candidate]) -> bool:
+    """Whether more starts would be waste: the bound is reached, or enough of them agree on the best."""
+    feasible = [c for c in candidates if c.feasible]
+    if not feasible:
+        return False
+    best = min(c.objective for c in feasible)
+    if feasible[-1].objective == best and omega0_bound(problem, best).proven:
+        return True
+    agreeing = sum(same(c.objective, best) for c in feasible)
+    if problem.objective is None:  # any point of a square pattern will do
+        return agreeing >= (1 if freedom(problem).count <= 0 else _AGREE)
+    return len(candidates) >= _ENOUGH and agreeing >= _AGREE
+
+
+def _rescued(problem: Problem, nlp: NLP, seed: int, linear_solver: str) -> list[Candidate]:
+    """Starts where the abscissa is least under the same constraints: multiple roots are often met there."""
+    relaxed = replace(problem, locate=None, minimize="abscissa", maximize=None)
+    leading = abscissa(relaxed)
+    lead, follow = ipopt(leading, linear_solver), ipopt(nlp, linear_solver, near=True)
+    ended = [lead(complete(leading, relaxed, d)).x for d in designs(relaxed, seed, _RESCUES)]
+    reached = [design_of(problem, x.tolist()) for x in ended if np.all(np.isfinite(x))]
+    return [_candidate(nlp, follow(complete(nlp, problem, design))) for design in reached]
