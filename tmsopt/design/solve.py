@@ -19,6 +19,7 @@ from tmsopt.design.solution import Bound, Branch, NotSolved, Solution, Starts
 _STATIONARY = 1e-6  # gradient of the Lagrangian at which a point counts as converged whatever IPOPT says
 _POLISHED = 4  # candidates looked at closely
 _CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found")
+_SPURIOUS = 1e-3  # violation that no lack of digits explains: equations met only because all coefficients vanish
 _MULTIPLIER = 1e-9  # below it a limit does not bind
 
 
@@ -96,6 +97,9 @@ def _best(problem: Problem, nlp: NLP, candidates: list[Candidate]) -> _Finding |
     if trial is None:
         return None
     candidate, point, checked = trial
+    counted = freedom(problem)
+    if sum(checked.violations.values()) > _SPURIOUS and counted.count >= 0:
+        return None
     parameters = problem.ordered(design_of(problem, point.x.tolist()))
     converged = candidate.run.status in _CONVERGED or point.stationarity <= _STATIONARY
     notes: tuple[str, ...] = ()
@@ -106,11 +110,15 @@ def _best(problem: Problem, nlp: NLP, candidates: list[Candidate]) -> _Finding |
             f"the solver's objective {claimed:.9g} is not the design's, {checked.objective:.9g}: abscissa can only be "
             "minimised or bounded above, damping_ratio only maximised or bounded below",
         )
-    square = freedom(problem).kind == "square"
+    status = "optimal" if converged and not checked.violations else "not_converged"
+    if counted.kind == "over-determined" and checked.violations:
+        status = "infeasible"
+        surplus = f"{counted.conditions} conditions for {counted.free} free parameters"
+        notes += (f"{surplus}, and they are not consistent; free {-counted.count} more, or drop a constraint",)
     return _Finding(
         parameters,
         checked,
-        "optimal" if converged and not checked.violations else "not_converged",
+        status,
         _active(problem, nlp, point),
         Starts(
             tried=len(candidates),
@@ -118,7 +126,7 @@ def _best(problem: Problem, nlp: NLP, candidates: list[Candidate]) -> _Finding |
             at_best=sum(c.feasible and same(c.objective, candidate.objective) for c in candidates),
         ),
         nlp.formulation,
-        other_branches(problem, nlp, parameters) if square else (),
+        other_branches(problem, nlp, parameters) if counted.kind == "square" else (),
         notes,
     )
 

@@ -65,8 +65,8 @@ class Structure:
 def structure(coefficients: ArrayLike, tolerance: float = 1e-12) -> Structure:
     """Structure of the rightmost roots of a real quartic, coefficients descending, shape (5,).
 
-    A structure holds when a polynomial that has it exactly lies within `tolerance`, the largest relative
-    change of a coefficient. The most degenerate one that holds is named. ``undecided`` says that the distance
+    A structure holds when a polynomial that has it exactly lies within `tolerance`, the largest change of a
+    coefficient relative to the terms that make it up. The most degenerate one that holds is named. ``undecided`` says that the distance
     differs from the tolerance by less than rounding does, as it must for tolerance 0 at an exceptional point.
 
     Raises:
@@ -110,8 +110,14 @@ def _distance(pattern: Pattern, unknowns: Array, c: Array, found: Roots) -> floa
 
 
 def _size(found: Roots) -> Array:
-    """Size of the terms that each monic coefficient is summed from; tiny where roots at 0 make it exactly 0."""
-    return np.maximum(rebuilt((-np.abs(found)).astype(complex)), 1e-100)
+    """Size of the terms that each monic coefficient is summed from.
+
+    A root far smaller than the others counts as a thousandth of their median, so that a coefficient that a root
+    at 0 makes vanish is judged by the others' size and not by its own rounding.
+    """
+    radius = np.abs(found)
+    floor = 1e-3 * float(np.median(radius))
+    return np.maximum(rebuilt((-np.maximum(radius, floor)).astype(complex)), 1e-100)
 
 
 def _quartic(coefficients: ArrayLike) -> Array:

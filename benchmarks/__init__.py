@@ -1,0 +1,1 @@
+"""Benchmarks: honest numbers, failures kept."""

@@ -1,0 +1,260 @@
+"""SciPy's optimisers on the eigenvalues, given the same problems: what one would try without factors.
+
+Every rival minimises the largest real part of `numpy.roots` of the coefficients in the box, with the constraints in
+the form that suits it best. An equality is solved for a parameter that enters it linearly, so that no rival has to
+follow one.
+"""
+
+import time
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution, minimize
+
+from tmsopt.design.expression import FUNCTIONS, parse_value
+from tmsopt.design.problem import Problem
+from tmsopt.design.starts import designs
+from tmsopt.models.tms import copo, tms
+
+Array = NDArray[np.float64]
+
+FEASIBLE = 1e-6
+"""Violation, relative to the size of the two sides, up to which a rival's design counts as feasible."""
+
+STARTS = 5
+"""Designs that the local rivals start from: the first ones of `tmsopt.solve`."""
+
+SCALAR, VECTORISED = "DE", "DE, vectorised"
+"""The two ways in which differential evolution is run: design by design, and a whole generation at once."""
+
+_NOWHERE = 1e3  # abscissa, and violation, of a design where it does not exist
+_PENALTY = 1e3
+_NUMPY = {name: getattr(np, name) for name in FUNCTIONS if hasattr(np, name)} | {
+    "asin": np.arcsin,
+    "acos": np.arccos,
+    "atan": np.arctan,
+    "min": np.minimum,
+    "max": np.maximum,
+    "pi": np.pi,
+}
+_QUANTITIES = {q.name: q.value for q in tms.quantities}
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a rival ended with.
+
+    Attributes:
+        value: abscissa by the rival's own eigenvalues.
+        violation: largest violation of a constraint or of the box, relative to the size of the two sides.
+        seconds: of all its starts.
+    """
+
+    method: str
+    value: float
+    violation: float
+    parameters: Mapping[str, float]
+    seconds: float
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the design counts."""
+        return self.violation <= FEASIBLE and self.value < _NOWHERE
+
+
+class Reduced:
+    """A problem without its equality: the free parameters that are left, the abscissa and g(x) >= 0, vectorised."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        conditions = list(problem.conditions.values())
+        equalities = [c.text for c in conditions if c.comparison == "=="]
+        self._solved = _solvable(problem, equalities[0]) if equalities else ""
+        self._equation = compile(_difference(equalities[0]), "equality", "eval") if equalities else None
+        self._rows = [
+            (compile(_difference(c.text), c.text, "eval"), -1.0 if c.comparison == "<=" else 1.0)
+            for c in conditions
+            if c.comparison != "=="
+        ]
+        self._used = [q for q in _QUANTITIES if any(q in c.names for c in conditions)]
+        self.names = [n for n in problem.free if n != self._solved]
+        self.lower, self.upper = np.array([problem.free[n] for n in self.names]).reshape(-1, 2).T
+
+    @property
+    def constrained(self) -> bool:
+        """Whether any inequality is left."""
+        return bool(self._rows or self._solved)
+
+    def parameters(self, x: Array) -> dict[str, Any]:
+        """Every parameter for the free ones, x of shape (n,) or (n, m)."""
+        values: dict[str, Any] = {**self.problem.fixed, **dict(zip(self.names, x, strict=True))}
+        if self._solved:
+            values[self._solved] = self._eliminated(values)
+        return values
+
+    def abscissa(self, x: Array) -> float:
+        """Largest real part of the eigenvalues of one design."""
+        coefficients = np.array(_coefficients(self.parameters(x)))
+        if not np.all(np.isfinite(coefficients)):
+            return _NOWHERE
+        return float(np.roots(coefficients).real.max(initial=-_NOWHERE))
+
+    def abscissae(self, x: Array) -> Array:
+        """The same for designs of shape (n, m), by stacked companion matrices as in `numpy.roots`."""
+        a = np.stack(np.broadcast_arrays(*_coefficients(self.parameters(x)), x[0])[:-1], axis=-1)
+        regular = np.all(np.isfinite(a), axis=-1) & (a[:, 0] != 0)
+        companion = np.zeros((len(a), 4, 4))
+        companion[:, 0, :] = -np.where(regular[:, None], a[:, 1:], 0.0) / np.where(regular, a[:, 0], 1.0)[:, None]
+        companion[:, np.arange(1, 4), np.arange(3)] = 1
+        return np.where(regular, np.linalg.eigvals(companion).real.max(axis=-1), _NOWHERE)
+
+    def rows(self, x: Array) -> Array:
+        """g(x) of shape (rows,) or (rows, m), at least 0 where a design is feasible."""
+        values = self.parameters(x)
+        solved = [values[self._solved]] if self._solved else []
+        if self._used:
+            values |= {f"a{k}": np.asarray(a)[()] for k, a in enumerate(_coefficients(values))}
+            values |= {name: _QUANTITIES[name](values) for name in self._used}
+        g = [sign * eval(code, _NUMPY, values) for code, sign in self._rows]
+        for value in solved:
+            lower, upper = self.problem.free[self._solved]
+            g += [value - lower, upper - value]
+        found = np.array([np.broadcast_to(row, np.shape(x)[1:]) for row in g], dtype=float)
+        return np.where(np.isfinite(found), found, -_NOWHERE)
+
+    def found(self, method: str, x: Array, seconds: float) -> Found:
+        """A rival's end point, judged."""
+        x = np.clip(x, self.lower, self.upper)
+        parameters = {n: float(v) for n, v in self.parameters(x).items()}
+        return Found(method, self.abscissa(x), _violation(self.problem, parameters), parameters, seconds)
+
+    def _eliminated(self, values: dict[str, Any]) -> Any:
+        assert self._equation is not None
+        first, second = (eval(self._equation, _NUMPY, values | {self._solved: v}) for v in (0.25, 0.75))
+        return 0.25 - 0.5 * first / (second - first)
+
+
+def differential(problem: Problem, seed: int = 0, vectorized: bool = False) -> Found:
+    """Differential evolution with the constraints as such (Lampinen's rule), polished by SciPy's own choice."""
+    reduced = Reduced(problem)
+    bounds = Bounds(reduced.lower, reduced.upper)
+    constraints = [NonlinearConstraint(reduced.rows, 0.0, np.inf)] if reduced.constrained else []
+    began = time.perf_counter()
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        answer = differential_evolution(
+            reduced.abscissae if vectorized else reduced.abscissa,
+            bounds,
+            constraints=constraints,
+            tol=1e-8,
+            rng=seed,
+            vectorized=vectorized,
+            updating="deferred" if vectorized else "immediate",
+            polish=not vectorized,
+        )
+        return reduced.found(VECTORISED if vectorized else SCALAR, answer.x, time.perf_counter() - began)
+
+
+def slsqp(problem: Problem) -> Found:
+    """SLSQP from the first starts."""
+
+    def run(reduced: Reduced, x: Array) -> Array:
+        options = {"ftol": 1e-14, "maxiter": 300}
+        return _minimized(reduced, reduced.abscissa, x, method="SLSQP", constraints=_rows(reduced), options=options)
+
+    return _multistart("SLSQP", problem, run)
+
+
+def cobyla(problem: Problem) -> Found:
+    """COBYLA from the first starts."""
+
+    def run(reduced: Reduced, x: Array) -> Array:
+        options = {"maxiter": 5000, "tol": 1e-12, "rhobeg": 0.1 * float((reduced.upper - reduced.lower).min())}
+        return _minimized(reduced, reduced.abscissa, x, method="COBYLA", constraints=_rows(reduced), options=options)
+
+    return _multistart("COBYLA", problem, run)
+
+
+def nelder_mead(problem: Problem) -> Found:
+    """Nelder–Mead from the first starts, violations as an exact penalty."""
+
+    def run(reduced: Reduced, x: Array) -> Array:
+        def penalised(x: Array) -> float:
+            return reduced.abscissa(x) + _PENALTY * float(np.maximum(-reduced.rows(x), 0.0).sum())
+
+        options = {"xatol": 1e-12, "fatol": 1e-12, "maxiter": 1000 * len(x), "maxfev": 1000 * len(x)}
+        return _minimized(reduced, penalised, x, method="Nelder-Mead", options=options)
+
+    return _multistart("Nelder–Mead", problem, run)
+
+
+def _rows(reduced: Reduced) -> list[dict[str, Any]]:
+    return [{"type": "ineq", "fun": reduced.rows}] if reduced.constrained else []
+
+
+def _minimized(reduced: Reduced, function: Callable[[Array], float], x: Array, **options: Any) -> Array:
+    answer: Any = minimize(function, x, bounds=Bounds(reduced.lower, reduced.upper), **options)
+    return np.asarray(answer.x)
+
+
+LOCAL: Mapping[str, Callable[[Problem], Found]] = {"SLSQP": slsqp, "Nelder–Mead": nelder_mead, "COBYLA": cobyla}
+"""The local rivals by name."""
+
+
+def _multistart(method: str, problem: Problem, run: Callable[[Reduced, Array], Array]) -> Found:
+    reduced = Reduced(problem)
+    began = time.perf_counter()
+    ends: list[Found] = []
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        for design in designs(problem, 0, STARTS):
+            x = run(reduced, np.array([design[n] for n in reduced.names]))
+            ends.append(reduced.found(method, x, 0.0))
+    best = min(ends, key=lambda f: (not f.feasible, f.value if f.feasible else f.violation))
+    return Found(method, best.value, best.violation, best.parameters, time.perf_counter() - began)
+
+
+def _coefficients(p: Mapping[str, Any]) -> list[Any]:
+    T = np.tan(p["lambda_s"])
+    return copo(p["Fr"], p["mu"], p["chi_B"], p["chi_H"], p["zeta_B"], p["zeta_H"], T)
+
+
+def _violation(problem: Problem, parameters: Mapping[str, float]) -> float:
+    """Largest violation, by the package's own evaluation and not by what the rival was told."""
+    values = problem.values(parameters)
+    worst = [c.violation(values) for c in problem.conditions.values()]
+    worst += [max(lo - parameters[n], parameters[n] - hi, 0.0) for n, (lo, hi) in problem.free.items()]
+    largest = float(np.max(worst, initial=0.0))
+    return largest if np.isfinite(largest) else np.inf
+
+
+def _difference(text: str) -> str:
+    for comparison in ("<=", ">=", "=="):
+        left, found, right = text.partition(comparison)
+        if found:
+            return f"({left}) - ({right})"
+    raise ValueError(f"{text!r} compares nothing")
+
+
+def _solvable(problem: Problem, equality: str) -> str:
+    """A free parameter in which the equality is linear, so that it can be solved for it."""
+    expression = parse_value(_difference(equality), problem.vocabulary)
+    rng = np.random.default_rng(0)
+    designs = [{n: rng.uniform(*ends) for n, ends in problem.free.items()} for _ in range(3)]
+
+    def at(design: Mapping[str, float], name: str, value: float) -> float:
+        return float(expression(problem.values(problem.ordered({**design, name: value}))))
+
+    def second_differences(name: str) -> Iterable[tuple[float, float]]:
+        for design in designs:
+            low, middle, high = (at(design, name, v) for v in (0.25, 0.5, 0.75))
+            yield abs(low - 2 * middle + high), abs(high - low)
+
+    for name in problem.free:
+        if all(bend <= 1e-12 * (1 + slope) and slope > 1e-9 for bend, slope in second_differences(name)):
+            return name
+    raise ValueError(f"{equality!r} is not linear in any free parameter")

@@ -1,0 +1,34 @@
+"""How often, how well and how fast random constrained designs are solved: ``python -m benchmarks.solve``."""
+
+import os
+from pathlib import Path
+
+import click
+
+from benchmarks.report import keep, section
+from benchmarks.stages import measure
+from benchmarks.suite import SEED
+
+
+@click.command()
+@click.option("--count", default=200, show_default=True, help="problems")
+@click.option("--seed", default=SEED, show_default=True, help="of the problems")
+@click.option("--de", "evolved", default=25, show_default=True, help="problems for scalar differential evolution")
+@click.option("--workers", default=os.cpu_count() or 1, show_default=True, help="processes for what is not timed")
+@click.option(
+    "--output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    default=Path("benchmarks/results.md"),
+    show_default=True,
+    help="file that keeps the table",
+)
+def main(count: int, seed: int, evolved: int, workers: int, output: Path) -> None:
+    """Solve a suite of random designs, compare with SciPy, print the tables and keep them."""
+    command = f"python -m benchmarks.solve --count {count} --seed {seed} --de {evolved}"
+    text = section(measure(count, seed, evolved, workers), command)
+    click.echo(text)
+    keep(output, "solve", text)
+
+
+if __name__ == "__main__":
+    main()
