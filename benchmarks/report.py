@@ -90,7 +90,7 @@ def _by_freedom(records: Sequence[Record]) -> str:
                 sum(r.solved for r in solvable),
                 _milliseconds(r.default.per_start for r in solvable),
                 _milliseconds(r.default.seconds for r in solvable),
-                f"{_quantile(r.default.tried for r in solvable):.0f}",
+                _digits(_quantile(r.default.tried for r in solvable)),
             )
         )
     return _table(("free", "problems", "solvable", "solved", "time per start", "time", "starts"), rows)
@@ -137,11 +137,11 @@ def _ratios(records: Sequence[Record]) -> str:
 def _speedups(pairs: Sequence[tuple[Record, Found]]) -> tuple[str, str, str]:
     solves = [f.seconds / r.default.seconds for r, f in pairs]
     starts = [f.seconds / r.default.per_start for r, f in pairs]
-    return f"{_quantile(solves):.0f}", f"{_quantile(solves, 0.1):.0f}", f"{_quantile(starts):.0f}"
+    return _digits(_quantile(solves)), _digits(_quantile(solves, 0.1)), _digits(_quantile(starts))
 
 
 def _failures(records: Sequence[Record]) -> str:
-    failed = [r for r in records if (r.solvable and not r.solved) or _unsettled(r)]
+    failed = [r for r in records if (r.solvable and not r.solved) or r.contradicted or _unsettled(r)]
     if not failed:
         return "None."
     rows = [
@@ -182,7 +182,11 @@ def _quantile(numbers: Iterable[float], q: float = 0.5) -> float:
 
 
 def _milliseconds(seconds: Iterable[float], q: float = 0.5) -> str:
-    return f"{1e3 * _quantile(seconds, q):.3g} ms"
+    return _digits(1e3 * _quantile(seconds, q)) + " ms"
+
+
+def _digits(number: float) -> str:
+    return "–" if math.isnan(number) else f"{number:.0f}" if number >= 100 else f"{number:.2g}"
 
 
 def _table(header: Sequence[object], rows: Iterable[Sequence[object]]) -> str:

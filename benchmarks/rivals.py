@@ -142,12 +142,13 @@ def differential(problem: Problem, seed: int = 0, vectorized: bool = False) -> F
     """Differential evolution with the constraints as such (Lampinen's rule), polished by SciPy's own choice."""
     reduced = Reduced(problem)
     bounds = Bounds(reduced.lower, reduced.upper)
-    constraints = [NonlinearConstraint(reduced.rows, 0.0, np.inf)] if reduced.constrained else []
+    constraints: Any = NonlinearConstraint(reduced.rows, 0.0, np.inf) if reduced.constrained else ()
+    objective: Callable[[Array], Any] = reduced.abscissae if vectorized else reduced.abscissa
     began = time.perf_counter()
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         answer = differential_evolution(
-            reduced.abscissae if vectorized else reduced.abscissa,
+            objective,
             bounds,
             constraints=constraints,
             tol=1e-8,

@@ -28,9 +28,7 @@ def polynomial_60(
 ) -> list[mpmath.mpf]:
     """a0, ..., a4 of det(M s^2 + V s + P) / (mu nu_H cos(lambda_s)); mu, nu_H and cos(lambda_s) not 0."""
     with mp.workdps(DIGITS + GUARD):
-        Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s = map(
-            _mpf, (Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s)
-        )
+        Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s = map(_mpf, (Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s))
         cos, sin = mp.cos(lambda_s), mp.sin(lambda_s)
         M, V, P, nu_H = _matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, cos, sin)
         return _rounded(a / (mu * nu_H * cos) for a in _determinant(M, V, P))
@@ -44,9 +42,7 @@ def polynomial_exact(
     cos(lambda_s) may be irrational, but with sin = T cos the second row and the second column of the matrices
     each have it as a factor, and it leaves the quotient. So cos = 1 and sin = T serve.
     """
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = map(
-        Fraction, (Fr, mu, chi_B, chi_H, zeta_B, zeta_H, tan_lambda_s)
-    )
+    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = map(Fraction, (Fr, mu, chi_B, chi_H, zeta_B, zeta_H, tan_lambda_s))
     M, V, P, nu_H = _matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, Fraction(1), T)
     return [a / (mu * nu_H) for a in _determinant(M, V, P)]
 
@@ -126,9 +122,7 @@ def elementary(roots: Sequence[Any]) -> list[Any]:
     return _at_60(monic)
 
 
-def weave_Fr_60(
-    mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, lambda_s: Any
-) -> mpmath.mpf | None:
+def weave_Fr_60(mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, lambda_s: Any) -> mpmath.mpf | None:
     """The Froude number in (1e-3, 1e3) where the Hurwitz determinant of the 60-digit polynomial vanishes.
 
     By root finding on the speed alone; no formula for it is used. None where the determinant keeps its sign.
@@ -137,9 +131,7 @@ def weave_Fr_60(
     def determinant(logarithm: Any) -> Any:
         Fr = mp.exp(logarithm)
         a0, a1, a2, a3, a4 = polynomial_60(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s)
-        return (
-            a1 * a2 * a3 - a0 * a3**2 - a1**2 * a4
-        ) / Fr**2  # the factor Fr^2 hides the zero from bisection
+        return (a1 * a2 * a3 - a0 * a3**2 - a1**2 * a4) / Fr**2  # the factor Fr^2 hides the zero from bisection
 
     with mp.workdps(DIGITS):
         low, high = mp.log(mp.mpf("1e-3")), mp.log(mp.mpf("1e3"))

@@ -191,7 +191,7 @@ def test_si_there_and_back_to_2_ulp(p: dict[str, float]) -> None:
 
 
 def test_si_conversion_is_exact_in_rational_numbers() -> None:
-    """Fr = v/√(g w) with g w a square of a rational, which NumPy's scalar root of a float gives exactly."""
+    """Fr = v/√(g w) with g w the square of a rational; balls of 100 digits hold what is exact in each direction."""
     p = {
         "w": Fraction(9, 4), "v": Fraction(7, 3), "g": Fraction(4), "lambda_s": Fraction(1, 3), "m_B": Fraction(10),
         "x_B": Fraction(6, 5), "z_B": Fraction(-2, 5), "m_H": Fraction(1, 7), "x_H": Fraction(51, 50), "z_H": Fraction(-1, 5),
@@ -321,7 +321,7 @@ def test_chi_T_is_the_centre_of_mass() -> None:
 
 
 def test_benchmark_numbers() -> None:
-    """Fr_c = 0.90706414955081164 and v_c = 2.8410083233664 m/s at g = 9.81, as published with the design."""
+    """Fr_c = 0.90706414955081164 and v_c = 2.8410083233664 m/s at g = 9.81: the numbers of the issue."""
     values = quantities(BENCHMARK, SI)
     assert values["Fr_c"] == pytest.approx(0.90706414955081164, rel=1e-14)
     assert values["v_c"] == pytest.approx(2.8410083233664, rel=1e-13)
@@ -372,7 +372,7 @@ def test_the_parameters_of_the_contract() -> None:
     assert NATIVE.names == ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")
     assert SI.names == ("w", "v", "g", "lambda_s", "m_B", "x_B", "z_B", "m_H", "x_H", "z_H")
     assert tms.coefficient_names() == ("a0", "a1", "a2", "a3", "a4")
-    assert MODELS == {"tms": tms}
+    assert {"tms": tms} == MODELS
     assert {q.name for q in tms.quantities} == {"nu_H", "omega0", "Fr_c", "chi_T"}
 
 

@@ -261,7 +261,9 @@ def test_infeasible_problem_names_the_violation():
     best = caught.value.solution
     assert best.status == "infeasible"
     assert set(best.violations) <= {"low", "high"}
-    assert sum(best.violations.values()) == pytest.approx(0.3, rel=0.5)  # least total violation, sides of size 1.2 to 1.5
+    assert sum(best.violations.values()) == pytest.approx(
+        0.3, rel=0.5
+    )  # least total violation, sides of size 1.2 to 1.5
     assert set(best.parameters) == set(TMS.sets[0].names)
     assert pickle.loads(pickle.dumps(caught.value)).solution.status == "infeasible"
 

@@ -58,7 +58,9 @@ def _elastic(problem: Problem, nlp: NLP) -> tuple[NLP, list[int]]:
         NLP(
             formulation="elastic",
             variables=(*nlp.variables, *(f"slack of {nlp.rows[k]}" for k in rows)),
-            functions=ca.Function("elastic", [variables], [ca.densify(ca.sum1(slack)), ca.densify(ca.vertcat(*parts))], ["x"], ["f", "g"]),
+            functions=ca.Function(
+                "elastic", [variables], [ca.densify(ca.sum1(slack)), ca.densify(ca.vertcat(*parts))], ["x"], ["f", "g"]
+            ),
             lower=(*nlp.lower, *(0.0 for _ in rows)),
             upper=(*nlp.upper, *(np.inf for _ in rows)),
             rows=tuple(names),

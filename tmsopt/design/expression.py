@@ -3,6 +3,7 @@
 import ast
 import math
 import operator
+import re
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -19,6 +20,8 @@ COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
 
 _LONGEST = 2000  # characters; longer texts could exhaust the parser's stack
 _DEEPEST = 100
+_LANGUAGE = f"numbers, names, + - * / **, parentheses and {' '.join(FUNCTIONS)}"
+_NOT_ACCEPTED = re.compile(r"[^ -~]|#")  # look-alike letters, line breaks and comments
 
 _BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
@@ -124,15 +127,15 @@ def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
 def _parse(text: str) -> ast.expr:
     if len(text) > _LONGEST:
         raise ExpressionError(f"expression of {len(text)} characters; accepted: up to {_LONGEST}")
+    if strange := _NOT_ACCEPTED.search(text.strip()):
+        raise ExpressionError(f"'{text}' contains {strange[0]!r}; accepted: one line of {_LANGUAGE}")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the tokenizer warns of texts like 1if, which fail below
             return ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         column = f" at character {error.offset}" if isinstance(error, SyntaxError) and error.offset else ""
-        raise ExpressionError(
-            f"'{text}' does not parse{column}; write numbers, names, + - * / **, parentheses and {' '.join(FUNCTIONS)}"
-        ) from None
+        raise ExpressionError(f"'{text}' does not parse{column}; accepted: {_LANGUAGE}") from None
 
 
 def _checked_names(  # noqa: PLR0912 - one case per kind of node
@@ -174,12 +177,16 @@ def _checked_names(  # noqa: PLR0912 - one case per kind of node
                 raise ExpressionError(f"'{text}' calls {name} with {len(args)} arguments; accepted: {wanted}")
             return names_in(*args)
         case ast.Call():
-            raise ExpressionError(f"'{text}' calls '{ast.unparse(node.func)}'; accepted: {' '.join(FUNCTIONS)}")
+            raise ExpressionError(f"'{text}' calls '{_source(node.func, text)}'; accepted: {' '.join(FUNCTIONS)}")
         case ast.Attribute():
-            raise ExpressionError(f"'{text}' uses the attribute '{ast.unparse(node)}'; accepted: plain names")
+            raise ExpressionError(f"'{text}' uses the attribute '{_source(node, text)}'; accepted: plain names")
         case _:
-            accepted_words = f"numbers, names, + - * / ** and {' '.join(FUNCTIONS)}"
-            raise ExpressionError(f"'{text}' contains '{ast.unparse(node)}'; accepted: {accepted_words}")
+            raise ExpressionError(f"'{text}' contains '{_source(node, text)}'; accepted: {_LANGUAGE}")
+
+
+def _source(node: ast.expr, text: str) -> str:
+    """The part of an expression that a node was parsed from."""
+    return ast.get_source_segment(text.strip(), node) or text
 
 
 def _number(node: ast.Constant, text: str) -> float:

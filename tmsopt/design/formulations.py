@@ -215,7 +215,9 @@ class _Builder:
 
     def finish(self, formulation: str) -> NLP:
         g = ca.vertcat(*[r[1] for r in self.rows]) if self.rows else ca.SX(0, 1)
-        functions = ca.Function("nlp", [ca.vertcat(*self.x)], [ca.densify(self.objective), ca.densify(g)], ["x"], ["f", "g"])
+        functions = ca.Function(
+            "nlp", [ca.vertcat(*self.x)], [ca.densify(self.objective), ca.densify(g)], ["x"], ["f", "g"]
+        )
         return NLP(
             formulation=formulation,
             variables=tuple(self.names),

@@ -1,12 +1,15 @@
 """Text such as "40 cm" or "1 deg" as a number in the parameter's own unit."""
 
+import math
 import re
 from functools import cache
 from typing import Any
 
-_QUANTITY = re.compile(r"\s*(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.+-].*?)?\s*")
-_UNIT = re.compile(r"[A-Za-zµμ°%_ */^()²³0-9-]{1,40}")
-_BIG_POWER = re.compile(r"\d\d|\^\s*\^")
+_LONGEST = 80
+_QUANTITY = re.compile(r"(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.+-].*)?", re.ASCII)
+_POWER = r"(?:\s*(?:\*\*|\^)\s*-?\d)?"
+_UNIT = re.compile(rf"[A-Za-zµμ°%]+{_POWER}(?:\s*[*/ ]\s*[A-Za-zµμ°%]+{_POWER})*", re.ASCII)
+"""Names with one-digit powers, joined by * / or a space: anything richer could keep a parser busy for ever."""
 
 _EXAMPLES = {
     "1": "a number",
@@ -27,19 +30,24 @@ def with_unit(text: str, unit: str) -> float:
     accepted = f"accepted: {_EXAMPLES.get(unit, unit)}"
     if unit != "1":
         accepted += f", or a number without quotes in {unit}"
-    parts = _QUANTITY.fullmatch(text)
+    parts = _QUANTITY.fullmatch(text.strip()) if len(text) <= _LONGEST else None
     if parts is None:
-        raise ValueError(f"found '{text}', not a number with a unit; {accepted}")
+        raise ValueError(f"found '{text[:_LONGEST]}', not a number with a unit; {accepted}")
     number, written = float(parts["number"]), parts["unit"]
+    if not math.isfinite(number):
+        raise ValueError(f"found '{text}', a number beyond double precision; {accepted}")
     if not written:
         raise ValueError(f"found '{text}', a number in quotes without a unit; {accepted}")
     if unit == "1":
         raise ValueError(f"found '{text}', but the parameter is dimensionless; {accepted}")
-    if not _UNIT.fullmatch(written) or _BIG_POWER.search(written):
+    written = written.replace("²", "^2").replace("³", "^3")
+    if not _UNIT.fullmatch(written):
         raise ValueError(f"found the unit '{written}', which does not read as a unit; {accepted}")
-    factor = _factor(written.replace("²", "^2").replace("³", "^3").replace("°", "deg"), unit)
+    factor = _factor(written.replace("°", "deg"), unit)
     if factor is None:
         raise ValueError(f"found the unit '{written}', which is not known or not a unit of {unit}; {accepted}")
+    if not math.isfinite(number * factor):
+        raise ValueError(f"found '{text}', a number beyond double precision; {accepted}")
     return number * factor
 
 

@@ -68,8 +68,13 @@ def _nu_H(v: Mapping[str, Any]) -> Any:
 
 
 def _omega0(v: Mapping[str, Any]) -> Any:
+    return -sqrt(sqrt(_quotient(v["a4"], v["a0"])))
+
+
+def _quotient(a: Any, b: Any) -> Any:
+    """a / b, nan where b is 0: a quantity that does not exist, not an infinite one."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        return -sqrt(sqrt(np.divide(v["a4"], v["a0"])))
+        return np.where(np.equal(b, 0), np.nan, np.divide(a, b))[()]
 
 
 def _omega0_equation(v: Mapping[str, Any], x: Any) -> Any:
@@ -98,8 +103,7 @@ def _shape(v: Mapping[str, Any]) -> list[Any]:
 
 def _Fr_c(v: Mapping[str, Any]) -> Any:
     numerator, denominator = _weave_condition(v)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return sqrt(np.divide(numerator, denominator))
+    return sqrt(_quotient(numerator, denominator))
 
 
 def _Fr_c_equation(v: Mapping[str, Any], x: Any) -> Any:

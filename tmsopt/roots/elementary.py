@@ -10,7 +10,7 @@ def tan(x: Any) -> Any:
     """Tangent of x (radians); of a symbolic arctangent, its argument, so that formulas in tan stay polynomial."""
     if hasattr(x, "is_op") and x.is_op(ca.OP_ATAN):
         return x.dep(0)
-    return x.tan() if hasattr(x, "tan") else np.tan(x)
+    return x.tan() if hasattr(x, "tan") else np.tan(np.asarray(x, dtype=float))[()]
 
 
 def sqrt(x: Any) -> Any:
@@ -18,4 +18,4 @@ def sqrt(x: Any) -> Any:
     if hasattr(x, "sqrt"):
         return x.sqrt()
     with np.errstate(invalid="ignore"):
-        return np.sqrt(x)
+        return np.sqrt(np.asarray(x, dtype=float))[()]

@@ -23,10 +23,10 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
         ValueError: for a leading coefficient 0 or coefficients that are not finite.
     """
     c = np.asarray(coefficients, dtype=float)
-    if c.shape[-1] < 2 or not np.all(np.isfinite(c)) or np.any(c[..., 0] == 0):
+    if c.ndim == 0 or c.shape[-1] < 2 or not np.all(np.isfinite(c)) or np.any(c[..., 0] == 0):
         raise ValueError("roots takes finite coefficients, two or more, with a leading one other than 0")
-    monic = (c / c[..., :1]).reshape(-1, c.shape[-1])
-    n = monic.shape[-1] - 1
+    n = c.shape[-1] - 1
+    monic = (c / c[..., :1]).reshape(c[..., 0].size, n + 1)
     scale = _scale(monic)
     scaled = monic / scale[:, None] ** np.arange(n + 1)
     factors = _factors(_companion_eigenvalues(scaled))
@@ -145,7 +145,7 @@ def _factor_roots(factors: Array) -> NDArray[np.complex128]:
     real = disc >= 0
     first = np.where(real, large, half + 1j * root)
     second = np.where(real, small, half - 1j * root)
-    return np.stack([first, second], axis=-1).reshape(len(factors), -1)
+    return np.stack([first, second], axis=-1).reshape(len(factors), 2 * factors.shape[1])
 
 
 def _elementary(values: NDArray[np.complex128] | Array) -> NDArray[np.complex128]:

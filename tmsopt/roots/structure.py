@@ -49,7 +49,7 @@ class Structure:
         name: ``EP4``, ``EP3``, ``2EP2``, ``CEP2``, ``EP2+pair``, ``EP2``, ``pair+real``, ``two pairs``,
             ``pair``, ``real``, or ``undecided`` where double precision cannot tell.
         roots: all roots with multiplicities, of the nearest polynomial that has the structure.
-        distance: largest relative change of a coefficient that takes the polynomial there.
+        distance: relative change of the coefficients (root sum of squares) that takes the polynomial there.
     """
 
     name: str
@@ -65,8 +65,8 @@ class Structure:
 def structure(coefficients: ArrayLike, tolerance: float = 1e-12) -> Structure:
     """Structure of the rightmost roots of a real quartic, coefficients descending, shape (5,).
 
-    A structure holds when a polynomial that has it exactly lies within `tolerance`, the largest change of a
-    coefficient relative to the terms that make it up. The most degenerate one that holds is named. ``undecided`` says that the distance
+    A structure holds when a polynomial that has it exactly lies within `tolerance`: the root sum of squares of
+    the changes of the coefficients, each relative to the terms that make it up. The most degenerate one that holds is named. ``undecided`` says that the distance
     differs from the tolerance by less than rounding does, as it must for tolerance 0 at an exceptional point.
 
     Raises:
@@ -91,7 +91,7 @@ def structure(coefficients: ArrayLike, tolerance: float = 1e-12) -> Structure:
 
 
 def pattern_distance(pattern: Pattern, coefficients: ArrayLike) -> float:
-    """Largest relative change of a coefficient that takes a quartic to a pattern; inf if no fit was found."""
+    """Relative change of the coefficients (root sum of squares) that takes a quartic to a pattern; inf if none."""
     try:
         c = _quartic(coefficients)
     except ValueError:
@@ -106,7 +106,7 @@ def guess_distance(pattern: Pattern, coefficients: Array, found: Roots) -> float
 
 
 def _distance(pattern: Pattern, unknowns: Array, c: Array, found: Roots) -> float:
-    return float(np.max(np.abs(np.array(pattern.monic(list(unknowns)), dtype=float) - c / c[0]) / _size(found)))
+    return float(np.linalg.norm((np.array(pattern.monic(list(unknowns)), dtype=float) - c / c[0]) / _size(found)))
 
 
 def _size(found: Roots) -> Array:
