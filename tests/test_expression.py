@@ -220,7 +220,7 @@ def test_names_in_order_of_appearance() -> None:
     ],
 )
 def test_comparisons(text: str, comparison: str, difference: float, violation: float) -> None:
-    """Value: left minus right. Violation: relative to the larger side, or to 1 if both are smaller. Fr = 3/2, mu = 1."""
+    """Value: left minus right. Violation: relative to the larger side, or to 1 if both are smaller."""
     expression = parse_comparison(text, NAMES)
     at = {"Fr": 1.5, "mu": 1.0}
     assert expression.comparison == comparison
@@ -265,8 +265,12 @@ def test_other_comparisons_are_refused(text: str) -> None:
 
 
 FORBIDDEN = {
-    "call": ["print(1)", "__import__('os')", "eval('1')", "open('x')", "Fr()", "pi()", "Fr(1)", "sin(1)(2)", "(sin)(1)(1)"],
-    "attribute": ["Fr.real", "Fr.__class__", "sin.__globals__", "().__class__.__bases__", "math.pi", "(1).real", "np.sin(Fr)"],
+    "call": [
+        "print(1)", "__import__('os')", "eval('1')", "open('x')", "Fr()", "pi()", "Fr(1)", "sin(1)(2)", "(sin)(1)(1)",
+    ],
+    "attribute": [
+        "Fr.real", "Fr.__class__", "sin.__globals__", "().__class__.__bases__", "math.pi", "(1).real", "np.sin(Fr)",
+    ],
     "subscript": ["Fr[0]", "[Fr][0]", "(1, 2)[0]", "Fr[1:2]"],
     "lambda": ["lambda: 1", "(lambda x: x)(1)"],
     "comprehension": ["[x for x in (1, 2)]", "{x for x in (1, 2)}", "{1: x for x in ()}", "min(x for x in (1, 2))"],
@@ -276,20 +280,28 @@ FORBIDDEN = {
     "f-string": ["f'{Fr}'", "f'{print(1)}'"],
     "keyword argument": ["sin(x=1)", "min(1, key=2)", "max(1, 2, key=abs)", "sin(**Fr)", "min(*Fr, 1)", "max(*Fr)"],
     "condition": ["1 if Fr else 2", "Fr and mu", "Fr or mu", "not Fr", "Fr == mu", "sin(Fr == mu)"],
-    "operator": ["Fr ^ 2", "Fr // 2", "Fr % 2", "Fr @ mu", "Fr << 1", "Fr >> 1", "Fr | 1", "Fr & 1", "~Fr", "Fr <- mu"],
+    "operator": [
+        "Fr ^ 2", "Fr // 2", "Fr % 2", "Fr @ mu", "Fr << 1", "Fr >> 1", "Fr | 1", "Fr & 1", "~Fr", "Fr <- mu",
+    ],
     "constant": ["True", "False", "None", "...", "1j", "2 + 3j", "inf", "nan", "Infinity", "e"],
     "overflow": ["1e999", "-1e999", "1e400 * 0", "9" * 400, "1" + "0" * 309],
-    "statement": ["Fr = 1", "Fr; mu", "import os", "del Fr", "return 1", "yield", "await Fr", "pass", "assert Fr", "x: int"],
+    "statement": [
+        "Fr = 1", "Fr; mu", "import os", "del Fr", "return 1", "yield", "await Fr", "pass", "assert Fr", "x: int",
+    ],
     "wrong number of arguments": ["sin()", "sin(1, 2)", "min()", "min(1)", "max(Fr)", "sqrt(1, 2)", "abs()"],
     "function without argument": ["sin", "min + 1", "sin(cos)", "abs"],
     "unknown name": ["x", "fr", "FR", "chi", "_", "__builtins__", "a5", "tmsopt", "Pi"],
-    "not parsed": ["", " ", "\t", "(", ")", "1 +", "* 1", "1 2", "Fr mu", "2 Fr", "2Fr", "1..2", "1e", "sin 1", "(1", "1)", "$",
-                   "Fr!", "?", "@Fr", "1,000.5", "0777", "Fr''"],
+    "not parsed": [
+        "", " ", "\t", "(", ")", "1 +", "* 1", "1 2", "Fr mu", "2 Fr", "2Fr", "1..2", "1e", "sin 1", "(1", "1)", "$",
+        "Fr!", "?", "@Fr", "1,000.5", "0777", "Fr''",
+    ],
     "line break": ["Fr\nmu", "Fr\n+ 1", "(Fr\n+ 1)", "(Fr +\r\n1)", "Fr \\\n+ 1", "sin(\nFr)"],
     "control character": ["Fr\x00", "\x00", "Fr + \x001", "Fr\x1b", "Fr\x07+1", "Fr\x7f"],
     "comment": ["Fr # mu", "Fr #"],
-    "unicode": ["ｓｉｎ(Fr)", "𝐅𝐫", "Ｆｒ", "ℱr", "F\u0280", "Fr − 1", "Fr × 2", "Fr ÷ 2", "２", "Fr\u00a0+ 1", "Fr\u200b", "\ufeffFr",
-                "π", "µ", "μ", "а0", "Fr²", "√Fr", "\u202eFr", "m\u1d58", "\ud800"],
+    "unicode": [
+        "ｓｉｎ(Fr)", "𝐅𝐫", "Ｆｒ", "ℱr", "F\u0280", "Fr − 1", "Fr × 2", "Fr ÷ 2", "２", "Fr\u00a0+ 1", "Fr\u200b",
+        "\ufeffFr", "π", "µ", "μ", "а0", "Fr²", "√Fr", "\u202eFr", "m\u1d58", "\ud800",
+    ],
 }  # fmt: skip
 """Looks like a name or an operator, or is one in another language; the grammar of the problem file has none of it."""
 
@@ -388,12 +400,15 @@ def test_a_caret_is_answered_with_the_power() -> None:
         parse_value("Fr^2", NAMES)
 
 
-ALLOWED = set(string.ascii_letters + string.digits + "_.+-*/(), <>=\t")
+ALLOWED = set(string.ascii_letters + string.digits + "_.+-*/(), <>=")
 tokens = st.lists(
     st.sampled_from(
-        [*NAMES, "sin", "min", "max", "abs", "pi", "1", "2.5", "1e3", ".5", "+", "-", "*", "/", "**", "(", ")", ",", "<=", ">=",
-         "==", "<", "!=", "=", ".", "[", "]", "{", "}", ":", ";", "'", '"', "lambda", "if", "else", "for", "in", "not", "and",
-         "True", "None", "~", "^", "%", "@", "#", "\\", "\n", "\x00", "é", "f''", ":=", "...", "await", "yield", "0x", "_"]
+        [
+            *NAMES, "sin", "min", "max", "abs", "pi", "1", "2.5", "1e3", ".5", "+", "-", "*", "/", "**", "(", ")",
+            ",", "<=", ">=", "==", "<", "!=", "=", ".", "[", "]", "{", "}", ":", ";", "'", '"', "lambda", "if",
+            "else", "for", "in", "not", "and", "True", "None", "~", "^", "%", "@", "#", "\\", "\n", "\x00", "é",
+            "f''", ":=", "...", "await", "yield", "0x", "_",
+        ]
     ),
     max_size=12,
 )  # fmt: skip
@@ -407,10 +422,9 @@ def test_random_tokens_are_refused_or_can_be_evaluated(
     text = space.join(parts)
     try:
         expression = parse(text, NAMES)
-    except ExpressionError as error:
-        assert str(error)
+    except ExpressionError:
         return
-    assert set(text) <= ALLOWED, text
+    assert set(text.strip()) <= ALLOWED, text
     assert isinstance(float(expression(dict.fromkeys(NAMES, 0.7))), float)
     expression.symbolic({n: ca.SX.sym(n) for n in NAMES})
 
@@ -423,4 +437,4 @@ def test_random_text_never_raises_anything_else(text: str) -> None:
             parse(text, NAMES)
         except ExpressionError:
             continue
-        assert set(text) <= ALLOWED, text
+        assert set(text.strip()) <= ALLOWED, text

@@ -194,7 +194,8 @@ def test_si_conversion_is_exact_in_rational_numbers() -> None:
     """Fr = v/√(g w) with g w the square of a rational; balls of 100 digits hold what is exact in each direction."""
     p = {
         "w": Fraction(9, 4), "v": Fraction(7, 3), "g": Fraction(4), "lambda_s": Fraction(1, 3), "m_B": Fraction(10),
-        "x_B": Fraction(6, 5), "z_B": Fraction(-2, 5), "m_H": Fraction(1, 7), "x_H": Fraction(51, 50), "z_H": Fraction(-1, 5),
+        "x_B": Fraction(6, 5), "z_B": Fraction(-2, 5), "m_H": Fraction(1, 7), "x_H": Fraction(51, 50),
+        "z_H": Fraction(-1, 5),
     }  # fmt: skip
     with flint.ctx.workdps(100):
         native = from_si({name: flint.arb(x.numerator) / x.denominator for name, x in p.items()})
@@ -394,9 +395,10 @@ def test_every_parameter_and_quantity_is_documented(item: Parameter | Quantity) 
 
 PHYSICAL = {
     "Fr": ([0, 3], [-1e-9]), "mu": ([0, 30], [-0.1]), "chi_B": ([-1, 0, 2], []), "chi_H": ([-1, 0, 2], []),
-    "zeta_B": ([0, -1], [0.1]), "zeta_H": ([0, -1], [0.1]), "lambda_s": ([-1.5, 0, 1.5], [math.pi / 2, -math.pi / 2, 2]),
-    "w": ([1], [0, -1]), "v": ([0, 5], [-1]), "g": ([9.81, 1.62], [0, -9.81]), "m_B": ([1], [0, -1]),
-    "m_H": ([0, 1], [-1]), "x_B": ([-1, 0, 1], []), "x_H": ([-1, 0, 1], []), "z_B": ([-1, 0], [1]), "z_H": ([-1, 0], [1]),
+    "zeta_B": ([0, -1], [0.1]), "zeta_H": ([0, -1], [0.1]),
+    "lambda_s": ([-1.5, 0, 1.5], [math.pi / 2, -math.pi / 2, 2]), "w": ([1], [0, -1]), "v": ([0, 5], [-1]),
+    "g": ([9.81, 1.62], [0, -9.81]), "m_B": ([1], [0, -1]), "m_H": ([0, 1], [-1]), "x_B": ([-1, 0, 1], []),
+    "x_H": ([-1, 0, 1], []), "z_B": ([-1, 0], [1]), "z_H": ([-1, 0], [1]),
 }  # fmt: skip
 
 

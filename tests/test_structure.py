@@ -208,12 +208,11 @@ def test_the_definition_of_the_tolerance(name: str) -> None:
 
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("name", LINEAR)
-def test_pattern_distance_is_that_of_a_least_squares_fit(name: str, seed: int) -> None:
-    """At least the smallest largest change, by linear programming, and at most √4 times it, whatever the norm of
-    the fit; 1e-3 is left for the second order of a change of 1e-6."""
+def test_pattern_distance_is_the_least_root_sum_of_squares(name: str, seed: int) -> None:
+    """Against linear least squares in exact derivatives; 1e-3 is left for the second order of a change of 1e-6."""
     for distance in (1e-6, 1e-8):
-        ratio = pattern_distance(PATTERNS[name], perturbed(name, seed, distance)) / distance
-        assert 1 - 1e-3 <= ratio <= 2 + 1e-3
+        found = pattern_distance(PATTERNS[name], perturbed(name, seed, distance, euclidean_distance))
+        assert found == pytest.approx(distance, rel=1e-3)
 
 
 @pytest.mark.parametrize(("name", "factors"), [e for e in EVERY if e[0] not in ("real", "pair")])

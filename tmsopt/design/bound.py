@@ -5,11 +5,10 @@ The product of the roots is aₙ/a0, so the abscissa is at least −|aₙ/a0|^(1
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,18 +20,32 @@ PROVEN = 1e-9
 """Gap, relative to 1 + |bound|, below which a design counts as proven optimal."""
 
 _ROUNDING = 1e-15  # of the two coefficients, their quotient and its root
+_NODES = np.linspace(-1, 1, 9)
+_DEGREE = 4  # in any one parameter; nine nodes fit it
+_FIT = np.linalg.pinv(np.vander(_NODES, _DEGREE + 1))
+
+Array = NDArray[np.float64]
+Box = Mapping[str, tuple[float, float]]
+
+
+def bounded(problem: Problem) -> bool:
+    """Whether the bound speaks of the problem: it asks for the least abscissa."""
+    return problem.sense == "minimize" and (problem.minimize or "").strip() == "abscissa"
 
 
 def omega0_bound(problem: Problem, value: float) -> Bound:
     """Lower bound on the abscissa over the whole box, constraints ignored, and the gap of a value to it."""
-    if problem.sense != "minimize" or (problem.minimize or "").strip() != "abscissa":
-        return Bound()
-    largest = _largest_product(problem)
+    largest = _largest_product(problem) if bounded(problem) else math.inf
     if not math.isfinite(largest):
         return Bound()
     bound = -(largest ** (1 / problem.model.degree)) * (1 + _ROUNDING)
     gap = max(value - bound, 0.0)
-    return Bound(bound, gap, gap <= PROVEN * (1 + abs(bound)), "omega0")
+    return Bound(bound, gap, closed(gap, bound), "omega0")
+
+
+def closed(gap: float, bound: float) -> bool:
+    """Whether a gap is closed."""
+    return gap <= PROVEN * (1 + abs(bound))
 
 
 def _largest_product(problem: Problem) -> float:
@@ -41,86 +54,89 @@ def _largest_product(problem: Problem) -> float:
     Along a parameter in which aₙ and a0 are linear the quotient is monotone, so its extremes are at the ends. One
     further parameter may enter otherwise; along it the stationary points are polynomial roots.
     """
-    model = problem.model
-    box = _algebraic_box(problem)
-    constant = {n for n, (lo, hi) in box.items() if lo == hi or _plays_no_role(model, n, box)}
-    curved = [n for n in box if n not in constant and not _linear(model, n, box)]
+    model, box = problem.model, _algebraic_box(problem)
+    constant = [n for n, (lo, hi) in box.items() if lo == hi or _plays_no_role(model, n, box)]
+    varying = [n for n in box if n not in constant]
+    curved = [n for n in varying if not _linear(model, n, box)]
     if len(curved) > 1:
         return math.inf
-    middles = {n: (lo + hi) / 2 for n, (lo, hi) in box.items()}
-    vertices = [n for n in box if n not in constant and n not in curved]
-    largest, signs = 0.0, set()
-    for corner in itertools.product(*(box[n] for n in vertices)):
-        at = middles | dict(zip(vertices, corner, strict=True))
-        points = _critical(model, at, curved, box)
-        if points is None:
-            return math.inf
-        for point in points:
-            a = model.polynomial(**point)
-            if a[0] == 0 and a[-1] == 0:
-                continue  # the quotient is constant along the edges that end here
-            if a[0] == 0:
-                return math.inf
-            signs.add(a[0] > 0)
-            largest = max(largest, abs(a[-1] / a[0]))
-    return largest if len(signs) == 1 else math.inf
+    ends = [box[n] if n in varying and n not in curved else ((box[n][0] + box[n][1]) / 2,) for n in box]
+    corners = dict(zip(box, np.array(list(itertools.product(*ends))).T, strict=True))
+    quotients, signs = _along(model, corners, curved[0], box) if curved else _at(model, corners)
+    if len(signs) != 1:
+        return math.inf
+    return float(quotients.max())
+
+
+def _at(model: Model, points: Mapping[str, Array]) -> tuple[Array, set[bool]]:
+    """|aₙ/a0| at points, and the signs of a0. Where both vanish the quotient is constant along the edges that end."""
+    a = model.polynomial(**points)
+    last, first = np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in (a[-1], a[0])))
+    both = (last == 0) & (first == 0)
+    if np.any((first == 0) & ~both) or np.all(both):
+        return np.array([math.inf]), set()
+    return np.abs(last[~both] / first[~both]), set((first[~both] > 0).tolist())
+
+
+def _along(model: Model, corners: Mapping[str, Array], name: str, box: Box) -> tuple[Array, set[bool]]:
+    """The same at the ends and stationary points of the one curved parameter; no sign at all if it has a pole."""
+    lower, upper = box[name]
+    y = (lower + upper) / 2 + (upper - lower) / 2 * _NODES
+    grid: dict[str, Any] = {n: column[:, None] for n, column in corners.items()} | {name: y[None, :]}
+    a = model.polynomial(**grid)
+    shape = (len(corners[name]), len(y))
+    tops, bottoms = (np.broadcast_to(c, shape) @ _FIT.T for c in (a[-1], a[0]))
+    points: list[dict[str, float]] = []
+    for k, (top, bottom) in enumerate(zip(tops, bottoms, strict=True)):
+        if _inside(bottom).size:
+            return np.array([math.inf]), set()
+        turning = np.polysub(np.polymul(np.polyder(top), bottom), np.polymul(top, np.polyder(bottom)))
+        at = {n: float(column[k]) for n, column in corners.items()}
+        for u in (-1.0, 1.0, *_inside(turning)):
+            points.append({**at, name: (lower + upper) / 2 + (upper - lower) / 2 * float(u)})
+    return _at(model, {n: np.array([p[n] for p in points]) for n in corners})
+
+
+def _inside(polynomial: Array) -> Array:
+    """Real roots in [-1, 1] of a fitted polynomial, with a margin for rounding."""
+    clean = np.where(np.abs(polynomial) > 1e-13 * np.abs(polynomial).max(), polynomial, 0.0)
+    found = np.roots(clean)
+    close = (np.abs(found.imag) < 1e-6) & (np.abs(found.real) <= 1 + 1e-6)
+    return np.asarray(np.clip(found.real[close], -1.0, 1.0))
 
 
 def _algebraic_box(problem: Problem) -> dict[str, tuple[float, float]]:
     """Range of each algebraic parameter: they are monotone in every parameter of a set, so corners suffice."""
-    ends = [problem.free.get(n) or (problem.fixed[n],) for n in problem.parameter_set.names]
-    corners = [
-        problem.model.algebraic(problem.parameter_set.native(dict(zip(problem.parameter_set.names, c, strict=True))))
-        for c in itertools.product(*ends)
-    ]
-    return {n: (float(min(c[n] for c in corners)), float(max(c[n] for c in corners))) for n in corners[0]}
+    of = problem.parameter_set
+    corners = np.array(list(itertools.product(*(problem.free.get(n) or (problem.fixed[n],) for n in of.names))))
+    values = problem.model.algebraic(of.native(dict(zip(of.names, corners.T, strict=True))))
+    return {n: (float(np.min(column)), float(np.max(column))) for n, column in values.items()}
 
 
-def _plays_no_role(model: Model, name: str, box: Mapping[str, tuple[float, float]]) -> bool:
+def _plays_no_role(model: Model, name: str, box: Box) -> bool:
     """Whether aₙ/a0 is free of a parameter: exact arithmetic at points where a difference would show."""
-
-    def ends(numbers: tuple[Fraction, Fraction], part: Fraction) -> tuple[Any, Any]:
-        at = {
-            n: Fraction(lo) if lo == hi else Fraction(lo) + (Fraction(hi) - Fraction(lo)) * part * Fraction(k, 13)
-            for k, (n, (lo, hi)) in enumerate(box.items(), start=3)
-        }
-        first, second = (model.polynomial(**{**at, name: x}) for x in numbers)
-        return first[-1] * second[0], second[-1] * first[0]
-
-    pairs = [
-        ((Fraction(3, 7), Fraction(11, 5)), Fraction(1, 2)),
-        ((Fraction(-2, 3), Fraction(17, 4)), Fraction(2, 3)),
-    ]
-    return all(left == right for left, right in (ends(*pair) for pair in pairs))
+    for part in (Fraction(1, 2), Fraction(2, 3)):
+        (last, first), (last2, first2) = _exact(model, name, box, part, [Fraction(3, 7), Fraction(11, 5)])
+        if last * first2 != last2 * first:
+            return False
+    return True
 
 
-def _linear(model: Model, name: str, box: Mapping[str, tuple[float, float]]) -> bool:
-    symbols: dict[str, Any] = {n: lo if lo == hi else ca.SX.sym(n) for n, (lo, hi) in box.items()}
-    a = model.polynomial(**symbols)
-    return all(bool(ca.is_linear(ca.SX(c), symbols[name])) for c in (a[0], a[-1]))
+def _linear(model: Model, name: str, box: Box) -> bool:
+    """Whether aₙ and a0 are linear in a parameter: exact second differences, at points where others would show."""
+    for part in (Fraction(1, 2), Fraction(2, 3)):
+        at = _exact(model, name, box, part, [Fraction(1, 3), Fraction(4, 3), Fraction(7, 3), Fraction(10, 3)])
+        for a, b, c, d in zip(*at, strict=True):
+            if a - 2 * b + c != 0 or b - 2 * c + d != 0:
+                return False
+    return True
 
 
-def _critical(
-    model: Model, at: Mapping[str, float], curved: list[str], box: Mapping[str, tuple[float, float]]
-) -> list[dict[str, float]] | None:
-    """The ends and stationary points of aₙ/a0 along the curved parameter, if there is one; None at a pole."""
-    if not curved:
-        return [dict(at)]
-    name = curved[0]
-    lower, upper = box[name]
-    y = np.linspace(lower, upper, 9)
-    rows = [model.polynomial(**{**at, name: float(v)}) for v in y]
-    u = np.linspace(-1, 1, 9)  # nine points fit degree 4, more than any parameter has in a0 or aₙ
-    top = np.polynomial.Polynomial.fit(u, [r[-1] for r in rows], 4).convert().trim(1e-13)
-    bottom = np.polynomial.Polynomial.fit(u, [r[0] for r in rows], 4).convert().trim(1e-13)
-    if _inside(bottom.roots()).size:
-        return None
-    stationary = _inside((top.deriv() * bottom - top * bottom.deriv()).roots())
-    points = [lower, upper, *(lower + (upper - lower) * (stationary + 1) / 2)]
-    return [{**at, name: float(v)} for v in points]
-
-
-def _inside(found: NDArray[Any]) -> NDArray[np.float64]:
-    """The real ones among roots that lie in [-1, 1], with a margin for rounding."""
-    close = (np.abs(found.imag) < 1e-6) & (np.abs(found.real) <= 1 + 1e-6)
-    return np.asarray(np.clip(found.real[close], -1.0, 1.0))
+def _exact(model: Model, name: str, box: Box, part: Fraction, at: Sequence[Fraction]) -> list[tuple[Any, Any]]:
+    """aₙ and a0 for exact values of one parameter, the others fixed somewhere in the box."""
+    others = {
+        n: Fraction(lo) if lo == hi else Fraction(lo) + (Fraction(hi) - Fraction(lo)) * part * Fraction(k, 13)
+        for k, (n, (lo, hi)) in enumerate(box.items(), start=3)
+    }
+    rows = (model.polynomial(**{**others, name: x}) for x in at)
+    return [(a[-1], a[0]) for a in rows]

@@ -13,6 +13,7 @@ from tmsopt.design.ipopt import Run
 Array = NDArray[np.float64]
 
 _STEPS = 12
+_STATIONARY = 1e-9
 _ACTIVE = 1e-5  # slack below which a bound may be active although its multiplier is nearly 0
 
 
@@ -93,6 +94,8 @@ def polisher(nlp: NLP) -> Callable[[Run], Point]:
             refined = newton(run, loose)
             if refined is not None and _better(refined, best):
                 best = refined
+            if best is refined and best.stationarity <= _STATIONARY:
+                break
         return best
 
     return polish

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from tmsopt.design.errors import Fault, InputError, suggest
@@ -81,7 +82,7 @@ class Problem:
         object.__setattr__(self, "constraints", dict(self.constraints))
         object.__setattr__(self, "start", {n: float(v) for n, v in self.start.items() if n in ends})
 
-    @property
+    @cached_property
     def parameter_set(self) -> ParameterSet:
         """The set in which the parameters are written, e.g. dimensionless or SI."""
         return next(s for s in self.model.sets if set(s.names) == {*self.fixed, *self.free})
@@ -100,13 +101,13 @@ class Problem:
             return "maximize"
         return "locate" if self.locate else "evaluate"
 
-    @property
+    @cached_property
     def objective(self) -> Expression | None:
         """The expression to optimise, if there is one."""
         text = self.minimize if self.minimize is not None else self.maximize
         return None if text is None else parse_value(text, self.vocabulary)
 
-    @property
+    @cached_property
     def conditions(self) -> dict[str, Expression]:
         """The constraints, parsed."""
         return {name: parse_comparison(text, self.vocabulary) for name, text in self.constraints.items()}

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tmsopt.design.bound import omega0_bound
-from tmsopt.design.formulations import NLP, abscissa, design_of, freedom
+from tmsopt.design.bound import bounded, closed, omega0_bound
+from tmsopt.design.formulations import NLP, abscissa, design_of, freedom, middle
 from tmsopt.design.ipopt import Run, ipopt
 from tmsopt.design.problem import Problem
 from tmsopt.design.starts import complete, designs
@@ -18,7 +18,7 @@ STARTS = 32
 _ENOUGH = 8  # starts tried before agreement counts
 _AGREE = 5  # starts at the best value that end the search
 _SAME = 1e-7  # relative difference of objectives that counts as the same
-_FEASIBLE = 1e-8  # of the rows, before polishing; the recheck has the last word
+_FEASIBLE = 1e-6  # of the rows, before polishing; the recheck has the last word
 _RESCUES = 4  # starts from abscissa optima, for a pattern that no start reached
 
 Progress = Callable[[int, int], None]
@@ -51,7 +51,10 @@ def search(
     """Where every start ended that was tried, in order."""
     run = ipopt(nlp, linear_solver)
     candidates: list[Candidate] = []
-    for design in designs(problem, seed, starts):
+    if problem.start:  # the user's own: near it, not pushed away from the bounds
+        given = complete(nlp, problem, middle(problem))
+        candidates.append(_candidate(nlp, ipopt(nlp, linear_solver, near=True)(given)))
+    for design in designs(problem, seed, max(starts - len(candidates), 0)):
         candidates.append(_candidate(nlp, run(complete(nlp, problem, design))))
         if progress:
             progress(len(candidates), starts)
@@ -82,12 +85,21 @@ def _settled(problem: Problem, candidates: list[Candidate]) -> bool:
     if not feasible:
         return False
     best = min(c.objective for c in feasible)
-    if feasible[-1].objective == best and omega0_bound(problem, best).proven:
+    if feasible[-1].objective == best and _proven(problem, feasible[-1]):
         return True
     agreeing = sum(same(c.objective, best) for c in feasible)
     if problem.objective is None:  # any point of a square pattern will do
         return agreeing >= (1 if freedom(problem).count <= 0 else _AGREE)
     return len(candidates) >= _ENOUGH and agreeing >= _AGREE
+
+
+def _proven(problem: Problem, candidate: Candidate) -> bool:
+    """Whether the bound is reached; it is looked at only where the design itself has all roots of one modulus."""
+    if not bounded(problem):
+        return False
+    a = problem.model.coefficients(problem.ordered(design_of(problem, candidate.run.x.tolist())), problem.parameter_set)
+    own = -float(np.abs(np.divide(a[-1], a[0]))) ** (1 / problem.model.degree)
+    return closed(candidate.objective - own, own) and omega0_bound(problem, candidate.objective).proven
 
 
 def _rescued(problem: Problem, nlp: NLP, seed: int, linear_solver: str) -> list[Candidate]:

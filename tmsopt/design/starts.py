@@ -21,14 +21,12 @@ _CANDIDATES = 8
 
 
 def designs(problem: Problem, seed: int, count: int) -> list[dict[str, float]]:
-    """`count` designs to start from: the given start, if any, then the most promising of each few of a
-    quasi-random sequence over the box."""
+    """`count` designs to start from: the most promising of each few of a quasi-random sequence over the box."""
     names = list(problem.free)
     pool = list(islice(_spread(problem, seed), _CANDIDATES * count))
     columns = {n: np.array([d[n] for d in pool]) for n in names}
     merit = _merit(problem, columns).reshape(count, _CANDIDATES)
-    chosen = [pool[row * _CANDIDATES + int(np.argmin(merit[row]))] for row in range(count)]
-    return [middle(problem), *chosen[: count - 1]] if problem.start else chosen
+    return [pool[row * _CANDIDATES + int(np.argmin(merit[row]))] for row in range(count)]
 
 
 def complete(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Array:

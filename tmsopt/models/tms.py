@@ -85,30 +85,32 @@ def _chi_T(v: Mapping[str, Any]) -> Any:
     return (v["chi_B"] + v["mu"] * v["chi_H"]) / (1 + v["mu"])
 
 
-def _weave_condition(v: Mapping[str, Any]) -> tuple[Any, Any]:
-    """Numerator and denominator of Fr_c².
+def _weave_condition(v: Mapping[str, Any]) -> tuple[list[Any], Any]:
+    """Terms of the numerator of Fr_c², and its denominator.
 
-    a1 = b1 Fr, a3 = b3 Fr and a2 = c2 Fr² + d2, so the Hurwitz condition a1 a2 a3 = a0 a3² + a4 a1² is linear
-    in Fr².
+    The Hurwitz condition a1 a2 a3 = a0 a3² + a4 a1² is linear in Fr², and ζ_B − ζ_H divides all of it. Divided
+    out, it stays regular at ζ_B = ζ_H, where the undivided one holds for any speed.
     """
-    b = copo(1, *_shape(v))
-    d = copo(0, *_shape(v))
-    b1, b3, c2, d2 = b[1], b[3], b[2] - d[2], d[2]
-    return b[0] * b3 * b3 + b[4] * b1 * b1 - b1 * b3 * d2, b1 * b3 * c2
-
-
-def _shape(v: Mapping[str, Any]) -> list[Any]:
-    return [v[name] for name in ("mu", "chi_B", "chi_H", "zeta_B", "zeta_H")] + [tan(v["lambda_s"])]
+    mu, chi_B, chi_H, zeta_B, zeta_H = (v[name] for name in ("mu", "chi_B", "chi_H", "zeta_B", "zeta_H"))
+    lever, moment, k = chi_B - chi_H, zeta_B * chi_H - zeta_H * chi_B, chi_H - 1
+    numerator = [
+        zeta_B * (zeta_B - zeta_H) * chi_B * chi_H * tan(v["lambda_s"]),
+        k * chi_H * mu * moment,
+        -k * chi_B * zeta_B * lever,
+    ]
+    return numerator, lever * moment * zeta_B
 
 
 def _Fr_c(v: Mapping[str, Any]) -> Any:
-    numerator, denominator = _weave_condition(v)
-    return sqrt(_quotient(numerator, denominator))
+    terms, denominator = _weave_condition(v)
+    numerator = sum(terms)
+    rounding = 4 * np.finfo(float).eps * sum(np.abs(t) for t in terms)
+    return sqrt(_quotient(np.where(np.abs(numerator) <= rounding, 0.0, numerator), denominator))
 
 
 def _Fr_c_equation(v: Mapping[str, Any], x: Any) -> Any:
-    numerator, denominator = _weave_condition(v)
-    return x * x * denominator - numerator
+    terms, denominator = _weave_condition(v)
+    return x * x * denominator - (terms[0] + terms[1] + terms[2])
 
 
 def _v_c(v: Mapping[str, Any]) -> Any:

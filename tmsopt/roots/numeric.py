@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-_POLISHED = 4e-16  # backward error below which one more Newton step can only add rounding
+_POLISHED = 4e-15  # backward error below which more Newton steps are not worth their time
 _STEPS = 6  # Newton doubles the digits at each step; companion eigenvalues start with 4 or more
 
 

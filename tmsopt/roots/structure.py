@@ -66,8 +66,9 @@ def structure(coefficients: ArrayLike, tolerance: float = 1e-12) -> Structure:
     """Structure of the rightmost roots of a real quartic, coefficients descending, shape (5,).
 
     A structure holds when a polynomial that has it exactly lies within `tolerance`: the root sum of squares of
-    the changes of the coefficients, each relative to the terms that make it up. The most degenerate one that holds is named. ``undecided`` says that the distance
-    differs from the tolerance by less than rounding does, as it must for tolerance 0 at an exceptional point.
+    the changes of the coefficients, each relative to the terms that make it up. The most degenerate structure that
+    holds is named. ``undecided`` says that the distance differs from the tolerance by less than rounding does, as
+    it must for tolerance 0 at an exceptional point.
 
     Raises:
         ValueError: for another shape, coefficients that are not finite, or a leading 0.
