@@ -6,6 +6,7 @@ coefficients, distances from a linear programme in the exact derivatives of the 
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from functools import cache
 
 import numpy as np
 import pytest
@@ -140,6 +141,7 @@ UNKNOWNS = {"EP4": [-1], "EP3": [-1, -3], "2EP2": [5, 4], "CEP2": [2, 2], "EP2":
 """Unknowns of (s+1)⁴, (s+1)³(s+3), (s+1)²(s+4)², (s²+2s+2)² and (s+1)²(s+3)(s+4)."""
 
 
+@cache
 def relative_derivatives(name: str) -> tuple[np.ndarray, np.ndarray]:
     """Monic coefficients of a pattern and their derivatives, relative to the terms they are summed from."""
     u = sympy.symbols(f"u0:{len(UNKNOWNS[name])}")

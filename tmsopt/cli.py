@@ -45,7 +45,7 @@ def _common(command: Command) -> Command:
     """Options that every solving command has."""
     for option in (
         click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table."),
-        click.option("--starts", type=click.IntRange(min=1), default=None, help="Starts tried at most. [default: 32]"),
+        click.option("--starts", type=click.IntRange(min=1), default=None, help="Starts tried at most. [default: 64]"),
         click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts."),
         click.option(
             "--linear-solver", type=click.Choice(["mumps", "spral"]), default="mumps", show_default=True,

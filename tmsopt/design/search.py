@@ -1,8 +1,9 @@
 """Multi-start: IPOPT from many designs, ended early when enough of them agree."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,11 +13,12 @@ from tmsopt.design.ipopt import Run, ipopt
 from tmsopt.design.problem import Problem
 from tmsopt.design.starts import complete, designs
 
-STARTS = 32
-"""Starts tried at most, unless fewer agree earlier."""
+STARTS = 64
+"""Starts tried at most; most problems settle with a dozen."""
 
-_ENOUGH = 8  # starts tried before agreement counts
+_ENOUGH = 12  # starts tried before agreement counts
 _AGREE = 5  # starts at the best value that end the search
+_HOPELESS = 16  # starts without a feasible end after which the least-violating design is looked for instead
 _SAME = 1e-7  # relative difference of objectives that counts as the same
 _FEASIBLE = 1e-6  # of the rows, before polishing; the recheck has the last word
 _RESCUES = 4  # starts from abscissa optima, for a pattern that no start reached
@@ -51,9 +53,8 @@ def search(
     """Where every start ended that was tried, in order."""
     run = ipopt(nlp, linear_solver)
     candidates: list[Candidate] = []
-    if problem.start:  # the user's own: near it, not pushed away from the bounds
-        given = complete(nlp, problem, middle(problem))
-        candidates.append(_candidate(nlp, ipopt(nlp, linear_solver, near=True)(given)))
+    if problem.start:  # the user's own
+        candidates.append(follow(problem, nlp, middle(problem), linear_solver))
     for design in designs(problem, seed, max(starts - len(candidates), 0)):
         candidates.append(_candidate(nlp, run(complete(nlp, problem, design))))
         if progress:
@@ -63,6 +64,11 @@ def search(
     if problem.pattern is not None and not any(c.feasible for c in candidates):
         candidates += _rescued(problem, nlp, seed, linear_solver)
     return candidates
+
+
+def follow(problem: Problem, nlp: NLP, design: Mapping[str, float], linear_solver: str) -> Candidate:
+    """Where IPOPT ends from close to a design."""
+    return _candidate(nlp, ipopt(nlp, linear_solver, near=True)(complete(nlp, problem, design)))
 
 
 def same(a: float, b: float) -> bool:
@@ -80,17 +86,29 @@ def _candidate(nlp: NLP, run: Run) -> Candidate:
 
 
 def _settled(problem: Problem, candidates: list[Candidate]) -> bool:
-    """Whether more starts would be waste: the bound is reached, or enough of them agree on the best."""
+    """Whether more starts would be waste: the bound is reached, or enough of them agree on the best.
+
+    With w different optima seen in n starts, w (n − 1)/(n − w − 2) are expected in all (Boender and Rinnooy Kan
+    1987); the search goes on while that is more than w and a half.
+    """
     feasible = [c for c in candidates if c.feasible]
     if not feasible:
-        return False
+        return len(candidates) >= _HOPELESS
     best = min(c.objective for c in feasible)
     if feasible[-1].objective == best and _proven(problem, feasible[-1]):
         return True
     agreeing = sum(same(c.objective, best) for c in feasible)
     if problem.objective is None:  # any point of a square pattern will do
         return agreeing >= (1 if freedom(problem).count <= 0 else _AGREE)
-    return len(candidates) >= _ENOUGH and agreeing >= _AGREE
+    n, w = len(feasible), _different([c.objective for c in feasible])
+    seen = n > w + 2 and w * (n - 1) <= (w + 0.5) * (n - w - 2)
+    return len(candidates) >= _ENOUGH and agreeing >= _AGREE and seen
+
+
+def _different(objectives: list[float]) -> int:
+    """Number of different optima among the objectives."""
+    ordered = sorted(objectives)
+    return 1 + sum(not same(a, b) for a, b in pairwise(ordered))
 
 
 def _proven(problem: Problem, candidate: Candidate) -> bool:
@@ -98,7 +116,7 @@ def _proven(problem: Problem, candidate: Candidate) -> bool:
     if not bounded(problem):
         return False
     a = problem.model.coefficients(problem.ordered(design_of(problem, candidate.run.x.tolist())), problem.parameter_set)
-    own = -float(np.abs(np.divide(a[-1], a[0]))) ** (1 / problem.model.degree)
+    own = -(float(np.abs(np.divide(a[-1], a[0]))) ** (1 / problem.model.degree))
     return closed(candidate.objective - own, own) and omega0_bound(problem, candidate.objective).proven
 
 
@@ -106,7 +124,7 @@ def _rescued(problem: Problem, nlp: NLP, seed: int, linear_solver: str) -> list[
     """Starts where the abscissa is least under the same constraints: multiple roots are often met there."""
     relaxed = replace(problem, locate=None, minimize="abscissa", maximize=None)
     leading = abscissa(relaxed)
-    lead, follow = ipopt(leading, linear_solver), ipopt(nlp, linear_solver, near=True)
+    lead = ipopt(leading, linear_solver)
     ended = [lead(complete(leading, relaxed, d)).x for d in designs(relaxed, seed, _RESCUES)]
     reached = [design_of(problem, x.tolist()) for x in ended if np.all(np.isfinite(x))]
-    return [_candidate(nlp, follow(complete(nlp, problem, design))) for design in reached]
+    return [follow(problem, nlp, design, linear_solver) for design in reached]

@@ -13,7 +13,7 @@ from tmsopt.design.frozen import Table
 from tmsopt.design.polish import Point, polisher
 from tmsopt.design.problem import Problem
 from tmsopt.design.recheck import Checked, recheck
-from tmsopt.design.search import STARTS, Candidate, Progress, same, search
+from tmsopt.design.search import STARTS, Candidate, Progress, follow, same, search
 from tmsopt.design.solution import Bound, Branch, NotSolved, Solution, Starts
 
 _STATIONARY = 1e-6  # gradient of the Lagrangian at which a point counts as converged whatever IPOPT says
@@ -61,7 +61,7 @@ def solve(
             linear_solver=linear_solver,
             progress=progress,
         )
-        finding = _best(problem, nlp, candidates) or _least_violating(problem, nlp, candidates, seed, linear_solver)
+        finding = _best(problem, nlp, candidates) or _without_any(problem, nlp, candidates, seed, linear_solver)
     else:
         finding = _evaluated(problem)
     solution = _assembled(problem, finding, began)
@@ -144,16 +144,18 @@ def _survivor(problem: Problem, nlp: NLP, candidates: list[Candidate]) -> _Trial
         point = polish(candidate.run)
         checked = recheck(problem, problem.ordered(design_of(problem, point.x.tolist())))
         trial = (candidate, point, checked)
-        if kept is None or _rank(trial) < _rank(kept):
+        if kept is None or _rank(problem, trial) < _rank(problem, kept):
             kept = trial
         if not checked.violations and point.stationarity <= _STATIONARY:
             break
     return kept
 
 
-def _rank(trial: _Trial) -> tuple[float, float]:
+def _rank(problem: Problem, trial: _Trial) -> tuple[float, float]:
+    """Violation first, then the objective that the recheck found."""
     _, point, checked = trial
-    return sum(checked.violations.values()), point.objective
+    value = point.objective if math.isnan(checked.objective) else checked.objective
+    return sum(checked.violations.values()), -value if problem.sense == "maximize" else value
 
 
 def _active(problem: Problem, nlp: NLP, point: Point) -> dict[str, float]:
@@ -178,16 +180,18 @@ def _active(problem: Problem, nlp: NLP, point: Point) -> dict[str, float]:
     return active
 
 
-def _least_violating(
-    problem: Problem, nlp: NLP, candidates: list[Candidate], seed: int, linear_solver: str
-) -> _Finding:
-    """No start ended feasible: the least-violating point, and whether feasible ones exist at all."""
-    parameters = problem.ordered(least_violating(problem, nlp, seed, linear_solver))
+def _without_any(problem: Problem, nlp: NLP, candidates: list[Candidate], seed: int, linear_solver: str) -> _Finding:
+    """No start ended feasible: the least-violating design, and what can be reached from it if it violates nothing."""
+    design = least_violating(problem, nlp, seed, linear_solver)
+    parameters = problem.ordered(design)
     checked = recheck(problem, parameters)
     tried = f"of {len(candidates)} starts, none"
     if checked.violations:
         status, note = "infeasible", f"{tried} satisfies all constraints; relax one of those violated"
     else:
+        candidates = [*candidates, follow(problem, nlp, design, linear_solver)]
+        if finding := _best(problem, nlp, candidates):
+            return finding
         status, note = "not_converged", f"feasible designs exist, but {tried} converged; try more starts or give one"
     return _Finding(parameters, checked, status, {}, Starts(tried=len(candidates)), nlp.formulation, notes=(note,))
 

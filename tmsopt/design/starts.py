@@ -21,11 +21,15 @@ _CANDIDATES = 8
 
 
 def designs(problem: Problem, seed: int, count: int) -> list[dict[str, float]]:
-    """`count` designs to start from: the most promising of each few of a quasi-random sequence over the box."""
+    """`count` designs to start from: the most promising of each few of a quasi-random sequence over the box.
+
+    Every other one is chosen by the constraints alone, lest all starts fall into the basin of one good region.
+    """
     names = list(problem.free)
     pool = list(islice(_spread(problem, seed), _CANDIDATES * count))
     columns = {n: np.array([d[n] for d in pool]) for n in names}
-    merit = _merit(problem, columns).reshape(count, _CANDIDATES)
+    objective, violation = (m.reshape(count, _CANDIDATES) for m in _merit(problem, columns))
+    merit = violation + objective * (np.arange(count) % 2 == 0)[:, None]
     return [pool[row * _CANDIDATES + int(np.argmin(merit[row]))] for row in range(count)]
 
 
@@ -62,25 +66,25 @@ def _spread(problem: Problem, seed: int) -> Iterator[dict[str, float]]:
         k += 1
 
 
-def _merit(problem: Problem, columns: Mapping[str, Array]) -> Array:
-    """Objective plus violated constraints of many designs, each in units of its own spread; small is good."""
+def _merit(problem: Problem, columns: Mapping[str, Array]) -> tuple[Array, Array]:
+    """Objective, and violated constraints, of many designs, each in units of its own spread; small is good."""
     parameters = problem.ordered(columns)
     shape = next(iter(columns.values())).shape
     arrays = {name: np.broadcast_to(np.asarray(value, dtype=float), shape) for name, value in parameters.items()}
     values = Values(problem.model, problem.parameter_set, arrays, extra=_ARRAY_ROOT_QUANTITIES)
-    merit = np.zeros(shape)
+    objective, violation = np.zeros(shape), np.zeros(shape)
     if problem.objective is not None:
         sign = -1.0 if problem.sense == "maximize" else 1.0
-        merit += _in_spreads(sign * np.broadcast_to(problem.objective(values), shape))
+        objective += _in_spreads(sign * np.broadcast_to(problem.objective(values), shape))
     if problem.pattern is not None:
         a = _regular(np.stack(np.broadcast_arrays(*values.coefficients), axis=-1))
         mismatch = [guess_distance(problem.pattern, c, z) for c, z in zip(a, roots(a), strict=True)]
-        merit += 3 * _in_spreads(np.array(mismatch))
+        violation += 3 * _in_spreads(np.array(mismatch))
     for condition in problem.conditions.values():
         difference = np.broadcast_to(np.asarray(condition(values), dtype=float), shape)
         sides = {"<=": np.maximum(difference, 0), ">=": np.maximum(-difference, 0), "==": np.abs(difference)}
-        merit += 3 * _in_spreads(sides[condition.comparison])
-    return merit
+        violation += 3 * _in_spreads(sides[condition.comparison])
+    return objective, violation
 
 
 def _in_spreads(column: Array) -> Array:
