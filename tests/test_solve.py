@@ -375,7 +375,7 @@ def test_start_satisfies_the_lifted_equations():
     problem = ep4_problem(constraints={"decay": "omega0 >= -9", "weave": "Fr_c <= 3"})
     nlp = abscissa_nlp(problem)
     equalities = np.array(nlp.row_lower) == np.array(nlp.row_upper)
-    exist = [d for d in designs(problem, 0, 20) if math.isfinite(problem.values(problem.ordered(d))["Fr_c"])]
+    exist = [d for d in list(designs(problem, 0, 20)) if math.isfinite(problem.values(problem.ordered(d))["Fr_c"])]
     assert len(exist) >= 5
     for design in exist:
         g = np.array(nlp.functions(complete(nlp, problem, design))[1]).ravel()

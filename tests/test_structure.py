@@ -77,7 +77,7 @@ def scaled(coefficients: Sequence[float], scale: float, leading: float) -> list[
 def test_every_kind_is_named_in_any_unit_of_time(name: str, factors: list[list[int]]) -> None:
     """Scaling rounds each coefficient by about 1e-16, far below the tolerance of 1e-12."""
     for scale in (1.0, 1e-6, 7e-3, 3.7, 1e8):
-        for leading in (1.0, -1.0, 0.017, -3e5):
+        for leading in (1.0, -0.017):
             found = structure(scaled(product(*factors), scale, leading))
             assert found.name == name, (scale, leading)
             assert found.distance <= 1e-14
@@ -182,21 +182,21 @@ def perturbed(name: str, seed: int, distance: float, norm: Norm = chebyshev_dist
             return [1.0, *(p[1:] + size * change * distance / reach)]
 
 
-@pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("tolerance", [1e-12, 1e-10, 1e-8])
 @pytest.mark.parametrize("name", LINEAR)
-def test_ten_tolerances_away_it_is_not_named(name: str, tolerance: float, seed: int) -> None:
-    found = structure(perturbed(name, seed, 10 * tolerance), tolerance)
-    assert found.name not in (name, "undecided")
+def test_ten_tolerances_away_it_is_not_named(name: str, tolerance: float) -> None:
+    for seed in range(4):
+        found = structure(perturbed(name, seed, 10 * tolerance), tolerance)
+        assert found.name not in (name, "undecided"), seed
 
 
-@pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("tolerance", [1e-12, 1e-10, 1e-8])
 @pytest.mark.parametrize("name", LINEAR)
-def test_a_tenth_of_the_tolerance_away_it_is_named(name: str, tolerance: float, seed: int) -> None:
-    found = structure(perturbed(name, seed, tolerance / 10), tolerance)
-    assert found.name == name
-    assert found.distance <= tolerance
+def test_a_tenth_of_the_tolerance_away_it_is_named(name: str, tolerance: float) -> None:
+    for seed in range(4):
+        found = structure(perturbed(name, seed, tolerance / 10), tolerance)
+        assert found.name == name, seed
+        assert found.distance <= tolerance
 
 
 @pytest.mark.parametrize("name", LINEAR)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Bound
 from tmsopt.models import Model
+from tmsopt.roots.exact import rational
 
 PROVEN = 1e-9
 """Gap, relative to 1 + |bound|, below which a design counts as proven optimal."""
@@ -135,8 +136,8 @@ def _linear(model: Model, name: str, box: Box) -> bool:
 def _exact(model: Model, name: str, box: Box, part: Fraction, at: Sequence[Fraction]) -> list[tuple[Any, Any]]:
     """aₙ and a0 for exact values of one parameter, the others fixed somewhere in the box."""
     others = {
-        n: Fraction(lo) if lo == hi else Fraction(lo) + (Fraction(hi) - Fraction(lo)) * part * Fraction(k, 13)
+        n: rational(lo) if lo == hi else rational(lo + (hi - lo) * float(part * Fraction(k, 13)))
         for k, (n, (lo, hi)) in enumerate(box.items(), start=3)
     }
-    rows = (model.polynomial(**{**others, name: x}) for x in at)
+    rows = (model.polynomial(**{**others, name: rational(x)}) for x in at)
     return [(a[-1], a[0]) for a in rows]

@@ -18,7 +18,7 @@ def least_violating(problem: Problem, nlp: NLP, seed: int, linear_solver: str) -
     """Free parameters with the smallest sum of violations that a few starts reach."""
     relaxed, rows = _elastic(problem, nlp)
     run = ipopt(relaxed, linear_solver)
-    starting = designs(problem, seed, _TRIED)
+    starting = list(designs(problem, seed, _TRIED))
     best, least = starting[0], math.inf
     for design in starting:
         x = complete(nlp, problem, design)

@@ -95,7 +95,8 @@ def _settled(problem: Problem, candidates: list[Candidate]) -> bool:
     if not feasible:
         return len(candidates) >= _HOPELESS
     best = min(c.objective for c in feasible)
-    if feasible[-1].objective == best and _proven(problem, feasible[-1]):
+    record = candidates[-1].feasible and all(candidates[-1].objective < c.objective for c in feasible[:-1])
+    if record and _proven(problem, candidates[-1]):
         return True
     agreeing = sum(same(c.objective, best) for c in feasible)
     if problem.objective is None:  # any point of a square pattern will do

@@ -16,21 +16,25 @@ from tmsopt.roots.structure import guess_distance
 
 Array = NDArray[np.float64]
 
-_CANDIDATES = 8
+_CANDIDATES = 16
 """Designs looked at for each that is started from: a start near the good ones needs half the iterations."""
 
+_BATCH = 16  # starts whose candidates are looked at together
 
-def designs(problem: Problem, seed: int, count: int) -> list[dict[str, float]]:
+
+def designs(problem: Problem, seed: int, count: int) -> Iterator[dict[str, float]]:
     """`count` designs to start from: the most promising of each few of a quasi-random sequence over the box.
 
     Every other one is chosen by the constraints alone, lest all starts fall into the basin of one good region.
     """
-    names = list(problem.free)
-    pool = list(islice(_spread(problem, seed), _CANDIDATES * count))
-    columns = {n: np.array([d[n] for d in pool]) for n in names}
-    objective, violation = (m.reshape(count, _CANDIDATES) for m in _merit(problem, columns))
-    merit = violation + objective * (np.arange(count) % 2 == 0)[:, None]
-    return [pool[row * _CANDIDATES + int(np.argmin(merit[row]))] for row in range(count)]
+    spread = _spread(problem, seed)
+    for done in range(0, count, _BATCH):
+        size = min(_BATCH, count - done)
+        pool = list(islice(spread, _CANDIDATES * size))
+        columns = {n: np.array([d[n] for d in pool]) for n in problem.free}
+        objective, violation = (m.reshape(size, _CANDIDATES) for m in _merit(problem, columns))
+        merit = violation + objective * (np.arange(size) % 2 == 0)[:, None]
+        yield from (pool[row * _CANDIDATES + int(np.argmin(merit[row]))] for row in range(size))
 
 
 def complete(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Array:
