@@ -128,7 +128,7 @@ trees = st.recursive(
 
 
 @settings(
-    max_examples=400,
+    max_examples=250,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow],
@@ -414,7 +414,7 @@ tokens = st.lists(
 )  # fmt: skip
 
 
-@settings(max_examples=1500, deadline=None, derandomize=True)
+@settings(max_examples=800, deadline=None, derandomize=True)
 @given(tokens, st.sampled_from(["", " "]), st.sampled_from([parse_value, parse_comparison]))
 def test_random_tokens_are_refused_or_can_be_evaluated(
     parts: list[str], space: str, parse: Callable[..., Expression]
@@ -429,7 +429,7 @@ def test_random_tokens_are_refused_or_can_be_evaluated(
     expression.symbolic({n: ca.SX.sym(n) for n in NAMES})
 
 
-@settings(max_examples=500, deadline=None, derandomize=True)
+@settings(max_examples=300, deadline=None, derandomize=True)
 @given(st.text(max_size=30))
 def test_random_text_never_raises_anything_else(text: str) -> None:
     for parse in (parse_value, parse_comparison):

@@ -94,7 +94,7 @@ def integer_roots(draw: st.DrawFn) -> list[tuple[int, int]]:
     return roots
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=120, deadline=None, derandomize=True)
 @given(integer_roots(), st.integers(-50, 50).filter(bool), st.integers(-20, 20))
 def test_random_integer_roots_are_named_by_their_exact_multiplicities(
     roots: list[tuple[int, int]], leading: int, power: int

@@ -172,7 +172,7 @@ def test_products_and_powers_are_read() -> None:
             assert with_unit(text, "m") == 5
 
 
-@settings(max_examples=400, deadline=None, derandomize=True)
+@settings(max_examples=250, deadline=None, derandomize=True)
 @given(
     st.lists(
         st.sampled_from(

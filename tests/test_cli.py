@@ -1,0 +1,142 @@
+"""The command line by its contract: streams, exit status, JSON, figures; always in a process of its own."""
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+KEYS = {
+    "schema", "title", "model", "status", "objective", "parameters", "abscissa", "abscissa_realised", "roots",
+    "structure", "active", "violations", "bound", "starts", "seconds",
+}  # fmt: skip
+"""Keys of the JSON contract."""
+
+
+def tmsopt(*arguments, cwd=None):
+    command = [sys.executable, "-c", "from tmsopt.cli import main; main()", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, cwd=cwd, encoding="utf-8")
+
+
+def test_help_names_the_commands_and_examples():
+    done = tmsopt("--help")
+    assert done.returncode == 0
+    assert "solve" in done.stdout
+    assert "compare" in done.stdout
+    for command in ("solve", "compare"):
+        assert "tmsopt " + command in tmsopt(command, "--help").stdout  # an example
+
+
+def test_json_of_solve_is_the_contract():
+    done = tmsopt("solve", "problems/ep4.toml", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    data = json.loads(done.stdout)
+    assert set(data) >= KEYS
+    assert data["schema"] == 1
+    assert data["status"] == "optimal"
+    assert data["objective"] == {"sense": "minimize", "expression": "abscissa", "value": data["abscissa"]}
+    assert set(data["parameters"]) == {"Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s"}
+    assert data["parameters"]["chi_B"] == pytest.approx(math.sqrt(2), abs=1e-12)  # Table 1 of the paper
+    assert data["roots"] == [{"re": data["abscissa"], "im": 0.0, "multiplicity": 4}]
+    assert data["structure"] == "EP4"
+    assert data["bound"]["proven"] is True
+    assert data["bound"]["method"] == "omega0"
+    assert set(data["starts"]) == {"tried", "converged", "at_best"}
+
+
+def test_table_of_solve_shows_both_scales():
+    done = tmsopt("solve", "problems/ep4.toml", "--wheelbase", "2 m")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "1.41421356237" in done.stdout  # chi_B
+    assert "2.82842712475" in done.stdout  # x_B = chi_B w
+    assert "23.5300893481" in done.stdout  # the tilt in degrees, atan(15/4 - 75 sqrt(2)/32)
+    assert "proven" in done.stdout
+
+
+def test_benchmark_prints_the_published_critical_speed():
+    done = tmsopt("solve", "problems/benchmark.toml")
+    assert "2.8410083" in done.stdout
+    assert "0.907064149551" in done.stdout
+
+
+def test_compare_shows_laws_and_formulations():
+    done = tmsopt("compare", "problems/ep4.toml", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    data = json.loads(done.stdout)
+    laws = {row["label"]: row for row in data["laws"]}
+    assert all(laws[label]["agrees"] for label in ("w0", "chib", "tls", "frep4", "epset", "flus", "chib1"))
+    assert max(abs(d) for d in data["formulations"]["differences"].values()) < 1e-12
+
+
+INFEASIBLE = """
+[parameters]
+chi_H = 1.0
+zeta_H = -0.2
+zeta_B = -0.4
+mu = 0.1
+chi_B = { min = 1.01, max = 5 }
+Fr = { min = 0.01, max = 10 }
+lambda_s = { min = 0.02, max = 1.4 }
+[objective]
+minimize = "abscissa"
+[constraints]
+low = "chi_B <= 1.2"
+high = "chi_B >= 1.5"
+"""
+
+
+def test_infeasible_ends_with_3_and_still_reports(tmp_path):
+    path = tmp_path / "x.toml"
+    path.write_text(INFEASIBLE)
+    done = tmsopt("solve", path, "--json")
+    assert done.returncode == 3
+    data = json.loads(done.stdout)
+    assert data["status"] == "infeasible"
+    assert data["violations"]
+    assert data["parameters"]["Fr"] > 0
+    assert "violated" in tmsopt("solve", path).stdout
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["solve"], ["solve", "nothing.toml"], ["solve", "."], ["solv", "problems/ep4.toml"],
+        ["solve", "problems/ep4.toml", "--starts", "0"], ["solve", "problems/ep4.toml", "--linear-solver", "ma27"],
+        ["solve", "problems/ep4.toml", "--plot", "x.bmp"], ["solve", "problems/ep4.toml", "--plot", "no/such/x.png"],
+        ["solve", "problems/ep4.toml", "--wheelbase", "3 kg"], ["solve", "problems/ep4.toml", "--wheelbase", "-1"],
+        ["compare", "pyproject.toml"],
+    ],
+)  # fmt: skip
+def test_bad_usage_ends_with_2_and_one_message(arguments):
+    done = tmsopt(*arguments)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.strip()
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("ending", ["png", "pdf", "svg"])
+def test_plot_is_written_whole(tmp_path, ending):
+    path = tmp_path / f"growth.{ending}"
+    done = tmsopt("solve", "problems/ep4.toml", "--plot", path)
+    assert done.returncode == 0
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+    start = path.read_bytes()[:200]
+    assert start.startswith({"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}[ending])
+
+
+def test_plot_that_cannot_be_written_leaves_nothing(tmp_path):
+    done = tmsopt("solve", tmp_path / "missing.toml", "--plot", tmp_path / "x.png")
+    assert done.returncode == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_script_in_problems_runs():
+    done = subprocess.run(
+        [sys.executable, "problems/heights.py"], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert len(done.stdout.splitlines()) >= 5
+    assert Path("problems/heights.py").read_text().startswith('"""')
