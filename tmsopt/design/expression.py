@@ -19,7 +19,7 @@ CONSTANTS: Mapping[str, float] = {"pi": math.pi}
 COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
 
 _LONGEST = 2000  # characters; longer texts could exhaust the parser's stack
-_DEEPEST = 100
+_DEEPEST = 200
 _LANGUAGE = f"numbers, names, + - * / **, parentheses and {' '.join(FUNCTIONS)}"
 _NOT_ACCEPTED = re.compile(r"[^ -~]|#")  # look-alike letters, line breaks and comments
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import casadi as ca
 import numpy as np
@@ -39,66 +40,81 @@ def polisher(nlp: NLP) -> Callable[[Run], Point]:
     x = ca.SX.sym("x", len(nlp.variables))
     multipliers = ca.SX.sym("m", len(nlp.rows))
     f, g = nlp.functions(x)
-    lagrangian = f + ca.dot(multipliers, g)
-    expand = ca.Function(
-        "kkt", [x, multipliers], [f, ca.gradient(f, x), g, ca.jacobian(g, x), ca.hessian(lagrangian, x)[0]]
-    )
-    lower, upper = np.array(nlp.lower), np.array(nlp.upper)
-    row_lower, row_upper = np.array(nlp.row_lower), np.array(nlp.row_upper)
+    hessian = ca.hessian(f + ca.dot(multipliers, g), x)[0]
+    expand = ca.Function("kkt", [x, multipliers], [f, ca.gradient(f, x), g, ca.jacobian(g, x), hessian])
+    limits = (np.array(ends) for ends in (nlp.lower, nlp.upper, nlp.row_lower, nlp.row_upper))
+    return partial(_polished, _Conditions(expand, *limits))
 
-    def evaluate(x: Array, rows: Array, bounds: Array) -> Point:
-        f, gradient, g, jacobian, _ = (np.array(part) for part in expand(x, rows))
-        g = g.ravel()
-        outside = np.concatenate([row_lower - g, g - row_upper, lower - x, x - upper, [0.0]])
-        stationarity = gradient.ravel() + jacobian.T @ rows + bounds
+
+@dataclass(frozen=True)
+class _Conditions:
+    """The optimality conditions of one NLP: its functions with derivatives, and its limits."""
+
+    expand: ca.Function
+    lower: Array
+    upper: Array
+    row_lower: Array
+    row_upper: Array
+
+    def at(self, x: Array, rows: Array) -> tuple[float, Array, Array, Array, Array]:
+        """Objective, its gradient, rows, their Jacobian, and the Hessian of the Lagrangian."""
+        f, gradient, g, jacobian, hessian = (np.array(part) for part in self.expand(x, rows))
+        return float(f.item()), gradient.ravel(), g.ravel(), jacobian, hessian
+
+    def point(self, x: Array, rows: Array, bounds: Array) -> Point:
+        """A point with its violation and stationarity."""
+        objective, gradient, g, jacobian, _ = self.at(x, rows)
+        outside = np.concatenate([self.row_lower - g, g - self.row_upper, self.lower - x, x - self.upper, [0.0]])
         violation = float(outside.max()) if np.all(np.isfinite(g)) else np.inf
-        return Point(x, float(f.item()), violation, float(np.abs(stationarity).max(initial=0.0)), rows, bounds)
+        slope = np.abs(gradient + jacobian.T @ rows + bounds).max(initial=0.0)
+        return Point(x, objective, violation, float(slope), rows, bounds)
 
-    def newton(run: Run, loose: bool) -> Point | None:
-        at_lower, at_upper = _active(run.x, lower, upper, run.bound_multipliers, loose)
-        x = np.where(at_lower, lower, np.where(at_upper, upper, run.x))
-        free = np.logical_not(np.logical_or(at_lower, at_upper))
-        g = np.array(expand(x, run.row_multipliers)[2]).ravel()
-        if not np.all(np.isfinite(g)):
+
+def _polished(conditions: _Conditions, run: Run) -> Point:
+    best = conditions.point(run.x, run.row_multipliers, run.bound_multipliers)
+    for loose in (False, True):
+        refined = _newton(conditions, run, loose)
+        if refined is not None and _better(refined, best):
+            best = refined
+        if best is refined and best.stationarity <= _STATIONARY:
+            break
+    return best
+
+
+def _newton(conditions: _Conditions, run: Run, loose: bool) -> Point | None:
+    """Newton's method with the active limits held as equations; least squares where they are dependent."""
+    lower, upper = conditions.lower, conditions.upper
+    at_lower, at_upper = _active(run.x, lower, upper, run.bound_multipliers, loose)
+    x = np.where(at_lower, lower, np.where(at_upper, upper, run.x))
+    free = np.logical_not(np.logical_or(at_lower, at_upper))
+    g = conditions.at(x, run.row_multipliers)[2]
+    if not np.all(np.isfinite(g)):
+        return None
+    low, high = _active(g, conditions.row_lower, conditions.row_upper, run.row_multipliers, loose)
+    held = np.logical_or(low, high)
+    target = np.where(low, conditions.row_lower, conditions.row_upper)[held]
+    rows = np.where(held, run.row_multipliers, 0.0)
+    n, m = int(free.sum()), int(held.sum())
+    for _ in range(_STEPS):
+        _, gradient, g, jacobian, hessian = conditions.at(x, rows)
+        active = jacobian[np.ix_(held, free)]
+        matrix = np.block([[hessian[np.ix_(free, free)], active.T], [active, np.zeros((m, m))]])
+        right = np.concatenate([-gradient[free], target - g[held]])
+        if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(right))):
             return None
-        row_at_lower, row_at_upper = _active(g, row_lower, row_upper, run.row_multipliers, loose)
-        rows = np.logical_or(row_at_lower, row_at_upper)
-        target = np.where(row_at_lower, row_lower, row_upper)[rows]
-        dual = np.where(rows, run.row_multipliers, 0.0)
-        n, m = int(free.sum()), int(rows.sum())
-        for _ in range(_STEPS):
-            _, gradient, g, jacobian, hessian = (np.array(part) for part in expand(x, dual))
-            active = jacobian[np.ix_(rows, free)]
-            matrix = np.block([[hessian[np.ix_(free, free)], active.T], [active, np.zeros((m, m))]])
-            right = np.concatenate([-gradient.ravel()[free], target - g.ravel()[rows]])
-            if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(right))):
-                return None
-            scale = 1 / np.maximum(np.abs(matrix).max(axis=1, initial=0.0), 1e-300)
-            solution = np.linalg.lstsq(matrix * scale[:, None], right * scale, rcond=1e-13)[0]
-            x = x.copy()
-            x[free] += solution[:n]
-            dual = np.where(rows, 0.0, 0.0)
-            dual[rows] = solution[n:]
-            if np.all(np.abs(solution[:n]) <= 1e-16 * (1 + np.abs(x[free]))):
-                break
-        if not np.all(np.isfinite(x)):
-            return None
-        x = np.clip(x, lower, upper)
-        _, gradient, _, jacobian, _ = (np.array(part) for part in expand(x, dual))
-        bounds = np.where(free, 0.0, -(gradient.ravel() + jacobian.T @ dual))
-        return evaluate(x, dual, bounds)
-
-    def polish(run: Run) -> Point:
-        best = evaluate(run.x, run.row_multipliers, run.bound_multipliers)
-        for loose in (False, True):
-            refined = newton(run, loose)
-            if refined is not None and _better(refined, best):
-                best = refined
-            if best is refined and best.stationarity <= _STATIONARY:
-                break
-        return best
-
-    return polish
+        scale = 1 / np.maximum(np.abs(matrix).max(axis=1, initial=0.0), 1e-300)
+        solution = np.linalg.lstsq(matrix * scale[:, None], right * scale, rcond=1e-13)[0]
+        x = x.copy()
+        x[free] += solution[:n]
+        rows = np.zeros_like(rows)
+        rows[held] = solution[n:]
+        if np.all(np.abs(solution[:n]) <= 1e-16 * (1 + np.abs(x[free]))):
+            break
+    if not np.all(np.isfinite(x)):
+        return None
+    x = np.clip(x, lower, upper)
+    _, gradient, _, jacobian, _ = conditions.at(x, rows)
+    return conditions.point(x, rows, np.where(free, 0.0, -(gradient + jacobian.T @ rows)))
 
 
 def _active(value: Array, lower: Array, upper: Array, multiplier: Array, loose: bool) -> tuple[Array, Array]:

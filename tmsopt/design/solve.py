@@ -17,7 +17,7 @@ from tmsopt.design.search import STARTS, Candidate, Progress, follow, same, sear
 from tmsopt.design.solution import Bound, Branch, NotSolved, Solution, Starts
 
 _STATIONARY = 1e-6  # gradient of the Lagrangian at which a point counts as converged whatever IPOPT says
-_POLISHED = 4  # candidates looked at closely
+_ALIKE = 3  # candidates of one objective looked at closely
 _CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found")
 _SPURIOUS = 1e-3  # violation that no lack of digits explains: equations met only because all coefficients vanish
 _MULTIPLIER = 1e-9  # below it a limit does not bind
@@ -138,9 +138,14 @@ def _survivor(problem: Problem, nlp: NLP, candidates: list[Candidate]) -> _Trial
     """The first of the best candidates to pass the recheck once polished, or the one that fails it least."""
     polish = polisher(nlp)
     kept: _Trial | None = None
-    for candidate in sorted((c for c in candidates if c.feasible), key=lambda c: c.objective)[:_POLISHED]:
-        if kept and not kept[2].violations and not same(candidate.objective, kept[0].objective):
+    tried: list[float] = []
+    for candidate in sorted((c for c in candidates if c.feasible), key=lambda c: c.objective):
+        alike = sum(same(candidate.objective, value) for value in tried)
+        if kept and not kept[2].violations and not alike:
             break
+        if alike >= _ALIKE:
+            continue
+        tried.append(candidate.objective)
         point = polish(candidate.run)
         checked = recheck(problem, problem.ordered(design_of(problem, point.x.tolist())))
         trial = (candidate, point, checked)

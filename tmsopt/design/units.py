@@ -56,9 +56,10 @@ def _factor(written: str, unit: str) -> float | None:
     """How many `unit` one written unit is, or None where it is not one."""
     registry = _registry()
     try:
-        # Angles carry no dimension for pint, so only units built of radian pass as angles.
+        # Angles carry no dimension for pint, so their power is compared by name.
         found = registry.parse_units(written)
-        if (unit == "rad") != (str(registry.get_base_units(found)[1]) == "radian"):
+        powers = dict(registry.Quantity(1.0, found).to_base_units().unit_items())
+        if powers.get("radian", 0) != (unit == "rad"):
             return None
         quantity = registry.Quantity(2.0, found).to(unit)
         offset = registry.Quantity(0.0, found).to(unit)

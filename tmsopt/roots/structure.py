@@ -27,6 +27,7 @@ _CANDIDATES = (
 
 _NEAR = 0.05  # relative distance of a guess that can still lead to a pattern within any sensible tolerance
 _STEPS = 20
+_CLOSED = 1e-10  # of the squared root size: a pattern contains its own boundary, as CEP2 and 2EP2 contain EP4
 _LINE = 1e-6  # relative difference of real parts on one vertical line, for roots of an exact pattern
 
 Array = NDArray[np.float64]
@@ -145,7 +146,7 @@ def _fits(pattern: Pattern, c: Array, found: Roots, near: float) -> Iterator[Str
         if _distance(pattern, np.array(guess), c, found) > near:
             continue
         unknowns = _gauss_newton(pattern, np.array(guess), c / c[0], _size(found))
-        if all(value >= 0 for value in pattern.nonnegative(list(unknowns))):
+        if all(value >= -_CLOSED * np.abs(found).max() ** 2 for value in pattern.nonnegative(list(unknowns))):
             distance = _distance(pattern, unknowns, c, found)
             fits.append(Structure(pattern.name, _roots_of(pattern, unknowns), distance))
     yield from sorted(fits, key=lambda fit: fit.distance)
