@@ -173,7 +173,7 @@ def test_files_that_cannot_be_problems(tmp_path, name):
 
 def test_missing_file_suggests_a_neighbour(write):
     path = write(GOOD)
-    with pytest.raises(tmsopt.InputError, match="did you mean 'problem.toml'"):
+    with pytest.raises(tmsopt.InputError, match=r"did you mean 'problem\.toml'"):
         tmsopt.load(path.with_name("problm.toml"))
 
 
