@@ -14,6 +14,7 @@ from benchmarks.suite import SEED
 @click.option("--count", default=200, show_default=True, help="problems")
 @click.option("--seed", default=SEED, show_default=True, help="of the problems")
 @click.option("--de", "evolved", default=25, show_default=True, help="problems for scalar differential evolution")
+@click.option("--local", default=24, show_default=True, help="problems for SLSQP, Nelder-Mead and COBYLA")
 @click.option("--workers", default=os.cpu_count() or 1, show_default=True, help="processes for what is not timed")
 @click.option(
     "--output",
@@ -22,10 +23,10 @@ from benchmarks.suite import SEED
     show_default=True,
     help="file that keeps the table",
 )
-def main(count: int, seed: int, evolved: int, workers: int, output: Path) -> None:
+def main(count: int, seed: int, evolved: int, local: int, workers: int, output: Path) -> None:
     """Solve a suite of random designs, compare with SciPy, print the tables and keep them."""
-    command = f"python -m benchmarks.solve --count {count} --seed {seed} --de {evolved}"
-    text = section(measure(count, seed, evolved, workers), command)
+    command = f"python -m benchmarks.solve --count {count} --seed {seed} --de {evolved} --local {local}"
+    text = section(measure(count, seed, evolved, local, workers), command)
     click.echo(text)
     keep(output, "solve", text)
 

@@ -96,8 +96,8 @@ class Record:
         return (value - self.best) / max(_FLOOR, abs(self.best))
 
 
-def measure(count: int, seed: int, evolved: int, workers: int) -> list[Record]:
-    """Run all stages: `evolved` is the number of problems given to the scalar differential evolution.
+def measure(count: int, seed: int, evolved: int, local: int, workers: int) -> list[Record]:
+    """Run all stages: `evolved` problems for the scalar differential evolution, `local` for the local optimisers.
 
     Default solves and both evolutions run one after another in this process; the rest is spread over the workers.
     """
@@ -110,7 +110,8 @@ def measure(count: int, seed: int, evolved: int, workers: int) -> list[Record]:
     for i in _progress(indices, "vectorised evolution"):
         rivals[i][VECTORISED] = differential(random_problem(i, seed), vectorized=True)
     with ProcessPoolExecutor(workers) as pool:
-        for i, found in enumerate(_progress(pool.map(_local, indices, repeat(seed)), "local rivals", count)):
+        few = _evolved(defaults, local)
+        for i, found in zip(few, _progress(pool.map(_local, few, repeat(seed)), "local rivals", len(few)), strict=True):
             rivals[i].update(found)
         ends = [[f.parameters for f in found.values() if f.feasible] for found in rivals]
         claimed = [own.status == "infeasible" for own in defaults]
