@@ -306,6 +306,22 @@ def test_seeded_runs_are_identical_and_threads_do_not_share_solvers():
     assert len({(d.value, *d.parameters.values()) for d in designs}) == 1
 
 
+def test_both_tilts_in_the_box_and_a_singular_mass_matrix_between_them():
+    """At chi_H = 1 and lambda_s = 0 a0 vanishes, where the factor equations hold for any abscissa: not a design."""
+    problem = ep4_problem(free={"Fr": (0.01, 10), "chi_B": (0.1, 5), "lambda_s": (-1.4, 1.4)})
+    design = tmsopt.solve(problem)
+    assert design.structure == "EP4"
+    assert design.parameters["Fr"] == pytest.approx(EP4["Fr"], abs=1e-11)
+
+
+def test_no_mass_matrix_is_said_and_is_no_traceback():
+    design = tmsopt.solve(ep4_problem(fixed={"chi_H": 1.0, "mu": 0.1, "zeta_B": 0.0, "zeta_H": -0.2}), throw=False)
+    assert design.status == "infeasible"
+    assert "a0" in design.violations
+    assert any("mass matrix is singular" in note for note in design.notes)
+    assert design.to_json()["abscissa"] is None
+
+
 def test_solution_is_frozen_and_pickles():
     design = tmsopt.solve(ep4_problem())
     with pytest.raises(FrozenInstanceError):

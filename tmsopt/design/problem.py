@@ -17,7 +17,10 @@ STRUCTURE_TOLERANCE = 1e-11
 
 def _structure(values: Mapping[str, Any]) -> Structure:
     assert isinstance(values, Values)
-    return structure(values.coefficients, STRUCTURE_TOLERANCE)
+    a = [float(c) for c in values.coefficients]
+    if a[0] == 0 or not all(map(math.isfinite, a)):
+        return Structure("undecided", (), math.inf)  # a singular mass matrix: a root is at infinity
+    return structure(a, STRUCTURE_TOLERANCE)
 
 
 def _abscissa(values: Mapping[str, Any]) -> float:
@@ -26,7 +29,8 @@ def _abscissa(values: Mapping[str, Any]) -> float:
 
 def _damping_ratio(values: Mapping[str, Any]) -> float:
     roots = values["structure"].roots
-    return min(-r.re / math.hypot(r.re, r.im) if r.re or r.im else 0.0 for r in roots)
+    ratios = (-r.re / math.hypot(r.re, r.im) if r.re or r.im else 0.0 for r in roots)
+    return min(ratios, default=math.nan)
 
 
 ROOT_QUANTITIES = (

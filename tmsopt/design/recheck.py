@@ -36,6 +36,8 @@ def recheck(problem: Problem, parameters: Mapping[str, float]) -> Checked:
     values = problem.values(parameters)
     conditions = {name: c.violation(values) for name, c in problem.conditions.items()}
     violations = {name: v for name, v in conditions.items() if not v <= FEASIBLE}
+    if not math.isfinite(values["structure"].abscissa):
+        violations["a0"] = 1.0  # a singular mass matrix
     if problem.locate:
         distance = pattern_distance(PATTERNS[problem.locate], [float(c) for c in values.coefficients])
         if not distance <= MATCHED:

@@ -12,6 +12,7 @@ from tmsopt.design.formulations import NLP, abscissa, design_of, freedom, middle
 from tmsopt.design.ipopt import Run, ipopt
 from tmsopt.design.problem import Problem
 from tmsopt.design.starts import complete, designs
+from tmsopt.roots import roots
 
 STARTS = 64
 """Starts tried at most; most problems settle with a dozen."""
@@ -21,6 +22,7 @@ _AGREE = 5  # starts at the best value that end the search
 _HOPELESS = 16  # starts without a feasible end after which the least-violating design is looked for instead
 _SAME = 1e-7  # relative difference of objectives that counts as the same
 _FEASIBLE = 1e-6  # of the rows, before polishing; the recheck has the last word
+_SCATTER = 0.01  # of the largest root: roots in double precision beside a 4-fold one are off by 4e-4
 _RESCUES = 4  # starts from abscissa optima, for a pattern that no start reached
 
 Progress = Callable[[int, int], None]
@@ -56,7 +58,7 @@ def search(
     if problem.start:  # the user's own
         candidates.append(follow(problem, nlp, middle(problem), linear_solver))
     for design in designs(problem, seed, max(starts - len(candidates), 0)):
-        candidates.append(_candidate(nlp, run(complete(nlp, problem, design))))
+        candidates.append(_candidate(problem, nlp, run(complete(nlp, problem, design))))
         if progress:
             progress(len(candidates), starts)
         if not exhaustive and _settled(problem, candidates):
@@ -66,9 +68,9 @@ def search(
     return candidates
 
 
-def follow(problem: Problem, nlp: NLP, design: Mapping[str, float], linear_solver: str) -> Candidate:
-    """Where IPOPT ends from close to a design."""
-    return _candidate(nlp, ipopt(nlp, linear_solver, near=True)(complete(nlp, problem, design)))
+def follow(problem: Problem, nlp: NLP, design: Mapping[str, float], linear_solver: str, near: bool = True) -> Candidate:
+    """Where IPOPT ends from a design, close to it or not."""
+    return _candidate(problem, nlp, ipopt(nlp, linear_solver, near=near)(complete(nlp, problem, design)))
 
 
 def same(a: float, b: float) -> bool:
@@ -76,13 +78,25 @@ def same(a: float, b: float) -> bool:
     return abs(a - b) <= _SAME * (1 + abs(b))
 
 
-def _candidate(nlp: NLP, run: Run) -> Candidate:
+def _candidate(problem: Problem, nlp: NLP, run: Run) -> Candidate:
     f, g = nlp.functions(run.x)
     rows = np.array(g).ravel()
     if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(run.x)) and math.isfinite(float(f))):
         return Candidate(run, math.inf, False)
     outside = np.concatenate([np.array(nlp.row_lower) - rows, rows - np.array(nlp.row_upper), [0.0]])
-    return Candidate(run, float(f), bool(outside.max() <= _FEASIBLE) and run.status != "Infeasible_Problem_Detected")
+    feasible = outside.max() <= _FEASIBLE and run.status != "Infeasible_Problem_Detected"
+    return Candidate(run, float(f), bool(feasible) and not _spurious(problem, nlp, run))
+
+
+def _spurious(problem: Problem, nlp: NLP, run: Run) -> bool:
+    """Whether the factors claim an abscissa left of the roots: near a0 = 0 equations hold as all terms vanish."""
+    if "abscissa" not in nlp.variables:
+        return False
+    a = np.array(_coefficients(problem, run), dtype=float)
+    if a[0] == 0:
+        return True
+    z = roots(a)
+    return bool(run.x[nlp.variables.index("abscissa")] < z.real.max() - _SCATTER * np.abs(z).max())
 
 
 def _settled(problem: Problem, candidates: list[Candidate]) -> bool:
@@ -116,9 +130,14 @@ def _proven(problem: Problem, candidate: Candidate) -> bool:
     """Whether the bound is reached; it is looked at only where the design itself has all roots of one modulus."""
     if not bounded(problem):
         return False
-    a = problem.model.coefficients(problem.ordered(design_of(problem, candidate.run.x.tolist())), problem.parameter_set)
-    own = -(float(np.abs(np.divide(a[-1], a[0]))) ** (1 / problem.model.degree))
+    a = _coefficients(problem, candidate.run)
+    own = -(abs(a[-1] / a[0]) ** (1 / problem.model.degree)) if a[0] else -math.inf
     return closed(candidate.objective - own, own) and omega0_bound(problem, candidate.objective).proven
+
+
+def _coefficients(problem: Problem, run: Run) -> list[float]:
+    parameters = problem.ordered(design_of(problem, run.x.tolist()))
+    return [float(c) for c in problem.model.coefficients(parameters, problem.parameter_set)]
 
 
 def _rescued(problem: Problem, nlp: NLP, seed: int, linear_solver: str) -> list[Candidate]:

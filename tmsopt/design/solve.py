@@ -194,10 +194,12 @@ def _without_any(problem: Problem, nlp: NLP, candidates: list[Candidate], seed: 
     if checked.violations:
         status, note = "infeasible", f"{tried} satisfies all constraints; relax one of those violated"
     else:
-        candidates = [*candidates, follow(problem, nlp, design, linear_solver)]
+        ended = [follow(problem, nlp, design, linear_solver, near) for near in (True, False)]
+        candidates = [*candidates, *ended]
         if finding := _best(problem, nlp, candidates):
             return finding
-        status, note = "not_converged", f"feasible designs exist, but {tried} converged; try more starts or give one"
+        advice = "try more starts, give one, or keep a0 away from 0 (for tms, nu_H >= 0.02)"
+        status, note = "not_converged", f"feasible designs exist, but {tried} converged; {advice}"
     return _Finding(parameters, checked, status, {}, Starts(tried=len(candidates)), nlp.formulation, notes=(note,))
 
 
@@ -227,6 +229,8 @@ def _assembled(problem: Problem, finding: _Finding, began: float) -> Solution:
 
 
 def _stability_note(problem: Problem, checked: Checked, optimal: bool) -> tuple[str, ...]:
+    if "a0" in checked.violations:
+        return ("the mass matrix is singular (a0 = 0), so a root is at infinity; keep nu_H and zeta_B away from 0",)
     if not optimal or checked.structure.abscissa < 0:
         return ()
     if problem.free and (problem.minimize or "").strip() == "abscissa":

@@ -43,7 +43,7 @@ def complete(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Array:
     z = roots(_regular(np.array([float(c) for c in values.coefficients])))
     x = variables_of(problem, design)
     for lift in nlp.lifts:
-        guesses = lift.guess(values, z)
+        guesses = lift.guess(values, z) or [[0.0] * lift.size]
         mismatches = [_mismatch(nlp, x, guess) for guess in guesses] if len(guesses) > 1 else [0.0]
         x = x + guesses[int(np.argmin(mismatches))]
     return np.array(x)

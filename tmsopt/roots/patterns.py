@@ -55,21 +55,12 @@ def quadratic(pair: Roots) -> list[float]:
     return [float(-pair.sum().real), float(pair.prod().real)]
 
 
-def _splits(size: int) -> Callable[[Roots], list[tuple[Roots, Roots]]]:
-    """Every choice of `size` of the roots that is closed under conjugation, with the rest."""
-
-    def split(roots: Roots) -> list[tuple[Roots, Roots]]:
-        every = range(len(roots))
-        chosen = [(roots[list(c)], roots[[k for k in every if k not in c]]) for c in combinations(every, size)]
-        close = 1e-9 * (np.abs(roots).max() + 1e-300)
-        return [
-            (a, b) for a, b in chosen if abs(a.sum().imag) <= close and abs(a.prod().imag) <= close * np.abs(a).max()
-        ]
-
-    return split
-
-
-_one, _two = _splits(1), _splits(2)
+def _two(roots: Roots) -> list[tuple[Roots, Roots]]:
+    """Every choice of two of the roots that is closed under conjugation, with the rest."""
+    every = range(len(roots))
+    chosen = [(roots[list(c)], roots[[k for k in every if k not in c]]) for c in combinations(every, 2)]
+    close = 1e-9 * (np.abs(roots).max() + 1e-300)
+    return [(a, b) for a, b in chosen if abs(a.sum().imag) <= close and abs(a.prod().imag) <= close * np.abs(a).max()]
 
 
 def _double_quadratic_guess(roots: Roots) -> list[list[float]]:
@@ -141,7 +132,7 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
                 "a root at 0",
                 ("b", "c", "d"),
                 lambda u: [[1, 0], [1, u[0], u[1], u[2]]],
-                lambda z: [[float(x) for x in np.poly(b)[1:].real] for _, b in _one(z)],
+                lambda z: [[float(x) for x in np.poly(z)[1:4].real]],
             ),
             Pattern(
                 "resonance",

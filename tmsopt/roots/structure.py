@@ -60,7 +60,7 @@ class Structure:
     @property
     def abscissa(self) -> float:
         """Real part of the rightmost root of the structured polynomial."""
-        return max(root.re for root in self.roots)
+        return max((root.re for root in self.roots), default=float("nan"))
 
 
 def structure(coefficients: ArrayLike, tolerance: float = 1e-12) -> Structure:
