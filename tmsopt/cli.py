@@ -1,6 +1,7 @@
 """The tmsopt command: thin commands over the library; heavy imports stand inside them."""
 
 import json
+import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -210,6 +211,9 @@ def _draw(solution: "Solution", path: Path, w: float, m_B: float) -> None:
     from tmsopt.show.tables import si_parameters
     from tmsopt.study.growth import growth
 
+    if not math.isfinite(solution.abscissa):
+        click.echo("--plot: nothing to draw, a root is at infinity", err=True)
+        return
     si = si_parameters(solution, w, m_B)
     try:
         save(growth_figure(growth(solution), solution.problem.title, (si["g"] * si["w"]) ** 0.5), path)

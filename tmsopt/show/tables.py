@@ -98,7 +98,7 @@ def _result_rows(solution: Solution, si: Mapping[str, float]) -> list[Sequence[s
 
 
 def _facts(solution: Solution) -> list[str]:
-    lines = ["roots: " + ", ".join(_roots(solution.roots))]
+    lines = ["roots: " + (", ".join(_roots(solution.roots)) or "none")]
     bound = solution.bound
     if math.isfinite(bound.value):
         lines.append(
@@ -111,7 +111,7 @@ def _facts(solution: Solution) -> list[str]:
         gains = ", ".join(f"{name} ({value:.4g})" for name, value in solution.active.items())
         lines.append(f"limits that bind (gain per unit relaxed): {gains}")
     for name, value in solution.violations.items():
-        text = solution.problem.constraints.get(name, "pattern")
+        text = solution.problem.constraints.get(name, "pattern" if name == solution.problem.locate else "must not be 0")
         lines.append(f"violated: {name} ({text}) by {value:.4g}")
     for branch in solution.branches:
         where = ", ".join(f"{n} = {branch.parameters[n]:.10g}" for n in solution.problem.free)

@@ -176,7 +176,7 @@ def _law_rows(design: Solution) -> Iterator[LawRow]:
 
     yield LawRow("w0", "abscissa, the 4-fold root", r, _f(laws.w0(p["mu"], p["chi_H"], **heights, **tilt)), not_ep4)
     a = np.array([design.quantities[f"a{k}"] for k in range(5)])
-    mismatch = np.max(np.abs(a / a[0] / laws.poly4(np.float64(r)) - 1)) if r else math.nan
+    mismatch = np.max(np.abs(a / a[0] / laws.poly4(r) - 1)) if r and a[0] else math.nan
     yield LawRow("4poly", "largest relative mismatch of a coefficient", _f(mismatch), 0.0, not_ep4)
     yield LawRow("chib", "chi_B", p["chi_B"], _f(laws.chib(r, p["chi_H"], **heights)), not_ep4)
     a2 = laws.a2(p["Fr"], p["mu"], p["chi_H"], **heights, **tilt, omega0=r)
