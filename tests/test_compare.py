@@ -10,7 +10,8 @@ from oracles import abscissa_60, polynomial_60
 
 import tmsopt
 from tmsopt import laws
-from tmsopt.show.figures import draw_frequencies, draw_growth_rates, growth_figure, save
+from tmsopt.show.growth import draw_frequencies, draw_growth_rates, growth_figure
+from tmsopt.show.style import save
 from tmsopt.study.growth import growth
 
 

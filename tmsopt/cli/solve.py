@@ -1,22 +1,27 @@
-"""The tmsopt command: thin commands over the library; heavy imports stand inside them."""
+"""Commands that solve one problem."""
 
-import json
 import math
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tmsopt import __version__
+from tmsopt.cli.common import (
+    BAD_INPUT,
+    DONE,
+    FIGURES,
+    INFEASIBLE,
+    NOT_CONVERGED,
+    bad_input,
+    check_output,
+    progress,
+    write_json,
+)
 
 if TYPE_CHECKING:
     from tmsopt.design.solution import Solution
-
-DONE, BAD_INPUT, INFEASIBLE, NOT_CONVERGED = 0, 2, 3, 4
-"""Exit status."""
 
 _EXIT = {"optimal": DONE, "infeasible": INFEASIBLE, "not_converged": NOT_CONVERGED}
 
@@ -57,22 +62,7 @@ def _common(command: Command) -> Command:
     return command
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(__version__, prog_name="tmsopt")
-def main() -> None:
-    """Design self-stable bicycles under your own constraints, and localise exceptional points.
-
-    \b
-    Examples:
-      tmsopt solve problems/ep4.toml
-      tmsopt compare problems/ep4.toml
-    """
-    for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")  # a narrow terminal encoding must not lose a result
-
-
-@main.command(epilog=_SOLVE_EXAMPLES)
+@click.command(epilog=_SOLVE_EXAMPLES)
 @click.argument("file", type=click.Path(path_type=Path))
 @_common
 @click.option(
@@ -101,21 +91,21 @@ def solve(
     rear_mass: str,
 ) -> None:
     """Find the best design that the problem FILE asks for."""
-    with _bad_input():
+    with bad_input():
         from tmsopt.design.files import load
 
         w, m_B = _scale("--wheelbase", wheelbase, "m"), _scale("--rear-mass", rear_mass, "kg")
-        _check_plot(plot)
+        check_output("--plot", plot, FIGURES)
         problem = load(file)
     from tmsopt.design.search import STARTS
     from tmsopt.design.solve import solve as solve_problem
 
-    with _progress() as progress:
+    with progress() as update:
         solution = solve_problem(
-            problem, starts=starts or STARTS, seed=seed, linear_solver=linear_solver, throw=False, progress=progress
+            problem, starts=starts or STARTS, seed=seed, linear_solver=linear_solver, throw=False, progress=update
         )
     if as_json:
-        _write_json(solution.to_json())
+        write_json(solution.to_json())
     else:
         from tmsopt.show.tables import solution_table
 
@@ -125,12 +115,12 @@ def solve(
     sys.exit(_EXIT[solution.status])
 
 
-@main.command(epilog=_COMPARE_EXAMPLES)
+@click.command(epilog=_COMPARE_EXAMPLES)
 @click.argument("file", type=click.Path(path_type=Path))
 @_common
 def compare(file: Path, as_json: bool, starts: int | None, seed: int, linear_solver: str) -> None:
     """Set the optimum of FILE beside the closed-form laws, and one formulation beside the other."""
-    with _bad_input():
+    with bad_input():
         from tmsopt.design.files import load
 
         problem = load(file)
@@ -138,41 +128,15 @@ def compare(file: Path, as_json: bool, starts: int | None, seed: int, linear_sol
     from tmsopt.show.tables import comparison_table
     from tmsopt.study.compare import compare as compare_design
 
-    with _progress() as progress:
+    with progress() as update:
         comparison = compare_design(
-            problem, starts=starts or STARTS, seed=seed, linear_solver=linear_solver, progress=progress
+            problem, starts=starts or STARTS, seed=seed, linear_solver=linear_solver, progress=update
         )
     if as_json:
-        _write_json(comparison.to_json())
+        write_json(comparison.to_json())
     else:
         click.echo(comparison_table(comparison))
     sys.exit(_EXIT[comparison.design.status])
-
-
-@contextmanager
-def _bad_input() -> Iterator[None]:
-    """Turn bad input into its messages on stderr and exit status 2."""
-    from tmsopt.design.errors import InputError
-
-    try:
-        yield
-    except InputError as error:
-        click.echo(str(error), err=True)
-        sys.exit(BAD_INPUT)
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[int, int], None]]:
-    """A progress bar of starts on stderr, shown on a terminal when solving takes longer than a second."""
-    from tqdm import tqdm
-
-    with tqdm(desc="starts", unit="start", delay=1, disable=None, leave=False, file=sys.stderr) as bar:
-
-        def update(done: int, most: int) -> None:
-            bar.total = most
-            bar.update(done - bar.n)
-
-        yield update
 
 
 def _scale(option: str, text: str, unit: str) -> float:
@@ -192,22 +156,9 @@ def _scale(option: str, text: str, unit: str) -> float:
     return value
 
 
-def _check_plot(path: Path | None) -> None:
-    """Refuse a plot that could not be written, before any work is done."""
-    if path is None:
-        return
-    from tmsopt.design.errors import Fault, InputError
-
-    endings = ("png", "pdf", "svg")
-    if path.suffix.lstrip(".").lower() not in endings:
-        raise InputError([Fault(f"found '{path}'; accepted: a file name ending in {', '.join(endings)}", ("--plot",))])
-    if path.is_dir() or not path.parent.is_dir():
-        problem = "is a directory" if path.is_dir() else "is in a directory that does not exist"
-        raise InputError([Fault(f"'{path}' {problem}; give the path of a file to write", ("--plot",))])
-
-
 def _draw(solution: "Solution", path: Path, w: float, m_B: float) -> None:
-    from tmsopt.show.figures import growth_figure, save
+    from tmsopt.show.growth import growth_figure
+    from tmsopt.show.style import save
     from tmsopt.show.tables import si_parameters
     from tmsopt.study.growth import growth
 
@@ -221,7 +172,3 @@ def _draw(solution: "Solution", path: Path, w: float, m_B: float) -> None:
         click.echo(f"--plot: '{path}' cannot be written: {error.strerror}", err=True)
         sys.exit(BAD_INPUT)
     click.echo(f"wrote {path}", err=True)
-
-
-def _write_json(data: dict[str, Any]) -> None:
-    click.echo(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
