@@ -27,10 +27,10 @@ def designs(problem: Problem, seed: int, count: int) -> Iterator[dict[str, float
 
     Every other one is chosen by the constraints alone, lest all starts fall into the basin of one good region.
     """
-    spread = _spread(problem, seed)
+    pool_of = spread(problem, seed)
     for done in range(0, count, _BATCH):
         size = min(_BATCH, count - done)
-        pool = list(islice(spread, _CANDIDATES * size))
+        pool = list(islice(pool_of, _CANDIDATES * size))
         columns = {n: np.array([d[n] for d in pool]) for n in problem.free}
         objective, violation = (m.reshape(size, _CANDIDATES) for m in _merit(problem, columns))
         merit = violation + objective * (np.arange(size) % 2 == 0)[:, None]
@@ -49,7 +49,7 @@ def complete(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Array:
     return np.array(x)
 
 
-def _spread(problem: Problem, seed: int) -> Iterator[dict[str, float]]:
+def spread(problem: Problem, seed: int) -> Iterator[dict[str, float]]:
     """The middle of the box, then a quasi-random sequence without end.
 
     The sequence adds powers of the generalised golden ratio modulo 1; scipy.stats.qmc has others, but importing

@@ -5,7 +5,7 @@ the roots themselves are not.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 from types import MappingProxyType
 from typing import Any
@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from tmsopt.roots.polynomial import product
 
 Roots = NDArray[np.complex128]
+
+_NAME = "<U16"
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,9 @@ class Pattern:
         guesses: unknowns to start from, for numeric roots.
         nonnegative: expressions of the unknowns that must be ≥ 0.
         abscissa: largest real part of the roots, where one smooth expression of the unknowns gives it.
+        rest: the factors whose roots the pattern does not tie to the imaginary axis; all of them by default.
+        marks: name of a more special pattern → expression of the unknowns that is 0 where it is met.
+        ends: unknown → what happens where it reaches 0 and the pattern ends.
     """
 
     name: str
@@ -39,6 +44,9 @@ class Pattern:
     guesses: Callable[[Roots], list[list[float]]]
     nonnegative: Callable[[Sequence[Any]], list[Any]] = lambda u: []
     abscissa: Callable[[Sequence[Any]], Any] | None = None
+    rest: Callable[[Sequence[Any]], list[list[Any]]] | None = None
+    marks: Mapping[str, Callable[[Sequence[Any]], Any]] = field(default_factory=dict)
+    ends: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def codimension(self) -> int:
@@ -48,6 +56,17 @@ class Pattern:
     def monic(self, unknowns: Sequence[Any]) -> list[Any]:
         """The five coefficients of the product of the factors, descending from 1."""
         return product(*self.factors(unknowns))
+
+    def remaining(self, unknowns: Sequence[Any]) -> list[list[Any]]:
+        """The factors whose roots must lie left of the imaginary axis for the pattern to bound or keep stability."""
+        return (self.rest or self.factors)(unknowns)
+
+    def kind(self, unknowns: Sequence[Any]) -> NDArray[np.str_]:
+        """Name of the pattern at each point: 2EP2 and CEP2 are one set, told apart by the sign of b² − 4c."""
+        if self.name not in ("2EP2", "CEP2"):
+            return np.full(np.shape(unknowns[0]), self.name, dtype=_NAME)
+        b, c = unknowns
+        return np.where(b * b - 4 * c >= 0, "2EP2", "CEP2").astype(_NAME)
 
 
 def quadratic(pair: Roots) -> list[float]:
@@ -94,6 +113,7 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
                 ("r", "t"),
                 lambda u: [[1, -u[0]]] * 3 + [[1, -u[1]]],
                 _triple_guesses,
+                marks={"EP4": lambda u: u[0] - u[1]},
             ),
             Pattern(
                 "2EP2",
@@ -102,6 +122,7 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
                 lambda u: [[1, u[0], u[1]]] * 2,
                 _double_quadratic_guess,
                 lambda u: [u[0] * u[0] - 4 * u[1]],
+                marks={"EP4": lambda u: u[0] * u[0] - 4 * u[1]},
             ),
             Pattern(
                 "CEP2",
@@ -111,6 +132,7 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
                 _double_quadratic_guess,
                 lambda u: [4 * u[1] - u[0] * u[0]],
                 abscissa=lambda u: -u[0] / 2,
+                marks={"EP4": lambda u: u[0] * u[0] - 4 * u[1]},
             ),
             Pattern(
                 "EP2",
@@ -118,6 +140,10 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
                 ("r", "b", "c"),
                 lambda u: [[1, -u[0]]] * 2 + [[1, u[1], u[2]]],
                 lambda z: [[float(a.mean().real), *quadratic(b)] for a, b in _two(z)],
+                marks={
+                    "EP3": lambda u: u[0] * u[0] + u[1] * u[0] + u[2],
+                    "2EP2": lambda u: u[1] * u[1] - 4 * u[2],
+                },
             ),
             Pattern(
                 "weave",
@@ -126,6 +152,8 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
                 lambda u: [[1, 0, u[0]], [1, u[1], u[2]]],
                 lambda z: [[abs(float(a.prod().real)), *quadratic(b)] for a, b in _two(z)],
                 lambda u: [u[0]],
+                rest=lambda u: [[1, u[1], u[2]]],
+                ends={"W": "the pair meets in a double root 0"},
             ),
             Pattern(
                 "capsize",
@@ -133,6 +161,8 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
                 ("b", "c", "d"),
                 lambda u: [[1, 0], [1, u[0], u[1], u[2]]],
                 lambda z: [[float(x) for x in np.poly(z)[1:4].real]],
+                rest=lambda u: [[1, u[0], u[1], u[2]]],
+                marks={"double zero": lambda u: u[2]},
             ),
             Pattern(
                 "resonance",
@@ -141,6 +171,8 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
                 lambda u: [[1, 0, u[0]]] * 2,
                 lambda z: [[float(np.abs(z).mean()) ** 2]],
                 lambda u: [u[0]],
+                rest=lambda u: [],
+                ends={"W": "both pairs meet in a 4-fold root 0"},
             ),
         )
     }

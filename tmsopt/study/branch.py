@@ -1,0 +1,169 @@
+"""A traced curve of a root pattern as data: points, tangents, labels, events."""
+
+import csv
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.design.frozen import Table
+from tmsopt.design.problem import Problem
+
+Array = NDArray[np.float64]
+
+SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class Event:
+    """A point of a branch where something happens.
+
+    Attributes:
+        name: ``EP4``, ``EP3``, ``2EP2``, ``double zero``, ``weave``, ``capsize``, ``fold``, ``constraint`` or ``end``.
+        detail: in words, e.g. which parameter folds or which limit ends the branch.
+        parameters: every parameter of the design there.
+        index: row of the branch.
+    """
+
+    name: str
+    detail: str
+    parameters: Table[float]
+    index: int
+
+
+@dataclass(frozen=True)
+class Branch:
+    """A curve of designs with one root pattern; every event is one of its points.
+
+    Attributes:
+        pattern: the pattern traced.
+        parameters: name → values along the curve, every parameter of the set, shape (n,).
+        unknowns: factor coefficients of the pattern, by name, shape (n,).
+        tangent: free parameter → its derivative by the arclength.
+        arclength: from the first point, with every free parameter measured in widths of its box.
+        kinds: name of the root pattern at each point; 2EP2, EP4 and CEP2 on one curve.
+        stable: where the roots that the pattern does not tie to the imaginary axis lie left of it.
+        heavily_damped: where all roots are real and negative or tied to 0 by the pattern.
+        satisfied: where every inequality constraint of the problem holds.
+        abscissa: largest real part of the roots, from the factors.
+        events: in the order of the arclength.
+        closed: whether the last point is the first.
+        residual: largest mismatch of a coefficient along the curve, relative to the terms that it is made of.
+    """
+
+    pattern: str
+    parameters: Mapping[str, Array]
+    unknowns: Mapping[str, Array]
+    tangent: Mapping[str, Array]
+    arclength: Array
+    kinds: NDArray[np.str_]
+    stable: NDArray[np.bool_]
+    heavily_damped: NDArray[np.bool_]
+    satisfied: NDArray[np.bool_]
+    abscissa: Array
+    events: tuple[Event, ...]
+    closed: bool
+    residual: float
+
+    def __len__(self) -> int:
+        return len(self.arclength)
+
+    def rows(self) -> Iterable[dict[str, Any]]:
+        """One record per point, as written to CSV."""
+        marks: dict[int, list[str]] = {}
+        for event in self.events:
+            marks.setdefault(event.index, []).append(f"{event.name}: {event.detail}" if event.detail else event.name)
+        for k in range(len(self)):
+            yield {
+                "arclength": float(self.arclength[k]),
+                **{name: float(column[k]) for name, column in self.parameters.items()},
+                **{f"d_{name}": float(column[k]) for name, column in self.tangent.items()},
+                **{name: float(column[k]) for name, column in self.unknowns.items()},
+                "abscissa": float(self.abscissa[k]),
+                "kind": str(self.kinds[k]),
+                "stable": bool(self.stable[k]),
+                "heavily_damped": bool(self.heavily_damped[k]),
+                "constraints": bool(self.satisfied[k]),
+                "event": "; ".join(marks.get(k, [])),
+            }
+
+    def to_json(self) -> dict[str, Any]:
+        """Columns and events; numbers that do not exist are null."""
+        columns: dict[str, list[Any]] = {}
+        for row in self.rows():
+            for name, value in row.items():
+                columns.setdefault(name, []).append(_finite(value))
+        return {
+            "pattern": self.pattern,
+            "closed": self.closed,
+            "points": len(self),
+            "residual": self.residual,
+            "events": [
+                {"name": e.name, "detail": e.detail, "index": e.index, "parameters": dict(e.parameters)}
+                for e in self.events
+            ],
+            "columns": columns,
+        }
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Every branch of a pattern that was found in the box.
+
+    Attributes:
+        starts: designs that the search for branches began from.
+        seconds: for the whole; `seconds_walking` for the points alone.
+    """
+
+    problem: Problem
+    pattern: str
+    branches: tuple[Branch, ...]
+    starts: int
+    seconds: float
+    seconds_walking: float
+
+    @property
+    def points(self) -> int:
+        """Number of points on all branches."""
+        return sum(len(b) for b in self.branches)
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """Events of all branches."""
+        return tuple(e for b in self.branches for e in b.events)
+
+    def to_json(self) -> dict[str, Any]:
+        """The JSON of `tmsopt trace`."""
+        return {
+            "schema": SCHEMA,
+            "title": self.problem.title,
+            "model": self.problem.model.name,
+            "pattern": self.pattern,
+            "free": list(self.problem.free),
+            "branches": [b.to_json() for b in self.branches],
+            "starts": self.starts,
+            "points": self.points,
+            "seconds": self.seconds,
+            "seconds_per_point": self.seconds_walking / max(self.points, 1),
+        }
+
+
+def write_csv(trace: Trace, path: Path) -> None:
+    """All branches in one table, a column `branch` before the others.
+
+    Raises:
+        OSError: when the file cannot be written.
+    """
+    rows = [{"branch": k, **row} for k, branch in enumerate(trace.branches) for row in branch.rows()]
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, fieldnames=list(rows[0]) if rows else ["branch"])
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _finite(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value

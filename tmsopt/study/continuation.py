@@ -1,0 +1,262 @@
+"""Pseudo-arclength continuation of a smooth curve F(x) = 0, n equations in n + 1 variables.
+
+Keller's method: predict along the tangent, correct by Newton's method on F = 0 and a fixed arclength. Predictor,
+three corrections and the new tangent are one CasADi function of scalar operations, so that a point costs one call.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_CONVERGED = 1e-8
+"""Last Newton step, in units of the scale: the error left is its square."""
+
+_CONTRACTION = 0.1  # of the second Newton step against the first: slower means that the prediction was too far
+_COSINE = np.cos(0.15)  # of the angle between tangents: a sharper turn takes a smaller step
+_SMALLEST = 1e-12
+_GROWTH = 1.5
+_FAR = 1e6
+_SAME = 1e-7
+CLOSED = "closed"
+_ISOLATED = 1e-10  # singular values, relative to the largest, below which an equation has no influence
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A compiled system; its variables y = x / scale are of order 1.
+
+    Attributes:
+        scale: units of the variables.
+        lower, upper: limits of y, infinite where there are none.
+        evaluate: y → F and its Jacobian in y.
+        advance: (y, t, s, origin) → next y, next t, and the numbers of `_Check`.
+    """
+
+    scale: Array
+    lower: Array
+    upper: Array
+    evaluate: ca.Function = field(repr=False)
+    advance: ca.Function = field(repr=False)
+
+
+@dataclass(frozen=True)
+class End:
+    """Why a walk ended; `limit` is the variable that reached a limit."""
+
+    reason: str
+    limit: int | None = None
+
+
+@dataclass(frozen=True)
+class Walk:
+    """Points y and unit tangents t of a curve, shape (points, n + 1), and why it ends at either side."""
+
+    y: Array
+    t: Array
+    ends: tuple[End, End]
+
+    @property
+    def closed(self) -> bool:
+        """Whether the curve returns to its first point, which is then also the last."""
+        return self.ends[1].reason == CLOSED
+
+
+def curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> Curve:
+    """Compile the curve equations(x) = 0 of a CasADi symbol x of n + 1 entries; limits are of x."""
+    size = x.numel()
+    unit = ca.DM(scale)
+    system = ca.Function("system", [x], [equations, ca.jacobian(equations, x)])
+    y, t, s, origin = ca.SX.sym("y", size), ca.SX.sym("t", size), ca.SX.sym("s"), ca.SX.sym("origin", size)
+
+    def scaled(at: Any) -> tuple[Any, Any]:
+        value, jacobian = system(at * unit)
+        return value, ca.densify(jacobian) @ ca.diag(unit)
+
+    z, sizes = y + s * t, []
+    for _ in range(3):
+        value, jacobian = scaled(z)
+        correction = ca.solve(ca.vertcat(jacobian, t.T), ca.vertcat(value, ca.dot(t, z - y) - s))
+        z = z - correction
+        sizes.append(ca.norm_2(correction))
+    value, jacobian = scaled(z)
+    tangent = ca.solve(ca.vertcat(jacobian, t.T), ca.vertcat(ca.DM.zeros(size - 1), 1))
+    tangent = tangent / ca.norm_2(tangent)
+
+    boxed = [k for k in range(size) if np.isfinite(lower[k]) and np.isfinite(upper[k])]
+    reach = ca.SX(np.inf)
+    for k in range(size):
+        room = 1.0 if k in boxed else 1 + ca.fabs(z[k])
+        reach = ca.fmin(reach, room / (ca.fabs(tangent[k]) + 1e-300))
+    slack = ca.SX(np.inf)
+    for k in range(size):
+        if np.isfinite(lower[k]):
+            slack = ca.fmin(slack, z[k] - lower[k] / scale[k])
+        if np.isfinite(upper[k]):
+            slack = ca.fmin(slack, upper[k] / scale[k] - z[k])
+    checks = ca.vertcat(
+        *sizes, ca.dot(t, tangent), reach, slack, ca.norm_inf(z), ca.norm_2(origin - y), ca.dot(t, origin - y)
+    )
+    return Curve(
+        scale=scale,
+        lower=lower / scale,
+        upper=upper / scale,
+        evaluate=ca.Function("evaluate", [y], list(scaled(y))),
+        advance=ca.Function("advance", [y, t, s, origin], [z, tangent, checks]),
+    )
+
+
+def tangent_at(on: Curve, y: Array) -> Array:
+    """Unit tangent at a point of the curve.
+
+    Raises:
+        ValueError: where the equations do not determine a direction.
+    """
+    jacobian = np.array(on.evaluate(y)[1])
+    _, singular, rows = np.linalg.svd(jacobian)
+    if singular[-1] <= _ISOLATED * singular[0]:
+        raise ValueError("the equations leave more than a curve here")
+    return np.asarray(rows[-1])
+
+
+def project(on: Curve, y: Array, held: int | None = None, steps: int = 40) -> Array | None:
+    """A point of the curve near y by damped Gauss–Newton, optionally with one variable held; None if not found."""
+    moving = [k for k in range(y.size) if k != held]
+    value, jacobian = _system(on, y)
+    for _ in range(steps):
+        if not (np.all(np.isfinite(value)) and np.all(np.isfinite(jacobian))):
+            return None
+        size = float(np.abs(value).max())
+        step = np.zeros(y.size)
+        step[moving] = np.linalg.lstsq(jacobian[:, moving], -value, rcond=1e-12)[0]
+        if np.abs(step).max() <= 1e-13 * (1 + np.abs(y).max()):
+            return y + step
+        damping = 1.0
+        while damping > 1e-3:
+            trial, slope = _system(on, y + damping * step)
+            if np.all(np.isfinite(trial)) and np.abs(trial).max() < size:
+                break
+            damping /= 2
+        else:
+            return y if size <= 1e-13 else None
+        y, value, jacobian = y + damping * step, trial, slope
+    return None
+
+
+def walk(on: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
+    """Follow the curve from y in the direction t until a limit, a closed loop, infinity, or `most` points."""
+    advance = _Advance(on, y)
+    ys, ts = [y], [t]
+    s, reach = step / 4, _reach(on, y, t)
+    while len(ys) < most:
+        s = min(s, step * reach)
+        while True:
+            new, tangent, first, second, third, cosine, reach, slack, largest, far, ahead = advance(y, t, s)
+            if third <= _CONVERGED and cosine >= _COSINE and (second <= _CONTRACTION * first or first < 1e-6):
+                break  # nan does not come here
+            s /= 2
+            if s < _SMALLEST:
+                return _ended(ys, ts, End("singular: the curve branches or has no direction here"))
+        if len(ys) > 2 and 0 < ahead <= s and far <= 2 * s and advance.returns(y, t, ahead):
+            return _ended([*ys, ys[0]], [*ts, ts[0]], End(CLOSED))
+        if slack < 0:
+            last, direction, end = _at_limit(on, advance, y, t, s)
+            return _ended([*ys, last], [*ts, direction], end)
+        ys.append(new)
+        ts.append(tangent)
+        if largest > _FAR:
+            return _ended(ys, ts, End("a root goes to infinity: a0 vanishes"))
+        y, t, s = new, tangent, s * _GROWTH
+    return _ended(ys, ts, End(f"stopped after {most} points"))
+
+
+def between(on: Curve, y: Array, t: Array, s: float) -> tuple[Array, Array]:
+    """The point and tangent at arclength s beyond a point of the curve, s no more than a step."""
+    new, tangent, _ = (np.array(part).ravel() for part in on.advance(y, t, s, y))
+    return new, tangent
+
+
+def contains(on: Curve, walked: Walk, y: Array, step: float) -> bool:
+    """Whether a point lies on a curve already walked."""
+    distance = np.linalg.norm(walked.y - y, axis=1)
+    k = int(np.argmin(distance))
+    if distance[k] > 4 * step * (1 + np.abs(y).max()):
+        return False
+    new, _ = between(on, walked.y[k], walked.t[k], float(walked.t[k] @ (y - walked.y[k])))
+    return bool(np.abs(new - y).max() <= _SAME * (1 + np.abs(y).max()))
+
+
+def crossing(function: Callable[[float], float], end: float) -> float:
+    """Where a function that changes sign on [0, end] is 0."""
+    from scipy.optimize import brentq  # loading it takes longer than tracing
+
+    if function(0.0) == 0:
+        return 0.0
+    if function(end) == 0:
+        return end
+    return float(brentq(function, 0.0, end, xtol=1e-300, rtol=4 * np.finfo(float).eps))
+
+
+class _Advance:
+    """The compiled step without the cost of converting arguments: a few microseconds a call."""
+
+    def __init__(self, on: Curve, origin: Array) -> None:
+        self._arguments = [np.zeros(origin.size), np.zeros(origin.size), np.zeros(1), origin.copy()]
+        self._results = [np.zeros(origin.size), np.zeros(origin.size), np.zeros(9)]
+        buffer: Any
+        buffer, self._trigger = on.advance.buffer()
+        self._buffer = buffer  # kept alive with the memory that it points to
+        for k, a in enumerate(self._arguments):
+            buffer.set_arg(k, memoryview(a.data))
+        for k, r in enumerate(self._results):
+            buffer.set_res(k, memoryview(r.data))
+
+    def __call__(self, y: Array, t: Array, s: float) -> tuple[Any, ...]:
+        self._arguments[0][:] = y
+        self._arguments[1][:] = t
+        self._arguments[2][0] = s
+        self._trigger()
+        return (self._results[0].copy(), self._results[1].copy(), *self._results[2].tolist())
+
+    def returns(self, y: Array, t: Array, s: float) -> bool:
+        """Whether the curve, followed from y by s, meets the origin."""
+        new = self(y, t, s)[0]
+        return bool(np.abs(new - self._arguments[3]).max() <= _SAME * (1 + np.abs(new).max()))
+
+
+def _system(on: Curve, y: Array) -> tuple[Array, Array]:
+    value, jacobian = on.evaluate(y)
+    return np.array(value).ravel(), np.array(jacobian)
+
+
+def _reach(on: Curve, y: Array, t: Array) -> float:
+    """Longest step, per unit of `step`: boxed variables by their box, the others by their own size."""
+    boxed = np.logical_and(np.isfinite(on.lower), np.isfinite(on.upper))
+    return float(np.min(np.where(boxed, 1.0, 1 + np.abs(y)) / (np.abs(t) + 1e-300)))
+
+
+def _at_limit(on: Curve, advance: _Advance, y: Array, t: Array, s: float) -> tuple[Array, Array, End]:
+    """The first point within a step that lies on a limit, on it exactly."""
+    beyond = advance(y, t, s)[0]
+    found = []
+    for k in range(y.size):
+        for side, limit in (("min", on.lower[k]), ("max", on.upper[k])):
+            if beyond[k] < limit if side == "min" else beyond[k] > limit:
+
+                def excess(r: float, k: int = k, limit: float = float(limit)) -> float:
+                    return float(advance(y, t, r)[0][k]) - limit
+
+                found.append((crossing(excess, s), k, side, limit))
+    share, k, side, limit = min(found)
+    last, direction = advance(y, t, share)[:2]
+    last[k] = limit
+    return last, direction, End(side, k)
+
+
+def _ended(ys: Sequence[Array], ts: Sequence[Array], end: End) -> Walk:
+    return Walk(np.array(ys), np.array(ts), (End("start"), end))

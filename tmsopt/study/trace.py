@@ -1,0 +1,217 @@
+"""Trace a root pattern through parameter space: every branch in the box, with its events."""
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.design.errors import Fault, InputError, suggest
+from tmsopt.design.formulations import NLP, freedom, matching, variables_of
+from tmsopt.design.problem import Problem
+from tmsopt.design.starts import spread
+from tmsopt.roots import PATTERNS, Pattern, roots
+from tmsopt.study.branch import Branch, Trace
+from tmsopt.study.continuation import Curve, Walk, contains, curve, project, tangent_at, walk
+from tmsopt.study.events import describe
+
+Array = NDArray[np.float64]
+Report = Callable[[int, int], None]
+
+STARTS = 48
+STEP = 0.005
+POINTS = 200_000
+
+
+@dataclass(frozen=True)
+class Traced:
+    """A problem made ready for tracing one pattern.
+
+    Attributes:
+        problem: with the pattern to locate and every constraint.
+        unknowns: where the unknowns of the pattern stand among the variables.
+    """
+
+    problem: Problem
+    pattern: Pattern
+    nlp: NLP
+    on: Curve
+    unknowns: slice
+
+
+def trace(
+    problem: Problem,
+    pattern: str | None = None,
+    *,
+    step: float = STEP,
+    starts: int = STARTS,
+    seed: int = 0,
+    most: int = POINTS,
+    through: Sequence[Mapping[str, float]] = (),
+    progress: Report | None = None,
+) -> Trace:
+    """Every branch of a pattern in the box of the free parameters, one more of which is free than the pattern ties.
+
+    Args:
+        pattern: name; by default the one that the problem locates.
+        step: longest step, in widths of the box.
+        starts: designs from which branches are looked for; a short branch far from all of them can be missed.
+        most: points of a branch in one direction.
+        through: designs (free parameters) to begin at, before the others.
+        progress: called with the number of starts done and in all.
+
+    Raises:
+        InputError: for an unknown pattern, or when the equations do not leave a curve.
+    """
+    began = time.perf_counter()
+    problem = _asked(problem, pattern)
+    ready = prepare(problem)
+    walks: list[Walk] = []
+    walking = 0.0
+    for done, y in enumerate(_seeds(ready, starts, seed, through)):
+        if progress:
+            progress(min(done // _GUESSES, starts), starts)
+        if y is None or any(contains(ready.on, w, y, step) for w in walks):
+            continue
+        before = time.perf_counter()
+        found = _both_ways(ready, y, step, most)
+        walking += time.perf_counter() - before
+        if found is not None:
+            walks.append(found)
+    branches = tuple(branch_of(ready, w) for w in walks)
+    ordered = tuple(sorted(branches, key=lambda b: -float(b.arclength[-1])))
+    return Trace(problem, str(problem.locate), ordered, starts, time.perf_counter() - began, walking)
+
+
+def prepare(problem: Problem) -> Traced:
+    """The equations of a pattern problem, compiled for tracing."""
+    pattern = PATTERNS[str(problem.locate)]
+    equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].comparison == "=="}
+    nlp = matching(replace(problem, constraints=equalities))
+    x = ca.SX.sym("x", len(nlp.variables))
+    g = nlp.functions(x)[1]
+    rows = [k for k in range(len(nlp.rows)) if nlp.row_lower[k] == nlp.row_upper[k]]
+    if len(rows) != len(nlp.variables) - 1:
+        names = ", ".join(equalities)
+        message = f"an equality of a root quantity cannot be traced along {pattern.name}; leave out {names}"
+        raise InputError([Fault(message, ("constraints",))])
+    free = len(problem.free)
+    unknowns = slice(free, free + len(pattern.unknowns))
+    lower, upper = np.array(nlp.lower), np.array(nlp.upper)
+    for k, name in enumerate(pattern.unknowns):
+        if name in pattern.ends:
+            lower[free + k] = 0.0
+    scale = np.ones(len(nlp.variables))
+    scale[:free] = upper[:free] - lower[:free]
+    sample = [_variables(nlp, problem, d, guess=0) for d, _ in zip(spread(problem, 0), range(32), strict=False)]
+    known = np.array([s for s in sample if s is not None]).reshape(-1, len(nlp.variables))
+    if known.size:
+        scale[free:] = np.clip(np.median(np.abs(known[:, free:]), axis=0), 0.1, 1e3)
+    on = curve(x, ca.vertcat(*[g[k] for k in rows]), scale, lower, upper)
+    return Traced(problem, pattern, nlp, on, unknowns)
+
+
+def branch_of(ready: Traced, walked: Walk) -> Branch:
+    """A walked curve with its events, in the parameters of the problem."""
+    return describe(ready.problem, ready.pattern, ready.on, ready.unknowns, walked)
+
+
+def _asked(problem: Problem, name: str | None) -> Problem:
+    """The problem with the pattern as its only question, checked to leave a curve."""
+    name = name or problem.locate
+    if name is None:
+        message = f"no pattern to trace; write locate = 'EP2' or another, or name one. accepted: {' '.join(PATTERNS)}"
+        raise InputError([Fault(message, ("objective", "locate"))])
+    if name not in PATTERNS:
+        raise InputError([Fault(f"unknown pattern '{name}'; {suggest(name, PATTERNS)}", ("objective", "locate"))])
+    asked = replace(problem, locate=name, minimize=None, maximize=None)
+    count = freedom(asked)
+    if count.count != 1:
+        free, needed = ", ".join(problem.free) or "none", count.conditions + 1
+        advice = (
+            f"free {needed - count.free} more"
+            if count.count < 1
+            else f"fix {count.count - 1} of them, or add as many == constraints"
+        )
+        message = (
+            f"a curve of {name} takes {needed} free parameters ({count.conditions} conditions and one to move "
+            f"along), and {count.free} are free ({free}); {advice}"
+        )
+        raise InputError([Fault(message, ("parameters",))])
+    return asked
+
+
+_GUESSES = 4  # starting values of the unknowns tried at each design
+
+
+def _seeds(ready: Traced, starts: int, seed: int, through: Sequence[Mapping[str, float]]) -> Iterator[Array | None]:
+    """Points of the pattern's curve in the box, found from many designs; None where a start led nowhere."""
+    problem = ready.problem
+    free = len(problem.free)
+    given = [*through, *([problem.start] if set(problem.start) == set(problem.free) else [])]
+    for design in given:
+        for guess in range(_GUESSES):
+            yield _seed(ready, design, guess, None)
+    for count, design in zip(range(starts), spread(problem, seed), strict=False):
+        held = [None, *range(free)][count % (free + 1)]
+        for guess in range(_GUESSES):
+            yield _seed(ready, design, guess, held)
+
+
+def _seed(ready: Traced, design: Mapping[str, float], guess: int, held: int | None) -> Array | None:
+    on, free = ready.on, len(ready.problem.free)
+    x = _variables(ready.nlp, ready.problem, design, guess)
+    if x is None:
+        return None
+    y = project(on, x / on.scale, held)
+    if y is None or not np.all((y >= on.lower - 1e-12) & (y <= on.upper + 1e-12)) or np.abs(y[free:]).max() > 1e5:
+        return None
+    y = np.clip(y, on.lower, on.upper)
+    a = ready.problem.values(ready.problem.ordered(design_at(ready.problem, y * on.scale))).coefficients
+    size = max(abs(float(c)) for c in a)
+    return y if abs(float(a[0])) > 1e-9 * size else None  # at a0 = a1 = … = 0 any unknowns fit
+
+
+def design_at(problem: Problem, x: Array) -> dict[str, Any]:
+    """Free parameters for traced variables, floats or columns."""
+    of = problem.parameter_set
+    return {n: np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, x.T, strict=False)}
+
+
+def _variables(nlp: NLP, problem: Problem, design: Mapping[str, float], guess: int) -> Array | None:
+    """All variables for a design, with the guess of that number for the pattern's unknowns; None without one."""
+    values = problem.values(problem.ordered(design))
+    a = np.array([float(c) for c in values.coefficients])
+    if a[0] == 0 or not np.all(np.isfinite(a)):
+        return None
+    z = roots(a)
+    x = variables_of(problem, design)
+    for number, lift in enumerate(nlp.lifts):
+        guesses = lift.guess(values, z)
+        chosen = guess if number == 0 else 0
+        if chosen >= len(guesses):
+            return None
+        x = x + guesses[chosen]
+    return np.array(x)
+
+
+def _both_ways(ready: Traced, y: Array, step: float, most: int) -> Walk | None:
+    """The whole branch through a point; None where it is no regular point of a curve."""
+    try:
+        t = tangent_at(ready.on, y)
+    except ValueError:
+        return None
+    ahead = walk(ready.on, y, t, step, most)
+    if ahead.closed:
+        return ahead
+    back = walk(ready.on, y, -t, step, most)
+    if len(ahead.y) + len(back.y) < 4:
+        return None
+    return Walk(
+        y=np.concatenate([back.y[::-1], ahead.y[1:]]),
+        t=np.concatenate([-back.t[::-1], ahead.t[1:]]),
+        ends=(back.ends[1], ahead.ends[1]),
+    )
