@@ -10,34 +10,42 @@ if TYPE_CHECKING:
     from tmsopt.design.problem import Problem
     from tmsopt.design.solution import NotSolved, Solution
     from tmsopt.design.solve import solve
+    from tmsopt.study.branch import Branch, Trace
     from tmsopt.study.compare import Comparison, compare
+    from tmsopt.study.trace import trace
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "Branch",
     "Comparison",
     "InputError",
     "NotSolved",
     "Problem",
     "Solution",
+    "Trace",
     "compare",
     "laws",
     "load",
     "models",
     "roots",
     "solve",
+    "trace",
 ]
 
 # Imported when first used, so that `tmsopt --help` need not wait for CasADi.
 _HOMES = {
+    "Branch": "tmsopt.study.branch",
     "Comparison": "tmsopt.study.compare",
     "InputError": "tmsopt.design.errors",
     "NotSolved": "tmsopt.design.solution",
     "Problem": "tmsopt.design.problem",
     "Solution": "tmsopt.design.solution",
+    "Trace": "tmsopt.study.branch",
     "compare": "tmsopt.study.compare",
     "load": "tmsopt.design.files",
     "solve": "tmsopt.design.solve",
+    "trace": "tmsopt.study.trace",
 }
 
 

@@ -6,6 +6,7 @@ import click
 
 from tmsopt import __version__
 from tmsopt.cli.solve import compare, solve
+from tmsopt.cli.trace import trace
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -23,5 +24,5 @@ def main() -> None:
             stream.reconfigure(errors="replace")  # a narrow terminal encoding must not lose a result
 
 
-for _command in (solve, compare):
+for _command in (solve, compare, trace):
     main.add_command(_command)

@@ -5,9 +5,12 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from tmsopt.design.problem import Problem
 
 DONE, BAD_INPUT, INFEASIBLE, NOT_CONVERGED = 0, 2, 3, 4
 """Exit status."""
@@ -53,6 +56,35 @@ def check_output(option: str, path: Path | None, endings: Sequence[str]) -> None
     if path.is_dir() or not path.parent.is_dir():
         problem = "is a directory" if path.is_dir() else "is in a directory that does not exist"
         raise InputError([Fault(f"'{path}' {problem}; give the path of a file to write", (option,))])
+
+
+@contextmanager
+def saving(option: str, path: Path) -> Iterator[None]:
+    """Say that a file was written, or why it could not be, with exit status 2."""
+    try:
+        yield
+    except OSError as error:
+        click.echo(f"{option}: '{path}' cannot be written: {error.strerror}", err=True)
+        sys.exit(BAD_INPUT)
+    click.echo(f"wrote {path}", err=True)
+
+
+def plane(problem: "Problem", axes: str | None) -> tuple[str, str]:
+    """Two parameters to draw over: the given ones, or the first two that are free.
+
+    Raises:
+        InputError: unless there are two, both free.
+    """
+    from tmsopt.design.errors import Fault, InputError
+
+    free = list(problem.free)
+    names = [n.strip() for n in axes.split(",")] if axes is not None else free[:2]
+    if len(names) != 2 or names[0] == names[1] or not set(names) <= set(free):
+        message = (
+            f"found {axes or ', '.join(names) or 'none'}; accepted: two of the free parameters ({', '.join(free)})"
+        )
+        raise InputError([Fault(message, ("--axes",))])
+    return names[0], names[1]
 
 
 def write_json(data: dict[str, Any]) -> None:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tmsopt.cli.common import (
-    BAD_INPUT,
     DONE,
     FIGURES,
     INFEASIBLE,
@@ -17,6 +16,7 @@ from tmsopt.cli.common import (
     bad_input,
     check_output,
     progress,
+    saving,
     write_json,
 )
 
@@ -166,9 +166,5 @@ def _draw(solution: "Solution", path: Path, w: float, m_B: float) -> None:
         click.echo("--plot: nothing to draw, a root is at infinity", err=True)
         return
     si = si_parameters(solution, w, m_B)
-    try:
+    with saving("--plot", path):
         save(growth_figure(growth(solution), solution.problem.title, (si["g"] * si["w"]) ** 0.5), path)
-    except OSError as error:
-        click.echo(f"--plot: '{path}' cannot be written: {error.strerror}", err=True)
-        sys.exit(BAD_INPUT)
-    click.echo(f"wrote {path}", err=True)

@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, StrictStr, ValidationError
 
 from tmsopt.design.errors import Fault, InputError, suggest
-from tmsopt.design.problem import Problem, guess_parameter_set
+from tmsopt.design.problem import Problem, guess_parameter_set, unasked
 from tmsopt.design.units import with_unit
 from tmsopt.models import MODELS, Model
 
@@ -47,8 +47,8 @@ class _File(_Table):
     constraints: dict[str, StrictStr] = Field(default_factory=dict)
 
 
-def load(path: str | PathLike[str]) -> Problem:
-    """Read a problem file.
+def load(path: str | PathLike[str], asks: bool = True) -> Problem:
+    """Read a problem file; one that `asks` must say what to do with its free parameters.
 
     Raises:
         InputError: listing every fault with file, line, key, what was found and what is accepted.
@@ -92,6 +92,8 @@ def load(path: str | PathLike[str]) -> Problem:
         except InputError as error:
             reported = {f.key[:2] for f in faults} | {f.key[:1] for f in faults if f.key[:1] == ("objective",)}
             faults = faults + [f for f in error.faults if f.key[:2] not in reported]
+    if problem is not None and asks:
+        faults = [*faults, *unasked(problem)]
     if problem is None or faults:
         placed = [f.at(file, _line_of(lines, f.key)) for f in faults]
         raise InputError(sorted(placed, key=lambda f: f.line))

@@ -98,7 +98,7 @@ class Problem:
 
     @property
     def sense(self) -> str:
-        """``minimize``, ``maximize``, ``locate``, or ``evaluate`` when nothing is free and nothing asked."""
+        """``minimize``, ``maximize``, ``locate``, or ``evaluate`` when nothing is asked."""
         if self.minimize is not None:
             return "minimize"
         if self.maximize is not None:
@@ -130,6 +130,14 @@ class Problem:
         """Every parameter in the model's order: the given values of the free ones, and the fixed ones."""
         complete = {**self.fixed, **values}
         return {name: complete[name] for name in self.parameter_set.names}
+
+
+def unasked(problem: Problem) -> list[Fault]:
+    """What is wrong with solving a problem that frees parameters without a question; a chart needs none."""
+    if not problem.free or problem.sense != "evaluate":
+        return []
+    message = "parameters are free, but nothing is asked of them; write minimize, maximize or locate"
+    return [Fault(message, ("objective",))]
 
 
 def guess_parameter_set(model: Model, names: Mapping[str, Any]) -> ParameterSet:
@@ -230,8 +238,6 @@ def _objective_faults(problem: Problem) -> Iterator[Fault]:
         yield Fault("minimize and maximize together; keep one of them", key)
     if problem.locate is not None and problem.locate not in PATTERNS:
         yield Fault(f"unknown pattern {problem.locate!r}; {suggest(str(problem.locate), PATTERNS)}", (*key, "locate"))
-    if problem.free and problem.minimize is None and problem.maximize is None and problem.locate is None:
-        yield Fault("parameters are free, but nothing is asked of them; write minimize, maximize or locate", key)
 
 
 def _expression_faults(problem: Problem, of: ParameterSet) -> Iterator[Fault]:

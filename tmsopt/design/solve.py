@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from tmsopt.design.bound import omega0_bound
 from tmsopt.design.branches import other_branches
 from tmsopt.design.elastic import least_violating
+from tmsopt.design.errors import InputError
 from tmsopt.design.formulations import NLP, design_of, formulate, freedom
 from tmsopt.design.frozen import Table
 from tmsopt.design.polish import Point, polisher
-from tmsopt.design.problem import Problem
+from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.recheck import Checked, recheck
 from tmsopt.design.search import STARTS, Candidate, Progress, follow, same, search
 from tmsopt.design.solution import Bound, Branch, NotSolved, Solution, Starts
@@ -45,8 +46,11 @@ def solve(
 
     Raises:
         NotSolved: carrying the best point found, when `throw`.
+        InputError: when parameters are free and nothing is asked of them.
         ValueError: for another linear solver or fewer than one start.
     """
+    if faults := unasked(problem):
+        raise InputError(faults)
     if starts < 1:
         raise ValueError(f"starts = {starts}; accepted: 1 or more")
     began = time.perf_counter()

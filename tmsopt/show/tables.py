@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from tmsopt.design.solution import Solution
 from tmsopt.models.tms import GRAVITY, to_si
 from tmsopt.roots import Root
+from tmsopt.show.text import columns, number
 from tmsopt.study.compare import Comparison
 
 _SI_OF = {"Fr": "v", "mu": "m_H", "chi_B": "x_B", "chi_H": "x_H", "zeta_B": "z_B", "zeta_H": "z_H"}
@@ -22,8 +23,8 @@ def solution_table(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: floa
     """A design, dimensionless and in SI side by side, with its roots, bound, limits and remarks."""
     si = si_parameters(solution, w, m_B, g)
     lines = [solution.problem.title or "untitled problem", _headline(solution), ""]
-    lines += [*_columns(_parameter_rows(solution, si)), ""]
-    lines += [*_columns(_result_rows(solution, si)), ""]
+    lines += [*columns(_parameter_rows(solution, si)), ""]
+    lines += [*columns(_result_rows(solution, si)), ""]
     lines += _facts(solution)
     return "\n".join(line.rstrip() for line in lines).rstrip()
 
@@ -36,16 +37,16 @@ def comparison_table(comparison: Comparison) -> str:
     for row in comparison.laws:
         verdict = row.reason or ("agrees" if row.agrees else "DIFFERS")
         relative = f"{row.relative:.1e}" if row.applies else ""
-        law = _number(row.law) if row.applies else ""
-        rows.append((row.label, row.subject, _number(row.numeric), law, relative, verdict))
-    lines += _columns(rows)
+        law = number(row.law) if row.applies else ""
+        rows.append((row.label, row.subject, number(row.numeric), law, relative, verdict))
+    lines += columns(rows)
     lines.append("")
     if comparison.other is None:
         lines.append(f"other formulation: none, {comparison.reason}")
     else:
         names = f"{comparison.other.formulation} minus {design.formulation}"
         rows2 = [("formulations", names)] + [(n, f"{d:.1e}") for n, d in comparison.differences.items()]
-        lines += _columns(rows2)
+        lines += columns(rows2)
     lines += [line for line in _facts(design) if line.startswith("also solved")]
     return "\n".join(line.rstrip() for line in lines).rstrip()
 
@@ -53,7 +54,7 @@ def comparison_table(comparison: Comparison) -> str:
 def _headline(solution: Solution) -> str:
     problem = solution.problem
     text = problem.minimize or problem.maximize
-    asked = f"{problem.sense} {text} = {_number(solution.value)}" if text else ""
+    asked = f"{problem.sense} {text} = {number(solution.value)}" if text else ""
     located = f"locate {problem.locate}" if problem.locate else ""
     proven = ", proven globally" if solution.bound.proven else ""
     words = solution.status.replace("_", " ")
@@ -67,13 +68,13 @@ def _parameter_rows(solution: Solution, si: Mapping[str, float]) -> list[Sequenc
     for name, value in solution.dimensionless.items():
         if name == "lambda_s":
             free = _freedom(solution, "lambda_s")
-            rows.append((name, _number(value), "lambda_s", _number(math.degrees(value)), "deg", free))
+            rows.append((name, number(value), "lambda_s", number(math.degrees(value)), "deg", free))
             continue
         symbol = _SI_OF[name]
         free = _freedom(solution, symbol if own else name)
-        rows.append((name, _number(value), symbol, _number(si[symbol]), _UNITS[symbol], free))
+        rows.append((name, number(value), symbol, number(si[symbol]), _UNITS[symbol], free))
     if own:
-        rows += [("", "", n, _number(si[n]), _UNITS[n], _freedom(solution, n)) for n in ("w", "m_B")]
+        rows += [("", "", n, number(si[n]), _UNITS[n], _freedom(solution, n)) for n in ("w", "m_B")]
     return rows
 
 
@@ -87,13 +88,13 @@ def _result_rows(solution: Solution, si: Mapping[str, float]) -> list[Sequence[s
     rows: list[Sequence[str]] = []
     for name, value in (("abscissa", solution.abscissa), ("  as stored", solution.abscissa_realised)):
         time = f"{1 / (-value * rate):.4g}" if value < 0 else ""
-        rows.append((name, _number(value), "decay time" if time else "", time, "s" if time else ""))
-    rows.append(("damping_ratio", _number(q["damping_ratio"]), "", "", ""))
+        rows.append((name, number(value), "decay time" if time else "", time, "s" if time else ""))
+    rows.append(("damping_ratio", number(q["damping_ratio"]), "", "", ""))
     critical = q["Fr_c"]
     speed = f"{critical * math.sqrt(si['g'] * si['w']):.8g}" if math.isfinite(critical) else ""
-    rows.append(("Fr_c", _number(critical), "v_c" if speed else "", speed, "m/s" if speed else ""))
-    rows.append(("nu_H", _number(q["nu_H"]), "u_H", _number(q["nu_H"] * si["w"]), "m"))
-    rows.append(("chi_T", _number(q["chi_T"]), "x_T", _number(q["chi_T"] * si["w"]), "m"))
+    rows.append(("Fr_c", number(critical), "v_c" if speed else "", speed, "m/s" if speed else ""))
+    rows.append(("nu_H", number(q["nu_H"]), "u_H", number(q["nu_H"] * si["w"]), "m"))
+    rows.append(("chi_T", number(q["chi_T"]), "x_T", number(q["chi_T"] * si["w"]), "m"))
     return rows
 
 
@@ -102,7 +103,7 @@ def _facts(solution: Solution) -> list[str]:
     bound = solution.bound
     if math.isfinite(bound.value):
         lines.append(
-            f"bound: no design in the box is below {_number(bound.value)} ({bound.method}); gap {bound.gap:.1e}"
+            f"bound: no design in the box is below {number(bound.value)} ({bound.method}); gap {bound.gap:.1e}"
         )
     free = solution.freedom
     if solution.problem.locate:
@@ -133,12 +134,3 @@ def _roots(roots: Iterable[Root]) -> list[str]:
         value = f"{root.re:.8g}" + (f" ± {root.im:.8g}i" if root.im else "")
         words.append(value + (f" ({root.multiplicity}-fold)" if root.multiplicity > 1 else ""))
     return words
-
-
-def _number(value: float) -> str:
-    return f"{value:.12g}" if math.isfinite(value) else "none"
-
-
-def _columns(rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    return ["  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]

@@ -11,6 +11,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 Array = NDArray[np.float64]
 
@@ -124,10 +125,13 @@ def tangent_at(on: Curve, y: Array) -> Array:
     return np.asarray(rows[-1])
 
 
-def project(on: Curve, y: Array, held: int | None = None, steps: int = 40) -> Array | None:
-    """A point of the curve near y by damped Gauss–Newton, optionally with one variable held; None if not found."""
+def project(system: ca.Function, y: Array, held: int | None = None, steps: int = 40) -> Array | None:
+    """A solution near y by damped Gauss–Newton, optionally with one variable held; None if not found.
+
+    `system` gives the equations, any number of them, and their Jacobian.
+    """
     moving = [k for k in range(y.size) if k != held]
-    value, jacobian = _system(on, y)
+    value, jacobian = _evaluate(system, y)
     for _ in range(steps):
         if not (np.all(np.isfinite(value)) and np.all(np.isfinite(jacobian))):
             return None
@@ -138,7 +142,7 @@ def project(on: Curve, y: Array, held: int | None = None, steps: int = 40) -> Ar
             return y + step
         damping = 1.0
         while damping > 1e-3:
-            trial, slope = _system(on, y + damping * step)
+            trial, slope = _evaluate(system, y + damping * step)
             if np.all(np.isfinite(trial)) and np.abs(trial).max() < size:
                 break
             damping /= 2
@@ -193,8 +197,6 @@ def contains(on: Curve, walked: Walk, y: Array, step: float) -> bool:
 
 def crossing(function: Callable[[float], float], end: float) -> float:
     """Where a function that changes sign on [0, end] is 0."""
-    from scipy.optimize import brentq  # loading it takes longer than tracing
-
     if function(0.0) == 0:
         return 0.0
     if function(end) == 0:
@@ -229,8 +231,8 @@ class _Advance:
         return bool(np.abs(new - self._arguments[3]).max() <= _SAME * (1 + np.abs(new).max()))
 
 
-def _system(on: Curve, y: Array) -> tuple[Array, Array]:
-    value, jacobian = on.evaluate(y)
+def _evaluate(system: ca.Function, y: Array) -> tuple[Array, Array]:
+    value, jacobian = system(y)
     return np.array(value).ravel(), np.array(jacobian)
 
 

@@ -1,18 +1,19 @@
 """What happens along a traced curve: events found by sign changes, located on the curve itself, put in as points."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.frozen import Table
 from tmsopt.design.problem import ROOT_QUANTITIES, Problem
 from tmsopt.models import Values
-from tmsopt.roots import Pattern, lienard_chipart, roots
+from tmsopt.roots import PATTERNS, Pattern, lienard_chipart, roots
 from tmsopt.study.branch import Branch, Event
-from tmsopt.study.continuation import CLOSED, Curve, End, Walk, between, crossing
+from tmsopt.study.continuation import CLOSED, Curve, End, Walk, between, crossing, project
 
 Array = NDArray[np.float64]
 Truth = NDArray[np.bool_]
@@ -20,6 +21,9 @@ Function = Callable[[Array, Array], Array]
 
 _TOGETHER = 1e-6
 """Distance, in units of the scale, within which events are one: each is located to 1e-12 or better."""
+
+_SAME_DESIGN = 1e-9
+"""Likewise in the free parameters alone: where the traced equations are singular, the unknowns scatter."""
 
 _NOTHING = 1e-9  # a function smaller than this all along the curve is 0 on it, not an event of it
 
@@ -50,7 +54,7 @@ class _Found:
 def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walked: Walk) -> Branch:
     """A walked curve in the parameters of the problem, with its events among its points."""
     found = list(_events(problem, pattern, on, unknowns, walked))
-    merged = _merged(found)
+    merged = [_sharp(problem, pattern, on, e) if e.name == "EP4" else e for e in _merged(found, len(problem.free))]
     rows, y, t = _inserted(walked, merged)
     x = y * on.scale
     columns = parameters_of(problem, x)
@@ -140,9 +144,12 @@ def _events(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walk
     x = walked.y * on.scale
     u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]
     stable = stability(pattern.remaining(u), len(x))
-    for mark in _marks(problem, pattern, unknowns):
+    within = [name for name, special in pattern.marks.items() if _vanishes(special(u), u)]
+    for mark in _marks(problem, pattern, unknowns, within):
         value = np.broadcast_to(mark.value(x, walked.t), len(x))
-        if mark.name != "constraint" and _vanishes(value, u):
+        if mark.name in within:
+            continue
+        if mark.name == "fold" and np.abs(value).max() <= _NOTHING:
             continue
         sign = np.sign(value)
         for k in range(1, len(sign)):
@@ -164,7 +171,28 @@ def _events(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walk
             yield _Found(mark.name, mark.detail, y, t, int(i), s)
 
 
-def _marks(problem: Problem, pattern: Pattern, unknowns: slice) -> Iterator[_Mark]:
+def _sharp(problem: Problem, pattern: Pattern, on: Curve, event: _Found) -> _Found:
+    """An EP4 by its own equations: where it is met by symmetry, the traced ones are singular there."""
+    free = len(problem.free)
+    x = ca.SX.sym("x", free + 1)
+    symbols = {n: ca.atan(x[k]) if problem.parameter_set[n].tangent else x[k] for k, n in enumerate(problem.free)}
+    a = Values(problem.model, problem.parameter_set, problem.ordered(symbols)).coefficients
+    matched = [a[0] * c for c in PATTERNS["EP4"].monic([x[free]])]
+    equations = ca.vertcat(*[p - q for p, q in zip(a[1:], matched[1:], strict=True)])
+    start = event.y * on.scale
+    u = list(start[free : free + len(pattern.unknowns)])
+    mean = float(np.concatenate([roots(f) for f in pattern.factors(u)]).real.mean())
+    end = project(ca.Function("EP4", [x], [equations, ca.jacobian(equations, x)]), np.append(start[:free], mean))
+    if end is None or np.abs(end[:free] - start[:free]).max() > _TOGETHER * (1 + np.abs(start[:free]).max()):
+        return event
+    y = event.y.copy()
+    y[:free] = end[:free] / on.scale[:free]
+    fourfold = np.full(4, end[free], dtype=complex)
+    y[free : free + len(u)] = np.array(pattern.guesses(fourfold)[0]) / on.scale[free : free + len(u)]
+    return replace(event, y=y)
+
+
+def _marks(problem: Problem, pattern: Pattern, unknowns: slice, within: Sequence[str]) -> Iterator[_Mark]:
     def of_unknowns(function: Callable[[list[Array]], Any]) -> Function:
         return lambda x, t: np.asarray(function([x[:, k] for k in range(unknowns.start, unknowns.stop)]))
 
@@ -176,6 +204,8 @@ def _marks(problem: Problem, pattern: Pattern, unknowns: slice) -> Iterator[_Mar
 
     for name, special in pattern.marks.items():
         yield _Mark(name, "", of_unknowns(special))
+    if pattern.name == "EP2" and "2EP2" in within:
+        yield _Mark("EP4", "", of_unknowns(lambda u: 2 * u[0] + u[1]))  # q(r) has a double zero here
     example = [np.ones(1)] * len(pattern.unknowns)
     for number, factor in enumerate(pattern.remaining(example)):
         for k in range(len(lienard_chipart(factor))):
@@ -202,12 +232,13 @@ def _vanishes(value: Any, u: list[Array]) -> bool:
     return bool(np.median(np.abs(value)) <= _NOTHING * (1 + size * size))
 
 
-def _merged(found: list[_Found]) -> list[_Found]:
+def _merged(found: list[_Found], free: int) -> list[_Found]:
     """Events in order, those at one place as one: the most special names it, the others stand in its detail."""
     ordered = sorted(found, key=lambda e: (e.after, e.s))
     groups: list[list[_Found]] = []
     for event in ordered:
-        if groups and np.abs(event.y - groups[-1][-1].y).max() <= _TOGETHER * (1 + np.abs(event.y).max()):
+        apart = np.abs(event.y - groups[-1][-1].y) if groups else np.array([np.inf])
+        if apart.max() <= _TOGETHER * (1 + np.abs(event.y).max()) or apart[:free].max() <= _SAME_DESIGN:
             groups[-1].append(event)
         else:
             groups.append([event])

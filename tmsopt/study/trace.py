@@ -166,7 +166,7 @@ def _seed(ready: Traced, design: Mapping[str, float], guess: int, held: int | No
     x = _variables(ready.nlp, ready.problem, design, guess)
     if x is None:
         return None
-    y = project(on, x / on.scale, held)
+    y = project(on.evaluate, x / on.scale, held)
     if y is None or not np.all((y >= on.lower - 1e-12) & (y <= on.upper + 1e-12)) or np.abs(y[free:]).max() > 1e5:
         return None
     y = np.clip(y, on.lower, on.upper)

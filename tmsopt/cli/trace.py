@@ -1,0 +1,79 @@
+"""The command that traces a root pattern."""
+
+from pathlib import Path
+
+import click
+
+from tmsopt.cli.common import FIGURES, bad_input, check_output, plane, progress, saving, write_json
+
+_EXAMPLES = """
+\b
+Examples:
+  tmsopt trace problems/ep_set.toml
+  tmsopt trace problems/ep_set.toml --plot ep_set.png --axes Fr,lambda_s
+  tmsopt trace problems/off_law.toml --pattern weave --csv weave.csv
+
+A curve takes one free parameter more than the pattern has conditions (EP2, weave, capsize: 1; EP3, 2EP2, CEP2: 2;
+EP4, resonance: 3) and == constraints add; other constraints are marked where they are crossed.
+
+Exit status: 0 traced, 2 bad input, 3 nothing of the pattern found in the box.
+"""
+
+
+@click.command(epilog=_EXAMPLES)
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--pattern", help="Pattern to trace. [default: the one that FILE locates]")
+@click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
+@click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write every point of every branch.")
+@click.option("--plot", type=click.Path(path_type=Path), help="Draw the branches (png, pdf, svg).")
+@click.option("--axes", help="Two parameters to draw over, e.g. Fr,chi_B. [default: the first two free ones]")
+@click.option(
+    "--step",
+    type=click.FloatRange(min=1e-6, max=0.1),
+    default=0.005,
+    show_default=True,
+    help="Longest step, in widths of the box.",
+)
+@click.option("--starts", type=click.IntRange(min=1), default=48, show_default=True, help="To look for branches from.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts.")
+def trace(
+    file: Path,
+    pattern: str | None,
+    as_json: bool,
+    csv_file: Path | None,
+    plot: Path | None,
+    axes: str | None,
+    step: float,
+    starts: int,
+    seed: int,
+) -> None:
+    """Trace a root pattern of FILE through parameter space, every branch in the box, with its events."""
+    with bad_input():
+        from tmsopt.design.files import load
+        from tmsopt.study.branch import write_csv
+        from tmsopt.study.trace import trace as trace_problem
+
+        check_output("--plot", plot, FIGURES)
+        check_output("--csv", csv_file, ("csv",))
+        problem = load(file, asks=False)
+        names = plane(problem, axes) if plot else ()
+        with progress() as update:
+            found = trace_problem(problem, pattern, step=step, starts=starts, seed=seed, progress=update)
+    if as_json:
+        write_json(found.to_json())
+    else:
+        from tmsopt.show.traced import trace_table
+
+        click.echo(trace_table(found))
+    if csv_file is not None:
+        with saving("--csv", csv_file):
+            write_csv(found, csv_file)
+    if plot is not None:
+        from tmsopt.show.style import save
+        from tmsopt.show.traced import trace_figure
+
+        with saving("--plot", plot):
+            save(trace_figure(found, *names), plot)
+    if not found.branches:
+        click.echo(f"no {found.pattern} found in the box; widen it, or try more --starts", err=True)
+        raise SystemExit(3)

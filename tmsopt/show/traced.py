@@ -1,0 +1,111 @@
+"""Traced branches as a table and as curves in a plane of two parameters."""
+
+from itertools import groupby
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tmsopt.show.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, new_figure
+from tmsopt.show.text import columns, number
+from tmsopt.study.branch import Branch, Trace
+
+COLOURS = {
+    "EP4": MARK, "EP3": MARK, "2EP2": REAL, "CEP2": COMPLEX, "EP2": LINE, "weave": CRITICAL, "capsize": CAPSIZE,
+    "resonance": COMPLEX,
+}  # fmt: skip
+"""Colour of each pattern; CEP2 is dashed besides."""
+
+_LABELLED = ("EP4", "EP3", "2EP2", "double zero", "weave", "capsize")
+
+
+def trace_table(trace: Trace) -> str:
+    """Branches with their events, one a row, in the free parameters."""
+    free = list(trace.problem.free)
+    per_point = 1e6 * trace.seconds_walking / max(trace.points, 1)
+    count = f"{len(trace.branches)} branch" + ("es" if len(trace.branches) != 1 else "")
+    lines = [
+        trace.problem.title or "untitled problem",
+        f"{trace.pattern}: {count}, {trace.points} points at {per_point:.0f} µs each, "
+        f"looked for from {trace.starts} starts; {trace.seconds:.2f} s",
+    ]
+    for number_, branch in enumerate(trace.branches, start=1):
+        lines += ["", f"branch {number_}: {_summary(branch)}"]
+        rows = [("", *free, "abscissa", "")]
+        for event in branch.events:
+            values = (number(event.parameters[n]) for n in free)
+            rows.append((event.name, *values, number(float(branch.abscissa[event.index])), event.detail))
+        lines += columns(rows)
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def draw_trace(ax: Axes, trace: Trace, horizontal: str, vertical: str) -> None:
+    """Branches in a plane of two parameters: one line style per pattern, pale where unstable, events marked."""
+    for branch in trace.branches:
+        draw_branch(ax, branch, horizontal, vertical)
+    placed: list[tuple[float, float]] = []
+    for event in trace.events:
+        if event.name not in _LABELLED:
+            continue
+        x, y = event.parameters[horizontal], event.parameters[vertical]
+        ax.plot([x], [y], "o", color=MARK, markersize=4, zorder=4)
+        if any(np.allclose((x, y), other, rtol=1e-6) for other in placed):
+            continue
+        placed.append((x, y))
+        ax.annotate(event.name, (x, y), xytext=(5, 5), textcoords="offset points", fontsize=8)
+
+
+def draw_branch(ax: Axes, branch: Branch, horizontal: str, vertical: str, width: float = 1.4) -> None:
+    """One branch as lines, cut where its pattern or its stability changes."""
+    x, y = branch.parameters[horizontal], branch.parameters[vertical]
+    states = list(zip(_sides(branch), branch.stable.tolist(), strict=True))
+    start = 0
+    for (kind, stable), run in groupby(states):
+        stop = start + len(list(run))
+        end = min(stop + 1, len(x))  # up to the first point of the next run, so that no gap is left
+        ax.plot(
+            x[start:end],
+            y[start:end],
+            color=COLOURS[kind],
+            linewidth=width,
+            linestyle="--" if kind == "CEP2" else "-",
+            alpha=1.0 if stable else 0.35,
+            label=_label(ax, kind + ("" if stable else ", unstable")),
+        )
+        start = stop
+
+
+def trace_figure(trace: Trace, horizontal: str, vertical: str) -> Figure:
+    """All branches of a trace in one plane."""
+    figure = new_figure(6.4, 4.8)
+    ax = figure.subplots()
+    draw_trace(ax, trace, horizontal, vertical)
+    of = trace.problem.parameter_set
+    for name, label in ((horizontal, ax.set_xlabel), (vertical, ax.set_ylabel)):
+        unit = "" if of[name].unit == "1" else f" in {of[name].unit}"
+        label(f"${of[name].latex}${unit}")
+    if trace.branches:
+        ax.legend(fontsize=8)
+    ax.set_title(trace.problem.title or trace.pattern, fontsize=11)
+    return figure
+
+
+def _summary(branch: Branch) -> str:
+    states = f"stable on {100 * float(np.mean(branch.stable)):.0f} % of its points"
+    form = "closed" if branch.closed else "open"
+    kinds = " and ".join(dict.fromkeys(_sides(branch)))
+    return f"{kinds}, {len(branch)} points, {form}, {states}, coefficients met to {branch.residual:.0e}"
+
+
+def _sides(branch: Branch) -> list[str]:
+    """The pattern of each point, a special point counted with the one before it."""
+    special = {e.index for e in branch.events if str(branch.kinds[e.index]) == e.name}
+    kinds = [str(k) for k in branch.kinds]
+    for row in sorted(special):
+        if len(kinds) > 1:
+            kinds[row] = kinds[row - 1] if row else kinds[1]
+    return kinds
+
+
+def _label(ax: Axes, text: str) -> str | None:
+    return None if any(line.get_label() == text for line in ax.get_lines()) else text
