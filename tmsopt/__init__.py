@@ -11,20 +11,26 @@ if TYPE_CHECKING:
     from tmsopt.design.solution import NotSolved, Solution
     from tmsopt.design.solve import solve
     from tmsopt.study.branch import Branch, Trace
+    from tmsopt.study.chart import Chart, chart
     from tmsopt.study.compare import Comparison, compare
+    from tmsopt.study.domain import Domain, domain
     from tmsopt.study.trace import trace
 
 __version__ = "0.1.0"
 
 __all__ = [
     "Branch",
+    "Chart",
     "Comparison",
+    "Domain",
     "InputError",
     "NotSolved",
     "Problem",
     "Solution",
     "Trace",
+    "chart",
     "compare",
+    "domain",
     "laws",
     "load",
     "models",
@@ -36,13 +42,17 @@ __all__ = [
 # Imported when first used, so that `tmsopt --help` need not wait for CasADi.
 _HOMES = {
     "Branch": "tmsopt.study.branch",
+    "Chart": "tmsopt.study.chart",
     "Comparison": "tmsopt.study.compare",
+    "Domain": "tmsopt.study.domain",
     "InputError": "tmsopt.design.errors",
     "NotSolved": "tmsopt.design.solution",
     "Problem": "tmsopt.design.problem",
     "Solution": "tmsopt.design.solution",
     "Trace": "tmsopt.study.branch",
+    "chart": "tmsopt.study.chart",
     "compare": "tmsopt.study.compare",
+    "domain": "tmsopt.study.domain",
     "load": "tmsopt.design.files",
     "solve": "tmsopt.design.solve",
     "trace": "tmsopt.study.trace",

@@ -5,6 +5,8 @@ import sys
 import click
 
 from tmsopt import __version__
+from tmsopt.cli.chart import chart
+from tmsopt.cli.figure import figure
 from tmsopt.cli.solve import compare, solve
 from tmsopt.cli.trace import trace
 
@@ -24,5 +26,5 @@ def main() -> None:
             stream.reconfigure(errors="replace")  # a narrow terminal encoding must not lose a result
 
 
-for _command in (solve, compare, trace):
+for _command in (solve, compare, trace, chart, figure):
     main.add_command(_command)

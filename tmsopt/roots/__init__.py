@@ -1,5 +1,6 @@
 """Real polynomials and their roots: factored forms, stability, numeric and exact roots, multiplicity."""
 
+from tmsopt.roots.count import real_roots
 from tmsopt.roots.exact import exact_abscissa, exact_roots
 from tmsopt.roots.numeric import abscissa, backward_error, rebuilt, roots
 from tmsopt.roots.patterns import PATTERNS, Pattern
@@ -25,6 +26,7 @@ __all__ = [
     "pattern_distance",
     "product",
     "quadratic_pencil",
+    "real_roots",
     "rebuilt",
     "roots",
     "shift",

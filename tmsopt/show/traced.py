@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from tmsopt.show.chart import label_axes
 from tmsopt.show.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, new_figure
 from tmsopt.show.text import columns, number
 from tmsopt.study.branch import Branch, Trace
@@ -80,10 +81,7 @@ def trace_figure(trace: Trace, horizontal: str, vertical: str) -> Figure:
     figure = new_figure(6.4, 4.8)
     ax = figure.subplots()
     draw_trace(ax, trace, horizontal, vertical)
-    of = trace.problem.parameter_set
-    for name, label in ((horizontal, ax.set_xlabel), (vertical, ax.set_ylabel)):
-        unit = "" if of[name].unit == "1" else f" in {of[name].unit}"
-        label(f"${of[name].latex}${unit}")
+    label_axes(ax, trace.problem.parameter_set, horizontal, vertical)
     if trace.branches:
         ax.legend(fontsize=8)
     ax.set_title(trace.problem.title or trace.pattern, fontsize=11)

@@ -22,7 +22,11 @@ _CONTRACTION = 0.1  # of the second Newton step against the first: slower means 
 _COSINE = np.cos(0.15)  # of the angle between tangents: a sharper turn takes a smaller step
 _SMALLEST = 1e-12
 _GROWTH = 1.5
-_FAR = 1e6
+_ROOM = 4.0  # steps of variables without a box, against those with one: nobody looks at their spacing
+_SOLVED = 1e-10
+"""Residual, relative to the terms of the equations, of a solution: a stationary point of the residual is none."""
+
+_FAR = 1e4  # in units of the scale; further out the equations lose their digits
 _SAME = 1e-7
 CLOSED = "closed"
 _ISOLATED = 1e-10  # singular values, relative to the largest, below which an equation has no influence
@@ -92,7 +96,7 @@ def curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> C
     boxed = [k for k in range(size) if np.isfinite(lower[k]) and np.isfinite(upper[k])]
     reach = ca.SX(np.inf)
     for k in range(size):
-        room = 1.0 if k in boxed else 1 + ca.fabs(z[k])
+        room = 1.0 if k in boxed else _ROOM * (1 + ca.fabs(z[k]))
         reach = ca.fmin(reach, room / (ca.fabs(tangent[k]) + 1e-300))
     slack = ca.SX(np.inf)
     for k in range(size):
@@ -139,7 +143,8 @@ def project(system: ca.Function, y: Array, held: int | None = None, steps: int =
         step = np.zeros(y.size)
         step[moving] = np.linalg.lstsq(jacobian[:, moving], -value, rcond=1e-12)[0]
         if np.abs(step).max() <= 1e-13 * (1 + np.abs(y).max()):
-            return y + step
+            solved = size <= _SOLVED * float(np.abs(jacobian).max()) * (1 + float(np.abs(y).max()))
+            return y + step if solved else None
         damping = 1.0
         while damping > 1e-3:
             trial, slope = _evaluate(system, y + damping * step)
@@ -177,6 +182,25 @@ def walk(on: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
             return _ended(ys, ts, End("a root goes to infinity: a0 vanishes"))
         y, t, s = new, tangent, s * _GROWTH
     return _ended(ys, ts, End(f"stopped after {most} points"))
+
+
+def both_ways(on: Curve, y: Array, step: float, most: int) -> Walk | None:
+    """The whole curve through a point; None where it is no regular point of one."""
+    try:
+        t = tangent_at(on, y)
+    except ValueError:
+        return None
+    ahead = walk(on, y, t, step, most)
+    if ahead.closed:
+        return ahead
+    back = walk(on, y, -t, step, most)
+    if len(ahead.y) + len(back.y) < 4:
+        return None
+    return Walk(
+        y=np.concatenate([back.y[::-1], ahead.y[1:]]),
+        t=np.concatenate([-back.t[::-1], ahead.t[1:]]),
+        ends=(back.ends[1], ahead.ends[1]),
+    )
 
 
 def between(on: Curve, y: Array, t: Array, s: float) -> tuple[Array, Array]:
@@ -239,7 +263,7 @@ def _evaluate(system: ca.Function, y: Array) -> tuple[Array, Array]:
 def _reach(on: Curve, y: Array, t: Array) -> float:
     """Longest step, per unit of `step`: boxed variables by their box, the others by their own size."""
     boxed = np.logical_and(np.isfinite(on.lower), np.isfinite(on.upper))
-    return float(np.min(np.where(boxed, 1.0, 1 + np.abs(y)) / (np.abs(t) + 1e-300)))
+    return float(np.min(np.where(boxed, 1.0, _ROOM * (1 + np.abs(y))) / (np.abs(t) + 1e-300)))
 
 
 def _at_limit(on: Curve, advance: _Advance, y: Array, t: Array, s: float) -> tuple[Array, Array, End]:
@@ -253,7 +277,8 @@ def _at_limit(on: Curve, advance: _Advance, y: Array, t: Array, s: float) -> tup
                 def excess(r: float, k: int = k, limit: float = float(limit)) -> float:
                     return float(advance(y, t, r)[0][k]) - limit
 
-                found.append((crossing(excess, s), k, side, limit))
+                share = crossing(excess, s) if excess(0.0) * excess(s) < 0 else 0.0
+                found.append((share, k, side, limit))
     share, k, side, limit = min(found)
     last, direction = advance(y, t, share)[:2]
     last[k] = limit

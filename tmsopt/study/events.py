@@ -22,10 +22,15 @@ Function = Callable[[Array, Array], Array]
 _TOGETHER = 1e-6
 """Distance, in units of the scale, within which events are one: each is located to 1e-12 or better."""
 
-_SAME_DESIGN = 1e-9
+_NEAR = 1e-3
+"""Distance within which an EP4 is looked for beside an EP3 and a 2EP2."""
+
+_SAME_DESIGN = 1e-6
 """Likewise in the free parameters alone: where the traced equations are singular, the unknowns scatter."""
 
 _NOTHING = 1e-9  # a function smaller than this all along the curve is 0 on it, not an event of it
+
+_LEVEL = 1e-7  # a parameter that changes less per arclength stays level: its slope has no sign
 
 _REAL = 1e-6  # of |s|: a factor with a double root has coefficients right to 1e-15 and roots to the root of that
 
@@ -54,7 +59,7 @@ class _Found:
 def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walked: Walk) -> Branch:
     """A walked curve in the parameters of the problem, with its events among its points."""
     found = list(_events(problem, pattern, on, unknowns, walked))
-    merged = [_sharp(problem, pattern, on, e) if e.name == "EP4" else e for e in _merged(found, len(problem.free))]
+    merged = _merged(_with_EP4(problem, pattern, on, found), len(problem.free))
     rows, y, t = _inserted(walked, merged)
     x = y * on.scale
     columns = parameters_of(problem, x)
@@ -156,6 +161,8 @@ def _events(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walk
             sign[k] = sign[k] or sign[k - 1]
         changes = np.flatnonzero(sign[1:] * sign[:-1] < 0)
         for i in changes:
+            if mark.name == "fold" and np.abs(value[i : i + 2]).max() <= _LEVEL:
+                continue
             if mark.name in ("weave", "capsize") and stable[i] == stable[i + 1]:
                 continue
             end = float(walked.t[i] @ (walked.y[i + 1] - walked.y[i]))
@@ -171,8 +178,26 @@ def _events(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walk
             yield _Found(mark.name, mark.detail, y, t, int(i), s)
 
 
-def _sharp(problem: Problem, pattern: Pattern, on: Curve, event: _Found) -> _Found:
-    """An EP4 by its own equations: where it is met by symmetry, the traced ones are singular there."""
+def _with_EP4(problem: Problem, pattern: Pattern, on: Curve, found: list[_Found]) -> list[_Found]:
+    """Events in order; EP3 and 2EP2 side by side are one EP4 where there is one, and each EP4 is made exact.
+
+    Where symmetry takes a curve through EP4, the traced equations are singular there, and locate it to 1e-6 only.
+    """
+    result: list[_Found] = []
+    for event in sorted(found, key=lambda e: (e.after, e.s)):
+        before = result[-1] if result else event
+        pair = {event.name, before.name} == {"EP3", "2EP2"}
+        if event.name == "EP4" or (pair and np.abs(event.y - before.y).max() <= _NEAR):
+            exact = _exact_EP4(problem, pattern, on, event)
+            if exact is not None:
+                result = [*(result[:-1] if pair else result), exact]
+                continue
+        result.append(event)
+    return result
+
+
+def _exact_EP4(problem: Problem, pattern: Pattern, on: Curve, event: _Found) -> _Found | None:
+    """The EP4 beside an event, by its own equations; None if there is none."""
     free = len(problem.free)
     x = ca.SX.sym("x", free + 1)
     symbols = {n: ca.atan(x[k]) if problem.parameter_set[n].tangent else x[k] for k, n in enumerate(problem.free)}
@@ -183,13 +208,13 @@ def _sharp(problem: Problem, pattern: Pattern, on: Curve, event: _Found) -> _Fou
     u = list(start[free : free + len(pattern.unknowns)])
     mean = float(np.concatenate([roots(f) for f in pattern.factors(u)]).real.mean())
     end = project(ca.Function("EP4", [x], [equations, ca.jacobian(equations, x)]), np.append(start[:free], mean))
-    if end is None or np.abs(end[:free] - start[:free]).max() > _TOGETHER * (1 + np.abs(start[:free]).max()):
-        return event
+    if end is None or np.abs((end[:free] - start[:free]) / on.scale[:free]).max() > _NEAR:
+        return None
     y = event.y.copy()
     y[:free] = end[:free] / on.scale[:free]
     fourfold = np.full(4, end[free], dtype=complex)
     y[free : free + len(u)] = np.array(pattern.guesses(fourfold)[0]) / on.scale[free : free + len(u)]
-    return replace(event, y=y)
+    return replace(event, name="EP4", detail="", y=y)
 
 
 def _marks(problem: Problem, pattern: Pattern, unknowns: slice, within: Sequence[str]) -> Iterator[_Mark]:
@@ -234,9 +259,8 @@ def _vanishes(value: Any, u: list[Array]) -> bool:
 
 def _merged(found: list[_Found], free: int) -> list[_Found]:
     """Events in order, those at one place as one: the most special names it, the others stand in its detail."""
-    ordered = sorted(found, key=lambda e: (e.after, e.s))
     groups: list[list[_Found]] = []
-    for event in ordered:
+    for event in found:
         apart = np.abs(event.y - groups[-1][-1].y) if groups else np.array([np.inf])
         if apart.max() <= _TOGETHER * (1 + np.abs(event.y).max()) or apart[:free].max() <= _SAME_DESIGN:
             groups[-1].append(event)
@@ -248,12 +272,7 @@ def _merged(found: list[_Found], free: int) -> list[_Found]:
 def _one(group: list[_Found]) -> _Found:
     group = sorted(group, key=lambda e: _RANK.index(e.name))
     names = {e.name for e in group}
-    if {"EP3", "2EP2"} <= names:
-        name = "EP4"
-    elif {"weave", "capsize"} <= names:
-        name = "double zero"
-    else:
-        name = group[0].name
+    name = "double zero" if {"weave", "capsize"} <= names else group[0].name
     folds = [e.detail for e in group if e.name == "fold"]
     others = [
         e.detail if e.name == name else f"{e.name} {e.detail}".strip() for e in group if e.name not in ("fold", "")

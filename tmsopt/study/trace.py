@@ -15,7 +15,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.starts import spread
 from tmsopt.roots import PATTERNS, Pattern, roots
 from tmsopt.study.branch import Branch, Trace
-from tmsopt.study.continuation import Curve, Walk, contains, curve, project, tangent_at, walk
+from tmsopt.study.continuation import Curve, Walk, both_ways, contains, curve, project
 from tmsopt.study.events import describe
 
 Array = NDArray[np.float64]
@@ -77,7 +77,7 @@ def trace(
         if y is None or any(contains(ready.on, w, y, step) for w in walks):
             continue
         before = time.perf_counter()
-        found = _both_ways(ready, y, step, most)
+        found = both_ways(ready.on, y, step, most)
         walking += time.perf_counter() - before
         if found is not None:
             walks.append(found)
@@ -196,22 +196,3 @@ def _variables(nlp: NLP, problem: Problem, design: Mapping[str, float], guess: i
             return None
         x = x + guesses[chosen]
     return np.array(x)
-
-
-def _both_ways(ready: Traced, y: Array, step: float, most: int) -> Walk | None:
-    """The whole branch through a point; None where it is no regular point of a curve."""
-    try:
-        t = tangent_at(ready.on, y)
-    except ValueError:
-        return None
-    ahead = walk(ready.on, y, t, step, most)
-    if ahead.closed:
-        return ahead
-    back = walk(ready.on, y, -t, step, most)
-    if len(ahead.y) + len(back.y) < 4:
-        return None
-    return Walk(
-        y=np.concatenate([back.y[::-1], ahead.y[1:]]),
-        t=np.concatenate([-back.t[::-1], ahead.t[1:]]),
-        ends=(back.ends[1], ahead.ends[1]),
-    )
