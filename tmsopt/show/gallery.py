@@ -1,0 +1,146 @@
+"""The figures of the paper, and others about it, by name: from reference designs to finished figures.
+
+To add one, write a function that takes nothing and returns a Figure, and an Item with it. Imports stand inside the
+functions, so that listing the figures loads nothing heavy.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tmsopt.design.frozen import Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Item:
+    """A figure that can be asked for.
+
+    Attributes:
+        name: on the command line.
+        alias: its label in the paper, empty where it is not there.
+        caption: what it shows.
+        make: computes the data and draws it.
+    """
+
+    name: str
+    alias: str
+    caption: str
+    make: "Callable[[], Figure]"
+
+
+def find(name: str) -> Item:
+    """The figure of that name or alias.
+
+    Raises:
+        InputError: for an unknown name, with a suggestion.
+    """
+    from tmsopt.design.errors import Fault, InputError, suggest
+
+    for item in GALLERY.values():
+        if name in (item.name, item.alias):
+            return item
+    raise InputError([Fault(f"found '{name}'; {suggest(name, _names())}", ("NAME",))])
+
+
+def _names() -> Iterator[str]:
+    """Everything that `find` accepts, names first."""
+    yield from GALLERY
+    yield from (item.alias for item in GALLERY.values() if item.alias)
+
+
+def _bicycle() -> "Figure":
+    from tmsopt.show.bicycle import bicycle_figure
+    from tmsopt.study.reference import benchmark
+    from tmsopt.study.sketch import sketch
+
+    return bicycle_figure(sketch(benchmark().parameters), "The two-mass-skate bicycle: the benchmark, to scale")
+
+
+def _growth() -> "Figure":
+    from tmsopt.design.problem import Problem
+    from tmsopt.design.solve import solve
+    from tmsopt.models import tms
+    from tmsopt.show.growth import draw_growth_rates
+    from tmsopt.show.style import REAL, new_figure
+    from tmsopt.study.growth import growth
+    from tmsopt.study.reference import benchmark, optimised
+
+    others = {name: value for name, value in benchmark().parameters.items() if name != "Fr"}
+    fastest = solve(Problem(tms, fixed=others, free={"Fr": (0.1, 4.0)}, minimize="abscissa"))
+    best = solve(Problem(tms, fixed=dict(optimised().parameters)))
+    figure = new_figure(9.2, 4.2)
+    left, right = figure.subplots(1, 2, sharey=True)
+    for ax, design, name in ((left, fastest, "(a) benchmark"), (right, best, "(b) optimised benchmark")):
+        draw_growth_rates(ax, growth(design, Fr_max=4.0))
+        ax.axhline(design.abscissa, color="0.5", linewidth=0.8, linestyle=":")
+        ax.plot(
+            [design.dimensionless["Fr"]], [design.abscissa], linestyle="none", marker="o", markersize=6, zorder=5,
+            color=REAL if "EP" in design.structure else "white", markeredgecolor="black",
+        )  # fmt: skip
+        ax.set_xlim(0, 4)
+        ax.set_ylim(-4, 4)
+        ax.set_xlabel(r"Froude number $\mathrm{Fr} = v/\sqrt{gw}$")
+        least = rf"${design.abscissa:.4g}$ at $\mathrm{{Fr}} = {design.dimensionless['Fr']:.4f}$"
+        ax.set_title(f"{name}: least abscissa {least}", fontsize=9.5)
+    right.set_ylabel("")
+    return figure
+
+
+def _root_locus() -> "Figure":
+    from tmsopt.show.locus import locus_figure
+    from tmsopt.study.locus import table_1_loci
+
+    return locus_figure(table_1_loci())
+
+
+def _experiment() -> "Figure":
+    from tmsopt.show.experiment import experiment_figure
+    from tmsopt.study.experiment import experiment
+
+    return experiment_figure(experiment())
+
+
+def _universal() -> "Figure":
+    from tmsopt.show.universal import LIMIT, universal_figure
+    from tmsopt.study.universal import spire_faces, table_1_paths
+
+    return universal_figure(table_1_paths(), spire_faces(LIMIT), r"$\mathrm{Fr}$")
+
+
+_ITEMS = (
+    Item(
+        "bicycle", "figTMS",
+        "The two-mass-skate bicycle with its parameters, drawn to scale for the benchmark.",
+        _bicycle,
+    ),
+    Item(
+        "growth", "fig0",
+        "Growth rates over the Froude number: the benchmark, with the speed of its least abscissa, and the optimised "
+        "bicycle with the quadruple root s = -1 (EP4).",
+        _growth,
+    ),
+    Item(
+        "root-locus", "fig3",
+        "Roots as Fr increases from 0 to 5 for chi_H = 1, zeta_H = -0.2, zeta_B = -0.4 at the three steer axis tilts "
+        "of Table 1, with chi_B = sqrt(2) and beside it; enlarged around EP4, 2EP2 and CEP2.",
+        _root_locus,
+    ),
+    Item(
+        "experiment", "fige",
+        "The experimental bicycle beside the law chi_B = sqrt(zeta_B/zeta_H), which is for chi_H = 1 while it has "
+        "0.921, and its critical Froude number over chi_B at an assumed tilt of 20 deg and assumed mass ratios.",
+        _experiment,
+    ),
+    Item(
+        "universal", "",
+        "Every quartic with a4/a0 > 0 as a point (A1, A2, A3), with stability, heavy damping and the EP set; the "
+        "designs of Table 1 swept over Fr from 0 to 5.",
+        _universal,
+    ),
+)  # fmt: skip
+
+GALLERY = Table({item.name: item for item in _ITEMS})
+"""Figures by name, in the order of the list."""

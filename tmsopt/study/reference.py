@@ -1,0 +1,77 @@
+"""The bicycles of the paper as data, in closed form where it gives one."""
+
+import math
+from dataclasses import dataclass
+
+from tmsopt import laws
+from tmsopt.design.frozen import Table
+from tmsopt.models.tms import GRAVITY, from_si
+
+ZETA_B, ZETA_H = laws.bench["z_B"] / laws.bench["w"], laws.bench["z_H"] / laws.bench["w"]
+"""Heights of the benchmark, over the wheelbase, that the paper keeps in all its examples."""
+
+MU = laws.bench["m_H"] / laws.bench["m_B"]
+"""Mass ratio of the benchmark; at χ_H = 1 any other gives the same polynomial."""
+
+TILT_OFFSETS = Table({"EP4": 0.0, "2EP2": -0.05, "CEP2": 0.8})
+"""Steer axis tilts of Table 1 in rad, from that of EP4."""
+
+
+@dataclass(frozen=True)
+class Bicycle:
+    """A bicycle of the paper.
+
+    Attributes:
+        name: as in figures.
+        parameters: native parameters (dimensionless, rad); those that the paper does not give are missing.
+        omega0: root of the exceptional point, or the mean decay for a pair of them; nan for neither.
+    """
+
+    name: str
+    parameters: Table[float]
+    omega0: float = math.nan
+
+
+def benchmark(Fr: float | None = None) -> Bicycle:
+    """The benchmark (equation bench), by default at its critical speed (equation flus), as it has no other."""
+    native = from_si({**laws.bench, "v": 0.0, "g": GRAVITY})
+    native["Fr"] = float(laws.Fr_c(*(native[n] for n in _GEOMETRY))) if Fr is None else Fr
+    return Bicycle("benchmark", Table({name: float(value) for name, value in native.items()}))
+
+
+def optimised() -> Bicycle:
+    """The optimised benchmark: ω0 = −1 with χ_H, ζ_B, ζ_H of the benchmark (equations chib, a2, w0)."""
+    chi_H = laws.bench["x_H"] / laws.bench["w"]
+    point = laws.ep4(-1.0, ZETA_B, ZETA_H, chi_H)[0]
+    parameters = {
+        "Fr": float(point.Fr), "mu": float(point.mu), "chi_B": float(point.chi_B), "chi_H": chi_H,
+        "zeta_B": ZETA_B, "zeta_H": ZETA_H, "lambda_s": float(point.lambda_s),
+    }  # fmt: skip
+    return Bicycle("optimised benchmark", Table(parameters), -1.0)
+
+
+def table_1() -> tuple[Bicycle, Bicycle, Bicycle]:
+    """The rows EP4, 2EP2 and CEP2 of Table 1, at their exceptional points (equations chib1, tls, epset)."""
+    ep4, double, pair = (on_ep_set(name, offset) for name, offset in TILT_OFFSETS.items())
+    return ep4, double, pair
+
+
+def on_ep_set(name: str, tilt_offset: float) -> Bicycle:
+    """The χ_H = 1 bicycle on the EP set whose steer axis tilt differs from that of EP4 by an offset in rad."""
+    point = laws.ep4_chi_H_1(ZETA_B, ZETA_H)
+    tilt = float(point.lambda_s) + tilt_offset
+    # at EP4 both are the same number; the form for EP4 has no pole to cancel
+    Fr = float(laws.epset(ZETA_B, ZETA_H, tilt)) if tilt_offset else float(point.Fr)
+    parameters = {
+        "Fr": Fr, "mu": MU, "chi_B": float(point.chi_B), "chi_H": 1.0,
+        "zeta_B": ZETA_B, "zeta_H": ZETA_H, "lambda_s": tilt,
+    }  # fmt: skip
+    return Bicycle(name, Table(parameters), float(point.omega0))
+
+
+def experimental() -> Bicycle:
+    """The bicycle that was built, as measured on its photograph; speed, mass ratio and tilt are not given."""
+    return Bicycle("experimental", Table({"chi_B": 1.526, "chi_H": 0.921, "zeta_B": -1.158, "zeta_H": -0.526}))
+
+
+_GEOMETRY = ("mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")

@@ -1,0 +1,63 @@
+"""Geometry of a two-mass-skate bicycle seen from its right side, to scale."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.design.frozen import Table
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """Points (x, z) of the side view, in wheelbases: x forward, z down, the rear contact at the origin.
+
+    Attributes:
+        parameters: the native parameters that it shows.
+        rear, front: contacts of the skates, shape (2,).
+        B, H: the two masses.
+        axis: unit vector up along the steer axis, which passes through the front contact: there is no trail.
+        foot: foot of the perpendicular from H on the steer axis.
+        nu_H: signed distance of H from the axis, positive in front of it (below equation matrices).
+        chi_T: horizontal position of the centre of mass of the whole bicycle.
+    """
+
+    parameters: Table[float]
+    rear: Array
+    front: Array
+    B: Array
+    H: Array
+    axis: Array
+    foot: Array
+    nu_H: float
+    chi_T: float
+
+    def on_axis(self, length: float) -> Array:
+        """The point of the steer axis at a signed distance from the front contact, upward."""
+        return self.front + length * self.axis
+
+
+def sketch(parameters: Mapping[str, float]) -> Sketch:
+    """Geometry of the design with these native parameters.
+
+    H is projected on the axis as a vector, so that ν_H here does not repeat the formula that the model uses.
+    """
+    p = dict(parameters)
+    front, H = np.array([1.0, 0.0]), np.array([p["chi_H"], p["zeta_H"]])
+    axis = -np.array([np.sin(p["lambda_s"]), np.cos(p["lambda_s"])])  # a positive tilt leans it back
+    forward = np.array([-axis[1], axis[0]])
+    foot = front + np.dot(H - front, axis) * axis
+    return Sketch(
+        parameters=Table(p),
+        rear=np.zeros(2),
+        front=front,
+        B=np.array([p["chi_B"], p["zeta_B"]]),
+        H=H,
+        axis=axis,
+        foot=foot,
+        nu_H=float(np.dot(H - foot, forward)),
+        chi_T=(p["chi_B"] + p["mu"] * p["chi_H"]) / (1 + p["mu"]),
+    )
