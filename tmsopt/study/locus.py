@@ -12,7 +12,7 @@ from tmsopt.models import Model, ParameterSet
 from tmsopt.models import tms as bicycle_model
 from tmsopt.roots import discriminant, roots
 from tmsopt.study.reference import TILT_OFFSETS, on_ep_set
-from tmsopt.study.universal import normalised, universal_path
+from tmsopt.study.universal import universal_path
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -78,7 +78,11 @@ def locus(
     model: Model, of: ParameterSet, parameters: Mapping[str, float], sweep: str, ends: tuple[float, float],
     resolution: float = 0.02, title: str = "",
 ) -> Locus:  # fmt: skip
-    """Roots of a degree-4 model over `sweep` between two ends; no root moves further than `resolution` in a step."""
+    """Roots of a degree-4 model over `sweep` between two ends; no root moves further than `resolution` in a step.
+
+    Raises:
+        ValueError: where a0 = 0, a root at infinity.
+    """
 
     def coefficients(value: ArrayLike) -> Array:
         a = model.coefficients({**parameters, sweep: np.asarray(value, dtype=float)}, of)
@@ -96,7 +100,11 @@ def locus(
     path = universal_path(model, of, parameters, sweep, values)
     pairs = [Mark(e.name, e.value, _double_roots(e.name, e.A, e.omega0)) for e in path.events if "EP" in e.name]
     marks = [*pairs, *_real_double_roots(coefficients, values, [m.value for m in pairs])]
-    crossings = [(e.value, abs(e.omega0) * float(np.sqrt(e.A[2] / e.A[0]))) for e in path.events if "EP" not in e.name]
+    crossings = [
+        (e.value, abs(e.omega0) * float(np.sqrt(e.A[2] / e.A[0])))
+        for e in path.events
+        if "EP" not in e.name and e.A[0] * e.A[2] > 0  # a pair on the axis: σ² = −A3/A1
+    ]
     return Locus(
         title, values, found, tuple(_tracks(values, found)), tuple(sorted(marks, key=lambda m: m.value)),
         tuple(crossings),
@@ -182,9 +190,7 @@ def _real_double_roots(coefficients: Callable[[ArrayLike], Array], values: Array
     """Where the discriminant changes sign: two real roots meet. It keeps its sign at 2EP2 and CEP2."""
 
     def quartic(at: ArrayLike) -> list[Array]:
-        A, _ = normalised(coefficients(at))
-        one = np.ones(A.shape[:-1])
-        return [one, A[..., 0], A[..., 1], A[..., 2], one]
+        return list(np.moveaxis(coefficients(at), -1, 0))
 
     def value(at: float) -> float:
         return float(discriminant(quartic(at)))

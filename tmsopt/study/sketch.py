@@ -22,7 +22,6 @@ class Sketch:
         axis: unit vector up along the steer axis, which passes through the front contact: there is no trail.
         foot: foot of the perpendicular from H on the steer axis.
         nu_H: signed distance of H from the axis, positive in front of it (below equation matrices).
-        chi_T: horizontal position of the centre of mass of the whole bicycle.
     """
 
     parameters: Table[float]
@@ -33,7 +32,6 @@ class Sketch:
     axis: Array
     foot: Array
     nu_H: float
-    chi_T: float
 
     def on_axis(self, length: float) -> Array:
         """The point of the steer axis at a signed distance from the front contact, upward."""
@@ -59,5 +57,4 @@ def sketch(parameters: Mapping[str, float]) -> Sketch:
         axis=axis,
         foot=foot,
         nu_H=float(np.dot(H - foot, forward)),
-        chi_T=(p["chi_B"] + p["mu"] * p["chi_H"]) / (1 + p["mu"]),
     )
