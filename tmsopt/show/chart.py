@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from tmsopt.models import ParameterSet
-from tmsopt.show.style import CRITICAL, LINE, MARK, new_figure
+from tmsopt.show.style import CAPSIZE, CRITICAL, LINE, MARK, new_figure
 from tmsopt.show.text import columns, number
 from tmsopt.study.chart import CLASSES, Chart
 from tmsopt.study.domain import Domain
@@ -51,14 +51,23 @@ def draw_layer(ax: Axes, chart: Chart, layer: str) -> None:
 
 def draw_domain(ax: Axes, domain: Domain, horizontal: str, vertical: str) -> None:
     """Boundaries of stability and of heavy damping as curves, their corners marked and named."""
-    for arcs, colour, width in ((domain.stability, CRITICAL, 1.8), (domain.heavy_damping, LINE, 1.4)):
+    boundaries = ((domain.merging, CAPSIZE, 1.2), (domain.stability, CRITICAL, 1.8), (domain.heavy_damping, LINE, 1.4))
+    for arcs, colour, width in boundaries:
         for arc in arcs:
             style = {"capsize": "-.", "infinity": ":"}.get(arc.kind, "-")
             ax.plot(arc.points[horizontal], arc.points[vertical], color=colour, linewidth=width, linestyle=style)
     for corner in domain.corners:
         x, y = corner.parameters[horizontal], corner.parameters[vertical]
         ax.plot([x], [y], "o", color=MARK, markersize=4, zorder=5)
-        ax.annotate(corner.name, (x, y), xytext=(5, 5), textcoords="offset points", fontsize=8, zorder=5)
+        name_point(ax, corner.name, x, y)
+
+
+def name_point(ax: Axes, name: str, x: float, y: float, left: bool = False) -> None:
+    """A name beside a marked point, readable on any background."""
+    ax.annotate(
+        name, (x, y), xytext=(-6 if left else 6, 5), textcoords="offset points", fontsize=8, zorder=6,
+        ha="right" if left else "left", bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.7},
+    )  # fmt: skip
 
 
 def chart_figure(chart: Chart, layer: str = "kind") -> Figure:

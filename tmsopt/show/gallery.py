@@ -80,6 +80,9 @@ def _growth() -> "Figure":
             [design.dimensionless["Fr"]], [design.abscissa], linestyle="none", marker="o", markersize=6, zorder=5,
             color=REAL if "EP" in design.structure else "white", markeredgecolor="black",
         )  # fmt: skip
+        if design.structure == "EP4":
+            at = (design.dimensionless["Fr"], design.abscissa)
+            ax.annotate(r"$\mathrm{EP}_4$", at, xytext=(9, -3), textcoords="offset points", fontsize=10)
         ax.set_xlim(0, 4)
         ax.set_ylim(-4, 4)
         ax.set_xlabel(r"Froude number $\mathrm{Fr} = v/\sqrt{gw}$")
@@ -87,6 +90,44 @@ def _growth() -> "Figure":
         ax.set_title(f"{name}: least abscissa {least}", fontsize=9.5)
     right.set_ylabel("")
     return figure
+
+
+def _swallowtail() -> "Figure":
+    from tmsopt.show.swallowtail import swallowtail_figure
+    from tmsopt.study.planes import SECTIONS, section, surface
+
+    names = (r"\mathrm{Fr}_{\mathrm{EP}_4}" + (f" {offset:+g}" if offset else "") for offset in SECTIONS)
+    titles = [rf"({letter}) $\mathrm{{Fr}} = {name}$" for letter, name in zip("bcd", names, strict=True)]
+    return swallowtail_figure(surface(), [section(offset) for offset in SECTIONS], titles)
+
+
+def _ep_set() -> "Figure":
+    from tmsopt.show.planes import planes_figure
+    from tmsopt.study.planes import chi_B_plane, tilt_plane
+
+    return planes_figure([tilt_plane(), chi_B_plane()], _ON_LAW)
+
+
+def _off_law() -> "Figure":
+    from tmsopt.show.planes import planes_figure
+    from tmsopt.study.planes import OFF_LAW_CHI_B, OFF_LAW_TILT, chi_B_plane, tilt_plane
+
+    titles = [
+        rf"(a) $\chi_B = \sqrt{{2}} {OFF_LAW_CHI_B:+g}$",
+        rf"(b) $\lambda_s = \lambda_s^{{\mathrm{{EP}}_4}} {OFF_LAW_TILT:+g}$ rad",
+    ]
+    return planes_figure([tilt_plane(OFF_LAW_CHI_B), chi_B_plane(OFF_LAW_TILT)], titles)
+
+
+def _abscissa() -> "Figure":
+    from tmsopt.show.planes import abscissa_figure
+    from tmsopt.study.planes import chi_B_plane, tilt_plane
+
+    points = (480, 360)
+    return abscissa_figure([tilt_plane(0, points, False), chi_B_plane(0, points, False)], _ON_LAW)
+
+
+_ON_LAW = (r"(a) $\chi_B = \sqrt{2}$", r"(b) $\lambda_s = \lambda_s^{\mathrm{EP}_4} = 0.4107$ rad")
 
 
 def _root_locus() -> "Figure":
@@ -123,6 +164,24 @@ _ITEMS = (
         _growth,
     ),
     Item(
+        "swallowtail", "fig00",
+        "The discriminant surface for chi_H = 1, zeta_H = -0.2, zeta_B = -0.4 with its cuspidal edges (EP3) and "
+        "self-intersection (2EP2) meeting in EP4, and its sections at the Fr of EP4, 0.1 below and 0.5 above.",
+        _swallowtail,
+    ),
+    Item(
+        "ep-set", "fig1",
+        "Stability and heavy damping over (Fr, lambda_s) at chi_B = sqrt(2) with the EP set, and over (Fr, chi_B) at "
+        "the steer axis tilt of EP4; every boundary is traced.",
+        _ep_set,
+    ),
+    Item(
+        "off-law", "fig2",
+        "The same beside the laws: chi_B = sqrt(2) - 0.1, and 0.18 rad below the steer axis tilt of EP4, with EP3 "
+        "cusps and the 2EP2 crossing.",
+        _off_law,
+    ),
+    Item(
         "root-locus", "fig3",
         "Roots as Fr increases from 0 to 5 for chi_H = 1, zeta_H = -0.2, zeta_B = -0.4 at the three steer axis tilts "
         "of Table 1, with chi_B = sqrt(2) and beside it; enlarged around EP4, 2EP2 and CEP2.",
@@ -133,6 +192,12 @@ _ITEMS = (
         "The experimental bicycle beside the law chi_B = sqrt(zeta_B/zeta_H), which is for chi_H = 1 while it has "
         "0.921, and its critical Froude number over chi_B at an assumed tilt of 20 deg and assumed mass ratios.",
         _experiment,
+    ),
+    Item(
+        "abscissa", "",
+        "Spectral abscissa over the planes of Fig. fig1 with the laws drawn in; its contours have corners at the "
+        "exceptional points, and its least value is at EP4.",
+        _abscissa,
     ),
     Item(
         "universal", "",

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tmsopt.show.chart import label_axes
+from tmsopt.show.chart import label_axes, name_point
 from tmsopt.show.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, new_figure
 from tmsopt.show.text import columns, number
 from tmsopt.study.branch import Branch, Trace
@@ -53,7 +53,7 @@ def draw_trace(ax: Axes, trace: Trace, horizontal: str, vertical: str) -> None:
         if any(np.allclose((x, y), other, rtol=1e-6) for other in placed):
             continue
         placed.append((x, y))
-        ax.annotate(event.name, (x, y), xytext=(5, 5), textcoords="offset points", fontsize=8)
+        name_point(ax, event.name, x, y)
 
 
 def draw_branch(ax: Axes, branch: Branch, horizontal: str, vertical: str, width: float = 1.4) -> None:

@@ -52,18 +52,24 @@ class Domain:
     Attributes:
         stability: arcs that bound asymptotic stability.
         heavy_damping: arcs that bound the designs whose roots are all real and negative.
-        corners: of either boundary.
+        merging: arcs on which two positive real roots merge, between capsize and weave.
+        corners: of the first two boundaries.
     """
 
     stability: tuple[Arc, ...]
     heavy_damping: tuple[Arc, ...]
+    merging: tuple[Arc, ...]
     corners: tuple[Corner, ...]
 
     def to_json(self) -> dict[str, Any]:
         """Arcs as columns of their parameters."""
         return {
             name: [{"kind": arc.kind, "points": {n: c.tolist() for n, c in arc.points.items()}} for arc in arcs]
-            for name, arcs in (("stability", self.stability), ("heavy_damping", self.heavy_damping))
+            for name, arcs in (
+                ("stability", self.stability),
+                ("heavy_damping", self.heavy_damping),
+                ("merging", self.merging),
+            )
         } | {"corners": [{"name": c.name, "detail": c.detail, **c.parameters} for c in self.corners]}
 
 
@@ -82,8 +88,9 @@ def domain(problem: Problem, *, step: float = STEP, starts: int = STARTS, seed: 
     damping = [arc for b in found["EP2"] for arc in _pieces(b, b.heavily_damped & _once(b), plane)]
     damping += [arc for b in found["capsize"] for arc in _pieces(b, b.heavily_damped, plane)]
     stability += infinite
+    merging = [arc for b in found["EP2"] for arc in _pieces(b, b.unknowns["r"] > 0, plane)]
     corners = [c for b in (*unstable_beyond, *found["EP2"]) for c in _corners(b, b.stable, b.heavily_damped, plane)]
-    return Domain(tuple(stability), tuple(damping), tuple(_distinct(corners)))
+    return Domain(tuple(stability), tuple(damping), tuple(merging), tuple(_distinct(corners)))
 
 
 def _pieces(branch: Branch, inside: NDArray[np.bool_], problem: Problem) -> Iterator[Arc]:

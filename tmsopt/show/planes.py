@@ -1,0 +1,117 @@
+"""The planes of the paper: domains with exact boundaries, the EP set, and the abscissa with the laws drawn in."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from tmsopt.show.chart import draw_classes, draw_domain, label_axes, name_point
+from tmsopt.show.style import COMPLEX, CRITICAL, LINE, MARK, REAL, new_figure
+from tmsopt.show.traced import draw_branch
+from tmsopt.study.planes import Plane
+
+LAW_STYLE: Mapping[str, tuple[str, str]] = {
+    "Frc1": (CRITICAL, "-"),
+    "epset": (REAL, "-"),
+    "tls": (LINE, ":"),
+    "chib1": (LINE, ":"),
+}
+"""Colour and line of each law."""
+
+_LAW_WORDS = {
+    "Frc1": r"$\mathrm{Fr}_c$ (Frc1)",
+    "epset": "EP set (epset)",
+    "tls": r"$\tan\lambda_s$ (tls)",
+    "chib1": r"$\chi_B$ (chib1)",
+}
+
+
+def draw_plane(ax: Axes, plane: Plane) -> None:
+    """Classes, exact boundaries with corners, the EP set and the marked points of a plane."""
+    chart = plane.chart
+    draw_classes(ax, chart)
+    if chart.domain is not None:
+        draw_domain(ax, chart.domain, *chart.axes)
+    if plane.ep_set is not None:
+        for branch in plane.ep_set.branches:
+            draw_branch(ax, branch, *chart.axes, width=2.0)
+    _draw_marked(ax, plane)
+    _frame(ax, plane)
+
+
+def draw_abscissa(ax: Axes, plane: Plane, low: float, high: float) -> ScalarMappable:
+    """The abscissa as colours and contours between two values, with the laws as curves."""
+    chart = plane.chart
+    values = np.clip(chart.abscissa, low, high)
+    mesh = ax.pcolormesh(*chart.grid, values, cmap="cividis", vmin=low, vmax=high, rasterized=True)
+    levels = np.arange(-1.75, 0.01, 0.25)
+    ax.contour(*chart.grid, chart.abscissa, levels=levels, colors="white", linewidths=0.5, linestyles="-")
+    for label, (x, y) in plane.laws.items():
+        colour, line = LAW_STYLE[label]
+        colour = {LINE: "white", CRITICAL: "#56B4E9", REAL: "#E69F00"}[colour]
+        ax.plot(x, y, color=colour, linestyle=line, linewidth=1.5, label=_LAW_WORDS[label])
+    _draw_marked(ax, plane)
+    legend = ax.legend(fontsize=7.5, facecolor="0.25", framealpha=0.85, loc="upper left")
+    for text in legend.get_texts():
+        text.set_color("white")
+    _frame(ax, plane)
+    return mesh
+
+
+def planes_figure(planes: Sequence[Plane], titles: Sequence[str]) -> Figure:
+    """Planes side by side."""
+    figure = new_figure(4.8 * len(planes), 4.4)
+    panels = np.atleast_1d(figure.subplots(1, len(planes)))
+    for ax, plane, title in zip(panels, planes, titles, strict=True):
+        draw_plane(ax, plane)
+        ax.set_title(title, fontsize=10)
+        _legend(ax, plane)
+    return figure
+
+
+def abscissa_figure(planes: Sequence[Plane], titles: Sequence[str], low: float = -1.9, high: float = 0.1) -> Figure:
+    """The abscissa over planes side by side, one colour scale for all."""
+    figure = new_figure(4.8 * len(planes) + 0.8, 4.4)
+    panels = np.atleast_1d(figure.subplots(1, len(planes)))
+    mesh = None
+    for ax, plane, title in zip(panels, planes, titles, strict=True):
+        mesh = draw_abscissa(ax, plane, low, high)
+        ax.set_title(title, fontsize=10)
+    if mesh is not None:
+        figure.colorbar(mesh, ax=panels.tolist(), label="spectral abscissa", extend="max")
+    return figure
+
+
+def _draw_marked(ax: Axes, plane: Plane) -> None:
+    corners = plane.chart.domain.corners if plane.chart.domain is not None else ()
+    named = {c.name for c in corners}
+    for name, (x, y) in plane.marked.items():
+        ax.plot([x], [y], "o", color=MARK, markeredgecolor="white", markersize=6, zorder=6)
+        if name not in named:
+            least = name == "least Fr_c"
+            name_point(ax, r"least $\mathrm{Fr}_c$" if least else name, x, y, left=least or bool(corners))
+
+
+def _frame(ax: Axes, plane: Plane) -> None:
+    chart = plane.chart
+    label_axes(ax, chart.problem.parameter_set, *chart.axes)
+    ax.set_xlim(chart.grid[0][0], chart.grid[0][-1])
+    ax.set_ylim(chart.grid[1][0], chart.grid[1][-1])
+
+
+def _legend(ax: Axes, plane: Plane) -> None:
+    """The classes that draw_classes named, and the curves."""
+    old = ax.get_legend()
+    patches = list(old.legend_handles) if old is not None else []
+    lines = [Line2D([], [], color=CRITICAL, linewidth=1.8, label="weave boundary")]
+    domain = plane.chart.domain
+    if domain is not None and domain.heavy_damping:
+        lines.append(Line2D([], [], color=LINE, linewidth=1.4, label="boundary of heavy damping"))
+    if plane.ep_set is not None:
+        lines.append(Line2D([], [], color=REAL, linewidth=2, label="2EP2"))
+        lines.append(Line2D([], [], color=COMPLEX, linewidth=2, linestyle="--", label="CEP2"))
+    handles = [h for h in (*patches, *lines) if h is not None]
+    ax.legend(handles=handles, fontsize=7.5, framealpha=0.9, loc="best")

@@ -1,0 +1,114 @@
+"""The planes and the surface that the paper draws for χ_H = 1, as data: charts, exact boundaries, the EP set."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt import laws
+from tmsopt.design.frozen import Table
+from tmsopt.design.problem import Problem
+from tmsopt.models import tms
+from tmsopt.study.branch import Trace
+from tmsopt.study.chart import Chart, chart
+from tmsopt.study.reference import MU, ZETA_B, ZETA_H
+from tmsopt.study.swallowtail import Swallowtail, swallowtail
+from tmsopt.study.trace import trace
+
+Array = NDArray[np.float64]
+
+FR, TILT, CHI_B = (0.01, 5.0), (0.01, 1.5), (1.001, 1.999)
+"""Boxes of the planes; between χ_B = 1 and ζ_B/ζ_H = 2 a bicycle with λ_s > 0 can be stable."""
+
+OFF_LAW_CHI_B, OFF_LAW_TILT = -0.1, -0.18
+"""Distances from the laws `chib1` and `tls` in Fig. fig2; the tilt in rad."""
+
+SECTIONS = (0.0, -0.1, 0.5)
+"""Distances from the Froude number of EP4 in Fig. fig00."""
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A plane of two parameters, all else fixed, with what the laws say about it.
+
+    Attributes:
+        ep_set: traced 2EP2 and CEP2, None where the plane does not contain the EP set.
+        laws: label of an equation → (horizontal, vertical) values of its curve, nan where it does not exist.
+        marked: name → point, in closed form.
+    """
+
+    chart: Chart
+    ep_set: Trace | None
+    laws: Mapping[str, tuple[Array, Array]]
+    marked: Mapping[str, tuple[float, float]]
+
+
+def ep4() -> Table[float]:
+    """The EP4 of Table 1 by the closed-form laws: Fr, chi_B and lambda_s."""
+    point = laws.ep4_chi_H_1(ZETA_B, ZETA_H)
+    return Table({"Fr": float(point.Fr), "chi_B": float(point.chi_B), "lambda_s": float(point.lambda_s)})
+
+
+def tilt_plane(chi_B_offset: float = 0.0, points: tuple[int, int] = (320, 240), boundaries: bool = True) -> Plane:
+    """(Fr, λ_s) at a distance from the law `chib1`; with the EP set where it lies in the plane."""
+    at = ep4()
+    chi_B = at["chi_B"] + chi_B_offset
+    problem = bicycle({"chi_B": chi_B}, {"Fr": FR, "lambda_s": TILT})
+    tilt = np.linspace(*TILT, 1200)
+    curves = {"Frc1": (np.sqrt(laws.Frc1(chi_B, ZETA_B, ZETA_H, tilt)), tilt)}
+    if chi_B_offset:
+        return Plane(_charted(problem, points, boundaries), None, curves, {})
+    curves["epset"] = (np.asarray(laws.epset(ZETA_B, ZETA_H, tilt)), tilt)
+    curves["tls"] = (np.array(FR), np.full(2, at["lambda_s"]))
+    marked = {"EP4": (at["Fr"], at["lambda_s"])}
+    return Plane(_charted(problem, points, boundaries), ep_set(), curves, marked)
+
+
+def chi_B_plane(tilt_offset: float = 0.0, points: tuple[int, int] = (320, 240), boundaries: bool = True) -> Plane:
+    """(Fr, χ_B) at a distance in rad from the tilt `tls`."""
+    at = ep4()
+    tilt = at["lambda_s"] + tilt_offset
+    problem = bicycle({"lambda_s": tilt}, {"Fr": FR, "chi_B": CHI_B})
+    chi_B = np.linspace(*CHI_B, 1200)
+    curves = {
+        "Frc1": (np.sqrt(laws.Frc1(chi_B, ZETA_B, ZETA_H, tilt)), chi_B),
+        "chib1": (np.array(FR), np.full(2, at["chi_B"])),
+    }
+    marked = {"least Fr_c": (float(laws.frm(ZETA_B, ZETA_H, tilt)), at["chi_B"])}
+    if not tilt_offset:
+        marked["EP4"] = (at["Fr"], at["chi_B"])
+    return Plane(_charted(problem, points, boundaries), None, curves, marked)
+
+
+def section(Fr_offset: float, points: tuple[int, int] = (240, 200)) -> Plane:
+    """(χ_B, λ_s) at a distance from the Froude number of EP4."""
+    at = ep4()
+    Fr = at["Fr"] + Fr_offset
+    problem = bicycle({"Fr": Fr}, {"chi_B": CHI_B, "lambda_s": (0.01, 1.2)})
+    chi_B = np.linspace(*CHI_B, 1200)
+    onset = np.arctan(Fr**2 / laws.Frc1(chi_B, ZETA_B, ZETA_H, np.pi / 4))  # Frc1 is linear in tan λ_s
+    marked = {} if Fr_offset else {"EP4": (at["chi_B"], at["lambda_s"])}
+    return Plane(_charted(problem, points, True), None, {"Frc1": (chi_B, np.asarray(onset))}, marked)
+
+
+def surface() -> Swallowtail:
+    """The discriminant surface around the EP4 of Table 1 in (Fr, χ_B, λ_s)."""
+    box = {"Fr": (1.9, 3.2), "chi_B": (1.1, 1.8), "lambda_s": (0.02, 0.75)}
+    return swallowtail(bicycle({}, box))
+
+
+def ep_set(step: float = 0.004) -> Trace:
+    """The EP set of the paper, traced from the pattern alone."""
+    free = {"Fr": FR, "chi_B": (1.01, 3.0), "lambda_s": TILT}
+    return trace(bicycle({}, free), "2EP2", step=step)
+
+
+def bicycle(fixed: Mapping[str, float], free: Mapping[str, tuple[float, float]]) -> Problem:
+    """The χ_H = 1 bicycle with the heights of the benchmark."""
+    always = {"chi_H": 1.0, "zeta_B": ZETA_B, "zeta_H": ZETA_H, "mu": MU}
+    return Problem(tms, fixed={**always, **fixed}, free=dict(free))
+
+
+def _charted(problem: Problem, points: tuple[int, int], boundaries: bool) -> Chart:
+    return chart(problem, points=points, boundaries=boundaries)
