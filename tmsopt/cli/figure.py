@@ -96,7 +96,8 @@ def _draw(wanted: "list[Item]", files: list[Path]) -> None:
             except OSError as error:
                 click.echo(f"--output: '{path}' cannot be written: {error.strerror}", err=True)
                 sys.exit(BAD_INPUT)
-            click.echo(f"wrote {path}", err=True)
+    for path in files:
+        click.echo(f"wrote {path}", err=True)
 
 
 def _described(item: "Item") -> dict[str, str]:

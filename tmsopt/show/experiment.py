@@ -66,7 +66,7 @@ def draw_critical_speeds(ax: Axes, data: Experiment) -> None:
         markersize=10, color=MARK, markeredgecolor="black", markeredgewidth=0.5, zorder=5,
         label=rf"as built, $\chi_B = {data.chi_B:g}$",
     )  # fmt: skip
-    least = min(curve.best[1] for curve in data.critical)
+    least = float(np.nanmin([curve.best[1] for curve in data.critical]))
     ax.set_xlim(1, 2.05)
     ax.set_ylim(0.93 * least, 1.9 * least)
     ax.set_xlabel(r"$\chi_B$")

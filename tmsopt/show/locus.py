@@ -135,6 +135,7 @@ def _legend(row: LocusRow) -> list[Line2D]:
 
 
 def _key(row: LocusRow) -> list[Line2D]:
+    first, last = row.loci[0].values[[0, -1]]
     dot: dict[str, Any] = {
         "linestyle": "none",
         "marker": "o",
@@ -150,7 +151,9 @@ def _key(row: LocusRow) -> list[Line2D]:
             [], [], linestyle="none", marker="D", markersize=4.5, markerfacecolor="white", markeredgecolor=LINE,
             label=r"$\mathrm{Fr} = \mathrm{Fr}_c$, $\chi_B = \sqrt{2}$",
         ),
-        Line2D([], [], color=LINE, marker=">", markersize=5, label=r"$\mathrm{Fr}$ increases from 0 to 5"),
+        Line2D(
+            [], [], color=LINE, marker=">", markersize=5, label=rf"$\mathrm{{Fr}}$ increases from {first:g} to {last:g}"
+        ),
     ]  # fmt: skip
 
 

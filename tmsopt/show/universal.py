@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tmsopt.show.style import COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, new_figure
 from tmsopt.study.universal import UniversalPath, ep_set, heavy_section
 
-COLOURS = (LINE, CRITICAL, MARK, "#009E73", "#CC79A7", "#999999")
+COLOURS = (LINE, CRITICAL, MARK, "#999999", "#F0E442", STABLE)
 """Paths, in the order given."""
 
 _EVENTS = {
@@ -114,9 +114,14 @@ def universal_figure(paths: Sequence[UniversalPath], faces: Sequence[Array], swe
     draw_box(left, paths, faces)
     draw_section(right, paths)
     left.set_title("(a) every quartic with $a_4/a_0 > 0$, scaled", fontsize=9.5)
-    right.set_title("(b) section $A_1 = A_3$", fontsize=9.5)
+    projected = any(np.nanmax(np.abs(path.A[:, 0] - path.A[:, 2]), initial=0.0) > 1e-6 for path in paths)
+    right.set_title("(b) section $A_1 = A_3$" + (", paths projected on it" if projected else ""), fontsize=9.5)
     figure.legend(
-        handles=[*_path_handles(paths), *_key(swept)], loc="outside lower center", ncols=4, fontsize=8, frameon=False
+        handles=[*_path_handles(paths), *_key(swept, paths)],
+        loc="outside lower center",
+        ncols=3 if len(paths) > 3 else 4,
+        fontsize=8,
+        frameon=False,
     )
     return figure
 
@@ -175,12 +180,15 @@ def _path_handles(paths: Sequence[UniversalPath]) -> list[Line2D]:
     ]
 
 
-def _key(swept: str) -> list[Line2D | Patch]:
+def _key(swept: str, paths: Sequence[UniversalPath]) -> list[Line2D | Patch]:
     open_marker: dict[str, Any] = {"linestyle": "none", "markeredgecolor": LINE, "markersize": 6}
+    ends = any(event.name == "unstable" for path in paths for event in path.events)
     return [
         Line2D([], [], marker="D", markerfacecolor="white", label=f"{swept} where stability begins", **open_marker),
+        *([Line2D([], [], marker="X", markerfacecolor="white", label="where it ends", **open_marker)] if ends else []),
         Line2D([], [], marker="o", markerfacecolor="0.8", label="on the EP set", **open_marker),
         Line2D([], [], color=REAL, linewidth=2, label=r"$2\mathrm{EP}_2$"),
         Line2D([], [], color=COMPLEX, linewidth=2, linestyle="--", label=r"$\mathrm{CEP}_2$"),
-        Patch(facecolor=HEAVY, edgecolor=_EDGE, alpha=0.55, label="heavy damping and its boundary"),
-    ]  # fmt: skip
+        Patch(facecolor=HEAVY, edgecolor=_EDGE, alpha=0.55, label="heavy damping"),
+        Patch(facecolor=STABLE, alpha=0.25, label="stable above $A_2 = A_1/A_3 + A_3/A_1$"),
+    ]

@@ -42,8 +42,8 @@ class CriticalSpeed:
         chi_B: ascending, shape (n,).
         Fr_c: shape (n,), nan where no speed above it is stable.
         chi_H, mu: of this curve; at χ_H = 1 the mass ratio has no influence and is nan.
-        best: (χ_B, Fr_c) at the minimum.
-        own: Fr_c at the χ_B that was built.
+        best: (χ_B, Fr_c) at the minimum, nan where no χ_B is stable.
+        own: Fr_c at the χ_B that was built, likewise.
         flat: range of χ_B where Fr_c exceeds the minimum by at most `slack`, as a fraction.
     """
 
@@ -111,18 +111,22 @@ def _critical(chi_H: float, mu: float, lambda_s: float, slack: float = 0.01) -> 
     def square(chi_B: float) -> float:
         return float(laws.flus(weight, chi_B, chi_H, p["zeta_B"], p["zeta_H"], lambda_s))
 
+    def level(chi_B: float) -> float:
+        return float(value(np.asarray(chi_B)))
+
     margin = 1e-3 * (high - low)
     chi_B = np.linspace(low, high, _POINTS)[1:-1]
     least = minimize_scalar(square, bounds=(low + margin, high - margin), method="bounded", options={"xatol": 1e-10})
-    best = float(least.x)
+    stable = bool(np.isfinite(level(float(least.x))))
+    best = float(least.x) if stable else np.nan
     return CriticalSpeed(
         chi_B=chi_B,
         Fr_c=value(chi_B),
         chi_H=chi_H,
         mu=mu,
-        best=(best, float(np.sqrt(square(best)))),
-        own=float(np.sqrt(square(p["chi_B"]))),
-        flat=_flat(square, best, (low + margin, high - margin), (1 + slack) ** 2),
+        best=(best, level(best)),
+        own=level(p["chi_B"]),
+        flat=_flat(square, best, (low + margin, high - margin), (1 + slack) ** 2) if stable else (np.nan, np.nan),
         slack=slack,
     )
 
