@@ -330,6 +330,8 @@ def test_less_tilt_than_stated_is_not_stable(built):
             for Fr in np.linspace(0.1, 20, 50)
         ]
         assert any(np.roots(c).real.max() < 0 for c in a) is stable
+    for curve in experiment(built.least_tilt - 0.01).critical[1:]:
+        assert np.isnan([*curve.Fr_c, *curve.best, curve.own, *curve.flat]).all()
 
 
 # The universal chart
@@ -447,6 +449,16 @@ def test_off_the_plane_the_path_is_that_of_the_roots():
     s = np.roots(np.concatenate([[1.0], path.A[250], [1.0]])) * abs(path.omega0[250])
     found = roots_60(polynomial_60(**{**p, "Fr": path.values[250]}))
     assert np.sort_complex(s) == pytest.approx(np.sort_complex(np.array([complex(z) for z in found])), rel=1e-9)
+
+
+def test_a_path_that_leaves_stability():
+    """The optimised bicycle over its tilt: EP4 at the printed tilt, then a loss of stability."""
+    p = optimised().parameters
+    path = universal_path(tms, tms.sets[0], p, "lambda_s", np.linspace(0.7, 1.2, 101))
+    assert [e.name for e in path.events] == ["EP4", "unstable"]
+    assert path.events[0].value == pytest.approx(0.8514403685, abs=5e-11)  # printed digits
+    for step, stable in ((-1e-9, True), (1e-9, False)):
+        assert is_stable_60(polynomial_60(**{**p, "lambda_s": path.events[1].value + step})) is stable
 
 
 def test_sweep_in_si_units():

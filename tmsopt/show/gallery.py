@@ -82,7 +82,7 @@ def _growth() -> "Figure":
         )  # fmt: skip
         if design.structure == "EP4":
             at = (design.dimensionless["Fr"], design.abscissa)
-            ax.annotate(r"$\mathrm{EP}_4$", at, xytext=(9, -3), textcoords="offset points", fontsize=10)
+            ax.annotate(r"$\mathrm{EP}_4$", at, xytext=(9, 5), textcoords="offset points", fontsize=10)
         ax.set_xlim(0, 4)
         ax.set_ylim(-4, 4)
         ax.set_xlabel(r"Froude number $\mathrm{Fr} = v/\sqrt{gw}$")
