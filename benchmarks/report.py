@@ -21,7 +21,7 @@ def section(records: Sequence[Record], command: str) -> str:
     """The whole report in Markdown."""
     parts = [
         "## Random constrained designs",
-        _origin(command),
+        origin(command),
         _counts(records),
         "### Default settings, by number of free parameters",
         _by_freedom(records),
@@ -43,7 +43,7 @@ def keep(path: Path, name: str, text: str) -> None:
     path.write_text(f"{before.rstrip()}\n\n{first}\n\n{text}\n{last}\n{after.lstrip(chr(10))}", encoding="utf-8")
 
 
-def _origin(command: str) -> str:
+def origin(command: str) -> str:
     versions = ", ".join([f"Python {platform.python_version()}", *(f"{p} {version(p)}" for p in _PACKAGES)])
     return f"`{command}`, {datetime.now(UTC):%Y-%m-%d}, {versions}, {os.cpu_count()} cores."
 
