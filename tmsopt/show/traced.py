@@ -60,13 +60,15 @@ def draw_branch(ax: Axes, branch: Branch, horizontal: str, vertical: str, width:
     """One branch as lines, cut where its pattern or its stability changes."""
     x, y = branch.parameters[horizontal], branch.parameters[vertical]
     states = list(zip(_sides(branch), branch.stable.tolist(), strict=True))
+    events = {e.index for e in branch.events}
     start = 0
     for (kind, stable), run in groupby(states):
         stop = start + len(list(run))
-        end = min(stop + 1, len(x))  # up to the first point of the next run, so that no gap is left
+        first = start - 1 if start and start - 1 in events else start
+        end = stop if stop - 1 in events else stop + 1  # no gap: an event belongs to both of its sides
         ax.plot(
-            x[start:end],
-            y[start:end],
+            x[first:end],
+            y[first:end],
             color=COLOURS[kind],
             linewidth=width,
             linestyle="--" if kind == "CEP2" else "-",
