@@ -369,7 +369,8 @@ def test_heavy_damping_in_the_section_by_exact_counts():
     """Between A2 = 2 A1 − 2 and 2 + A1²/4 for A1 ≥ 4, on rational points and on the two boundaries themselves."""
     for A1 in [sympy.Rational(n, 4) for n in range(1, 33, 3)]:
         low, high = heavy_section(float(A1))
-        for A2 in [sympy.Rational(n, 5) for n in range(-15, 95, 7)] + [2 * A1 - 2, 2 + A1**2 / 4]:
+        near = [edge + sympy.Rational(n, 1000) for edge in (2 * A1 - 2, 2 + A1**2 / 4) for n in (-1, 0, 1)]
+        for A2 in [*near, *(sympy.Rational(n, 5) for n in range(-15, 95, 7))]:
             expected = heavy_exact(A1, A2, A1)
             assert expected == bool(
                 low <= float(A2) <= high
