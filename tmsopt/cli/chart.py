@@ -15,7 +15,8 @@ Examples:
   tmsopt chart problems/chart.toml --axes lambda_s,Fr --layer abscissa --plot abscissa.pdf
 
 FILE frees two parameters; it needs no [objective]. The archive of --output holds both axes under their names and the
-arrays kind (0 undefined, 1 capsize, 2 weave, 3 stable, 4 heavily damped), abscissa, damping_ratio, real_roots.
+arrays kind (0 undefined, 1 capsize, 2 weave, 3 stable, 4 heavily damped), abscissa, damping_ratio, real_roots and
+satisfied (every constraint holds).
 
 Exit status: 0 done, 2 bad input.
 """

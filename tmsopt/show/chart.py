@@ -71,7 +71,7 @@ def name_point(ax: Axes, name: str, x: float, y: float, left: bool = False) -> N
 
 
 def chart_figure(chart: Chart, layer: str = "kind") -> Figure:
-    """A chart with the exact boundaries on top."""
+    """A chart with the exact boundaries on top, hatched where a constraint is violated."""
     figure = new_figure(6.4, 4.8)
     ax = figure.subplots()
     if layer == "kind":
@@ -80,6 +80,8 @@ def chart_figure(chart: Chart, layer: str = "kind") -> Figure:
         draw_layer(ax, chart, layer)
     if chart.domain is not None:
         draw_domain(ax, chart.domain, *chart.axes)
+    if not chart.satisfied.all():
+        ax.contourf(*chart.grid, ~chart.satisfied, levels=[0.5, 1.5], colors="none", hatches=["////"])
     label_axes(ax, chart.problem.parameter_set, *chart.axes)
     ax.set_xlim(chart.grid[0][0], chart.grid[0][-1])
     ax.set_ylim(chart.grid[1][0], chart.grid[1][-1])
@@ -101,6 +103,8 @@ def chart_table(chart: Chart) -> str:
     size = f"{len(chart.grid[0])} × {len(chart.grid[1])}"
     lines = [chart.problem.title or "untitled problem", f"{size} designs over {first} and {second}", ""]
     lines += columns([(name, f"{100 * share:.2f} %") for name, share in chart.shares.items() if share])
+    if chart.problem.constraints:
+        lines.append(f"  the constraints hold on {100 * data['satisfied']:.2f} %")
     if best := data["least_abscissa"]:
         where = f"{first} = {best[first]:.6g}, {second} = {best[second]:.6g}"
         lines += ["", f"least abscissa on the grid: {best['value']:.6g} at {where}"]

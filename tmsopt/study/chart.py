@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.problem import Problem
+from tmsopt.models import Values
 from tmsopt.roots import is_stable, real_roots, roots
 from tmsopt.study.domain import Domain, domain
 
@@ -33,6 +34,7 @@ class Chart:
             (weave), stable, stable with all roots real (heavily damped).
         abscissa, damping_ratio: from roots that are jointly right next to an exceptional point; nan if undefined.
         real_roots: number of different real roots, from coefficients.
+        satisfied: where every constraint of the problem holds.
         domain: the exact boundaries, if asked for.
     """
 
@@ -43,6 +45,7 @@ class Chart:
     abscissa: Array
     damping_ratio: Array
     real_roots: NDArray[np.int8]
+    satisfied: NDArray[np.bool_]
     domain: Domain | None
 
     @property
@@ -60,6 +63,7 @@ class Chart:
             "model": self.problem.model.name,
             "axes": {n: {"min": float(g[0]), "max": float(g[-1]), "points": len(g)} for n, g in self._named()},
             "classes": self.shares,
+            "satisfied": float(np.mean(self.satisfied)),
             "least_abscissa": None
             if best is None
             else {
@@ -99,10 +103,13 @@ def chart(
     count = across.size
     kind, real = np.zeros(count, dtype=np.int8), np.zeros(count, dtype=np.int8)
     alpha, ratio = np.full(count, np.nan), np.full(count, np.nan)
+    satisfied = np.ones(count, dtype=bool)
     for start in range(0, count, _BLOCK):
         block = slice(start, min(start + _BLOCK, count))
-        a = coefficients(problem, {names[0]: across[block], names[1]: up[block]})
+        columns = {names[0]: across[block], names[1]: up[block]}
+        a = coefficients(problem, columns)
         kind[block], real[block], alpha[block], ratio[block] = classify(a)
+        satisfied[block] = _satisfied(problem, columns, alpha[block], ratio[block])
         if progress:
             progress(block.stop, count)
     shape = (len(second), len(first))
@@ -114,6 +121,7 @@ def chart(
         abscissa=alpha.reshape(shape),
         damping_ratio=ratio.reshape(shape),
         real_roots=real.reshape(shape),
+        satisfied=satisfied.reshape(shape),
         domain=domain(problem) if boundaries else None,
     )
 
@@ -163,8 +171,22 @@ def classify(a: Array) -> tuple[NDArray[np.int8], NDArray[np.int8], Array, Array
     return kind, real, alpha, ratio
 
 
+def _satisfied(problem: Problem, columns: Mapping[str, Array], alpha: Array, ratio: Array) -> NDArray[np.bool_]:
+    """Where every constraint holds; one that does not exist, such as the speed of a root, does not hold."""
+    values = Values(problem.model, problem.parameter_set, problem.ordered(columns))
+    values.define("abscissa", alpha)
+    values.define("damping_ratio", ratio)
+    holds = np.ones(len(alpha), dtype=bool)
+    for condition in problem.conditions.values():
+        difference = np.broadcast_to(np.asarray(condition(values), dtype=float), len(alpha))
+        sides = {"<=": difference <= 0, ">=": difference >= 0, "==": difference == 0}
+        holds &= sides[condition.comparison]
+    return holds
+
+
 def save_arrays(found: Chart, path: Path) -> None:
-    """Write a chart as a NumPy archive: the axes by name, `kind`, `abscissa`, `damping_ratio`, `real_roots`, `about`.
+    """Write a chart as a NumPy archive: the axes by name, `kind`, `abscissa`, `damping_ratio`, `real_roots`,
+    `satisfied`, `about`.
 
     Raises:
         OSError: when the file cannot be written.
@@ -177,6 +199,6 @@ def save_arrays(found: Chart, path: Path) -> None:
         "fixed": dict(found.problem.fixed),
     }
     arrays: dict[str, Any] = dict(zip(found.axes, found.grid, strict=True))
-    arrays |= {n: getattr(found, n) for n in ("kind", "abscissa", "damping_ratio", "real_roots")}
+    arrays |= {n: getattr(found, n) for n in ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied")}
     with path.open("wb") as stream:
         np.savez_compressed(stream, about=np.array(json.dumps(about)), **arrays)
