@@ -81,7 +81,9 @@ def chart_figure(chart: Chart, layer: str = "kind") -> Figure:
     if chart.domain is not None:
         draw_domain(ax, chart.domain, *chart.axes)
     if not chart.satisfied.all():
-        ax.contourf(*chart.grid, ~chart.satisfied, levels=[0.5, 1.5], colors="none", hatches=["////"])
+        hatched = ax.contourf(*chart.grid, ~chart.satisfied, levels=[0.5, 1.5], colors="none", hatches=["//"])
+        hatched.set(edgecolor=(0.4, 0.4, 0.4, 0.7), linewidth=0)
+        ax.contour(*chart.grid, chart.satisfied, levels=[0.5], colors="0.3", linewidths=0.8)
     label_axes(ax, chart.problem.parameter_set, *chart.axes)
     ax.set_xlim(chart.grid[0][0], chart.grid[0][-1])
     ax.set_ylim(chart.grid[1][0], chart.grid[1][-1])
