@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 Array = NDArray[np.float64]
 
 _CONVERGED = 1e-8
-"""Last Newton step, in units of the scale: the error left is its square."""
+"""Last Newton step, relative to the point: the error left is its square."""
 
 _CONTRACTION = 0.1  # of the second Newton step against the first: slower means that the prediction was too far
 _COSINE = np.cos(0.15)  # of the angle between tangents: a sharper turn takes a smaller step
@@ -26,7 +26,7 @@ _ROOM = 4.0  # steps of variables without a box, against those with one: nobody 
 _SOLVED = 1e-10
 """Residual, relative to the terms of the equations, of a solution: a stationary point of the residual is none."""
 
-_FAR = 1e4  # in units of the scale; further out the equations lose their digits
+_FAR = 1e6  # in units of the scale; further out the equations lose their digits
 _SAME = 1e-7
 CLOSED = "closed"
 _ISOLATED = 1e-10  # singular values, relative to the largest, below which an equation has no influence
@@ -88,7 +88,7 @@ def curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> C
         value, jacobian = scaled(z)
         correction = ca.solve(ca.vertcat(jacobian, t.T), ca.vertcat(value, ca.dot(t, z - y) - s))
         z = z - correction
-        sizes.append(ca.norm_2(correction))
+        sizes.append(ca.norm_2(correction) / (1 + ca.norm_inf(z)))
     value, jacobian = scaled(z)
     tangent = ca.solve(ca.vertcat(jacobian, t.T), ca.vertcat(ca.DM.zeros(size - 1), 1))
     tangent = tangent / ca.norm_2(tangent)

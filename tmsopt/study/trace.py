@@ -144,6 +144,8 @@ def _asked(problem: Problem, name: str | None) -> Problem:
     return asked
 
 
+_FAR = 1e5  # unknowns of a seed, in units of their scale: beyond, a0 all but vanishes
+
 _GUESSES = 4  # starting values of the unknowns tried at each design
 
 
@@ -167,7 +169,7 @@ def _seed(ready: Traced, design: Mapping[str, float], guess: int, held: int | No
     if x is None:
         return None
     y = project(on.evaluate, x / on.scale, held)
-    if y is None or not np.all((y >= on.lower - 1e-12) & (y <= on.upper + 1e-12)) or np.abs(y[free:]).max() > 1e5:
+    if y is None or not np.all((y >= on.lower - 1e-12) & (y <= on.upper + 1e-12)) or np.abs(y[free:]).max() > _FAR:
         return None
     y = np.clip(y, on.lower, on.upper)
     a = ready.problem.values(ready.problem.ordered(design_at(ready.problem, y * on.scale))).coefficients
