@@ -23,11 +23,11 @@ from tmsopt.show.experiment import draw_critical_speeds, draw_law
 from tmsopt.show.gallery import GALLERY, find
 from tmsopt.show.locus import draw_row, full_window
 from tmsopt.show.universal import draw_box, draw_section
-from tmsopt.study.experiment import experiment
-from tmsopt.study.locus import locus, table_1_loci
-from tmsopt.study.reference import benchmark, experimental, optimised, table_1
-from tmsopt.study.sketch import sketch
-from tmsopt.study.universal import (
+from tmsopt.study.paper.experiment import experiment
+from tmsopt.study.paper.locus import locus, table_1_loci
+from tmsopt.study.paper.reference import benchmark, experimental, optimised, table_1
+from tmsopt.study.paper.sketch import sketch
+from tmsopt.study.paper.universal import (
     ep_set,
     heavy_section,
     normalised,

@@ -9,7 +9,7 @@ from matplotlib.patches import Arc, Circle, Polygon
 from numpy.typing import NDArray
 
 from tmsopt.show.style import CRITICAL, HEAVY, LINE, MARK, REAL, new_figure
-from tmsopt.study.sketch import Sketch
+from tmsopt.study.paper.sketch import Sketch
 
 Array = NDArray[np.float64]
 

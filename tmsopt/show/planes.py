@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from tmsopt.show.chart import draw_classes, draw_domain, label_axes, name_point
 from tmsopt.show.style import COMPLEX, CRITICAL, LINE, MARK, REAL, new_figure
 from tmsopt.show.traced import draw_branch
-from tmsopt.study.planes import Plane
+from tmsopt.study.paper.planes import Plane
 
 LAW_STYLE: Mapping[str, tuple[str, str]] = {
     "Frc1": (CRITICAL, "-"),

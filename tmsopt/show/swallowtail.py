@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tmsopt.show.planes import draw_plane
 from tmsopt.show.style import COMPLEX, HEAVY, LINE, MARK, REAL, STABLE, new_figure
 from tmsopt.study.branch import Trace
-from tmsopt.study.planes import Plane
+from tmsopt.study.paper.planes import Plane
 from tmsopt.study.swallowtail import Swallowtail
 
 Array = NDArray[np.float64]

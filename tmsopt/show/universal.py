@@ -12,7 +12,7 @@ from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from tmsopt.show.style import COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, new_figure
-from tmsopt.study.universal import UniversalPath, ep_set, heavy_section
+from tmsopt.study.paper.universal import UniversalPath, ep_set, heavy_section
 
 COLOURS = (LINE, CRITICAL, MARK, "#999999", "#F0E442", STABLE)
 """Paths, in the order given."""

@@ -253,8 +253,8 @@ def _condition(problem: Problem, pattern: Pattern, unknowns: slice, condition: C
 
 def _vanishes(value: Any, u: list[Array]) -> bool:
     """Whether a function is 0 along the whole curve, up to rounding."""
-    size = max((float(np.abs(c).max()) for c in u), default=0.0)
-    return bool(np.median(np.abs(value)) <= _NOTHING * (1 + size * size))
+    size = np.max(np.abs(u), axis=0)
+    return bool(np.median(np.abs(value) / (1 + size * size)) <= _NOTHING)
 
 
 def _merged(found: list[_Found], free: int) -> list[_Found]:

@@ -12,7 +12,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.models import tms
 from tmsopt.study.branch import Trace
 from tmsopt.study.chart import Chart, chart
-from tmsopt.study.reference import MU, ZETA_B, ZETA_H
+from tmsopt.study.paper.reference import MU, ZETA_B, ZETA_H
 from tmsopt.study.swallowtail import Swallowtail, swallowtail
 from tmsopt.study.trace import trace
 

@@ -11,8 +11,8 @@ from scipy.optimize import brentq
 from tmsopt.models import Model, ParameterSet
 from tmsopt.models import tms as bicycle_model
 from tmsopt.roots import discriminant, roots
-from tmsopt.study.reference import TILT_OFFSETS, on_ep_set
-from tmsopt.study.universal import universal_path
+from tmsopt.study.paper.reference import TILT_OFFSETS, on_ep_set
+from tmsopt.study.paper.universal import universal_path
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

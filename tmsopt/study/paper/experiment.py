@@ -9,7 +9,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from tmsopt import laws
 from tmsopt.roots import is_stable
-from tmsopt.study.reference import Bicycle, benchmark, experimental, optimised
+from tmsopt.study.paper.reference import Bicycle, benchmark, experimental, optimised
 
 Array = NDArray[np.float64]
 

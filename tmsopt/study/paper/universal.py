@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from tmsopt.models import Model, ParameterSet, tms
-from tmsopt.study.reference import table_1
+from tmsopt.study.paper.reference import table_1
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""The designs and figures of Kirillov (2018) as data."""
