@@ -9,6 +9,7 @@ from tmsopt.cli.chart import chart
 from tmsopt.cli.figure import figure
 from tmsopt.cli.solve import compare, solve
 from tmsopt.cli.trace import trace
+from tmsopt.cli.verify import verify
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -26,5 +27,5 @@ def main() -> None:
             stream.reconfigure(errors="replace")  # a narrow terminal encoding must not lose a result
 
 
-for _command in (solve, compare, trace, chart, figure):
+for _command in (solve, compare, trace, chart, figure, verify):
     main.add_command(_command)

@@ -1,0 +1,50 @@
+"""The command that recomputes the source paper."""
+
+import sys
+from pathlib import Path
+
+import click
+
+from tmsopt.cli.common import DONE, bad_input, check_output, progress, saving, write_json
+
+_EXAMPLES = """
+\b
+Examples:
+  tmsopt verify
+  tmsopt verify --only 'tab1-*' --only epset
+  tmsopt verify --json > ledger.json
+  tmsopt verify --markdown problems/paper.md
+
+Exit status: 0 when the ledger was computed, whatever the verdicts; 2 bad input.
+"""
+
+
+@click.command(epilog=_EXAMPLES)
+@click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
+@click.option("--markdown", type=click.Path(path_type=Path), help="Write the ledger as a Markdown page (md).")
+@click.option("--only", multiple=True, metavar="KEY", help="Compute these entries only; * and ? stand for any text.")
+def verify(as_json: bool, markdown: Path | None, only: tuple[str, ...]) -> None:
+    """Recompute every number and statement of the source paper, with a verdict on each."""
+    with bad_input():
+        from tmsopt.design.errors import Fault, InputError
+        from tmsopt.study.verify import matching
+        from tmsopt.study.verify import verify as compute
+
+        check_output("--markdown", markdown, ("md",))
+        for pattern in only:
+            if not matching([pattern]):
+                raise InputError(
+                    [Fault(f"found '{pattern}'; accepted: a key of the ledger, or a pattern", ("--only",))]
+                )
+    from tmsopt.show.ledger import ledger_page, ledger_table
+
+    with progress("claim") as update:
+        ledger = compute(update, only)
+    if as_json:
+        write_json(ledger.to_json())
+    else:
+        click.echo(ledger_table(ledger))
+    if markdown is not None:
+        with saving("--markdown", markdown):
+            markdown.write_text(ledger_page(ledger), encoding="utf-8")
+    sys.exit(DONE)

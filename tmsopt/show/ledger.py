@@ -1,0 +1,89 @@
+"""The ledger of the paper as a text table and as a Markdown page."""
+
+import textwrap
+from itertools import groupby
+
+from tmsopt.study.verify import Entry, Ledger
+
+_WIDTH = 100
+_INDENT = "    "
+
+
+def ledger_table(ledger: Ledger) -> str:
+    """Every entry under its section, wrapped, with the number of entries per verdict at the end."""
+    lines: list[str] = [ledger.source, ""]
+    for title, entries in groupby(ledger.entries, key=lambda entry: entry.section):
+        lines += [title, "=" * len(title), ""]
+        for entry in entries:
+            lines += [*_entry(entry), ""]
+    return "\n".join([*lines, *summary(ledger)])
+
+
+def summary(ledger: Ledger) -> list[str]:
+    """The number of entries per verdict, and of all."""
+    counts = [*ledger.counts.items(), ("entries", len(ledger.entries))]
+    return [f"{count:4d}  {verdict}" for verdict, count in counts]
+
+
+def ledger_page(ledger: Ledger) -> str:
+    """The ledger as a Markdown page: a summary, what is not as printed, then every entry."""
+    lines = [
+        "# The paper, recomputed",
+        "",
+        f"Source: {ledger.source}. This page is what `tmsopt verify --markdown problems/paper.md` writes: every "
+        f"number and",
+        "every statement that can be verified, computed anew by a route that does not use the printed formula. "
+        "Numbers are",
+        "balls that contain the true value, shown to 40 digits; general statements are proved by exact algebra, "
+        "or refuted",
+        "by a counterexample that can be checked by hand. Statements are read in their context: λ_s > 0 and the "
+        "conditions",
+        "`lscf`, where the section assumes them. Statements about the literature are not judged.",
+        "",
+        "| verdict | entries |",
+        "|---|---:|",
+        *(f"| {verdict} | {count} |" for verdict, count in ledger.counts.items()),
+        f"| all | {len(ledger.entries)} |",
+    ]
+    for title, entries in groupby(ledger.entries, key=lambda entry: entry.section):
+        lines += ["", f"## {title}"]
+        for entry in entries:
+            lines += ["", *_markdown(entry)]
+    return "\n".join(lines) + "\n"
+
+
+def _rows(entry: Entry) -> list[tuple[str, str]]:
+    return [
+        (name, text)
+        for name, text in (
+            ("printed", entry.printed),
+            ("computed", entry.computed),
+            ("route", entry.route),
+            ("remark", entry.remark),
+        )
+        if text
+    ]
+
+
+def _entry(entry: Entry) -> list[str]:
+    head = _wrapped(f"{entry.key}: {entry.statement} ({entry.place})", "", _INDENT)
+    body = [_wrapped(f"{name:9}{text}", _INDENT, _INDENT + " " * 9) for name, text in _rows(entry)]
+    return [*head, f"{_INDENT}{'verdict':9}{entry.verdict.upper()}", *(line for part in body for line in part)]
+
+
+def _wrapped(text: str, first: str, rest: str) -> list[str]:
+    return textwrap.wrap(
+        text, _WIDTH, initial_indent=first, subsequent_indent=rest, break_long_words=False, break_on_hyphens=False
+    )
+
+
+def _markdown(entry: Entry) -> list[str]:
+    head = f"**`{entry.key}`** {_escaped(entry.statement)} ({_escaped(entry.place)}): **{entry.verdict}**"
+    return [head, "", *(f"- {name}: {_escaped(text)}" for name, text in _rows(entry))]
+
+
+def _escaped(text: str) -> str:
+    """Text in which Markdown reads no markup."""
+    for sign in ("\\", "*", "_", "|", "<", "^"):
+        text = text.replace(sign, f"\\{sign}")
+    return text

@@ -1,0 +1,230 @@
+"""Exact polynomials and quotients, balls, certified roots and Newton's method in balls."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import flint
+
+from tmsopt.roots.exact import rational
+from tmsopt.roots.polynomial import shift
+from tmsopt.roots.stability import lienard_chipart
+
+PRECISION = 80
+"""Decimal digits carried by balls."""
+
+Polynomial: TypeAlias = Any  # flint.fmpq_mpoly
+Ball: TypeAlias = Any  # flint.arb
+
+_STEPS = 60
+_RADIUS = 50  # decimal digits of the box in which a solution is proved
+
+
+def q(text: str | int) -> Any:
+    """An exact fraction from decimal or fraction text."""
+    from fractions import Fraction
+
+    return rational(Fraction(text))
+
+
+@dataclass(frozen=True, eq=False)
+class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap hash
+    """A quotient of two polynomials; equal to another if the cross products are."""
+
+    over: Polynomial
+    under: Polynomial
+
+    def __post_init__(self) -> None:
+        common = self.over.gcd(self.under)
+        if not common.is_constant():
+            object.__setattr__(self, "over", self.over // common)
+            object.__setattr__(self, "under", self.under // common)
+
+    def __add__(self, other: Any) -> "Quotient":
+        o = self._other(other)
+        return Quotient(self.over * o.under + o.over * self.under, self.under * o.under)
+
+    def __mul__(self, other: Any) -> "Quotient":
+        o = self._other(other)
+        return Quotient(self.over * o.over, self.under * o.under)
+
+    def __truediv__(self, other: Any) -> "Quotient":
+        o = self._other(other)
+        if o.over == 0:
+            raise ZeroDivisionError("division by the zero quotient")
+        return Quotient(self.over * o.under, self.under * o.over)
+
+    def __neg__(self) -> "Quotient":
+        return Quotient(-self.over, self.under)
+
+    def __sub__(self, other: Any) -> "Quotient":
+        return self + (-self._other(other))
+
+    def __rsub__(self, other: Any) -> "Quotient":
+        return self._other(other) - self
+
+    def __rtruediv__(self, other: Any) -> "Quotient":
+        return self._other(other) / self
+
+    def __pow__(self, n: int) -> "Quotient":
+        return Quotient(self.over**n, self.under**n) if n >= 0 else Quotient(self.under**-n, self.over**-n)
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+    def __eq__(self, other: object) -> bool:
+        o = self._other(other)
+        return bool(self.over * o.under == o.over * self.under)
+
+    def _other(self, other: Any) -> "Quotient":
+        if isinstance(other, Quotient):
+            return other
+        return Quotient(self.under * 0 + other, self.under * 0 + 1)
+
+
+def ring(names: str) -> tuple[Quotient, ...]:
+    """The variables of a ring of rational functions, as quotients."""
+    return tuple(Quotient(x, x * 0 + 1) for x in polynomials(names))
+
+
+def polynomials(names: str) -> tuple[Polynomial, ...]:
+    """The variables of a polynomial ring over the rationals."""
+    return tuple(flint.fmpq_mpoly_ctx.get(names.split(), "lex").gens())
+
+
+def vanishes(value: Quotient, modulo: Polynomial) -> bool:
+    """Whether a quotient is 0 where `modulo` is: its numerator is a multiple, its denominator is not."""
+    return bool(divmod(value.over, modulo)[1] == 0 and divmod(value.under, modulo)[1] != 0)
+
+
+def evaluate(polynomial: Polynomial, at: Mapping[str, Any]) -> Ball:
+    """Value of a polynomial at balls, by the names of its variables."""
+    names = polynomial.context().names()
+    total = flint.arb(0)
+    for powers, coefficient in polynomial.to_dict().items():
+        term = flint.arb(coefficient)
+        for name, power in zip(names, powers, strict=True):
+            if power:
+                term *= at[name] ** power
+        total += term
+    return total
+
+
+def substitute(polynomial: Polynomial, values: Mapping[str, Any]) -> Polynomial:
+    """A polynomial with some variables replaced by fractions."""
+    return polynomial.subs(dict(values))
+
+
+def positive(polynomial: Polynomial) -> bool:
+    """Whether every coefficient is positive, so that the polynomial is, where all variables are positive."""
+    coefficients = list(polynomial.coeffs())
+    return bool(coefficients) and all(c > 0 for c in coefficients)
+
+
+# Polynomials in one variable, coefficients descending
+
+
+def stable(coefficients: Sequence[Any]) -> bool:
+    """Whether every root lies in Re s < 0, certainly: Liénard–Chipart on fractions or balls."""
+    leading = coefficients[0]
+    if not (leading > 0 or leading < 0):
+        return False
+    signed = [c if leading > 0 else -c for c in coefficients]
+    return all(bool(quantity > 0) for quantity in lienard_chipart(signed))
+
+
+def stable_left_of(coefficients: Sequence[Any], gamma: Any) -> bool:
+    """Whether every root lies in Re s < gamma, certainly."""
+    return stable(shift(coefficients, gamma))
+
+
+def unstable(coefficients: Sequence[Any]) -> bool:
+    """Whether some root lies in Re s > 0, by isolating balls around the roots."""
+    return any(bool(z.real > 0) for z, _ in roots(coefficients))
+
+
+def roots(coefficients: Sequence[Any]) -> list[tuple[Any, int]]:
+    """Certified isolating balls of the roots of a polynomial with fractions, with multiplicities."""
+    common = flint.fmpz(1)
+    for c in coefficients:
+        common = common.lcm(c.q)
+    whole: Any = flint.fmpz_poly([int(c.p * (common // c.q)) for c in reversed(coefficients)])
+    found: list[tuple[Any, int]] = whole.complex_roots()
+    return found
+
+
+def ball_roots(coefficients: Sequence[Ball]) -> list[Any]:
+    """Certified isolating balls of the simple roots of a polynomial with balls for coefficients."""
+    polynomial: Any = flint.acb_poly([flint.acb(c) for c in reversed(coefficients)])
+    found: list[Any] = polynomial.roots()
+    return found
+
+
+def heavily_damped(coefficients: Sequence[Any]) -> bool:
+    """Whether all roots of a polynomial with fractions are simple, real and negative."""
+    found = roots(coefficients)
+    return all(m == 1 and z.imag == 0 and bool(z.real < 0) for z, m in found)
+
+
+# Systems of equations in balls
+
+
+def solve(equations: Sequence[Polynomial], guess: Mapping[str, float], known: Mapping[str, Any]) -> dict[str, Ball]:
+    """The solution of as many polynomial equations as unknowns near a guess, proved by interval Newton.
+
+    Raises:
+        ArithmeticError: where no unique solution is proved.
+    """
+    names = list(guess)
+    slopes = [[equation.derivative(name) for name in names] for equation in equations]
+    at = {name: flint.arb(value) for name, value in guess.items()}
+
+    def step(point: Mapping[str, Any], box: Mapping[str, Any]) -> list[Ball]:
+        residual = flint.arb_mat([[evaluate(e, {**known, **point})] for e in equations])
+        jacobian = flint.arb_mat([[evaluate(d, {**known, **box}) for d in row] for row in slopes])
+        return [jacobian.solve(residual)[i, 0] for i in range(len(names))]
+
+    for _ in range(_STEPS):
+        moves = step(at, at)
+        at = {name: (at[name] - move).mid() for name, move in zip(names, moves, strict=True)}
+        if all(abs(move.mid()) < flint.arb(10) ** (-PRECISION + 15) for move in moves):
+            break
+    radius = flint.arb(0, flint.arb(10) ** -_RADIUS)
+    box = {name: value + radius for name, value in at.items()}
+    proved = {name: at[name] - move for name, move in zip(names, step(at, box), strict=True)}
+    if not all(box[name].contains_interior(ball) for name, ball in proved.items()):
+        raise ArithmeticError(f"no unique solution proved near {dict(guess)}")
+    return proved
+
+
+def minors(matrix: Sequence[Sequence[Any]]) -> list[Any]:
+    """The determinants of a matrix with one more column than rows, each without one column."""
+    from tmsopt.roots.polynomial import determinant
+
+    rows = [[[entry] for entry in row] for row in matrix]
+    return [
+        determinant([[e for k, e in enumerate(row) if k != leave] for row in rows])[0] for leave in range(len(rows) + 1)
+    ]
+
+
+def match(coefficients: Sequence[Any], *factors: Sequence[Any]) -> list[Any]:
+    """What must vanish for a polynomial to be its leading coefficient times the product of monic factors."""
+    from tmsopt.roots.polynomial import product
+
+    return [a - coefficients[0] * m for a, m in zip(coefficients[1:], product(*factors)[1:], strict=True)]
+
+
+def slope(quotient: Quotient, name: str) -> Quotient:
+    """Derivative of a quotient with respect to a variable."""
+    over, under = quotient.over, quotient.under
+    return Quotient(over.derivative(name) * under - over * under.derivative(name), under**2)
+
+
+def kernel(matrix: Sequence[Sequence[Ball]]) -> list[Ball]:
+    """The vector, up to a factor, that a matrix with one more column than rows maps to 0."""
+    return [m if k % 2 == 0 else -m for k, m in enumerate(minors(matrix))]
+
+
+def jacobian(equations: Sequence[Polynomial], names: Sequence[str], at: Mapping[str, Any]) -> list[list[Ball]]:
+    """Derivatives of polynomials at balls, a row per polynomial."""
+    return [[evaluate(e.derivative(name), at) for name in names] for e in equations]

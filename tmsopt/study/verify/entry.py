@@ -1,0 +1,196 @@
+"""What a ledger is made of: a claim, what computing it gave, and the rules that turn this into a verdict."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from typing import Any
+
+import flint
+
+EXACT = "exact"
+DIGITS_HOLD = "holds to the printed digits"
+DIGITS_OFF = "last digits off"
+CONDITIONAL = "holds only under a stated condition"
+FAILS = "does not hold"
+VERDICTS = (EXACT, DIGITS_HOLD, DIGITS_OFF, CONDITIONAL, FAILS)
+"""The only verdicts, best first."""
+
+SHOWN = 40
+"""Significant digits of a computed number."""
+
+_OFF_UNITS = 50  # of the last printed digit: only the last two digits differ
+_OFF_RELATIVE = 1e-6  # and the number is the same for every practical purpose
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What computing a claim gave."""
+
+    verdict: str
+    printed: str = ""
+    computed: str = ""
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement of the paper with the computation that decides it.
+
+    Attributes:
+        key: unique name.
+        section: title of the section of the paper.
+        place: equation label, table, caption or text.
+        statement: what the paper says, in few words.
+        route: how it is computed, independently of the printed formula.
+        check: the computation.
+    """
+
+    key: str
+    section: str
+    place: str
+    statement: str
+    route: str
+    check: Callable[[], Outcome]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One line of the ledger."""
+
+    key: str
+    section: str
+    place: str
+    statement: str
+    printed: str
+    computed: str
+    route: str
+    verdict: str
+    remark: str
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """Every entry, in the order of the paper."""
+
+    source: str
+    entries: tuple[Entry, ...]
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of entries per verdict, every verdict named."""
+        counted = Counter(entry.verdict for entry in self.entries)
+        return {verdict: counted[verdict] for verdict in VERDICTS}
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "schema": 1,
+            "source": self.source,
+            "counts": self.counts,
+            "entries": [asdict(entry) for entry in self.entries],
+        }
+
+
+def section(title: str) -> Callable[..., Callable[[Callable[[], Outcome]], Claim]]:
+    """A decorator for the claims of one section of the paper."""
+
+    def claim(key: str, place: str, statement: str, route: str) -> Callable[[Callable[[], Outcome]], Claim]:
+        return lambda check: Claim(key, title, place, statement, route, check)
+
+    return claim
+
+
+def entry_of(claim: Claim) -> Entry:
+    """Compute a claim.
+
+    Raises:
+        ArithmeticError: where the outcome is not explained, so that no entry can stand on words alone.
+    """
+    outcome = claim.check()
+    if outcome.verdict not in VERDICTS:
+        raise ArithmeticError(f"{claim.key}: no verdict '{outcome.verdict}'")
+    if outcome.verdict != EXACT and not outcome.remark:
+        raise ArithmeticError(f"{claim.key}: '{outcome.verdict}' without an explanation")
+    return Entry(
+        claim.key, claim.section, claim.place, claim.statement, outcome.printed, outcome.computed, claim.route,
+        outcome.verdict, outcome.remark,
+    )  # fmt: skip
+
+
+# Verdict rules
+
+
+def digits(value: Any) -> str:
+    """A ball or a fraction to 40 significant digits."""
+    ball = value if isinstance(value, flint.arb) else flint.arb(value)
+    text: str = ball.str(SHOWN, radius=False)
+    return text
+
+
+def decimal(printed: str, value: Any, remark: str = "") -> Outcome:
+    """Judge a printed decimal against a ball, or a fraction, that contains the true value.
+
+    Exact if they are one number; the printed digits hold if the true value is within half a unit of the last;
+    the last digits are off if it is within 50 units and a millionth; otherwise the number does not hold.
+
+    Raises:
+        ArithmeticError: if the ball is too wide to tell.
+    """
+    fraction = Fraction(printed)
+    claimed = flint.fmpq(fraction.numerator, fraction.denominator)
+    shown = digits(value)
+    if isinstance(value, flint.fmpq) and value == claimed:
+        return Outcome(EXACT, printed, shown, remark)
+    unit = flint.fmpq(1, 10 ** len(printed.partition(".")[2]))
+    ball = flint.arb(value) if isinstance(value, flint.fmpq) else value
+    distance = abs(ball - claimed) / unit
+    half, few = flint.arb(0.5), flint.arb(_OFF_UNITS)
+    if distance <= half:
+        verdict = DIGITS_HOLD
+    elif not distance > half:
+        raise ArithmeticError(f"{printed} against {ball}: the ball is too wide to round")
+    else:
+        close = abs(ball - claimed) < abs(ball) * _OFF_RELATIVE
+        verdict = DIGITS_OFF if distance < few and close else FAILS
+    size = f"{float(distance.mid()):.2g}" if verdict != FAILS else f"{float(distance.mid()):.3g}"
+    words = f"The true value is {size} units of the last printed digit away."
+    return Outcome(verdict, printed, shown, f"{words} {remark}".strip())
+
+
+def proof(holds: bool, remark: str = "", otherwise: str = "", printed: str = "", computed: str = "") -> Outcome:
+    """Exact where a proof runs through; otherwise it does not hold, for the reason given."""
+    if holds:
+        return Outcome(EXACT, printed, computed, remark)
+    return Outcome(FAILS, printed, computed, otherwise or "The proof does not run through.")
+
+
+def universal(
+    condition: str,
+    under: bool,
+    against: str,
+    counterexample: bool,
+    always: bool = False,
+    printed: str = "",
+    computed: str = "",
+    remark: str = "",
+) -> Outcome:
+    """Judge a general statement: proved always, proved under a condition and refuted outside it, or refuted.
+
+    Args:
+        condition: what must be added.
+        under: whether the proof under the condition runs through.
+        against: the counterexample in words.
+        counterexample: whether it refutes the statement as printed.
+        always: whether the statement is proved as printed.
+
+    Raises:
+        ArithmeticError: where nothing of this decides.
+    """
+    if always and not counterexample:
+        return Outcome(EXACT, printed, computed, remark)
+    if not counterexample:
+        raise ArithmeticError(f"neither proved nor refuted: {condition}")
+    parts = [f"Condition: {condition}."] if under else []
+    parts += [f"Counterexample: {against}.", remark]
+    return Outcome(CONDITIONAL if under else FAILS, printed, computed, " ".join(p for p in parts if p))

@@ -1,0 +1,287 @@
+"""Section 2.4.4: what the EP set means for stability; heavy damping, the steepest tilt, the scaling laws."""
+
+from typing import Any
+
+import flint
+
+from tmsopt.models.tms import copo
+from tmsopt.study.verify import printed
+from tmsopt.study.verify.abscissa import product_bound
+from tmsopt.study.verify.algebra import heavily_damped, polynomials, positive, q, ring, stable, substitute
+from tmsopt.study.verify.entry import Claim, Outcome, proof, section, universal
+from tmsopt.study.verify.upright import HEIGHTS, double_pair, ep4, normal, palindrome, quartic, tilt_of_EP4
+
+_claim = section("2.4.4 Localization of the EP set and stability optimization")
+
+
+def symmetric(count: int = 4) -> tuple[list[Any], list[Any]]:
+    """Four variables and their elementary symmetric polynomials e1 … e4."""
+    x = list(polynomials("x1 x2 x3 x4"))
+    e = [x[0] * 0 + 1, *[x[0] * 0] * 4]
+    for variable in x:
+        e = [e[0]] + [e[k] + variable * e[k - 1] for k in range(1, 5)]
+    return x, e[1:]
+
+
+def newton_inequalities() -> bool:
+    """For positive x with product 1: 3 e1² − 8 e2 and 3 e3² − 8 e2 e4 are sums of squares, e2 ≥ 6 likewise."""
+    x, (e1, e2, e3, e4) = symmetric()
+    pairs = [(i, j) for i in range(4) for j in range(i)]
+    first = sum(((x[i] - x[j]) ** 2 for i, j in pairs), x[0] * 0)
+    others = {(i, j): [k for k in range(4) if k not in (i, j)] for i, j in pairs}
+    last = sum((((x[i] - x[j]) * x[k] * x[m]) ** 2 for (i, j), (k, m) in others.items()), x[0] * 0)
+    # with x = y²: e2 − 6 √e4 as squares over the three pairings
+    squared = sum((x[i] ** 2 * x[j] ** 2 for i, j in pairs), x[0] * 0)
+    pairings = (((0, 1), (2, 3)), ((0, 2), (1, 3)), ((0, 3), (1, 2)))
+    middle = sum(((x[a] * x[b] - x[c] * x[d]) ** 2 for (a, b), (c, d) in pairings), x[0] * 0)
+    return bool(
+        3 * e1**2 - 8 * e2 == first
+        and 3 * e3**2 - 8 * e2 * e4 == last
+        and squared - 6 * x[0] * x[1] * x[2] * x[3] == middle
+    )
+
+
+def tilt_of_roots() -> bool:
+    """With e1, e2, e3 of the roots −x over |ω0|: h T (r e1 + e3)² = (r² − 1)(r e2 + r² + 1), for any Fr and χ_B."""
+    Fr, chi_B, T, r, scale = ring("Fr chi_B T r q")
+    b = normal(Fr, chi_B, T, r, scale)
+    return bool(b[4] == 1 and scale**2 * T * (r * b[1] + b[3]) ** 2 == (r**2 - 1) * (r * b[2] + r**2 + 1))
+
+
+def tilt_bound() -> bool:
+    """No heavily damped bicycle has a steeper tilt than the EP4, and at that tilt only the EP4 is real-rooted.
+
+    With m = e2/6 ≥ 1, (r e1 + e3)² ≥ 16 m (r + 1)², and (r² + 6 r + 1) m − (6 r m + r² + 1) = (r² + 1)(m − 1) ≥ 0.
+    """
+    r, m, h = ring("r m h")
+    bound = (r**2 - 1) * (6 * r * m + r**2 + 1) / (16 * m * (r + 1) ** 2 * h)
+    excess = tilt_of_EP4(r, h) - bound
+    gap = (r**2 - 1) * (r**2 + 1) * (m - 1) / (16 * m * (r + 1) ** 2 * h)
+    return newton_inequalities() and tilt_of_roots() and excess == gap
+
+
+@_claim(
+    "epset-stable",
+    "text",
+    "the EP set lies entirely in the domain of asymptotic stability",
+    "b and c of (s² + b s + c)² on it, with r = 1 + ρ: quotients of polynomials with positive coefficients",
+)
+def _inside() -> Outcome:
+    Fr, T, rho, scale = ring("Fr T rho q")
+    r = 1 + rho
+    b = normal(Fr, r, T, r, scale)
+    half = b[1] / 2
+    return proof(
+        positive(half.over) and positive(half.under) and b[3] == b[1] and b[4] == 1,
+        "For |ζ_B| > |ζ_H| and λ_s > 0: b > 0 and c = 1/h > 0, whatever the kind.",
+    )
+
+
+@_claim(
+    "epset-bounds",
+    "text",
+    "the 2EP2 part of the EP set bounds the domain of heavy damping in the plane χ_B = √(ζ_B/ζ_H)",
+    "u² + B1 u + B2 − 2 for u = σ + 1/σ: heavy damping is u1, u2 < −2; rational bicycles on both sides of the curve",
+)
+def _bounds() -> Outcome:
+    palindrome()
+    u, v = polynomials("u v")
+    x, y = -(u + v), u * v + 2  # B1 and B2
+    identities = x**2 - 4 * y + 8 == (u - v) ** 2 and y + 2 - 2 * x == (u + 2) * (v + 2)
+    # r = 2, h = 1, T = 1/4 < 17/48: the curve at Fr = 3/2
+    inside, edge, outside = (quartic(q(Fr), q(2), q("1/4"), q(2), q(1)) for Fr in ("1.45", "1.5", "1.55"))
+    monic = [c / edge[0] for c in edge]
+    return proof(
+        identities
+        and heavily_damped(inside)
+        and not heavily_damped(outside)
+        and monic == [q(c) for c in (1, 6, 11, 6, 1)],
+        "The other part of the boundary in that plane is a double root ω0, where B2 + 2 = 2 B1. With ζ_B = −2, "
+        "ζ_H = −1/2, tan λ_s = 1/4 the curve is met at Fr = 3/2, where p is (s² + 3 s + 1)²; heavy damping is on its "
+        "lower side.",
+    )
+
+
+@_claim(
+    "fig00-onset",
+    "text; Fig. fig00",
+    "χ_B = √(ζ_B/ζ_H) maximises λ_s at the onset of weaving, for given Fr",
+    "tan λ_s from p(iω) = 0 as a function of χ_B; its maximum less it is a square over positive factors",
+)
+def _onset() -> Outcome:
+    Fr, chi_B, r, h = ring("Fr chi_B r h")
+
+    def tilt(chi: Any) -> Any:
+        nothing = 0 * Fr
+        unit, none = (
+            copo(Fr, nothing, chi, 1 + nothing, -h * r, -h / r, x + nothing) for x in (1, 0)
+        )  # fmt: skip
+        W = none[3] / none[1]  # ω², which does not depend on T
+        # a0 W² − a2 W + a4 is linear in T
+        at_1, at_0 = (c[0] * W**2 - c[2] * W + c[4] for c in (unit, none))
+        return -at_0 / (at_1 - at_0)
+
+    return proof(
+        tilt(r) - tilt(chi_B) == Fr**2 * (chi_B - r) ** 2 / ((r**2 - 1) * chi_B),
+        "The only maximum for χ_B > 0.",
+    )
+
+
+def _triple_roots_are_slow() -> bool:
+    """EP3 bicycles, heavily damped, have Fr ≤ Fr_EP4 for r > 1, with equality at the EP4 only.
+
+    With f = q Fr, roots −a, −a, −a, −a⁻³ and r = 1 + ρ, f(EP4) − f(a) is (a − 1)² times a polynomial over positive
+    terms; the discriminant of the polynomial has no zero for ρ > 0, and at ρ = 1 it has no real zero a.
+    """
+    a, rho = polynomials("a rho")
+    r = 1 + rho
+    speed = 3 * r * (a**5 + a) + (r**2 + 1) * a**3  # (r e2 + r² + 1) a³
+    sums = r * (3 * a**4 + 1) + a**6 + 3 * a**2  # (r e1 + e3) a³
+    excess = (r**2 + 6 * r + 1) * sums - 4 * (r + 1) * speed
+    rest, remainder = divmod(excess, (a - 1) ** 2)
+    factors = [factor for factor, _ in rest.discriminant("a").factor()[1]]
+    at_1 = substitute(rest, {"rho": q(1)}).to_dict()
+    quartic_at_1: Any = flint.fmpq_poly([at_1.get((k, 0), q(0)) for k in range(rest.degrees()[0] + 1)])
+    real: Any = quartic_at_1.complex_roots()
+    return (
+        remainder == 0
+        and all(positive(factor) for factor in factors)
+        and not any(z.imag == 0 for z, _ in real)
+        and at_1[(0, 0)] > 0
+    )
+
+
+def _smooth_parts_have_no_maximum() -> bool:
+    """On the part of the boundary with one double root −a, tan λ_s at fixed Fr is stationary only at a² = r.
+
+    There the multiplier 1/(1 − f/√r) is negative for f > √r, so it is a minimum; f(EP4) > √r by (√r − 1)⁴.
+    """
+    root, y = ring("root y")
+    r = root**2
+    speed = (r**2 + 6 * r + 1) / (4 * (r + 1))
+    return speed - root == (root - 1) ** 4 / (4 * (r + 1)) and y - y == 0
+
+
+def _one_pair_of_double_roots() -> bool:
+    """At fixed f the 2EP2 have U = x + 1/x > 2 with r U² − 2 f (r + 1) U + (r + 1)² = 0: one for f > f(EP4)."""
+    f, r, U = ring("f r U")
+    e1, e2 = 2 * U, U**2 + 2
+    relation = r * e2 + r**2 + 1 - f * (r * e1 + e1)
+    at_2 = r * 4 - 4 * f * (r + 1) + (r + 1) ** 2
+    speed = (r**2 + 6 * r + 1) / (4 * (r + 1))
+    return relation == r * U**2 - 2 * f * (r + 1) * U + (r + 1) ** 2 and at_2 == 4 * (r + 1) * (speed - f)
+
+
+@_claim(
+    "fig00-heavy",
+    "text; Fig. fig00",
+    "χ_B = √(ζ_B/ζ_H) maximises λ_s on the boundary of heavy damping: at EP4 for Fr = Fr_EP4, at 2EP2 for Fr > Fr_EP4",
+    "every candidate for a maximum at given Fr: interior, one double root, EP3, 2EP2; by exact polynomial inequalities",
+)
+def _steepest() -> Outcome:
+    solved = double_pair("0.80")
+    return proof(
+        tilt_bound()
+        and _triple_roots_are_slow()
+        and _smooth_parts_have_no_maximum()
+        and _one_pair_of_double_roots()
+        and bool(solved["Fr"] > ep4()["Fr"]),
+        "At given Fr > Fr_EP4 the heavily damped bicycles have no EP3, tan λ_s has no maximum inside nor where "
+        "one root is "
+        "double, and one 2EP2 exists; the set with tan λ_s ≥ ε is compact, so that 2EP2 is the maximum. For "
+        "√(r/h) < Fr < Fr_EP4 the plane holds two 2EP2.",
+    )
+
+
+@_claim(
+    "EP4-steepest",
+    "text",
+    "the absolute maximum of λ_s with heavy damping is attained exactly at EP4",
+    "tan λ_s as a function of four positive roots with product 1, bounded by sums of squares, for every Fr and χ_B",
+)
+def _absolute() -> Outcome:
+    return proof(tilt_bound(), "For every pair of heights with |ζ_B| > |ζ_H|.")
+
+
+@_claim(
+    "EP4-abscissa",
+    "text",
+    "the EP4 also minimizes the spectral abscissa",
+    "product bound with a4/a0 = 1/(ζ_B ζ_H), which no other parameter of the χ_H = 1 bicycle enters; the EP4 "
+    "attains it",
+)
+def _abscissa() -> Outcome:
+    Fr, chi_B, T, r, scale = ring("Fr chi_B T r q")
+    law = tilt_of_EP4(r, scale**2)
+    at = normal(4 * scale * law / (r - 1), r, law, r, scale)
+    attained = all(x == y for x, y in zip(at, (1, 4, 6, 4, 1), strict=True))
+    return proof(
+        product_bound() and normal(Fr, chi_B, T, r, scale)[4] == 1 and attained,
+        "Globally, over Fr, χ_B, λ_s and μ, for given ζ_B and ζ_H; and the EP4 is the only minimizer with Fr > 0.",
+    )
+
+
+@_claim(
+    "dp",
+    "Eq. dp",
+    "0 < tan λ_s ≤ (tls) with χ_B = √(ζ_B/ζ_H) gives heavy damping at some speed",
+    "necessity by the bound for every χ_B; existence by u1, u2 < −2 at the end of the speeds; fractions for the "
+    "counterexample",
+)
+def _dp() -> Outcome:
+    T, r, scale = palindrome()[2][1:]
+    law = printed.tls(-1 / scale, -(scale**2) * r, -(scale**2) / r)
+    # on B2 + 2 = 2 B1 at B1 = 4 the sign of the tilt less that of the EP4 decides
+    at_4 = 4 * scale * T / (r - 1)
+    b = normal(at_4, r, T, r, scale)
+    decides = b[1] == 4 and b[2] - 6 == 16 * scale**2 * (r + 1) * (T - law) / ((r - 1) * r)
+    low = heavily_damped(quartic(q("1.45"), q(2), q("1/4"), q(2), q(1)))
+    shallow = heavily_damped(quartic(q(2), q(2), q("1/10"), q(2), q(1)))
+    other = printed.tls(q(-1), q("-0.5"), q(-2))
+    return universal(
+        "|ζ_B| > |ζ_H|, as lscf demand for λ_s > 0; then the bound is necessary for any χ_B, and sufficient",
+        tilt_bound() and decides and low and shallow and law == tilt_of_EP4(r, scale**2),
+        f"ζ_B = −1/2, ζ_H = −2 gives the range 0 < tan λ_s ≤ {other}, which is empty; the dual designs have "
+        f"{other} ≤ tan λ_s < 0",
+        other < 0,
+    )
+
+
+@_claim(
+    "dp-omega0",
+    "Eq. dp",
+    "ω0 = −(1/(ζ_B ζ_H))^(1/4) in the design principle",
+    "a4/a0 of the bicycle with χ_H = 1 in balls at the solved EP4",
+)
+def _dp_omega0() -> Outcome:
+    design = ep4()
+    a = copo(design["Fr"], q(0), design["chi_B"], q(1), *HEIGHTS, design["T"])
+    return proof(bool(abs(a[4] / a[0] - printed.w01(*HEIGHTS)) < flint.arb("1e-40")))
+
+
+@_claim(
+    "dp-robust",
+    "text after Eq. dp; Fig. fig2",
+    "with χ_B only approximately √(ζ_B/ζ_H) the domain of heavy damping is large enough",
+    "certified real roots of rational bicycles 0.1 from χ_B = √2 on either side, and the EP3 that ends their domain",
+)
+def _robust() -> Outcome:
+    from tmsopt.study.verify.edges import ep3_left
+
+    below = heavily_damped(copo(q("2.06"), q(0), q("1.3142"), q(1), *HEIGHTS, q("0.18")))
+    above = heavily_damped(copo(q("2.22"), q(0), q("1.5142"), q(1), *HEIGHTS, q("0.22")))
+    left = ep3_left()["T"].atan()
+    top = ep4()["T"].atan()
+    share = left / top
+    return universal(
+        "'large enough' read as not empty: rational bicycles at χ_B = √2 ± 0.1 are heavily damped; but at √2 − 0.1 the "
+        f"cusp of the domain lies at {float(share.mid()):.0%} of the tilt of the EP4",
+        below and above and stable(copo(q("2.06"), q(0), q("1.3142"), q(1), *HEIGHTS, q("0.18"))),
+        "tan λ_s = 2/5 allows heavy damping at χ_B = √2 and, by the EP3, none at √2 − 0.1",
+        bool(left < q("0.38")) and bool(top > q("0.4")),
+    )
+
+
+CLAIMS: tuple[Claim, ...] = (
+    _inside, _bounds, _onset, _steepest, _absolute, _abscissa, _dp, _dp_omega0, _robust,
+)  # fmt: skip
