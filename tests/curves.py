@@ -125,6 +125,10 @@ def epset_Fr(zeta_B: float, zeta_H: float, lambda_s: float) -> Any:
         return ratio * 2 * T / mp.sqrt(w2 * w2 * zB + 4 * T * ratio)
 
 
+FR_C2_SLOPE = float(3 + 2 * mp.sqrt(2))
+"""Fr_c²/tan(lambda_s) for the paper's heights and chi_B = √2, equation `frm`: (√2 + 1)/(√2 − 1)."""
+
+
 # Exact classes of designs
 
 
