@@ -5,7 +5,18 @@ from fnmatch import fnmatchcase
 
 import flint
 
-from tmsopt.study.verify import abscissa, critical, edges, exceptional, model, optimum, sets, stability
+from tmsopt.study.verify import (
+    abscissa,
+    critical,
+    edges,
+    exceptional,
+    experiment,
+    model,
+    motion,
+    optimum,
+    sets,
+    stability,
+)
 from tmsopt.study.verify.algebra import PRECISION
 from tmsopt.study.verify.entry import VERDICTS, Claim, Entry, Ledger, entry_of
 
@@ -13,7 +24,7 @@ __all__ = ["CLAIMS", "VERDICTS", "Claim", "Entry", "Ledger", "matching", "verify
 
 SOURCE = "O. N. Kirillov, Localizing EP sets in dissipative systems and the self-stability of bicycles (2018)"
 
-_PARTS = (model, stability, abscissa, critical, exceptional, sets, edges, optimum)
+_PARTS = (model, stability, abscissa, critical, exceptional, sets, edges, optimum, motion, experiment)
 
 CLAIMS: tuple[Claim, ...] = tuple(claim for part in _PARTS for claim in part.CLAIMS)
 """Every claim, in the order of the paper."""

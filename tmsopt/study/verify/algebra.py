@@ -121,6 +121,11 @@ def positive(polynomial: Polynomial) -> bool:
     return bool(coefficients) and all(c > 0 for c in coefficients)
 
 
+def positive_quotient(value: Quotient) -> bool:
+    """Likewise for a quotient."""
+    return any(positive(sign * value.over) and positive(sign * value.under) for sign in (1, -1))
+
+
 # Polynomials in one variable, coefficients descending
 
 

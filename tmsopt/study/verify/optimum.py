@@ -7,7 +7,16 @@ import flint
 from tmsopt.models.tms import copo
 from tmsopt.study.verify import printed
 from tmsopt.study.verify.abscissa import product_bound
-from tmsopt.study.verify.algebra import heavily_damped, polynomials, positive, q, ring, stable, substitute
+from tmsopt.study.verify.algebra import (
+    heavily_damped,
+    polynomials,
+    positive,
+    positive_quotient,
+    q,
+    ring,
+    stable,
+    substitute,
+)
 from tmsopt.study.verify.entry import Claim, Outcome, proof, section, universal
 from tmsopt.study.verify.upright import HEIGHTS, double_pair, ep4, normal, palindrome, quartic, tilt_of_EP4
 
@@ -72,7 +81,7 @@ def _inside() -> Outcome:
     b = normal(Fr, r, T, r, scale)
     half = b[1] / 2
     return proof(
-        positive(half.over) and positive(half.under) and b[3] == b[1] and b[4] == 1,
+        positive_quotient(half) and b[3] == b[1] and b[4] == 1,
         "For |ζ_B| > |ζ_H| and λ_s > 0: b > 0 and c = 1/h > 0, whatever the kind.",
     )
 
@@ -156,10 +165,13 @@ def _smooth_parts_have_no_maximum() -> bool:
 
     There the multiplier 1/(1 − f/√r) is negative for f > √r, so it is a minimum; f(EP4) > √r by (√r − 1)⁴.
     """
-    root, y = ring("root y")
-    r = root**2
+    root, f = ring("root f")
+    r, a = root**2, root
+    y = 1 / (1 - f / root)  # d(r e1 + e3) = y (a² de1 − a de2 + de3) + z (r de2 − f d(r e1 + e3))
+    z = y * a / r
+    stationary = r * (1 + z * f) == y * a**2 and z * r == y * a and 1 + z * f == y
     speed = (r**2 + 6 * r + 1) / (4 * (r + 1))
-    return speed - root == (root - 1) ** 4 / (4 * (r + 1)) and y - y == 0
+    return bool(stationary and speed - root == (root - 1) ** 4 / (4 * (r + 1)))
 
 
 def _one_pair_of_double_roots() -> bool:
@@ -169,7 +181,7 @@ def _one_pair_of_double_roots() -> bool:
     relation = r * e2 + r**2 + 1 - f * (r * e1 + e1)
     at_2 = r * 4 - 4 * f * (r + 1) + (r + 1) ** 2
     speed = (r**2 + 6 * r + 1) / (4 * (r + 1))
-    return relation == r * U**2 - 2 * f * (r + 1) * U + (r + 1) ** 2 and at_2 == 4 * (r + 1) * (speed - f)
+    return bool(relation == r * U**2 - 2 * f * (r + 1) * U + (r + 1) ** 2 and at_2 == 4 * (r + 1) * (speed - f))
 
 
 @_claim(
