@@ -240,6 +240,14 @@ def test_what_is_no_plane_is_refused(free, axes, words):
 # The command line
 
 
+def run(capsys, *arguments):
+    """In this process, to save starting so many: exit status, stdout, stderr."""
+    with pytest.raises(SystemExit) as stop:
+        main(args=[*map(str, arguments)], prog_name="tmsopt")
+    written = capsys.readouterr()
+    return stop.value.code, written.out, written.err
+
+
 def tmsopt(*arguments, cwd=None):
     command = [sys.executable, "-c", "from tmsopt.cli import main; main()", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, cwd=cwd, encoding="utf-8")
@@ -294,13 +302,13 @@ lambda_s = { min = 1.2, max = 1.3 }
 """
 
 
-def test_nothing_found_ends_with_3_and_says_so(tmp_path):
+def test_nothing_found_ends_with_3_and_says_so(tmp_path, capsys):
     path = tmp_path / "nothing.toml"
     path.write_text(NOTHING)
-    done = tmsopt("trace", path, "--pattern", "weave", "--json", "--starts", 4)
-    assert done.returncode == 3
-    assert "no weave found" in done.stderr
-    assert json.loads(done.stdout)["branches"] == []
+    status, out, err = run(capsys, "trace", path, "--pattern", "weave", "--json", "--starts", 4)
+    assert status == 3
+    assert "no weave found" in err
+    assert json.loads(out)["branches"] == []
 
 
 def test_chart_writes_table_archive_and_figure(tmp_path):
@@ -319,10 +327,10 @@ def test_chart_writes_table_archive_and_figure(tmp_path):
         assert (data["lambda_s"][0], data["lambda_s"][-1]) == (0.01, 1.4)
 
 
-def test_chart_json_is_finite():
-    done = tmsopt("chart", "problems/chart.toml", "--points", "30", "--no-boundaries", "--json")
-    assert (done.returncode, done.stderr) == (0, "")
-    data = json.loads(done.stdout, parse_constant=pytest.fail)
+def test_chart_json_is_finite(capsys):
+    status, out, err = run(capsys, "chart", "problems/chart.toml", "--points", "30", "--no-boundaries", "--json")
+    assert (status, err) == (0, "")
+    data = json.loads(out, parse_constant=pytest.fail)
     assert data["axes"]["Fr"] == {"min": 0.01, "max": 5.0, "points": 30}
     assert sum(data["classes"].values()) == pytest.approx(1)
     assert data["boundaries"] is None
@@ -348,13 +356,9 @@ def test_chart_json_is_finite():
     ],
 )  # fmt: skip
 def test_bad_input_ends_with_2_and_says_what_is_accepted(arguments, words, capsys):
-    """In this process, to save starting so many."""
-    with pytest.raises(SystemExit) as stop:
-        main(args=arguments, prog_name="tmsopt")
-    assert stop.value.code == 2
-    written = capsys.readouterr()
-    assert written.out == ""
-    assert words in " ".join(written.err.split())
+    status, out, err = run(capsys, *arguments)
+    assert (status, out) == (2, "")
+    assert words in " ".join(err.split())
 
 
 def test_a_pattern_with_other_freedom_ends_a_process_with_2():
