@@ -123,10 +123,19 @@ def numbers():
         return out
 
 
-KEYS = (
-    "fr1-Fr_c fr1-v_c e123-Fr e123-mu e123-lambda_s Fr_EP4 tab1-2EP2-Fr_c tab1-2EP2-Fr_EP tab1-CEP2-Fr_c "
-    "tab1-CEP2-Fr_EP fige-ratio"
-).split()
+KEYS = [
+    "fr1-Fr_c",
+    "fr1-v_c",
+    "e123-Fr",
+    "e123-mu",
+    "e123-lambda_s",
+    "Fr_EP4",
+    "tab1-2EP2-Fr_c",
+    "tab1-2EP2-Fr_EP",
+    "tab1-CEP2-Fr_c",
+    "tab1-CEP2-Fr_EP",
+    "fige-ratio",
+]
 
 
 @pytest.mark.parametrize("key", KEYS)
@@ -186,7 +195,7 @@ def wrong(name, key, formula):
 
 
 WRONG = [
-    wrong("copo", "copo-a2", lambda f: lambda *p: [*f(*p)[:2], f(*p)[2] + p[0], *f(*p)[3:]]),
+    wrong("coefficients", "copo-a2", lambda f: lambda *p: [*f(*p)[:2], f(*p)[2] + p[0], *f(*p)[3:]]),
     wrong("flus", "flus", lambda f: lambda mu, b, h, zb, zh, T: f(mu, b, h, zb, zh, T) + (h - 1) * b),
     wrong("w0", "w0", lambda f: lambda *p: -f(*p)),
     wrong("poly4", "4poly-expansion", lambda f: lambda w: [1, -4 * w, 6 * w**2, -4 * w**2, w**4]),
@@ -222,7 +231,9 @@ def fractions(design):
 
 def test_the_counterexample_to_sufficiency() -> None:
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = fractions(WITNESS)
-    assert (chi_H, chi_B, zeta_B, zeta_H, mu, T, Fr) == tuple(map(Fraction, ("0.9", "1.2", "-0.5", "-0.4", "5", "0.5", "2")))
+    assert (chi_H, chi_B, zeta_B, zeta_H, mu, T, Fr) == tuple(
+        map(Fraction, ("0.9", "1.2", "-0.5", "-0.4", "5", "0.5", "2"))
+    )
     assert 1 + zeta_H * T < chi_H < 1 - zeta_B / mu * T
     assert chi_H < chi_B
     assert zeta_H > zeta_B
@@ -242,7 +253,13 @@ def test_a_bicycle_that_is_stable_backward() -> None:
 def test_no_sampled_bicycle_with_chi_H_above_0_is_stable_backward() -> None:
     rng = np.random.default_rng(3)
     for _ in range(3000):
-        values = [-rng.uniform(0.1, 9), rng.uniform(0.1, 20), rng.uniform(-3, 3), rng.uniform(0, 3), *-rng.uniform(0.05, 2, 2)]
+        values = [
+            -rng.uniform(0.1, 9),
+            rng.uniform(0.1, 20),
+            rng.uniform(-3, 3),
+            rng.uniform(0, 3),
+            *-rng.uniform(0.05, 2, 2),
+        ]
         assert not oracles.routh_exact(oracles.polynomial_exact(*values, rng.uniform(-12, 12)))
 
 
@@ -306,6 +323,23 @@ def test_negative_eigenvalues_first_move_apart(by_key) -> None:
     assert spans[1] > max(spans[0], spans[2])
 
 
+def test_a_heavily_damped_bicycle_can_lean_more_before_it_recovers() -> None:
+    """Two modes of the linear system itself, scaled to leans 1 and −1: the lean starts at 0 and grows."""
+    with mp.workdps(30):
+        lean_angle = mp.atan(mp.mpf(1) / 4)
+        M, V, P, _ = oracles._matrices(
+            mp.mpf("1.45"), 1, 2, 1, -2, mp.mpf(-1) / 2, mp.cos(lean_angle), mp.sin(lean_angle)
+        )
+        roots = [z.real for z in oracles.roots_60(hand(Fraction("1.45"), Fraction(1, 4)))]
+        assert all(z < 0 for z in roots)
+        for s in (roots[0], roots[-1]):
+            L = [[M[i][j] * s**2 + V[i][j] * s + P[i][j] for j in range(2)] for i in range(2)]
+            steer = -L[0][0] / L[0][1]  # with lean 1
+            assert abs(L[1][0] + L[1][1] * steer) < mp.mpf(10) ** -20
+        lean = [mp.exp(roots[-1] * t) - mp.exp(roots[0] * t) for t in (0, mp.mpf("0.1"), 200)]
+        assert lean[0] == 0 < lean[2] < lean[1]
+
+
 def test_dp_is_empty_for_lower_rear_mass() -> None:
     """ζ_B = −1/2, ζ_H = −2: ω0 = −1, and (tls) in fractions."""
     zeta_B, zeta_H = Fraction(-1, 2), Fraction(-2)
@@ -321,7 +355,9 @@ def test_the_abscissa_below_that_of_the_optimised_benchmark() -> None:
 
 def test_an_exceptional_point_that_is_no_minimum() -> None:
     x = sympy.Symbol("x")
-    assert sympy.solve(sympy.discriminant(sympy.Symbol("s") ** 2 + 2 * x * sympy.Symbol("s") + x**2 + x - 1, sympy.Symbol("s")), x) == [1]
+    assert sympy.solve(
+        sympy.discriminant(sympy.Symbol("s") ** 2 + 2 * x * sympy.Symbol("s") + x**2 + x - 1, sympy.Symbol("s")), x
+    ) == [1]
     assert max(z.real for z, _ in oracles.certified_roots([1, 4, 5])) < -1
 
 
@@ -362,7 +398,9 @@ def test_the_cusp_is_a_triple_root(key, start, free, by_key) -> None:
 
         def triple(Fr, T, s):
             a = oracles.polynomial_60(Fr, 1, chi_B, 1, ZB, ZH, mp.atan(T))
-            return [sum(c * mp.ff(4 - k, n) * s ** (4 - k - n) for k, c in enumerate(a) if 4 - k >= n) for n in range(3)]
+            return [
+                sum(c * mp.ff(4 - k, n) * s ** (4 - k - n) for k, c in enumerate(a) if 4 - k >= n) for n in range(3)
+            ]
 
         found = mp.findroot(triple, start)
         assert abs(found[0] / mp.mpf(by_key[key].computed) - 1) < mp.mpf(10) ** -38

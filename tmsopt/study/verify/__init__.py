@@ -7,13 +7,16 @@ import flint
 
 from tmsopt.study.verify import (
     abscissa,
+    benchmark,
     critical,
     edges,
+    epset,
     exceptional,
     experiment,
     model,
     motion,
     optimum,
+    precursor,
     sets,
     stability,
 )
@@ -24,7 +27,10 @@ __all__ = ["CLAIMS", "VERDICTS", "Claim", "Entry", "Ledger", "matching", "verify
 
 SOURCE = "O. N. Kirillov, Localizing EP sets in dissipative systems and the self-stability of bicycles (2018)"
 
-_PARTS = (model, stability, abscissa, critical, exceptional, sets, edges, optimum, motion, experiment)
+_PARTS = (
+    model, stability, abscissa, benchmark, critical, exceptional, sets, epset, edges, optimum, motion, precursor,
+    experiment,
+)  # fmt: skip
 
 CLAIMS: tuple[Claim, ...] = tuple(claim for part in _PARTS for claim in part.CLAIMS)
 """Every claim, in the order of the paper."""

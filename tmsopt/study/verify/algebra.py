@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any, TypeAlias
 
 import flint
 
 from tmsopt.roots.exact import rational
-from tmsopt.roots.polynomial import shift
+from tmsopt.roots.polynomial import determinant, product, shift
 from tmsopt.roots.stability import lienard_chipart
 
 PRECISION = 80
@@ -22,8 +23,6 @@ _RADIUS = 50  # decimal digits of the box in which a solution is proved
 
 def q(text: str | int) -> Any:
     """An exact fraction from decimal or fraction text."""
-    from fractions import Fraction
-
     return rational(Fraction(text))
 
 
@@ -204,8 +203,6 @@ def solve(equations: Sequence[Polynomial], guess: Mapping[str, float], known: Ma
 
 def minors(matrix: Sequence[Sequence[Any]]) -> list[Any]:
     """The determinants of a matrix with one more column than rows, each without one column."""
-    from tmsopt.roots.polynomial import determinant
-
     rows = [[[entry] for entry in row] for row in matrix]
     return [
         determinant([[e for k, e in enumerate(row) if k != leave] for row in rows])[0] for leave in range(len(rows) + 1)
@@ -214,8 +211,6 @@ def minors(matrix: Sequence[Sequence[Any]]) -> list[Any]:
 
 def match(coefficients: Sequence[Any], *factors: Sequence[Any]) -> list[Any]:
     """What must vanish for a polynomial to be its leading coefficient times the product of monic factors."""
-    from tmsopt.roots.polynomial import product
-
     return [a - coefficients[0] * m for a, m in zip(coefficients[1:], product(*factors)[1:], strict=True)]
 
 
@@ -233,3 +228,19 @@ def kernel(matrix: Sequence[Sequence[Ball]]) -> list[Ball]:
 def jacobian(equations: Sequence[Polynomial], names: Sequence[str], at: Mapping[str, Any]) -> list[list[Ball]]:
     """Derivatives of polynomials at balls, a row per polynomial."""
     return [[evaluate(e.derivative(name), at) for name in names] for e in equations]
+
+
+def composed(quotient: Quotient, at: Mapping[str, Quotient]) -> Quotient:
+    """A quotient with quotients put in for its variables."""
+
+    def put(polynomial: Any) -> Quotient:
+        names = polynomial.context().names()
+        total = 0 * at[names[0]]
+        for powers, coefficient in polynomial.to_dict().items():
+            term = total * 0 + coefficient
+            for name, power in zip(names, powers, strict=True):
+                term = term * at[name] ** power
+            total = total + term
+        return total
+
+    return put(quotient.over) / put(quotient.under)

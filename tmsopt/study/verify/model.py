@@ -2,7 +2,7 @@
 
 import flint
 
-from tmsopt.models.tms import tms
+from tmsopt.models.tms import matrices, tms
 from tmsopt.roots.polynomial import quadratic_pencil
 from tmsopt.study.verify import printed
 from tmsopt.study.verify.algebra import polynomials, q, ring
@@ -29,7 +29,7 @@ def _nine() -> Outcome:
     names = [name for name in tms.sets[1].names if name != "g"]
     w, v, g, T, m_B, x_B, z_B, m_H, x_H, z_H = variables = ring("w v g T m_B x_B z_B m_H x_H z_H")
     # Fr stands squared or beside a1 and a3; Fr² in place of Fr shows the same dependence without a root
-    a = printed.copo(v**2 / (g * w), m_H / m_B, x_B / w, x_H / w, z_B / w, z_H / w, T)
+    a = printed.coefficients(v**2 / (g * w), m_H / m_B, x_B / w, x_H / w, z_B / w, z_H / w, T)
     matters = [
         any(
             c.over.derivative(str(x.over)) * c.under != c.over * c.under.derivative(str(x.over))
@@ -89,7 +89,7 @@ def _distance() -> Outcome:
 )
 def _forces() -> Outcome:
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T, cosine = polynomials(f"{_NAMES} cosine")
-    _, V, P = printed.matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T * cosine, cosine)
+    _, V, P = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T * cosine, cosine)
     parts = [X[0][1] + sign * X[1][0] for X in (V, P) for sign in (1, -1)]
     circulatory = parts[3]
     determinant = 4 * V[0][0] * V[1][1] - parts[0] ** 2
@@ -112,9 +112,9 @@ def _coefficient(order: int) -> Claim:
     )
     def check() -> Outcome:
         Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T, cosine = polynomials(f"{_NAMES} cosine")
-        M, V, P = printed.matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T * cosine, cosine)
+        M, V, P = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T * cosine, cosine)
         factor = mu * cosine * printed.nu_H(chi_H, zeta_H, T * cosine, cosine)
-        claimed = printed.copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)[order]
+        claimed = printed.coefficients(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)[order]
         return proof(
             quadratic_pencil(M, V, P)[order] == factor * claimed,
             otherwise="The coefficient of the determinant is another.",
@@ -134,13 +134,13 @@ a0, a1, a2, a3, a4 = (_coefficient(order) for order in range(5))
 )
 def _scale() -> Outcome:
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = polynomials(_NAMES)
-    M, V, P = printed.matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T, T * 0 + 1)
+    M, V, P = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T, T * 0 + 1)
     nu = printed.nu_H(chi_H, zeta_H, T, T * 0 + 1)
-    a = printed.copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    a = printed.coefficients(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
     under = all(d == mu * nu * c for d, c in zip(quadratic_pencil(M, V, P), a, strict=True))
     design = (q(1), q(1), q(2), q(1), q(-2), q(-1))  # Fr, mu, chi_B, chi_H, zeta_B, zeta_H
-    upright = quadratic_pencil(*printed.matrices(*design, q(0), q(1)))
-    cubic = printed.copo(*design, q(0))
+    upright = quadratic_pencil(*matrices(*design, q(0), q(1)))
+    cubic = printed.coefficients(*design, q(0))
     return universal(
         "up to the factor μ ν_H cos λ_s, which must not be 0",
         under,

@@ -17,6 +17,7 @@ from tmsopt.study.verify.algebra import (
     stable,
     substitute,
 )
+from tmsopt.study.verify.edges import ep3_left
 from tmsopt.study.verify.entry import Claim, Outcome, proof, section, universal
 from tmsopt.study.verify.upright import HEIGHTS, double_pair, ep4, normal, palindrome, quartic, tilt_of_EP4
 
@@ -278,8 +279,6 @@ def _dp_omega0() -> Outcome:
     "certified real roots of rational bicycles 0.1 from χ_B = √2 on either side, and the EP3 that ends their domain",
 )
 def _robust() -> Outcome:
-    from tmsopt.study.verify.edges import ep3_left
-
     below = heavily_damped(copo(q("2.06"), q(0), q("1.3142"), q(1), *HEIGHTS, q("0.18")))
     above = heavily_damped(copo(q("2.22"), q(0), q("1.5142"), q(1), *HEIGHTS, q("0.22")))
     left = ep3_left()["T"].atan()

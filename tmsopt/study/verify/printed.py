@@ -6,8 +6,8 @@ Fourth and square roots are left out: a formula for ω0 gives ω0⁴, one for Fr
 from typing import Any
 
 
-def copo(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, T: Any) -> list[Any]:
-    """Coefficients a0 … a4 (copo)."""
+def coefficients(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, T: Any) -> list[Any]:
+    """a0 … a4 (copo), in the printed arrangement."""
     return [
         -(zeta_H * T - chi_H + 1) * zeta_B**2,
         Fr * (zeta_B * chi_H - zeta_H * chi_B) * zeta_B,
@@ -15,23 +15,6 @@ def copo(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, T: 
         -Fr * (chi_B - chi_H) * zeta_B,
         -zeta_B * T - mu * (chi_H - 1),
     ]
-
-
-def matrices(
-    Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, sine: Any, cosine: Any
-) -> tuple[list[list[Any]], list[list[Any]], list[list[Any]]]:
-    """M, V, P (matrices)."""
-    nu = nu_H(chi_H, zeta_H, sine, cosine)
-    M = [[mu * zeta_H**2 + zeta_B**2, -mu * zeta_H * nu], [-mu * zeta_H * nu, mu * nu**2]]
-    V = [
-        [0 * Fr, (-mu * chi_H * zeta_H - chi_B * zeta_B) * Fr * cosine],
-        [0 * Fr, mu * chi_H * nu * Fr * cosine],
-    ]
-    P = [
-        [mu * zeta_H + zeta_B, -(Fr**2) * cosine * (mu * zeta_H + zeta_B) - mu * nu],
-        [-mu * nu, mu * (Fr**2 * cosine - sine) * nu],
-    ]
-    return M, V, P
 
 
 def nu_H(chi_H: Any, zeta_H: Any, sine: Any, cosine: Any) -> Any:
