@@ -340,6 +340,21 @@ def test_a_heavily_damped_bicycle_can_lean_more_before_it_recovers() -> None:
         assert lean[0] == 0 < lean[2] < lean[1]
 
 
+def test_slow_heavily_damped_bicycles_stand_off_the_plane() -> None:
+    """Eigenvalues −6, −4, −3, −1/72 chosen; the design from a1, a2, a3 over a0 in fractions."""
+    x = [Fraction(6), Fraction(4), Fraction(3), Fraction(1, 72)]
+    e1, e3 = sum(x), sum(1 / k for k in x)
+    e2 = (e1**2 - sum(k * k for k in x)) / 2
+    Fr, T = (2 * e2 + 5) / (2 * e1 + e3), 3 * (2 * e2 + 5) / (2 * e1 + e3) ** 2
+    chi_B = 1 + e3 * T / Fr
+    a = oracles.polynomial_exact(Fr, 1, chi_B, 1, -2, Fraction(-1, 2), T)
+    assert [c / a[0] for c in a] == [1, e1, e2, e3, 1]
+    assert Fr < Fraction(4, 3)
+    for k in range(1, 400):  # no tilt does at χ_B = 2
+        roots = oracles.certified_roots(hand(Fr, Fraction(k, 100) ** 2))
+        assert not all(z.imag == 0 and z.real < 0 for z, _ in roots)
+
+
 def test_dp_is_empty_for_lower_rear_mass() -> None:
     """ζ_B = −1/2, ζ_H = −2: ω0 = −1, and (tls) in fractions."""
     zeta_B, zeta_H = Fraction(-1, 2), Fraction(-2)

@@ -232,7 +232,7 @@ def _block() -> Outcome:
 @_claim(
     "fig0-benchmark",
     "caption of Fig. fig0; text",
-    "the benchmark is generic: no multiple eigenvalue marks its growth rates",
+    "the benchmark is generic: its growth rates meet no EP4",
     "the EP4 condition (a3/a1)² = a4/a0 of the benchmark, in balls",
 )
 def _generic() -> Outcome:

@@ -115,7 +115,7 @@ def _tangent() -> Outcome:
         "the EP4 at "
         f"Fr = {ep4()['Fr'].str(6, radius=False)} and λ_s = {ep4()['T'].atan().str(8, radius=False)}: too near to "
         f"tell apart "
-        "in the figure.",
+        "in the figure. With the axes exchanged the tangent is vertical nowhere.",
     )
 
 

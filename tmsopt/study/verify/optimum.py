@@ -5,6 +5,7 @@ from typing import Any
 import flint
 
 from tmsopt.models.tms import copo
+from tmsopt.roots.polynomial import product
 from tmsopt.study.verify import printed
 from tmsopt.study.verify.abscissa import product_bound
 from tmsopt.study.verify.algebra import (
@@ -18,7 +19,7 @@ from tmsopt.study.verify.algebra import (
     substitute,
 )
 from tmsopt.study.verify.edges import ep3_left
-from tmsopt.study.verify.entry import Claim, Outcome, proof, section, universal
+from tmsopt.study.verify.entry import EXACT, Claim, Outcome, proof, section, universal
 from tmsopt.study.verify.upright import HEIGHTS, double_pair, ep4, normal, palindrome, quartic, tilt_of_EP4
 
 _claim = section("2.4.4 Localization of the EP set and stability optimization")
@@ -206,6 +207,55 @@ def _steepest() -> Outcome:
     )
 
 
+SLOW = tuple(q(x) for x in ("6", "4", "3", "1/72"))
+"""Minus the eigenvalues of a slow heavily damped bicycle with ζ_B = −2, ζ_H = −1/2 (r = 2, h = 1)."""
+
+
+def slow_bicycle() -> tuple[Any, Any, Any]:
+    """Its Fr, χ_B and tan λ_s."""
+    e = product(*[[1, x] for x in SLOW])
+    sums = 2 * e[1] + e[3]
+    Fr, T = (2 * e[2] + 5) / sums, 3 * (2 * e[2] + 5) / sums**2
+    return Fr, 1 + e[3] * T / Fr, T
+
+
+def _none_in_the_plane() -> bool:
+    """At χ_B = r, u1 = −v and u2 = −w obey (r v − f (r + 1))(r w − f (r + 1)) = (r + 1)² (f² − r).
+
+    With f < 2 r/(r + 1) ≤ √r the right side is negative, the left positive for v, w ≥ 2.
+    """
+    f, r, v, w, root = ring("f r v w root")
+    relation = r * (v * w + 2) + r**2 + 1 - f * (r + 1) * (v + w)
+    apart = (r * v - f * (r + 1)) * (r * w - f * (r + 1)) - (r + 1) ** 2 * (f**2 - r)
+    below = root - 2 * root**2 / (root**2 + 1) == root * (root - 1) ** 2 / (root**2 + 1)
+    return bool(apart == r * relation and below)
+
+
+@_claim(
+    "fig00-always",
+    "text; Fig. fig00, lower left",
+    "that maximum is always attained at a singular point of the EP set",
+    "the equation for u1, u2 in the plane at small Fr, as polynomials; a bicycle with chosen rational eigenvalues",
+)
+def _always() -> Outcome:
+    Fr, chi_B, T = slow_bicycle()
+    p = copo(Fr, q(0), chi_B, q(1), q(-2), q("-0.5"), T)
+    eigenvalues = [c / p[0] for c in p] == product(*[[1, x] for x in SLOW])
+    r = flint.arb(2).sqrt()
+    lower_left = bool((ep4()["Fr"] - flint.arb(q("0.1"))) * (r / 5).sqrt() < 2 * r / (r + 1))
+    return universal(
+        "Fr ≥ Fr_EP4, the cases that the sentence then names",
+        _steepest.check().verdict == EXACT,
+        f"ζ_B = −2, ζ_H = −1/2, χ_B = {chi_B}, tan λ_s = {T}, Fr = {Fr} has the eigenvalues −6, −4, −3, −1/72, "
+        f"while at "
+        "χ_B = √(ζ_B/ζ_H) = 2 no tilt gives heavy damping at any Fr < 4/3",
+        eigenvalues and heavily_damped(p) and Fr < q("4/3") and _none_in_the_plane(),
+        remark="The lower left part of Fig. fig00, Fr = Fr_EP4 − 0.1, is such a speed: there √2 is no maximizer."
+        if lower_left
+        else "",
+    )
+
+
 @_claim(
     "EP4-steepest",
     "text",
@@ -294,5 +344,5 @@ def _robust() -> Outcome:
 
 
 CLAIMS: tuple[Claim, ...] = (
-    _inside, _bounds, _onset, _steepest, _absolute, _abscissa, _dp, _dp_omega0, _robust,
+    _inside, _bounds, _onset, _steepest, _always, _absolute, _abscissa, _dp, _dp_omega0, _robust,
 )  # fmt: skip
