@@ -134,6 +134,18 @@ def test_every_change_along_random_lines_lies_on_an_arc(planes, name):
 
 
 @pytest.mark.parametrize("name", PLANES)
+def test_arcs_cross_a_line_as_often_as_the_domain_changes(planes, name):
+    """No arc is drawn twice, as on the law, where two double roots at once belong to one arc; and none is spurious."""
+    plane = planes[name]
+    for which, inside in (("stability", stable), ("heavy_damping", damped)):
+        for height in (0.1537, 0.2211):
+            line = np.array([[0.0, height], [1.0, height]])
+            truly = list(changes(lambda y, truth=inside: truth(plane.polynomial(y)), *line, 120))
+            drawn = sum(np.count_nonzero(np.diff(arc[:, 1] > height)) for arc in plane.arcs(which))
+            assert drawn == len(truly)
+
+
+@pytest.mark.parametrize("name", PLANES)
 def test_arcs_that_merge_positive_roots_do_so(planes, name):
     """On one side of each there are two more positive real roots than on the other."""
     plane = planes[name]

@@ -402,8 +402,10 @@ def test_folds_of_the_discriminant_curves_in_speed_are_at_the_closed_form(planes
         assert len(folds) == 1
         assert folds[0].parameters["Fr"] == pytest.approx(math.sqrt(5), abs=EXACT)
     on_law = traced("EP2", BASE | {"chi_B": SQRT2}, {"Fr": (0.01, 5.0), "lambda_s": (0.01, 1.4)})
-    assert [e.parameters["Fr"] for e in events(on_law, "EP4")] == pytest.approx([FR_EP4] * len(events(on_law, "EP4")))
     assert events(on_law, "EP4")
+    for event in events(on_law, "EP4"):  # where symmetry makes the traced equations singular
+        assert event.parameters["Fr"] == pytest.approx(FR_EP4, abs=EXACT)
+        assert math.tan(event.parameters["lambda_s"]) == pytest.approx(TAN_EP4, abs=EXACT)
 
 
 def test_ep3_curve_through_space_is_a_cuspidal_edge_ending_in_ep4():
