@@ -8,6 +8,14 @@ from tmsopt.study.verify import Entry, Ledger
 _WIDTH = 100
 _INDENT = "    "
 
+_ABOUT = (
+    "This page is what `tmsopt verify --markdown problems/paper.md` writes: every number and every statement that can be "
+    "verified, computed anew by a route that does not use the printed formula. Numbers are balls that contain the true "
+    "value, shown to 40 digits; general statements are proved by exact algebra, or refuted by a counterexample in "
+    "small fractions. Statements are read in their context: λ_s > 0 and the conditions `lscf`, where the section assumes "
+    "them. Statements about the literature are not judged."
+)
+
 
 def ledger_table(ledger: Ledger) -> str:
     """Every entry under its section, wrapped, with the number of entries per verdict at the end."""
@@ -26,19 +34,13 @@ def summary(ledger: Ledger) -> list[str]:
 
 
 def ledger_page(ledger: Ledger) -> str:
-    """The ledger as a Markdown page: a summary, what is not as printed, then every entry."""
+    """The ledger as a Markdown page: a summary, then every entry under its section."""
     lines = [
         "# The paper, recomputed",
         "",
-        f"Source: {ledger.source}. This page is what `tmsopt verify --markdown problems/paper.md` writes: every "
-        f"number and",
-        "every statement that can be verified, computed anew by a route that does not use the printed formula. "
-        "Numbers are",
-        "balls that contain the true value, shown to 40 digits; general statements are proved by exact algebra, "
-        "or refuted",
-        "by a counterexample that can be checked by hand. Statements are read in their context: λ_s > 0 and the "
-        "conditions",
-        "`lscf`, where the section assumes them. Statements about the literature are not judged.",
+        f"Source: {ledger.source}.",
+        "",
+        *textwrap.wrap(_ABOUT, _WIDTH + 20),
         "",
         "| verdict | entries |",
         "|---|---:|",

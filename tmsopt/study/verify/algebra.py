@@ -179,6 +179,11 @@ def solve(equations: Sequence[Polynomial], guess: Mapping[str, float], known: Ma
     Raises:
         ArithmeticError: where no unique solution is proved.
     """
+    with flint.ctx.workdps(PRECISION):
+        return _solve(equations, guess, known)
+
+
+def _solve(equations: Sequence[Polynomial], guess: Mapping[str, float], known: Mapping[str, Any]) -> dict[str, Ball]:
     names = list(guess)
     slopes = [[equation.derivative(name) for name in names] for equation in equations]
     at = {name: flint.arb(value) for name, value in guess.items()}

@@ -19,6 +19,7 @@ from tmsopt.study.verify.algebra import (
     stable,
 )
 from tmsopt.study.verify.entry import Claim, Outcome, digits, proof, section, universal
+from tmsopt.study.verify.stability import designs
 from tmsopt.study.verify.upright import (
     HEIGHTS,
     ep4,
@@ -56,7 +57,14 @@ def _standstill() -> Outcome:
     T, r, scale = ring("T r q")
     b = normal(0 * T, r, T, r, scale)
     even = b[1] == 0 and b[3] == 0 and b[2] == -(r + 1 / r) and b[4] == 1
-    return proof(even, "They are ±√r |ω0| and ±|ω0|/√r, r = √(ζ_B/ζ_H), whatever λ_s; also for χ_H ≠ 1 if a0 a4 > 0.")
+    others = [copo(q(0), *design[1:]) for design, _ in designs()]
+    upright = [a for a in others if a[0] * a[4] > 0]
+    general = all(a[0] * a[2] < 0 and a[2] ** 2 >= 4 * a[0] * a[4] for a in upright)
+    return proof(
+        even and general,
+        "They are ±√r |ω0| and ±|ω0|/√r, r = √(ζ_B/ζ_H), whatever λ_s. So it is for χ_H ≠ 1 where a0 a4 > 0, in "
+        f"{len(upright)} random rational bicycles.",
+    )
 
 
 @_claim(
