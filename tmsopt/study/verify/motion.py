@@ -19,7 +19,7 @@ from tmsopt.study.verify.algebra import (
     stable,
 )
 from tmsopt.study.verify.entry import Claim, Outcome, digits, proof, section, universal
-from tmsopt.study.verify.stability import designs
+from tmsopt.study.verify.stability import standstill_identity
 from tmsopt.study.verify.upright import (
     HEIGHTS,
     ep4,
@@ -51,20 +51,28 @@ def _grown() -> tuple[Quotient, Quotient, tuple[Quotient, ...]]:
     "motion-standstill",
     "text",
     "at Fr = 0 there are two real negative and two real positive eigenvalues",
-    "factorisation of the even polynomial at Fr = 0, in r and q",
+    "factorisation of the even polynomial at Fr = 0, in r and q; for any χ_H the symmetric matrices M and P",
 )
 def _standstill() -> Outcome:
     T, r, scale = ring("T r q")
     b = normal(0 * T, r, T, r, scale)
     even = b[1] == 0 and b[3] == 0 and b[2] == -(r + 1 / r) and b[4] == 1
-    others = [copo(q(0), *design[1:]) for design, _ in designs()]
-    upright = [a for a in others if a[0] * a[4] > 0]
-    general = all(a[0] * a[2] < 0 and a[2] ** 2 >= 4 * a[0] * a[4] for a in upright)
     return proof(
-        even and general,
-        "They are ±√r |ω0| and ±|ω0|/√r, r = √(ζ_B/ζ_H), whatever λ_s. So it is for χ_H ≠ 1 where a0 a4 > 0, in "
-        f"{len(upright)} random rational bicycles.",
+        even and real_squares() and standstill_identity(),
+        "They are ±√r |ω0| and ±|ω0|/√r, r = √(ζ_B/ζ_H), whatever λ_s. So it is for any χ_H where a0 a4 > 0: s² "
+        "is real, "
+        "as M > 0 and P are symmetric, and both s² are positive, as a2 then differs in sign from a0.",
     )
+
+
+def real_squares() -> bool:
+    """The discriminant of det(M S + P) in S, times M11², is a square plus 4 det M times a square."""
+    m11, m12, m22, p11, p12, p22 = ring("m11 m12 m22 p11 p12 p22")
+    middle = m11 * p22 + m22 * p11 - 2 * m12 * p12
+    det_M, det_P = m11 * m22 - m12**2, p11 * p22 - p12**2
+    skew = m11 * p12 - m12 * p11
+    squares = (m11 * (m11 * p22 - m22 * p11) - 2 * m12 * skew) ** 2 + 4 * det_M * skew**2
+    return bool(m11**2 * (middle**2 - 4 * det_M * det_P) == squares)
 
 
 @_claim(
