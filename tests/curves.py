@@ -14,7 +14,7 @@ import flint
 import numpy as np
 import sympy
 from mpmath import mp
-from oracles import polynomial_exact, routh_exact, symbolic_copo
+from oracles import routh_exact, symbolic_copo
 
 DIGITS = 40
 COPO, SYMBOLS = symbolic_copo()
@@ -134,11 +134,15 @@ FR_C2_SLOPE = float(3 + 2 * mp.sqrt(2))
 
 def exact_polynomial(design: Mapping[str, Any]) -> list[Fraction]:
     """Coefficients of a dimensionless design in Fractions; tan(lambda_s) is rounded to 40 digits."""
-    rest = {n: v for n, v in design.items() if n != "lambda_s"}
     with mp.workdps(DIGITS):
-        T = mp.tan(mp.mpf(design["lambda_s"]))
-    sign, mantissa, exponent, _ = T._mpf_
-    return polynomial_exact(**rest, tan_lambda_s=(-1) ** sign * int(mantissa) * Fraction(2) ** int(exponent))
+        sign, mantissa, exponent, _ = mp.tan(mp.mpf(design["lambda_s"]))._mpf_
+    T = flint.fmpq((-1) ** sign * int(mantissa)) * flint.fmpq(2) ** exponent
+    rest = [flint.fmpq(*float(design[n]).as_integer_ratio()) for n in SYMBOLS if n != "T"]
+    return [Fraction(int(a.p), int(a.q)) for a in map(flint.fmpq, _EXACT(*rest, T))]
+
+
+_EXACT = sympy.lambdify(list(SYMBOLS.values()), COPO, modules="math")
+"""By + - * and whole powers alone; fast in FLINT's rationals."""
 
 
 def sturm(coefficients: Sequence[Any]) -> tuple[int, int, int]:

@@ -140,7 +140,7 @@ def test_arcs_cross_a_line_as_often_as_the_domain_changes(planes, name):
     for which, inside in (("stability", stable), ("heavy_damping", damped)):
         for height in (0.1537, 0.2211):
             line = np.array([[0.0, height], [1.0, height]])
-            truly = list(changes(lambda y, truth=inside: truth(plane.polynomial(y)), *line, 120))
+            truly = list(changes(lambda y, truth=inside: truth(plane.polynomial(y)), *line, 70))
             drawn = sum(np.count_nonzero(np.diff(arc[:, 1] > height)) for arc in plane.arcs(which))
             assert drawn == len(truly)
 

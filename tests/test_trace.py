@@ -200,10 +200,10 @@ def test_the_file_of_the_ep_set_is_the_same_curve():
     law = laws.epset(-0.4, -0.2, branch.parameters["lambda_s"])
     # near 85 degrees dFr/dlambda is 60: rounding of the stored angle alone
     assert np.abs(branch.parameters["Fr"] - law).max() <= 2e-13
-    assert [e.name for e in events(found, "EP4")] == ["EP4"]
+    assert len(events(found, "EP4")) == 1
 
 
-@settings(max_examples=4, deadline=None, derandomize=True)
+@settings(max_examples=3, deadline=None, derandomize=True)
 @given(st.floats(-1.0, -0.15), st.floats(1.3, 3.0), st.booleans())
 def test_ep4_of_any_heights_lies_on_its_traced_ep_set(upper, ratio, mirrored):
     """Either class: lambda_s > 0 for |zeta_B| > |zeta_H|, else lambda_s < 0."""
