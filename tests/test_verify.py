@@ -398,6 +398,10 @@ def test_heavy_damping_is_never_steeper_than_the_EP4_or_the_2EP2() -> None:
         assert np.allclose([float(c / a[0]) * h ** (i / 2) for i, c in enumerate(a)], np.poly(-x[k]), rtol=1e-9)
     top = (r - 1) * (r**2 + 6 * r + 1) / (16 * h * (r + 1))
     assert np.all(tilt <= top * (1 + 1e-12))
+    kappa = e3 / e1  # r (χ_B − 1)/(r² − χ_B): below 1 for χ_B < r
+    beside = kappa < 1
+    low = (r**2 - 1) * kappa**2 * (r**2 + 6 * r + 1) / (16 * h * (r + kappa) ** 2)
+    assert np.all(tilt[beside] <= low[beside] * (1 + 1e-12))
     at_EP4 = (r**2 + 6 * r + 1) / (4 * (r + 1))
     faster = speed > at_EP4
     assert faster.sum() > 1000

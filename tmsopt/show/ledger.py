@@ -10,8 +10,8 @@ _INDENT = "    "
 
 _ABOUT = (
     "This page is what `tmsopt verify --markdown problems/paper.md` writes: every number and every statement that can "
-    "be verified, computed anew by a route that does not use the printed formula. Numbers are balls that contain the true "
-    "value, shown to 40 digits; general statements are proved by exact algebra, or refuted by a counterexample in "
+    "be verified, computed anew by a route that does not use the printed formula. Numbers are balls that contain the "
+    "true value, shown to 40 digits; general statements are proved by exact algebra, or refuted by a counterexample in "
     "small fractions. Statements are read in their context: λ_s > 0 and the conditions `lscf`, where the section "
     "assumes them. Statements about the literature are not judged."
 )

@@ -47,7 +47,7 @@ def _close() -> Outcome:
         f"1.526² = {CHI_B**2} against ζ_B/ζ_H = {ZETA_B / ZETA_H}",
         CHI_B**2 != ZETA_B / ZETA_H,
         computed=digits(gap),
-        remark="The number is the relative difference. The two digits read off the photograph decide the third.",
+        remark="The number is the relative difference.",
     )
 
 

@@ -331,6 +331,13 @@ def _dp_omega0() -> Outcome:
 def _robust() -> Outcome:
     below = heavily_damped(copo(q("2.06"), q(0), q("1.3142"), q(1), *HEIGHTS, q("0.18")))
     above = heavily_damped(copo(q("2.22"), q(0), q("1.5142"), q(1), *HEIGHTS, q("0.22")))
+    Fr, chi, T, ratio, scale = ring("Fr chi_B T r q")
+    b = normal(Fr, chi, T, ratio, scale)
+    fixed = b[3] * (ratio**2 - chi) == b[1] * ratio * (chi - 1)
+    r = flint.arb(2).sqrt()
+    chi_B = r - flint.arb(q("0.1"))
+    kappa = r * (chi_B - 1) / (r**2 - chi_B)
+    bound = (r**2 - 1) * kappa**2 * (r**2 + 6 * r + 1) / (16 * r / 5 * (r + kappa) ** 2)
     left = ep3_left()["T"].atan()
     top = ep4()["T"].atan()
     share = left / top
@@ -338,8 +345,9 @@ def _robust() -> Outcome:
         "'large enough' read as not empty: rational bicycles at χ_B = √2 ± 0.1 are heavily damped; but at √2 − 0.1 the "
         f"cusp of the domain lies at {float(share.mid()):.0%} of the tilt of the EP4",
         below and above and stable(copo(q("2.06"), q(0), q("1.3142"), q(1), *HEIGHTS, q("0.18"))),
-        "tan λ_s = 2/5 allows heavy damping at χ_B = √2 and, by the EP3, none at √2 − 0.1",
-        bool(left < q("0.38")) and bool(top > q("0.4")),
+        "tan λ_s = 2/5 allows heavy damping at χ_B = √2, but at √2 − 0.1 heavy damping needs tan λ_s ≤ "
+        f"{bound.str(4, radius=False)}, as a3/a1 is fixed there: e3 = κ e1 with κ < 1, e1 ≥ 4/κ and e2 ≤ (3/8) κ² e1²",
+        newton_inequalities() and tilt_of_roots() and fixed and bool(bound < q("0.4")) and bool(ep4()["T"] > q("0.4")),
     )
 
 
