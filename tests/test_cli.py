@@ -140,3 +140,13 @@ def test_the_script_in_problems_runs():
     assert (done.returncode, done.stderr) == (0, "")
     assert len(done.stdout.splitlines()) >= 5
     assert Path("problems/heights.py").read_text().startswith('"""')
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a disk that is always full")
+def test_an_answer_that_cannot_be_written_is_no_traceback():
+    command = [sys.executable, "-c", "from tmsopt.cli import main; main()", "figure", "--list"]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=120, check=False)
+    assert done.returncode == 2
+    assert "cannot be written" in done.stderr
+    assert "Traceback" not in done.stderr

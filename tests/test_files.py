@@ -185,4 +185,4 @@ def test_minimum_equal_to_maximum_fixes(write):
 
 @pytest.mark.parametrize("path", sorted(Path("problems").glob("*.toml")), ids=lambda p: p.stem)
 def test_every_problem_in_the_repository_loads(path):
-    assert tmsopt.load(path).title
+    assert tmsopt.load(path, asks=False).title

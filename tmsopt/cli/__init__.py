@@ -1,18 +1,35 @@
 """The tmsopt command: thin commands over the library; heavy imports stand inside them."""
 
+import errno
 import sys
+from typing import Any
 
 import click
 
 from tmsopt import __version__
 from tmsopt.cli.chart import chart
+from tmsopt.cli.common import BAD_INPUT
 from tmsopt.cli.figure import figure
 from tmsopt.cli.solve import compare, solve
 from tmsopt.cli.trace import trace
 from tmsopt.cli.verify import verify
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+class _Commands(click.Group):
+    """Commands whose answer may meet a full disk."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; what cannot be written ends it with a message."""
+        try:
+            return super().invoke(ctx)
+        except OSError as error:
+            if error.errno == errno.EPIPE:  # the reader has enough: click ends quietly
+                raise
+            click.echo(f"the answer cannot be written: {error}; give a file or a device with room", err=True)
+            sys.exit(BAD_INPUT)
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="tmsopt")
 def main() -> None:
     """Design self-stable bicycles under your own constraints, and localise exceptional points.
@@ -21,6 +38,10 @@ def main() -> None:
     Examples:
       tmsopt solve problems/ep4.toml
       tmsopt compare problems/ep4.toml
+      tmsopt trace problems/ep_set.toml --plot ep_set.png
+      tmsopt chart problems/chart.toml --plot chart.png
+      tmsopt figure all --output figures
+      tmsopt verify
     """
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):

@@ -53,8 +53,12 @@ def check_output(option: str, path: Path | None, endings: Sequence[str]) -> None
 
     if path.suffix.lstrip(".").lower() not in endings:
         raise InputError([Fault(f"found '{path}'; accepted: a file name ending in {', '.join(endings)}", (option,))])
-    if path.is_dir() or not path.parent.is_dir():
-        problem = "is a directory" if path.is_dir() else "is in a directory that does not exist"
+    try:
+        problem = "is a directory" if path.is_dir() else ""
+        problem = problem or ("" if path.parent.is_dir() else "is in a directory that does not exist")
+    except OSError as error:  # a name longer than the file system takes
+        problem = f"is no name for a file here ({error.strerror})"
+    if problem:
         raise InputError([Fault(f"'{path}' {problem}; give the path of a file to write", (option,))])
 
 

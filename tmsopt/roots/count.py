@@ -1,5 +1,8 @@
 """Number of real roots from the coefficients alone, by Sturm's theorem, for arrays of polynomials."""
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -8,16 +11,46 @@ from tmsopt.roots.exact import exact_roots
 Array = NDArray[np.float64]
 Counts = NDArray[np.int_]
 
-_CANCELLED = 1e-9
-"""A leading coefficient of a remainder this small, relative to its terms, may be 0: then exact arithmetic decides."""
+_UNIT = 2 * np.finfo(float).eps
+"""Bound of the rounding of one operation, relative to its result; the double of it pays for that of the bounds."""
+
+_SMALLEST = 1e-290  # scaled coefficients below may have lost digits
+
+
+@dataclass(frozen=True)
+class _Bounded:
+    """Numbers with bounds of their errors, which every operation carries on."""
+
+    value: Array
+    error: Array
+
+    def __getitem__(self, index: Any) -> "_Bounded":
+        return _Bounded(self.value[index], self.error[index])
+
+    def __sub__(self, other: "_Bounded") -> "_Bounded":
+        return _rounded(self.value - other.value, self.error + other.error)
+
+    def __mul__(self, other: "_Bounded") -> "_Bounded":
+        own, others = np.abs(self.value), np.abs(other.value)
+        return _rounded(self.value * other.value, own * other.error + (others + other.error) * self.error)
+
+    def __truediv__(self, other: "_Bounded") -> "_Bounded":
+        quotient = self.value / other.value
+        room = np.abs(other.value) - other.error
+        error = (self.error + np.abs(quotient) * other.error) / np.where(room > 0, room, np.nan)
+        return _rounded(quotient, np.where(room > 0, error, np.inf))
+
+
+def _rounded(value: Array, error: Array) -> _Bounded:
+    return _Bounded(value, error + _UNIT * np.abs(value))
 
 
 def real_roots(coefficients: ArrayLike) -> tuple[Counts, Counts]:
     """Numbers of negative and of positive real roots, each multiple root counted once.
 
     Coefficients of shape (…, n + 1), descending, with a leading one other than 0; both answers have shape (…).
-    The rows where the sequence comes near a degenerate one, as beside an exceptional point, are decided in exact
-    arithmetic from the coefficients as stored.
+    The rows in which rounding could change a sign of the sequence, as beside an exceptional point, are decided in
+    exact arithmetic from the coefficients as stored.
 
     Raises:
         ValueError: for a leading coefficient 0 or coefficients that are not finite.
@@ -33,48 +66,51 @@ def real_roots(coefficients: ArrayLike) -> tuple[Counts, Counts]:
     return negative.reshape(c.shape[:-1]), positive.reshape(c.shape[:-1])
 
 
-def _scaled(c: Array) -> Array:
-    """Monic, in units of the largest term of the Fujiwara bound, so that no coefficient exceeds 1 by much."""
-    monic = c / c[:, :1]
-    n = c.shape[1] - 1
-    radius = np.max(np.abs(monic[:, 1:]) ** (1 / np.arange(1, n + 1)), axis=1)
-    return np.asarray(monic / np.where(radius > 0, radius, 1.0)[:, None] ** np.arange(n + 1))
+def _scaled(c: Array) -> _Bounded:
+    """In units near the largest term of the Fujiwara bound, a leading one near 1: powers of 2, so without rounding."""
+    n = np.arange(c.shape[1])
+    _, exponent = np.frexp(c)
+    above = np.where(c[:, 1:] != 0, (exponent[:, 1:] - exponent[:, :1]) / n[1:], -np.inf).max(axis=1)
+    unit = np.where(np.isfinite(above), np.ceil(above), 0).astype(int)
+    value = np.ldexp(c, -exponent[:, :1] - unit[:, None] * n)
+    lost = (np.abs(value) < _SMALLEST) & (c != 0)
+    return _Bounded(value, np.where(lost, np.inf, 0.0))
 
 
-def _sturm(c: Array) -> tuple[Counts, Counts, NDArray[np.bool_]]:
-    """Counts by sign changes at −∞, 0 and ∞, and where they may be wrong: degrees must fall one by one."""
-    n = c.shape[1] - 1
-    chain = [c, c[:, :-1] * np.arange(n, 0, -1)]
-    doubtful = np.zeros(len(c), dtype=bool)
+def _sturm(c: _Bounded) -> tuple[Counts, Counts, NDArray[np.bool_]]:
+    """Counts by sign changes at −∞, 0 and ∞, and where a sign that they rest on is in doubt."""
+    n = c.value.shape[1] - 1
+    power = np.arange(n, 0, -1.0)
+    chain = [c, _rounded(c.value[:, :-1] * power, c.error[:, :-1] * power)]
     with np.errstate(all="ignore"):
         for _ in range(n - 1):
-            remainder, size = _remainder(chain[-2], chain[-1])
-            doubtful |= ~(np.abs(remainder[:, 0]) > _CANCELLED * size)
-            unit = np.abs(remainder).max(axis=1, keepdims=True)
-            chain.append(-remainder / np.where(unit > 0, unit, 1.0))
-    lead = np.sign(np.stack([p[:, 0] for p in chain], axis=1))
-    constant = np.sign(np.stack([p[:, -1] for p in chain], axis=1))
+            chain.append(_next(chain[-2], chain[-1]))
+    ends = [
+        _Bounded(np.stack([p.value[:, k] for p in chain], 1), np.stack([p.error[:, k] for p in chain], 1))
+        for k in (0, -1)
+    ]
+    certain = [np.all(np.abs(end.value) > end.error, axis=1) for end in ends]
+    lead, constant = (np.sign(end.value) for end in ends)
     at_minus = lead * (-1.0) ** np.arange(n, -1, -1)
     left, middle, right = (_variations(signs) for signs in (at_minus, constant, lead))
-    return left - middle, middle - right, doubtful | (c[:, -1] == 0)
+    return left - middle, middle - right, ~(certain[0] & certain[1])
 
 
-def _remainder(p: Array, q: Array) -> tuple[Array, Array]:
-    """p mod q for degrees one apart, and the size of the terms that its leading coefficient is summed from."""
+def _next(p: _Bounded, q: _Bounded) -> _Bounded:
+    """−(p mod q) for degrees one apart, in units of its largest coefficient."""
     lead = q[:, :1]
     first = p[:, :1] / lead
-    rest = p[:, 1:].copy()
-    rest[:, :-1] -= first * q[:, 1:]
+    rest = p[:, 1:-1] - first * q[:, 1:]
     second = rest[:, :1] / lead
-    terms = np.abs(p[:, 2:3]) + np.abs(second * q[:, 1:2])
-    if q.shape[1] > 2:
-        terms = terms + np.abs(first * q[:, 2:3])
-    return rest[:, 1:] - second * q[:, 1:], terms[:, 0]
+    tail = _Bounded(
+        *(np.concatenate(pair, 1) for pair in ((rest.value, p.value[:, -1:]), (rest.error, p.error[:, -1:])))
+    )
+    remainder = second * q[:, 1:] - tail[:, 1:]
+    largest = np.abs(remainder.value).max(axis=1, keepdims=True)
+    _, exponent = np.frexp(np.where(np.isfinite(largest) & (largest > 0), largest, 1.0))
+    return _Bounded(np.ldexp(remainder.value, -exponent), np.ldexp(remainder.error, -exponent))
 
 
 def _variations(signs: Array) -> Counts:
-    """Sign changes along each row, zeros skipped."""
-    filled = signs.copy()
-    for k in range(1, filled.shape[1]):
-        filled[:, k] = np.where(filled[:, k] == 0, filled[:, k - 1], filled[:, k])
-    return np.asarray(np.sum(filled[:, 1:] * filled[:, :-1] < 0, axis=1), dtype=int)
+    """Sign changes along each row, none of which is 0."""
+    return np.asarray(np.sum(signs[:, 1:] * signs[:, :-1] < 0, axis=1), dtype=int)
