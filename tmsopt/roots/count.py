@@ -1,5 +1,6 @@
 """Number of real roots from the coefficients alone, by Sturm's theorem, for arrays of polynomials."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,6 +46,11 @@ def _rounded(value: Array, error: Array) -> _Bounded:
     return _Bounded(value, error + _UNIT * np.abs(value))
 
 
+def _beside(parts: Sequence[_Bounded]) -> _Bounded:
+    """Columns side by side."""
+    return _Bounded(np.concatenate([p.value for p in parts], 1), np.concatenate([p.error for p in parts], 1))
+
+
 def real_roots(coefficients: ArrayLike) -> tuple[Counts, Counts]:
     """Numbers of negative and of positive real roots, each multiple root counted once.
 
@@ -85,10 +91,7 @@ def _sturm(c: _Bounded) -> tuple[Counts, Counts, NDArray[np.bool_]]:
     with np.errstate(all="ignore"):
         for _ in range(n - 1):
             chain.append(_next(chain[-2], chain[-1]))
-    ends = [
-        _Bounded(np.stack([p.value[:, k] for p in chain], 1), np.stack([p.error[:, k] for p in chain], 1))
-        for k in (0, -1)
-    ]
+    ends = [_beside([p[:, end] for p in chain]) for end in (slice(0, 1), slice(-1, None))]
     certain = [np.all(np.abs(end.value) > end.error, axis=1) for end in ends]
     lead, constant = (np.sign(end.value) for end in ends)
     at_minus = lead * (-1.0) ** np.arange(n, -1, -1)
@@ -102,10 +105,8 @@ def _next(p: _Bounded, q: _Bounded) -> _Bounded:
     first = p[:, :1] / lead
     rest = p[:, 1:-1] - first * q[:, 1:]
     second = rest[:, :1] / lead
-    tail = _Bounded(
-        *(np.concatenate(pair, 1) for pair in ((rest.value, p.value[:, -1:]), (rest.error, p.error[:, -1:])))
-    )
-    remainder = second * q[:, 1:] - tail[:, 1:]
+    tail = _beside([rest[:, 1:], p[:, -1:]])
+    remainder = second * q[:, 1:] - tail
     largest = np.abs(remainder.value).max(axis=1, keepdims=True)
     _, exponent = np.frexp(np.where(np.isfinite(largest) & (largest > 0), largest, 1.0))
     return _Bounded(np.ldexp(remainder.value, -exponent), np.ldexp(remainder.error, -exponent))
