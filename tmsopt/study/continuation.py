@@ -29,6 +29,7 @@ _SOLVED = 1e-10
 _FAR = 1e6  # in units of the scale; further out the equations lose their digits
 _SAME = 1e-7
 CLOSED = "closed"
+INFINITE = "a root goes to infinity: a0 vanishes"
 _ISOLATED = 1e-10  # singular values, relative to the largest, below which an equation has no influence
 
 
@@ -179,7 +180,7 @@ def walk(on: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
         ys.append(new)
         ts.append(tangent)
         if largest > _FAR:
-            return _ended(ys, ts, End("a root goes to infinity: a0 vanishes"))
+            return _ended(ys, ts, End(INFINITE))
         y, t, s = new, tangent, s * _GROWTH
     return _ended(ys, ts, End(f"stopped after {most} points"))
 

@@ -4,23 +4,24 @@ A boundary is not read off a grid: each arc is a traced root pattern, cut where 
 the imaginary axis, or real.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
-from tmsopt.design.starts import spread
-from tmsopt.models import Values
-from tmsopt.roots import is_stable
+from tmsopt.roots import PATTERNS
 from tmsopt.study.branch import Branch, Event
-from tmsopt.study.continuation import Walk, both_ways, contains, curve, project
+from tmsopt.study.continuation import INFINITE
+from tmsopt.study.infinity import Infinity, through_infinity
 from tmsopt.study.trace import STARTS, STEP, trace
 
 Array = NDArray[np.float64]
+
+_CLOSE = 1e-3
+"""Widths of the box between the last point before infinity, some 1e-6 off, and the corner that it belongs to."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,10 @@ class Arc:
 
 @dataclass(frozen=True)
 class Corner:
-    """A point where arcs of a boundary meet or turn back: ``EP3`` is a cusp, ``2EP2`` a crossing."""
+    """A point where arcs of a boundary meet or turn back: ``EP3`` is a cusp, ``2EP2`` a crossing.
+
+    ``infinity and weave`` is where a weave boundary runs into a0 = 0, ``infinity`` where two roots go there at once.
+    """
 
     name: str
     detail: str
@@ -83,27 +87,67 @@ def domain(problem: Problem, *, step: float = STEP, starts: int = STARTS, seed: 
         name: trace(plane, name, step=step, starts=starts, seed=seed).branches for name in ("weave", "capsize", "EP2")
     }
     unstable_beyond = [b for name in ("weave", "capsize") for b in found[name]]
-    infinite = list(_through_infinity(plane, step, starts, seed))
-    stability = [arc for b in unstable_beyond for arc in _pieces(b, b.stable, plane)]
-    damping = [arc for b in found["EP2"] for arc in _pieces(b, b.heavily_damped & _once(b), plane)]
-    damping += [arc for b in found["capsize"] for arc in _pieces(b, b.heavily_damped, plane)]
-    stability += infinite
-    merging = [arc for b in found["EP2"] for arc in _pieces(b, b.unknowns["r"] > 0, plane)]
+    infinite = list(through_infinity(plane, step, starts, seed))
+    at_infinity = [c for curve in infinite for c in _changes(curve)]
+    stability = [arc for b in unstable_beyond for arc in _pieces(b, b.stable, plane, at_infinity)]
+    stability += [arc for curve in infinite for arc in _runs(curve, curve.stable)]
+    damping = [arc for b in found["EP2"] for arc in _pieces(b, b.heavily_damped & _once(b), plane, at_infinity)]
+    damping += [arc for b in found["capsize"] for arc in _pieces(b, b.heavily_damped, plane, at_infinity)]
+    damping += [arc for curve in infinite for arc in _runs(curve, curve.heavily_damped)]
+    merging = [arc for b in found["EP2"] for arc in _pieces(b, b.unknowns["r"] > 0, plane, at_infinity)]
     corners = [c for b in (*unstable_beyond, *found["EP2"]) for c in _corners(b, b.stable, b.heavily_damped, plane)]
-    return Domain(tuple(stability), tuple(damping), tuple(merging), tuple(_distinct(corners)))
+    return Domain(tuple(stability), tuple(damping), tuple(merging), tuple(_distinct([*corners, *at_infinity])))
 
 
-def _pieces(branch: Branch, inside: NDArray[np.bool_], problem: Problem) -> Iterator[Arc]:
+def _runs(curve: Infinity, inside: NDArray[np.bool_]) -> Iterator[Arc]:
+    """Runs of segments that bound a domain."""
+    for start, stop in _edges(inside):
+        yield Arc("infinity", {n: column[start : stop + 1] for n, column in curve.parameters.items()})
+
+
+def _edges(inside: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Begin and end of every run of truth."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def _changes(curve: Infinity) -> Iterator[Corner]:
+    """Corners on a0 = 0, where another boundary comes in."""
+    for row, what in curve.changes.items():
+        name, detail = (f"infinity and {what}", "a0 = 0") if what != "infinity" else ("infinity", "a0 = a1 = 0")
+        yield Corner(name, detail, {n: float(column[row]) for n, column in curve.parameters.items()})
+
+
+def _pieces(
+    branch: Branch, inside: NDArray[np.bool_], problem: Problem, at_infinity: Sequence[Corner]
+) -> Iterator[Arc]:
     """Runs of points that bound a domain; the events at their ends belong to them."""
     marked = inside.copy()
+    beyond: dict[int, Corner] = {}
     for event in branch.events:
         k = event.index
         if event.name != "end":
             marked[k] = bool(inside[max(k - 1, 0)] or inside[min(k + 1, len(branch) - 1)])
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], marked.astype(int), [0]])))
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        elif event.detail == INFINITE:
+            for corner in _near(problem, event, at_infinity):
+                beyond[k] = corner
+    for start, stop in _edges(marked):
         if stop - start > 1:
-            yield Arc(branch.pattern, {n: branch.parameters[n][start:stop] for n in problem.free})
+            rows = [{n: branch.parameters[n][k] for n in problem.free} for k in range(start, stop)]
+            before = [beyond[start].parameters] if start in beyond else []
+            after = [beyond[stop - 1].parameters] if stop - 1 in beyond else []
+            points = [*before, *rows, *after]
+            yield Arc(branch.pattern, {n: np.array([p[n] for p in points]) for n in problem.free})
+
+
+def _near(problem: Problem, event: Event, corners: Sequence[Corner]) -> list[Corner]:
+    """The corners within reach of an event, the nearest last."""
+
+    def distance(corner: Corner) -> float:
+        widths = {n: high - low for n, (low, high) in problem.free.items()}
+        return max(abs(event.parameters[n] - corner.parameters[n]) / width for n, width in widths.items())
+
+    return sorted((c for c in corners if distance(c) <= _CLOSE), key=distance, reverse=True)
 
 
 def _once(branch: Branch) -> NDArray[np.bool_]:
@@ -118,65 +162,26 @@ def _corners(
     """Events where a boundary of a domain turns, crosses another or ends inside the box."""
     inside = damped if branch.pattern == "EP2" else stable
     for event in branch.events:
-        k = event.index
-        near = inside[max(k - 1, 0)] or inside[min(k + 1, len(branch) - 1)]
-        if near and _turns(branch, event):
+        if _turns(branch, event) and np.any(inside[max(event.index - 1, 0) : event.index + 2]):
             name = "double zero" if event.name == "end" else event.name
             yield Corner(name, event.detail, {n: event.parameters[n] for n in problem.free})
 
 
 def _turns(branch: Branch, event: Event) -> bool:
     if event.name == "end":
-        return not event.detail.endswith((".min", ".max")) and "0" in event.detail and branch.pattern == "weave"
+        return event.detail in PATTERNS[branch.pattern].ends.values()
     return event.name in ("EP4", "EP3", "2EP2", "double zero", "weave", "capsize")
 
 
-def _distinct(corners: list[Corner]) -> list[Corner]:
+def _distinct(corners: Sequence[Corner]) -> list[Corner]:
     """Each place once, with every name it has: where a weave arc meets a capsize arc, both end there."""
     found: list[Corner] = []
     for corner in corners:
         for k, other in enumerate(found):
             if np.allclose(list(corner.parameters.values()), list(other.parameters.values()), rtol=1e-7, atol=1e-9):
-                names = dict.fromkeys([*other.name.split(" and "), corner.name])
+                names = dict.fromkeys([*other.name.split(" and "), *corner.name.split(" and ")])
                 found[k] = replace(other, name=" and ".join(names))
                 break
         else:
             found.append(corner)
     return found
-
-
-def _through_infinity(problem: Problem, step: float, starts: int, seed: int) -> Iterator[Arc]:
-    """Curves a0 = 0 on which the other roots are stable: there a root goes through infinity, from side to side."""
-    x = ca.SX.sym("x", 2)
-    of = problem.parameter_set
-    symbols = {n: ca.atan(x[k]) if of[n].tangent else x[k] for k, n in enumerate(problem.free)}
-    a = Values(problem.model, of, problem.ordered(symbols)).coefficients
-    if not ca.SX(a[0]).is_constant() and ca.depends_on(a[0], x):
-        ends = [[np.tan(e) if of[n].tangent else e for e in problem.free[n]] for n in problem.free]
-        lower, upper = np.array(ends).T
-        on = curve(x, ca.SX(a[0]), upper - lower, lower, upper)
-        rest = ca.Function("rest", [x], [ca.vertcat(*a[1:])])
-        walks: list[Walk] = []
-        for count, design in zip(range(starts), spread(problem, seed), strict=False):
-            start = np.array([np.tan(v) if of[n].tangent else v for n, v in design.items()]) / on.scale
-            y = project(on.evaluate, start, held=count % 2)
-            if (
-                y is None
-                or np.any(y < on.lower)
-                or np.any(y > on.upper)
-                or any(contains(on, w, y, step) for w in walks)
-            ):
-                continue
-            walked = both_ways(on, y, step, 10**6)
-            if walked is None:
-                continue
-            walks.append(walked)
-            points = walked.y * on.scale
-            c = np.array(rest.map(len(points))(points.T)).T
-            stable = np.zeros(len(points), dtype=bool)
-            proper = c[:, 0] != 0
-            stable[proper] = is_stable(c[proper])
-            columns = {n: np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, points.T, strict=True)}
-            edges = np.flatnonzero(np.diff(np.concatenate([[0], stable.astype(int), [0]])))
-            for first, last in zip(edges[::2], edges[1::2], strict=True):
-                yield Arc("infinity", {n: v[first:last] for n, v in columns.items()})

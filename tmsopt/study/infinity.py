@@ -1,0 +1,137 @@
+"""Where a root goes through infinity: the curves a0 = 0 in a plane, and what the other roots do along them.
+
+On one side of such a curve a large root is negative, on the other positive: it bounds stability where the other
+roots are stable, and heavy damping where they are real and negative.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.design.problem import Problem
+from tmsopt.design.starts import spread
+from tmsopt.models import Values
+from tmsopt.roots import discriminant, is_stable, lienard_chipart, real_roots
+from tmsopt.study.continuation import Curve, Walk, between, both_ways, contains, crossing, curve, project
+
+Array = NDArray[np.float64]
+Truth = NDArray[np.bool_]
+
+_NOTHING = 1e-12  # of the largest coefficient: a constant term this small all along the curve vanishes with a0
+
+_MOST = 10**6
+
+
+@dataclass(frozen=True)
+class Infinity:
+    """A curve a0 = 0 in the plane of two free parameters.
+
+    Attributes:
+        parameters: free parameter → values at n points.
+        stable: where it bounds stability, for each of the n - 1 segments.
+        heavily_damped: where it bounds heavy damping, likewise.
+        changes: row → what the other roots do there, ``capsize``, ``weave``, ``EP2`` or a second ``infinity``.
+    """
+
+    parameters: dict[str, Array]
+    stable: Truth
+    heavily_damped: Truth
+    changes: dict[int, str]
+
+
+def through_infinity(problem: Problem, step: float, starts: int, seed: int) -> Iterator[Infinity]:
+    """Every curve a0 = 0 found in the box of a problem with two free parameters."""
+    x = ca.SX.sym("x", 2)
+    of = problem.parameter_set
+    symbols = {n: ca.atan(x[k]) if of[n].tangent else x[k] for k, n in enumerate(problem.free)}
+    a = Values(problem.model, of, problem.ordered(symbols)).coefficients
+    if ca.SX(a[0]).is_constant() or not ca.depends_on(a[0], x):
+        return
+    ends = [[np.tan(e) if of[n].tangent else e for e in problem.free[n]] for n in problem.free]
+    lower, upper = np.array(ends).T
+    on = curve(x, ca.SX(a[0]), upper - lower, lower, upper)
+    along = ca.dot(ca.gradient(a[0], x), ca.gradient(ca.SX(a[-1]), x))
+    rest = ca.Function("rest", [x], [ca.vertcat(*a[1:], along)])
+    for walked in _walks(problem, on, step, starts, seed):
+        x_on, stable, damped, changes = _judged(on, walked, rest)
+        columns = {n: np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, x_on.T, strict=True)}
+        yield Infinity(columns, stable, damped, changes)
+
+
+def _walks(problem: Problem, on: Curve, step: float, starts: int, seed: int) -> Iterator[Walk]:
+    of = problem.parameter_set
+    walks: list[Walk] = []
+    for count, design in zip(range(starts), spread(problem, seed), strict=False):
+        start = np.array([np.tan(v) if of[n].tangent else v for n, v in design.items()]) / on.scale
+        y = project(on.evaluate, start, held=count % 2)
+        if y is None or np.any(y < on.lower) or np.any(y > on.upper) or any(contains(on, w, y, step) for w in walks):
+            continue
+        walked = both_ways(on, y, step, _MOST)
+        if walked is not None:
+            walks.append(walked)
+            yield walked
+
+
+def _judged(on: Curve, walked: Walk, rest: ca.Function) -> tuple[Array, Truth, Truth, dict[int, str]]:
+    """Points with every change among them, and what each segment between them bounds."""
+
+    def values(y: Array) -> Array:
+        return np.array(rest.map(len(y))((y * on.scale).T)).T
+
+    known = values(walked.y)
+    size = np.abs(known[:, :-1]).max(axis=1)
+    vanishing = bool(np.all(np.abs(known[:, -2]) <= _NOTHING * size))
+
+    def quantities(v: Array) -> tuple[Array, list[str]]:
+        """Columns without a zero wherever the other roots keep their class, and what a zero means."""
+        c = v[:, : -2 if vanishing else -1]
+        degree = c.shape[1] - 1
+        tests = lienard_chipart(list(c.T))
+        named = [(c[:, 0], "infinity"), *zip(tests, ["capsize"] + ["weave"] * len(tests), strict=False)]
+        if degree in (2, 3, 4):
+            named.append((discriminant(list(c.T)), "EP2"))
+        if vanishing:
+            named.append((v[:, -1], "capsize"))
+        return np.stack([q for q, _ in named], axis=-1), [name for _, name in named]
+
+    columns, names = quantities(known)
+    found: list[tuple[int, float, str]] = []
+    for k, name in enumerate(names):
+        for i in np.flatnonzero(columns[1:, k] * columns[:-1, k] < 0):
+
+            def at(s: float, i: int = int(i), k: int = k) -> float:
+                return float(quantities(values(between(on, walked.y[i], walked.t[i], s)[0][None]))[0][0, k])
+
+            end = float(walked.t[i] @ (walked.y[i + 1] - walked.y[i]))
+            if at(0.0) * at(end) <= 0:
+                found.append((int(i), crossing(at, end), name))
+    y = list(walked.y)
+    rows: dict[int, str] = {}
+    for shift, (before, s, name) in enumerate(sorted(found)):
+        rows[before + 1 + shift] = name
+        y.insert(before + 1 + shift, between(on, walked.y[before], walked.t[before], s)[0])
+    points = np.array(y)
+    stable, damped = _classes(values((points[1:] + points[:-1]) / 2), vanishing)
+    changes = {
+        row: name for row, name in rows.items() if stable[row - 1] != stable[row] or damped[row - 1] != damped[row]
+    }
+    return points * on.scale, stable, damped, changes
+
+
+def _classes(v: Array, vanishing: bool) -> tuple[Truth, Truth]:
+    """Whether a crossing bounds stability and heavy damping.
+
+    Where the constant term vanishes with a0, another root goes through 0: to the same side only if both change
+    sign alike.
+    """
+    c = v[:, : -2 if vanishing else -1]
+    stable, damped = np.zeros((2, len(c)), dtype=bool)
+    proper = c[:, 0] != 0
+    if vanishing:
+        proper &= v[:, -1] > 0
+    stable[proper] = is_stable(c[proper])
+    damped[stable] = real_roots(c[stable])[0] == c.shape[1] - 1
+    return stable, damped

@@ -1,0 +1,125 @@
+"""Quantities along a traced curve: parameters, values, stability, and the functions whose zeros are events."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.design.problem import ROOT_QUANTITIES, Problem
+from tmsopt.models import Values
+from tmsopt.roots import Pattern, lienard_chipart, roots
+
+Array = NDArray[np.float64]
+Truth = NDArray[np.bool_]
+Function = Callable[[Array, Array], Array]
+
+NOTHING = 1e-9  # a function smaller than this all along the curve is 0 on it, not an event of it
+
+_REAL = 1e-6  # of |s|: a factor with a double root has coefficients right to 1e-15 and roots to the root of that
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A function of points x and tangents t, both of shape (n, variables), whose zeros are events."""
+
+    name: str
+    detail: str
+    value: Function
+
+
+def parameters_of(problem: Problem, x: Array) -> dict[str, Array]:
+    """Every parameter of the problem along traced variables, shape (n,) each."""
+    of = problem.parameter_set
+    free = {n: np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, x.T, strict=False)}
+    return {n: np.array(np.broadcast_to(v, len(x)), dtype=float) for n, v in problem.ordered(free).items()}
+
+
+def values_of(problem: Problem, pattern: Pattern, columns: Mapping[str, Array], u: list[Array]) -> Values:
+    """Quantities along a curve; those of the roots come from the factors, where multiple roots are exact."""
+
+    def factor_roots(_: Any) -> NDArray[np.complex128]:
+        parts = [np.stack(np.broadcast_arrays(*f, u[0]), axis=-1)[:, :-1] for f in pattern.factors(u)]
+        return np.concatenate([roots(part) for part in parts], axis=-1)
+
+    def abscissa(_: Any) -> Array:
+        return np.asarray(factor_roots(_).real.max(axis=-1))
+
+    def damping_ratio(_: Any) -> Array:
+        z = factor_roots(_)
+        return np.asarray(np.min(-z.real / (np.abs(z) + 1e-300), axis=-1))
+
+    formulas = {"abscissa": abscissa, "damping_ratio": damping_ratio}
+    extra = [replace(q, value=formulas[q.name]) for q in ROOT_QUANTITIES]
+    return Values(problem.model, problem.parameter_set, columns, extra=extra)
+
+
+def stability(factors: list[list[Any]], count: int) -> Truth:
+    """Where every factor has its roots left of the imaginary axis, from coefficients; no factor counts as stable."""
+    stable = np.ones(count, dtype=bool)
+    for factor in factors:
+        for quantity in lienard_chipart(factor):
+            stable &= np.broadcast_to(np.asarray(quantity, dtype=float) > 0, count)
+    return stable
+
+
+def all_real(factors: list[list[Any]], count: int) -> Truth:
+    """Where every root of the factors is real and negative."""
+    real = stability(factors, count)
+    for factor in factors:
+        rows = np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in factor), np.zeros(count)), axis=-1)
+        z = roots(rows[:, :-1])
+        real &= np.all(np.abs(z.imag) <= _REAL * np.abs(z), axis=-1)
+    return real
+
+
+def satisfied(problem: Problem, values: Values, count: int) -> Truth:
+    inside = np.ones(count, dtype=bool)
+    for condition in problem.conditions.values():
+        difference = np.broadcast_to(np.asarray(condition(values), dtype=float), count)
+        if condition.comparison == "<=":
+            inside &= difference <= 0
+        elif condition.comparison == ">=":
+            inside &= difference >= 0
+    return inside
+
+
+def marks(problem: Problem, pattern: Pattern, unknowns: slice, within: Sequence[str]) -> Iterator[Mark]:
+    def of_unknowns(function: Callable[[list[Array]], Any]) -> Function:
+        return lambda x, t: np.asarray(function([x[:, k] for k in range(unknowns.start, unknowns.stop)]))
+
+    def of_factor(number: int, k: int) -> Function:
+        return of_unknowns(lambda u: lienard_chipart(pattern.remaining(u)[number])[k])
+
+    def of_tangent(k: int) -> Function:
+        return lambda x, t: t[:, k]
+
+    for name, special in pattern.marks.items():
+        yield Mark(name, "", of_unknowns(special))
+    if pattern.name == "EP2" and "2EP2" in within:
+        yield Mark("EP4", "", of_unknowns(lambda u: 2 * u[0] + u[1]))  # q(r) has a double zero here
+    example = [np.ones(1)] * len(pattern.unknowns)
+    for number, factor in enumerate(pattern.remaining(example)):
+        for k in range(len(lienard_chipart(factor))):
+            name = "capsize" if k == 0 else "weave"  # the first quantity is the constant term
+            yield Mark(name, "stability changes", of_factor(number, k))
+    for k, parameter in enumerate(problem.free):
+        yield Mark("fold", parameter, of_tangent(k))
+    for name, condition in problem.conditions.items():
+        if condition.comparison != "==":
+            yield Mark("constraint", name, _condition(problem, pattern, unknowns, condition))
+
+
+def _condition(problem: Problem, pattern: Pattern, unknowns: slice, condition: Callable[[Values], Any]) -> Function:
+    def value(x: Array, t: Array) -> Array:
+        u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]
+        return np.asarray(condition(values_of(problem, pattern, parameters_of(problem, x), u)), dtype=float)
+
+    return value
+
+
+def vanishes(value: Any, u: list[Array]) -> bool:
+    """Whether a function is 0 along the whole curve, up to rounding."""
+    size = np.max(np.abs(u), axis=0)
+    return bool(np.median(np.abs(value) / (1 + size * size)) <= NOTHING)
