@@ -52,6 +52,10 @@ def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, wal
     merged = _merged(_with_EP4(problem, pattern, on, found), len(problem.free))
     rows, y, t = _inserted(walked, merged)
     x = y * on.scale
+    if pattern.unknowns[-2:] == ("b", "c"):
+        for event, row in zip(merged, rows, strict=True):
+            if event.name in ("EP4", "2EP2"):  # a double root of the last factor: exact, or it scatters by 1e-8
+                x[row, unknowns.stop - 1] = x[row, unknowns.stop - 2] ** 2 / 4
     columns = parameters_of(problem, x)
     u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]
     kinds = pattern.kind(u)

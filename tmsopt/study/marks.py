@@ -32,7 +32,10 @@ class Mark:
 def parameters_of(problem: Problem, x: Array) -> dict[str, Array]:
     """Every parameter of the problem along traced variables, shape (n,) each."""
     of = problem.parameter_set
-    free = {n: np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, x.T, strict=False)}
+    free = {
+        n: np.clip(np.arctan(v) if of[n].tangent else v, *problem.free[n])  # a limit is met exactly
+        for n, v in zip(problem.free, x.T, strict=False)
+    }
     return {n: np.array(np.broadcast_to(v, len(x)), dtype=float) for n, v in problem.ordered(free).items()}
 
 
