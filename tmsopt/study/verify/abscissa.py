@@ -111,9 +111,8 @@ def _jordan() -> Outcome:
     level = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_B, T)
     return proof(
         only and then and apart and level[1] == zeta_B * level[3],
-        "The first column vanishes only if s² = −1/ζ_H = −1/ζ_B, so with ζ_B ≠ ζ_H every eigenvalue of the model "
-        "has one "
-        "Jordan block. With ζ_B = ζ_H there is no EP4, as a1 = ζ_B a3 gives a1 and a3 different signs.",
+        "The first column vanishes only if s² = −1/ζ_H = −1/ζ_B, so with ζ_B ≠ ζ_H every eigenvalue of the model has "
+        "one Jordan block. With ζ_B = ζ_H there is no EP4, as a1 = ζ_B a3 gives a1 and a3 different signs.",
     )
 
 

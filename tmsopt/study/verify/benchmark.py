@@ -205,9 +205,8 @@ def _swallowtail() -> Outcome:
     transversal = not relation[0].contains(0)
     return proof(
         transversal and stable(a),
-        "The changes of Fr, χ_B, tan λ_s, and a shift of the root, which changes c1 alone, are independent; so "
-        "the family "
-        "is a versal unfolding of t⁴ and its discriminant set is a swallowtail.",
+        "The changes of Fr, χ_B, tan λ_s, and a shift of the root, which changes c1 alone, are independent; so the "
+        "family is a versal unfolding of t⁴ and its discriminant set is a swallowtail.",
     )
 
 

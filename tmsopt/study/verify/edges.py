@@ -68,9 +68,8 @@ def _left() -> Outcome:
     return proof(
         is_cusp(point, ("Fr", "T")) and bool(point["a"] < 0) and bool(point["t"] < 0),
         f"At Fr = {point['Fr'].str(10, radius=False)}, λ_s = {point['T'].atan().str(10, radius=False)}: triple root "
-        f"{point['a'].str(8, radius=False)}, simple root {point['t'].str(8, radius=False)}; one Jordan block of "
-        f"order 3, "
-        "by w0-Jordan.",
+        f"{point['a'].str(8, radius=False)}, simple root {point['t'].str(8, radius=False)}; one Jordan block of order "
+        "3, by w0-Jordan.",
         computed=digits(point["Fr"]),
     )
 

@@ -20,8 +20,8 @@ from tmsopt.study.verify.algebra import (
     stable,
 )
 from tmsopt.study.verify.entry import Claim, Outcome, digits, proof, section, universal
-from tmsopt.study.verify.optimum import tilt_bound
 from tmsopt.study.verify.sets import lifted
+from tmsopt.study.verify.steepest import tilt_bound
 from tmsopt.study.verify.upright import (
     HEIGHTS,
     double_pair,
@@ -64,8 +64,7 @@ def _epset() -> Outcome:
         "tan λ_s (r + 1)/(r − 1) > r/(4 h), r = √(ζ_B/ζ_H), h = √(ζ_B ζ_H); there it is the one positive speed",
         same,
         f"ζ_B = −2, ζ_H = −1/2, χ_B = 2, tan λ_s = 1/10: the radicand is {radicand} and no speed gives two double "
-        f"roots, "
-        "as B1² − 4 B2 + 8 = 40 Fr² + 18",
+        "roots, as B1² − 4 B2 + 8 = 40 Fr² + 18",
         radicand < 0 and _pair_factor() == (q(40), q(18)),
     )
 
@@ -105,17 +104,14 @@ def _tangent() -> Outcome:
     return universal(
         "never for ζ_B ≠ ζ_H",
         False,
-        "the tangent is vertical at tan λ_s = r (r − 1)/(2 h (r + 1)), Fr = √(r/h), where the roots of the 2EP2 "
-        "are not "
-        "yet equal; the EP4 lies above it by (r − 1)³/(16 h (r + 1)) in tan λ_s. With r = 2, h = 1: tan λ_s = 1/3 and "
-        "Fr² = 2 against 17/48 and Fr² = 289/144",
+        "the tangent is vertical at tan λ_s = r (r − 1)/(2 h (r + 1)), Fr = √(r/h), where the roots of the 2EP2 are "
+        "not yet equal; the EP4 lies above it by (r − 1)³/(16 h (r + 1)) in tan λ_s. With r = 2, h = 1: tan λ_s = "
+        "1/3 and Fr² = 2 against 17/48 and Fr² = 289/144",
         is_turn and only_there and apart and speed and _by_hand(),
         computed=digits(lean),
         remark="For ζ_B = −0.4, ζ_H = −0.2 the vertical tangent is at Fr = √5 = 2.23607 and the λ_s given here; "
-        "the EP4 at "
-        f"Fr = {ep4()['Fr'].str(6, radius=False)} and λ_s = {ep4()['T'].atan().str(8, radius=False)}: too near to "
-        f"tell apart "
-        "in the figure. With the axes exchanged the tangent is vertical nowhere.",
+        f"the EP4 at Fr = {ep4()['Fr'].str(6, radius=False)} and λ_s = {ep4()['T'].atan().str(8, radius=False)}: too "
+        "near to tell apart in the figure. With the axes exchanged the tangent is vertical nowhere.",
     )
 
 

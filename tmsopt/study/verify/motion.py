@@ -19,7 +19,7 @@ from tmsopt.study.verify.algebra import (
     stable,
 )
 from tmsopt.study.verify.entry import Claim, Outcome, digits, proof, section, universal
-from tmsopt.study.verify.stability import standstill_identity
+from tmsopt.study.verify.regimes import standstill_identity
 from tmsopt.study.verify.upright import (
     HEIGHTS,
     ep4,
@@ -59,9 +59,8 @@ def _standstill() -> Outcome:
     even = b[1] == 0 and b[3] == 0 and b[2] == -(r + 1 / r) and b[4] == 1
     return proof(
         even and real_squares() and standstill_identity(),
-        "They are ±√r |ω0| and ±|ω0|/√r, r = √(ζ_B/ζ_H), whatever λ_s. So it is for any χ_H where a0 a4 > 0: s² "
-        "is real, "
-        "as M > 0 and P are symmetric, and both s² are positive, as a2 then differs in sign from a0.",
+        "They are ±√r |ω0| and ±|ω0|/√r, r = √(ζ_B/ζ_H), whatever λ_s. So it is for any χ_H where a0 a4 > 0: s² is "
+        "real, as M > 0 and P are symmetric, and both s² are positive, as a2 then differs in sign from a0.",
     )
 
 
@@ -127,8 +126,7 @@ def _slower() -> Outcome:
         before > 0 > after,
         computed=digits(value),
         remark="The number is that speed at the tilt of the EP4 in Table 1; the positive pair merges there long "
-        "before, at "
-        f"Fr = {_merging().str(6, radius=False)}.",
+        f"before, at Fr = {_merging().str(6, radius=False)}.",
     )
 
 
@@ -289,9 +287,8 @@ def _simultaneous() -> Outcome:
     return universal(
         "tan λ_s (r + 1)/(r − 1) > r/(4 h), the pole of (epset); below it heavy damping never ends",
         edge == [q(c) for c in (1, 6, 11, 6, 1)] and _order() and stable(_hand("1.55", "1/4")),
-        "ζ_B = −2, ζ_H = −1/2, χ_B = 2, tan λ_s = 1/10: all roots are simple, real and negative at Fr = 2, 10 "
-        "and 1000, "
-        "as B1² − 4 B2 + 8 = 40 Fr² + 18",
+        "ζ_B = −2, ζ_H = −1/2, χ_B = 2, tan λ_s = 1/10: all roots are simple, real and negative at Fr = 2, 10 and "
+        "1000, as B1² − 4 B2 + 8 = 40 Fr² + 18",
         shallow,
     )
 
@@ -309,9 +306,8 @@ def _lower() -> Outcome:
     off = all(not (abs(z) - 1).contains(0) for z, _ in roots(after))
     return proof(
         _third() and _order() and counts == [2, 0, 0] and round_ and off and stable(after),
-        "With ζ_B = −2, ζ_H = −1/2, tan λ_s = 1: two real roots at Fr = 3/2, two pairs of modulus 1 at 1.85, "
-        "four complex "
-        "roots off the circle at 2; Fr_EP² = 18/5. The real parts after the collision are negative.",
+        "With ζ_B = −2, ζ_H = −1/2, tan λ_s = 1: two real roots at Fr = 3/2, two pairs of modulus 1 at 1.85, four "
+        "complex roots off the circle at 2; Fr_EP² = 18/5. The real parts after the collision are negative.",
     )
 
 

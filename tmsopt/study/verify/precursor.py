@@ -88,8 +88,7 @@ def _precursor() -> Outcome:
     return proof(
         excess and remains,
         "Fr_c² grows by tan λ_s times ε² while Fr_EP² − Fr_c² stays bounded, so any ε ≠ 0 does at a steep enough "
-        "tilt. At "
-        "the tilt of Fig. fig3 (lower row) a change of ± 0.1 "
+        "tilt. At the tilt of Fig. fig3 (lower row) a change of ± 0.1 "
         + ("does not yet: both bicycles are stable at Fr_EP." if all(figure) else "already does."),
     )
 
@@ -106,9 +105,8 @@ def _symmetry() -> Outcome:
     odd = all(slope(b[k] ** 2 * T**2 / Fr**2, name) == 0 for k in (1, 3) for name in ("T", "Fr"))
     return proof(
         odd,
-        "Their squares are Fr²/tan λ_s times a constant over tan λ_s: they vanish at speeds of the order of "
-        "Fr_c, and p "
-        "becomes even in s.",
+        "Their squares are Fr²/tan λ_s times a constant over tan λ_s: they vanish at speeds of the order of Fr_c, "
+        "and p becomes even in s.",
     )
 
 
@@ -191,9 +189,8 @@ def _repelling() -> Outcome:
     gaps = [_gap(shift) for shift in ("0.1", "-0.1")]
     return proof(
         never and all(gap > 0.01 for gap in gaps),
-        f"At Fr_EP the two pairs are {gaps[0]:.3f} apart for χ_B = √2 + 0.1 and {gaps[1]:.3f} for √2 − 0.1. Near "
-        f"the EP4 and "
-        "the 2EP2 they still meet on the real axis, as a double real root has codimension 1.",
+        f"At Fr_EP the two pairs are {gaps[0]:.3f} apart for χ_B = √2 + 0.1 and {gaps[1]:.3f} for √2 − 0.1. Near the "
+        "EP4 and the 2EP2 they still meet on the real axis, as a double real root has codimension 1.",
     )
 
 
@@ -224,9 +221,8 @@ def _monotonic() -> Outcome:
         "the motion is in a single mode",
         heavily_damped(p),
         "ζ_B = −2, ζ_H = −1/2, χ_B = 2, tan λ_s = 1/4, Fr = 29/20 is heavily damped with the eigenvalues "
-        f"{', '.join(z.str(5, radius=False) for z in modes)}, and every mode leans: the sum of two of them with "
-        f"leans e^(s1 t) "
-        "and −e^(s2 t) starts at 0, grows and only then decays",
+        f"{', '.join(z.str(5, radius=False) for z in modes)}, and every mode leans: the sum of two of them with leans "
+        "e^(s1 t) and −e^(s2 t) starts at 0, grows and only then decays",
         visible and not (slow - fast).contains(0),
         remark="A sum of four such modes can cross 0 up to three times; it does not oscillate for ever.",
     )
@@ -245,9 +241,8 @@ def _similar() -> Outcome:
         "up to the last collision, and χ_B between the two EP3 of that tilt (see spire): four real roots, two, four "
         "again (heavy damping), and at last none",
         all(counts[:3] == [4, 2, 4] and counts[-1] == 0 for counts in (below, above)),
-        f"at χ_B = 1.404214 the numbers of real roots at Fr = 0.01, 2, 2.221, 2.25, 2.4 are {below}: the two "
-        f"double roots "
-        "form one after the other, not simultaneously",
+        f"at χ_B = 1.404214 the numbers of real roots at Fr = 0.01, 2, 2.221, 2.25, 2.4 are {below}: the two double "
+        "roots form one after the other, not simultaneously",
         below[3] == 2,
     )
 

@@ -1,7 +1,6 @@
 """Section 2.2: the conditions for asymptotic stability and the critical Froude number."""
 
-import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -11,85 +10,21 @@ from tmsopt.models.tms import copo
 from tmsopt.study.verify import printed
 from tmsopt.study.verify.algebra import match, polynomials, positive, q, ring, solve, stable, unstable
 from tmsopt.study.verify.entry import EXACT, Claim, Outcome, decimal, proof, section, universal
+from tmsopt.study.verify.regimes import (
+    Design,
+    admitted,
+    class_identity,
+    designs,
+    fifth,
+    first_four,
+    hurwitz_identity,
+    necessary,
+    standstill_identity,
+)
 
 _claim = section("2.2 Asymptotic stability and the critical Froude number")
 
 _NAMES = "Fr mu chi_B chi_H zeta_B zeta_H T"
-
-Design = tuple[Any, ...]  # Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T as fractions
-
-
-@cache
-def designs() -> tuple[tuple[Design, bool], ...]:
-    """Rational designs in every sign regime, Fr of both signs, and whether each is stable, by its Routh conditions."""
-    return tuple((design, stable(copo(*design))) for design in _designs(4000))
-
-
-def _designs(count: int) -> Iterator[Design]:
-    pick = random.Random(1)
-
-    def tenths(low: int, high: int) -> Any:
-        return q(pick.randint(10 * low, 10 * high)) / 10
-
-    for k in range(count):
-        chi_H = 1 + tenths(-1, 1) / 3 if k % 2 else tenths(-2, 3)
-        zeta_B, zeta_H = -q(pick.randint(1, 40)) / 20, -q(pick.randint(0, 40)) / 20
-        mu, T = q(pick.choice((1, 2, 5, 10, 50, 200))) / 10, q(pick.choice((1, 3, 7, 15, 60))) / 10
-        Fr = tenths(0, 8) + q("1/20")
-        signs = (pick.choice((1, 1, 1, -1)), pick.choice((1, -1)))
-        yield signs[0] * Fr, mu, tenths(-2, 3) + q("1/50"), chi_H, zeta_B, zeta_H, signs[1] * T
-
-
-def _first_four(design: Design) -> list[bool]:
-    _, mu, chi_B, chi_H, zeta_B, zeta_H, T = design
-    return [chi_H > 1 + zeta_H * T, chi_H < 1 - zeta_B / mu * T, chi_H < chi_B, zeta_H > zeta_B]
-
-
-def _fifth(design: Design) -> bool:
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = design
-    if zeta_B * chi_H == zeta_H * chi_B:
-        return False
-    square = printed.flus(mu, chi_B, chi_H, zeta_B, zeta_H, T)
-    return bool(square > 0 and Fr > 0 and Fr * Fr > square)
-
-
-def admitted(design: Design) -> bool:
-    """Whether all five printed conditions hold."""
-    return all(_first_four(design)) and _fifth(design)
-
-
-def class_identity() -> bool:
-    """a4 + μ a0/ζ_B² = −T (ζ_B + μ ζ_H): with T > 0 not both a0 and a4 are negative, with T < 0 not both positive."""
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
-    a = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
-    return bool(a[4] + mu * a[0] / zeta_B**2 == -T * (zeta_B + mu * zeta_H))
-
-
-def standstill_identity() -> bool:
-    """At Fr = 0, a2 is minus a positive combination of a0 and a4; with y = −ζ > 0."""
-    mu, k, y_B, y_H, T = ring("mu k y_B y_H T")
-    a = copo(0 * T, mu, 2 * k, 1 + k, -y_B, -y_H, T)
-    weight = y_B + mu * y_H
-    return bool(a[2] * weight == -a[4] * (y_B**2 + mu * y_H**2) - a[0] * (1 + mu))
-
-
-def hurwitz_identity() -> bool:
-    """a1 a2 a3 − a0 a3² − a4 a1² is (ζ_B − ζ_H) ζ_B a1 a3 (Fr² − flus), and so affine in Fr² beside Fr²."""
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
-    a0, a1, a2, a3, a4 = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
-    square = printed.flus(mu, chi_B, chi_H, zeta_B, zeta_H, T)
-    return bool(a1 * a2 * a3 - a0 * a3**2 - a4 * a1**2 == (zeta_B - zeta_H) * zeta_B * a1 * a3 * (Fr**2 - square))
-
-
-def _necessary(line: int) -> bool:
-    """No stable design of the sample with λ_s > 0 and Fr > 0 breaks a line of the conditions."""
-    for design, is_stable in designs():
-        if is_stable and design[0] > 0 and design[6] > 0:
-            lines = [*_first_four(design), _fifth(design)]
-            if not lines[line]:
-                return False
-    return True
-
 
 _NECESSARY = (
     "as a necessary condition: sign identities of polynomials, and the Routh conditions of 4000 rational designs"
@@ -100,27 +35,27 @@ _NECESSARY = (
 def _line_1() -> Outcome:
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
     is_a0 = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)[0] == (chi_H - (1 + zeta_H * T)) * zeta_B**2
-    return proof(is_a0 and class_identity() and _necessary(0), "It is a0 > 0; a0 and a4 cannot both be negative.")
+    return proof(is_a0 and class_identity() and necessary(0), "It is a0 > 0; a0 and a4 cannot both be negative.")
 
 
 @_claim("lscf-2", "Eq. lscf, line 2", "χ_H < 1 − (ζ_B/μ) tan λ_s", _NECESSARY)
 def _line_2() -> Outcome:
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
     is_a4 = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)[4] == (1 - zeta_B / mu * T - chi_H) * mu
-    return proof(is_a4 and class_identity() and _necessary(1), "It is a4 > 0.")
+    return proof(is_a4 and class_identity() and necessary(1), "It is a4 > 0.")
 
 
 @_claim("lscf-3", "Eq. lscf, line 3", "χ_H < χ_B", _NECESSARY)
 def _line_3() -> Outcome:
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
     is_a3 = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)[3] == (chi_B - chi_H) * -zeta_B * Fr
-    return proof(is_a3 and _necessary(2), "It is a3 > 0.")
+    return proof(is_a3 and necessary(2), "It is a3 > 0.")
 
 
 @_claim("lscf-4", "Eq. lscf, line 4", "ζ_H > ζ_B", _NECESSARY)
 def _line_4() -> Outcome:
     return proof(
-        hurwitz_identity() and standstill_identity() and _necessary(3),
+        hurwitz_identity() and standstill_identity() and necessary(3),
         "With a0, a1, a3, a4 > 0 the Hurwitz determinant over Fr² is affine in Fr² and negative at Fr = 0, where a2 is "
         "minus a positive combination of a0 and a4; it can become positive only if its slope, which has the sign of "
         "ζ_H − ζ_B, is positive.",
@@ -130,7 +65,7 @@ def _line_4() -> Outcome:
 @_claim("lscf-5", "Eq. lscf, line 5", "Fr > Fr_c > 0", _NECESSARY)
 def _line_5() -> Outcome:
     return proof(
-        hurwitz_identity() and standstill_identity() and _necessary(4),
+        hurwitz_identity() and standstill_identity() and necessary(4),
         "Fr_c² is the zero of that affine function, so where a0, a1, a3, a4 > 0 and ζ_H > ζ_B it is positive of "
         "itself.",
     )
@@ -193,7 +128,7 @@ def _classes() -> Outcome:
     forward = copo(*(q(x) for x in ("4", "1", "2", "1", "-2", "-0.5", "1")))
     other = copo(*(q(x) for x in ("2", "1", "0.5", "1", "-0.5", "-2", "-0.25")))
     mirrored = all(
-        is_stable == (not any(_first_four(d)) and _fifth(d) and d[4] * d[3] > d[5] * d[2])
+        is_stable == (not any(first_four(d)) and fifth(d) and d[4] * d[3] > d[5] * d[2])
         for d, is_stable in designs()
         if d[6] < 0 and d[0] > 0
     )
@@ -283,7 +218,7 @@ def _sides_of_critical() -> Outcome:
     regular = all(
         is_stable == (d[0] ** 2 > printed.flus(*d[1:]))
         for d, is_stable in designs()
-        if d[0] > 0 and d[6] > 0 and all(_first_four(d)) and d[4] * d[3] < d[5] * d[2]
+        if d[0] > 0 and d[6] > 0 and all(first_four(d)) and d[4] * d[3] < d[5] * d[2]
     )
     return universal(
         "a0, a1, a3, a4 have one sign, which lscf gives for χ_H ≥ 1",
@@ -333,7 +268,7 @@ def _bench() -> Outcome:
     T, Fr = (flint.arb.pi() / 36).tan(), benchmark()["Fr"]
     geometry = q("0.1"), q("1.2"), q("1.02"), q("-0.4"), q("-0.2")
     above, below = (copo(Fr + flint.arb(step), *geometry, T) for step in ("1e-9", "-1e-9"))
-    return proof(stable(above) and not stable(below) and all(_first_four((Fr, *geometry, T))))
+    return proof(stable(above) and not stable(below) and all(first_four((Fr, *geometry, T))))
 
 
 @_claim("fr1-Fr_c", "Eq. fr1", "Fr_c of the benchmark", _MATCHED)
