@@ -250,6 +250,18 @@ def test_the_untilted_axis_bounds_stability_at_chi_H_1():
     assert distance(edge, plane.arcs("stability")) <= 1e-5
 
 
+def test_the_axis_bounds_nothing_where_two_roots_cross_it_in_turn():
+    """chi_H = 1 and a mass below ground: a0 and a4 change sign oppositely, so one root is positive on either side."""
+    fixed = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": 0.2, "mu": 0.1, "Fr": 2.0}
+    plane = Plane(fixed, {"chi_B": (1.1, 1.9), "lambda_s": (-0.5, 0.5)}, starts=8)
+    edge, up = plane.unit({"chi_B": 1.6, "lambda_s": 0.0}), np.array([0.0, 1e-6])
+    for sign in (1, -1):
+        p = plane.polynomial(edge + sign * up)
+        assert all(c / p[1] > 0 for c in p[2:4])  # the other roots are stable
+        assert not stable(p)
+    assert plane.found.stability == ()
+
+
 def test_the_swallowtail_point_is_a_corner_of_the_section_through_it():
     """Fig. fig00, upper right: Fr = Fr_EP4 to double precision."""
     plane = Plane(BASE | {"Fr": FR_EP4}, {"chi_B": (0.5, 3.0), "lambda_s": (0.01, 1.4)}, starts=8)

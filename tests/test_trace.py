@@ -348,7 +348,7 @@ def test_crossings_are_2EP2_on_the_ep_set(planes, name):
         assert math.tan(p["lambda_s"]) < TAN_EP4
 
 
-@pytest.mark.parametrize("name", ["fig2 right", "fig00 above"])
+@pytest.mark.parametrize("name", ["fig2 right", "fig00 at EP4", "fig00 above"])
 def test_abscissa_at_a_crossing_does_not_scatter(planes, name):
     """(s² + bs + c)² solved at 40 digits; roots computed from the factor of a double root are 1e-8 off."""
     fixed, free, *_ = PLANES[name]
@@ -359,7 +359,8 @@ def test_abscissa_at_a_crossing_does_not_scatter(planes, name):
             true = certified(equations("2EP2"), start, BASE | fixed)
             with mp.workdps(curves.DIGITS):
                 larger = (-true["b"] + mp.sqrt(true["b"] ** 2 - 4 * true["c"])) / 2
-            assert branch.abscissa[event.index] == pytest.approx(float(larger), abs=EXACT)
+            exact = 1e-11 if name == "fig00 at EP4" else EXACT  # beside EP4 the factors are near to singular
+            assert branch.abscissa[event.index] == pytest.approx(float(larger), abs=exact)
 
 
 def test_the_section_through_ep4_has_it_as_an_event(planes):
@@ -687,6 +688,14 @@ def test_ends_are_on_the_edges_that_they_name(planes):
             for n, (low, high) in free.items():
                 assert branch.parameters[n].min() >= low
                 assert branch.parameters[n].max() <= high
+
+
+def test_a_limit_that_its_tangent_does_not_return_is_met_exactly():
+    limit = 0.249
+    assert math.atan(math.tan(limit)) < limit
+    found = traced("weave", BASE | {"chi_B": SQRT2}, {"Fr": (0.01, 5.0), "lambda_s": (limit, 1.0)})
+    assert limit in [e.parameters["lambda_s"] for e in events(found, "end")]
+    assert min(b.parameters["lambda_s"].min() for b in found.branches) == limit
 
 
 def test_rows_json_and_csv_hold_the_same_numbers(planes, tmp_path):
