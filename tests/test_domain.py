@@ -5,6 +5,7 @@ lines lies on an arc.
 """
 
 import math
+from fractions import Fraction
 
 import curves
 import numpy as np
@@ -13,6 +14,7 @@ from curves import certified, changes, damped, distance, equations, exact_polyno
 
 from tmsopt.design.problem import Problem
 from tmsopt.models import tms
+from tmsopt.models.model import Model, Parameter, ParameterSet
 from tmsopt.study.domain import domain
 
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
@@ -250,16 +252,22 @@ def test_the_untilted_axis_bounds_stability_at_chi_H_1():
     assert distance(edge, plane.arcs("stability")) <= 1e-5
 
 
-def test_the_axis_bounds_nothing_where_two_roots_cross_it_in_turn():
-    """chi_H = 1 and a mass below ground: a0 and a4 change sign oppositely, so one root is positive on either side."""
-    fixed = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": 0.2, "mu": 0.1, "Fr": 2.0}
-    plane = Plane(fixed, {"chi_B": (1.1, 1.9), "lambda_s": (-0.5, 0.5)}, starts=8)
-    edge, up = plane.unit({"chi_B": 1.6, "lambda_s": 0.0}), np.array([0.0, 1e-6])
-    for sign in (1, -1):
-        p = plane.polynomial(edge + sign * up)
-        assert all(c / p[1] > 0 for c in p[2:4])  # the other roots are stable
-        assert not stable(p)
-    assert plane.found.stability == ()
+@pytest.mark.parametrize("sign", [1, -1])
+def test_where_a0_and_a4_vanish_together_it_matters_whether_in_turn(sign):
+    """x s⁴ + s³ + 3 s² + s ± x: at x = 0 its other roots are stable; one side of it is stable only for +."""
+    parameters = (Parameter("x", "1", "", "x"), Parameter("y", "1", "", "y"))
+    model = Model(
+        name="toy",
+        title="toy",
+        degree=4,
+        sets=(ParameterSet("native", parameters, dict),),
+        algebraic=dict,
+        polynomial=lambda x, y: [x, 1 + 0 * y, 3 + 0 * y, 1 + 0 * y, sign * x],
+    )
+    found = domain(Problem(model=model, fixed={}, free={"x": (-0.1, 0.1), "y": (0.0, 1.0)}), starts=8)
+    assert [a.kind for a in found.stability] == (["infinity"] if sign > 0 else [])
+    for x in (0.001, -0.001):
+        assert stable([Fraction(c) for c in (x, 1, 3, 1, sign * x)]) == (sign > 0 and x > 0)
 
 
 def test_the_swallowtail_point_is_a_corner_of_the_section_through_it():
