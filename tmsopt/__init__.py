@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from tmsopt.study.chart import Chart, chart
     from tmsopt.study.compare import Comparison, compare
     from tmsopt.study.domain import Domain, domain
+    from tmsopt.study.swallowtail import Swallowtail, swallowtail
     from tmsopt.study.trace import trace
 
 __version__ = "0.1.0"
@@ -27,6 +28,7 @@ __all__ = [
     "NotSolved",
     "Problem",
     "Solution",
+    "Swallowtail",
     "Trace",
     "chart",
     "compare",
@@ -36,6 +38,7 @@ __all__ = [
     "models",
     "roots",
     "solve",
+    "swallowtail",
     "trace",
 ]
 
@@ -49,12 +52,14 @@ _HOMES = {
     "NotSolved": "tmsopt.design.solution",
     "Problem": "tmsopt.design.problem",
     "Solution": "tmsopt.design.solution",
+    "Swallowtail": "tmsopt.study.swallowtail",
     "Trace": "tmsopt.study.branch",
     "chart": "tmsopt.study.chart",
     "compare": "tmsopt.study.compare",
     "domain": "tmsopt.study.domain",
     "load": "tmsopt.design.files",
     "solve": "tmsopt.design.solve",
+    "swallowtail": "tmsopt.study.swallowtail",
     "trace": "tmsopt.study.trace",
 }
 
