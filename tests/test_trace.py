@@ -370,6 +370,29 @@ def test_the_section_through_ep4_has_it_as_an_event(planes):
     assert math.tan(event.parameters["lambda_s"]) == pytest.approx(TAN_EP4, abs=EXACT)
 
 
+@pytest.mark.parametrize("below", [1e-4, 1e-5, 1e-8, 1e-10])
+def test_sections_beside_ep4_keep_their_events_apart(below):
+    """Below Fr_EP4 two EP3 and two 2EP2, each met by both of its roots, come together as the root of the distance."""
+    fixed, free = BASE | {"Fr": FR_EP4 - below}, {"chi_B": (0.5, 3.0), "lambda_s": (0.01, 1.4)}
+    found = traced("EP2", fixed, free)
+    named = [(e.name, e.detail) for e in found.events if e.name in ("EP4", "EP3", "2EP2")]
+    if below > 1e-6:
+        assert sorted(named) == [("2EP2", "")] * 4 + [("EP3", "cusp")] * 2
+        for branch in found.branches:
+            for event in (e for e in branch.events if e.name == "EP3"):
+                start = {n: event.parameters[n] for n in free} | {"s": float(branch.unknowns["r"][event.index])}
+                true = certified(equations("EP3"), start, fixed)
+                assert event.parameters["chi_B"] == pytest.approx(float(true["chi_B"]), abs=1e-10)
+    else:  # events closer than 1e-6 are one
+        assert sorted(named) == [("2EP2", "")] * 2 + [("EP3", "beside an EP4; cusp")]
+
+
+def test_sections_above_ep4_have_no_ep3():
+    for above in (1e-10, 1e-7, 1e-4):
+        found = traced("EP2", BASE | {"Fr": FR_EP4 + above}, {"chi_B": (0.5, 3.0), "lambda_s": (0.01, 1.4)})
+        assert [e.name for e in found.events if e.name in ("EP4", "EP3", "2EP2")] == ["2EP2", "2EP2"]
+
+
 @pytest.mark.parametrize("name", PLANES)
 def test_every_point_of_a_discriminant_curve_has_a_double_root(planes, name):
     # beside EP4 the factors are near to singular, and lose a digit
@@ -446,6 +469,8 @@ def test_ep3_curve_through_space_is_a_cuspidal_edge_ending_in_ep4():
             values = design(branch, k)
             if abs(branch.unknowns["r"][k] - branch.unknowns["t"][k]) < 0.05:
                 continue  # beside EP4 the point is right to a root of rounding along the edge
+            if abs(branch.tangent["Fr"][k]) < 0.05:
+                continue  # a fold in Fr, which is held below
             start = {n: values[n] for n in ("chi_B", "lambda_s")} | {"s": float(branch.unknowns["r"][k])}
             true = certified(equations("EP3"), start, {n: values[n] for n in NAMES if n not in start})
             assert values["chi_B"] == pytest.approx(float(true["chi_B"]), abs=1e-11)

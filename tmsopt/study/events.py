@@ -7,6 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
@@ -31,6 +32,13 @@ _SAME_DESIGN = 1e-6
 _LOW = 1e-2
 """Relative size of the marks beside a place where they may touch 0: they grow with the square of a step of 0.1."""
 
+_DIP = 0.5
+"""Share of a small value that a parabola must fall further by, for its least to be looked for between the steps."""
+
+_ASTRAY = 2.0  # arclengths: a point further off lies on another curve, as beside a singular point it may
+
+_EXACT = 1e-13  # mismatch of a coefficient of an EP4, relative to its terms: some roundings
+
 _LEVEL = 1e-7  # a parameter that changes less per arclength stays level: its slope has no sign
 
 _RANK = ("EP4", "EP3", "2EP2", "double zero", "weave", "capsize", "constraint", "fold")
@@ -48,6 +56,7 @@ class _Found:
 
 def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walked: Walk) -> Branch:
     """A walked curve in the parameters of the problem, with its events among its points."""
+    walked = _refined(problem, pattern, on, unknowns, walked)
     found = [*_events(problem, pattern, on, unknowns, walked), *_touched(problem, pattern, on, unknowns, walked)]
     merged = _merged(_with_EP4(problem, pattern, on, found), len(problem.free))
     rows, y, t = _inserted(walked, merged)
@@ -94,17 +103,63 @@ def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, wal
     )
 
 
+def _at(on: Curve, walked: Walk, k: int, mark: Mark, s: float) -> float:
+    """A mark at arclength s from a row of the walk."""
+    y, t = between(on, walked.y[k], walked.t[k], s)
+    return float(np.broadcast_to(mark.value((y * on.scale)[None], t[None]), 1)[0])
+
+
+def _live(problem: Problem, pattern: Pattern, unknowns: slice, x: Array, t: Array) -> Iterator[tuple[Mark, Array]]:
+    """The marks that are not 0 all along the curve, with their values."""
+    u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]
+    within = [name for name, special in pattern.marks.items() if vanishes(special(u), u)]
+    for mark in marks(problem, pattern, unknowns, within):
+        value = np.broadcast_to(mark.value(x, t), len(x))
+        if mark.name not in within and (mark.name != "fold" or np.abs(value).max() > NOTHING):
+            yield mark, value
+
+
+def _refined(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walked: Walk) -> Walk:
+    """The walk with a point wherever a mark comes nearest to 0 between two steps, so that two zeros show two signs."""
+    x = walked.y * on.scale
+    steps = np.sum(walked.t[:-1] * np.diff(walked.y, axis=0), axis=1)
+    added: dict[tuple[int, float], tuple[Array, Array]] = {}
+    for mark, value in _live(problem, pattern, unknowns, x, walked.t):
+        side = np.sign(value[1:-1])
+        left, here, right = side * value[:-2], side * value[1:-1], side * value[2:]
+        with np.errstate(all="ignore"):
+            slope, bend = _parabola(left, here, right, steps[:-1], steps[1:])
+            dips = (here <= left) & (here <= right) & (bend > 0) & (slope**2 / (2 * bend) > _DIP * here)
+        for k in (np.flatnonzero(dips & (here > 0)) + 1).tolist():
+
+            def height(s: float, k: int = k, mark: Mark = mark, sign: float = float(side[k - 1])) -> float:
+                return sign * _at(on, walked, k, mark, s)
+
+            found = minimize_scalar(
+                height, bounds=(-steps[k - 1], steps[k]), method="bounded", options={"xatol": 1e-14}
+            )
+            s = float(found.x)
+            y, t = between(on, walked.y[k], walked.t[k], s)
+            if np.abs(y - walked.y[k]).max() <= _ASTRAY * abs(s) and t @ walked.t[k] > 0:
+                added[(k, s) if s >= 0 else (k - 1, steps[k - 1] + s)] = y, t
+    ys, ts = list(walked.y), list(walked.t)
+    for shift, (after, s) in enumerate(sorted(added)):
+        ys.insert(after + 1 + shift, added[after, s][0])
+        ts.insert(after + 1 + shift, added[after, s][1])
+    return replace(walked, y=np.array(ys), t=np.array(ts))
+
+
+def _parabola(left: Array, here: Array, right: Array, before: Array, after: Array) -> tuple[Array, Array]:
+    """Slope and second derivative, in the middle, of the parabolas through three values."""
+    back, ahead = (here - left) / before, (right - here) / after
+    return (back * after + ahead * before) / (before + after), 2 * (ahead - back) / (before + after)
+
+
 def _events(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walked: Walk) -> Iterator[_Found]:
     x = walked.y * on.scale
     u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]
     stable = stability(pattern.remaining(u), len(x))
-    within = [name for name, special in pattern.marks.items() if vanishes(special(u), u)]
-    for mark in marks(problem, pattern, unknowns, within):
-        value = np.broadcast_to(mark.value(x, walked.t), len(x))
-        if mark.name in within:
-            continue
-        if mark.name == "fold" and np.abs(value).max() <= NOTHING:
-            continue
+    for mark, value in _live(problem, pattern, unknowns, x, walked.t):
         sign = np.sign(value)
         for k in range(1, len(sign)):
             sign[k] = sign[k] or sign[k - 1]
@@ -117,8 +172,7 @@ def _events(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walk
             end = float(walked.t[i] @ (walked.y[i + 1] - walked.y[i]))
 
             def at(s: float, i: int = int(i), mark: Mark = mark) -> float:
-                y, t = between(on, walked.y[i], walked.t[i], s)
-                return float(np.broadcast_to(mark.value((y * on.scale)[None], t[None]), 1)[0])
+                return _at(on, walked, i, mark, s)
 
             if not at(0.0) * at(end) <= 0:
                 continue  # a jump through infinity, or nan
@@ -169,12 +223,19 @@ def _exact_EP4(problem: Problem, pattern: Pattern, on: Curve, event: _Found) -> 
     a = Values(problem.model, problem.parameter_set, problem.ordered(symbols)).coefficients
     matched = [a[0] * c for c in PATTERNS["EP4"].monic([x[free]])]
     equations = ca.vertcat(*[p - q for p, q in zip(a[1:], matched[1:], strict=True)])
+    mismatch = ca.Function(
+        "mismatch",
+        [x],
+        [equations / ca.vertcat(*[ca.fabs(p) + ca.fabs(q) for p, q in zip(a[1:], matched[1:], strict=True)])],
+    )
     start = event.y * on.scale
     u = list(start[free : free + len(pattern.unknowns)])
     mean = float(np.concatenate([roots(f) for f in pattern.factors(u)]).real.mean())
     end = project(ca.Function("EP4", [x], [equations, ca.jacobian(equations, x)]), np.append(start[:free], mean))
     if end is None or np.abs((end[:free] - start[:free]) / on.scale[:free]).max() > _NEAR:
         return None
+    if np.any(np.abs(np.array(mismatch(end)).ravel()) > _EXACT):
+        return None  # a section beside an EP4, not through it
     y = event.y.copy()
     y[:free] = end[:free] / on.scale[:free]
     fourfold = np.full(4, end[free], dtype=complex)
@@ -198,11 +259,15 @@ def _one(group: list[_Found]) -> _Found:
     group = sorted(group, key=lambda e: _RANK.index(e.name))
     names = {e.name for e in group}
     name = "double zero" if {"weave", "capsize"} <= names else group[0].name
-    folds = [e.detail for e in group if e.name == "fold"]
-    others = [
-        e.detail if e.name == name else f"{e.name} {e.detail}".strip() for e in group if e.name not in ("fold", "")
+    folds = dict.fromkeys(e.detail for e in group if e.name == "fold")
+    special = [m for m in ("EP3", "2EP2") if m in names]
+    others = ["beside an EP4"] if name == "EP3" and len(special) == 2 else []
+    others += [
+        e.detail if e.name == name else f"{e.name} {e.detail}".strip()
+        for e in group
+        if e.name not in ("fold", *special)
     ]
-    others = [text for text in others if text]
+    others = [text for text in dict.fromkeys(others) if text]
     if name == "EP3" and len(folds) > 1:
         others.append("cusp")
     elif folds:

@@ -17,6 +17,8 @@ Function = Callable[[Array, Array], Array]
 
 NOTHING = 1e-9  # a function smaller than this all along the curve is 0 on it, not an event of it
 
+_ROUNDED = 1e-14  # a tangent, its inverse and the scale: some roundings
+
 _REAL = 1e-6  # of |s|: a factor with a double root has coefficients right to 1e-15 and roots to the root of that
 
 
@@ -33,10 +35,16 @@ def parameters_of(problem: Problem, x: Array) -> dict[str, Array]:
     """Every parameter of the problem along traced variables, shape (n,) each."""
     of = problem.parameter_set
     free = {
-        n: np.clip(np.arctan(v) if of[n].tangent else v, *problem.free[n])  # a limit is met exactly
+        n: _within(np.arctan(v) if of[n].tangent else v, *problem.free[n])
         for n, v in zip(problem.free, x.T, strict=False)
     }
     return {n: np.array(np.broadcast_to(v, len(x)), dtype=float) for n, v in problem.ordered(free).items()}
+
+
+def _within(v: Array, low: float, high: float) -> Array:
+    """A limit met exactly, where a tangent and its inverse have rounded past it."""
+    limited = np.clip(v, low, high)
+    return np.where(np.abs(v - limited) <= _ROUNDED * (1 + np.abs(v)), limited, v)
 
 
 def values_of(problem: Problem, pattern: Pattern, columns: Mapping[str, Array], u: list[Array]) -> Values:
