@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+import re
 from fractions import Fraction
 from math import comb
 
@@ -11,7 +12,7 @@ import mpmath
 import numpy as np
 import pytest
 import sympy
-from curves import certified, epset_Fr, equations, exact_polynomial
+from curves import certified, distance, epset_Fr, equations, exact_polynomial
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import mp
@@ -789,3 +790,84 @@ def test_through_begins_where_it_is_told():
     near = np.argmin(np.abs(branch.parameters["lambda_s"] - angle))
     assert branch.parameters["lambda_s"][near] == pytest.approx(angle, abs=0.05)
     assert traced("2EP2", BASE, free, starts=0).branches == ()
+
+
+# Nothing that a grid can see is missed
+
+
+def test_a_short_branch_far_from_every_start_is_found():
+    """A double root at zeta_B = −2: 0.7050941 by Newton at 40 digits; 48 starts alone find one branch of two."""
+    fixed = {"Fr": 0.15012234384726733, "chi_B": 1.0498249944786298, "chi_H": 1.39922070585915}
+    fixed |= {"zeta_H": -1.50192108723902, "lambda_s": 0.9773246612059618}
+    free = {"mu": (0.01, 20.0), "zeta_B": (-2.0, -0.1)}
+    found = traced("EP2", fixed, free, starts=1)
+    assert len(found.branches) == 2
+    ends = [e.parameters for e in events(found, "end") if e.detail == "zeta_B.min"]
+    assert any(abs(p["mu"] - 0.670327) < 1e-6 for p in ends)
+
+
+@pytest.mark.parametrize("pattern", ["EP2", "weave", "capsize"])
+def test_every_sign_change_on_a_grid_lies_on_a_branch(pattern):
+    """Discriminant, Hurwitz determinant and a4 from the oracle's coefficients, on a grid finer than the program's."""
+    rng = np.random.default_rng(8)
+    box = {"Fr": (0.1, 5), "mu": (0.01, 20), "chi_B": (0.2, 3), "chi_H": (0.7, 1.3)}
+    box |= {"zeta_B": (-1.2, -0.1), "zeta_H": (-1.2, -0.1), "lambda_s": (-1.4, 1.4)}
+    numbers = sympy.lambdify(list(curves.SYMBOLS.values()), list(curves.COPO))
+    for _ in range(4):
+        names = [str(n) for n in rng.choice(list(box), 2, replace=False)]
+        fixed = {n: float(rng.uniform(*box[n])) for n in box if n not in names}
+        found = traced(pattern, fixed, {n: box[n] for n in names})
+        share = np.linspace(0, 1, 301)
+        x, y = np.meshgrid(share, share, indexing="ij")
+        low, high = np.array([box[n] for n in names]).T
+        values = fixed | {
+            n: low[k] + part * (high[k] - low[k]) for k, (n, part) in enumerate(zip(names, (x, y), strict=True))
+        }
+        a = [c + 0 * x for c in numbers(*(values[n] for n in NAMES[:-1]), np.tan(values["lambda_s"]))]
+        value = {
+            "EP2": relative_discriminants(a),
+            "weave": np.where(a[1] * a[3] > 0, a[1] * a[2] * a[3] - a[0] * a[3] ** 2 - a[1] ** 2 * a[4], np.nan),
+            "capsize": a[4],
+        }[pattern]
+        along = np.argwhere(value[1:] * value[:-1] < 0) + np.array([0.5, 0])
+        edges = np.concatenate([along, np.argwhere(value[:, 1:] * value[:, :-1] < 0) + np.array([0, 0.5])])
+        lines = [
+            np.stack(
+                [(b.parameters[n] - lo) / (hi - lo) * 300 for n, lo, hi in zip(names, low, high, strict=True)], axis=-1
+            )
+            for b in found.branches
+        ]
+        for edge in edges[:: max(1, len(edges) // 60)]:
+            assert distance(edge, lines) <= 1.0
+
+
+def relative_discriminants(a):
+    """Of quartics, by the resultant form written out in its invariants."""
+    i = 12 * a[0] * a[4] - 3 * a[1] * a[3] + a[2] ** 2
+    j = 72 * a[0] * a[2] * a[4] + 9 * a[1] * a[2] * a[3] - 27 * (a[0] * a[3] ** 2 + a[4] * a[1] ** 2) - 2 * a[2] ** 3
+    return 4 * i**3 - j**2
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"step": math.nan}, "step: found nan; accepted: a number from 1e-06 to 0.1"),
+        ({"step": 0}, "step: found 0"),
+        ({"step": -0.1}, "step: found -0.1"),
+        ({"step": 5.0}, "step: found 5.0"),
+        ({"starts": -1}, "starts: found -1; accepted: a whole number"),
+        ({"most": 0}, "most: found 0"),
+        ({"through": [{"Fr": 2.0}]}, "through: found Fr; accepted: each of Fr, lambda_s"),
+        ({"through": [{"Fr": math.nan, "lambda_s": 0.3}]}, "outside the box"),
+        ({"through": [{"Fr": 50.0, "lambda_s": 0.3}]}, "Fr = 50.0 lies outside the box"),
+    ],
+)
+def test_options_out_of_range_are_refused(options, words):
+    with pytest.raises(InputError, match=re.escape(words)):
+        traced("EP2", BASE | {"chi_B": SQRT2}, {"Fr": (0.1, 5.0), "lambda_s": (0.01, 1.4)}, **options)
+
+
+def test_a_box_one_rounding_wide_is_a_number():
+    fixed, free = BASE | {"chi_B": SQRT2}, {"Fr": (2.0, 2.0000000000000004), "lambda_s": (0.01, 1.4)}
+    with pytest.raises(InputError, match="1 is free"):
+        traced("EP2", fixed, free)

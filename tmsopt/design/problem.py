@@ -14,6 +14,9 @@ from tmsopt.roots import PATTERNS, Pattern, Structure, structure
 STRUCTURE_TOLERANCE = 1e-11
 """Relative change of a coefficient within which roots count as multiple: a polished optimum is within 1e-14."""
 
+_POINT = 1e-12
+"""Relative width below which a range is a number: a few roundings leave nothing to move in."""
+
 
 def _structure(values: Mapping[str, Any]) -> Structure:
     assert isinstance(values, Values)
@@ -79,7 +82,7 @@ class Problem:
         of = guess_parameter_set(self.model, {**self.fixed, **self.free})
         given = {p.name: p.default for p in of.parameters if p.default is not None} | dict(self.fixed)
         given = {n: v for n, v in given.items() if n not in self.free}
-        pinned = {n: lo for n, (lo, hi) in self.free.items() if lo == hi}
+        pinned = {n: lo for n, (lo, hi) in self.free.items() if hi - lo <= _POINT * max(abs(lo), abs(hi))}
         ends = {n: (float(lo), float(hi)) for n, (lo, hi) in self.free.items() if n not in pinned}
         object.__setattr__(self, "fixed", {n: float(v) for n, v in {**given, **pinned}.items()})
         object.__setattr__(self, "free", ends)

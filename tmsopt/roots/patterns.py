@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.roots.polynomial import product
+from tmsopt.roots.stability import discriminant, hurwitz_minors
 
 Roots = NDArray[np.complex128]
 
@@ -33,6 +34,8 @@ class Pattern:
         nonnegative: expressions of the unknowns that must be ≥ 0.
         abscissa: largest real part of the roots, where one smooth expression of the unknowns gives it.
         rest: the factors whose roots the pattern does not tie to the imaginary axis; all of them by default.
+        test: function of the coefficients that changes sign across the set, where one condition makes it; nan where
+            it means nothing.
         marks: name of a more special pattern → expression of the unknowns that is 0 where it is met.
         ends: unknown → what happens where it reaches 0 and the pattern ends.
     """
@@ -45,6 +48,7 @@ class Pattern:
     nonnegative: Callable[[Sequence[Any]], list[Any]] = lambda u: []
     abscissa: Callable[[Sequence[Any]], Any] | None = None
     rest: Callable[[Sequence[Any]], list[list[Any]]] | None = None
+    test: Callable[[Sequence[Any]], Any] | None = None
     marks: Mapping[str, Callable[[Sequence[Any]], Any]] = field(default_factory=dict)
     ends: Mapping[str, str] = field(default_factory=dict)
 
@@ -95,6 +99,11 @@ def _triple_guesses(roots: Roots) -> list[list[float]]:
     return [[(roots.sum().real - t) / 3, float(t)] for t in simple] or [[float(roots.mean().real)] * 2]
 
 
+def _pair_test(a: Sequence[Any]) -> Any:
+    """The Hurwitz determinant Δ3, which is 0 where two roots add up to 0; they are imaginary where a3/a1 = W > 0."""
+    return np.where(a[1] * a[3] > 0, hurwitz_minors(a)[2], np.nan)
+
+
 PATTERNS: Mapping[str, Pattern] = MappingProxyType(
     {
         p.name: p
@@ -140,6 +149,7 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
                 ("r", "b", "c"),
                 lambda u: [[1, -u[0]]] * 2 + [[1, u[1], u[2]]],
                 lambda z: [[float(a.mean().real), *quadratic(b)] for a, b in _two(z)],
+                test=discriminant,
                 marks={
                     "EP3": lambda u: u[0] * u[0] + u[1] * u[0] + u[2],
                     "2EP2": lambda u: u[1] * u[1] - 4 * u[2],
@@ -153,6 +163,7 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
                 lambda z: [[abs(float(a.prod().real)), *quadratic(b)] for a, b in _two(z)],
                 lambda u: [u[0]],
                 rest=lambda u: [[1, u[1], u[2]]],
+                test=_pair_test,
                 ends={"W": "the pair meets in a double root 0"},
             ),
             Pattern(
@@ -162,6 +173,7 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
                 lambda u: [[1, 0], [1, u[0], u[1], u[2]]],
                 lambda z: [[float(x) for x in np.poly(z)[1:4].real]],
                 rest=lambda u: [[1, u[0], u[1], u[2]]],
+                test=lambda a: a[-1],
                 marks={"double zero": lambda u: u[2]},
             ),
             Pattern(

@@ -14,6 +14,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.models import Values
 from tmsopt.roots import is_stable, real_roots, roots
 from tmsopt.study.domain import Domain, domain
+from tmsopt.study.grid import coefficients
 
 Array = NDArray[np.float64]
 
@@ -140,13 +141,6 @@ def plane_of(problem: Problem, axes: tuple[str, str] | None = None) -> tuple[str
     if axes is not None and set(axes) != set(free):
         raise InputError([Fault(f"found {', '.join(axes)}; accepted: {' and '.join(free)}", ("axes",))])
     return axes or (free[0], free[1])
-
-
-def coefficients(problem: Problem, columns: Mapping[str, Array]) -> Array:
-    """Coefficients of the designs given by columns of the free parameters, shape (designs, n + 1)."""
-    a = problem.model.coefficients(problem.ordered(columns), problem.parameter_set)
-    shape = np.shape(next(iter(columns.values())))
-    return np.stack([np.broadcast_to(np.asarray(c, dtype=float), shape) for c in a], axis=-1)
 
 
 def classify(a: Array) -> tuple[NDArray[np.int8], NDArray[np.int8], Array, Array]:

@@ -6,6 +6,7 @@ roots are stable, and heavy damping where they are real and negative.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain, islice
 
 import casadi as ca
 import numpy as np
@@ -16,6 +17,8 @@ from tmsopt.design.starts import spread
 from tmsopt.models import Values
 from tmsopt.roots import discriminant, is_stable, lienard_chipart, real_roots
 from tmsopt.study.continuation import Curve, Walk, between, both_ways, contains, crossing, curve, project
+from tmsopt.study.grid import unexplained
+from tmsopt.study.trace import design_at
 
 Array = NDArray[np.float64]
 Truth = NDArray[np.bool_]
@@ -57,14 +60,15 @@ def through_infinity(problem: Problem, step: float, starts: int, seed: int) -> I
     rest = ca.Function("rest", [x], [ca.vertcat(*a[1:], along)])
     for walked in _walks(problem, on, step, starts, seed):
         x_on, stable, damped, changes = _judged(on, walked, rest)
-        columns = {n: np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, x_on.T, strict=True)}
-        yield Infinity(columns, stable, damped, changes)
+        yield Infinity(design_at(problem, x_on), stable, damped, changes)
 
 
 def _walks(problem: Problem, on: Curve, step: float, starts: int, seed: int) -> Iterator[Walk]:
     of = problem.parameter_set
     walks: list[Walk] = []
-    for count, design in zip(range(starts), spread(problem, seed), strict=False):
+    lines: list[dict[str, Array]] = []
+    spots = chain(islice(spread(problem, seed), starts), unexplained(problem, lambda a: a[0], lines))
+    for count, design in enumerate(spots):
         start = np.array([np.tan(v) if of[n].tangent else v for n, v in design.items()]) / on.scale
         y = project(on.evaluate, start, held=count % 2)
         if y is None or np.any(y < on.lower) or np.any(y > on.upper) or any(contains(on, w, y, step) for w in walks):
@@ -72,6 +76,7 @@ def _walks(problem: Problem, on: Curve, step: float, starts: int, seed: int) -> 
         walked = both_ways(on, y, step, _MOST)
         if walked is not None:
             walks.append(walked)
+            lines.append(design_at(problem, walked.y * on.scale))
             yield walked
 
 

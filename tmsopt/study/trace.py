@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 import casadi as ca
@@ -17,13 +18,14 @@ from tmsopt.roots import PATTERNS, Pattern, roots
 from tmsopt.study.branch import Branch, Trace
 from tmsopt.study.continuation import Curve, Walk, both_ways, contains, curve, project
 from tmsopt.study.events import describe
+from tmsopt.study.grid import unexplained
 
 Array = NDArray[np.float64]
 Report = Callable[[int, int], None]
 
 STARTS = 48
 STEP = 0.005
-POINTS = 200_000
+MOST = 200_000
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,7 @@ def trace(
     step: float = STEP,
     starts: int = STARTS,
     seed: int = 0,
-    most: int = POINTS,
+    most: int = MOST,
     through: Sequence[Mapping[str, float]] = (),
     progress: Report | None = None,
 ) -> Trace:
@@ -58,20 +60,24 @@ def trace(
     Args:
         pattern: name; by default the one that the problem locates.
         step: longest step, in widths of the box.
-        starts: designs from which branches are looked for; a short branch far from all of them can be missed.
+        starts: designs from which branches are looked for. With two free parameters and one condition (EP2, weave,
+            capsize) a grid of 256 × 256 designs shows what they missed; otherwise a short branch far from all of
+            them can be missed.
         most: points of a branch in one direction.
-        through: designs (free parameters) to begin at, before the others.
+        through: designs (values of every free parameter, in the box) to begin at, before the others.
         progress: called with the number of starts done and in all.
 
     Raises:
-        InputError: for an unknown pattern, or when the equations do not leave a curve.
+        InputError: for an unknown pattern, when the equations do not leave a curve, or for options out of range.
     """
     began = time.perf_counter()
     problem = _asked(problem, pattern)
+    _check(problem, step, starts, most, through)
     ready = prepare(problem)
     walks: list[Walk] = []
+    lines: list[dict[str, Array]] = []
     walking = 0.0
-    for done, y in enumerate(_seeds(ready, starts, seed, through)):
+    for done, y in enumerate(chain(_seeds(ready, starts, seed, through), _missed(ready, lines))):
         if progress:
             progress(min(done // _GUESSES, starts), starts)
         if y is None or any(contains(ready.on, w, y, step) for w in walks):
@@ -81,7 +87,8 @@ def trace(
         walking += time.perf_counter() - before
         if found is not None:
             walks.append(found)
-    branches = tuple(branch_of(ready, w) for w in walks)
+            lines.append(design_at(problem, found.y * ready.on.scale))
+    branches = tuple(b for b in (branch_of(ready, w) for w in walks) if b.residual <= _BELIEVED)
     ordered = tuple(sorted(branches, key=lambda b: -float(b.arclength[-1])))
     return Trace(problem, str(problem.locate), ordered, starts, time.perf_counter() - began, walking)
 
@@ -136,15 +143,49 @@ def _asked(problem: Problem, name: str | None) -> Problem:
             if count.count < 1
             else f"fix {count.count - 1} of them, or add as many == constraints"
         )
+        conditions = f"{count.conditions} condition{'s' if count.conditions != 1 else ''}"
         message = (
-            f"a curve of {name} takes {needed} free parameters ({count.conditions} conditions and one to move "
-            f"along), and {count.free} are free ({free}); {advice}"
+            f"a curve of {name} takes {needed} free parameters ({conditions} and one to move along), "
+            f"and {count.free} {'is' if count.free == 1 else 'are'} free ({free}); {advice}"
         )
         raise InputError([Fault(message, ("parameters",))])
     return asked
 
 
+def _check(problem: Problem, step: float, starts: int, most: int, through: Sequence[Mapping[str, float]]) -> None:
+    faults = [
+        Fault(f"found {value!r}; accepted: {accepted}", (name,))
+        for name, value, holds, accepted in (
+            ("step", step, STEPS[0] <= step <= STEPS[1], f"a number from {STEPS[0]:g} to {STEPS[1]:g}"),
+            ("starts", starts, starts >= 0, "a whole number, 0 or more"),
+            ("most", most, most >= _FEWEST, f"a whole number, {_FEWEST} or more"),
+        )
+        if not holds
+    ]
+    for design in through:
+        if set(design) != set(problem.free):
+            names = ", ".join(problem.free)
+            faults.append(Fault(f"found {', '.join(design) or 'nothing'}; accepted: each of {names}", ("through",)))
+            continue
+        for n, value in design.items():
+            low, high = problem.free[n]
+            if not low <= value <= high:
+                message = f"{n} = {value!r} lies outside the box; accepted: {low:g} to {high:g}"
+                faults.append(Fault(message, ("through",)))
+    if faults:
+        raise InputError(faults)
+
+
+STEPS = (1e-6, 0.1)
+"""Least and greatest longest step."""
+
+_FEWEST = 4  # points that make a curve with tangents
+
+_BELIEVED = 1e-3  # residual of a branch: beside infinity it grows to 1e-5, a curve of something else has 1
+
 _FAR = 1e5  # unknowns of a seed, in units of their scale: beyond, a0 all but vanishes
+
+_PAIRS = 6  # of four roots
 
 _GUESSES = 4  # starting values of the unknowns tried at each design
 
@@ -163,9 +204,23 @@ def _seeds(ready: Traced, starts: int, seed: int, through: Sequence[Mapping[str,
             yield _seed(ready, design, guess, held)
 
 
-def _seed(ready: Traced, design: Mapping[str, float], guess: int, held: int | None) -> Array | None:
+def _missed(ready: Traced, lines: Sequence[Mapping[str, Array]]) -> Iterator[Array | None]:
+    """Points of the curve where a test function of the pattern changes sign over a grid, off the lines so far."""
+    problem, test = ready.problem, ready.pattern.test
+    if test is None or len(problem.free) != 2:
+        return
+    for design in unexplained(problem, test, lines):
+        yield _seed(ready, design, None, None)
+
+
+def _seed(ready: Traced, design: Mapping[str, float], guess: int | None, held: int | None) -> Array | None:
+    """A point of the curve near a design, from a guess of that number, or the best guess."""
     on, free = ready.on, len(ready.problem.free)
-    x = _variables(ready.nlp, ready.problem, design, guess)
+    if guess is None:
+        tried = [_variables(ready.nlp, ready.problem, design, k) for k in range(_PAIRS)]
+        x = min((t for t in tried if t is not None), key=lambda t: _mismatch(on, t), default=None)
+    else:
+        x = _variables(ready.nlp, ready.problem, design, guess)
     if x is None:
         return None
     y = project(on.evaluate, x / on.scale, held)
@@ -175,6 +230,10 @@ def _seed(ready: Traced, design: Mapping[str, float], guess: int, held: int | No
     a = ready.problem.values(ready.problem.ordered(design_at(ready.problem, y * on.scale))).coefficients
     size = max(abs(float(c)) for c in a)
     return y if abs(float(a[0])) > 1e-9 * size else None  # at a0 = a1 = … = 0 any unknowns fit
+
+
+def _mismatch(on: Curve, x: Array) -> float:
+    return float(np.abs(np.array(on.evaluate(x / on.scale)[0])).max())
 
 
 def design_at(problem: Problem, x: Array) -> dict[str, Any]:
