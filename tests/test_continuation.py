@@ -221,8 +221,8 @@ def test_contains_tells_curves_apart():
     assert inner is not None
     for angle in (0.3, 2.0, 4.4):
         direction = np.array([math.cos(angle), math.sin(angle)])
-        assert contains(on, inner, direction, 0.01)
-        assert not contains(on, inner, 2 * direction, 0.01)
+        assert contains(on, inner, direction)
+        assert not contains(on, inner, 2 * direction)
 
 
 def test_between_is_a_point_of_the_curve_at_the_arclength_along_the_tangent():

@@ -100,7 +100,12 @@ class Plane:
 
 @pytest.fixture(scope="module")
 def planes():
-    return {name: Plane(fixed, free, starts=8) for name, (fixed, free) in PLANES.items()}
+    axis = (
+        {"chi_B": 1.2, "lambda_s": 0.1, "mu": 0.5, "zeta_B": -0.4, "zeta_H": -0.2},
+        {"chi_H": (0.5, 1.5), "Fr": (0.5, 5.0)},
+    )
+    every = PLANES | {"towards the axis": axis}
+    return {name: Plane(fixed, free, starts=8) for name, (fixed, free) in every.items()}
 
 
 @pytest.mark.parametrize("name", PLANES)
@@ -147,13 +152,28 @@ def test_arcs_cross_a_line_as_often_as_the_domain_changes(planes, name):
             assert drawn == len(truly)
 
 
-@pytest.mark.parametrize("name", PLANES)
-def test_arcs_that_merge_positive_roots_do_so(planes, name):
-    """On one side of each there are two more positive real roots than on the other."""
+@pytest.mark.parametrize("name", [*PLANES, "towards the axis"])
+def test_arcs_that_part_capsize_from_weave_do_so(planes, name):
+    """Both sides are unstable, and on one of them alone is there a positive real root."""
     plane = planes[name]
-    for arc in plane.arcs("merging"):
+    seen = 0
+    for arc in plane.arcs("parting"):
         for left, right in plane.sides(arc, 6):
-            assert abs(sturm(left)[2] - sturm(right)[2]) == 2
+            assert not stable(left)
+            assert not stable(right)
+            assert (sturm(left)[2] > 0) != (sturm(right)[2] > 0)
+            seen += 1
+    assert seen > 0 or name in ("off the law", "above EP4", "chi_H = 0.9", "reversed", "heights")
+
+
+@pytest.mark.parametrize("name", [*PLANES, "towards the axis"])
+def test_positive_real_roots_come_and_go_on_arcs_only(planes, name):
+    plane = planes[name]
+    rng = np.random.default_rng(6)
+    arcs = [*plane.arcs("stability"), *plane.arcs("parting")]
+    for _ in range(5):
+        for point in changes(lambda y: sturm(plane.polynomial(y))[2] > 0, rng.random(2), rng.random(2), 50):
+            assert distance(point, arcs) <= CHORD
 
 
 SYSTEMS = {

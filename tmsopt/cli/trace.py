@@ -49,6 +49,7 @@ def trace(
 ) -> None:
     """Trace a root pattern of FILE through parameter space, every branch in the box, with its events."""
     with bad_input():
+        from tmsopt.design.errors import Fault, InputError
         from tmsopt.design.files import load
         from tmsopt.study.branch import write_csv
         from tmsopt.study.trace import trace as trace_problem
@@ -56,7 +57,10 @@ def trace(
         check_output("--plot", plot, FIGURES)
         check_output("--csv", csv_file, ("csv",))
         problem = load(file, asks=False)
-        names = plane(problem, axes) if plot else ()
+        if plot is None and axes is not None:
+            raise InputError([Fault("says what --plot draws; add --plot FILE", ("--axes",))])
+        if axes is not None:
+            plane(problem, axes)
         with progress() as update:
             found = trace_problem(problem, pattern, step=step, starts=starts, seed=seed, progress=update)
     if as_json:
@@ -65,15 +69,15 @@ def trace(
         from tmsopt.show.traced import trace_table
 
         click.echo(trace_table(found))
+    if not found.branches:
+        click.echo(f"no {found.pattern} found in the box; widen it, or try more --starts", err=True)
+        raise SystemExit(3)
     if csv_file is not None:
         with saving("--csv", csv_file):
             write_csv(found, csv_file)
     if plot is not None:
         from tmsopt.show.style import save
-        from tmsopt.show.traced import trace_figure
+        from tmsopt.show.traced import trace_figure, varying
 
         with saving("--plot", plot):
-            save(trace_figure(found, *names), plot)
-    if not found.branches:
-        click.echo(f"no {found.pattern} found in the box; widen it, or try more --starts", err=True)
-        raise SystemExit(3)
+            save(trace_figure(found, *plane(problem, axes or ",".join(varying(found)[:2]))), plot)

@@ -3,13 +3,15 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from tmsopt.show.chart import draw_classes, draw_domain, label_axes, name_point
-from tmsopt.show.style import COMPLEX, CRITICAL, LINE, MARK, REAL, new_figure
+from tmsopt.show.chart import class_handles, domain_handles, draw_classes, draw_domain
+from tmsopt.show.labels import Name, label_axes, place_names
+from tmsopt.show.style import COMPLEX, CRITICAL, LINE, MARK, REAL, legend_below, new_figure
 from tmsopt.show.traced import draw_branch
 from tmsopt.study.paper.planes import Plane
 
@@ -29,17 +31,28 @@ _LAW_WORDS = {
 }
 
 
-def draw_plane(ax: Axes, plane: Plane) -> None:
-    """Classes, exact boundaries with corners, the EP set and the marked points of a plane."""
+def draw_plane(ax: Axes, plane: Plane) -> list[Name]:
+    """Classes, exact boundaries with corners, the EP set and the marked points of a plane; names to place."""
     chart = plane.chart
     draw_classes(ax, chart)
-    if chart.domain is not None:
-        draw_domain(ax, chart.domain, *chart.axes)
+    names = draw_domain(ax, chart.domain, *chart.axes) if chart.domain is not None else []
     if plane.ep_set is not None:
         for branch in plane.ep_set.branches:
             draw_branch(ax, branch, *chart.axes, width=2.0)
-    _draw_marked(ax, plane)
+    names += _draw_marked(ax, plane)
     _frame(ax, plane)
+    return names
+
+
+def plane_handles(plane: Plane) -> list[Artist]:
+    """Legend entries of the classes and the curves of a plane."""
+    handles: list[Artist] = [*class_handles(plane.chart.kind)]
+    if plane.chart.domain is not None:
+        handles += domain_handles(plane.chart.domain)
+    if plane.ep_set is not None:
+        handles.append(Line2D([], [], color=REAL, linewidth=2, label="2EP2"))
+        handles.append(Line2D([], [], color=COMPLEX, linewidth=2, linestyle="--", label="CEP2"))
+    return handles
 
 
 def draw_abscissa(ax: Axes, plane: Plane, low: float, high: float) -> ScalarMappable:
@@ -53,22 +66,26 @@ def draw_abscissa(ax: Axes, plane: Plane, low: float, high: float) -> ScalarMapp
         colour, line = LAW_STYLE[label]
         colour = {LINE: "white", CRITICAL: "#56B4E9", REAL: "#E69F00"}[colour]
         ax.plot(x, y, color=colour, linestyle=line, linewidth=1.5, label=_LAW_WORDS[label])
-    _draw_marked(ax, plane)
+    names = _draw_marked(ax, plane)
     legend = ax.legend(fontsize=7.5, facecolor="0.25", framealpha=0.85, loc="upper left")
     for text in legend.get_texts():
         text.set_color("white")
     _frame(ax, plane)
+    place_names(ax, names)
     return mesh
 
 
 def planes_figure(planes: Sequence[Plane], titles: Sequence[str]) -> Figure:
     """Planes side by side."""
-    figure = new_figure(4.8 * len(planes), 4.4)
+    figure = new_figure(4.8 * len(planes), 5.0)
     panels = np.atleast_1d(figure.subplots(1, len(planes)))
+    names = []
     for ax, plane, title in zip(panels, planes, titles, strict=True):
-        draw_plane(ax, plane)
+        names.append(draw_plane(ax, plane))
         ax.set_title(title, fontsize=10)
-        _legend(ax, plane)
+    legend_below(figure, [h for plane in planes for h in plane_handles(plane)])
+    for ax, found in zip(panels, names, strict=True):
+        place_names(ax, found)
     return figure
 
 
@@ -85,14 +102,11 @@ def abscissa_figure(planes: Sequence[Plane], titles: Sequence[str], low: float =
     return figure
 
 
-def _draw_marked(ax: Axes, plane: Plane) -> None:
-    corners = plane.chart.domain.corners if plane.chart.domain is not None else ()
-    named = {c.name for c in corners}
-    for name, (x, y) in plane.marked.items():
+def _draw_marked(ax: Axes, plane: Plane) -> list[Name]:
+    for x, y in plane.marked.values():
         ax.plot([x], [y], "o", color=MARK, markeredgecolor="white", markersize=6, zorder=6)
-        if name not in named:
-            least = name == "least Fr_c"
-            name_point(ax, r"least $\mathrm{Fr}_c$" if least else name, x, y, left=least or bool(corners))
+    words = {"least Fr_c": r"least $\mathrm{Fr}_c$"}
+    return [Name(words.get(name, name), x, y) for name, (x, y) in plane.marked.items()]
 
 
 def _frame(ax: Axes, plane: Plane) -> None:
@@ -100,18 +114,3 @@ def _frame(ax: Axes, plane: Plane) -> None:
     label_axes(ax, chart.problem.parameter_set, *chart.axes)
     ax.set_xlim(chart.grid[0][0], chart.grid[0][-1])
     ax.set_ylim(chart.grid[1][0], chart.grid[1][-1])
-
-
-def _legend(ax: Axes, plane: Plane) -> None:
-    """The classes that draw_classes named, and the curves."""
-    old = ax.get_legend()
-    patches = list(old.legend_handles) if old is not None else []
-    lines = [Line2D([], [], color=CRITICAL, linewidth=1.8, label="weave boundary")]
-    domain = plane.chart.domain
-    if domain is not None and domain.heavy_damping:
-        lines.append(Line2D([], [], color=LINE, linewidth=1.4, label="boundary of heavy damping"))
-    if plane.ep_set is not None:
-        lines.append(Line2D([], [], color=REAL, linewidth=2, label="2EP2"))
-        lines.append(Line2D([], [], color=COMPLEX, linewidth=2, linestyle="--", label="CEP2"))
-    handles = [h for h in (*patches, *lines) if h is not None]
-    ax.legend(handles=handles, fontsize=7.5, framealpha=0.9, loc="best")

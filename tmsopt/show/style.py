@@ -2,8 +2,10 @@
 
 import os
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
+from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -17,11 +19,22 @@ REAL, COMPLEX, CAPSIZE = "#009E73", "#CC79A7", "#999999"
 """Real and complex exceptional points, the capsize boundary."""
 
 
+_ENTRY = 2.6  # inches of a legend entry
+
+
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure, sizes in inches, that needs no display."""
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
+
+
+def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
+    """One legend for the whole figure, below it, where it covers nothing; each label once."""
+    once = {str(h.get_label()): h for h in handles}
+    if once:
+        beside = min(len(once), int(figure.get_figwidth() / _ENTRY))
+        figure.legend(handles=list(once.values()), loc="outside lower center", ncols=beside, fontsize=8, frameon=False)
 
 
 def save(figure: Figure, path: Path) -> None:
@@ -30,6 +43,10 @@ def save(figure: Figure, path: Path) -> None:
     Raises:
         OSError: when the file cannot be written.
     """
+    path = path.resolve()  # a link stays one
+    if path.exists() and not path.is_file():
+        figure.savefig(path, dpi=200, format=path.suffix.lstrip(".") or None)
+        return
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".tmsopt-", suffix=path.suffix)
     os.close(handle)
     try:

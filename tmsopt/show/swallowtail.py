@@ -6,12 +6,14 @@ import numpy as np
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.axes3d import Axes3D  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from tmsopt.show.planes import draw_plane
-from tmsopt.show.style import COMPLEX, HEAVY, LINE, MARK, REAL, STABLE, new_figure
+from tmsopt.show.labels import place_names
+from tmsopt.show.planes import draw_plane, plane_handles
+from tmsopt.show.style import COMPLEX, HEAVY, LINE, MARK, REAL, STABLE, legend_below, new_figure
 from tmsopt.study.branch import Trace
 from tmsopt.study.paper.planes import Plane
 from tmsopt.study.swallowtail import Swallowtail
@@ -52,6 +54,8 @@ def draw_swallowtail(ax: Axes3D, data: Swallowtail) -> None:
     ):
         limit(low, high)
         label(f"${of[name].latex}$")
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+        axis.set_major_locator(MaxNLocator(4, prune="both"))  # ticks of two axes must not meet at their corner
 
 
 def quadrilaterals(points: Array) -> Array:
@@ -69,7 +73,7 @@ def swallowtail_figure(data: Swallowtail, sections: Sequence[Plane], titles: Seq
     draw_swallowtail(ax, data)
     ax.view_init(elev=24, azim=-52)
     ax.set_box_aspect(None, zoom=0.86)  # leaves room for the vertical label
-    ax.set_title("discriminant surface", fontsize=10)
+    ax.set_title("(a) discriminant surface", fontsize=10)
     ax.legend(
         handles=[
             Line2D([], [], color=HEAVY, linewidth=6, label="bounds heavy damping"),
@@ -81,10 +85,14 @@ def swallowtail_figure(data: Swallowtail, sections: Sequence[Plane], titles: Seq
         fontsize=7.5,
         loc="upper left",
     )
+    names = []
     for k, (plane, title) in enumerate(zip(sections, titles, strict=True)):
         flat = figure.add_subplot(2, 2, k + 2)
-        draw_plane(flat, plane)
+        names.append((flat, draw_plane(flat, plane)))
         flat.set_title(title, fontsize=10)
+    legend_below(figure, [h for plane in sections for h in plane_handles(plane)])
+    for flat, found in names:
+        place_names(flat, found)
     return figure
 
 

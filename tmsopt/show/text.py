@@ -3,10 +3,18 @@
 import math
 from collections.abc import Sequence
 
+from tmsopt.models import ParameterSet
+
 
 def number(value: float) -> str:
     """Twelve digits, or ``none`` for a number that does not exist."""
     return f"{value:.12g}" if math.isfinite(value) else "none"
+
+
+def with_unit(of: ParameterSet, name: str) -> str:
+    """A parameter with the unit of its numbers, e.g. ``v m/s``."""
+    unit = of[name].unit
+    return name if unit == "1" else f"{name} {unit}"
 
 
 def columns(rows: Sequence[Sequence[str]]) -> list[str]:

@@ -6,9 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tmsopt.show.chart import label_axes, name_point
-from tmsopt.show.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, new_figure
-from tmsopt.show.text import columns, number
+from tmsopt.roots import PATTERNS
+from tmsopt.show.labels import Name, label_axes, place_names
+from tmsopt.show.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, legend_below, new_figure
+from tmsopt.show.text import columns, number, with_unit
 from tmsopt.study.branch import Branch, Trace
 
 COLOURS = {
@@ -22,17 +23,17 @@ _LABELLED = ("EP4", "EP3", "2EP2", "double zero", "weave", "capsize")
 
 def trace_table(trace: Trace) -> str:
     """Branches with their events, one a row, in the free parameters."""
-    free = list(trace.problem.free)
+    free, of = list(trace.problem.free), trace.problem.parameter_set
     per_point = 1e6 * trace.seconds_walking / max(trace.points, 1)
     count = f"{len(trace.branches)} branch" + ("es" if len(trace.branches) != 1 else "")
+    points = f", {trace.points} points at {per_point:.0f} µs each" if trace.points else ""
     lines = [
         trace.problem.title or "untitled problem",
-        f"{trace.pattern}: {count}, {trace.points} points at {per_point:.0f} µs each, "
-        f"looked for from {trace.starts} starts; {trace.seconds:.2f} s",
+        f"{trace.pattern}: {count}{points}, looked for from {trace.starts} starts; {trace.seconds:.2f} s",
     ]
     for number_, branch in enumerate(trace.branches, start=1):
-        lines += ["", f"branch {number_}: {_summary(branch)}"]
-        rows = [("", *free, "abscissa", "")]
+        lines += ["", f"branch {number_}: {_summary(branch, trace)}"]
+        rows = [("", *(with_unit(of, n) for n in free), "abscissa", "")]
         for event in branch.events:
             values = (number(event.parameters[n]) for n in free)
             rows.append((event.name, *values, number(float(branch.abscissa[event.index])), event.detail))
@@ -40,20 +41,18 @@ def trace_table(trace: Trace) -> str:
     return "\n".join(line.rstrip() for line in lines)
 
 
-def draw_trace(ax: Axes, trace: Trace, horizontal: str, vertical: str) -> None:
-    """Branches in a plane of two parameters: one line style per pattern, pale where unstable, events marked."""
+def draw_trace(ax: Axes, trace: Trace, horizontal: str, vertical: str) -> list[Name]:
+    """Branches in a plane of two parameters: one line style per pattern, pale where unstable, events marked.
+
+    Returns the names of the events, to place.
+    """
     for branch in trace.branches:
         draw_branch(ax, branch, horizontal, vertical)
-    placed: list[tuple[float, float]] = []
-    for event in trace.events:
-        if event.name not in _LABELLED:
-            continue
-        x, y = event.parameters[horizontal], event.parameters[vertical]
-        ax.plot([x], [y], "o", color=MARK, markersize=4, zorder=4)
-        if any(np.allclose((x, y), other, rtol=1e-6) for other in placed):
-            continue
-        placed.append((x, y))
-        name_point(ax, event.name, x, y)
+    marked = [e for e in trace.events if e.name in _LABELLED]
+    names = [Name(e.name, e.parameters[horizontal], e.parameters[vertical]) for e in marked]
+    for name in names:
+        ax.plot([name.x], [name.y], "o", color=MARK, markersize=4, zorder=4)
+    return names
 
 
 def draw_branch(ax: Axes, branch: Branch, horizontal: str, vertical: str, width: float = 1.4) -> None:
@@ -80,18 +79,31 @@ def draw_branch(ax: Axes, branch: Branch, horizontal: str, vertical: str, width:
 
 def trace_figure(trace: Trace, horizontal: str, vertical: str) -> Figure:
     """All branches of a trace in one plane."""
-    figure = new_figure(6.4, 4.8)
+    figure = new_figure(6.4, 5.0)
     ax = figure.subplots()
-    draw_trace(ax, trace, horizontal, vertical)
+    names = draw_trace(ax, trace, horizontal, vertical)
     label_axes(ax, trace.problem.parameter_set, horizontal, vertical)
-    if trace.branches:
-        ax.legend(fontsize=8)
     ax.set_title(trace.problem.title or trace.pattern, fontsize=11)
+    legend_below(figure, ax.get_legend_handles_labels()[0])
+    place_names(ax, names)
     return figure
 
 
-def _summary(branch: Branch) -> str:
-    states = f"stable on {100 * float(np.mean(branch.stable)):.0f} % of its points"
+def varying(trace: Trace) -> list[str]:
+    """The free parameters, those that stay the same on every branch last."""
+
+    def moves(name: str) -> bool:
+        low, high = trace.problem.free[name]
+        return any(np.ptp(b.parameters[name]) > 1e-9 * (high - low) for b in trace.branches)
+
+    return sorted(trace.problem.free, key=lambda name: not moves(name))
+
+
+def _summary(branch: Branch, trace: Trace) -> str:
+    share = f"{100 * float(np.mean(branch.stable)):.0f} % of its points"
+    states = f"bounds stability on {share}" if PATTERNS[branch.pattern].rest else f"stable on {share}"
+    if any(c.comparison != "==" for c in trace.problem.conditions.values()):
+        states += f", constraints hold on {100 * float(np.mean(branch.satisfied)):.0f} %"
     form = "closed" if branch.closed else "open"
     kinds = " and ".join(dict.fromkeys(_sides(branch)))
     return f"{kinds}, {len(branch)} points, {form}, {states}, coefficients met to {branch.residual:.0e}"

@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 CLASSES = ("undefined", "capsize", "weave", "stable", "heavily damped")
 """Names of the class codes 0 … 4, from worst to best; undefined is a singular mass matrix."""
 
+LARGEST = 20_000_000
+"""Designs of a chart, which is held in memory at some 40 bytes each."""
+
 _BLOCK = 20_000
 
 
@@ -35,7 +38,9 @@ class Chart:
             (weave), stable, stable with all roots real (heavily damped).
         abscissa, damping_ratio: from roots that are jointly right next to an exceptional point; nan if undefined.
         real_roots: number of different real roots, from coefficients.
-        satisfied: where every constraint of the problem holds.
+        satisfied: where every inequality constraint of the problem holds.
+        margin: least difference of the sides of an inequality, negative where one is violated, nan where one does not
+            exist.
         domain: the exact boundaries, if asked for.
     """
 
@@ -47,6 +52,7 @@ class Chart:
     damping_ratio: Array
     real_roots: NDArray[np.int8]
     satisfied: NDArray[np.bool_]
+    margin: Array
     domain: Domain | None
 
     @property
@@ -54,9 +60,15 @@ class Chart:
         """Share of the grid in each class."""
         return {name: float(np.mean(self.kind == code)) for code, name in enumerate(CLASSES)}
 
+    @property
+    def left_aside(self) -> tuple[str, ...]:
+        """Names of the equality constraints: they hold on curves, which `trace` follows, and nowhere on a grid."""
+        return tuple(n for n, c in self.problem.conditions.items() if c.comparison == "==")
+
     def to_json(self) -> dict[str, Any]:
         """Summary, boundaries and corners; the arrays themselves go to a file."""
-        best = int(np.nanargmin(self.abscissa)) if np.any(np.isfinite(self.abscissa)) else None
+        allowed = np.where(self.satisfied, self.abscissa, np.nan)
+        best = int(np.nanargmin(allowed)) if np.any(np.isfinite(allowed)) else None
         row, column = divmod(best, len(self.grid[0])) if best is not None else (0, 0)
         return {
             "schema": 1,
@@ -89,6 +101,8 @@ def chart(
 ) -> Chart:
     """Classify every design of a grid over the two free parameters; the others must be fixed.
 
+    Equality constraints are left aside.
+
     Args:
         axes: horizontal and vertical parameter; by default in the order of the problem.
         points: along each axis; the ends of the box are grid points.
@@ -96,21 +110,22 @@ def chart(
         progress: called with the number of designs done and in all.
 
     Raises:
-        InputError: unless exactly two parameters are free and the axes name them.
+        InputError: unless exactly two parameters are free and the axes name them, or for other numbers of points.
     """
     names = plane_of(problem, axes)
+    _check(points)
     first, second = (np.linspace(*problem.free[n], m) for n, m in zip(names, points, strict=True))
     across, up = (part.ravel() for part in np.meshgrid(first, second))
     count = across.size
     kind, real = np.zeros(count, dtype=np.int8), np.zeros(count, dtype=np.int8)
     alpha, ratio = np.full(count, np.nan), np.full(count, np.nan)
-    satisfied = np.ones(count, dtype=bool)
+    margin = np.full(count, np.inf)
     for start in range(0, count, _BLOCK):
         block = slice(start, min(start + _BLOCK, count))
         columns = {names[0]: across[block], names[1]: up[block]}
-        a = coefficients(problem, columns)
-        kind[block], real[block], alpha[block], ratio[block] = classify(a)
-        satisfied[block] = _satisfied(problem, columns, alpha[block], ratio[block])
+        with np.errstate(all="ignore"):  # a box of any size: what overflows is undefined
+            kind[block], real[block], alpha[block], ratio[block] = classify(coefficients(problem, columns))
+            margin[block] = _margin(problem, columns, alpha[block], ratio[block])
         if progress:
             progress(block.stop, count)
     shape = (len(second), len(first))
@@ -122,9 +137,20 @@ def chart(
         abscissa=alpha.reshape(shape),
         damping_ratio=ratio.reshape(shape),
         real_roots=real.reshape(shape),
-        satisfied=satisfied.reshape(shape),
+        satisfied=(margin >= 0).reshape(shape),
+        margin=margin.reshape(shape),
         domain=domain(problem) if boundaries else None,
     )
+
+
+def _check(points: Any) -> None:
+    try:
+        across, up = (int(p) for p in points)
+    except (TypeError, ValueError):
+        across = up = 0
+    if min(across, up) < 2 or across * up > LARGEST:
+        message = f"found {points!r}; accepted: two whole numbers, each 2 or more, their product {LARGEST:.0e} or less"
+        raise InputError([Fault(message, ("points",))])
 
 
 def plane_of(problem: Problem, axes: tuple[str, str] | None = None) -> tuple[str, str]:
@@ -165,17 +191,17 @@ def classify(a: Array) -> tuple[NDArray[np.int8], NDArray[np.int8], Array, Array
     return kind, real, alpha, ratio
 
 
-def _satisfied(problem: Problem, columns: Mapping[str, Array], alpha: Array, ratio: Array) -> NDArray[np.bool_]:
-    """Where every constraint holds; one that does not exist, such as the speed of a root, does not hold."""
+def _margin(problem: Problem, columns: Mapping[str, Array], alpha: Array, ratio: Array) -> Array:
+    """Least difference by which the inequalities hold; nan where one does not exist, such as the speed of a root."""
     values = Values(problem.model, problem.parameter_set, problem.ordered(columns))
     values.define("abscissa", alpha)
     values.define("damping_ratio", ratio)
-    holds = np.ones(len(alpha), dtype=bool)
+    least = np.full(len(alpha), np.inf)
     for condition in problem.conditions.values():
-        difference = np.broadcast_to(np.asarray(condition(values), dtype=float), len(alpha))
-        sides = {"<=": difference <= 0, ">=": difference >= 0, "==": difference == 0}
-        holds &= sides[condition.comparison]
-    return holds
+        if condition.comparison != "==":
+            sign = -1.0 if condition.comparison == "<=" else 1.0
+            least = np.minimum(least, sign * np.asarray(condition(values), dtype=float))
+    return least
 
 
 def save_arrays(found: Chart, path: Path) -> None:

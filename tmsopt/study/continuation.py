@@ -23,9 +23,11 @@ _COSINE = np.cos(0.15)  # of the angle between tangents: a sharper turn takes a 
 _SMALLEST = 1e-12
 _GROWTH = 1.5
 _ROOM = 4.0  # steps of variables without a box, against those with one: nobody looks at their spacing
+_REMOTE = 100.0  # units of the scale beyond which points lie ever further apart, towards infinity
 _SOLVED = 1e-10
 """Residual, relative to the terms of the equations, of a solution: a stationary point of the residual is none."""
 
+_FINE = 1e-17
 _FAR = 1e6  # in units of the scale; further out the equations lose their digits
 _SAME = 1e-7
 CLOSED = "closed"
@@ -97,7 +99,7 @@ def curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> C
     boxed = [k for k in range(size) if np.isfinite(lower[k]) and np.isfinite(upper[k])]
     reach = ca.SX(np.inf)
     for k in range(size):
-        room = 1.0 if k in boxed else _ROOM * (1 + ca.fabs(z[k]))
+        room = 1.0 if k in boxed else _ROOM * (1 + ca.fabs(z[k])) * ca.sqrt(ca.fmax(1, ca.fabs(z[k]) / _REMOTE))
         reach = ca.fmin(reach, room / (ca.fabs(tangent[k]) + 1e-300))
     slack = ca.SX(np.inf)
     for k in range(size):
@@ -210,11 +212,12 @@ def between(on: Curve, y: Array, t: Array, s: float) -> tuple[Array, Array]:
     return new, tangent
 
 
-def contains(on: Curve, walked: Walk, y: Array, step: float) -> bool:
+def contains(on: Curve, walked: Walk, y: Array) -> bool:
     """Whether a point lies on a curve already walked."""
     distance = np.linalg.norm(walked.y - y, axis=1)
     k = int(np.argmin(distance))
-    if distance[k] > 4 * step * (1 + np.abs(y).max()):
+    gaps = np.linalg.norm(np.diff(walked.y, axis=0), axis=1)
+    if distance[k] > 2 * gaps[max(k - 1, 0) : k + 1].max():
         return False
     new, _ = between(on, walked.y[k], walked.t[k], float(walked.t[k] @ (y - walked.y[k])))
     return bool(np.abs(new - y).max() <= _SAME * (1 + np.abs(y).max()))
@@ -226,7 +229,8 @@ def crossing(function: Callable[[float], float], end: float) -> float:
         return 0.0
     if function(end) == 0:
         return end
-    return float(brentq(function, 0.0, end, xtol=1e-300, rtol=4 * np.finfo(float).eps))
+    # a zero at 0 up to rounding has no relative accuracy: that of the whole step is enough
+    return float(brentq(function, 0.0, end, xtol=_FINE * abs(end), rtol=4 * np.finfo(float).eps, disp=False))
 
 
 class _Advance:
@@ -264,7 +268,12 @@ def _evaluate(system: ca.Function, y: Array) -> tuple[Array, Array]:
 def _reach(on: Curve, y: Array, t: Array) -> float:
     """Longest step, per unit of `step`: boxed variables by their box, the others by their own size."""
     boxed = np.logical_and(np.isfinite(on.lower), np.isfinite(on.upper))
-    return float(np.min(np.where(boxed, 1.0, _ROOM * (1 + np.abs(y))) / (np.abs(t) + 1e-300)))
+    return float(
+        np.min(
+            np.where(boxed, 1.0, _ROOM * (1 + np.abs(y)) * np.sqrt(np.maximum(1, np.abs(y) / _REMOTE)))
+            / (np.abs(t) + 1e-300)
+        )
+    )
 
 
 def _at_limit(on: Curve, advance: _Advance, y: Array, t: Array, s: float) -> tuple[Array, Array, End]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
-from tmsopt.roots import PATTERNS
+from tmsopt.roots import PATTERNS, real_roots
 from tmsopt.study.branch import Branch, Event
 from tmsopt.study.continuation import INFINITE
 from tmsopt.study.infinity import Infinity, through_infinity
@@ -56,13 +56,14 @@ class Domain:
     Attributes:
         stability: arcs that bound asymptotic stability.
         heavy_damping: arcs that bound the designs whose roots are all real and negative.
-        merging: arcs on which two positive real roots merge, between capsize and weave.
+        parting: arcs that part capsize from weave among the unstable designs: two positive real roots merge, or one
+            passes 0 or infinity, where no other root is real and positive.
         corners: of the first two boundaries.
     """
 
     stability: tuple[Arc, ...]
     heavy_damping: tuple[Arc, ...]
-    merging: tuple[Arc, ...]
+    parting: tuple[Arc, ...]
     corners: tuple[Corner, ...]
 
     def to_json(self) -> dict[str, Any]:
@@ -72,7 +73,7 @@ class Domain:
             for name, arcs in (
                 ("stability", self.stability),
                 ("heavy_damping", self.heavy_damping),
-                ("merging", self.merging),
+                ("parting", self.parting),
             )
         } | {"corners": [{"name": c.name, "detail": c.detail, **c.parameters} for c in self.corners]}
 
@@ -94,9 +95,10 @@ def domain(problem: Problem, *, step: float = STEP, starts: int = STARTS, seed: 
     damping = [arc for b in found["EP2"] for arc in _pieces(b, b.heavily_damped & _once(b), plane, at_infinity)]
     damping += [arc for b in found["capsize"] for arc in _pieces(b, b.heavily_damped, plane, at_infinity)]
     damping += [arc for curve in infinite for arc in _runs(curve, curve.heavily_damped)]
-    merging = [arc for b in found["EP2"] for arc in _pieces(b, b.unknowns["r"] > 0, plane, at_infinity)]
+    parting = [arc for b in (*found["EP2"], *found["capsize"]) for arc in _pieces(b, _parts(b), plane, at_infinity)]
+    parting += [arc for curve in infinite for arc in _runs(curve, curve.parting)]
     corners = [c for b in (*unstable_beyond, *found["EP2"]) for c in _corners(b, b.stable, b.heavily_damped, plane)]
-    return Domain(tuple(stability), tuple(damping), tuple(merging), tuple(_distinct([*corners, *at_infinity])))
+    return Domain(tuple(stability), tuple(damping), tuple(parting), tuple(_distinct([*corners, *at_infinity])))
 
 
 def _runs(curve: Infinity, inside: NDArray[np.bool_]) -> Iterator[Arc]:
@@ -148,6 +150,14 @@ def _near(problem: Problem, event: Event, corners: Sequence[Corner]) -> list[Cor
         return max(abs(event.parameters[n] - corner.parameters[n]) / width for n, width in widths.items())
 
     return sorted((c for c in corners if distance(c) <= _CLOSE), key=distance, reverse=True)
+
+
+def _parts(branch: Branch) -> NDArray[np.bool_]:
+    """Where one side has a positive real root and the other, unstable too, has none."""
+    names = ("b", "c", "d")[: 3 if branch.pattern == "capsize" else 2]
+    rest = np.stack([np.ones(len(branch)), *(branch.unknowns[n] for n in names)], axis=-1)
+    alone = real_roots(rest)[1] == 0
+    return np.asarray(alone & (branch.unknowns["r"] > 0 if branch.pattern == "EP2" else ~branch.stable))
 
 
 def _once(branch: Branch) -> NDArray[np.bool_]:

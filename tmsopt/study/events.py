@@ -129,7 +129,8 @@ def _refined(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, wal
         left, here, right = side * value[:-2], side * value[1:-1], side * value[2:]
         with np.errstate(all="ignore"):
             slope, bend = _parabola(left, here, right, steps[:-1], steps[1:])
-            dips = (here <= left) & (here <= right) & (bend > 0) & (slope**2 / (2 * bend) > _DIP * here)
+            forward = (steps[:-1] > 0) & (steps[1:] > 0)
+            dips = forward & (here <= left) & (here <= right) & (bend > 0) & (slope**2 / (2 * bend) > _DIP * here)
         for k in (np.flatnonzero(dips & (here > 0)) + 1).tolist():
 
             def height(s: float, k: int = k, mark: Mark = mark, sign: float = float(side[k - 1])) -> float:

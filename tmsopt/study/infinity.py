@@ -36,12 +36,14 @@ class Infinity:
         parameters: free parameter → values at n points.
         stable: where it bounds stability, for each of the n - 1 segments.
         heavily_damped: where it bounds heavy damping, likewise.
+        parting: where it parts capsize from weave.
         changes: row → what the other roots do there, ``capsize``, ``weave``, ``EP2`` or a second ``infinity``.
     """
 
     parameters: dict[str, Array]
     stable: Truth
     heavily_damped: Truth
+    parting: Truth
     changes: dict[int, str]
 
 
@@ -59,8 +61,8 @@ def through_infinity(problem: Problem, step: float, starts: int, seed: int) -> I
     along = ca.dot(ca.gradient(a[0], x), ca.gradient(ca.SX(a[-1]), x))
     rest = ca.Function("rest", [x], [ca.vertcat(*a[1:], along)])
     for walked in _walks(problem, on, step, starts, seed):
-        x_on, stable, damped, changes = _judged(on, walked, rest)
-        yield Infinity(design_at(problem, x_on), stable, damped, changes)
+        x_on, bounds, changes = _judged(on, walked, rest)
+        yield Infinity(design_at(problem, x_on), *bounds, changes)
 
 
 def _walks(problem: Problem, on: Curve, step: float, starts: int, seed: int) -> Iterator[Walk]:
@@ -71,7 +73,7 @@ def _walks(problem: Problem, on: Curve, step: float, starts: int, seed: int) -> 
     for count, design in enumerate(spots):
         start = np.array([np.tan(v) if of[n].tangent else v for n, v in design.items()]) / on.scale
         y = project(on.evaluate, start, held=count % 2)
-        if y is None or np.any(y < on.lower) or np.any(y > on.upper) or any(contains(on, w, y, step) for w in walks):
+        if y is None or np.any(y < on.lower) or np.any(y > on.upper) or any(contains(on, w, y) for w in walks):
             continue
         walked = both_ways(on, y, step, _MOST)
         if walked is not None:
@@ -80,7 +82,7 @@ def _walks(problem: Problem, on: Curve, step: float, starts: int, seed: int) -> 
             yield walked
 
 
-def _judged(on: Curve, walked: Walk, rest: ca.Function) -> tuple[Array, Truth, Truth, dict[int, str]]:
+def _judged(on: Curve, walked: Walk, rest: ca.Function) -> tuple[Array, tuple[Truth, Truth, Truth], dict[int, str]]:
     """Points with every change among them, and what each segment between them bounds."""
 
     def values(y: Array) -> Array:
@@ -119,24 +121,24 @@ def _judged(on: Curve, walked: Walk, rest: ca.Function) -> tuple[Array, Truth, T
         rows[before + 1 + shift] = name
         y.insert(before + 1 + shift, between(on, walked.y[before], walked.t[before], s)[0])
     points = np.array(y)
-    stable, damped = _classes(values((points[1:] + points[:-1]) / 2), vanishing)
-    changes = {
-        row: name for row, name in rows.items() if stable[row - 1] != stable[row] or damped[row - 1] != damped[row]
-    }
-    return points * on.scale, stable, damped, changes
+    bounds = _classes(values((points[1:] + points[:-1]) / 2), vanishing)
+    changes = {row: name for row, name in rows.items() if any(b[row - 1] != b[row] for b in bounds[:2])}
+    return points * on.scale, bounds, changes
 
 
-def _classes(v: Array, vanishing: bool) -> tuple[Truth, Truth]:
-    """Whether a crossing bounds stability and heavy damping.
+def _classes(v: Array, vanishing: bool) -> tuple[Truth, Truth, Truth]:
+    """Whether a crossing bounds stability, bounds heavy damping, and parts capsize from weave.
 
     Where the constant term vanishes with a0, another root goes through 0: to the same side only if both change
     sign alike.
     """
     c = v[:, : -2 if vanishing else -1]
-    stable, damped = np.zeros((2, len(c)), dtype=bool)
+    stable, damped, parting = np.zeros((3, len(c)), dtype=bool)
     proper = c[:, 0] != 0
     if vanishing:
         proper &= v[:, -1] > 0
     stable[proper] = is_stable(c[proper])
-    damped[stable] = real_roots(c[stable])[0] == c.shape[1] - 1
-    return stable, damped
+    negative, positive = real_roots(c[proper])
+    damped[proper] = stable[proper] & (negative == c.shape[1] - 1)
+    parting[proper] = ~stable[proper] & (positive == 0)
+    return stable, damped, parting

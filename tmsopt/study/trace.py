@@ -80,7 +80,7 @@ def trace(
     for done, y in enumerate(chain(_seeds(ready, starts, seed, through), _missed(ready, lines))):
         if progress:
             progress(min(done // _GUESSES, starts), starts)
-        if y is None or any(contains(ready.on, w, y, step) for w in walks):
+        if y is None or any(contains(ready.on, w, y) for w in walks):
             continue
         before = time.perf_counter()
         found = both_ways(ready.on, y, step, most)
