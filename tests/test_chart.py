@@ -1,6 +1,7 @@
 """Stability charts against exact classes; `tmsopt trace` and `tmsopt chart` by their contract, in processes."""
 
 import csv
+import dataclasses
 import json
 import math
 import subprocess
@@ -17,9 +18,13 @@ from oracles import abscissa_60, certified_roots, polynomial_60
 
 from tmsopt.cli import main
 from tmsopt.design.errors import InputError
+from tmsopt.design.files import load
 from tmsopt.design.problem import Problem
 from tmsopt.models import tms
+from tmsopt.show.chart import chart_table
 from tmsopt.study.chart import CLASSES, chart, classify, save_arrays
+from tmsopt.study.domain import domain
+from tmsopt.study.trace import trace
 
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 SQRT2 = math.sqrt(2)
@@ -391,3 +396,61 @@ def test_help_shows_examples():
         assert done.returncode == 0
         assert f"tmsopt {command} problems/" in done.stdout
         assert "Exit status" in done.stdout
+
+
+@pytest.mark.parametrize("points", [(1, 5), (0, 5), 50, (5,), (99_999, 99_999), ("a", 5)])
+def test_other_numbers_of_points_are_refused(points):
+    problem = load("problems/chart.toml", asks=False)
+    with pytest.raises(InputError, match=r"points: found .* accepted: two whole numbers"):
+        chart(problem, points=points, boundaries=False)
+
+
+@pytest.mark.parametrize("call", [chart, domain, trace])
+def test_a_file_name_is_no_problem(call):
+    with pytest.raises(InputError, match=r"accepted: a Problem, such as tmsopt\.load"):
+        call("problems/chart.toml")
+
+
+def test_axes_as_one_text_are_refused():
+    problem = load("problems/chart.toml", asks=False)
+    with pytest.raises(InputError, match="found 'Fr,lambda_s'; accepted: Fr and lambda_s"):
+        chart(problem, "Fr,lambda_s", points=(5, 5), boundaries=False)
+
+
+def test_the_least_abscissa_satisfies_the_constraints():
+    problem = load("problems/chart.toml", asks=False)
+    free = chart(problem, points=(40, 30), boundaries=False)
+    best = free.to_json()["least_abscissa"]
+    bounded = dataclasses.replace(problem, constraints={"slow": f"Fr <= {best['Fr'] / 2}"})
+    found = chart(bounded, points=(40, 30), boundaries=False)
+    allowed = found.grid[0] <= best["Fr"] / 2
+    assert found.to_json()["least_abscissa"]["value"] == free.abscissa[:, allowed].min()
+    never = chart(dataclasses.replace(problem, constraints={"never": "Fr >= 100"}), points=(5, 5), boundaries=False)
+    assert never.to_json()["least_abscissa"] is None
+    assert "least abscissa" not in chart_table(never)
+
+
+def test_an_equality_is_left_aside_and_said_to_be():
+    problem = dataclasses.replace(load("problems/chart.toml", asks=False), constraints={"law": "Fr == 2"})
+    found = chart(problem, points=(5, 5), boundaries=False)
+    assert found.left_aside == ("law",)
+    assert found.satisfied.all()
+    assert "law is an equality" in chart_table(found)
+
+
+def test_the_margin_is_the_difference_of_the_sides():
+    problem = dataclasses.replace(
+        load("problems/chart.toml", asks=False), constraints={"slow": "Fr <= 2", "steep": "lambda_s >= 0.3"}
+    )
+    found = chart(problem, points=(12, 9), boundaries=False)
+    Fr, tilt = np.meshgrid(*found.grid)
+    assert np.array_equal(found.margin, np.minimum(2 - Fr, tilt - 0.3))
+    assert np.array_equal(found.satisfied, (Fr <= 2) & (tilt >= 0.3))
+
+
+def test_a_huge_box_is_charted_without_a_warning():
+    problem = dataclasses.replace(
+        load("problems/chart.toml", asks=False), free={"Fr": (0.1, 1e300), "lambda_s": (0.01, 1.4)}
+    )
+    found = chart(problem, points=(20, 15))
+    assert found.shares["undefined"] > 0.9

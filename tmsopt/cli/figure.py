@@ -19,6 +19,8 @@ Examples:
   tmsopt figure fig3 --output locus.pdf
   tmsopt figure all --output figures --format svg
 
+'all' takes half a minute or so.
+
 Exit status: 0 drawn, 2 bad input.
 """
 

@@ -106,7 +106,9 @@ def _text(file: str) -> str:
         if path.is_dir():
             raise InputError([Fault("is a directory; accepted: a TOML problem file", file=file)])
         if not path.exists():
-            near = suggest(path.name, [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else [])
+            near = suggest(
+                path.name, sorted(p.name for p in path.parent.glob("*.toml")) if path.parent.is_dir() else []
+            )
             hint = f"; {near}" if "did you mean" in near else ""
             raise InputError([Fault(f"no such file{hint}", file=file)])
         if not path.is_file():

@@ -135,11 +135,26 @@ class Problem:
         return {name: complete[name] for name in self.parameter_set.names}
 
 
+def checked(problem: object) -> Problem:
+    """A problem as it is.
+
+    Raises:
+        InputError: for anything else, such as the name of a file.
+    """
+    if isinstance(problem, Problem):
+        return problem
+    message = f"found {problem!r}; accepted: a Problem, such as tmsopt.load('problems/chart.toml', asks=False)"
+    raise InputError([Fault(message, ("problem",))])
+
+
 def unasked(problem: Problem) -> list[Fault]:
     """What is wrong with solving a problem that frees parameters without a question; a chart needs none."""
     if not problem.free or problem.sense != "evaluate":
         return []
-    message = "parameters are free, but nothing is asked of them; write minimize, maximize or locate"
+    message = (
+        "parameters are free, but nothing is asked of them; write minimize, maximize or locate "
+        "(chart and trace need none: in Python, load(file, asks=False))"
+    )
     return [Fault(message, ("objective",))]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.errors import Fault, InputError
-from tmsopt.design.problem import Problem
+from tmsopt.design.problem import Problem, checked
 from tmsopt.models import Values
 from tmsopt.roots import is_stable, real_roots, roots
 from tmsopt.study.domain import Domain, domain
@@ -112,7 +112,7 @@ def chart(
     Raises:
         InputError: unless exactly two parameters are free and the axes name them, or for other numbers of points.
     """
-    names = plane_of(problem, axes)
+    names = plane_of(checked(problem), axes)
     _check(points)
     first, second = (np.linspace(*problem.free[n], m) for n, m in zip(names, points, strict=True))
     across, up = (part.ravel() for part in np.meshgrid(first, second))
@@ -164,8 +164,8 @@ def plane_of(problem: Problem, axes: tuple[str, str] | None = None) -> tuple[str
         message = f"a plane has two free parameters, and {len(free)} are free ({', '.join(free) or 'none'})"
         advice = "; fix the others" if len(free) > 2 else "; write e.g. Fr = { min = 0.1, max = 5 }"
         raise InputError([Fault(message + advice, ("parameters",))])
-    if axes is not None and set(axes) != set(free):
-        raise InputError([Fault(f"found {', '.join(axes)}; accepted: {' and '.join(free)}", ("axes",))])
+    if axes is not None and (isinstance(axes, str) or sorted(axes) != sorted(free)):
+        raise InputError([Fault(f"found {axes!r}; accepted: {' and '.join(free)}", ("axes",))])
     return axes or (free[0], free[1])
 
 

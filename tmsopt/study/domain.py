@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.problem import Problem
+from tmsopt.design.problem import Problem, checked
 from tmsopt.roots import PATTERNS, real_roots
 from tmsopt.study.branch import Branch, Event
 from tmsopt.study.continuation import INFINITE
@@ -83,7 +83,7 @@ def domain(problem: Problem, *, step: float = STEP, starts: int = STARTS, seed: 
 
     Constraints of the problem are left aside. `step`, `starts` and `seed` are those of `trace`.
     """
-    plane = replace(problem, constraints={}, minimize=None, maximize=None, locate=None)
+    plane = replace(checked(problem), constraints={}, minimize=None, maximize=None, locate=None)
     found = {
         name: trace(plane, name, step=step, starts=starts, seed=seed).branches for name in ("weave", "capsize", "EP2")
     }

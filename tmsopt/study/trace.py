@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tmsopt.design.errors import Fault, InputError, suggest
 from tmsopt.design.formulations import NLP, freedom, matching, variables_of
-from tmsopt.design.problem import Problem
+from tmsopt.design.problem import Problem, checked
 from tmsopt.design.starts import spread
 from tmsopt.roots import PATTERNS, Pattern, roots
 from tmsopt.study.branch import Branch, Trace
@@ -71,7 +71,7 @@ def trace(
         InputError: for an unknown pattern, when the equations do not leave a curve, or for options out of range.
     """
     began = time.perf_counter()
-    problem = _asked(problem, pattern)
+    problem = _asked(checked(problem), pattern)
     _check(problem, step, starts, most, through)
     ready = prepare(problem)
     walks: list[Walk] = []
@@ -133,7 +133,7 @@ def _asked(problem: Problem, name: str | None) -> Problem:
         message = f"no pattern to trace; write locate = 'EP2' or another, or name one. accepted: {' '.join(PATTERNS)}"
         raise InputError([Fault(message, ("objective", "locate"))])
     if name not in PATTERNS:
-        raise InputError([Fault(f"unknown pattern '{name}'; {suggest(name, PATTERNS)}", ("objective", "locate"))])
+        raise InputError([Fault(f"unknown pattern '{name}'; {suggest(str(name), PATTERNS)}", ("objective", "locate"))])
     asked = replace(problem, locate=name, minimize=None, maximize=None)
     count = freedom(asked)
     if count.count != 1:
