@@ -4,6 +4,7 @@ import ast
 import math
 import operator
 import re
+import threading
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -124,13 +125,17 @@ def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
     return Expression(text, names, symbol)
 
 
+_ONE_AT_A_TIME = threading.Lock()
+"""Neither ast.parse (python/cpython#106905) nor warnings.catch_warnings may run in two threads at once."""
+
+
 def _parse(text: str) -> ast.expr:
     if len(text) > _LONGEST:
         raise ExpressionError(f"expression of {len(text)} characters; accepted: up to {_LONGEST}")
     if strange := _NOT_ACCEPTED.search(text.strip()):
         raise ExpressionError(f"'{text}' contains {strange[0]!r}; accepted: one line of {_LANGUAGE}")
     try:
-        with warnings.catch_warnings():
+        with _ONE_AT_A_TIME, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the tokenizer warns of texts like 1if, which fail below
             return ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
