@@ -5,6 +5,7 @@ import math
 import subprocess
 import sys
 from itertools import pairwise
+from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -16,12 +17,16 @@ from oracles import is_stable_60, polynomial_60, roots_60, weave_Fr_60
 
 from tmsopt import laws
 from tmsopt.cli import main
+from tmsopt.design.files import load
 from tmsopt.design.frozen import Table
 from tmsopt.models import Model, Parameter, ParameterSet, tms
 from tmsopt.show.bicycle import draw_bicycle, draw_distance
 from tmsopt.show.experiment import draw_critical_speeds, draw_law
 from tmsopt.show.gallery import GALLERY, find
+from tmsopt.show.labels import Name, place_names
 from tmsopt.show.locus import draw_row, full_window
+from tmsopt.show.style import new_figure, save
+from tmsopt.show.traced import varying
 from tmsopt.show.universal import draw_box, draw_section
 from tmsopt.study.paper.experiment import experiment
 from tmsopt.study.paper.locus import locus, table_1_loci
@@ -37,6 +42,7 @@ from tmsopt.study.paper.universal import (
     table_1_paths,
     universal_path,
 )
+from tmsopt.study.trace import trace
 
 ROUNDING = 1e-13
 """Relative; a few hundred operations in double precision."""
@@ -560,3 +566,60 @@ def test_all_figures_go_into_a_new_directory(tmp_path, monkeypatch):
     assert sorted(path.name for path in folder.iterdir()) == ["bicycle.png", "experiment.png"]
     assert all(path.read_bytes().startswith(b"\x89PNG") and path.stat().st_size > 20_000 for path in folder.iterdir())
     assert done.stderr.splitlines() == [f"wrote {folder / name}.png" for name in quick]
+
+
+# Names beside points
+
+
+def test_names_stand_clear_of_curves_of_one_another_and_of_the_frame():
+    ax = new_figure(4, 4).subplots()
+    x = np.linspace(0, 1, 200)
+    ax.plot(x, x)
+    ax.plot(x, 1 - x)
+    ax.set_xlim(0, 1)
+    ax.set_ylim(0, 1)
+    names = [Name("capsize and weave", 0.995, 0.5), Name("EP3", 0.5, 0.5), Name("EP4", 0.52, 0.53), Name("out", 2, 0.5)]
+    place_names(ax, names)
+    renderer = ax.figure.canvas.get_renderer()
+    boxes = [t.get_window_extent(renderer) for t in ax.texts]
+    assert [t.get_text() for t in ax.texts] == ["capsize and weave", "EP3", "EP4"]
+    frame = ax.get_window_extent(renderer)
+    for k, box in enumerate(boxes):
+        assert frame.x0 <= box.x0 < box.x1 <= frame.x1
+        assert not any(box.overlaps(other) for other in boxes[:k])
+        for line in ax.get_lines()[:2]:
+            drawn = ax.transData.transform(line.get_xydata())
+            assert not any(box.contains(*point) for point in drawn)
+
+
+def test_points_that_fall_together_share_a_label():
+    ax = axes()
+    ax.set_xlim(0, 5)
+    ax.set_ylim(0, 5)
+    place_names(ax, [Name("EP4", 1.0, 2.0), Name("2EP2", 1.001, 2.0), Name("EP4", 1.0, 2.0)])
+    assert [t.get_text() for t in ax.texts] == ["EP4, 2EP2"]
+    place_names(ax, [])
+    assert len(ax.texts) == 1
+
+
+def test_a_parameter_that_stays_the_same_is_no_axis():
+    found = trace(load("problems/ep_set.toml", asks=False), starts=4)
+    assert list(found.problem.free)[:2] == ["Fr", "chi_B"]
+    assert varying(found)[:2] == ["Fr", "lambda_s"]
+
+
+def test_a_link_stays_a_link(tmp_path):
+    target, link = tmp_path / "there.png", tmp_path / "here.png"
+    target.write_bytes(b"old")
+    link.symlink_to(target)
+    save(new_figure(1, 1), link)
+    assert link.is_symlink()
+    assert target.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a disk that is always full")
+def test_a_figure_that_cannot_be_written_is_said(tmp_path):
+    link = tmp_path / "full.png"
+    link.symlink_to("/dev/full")
+    with pytest.raises(OSError, match="No space left"):
+        save(new_figure(1, 1), link)

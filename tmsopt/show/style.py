@@ -1,5 +1,6 @@
 """What all figures share: colours that the colour-blind can tell apart, sizes for print, and saving."""
 
+import io
 import os
 import tempfile
 from collections.abc import Sequence
@@ -43,14 +44,17 @@ def save(figure: Figure, path: Path) -> None:
     Raises:
         OSError: when the file cannot be written.
     """
+    ending = path.suffix.lstrip(".").lower()
     path = path.resolve()  # a link stays one
     if path.exists() and not path.is_file():
-        figure.savefig(path, dpi=200, format=path.suffix.lstrip(".") or None)
+        drawn = io.BytesIO()
+        figure.savefig(drawn, dpi=200, format=ending)
+        path.write_bytes(drawn.getvalue())
         return
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".tmsopt-", suffix=path.suffix)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".tmsopt-")
     os.close(handle)
     try:
-        figure.savefig(temporary, dpi=200)
+        figure.savefig(temporary, dpi=200, format=ending)
         umask = os.umask(0)
         os.umask(umask)
         os.chmod(temporary, 0o666 & ~umask)
