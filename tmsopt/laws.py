@@ -130,7 +130,7 @@ def flus(mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_
 
     It is the zero of a1 a2 a3 - a0 a3^2 - a1^2 a4 in Fr^2, for every chi_H and either sign of lambda_s;
     negative where no speed gives one. It bounds the stable speeds only where a0, a1, a3, a4 have one sign,
-    and is positive there, whatever chi_H. Elsewhere a positive value is no boundary of stability.
+    and is positive there for chi_H > 0. Elsewhere a positive value is no boundary of stability.
     """
     T, k, skew = _tan(lambda_s), chi_H - 1, zeta_B * chi_H - zeta_H * chi_B
     return (
