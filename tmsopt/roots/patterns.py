@@ -153,6 +153,8 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
                 marks={
                     "EP3": lambda u: u[0] * u[0] + u[1] * u[0] + u[2],
                     "2EP2": lambda u: u[1] * u[1] - 4 * u[2],
+                    "double zero": lambda u: u[0],
+                    "capsize": lambda u: u[2],
                 },
             ),
             Pattern(
@@ -174,7 +176,7 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
                 lambda z: [[float(x) for x in np.poly(z)[1:4].real]],
                 rest=lambda u: [[1, u[0], u[1], u[2]]],
                 test=lambda a: a[-1],
-                marks={"double zero": lambda u: u[2]},
+                marks={"double zero": lambda u: u[2], "EP2": lambda u: discriminant([1, *u])},
             ),
             Pattern(
                 "resonance",

@@ -12,7 +12,7 @@ from tmsopt.models import ParameterSet
 
 _SIZE = 8
 
-_SAME = 5e-3  # of an axis: two marks so close are one to the eye
+_SAME = 0.02  # of an axis: names of marks so close would stand beside the wrong ones
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ COLOURS = {
 }  # fmt: skip
 """Colour of each pattern; CEP2 is dashed besides."""
 
-_LABELLED = ("EP4", "EP3", "2EP2", "double zero", "weave", "capsize")
+_LABELLED = ("EP4", "EP3", "2EP2", "double zero", "weave", "capsize", "EP2")
 
 
 def trace_table(trace: Trace) -> str:
@@ -42,9 +42,9 @@ def trace_table(trace: Trace) -> str:
 
 
 def draw_trace(ax: Axes, trace: Trace, horizontal: str, vertical: str) -> list[Name]:
-    """Branches in a plane of two parameters: one line style per pattern, pale where unstable, events marked.
+    """Branches in a plane of two parameters: one colour per pattern, pale where unstable; events marked.
 
-    Returns the names of the events, to place.
+    They are thin where a constraint is violated. Returns the names of the events, to place.
     """
     for branch in trace.branches:
         draw_branch(ax, branch, horizontal, vertical)
@@ -56,12 +56,12 @@ def draw_trace(ax: Axes, trace: Trace, horizontal: str, vertical: str) -> list[N
 
 
 def draw_branch(ax: Axes, branch: Branch, horizontal: str, vertical: str, width: float = 1.4) -> None:
-    """One branch as lines, cut where its pattern or its stability changes."""
+    """One branch as lines, cut where its pattern, its stability or a constraint changes."""
     x, y = branch.parameters[horizontal], branch.parameters[vertical]
-    states = list(zip(_sides(branch), branch.stable.tolist(), strict=True))
+    states = list(zip(_sides(branch), branch.stable.tolist(), branch.satisfied.tolist(), strict=True))
     events = {e.index for e in branch.events}
     start = 0
-    for (kind, stable), run in groupby(states):
+    for (kind, stable, satisfied), run in groupby(states):
         stop = start + len(list(run))
         first = start - 1 if start and start - 1 in events else start
         end = stop if stop - 1 in events else stop + 1  # no gap: an event belongs to both of its sides
@@ -69,10 +69,10 @@ def draw_branch(ax: Axes, branch: Branch, horizontal: str, vertical: str, width:
             x[first:end],
             y[first:end],
             color=COLOURS[kind],
-            linewidth=width,
-            linestyle="--" if kind == "CEP2" else "-",
+            linewidth=width if satisfied else width / 2,
+            linestyle="--" if kind == "CEP2" else "-" if satisfied else ":",
             alpha=1.0 if stable else 0.35,
-            label=_label(ax, kind + ("" if stable else ", unstable")),
+            label=_label(ax, kind + ("" if stable else ", unstable") + ("" if satisfied else ", constraint violated")),
         )
         start = stop
 

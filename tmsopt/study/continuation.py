@@ -31,8 +31,9 @@ _FINE = 1e-17
 _FAR = 1e6  # in units of the scale; further out the equations lose their digits
 _SAME = 1e-7
 CLOSED = "closed"
+SINGULAR = "singular: the curve branches or has no direction here"
 INFINITE = "a root goes to infinity: a0 vanishes"
-_ISOLATED = 1e-10  # singular values, relative to the largest, below which an equation has no influence
+_ISOLATED = 1e-7  # singular values, relative to the largest, below which an equation has no influence
 
 
 @dataclass(frozen=True)
@@ -173,7 +174,7 @@ def walk(on: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
                 break  # nan does not come here
             s /= 2
             if s < _SMALLEST:
-                return _ended(ys, ts, End("singular: the curve branches or has no direction here"))
+                return _ended(ys, ts, End(SINGULAR))
         if len(ys) > 2 and 0 < ahead <= s and far <= 2 * s and advance.returns(y, t, ahead):
             return _ended([*ys, ys[0]], [*ts, ts[0]], End(CLOSED))
         if slack < 0:

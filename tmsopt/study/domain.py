@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from tmsopt.design.problem import Problem, checked
 from tmsopt.roots import PATTERNS, real_roots
 from tmsopt.study.branch import Branch, Event
-from tmsopt.study.continuation import INFINITE
+from tmsopt.study.continuation import INFINITE, SINGULAR
 from tmsopt.study.infinity import Infinity, through_infinity
 from tmsopt.study.trace import STARTS, STEP, trace
 
 Array = NDArray[np.float64]
 
-_CLOSE = 1e-3
-"""Widths of the box between the last point before infinity, some 1e-6 off, and the corner that it belongs to."""
+_CLOSE = 2e-3
+"""Widths of the box between the last point before infinity, often some 1e-6 off, and the corner that it belongs to."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,12 @@ def domain(problem: Problem, *, step: float = STEP, starts: int = STARTS, seed: 
     parting = [arc for b in (*found["EP2"], *found["capsize"]) for arc in _pieces(b, _parts(b), plane, at_infinity)]
     parting += [arc for curve in infinite for arc in _runs(curve, curve.parting)]
     corners = [c for b in (*unstable_beyond, *found["EP2"]) for c in _corners(b, b.stable, b.heavily_damped, plane)]
-    return Domain(tuple(stability), tuple(damping), tuple(parting), tuple(_distinct([*corners, *at_infinity])))
+    return Domain(
+        tuple(stability),
+        tuple(damping),
+        tuple(parting),
+        tuple(_distinct([*corners, *(c for curve in infinite for c in _changes(curve, corners=True))])),
+    )
 
 
 def _runs(curve: Infinity, inside: NDArray[np.bool_]) -> Iterator[Arc]:
@@ -113,9 +118,11 @@ def _edges(inside: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def _changes(curve: Infinity) -> Iterator[Corner]:
-    """Corners on a0 = 0, where another boundary comes in."""
+def _changes(curve: Infinity, corners: bool = False) -> Iterator[Corner]:
+    """Points on a0 = 0 where another boundary comes in; only the corners of stability and of heavy damping, or all."""
     for row, what in curve.changes.items():
+        if corners and not any(b[row - 1] != b[row] for b in (curve.stable, curve.heavily_damped)):
+            continue
         name, detail = (f"infinity and {what}", "a0 = 0") if what != "infinity" else ("infinity", "a0 = a1 = 0")
         yield Corner(name, detail, {n: float(column[row]) for n, column in curve.parameters.items()})
 
@@ -130,7 +137,7 @@ def _pieces(
         k = event.index
         if event.name != "end":
             marked[k] = bool(inside[max(k - 1, 0)] or inside[min(k + 1, len(branch) - 1)])
-        elif event.detail == INFINITE:
+        elif event.detail in (INFINITE, SINGULAR):
             for corner in _near(problem, event, at_infinity):
                 beyond[k] = corner
     for start, stop in _edges(marked):
@@ -180,7 +187,7 @@ def _corners(
 def _turns(branch: Branch, event: Event) -> bool:
     if event.name == "end":
         return event.detail in PATTERNS[branch.pattern].ends.values()
-    return event.name in ("EP4", "EP3", "2EP2", "double zero", "weave", "capsize")
+    return event.name in ("EP4", "EP3", "2EP2", "double zero", "weave", "capsize", "EP2")
 
 
 def _distinct(corners: Sequence[Corner]) -> list[Corner]:

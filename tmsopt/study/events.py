@@ -15,7 +15,19 @@ from tmsopt.models import Values
 from tmsopt.roots import PATTERNS, Pattern, roots
 from tmsopt.study.branch import Branch, Event
 from tmsopt.study.continuation import CLOSED, Curve, End, Walk, between, crossing, project
-from tmsopt.study.marks import NOTHING, Mark, all_real, marks, parameters_of, satisfied, stability, values_of, vanishes
+from tmsopt.study.marks import (
+    CHANGES,
+    NOTHING,
+    Mark,
+    all_real,
+    marks,
+    parameters_of,
+    satisfied,
+    sign_changes,
+    stability,
+    values_of,
+    vanishes,
+)
 
 Array = NDArray[np.float64]
 Truth = NDArray[np.bool_]
@@ -39,9 +51,9 @@ _ASTRAY = 2.0  # arclengths: a point further off lies on another curve, as besid
 
 _EXACT = 1e-13  # mismatch of a coefficient of an EP4, relative to its terms: some roundings
 
-_LEVEL = 1e-7  # a parameter that changes less per arclength stays level: its slope has no sign
+_ROUNDING = 1e-14  # of a variable of order 1
 
-_RANK = ("EP4", "EP3", "2EP2", "double zero", "weave", "capsize", "constraint", "fold")
+_RANK = ("EP4", "EP3", "2EP2", "double zero", "weave", "capsize", "EP2", "constraint", "fold")
 
 
 @dataclass(frozen=True)
@@ -161,14 +173,8 @@ def _events(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walk
     u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]
     stable = stability(pattern.remaining(u), len(x))
     for mark, value in _live(problem, pattern, unknowns, x, walked.t):
-        sign = np.sign(value)
-        for k in range(1, len(sign)):
-            sign[k] = sign[k] or sign[k - 1]
-        changes = np.flatnonzero(sign[1:] * sign[:-1] < 0)
-        for i in changes:
-            if mark.name == "fold" and np.abs(value[i : i + 2]).max() <= _LEVEL:
-                continue
-            if mark.name in ("weave", "capsize") and stable[i] == stable[i + 1]:
+        for i in np.flatnonzero(sign_changes(value)):
+            if mark.detail == CHANGES and stable[i] == stable[i + 1]:
                 continue
             end = float(walked.t[i] @ (walked.y[i + 1] - walked.y[i]))
 
@@ -179,7 +185,22 @@ def _events(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walk
                 continue  # a jump through infinity, or nan
             s = crossing(at, end)
             y, t = between(on, walked.y[i], walked.t[i], s)
+            if mark.name == "fold" and not _turns(walked, int(i), y, list(problem.free).index(mark.detail)):
+                continue
             yield _Found(mark.name, mark.detail, y, t, int(i), s)
+
+
+def _turns(walked: Walk, i: int, y: Array, k: int) -> bool:
+    """Whether a variable has its neighbours, next or next but one, on one side of it by more than rounding.
+
+    Where the equations are singular the tangent alone may say so.
+    """
+    last = len(walked.y) - 1
+    for before, after in ((i, i + 1), (max(i - 1, 0), min(i + 2, last))):
+        back, ahead = walked.y[before, k] - y[k], walked.y[after, k] - y[k]
+        if back * ahead > 0 and min(abs(back), abs(ahead)) > _ROUNDING * (1 + abs(y[k])):
+            return True
+    return False
 
 
 def _touched(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walked: Walk) -> Iterator[_Found]:

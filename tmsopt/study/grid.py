@@ -23,11 +23,14 @@ def coefficients(problem: Problem, columns: Mapping[str, Array]) -> Array:
 
 
 def unexplained(
-    problem: Problem, test: Callable[[Sequence[Any]], Any], lines: Sequence[Mapping[str, Array]]
+    problem: Problem, test: Callable[[Sequence[Any]], Any], lines: Sequence[Mapping[str, Array]], proper: bool = True
 ) -> Iterator[dict[str, float]]:
-    """Designs by which a function of the coefficients changes sign, far from every line; `lines` may grow meanwhile."""
+    """Designs by which a function of the coefficients changes sign, far from every line; `lines` may grow meanwhile.
+
+    Edges over which a0 changes sign as well are left aside where the polynomial is to be `proper`.
+    """
     low, high = np.array(list(problem.free.values())).T
-    left = changes(problem, test)
+    left = changes(problem, test, proper)
     np.random.default_rng(0).shuffle(left)  # neighbours likely belong to one branch, which is then found at once
     seen = 0
     while len(left):
@@ -40,7 +43,7 @@ def unexplained(
             left = left[1:]
 
 
-def changes(problem: Problem, test: Callable[[Sequence[Any]], Any], points: int = POINTS) -> Array:
+def changes(problem: Problem, test: Callable[[Sequence[Any]], Any], proper: bool, points: int = POINTS) -> Array:
     """Middles of the edges over which a function of the coefficients changes sign, in shares of the box, shape (n, 2).
 
     Where the function is nan it does not count.
@@ -51,11 +54,18 @@ def changes(problem: Problem, test: Callable[[Sequence[Any]], Any], points: int 
         n: low + part * (high - low) for (n, (low, high)), part in zip(problem.free.items(), (x, y), strict=True)
     }
     with np.errstate(all="ignore"):
-        value = np.asarray(test(list(np.moveaxis(coefficients(problem, columns), -1, 0))), dtype=float)
-        value = np.broadcast_to(value, x.shape)
-        along = [np.argwhere(value[1:] * value[:-1] < 0), np.argwhere(value[:, 1:] * value[:, :-1] < 0)]
+        a = np.moveaxis(coefficients(problem, columns), -1, 0)
+        value = np.broadcast_to(np.asarray(test(list(a)), dtype=float), x.shape)
+        along = [np.argwhere(_turns(value, axis) & ~(proper & _turns(a[0], axis))) for axis in (0, 1)]
     middles = [rows + offset for rows, offset in zip(along, ([0.5, 0.0], [0.0, 0.5]), strict=True)]
     return np.asarray(np.concatenate(middles) / (points - 1))
+
+
+def _turns(value: Array, axis: int) -> Truth:
+    """Where the sign changes from one grid point to the next; a 0 on the way counts on either side."""
+    sign = np.sign(value)
+    ahead, back = np.take(sign, range(1, sign.shape[axis]), axis), np.take(sign, range(sign.shape[axis] - 1), axis)
+    return np.asarray((ahead != back) & np.isfinite(ahead) & np.isfinite(back))
 
 
 def apart(points: Array, line: Array, distance: float) -> Truth:

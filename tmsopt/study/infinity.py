@@ -18,6 +18,7 @@ from tmsopt.models import Values
 from tmsopt.roots import discriminant, is_stable, lienard_chipart, real_roots
 from tmsopt.study.continuation import Curve, Walk, between, both_ways, contains, crossing, curve, project
 from tmsopt.study.grid import unexplained
+from tmsopt.study.marks import sign_changes
 from tmsopt.study.trace import design_at
 
 Array = NDArray[np.float64]
@@ -69,7 +70,7 @@ def _walks(problem: Problem, on: Curve, step: float, starts: int, seed: int) -> 
     of = problem.parameter_set
     walks: list[Walk] = []
     lines: list[dict[str, Array]] = []
-    spots = chain(islice(spread(problem, seed), starts), unexplained(problem, lambda a: a[0], lines))
+    spots = chain(islice(spread(problem, seed), starts), unexplained(problem, lambda a: a[0], lines, proper=False))
     for count, design in enumerate(spots):
         start = np.array([np.tan(v) if of[n].tangent else v for n, v in design.items()]) / on.scale
         y = project(on.evaluate, start, held=count % 2)
@@ -107,7 +108,7 @@ def _judged(on: Curve, walked: Walk, rest: ca.Function) -> tuple[Array, tuple[Tr
     columns, names = quantities(known)
     found: list[tuple[int, float, str]] = []
     for k, name in enumerate(names):
-        for i in np.flatnonzero(columns[1:, k] * columns[:-1, k] < 0):
+        for i in np.flatnonzero(sign_changes(columns[:, k])):
 
             def at(s: float, i: int = int(i), k: int = k) -> float:
                 return float(quantities(values(between(on, walked.y[i], walked.t[i], s)[0][None]))[0][0, k])
@@ -122,7 +123,7 @@ def _judged(on: Curve, walked: Walk, rest: ca.Function) -> tuple[Array, tuple[Tr
         y.insert(before + 1 + shift, between(on, walked.y[before], walked.t[before], s)[0])
     points = np.array(y)
     bounds = _classes(values((points[1:] + points[:-1]) / 2), vanishing)
-    changes = {row: name for row, name in rows.items() if any(b[row - 1] != b[row] for b in bounds[:2])}
+    changes = {row: name for row, name in rows.items() if any(b[row - 1] != b[row] for b in bounds)}
     return points * on.scale, bounds, changes
 
 

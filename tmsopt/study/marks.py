@@ -17,6 +17,9 @@ Function = Callable[[Array, Array], Array]
 
 NOTHING = 1e-9  # a function smaller than this all along the curve is 0 on it, not an event of it
 
+CHANGES = "stability changes"
+"""Detail of the marks that count only where they change it."""
+
 _ROUNDED = 1e-14  # a tangent, its inverse and the scale: some roundings
 
 _REAL = 1e-6  # of |s|: a factor with a double root has coefficients right to 1e-15 and roots to the root of that
@@ -104,7 +107,8 @@ def marks(problem: Problem, pattern: Pattern, unknowns: slice, within: Sequence[
         return of_unknowns(lambda u: lienard_chipart(pattern.remaining(u)[number])[k])
 
     def of_tangent(k: int) -> Function:
-        return lambda x, t: t[:, k]
+        free = len(problem.free)  # by the arclength in the parameters: the unknowns may move much faster
+        return lambda x, t: np.asarray(t[:, k] / (np.linalg.norm(t[:, :free], axis=1) + 1e-300))
 
     for name, special in pattern.marks.items():
         yield Mark(name, "", of_unknowns(special))
@@ -114,7 +118,7 @@ def marks(problem: Problem, pattern: Pattern, unknowns: slice, within: Sequence[
     for number, factor in enumerate(pattern.remaining(example)):
         for k in range(len(lienard_chipart(factor))):
             name = "capsize" if k == 0 else "weave"  # the first quantity is the constant term
-            yield Mark(name, "stability changes", of_factor(number, k))
+            yield Mark(name, CHANGES, of_factor(number, k))
     for k, parameter in enumerate(problem.free):
         yield Mark("fold", parameter, of_tangent(k))
     for name, condition in problem.conditions.items():
@@ -128,6 +132,16 @@ def _condition(problem: Problem, pattern: Pattern, unknowns: slice, condition: C
         return np.asarray(condition(values_of(problem, pattern, parameters_of(problem, x), u)), dtype=float)
 
     return value
+
+
+def sign_changes(value: Array) -> Truth:
+    """Where a sequence changes sign from one entry to the next; a 0 has the sign before it, or that after the first."""
+    sign = np.sign(value)
+    if np.any(sign):
+        sign[0] = sign[0] or sign[np.flatnonzero(sign)[0]]
+    for k in range(1, len(sign)):
+        sign[k] = sign[k] or sign[k - 1]
+    return np.asarray(sign[1:] * sign[:-1] < 0)
 
 
 def vanishes(value: Any, u: list[Array]) -> bool:

@@ -61,8 +61,8 @@ def trace(
         pattern: name; by default the one that the problem locates.
         step: longest step, in widths of the box.
         starts: designs from which branches are looked for. With two free parameters and one condition (EP2, weave,
-            capsize) a grid of 256 × 256 designs shows what they missed; otherwise a short branch far from all of
-            them can be missed.
+            capsize) a grid of 256 × 256 designs shows what they missed; otherwise the search ends when so many in
+            a row find nothing new, and a branch far from all of them can be missed.
         most: points of a branch in one direction.
         through: designs (values of every free parameter, in the box) to begin at, before the others.
         progress: called with the number of starts done and in all.
@@ -77,9 +77,11 @@ def trace(
     walks: list[Walk] = []
     lines: list[dict[str, Array]] = []
     walking = 0.0
-    for done, y in enumerate(chain(_seeds(ready, starts, seed, through), _missed(ready, lines))):
+    tried = 0
+    for count, y in chain(_seeds(ready, starts, seed, through, lines), _missed(ready, lines)):
+        tried = max(tried, count)
         if progress:
-            progress(min(done // _GUESSES, starts), starts)
+            progress(tried, max(tried, starts))
         if y is None or any(contains(ready.on, w, y) for w in walks):
             continue
         before = time.perf_counter()
@@ -88,9 +90,9 @@ def trace(
         if found is not None:
             walks.append(found)
             lines.append(design_at(problem, found.y * ready.on.scale))
-    branches = tuple(b for b in (branch_of(ready, w) for w in walks) if b.residual <= _BELIEVED)
+    branches = (branch_of(ready, w) for w in walks)
     ordered = tuple(sorted(branches, key=lambda b: -float(b.arclength[-1])))
-    return Trace(problem, str(problem.locate), ordered, starts, time.perf_counter() - began, walking)
+    return Trace(problem, str(problem.locate), ordered, tried, time.perf_counter() - began, walking)
 
 
 def prepare(problem: Problem) -> Traced:
@@ -181,36 +183,53 @@ STEPS = (1e-6, 0.1)
 
 _FEWEST = 4  # points that make a curve with tangents
 
-_BELIEVED = 1e-3  # residual of a branch: beside infinity it grows to 1e-5, a curve of something else has 1
-
 _FAR = 1e5  # unknowns of a seed, in units of their scale: beyond, a0 all but vanishes
 
 _PAIRS = 6  # of four roots
 
+_PATIENCE = 8  # times the starts asked for, at most
+
 _GUESSES = 4  # starting values of the unknowns tried at each design
 
 
-def _seeds(ready: Traced, starts: int, seed: int, through: Sequence[Mapping[str, float]]) -> Iterator[Array | None]:
-    """Points of the pattern's curve in the box, found from many designs; None where a start led nowhere."""
+def _seeds(
+    ready: Traced,
+    starts: int,
+    seed: int,
+    through: Sequence[Mapping[str, float]],
+    lines: Sequence[Mapping[str, Array]],
+) -> Iterator[tuple[int, Array | None]]:
+    """Points of the pattern's curve in the box, found from many designs, and the number of these; None where one fails.
+
+    Where no grid shows what they missed, the search goes on until as many starts in a row find nothing new: `lines`
+    grows meanwhile.
+    """
     problem = ready.problem
     free = len(problem.free)
     given = [*through, *([problem.start] if set(problem.start) == set(problem.free) else [])]
     for design in given:
         for guess in range(_GUESSES):
-            yield _seed(ready, design, guess, None)
-    for count, design in zip(range(starts), spread(problem, seed), strict=False):
+            yield 0, _seed(ready, design, guess, None)
+    vain, known = 0, len(lines)
+    for count, design in enumerate(spread(problem, seed)):
+        if vain >= starts or count >= _PATIENCE * starts or (count >= starts and _swept(ready)):
+            return
         held = [None, *range(free)][count % (free + 1)]
         for guess in range(_GUESSES):
-            yield _seed(ready, design, guess, held)
+            yield count + 1, _seed(ready, design, guess, held)
+        vain, known = (vain + 1 if len(lines) == known else 0), len(lines)
 
 
-def _missed(ready: Traced, lines: Sequence[Mapping[str, Array]]) -> Iterator[Array | None]:
+def _swept(ready: Traced) -> bool:
+    """Whether a grid over two free parameters shows every branch that is not too short for it."""
+    return ready.pattern.test is not None and len(ready.problem.free) == 2
+
+
+def _missed(ready: Traced, lines: Sequence[Mapping[str, Array]]) -> Iterator[tuple[int, Array | None]]:
     """Points of the curve where a test function of the pattern changes sign over a grid, off the lines so far."""
-    problem, test = ready.problem, ready.pattern.test
-    if test is None or len(problem.free) != 2:
-        return
-    for design in unexplained(problem, test, lines):
-        yield _seed(ready, design, None, None)
+    if ready.pattern.test is not None and _swept(ready):
+        for design in unexplained(ready.problem, ready.pattern.test, lines):
+            yield 0, _seed(ready, design, None, None)
 
 
 def _seed(ready: Traced, design: Mapping[str, float], guess: int | None, held: int | None) -> Array | None:
