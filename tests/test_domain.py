@@ -132,8 +132,9 @@ def test_exactly_one_side_of_every_arc_is_inside(planes, name, which, inside):
         for left, right in plane.sides(arc, 12):
             assert inside(left) != inside(right)
             seen += 1
-    expected = which == "stability" or name not in ("chi_H = 1.02", "chi_H = 0.9")
-    assert (seen > 5) == expected  # those two have no heavily damped design in their box
+    # two have no heavily damped design in their box, and one a sliver at a corner
+    expected = which == "stability" or name not in ("chi_H = 1.02", "chi_H = 0.9", "across the axis")
+    assert (seen > 5) == expected
 
 
 @pytest.mark.parametrize("name", EVERY)
@@ -195,13 +196,14 @@ def test_positive_real_roots_come_and_go_on_arcs_only(planes, name):
 def test_every_arc_ends_at_another_or_at_the_edge(planes, name):
     """No gap: boundaries turn only at cusps, meet in a point, and leave only through the edge of the box."""
     plane = planes[name]
-    arcs = [arc for which in ("stability", "heavy_damping", "parting") for arc in plane.arcs(which)]
-    ends = np.array([arc[k] for arc in arcs for k in (0, -1)])
-    for k, end in enumerate(ends):
-        at_edge = np.any(np.abs(end) < 1e-9) or np.any(np.abs(end - 1) < 1e-9)
-        others = np.delete(ends, k, axis=0)
-        on_another = distance(end, [a for n, a in enumerate(arcs) if n != k // 2]) if len(arcs) > 1 else np.inf
-        assert at_edge or np.abs(others - end).max(axis=1).min() < 1e-9 or on_another < CHORD
+    for which in ("stability", "heavy_damping"):
+        arcs = plane.arcs(which)
+        beyond = plane.arcs("parting") if which == "stability" else []
+        ends = np.array([arc[k] for arc in arcs for k in (0, -1)]).reshape(-1, 2)
+        for k, end in enumerate(ends):
+            at_edge = np.any(np.abs(end) < 1e-9) or np.any(np.abs(end - 1) < 1e-9)
+            others = [*np.delete(ends, k, axis=0), *(arc[m] for arc in beyond for m in (0, -1))]
+            assert at_edge or min(np.abs(other - end).max() for other in others) < 1e-9
 
 
 SYSTEMS = {

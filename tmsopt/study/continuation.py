@@ -33,7 +33,7 @@ _SAME = 1e-7
 CLOSED = "closed"
 SINGULAR = "singular: the curve branches or has no direction here"
 INFINITE = "a root goes to infinity: a0 vanishes"
-_ISOLATED = 1e-7  # singular values, relative to the largest, below which an equation has no influence
+_ISOLATED = 1e-6  # singular values, relative to the largest, below which an equation has no influence
 
 
 @dataclass(frozen=True)
@@ -127,10 +127,17 @@ def tangent_at(on: Curve, y: Array) -> Array:
         ValueError: where the equations do not determine a direction.
     """
     jacobian = np.array(on.evaluate(y)[1])
-    _, singular, rows = np.linalg.svd(jacobian)
+    singular = np.linalg.svd(_even(_even(jacobian, 0), 1), compute_uv=False)
+    rows = np.linalg.svd(jacobian)[2]
     if singular[-1] <= _ISOLATED * singular[0]:
         raise ValueError("the equations leave more than a curve here")
     return np.asarray(rows[-1])
+
+
+def _even(matrix: Array, axis: int) -> Array:
+    """Columns or rows of norm 1, so that units, which differ by much beside infinity, do not make it look singular."""
+    norm = np.linalg.norm(matrix, axis=axis, keepdims=True)
+    return np.asarray(matrix / np.where(norm > 0, norm, 1.0))
 
 
 def project(system: ca.Function, y: Array, held: int | None = None, steps: int = 40) -> Array | None:

@@ -16,7 +16,7 @@ from tmsopt.design.problem import Problem, checked
 from tmsopt.design.starts import spread
 from tmsopt.roots import PATTERNS, Pattern, roots
 from tmsopt.study.branch import Branch, Trace
-from tmsopt.study.continuation import Curve, Walk, both_ways, contains, curve, project
+from tmsopt.study.continuation import INFINITE, Curve, Walk, both_ways, contains, curve, project
 from tmsopt.study.events import describe
 from tmsopt.study.grid import unexplained
 
@@ -78,7 +78,8 @@ def trace(
     lines: list[dict[str, Array]] = []
     walking = 0.0
     tried = 0
-    for count, y in chain(_seeds(ready, starts, seed, through, lines), _missed(ready, lines)):
+    sources = (_seeds(ready, starts, seed, through, lines), _missed(ready, lines), _beyond(ready, walks))
+    for count, y in chain.from_iterable(sources):
         tried = max(tried, count)
         if progress:
             progress(tried, max(tried, starts))
@@ -183,6 +184,8 @@ STEPS = (1e-6, 0.1)
 
 _FEWEST = 4  # points that make a curve with tangents
 
+_BACK = 300.0  # size of an unknown from which a curve is looked for on the other side of infinity
+
 _FAR = 1e5  # unknowns of a seed, in units of their scale: beyond, a0 all but vanishes
 
 _PAIRS = 6  # of four roots
@@ -230,6 +233,33 @@ def _missed(ready: Traced, lines: Sequence[Mapping[str, Array]]) -> Iterator[tup
     if ready.pattern.test is not None and _swept(ready):
         for design in unexplained(ready.problem, ready.pattern.test, lines):
             yield 0, _seed(ready, design, None, None)
+
+
+def _beyond(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int, Array | None]]:
+    """Points where a curve may come back from infinity: there a root changes sides, and the parameters go on.
+
+    They approach a0 = 0 with the inverse of the unknown that grows, so two points give the limit, and a point beyond
+    it.
+    """
+    free = len(ready.problem.free)
+    done = 0
+    while done < len(walks):
+        walked = walks[done]
+        done += 1
+        for end, y in zip(walked.ends, (walked.y[::-1], walked.y), strict=True):
+            if end.reason != INFINITE:
+                continue
+            size = np.abs(y[:, free:]).max(axis=1)
+            begin = int(np.flatnonzero(size < _BACK)[-1]) if np.any(size < _BACK) else 0
+            if begin < len(y) - 2:
+                (here, far), weight = (y[begin, :free], y[-1, :free]), size[begin] / size[-1]
+                limit = (far - weight * here) / (1 - weight)
+                x = (2 * limit - here) * ready.on.scale[:free]
+                yield 0, _seed(ready, _floats(design_at(ready.problem, x)), None, None)
+
+
+def _floats(design: Mapping[str, Any]) -> dict[str, float]:
+    return {n: float(v) for n, v in design.items()}
 
 
 def _seed(ready: Traced, design: Mapping[str, float], guess: int | None, held: int | None) -> Array | None:
