@@ -334,3 +334,20 @@ def test_a_boundary_that_runs_into_infinity_ends_on_a0_zero():
     assert near[0].name != "double zero"
     assert near[0].parameters["chi_B"] == pytest.approx(1.8, abs=1e-9)
     assert math.tan(near[0].parameters["lambda_s"]) == pytest.approx(0.5, abs=1e-9)
+
+
+def test_a_root_0_and_one_at_infinity_meet_in_a_corner():
+    """At chi_H = 1 and lambda_s = 0 both a0 and a4 are 0; stability ends there from two sides."""
+    plane = Plane(
+        {"Fr": 0.3595, "mu": 0.1115, "chi_B": 1.0798, "zeta_B": -0.5598, "zeta_H": -0.1054},
+        {"lambda_s": (-1.4, 1.4), "chi_H": (0.7, 1.3)},
+    )
+    corner = next(c for c in plane.found.corners if {"infinity", "capsize"} <= set(c.name.split(" and ")))
+    assert corner.parameters["lambda_s"] == pytest.approx(0.0, abs=1e-12)
+    assert corner.parameters["chi_H"] == pytest.approx(1.0, abs=1e-12)
+    kinds = {
+        a.kind
+        for a in plane.found.stability
+        if np.abs(plane.unit(a.points) - plane.unit(corner.parameters)).sum(1).min() < 1e-9
+    }
+    assert kinds == {"capsize", "infinity"}

@@ -871,3 +871,63 @@ def test_a_box_one_rounding_wide_is_a_number():
     fixed, free = BASE | {"chi_B": SQRT2}, {"Fr": (2.0, 2.0000000000000004), "lambda_s": (0.01, 1.4)}
     with pytest.raises(InputError, match="1 is free"):
         traced("EP2", fixed, free)
+
+
+def test_a_long_branch_that_the_first_starts_miss_is_found():
+    """All three are met by 384 starts of any seed; the first 48 of seed 0 find the one of length 0.197."""
+    fixed = {"Fr": 2.9237, "chi_B": 0.9004, "zeta_B": -0.2254, "zeta_H": -0.4156}
+    free = {"chi_H": (0.7, 1.3), "lambda_s": (-1.4, 1.4), "mu": (0.01, 20.0)}
+    for seed in (0, 1):
+        found = traced("2EP2", fixed, free, starts=48, seed=seed)
+        assert len(found.branches) == 3
+        assert max(mismatch(b, k) for b in found.branches for k in range(0, len(b), 11)) <= 1e-13
+
+
+def test_a_surface_of_perfect_squares_is_not_walked():
+    """At chi_H = chi_B = 1 and zeta_B = zeta_H the polynomial is a square for every Fr: no curve, but a surface."""
+    fixed = {"mu": 0.3341, "chi_H": 1.0, "zeta_B": -1.1624, "lambda_s": 0.8738}
+    p = exact_polynomial(fixed | {"Fr": 1.7, "chi_B": 1.0, "zeta_H": -1.1624})
+    assert p[1] == p[3] == 0
+    assert float(p[2] ** 2 / p[0] / p[4]) == pytest.approx(4, abs=1e-12)
+    found = traced("2EP2", fixed, {"chi_B": (0.2, 3.0), "Fr": (0.1, 5.0), "zeta_H": (-1.2, -0.1)})
+    walked = [np.abs(b.parameters["chi_B"] - 1) + np.abs(b.parameters["zeta_H"] + 1.1624) for b in found.branches]
+    assert sum(np.sum(apart < 1e-6) for apart in walked) < 100
+
+
+def test_a_flat_minimum_is_a_fold():
+    """Fr over the EP4 curve is least where its tangent vanishes, once; by differences of its own points."""
+    fixed = {"mu": 0.0172, "chi_B": 1.5213, "zeta_H": -0.2246}
+    free = {"chi_H": (0.7, 1.3), "zeta_B": (-1.2, -0.1), "lambda_s": (-1.4, 1.4), "Fr": (0.1, 5.0)}
+    found = traced("EP4", fixed, free)
+    (branch,) = found.branches
+    k = int(np.argmin(branch.parameters["Fr"]))
+    assert 0 < k < len(branch) - 1
+    folds = [e for e in events(found, "fold") if "Fr" in e.detail]
+    assert [e.parameters["Fr"] for e in folds] == pytest.approx([branch.parameters["Fr"][k]], abs=1e-12)
+
+
+def test_no_fold_where_a_parameter_runs_on():
+    """Beside chi_B = chi_H = 1, lambda_s = 0 the equations are singular, and the tangent alone is noise."""
+    fixed = {"Fr": 2.322, "mu": 0.0105, "chi_H": 1.0, "zeta_B": -0.5435, "zeta_H": -0.3305}
+    found = traced("EP2", fixed, {"lambda_s": (-0.121, 0.628), "chi_B": (0.514, 1.439)})
+    for branch in found.branches:
+        for event in (e for e in branch.events if e.name == "fold"):
+            k = event.index
+            around = (
+                branch.parameters[event.detail.split(",")[0]][[k - 1, k + 1]]
+                - event.parameters[event.detail.split(",")[0]]
+            )
+            assert around[0] * around[1] > 0
+
+
+def test_a_curve_comes_back_from_infinity():
+    """A root goes to −∞ and comes from +∞ along one discriminant curve, cut in two at a0 = 0 and thinner than a grid."""
+    fixed = {"Fr": 0.4538, "mu": 0.0146, "zeta_B": -1.1496, "zeta_H": -0.8924, "chi_H": 1.0}
+    found = traced("EP2", fixed, {"chi_B": (0.2, 3.0), "lambda_s": (-1.4, 1.4)})
+    limits = [e.parameters["chi_B"] for e in events(found, "end") if "infinity" in e.detail]
+    assert sum(abs(x - 1.0139132) < 1e-6 for x in limits) == 2  # both sides of lambda_s = 0
+    (cusp,) = [e for e in events(found, "EP3") if e.parameters["lambda_s"] > 0.0004]
+    branch = next(b for b in found.branches if cusp in b.events)
+    start = dict(cusp.parameters) | {"s": float(branch.unknowns["r"][cusp.index])}
+    true = certified(equations("EP3"), {n: start[n] for n in ("chi_B", "lambda_s", "s")}, fixed)
+    assert cusp.parameters["chi_B"] == pytest.approx(float(true["chi_B"]), abs=1e-10)

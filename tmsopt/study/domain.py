@@ -20,8 +20,8 @@ from tmsopt.study.trace import STARTS, STEP, trace
 
 Array = NDArray[np.float64]
 
-_CLOSE = 2e-3
-"""Widths of the box between the last point before infinity, often some 1e-6 off, and the corner that it belongs to."""
+_CLOSE = 5e-3
+"""Widths of the box, a step, between the last point before infinity or a singular end and the corner it belongs to."""
 
 
 @dataclass(frozen=True)

@@ -185,6 +185,8 @@ def _events(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walk
                 continue  # a jump through infinity, or nan
             s = crossing(at, end)
             y, t = between(on, walked.y[i], walked.t[i], s)
+            if not np.abs(y - walked.y[i]).max() <= _ASTRAY * s + _TOGETHER:
+                continue
             if mark.name == "fold" and not _turns(walked, int(i), y, list(problem.free).index(mark.detail)):
                 continue
             yield _Found(mark.name, mark.detail, y, t, int(i), s)

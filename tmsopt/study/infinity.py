@@ -118,9 +118,12 @@ def _judged(on: Curve, walked: Walk, rest: ca.Function) -> tuple[Array, tuple[Tr
                 found.append((int(i), crossing(at, end), name))
     y = list(walked.y)
     rows: dict[int, str] = {}
-    for shift, (before, s, name) in enumerate(sorted(found)):
-        rows[before + 1 + shift] = name
-        y.insert(before + 1 + shift, between(on, walked.y[before], walked.t[before], s)[0])
+    shift = 0
+    for before, s, name in sorted(found):
+        if s > 0:
+            shift += 1
+            y.insert(before + shift, between(on, walked.y[before], walked.t[before], s)[0])
+        rows[before + shift] = name
     points = np.array(y)
     bounds = _classes(values((points[1:] + points[:-1]) / 2), vanishing)
     changes = {row: name for row, name in rows.items() if any(b[row - 1] != b[row] for b in bounds)}
