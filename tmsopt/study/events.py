@@ -49,6 +49,8 @@ _DIP = 0.5
 
 _ASTRAY = 2.0  # arclengths: a point further off lies on another curve, as beside a singular point it may
 
+_FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
+
 _EXACT = 1e-13  # mismatch of a coefficient of an EP4, relative to its terms: some roundings
 
 _ROUNDING = 1e-14  # of a variable of order 1
@@ -68,7 +70,7 @@ class _Found:
 
 def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walked: Walk) -> Branch:
     """A walked curve in the parameters of the problem, with its events among its points."""
-    walked = _refined(problem, pattern, on, unknowns, walked)
+    walked = _refined(problem, pattern, on, unknowns, _trimmed(problem, pattern, on, unknowns, walked))
     found = [*_events(problem, pattern, on, unknowns, walked), *_touched(problem, pattern, on, unknowns, walked)]
     merged = _merged(_with_EP4(problem, pattern, on, found), len(problem.free))
     rows, y, t = _inserted(walked, merged)
@@ -111,7 +113,7 @@ def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, wal
         abscissa=np.broadcast_to(values["abscissa"], len(x)),
         events=tuple(sorted(events, key=lambda e: e.index)),
         closed=walked.closed,
-        residual=_residual(values, pattern.monic(u), u),
+        residual=float(np.max(_residual(values, pattern.monic(u), u))),
     )
 
 
@@ -318,13 +320,27 @@ def _natural_tangent(problem: Problem, on: Curve, x: Array, t: Array) -> Array:
     return np.asarray(np.stack(columns, axis=-1) / (size + 1e-300)[:, None])
 
 
-def _residual(values: Values, monic: list[Any], u: list[Array]) -> float:
+def _residual(values: Values, monic: list[Any], u: list[Array]) -> Array:
+    """Largest mismatch of a coefficient at each point, relative to the terms that it is made of."""
     a0 = np.asarray(values.coefficients[0], dtype=float)
-    worst = 0.0
+    worst = np.zeros(np.shape(u[0]))
     for a, c in zip(values.coefficients, monic, strict=True):
         size = np.abs(a) + np.abs(a0 * c) + np.abs(a0)
-        worst = max(worst, float(np.max(np.abs(a - a0 * c) / size)))
+        worst = np.maximum(worst, np.abs(a - a0 * c) / size)
     return worst
+
+
+def _trimmed(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walked: Walk) -> Walk:
+    """Without the points beside infinity that have lost their digits: their parameters do not fit the unknowns."""
+    x = walked.y * on.scale
+    u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]
+    with np.errstate(all="ignore"):
+        values = values_of(problem, pattern, parameters_of(problem, x), u)
+        good = np.flatnonzero(_residual(values, pattern.monic(u), u) <= _FITTING)
+    if walked.closed or not good.size:
+        return walked
+    inside = slice(int(good[0]), int(good[-1]) + 1)
+    return replace(walked, y=walked.y[inside], t=walked.t[inside])
 
 
 def _end_words(problem: Problem, pattern: Pattern, end: End) -> str:

@@ -14,6 +14,8 @@ Truth = NDArray[np.bool_]
 POINTS = 256
 """Along each axis; an edge of the grid is as long as a step of a trace."""
 
+_PATIENCE = 32  # designs in a row that lead to nothing new
+
 
 def coefficients(problem: Problem, columns: Mapping[str, Array]) -> Array:
     """Coefficients of the designs given by columns of the free parameters, shape (designs, n + 1)."""
@@ -23,17 +25,24 @@ def coefficients(problem: Problem, columns: Mapping[str, Array]) -> Array:
 
 
 def unexplained(
-    problem: Problem, test: Callable[[Sequence[Any]], Any], lines: Sequence[Mapping[str, Array]], proper: bool = True
+    problem: Problem, test: Callable[[Sequence[Any]], Any], lines: Sequence[Mapping[str, Array]]
 ) -> Iterator[dict[str, float]]:
     """Designs by which a function of the coefficients changes sign, far from every line; `lines` may grow meanwhile.
 
-    Edges over which a0 changes sign as well are left aside where the polynomial is to be `proper`.
+    Those between which a0 changes sign too come last, and only while they lead to new lines: mostly it is a0 alone.
     """
+    regular, others = changes(problem, test)
+    yield from _apart_from(lines, problem, regular, np.inf)
+    yield from _apart_from(lines, problem, others, _PATIENCE)
+
+
+def _apart_from(
+    lines: Sequence[Mapping[str, Array]], problem: Problem, left: Array, patience: float
+) -> Iterator[dict[str, float]]:
     low, high = np.array(list(problem.free.values())).T
-    left = changes(problem, test, proper)
     np.random.default_rng(0).shuffle(left)  # neighbours likely belong to one branch, which is then found at once
-    seen = 0
-    while len(left):
+    vain, known, seen = 0, len(lines), 0
+    while len(left) and vain < patience:
         for line in lines[seen:]:
             points = np.stack([line[n] for n in problem.free], axis=-1)
             left = left[apart(left, (points - low) / (high - low), 1 / (POINTS - 1))]
@@ -41,24 +50,31 @@ def unexplained(
         if len(left):
             yield dict(zip(problem.free, (low + left[0] * (high - low)).tolist(), strict=True))
             left = left[1:]
+            vain, known = (vain + 1 if len(lines) == known else 0), len(lines)
 
 
-def changes(problem: Problem, test: Callable[[Sequence[Any]], Any], proper: bool, points: int = POINTS) -> Array:
+def changes(problem: Problem, test: Callable[[Sequence[Any]], Any], points: int = POINTS) -> tuple[Array, Array]:
     """Middles of the edges over which a function of the coefficients changes sign, in shares of the box, shape (n, 2).
 
-    Where the function is nan it does not count.
+    Two parts: those where a0 keeps its sign, or is the function, and the others. Where it is nan it does not count.
     """
     share = np.linspace(0, 1, points)
     x, y = np.meshgrid(share, share, indexing="ij")
-    columns = {
-        n: low + part * (high - low) for (n, (low, high)), part in zip(problem.free.items(), (x, y), strict=True)
-    }
+    ends = problem.free.items()
+    columns = {n: low + part * (high - low) for (n, (low, high)), part in zip(ends, (x, y), strict=True)}
     with np.errstate(all="ignore"):
         a = np.moveaxis(coefficients(problem, columns), -1, 0)
         value = np.broadcast_to(np.asarray(test(list(a)), dtype=float), x.shape)
-        along = [np.argwhere(_turns(value, axis) & ~(proper & _turns(a[0], axis))) for axis in (0, 1)]
-    middles = [rows + offset for rows, offset in zip(along, ([0.5, 0.0], [0.0, 0.5]), strict=True)]
-    return np.asarray(np.concatenate(middles) / (points - 1))
+    same = np.array_equal(value, a[0], equal_nan=True)
+    parts: list[list[Array]] = [[], []]
+    for axis, offset in ((0, np.array([0.5, 0.0])), (1, np.array([0.0, 0.5]))):
+        turns, through = _turns(value, axis), _turns(a[0], axis)
+        if same:
+            through[:] = False
+        parts[0].append(np.argwhere(turns & ~through) + offset)
+        parts[1].append(np.argwhere(turns & through) + offset)
+    regular, others = (np.concatenate(part) / (points - 1) for part in parts)
+    return regular, others
 
 
 def _turns(value: Array, axis: int) -> Truth:

@@ -70,7 +70,7 @@ def _walks(problem: Problem, on: Curve, step: float, starts: int, seed: int) -> 
     of = problem.parameter_set
     walks: list[Walk] = []
     lines: list[dict[str, Array]] = []
-    spots = chain(islice(spread(problem, seed), starts), unexplained(problem, lambda a: a[0], lines, proper=False))
+    spots = chain(islice(spread(problem, seed), starts), unexplained(problem, lambda a: a[0], lines))
     for count, design in enumerate(spots):
         start = np.array([np.tan(v) if of[n].tangent else v for n, v in design.items()]) / on.scale
         y = project(on.evaluate, start, held=count % 2)
