@@ -14,7 +14,8 @@ Examples:
   tmsopt trace problems/off_law.toml --pattern weave --csv weave.csv
 
 A curve takes one free parameter more than the pattern has conditions (EP2, weave, capsize: 1; EP3, 2EP2, CEP2: 2;
-EP4, resonance: 3) and == constraints add; other constraints are marked where they are crossed.
+EP4, resonance: 3) and == constraints add; other constraints are marked where they are crossed. Where two parameters
+are free, a grid shows the branches that the starts missed, if they are no thinner than 1/256 of the box.
 
 Exit status: 0 traced, 2 bad input, 3 nothing of the pattern found in the box.
 """
@@ -34,7 +35,7 @@ Exit status: 0 traced, 2 bad input, 3 nothing of the pattern found in the box.
     show_default=True,
     help="Longest step, in widths of the box.",
 )
-@click.option("--starts", type=click.IntRange(min=1), default=48, show_default=True, help="To look for branches from.")
+@click.option("--starts", type=click.IntRange(min=1), default=48, show_default=True, help="That may in a row find nothing new.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts.")
 def trace(
     file: Path,
