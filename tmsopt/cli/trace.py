@@ -27,7 +27,7 @@ Exit status: 0 traced, 2 bad input, 3 nothing of the pattern found in the box.
 @click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
 @click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write every point of every branch.")
 @click.option("--plot", type=click.Path(path_type=Path), help="Draw the branches (png, pdf, svg).")
-@click.option("--axes", help="Two parameters to draw over, e.g. Fr,chi_B. [default: the first two free ones]")
+@click.option("--axes", help="Two parameters to draw over, e.g. Fr,chi_B. [default: two that vary]")
 @click.option(
     "--step",
     type=click.FloatRange(min=1e-6, max=0.1),
@@ -35,7 +35,9 @@ Exit status: 0 traced, 2 bad input, 3 nothing of the pattern found in the box.
     show_default=True,
     help="Longest step, in widths of the box.",
 )
-@click.option("--starts", type=click.IntRange(min=1), default=48, show_default=True, help="That may in a row find nothing new.")
+@click.option(
+    "--starts", type=click.IntRange(min=1), default=48, show_default=True, help="Fruitless in a row, to stop."
+)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts.")
 def trace(
     file: Path,
