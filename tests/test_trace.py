@@ -931,3 +931,29 @@ def test_a_curve_comes_back_from_infinity():
     start = dict(cusp.parameters) | {"s": float(branch.unknowns["r"][cusp.index])}
     true = certified(equations("EP3"), {n: start[n] for n in ("chi_B", "lambda_s", "s")}, fixed)
     assert cusp.parameters["chi_B"] == pytest.approx(float(true["chi_B"]), abs=1e-10)
+
+
+def test_points_that_lost_their_digits_beside_infinity_are_cut():
+    """Where a0 = a1 = 0 a double root goes to infinity: the branch stays, without the points that do not fit it."""
+    fixed = {"Fr": 3.5559, "mu": 0.058, "chi_B": 2.8386, "chi_H": 1.1037, "zeta_B": -0.7215}
+    found = traced("EP2", fixed, {"lambda_s": (-1.4, 1.4), "zeta_H": (-1.2, -0.1)})
+    to_infinity = [b for b in found.branches if np.abs(b.unknowns["r"]).max() > 1e4]
+    assert max(np.ptp(b.parameters["lambda_s"]) for b in to_infinity) > 1.5
+    assert all(any("singular" in e.detail for e in b.events) for b in to_infinity)
+    for branch in to_infinity:
+        assert branch.residual <= 1e-6
+        assert max(mismatch(branch, k) for k in (0, 1, len(branch) - 2, len(branch) - 1)) <= 1e-6
+
+
+def test_a_curve_that_hugs_a0_zero_is_found():
+    """A double root near infinity: the discriminant and a0 change sign within one edge of the grid, whatever Fr."""
+    fixed = {"mu": 11.5892, "chi_B": 0.3972, "chi_H": 0.7779, "zeta_B": -0.1568, "zeta_H": -0.5159}
+    found = traced("EP2", fixed, {"Fr": (0.241, 0.825), "lambda_s": (-1.4, 1.4)}, starts=1)
+    assert found.branches
+    (branch,) = (b for b in found.branches if np.ptp(b.parameters["Fr"]) > 0.5)
+    limit = math.atan((0.7779 - 1) / -0.5159)  # a0 = 0
+    assert np.abs(branch.parameters["lambda_s"] - limit).max() < 0.02
+    k = len(branch) // 2
+    start = {"lambda_s": float(branch.parameters["lambda_s"][k]), "s": float(branch.unknowns["r"][k])}
+    true = certified(equations("EP2"), start, fixed | {"Fr": float(branch.parameters["Fr"][k])})
+    assert branch.parameters["lambda_s"][k] == pytest.approx(float(true.lambda_s), abs=1e-12)

@@ -10,9 +10,6 @@ from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-FORMATS = ("png", "pdf", "svg")
-"""Endings of figure files."""
-
 STABLE, HEAVY, LINE, MARK, CRITICAL = "#56B4E9", "#E69F00", "#000000", "#D55E00", "#0072B2"
 """Fills of stability and heavy damping, lines, marked points, the weave boundary (Okabe–Ito)."""
 
