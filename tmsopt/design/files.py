@@ -11,8 +11,9 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, StrictStr, ValidationError
 
 from tmsopt.design.errors import Fault, InputError, suggest
-from tmsopt.design.problem import Problem, guess_parameter_set, unasked
+from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.units import with_unit
+from tmsopt.design.validate import guess_parameter_set
 from tmsopt.models import MODELS, Model
 
 LARGEST = 1_000_000

@@ -11,7 +11,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.design.problem import ROOT_QUANTITIES, Problem
+from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import ROOT_QUANTITIES
 from tmsopt.models import Quantity, Values
 from tmsopt.roots import Pattern, product, shift
 from tmsopt.roots.patterns import Roots

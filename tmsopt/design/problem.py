@@ -1,50 +1,20 @@
 """A design problem as data: which parameters are fixed, which are free, and what is asked of them."""
 
-import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from tmsopt.design.errors import Fault, InputError, suggest
-from tmsopt.design.expression import Expression, ExpressionError, parse_comparison, parse_value
-from tmsopt.models import Model, ParameterSet, Quantity, Values
-from tmsopt.roots import PATTERNS, Pattern, Structure, structure
-
-STRUCTURE_TOLERANCE = 1e-11
-"""Relative change of a coefficient within which roots count as multiple: a polished optimum is within 1e-14."""
+from tmsopt.design.cases import Band, Case, Scenario, as_scenario, first_cases, middle_of
+from tmsopt.design.errors import Fault, InputError
+from tmsopt.design.expression import Expression, parse_comparison, parse_value
+from tmsopt.design.quantities import ROOT_NAMES, ROOT_QUANTITIES, STRUCTURE
+from tmsopt.design.validate import faults, guess_parameter_set
+from tmsopt.models import Model, ParameterSet, Values
+from tmsopt.roots import PATTERNS, Pattern
 
 _POINT = 1e-12
 """Relative width below which a range is a number: a few roundings leave nothing to move in."""
-
-
-def _structure(values: Mapping[str, Any]) -> Structure:
-    assert isinstance(values, Values)
-    a = [float(c) for c in values.coefficients]
-    if a[0] == 0 or not all(map(math.isfinite, a)):
-        return Structure("undecided", (), math.inf)  # a singular mass matrix: a root is at infinity
-    return structure(a, STRUCTURE_TOLERANCE)
-
-
-def _abscissa(values: Mapping[str, Any]) -> float:
-    return float(values["structure"].abscissa)
-
-
-def _damping_ratio(values: Mapping[str, Any]) -> float:
-    roots = values["structure"].roots
-    ratios = (-r.re / math.hypot(r.re, r.im) if r.re or r.im else 0.0 for r in roots)
-    return min(ratios, default=math.nan)
-
-
-ROOT_QUANTITIES = (
-    Quantity("abscissa", "1", "largest real part of the roots", r"\alpha", _abscissa),
-    Quantity("damping_ratio", "1", "least −Re s/|s| over the roots", r"\zeta", _damping_ratio),
-)
-"""Quantities of the roots, for any model."""
-
-_STRUCTURE = Quantity("structure", "", "structure of the roots, multiple roots recognised", "", _structure)
-
-_ROOT_NAMES = tuple(q.name for q in ROOT_QUANTITIES)
 
 
 @dataclass(frozen=True)
@@ -60,6 +30,11 @@ class Problem:
         locate: name of a root pattern to realise, e.g. ``"EP4"``.
         start: values to start from, for any of the free parameters.
         title: one line for reports.
+        scenarios: parameter → a `Band` or a list of values at which the design must do: root quantities are the worst
+            over them, inequalities hold at each. Its value in `fixed`, or else its middle, is the nominal one.
+        tolerances: parameter → how far it may be off either way; likewise.
+        weights: parameter → size of a change that counts as 1 in the robustness radius; by default relative changes
+            of every parameter.
 
     Raises:
         InputError: listing everything that is wrong, each with the accepted values.
@@ -74,20 +49,36 @@ class Problem:
     locate: str | None = None
     start: Mapping[str, float] = field(default_factory=dict)
     title: str = ""
+    scenarios: Mapping[str, Scenario | Sequence[float] | Mapping[str, float]] = field(default_factory=dict)
+    tolerances: Mapping[str, float] = field(default_factory=dict)
+    weights: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        faults = list(_faults(self))
-        if faults:
-            raise InputError(faults)
-        of = guess_parameter_set(self.model, {**self.fixed, **self.free})
-        given = {p.name: p.default for p in of.parameters if p.default is not None} | dict(self.fixed)
+        object.__setattr__(self, "scenarios", {n: as_scenario(s) for n, s in self.scenarios.items()})
+        if found := list(faults(self)):
+            raise InputError(found)
+        of = guess_parameter_set(self.model, {**self.fixed, **self.free, **self.scenarios})
+        nominal = {n: middle_of(s) for n, s in self.variations.items()}
+        given = {p.name: p.default for p in of.parameters if p.default is not None} | nominal | dict(self.fixed)
         given = {n: v for n, v in given.items() if n not in self.free}
         pinned = {n: lo for n, (lo, hi) in self.free.items() if hi - lo <= _POINT * max(abs(lo), abs(hi))}
         ends = {n: (float(lo), float(hi)) for n, (lo, hi) in self.free.items() if n not in pinned}
         object.__setattr__(self, "fixed", {n: float(v) for n, v in {**given, **pinned}.items()})
         object.__setattr__(self, "free", ends)
         object.__setattr__(self, "constraints", dict(self.constraints))
+        object.__setattr__(self, "tolerances", {n: float(t) for n, t in self.tolerances.items()})
+        object.__setattr__(self, "weights", {n: float(w) for n, w in self.weights.items()})
         object.__setattr__(self, "start", {n: float(v) for n, v in self.start.items() if n in ends})
+
+    @property
+    def variations(self) -> dict[str, Scenario]:
+        """The scenarios, each a band or a tuple of values."""
+        return {n: s for n, s in self.scenarios.items() if isinstance(s, Band | tuple)}
+
+    @cached_property
+    def cases(self) -> tuple[Case, ...]:
+        """The cases that a search starts with; none for a problem that asks about one design alone."""
+        return first_cases(self.variations, self.tolerances)
 
     @cached_property
     def parameter_set(self) -> ParameterSet:
@@ -123,11 +114,11 @@ class Problem:
     def vocabulary(self) -> tuple[str, ...]:
         """Every name that an expression may use."""
         of = self.parameter_set
-        return (*of.names, *self.model.quantity_names(of), *_ROOT_NAMES)
+        return (*of.names, *self.model.quantity_names(of), *ROOT_NAMES)
 
     def values(self, parameters: Mapping[str, float]) -> Values:
         """Everything derived from a numeric design, root quantities included."""
-        return Values(self.model, self.parameter_set, parameters, extra=(*ROOT_QUANTITIES, _STRUCTURE))
+        return Values(self.model, self.parameter_set, parameters, extra=(*ROOT_QUANTITIES, STRUCTURE))
 
     def ordered(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Every parameter in the model's order: the given values of the free ones, and the fixed ones."""
@@ -156,122 +147,3 @@ def unasked(problem: Problem) -> list[Fault]:
         "(chart and trace need none: in Python, load(file, asks=False))"
     )
     return [Fault(message, ("objective",))]
-
-
-def guess_parameter_set(model: Model, names: Mapping[str, Any]) -> ParameterSet:
-    """The parameter set that most of the names belong to, the native one when in doubt."""
-    return max(model.sets, key=lambda s: sum(n in s.names for n in names))
-
-
-def _faults(problem: Problem) -> Iterator[Fault]:
-    if not isinstance(problem.model, Model):
-        accepted = "a model, such as tmsopt.models.tms"
-        yield Fault(f"found {type(problem.model).__name__}; accepted: {accepted}", ("model",))
-        return
-    names = {**problem.fixed, **problem.free}
-    of = guess_parameter_set(problem.model, names)
-    yield from _name_faults(problem, of)
-    for name in of.names:
-        yield from _value_faults(problem, of, name)
-    yield from _objective_faults(problem)
-    yield from _expression_faults(problem, of)
-
-
-def _name_faults(problem: Problem, of: ParameterSet) -> Iterator[Fault]:
-    others = {n: s.name for s in problem.model.sets if s is not of for n in s.names}
-    for name in dict.fromkeys([*problem.fixed, *problem.free]):
-        if name in of.names:
-            continue
-        if name in others:
-            yield Fault(
-                f"{others[name]} parameter '{name}' beside {of.name} ones; the two sets are not mixed: "
-                f"write all in one of them ({' '.join(of.names)})",
-                ("parameters", name),
-            )
-        else:
-            yield Fault(f"unknown parameter '{name}'; {suggest(name, of.names)}", ("parameters", name))
-    for name in problem.fixed:
-        if name in problem.free:
-            yield Fault(f"'{name}' is both fixed and free; keep one", ("parameters", name))
-    missing = _missing(problem, of)
-    if missing:
-        example = f"{missing[0]} = 1.0, or {missing[0]} = {{ min = 0.5, max = 2 }}"
-        yield Fault(f"missing parameter {', '.join(missing)}; write e.g. {example}", ("parameters",))
-    for name in problem.start:
-        if name not in problem.free:
-            yield Fault(f"start for '{name}', which is not a free parameter", ("parameters", name, "start"))
-
-
-def _missing(problem: Problem, of: ParameterSet) -> list[str]:
-    given = {*problem.fixed, *problem.free}
-    return [p.name for p in of.parameters if p.name not in given and p.default is None]
-
-
-def _value_faults(problem: Problem, of: ParameterSet, name: str) -> Iterator[Fault]:
-    key = ("parameters", name)
-    if name in problem.fixed:
-        yield from _number_faults(of, name, problem.fixed[name], key)
-    if name not in problem.free:
-        return
-    try:
-        lower, upper = problem.free[name]
-    except (TypeError, ValueError):
-        yield Fault(f"found {problem.free[name]!r}; accepted: a pair (least, greatest)", key)
-        return
-    ends = {"min": lower, "max": upper}
-    if name in problem.start:
-        ends["start"] = problem.start[name]
-    found = [f for end, value in ends.items() for f in _number_faults(of, name, value, (*key, end))]
-    yield from found
-    if found:
-        return
-    if lower > upper:
-        yield Fault(f"min = {lower:.6g} is greater than max = {upper:.6g}; swap them", key)
-    elif name in problem.start and not lower <= problem.start[name] <= upper:
-        yield Fault(
-            f"start = {problem.start[name]:.6g} lies outside the bounds {lower:.6g} … {upper:.6g}",
-            (*key, "start"),
-        )
-
-
-def _number_faults(of: ParameterSet, name: str, value: Any, key: tuple[str, ...]) -> Iterator[Fault]:
-    parameter = of[name]
-    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-    try:
-        number = math.nan if isinstance(value, bool | str) else float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
-    if not math.isfinite(number):
-        yield Fault(f"found {value!r}; accepted: a finite number{unit and ' in' + unit}", key)
-    elif number not in parameter.range:
-        yield Fault(
-            f"{name} = {number:.6g}{unit} is not physical; {parameter.meaning} is {parameter.range}{unit}",
-            key,
-        )
-
-
-def _objective_faults(problem: Problem) -> Iterator[Fault]:
-    key = ("objective",)
-    if problem.minimize is not None and problem.maximize is not None:
-        yield Fault("minimize and maximize together; keep one of them", key)
-    if problem.locate is not None and problem.locate not in PATTERNS:
-        yield Fault(f"unknown pattern {problem.locate!r}; {suggest(str(problem.locate), PATTERNS)}", (*key, "locate"))
-
-
-def _expression_faults(problem: Problem, of: ParameterSet) -> Iterator[Fault]:
-    accepted = (*of.names, *problem.model.quantity_names(of), *_ROOT_NAMES)
-    for sense, text in (("minimize", problem.minimize), ("maximize", problem.maximize)):
-        if text is not None:
-            yield from _parse_faults(parse_value, text, accepted, ("objective", sense))
-    for name, text in problem.constraints.items():
-        yield from _parse_faults(parse_comparison, text, accepted, ("constraints", name))
-
-
-def _parse_faults(parse: Any, text: Any, accepted: tuple[str, ...], key: tuple[str, ...]) -> Iterator[Fault]:
-    if not isinstance(text, str):
-        yield Fault(f"found {text!r}; accepted: an expression in quotes", key)
-        return
-    try:
-        parse(text, accepted)
-    except ExpressionError as error:
-        yield Fault(str(error), key)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.formulations import NLP, middle, variables_of
-from tmsopt.design.problem import ROOT_QUANTITIES, Problem
+from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import ROOT_QUANTITIES
 from tmsopt.models import Values
 from tmsopt.roots import roots
 from tmsopt.roots.structure import guess_distance

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.problem import ROOT_QUANTITIES, Problem
+from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import ROOT_QUANTITIES
 from tmsopt.models import Values
 from tmsopt.roots import Pattern, lienard_chipart, roots
 

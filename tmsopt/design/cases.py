@@ -1,0 +1,103 @@
+"""Cases: the variations of one design that it must stand up to, over a band, within tolerances, at a distance."""
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tmsopt.design.frozen import Table
+
+POINTS = 7
+"""Points of a band where a problem starts; more are added until the worst case between them is covered."""
+
+LARGEST = 64
+"""Cases that a search starts with; corners beyond are left to the check of the worst case."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """Every value of a parameter from `min` to `max`, looked at first in `points` even steps."""
+
+    min: float
+    max: float
+    points: int = POINTS
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The points, ends included."""
+        return tuple(np.linspace(self.min, self.max, self.points).tolist())
+
+
+Scenario = Band | tuple[float, ...]
+"""A band, or separate values between which nothing is asked."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One variation of a nominal design.
+
+    Attributes:
+        at: parameter → value in place of the nominal one, from a scenario.
+        offset: parameter → what is added, from a tolerance.
+        direction: parameter → change per unit of the robustness radius, in units of its weight.
+    """
+
+    at: Mapping[str, float] = Table()
+    offset: Mapping[str, float] = Table()
+    direction: Mapping[str, float] = Table()
+
+    def applied(
+        self, parameters: Mapping[str, Any], radius: Any = 0.0, weights: Mapping[str, float] | None = None
+    ) -> dict[str, Any]:
+        """The varied design, for numbers, arrays or CasADi expressions."""
+        varied = {**parameters, **self.at}
+        for name, change in self.offset.items():
+            varied[name] = varied[name] + change
+        for name, share in self.direction.items():
+            varied[name] = varied[name] + radius * share * weight_of(name, parameters[name], weights or {})
+        return varied
+
+
+def weight_of(name: str, value: Any, weights: Mapping[str, float]) -> Any:
+    """Weight of a parameter: the given one, else its own size, or 1 where it is fixed at 0."""
+    if name in weights:
+        return weights[name]
+    return 1.0 if isinstance(value, float | int) and value == 0 else value
+
+
+def points_of(scenario: Scenario) -> tuple[float, ...]:
+    """The values that a scenario lists."""
+    return scenario.values if isinstance(scenario, Band) else scenario
+
+
+def as_scenario(stated: Any) -> Any:
+    """A scenario as stated: a band, a mapping with its min, max and points, or separate values."""
+    if isinstance(stated, Mapping) and {"min", "max"} <= set(stated) <= {"min", "max", "points"}:
+        return Band(**stated)
+    return tuple(stated) if isinstance(stated, list) else stated
+
+
+def middle_of(scenario: Scenario) -> float:
+    """The nominal value: the middle of a band or of the values."""
+    values = points_of(scenario)
+    return (min(values) + max(values)) / 2
+
+
+def first_cases(scenarios: Mapping[str, Scenario], tolerances: Mapping[str, float]) -> tuple[Case, ...]:
+    """Scenario points with the corners of the tolerance box; no case at all without scenarios and tolerances."""
+    grid = list(_grid(scenarios))
+    signs = list(itertools.product((-1.0, 1.0), repeat=len(tolerances)))
+    if len(grid) * len(signs) > LARGEST:
+        signs = signs[:: max(1, math.ceil(len(grid) * len(signs) / LARGEST))]
+    corners = [Table({n: s * t for (n, t), s in zip(tolerances.items(), c, strict=True)}) for c in signs]
+    cases = tuple(Case(at, corner) for at in grid for corner in corners)
+    return () if cases == (Case(),) else cases
+
+
+def _grid(scenarios: Mapping[str, Scenario]) -> Iterator[Table[float]]:
+    values: Sequence[tuple[float, ...]] = [points_of(s) for s in scenarios.values()]
+    for point in itertools.product(*values):
+        yield Table(dict(zip(scenarios, point, strict=True)))

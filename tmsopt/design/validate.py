@@ -1,0 +1,201 @@
+"""Everything that can be wrong with a problem, each fault with its place and the accepted values."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from tmsopt.design.cases import Band, points_of
+from tmsopt.design.errors import Fault, suggest
+from tmsopt.design.expression import ExpressionError, parse_comparison, parse_value
+from tmsopt.design.quantities import ROOT_NAMES
+from tmsopt.models import Model, ParameterSet
+from tmsopt.roots import PATTERNS
+
+VARIATIONS = ("scenarios", "tolerances", "weights")
+"""Tables of a problem that name parameters beside those of `fixed` and `free`."""
+
+MOST_TOLERANCES = 8
+"""Parameters with a tolerance: a box has two corners for one, 256 for eight."""
+
+
+Stated = Any
+"""A Problem as its author stated it: any field may be of any type."""
+
+
+def guess_parameter_set(model: Model, names: Mapping[str, Any]) -> ParameterSet:
+    """The parameter set that most of the names belong to, the native one when in doubt."""
+    return max(model.sets, key=lambda s: sum(n in s.names for n in names))
+
+
+def faults(problem: Stated) -> Iterator[Fault]:
+    """What is wrong with a problem, everything at once."""
+    if not isinstance(problem.model, Model):
+        accepted = "a model, such as tmsopt.models.tms"
+        yield Fault(f"found {type(problem.model).__name__}; accepted: {accepted}", ("model",))
+        return
+    names = {**problem.fixed, **problem.free, **problem.scenarios}
+    of = guess_parameter_set(problem.model, names)
+    yield from _name_faults(problem, of)
+    for name in of.names:
+        yield from _value_faults(problem, of, name)
+    yield from _variation_faults(problem, of)
+    yield from _objective_faults(problem)
+    yield from _expression_faults(problem, of)
+
+
+def _name_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
+    others = {n: s.name for s in problem.model.sets if s is not of for n in s.names}
+    tables = {"parameters": {**problem.fixed, **problem.free}} | {t: getattr(problem, t) for t in VARIATIONS}
+    for table, name in ((t, n) for t, names in tables.items() for n in names):
+        if name in of.names:
+            continue
+        if name in others:
+            yield Fault(
+                f"{others[name]} parameter '{name}' beside {of.name} ones; the two sets are not mixed: "
+                f"write all in one of them ({' '.join(of.names)})",
+                (table, name),
+            )
+        else:
+            yield Fault(f"unknown parameter '{name}'; {suggest(name, of.names)}", (table, name))
+    for name in problem.fixed:
+        if name in problem.free:
+            yield Fault(f"'{name}' is both fixed and free; keep one", ("parameters", name))
+    missing = _missing(problem, of)
+    if missing:
+        example = f"{missing[0]} = 1.0, or {missing[0]} = {{ min = 0.5, max = 2 }}"
+        yield Fault(f"missing parameter {', '.join(missing)}; write e.g. {example}", ("parameters",))
+    for name in problem.start:
+        if name not in problem.free:
+            yield Fault(f"start for '{name}', which is not a free parameter", ("parameters", name, "start"))
+
+
+def _missing(problem: Stated, of: ParameterSet) -> list[str]:
+    given = {*problem.fixed, *problem.free, *problem.scenarios}
+    return [p.name for p in of.parameters if p.name not in given and p.default is None]
+
+
+def _value_faults(problem: Stated, of: ParameterSet, name: str) -> Iterator[Fault]:
+    key = ("parameters", name)
+    if name in problem.fixed:
+        yield from _number_faults(of, name, problem.fixed[name], key)
+    if name not in problem.free:
+        return
+    try:
+        lower, upper = problem.free[name]
+    except (TypeError, ValueError):
+        yield Fault(f"found {problem.free[name]!r}; accepted: a pair (least, greatest)", key)
+        return
+    ends = {"min": lower, "max": upper}
+    if name in problem.start:
+        ends["start"] = problem.start[name]
+    found = [f for end, value in ends.items() for f in _number_faults(of, name, value, (*key, end))]
+    yield from found
+    if found:
+        return
+    if lower > upper:
+        yield Fault(f"min = {lower:.6g} is greater than max = {upper:.6g}; swap them", key)
+    elif name in problem.start and not lower <= problem.start[name] <= upper:
+        yield Fault(
+            f"start = {problem.start[name]:.6g} lies outside the bounds {lower:.6g} … {upper:.6g}",
+            (*key, "start"),
+        )
+
+
+def _variation_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
+    for name, scenario in problem.scenarios.items():
+        if name in of.names:
+            yield from _scenario_faults(problem, of, name, scenario)
+    for table, needed in (("tolerances", "greater than 0"), ("weights", "0 or greater")):
+        for name, value in getattr(problem, table).items():
+            if name in of.names and not _is_size(value, zero=table == "weights"):
+                yield Fault(f"found {value!r}; accepted: a finite number {needed}", (table, name))
+            elif table == "tolerances" and name in of.names:
+                yield from _room_faults(problem, of, name, float(value))
+    if len(problem.tolerances) > MOST_TOLERANCES:
+        message = f"{len(problem.tolerances)} tolerances; accepted: {MOST_TOLERANCES}, those that matter most"
+        yield Fault(message, ("tolerances",))
+
+
+def _scenario_faults(problem: Stated, of: ParameterSet, name: str, scenario: Any) -> Iterator[Fault]:
+    key = ("scenarios", name)
+    if name in problem.free:
+        yield Fault(f"'{name}' is both free and in scenarios; keep one", key)
+    if isinstance(scenario, Band):
+        found = [f for end in ("min", "max") for f in _number_faults(of, name, getattr(scenario, end), (*key, end))]
+        yield from found
+        if not found and scenario.min >= scenario.max:
+            yield Fault(f"min = {scenario.min:.6g} is not less than max = {scenario.max:.6g}", key)
+        if isinstance(scenario.points, bool) or not isinstance(scenario.points, int) or not 2 <= scenario.points <= 99:
+            yield Fault(f"points = {scenario.points!r}; accepted: a whole number from 2 to 99", (*key, "points"))
+    elif not isinstance(scenario, Sequence) or isinstance(scenario, str) or not scenario:
+        yield Fault(f"found {scenario!r}; accepted: {{ min = …, max = …, points = … }}, or a list of values", key)
+    else:
+        for value in scenario:
+            yield from _number_faults(of, name, value, key)
+
+
+def _room_faults(problem: Stated, of: ParameterSet, name: str, tolerance: float) -> Iterator[Fault]:
+    """Faults of a tolerance that takes a parameter out of its physical range."""
+    given = problem.free.get(name) or points_of(problem.scenarios.get(name, ())) or (problem.fixed.get(name),)
+    try:
+        least, greatest = min(map(float, given)) - tolerance, max(map(float, given)) + tolerance
+    except (TypeError, ValueError):
+        return  # reported as a value
+    for value in (least, greatest):
+        if value not in of[name].range:
+            message = (
+                f"with the tolerance {tolerance:.6g}, {name} reaches {value:.6g}, which is not physical: "
+                f"{of[name].meaning} is {of[name].range}; keep {name} off the end of its range by the tolerance"
+            )
+            yield Fault(message, ("tolerances", name))
+
+
+def _is_size(value: Any, zero: bool) -> bool:
+    try:
+        number = math.nan if isinstance(value, bool | str) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return math.isfinite(number) and (number >= 0 if zero else number > 0)
+
+
+def _number_faults(of: ParameterSet, name: str, value: Any, key: tuple[str, ...]) -> Iterator[Fault]:
+    parameter = of[name]
+    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+    try:
+        number = math.nan if isinstance(value, bool | str) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number):
+        yield Fault(f"found {value!r}; accepted: a finite number{unit and ' in' + unit}", key)
+    elif number not in parameter.range:
+        yield Fault(
+            f"{name} = {number:.6g}{unit} is not physical; {parameter.meaning} is {parameter.range}{unit}",
+            key,
+        )
+
+
+def _objective_faults(problem: Stated) -> Iterator[Fault]:
+    key = ("objective",)
+    if problem.minimize is not None and problem.maximize is not None:
+        yield Fault("minimize and maximize together; keep one of them", key)
+    if problem.locate is not None and problem.locate not in PATTERNS:
+        yield Fault(f"unknown pattern {problem.locate!r}; {suggest(str(problem.locate), PATTERNS)}", (*key, "locate"))
+
+
+def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
+    accepted = (*of.names, *problem.model.quantity_names(of), *ROOT_NAMES)
+    for sense, text in (("minimize", problem.minimize), ("maximize", problem.maximize)):
+        if text is not None:
+            yield from _parse_faults(parse_value, text, accepted, ("objective", sense))
+    for name, text in problem.constraints.items():
+        yield from _parse_faults(parse_comparison, text, accepted, ("constraints", name))
+
+
+def _parse_faults(parse: Any, text: Any, accepted: tuple[str, ...], key: tuple[str, ...]) -> Iterator[Fault]:
+    if not isinstance(text, str):
+        yield Fault(f"found {text!r}; accepted: an expression in quotes", key)
+        return
+    try:
+        parse(text, accepted)
+    except ExpressionError as error:
+        yield Fault(str(error), key)
