@@ -6,8 +6,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.formulations import NLP
 from tmsopt.design.frozen import Table
+from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Branch
 from tmsopt.design.starts import complete, designs

@@ -86,15 +86,18 @@ def middle_of(scenario: Scenario) -> float:
     return (min(values) + max(values)) / 2
 
 
-def first_cases(scenarios: Mapping[str, Scenario], tolerances: Mapping[str, float]) -> tuple[Case, ...]:
-    """Scenario points with the corners of the tolerance box; no case at all without scenarios and tolerances."""
+def first_cases(
+    scenarios: Mapping[str, Scenario], tolerances: Mapping[str, float], directions: Sequence[str] = ()
+) -> tuple[Case, ...]:
+    """Scenario points with the corners of the tolerance box, and a step either way in each of the directions."""
     grid = list(_grid(scenarios))
     signs = list(itertools.product((-1.0, 1.0), repeat=len(tolerances)))
     if len(grid) * len(signs) > LARGEST:
         signs = signs[:: max(1, math.ceil(len(grid) * len(signs) / LARGEST))]
     corners = [Table({n: s * t for (n, t), s in zip(tolerances.items(), c, strict=True)}) for c in signs]
     cases = tuple(Case(at, corner) for at in grid for corner in corners)
-    return () if cases == (Case(),) else cases
+    steps = tuple(Case(direction=Table({name: sign})) for name in directions for sign in (-1.0, 1.0))
+    return (() if cases == (Case(),) else cases) + steps
 
 
 def _grid(scenarios: Mapping[str, Scenario]) -> Iterator[Table[float]]:

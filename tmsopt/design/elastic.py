@@ -5,8 +5,9 @@ import math
 import casadi as ca
 import numpy as np
 
-from tmsopt.design.formulations import NLP, design_of
+from tmsopt.design.formulations import design_of
 from tmsopt.design.ipopt import ipopt
+from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
 from tmsopt.design.recheck import recheck
 from tmsopt.design.starts import complete, designs

@@ -4,16 +4,18 @@ import math
 import re
 import tomllib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, StrictStr, ValidationError
 
+from tmsopt.design.cases import POINTS, Band
 from tmsopt.design.errors import Fault, InputError, suggest
 from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.units import with_unit
-from tmsopt.design.validate import guess_parameter_set
+from tmsopt.design.validate import VARIATIONS, guess_parameter_set
 from tmsopt.models import MODELS, Model
 
 LARGEST = 1_000_000
@@ -32,6 +34,12 @@ class _FreeParameter(_Table):
     start: _Number | None = None
 
 
+class _Band(_Table):
+    min: _Number
+    max: _Number
+    points: StrictInt = POINTS
+
+
 class _Objective(_Table):
     minimize: StrictStr | None = None
     maximize: StrictStr | None = None
@@ -46,6 +54,9 @@ class _File(_Table):
     parameters: dict[str, _FreeParameter | StrictFloat | StrictInt | StrictStr]
     objective: _Objective = Field(default_factory=_Objective)
     constraints: dict[str, StrictStr] = Field(default_factory=dict)
+    scenarios: dict[str, _Band | list[_Number]] = Field(default_factory=dict)
+    tolerances: dict[str, _Number] = Field(default_factory=dict)
+    weights: dict[str, _Number] = Field(default_factory=dict)
 
 
 def load(path: str | PathLike[str], asks: bool = True) -> Problem:
@@ -73,17 +84,20 @@ def load(path: str | PathLike[str], asks: bool = True) -> Problem:
         shape_faults.append(Fault(f"unknown model '{name}'; {suggest(name, MODELS)}", ("model",)))
     faults, problem = shape_faults, None
     if model is not None and parsed is not None:
-        unit_faults, fixed, free, start = _numbers(parsed.parameters, model)
-        faults = shape_faults + unit_faults
+        numbers = _numbers(parsed, model)
+        faults = shape_faults + numbers.faults
         for fault in shape_faults:
             if fault.key[:1] == ("parameters",) and len(fault.key) > 1:
-                fixed[fault.key[1]] = math.nan  # known to be given, and already reported
+                numbers.fixed[fault.key[1]] = math.nan  # known to be given, and already reported
         try:
             problem = Problem(
                 model=model,
-                fixed=fixed,
-                free=free,
-                start=start,
+                fixed=numbers.fixed,
+                free=numbers.free,
+                start=numbers.start,
+                scenarios=numbers.scenarios,
+                tolerances=numbers.tolerances,
+                weights=numbers.weights,
                 constraints=parsed.constraints,
                 minimize=parsed.objective.minimize,
                 maximize=parsed.objective.maximize,
@@ -157,7 +171,7 @@ def _without(data: Mapping[str, Any], key: tuple[str, ...]) -> dict[str, Any]:
 
 def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:  # noqa: PLR0911 - one per case
     """One pydantic complaint in the words of the problem file."""
-    tags = ("_FreeParameter", "float", "int", "str")
+    tags = ("_FreeParameter", "_Band", "float", "int", "str")
     key = tuple(str(k) for k in where if k not in tags)
     match key:
         case (section,) if kind == "extra_forbidden":
@@ -173,10 +187,19 @@ def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault: 
             return Fault(f"found {_short(found)}; accepted: {accepted}", key[:3])
         case ("objective", sense, *_) if kind == "extra_forbidden":
             return Fault(f"unknown key '{sense}'; {suggest(sense, _Objective.model_fields)}", key)
+        case ("scenarios", name, end, *_) if kind == "extra_forbidden":
+            return Fault(f"unknown key '{end}' of {name}; {suggest(end, _Band.model_fields)}", key)
+        case ("scenarios", name, end) if kind == "missing":
+            return Fault(f"missing {end} of {name}; write e.g. {name} = {{ min = 1, max = 2, points = 7 }}", key)
+        case ("scenarios", _, *_):
+            accepted = "{ min = …, max = …, points = … }, or a list of values such as [1, 2.5]"
+            return Fault(f"found {_short(found)}; accepted: {accepted}", key[:2])
+        case (("tolerances" | "weights"), _, *_):
+            return Fault(f"found {_short(found)}; accepted: a number, or a text with a unit such as '5 mm'", key[:2])
         case ("constraints", *_):
             return Fault(f"found {_short(found)}; accepted: a comparison in quotes, such as 'nu_H >= 0.02'", key)
         case _:
-            table = key in (("parameters",), ("objective",))
+            table = key[0] in ("parameters", "objective", *VARIATIONS)
             return Fault(f"found {_short(found)}; accepted: {'a table' if table else 'a text in quotes'}", key)
 
 
@@ -185,32 +208,54 @@ def _short(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "…"
 
 
-def _numbers(
-    written: Mapping[str, Any], model: Model
-) -> tuple[list[Fault], dict[str, Any], dict[str, tuple[Any, Any]], dict[str, Any]]:
-    """Faults, fixed values, free ranges and starts, with written units converted."""
-    faults: list[Fault] = []
-    of = guess_parameter_set(model, written)
+@dataclass(frozen=True)
+class _Numbers:
+    """The numbers of a file in the parameters' own units."""
 
-    def number(name: str, value: Any, *end: str) -> Any:
-        if not isinstance(value, str):
+    faults: list[Fault]
+    fixed: dict[str, Any]
+    free: dict[str, tuple[Any, Any]]
+    start: dict[str, Any]
+    scenarios: dict[str, Any]
+    tolerances: dict[str, Any]
+    weights: dict[str, Any]
+
+
+def _numbers(written: _File, model: Model) -> _Numbers:
+    """Every number, with written units converted."""
+    faults: list[Fault] = []
+    of = guess_parameter_set(model, {**written.parameters, **written.scenarios})
+
+    def number(value: Any, table: str, name: str, *end: str) -> Any:
+        if not isinstance(value, str) or name not in of.names:
             return value
-        unit = of[name].unit if name in of.names else "1"
+        unit = of[name].unit
+        if unit == "1" and table in ("tolerances", "weights"):
+            unit = of[name].multiple_of or unit  # a tolerance of 5 mm is one of 0.005 wheelbases of 1 m
         try:
             return with_unit(value, unit)
         except ValueError as error:
-            faults.append(Fault(str(error), ("parameters", name, *end)))
+            faults.append(Fault(str(error), (table, name, *end)))
             return value
 
     fixed, free, start = {}, {}, {}
-    for name, value in written.items():
+    scenarios: dict[str, Any] = {}
+    for name, value in written.parameters.items():
         if isinstance(value, _FreeParameter):
-            free[name] = (number(name, value.min, "min"), number(name, value.max, "max"))
+            free[name] = tuple(number(getattr(value, end), "parameters", name, end) for end in ("min", "max"))
             if value.start is not None:
-                start[name] = number(name, value.start, "start")
+                start[name] = number(value.start, "parameters", name, "start")
         else:
-            fixed[name] = number(name, value)
-    return faults, fixed, free, start
+            fixed[name] = number(value, "parameters", name)
+    for name, band in written.scenarios.items():
+        if isinstance(band, _Band):
+            lower, upper = (number(getattr(band, end), "scenarios", name, end) for end in ("min", "max"))
+            scenarios[name] = Band(lower, upper, band.points)
+        else:
+            scenarios[name] = tuple(number(value, "scenarios", name) for value in band)
+    tolerances = {name: number(value, "tolerances", name) for name, value in written.tolerances.items()}
+    weights = {name: number(value, "weights", name) for name, value in written.weights.items()}
+    return _Numbers(faults, fixed, free, start, scenarios, tolerances, weights)
 
 
 _HEADER = re.compile(r"\s*\[+\s*([^\]]+?)\s*\]+")

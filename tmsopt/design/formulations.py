@@ -1,61 +1,27 @@
 """From a problem to plain NLP data, by factors of the characteristic polynomial; no eigenvalue, no division.
 
 ``abscissa`` lifts root quantities into factor coefficients; ``matching`` equates the coefficients with those of a
-pattern. Both share how parameters, quantities and constraints become variables and rows.
+pattern. Both share how parameters, quantities and constraints become variables and rows. Every case that the design
+must stand up to has factors of its own, and shares the design and the root quantities with the others.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from tmsopt.design.cases import Case
+from tmsopt.design.expression import Expression
+from tmsopt.design.lifts import lift_abscissa, lift_damping_ratio, lift_quantity, lift_radius
+from tmsopt.design.nlp import NLP, Lift, Touch
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ROOT_QUANTITIES
+from tmsopt.design.quantities import RADIUS, ROOT_QUANTITIES
+from tmsopt.design.variation import varies
 from tmsopt.models import Quantity, Values
-from tmsopt.roots import Pattern, product, shift
-from tmsopt.roots.patterns import Roots
-
-Guess = Callable[[Values, Roots], list[list[float]]]
-"""Starting values of lifted variables for a numeric design and its roots; several where there is a choice."""
-
-
-@dataclass(frozen=True)
-class Lift:
-    """Variables that the formulation adds to the parameters, and how to start them."""
-
-    name: str
-    size: int
-    guess: Guess
-
-
-@dataclass(frozen=True)
-class NLP:
-    """minimise f(x) subject to lower ≤ x ≤ upper and row_lower ≤ g(x) ≤ row_upper.
-
-    Attributes:
-        formulation: ``abscissa`` or ``matching``.
-        variables: names; the free parameters come first, each as itself or as its tangent.
-        functions: CasADi function x → (f, g).
-        rows: name of each row of g: a constraint's name, or the equation it belongs to.
-        lifts: the variables after the free parameters, in order.
-    """
-
-    formulation: str
-    variables: tuple[str, ...]
-    functions: ca.Function = field(repr=False)
-    lower: tuple[float, ...]
-    upper: tuple[float, ...]
-    rows: tuple[str, ...]
-    row_lower: tuple[float, ...]
-    row_upper: tuple[float, ...]
-    lifts: tuple[Lift, ...] = field(repr=False, default=())
-
-    @property
-    def equations(self) -> int:
-        """Number of equality rows."""
-        return sum(lo == hi for lo, hi in zip(self.row_lower, self.row_upper, strict=True))
+from tmsopt.roots import Pattern
 
 
 @dataclass(frozen=True)
@@ -87,24 +53,20 @@ def freedom(problem: Problem) -> Freedom:
     return Freedom(len(problem.free), (problem.pattern.codimension if problem.pattern else 0) + equalities)
 
 
-def formulate(problem: Problem) -> NLP:
+def formulate(problem: Problem, cases: Sequence[Case] = ()) -> NLP:
     """The formulation that the problem asks for: ``matching`` for a pattern, else ``abscissa``."""
-    return matching(problem) if problem.pattern else abscissa(problem)
+    return matching(problem, cases=cases) if problem.pattern else abscissa(problem, cases)
 
 
-def abscissa(problem: Problem) -> NLP:
-    """Optimise the objective with every root quantity carried by factors.
-
-    For ``abscissa`` γ: coefficients of p(t + γ) = a0 ∏ (t² + βᵢ t + κᵢ) with βᵢ, κᵢ ≥ 0, which holds exactly for
-    γ at or right of the rightmost root.
-    """
-    build = _Builder(problem)
+def abscissa(problem: Problem, cases: Sequence[Case] = ()) -> NLP:
+    """Optimise the objective with every root quantity carried by factors, in every case."""
+    build = _Builder(problem, cases)
     build.constraints()
-    build.optimise(problem)
+    build.optimise()
     return build.finish("abscissa")
 
 
-def matching(problem: Problem, pattern: Pattern | None = None) -> NLP:
+def matching(problem: Problem, pattern: Pattern | None = None, cases: Sequence[Case] = ()) -> NLP:
     """Match coefficients with a pattern: a_k = a0 · c_k(unknowns).
 
     Square: the equations alone. Under-determined: the objective, or the distance to the start relative to the box.
@@ -113,12 +75,12 @@ def matching(problem: Problem, pattern: Pattern | None = None) -> NLP:
     pattern = pattern or problem.pattern
     if pattern is None:
         raise ValueError("matching needs a pattern; give the problem locate = 'EP4' or another")
-    build = _Builder(problem)
+    build = _Builder(problem, cases)
     build.pattern(pattern)
     build.constraints()
     left = freedom(problem).count
     if problem.objective is not None and left >= 0:
-        build.optimise(problem)
+        build.optimise()
     elif left > 0:
         build.nearest_to(middle(problem))
     return build.finish("matching")
@@ -145,24 +107,39 @@ def middle(problem: Problem) -> dict[str, float]:
 class _Builder:
     """Collects variables and rows; discarded once the NLP is finished."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, cases: Sequence[Case]) -> None:
         self.problem = problem
+        self.cases = tuple(cases)
         self.names: list[str] = []
         self.x: list[Any] = []
         self.bounds: list[tuple[float, float]] = []
         self.rows: list[tuple[str, Any, float, float]] = []
         self.lifts: list[Lift] = []
+        self.touches: dict[str, tuple[Touch, ...]] = {}
+        self.shared: dict[str, Any] = {}
         self.objective: Any = ca.SX(0)
-        free = {name: self.parameter(name, *ends) for name, ends in problem.free.items()}
-        self.design = free
-        self.values = Values(
-            problem.model,
-            problem.parameter_set,
-            problem.ordered(free),
-            extra=ROOT_QUANTITIES,
-            lift=self._lift,
-        )
-        self.a = self.values.coefficients
+        self.design = {name: self.parameter(name, *ends) for name, ends in problem.free.items()}
+        nominal = problem.ordered(self.design)
+        directed = [(k, case) for k, case in enumerate(self.cases, start=1) if case.direction]
+        radius = self.variable(RADIUS, 0.0) if directed else ca.SX(0)
+        varied = [case.applied(nominal, radius, problem.weights) for case in self.cases]
+        self.values = [self.derived(k, parameters) for k, parameters in enumerate([nominal, *varied])]
+        self.a = self.values[0].coefficients
+        self.covered = [k for k, case in enumerate(self.cases, start=1) if not case.direction] or [0]
+        if directed:
+            self.lifts.append(lift_radius(self, radius, directed, self.values))
+            self.shared[RADIUS] = radius
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return len(self.x), len(self.rows)
+
+    def derived(self, case: int, parameters: Mapping[str, Any]) -> Values:
+        """Everything derived from the design in one case."""
+        of = self.problem.parameter_set
+        lift = partial(self._lift, case)
+        radius = Quantity(RADIUS, "1", "robustness radius", "", lambda v: np.nan)
+        return Values(self.problem.model, of, parameters, extra=(*ROOT_QUANTITIES, radius), lift=lift)
 
     def variable(self, name: str, lower: float = -np.inf, upper: float = np.inf) -> Any:
         symbol = ca.SX.sym(name)
@@ -188,19 +165,34 @@ class _Builder:
     def constraints(self) -> None:
         ends = {"<=": (-np.inf, 0.0), ">=": (0.0, np.inf), "==": (0.0, 0.0)}
         for name, condition in self.problem.conditions.items():
-            self.row(name, condition.symbolic(self.values), *ends[condition.comparison])
+            for value in self.in_each_case(condition):
+                self.row(name, value, *ends[condition.comparison])
 
-    def optimise(self, problem: Problem) -> None:
-        expression = problem.objective
-        if expression is not None:
-            sign = -1 if problem.sense == "maximize" else 1
-            self.objective = sign * expression.symbolic(self.values)
+    def optimise(self) -> None:
+        """The objective: where it differs between cases, the worst of them."""
+        expression = self.problem.objective
+        if expression is None:
+            return
+        sign = -1 if self.problem.sense == "maximize" else 1
+        values = [sign * value for value in self.in_each_case(expression)]
+        self.objective = values[0]
+        if len(values) > 1:
+            self.objective = self.variable("objective")
+            worst = partial(_worst_guess, sign, expression, tuple(self.covered))
+            self.lifts.append(Lift("objective", 1, worst))
+            for value in values:
+                self.row("objective", value - self.objective, -np.inf, 0.0)
+
+    def in_each_case(self, expression: Expression) -> list[Any]:
+        """The expression's value in every case that it differs in, or the nominal one."""
+        covered = self.covered if varies(self.problem, expression, self.cases) else [0]
+        return [expression.symbolic(self.values[k]) for k in covered]
 
     def pattern(self, pattern: Pattern) -> None:
         unknowns = [self.variable(f"{pattern.name}.{u}") for u in pattern.unknowns]
-        self.lifts.append(Lift(pattern.name, len(unknowns), lambda v, z: pattern.guesses(z)))
-        if pattern.abscissa is not None:
-            self.values.define("abscissa", pattern.abscissa(unknowns))
+        self.lifts.append(Lift(pattern.name, len(unknowns), lambda v, z: pattern.guesses(z[0])))
+        if pattern.abscissa is not None and self.covered == [0]:
+            self.shared["abscissa"] = pattern.abscissa(unknowns)
         matched = [self.a[0] * c for c in pattern.monic(unknowns)]
         if freedom(self.problem).count >= 0:
             self.equal(pattern.name, self.a, matched)
@@ -229,60 +221,34 @@ class _Builder:
             row_lower=tuple(r[2] for r in self.rows),
             row_upper=tuple(r[3] for r in self.rows),
             lifts=tuple(self.lifts),
+            cases=self.cases,
+            touches=self.touches,
         )
 
-    def _lift(self, quantity: Quantity, values: Values) -> Any:
+    def _lift(self, case: int, quantity: Quantity, values: Values) -> Any:
         """A quantity as a variable, bound by factors or by its division-free equation."""
-        if quantity.name == "abscissa":
-            return self._abscissa()
-        if quantity.name == "damping_ratio":
-            return self._damping_ratio()
+        name = quantity.name
+        if name in self.shared:
+            return self.shared[name]
+        if name in _LIFTED:
+            lifted = _LIFTED[name](self, self.covered, self.values)
+            self.lifts.append(lifted.lift)
+            self.touches[name] = lifted.touches
+            self.shared[name] = lifted.symbol
+            return lifted.symbol
         if quantity.equation is None:
             return None
-        symbol = self.variable(quantity.name, quantity.range.lower, quantity.range.upper)
-        self.lifts.append(Lift(quantity.name, 1, lambda v, z: [[_finite(v[quantity.name])]]))
-        self.row(quantity.name, quantity.equation(values, symbol), 0.0, 0.0)
+        symbol, lift = lift_quantity(self, name, case, (quantity.range.lower, quantity.range.upper))
+        self.lifts.append(lift)
+        self.row(name, quantity.equation(values, symbol), 0.0, 0.0)
         return symbol
 
-    def _abscissa(self) -> Any:
-        gamma = self.variable("abscissa")
-        pairs = self._factors("abscissa", ("beta", "kappa"))
-        self.lifts.append(Lift("abscissa", 1 + 2 * len(pairs), _abscissa_guess))
-        self.equal("abscissa", shift(self.a, gamma), [self.a[0] * c for c in product(*([1, *p] for p in pairs))])
-        return gamma
 
-    def _damping_ratio(self) -> Any:
-        """ζ with p = a0 ∏ (s² + pᵢ s + qᵢ), pᵢ, qᵢ ≥ 0, pᵢ² ≥ 4 ζ² qᵢ: at or below the least damping ratio."""
-        zeta = self.variable("damping_ratio", 0.0, 1.0)
-        pairs = self._factors("damping_ratio", ("p", "q"))
-        self.lifts.append(Lift("damping_ratio", 1 + 2 * len(pairs), _damping_guess))
-        self.equal("damping_ratio", self.a, [self.a[0] * c for c in product(*([1, *p] for p in pairs))])
-        for p, q in pairs:
-            self.row("damping_ratio", p * p - 4 * zeta * zeta * q, 0.0, np.inf)
-        return zeta
-
-    def _factors(self, name: str, symbols: tuple[str, str]) -> list[tuple[Any, Any]]:
-        half = range(1, self.problem.model.degree // 2 + 1)
-        return [(self.variable(f"{symbols[0]}{k}", 0.0), self.variable(f"{symbols[1]}{k}", 0.0)) for k in half]
+_LIFTED = {"abscissa": lift_abscissa, "damping_ratio": lift_damping_ratio}
 
 
-def _finite(value: Any) -> float:
-    return float(value) if np.isfinite(value) else 1.0
-
-
-def _paired(z: Roots) -> list[Roots]:
-    """Roots two by two, conjugates together, as `roots` orders them."""
-    return [z[k : k + 2] for k in range(0, len(z), 2)]
-
-
-def _abscissa_guess(values: Values, z: Roots) -> list[list[float]]:
-    """γ a little right of the rightmost root and the factors of the shifted polynomial: feasible exactly."""
-    gamma = float(z.real.max()) + 0.05 * float(np.abs(z).mean()) + 1e-3
-    factors = [(-(pair - gamma).sum().real, (pair - gamma).prod().real) for pair in _paired(z)]
-    return [[gamma, *(float(c) for f in factors for c in f)]]
-
-
-def _damping_guess(values: Values, z: Roots) -> list[list[float]]:
-    ratio = float(np.min(-z.real / (np.abs(z) + 1e-300)))
-    factors = [(abs(pair.sum().real), abs(pair.prod().real)) for pair in _paired(z)]
-    return [[min(max(0.9 * ratio, 0.01), 0.99), *(float(c) for f in factors for c in f)]]
+def _worst_guess(
+    sign: int, expression: Expression, covered: Sequence[int], values: Sequence[Values], z: Sequence[Any]
+) -> list[list[float]]:
+    found = [sign * float(expression(values[k])) for k in covered]
+    return [[max((v for v in found if np.isfinite(v)), default=0.0)]]

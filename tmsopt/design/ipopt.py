@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.formulations import NLP
+from tmsopt.design.nlp import NLP
 
 LINEAR_SOLVERS = ("mumps", "spral")
 """The linear solvers in the CasADi wheel; any other name fails there without an error."""

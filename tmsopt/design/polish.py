@@ -8,8 +8,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.formulations import NLP
 from tmsopt.design.ipopt import Run
+from tmsopt.design.nlp import NLP
 
 Array = NDArray[np.float64]
 

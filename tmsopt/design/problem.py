@@ -8,7 +8,7 @@ from typing import Any
 from tmsopt.design.cases import Band, Case, Scenario, as_scenario, first_cases, middle_of
 from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.expression import Expression, parse_comparison, parse_value
-from tmsopt.design.quantities import ROOT_NAMES, ROOT_QUANTITIES, STRUCTURE
+from tmsopt.design.quantities import RADIUS, ROOT_NAMES, ROOT_QUANTITIES, STRUCTURE
 from tmsopt.design.validate import faults, guess_parameter_set
 from tmsopt.models import Model, ParameterSet, Values
 from tmsopt.roots import PATTERNS, Pattern
@@ -78,7 +78,9 @@ class Problem:
     @cached_property
     def cases(self) -> tuple[Case, ...]:
         """The cases that a search starts with; none for a problem that asks about one design alone."""
-        return first_cases(self.variations, self.tolerances)
+        asked = [e for e in (self.objective, *self.conditions.values()) if e]
+        far = weighted(self.parameter_set, self.weights) if any(RADIUS in e.names for e in asked) else ()
+        return first_cases(self.variations, self.tolerances, far)
 
     @cached_property
     def parameter_set(self) -> ParameterSet:
@@ -124,6 +126,13 @@ class Problem:
         """Every parameter in the model's order: the given values of the free ones, and the fixed ones."""
         complete = {**self.fixed, **values}
         return {name: complete[name] for name in self.parameter_set.names}
+
+
+def weighted(of: ParameterSet, weights: Mapping[str, float]) -> tuple[str, ...]:
+    """Parameters that the robustness radius lets change: by default all but constants of nature."""
+    if weights:
+        return tuple(n for n, w in weights.items() if w > 0)
+    return tuple(p.name for p in of.parameters if p.default is None)
 
 
 def checked(problem: object) -> Problem:

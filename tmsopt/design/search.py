@@ -8,8 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from tmsopt.design.bound import bounded, closed, omega0_bound
-from tmsopt.design.formulations import NLP, abscissa, design_of, freedom, middle
+from tmsopt.design.formulations import abscissa, design_of, freedom, middle
 from tmsopt.design.ipopt import Run, ipopt
+from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
 from tmsopt.design.starts import complete, designs
 from tmsopt.roots import roots

@@ -9,8 +9,9 @@ from tmsopt.design.bound import omega0_bound
 from tmsopt.design.branches import other_branches
 from tmsopt.design.elastic import least_violating
 from tmsopt.design.errors import InputError
-from tmsopt.design.formulations import NLP, design_of, formulate, freedom
+from tmsopt.design.formulations import design_of, formulate, freedom
 from tmsopt.design.frozen import Table
+from tmsopt.design.nlp import NLP
 from tmsopt.design.polish import Point, polisher
 from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.recheck import Checked, recheck

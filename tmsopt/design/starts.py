@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.formulations import NLP, middle, variables_of
+from tmsopt.design.formulations import middle, variables_of
+from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ROOT_QUANTITIES
 from tmsopt.models import Values
@@ -40,8 +41,10 @@ def designs(problem: Problem, seed: int, count: int) -> Iterator[dict[str, float
 
 def complete(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Array:
     """Start of all variables of an NLP: the design, and lifted variables that satisfy their equations with it."""
-    values = problem.values(problem.ordered(design))
-    z = roots(_regular(np.array([float(c) for c in values.coefficients])))
+    nominal = problem.ordered(design)
+    varied = (case.applied(nominal, 0.0, problem.weights) for case in nlp.cases)
+    values = [problem.values(parameters) for parameters in (nominal, *varied)]
+    z = list(roots(_regular(np.array([[float(c) for c in v.coefficients] for v in values]))))
     x = variables_of(problem, design)
     for lift in nlp.lifts:
         guesses = lift.guess(values, z) or [[0.0] * lift.size]

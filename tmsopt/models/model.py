@@ -44,6 +44,8 @@ class Parameter:
         range: physically possible values.
         default: value of a parameter that is left out, if it may be.
         tangent: whether the coefficients are polynomial in the tangent, so that an optimiser moves that.
+        multiple_of: unit of the scale that a dimensionless parameter is a multiple of, e.g. ``m`` for wheelbases.
+        sides: names of the designs with a negative and a positive value, where these are searched separately.
     """
 
     name: str
@@ -53,6 +55,8 @@ class Parameter:
     range: Range = Range()
     default: float | None = None
     tangent: bool = False
+    multiple_of: str = ""
+    sides: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,9 @@ _NOT_NEGATIVE = Range(lower=0.0)
 _NOT_POSITIVE = Range(upper=0.0)
 _TILT = Range(-np.pi / 2, np.pi / 2, closed=False)
 
-_LAMBDA_S = Parameter("lambda_s", "rad", "steer axis tilt", r"\lambda_s", _TILT, tangent=True)
+_LAMBDA_S = Parameter(
+    "lambda_s", "rad", "steer axis tilt", r"\lambda_s", _TILT, tangent=True, sides=("backward tilt", "forward tilt")
+)
 
 
 def copo(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, T: Any) -> list[Any]:
@@ -125,11 +127,13 @@ _NATIVE = ParameterSet(
     "dimensionless",
     (
         Parameter("Fr", "1", "Froude number v/√(g w)", r"\mathrm{Fr}", _NOT_NEGATIVE),
-        Parameter("mu", "1", "mass ratio m_H/m_B", r"\mu", _NOT_NEGATIVE),
-        Parameter("chi_B", "1", "rear frame centre of mass, forward of the rear contact", r"\chi_B"),
-        Parameter("chi_H", "1", "front assembly centre of mass, forward of the rear contact", r"\chi_H"),
-        Parameter("zeta_B", "1", "rear frame centre of mass, downward", r"\zeta_B", _NOT_POSITIVE),
-        Parameter("zeta_H", "1", "front assembly centre of mass, downward", r"\zeta_H", _NOT_POSITIVE),
+        Parameter("mu", "1", "mass ratio m_H/m_B", r"\mu", _NOT_NEGATIVE, multiple_of="kg"),
+        Parameter("chi_B", "1", "rear frame centre of mass, forward of the rear contact", r"\chi_B", multiple_of="m"),
+        Parameter(
+            "chi_H", "1", "front assembly centre of mass, forward of the rear contact", r"\chi_H", multiple_of="m"
+        ),
+        Parameter("zeta_B", "1", "rear frame centre of mass, downward", r"\zeta_B", _NOT_POSITIVE, multiple_of="m"),
+        Parameter("zeta_H", "1", "front assembly centre of mass, downward", r"\zeta_H", _NOT_POSITIVE, multiple_of="m"),
         _LAMBDA_S,
     ),
     native=dict,

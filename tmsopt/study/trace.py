@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.errors import Fault, InputError, suggest
-from tmsopt.design.formulations import NLP, freedom, matching, variables_of
+from tmsopt.design.formulations import freedom, matching, variables_of
+from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.starts import spread
 from tmsopt.roots import PATTERNS, Pattern, roots
@@ -300,7 +301,7 @@ def _variables(nlp: NLP, problem: Problem, design: Mapping[str, float], guess: i
     z = roots(a)
     x = variables_of(problem, design)
     for number, lift in enumerate(nlp.lifts):
-        guesses = lift.guess(values, z)
+        guesses = lift.guess([values], [z])
         chosen = guess if number == 0 else 0
         if chosen >= len(guesses):
             return None

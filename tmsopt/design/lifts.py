@@ -1,0 +1,156 @@
+"""Root quantities as variables with factors: statements about roots without a root."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Protocol
+
+import numpy as np
+
+from tmsopt.design.cases import Case
+from tmsopt.design.nlp import Array, Lift, Touch
+from tmsopt.models import Values
+from tmsopt.roots import product, shift
+from tmsopt.roots.patterns import Roots
+
+
+class Rows(Protocol):
+    """An NLP under construction."""
+
+    def variable(self, name: str, lower: float = ..., upper: float = ...) -> Any:
+        """A new variable."""
+
+    def row(self, name: str, expression: Any, lower: float, upper: float) -> None:
+        """A new row."""
+
+    def equal(self, name: str, left: Sequence[Any], right: Sequence[Any]) -> None:
+        """Equations between coefficient lists."""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Number of variables and rows so far."""
+
+
+@dataclass(frozen=True)
+class Lifted:
+    """A root quantity as a variable."""
+
+    symbol: Any
+    lift: Lift
+    touches: tuple[Touch, ...]
+
+
+def lift_abscissa(build: Rows, covered: Sequence[int], values: Sequence[Values]) -> Lifted:
+    """γ with p(t + γ) = a0 ∏ (t² + βᵢ t + κᵢ), βᵢ, κᵢ ≥ 0, in every case: at or right of every root.
+
+    Some β₁ = 0 or κ₁ = 0 puts a root on the line Re s = γ.
+    """
+    gamma = build.variable("abscissa")
+    touches: list[Touch] = []
+    for case in covered:
+        a, pairs = values[case].coefficients, []
+        for k in range(1, (len(values[case].coefficients) - 1) // 2 + 1):
+            at = build.size[0]
+            pairs.append((build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)))
+            touches.append(Touch(partial(_pair_distance, at), variable=at))
+            touches.append(Touch(partial(_real_distance, at), variable=at + 1))
+        build.equal("abscissa", shift(a, gamma), [a[0] * c for c in product(*([1, *p] for p in pairs))])
+    guess = partial(_abscissa_guess, covered)
+    return Lifted(gamma, Lift("abscissa", 1 + len(touches), guess), tuple(touches))
+
+
+def lift_damping_ratio(build: Rows, covered: Sequence[int], values: Sequence[Values]) -> Lifted:
+    """ζ with p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ, in every case: at or below every damping ratio.
+
+    pᵢ = 2 ζ wᵢ puts a pair on the edge of the sector.
+    """
+    zeta = build.variable("damping_ratio", -1.0, 1.0)
+    touches: list[Touch] = []
+    for case in covered:
+        a, pairs = values[case].coefficients, []
+        for k in range(1, (len(a) - 1) // 2 + 1):
+            at, row = build.size
+            pairs.append((build.variable(f"p{k}.{case}"), build.variable(f"w{k}.{case}", 0.0)))
+            build.row("damping_ratio", pairs[-1][0] - 2 * zeta * pairs[-1][1], 0.0, np.inf)
+            touches.append(Touch(partial(_sector_distance, at), row=row))
+        build.equal("damping_ratio", a, [a[0] * c for c in product(*([1, p, w * w] for p, w in pairs))])
+    guess = partial(_damping_guess, covered)
+    return Lifted(zeta, Lift("damping_ratio", 1 + 2 * len(touches), guess), tuple(touches))
+
+
+def lift_radius(build: Rows, radius: Any, directions: Sequence[tuple[int, Case]], values: Sequence[Values]) -> Lift:
+    """Stability at the distance `radius` in the given directions: p = a0 ∏ (s² + βᵢ s + κᵢ) at each, a0 of one sign."""
+    size = 0
+    for case, _ in directions:
+        a, pairs = values[case].coefficients, []
+        for k in range(1, (len(a) - 1) // 2 + 1):
+            pairs.append((build.variable(f"b{k}.{case}", 0.0), build.variable(f"c{k}.{case}", 0.0)))
+            size += 2
+        build.row("radius", a[0] * values[0].coefficients[0], 0.0, np.inf)
+        build.equal("radius", a, [a[0] * c for c in product(*([1, *p] for p in pairs))])
+    return Lift("radius", 1 + size, partial(_radius_guess, [case for case, _ in directions]))
+
+
+def lift_quantity(build: Rows, name: str, case: int, ends: tuple[float, float]) -> tuple[Any, Lift]:
+    """A derived quantity as a variable, to be tied by its division-free equation."""
+    symbol = build.variable(name if case == 0 else f"{name}.{case}", *ends)
+    return symbol, Lift(name, 1, lambda values, z: [[_finite(values[case][name])]])
+
+
+Measure = Callable[[Array], float]
+
+
+def _pair_distance(at: int, x: Array) -> float:
+    """Distance of a complex pair of t² + βt + κ from the line; inf for a real pair."""
+    beta, kappa = x[at], x[at + 1]
+    return float(beta / 2) if beta * beta < 4 * kappa else np.inf
+
+
+def _real_distance(at: int, x: Array) -> float:
+    """Distance of the nearer of two real roots from the line; inf for a complex pair."""
+    beta, kappa = x[at], x[at + 1]
+    return float(kappa / (beta or 1.0)) if beta * beta >= 4 * kappa else np.inf
+
+
+def _sector_distance(at: int, x: Array) -> float:
+    """Damping ratio of the pair, the least of which is on the edge."""
+    p, w = x[at], x[at + 1]
+    return float(p / (2 * w)) if w > 0 else np.inf
+
+
+def _finite(value: Any) -> float:
+    return float(value) if np.isfinite(value) else 1.0
+
+
+def _paired(z: Roots) -> list[Roots]:
+    """Roots two by two, conjugates together, as `roots` orders them."""
+    return [z[k : k + 2] for k in range(0, len(z), 2)]
+
+
+def _factors(z: Roots, gamma: float) -> list[float]:
+    """β and κ of the factors about the line Re s = γ."""
+    return [float(c) for pair in _paired(z) for c in (-(pair - gamma).sum().real, (pair - gamma).prod().real)]
+
+
+def _abscissa_guess(covered: Sequence[int], values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
+    """γ a little right of the rightmost root and the factors of the shifted polynomials: feasible exactly."""
+    every = np.concatenate([z[case] for case in covered])
+    gamma = float(every.real.max()) + 0.05 * float(np.abs(every).mean()) + 1e-3
+    return [[gamma, *(c for case in covered for c in _factors(z[case], gamma))]]
+
+
+def _damping_guess(covered: Sequence[int], values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
+    every = np.concatenate([z[case] for case in covered])
+    ratio = float(np.min(-every.real / (np.abs(every) + 1e-300)))
+    factors = [
+        float(c)
+        for case in covered
+        for pair in _paired(z[case])
+        for c in (-pair.sum().real, np.sqrt(abs(pair.prod().real)))
+    ]
+    return [[min(max(ratio - 0.05, -0.95), 0.95), *factors]]
+
+
+def _radius_guess(directions: Sequence[int], values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
+    """A small radius, at which the roots are nearly those of the design itself."""
+    return [[1e-3, *(max(c, 0.0) for _ in directions for c in _factors(z[0], 0.0))]]

@@ -1,0 +1,83 @@
+"""An NLP as plain data, and what its solver needs to start."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.design.cases import Case
+from tmsopt.models import Values
+from tmsopt.roots.patterns import Roots
+
+Array = NDArray[np.float64]
+
+Guess = Callable[[Sequence[Values], Sequence[Roots]], list[list[float]]]
+"""Starting values of lifted variables for a numeric design and its roots, the nominal design first and then each
+case; several where there is a choice."""
+
+
+@dataclass(frozen=True)
+class Lift:
+    """Variables that the formulation adds to the parameters, and how to start them."""
+
+    name: str
+    size: int
+    guess: Guess
+
+
+@dataclass(frozen=True)
+class Touch:
+    """One way in which a root can stand on the edge that a root quantity describes: a variable or row held at 0.
+
+    Attributes:
+        distance: how far the root is from the edge at a point of the NLP; of several ways, the least is taken.
+    """
+
+    distance: Callable[[Array], float]
+    variable: int | None = None
+    row: int | None = None
+
+
+@dataclass(frozen=True)
+class NLP:
+    """minimise f(x) subject to lower ≤ x ≤ upper and row_lower ≤ g(x) ≤ row_upper.
+
+    Attributes:
+        formulation: ``abscissa`` or ``matching``.
+        variables: names; the free parameters come first, each as itself or as its tangent.
+        functions: CasADi function x → (f, g).
+        rows: name of each row of g: a constraint's name, or the equation it belongs to.
+        lifts: the variables after the free parameters, in order.
+        cases: the variations of the design that its rows cover.
+        touches: root quantity → the ways in which it is met exactly; unless one is held, the NLP only bounds it.
+    """
+
+    formulation: str
+    variables: tuple[str, ...]
+    functions: ca.Function = field(repr=False)
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    rows: tuple[str, ...]
+    row_lower: tuple[float, ...]
+    row_upper: tuple[float, ...]
+    lifts: tuple[Lift, ...] = field(repr=False, default=())
+    cases: tuple[Case, ...] = field(repr=False, default=())
+    touches: Mapping[str, tuple[Touch, ...]] = field(repr=False, default_factory=dict)
+
+    @property
+    def equations(self) -> int:
+        """Number of equality rows."""
+        return sum(lo == hi for lo, hi in zip(self.row_lower, self.row_upper, strict=True))
+
+    def touching(self, x: Array) -> "NLP":
+        """The same with every root quantity met exactly, in the way that a point is closest to."""
+        upper, row_upper = list(self.upper), list(self.row_upper)
+        for ways in self.touches.values():
+            nearest = min(ways, key=lambda way: way.distance(x))
+            if nearest.variable is not None:
+                upper[nearest.variable] = 0.0
+            if nearest.row is not None:
+                row_upper[nearest.row] = 0.0
+        return replace(self, upper=tuple(upper), row_upper=tuple(row_upper))
