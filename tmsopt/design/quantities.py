@@ -2,10 +2,16 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tmsopt.models import Quantity, Values
-from tmsopt.roots import Structure, structure
+from tmsopt.roots import Structure, roots, structure
+
+Array = NDArray[np.float64]
 
 STRUCTURE_TOLERANCE = 1e-11
 """Relative change of a coefficient within which roots count as multiple: a polished optimum is within 1e-14."""
@@ -41,3 +47,30 @@ RADIUS = "radius"
 """Distance to the nearest loss of stability, in the problem's weights; found by a search of its own."""
 
 ROOT_NAMES = (*(q.name for q in ROOT_QUANTITIES), RADIUS)
+
+
+def regular(coefficients: Array) -> Array:
+    """Coefficients with a leading 0, of a singular mass matrix, moved a little off: one root at infinity."""
+    size = np.abs(coefficients).max(axis=-1, initial=0.0) + 1e-300
+    lead = coefficients[..., 0]
+    return np.concatenate([np.where(lead == 0, 1e-12 * size, lead)[..., None], coefficients[..., 1:]], axis=-1)
+
+
+def _array_roots(values: Mapping[str, Any]) -> NDArray[np.complex128]:
+    assert isinstance(values, Values)
+    return roots(regular(np.stack(np.broadcast_arrays(*values.coefficients), axis=-1)))
+
+
+def _array_abscissa(values: Mapping[str, Any]) -> Array:
+    return np.asarray(_array_roots(values).real.max(axis=-1))
+
+
+def _array_damping(values: Mapping[str, Any]) -> Array:
+    z = _array_roots(values)
+    return np.asarray(np.min(-z.real / (np.abs(z) + 1e-300), axis=-1))
+
+
+ARRAY_ROOT_QUANTITIES = tuple(
+    replace(q, value={"abscissa": _array_abscissa, "damping_ratio": _array_damping}[q.name]) for q in ROOT_QUANTITIES
+)
+"""The same for arrays of designs, by numeric roots."""

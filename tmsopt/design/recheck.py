@@ -1,13 +1,16 @@
 """What a design really is, computed from its parameters alone and without the NLP that produced it."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import flint
 
+from tmsopt.design.cases import Case
 from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
+from tmsopt.design.variation import varies
+from tmsopt.models import Values
 from tmsopt.roots import PATTERNS, Structure, exact_abscissa, pattern_distance
 
 FEASIBLE = 1e-9
@@ -21,7 +24,11 @@ _DIGITS = 120  # products of five doubles are exact, and the tangent is right fa
 
 @dataclass(frozen=True)
 class Checked:
-    """A design's roots, objective and violations."""
+    """A design's roots, objective and violations: in its worst case, where it has several.
+
+    Attributes:
+        worst: the case with the largest abscissa, of those looked at.
+    """
 
     structure: Structure
     realised: float
@@ -29,30 +36,58 @@ class Checked:
     violations: Table[float]
     quantities: Table[float]
     dimensionless: Table[float]
+    worst: Case = field(default_factory=Case)
 
 
-def recheck(problem: Problem, parameters: Mapping[str, float]) -> Checked:
-    """Evaluate a design independently of any solver: constraints, pattern, roots and objective."""
-    values = problem.values(parameters)
-    conditions = {name: c.violation(values) for name, c in problem.conditions.items()}
-    violations = {name: v for name, v in conditions.items() if not v <= FEASIBLE}
-    if not math.isfinite(values["structure"].abscissa):
+def recheck(problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case] | None = None) -> Checked:
+    """Evaluate a design independently of any solver: constraints, pattern, roots and objective, in the given cases."""
+    listed = [case for case in (problem.cases if cases is None else cases) if not case.direction]
+    nominal = problem.values(parameters)
+    each = [problem.values(case.applied(parameters)) for case in listed] or [nominal]
+    top = max(range(len(each)), key=lambda k: _or_infinite(each[k]["abscissa"]))
+    roots = {"abscissa": each[top]["abscissa"], "damping_ratio": min(v["damping_ratio"] for v in each)}
+    for values in (nominal, *each):
+        for name, value in roots.items():
+            values.define(name, value)
+    violations = {}
+    for name, condition in problem.conditions.items():
+        at = each if varies(problem, condition, listed) else [nominal]
+        violation = max((condition.violation(values) for values in at), key=_or_infinite)
+        if not violation <= FEASIBLE:
+            violations[name] = violation
+    structure = each[top]["structure"]
+    if not math.isfinite(structure.abscissa):
         violations["a0"] = 1.0  # a singular mass matrix
     if problem.locate:
-        distance = pattern_distance(PATTERNS[problem.locate], [float(c) for c in values.coefficients])
+        distance = pattern_distance(PATTERNS[problem.locate], [float(c) for c in nominal.coefficients])
         if not distance <= MATCHED:
             violations[problem.locate] = distance
-    objective = float(problem.objective(values)) if problem.objective else math.nan
     of = problem.parameter_set
     names = [n for n in (*problem.model.quantity_names(of), "damping_ratio") if n not in problem.model.sets[0].names]
     return Checked(
-        structure=values["structure"],
-        realised=realised_abscissa(problem, parameters),
-        objective=objective,
+        structure=structure,
+        realised=realised_abscissa(problem, listed[top].applied(parameters) if listed else parameters),
+        objective=_objective(problem, nominal, each, listed),
         violations=Table(violations),
-        quantities=Table({name: float(values[name]) for name in names}),
+        quantities=Table({name: float(nominal[name]) for name in names}),
         dimensionless=Table({n: float(v) for n, v in of.native(parameters).items()}),
+        worst=listed[top] if listed else Case(),
     )
+
+
+def _objective(problem: Problem, nominal: Values, each: Sequence[Values], cases: Sequence[Case]) -> float:
+    """The objective, the worst over the cases where it differs between them."""
+    if problem.objective is None:
+        return math.nan
+    if not varies(problem, problem.objective, cases):
+        return float(problem.objective(nominal))
+    sign = -1.0 if problem.sense == "maximize" else 1.0
+    return sign * max((sign * float(problem.objective(values)) for values in each), key=_or_infinite)
+
+
+def _or_infinite(value: float) -> float:
+    """A number for comparison in which one that does not exist is the worst."""
+    return math.inf if math.isnan(value) else value
 
 
 def realised_abscissa(problem: Problem, parameters: Mapping[str, float]) -> float:

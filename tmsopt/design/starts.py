@@ -1,9 +1,7 @@
 """Designs to start from, spread over the box, and starting values of the lifted variables that fit them."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from itertools import islice
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +9,8 @@ from numpy.typing import NDArray
 from tmsopt.design.formulations import middle, variables_of
 from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ROOT_QUANTITIES
+from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES, regular
+from tmsopt.design.sequence import golden_steps
 from tmsopt.models import Values
 from tmsopt.roots import roots
 from tmsopt.roots.structure import guess_distance
@@ -44,7 +43,7 @@ def complete(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Array:
     nominal = problem.ordered(design)
     varied = (case.applied(nominal, 0.0, problem.weights) for case in nlp.cases)
     values = [problem.values(parameters) for parameters in (nominal, *varied)]
-    z = list(roots(_regular(np.array([[float(c) for c in v.coefficients] for v in values]))))
+    z = list(roots(regular(np.array([[float(c) for c in v.coefficients] for v in values]))))
     x = variables_of(problem, design)
     for lift in nlp.lifts:
         guesses = lift.guess(values, z) or [[0.0] * lift.size]
@@ -54,17 +53,10 @@ def complete(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Array:
 
 
 def spread(problem: Problem, seed: int) -> Iterator[dict[str, float]]:
-    """The middle of the box, then a quasi-random sequence without end.
-
-    The sequence adds powers of the generalised golden ratio modulo 1; scipy.stats.qmc has others, but importing
-    it takes longer than solving.
-    """
+    """The middle of the box, then a quasi-random sequence without end."""
     yield middle(problem)
     names = list(problem.free)
-    ratio = 2.0
-    for _ in range(60):  # fixed point of φ^(d+1) = φ + 1
-        ratio = (1 + ratio) ** (1 / (len(names) + 1))
-    steps = ratio ** -np.arange(1.0, len(names) + 1)
+    steps = golden_steps(len(names))
     offset = np.random.default_rng(seed).random(len(names))
     lower, upper = np.array([problem.free[n] for n in names]).reshape(-1, 2).T
     k = 1
@@ -79,13 +71,13 @@ def _merit(problem: Problem, columns: Mapping[str, Array]) -> tuple[Array, Array
     parameters = problem.ordered(columns)
     shape = next(iter(columns.values())).shape
     arrays = {name: np.broadcast_to(np.asarray(value, dtype=float), shape) for name, value in parameters.items()}
-    values = Values(problem.model, problem.parameter_set, arrays, extra=_ARRAY_ROOT_QUANTITIES)
+    values = Values(problem.model, problem.parameter_set, arrays, extra=ARRAY_ROOT_QUANTITIES)
     objective, violation = np.zeros(shape), np.zeros(shape)
     if problem.objective is not None:
         sign = -1.0 if problem.sense == "maximize" else 1.0
         objective += _in_spreads(sign * np.broadcast_to(problem.objective(values), shape))
     if problem.pattern is not None:
-        a = _regular(np.stack(np.broadcast_arrays(*values.coefficients), axis=-1))
+        a = regular(np.stack(np.broadcast_arrays(*values.coefficients), axis=-1))
         mismatch = [guess_distance(problem.pattern, c, z) for c, z in zip(a, roots(a), strict=True)]
         violation += 3 * _in_spreads(np.array(mismatch))
     for condition in problem.conditions.values():
@@ -102,35 +94,9 @@ def _in_spreads(column: Array) -> Array:
     return np.where(np.isfinite(column), column, 1e6) / (spread or 1.0)
 
 
-def _regular(coefficients: Array) -> Array:
-    """Coefficients with a leading 0, of a singular mass matrix, moved a little off: one root at infinity."""
-    size = np.abs(coefficients).max(axis=-1, initial=0.0) + 1e-300
-    lead = coefficients[..., 0]
-    return np.concatenate([np.where(lead == 0, 1e-12 * size, lead)[..., None], coefficients[..., 1:]], axis=-1)
-
-
 def _mismatch(nlp: NLP, x: list[float], guess: list[float]) -> float:
     """Size of the rows when the lifts that follow are still unknown (at 0)."""
     trial = np.zeros(len(nlp.variables))
     trial[: len(x) + len(guess)] = x + guess
     g = np.array(nlp.functions(trial)[1]).ravel()
     return float(np.abs(g[np.isfinite(g)]).sum())
-
-
-def _array_roots(values: Mapping[str, Any]) -> NDArray[np.complex128]:
-    assert isinstance(values, Values)
-    return roots(_regular(np.stack(np.broadcast_arrays(*values.coefficients), axis=-1)))
-
-
-def _array_abscissa(values: Mapping[str, Any]) -> Array:
-    return np.asarray(_array_roots(values).real.max(axis=-1))
-
-
-def _array_damping(values: Mapping[str, Any]) -> Array:
-    z = _array_roots(values)
-    return np.asarray(np.min(-z.real / (np.abs(z) + 1e-300), axis=-1))
-
-
-_ARRAY_ROOT_QUANTITIES = tuple(
-    replace(q, value={"abscissa": _array_abscissa, "damping_ratio": _array_damping}[q.name]) for q in ROOT_QUANTITIES
-)

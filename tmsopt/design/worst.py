@@ -1,0 +1,190 @@
+"""Where, within its scenarios and tolerances, a design does worst."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.design.cases import Band, Case
+from tmsopt.design.expression import Expression
+from tmsopt.design.frozen import Table
+from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES, RADIUS
+from tmsopt.design.sequence import golden_steps
+from tmsopt.design.variation import varies
+from tmsopt.models import Values
+
+Array = NDArray[np.float64]
+
+_LINE = 1025  # points looked at along a band when nothing else varies
+_PLANE = 2048  # points, besides the corners, where more varies
+_PEAKS = 4  # worst points that are looked at closely
+_AROUND = 48  # points of each closer look
+_SHRINK = 0.25
+_LOOKS = 14  # 0.25^14 of a grid step is 4e-9 of it: at a smooth maximum the value is then exact
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The worst case for one thing that is asked of a design.
+
+    Attributes:
+        value: ``abscissa``, ``damping_ratio``, objective or left minus right of a constraint, in the case.
+    """
+
+    case: Case
+    value: float
+
+
+Badness = Callable[[Mapping[str, Any]], Any]
+"""A function of the values of designs that is greatest where a design does worst."""
+
+
+def subjects(problem: Problem, cases: Sequence[Case]) -> dict[str, tuple[float, Expression | str]]:
+    """What may differ between cases: name → sign that makes the worst the greatest, and what it is."""
+    found: dict[str, tuple[float, Expression | str]] = {"abscissa": (1.0, "abscissa")}
+    asked = [e for e in (problem.objective, *problem.conditions.values()) if e]
+    if any("damping_ratio" in e.names for e in asked):
+        found["damping_ratio"] = (-1.0, "damping_ratio")
+    if problem.objective and varies(problem, problem.objective, cases):
+        found["objective"] = (-1.0 if problem.sense == "maximize" else 1.0, problem.objective)
+    for name, condition in problem.conditions.items():
+        if varies(problem, condition, cases):
+            found[f"constraint {name}"] = (-1.0 if condition.comparison == ">=" else 1.0, condition)
+    return found
+
+
+def worst_cases(problem: Problem, parameters: Mapping[str, float]) -> dict[str, Worst]:
+    """The worst case of everything that differs between cases, over whole bands and tolerance boxes.
+
+    A grid with a closer look at its worst points; the value in the case found is exact, with multiple roots
+    recognised, but a peak narrower than the grid can escape: `prove` excludes that.
+    """
+    spaces = list(_spaces(problem))
+    found: dict[str, Worst] = {}
+    for name, (sign, what) in subjects(problem, problem.cases).items():
+        shared = {n: found[n].value for n in found if isinstance(what, Expression) and n in what.names}
+        peaks = [case for space in spaces for case in space.peaks(problem, parameters, sign, what, shared)]
+        measured = [Worst(case, _measured(problem, parameters, case, what, shared)) for case in peaks]
+        found[name] = max(measured, key=lambda w: sign * w.value if np.isfinite(w.value) else np.inf)
+    return found
+
+
+def _measured(
+    problem: Problem,
+    parameters: Mapping[str, float],
+    case: Case,
+    what: Expression | str,
+    shared: Mapping[str, float],
+) -> float:
+    """The value of a root quantity in one case, or of an expression with the given worst root quantities."""
+    values = problem.values(case.applied(parameters))
+    for name, value in shared.items():
+        values.define(name, value)
+    return float(values[what] if isinstance(what, str) else what(values))
+
+
+@dataclass(frozen=True)
+class _Space:
+    """Bands and tolerances as a unit cube, with separate scenario values fixed."""
+
+    at: Table[float]
+    bands: Mapping[str, Band]
+    tolerances: Mapping[str, float]
+
+    def case(self, u: Array) -> Case:
+        """The case at a point of the cube."""
+        at, offset = self._columns(u)
+        return Case(
+            Table({**self.at, **{n: float(v) for n, v in at.items()}}),
+            Table({n: float(v) for n, v in offset.items()}),
+        )
+
+    def peaks(
+        self,
+        problem: Problem,
+        parameters: Mapping[str, float],
+        sign: float,
+        what: Expression | str,
+        shared: Mapping[str, float],
+    ) -> Iterator[Case]:
+        """The worst few points of a grid, each moved to where it is locally worst."""
+        size = len(self.bands) + len(self.tolerances)
+        if size == 0:
+            yield Case(self.at)
+            return
+
+        def badness(u: Array) -> Array:
+            at, offset = self._columns(u)
+            found = _evaluated(problem, {**parameters, **self.at, **at}, offset, len(u), what, shared)
+            return np.where(np.isfinite(found), sign * found, np.inf)
+
+        u = _grid(size)
+        high = badness(u)
+        step = 1 / (_LINE - 1) if size == 1 else 0.5 * len(u) ** (-1 / size)
+        rng = np.random.default_rng(0)
+        for k in _apart(u, high, 4 * step):
+            best, value, reach = u[k], high[k], step
+            for _ in range(_LOOKS):
+                around = np.clip(best + reach * rng.uniform(-1, 1, (_AROUND, size)), 0, 1)
+                trial = badness(around)
+                top = int(np.argmax(trial))
+                if trial[top] > value:
+                    best, value = around[top], trial[top]
+                reach *= _SHRINK if size == 1 else _SHRINK ** (1 / 2)
+            yield self.case(best)
+
+    def _columns(self, u: Array) -> tuple[dict[str, Array], dict[str, Array]]:
+        columns = list(np.moveaxis(u, -1, 0))
+        at = {n: b.min + (b.max - b.min) * c for (n, b), c in zip(self.bands.items(), columns, strict=False)}
+        rest = columns[len(self.bands) :]
+        return at, {n: t * (2 * c - 1) for (n, t), c in zip(self.tolerances.items(), rest, strict=True)}
+
+
+def _spaces(problem: Problem) -> Iterator[_Space]:
+    """One space for every choice of the separate scenario values."""
+    bands = {n: s for n, s in problem.variations.items() if isinstance(s, Band)}
+    separate = {n: s for n, s in problem.variations.items() if not isinstance(s, Band)}
+    for values in product(*separate.values()):
+        yield _Space(Table(dict(zip(separate, values, strict=True))), bands, problem.tolerances)
+
+
+def _evaluated(
+    problem: Problem,
+    parameters: Mapping[str, Any],
+    offset: Mapping[str, Array],
+    count: int,
+    what: Expression | str,
+    shared: Mapping[str, float],
+) -> Array:
+    varied = Case(offset=offset).applied(parameters)  # type: ignore[arg-type]
+    columns = {n: np.broadcast_to(np.asarray(v, dtype=float), count) for n, v in varied.items()}
+    values = Values(problem.model, problem.parameter_set, columns, extra=ARRAY_ROOT_QUANTITIES)
+    for name, value in {RADIUS: np.nan, **shared}.items():
+        values.define(name, value)
+    with np.errstate(all="ignore"):
+        return np.broadcast_to(np.asarray(values[what] if isinstance(what, str) else what(values), dtype=float), count)
+
+
+def _grid(size: int) -> Array:
+    """Points of the unit cube, corners included: even along a line, else corners and a quasi-random sequence."""
+    if size == 1:
+        return np.linspace(0, 1, _LINE)[:, None]
+    corners = np.array(list(product((0.0, 1.0), repeat=size)))
+    middles = np.array(list(product((0.0, 0.5, 1.0), repeat=size))) if size <= 5 else corners
+    steps = np.arange(1, _PLANE + 1)[:, None] * golden_steps(size)
+    return np.concatenate([corners, middles, (0.5 + steps) % 1.0])
+
+
+def _apart(u: Array, high: Array, distance: float) -> list[int]:
+    """The highest points that are a distance from one another."""
+    chosen: list[int] = []
+    for k in np.argsort(-high, kind="stable"):
+        if all(np.abs(u[k] - u[c]).max() > distance for c in chosen):
+            chosen.append(int(k))
+        if len(chosen) == _PEAKS:
+            break
+    return chosen
