@@ -45,10 +45,10 @@ class Run:
     iterations: int
 
 
-def ipopt(
-    nlp: NLP, linear_solver: str = "mumps", max_iterations: int = 300, near: bool = False
-) -> Callable[[Array], Run]:
-    """A solver of one NLP: start → run; `near` for starts close to a solution. Not to be shared between threads.
+def ipopt(nlp: NLP, linear_solver: str = "mumps", max_iterations: int = 300, near: bool = False) -> Callable[..., Run]:
+    """A solver of one NLP: start, and other limits if wanted → run; `near` for starts close to a solution.
+
+    Not to be shared between threads.
 
     Raises:
         ValueError: for a linear solver other than mumps and spral.
@@ -69,10 +69,11 @@ def ipopt(
     x = ca.SX.sym("x", len(nlp.variables))
     f, g = nlp.functions(x)
     solver = ca.nlpsol("solver", "ipopt", {"x": x, "f": f, "g": g}, options)
-    lower, upper = np.array(nlp.lower), np.array(nlp.upper)
 
-    def run(start: Array) -> Run:
-        answer = solver(x0=start, lbx=lower, ubx=upper, lbg=np.array(nlp.row_lower), ubg=np.array(nlp.row_upper))
+    def run(start: Array, limits: NLP = nlp) -> Run:
+        lower, upper = np.array(limits.lower), np.array(limits.upper)
+        rows = {"lbg": np.array(limits.row_lower), "ubg": np.array(limits.row_upper)}
+        answer = solver(x0=start, lbx=lower, ubx=upper, **rows)
         stats = solver.stats()
         return Run(
             x=np.clip(np.array(answer["x"]).ravel(), lower, upper),

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import casadi as ca
 import numpy as np
@@ -35,15 +34,19 @@ class Point:
     bound_multipliers: Array
 
 
-def polisher(nlp: NLP) -> Callable[[Run], Point]:
-    """A function that refines runs of one NLP; the better of the refined and the raw point is returned."""
+def polisher(nlp: NLP) -> Callable[[Run, NLP], Point]:
+    """A function that refines runs of one NLP under given limits; the better of refined and raw point is returned."""
     x = ca.SX.sym("x", len(nlp.variables))
     multipliers = ca.SX.sym("m", len(nlp.rows))
     f, g = nlp.functions(x)
     hessian = ca.hessian(f + ca.dot(multipliers, g), x)[0]
     expand = ca.Function("kkt", [x, multipliers], [f, ca.gradient(f, x), g, ca.jacobian(g, x), hessian])
-    limits = (np.array(ends) for ends in (nlp.lower, nlp.upper, nlp.row_lower, nlp.row_upper))
-    return partial(_polished, _Conditions(expand, *limits))
+
+    def polish(run: Run, limits: NLP) -> Point:
+        ends = (np.array(e) for e in (limits.lower, limits.upper, limits.row_lower, limits.row_upper))
+        return _polished(_Conditions(expand, *ends), run)
+
+    return polish
 
 
 @dataclass(frozen=True)

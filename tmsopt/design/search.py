@@ -10,7 +10,7 @@ import numpy as np
 from tmsopt.design.bound import bounded, closed, omega0_bound
 from tmsopt.design.formulations import abscissa, design_of, freedom, middle
 from tmsopt.design.ipopt import Run, ipopt
-from tmsopt.design.nlp import NLP
+from tmsopt.design.nlp import NLP, Array
 from tmsopt.design.problem import Problem
 from tmsopt.design.starts import complete, designs
 from tmsopt.roots import roots
@@ -34,10 +34,12 @@ class Candidate:
     """Where one start ended.
 
     Attributes:
+        nlp: with the limits that held.
         objective: of the NLP; inf unless finite.
         feasible: whether rows and bounds hold as IPOPT left them.
     """
 
+    nlp: NLP
     run: Run
     objective: float
     feasible: bool
@@ -52,14 +54,22 @@ def search(
     exhaustive: bool,
     linear_solver: str,
     progress: Progress | None,
+    touching: bool = False,
 ) -> list[Candidate]:
-    """Where every start ended that was tried, in order."""
+    """Where every start ended that was tried, in order.
+
+    Args:
+        touching: hold every root quantity at its exact value, in the way that each start is closest to, where a mere
+            bound on it would let the optimiser claim too much.
+    """
     run = ipopt(nlp, linear_solver)
     candidates: list[Candidate] = []
     if problem.start:  # the user's own
-        candidates.append(follow(problem, nlp, middle(problem), linear_solver))
+        candidates.append(follow(problem, nlp, middle(problem), linear_solver, touching=touching))
     for design in designs(problem, seed, max(starts - len(candidates), 0)):
-        candidates.append(_candidate(problem, nlp, run(complete(nlp, problem, design))))
+        x = complete(nlp, problem, design)
+        limits = nlp.touching(x) if touching else nlp
+        candidates.append(_candidate(problem, limits, run(x, limits)))
         if progress:
             progress(len(candidates), starts)
         if not exhaustive and _settled(problem, candidates):
@@ -69,9 +79,23 @@ def search(
     return candidates
 
 
-def follow(problem: Problem, nlp: NLP, design: Mapping[str, float], linear_solver: str, near: bool = True) -> Candidate:
+def follow(
+    problem: Problem,
+    nlp: NLP,
+    design: Mapping[str, float],
+    linear_solver: str,
+    near: bool = True,
+    touching: bool = False,
+) -> Candidate:
     """Where IPOPT ends from a design, close to it or not."""
-    return _candidate(problem, nlp, ipopt(nlp, linear_solver, near=near)(complete(nlp, problem, design)))
+    x = complete(nlp, problem, design)
+    limits = nlp.touching(x) if touching else nlp
+    return _candidate(problem, limits, ipopt(nlp, linear_solver, near=near)(x, limits))
+
+
+def claim(problem: Problem, candidate: Candidate) -> float:
+    """The objective that a candidate claims, in the problem's own sense."""
+    return -candidate.objective if problem.sense == "maximize" else candidate.objective
 
 
 def same(a: float, b: float) -> bool:
@@ -83,21 +107,22 @@ def _candidate(problem: Problem, nlp: NLP, run: Run) -> Candidate:
     f, g = nlp.functions(run.x)
     rows = np.array(g).ravel()
     if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(run.x)) and math.isfinite(float(f))):
-        return Candidate(run, math.inf, False)
+        return Candidate(nlp, run, math.inf, False)
     outside = np.concatenate([np.array(nlp.row_lower) - rows, rows - np.array(nlp.row_upper), [0.0]])
     feasible = outside.max() <= _FEASIBLE and run.status != "Infeasible_Problem_Detected"
-    return Candidate(run, float(f), bool(feasible) and not _spurious(problem, nlp, run))
+    return Candidate(nlp, run, float(f), bool(feasible) and not _spurious(problem, nlp, run))
 
 
 def _spurious(problem: Problem, nlp: NLP, run: Run) -> bool:
     """Whether the factors claim an abscissa left of the roots: near a0 = 0 equations hold as all terms vanish."""
     if "abscissa" not in nlp.variables:
         return False
-    a = np.array(_coefficients(problem, run), dtype=float)
-    if a[0] == 0:
+    a = _coefficients(problem, nlp, run)
+    if np.any(a[:, 0] == 0):
         return True
     z = roots(a)
-    return bool(run.x[nlp.variables.index("abscissa")] < z.real.max() - _SCATTER * np.abs(z).max())
+    claimed = run.x[nlp.variables.index("abscissa")]
+    return bool(np.any(claimed < z.real.max(axis=1) - _SCATTER * np.abs(z).max(axis=1)))
 
 
 def _settled(problem: Problem, candidates: list[Candidate]) -> bool:
@@ -131,19 +156,22 @@ def _proven(problem: Problem, candidate: Candidate) -> bool:
     """Whether the bound is reached; it is looked at only where the design itself has all roots of one modulus."""
     if not bounded(problem):
         return False
-    a = _coefficients(problem, candidate.run)
+    a = _coefficients(problem, candidate.nlp, candidate.run)[0]
     own = -(abs(a[-1] / a[0]) ** (1 / problem.model.degree)) if a[0] else -math.inf
     return closed(candidate.objective - own, own) and omega0_bound(problem, candidate.objective).proven
 
 
-def _coefficients(problem: Problem, run: Run) -> list[float]:
-    parameters = problem.ordered(design_of(problem, run.x.tolist()))
-    return [float(c) for c in problem.model.coefficients(parameters, problem.parameter_set)]
+def _coefficients(problem: Problem, nlp: NLP, run: Run) -> Array:
+    """Coefficients in every case, shape (cases, n + 1)."""
+    nominal = problem.ordered(design_of(problem, run.x.tolist()))
+    varied = [c.applied(nominal) for c in nlp.cases if not c.direction] or [nominal]
+    of = problem.parameter_set
+    return np.array([[float(c) for c in problem.model.coefficients(p, of)] for p in varied])
 
 
 def _rescued(problem: Problem, nlp: NLP, seed: int, linear_solver: str) -> list[Candidate]:
     """Starts where the abscissa is least under the same constraints: multiple roots are often met there."""
-    relaxed = replace(problem, locate=None, minimize="abscissa", maximize=None)
+    relaxed = replace(problem, locate=None, minimize="abscissa", maximize=None, scenarios={}, tolerances={})
     leading = abscissa(relaxed)
     lead = ipopt(leading, linear_solver)
     ended = [lead(complete(leading, relaxed, d)).x for d in designs(relaxed, seed, _RESCUES)]

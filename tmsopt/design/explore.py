@@ -1,0 +1,190 @@
+"""The search of one part of the box, with cases added until the worst one is covered."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tmsopt.design.cases import Case
+from tmsopt.design.elastic import least_violating
+from tmsopt.design.finding import Finding, Trial, counted, found, honest, survivor
+from tmsopt.design.formulations import design_of, formulate
+from tmsopt.design.nlp import NLP
+from tmsopt.design.problem import Problem
+from tmsopt.design.recheck import FEASIBLE, recheck
+from tmsopt.design.search import Candidate, follow, same, search
+from tmsopt.design.sides import Side
+from tmsopt.design.solution import Starts
+from tmsopt.design.worst import worst_cases
+
+_ROUNDS = 16
+"""Times that cases are added; each time the worst one between them shrinks to its square, roughly."""
+
+_LEADERS = 3  # optima followed when cases are added: a better one may do worse between the old cases
+_FAR = 1e8  # of a variable: a root quantity that nothing holds runs away
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to search; see `solve`."""
+
+    starts: int
+    seed: int
+    exhaustive: bool
+    linear_solver: str
+    progress: Progress | None
+
+
+@dataclass(frozen=True)
+class Explored:
+    """What the search of one part of the box came to.
+
+    Attributes:
+        finding: None where nothing feasible was found.
+    """
+
+    side: Side
+    nlp: NLP
+    candidates: tuple[Candidate, ...]
+    finding: Finding | None
+
+
+def explore(problem: Problem, side: Side, options: Options) -> Explored:
+    """Search one part of the box from many starts, exactly and in all cases."""
+    nlp = side.narrowed(formulate(problem, problem.cases))
+    candidates, touching = _searched(side, nlp, options)
+    trial = survivor(problem, nlp, candidates)
+    starts = counted(candidates, trial.candidate.objective if trial else math.nan)
+    if problem.cases:
+        finding = _covered(problem, side, nlp, candidates, trial, starts, touching, options)
+    else:
+        finding = found(problem, nlp, trial, starts)
+    return Explored(side, nlp, tuple(candidates), finding)
+
+
+def without_any(problem: Problem, explored: Sequence[Explored], options: Options) -> Finding:
+    """No start ended feasible: the least-violating design, and what can be reached from it if it violates nothing."""
+    nlp = formulate(problem, problem.cases)
+    design = least_violating(problem, nlp, options.seed, options.linear_solver)
+    parameters = problem.ordered(design)
+    cases = evaluated_cases(problem, parameters)
+    checked = recheck(problem, parameters, cases)
+    tried = sum(len(e.candidates) for e in explored)
+    none = f"of {tried} starts, none"
+    if checked.violations:
+        status, note = "infeasible", f"{none} satisfies all constraints; relax one of those violated"
+    else:
+        ended = [follow(problem, nlp, design, options.linear_solver, near) for near in (True, False)]
+        trial = survivor(problem, nlp, ended)
+        if finding := found(problem, nlp, trial, Starts(tried + 2, sum(c.feasible for c in ended), 1)):
+            return finding
+        advice = "try more starts, give one, or keep a0 away from 0 (for tms, nu_H >= 0.02)"
+        status, note = "not_converged", f"feasible designs exist, but {none} converged; {advice}"
+    return Finding(parameters, checked, status, {}, Starts(tried=tried), nlp.formulation, cases, notes=(note,))
+
+
+def evaluated_cases(problem: Problem, parameters: Mapping[str, float]) -> tuple[Case, ...]:
+    """The listed cases of a design and the worst ones between them."""
+    listed = problem.cases
+    return (*listed, *(w.case for w in worst_cases(problem, parameters).values())) if listed else ()
+
+
+def _searched(side: Side, nlp: NLP, options: Options) -> tuple[list[Candidate], bool]:
+    """Where the starts ended; once more with root quantities held exact, if a bound on them claims too much."""
+
+    def run(touching: bool) -> list[Candidate]:
+        return search(
+            side.problem,
+            nlp,
+            starts=options.starts,
+            seed=options.seed,
+            exhaustive=options.exhaustive,
+            linear_solver=options.linear_solver,
+            progress=options.progress,
+            touching=touching,
+        )
+
+    candidates = run(touching=False)
+    if not nlp.touches or not _overclaims(side.problem, nlp, candidates):
+        return candidates, False
+    return run(touching=True), True
+
+
+def _overclaims(problem: Problem, nlp: NLP, candidates: Sequence[Candidate]) -> bool:
+    """Whether the best end owes its rank to a root quantity that the design does not have."""
+    feasible = [c for c in candidates if c.feasible]
+    if not feasible:
+        return any(float(np.abs(c.run.x).max()) > _FAR for c in candidates)
+    best = min(feasible, key=lambda c: c.objective)
+    trial = survivor(problem, nlp, [best])
+    return trial is not None and not (honest(problem, trial) and _sound(trial))
+
+
+def _sound(trial: Trial) -> bool:
+    return sum(trial.checked.violations.values()) <= math.sqrt(FEASIBLE)
+
+
+def _covered(
+    problem: Problem,
+    side: Side,
+    nlp: NLP,
+    candidates: Sequence[Candidate],
+    trial: Trial | None,
+    starts: Starts,
+    touching: bool,
+    options: Options,
+) -> Finding | None:
+    """The best design once cases have been added until none between them is worse."""
+    for _ in range(_ROUNDS):
+        if trial is None:
+            return None
+        more = _uncovered(problem, trial)
+        if not more:
+            break
+        leaders = _leaders(problem, candidates)
+        nlp = side.narrowed(formulate(problem, (*nlp.cases, *more)))
+        for near in (True, False):
+            candidates = [follow(problem, nlp, d, options.linear_solver, near, touching) for d in leaders]
+            trial = survivor(problem, nlp, candidates)
+            if trial is not None:
+                break
+    if trial is None:
+        return None
+    others = [c for c in evaluated_cases(problem, trial.parameters) if c not in nlp.cases]
+    return found(problem, nlp, trial, starts, (*nlp.cases, *others))
+
+
+def _uncovered(problem: Problem, trial: Trial) -> list[Case]:
+    """Cases in which the design does worse than in all that it was made for."""
+    more: list[Case] = []
+    known = trial.checked
+    for name, worst in worst_cases(problem, trial.parameters).items():
+        match name:
+            case "abscissa":
+                excess = worst.value - known.structure.abscissa
+            case "damping_ratio":
+                excess = known.quantities["damping_ratio"] - worst.value
+            case "objective":
+                excess = abs(worst.value - known.objective)
+            case _:
+                excess = abs(worst.value) if _violated(problem, name, worst.value) else 0.0
+        if not excess <= FEASIBLE * (1 + abs(worst.value)) and worst.case not in more:
+            more.append(worst.case)
+    return more
+
+
+def _violated(problem: Problem, name: str, difference: float) -> bool:
+    condition = problem.conditions[name.removeprefix("constraint ")]
+    return difference > 0 if condition.comparison == "<=" else difference < 0
+
+
+def _leaders(problem: Problem, candidates: Sequence[Candidate]) -> list[dict[str, float]]:
+    """The designs of the best few different optima."""
+    kept: list[Candidate] = []
+    for candidate in sorted((c for c in candidates if c.feasible), key=lambda c: c.objective):
+        if not any(same(candidate.objective, k.objective) for k in kept):
+            kept.append(candidate)
+    return [design_of(problem, c.run.x.tolist()) for c in kept[:_LEADERS]]

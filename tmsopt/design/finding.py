@@ -1,0 +1,175 @@
+"""From where the starts ended to one design with its standing: polished, rechecked, ranked."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tmsopt.design.branches import other_branches
+from tmsopt.design.cases import Case
+from tmsopt.design.formulations import design_of, freedom
+from tmsopt.design.nlp import NLP
+from tmsopt.design.polish import Point, polisher
+from tmsopt.design.problem import Problem
+from tmsopt.design.recheck import Checked, recheck
+from tmsopt.design.search import Candidate, claim, same
+from tmsopt.design.solution import Branch, Starts
+
+_STATIONARY = 1e-6  # gradient of the Lagrangian at which a point counts as converged whatever IPOPT says
+_ALIKE = 3  # candidates of one objective looked at closely
+_CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found")
+_SPURIOUS = 1e-3  # violation that no lack of digits explains: equations met only because all coefficients vanish
+_MULTIPLIER = 1e-9  # below it a limit does not bind
+_CLAIMED = 1e-6  # relative difference of the claimed objective from the design's own
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A design with its standing, ready to be reported.
+
+    Attributes:
+        cases: the cases that it was checked in.
+    """
+
+    parameters: Mapping[str, float]
+    checked: Checked
+    status: str
+    active: Mapping[str, float]
+    starts: Starts
+    formulation: str
+    cases: tuple[Case, ...] = ()
+    branches: tuple[Branch, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A candidate, polished and rechecked."""
+
+    candidate: Candidate
+    point: Point
+    parameters: Mapping[str, float]
+    checked: Checked
+
+
+def evaluated(problem: Problem, cases: Sequence[Case]) -> Finding:
+    """Nothing is free: the design is what it is."""
+    parameters = problem.ordered({})
+    checked = recheck(problem, parameters, cases)
+    status = "infeasible" if checked.violations else "optimal"
+    return Finding(parameters, checked, status, {}, Starts(), "none", tuple(cases))
+
+
+def found(
+    problem: Problem, nlp: NLP, trial: Trial | None, starts: Starts, cases: Sequence[Case] | None = None
+) -> Finding | None:
+    """A trial as a finding, in the given cases, by default those of the NLP; None where it is not feasible at all."""
+    if trial is None:
+        return None
+    point, parameters = trial.point, trial.parameters
+    checked = trial.checked if cases is None else recheck(problem, parameters, cases)
+    counted = freedom(problem)
+    if sum(checked.violations.values()) > _SPURIOUS and counted.count >= 0:
+        return None
+    converged = trial.candidate.run.status in _CONVERGED or point.stationarity <= _STATIONARY
+    notes: tuple[str, ...] = ()
+    if not honest(problem, trial):
+        converged = False
+        claimed = claim(problem, trial.candidate)
+        notes = (f"the solver's objective {claimed:.9g} is not the design's, {checked.objective:.9g}",)
+    status = "optimal" if converged and not checked.violations else "not_converged"
+    if counted.kind == "over-determined" and checked.violations:
+        status = "infeasible"
+        surplus = f"{counted.conditions} conditions for {counted.free} free parameters"
+        notes += (f"{surplus}, and they are not consistent; free {-counted.count} more, or drop a constraint",)
+    return Finding(
+        parameters,
+        checked,
+        status,
+        _active(problem, nlp, point),
+        starts,
+        nlp.formulation,
+        tuple(nlp.cases if cases is None else cases),
+        other_branches(problem, nlp, parameters) if counted.kind == "square" else (),
+        notes,
+    )
+
+
+def counted(candidates: Sequence[Candidate], at_best: float) -> Starts:
+    """How the starts of a search ended."""
+    return Starts(
+        tried=len(candidates),
+        converged=sum(c.feasible for c in candidates),
+        at_best=sum(c.feasible and same(c.objective, at_best) for c in candidates),
+    )
+
+
+def survivor(problem: Problem, nlp: NLP, candidates: Sequence[Candidate]) -> Trial | None:
+    """The first of the best candidates to pass the recheck once polished, or the one that fails it least."""
+    polish = polisher(nlp)
+    kept: Trial | None = None
+    tried: list[float] = []
+    for candidate in sorted((c for c in candidates if c.feasible), key=lambda c: c.objective):
+        alike = sum(same(candidate.objective, value) for value in tried)
+        if kept and not kept.checked.violations and not alike:
+            break
+        if alike >= _ALIKE:
+            continue
+        tried.append(candidate.objective)
+        point = polish(candidate.run, candidate.nlp)
+        parameters = problem.ordered(design_of(problem, point.x.tolist()))
+        trial = Trial(candidate, point, parameters, recheck(problem, parameters, nlp.cases))
+        if kept is None or _rank(problem, trial) < _rank(problem, kept):
+            kept = trial
+        if not trial.checked.violations and point.stationarity <= _STATIONARY:
+            break
+    return kept
+
+
+def honest(problem: Problem, trial: Trial) -> bool:
+    """Whether the objective that the solver claims is the design's own."""
+    if problem.objective is None:
+        return True
+    claimed = -trial.point.objective if problem.sense == "maximize" else trial.point.objective
+    return math.isclose(claimed, trial.checked.objective, rel_tol=_CLAIMED, abs_tol=_CLAIMED)
+
+
+def better(problem: Problem, one: Finding, other: Finding) -> bool:
+    """Whether one finding beats another: optimal before not, then by objective."""
+    sign = -1.0 if problem.sense == "maximize" else 1.0
+    ranks = [
+        (f.status != "optimal", sign * f.checked.objective if math.isfinite(f.checked.objective) else 0.0)
+        for f in (one, other)
+    ]
+    return ranks[0] < ranks[1]
+
+
+def _rank(problem: Problem, trial: Trial) -> tuple[float, float]:
+    """Violation first, then the objective that the recheck found."""
+    value = trial.point.objective if math.isnan(trial.checked.objective) else trial.checked.objective
+    return sum(trial.checked.violations.values()), -value if problem.sense == "maximize" else value
+
+
+def _active(problem: Problem, nlp: NLP, point: Point) -> dict[str, float]:
+    """Gain of the objective per unit by which a named constraint or a bound is relaxed.
+
+    For an equality constraint, the change of the objective per unit added to its right-hand side; for one that holds
+    in several cases, the gain of relaxing it in all of them.
+    """
+    active: dict[str, float] = {}
+    if problem.objective is None:
+        return active
+    sign = -1.0 if problem.sense == "maximize" else 1.0
+    rows = zip(nlp.rows, point.row_multipliers.tolist(), nlp.row_lower, nlp.row_upper, strict=True)
+    for row, multiplier, lower, upper in rows:
+        if row in problem.constraints and abs(multiplier) > _MULTIPLIER:
+            active[row] = active.get(row, 0.0) + (-sign * multiplier if lower == upper else abs(multiplier))
+    of = problem.parameter_set
+    for k, name in enumerate(problem.free):
+        multiplier, x = float(point.bound_multipliers[k]), float(point.x[k])
+        ends = [float(np.tan(e)) if of[name].tangent else e for e in problem.free[name]]
+        if abs(multiplier) > _MULTIPLIER and x in ends:  # not where two sides of the box meet
+            slope = 1 + x * x if of[name].tangent else 1.0  # d tan λ / dλ
+            active[f"{name}.{'max' if multiplier > 0 else 'min'}"] = abs(multiplier) * slope
+    return active
