@@ -8,6 +8,7 @@ from typing import Any
 from tmsopt.design.formulations import Freedom
 from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
+from tmsopt.design.readings import Reading, readings
 from tmsopt.roots import Root
 
 SCHEMA = 1
@@ -89,6 +90,11 @@ class Solution:
     branches: tuple[Branch, ...] = ()
     notes: tuple[str, ...] = field(default=())
 
+    @property
+    def si(self) -> dict[str, Reading]:
+        """The design in s, Hz, mm, km/h, degrees, N and kg; empty unless the problem is written in SI."""
+        return readings(self.problem.parameter_set, self.parameters, self.quantities, self.abscissa, self.roots)
+
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
         problem = self.problem
@@ -96,6 +102,7 @@ class Solution:
         objective: dict[str, Any] = {"sense": problem.sense, "expression": text, "value": _number(self.value)}
         if problem.locate:
             objective["locate"] = problem.locate
+        si = {name: list(x) if isinstance(x, tuple) else _number(x) for name, x in self.si.items()}
         return {
             "schema": SCHEMA,
             "title": problem.title,
@@ -134,6 +141,7 @@ class Solution:
                 {"parameters": _numbers(b.parameters), "excluded_by": list(b.excluded_by)} for b in self.branches
             ],
             "notes": list(self.notes),
+            **({"si": si} if si else {}),
         }
 
 

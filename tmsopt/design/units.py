@@ -1,8 +1,9 @@
-"""Text such as "40 cm" or "1 deg" as a number in the parameter's own unit."""
+"""Text such as "40 cm" or "1 deg" as a number in the parameter's own unit, and back in units that a builder reads."""
 
 import math
 import re
 from functools import cache
+from types import MappingProxyType
 from typing import Any
 
 _LONGEST = 80
@@ -19,6 +20,14 @@ _EXAMPLES = {
     "m/s": "'15 km/h' or '4 m/s'",
     "m/s^2": "'9.81 m/s^2'",
 }
+
+_READ_IN = MappingProxyType({"m": ("mm", 1000.0), "m/s": ("km/h", 3.6), "rad": ("deg", 180 / math.pi)})
+
+
+def reading(value: float, unit: str) -> tuple[float, str]:
+    """A number in SI as a builder reads it, with its unit: mm, km/h and degrees; others stay as they are."""
+    name, factor = _READ_IN.get(unit, (unit, 1.0))
+    return value * factor, name
 
 
 def with_unit(text: str, unit: str) -> float:

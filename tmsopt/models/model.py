@@ -85,12 +85,14 @@ class ParameterSet:
     Attributes:
         native: the model's native parameters for given values of this set.
         quantities: derived quantities that only this set has.
+        rate: for values of this set, how many 1/s a rate of 1 is; None where the set has no unit of time.
     """
 
     name: str
     parameters: tuple[Parameter, ...]
     native: Callable[[Mapping[str, Any]], dict[str, Any]]
     quantities: tuple[Quantity, ...] = ()
+    rate: Formula | None = None
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""tan and sqrt of whatever number a formula is given: floats, arrays, CasADi expressions, balls."""
+"""tan, sqrt and positive part of whatever number a formula is given: floats, arrays, CasADi expressions, balls."""
 
 from typing import Any
 
@@ -19,3 +19,8 @@ def sqrt(x: Any) -> Any:
         return x.sqrt()
     with np.errstate(invalid="ignore"):
         return np.sqrt(np.asarray(x, dtype=float))[()]
+
+
+def positive_part(x: Any) -> Any:
+    """x where it is positive, else 0; exact, for (x + |x|)/2 only doubles and halves."""
+    return (x + abs(x)) / 2

@@ -4,13 +4,15 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from tmsopt.design.solution import Solution
-from tmsopt.models.tms import GRAVITY, to_si
+from tmsopt.design.units import reading
+from tmsopt.models.tms import GRAVITY, tms, to_si
 from tmsopt.roots import Root
+from tmsopt.show.build import pitching, quantity_rows
 from tmsopt.show.text import columns, number
 from tmsopt.study.compare import Comparison
 
 _SI_OF = {"Fr": "v", "mu": "m_H", "chi_B": "x_B", "chi_H": "x_H", "zeta_B": "z_B", "zeta_H": "z_H"}
-_UNITS = {"v": "m/s", "x_B": "m", "x_H": "m", "z_B": "m", "z_H": "m", "m_H": "kg", "m_B": "kg", "w": "m"}
+_SI = tms.parameter_set("SI")
 
 
 def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> Mapping[str, float]:
@@ -24,8 +26,8 @@ def solution_table(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: floa
     si = si_parameters(solution, w, m_B, g)
     lines = [solution.problem.title or "untitled problem", _headline(solution), ""]
     lines += [*columns(_parameter_rows(solution, si)), ""]
-    lines += [*columns(_result_rows(solution, si)), ""]
-    lines += _facts(solution)
+    lines += [*columns(quantity_rows(solution, si)), ""]
+    lines += [pitching(solution, si), *_facts(solution)]
     return "\n".join(line.rstrip() for line in lines).rstrip()
 
 
@@ -66,36 +68,26 @@ def _parameter_rows(solution: Solution, si: Mapping[str, float]) -> list[Sequenc
     scale = "SI" if own else f"SI for w = {si['w']:g} m, m_B = {si['m_B']:g} kg"
     rows: list[Sequence[str]] = [("", "dimensionless", "", scale, "", "")]
     for name, value in solution.dimensionless.items():
-        if name == "lambda_s":
-            free = _freedom(solution, "lambda_s")
-            rows.append((name, number(value), "lambda_s", number(math.degrees(value)), "deg", free))
-            continue
-        symbol = _SI_OF[name]
+        symbol = _SI_OF.get(name, name)
         free = _freedom(solution, symbol if own else name)
-        rows.append((name, number(value), symbol, number(si[symbol]), _UNITS[symbol], free))
+        if symbol == "v":
+            rows.append((name, number(value), symbol, number(si["v"]), "m/s", free))
+            rows.append(("", "", "", *_read("v", si), ""))
+        else:
+            rows.append((name, number(value), symbol, *_read(symbol, si), free))
     if own:
-        rows += [("", "", n, number(si[n]), _UNITS[n], _freedom(solution, n)) for n in ("w", "m_B")]
+        rows += [("", "", n, *_read(n, si), _freedom(solution, n)) for n in ("w", "m_B")]
     return rows
+
+
+def _read(symbol: str, si: Mapping[str, float]) -> tuple[str, str]:
+    """An SI parameter as a builder reads it, and its unit."""
+    value, unit = reading(si[symbol], _SI[symbol].unit)
+    return number(value), unit
 
 
 def _freedom(solution: Solution, name: str) -> str:
     return "free" if name in solution.problem.free else "fixed"
-
-
-def _result_rows(solution: Solution, si: Mapping[str, float]) -> list[Sequence[str]]:
-    rate = math.sqrt(si["g"] / si["w"])
-    q = solution.quantities
-    rows: list[Sequence[str]] = []
-    for name, value in (("abscissa", solution.abscissa), ("  as stored", solution.abscissa_realised)):
-        time = f"{1 / (-value * rate):.4g}" if value < 0 else ""
-        rows.append((name, number(value), "decay time" if time else "", time, "s" if time else ""))
-    rows.append(("damping_ratio", number(q["damping_ratio"]), "", "", ""))
-    critical = q["Fr_c"]
-    speed = f"{critical * math.sqrt(si['g'] * si['w']):.8g}" if math.isfinite(critical) else ""
-    rows.append(("Fr_c", number(critical), "v_c" if speed else "", speed, "m/s" if speed else ""))
-    rows.append(("nu_H", number(q["nu_H"]), "u_H", number(q["nu_H"] * si["w"]), "m"))
-    rows.append(("chi_T", number(q["chi_T"]), "x_T", number(q["chi_T"] * si["w"]), "m"))
-    return rows
 
 
 def _facts(solution: Solution) -> list[str]:

@@ -1,0 +1,41 @@
+"""The equations of motion of the two-mass-skate bicycle: its matrices and its characteristic polynomial."""
+
+from typing import Any
+
+
+def copo(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, T: Any) -> list[Any]:
+    """Coefficients a0 … a4 of the characteristic polynomial, with T = tan λ_s (equation copo).
+
+    This is det(M s² + V s + P) / (μ ν_H cos λ_s), by plain arithmetic on any numbers.
+    """
+    return [
+        (chi_H - 1 - zeta_H * T) * zeta_B * zeta_B,
+        Fr * (zeta_B * chi_H - zeta_H * chi_B) * zeta_B,
+        Fr * Fr * (zeta_B - zeta_H) * zeta_B - zeta_B * (zeta_B + zeta_H) * T - (chi_H - 1) * (mu * zeta_H - zeta_B),
+        Fr * (chi_H - chi_B) * zeta_B,
+        -zeta_B * T - mu * (chi_H - 1),
+    ]
+
+
+def matrices(
+    Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, sine: Any, cosine: Any
+) -> tuple[list[list[Any]], list[list[Any]], list[list[Any]]]:
+    """M, V and P of M q″ + V q′ + P q = 0, q = (lean, steer), from the sine and cosine of the steer axis tilt.
+
+    Equation matrices of the paper; nested lists, any numbers.
+    """
+    nu_H = (chi_H - 1) * cosine - zeta_H * sine
+    lean = mu * zeta_H + zeta_B
+    M = [
+        [mu * zeta_H * zeta_H + zeta_B * zeta_B, -mu * zeta_H * nu_H],
+        [-mu * zeta_H * nu_H, mu * nu_H * nu_H],
+    ]
+    V = [
+        [0 * Fr, -(mu * chi_H * zeta_H + chi_B * zeta_B) * Fr * cosine],
+        [0 * Fr, mu * chi_H * nu_H * Fr * cosine],
+    ]
+    P = [
+        [lean, -Fr * Fr * cosine * lean - mu * nu_H],
+        [-mu * nu_H, mu * (Fr * Fr * cosine - sine) * nu_H],
+    ]
+    return M, V, P

@@ -1,0 +1,187 @@
+"""Quantities derived from the parameters of the two-mass-skate bicycle, dimensionless and in SI."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from tmsopt.models.model import Quantity, Range
+from tmsopt.models.tms_equations import matrices
+from tmsopt.roots.elementary import positive_part, sqrt, tan
+
+_NOT_NEGATIVE = Range(lower=0.0)
+_NOT_POSITIVE = Range(upper=0.0)
+_TINY = 1e-300  # keeps 0/0 away where all masses are on the ground line, and changes nothing else
+
+
+def _nu_H(v: Mapping[str, Any]) -> Any:
+    """ν_H by tan alone: cos λ_s = 1/√(1 + tan² λ_s) on the open interval of tilts."""
+    T = tan(v["lambda_s"])
+    return (v["chi_H"] - 1 - v["zeta_H"] * T) / sqrt(1 + T * T)
+
+
+def _omega0(v: Mapping[str, Any]) -> Any:
+    return -sqrt(sqrt(_quotient(v["a4"], v["a0"])))
+
+
+def _quotient(a: Any, b: Any) -> Any:
+    """a / b, nan where b is 0: a quantity that does not exist, not an infinite one."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(np.equal(b, 0), np.nan, np.divide(a, b))[()]
+
+
+def _omega0_equation(v: Mapping[str, Any], x: Any) -> Any:
+    return x * x * x * x * v["a0"] - v["a4"]
+
+
+def _chi_T(v: Mapping[str, Any]) -> Any:
+    return (v["chi_B"] + v["mu"] * v["chi_H"]) / (1 + v["mu"])
+
+
+def _weave_condition(v: Mapping[str, Any]) -> tuple[list[Any], Any]:
+    """Terms of the numerator of Fr_c², and its denominator.
+
+    The Hurwitz condition a1 a2 a3 = a0 a3² + a4 a1² is linear in Fr², and ζ_B − ζ_H divides all of it. Divided
+    out, it stays regular at ζ_B = ζ_H, where the undivided one holds for any speed.
+    """
+    mu, chi_B, chi_H, zeta_B, zeta_H = (v[name] for name in ("mu", "chi_B", "chi_H", "zeta_B", "zeta_H"))
+    lever, moment, k = chi_B - chi_H, zeta_B * chi_H - zeta_H * chi_B, chi_H - 1
+    numerator = [
+        zeta_B * (zeta_B - zeta_H) * chi_B * chi_H * tan(v["lambda_s"]),
+        k * chi_H * mu * moment,
+        -k * chi_B * zeta_B * lever,
+    ]
+    return numerator, lever * moment * zeta_B
+
+
+def _Fr_c(v: Mapping[str, Any]) -> Any:
+    terms, denominator = _weave_condition(v)
+    numerator = sum(terms)
+    rounding = 4 * np.finfo(float).eps * sum(np.abs(t) for t in terms)
+    return sqrt(_quotient(np.where(np.abs(numerator) <= rounding, 0.0, numerator), denominator))
+
+
+def _Fr_c_equation(v: Mapping[str, Any], x: Any) -> Any:
+    terms, denominator = _weave_condition(v)
+    return x * x * denominator - (terms[0] + terms[1] + terms[2])
+
+
+def _v_c(v: Mapping[str, Any]) -> Any:
+    return v["Fr_c"] * sqrt(v["g"] * v["w"])
+
+
+def _u_H(v: Mapping[str, Any]) -> Any:
+    return v["nu_H"] * v["w"]
+
+
+def _load_rear(v: Mapping[str, Any]) -> Any:
+    """1 − χ_T with the subtraction inside the moments, so that a small load keeps its digits."""
+    return (1 - v["chi_B"] + v["mu"] * (1 - v["chi_H"])) / (1 + v["mu"])
+
+
+def _ballast_rear(v: Mapping[str, Any]) -> Any:
+    return positive_part(-v["load_rear"]) * (1 + v["mu"])
+
+
+def _ballast_front(v: Mapping[str, Any]) -> Any:
+    return positive_part(-v["load_front"]) * (1 + v["mu"])
+
+
+def _mass_margin(v: Mapping[str, Any]) -> Any:
+    """Smaller eigenvalue of M as 2 det/(tr + √(tr² − 4 det)).
+
+    det M = μ ν_H² ζ_B² and tr² − 4 det = (M11 − M22)² + 4 M12² are sums and products of what is not negative, so
+    nothing cancels. There is no equation: the larger eigenvalue would satisfy it too, and the formula is smooth
+    wherever the two eigenvalues differ.
+    """
+    T = tan(v["lambda_s"])
+    h = sqrt(1 + T * T)
+    native = {name: v[name] for name in ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H")}
+    (first, mixed), (_, second) = matrices(**native, sine=T / h, cosine=1 / h)[0]
+    determinant = v["mu"] * v["nu_H"] * v["nu_H"] * v["zeta_B"] * v["zeta_B"]
+    apart = sqrt((first - second) * (first - second) + 4 * mixed * mixed)
+    return 2 * determinant / (first + second + apart + _TINY)
+
+
+def _weight(v: Mapping[str, Any]) -> Any:
+    return (v["m_B"] + v["m_H"]) * v["g"]
+
+
+def _N_F(v: Mapping[str, Any]) -> Any:
+    return v["load_front"] * _weight(v)
+
+
+def _N_R(v: Mapping[str, Any]) -> Any:
+    return v["load_rear"] * _weight(v)
+
+
+def _m_ballast_rear(v: Mapping[str, Any]) -> Any:
+    return v["ballast_rear"] * v["m_B"]
+
+
+def _m_ballast_front(v: Mapping[str, Any]) -> Any:
+    return v["ballast_front"] * v["m_B"]
+
+
+NATIVE_QUANTITIES = (
+    Quantity("nu_H", "1", "distance of the front centre of mass from the steer axis", r"\nu_H", _nu_H),
+    Quantity(
+        "omega0", "1", "−(a4/a0)^(1/4), the mean decay of the roots (equation w0)", r"\omega_0", _omega0,
+        equation=_omega0_equation,
+        range=_NOT_POSITIVE,
+    ),
+    Quantity(
+        "Fr_c", "1", "Froude number at the weave boundary (equation flus)", r"\mathrm{Fr}_c", _Fr_c,
+        equation=_Fr_c_equation,
+        range=_NOT_NEGATIVE,
+    ),
+    Quantity("chi_T", "1", "centre of mass of the whole bicycle, forward of the rear contact", r"\chi_T", _chi_T),
+    Quantity(
+        "load_front", "1", "share of the weight on the front wheel, negative where it lifts", r"N_F/(N_F + N_R)",
+        _chi_T,
+    ),
+    Quantity(
+        "load_rear", "1", "share of the weight on the rear wheel, negative where it lifts", r"N_R/(N_F + N_R)",
+        _load_rear,
+    ),
+    Quantity(
+        "ballast_rear", "1", "mass at the rear contact that keeps the rear wheel down, per mass of the rear frame",
+        r"m_R/m_B", _ballast_rear,
+        range=_NOT_NEGATIVE,
+    ),
+    Quantity(
+        "ballast_front", "1", "mass at the front contact that keeps the front wheel down, per mass of the rear frame",
+        r"m_F/m_B", _ballast_front,
+        range=_NOT_NEGATIVE,
+    ),
+    Quantity(
+        "mass_margin", "1", "smallest eigenvalue of the mass matrix, 0 where it is singular (equation matrices)",
+        r"\min\sigma(M)", _mass_margin,
+        range=_NOT_NEGATIVE,
+    ),
+)  # fmt: skip
+"""Quantities of a dimensionless design. A mass at a wheel contact has no part in the lateral motion."""
+
+SI_QUANTITIES = (
+    Quantity("v_c", "m/s", "speed at the weave boundary", "v_c", _v_c),
+    Quantity("u_H", "m", "distance of the front centre of mass from the steer axis", "u_H", _u_H),
+    Quantity(
+        "N_F", "N", "load on the front wheel at rest, negative where it lifts", "N_F",
+        _N_F,
+    ),
+    Quantity(
+        "N_R", "N", "load on the rear wheel at rest, negative where it lifts", "N_R",
+        _N_R,
+    ),
+    Quantity(
+        "m_ballast_rear", "kg", "mass at the rear contact that keeps the rear wheel down", "m_R",
+        _m_ballast_rear,
+        range=_NOT_NEGATIVE,
+    ),
+    Quantity(
+        "m_ballast_front", "kg", "mass at the front contact that keeps the front wheel down", "m_F",
+        _m_ballast_front,
+        range=_NOT_NEGATIVE,
+    ),
+)  # fmt: skip
+"""Quantities that need lengths, masses and gravity."""

@@ -1,0 +1,75 @@
+"""What a builder asks of a design: times, frequencies, speeds, wheel loads, and whether it stands on both wheels."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+from tmsopt.design.readings import decay_time, frequencies, growth_time
+from tmsopt.design.recheck import FEASIBLE
+from tmsopt.design.solution import Solution
+from tmsopt.models import Values
+from tmsopt.models.tms import tms
+from tmsopt.show.text import number
+
+Row = Sequence[str]
+
+_SI = tms.parameter_set("SI")
+
+
+def quantity_rows(solution: Solution, si: Mapping[str, float]) -> list[Row]:
+    """Rows of five cells: a dimensionless quantity with its number, and its counterpart in SI with number and unit.
+
+    Args:
+        si: the SI parameters of the design.
+    """
+    assert _SI.rate is not None
+    rate = float(_SI.rate(si))
+    q, values = solution.quantities, Values(tms, _SI, si)
+    return [
+        ("abscissa", number(solution.abscissa), *_time(solution.abscissa, rate)),
+        ("  as stored", number(solution.abscissa_realised), *_time(solution.abscissa_realised, rate)),
+        *_oscillation(q["damping_ratio"], frequencies(solution.roots, rate)),
+        *_critical_speed(q["Fr_c"], float(values["v_c"])),
+        ("nu_H", number(q["nu_H"]), "u_H", number(1000 * float(values["u_H"])), "mm"),
+        ("mass_margin", number(q["mass_margin"]), "", "", ""),
+        ("chi_T", number(q["chi_T"]), "x_T", number(1000 * q["chi_T"] * si["w"]), "mm"),
+        ("load_front", f"{_rounded(100 * q['load_front'])} %", "N_F", _rounded(float(values["N_F"])), "N"),
+        ("load_rear", f"{_rounded(100 * q['load_rear'])} %", "N_R", _rounded(float(values["N_R"])), "N"),
+    ]
+
+
+def pitching(solution: Solution, si: Mapping[str, float]) -> str:
+    """One line: whether the bicycle pitches over, and the ballast that prevents it."""
+    loads = {"front": solution.quantities["load_front"], "rear": solution.quantities["load_rear"]}
+    for lifted, over in (("rear", "front"), ("front", "rear")):
+        if abs(loads[lifted]) <= FEASIBLE:  # a limit chi_T <= 1 that binds is met within this
+            return f"balance: on the verge of pitching over the {over} wheel; the {lifted} wheel carries no load"
+        if loads[lifted] < 0:
+            ballast = solution.quantities[f"ballast_{lifted}"]
+            return (
+                f"balance: pitches over the {over} wheel; more than {ballast * si['m_B']:.4g} kg ({ballast:.4g} m_B) "
+                f"of ballast at the {lifted} contact prevents it, without any effect on the lateral motion"
+            )
+    return "balance: stands on both wheels"
+
+
+def _time(abscissa: float, rate: float) -> tuple[str, str, str]:
+    for name, time in (("decay time", decay_time(abscissa, rate)), ("growth time", growth_time(abscissa, rate))):
+        if math.isfinite(time):
+            return name, f"{time:.4g}", "s"
+    return "", "", ""
+
+
+def _oscillation(damping_ratio: float, hertz: Sequence[float]) -> list[Row]:
+    cells = [("frequency", f"{f:.6g}", "Hz") for f in hertz] or [("frequency", "none", "")]
+    return [("damping_ratio", number(damping_ratio), *cells[0]), *(("", "", *cell) for cell in cells[1:])]
+
+
+def _critical_speed(Fr_c: float, v_c: float) -> list[Row]:
+    if not math.isfinite(Fr_c):
+        return [("Fr_c", number(Fr_c), "", "", "")]
+    return [("Fr_c", number(Fr_c), "v_c", f"{v_c:.8g}", "m/s"), ("", "", "", f"{3.6 * v_c:.8g}", "km/h")]
+
+
+def _rounded(load: float) -> str:
+    """Three decimals at most, so that the rounding of a wheel without load reads as 0."""
+    return f"{round(load, 3) + 0.0:g}" if abs(load) < 1000 else f"{load:.6g}"
