@@ -50,7 +50,7 @@ def test_table_of_solve_shows_both_scales():
     done = tmsopt("solve", "problems/ep4.toml", "--wheelbase", "2 m")
     assert (done.returncode, done.stderr) == (0, "")
     assert "1.41421356237" in done.stdout  # chi_B
-    assert "2.82842712475" in done.stdout  # x_B = chi_B w
+    assert "2828.42712475" in done.stdout  # x_B = chi_B w, in mm
     assert "23.5300893481" in done.stdout  # the tilt in degrees, atan(15/4 - 75 sqrt(2)/32)
     assert "proven" in done.stdout
 

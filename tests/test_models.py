@@ -250,6 +250,14 @@ def test_coefficients_for_si_values_are_those_of_their_dimensionless_ones() -> N
 # Derived quantities
 
 
+QUANTITIES = {
+    "nu_H", "omega0", "Fr_c", "chi_T", "load_front", "load_rear", "ballast_rear", "ballast_front", "mass_margin",
+}  # fmt: skip
+SI_UNITS = {
+    "v_c": "m/s", "u_H": "m", "N_F": "N", "N_R": "N", "m_ballast_rear": "kg", "m_ballast_front": "kg",
+}  # fmt: skip
+
+
 def test_nu_H_is_the_distance_from_the_steer_axis() -> None:
     for p in designs(50):
         with mp.workdps(60):
@@ -357,7 +365,7 @@ def test_equations_of_quantities_vanish_at_their_values_and_nowhere_near() -> No
 def test_values_is_a_mapping_of_everything_an_expression_may_use() -> None:
     values = quantities(BENCHMARK, SI)
     names = set(SI.names) | set(NATIVE.names) | {"a0", "a1", "a2", "a3", "a4"}
-    assert set(values) == names | {"nu_H", "omega0", "Fr_c", "chi_T", "v_c", "u_H"}
+    assert set(values) == names | QUANTITIES | set(SI_UNITS)
     assert len(values) == len(set(values))
     assert {*tms.quantity_names(SI), *SI.names} == set(values)
     assert {*tms.quantity_names(NATIVE), *NATIVE.names} == set(quantities(from_si(BENCHMARK)))
@@ -374,7 +382,8 @@ def test_the_parameters_of_the_contract() -> None:
     assert SI.names == ("w", "v", "g", "lambda_s", "m_B", "x_B", "z_B", "m_H", "x_H", "z_H")
     assert tms.coefficient_names() == ("a0", "a1", "a2", "a3", "a4")
     assert {"tms": tms} == MODELS
-    assert {q.name for q in tms.quantities} == {"nu_H", "omega0", "Fr_c", "chi_T"}
+    assert {q.name for q in tms.quantities} == QUANTITIES
+    assert {q.name for q in SI.quantities} == set(SI_UNITS)
 
 
 UNITS = {
@@ -388,7 +397,7 @@ EVERY = [p for s in tms.sets for p in s.parameters] + [*tms.quantities, *SI.quan
 def test_every_parameter_and_quantity_is_documented(item: Parameter | Quantity) -> None:
     assert item.name.isidentifier()
     assert len(item.meaning) > 4
-    assert item.unit == {**UNITS, "v_c": "m/s", "u_H": "m"}.get(item.name, "1")
+    assert item.unit == {**UNITS, **SI_UNITS}.get(item.name, "1")
     assert isinstance(item.range, Range)
     MathTextParser("agg").parse(f"${item.latex}$")  # raises on what a figure could not show
 

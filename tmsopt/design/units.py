@@ -25,9 +25,14 @@ _READ_IN = MappingProxyType({"m": ("mm", 1000.0), "m/s": ("km/h", 3.6), "rad": (
 
 
 def reading(value: float, unit: str) -> tuple[float, str]:
-    """A number in SI as a builder reads it, with its unit: mm, km/h and degrees; others stay as they are."""
-    name, factor = _READ_IN.get(unit, (unit, 1.0))
-    return value * factor, name
+    """A number in SI as a builder reads it, with its unit: mm, km/h and degrees; others stay as they are.
+
+    To 15 digits, so that what was written as 15 km/h reads 15 again, and not what two roundings made of it.
+    """
+    if unit not in _READ_IN:
+        return value, unit
+    name, factor = _READ_IN[unit]
+    return float(f"{value * factor:.15g}"), name
 
 
 def with_unit(text: str, unit: str) -> float:

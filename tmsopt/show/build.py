@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from tmsopt.design.readings import decay_time, frequencies, growth_time
 from tmsopt.design.recheck import FEASIBLE
 from tmsopt.design.solution import Solution
+from tmsopt.design.units import reading
 from tmsopt.models import Values
 from tmsopt.models.tms import tms
 from tmsopt.show.text import number
@@ -29,11 +30,11 @@ def quantity_rows(solution: Solution, si: Mapping[str, float]) -> list[Row]:
         ("  as stored", number(solution.abscissa_realised), *_time(solution.abscissa_realised, rate)),
         *_oscillation(q["damping_ratio"], frequencies(solution.roots, rate)),
         *_critical_speed(q["Fr_c"], float(values["v_c"])),
-        ("nu_H", number(q["nu_H"]), "u_H", number(1000 * float(values["u_H"])), "mm"),
+        ("nu_H", number(q["nu_H"]), "u_H", *_read(float(values["u_H"]), "m")),
         ("mass_margin", number(q["mass_margin"]), "", "", ""),
-        ("chi_T", number(q["chi_T"]), "x_T", number(1000 * q["chi_T"] * si["w"]), "mm"),
-        ("load_front", f"{_rounded(100 * q['load_front'])} %", "N_F", _rounded(float(values["N_F"])), "N"),
-        ("load_rear", f"{_rounded(100 * q['load_rear'])} %", "N_R", _rounded(float(values["N_R"])), "N"),
+        ("chi_T", number(q["chi_T"]), "x_T", *_read(q["chi_T"] * si["w"], "m")),
+        _load("load_front", q["load_front"], "N_F", float(values["N_F"])),
+        _load("load_rear", q["load_rear"], "N_R", float(values["N_R"])),
     ]
 
 
@@ -52,6 +53,11 @@ def pitching(solution: Solution, si: Mapping[str, float]) -> str:
     return "balance: stands on both wheels"
 
 
+def _read(value: float, unit: str) -> tuple[str, str]:
+    value, unit = reading(value, unit)
+    return number(value), unit
+
+
 def _time(abscissa: float, rate: float) -> tuple[str, str, str]:
     for name, time in (("decay time", decay_time(abscissa, rate)), ("growth time", growth_time(abscissa, rate))):
         if math.isfinite(time):
@@ -67,9 +73,12 @@ def _oscillation(damping_ratio: float, hertz: Sequence[float]) -> list[Row]:
 def _critical_speed(Fr_c: float, v_c: float) -> list[Row]:
     if not math.isfinite(Fr_c):
         return [("Fr_c", number(Fr_c), "", "", "")]
-    return [("Fr_c", number(Fr_c), "v_c", f"{v_c:.8g}", "m/s"), ("", "", "", f"{3.6 * v_c:.8g}", "km/h")]
+    kmh, unit = reading(v_c, "m/s")
+    return [("Fr_c", number(Fr_c), "v_c", f"{v_c:.8g}", "m/s"), ("", "", "", f"{kmh:.8g}", unit)]
 
 
-def _rounded(load: float) -> str:
-    """Three decimals at most, so that the rounding of a wheel without load reads as 0."""
-    return f"{round(load, 3) + 0.0:g}" if abs(load) < 1000 else f"{load:.6g}"
+def _load(name: str, share: float, symbol: str, newtons: float) -> Row:
+    """One wheel; what is only rounding reads as 0."""
+    if abs(share) <= FEASIBLE:
+        share = newtons = 0.0
+    return name, f"{100 * share:.6g} %", symbol, f"{newtons:.6g}", "N"
