@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from tmsopt.study.chart import Chart, chart
     from tmsopt.study.compare import Comparison, compare
     from tmsopt.study.domain import Domain, domain
+    from tmsopt.study.explain import Explanation, explain
     from tmsopt.study.swallowtail import Swallowtail, swallowtail
     from tmsopt.study.trace import trace
 
@@ -24,6 +25,7 @@ __all__ = [
     "Chart",
     "Comparison",
     "Domain",
+    "Explanation",
     "InputError",
     "NotSolved",
     "Problem",
@@ -33,6 +35,7 @@ __all__ = [
     "chart",
     "compare",
     "domain",
+    "explain",
     "laws",
     "load",
     "models",
@@ -48,6 +51,7 @@ _HOMES = {
     "Chart": "tmsopt.study.chart",
     "Comparison": "tmsopt.study.compare",
     "Domain": "tmsopt.study.domain",
+    "Explanation": "tmsopt.study.explain",
     "InputError": "tmsopt.design.errors",
     "NotSolved": "tmsopt.design.solution",
     "Problem": "tmsopt.design.problem",
@@ -57,6 +61,7 @@ _HOMES = {
     "chart": "tmsopt.study.chart",
     "compare": "tmsopt.study.compare",
     "domain": "tmsopt.study.domain",
+    "explain": "tmsopt.study.explain",
     "load": "tmsopt.design.files",
     "solve": "tmsopt.design.solve",
     "swallowtail": "tmsopt.study.swallowtail",

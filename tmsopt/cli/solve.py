@@ -22,6 +22,7 @@ from tmsopt.cli.common import (
 
 if TYPE_CHECKING:
     from tmsopt.design.solution import Solution
+    from tmsopt.study.explain import Explanation
 
 _EXIT = {"optimal": DONE, "infeasible": INFEASIBLE, "not_converged": NOT_CONVERGED}
 
@@ -30,6 +31,7 @@ _SOLVE_EXAMPLES = """
 Examples:
   tmsopt solve problems/ep4.toml
   tmsopt solve problems/realistic.toml --plot growth.png
+  tmsopt solve problems/realistic.toml --brief
   tmsopt solve problems/benchmark.toml --json | python -m json.tool
 
 Exit status: 0 solved, 2 bad input, 3 infeasible, 4 not converged.
@@ -80,6 +82,7 @@ def _common(command: Command) -> Command:
     show_default=True,
     help="Likewise, the mass m_B of the rear frame, in kg or with a unit.",
 )
+@click.option("--brief", is_flag=True, help="Leave out what the optimum means: gains of limits moved, rounding.")
 def solve(
     file: Path,
     as_json: bool,
@@ -89,6 +92,7 @@ def solve(
     plot: Path | None,
     wheelbase: str,
     rear_mass: str,
+    brief: bool,
 ) -> None:
     """Find the best design that the problem FILE asks for."""
     with bad_input():
@@ -105,11 +109,15 @@ def solve(
             problem, starts=starts or STARTS, seed=seed, linear_solver=linear_solver, throw=False, progress=update
         )
     if as_json:
-        write_json(solution.to_json())
+        write_json(solution.to_json() | ({} if brief else {"meaning": _explained(solution).to_json()}))
     else:
         from tmsopt.show.tables import solution_table
 
         click.echo(solution_table(solution, w, m_B))
+        if not brief:
+            from tmsopt.show.explained import explained_lines
+
+            click.echo("\n".join(["", *explained_lines(_explained(solution))]))
     if plot is not None:
         _draw(solution, plot, w, m_B)
     sys.exit(_EXIT[solution.status])
@@ -154,6 +162,12 @@ def _scale(option: str, text: str, unit: str) -> float:
     except ValueError as error:
         raise InputError([Fault(str(error), (option,))]) from None
     return value
+
+
+def _explained(solution: "Solution") -> "Explanation":
+    from tmsopt.study.explain import explain
+
+    return explain(solution)
 
 
 def _draw(solution: "Solution", path: Path, w: float, m_B: float) -> None:

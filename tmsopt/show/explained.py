@@ -1,0 +1,39 @@
+"""What an optimum means, as lines for a reader."""
+
+from collections.abc import Mapping, Sequence
+
+from tmsopt.show.text import columns, number
+from tmsopt.study.explain import Explanation
+from tmsopt.study.rounding import ALONE, Rounded
+
+
+def explained_lines(explanation: Explanation) -> list[str]:
+    """Summary, levers, rounding, precision and warnings."""
+    lines = [f"meaning: {explanation.summary}"]
+    lines += [f"warning: {text}" for text in explanation.warnings]
+    if explanation.levers:
+        lines += ["", "what moving a limit buys, solved again:"]
+        lines += [f"  {lever.sentence}" for lever in explanation.levers]
+    if explanation.precision:
+        lines.append("")
+        lines += columns(_rows(explanation))
+    if explanation.worst:
+        lines.append(f"rounding {explanation.worst} alone to {ALONE} digits costs most")
+    return [line.rstrip() for line in lines]
+
+
+def _rows(explanation: Explanation) -> list[Sequence[str]]:
+    rows: list[Sequence[str]] = [("rounded", "to", "abscissa", "loses", "damping_ratio", "violates")]
+    for name, row in explanation.rounding.items():
+        rows.append(_row(f"{name} alone", row.written[name], row))
+    for row in explanation.precision:
+        rows.append(_row("all", f"{row.digits} digits", row))
+    return rows
+
+
+def _row(what: str, to: str, row: Rounded) -> tuple[str, ...]:
+    return (what, to, number(row.realised), f"{row.loss:.2g}", f"{row.damping_ratio:.4g}", _violated(row.violations))
+
+
+def _violated(violations: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} by {value:.1g}" for name, value in violations.items())

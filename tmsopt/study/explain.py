@@ -1,0 +1,66 @@
+"""What an optimum means: which limits it leans on and what they are worth, and how much rounding it bears."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from tmsopt.design.frozen import Table
+from tmsopt.design.solution import Bound, Solution
+from tmsopt.study.levers import Lever, levers
+from tmsopt.study.remarks import summary, warnings
+from tmsopt.study.rounding import Rounded, rounded_alone, rounded_together, worst
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What `explain` has to say of a solution.
+
+    Attributes:
+        summary: one sentence: the structure on the rightmost line, and how good the design is.
+        structure: of the design, as in the solution.
+        bound: of the design, as in the solution.
+        levers: the limits that bind, the most valuable first; empty unless the design is optimal.
+        rounding: free parameter → the design with it alone rounded to 3 digits.
+        worst: the parameter whose rounding costs most; empty where none costs anything.
+        precision: the design with all free parameters rounded to 2, 3, 4 and 6 digits.
+        warnings: arbitrary bounds that the design leans on, bounds touched for nothing, parameters without effect.
+    """
+
+    summary: str
+    structure: str
+    bound: Bound
+    levers: tuple[Lever, ...]
+    rounding: Table[Rounded]
+    worst: str
+    precision: tuple[Rounded, ...]
+    warnings: tuple[str, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``; numbers that do not exist are None."""
+        return {
+            "summary": self.summary,
+            "levers": [lever.to_json() for lever in self.levers],
+            "rounding": {name: row.to_json() for name, row in self.rounding.items()},
+            "worst": self.worst or None,
+            "precision": [row.to_json() for row in self.precision],
+            "warnings": list(self.warnings),
+        }
+
+
+def explain(solution: Solution, *, resolve: bool = True) -> Explanation:
+    """Say what a solution means; of one that is not optimal, what can be said.
+
+    Args:
+        resolve: check each multiplier by solving again with its limit moved, from the optimum; 30 ms or so each.
+    """
+    feasible = not solution.violations
+    alone = rounded_alone(solution) if feasible else Table[Rounded]()
+    return Explanation(
+        summary=summary(solution),
+        structure=solution.structure,
+        bound=solution.bound,
+        levers=levers(solution, resolve),
+        rounding=alone,
+        worst=worst(alone),
+        precision=rounded_together(solution) if feasible else (),
+        warnings=warnings(solution),
+    )

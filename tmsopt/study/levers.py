@@ -1,0 +1,247 @@
+"""What each limit that binds is worth: its multiplier, checked by solving again with the limit moved."""
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+from tmsopt.design.errors import InputError
+from tmsopt.design.expression import parse_value
+from tmsopt.design.problem import Problem
+from tmsopt.design.solution import Solution
+from tmsopt.design.solve import solve
+from tmsopt.study.steps import Step, natural_step, reported_unit, step_within, unit_of, with_reported_unit
+
+DIFFERS = 0.2
+"""Relative difference of the two gains from which the reader is told why."""
+
+_RETRY = 8  # starts when the optimum as the only start did not lead to one at least as good
+_NOISE = 1e-8  # of the objective: differences below it are no loss
+_COMPARISON = re.compile(r"<=|>=|==")
+
+
+@dataclass(frozen=True)
+class Lever:
+    """A limit that binds, and what moving it buys. Gains are positive where the objective gets better.
+
+    Attributes:
+        name: of the constraint, or a bound such as ``Fr.max``.
+        kind: ``bound`` or ``constraint``.
+        limit: the limit as written, angles in degrees.
+        physical: whether the limit is a physical end, such as 0 for a mass, and cannot be moved.
+        move: what is done to the limit, e.g. ``1 deg more lambda_s.max``.
+        step: change of the limit in the unit of the parameter, with its sign; 0 where it cannot be moved.
+        per_unit: gain per unit of that change, to first order (the multiplier).
+        resolved: gain found by solving the moved problem; nan where that was not done or failed.
+        structure: of the moved optimum; empty without one.
+        reason: why the two gains differ, or why there is only one.
+        gained_unit: unit of the gains in words, e.g. ``deg``; ``1`` for a dimensionless objective.
+        gained_one: what one of that unit is in the unit of the objective.
+    """
+
+    name: str
+    kind: str
+    limit: str
+    physical: bool
+    move: str
+    step: float
+    per_unit: float
+    resolved: float = math.nan
+    structure: str = ""
+    reason: str = ""
+    gained_unit: str = "1"
+    gained_one: float = 1.0
+
+    @property
+    def predicted(self) -> float:
+        """Gain to first order, multiplier times step."""
+        return self.per_unit * abs(self.step)
+
+    @property
+    def relative(self) -> float:
+        """Re-solved minus first-order gain, relative to the latter."""
+        return (self.resolved - self.predicted) / self.predicted if self.predicted else math.nan
+
+    @property
+    def sentence(self) -> str:
+        """The lever in words."""
+        if not self.step:
+            return f"{self.name} = {self.limit} binds and cannot be moved: it is a physical end"
+        solved = math.isfinite(self.resolved)
+        gain = self._gain(self.resolved if solved else self.predicted)
+        verb = "buys" if not gain.startswith("-") else "costs"
+        order = f"first order {self._gain(self.predicted)}" if solved else "first order"
+        return f"{self.move} {verb} {gain.lstrip('-')} ({order})" + (f"; {self.reason}" if self.reason else "")
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``; numbers that do not exist are None."""
+        return {
+            "name": self.name,
+            "kind": self.kind,
+            "limit": self.limit,
+            "physical": self.physical,
+            "step": self.step,
+            "gain_per_unit": self.per_unit,
+            "gain_first_order": self.predicted,
+            "gain_resolved": self.resolved if math.isfinite(self.resolved) else None,
+            "relative_difference": self.relative if math.isfinite(self.relative) else None,
+            "structure": self.structure or None,
+            "reason": self.reason,
+            "sentence": self.sentence,
+        }
+
+    def _gain(self, value: float) -> str:
+        text = f"{value / self.gained_one:.3g}"
+        return text if self.gained_unit == "1" else f"{text} {self.gained_unit}"
+
+
+def levers(solution: Solution, resolve: bool = True) -> tuple[Lever, ...]:
+    """One lever per limit that binds at an optimum, the most valuable step first."""
+    if solution.status != "optimal":
+        return ()
+    found = (_of_bound(solution, name) if _is_bound(solution, name) else _of_row(solution, name)
+             for name in solution.active)  # fmt: skip
+    checked = [_resolved(solution, lever) if resolve and lever.step else lever for lever in found]
+    return tuple(sorted(checked, key=lambda v: -(v.resolved if math.isfinite(v.resolved) else v.predicted)))
+
+
+def is_physical(problem: Problem, bound: str) -> bool:
+    """Whether a bound such as ``mu.min`` is a physical end of its parameter."""
+    name, end = bound.rsplit(".", 1)
+    allowed = problem.parameter_set[name].range
+    return problem.free[name][end == "max"] == (allowed.upper if end == "max" else allowed.lower)
+
+
+def _is_bound(solution: Solution, name: str) -> bool:
+    problem = solution.problem
+    return name not in problem.constraints and name.rsplit(".", 1)[0] in problem.free
+
+
+def _of_bound(solution: Solution, bound: str) -> Lever:
+    problem = solution.problem
+    name, end = bound.rsplit(".", 1)
+    parameter, (lower, upper) = problem.parameter_set[name], problem.free[name]
+    limit, direction = (upper, 1.0) if end == "max" else (lower, -1.0)
+    width = upper - lower
+    # an angle is measured by its box, for 0 is a tilt like any other
+    size = width if parameter.unit == "rad" or not limit else min(abs(limit), width)
+    step = step_within(parameter.unit, size, limit, direction, parameter.range)
+    return _lever(
+        solution,
+        name=bound,
+        kind="bound",
+        limit=with_reported_unit(limit, parameter.unit),
+        physical=is_physical(problem, bound),
+        move=f"{step.text if step else 'nothing'} {'more' if direction > 0 else 'less'} {bound}",
+        step=direction * step.size if step else 0.0,
+    )
+
+
+def _of_row(solution: Solution, name: str) -> Lever:
+    problem = solution.problem
+    condition, text = problem.conditions[name], problem.constraints[name]
+    sign = {"<=": 1.0, ">=": -1.0, "==": _better_side(solution, name)}[condition.comparison]
+    step = natural_step(unit_of(problem, condition), _size(solution, text))
+    verb = "moving" if condition.comparison == "==" else "relaxing"
+    return _lever(
+        solution,
+        name=name,
+        kind="constraint",
+        limit=text,
+        physical=False,
+        move=f"{verb} {name} ({text}) by {_signed(step, sign) if verb == 'moving' else step.text}",
+        step=sign * step.size,
+    )
+
+
+def _lever(solution: Solution, **given: Any) -> Lever:
+    unit, one = _gained(solution.problem)
+    return Lever(per_unit=abs(solution.active[given["name"]]), gained_unit=unit, gained_one=one, **given)
+
+
+def _gained(problem: Problem) -> tuple[str, float]:
+    """Unit of the objective in words, where it is a parameter with a unit."""
+    text = (problem.minimize or problem.maximize or "").strip()
+    of = problem.parameter_set
+    return reported_unit(of[text].unit) if text in of.names else ("1", 1.0)
+
+
+def _signed(step: Step, sign: float) -> str:
+    return step.text if sign > 0 else f"-{step.text}"
+
+
+def _better_side(solution: Solution, name: str) -> float:
+    """The direction in which moving the right-hand side of an equality improves the objective."""
+    change = solution.active[name]
+    better = change if solution.problem.sense == "maximize" else -change
+    return math.copysign(1.0, better)
+
+
+def _size(solution: Solution, text: str) -> float:
+    """Size of the sides of a constraint at the optimum, where they are equal but for rounding."""
+    problem = solution.problem
+    left, _, right = _split(text)
+    values = problem.values(solution.parameters)
+    sides = (abs(float(parse_value(side, problem.vocabulary)(values))) for side in (left, right))
+    return max((size for size in sides if math.isfinite(size)), default=1.0)
+
+
+def _split(text: str) -> tuple[str, str, str]:
+    """Left side, comparison sign and right side of a constraint."""
+    sign = next(iter(_COMPARISON.finditer(text)))
+    return text[: sign.start()].strip(), sign[0], text[sign.end() :].strip()
+
+
+def moved(problem: Problem, name: str, step: float) -> Problem:
+    """The problem with one limit changed by a step: a bound, or the right-hand side of a constraint."""
+    if name in problem.constraints:
+        left, sign, right = _split(problem.constraints[name])
+        text = f"({left}) {sign} ({right}) {'+' if step > 0 else '-'} {abs(step)!r}"
+        return replace(problem, constraints={**problem.constraints, name: text})
+    parameter, end = name.rsplit(".", 1)
+    lower, upper = problem.free[parameter]
+    ends = (lower, upper + step) if end == "max" else (lower + step, upper)
+    return replace(problem, free={**problem.free, parameter: ends})
+
+
+def _resolved(solution: Solution, lever: Lever) -> Lever:
+    """A lever with the gain found by solving again from the optimum."""
+    problem = solution.problem
+    start = {name: solution.parameters[name] for name in problem.free}
+    try:
+        asked = replace(moved(problem, lever.name, lever.step), start=start)
+    except InputError:
+        return replace(lever, reason="the moved problem cannot be written down")
+    sign = 1.0 if problem.sense == "maximize" else -1.0
+    gain, found = math.nan, None
+    for starts in (1, _RETRY):
+        again = solve(asked, starts=starts, throw=False)
+        better = sign * (again.value - solution.value)
+        if again.status == "optimal" and not better <= gain:
+            gain, found = better, again
+        if found and gain >= -_NOISE * (1 + abs(solution.value)):
+            break
+    if found is None:
+        return replace(lever, reason=f"the moved problem is {again.status.replace('_', ' ')}")
+    checked = replace(lever, resolved=gain, structure=found.structure)
+    if abs(checked.relative) <= DIFFERS:
+        return checked
+    return replace(checked, reason=", ".join(_reasons(solution, lever, found)))
+
+
+def _reasons(solution: Solution, lever: Lever, found: Solution) -> Iterator[str]:
+    """Why the gain is not what the multiplier says."""
+    plain = True
+    if found.structure != solution.structure:
+        yield f"the structure changes from {solution.structure} to {found.structure}"
+        plain = False
+    for words, names in (
+        ("no longer binds", [n for n in solution.active if n not in found.active]),
+        ("binds instead", [n for n in found.active if n not in solution.active]),
+    ):
+        if names:
+            yield f"{' and '.join(names)} {words}"
+            plain = False
+    if plain:
+        yield f"the gain is not linear over this step ({found.structure} before and after)"

@@ -1,0 +1,155 @@
+"""A solution in words: its structure, how good it is, and what a reader must be warned of."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from tmsopt.design.expression import Expression
+from tmsopt.design.problem import ROOT_QUANTITIES, Problem
+from tmsopt.design.solution import Solution
+from tmsopt.study.levers import is_physical
+from tmsopt.study.steps import with_reported_unit
+
+STRUCTURES = {
+    "EP4": "four roots meet in one (EP4)",
+    "EP3": "the three rightmost roots meet in one (EP3)",
+    "2EP2": "the roots meet two by two in two real ones (2EP2)",
+    "CEP2": "two complex pairs meet in one (CEP2)",
+    "EP2": "the two rightmost roots meet in a real one (EP2)",
+    "EP2+pair": "a real double root and a complex pair stand on one vertical line (EP2+pair)",
+    "pair+real": "a complex pair and a real root stand on one vertical line (pair+real)",
+    "two pairs": "two complex pairs stand on one vertical line (two pairs)",
+    "pair": "one complex pair is rightmost (pair)",
+    "real": "one real root is rightmost (real)",
+    "undecided": "double precision cannot tell which roots meet (undecided)",
+}
+"""Each structure of the rightmost line in words."""
+
+_ROOTS = {q.name for q in ROOT_QUANTITIES}
+_PARTS = (0.0, 0.29, 0.5, 0.83, 1.0)  # of a range: a change along it shows at one of these
+_UNCHANGED = 1e-13  # relative: rounding of a few operations
+_AT = 1e-12  # relative distance to a bound that counts as touching it
+
+
+def summary(solution: Solution) -> str:
+    """Structure and quality of a solution in one sentence."""
+    if solution.status == "infeasible":
+        names = ", ".join(solution.violations) or "something"
+        asked = "no design in the box was found that meets all constraints" if solution.problem.free else "as given"
+        return f"{asked}; this one violates {names}"
+    words = STRUCTURES.get(solution.structure, solution.structure)
+    if solution.status != "optimal":
+        return f"{words}; the search did not converge, so a better design may be near"
+    return f"{words}: {_quality(solution)}"
+
+
+def warnings(solution: Solution) -> tuple[str, ...]:
+    """Arbitrary bounds that the design leans on, bounds touched for nothing, parameters without effect."""
+    if solution.status == "infeasible":
+        return ()
+    problem = solution.problem
+    idle = {name: _idle(solution, name) for name in problem.free}
+    return (
+        *(_leaning(solution, bound) for bound in _leant_on(solution)),
+        *(text for name in problem.free if (text := idle[name])),
+        *(text for name in problem.free if not idle[name] for text in _touching(solution, name)),
+    )
+
+
+def _quality(solution: Solution) -> str:
+    problem, bound = solution.problem, solution.bound
+    text = (problem.minimize or problem.maximize or "").strip()
+    faster = "decays faster" if solution.abscissa < 0 else "grows more slowly"
+    if not problem.free:
+        return "the design as given, with nothing free"
+    if not text:
+        count = solution.freedom.count
+        left = f"; {count} more parameters are free than that takes" if count > 0 else ""
+        return f"a design with {problem.locate}, as asked{left}"
+    if bound.proven:
+        return f"no design in the box {faster} (proven)"
+    tried = f"the best of {solution.starts.tried} starts, not proven"
+    if math.isfinite(bound.value):
+        return (
+            f"{tried}; no design in the box has an abscissa below {bound.value:.6g}, which leaves {bound.gap:.2g} open"
+        )
+    end = "greatest" if problem.sense == "maximize" else "least"
+    unit = problem.parameter_set[text].unit if text in problem.parameter_set.names else "1"
+    value = with_reported_unit(solution.value, unit, 6)
+    return f"the {end} {text} found is {value}, {tried}"
+
+
+def _leant_on(solution: Solution) -> Iterator[str]:
+    """Active bounds that are no physical ends."""
+    problem = solution.problem
+    for name in problem.free:
+        for bound in (f"{name}.min", f"{name}.max"):
+            if bound in solution.active and bound not in problem.constraints and not is_physical(problem, bound):
+                yield bound
+
+
+def _leaning(solution: Solution, bound: str) -> str:
+    return (
+        f"the optimum leans on {bound} = {_limit(solution.problem, bound)}: if that bound is arbitrary, widen it; "
+        "if it is real, make that known by a constraint"
+    )
+
+
+def _limit(problem: Problem, bound: str) -> str:
+    name, end = bound.rsplit(".", 1)
+    return with_reported_unit(problem.free[name][end == "max"], problem.parameter_set[name].unit)
+
+
+def _touching(solution: Solution, name: str) -> Iterator[str]:
+    problem, x = solution.problem, solution.parameters[name]
+    for end, limit in zip(("min", "max"), problem.free[name], strict=True):
+        bound = f"{name}.{end}"
+        if bound not in solution.active and abs(x - limit) <= _AT * max(abs(limit), _AT):
+            gains = "gains nothing to first order" if problem.objective else "was not asked for"
+            yield f"{name} is at {bound} = {_limit(problem, bound)}, though moving that bound {gains}"
+
+
+def _idle(solution: Solution, name: str) -> str:
+    """What there is to say of a parameter without effect on what is asked; empty for one with an effect."""
+    problem = solution.problem
+    lower, upper = problem.free[name]
+    points = [solution.parameters[name], *(lower + part * (upper - lower) for part in _PARTS)]
+    conditions = problem.conditions
+    asked = ([problem.objective] if problem.objective else []) + list(conditions.values())
+    rows = [_signature(problem, {**solution.parameters, name: x}, asked) for x in points]
+    roots_move = _varies([monic for monic, _ in rows])
+    moves = [
+        _varies([[values[k]] for _, values in rows]) or (roots_move and bool(_ROOTS & set(e.names)))
+        for k, e in enumerate(asked)
+    ]
+    goal = problem.locate or ""
+    if (goal and roots_move) or (problem.objective and moves[0]):
+        return ""
+    affected = [n for n, m in zip(conditions, moves[len(asked) - len(conditions) :], strict=True) if m]
+    what = " and ".join(part for part in (goal, (problem.minimize or problem.maximize or "").strip()) if part)
+    if any(n in solution.active or conditions[n].comparison == "==" for n in affected):
+        return ""  # it moves the optimum through a constraint that binds
+    ends = " … ".join(_limit(problem, f"{name}.{end}") for end in ("min", "max"))
+    kept = f" that keeps {', '.join(affected)}" if affected else ""
+    return f"{name} has no effect on {what} here: any value in {ends}{kept} serves as well"
+
+
+def _signature(
+    problem: Problem, parameters: dict[str, float], asked: list[Expression]
+) -> tuple[list[float], list[float]]:
+    """Monic coefficients, and expressions with the roots held: what they read beside the roots."""
+    values = problem.values(problem.ordered(parameters))
+    a = np.array([float(c) for c in values.coefficients])
+    for root_quantity in _ROOTS:
+        values.define(root_quantity, 0.5)
+    with np.errstate(all="ignore"):
+        return list(a / a[0]), [float(e(values)) for e in asked]
+
+
+def _varies(rows: list[list[float]]) -> bool:
+    """Whether any column of rows changes by more than rounding; one that does not exist counts as a change."""
+    table = np.array(rows)
+    if not np.all(np.isfinite(table)):
+        return True
+    return bool(np.any(np.ptp(table, axis=0) > _UNCHANGED * np.abs(table).max()))

@@ -1,0 +1,130 @@
+"""What rounding the parameters of a design does to its roots, in exact arithmetic."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import flint
+
+from tmsopt.design.frozen import Table
+from tmsopt.design.problem import Problem
+from tmsopt.design.recheck import FEASIBLE, realised_abscissa
+from tmsopt.design.solution import Solution
+from tmsopt.study.steps import reported_unit
+
+ALONE = 3
+"""Significant digits to which each parameter is rounded alone."""
+
+DIGITS = (2, 3, 4, 6)
+"""Significant digits to which all parameters are rounded together."""
+
+_SAME = 1e-15  # relative change that is no rounding: a degree or two written as radians
+_WORKING = 140  # decimal digits of the exact numbers
+
+
+@dataclass(frozen=True)
+class Rounded:
+    """A design with parameters rounded to significant digits, in the unit in which each is reported.
+
+    Attributes:
+        digits: significant digits.
+        written: rounded parameter → the decimal number with its unit, e.g. ``23.5 deg``.
+        realised: abscissa of the decimals, exact to double precision; the other parameters as stored.
+        loss: realised minus ideal abscissa of the design.
+        damping_ratio: of the rounded design.
+        objective: value of the objective expression; nan without one.
+        violations: constraint or bound that the rounding violates → by how much, relative to its size.
+    """
+
+    digits: int
+    written: Table[str]
+    realised: float
+    loss: float
+    damping_ratio: float
+    objective: float
+    violations: Table[float]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``; numbers that do not exist are None."""
+        return {
+            "digits": self.digits,
+            "written": dict(self.written),
+            "abscissa_realised": _number(self.realised),
+            "loss": _number(self.loss),
+            "damping_ratio": _number(self.damping_ratio),
+            "objective": _number(self.objective),
+            "violations": {name: _number(v) for name, v in self.violations.items()},
+        }
+
+
+def rounded_alone(solution: Solution, digits: int = ALONE) -> Table[Rounded]:
+    """Each free parameter rounded by itself; one that is no longer than that is left out."""
+    return Table({n: rounded(solution, [n], digits) for n in solution.problem.free if not _short(solution, n, digits)})
+
+
+def rounded_together(solution: Solution, digits: Iterable[int] = DIGITS) -> tuple[Rounded, ...]:
+    """All free parameters rounded together, one row per number of digits."""
+    return tuple(rounded(solution, list(solution.problem.free), d) for d in digits) if solution.problem.free else ()
+
+
+def rounded(solution: Solution, names: Iterable[str], digits: int) -> Rounded:
+    """A design with some of its parameters rounded to significant digits."""
+    problem = solution.problem
+    of = problem.parameter_set
+    written = {n: _decimal(solution.parameters[n], of[n].unit, digits) for n in names}
+    with flint.ctx.workdps(_WORKING):
+        exact: dict[str, Any] = {n: _exact(text, of[n].unit) for n, text in written.items()}
+    plain = {**solution.parameters, **{n: float(x.mid()) for n, x in exact.items()}}
+    values = problem.values(plain)
+    realised = realised_abscissa(problem, {**solution.parameters, **exact})
+    return Rounded(
+        digits=digits,
+        written=Table({n: _with_unit(text, of[n].unit) for n, text in written.items()}),
+        realised=realised,
+        loss=realised - solution.abscissa,
+        damping_ratio=float(values["damping_ratio"]),
+        objective=float(problem.objective(values)) if problem.objective else math.nan,
+        violations=Table(_violations(problem, plain, values)),
+    )
+
+
+def worst(alone: Mapping[str, Rounded]) -> str:
+    """The parameter whose rounding costs most; empty where none costs anything."""
+    losing = {name: row.loss for name, row in alone.items() if row.loss > 0}
+    return max(losing, key=lambda name: losing[name], default="")
+
+
+def _violations(problem: Problem, parameters: Mapping[str, float], values: Mapping[str, Any]) -> dict[str, float]:
+    found = {name: condition.violation(values) for name, condition in problem.conditions.items()}
+    for name, (lower, upper) in problem.free.items():
+        x = parameters[name]
+        found[f"{name}.min"] = (lower - x) / max(1.0, abs(lower))
+        found[f"{name}.max"] = (x - upper) / max(1.0, abs(upper))
+    return {name: v for name, v in found.items() if not v <= FEASIBLE}
+
+
+def _short(solution: Solution, name: str, digits: int) -> bool:
+    """Whether a parameter has no more digits than that."""
+    value, unit = solution.parameters[name], solution.problem.parameter_set[name].unit
+    there = float(_decimal(value, unit, digits)) * reported_unit(unit)[1]
+    return abs(there - value) <= _SAME * abs(value)
+
+
+def _decimal(value: float, unit: str, digits: int) -> str:
+    """A number in its reported unit, as a decimal of so many significant digits."""
+    return f"{value / reported_unit(unit)[1]:#.{digits}g}".removesuffix(".")
+
+
+def _exact(text: str, unit: str) -> flint.arb:
+    """The decimal in the parameter's own unit, at the precision of the context."""
+    return flint.arb(text) * flint.arb.pi() / 180 if reported_unit(unit)[0] == "deg" else flint.arb(text)
+
+
+def _with_unit(text: str, unit: str) -> str:
+    name = reported_unit(unit)[0]
+    return text if name == "1" else f"{text} {name}"
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
