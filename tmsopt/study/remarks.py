@@ -36,8 +36,9 @@ def summary(solution: Solution) -> str:
     """Structure and quality of a solution in one sentence."""
     if solution.status == "infeasible":
         names = ", ".join(solution.violations) or "something"
-        asked = "no design in the box was found that meets all constraints" if solution.problem.free else "as given"
-        return f"{asked}; this one violates {names}"
+        if not solution.problem.free:
+            return f"the design as given violates {names}"
+        return f"no design in the box was found that meets all that is asked; the nearest one violates {names}"
     words = STRUCTURES.get(solution.structure, solution.structure)
     if solution.status != "optimal":
         return f"{words}; the search did not converge, so a better design may be near"
