@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from mpmath import mp
-from oracles import abscissa_60, polynomial_60
+from oracles import polynomial_60, roots_60
 
 import tmsopt
 from tmsopt.cli import main
@@ -240,13 +240,14 @@ def test_moved_constraints_keep_their_sense():
 # Rounding
 
 
-def decimal_abscissa(solution, written):
-    """60-digit abscissa of decimals as written, the other parameters as stored."""
+def of_decimals(solution, written):
+    """60-digit abscissa and damping ratio of decimals as written, the other parameters as stored."""
     with mp.workdps(80):
         numbers = {name: mp.mpf(text.removesuffix(" deg")) for name, text in written.items()}
         if "lambda_s" in numbers:
             numbers["lambda_s"] *= mp.pi / 180
-        return float(abscissa_60(polynomial_60(**{**solution.dimensionless, **numbers})))
+        found = roots_60(polynomial_60(**{**solution.dimensionless, **numbers}))
+        return float(max(z.real for z in found)), float(min(-z.real / abs(z) for z in found))
 
 
 @pytest.mark.parametrize("which", ["ep4", "realistic"])
@@ -254,10 +255,12 @@ def test_rounding_beside_roots_at_60_digits(request, which):
     solution, explanation = request.getfixturevalue(which)[:2]
     assert [row.digits for row in explanation.precision] == [2, 3, 4, 6]
     for row in (*explanation.precision, *explanation.rounding.values()):
-        truth = decimal_abscissa(solution, row.written)
+        truth, damping = of_decimals(solution, row.written)
         assert row.realised == pytest.approx(truth, rel=1e-15)  # both are right to the last bit but one
         assert row.loss == pytest.approx(truth - solution.abscissa, abs=1e-15)
-    losses = {n: decimal_abscissa(solution, row.written) for n, row in explanation.rounding.items()}
+        # a change of 1e-16 of roots a relative 1e-6^(1/4) apart moves them by 1e-16 / (4 · 0.03³), some 1e-12
+        assert row.damping_ratio == pytest.approx(damping, abs=1e-10)
+    losses = {n: of_decimals(solution, row.written) for n, row in explanation.rounding.items()}
     assert explanation.worst == max(losses, key=losses.get)
 
 

@@ -1,16 +1,18 @@
 """What rounding the parameters of a design does to its roots, in exact arithmetic."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import flint
+import numpy as np
 
 from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
 from tmsopt.design.recheck import FEASIBLE, realised_abscissa
 from tmsopt.design.solution import Solution
+from tmsopt.roots import roots
 from tmsopt.study.steps import reported_unit
 
 ALONE = 3
@@ -32,7 +34,7 @@ class Rounded:
         written: rounded parameter → the decimal number with its unit, e.g. ``23.5 deg``.
         realised: abscissa of the decimals, exact to double precision; the other parameters as stored.
         loss: realised minus ideal abscissa of the design.
-        damping_ratio: of the rounded design.
+        damping_ratio: of the rounded design, in double precision.
         objective: value of the objective expression; nan without one.
         violations: constraint or bound that the rounding violates → by how much, relative to its size.
     """
@@ -76,8 +78,10 @@ def rounded(solution: Solution, names: Iterable[str], digits: int) -> Rounded:
     with flint.ctx.workdps(_WORKING):
         exact: dict[str, Any] = {n: _exact(text, of[n].unit) for n, text in written.items()}
     plain = {**solution.parameters, **{n: float(x.mid()) for n, x in exact.items()}}
-    values = problem.values(plain)
     realised = realised_abscissa(problem, {**solution.parameters, **exact})
+    values = problem.values(plain)
+    values.define("abscissa", realised)  # known already, and better than by fitting structures
+    values.define("damping_ratio", _damping_ratio([float(c) for c in values.coefficients]))
     return Rounded(
         digits=digits,
         written=Table({n: _with_unit(text, of[n].unit) for n, text in written.items()}),
@@ -102,6 +106,14 @@ def _violations(problem: Problem, parameters: Mapping[str, float], values: Mappi
         found[f"{name}.min"] = (lower - x) / max(1.0, abs(lower))
         found[f"{name}.max"] = (x - upper) / max(1.0, abs(upper))
     return {name: v for name, v in found.items() if not v <= FEASIBLE}
+
+
+def _damping_ratio(coefficients: Sequence[float]) -> float:
+    """By numeric roots, for rounding has moved the design far enough from an exceptional point."""
+    if coefficients[0] == 0:
+        return math.nan
+    z = roots(coefficients)
+    return float(np.min(-z.real / np.maximum(np.abs(z), 1e-300)))
 
 
 def _short(solution: Solution, name: str, digits: int) -> bool:
