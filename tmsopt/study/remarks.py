@@ -6,7 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from tmsopt.design.expression import Expression
-from tmsopt.design.problem import ROOT_QUANTITIES, Problem
+from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import ROOT_QUANTITIES
 from tmsopt.design.solution import Solution
 from tmsopt.study.levers import is_physical
 from tmsopt.study.steps import with_reported_unit
