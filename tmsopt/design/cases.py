@@ -1,7 +1,6 @@
 """Cases: the variations of one design that it must stand up to, over a band, within tolerances, at a distance."""
 
 import itertools
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,8 +12,8 @@ from tmsopt.design.frozen import Table
 POINTS = 7
 """Points of a band where a problem starts; more are added until the worst case between them is covered."""
 
-LARGEST = 64
-"""Cases that a search starts with; corners beyond are left to the check of the worst case."""
+LARGEST = 16
+"""Cases that a search starts with where there are tolerances; corners beyond are left to the check of the worst."""
 
 
 @dataclass(frozen=True)
@@ -91,11 +90,14 @@ def first_cases(
 ) -> tuple[Case, ...]:
     """Scenario points with the corners of the tolerance box, and a step either way in each of the directions."""
     grid = list(_grid(scenarios))
-    signs = list(itertools.product((-1.0, 1.0), repeat=len(tolerances)))
-    if len(grid) * len(signs) > LARGEST:
-        signs = signs[:: max(1, math.ceil(len(grid) * len(signs) / LARGEST))]
-    corners = [Table({n: s * t for (n, t), s in zip(tolerances.items(), c, strict=True)}) for c in signs]
-    cases = tuple(Case(at, corner) for at in grid for corner in corners)
+    corners = [
+        Table({n: s * t for (n, t), s in zip(tolerances.items(), signs, strict=True)})
+        for signs in itertools.product((-1.0, 1.0), repeat=len(tolerances))
+    ]
+    pairs = [tuple(corners)] * len(grid)
+    if len(grid) * len(corners) > LARGEST:  # two opposite corners for each scenario in turn
+        pairs = [(corners[k % len(corners)], corners[-1 - k % len(corners)]) for k in range(len(grid))]
+    cases = tuple(Case(at, corner) for at, pair in zip(grid, pairs, strict=True) for corner in pair)
     steps = tuple(Case(direction=Table({name: sign})) for name in directions for sign in (-1.0, 1.0))
     return (() if cases == (Case(),) else cases) + steps
 

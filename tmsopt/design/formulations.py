@@ -16,7 +16,7 @@ import numpy as np
 from tmsopt.design.cases import Case
 from tmsopt.design.expression import Expression
 from tmsopt.design.lifts import lift_abscissa, lift_damping_ratio, lift_quantity, lift_radius
-from tmsopt.design.nlp import NLP, Lift, Touch
+from tmsopt.design.nlp import NLP, Factor, Lift, Touch
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS, ROOT_QUANTITIES
 from tmsopt.design.variation import varies
@@ -116,6 +116,7 @@ class _Builder:
         self.rows: list[tuple[str, Any, float, float]] = []
         self.lifts: list[Lift] = []
         self.touches: dict[str, tuple[Touch, ...]] = {}
+        self.products: list[tuple[Factor, ...]] = []
         self.shared: dict[str, Any] = {}
         self.objective: Any = ca.SX(0)
         self.design = {name: self.parameter(name, *ends) for name, ends in problem.free.items()}
@@ -223,6 +224,7 @@ class _Builder:
             lifts=tuple(self.lifts),
             cases=self.cases,
             touches=self.touches,
+            products=tuple(self.products),
         )
 
     def _lift(self, case: int, quantity: Quantity, values: Values) -> Any:
@@ -234,6 +236,7 @@ class _Builder:
             lifted = _LIFTED[name](self, self.covered, self.values)
             self.lifts.append(lifted.lift)
             self.touches[name] = lifted.touches
+            self.products += lifted.products
             self.shared[name] = lifted.symbol
             return lifted.symbol
         if quantity.equation is None:

@@ -45,7 +45,7 @@ class Run:
     iterations: int
 
 
-def ipopt(nlp: NLP, linear_solver: str = "mumps", max_iterations: int = 300, near: bool = False) -> Callable[..., Run]:
+def ipopt(nlp: NLP, linear_solver: str = "mumps", max_iterations: int = 150, near: bool = False) -> Callable[..., Run]:
     """A solver of one NLP: start, and other limits if wanted → run; `near` for starts close to a solution.
 
     Not to be shared between threads.

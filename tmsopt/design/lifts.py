@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from tmsopt.design.cases import Case
-from tmsopt.design.nlp import Array, Lift, Touch
+from tmsopt.design.nlp import Array, Factor, Lift, Touch
 from tmsopt.models import Values
 from tmsopt.roots import product, shift
 from tmsopt.roots.patterns import Roots
@@ -38,6 +38,7 @@ class Lifted:
     symbol: Any
     lift: Lift
     touches: tuple[Touch, ...]
+    products: tuple[tuple[Factor, ...], ...]
 
 
 def lift_abscissa(build: Rows, covered: Sequence[int], values: Sequence[Values]) -> Lifted:
@@ -47,16 +48,19 @@ def lift_abscissa(build: Rows, covered: Sequence[int], values: Sequence[Values])
     """
     gamma = build.variable("abscissa")
     touches: list[Touch] = []
+    products: list[tuple[Factor, ...]] = []
     for case in covered:
-        a, pairs = values[case].coefficients, []
-        for k in range(1, (len(values[case].coefficients) - 1) // 2 + 1):
+        a, pairs, factors = values[case].coefficients, [], []
+        for k in range(1, (len(a) - 1) // 2 + 1):
             at = build.size[0]
+            factors.append(Factor(at, squared=False))
             pairs.append((build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)))
             touches.append(Touch(partial(_pair_distance, at), variable=at))
             touches.append(Touch(partial(_real_distance, at), variable=at + 1))
         build.equal("abscissa", shift(a, gamma), [a[0] * c for c in product(*([1, *p] for p in pairs))])
+        products.append(tuple(factors))
     guess = partial(_abscissa_guess, covered)
-    return Lifted(gamma, Lift("abscissa", 1 + len(touches), guess), tuple(touches))
+    return Lifted(gamma, Lift("abscissa", 1 + len(touches), guess), tuple(touches), tuple(products))
 
 
 def lift_damping_ratio(build: Rows, covered: Sequence[int], values: Sequence[Values]) -> Lifted:
@@ -66,16 +70,19 @@ def lift_damping_ratio(build: Rows, covered: Sequence[int], values: Sequence[Val
     """
     zeta = build.variable("damping_ratio", -1.0, 1.0)
     touches: list[Touch] = []
+    products: list[tuple[Factor, ...]] = []
     for case in covered:
-        a, pairs = values[case].coefficients, []
+        a, pairs, factors = values[case].coefficients, [], []
         for k in range(1, (len(a) - 1) // 2 + 1):
             at, row = build.size
+            factors.append(Factor(at, squared=True))
             pairs.append((build.variable(f"p{k}.{case}"), build.variable(f"w{k}.{case}", 0.0)))
             build.row("damping_ratio", pairs[-1][0] - 2 * zeta * pairs[-1][1], 0.0, np.inf)
             touches.append(Touch(partial(_sector_distance, at), row=row))
         build.equal("damping_ratio", a, [a[0] * c for c in product(*([1, p, w * w] for p, w in pairs))])
+        products.append(tuple(factors))
     guess = partial(_damping_guess, covered)
-    return Lifted(zeta, Lift("damping_ratio", 1 + 2 * len(touches), guess), tuple(touches))
+    return Lifted(zeta, Lift("damping_ratio", 1 + 2 * len(touches), guess), tuple(touches), tuple(products))
 
 
 def lift_radius(build: Rows, radius: Any, directions: Sequence[tuple[int, Case]], values: Sequence[Values]) -> Lift:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -12,6 +13,8 @@ from tmsopt.models import Values
 from tmsopt.roots.patterns import Roots
 
 Array = NDArray[np.float64]
+
+_TANGLED = 1e-6  # overlap of two factors that no lack of digits explains
 
 Guess = Callable[[Sequence[Values], Sequence[Roots]], list[list[float]]]
 """Starting values of lifted variables for a numeric design and its roots, the nominal design first and then each
@@ -41,6 +44,24 @@ class Touch:
 
 
 @dataclass(frozen=True)
+class Factor:
+    """Where an NLP keeps a factor t² + βt + κ, or s² + ps + w².
+
+    Attributes:
+        squared: whether the second variable is w, not its square.
+    """
+
+    first: int
+    squared: bool
+
+    def real_roots(self, x: Array) -> tuple[float, float] | None:
+        """Both roots, the smaller first; None for a complex pair."""
+        half, q = -x[self.first] / 2, x[self.first + 1]
+        rest = half * half - (q * q if self.squared else q)
+        return (float(half - np.sqrt(rest)), float(half + np.sqrt(rest))) if rest >= 0 else None
+
+
+@dataclass(frozen=True)
 class NLP:
     """minimise f(x) subject to lower ≤ x ≤ upper and row_lower ≤ g(x) ≤ row_upper.
 
@@ -52,6 +73,7 @@ class NLP:
         lifts: the variables after the free parameters, in order.
         cases: the variations of the design that its rows cover.
         touches: root quantity → the ways in which it is met exactly; unless one is held, the NLP only bounds it.
+        products: the factors of each polynomial.
     """
 
     formulation: str
@@ -65,6 +87,7 @@ class NLP:
     lifts: tuple[Lift, ...] = field(repr=False, default=())
     cases: tuple[Case, ...] = field(repr=False, default=())
     touches: Mapping[str, tuple[Touch, ...]] = field(repr=False, default_factory=dict)
+    products: tuple[tuple[Factor, ...], ...] = field(repr=False, default=())
 
     @property
     def equations(self) -> int:
@@ -81,3 +104,16 @@ class NLP:
             if nearest.row is not None:
                 row_upper[nearest.row] = 0.0
         return replace(self, upper=tuple(upper), row_upper=tuple(row_upper))
+
+    def tangled(self, x: Array) -> bool:
+        """Whether real roots are shared out among factors other than neighbour by neighbour.
+
+        Where two neighbours of different factors meet, the double root cannot become a pair, so the point may be
+        stationary for the NLP and not for the design: factored anew, the way is open.
+        """
+        for factors in self.products:
+            pairs = sorted(pair for factor in factors if (pair := factor.real_roots(x)) is not None)
+            for (_, high), (low, top) in pairwise(pairs):
+                if high - low > _TANGLED * (1 + abs(high) + abs(low)) and top - low > 0:
+                    return True
+        return False

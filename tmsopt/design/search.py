@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -25,6 +26,9 @@ _SAME = 1e-7  # relative difference of objectives that counts as the same
 _FEASIBLE = 1e-6  # of the rows, before polishing; the recheck has the last word
 _SCATTER = 0.01  # of the largest root: roots in double precision beside a 4-fold one are off by 4e-4
 _RESCUES = 4  # starts from abscissa optima, for a pattern that no start reached
+
+_AGAIN = 4  # times that a start is taken up again where it ended badly
+_SUCCESS = "Solve_Succeeded"
 
 Progress = Callable[[int, int], None]
 
@@ -62,14 +66,12 @@ def search(
         touching: hold every root quantity at its exact value, in the way that each start is closest to, where a mere
             bound on it would let the optimiser claim too much.
     """
-    run = ipopt(nlp, linear_solver)
+    run = _Runner(problem, nlp, linear_solver, touching)
     candidates: list[Candidate] = []
     if problem.start:  # the user's own
-        candidates.append(follow(problem, nlp, middle(problem), linear_solver, touching=touching))
+        candidates.append(run.ended(middle(problem), near=True))
     for design in designs(problem, seed, max(starts - len(candidates), 0)):
-        x = complete(nlp, problem, design)
-        limits = nlp.touching(x) if touching else nlp
-        candidates.append(_candidate(problem, limits, run(x, limits)))
+        candidates.append(run.ended(design))
         if progress:
             progress(len(candidates), starts)
         if not exhaustive and _settled(problem, candidates):
@@ -88,9 +90,44 @@ def follow(
     touching: bool = False,
 ) -> Candidate:
     """Where IPOPT ends from a design, close to it or not."""
-    x = complete(nlp, problem, design)
-    limits = nlp.touching(x) if touching else nlp
-    return _candidate(problem, limits, ipopt(nlp, linear_solver, near=near)(x, limits))
+    return _Runner(problem, nlp, linear_solver, touching).ended(design, near)
+
+
+@dataclass(frozen=True)
+class _Runner:
+    """IPOPT on one NLP, started anew where an end is not to be trusted."""
+
+    problem: Problem
+    nlp: NLP
+    linear_solver: str
+    touching: bool
+
+    def ended(self, design: Mapping[str, float], near: bool = False) -> Candidate:
+        """Where a start ends, with the factors shared out anew as long as that helps."""
+        best = self._once(design, near)
+        for again in range(_AGAIN):
+            if best.feasible and best.run.status == _SUCCESS and not best.nlp.tangled(best.run.x):
+                break
+            if not np.all(np.isfinite(best.run.x)):
+                break
+            ended = self._once(design_of(self.problem, best.run.x.tolist()), near=again % 2 == 0)
+            if best.feasible and (not ended.feasible or ended.objective >= best.objective - _SAME):
+                break
+            best = ended
+        return best
+
+    def _once(self, design: Mapping[str, float], near: bool) -> Candidate:
+        x = complete(self.nlp, self.problem, design)
+        limits = self.nlp.touching(x) if self.touching else self.nlp
+        return _candidate(self.problem, limits, (self._near if near else self._far)(x, limits))
+
+    @cached_property
+    def _far(self) -> Callable[..., Run]:
+        return ipopt(self.nlp, self.linear_solver)
+
+    @cached_property
+    def _near(self) -> Callable[..., Run]:
+        return ipopt(self.nlp, self.linear_solver, near=True)
 
 
 def claim(problem: Problem, candidate: Candidate) -> float:
