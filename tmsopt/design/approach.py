@@ -1,0 +1,82 @@
+"""The nearest point of one edge as an NLP: least distance subject to a factored form, no eigenvalue in it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.design.edges import Edge
+from tmsopt.design.formulations import NLP
+from tmsopt.design.ipopt import ipopt
+from tmsopt.design.place import Place
+from tmsopt.design.polish import polisher
+
+Array = NDArray[np.float64]
+
+_ITERATIONS = 200
+_FEASIBLE = 1e-10  # violation of scaled coefficients, up to which a point counts as on the edge
+_STATIONARY = 1e-8
+
+
+@dataclass(frozen=True)
+class Approach:
+    """Where one run ended.
+
+    Attributes:
+        u: displacement, in weights.
+        refined: whether the conditions of a nearest point hold to rounding.
+    """
+
+    u: Array
+    refined: bool
+
+    @property
+    def distance(self) -> float:
+        """√Σ u²."""
+        return float(np.linalg.norm(self.u))
+
+
+def approach(place: Place, edge: Edge, sign: float, size: float) -> Callable[[Array], Approach | None]:
+    """A function from a start to a nearest point of an edge; None where it ends elsewhere.
+
+    Args:
+        sign: sign of a0 on the side of the edge that is stable or heavily damped.
+        size: distance to expect, the unit in which the NLP measures.
+    """
+    nlp = _nlp(place, edge, sign, size)
+    run, polish = ipopt(nlp, max_iterations=_ITERATIONS), polisher(nlp)
+    n = len(place.weights)
+
+    def from_start(u: Array) -> Approach | None:
+        c = sign * place.space.coefficients(u)
+        if not np.all(np.isfinite(c)):
+            return None
+        point = polish(run(np.concatenate([u / size, edge.guess(c)])))
+        if not point.violation <= _FEASIBLE:
+            return None
+        u_found = np.clip(point.x[:n] * size, place.space.lower, place.space.upper)
+        return Approach(u_found, point.stationarity <= _STATIONARY)
+
+    return from_start
+
+
+def _nlp(place: Place, edge: Edge, sign: float, size: float) -> NLP:
+    """Minimise y·y, y = u/size, over displacements and the unknowns of the edge."""
+    n, extra = len(place.weights), len(edge.unknowns)
+    x = ca.SX.sym("x", n + extra)
+    y, unknowns = [x[k] for k in range(n)], [x[n + k] for k in range(extra)]
+    c = [sign * a for a in place.scaled(place.displaced([size * v for v in y]))]
+    equations, others = edge.equations(c, unknowns), edge.nonnegative(c, unknowns)
+    f, g = sum(v * v for v in y), ca.vertcat(*equations, *others)
+    return NLP(
+        formulation="nearest",
+        variables=(*place.weights, *edge.unknowns),
+        functions=ca.Function("nlp", [x], [f, g]),
+        lower=(*(place.space.lower / size).tolist(), *[0.0] * extra),
+        upper=(*(place.space.upper / size).tolist(), *[np.inf] * extra),
+        rows=(*[edge.name] * len(equations), *["others"] * len(others)),
+        row_lower=(0.0,) * (len(equations) + len(others)),
+        row_upper=(*[0.0] * len(equations), *[np.inf] * len(others)),
+    )

@@ -1,0 +1,237 @@
+"""The nearest point of a boundary: by how much a design may change before it is unstable, or heavily damped no more."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.design.approach import Approach, approach
+from tmsopt.design.edges import EDGES, KINDS, Edge, lies_on
+from tmsopt.design.errors import Fault, InputError, suggest
+from tmsopt.design.frozen import Table
+from tmsopt.design.place import Place, placed
+from tmsopt.design.problem import Problem, checked
+from tmsopt.design.rays import Crossing, between, crossings, most_damped
+from tmsopt.design.solution import Solution
+
+Array = NDArray[np.float64]
+
+STABILITY = ("weave", "capsize", "infinity")
+"""The boundaries of stability: a pair on the imaginary axis, a root 0, a root through infinity."""
+
+_ROUNDS = 3
+_ALIKE = 1e-9  # relative difference of distances that is no difference
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """The nearest point of a boundary.
+
+    Attributes:
+        kind: ``weave``, ``capsize``, ``infinity`` or ``heavy damping``.
+        distance: √Σ ((x − x0)/weight)²; inf where none was found.
+        parameters: every parameter of the point; empty where none was found.
+        direction: (x − x0)/weight of each parameter that has a weight.
+        refined: whether the point meets the conditions of a nearest one to rounding; else it is the best crossing seen.
+        direct: whether the straight way there stays on one side of the boundaries until it ends.
+    """
+
+    kind: str
+    distance: float = math.inf
+    parameters: Table[float] = field(default_factory=Table)
+    direction: Table[float] = field(default_factory=Table)
+    refined: bool = False
+    direct: bool = False
+
+    @property
+    def found(self) -> bool:
+        """Whether there is such a point."""
+        return math.isfinite(self.distance)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``."""
+        return {
+            "kind": self.kind,
+            "found": self.found,
+            "distance": self.distance if self.found else None,
+            "parameters": dict(self.parameters),
+            "direction": dict(self.direction),
+            "refined": self.refined,
+            "direct": self.direct,
+        }
+
+
+@dataclass(frozen=True)
+class Robustness:
+    """How far a design is from each boundary.
+
+    Attributes:
+        stable: whether all roots are left of the imaginary axis.
+        heavily_damped: whether all roots are real and negative, multiple ones included.
+        weights: the unit of change of each parameter.
+        weave, capsize, infinity: nearest points of the boundaries of stability.
+        heavy_damping: nearest point of the edge of heavy damping: the way out of it for a heavily damped design, the
+            way into it for another; distance 0 on the edge, as for an EP4.
+    """
+
+    stable: bool
+    heavily_damped: bool
+    weights: Table[float]
+    weave: Nearest
+    capsize: Nearest
+    infinity: Nearest
+    heavy_damping: Nearest
+
+    @property
+    def limit(self) -> Nearest:
+        """The nearest point of the boundary of stability."""
+        return min((self.weave, self.capsize, self.infinity), key=lambda n: n.distance)
+
+    @property
+    def radius(self) -> float:
+        """Least change that ends stability; 0 for a design that is not stable."""
+        return self.limit.distance if self.stable else 0.0
+
+    @property
+    def to_stability(self) -> float:
+        """Least change that brings stability; 0 for a design that is stable."""
+        return 0.0 if self.stable else self.limit.distance
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``."""
+        return {
+            "stable": self.stable,
+            "heavily_damped": self.heavily_damped,
+            "radius": _number(self.radius),
+            "to_stability": _number(self.to_stability),
+            "limit": self.limit.kind if self.limit.found else None,
+            "weights": dict(self.weights),
+            "nearest": {n.kind: n.to_json() for n in (self.weave, self.capsize, self.infinity, self.heavy_damping)},
+        }
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def nearest(
+    design: Solution | Problem,
+    pattern: str,
+    *,
+    parameters: Mapping[str, float] | None = None,
+    weights: Mapping[str, float] | None = None,
+) -> Nearest:
+    """The nearest point of one boundary: ``weave``, ``capsize``, ``infinity`` or ``heavy damping``.
+
+    The distance is √Σ ((x − x0)/weight)² over the parameters that have a weight; the others stay. Parameters stay
+    inside their physical ranges; the box and the constraints of the problem play no part. For a heavily damped design
+    the edge of heavy damping is the way out of it, for another the way into it.
+
+    Args:
+        design: a solution, or a problem with `parameters`.
+        parameters: a value per parameter (rad, SI units); by default those of the solution, or all fixed ones.
+        weights: parameter → change that counts as 1; by default |x0| for every parameter, fixed ones too, except those
+            with a default value (g), so that distances are relative. Where x0 = 0 it is 1, or for a parameter with a
+            unit the largest of the same unit.
+
+    Raises:
+        InputError: for another pattern, or parameters or weights that are not accepted.
+    """
+    if pattern not in KINDS:
+        raise InputError([Fault(f"unknown boundary {pattern!r}; {suggest(str(pattern), KINDS)}", ("pattern",))])
+    place = _place(design, parameters, weights)
+    return _nearest(place, crossings(place.space), pattern)
+
+
+def robustness(
+    design: Solution | Problem,
+    *,
+    parameters: Mapping[str, float] | None = None,
+    weights: Mapping[str, float] | None = None,
+) -> Robustness:
+    """The nearest points of all boundaries, and the radius within which a design stays stable.
+
+    Arguments, distances and exceptions are those of `nearest`.
+    """
+    place = _place(design, parameters, weights)
+    seen = crossings(place.space)
+    return Robustness(
+        place.stable, place.heavily_damped, Table(place.weights), *(_nearest(place, seen, kind) for kind in KINDS)
+    )
+
+
+def _place(
+    design: Solution | Problem, parameters: Mapping[str, float] | None, weights: Mapping[str, float] | None
+) -> Place:
+    if isinstance(design, Solution):
+        return placed(design.problem, design.parameters if parameters is None else parameters, weights)
+    problem = checked(design)
+    if parameters is None and problem.free:
+        message = f"missing; the problem frees {' '.join(problem.free)}: give their values, or a solution"
+        raise InputError([Fault(message, ("parameters",))])
+    return placed(problem, problem.ordered(parameters or {}), weights)
+
+
+def _nearest(place: Place, seen: list[Crossing], kind: str) -> Nearest:
+    """The least distance over the pieces of one boundary."""
+    if kind == "heavy damping" and place.on_edge:
+        zero = dict.fromkeys(place.weights, 0.0)
+        return Nearest(kind, 0.0, Table(place.parameters), Table(zero), refined=True, direct=True)
+    mine = [s for s in seen if s.edge in KINDS[kind]]
+    best = Approach(np.zeros(0), False)
+    for edge, sign, starts in _pieces(place, mine, kind):
+        best = min(best, _best(place, EDGES[edge], sign, starts), key=_length)
+    if mine and mine[0].distance < _length(best) * (1 - _ALIKE):
+        best = Approach(mine[0].u, False)
+    if not best.u.size:
+        return Nearest(kind)
+    on_the_way = [c for c in between(place.space, best.u) if kind == "heavy damping" or c.edge in STABILITY]
+    return Nearest(
+        kind,
+        _length(best),
+        Table(place.design(best.u)),
+        Table(dict(zip(place.weights, best.u.tolist(), strict=True))),
+        best.refined,
+        not on_the_way,
+    )
+
+
+def _length(found: Approach) -> float:
+    return found.distance if found.u.size else math.inf
+
+
+def _pieces(place: Place, seen: list[Crossing], kind: str) -> Iterator[tuple[str, float, list[Array]]]:
+    """Each edge that rays crossed, the sign of a0, and starts; the way into heavy damping is sought without a ray."""
+    starts: dict[tuple[str, float], list[Array]] = {}
+    for crossing in seen:
+        starts.setdefault((crossing.edge, crossing.sign), []).append(crossing.u)
+    if kind == "heavy damping" and not place.heavily_damped:
+        sign = float(np.sign(place.space.coefficients(np.zeros(len(place.weights)))[0]))
+        starts.setdefault(("EP2", sign), []).extend(most_damped(place.space, sign))
+    for (edge, sign), points in starts.items():
+        yield edge, sign, points
+
+
+def _best(place: Place, edge: Edge, sign: float, starts: list[Array]) -> Approach:
+    """The nearest of where the starts lead; what is crossed on the way there is started from too."""
+    best = Approach(np.zeros(0), False)
+    size = min((float(np.linalg.norm(u)) for u in starts if u.any()), default=1.0)
+    run = approach(place, edge, sign, size)
+    for _ in range(_ROUNDS):
+        for u in starts:
+            found = run(u)
+            if (
+                found is not None
+                and lies_on(place.space.coefficients(found.u) * sign, edge)
+                and _length(found) < _length(best)
+            ):
+                best = found
+        if not best.u.size:
+            break
+        starts = [c.u for c in between(place.space, best.u) if (c.edge, c.sign) == (edge.name, sign)]
+        if not starts:
+            break
+    return best

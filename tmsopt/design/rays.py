@@ -1,0 +1,171 @@
+"""Where rays from a design first cross the boundaries: upper bounds of the distances, and starts for an optimiser."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.design.edges import heavily_damped, loss
+from tmsopt.roots import discriminant, hurwitz_minors, is_stable, roots
+
+Array = NDArray[np.float64]
+Truth = NDArray[np.bool_]
+
+_DIRECTIONS = 300
+_RADII = np.concatenate([[0.0], np.geomspace(1e-4, 4.0, 36)])
+_COARSE, _FINE = 10, 50  # halvings of all crossings, and of those that are kept
+_KEPT = 4
+_ALIKE = 0.9  # cosine between directions that lead to one start
+_POINTS = 400  # looked at on the straight way to a nearest point
+_AROUND = np.array([0.1, 0.3, 1.0])
+_STEP = 1e-6  # of differences, which only choose directions
+
+
+@dataclass(frozen=True)
+class Space:
+    """Designs around one, in units of the weights.
+
+    Attributes:
+        coefficients: displacements of shape (…, n) → coefficients of shape (…, 5), scaled to the size of 1.
+        lower, upper: physical ranges.
+    """
+
+    coefficients: Callable[[Array], Array]
+    lower: Array
+    upper: Array
+
+    def along(self, directions: Array, t: Array) -> Array:
+        """Displacements t · direction, inside the ranges."""
+        return np.clip(t[..., None] * directions, self.lower, self.upper)
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A point just beyond an edge.
+
+    Attributes:
+        edge: name of the edge.
+        sign: sign of a0 on the stable, or heavily damped, side.
+    """
+
+    edge: str
+    sign: float
+    u: Array
+    distance: float
+
+
+def crossings(space: Space, seed: int = 0) -> list[Crossing]:
+    """The nearest few crossings of each edge in different directions, nearest first."""
+    rays = directions(space, seed)
+    return along(space, rays, np.broadcast_to(_RADII, (len(rays), len(_RADII))))
+
+
+def between(space: Space, u: Array) -> list[Crossing]:
+    """Crossings on the straight way to u, short of its end."""
+    return along(space, u[None, :], np.linspace(0.0, 1.0, _POINTS)[None, :-1])
+
+
+def along(space: Space, rays: Array, t: Array) -> list[Crossing]:
+    """Crossings between displacements t · ray, t of shape (rays, steps)."""
+    c = space.coefficients(space.along(rays[:, None, :], t))
+    found: list[Crossing] = []
+    for heavy, test in ((False, is_stable), (True, heavily_damped)):
+        inside = test(c)
+        ray, step = np.nonzero(inside[:, 1:] != inside[:, :-1])
+        if not ray.size:
+            continue
+        all_of = _Bracket(space, test, rays[ray], t[ray, step], t[ray, step + 1], inside[ray, step]).halved(_COARSE)
+        names = all_of.names(heavy)
+        distance = np.linalg.norm(space.along(all_of.rays, all_of.high), axis=1)
+        unit = all_of.rays / np.linalg.norm(all_of.rays, axis=1, keepdims=True)
+        for name in sorted(set(names)):
+            rows = [k for k in np.argsort(distance, kind="stable") if names[k] == name]
+            found += all_of.rows(_different(unit, rows)).halved(_FINE).crossings(heavy)
+    return sorted(found, key=lambda x: x.distance)
+
+
+def directions(space: Space, seed: int) -> Array:
+    """Unit vectors: the axes, the gradients of the boundaries both ways, and random ones."""
+    axes = np.eye(len(space.lower))
+    random = np.random.default_rng(seed).standard_normal((_DIRECTIONS if len(axes) > 1 else 0, len(axes)))
+    near = space.coefficients(_STEP * np.concatenate([axes, -axes]))
+    slopes = (_tests(near[: len(axes)]) - _tests(near[len(axes) :])).T
+    slopes = slopes[np.all(np.isfinite(slopes), axis=1) & np.any(slopes != 0, axis=1)]
+    every = np.concatenate([axes, -axes, slopes, -slopes, random])
+    return np.asarray(every / np.linalg.norm(every, axis=1, keepdims=True))
+
+
+def most_damped(space: Space, sign: float, seed: int = 0) -> list[Array]:
+    """The design and points around it that are nearest to having real roots only, for a given sign of a0."""
+    rays = directions(space, seed)
+    u = space.along(rays[:, None, :], np.broadcast_to(_AROUND, (len(rays), len(_AROUND)))).reshape(-1, rays.shape[1])
+    c = sign * space.coefficients(u)
+    u, c = (part[np.all(np.isfinite(c), axis=1) & (c[:, 0] > 0) & is_stable(c)] for part in (u, c))
+    ratio = np.min(-(z := roots(c)).real / np.abs(z), axis=1) if len(c) else np.zeros(0)
+    rows = np.argsort(-ratio, kind="stable").tolist()
+    unit = u / np.linalg.norm(u, axis=1, keepdims=True)
+    return [np.zeros(rays.shape[1]), *u[_different(unit, rows)]]
+
+
+def _tests(c: Array) -> Array:
+    """What vanishes on the edges: a0, a4, the Hurwitz determinant and the discriminant, shape (…, 4)."""
+    by_power = [c[..., k] for k in range(5)]
+    return np.stack([c[..., 0], c[..., 4], hurwitz_minors(by_power)[2], discriminant(by_power)], axis=-1)
+
+
+def _different(unit: Array, rows: list[int]) -> NDArray[np.int_]:
+    """The first few of the rows whose directions differ."""
+    kept: list[int] = []
+    for k in rows:
+        if len(kept) < _KEPT and all(float(unit[k] @ unit[other]) < _ALIKE for other in kept):
+            kept.append(k)
+    return np.array(kept, dtype=int)
+
+
+@dataclass(frozen=True)
+class _Bracket:
+    """Points t · ray on either side of a change of a test: `low` has its value `inside`, `high` has not."""
+
+    space: Space
+    test: Callable[[Array], Truth]
+    rays: Array
+    low: Array
+    high: Array
+    inside: Truth
+
+    def rows(self, k: NDArray[np.int_]) -> "_Bracket":
+        """Some of them."""
+        return replace(self, rays=self.rays[k], low=self.low[k], high=self.high[k], inside=self.inside[k])
+
+    def at(self, t: Array) -> Array:
+        """Coefficients."""
+        return self.space.coefficients(self.space.along(self.rays, t))
+
+    def halved(self, times: int) -> "_Bracket":
+        """Bisected, until nothing lies between the ends."""
+        low, high = self.low, self.high
+        for _ in range(times):
+            middle = (low + high) / 2
+            same = self.test(self.at(middle)) == self.inside
+            low, high = np.where(same, middle, low), np.where(same, high, middle)
+        return replace(self, low=low, high=high)
+
+    def sides(self) -> tuple[Array, Array]:
+        """Coefficients beyond the edge, signed as on the side where the test holds; that sign."""
+        within, beyond = (self.at(np.where(self.inside == side, self.low, self.high)) for side in (True, False))
+        sign = np.sign(within[:, 0])
+        return sign[:, None] * beyond, sign
+
+    def names(self, heavy: bool) -> list[str]:
+        """Name of the edge that each has crossed."""
+        return [loss(c, heavy) for c in self.sides()[0]]
+
+    def crossings(self, heavy: bool) -> list[Crossing]:
+        """As data."""
+        beyond, sign = self.sides()
+        u = self.space.along(self.rays, self.high)
+        return [
+            Crossing(loss(c, heavy), float(s), v, float(np.linalg.norm(v)))
+            for c, s, v in zip(beyond, sign, u, strict=True)
+        ]
