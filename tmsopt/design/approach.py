@@ -15,6 +15,9 @@ from tmsopt.design.polish import polisher
 
 Array = NDArray[np.float64]
 
+ALIKE = 1e-9
+"""Relative difference of distances that is no difference."""
+
 _ITERATIONS = 200
 _FEASIBLE = 1e-10  # violation of scaled coefficients, up to which a point counts as on the edge
 _STATIONARY = 1e-8
@@ -38,8 +41,8 @@ class Approach:
         return float(np.linalg.norm(self.u))
 
 
-def approach(place: Place, edge: Edge, sign: float, size: float) -> Callable[[Array], Approach | None]:
-    """A function from a start to a nearest point of an edge; None where it ends elsewhere.
+def approach(place: Place, edge: Edge, sign: float, size: float) -> Callable[[Array, float], Approach | None]:
+    """A function from a start, and a distance to beat, to a nearest point of an edge; None where it ends elsewhere.
 
     Args:
         sign: sign of a0 on the side of the edge that is stable or heavily damped.
@@ -49,11 +52,14 @@ def approach(place: Place, edge: Edge, sign: float, size: float) -> Callable[[Ar
     run, polish = ipopt(nlp, max_iterations=_ITERATIONS), polisher(nlp)
     n = len(place.weights)
 
-    def from_start(u: Array) -> Approach | None:
+    def from_start(u: Array, below: float) -> Approach | None:
         c = sign * place.space.coefficients(u)
-        if not np.all(np.isfinite(c)):
+        if not (np.all(np.isfinite(c)) and c.any()):
             return None
-        point = polish(run(np.concatenate([u / size, edge.guess(c)])))
+        raw = run(np.concatenate([u / size, edge.guess(c)]))
+        if float(np.linalg.norm(raw.x[:n])) * size >= below * (1 - ALIKE):
+            return None
+        point = polish(raw)
         if not point.violation <= _FEASIBLE:
             return None
         u_found = np.clip(point.x[:n] * size, place.space.lower, place.space.upper)
@@ -75,7 +81,7 @@ def _nlp(place: Place, edge: Edge, sign: float, size: float) -> NLP:
         variables=(*place.weights, *edge.unknowns),
         functions=ca.Function("nlp", [x], [f, g]),
         lower=(*(place.space.lower / size).tolist(), *[0.0] * extra),
-        upper=(*(place.space.upper / size).tolist(), *[np.inf] * extra),
+        upper=(*(place.space.upper / size).tolist(), *[1.0 if name == "e" else np.inf for name in edge.unknowns]),
         rows=(*[edge.name] * len(equations), *["others"] * len(others)),
         row_lower=(0.0,) * (len(equations) + len(others)),
         row_upper=(*[0.0] * len(equations), *[np.inf] * len(others)),

@@ -25,12 +25,14 @@ _LEAD = 1e-9  # of the largest coefficient: a smaller a0 is replaced before root
 
 @dataclass(frozen=True)
 class Edge:
-    """A piece of a boundary: the quartics for which the equations have nonnegative unknowns.
+    """A piece of a boundary: the quartics for which the equations have unknowns e in [0, 1] and A, B, C ≥ 0.
+
+    A factor with unknown roots is e s² + 1 − e, or e s + 1 − e, which reaches infinity at e = 0, times A s² + B s + C.
 
     Attributes:
         name: ``weave``, ``capsize``, ``infinity``, ``EP2``, and ``capsize, real`` and ``infinity, real``, where
             all other roots are real.
-        unknowns: names of factor coefficients, each ≥ 0.
+        unknowns: names of factor coefficients.
         equations: expressions of the coefficients and the unknowns that are 0.
         nonnegative: expressions that are ≥ 0: the other roots are not right of the axis, or are real.
         guess: unknowns to start from, for numeric coefficients.
@@ -44,23 +46,35 @@ class Edge:
 
 
 def _difference(c: Sequence[Any], *factors: Sequence[Any]) -> list[Any]:
-    """Coefficients less those of a product that has the same leading one."""
-    return [a - b for a, b in zip(c, product(*factors), strict=True)][1:]
+    """Coefficients less those of a product."""
+    return [a - b for a, b in zip(c, product(*factors), strict=True)]
 
 
-def _real(lead: Any, u: Sequence[Any]) -> Any:
-    """≥ 0 where lead s² + B s + C has real roots; B and C are the last unknowns."""
-    return u[-2] * u[-2] - 4 * lead * u[-1]
+def _linear(u: Sequence[Any]) -> list[Any]:
+    """e s + 1 − e, with 0 ≤ e ≤ 1: every root ≤ 0, infinity included."""
+    return [u[0], 1 - u[0]]
+
+
+def _real(u: Sequence[Any]) -> Any:
+    """≥ 0 where A s² + B s + C has real roots."""
+    return u[2] * u[2] - 4 * u[1] * u[3]
+
+
+def _unknowns(x: float, c: Array, divisor: Callable[[float], list[float]]) -> list[float]:
+    """e for a root −x, or for W = x, and the quotient of c by the factor with that e."""
+    e = 1 / (1 + max(x, 0.0))
+    factor = np.array(divisor(e))
+    columns = np.stack([np.convolve(factor, unit) for unit in np.eye(len(c) - len(factor) + 1)], axis=1)
+    return [e, *np.linalg.lstsq(columns, c, rcond=None)[0].tolist()]
 
 
 def _weave_guess(c: Array) -> list[float]:
     """The pair whose W = c3/c1, as on the boundary."""
-    W = max(float(c[3] / c[1]), 0.0) if c[1] else 0.0
-    return [W, float(c[1]), float(c[2] - c[0] * W)]
+    return _unknowns(float(c[3] / c[1]) if c[1] else 0.0, c, lambda e: [e, 0.0, 1 - e])
 
 
 def _regular(c: Array) -> Array:
-    size = float(np.abs(c).max())
+    size = float(np.abs(c).max()) or 1.0
     return np.concatenate([[c[0] if abs(c[0]) > _LEAD * size else _LEAD * size], c[1:]])
 
 
@@ -71,16 +85,13 @@ def _double_guess(c: Array) -> list[float]:
     pattern = PATTERNS["EP2"]
     guesses = [g for g in pattern.guesses(found) if g[0] < 0] or [[float(found.mean().real), 1.0, 0.25]]
     size = np.abs(lead / lead[0]) + 1e-300
-    r, b, d = min(guesses, key=lambda g: float(np.abs((np.array(pattern.monic(g)) - lead / lead[0]) / size).max()))
-    return [-r, float(lead[0] * b), float(lead[0] * d)]
+    r = min(guesses, key=lambda g: float(np.abs((np.array(pattern.monic(g)) - lead / lead[0]) / size).max()))[0]
+    return _unknowns(-r, c, lambda e: [e * e, 2 * e * (1 - e), (1 - e) ** 2])
 
 
 def _split_guess(c: Array) -> list[float]:
-    """The cubic c as (s + d)(c0 s² + B s + C), d from its rightmost root."""
-    lead = _regular(c)
-    d = max(float(-roots(lead).real.max()), 0.0)
-    B = float(lead[1] - lead[0] * d)
-    return [d, B, float(lead[2] - B * d)]
+    """A cubic with its rightmost root split off."""
+    return _unknowns(float(-roots(_regular(c)).real.max()), c, lambda e: [e, 1 - e])
 
 
 EDGES: Mapping[str, Edge] = MappingProxyType(
@@ -89,9 +100,9 @@ EDGES: Mapping[str, Edge] = MappingProxyType(
         for e in (
             Edge(
                 "weave",
-                ("W", "B", "C"),
-                lambda c, u: _difference(c, [1, 0, u[0]], [c[0], u[1], u[2]]),
-                lambda c, u: [c[0]],
+                ("e", "A", "B", "C"),
+                lambda c, u: _difference(c, [u[0], 0, 1 - u[0]], u[1:]),
+                lambda c, u: [],
                 _weave_guess,
             ),
             # A cubic is in the closure of the stable ones where its coefficients and c1 c2 − c0 c3 are ≥ 0.
@@ -111,23 +122,23 @@ EDGES: Mapping[str, Edge] = MappingProxyType(
             ),
             Edge(
                 "EP2",
-                ("x", "B", "C"),
-                lambda c, u: _difference(c, [1, u[0]], [1, u[0]], [c[0], u[1], u[2]]),
-                lambda c, u: [c[0], _real(c[0], u)],
+                ("e", "A", "B", "C"),
+                lambda c, u: _difference(c, _linear(u), _linear(u), u[1:]),
+                lambda c, u: [_real(u)],
                 _double_guess,
             ),
             Edge(
                 "capsize, real",
-                ("x", "B", "C"),
-                lambda c, u: [c[4], *_difference(c[:4], [1, u[0]], [c[0], u[1], u[2]])],
-                lambda c, u: [c[0], _real(c[0], u)],
+                ("e", "A", "B", "C"),
+                lambda c, u: [c[4], *_difference(c[:4], _linear(u), u[1:])],
+                lambda c, u: [_real(u)],
                 lambda c: _split_guess(c[:4]),
             ),
             Edge(
                 "infinity, real",
-                ("x", "B", "C"),
-                lambda c, u: [c[0], *_difference(c[1:], [1, u[0]], [c[1], u[1], u[2]])],
-                lambda c, u: [c[1], _real(c[1], u)],
+                ("e", "A", "B", "C"),
+                lambda c, u: [c[0], *_difference(c[1:], _linear(u), u[1:])],
+                lambda c, u: [_real(u)],
                 lambda c: _split_guess(c[1:]),
             ),
         )
@@ -159,13 +170,14 @@ def heavily_damped(c: Array) -> Truth:
 
 def lies_on(c: Array, edge: Edge) -> bool:
     """Whether a quartic, signed as on the inner side, is on an edge within 1e-10 of its coefficients."""
-    size = float(np.abs(c).max())
+    size = float(np.abs(c).max()) or 1.0
     if edge.name.startswith("capsize"):
         rest, on = c[:4], abs(c[4])
     elif edge.name.startswith("infinity"):
         rest, on = c[1:], abs(c[0])
     else:
-        return pattern_distance(PATTERNS[edge.name], c) <= MATCHED
+        # Inverted roots keep both patterns, and keep clear of infinity.
+        return pattern_distance(PATTERNS[edge.name], c if abs(c[0]) >= abs(c[4]) else c[::-1]) <= MATCHED
     return bool(on <= MATCHED * size and np.all(rest >= -MATCHED * size))
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.approach import Approach, approach
+from tmsopt.design.approach import ALIKE, Approach, approach
 from tmsopt.design.edges import EDGES, KINDS, Edge, lies_on
 from tmsopt.design.errors import Fault, InputError, suggest
 from tmsopt.design.frozen import Table
@@ -23,7 +23,6 @@ STABILITY = ("weave", "capsize", "infinity")
 """The boundaries of stability: a pair on the imaginary axis, a root 0, a root through infinity."""
 
 _ROUNDS = 3
-_ALIKE = 1e-9  # relative difference of distances that is no difference
 
 
 @dataclass(frozen=True)
@@ -184,7 +183,7 @@ def _nearest(place: Place, seen: list[Crossing], kind: str) -> Nearest:
     best = Approach(np.zeros(0), False)
     for edge, sign, starts in _pieces(place, mine, kind):
         best = min(best, _best(place, EDGES[edge], sign, starts), key=_length)
-    if mine and mine[0].distance < _length(best) * (1 - _ALIKE):
+    if mine and mine[0].distance < _length(best) * (1 - ALIKE):
         best = Approach(mine[0].u, False)
     if not best.u.size:
         return Nearest(kind)
@@ -222,12 +221,8 @@ def _best(place: Place, edge: Edge, sign: float, starts: list[Array]) -> Approac
     run = approach(place, edge, sign, size)
     for _ in range(_ROUNDS):
         for u in starts:
-            found = run(u)
-            if (
-                found is not None
-                and lies_on(place.space.coefficients(found.u) * sign, edge)
-                and _length(found) < _length(best)
-            ):
+            found = run(u, _length(best))
+            if found is not None and lies_on(sign * place.space.coefficients(found.u), edge):
                 best = found
         if not best.u.size:
             break

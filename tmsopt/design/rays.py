@@ -14,7 +14,7 @@ Truth = NDArray[np.bool_]
 
 _DIRECTIONS = 300
 _RADII = np.concatenate([[0.0], np.geomspace(1e-4, 4.0, 36)])
-_COARSE, _FINE = 10, 50  # halvings of all crossings, and of those that are kept
+_COARSE, _FINE = (16, 2), (64, 8)  # parts and times: all crossings, and those that are kept to all digits
 _KEPT = 4
 _ALIKE = 0.9  # cosine between directions that lead to one start
 _POINTS = 400  # looked at on the straight way to a nearest point
@@ -75,13 +75,13 @@ def along(space: Space, rays: Array, t: Array) -> list[Crossing]:
         ray, step = np.nonzero(inside[:, 1:] != inside[:, :-1])
         if not ray.size:
             continue
-        all_of = _Bracket(space, test, rays[ray], t[ray, step], t[ray, step + 1], inside[ray, step]).halved(_COARSE)
+        all_of = _Bracket(space, test, rays[ray], t[ray, step], t[ray, step + 1], inside[ray, step]).narrowed(*_COARSE)
         names = all_of.names(heavy)
         distance = np.linalg.norm(space.along(all_of.rays, all_of.high), axis=1)
         unit = all_of.rays / np.linalg.norm(all_of.rays, axis=1, keepdims=True)
         for name in sorted(set(names)):
             rows = [k for k in np.argsort(distance, kind="stable") if names[k] == name]
-            found += all_of.rows(_different(unit, rows)).halved(_FINE).crossings(heavy)
+            found += all_of.rows(_different(unit, rows)).narrowed(*_FINE).crossings(heavy)
     return sorted(found, key=lambda x: x.distance)
 
 
@@ -139,16 +139,19 @@ class _Bracket:
         return replace(self, rays=self.rays[k], low=self.low[k], high=self.high[k], inside=self.inside[k])
 
     def at(self, t: Array) -> Array:
-        """Coefficients."""
-        return self.space.coefficients(self.space.along(self.rays, t))
+        """Coefficients at t of shape (rays,) or (rays, points)."""
+        rays = self.rays if t.ndim == 1 else self.rays[:, None, :]
+        return self.space.coefficients(self.space.along(rays, t))
 
-    def halved(self, times: int) -> "_Bracket":
-        """Bisected, until nothing lies between the ends."""
+    def narrowed(self, parts: int, times: int) -> "_Bracket":
+        """The first change within each, looked for at a few points at once: calls cost more than points."""
         low, high = self.low, self.high
+        every = np.arange(len(low))
         for _ in range(times):
-            middle = (low + high) / 2
-            same = self.test(self.at(middle)) == self.inside
-            low, high = np.where(same, middle, low), np.where(same, high, middle)
+            t = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, parts + 1)
+            other = self.test(self.at(t[:, 1:-1])) != self.inside[:, None]
+            first = np.where(other.any(axis=1), other.argmax(axis=1) + 1, parts)
+            low, high = t[every, first - 1], t[every, first]
         return replace(self, low=low, high=high)
 
     def sides(self) -> tuple[Array, Array]:
