@@ -7,6 +7,7 @@ if TYPE_CHECKING:
     from tmsopt import laws, models, roots
     from tmsopt.design.errors import InputError
     from tmsopt.design.files import load
+    from tmsopt.design.nearest import Nearest, Robustness, nearest, robustness
     from tmsopt.design.problem import Problem
     from tmsopt.design.solution import NotSolved, Solution
     from tmsopt.design.solve import solve
@@ -27,8 +28,10 @@ __all__ = [
     "Domain",
     "Explanation",
     "InputError",
+    "Nearest",
     "NotSolved",
     "Problem",
+    "Robustness",
     "Solution",
     "Swallowtail",
     "Trace",
@@ -39,6 +42,8 @@ __all__ = [
     "laws",
     "load",
     "models",
+    "nearest",
+    "robustness",
     "roots",
     "solve",
     "swallowtail",
@@ -53,8 +58,10 @@ _HOMES = {
     "Domain": "tmsopt.study.domain",
     "Explanation": "tmsopt.study.explain",
     "InputError": "tmsopt.design.errors",
+    "Nearest": "tmsopt.design.nearest",
     "NotSolved": "tmsopt.design.solution",
     "Problem": "tmsopt.design.problem",
+    "Robustness": "tmsopt.design.nearest",
     "Solution": "tmsopt.design.solution",
     "Swallowtail": "tmsopt.study.swallowtail",
     "Trace": "tmsopt.study.branch",
@@ -63,6 +70,8 @@ _HOMES = {
     "domain": "tmsopt.study.domain",
     "explain": "tmsopt.study.explain",
     "load": "tmsopt.design.files",
+    "nearest": "tmsopt.design.nearest",
+    "robustness": "tmsopt.design.nearest",
     "solve": "tmsopt.design.solve",
     "swallowtail": "tmsopt.study.swallowtail",
     "trace": "tmsopt.study.trace",

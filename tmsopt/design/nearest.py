@@ -70,7 +70,8 @@ class Robustness:
     Attributes:
         stable: whether all roots are left of the imaginary axis.
         heavily_damped: whether all roots are real and negative, multiple ones included.
-        weights: the unit of change of each parameter.
+        parameters: every parameter of the design.
+        weights: the unit of change of each parameter that may change.
         weave, capsize, infinity: nearest points of the boundaries of stability.
         heavy_damping: nearest point of the edge of heavy damping: the way out of it for a heavily damped design, the
             way into it for another; distance 0 on the edge, as for an EP4.
@@ -78,6 +79,7 @@ class Robustness:
 
     stable: bool
     heavily_damped: bool
+    parameters: Table[float]
     weights: Table[float]
     weave: Nearest
     capsize: Nearest
@@ -95,6 +97,11 @@ class Robustness:
         return self.limit.distance if self.stable else 0.0
 
     @property
+    def relative(self) -> bool:
+        """Whether the distances are of relative changes."""
+        return all(weight == abs(self.parameters[n]) for n, weight in self.weights.items())
+
+    @property
     def to_stability(self) -> float:
         """Least change that brings stability; 0 for a design that is stable."""
         return 0.0 if self.stable else self.limit.distance
@@ -107,6 +114,7 @@ class Robustness:
             "radius": _number(self.radius),
             "to_stability": _number(self.to_stability),
             "limit": self.limit.kind if self.limit.found else None,
+            "parameters": dict(self.parameters),
             "weights": dict(self.weights),
             "nearest": {n.kind: n.to_json() for n in (self.weave, self.capsize, self.infinity, self.heavy_damping)},
         }
@@ -158,7 +166,11 @@ def robustness(
     place = _place(design, parameters, weights)
     seen = crossings(place.space)
     return Robustness(
-        place.stable, place.heavily_damped, Table(place.weights), *(_nearest(place, seen, kind) for kind in KINDS)
+        place.stable,
+        place.heavily_damped,
+        Table(place.parameters),
+        Table(place.weights),
+        *(_nearest(place, seen, kind) for kind in KINDS),
     )
 
 
