@@ -24,7 +24,7 @@ KINDS = ("weave", "capsize", "infinity", "heavy damping")
 FORWARD = dict(zip(NAMES, (3.0, 0.1, 1.3, 1.0, -0.4, -0.2, 0.3), strict=True))
 BACKWARD = dict(zip(NAMES, (2.24, 0.25, 0.44, 1.0, -0.2, -0.9, -0.1), strict=True))
 OFF = dict(zip(NAMES, (3.5, 20.8, 1.19, 1.02, -0.4, -0.2, 0.85), strict=True))
-DAMPED = dict(zip(NAMES, (2.2365, 0.1, 1.414, 1.0, -0.4, -0.2, 0.4105), strict=True))
+DAMPED = dict(zip(NAMES, (2.469, 0.1, 1.318, 1.0, -0.4, -0.2, 0.133), strict=True))
 DESIGNS = {"forward": FORWARD, "backward": BACKWARD, "off the law": OFF, "heavily damped": DAMPED}
 
 
@@ -81,21 +81,6 @@ def test_only_the_speed_varies(name):
     assert not found.infinity.found
 
 
-def test_where_every_speed_is_stable_weave_is_at_rest():
-    """Fr_c² < 0: stable for all Fr > 0 and not at 0, where a1 = a3 = 0 leaves roots in pairs ±s."""
-    design = next(
-        d
-        for mu in (0.5, 1, 2, 5, 20)
-        for chi_H in (0.8, 0.9, 1.1, 1.2)
-        for chi_B in (0.6, 0.8, 1.1, 1.3, 1.6)
-        for tilt in (-0.6, -0.3, 0.3, 0.6)
-        for zeta_B in (-0.4, -0.1)
-        if stable(d := dict(zip(NAMES, (1e-2, mu, chi_B, chi_H, zeta_B, -0.2, tilt), strict=True)))
-        and laws.flus(**{n: v for n, v in d.items() if n != "Fr"}) < 0
-    )
-    assert nearest(problem(design), "weave", weights={"Fr": 0.01}).distance == pytest.approx(1, rel=1e-12)
-
-
 def test_only_the_tilt_varies_on_the_law():
     """χ_H = 1: a4 = −ζ_B T and a0 = −ζ_H T ζ_B² (copo), both 0 exactly at λ_s = 0."""
     for design in (FORWARD, BACKWARD):
@@ -147,9 +132,9 @@ def test_no_ray_finds_a_nearer_change(name, weighted):
 
 
 def _damped(columns):
-    """By the roots: far from multiple ones compared with the radii used, but for a share of 1e-9, left to rounding."""
+    """By the roots: rounding scatters a double root by 1e-8, and 1e-6 beyond the edge it has parted by 1e-4."""
     z = roots(coefficients(columns))
-    return (np.abs(z.imag).max(axis=-1) <= 1e-3 * np.abs(z).max(axis=-1)) & (z.real.max(axis=-1) < 0)
+    return (np.abs(z.imag).max(axis=-1) <= 1e-6 * np.abs(z).max(axis=-1)) & (z.real.max(axis=-1) < 0)
 
 
 @pytest.mark.parametrize("name", DESIGNS)
@@ -170,8 +155,9 @@ def test_first_order_condition(name, kind):
     c = [float(x.subs(at)) for x in a]
     size = max(map(abs, c))
     assert abs(float(tests[kind].subs(at))) <= 1e-10 * size ** (3 if kind == "weave" else 1)
-    if sum(abs(x) < 1e-6 * size for x in c) > (kind != "weave"):
-        return  # a corner: two conditions hold
+    vanishing = [abs(float(t.subs(at))) <= 1e-8 * size ** (3 if n == "weave" else 1) for n, t in tests.items()]
+    if sum(vanishing) > 1:
+        return  # a corner: the displacement lies between two normals
     u = np.array(list(found.direction.values()))
     slope = np.array(
         [
@@ -220,7 +206,7 @@ def test_just_inside_and_just_outside_heavy_damping():
         for n, v in DAMPED.items()
         if n not in ("Fr", "lambda_s")
     }
-    tangent = sympy.Float(math.tan(DAMPED["lambda_s"]), 40)
+    tangent = sympy.Rational(math.tan(DAMPED["lambda_s"]))
     p = sympy.Poly(sum(c.subs(fixed).subs(symbols["T"], tangent) * s ** (4 - k) for k, c in enumerate(a)), s)
     edges = [
         float(sympy.re(x)) for x in sympy.Poly(p.discriminant(), symbols["Fr"]).nroots(n=30) if abs(sympy.im(x)) < 1e-12

@@ -181,10 +181,9 @@ def lies_on(c: Array, edge: Edge) -> bool:
     return bool(on <= MATCHED * size and np.all(rest >= -MATCHED * size))
 
 
-def loss(c: Array, heavy: bool) -> str:
-    """The edge that a quartic just beyond it has crossed, c signed as on the other side."""
-    if c[4] <= 0:
-        return "capsize, real" if heavy else "capsize"
-    if c[0] <= 0:
-        return "infinity, real" if heavy else "infinity"
-    return "EP2" if heavy else "weave"
+def losses(c: Array, heavy: bool) -> tuple[str, ...]:
+    """The edges that a quartic just beyond them has crossed, c signed as on the other side."""
+    passed = [n for n, k in (("capsize", 4), ("infinity", 0)) if c[k] <= 0]
+    if heavy:
+        return tuple(f"{n}, real" for n in passed) or ("EP2",)
+    return tuple(passed) or ("weave",)

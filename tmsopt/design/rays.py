@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.edges import heavily_damped, loss
+from tmsopt.design.edges import heavily_damped, losses
 from tmsopt.roots import discriminant, hurwitz_minors, is_stable, roots
 
 Array = NDArray[np.float64]
@@ -79,8 +79,8 @@ def along(space: Space, rays: Array, t: Array) -> list[Crossing]:
         names = all_of.names(heavy)
         distance = np.linalg.norm(space.along(all_of.rays, all_of.high), axis=1)
         unit = all_of.rays / np.linalg.norm(all_of.rays, axis=1, keepdims=True)
-        for name in sorted(set(names)):
-            rows = [k for k in np.argsort(distance, kind="stable") if names[k] == name]
+        for name in sorted({n for each in names for n in each}):
+            rows = [k for k in np.argsort(distance, kind="stable") if name in names[k]]
             found += all_of.rows(_different(unit, rows)).narrowed(*_FINE).crossings(heavy)
     return sorted(found, key=lambda x: x.distance)
 
@@ -101,7 +101,9 @@ def most_damped(space: Space, sign: float, seed: int = 0) -> list[Array]:
     rays = directions(space, seed)
     u = space.along(rays[:, None, :], np.broadcast_to(_AROUND, (len(rays), len(_AROUND)))).reshape(-1, rays.shape[1])
     c = sign * space.coefficients(u)
-    u, c = (part[np.all(np.isfinite(c), axis=1) & (c[:, 0] > 0) & is_stable(c)] for part in (u, c))
+    u, c = (
+        part[np.any(u != 0, axis=1) & np.all(np.isfinite(c), axis=1) & (c[:, 0] > 0) & is_stable(c)] for part in (u, c)
+    )
     ratio = np.min(-(z := roots(c)).real / np.abs(z), axis=1) if len(c) else np.zeros(0)
     rows = np.argsort(-ratio, kind="stable").tolist()
     unit = u / np.linalg.norm(u, axis=1, keepdims=True)
@@ -160,15 +162,16 @@ class _Bracket:
         sign = np.sign(within[:, 0])
         return sign[:, None] * beyond, sign
 
-    def names(self, heavy: bool) -> list[str]:
-        """Name of the edge that each has crossed."""
-        return [loss(c, heavy) for c in self.sides()[0]]
+    def names(self, heavy: bool) -> list[tuple[str, ...]]:
+        """Names of the edges that each has crossed."""
+        return [losses(c, heavy) for c in self.sides()[0]]
 
     def crossings(self, heavy: bool) -> list[Crossing]:
         """As data."""
         beyond, sign = self.sides()
         u = self.space.along(self.rays, self.high)
         return [
-            Crossing(loss(c, heavy), float(s), v, float(np.linalg.norm(v)))
-            for c, s, v in zip(beyond, sign, u, strict=True)
+            Crossing(name, float(sign[k]), u[k], float(np.linalg.norm(u[k])))
+            for k, c in enumerate(beyond)
+            for name in losses(c, heavy)
         ]
