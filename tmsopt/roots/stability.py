@@ -10,13 +10,17 @@ from tmsopt.roots.polynomial import Coefficients, determinant
 
 def hurwitz_minors(coefficients: Coefficients) -> list[Any]:
     """Leading principal minors Δ1 … Δn of the Hurwitz matrix of a polynomial of degree n, any numbers."""
+    return [_hurwitz_minor(coefficients, m) for m in range(1, len(coefficients))]
+
+
+def _hurwitz_minor(coefficients: Coefficients, m: int) -> Any:
     n = len(coefficients) - 1
 
     def entry(i: int, j: int) -> list[Any]:
         k = 2 * (j + 1) - (i + 1)
         return [coefficients[k]] if 0 <= k <= n else [0]
 
-    return [determinant([[entry(i, j) for j in range(m)] for i in range(m)])[0] for m in range(1, n + 1)]
+    return determinant([[entry(i, j) for j in range(m)] for i in range(m)])[0]
 
 
 def lienard_chipart(coefficients: Coefficients) -> list[Any]:
@@ -26,8 +30,7 @@ def lienard_chipart(coefficients: Coefficients) -> list[Any]:
     of a0 first.
     """
     n = len(coefficients) - 1
-    minors = hurwitz_minors(coefficients)
-    return [coefficients[k] for k in range(n, 0, -2)] + [minors[m - 1] for m in range(n - 1, 0, -2)]
+    return [coefficients[k] for k in range(n, 0, -2)] + [_hurwitz_minor(coefficients, m) for m in range(n - 1, 0, -2)]
 
 
 def is_stable(coefficients: ArrayLike) -> NDArray[np.bool_]:
