@@ -226,7 +226,7 @@ def test_an_unstable_design_has_no_radius():
     assert "not stable" in robustness_line(found)
 
 
-@pytest.mark.parametrize("name", DESIGNS)
+@pytest.mark.parametrize("name", ["backward", "heavily damped"])
 def test_units_do_not_matter(name):
     """Shapes and speed only: w, m_B and g stay, so relative changes of SI and dimensionless parameters are the same."""
     design = DESIGNS[name]

@@ -165,12 +165,18 @@ def robustness(
     """
     place = _place(design, parameters, weights)
     seen = crossings(place.space)
+    found = [_nearest(place, seen, kind) for kind in KINDS]
+    limit = min((n for n in found if n.kind in STABILITY), key=lambda n: n.distance)
+    if limit.found and not limit.direct:  # another boundary is nearer, and no ray met it
+        u = np.array([limit.direction[n] for n in place.weights])
+        seen = sorted([*seen, *between(place.space, u)], key=lambda c: c.distance)
+        found = [_nearest(place, seen, kind) for kind in KINDS]
     return Robustness(
         place.stable,
         place.heavily_damped,
         Table(place.parameters),
         Table(place.weights),
-        *(_nearest(place, seen, kind) for kind in KINDS),
+        *found,
     )
 
 
