@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.edges import Edge
-from tmsopt.design.formulations import NLP
 from tmsopt.design.ipopt import ipopt
+from tmsopt.design.nlp import NLP
 from tmsopt.design.place import Place
 from tmsopt.design.polish import polisher
 
@@ -59,7 +59,7 @@ def approach(place: Place, edge: Edge, sign: float, size: float) -> Callable[[Ar
         raw = run(np.concatenate([u / size, edge.guess(c)]))
         if float(np.linalg.norm(raw.x[:n])) * size >= below * (1 - ALIKE):
             return None
-        point = polish(raw)
+        point = polish(raw, nlp)
         if not point.violation <= _FEASIBLE:
             return None
         u_found = np.clip(point.x[:n] * size, place.space.lower, place.space.upper)

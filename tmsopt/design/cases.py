@@ -64,7 +64,7 @@ def weight_of(name: str, value: Any, weights: Mapping[str, float]) -> Any:
     """Weight of a parameter: the given one, else its own size, or 1 where it is fixed at 0."""
     if name in weights:
         return weights[name]
-    return 1.0 if isinstance(value, float | int) and value == 0 else value
+    return 1.0 if isinstance(value, float | int) and value == 0 else abs(value)
 
 
 def points_of(scenario: Scenario) -> tuple[float, ...]:

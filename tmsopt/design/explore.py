@@ -10,18 +10,21 @@ from tmsopt.design.cases import Case
 from tmsopt.design.elastic import least_violating
 from tmsopt.design.finding import Finding, Trial, counted, found, honest, survivor
 from tmsopt.design.formulations import design_of, formulate
+from tmsopt.design.frozen import Table
 from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import RADIUS
 from tmsopt.design.recheck import FEASIBLE, recheck
 from tmsopt.design.search import Candidate, follow, same, search
 from tmsopt.design.sides import Side
 from tmsopt.design.solution import Starts
 from tmsopt.design.worst import worst_cases
 
-_ROUNDS = 16
+_ROUNDS = 40
 """Times that cases are added; each time the worst one between them shrinks to its square, roughly."""
 
 _LEADERS = 3  # optima followed when cases are added: a better one may do worse between the old cases
+_NEARER = 1e-7  # share of the radius
 _FAR = 1e8  # of a variable: a root quantity that nothing holds runs away
 
 Progress = Callable[[int, int], None]
@@ -120,11 +123,12 @@ def _overclaims(problem: Problem, nlp: NLP, candidates: Sequence[Candidate]) -> 
         return any(float(np.abs(c.run.x).max()) > _FAR for c in candidates)
     best = min(feasible, key=lambda c: c.objective)
     trial = survivor(problem, nlp, [best])
-    return trial is not None and not (honest(problem, trial) and _sound(trial))
-
-
-def _sound(trial: Trial) -> bool:
-    return sum(trial.checked.violations.values()) <= math.sqrt(FEASIBLE)
+    if trial is None:
+        return False
+    far = {n for n, c in problem.conditions.items() if RADIUS in c.names}  # these are for more directions to settle
+    excess = sum(v for n, v in trial.checked.violations.items() if n not in far)
+    objective = problem.objective is not None and RADIUS in problem.objective.names
+    return excess > math.sqrt(FEASIBLE) or not (objective or honest(problem, trial))
 
 
 def _covered(
@@ -141,7 +145,7 @@ def _covered(
     for _ in range(_ROUNDS):
         if trial is None:
             return None
-        more = _uncovered(problem, trial)
+        more = [*_uncovered(problem, trial), *_nearer(problem, nlp, trial)]
         if not more:
             break
         leaders = _leaders(problem, candidates)
@@ -174,6 +178,22 @@ def _uncovered(problem: Problem, trial: Trial) -> list[Case]:
         if not excess <= FEASIBLE * (1 + abs(worst.value)) and worst.case not in more:
             more.append(worst.case)
     return more
+
+
+def _nearer(problem: Problem, nlp: NLP, trial: Trial) -> list[Case]:
+    """The direction in which stability is lost before the radius that the design claims."""
+    around = trial.checked.around
+    if around is None or RADIUS not in nlp.variables:
+        return []
+    claimed = float(trial.point.x[nlp.variables.index(RADIUS)])
+    if around.radius >= claimed * (1 - _NEARER) or not around.limit.found:
+        return []
+    length = around.limit.distance or 1.0
+    step = {n: u / length for n, u in around.limit.direction.items()}
+    known = [c.direction for c in nlp.cases]
+    if any(all(abs(step[n] - k.get(n, 0.0)) < _NEARER for n in step) for k in known):  # stable again further out
+        step = {n: u * around.radius / claimed * (1 + _NEARER) for n, u in step.items()}
+    return [Case(direction=Table(step))]
 
 
 def _violated(problem: Problem, name: str, difference: float) -> bool:

@@ -18,7 +18,7 @@ from tmsopt.design.expression import Expression
 from tmsopt.design.lifts import lift_abscissa, lift_damping_ratio, lift_quantity, lift_radius
 from tmsopt.design.nlp import NLP, Factor, Lift, Touch
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import RADIUS, ROOT_QUANTITIES
+from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_QUANTITIES
 from tmsopt.design.variation import varies
 from tmsopt.models import Quantity, Values
 from tmsopt.roots import Pattern
@@ -139,8 +139,7 @@ class _Builder:
         """Everything derived from the design in one case."""
         of = self.problem.parameter_set
         lift = partial(self._lift, case)
-        radius = Quantity(RADIUS, "1", "robustness radius", "", lambda v: np.nan)
-        return Values(self.problem.model, of, parameters, extra=(*ROOT_QUANTITIES, radius), lift=lift)
+        return Values(self.problem.model, of, parameters, extra=(*ROOT_QUANTITIES, NO_RADIUS), lift=lift)
 
     def variable(self, name: str, lower: float = -np.inf, upper: float = np.inf) -> Any:
         symbol = ca.SX.sym(name)

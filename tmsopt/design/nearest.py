@@ -140,9 +140,9 @@ def nearest(
     Args:
         design: a solution, or a problem with `parameters`.
         parameters: a value per parameter (rad, SI units); by default those of the solution, or all fixed ones.
-        weights: parameter → change that counts as 1; by default |x0| for every parameter, fixed ones too, except those
-            with a default value (g), so that distances are relative. Where x0 = 0 it is 1, or for a parameter with a
-            unit the largest of the same unit.
+        weights: parameter → change that counts as 1; by default those of the problem, or else |x0| for every
+            parameter, fixed ones too, except those with a default value (g), so that distances are relative. Where
+            x0 = 0 it is 1, or for a parameter with a unit the largest of the same unit.
 
     Raises:
         InputError: for another pattern, or parameters or weights that are not accepted.
@@ -183,9 +183,11 @@ def robustness(
 def _place(
     design: Solution | Problem, parameters: Mapping[str, float] | None, weights: Mapping[str, float] | None
 ) -> Place:
+    problem = design.problem if isinstance(design, Solution) else checked(design)
+    if weights is None and problem.weights:
+        weights = problem.weights
     if isinstance(design, Solution):
-        return placed(design.problem, design.parameters if parameters is None else parameters, weights)
-    problem = checked(design)
+        return placed(problem, design.parameters if parameters is None else parameters, weights)
     if parameters is None and problem.free:
         message = f"missing; the problem frees {' '.join(problem.free)}: give their values, or a solution"
         raise InputError([Fault(message, ("parameters",))])

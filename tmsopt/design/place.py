@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.errors import Fault, InputError, suggest
-from tmsopt.design.problem import STRUCTURE_TOLERANCE, Problem
+from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import STRUCTURE_TOLERANCE
 from tmsopt.design.rays import Space
 from tmsopt.models import Range
 from tmsopt.roots import PATTERNS, is_stable, pattern_distance, real_roots, roots

@@ -8,7 +8,7 @@ from typing import Any
 from tmsopt.design.cases import Band, Case, Scenario, as_scenario, first_cases, middle_of
 from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.expression import Expression, parse_comparison, parse_value
-from tmsopt.design.quantities import RADIUS, ROOT_NAMES, ROOT_QUANTITIES, STRUCTURE
+from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTITIES, STRUCTURE
 from tmsopt.design.validate import faults, guess_parameter_set
 from tmsopt.models import Model, ParameterSet, Values
 from tmsopt.roots import PATTERNS, Pattern
@@ -78,9 +78,13 @@ class Problem:
     @cached_property
     def cases(self) -> tuple[Case, ...]:
         """The cases that a search starts with; none for a problem that asks about one design alone."""
-        asked = [e for e in (self.objective, *self.conditions.values()) if e]
-        far = weighted(self.parameter_set, self.weights) if any(RADIUS in e.names for e in asked) else ()
+        far = weighted(self.parameter_set, self.weights) if self.asks_radius else ()
         return first_cases(self.variations, self.tolerances, far)
+
+    @property
+    def asks_radius(self) -> bool:
+        """Whether the objective or a constraint names the robustness radius."""
+        return any(RADIUS in e.names for e in (self.objective, *self.conditions.values()) if e)
 
     @cached_property
     def parameter_set(self) -> ParameterSet:
@@ -120,7 +124,7 @@ class Problem:
 
     def values(self, parameters: Mapping[str, float]) -> Values:
         """Everything derived from a numeric design, root quantities included."""
-        return Values(self.model, self.parameter_set, parameters, extra=(*ROOT_QUANTITIES, STRUCTURE))
+        return Values(self.model, self.parameter_set, parameters, extra=(*ROOT_QUANTITIES, NO_RADIUS, STRUCTURE))
 
     def ordered(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Every parameter in the model's order: the given values of the free ones, and the fixed ones."""

@@ -46,6 +46,9 @@ STRUCTURE = Quantity("structure", "", "structure of the roots, multiple roots re
 RADIUS = "radius"
 """Distance to the nearest loss of stability, in the problem's weights; found by a search of its own."""
 
+NO_RADIUS = Quantity(RADIUS, "1", "robustness radius", "r", lambda values: math.nan)
+"""Where it was not searched for, the radius is not known."""
+
 ROOT_NAMES = (*(q.name for q in ROOT_QUANTITIES), RADIUS)
 
 
@@ -70,7 +73,7 @@ def _array_damping(values: Mapping[str, Any]) -> Array:
     return np.asarray(np.min(-z.real / (np.abs(z) + 1e-300), axis=-1))
 
 
-ARRAY_ROOT_QUANTITIES = tuple(
-    replace(q, value={"abscissa": _array_abscissa, "damping_ratio": _array_damping}[q.name]) for q in ROOT_QUANTITIES
-)
+_ARRAY_FORMULAS = {"abscissa": _array_abscissa, "damping_ratio": _array_damping}
+
+ARRAY_ROOT_QUANTITIES = (*(replace(q, value=_ARRAY_FORMULAS[q.name]) for q in ROOT_QUANTITIES), NO_RADIUS)
 """The same for arrays of designs, by numeric roots."""

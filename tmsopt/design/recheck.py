@@ -8,7 +8,9 @@ import flint
 
 from tmsopt.design.cases import Case
 from tmsopt.design.frozen import Table
+from tmsopt.design.nearest import Robustness, robustness
 from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import RADIUS
 from tmsopt.design.variation import varies
 from tmsopt.models import Values
 from tmsopt.roots import PATTERNS, Structure, exact_abscissa, pattern_distance
@@ -28,6 +30,7 @@ class Checked:
 
     Attributes:
         worst: the case with the largest abscissa, of those looked at.
+        around: the boundaries nearest to the design, where the problem asks for the robustness radius.
     """
 
     structure: Structure
@@ -37,6 +40,7 @@ class Checked:
     quantities: Table[float]
     dimensionless: Table[float]
     worst: Case = field(default_factory=Case)
+    around: Robustness | None = None
 
 
 def recheck(problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case] | None = None) -> Checked:
@@ -46,6 +50,9 @@ def recheck(problem: Problem, parameters: Mapping[str, float], cases: Sequence[C
     each = [problem.values(case.applied(parameters)) for case in listed] or [nominal]
     top = max(range(len(each)), key=lambda k: _or_infinite(each[k]["abscissa"]))
     roots = {"abscissa": each[top]["abscissa"], "damping_ratio": min(v["damping_ratio"] for v in each)}
+    around = robustness(problem, parameters=parameters) if problem.asks_radius else None
+    if around is not None:
+        roots[RADIUS] = around.radius
     for values in (nominal, *each):
         for name, value in roots.items():
             values.define(name, value)
@@ -72,6 +79,7 @@ def recheck(problem: Problem, parameters: Mapping[str, float], cases: Sequence[C
         quantities=Table({name: float(nominal[name]) for name in names}),
         dimensionless=Table({n: float(v) for n, v in of.native(parameters).items()}),
         worst=listed[top] if listed else Case(),
+        around=around,
     )
 
 

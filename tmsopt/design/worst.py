@@ -12,7 +12,7 @@ from tmsopt.design.cases import Band, Case
 from tmsopt.design.expression import Expression
 from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES, RADIUS
+from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES
 from tmsopt.design.sequence import golden_steps
 from tmsopt.design.variation import varies
 from tmsopt.models import Values
@@ -163,7 +163,7 @@ def _evaluated(
     varied = Case(offset=offset).applied(parameters)  # type: ignore[arg-type]
     columns = {n: np.broadcast_to(np.asarray(v, dtype=float), count) for n, v in varied.items()}
     values = Values(problem.model, problem.parameter_set, columns, extra=ARRAY_ROOT_QUANTITIES)
-    for name, value in {RADIUS: np.nan, **shared}.items():
+    for name, value in shared.items():
         values.define(name, value)
     with np.errstate(all="ignore"):
         return np.broadcast_to(np.asarray(values[what] if isinstance(what, str) else what(values), dtype=float), count)

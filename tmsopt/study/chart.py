@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.problem import Problem, checked
+from tmsopt.design.quantities import NO_RADIUS
 from tmsopt.models import Values
 from tmsopt.roots import is_stable, real_roots, roots
 from tmsopt.study.domain import Domain, domain
@@ -193,7 +194,7 @@ def classify(a: Array) -> tuple[NDArray[np.int8], NDArray[np.int8], Array, Array
 
 def _margin(problem: Problem, columns: Mapping[str, Array], alpha: Array, ratio: Array) -> Array:
     """Least difference by which the inequalities hold; nan where one does not exist, such as the speed of a root."""
-    values = Values(problem.model, problem.parameter_set, problem.ordered(columns))
+    values = Values(problem.model, problem.parameter_set, problem.ordered(columns), extra=(NO_RADIUS,))
     values.define("abscissa", alpha)
     values.define("damping_ratio", ratio)
     least = np.full(len(alpha), np.inf)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ROOT_QUANTITIES
+from tmsopt.design.quantities import NO_RADIUS, ROOT_QUANTITIES
 from tmsopt.models import Values
 from tmsopt.roots import Pattern, lienard_chipart, roots
 
@@ -66,7 +66,7 @@ def values_of(problem: Problem, pattern: Pattern, columns: Mapping[str, Array], 
         return np.asarray(np.min(-z.real / (np.abs(z) + 1e-300), axis=-1))
 
     formulas = {"abscissa": abscissa, "damping_ratio": damping_ratio}
-    extra = [replace(q, value=formulas[q.name]) for q in ROOT_QUANTITIES]
+    extra = [*(replace(q, value=formulas[q.name]) for q in ROOT_QUANTITIES), NO_RADIUS]
     return Values(problem.model, problem.parameter_set, columns, extra=extra)
 
 
