@@ -28,6 +28,7 @@ _SCATTER = 0.01  # of the largest root: roots in double precision beside a 4-fol
 _RESCUES = 4  # starts from abscissa optima, for a pattern that no start reached
 
 _AGAIN = 4  # times that a start is taken up again where it ended badly
+_AGAIN_HOPELESS = 1  # the same where rows are violated and no start has satisfied them yet
 _SUCCESS = "Solve_Succeeded"
 
 Progress = Callable[[int, int], None]
@@ -71,7 +72,7 @@ def search(
     if problem.start:  # the user's own
         candidates.append(run.ended(middle(problem), near=True))
     for design in designs(problem, seed, max(starts - len(candidates), 0)):
-        candidates.append(run.ended(design))
+        candidates.append(run.ended(design, hopeful=any(c.feasible for c in candidates)))
         if progress:
             progress(len(candidates), starts)
         if not exhaustive and _settled(problem, candidates):
@@ -102,11 +103,13 @@ class _Runner:
     linear_solver: str
     touching: bool
 
-    def ended(self, design: Mapping[str, float], near: bool = False) -> Candidate:
+    def ended(self, design: Mapping[str, float], near: bool = False, hopeful: bool = True) -> Candidate:
         """Where a start ends, with the factors shared out anew as long as that helps."""
         best = self._once(design, near)
         for again in range(_AGAIN):
             if best.feasible and best.run.status == _SUCCESS and not best.nlp.tangled(best.run.x):
+                break
+            if not best.feasible and again >= (_AGAIN if hopeful else _AGAIN_HOPELESS):
                 break
             if not np.all(np.isfinite(best.run.x)):
                 break
