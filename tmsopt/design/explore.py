@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from tmsopt.design.cases import Case
-from tmsopt.design.elastic import least_violating
 from tmsopt.design.finding import Finding, Trial, counted, found, honest, survivor
-from tmsopt.design.formulations import design_of, formulate
+from tmsopt.design.formulations import design_of, formulate, middle
 from tmsopt.design.frozen import Table
 from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
 from tmsopt.design.recheck import FEASIBLE, recheck
+from tmsopt.design.relax import relax
 from tmsopt.design.search import Candidate, follow, same, search
 from tmsopt.design.sides import Side
 from tmsopt.design.solution import Starts
@@ -71,14 +71,16 @@ def explore(problem: Problem, side: Side, options: Options) -> Explored:
 def without_any(problem: Problem, explored: Sequence[Explored], options: Options) -> Finding:
     """No start ended feasible: the least-violating design, and what can be reached from it if it violates nothing."""
     nlp = formulate(problem, problem.cases)
-    design = least_violating(problem, nlp, options.seed, options.linear_solver)
+    relaxation = relax(problem, options.seed, options.linear_solver)
+    free = relaxation.parameters if relaxation else middle(problem)
+    design = {n: min(max(free[n], lo), hi) for n, (lo, hi) in problem.free.items()}
     parameters = problem.ordered(design)
     cases = evaluated_cases(problem, parameters)
     checked = recheck(problem, parameters, cases)
     tried = sum(len(e.candidates) for e in explored)
     none = f"of {tried} starts, none"
-    if checked.violations:
-        status, note = "infeasible", f"{none} satisfies all constraints; relax one of those violated"
+    if relaxation is None or relaxation.amounts:
+        status, note = "infeasible", f"{none} satisfies all constraints"
     else:
         ended = [follow(problem, nlp, design, options.linear_solver, near) for near in (True, False)]
         trial = survivor(problem, nlp, ended)
@@ -86,7 +88,17 @@ def without_any(problem: Problem, explored: Sequence[Explored], options: Options
             return finding
         advice = "try more starts, give one, or keep a0 away from 0 (for tms, nu_H >= 0.02)"
         status, note = "not_converged", f"feasible designs exist, but {none} converged; {advice}"
-    return Finding(parameters, checked, status, {}, Starts(tried=tried), nlp.formulation, cases, notes=(note,))
+    return Finding(
+        parameters,
+        checked,
+        status,
+        {},
+        Starts(tried=tried),
+        nlp.formulation,
+        cases,
+        notes=(note,),
+        relaxation=relaxation,
+    )
 
 
 def evaluated_cases(problem: Problem, parameters: Mapping[str, float]) -> tuple[Case, ...]:

@@ -76,11 +76,16 @@ class Expression:
 
     def violation(self, values: Mapping[str, Any]) -> float:
         """By how much a numeric design violates a comparison, relative to the size of its sides; nan if undefined."""
-        with np.errstate(all="ignore"):
-            left, right = (float(_value(side, values, _NUMERIC)) for side in self._sides())
+        left, right = self.sides(values)
         difference = left - right
         excess = {"<=": max(difference, 0.0), ">=": max(-difference, 0.0), "==": abs(difference)}[self.comparison]
         return excess / max(1.0, abs(left), abs(right)) if math.isfinite(difference) else math.nan
+
+    def sides(self, values: Mapping[str, Any]) -> tuple[float, float]:
+        """Both sides of a comparison for a numeric design."""
+        with np.errstate(all="ignore"):
+            left, right = (float(_value(side, values, _NUMERIC)) for side in self._sides())
+        return left, right
 
     def _sides(self) -> list[ast.expr]:
         body = _parse(self.text)

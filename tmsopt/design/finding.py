@@ -14,7 +14,7 @@ from tmsopt.design.polish import Point, polisher
 from tmsopt.design.problem import Problem
 from tmsopt.design.recheck import Checked, recheck
 from tmsopt.design.search import Candidate, claim, same
-from tmsopt.design.solution import Branch, Starts
+from tmsopt.design.solution import Branch, Relaxation, Starts
 
 _STATIONARY = 1e-6  # gradient of the Lagrangian at which a point counts as converged whatever IPOPT says
 _ALIKE = 3  # candidates of one objective looked at closely
@@ -41,6 +41,7 @@ class Finding:
     cases: tuple[Case, ...] = ()
     branches: tuple[Branch, ...] = ()
     notes: tuple[str, ...] = ()
+    relaxation: Relaxation | None = None
 
 
 @dataclass(frozen=True)

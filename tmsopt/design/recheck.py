@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import flint
 
 from tmsopt.design.cases import Case
+from tmsopt.design.expression import Expression
 from tmsopt.design.frozen import Table
 from tmsopt.design.nearest import Robustness, robustness
 from tmsopt.design.problem import Problem
@@ -45,21 +46,11 @@ class Checked:
 
 def recheck(problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case] | None = None) -> Checked:
     """Evaluate a design independently of any solver: constraints, pattern, roots and objective, in the given cases."""
-    listed = [case for case in (problem.cases if cases is None else cases) if not case.direction]
-    nominal = problem.values(parameters)
-    each = [problem.values(case.applied(parameters)) for case in listed] or [nominal]
-    top = max(range(len(each)), key=lambda k: _or_infinite(each[k]["abscissa"]))
-    roots = {"abscissa": each[top]["abscissa"], "damping_ratio": min(v["damping_ratio"] for v in each)}
-    around = robustness(problem, parameters=parameters) if problem.asks_radius else None
-    if around is not None:
-        roots[RADIUS] = around.radius
-    for values in (nominal, *each):
-        for name, value in roots.items():
-            values.define(name, value)
+    looked = _look(problem, parameters, problem.cases if cases is None else cases)
+    listed, nominal, each, top, around = looked.cases, looked.nominal, looked.each, looked.top, looked.around
     violations = {}
     for name, condition in problem.conditions.items():
-        at = each if varies(problem, condition, listed) else [nominal]
-        violation = max((condition.violation(values) for values in at), key=_or_infinite)
+        violation = max((condition.violation(values) for values in looked.at(problem, condition)), key=_or_infinite)
         if not violation <= FEASIBLE:
             violations[name] = violation
     structure = each[top]["structure"]
@@ -71,6 +62,8 @@ def recheck(problem: Problem, parameters: Mapping[str, float], cases: Sequence[C
             violations[problem.locate] = distance
     of = problem.parameter_set
     names = [n for n in (*problem.model.quantity_names(of), "damping_ratio") if n not in problem.model.sets[0].names]
+    if around is not None:
+        names.append(RADIUS)
     return Checked(
         structure=structure,
         realised=realised_abscissa(problem, listed[top].applied(parameters) if listed else parameters),
@@ -81,6 +74,54 @@ def recheck(problem: Problem, parameters: Mapping[str, float], cases: Sequence[C
         worst=listed[top] if listed else Case(),
         around=around,
     )
+
+
+def excesses(problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case]) -> dict[str, float]:
+    """Amount by which each constraint's limit must be moved for a design: 0 or more, signed for an equality."""
+    looked = _look(problem, parameters, cases)
+    found = {}
+    for name, condition in problem.conditions.items():
+        differences = [left - right for left, right in (condition.sides(v) for v in looked.at(problem, condition))]
+        if condition.comparison == "==":
+            found[name] = differences[0]
+        else:
+            sign = -1.0 if condition.comparison == ">=" else 1.0
+            found[name] = max(0.0, *(_or_infinite(sign * d) for d in differences))
+    return found
+
+
+@dataclass(frozen=True)
+class _Look:
+    """A design in its cases, with root quantities the worst over them.
+
+    Attributes:
+        top: number of the case with the largest abscissa.
+    """
+
+    cases: list[Case]
+    nominal: Values
+    each: list[Values]
+    top: int
+    around: Robustness | None
+
+    def at(self, problem: Problem, condition: Expression) -> list[Values]:
+        """The cases that a condition holds in."""
+        return self.each if varies(problem, condition, self.cases) else [self.nominal]
+
+
+def _look(problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case]) -> _Look:
+    listed = [case for case in cases if not case.direction]
+    nominal = problem.values(parameters)
+    each = [problem.values(case.applied(parameters)) for case in listed] or [nominal]
+    top = max(range(len(each)), key=lambda k: _or_infinite(each[k]["abscissa"]))
+    roots = {"abscissa": each[top]["abscissa"], "damping_ratio": min(v["damping_ratio"] for v in each)}
+    around = robustness(problem, parameters=parameters) if problem.asks_radius else None
+    if around is not None:
+        roots[RADIUS] = around.radius
+    for values in (nominal, *each):
+        for name, value in roots.items():
+            values.define(name, value)
+    return _Look(listed, nominal, each, top, around)
 
 
 def _objective(problem: Problem, nominal: Values, each: Sequence[Values], cases: Sequence[Case]) -> float:

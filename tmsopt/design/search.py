@@ -67,7 +67,7 @@ def search(
         touching: hold every root quantity at its exact value, in the way that each start is closest to, where a mere
             bound on it would let the optimiser claim too much.
     """
-    run = _Runner(problem, nlp, linear_solver, touching)
+    run = Runner(problem, nlp, linear_solver, touching)
     candidates: list[Candidate] = []
     if problem.start:  # the user's own
         candidates.append(run.ended(middle(problem), near=True))
@@ -91,11 +91,11 @@ def follow(
     touching: bool = False,
 ) -> Candidate:
     """Where IPOPT ends from a design, close to it or not."""
-    return _Runner(problem, nlp, linear_solver, touching).ended(design, near)
+    return Runner(problem, nlp, linear_solver, touching).ended(design, near)
 
 
 @dataclass(frozen=True)
-class _Runner:
+class Runner:
     """IPOPT on one NLP, started anew where an end is not to be trusted."""
 
     problem: Problem

@@ -2,9 +2,11 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from tmsopt.design.cases import Case
+from tmsopt.design.cover import Cover
 from tmsopt.design.formulations import Freedom
 from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
@@ -49,6 +51,32 @@ class Branch:
 
 
 @dataclass(frozen=True)
+class Relaxation:
+    """The smallest move of limits that leaves a feasible design.
+
+    Attributes:
+        parameters: a design that is feasible once the limits are moved.
+        amounts: limit → how far it is moved, in its own units; signed for an equality, else towards what it forbids.
+        conflict: limits that keep the amounts from being smaller, those moved included.
+        alone: limit → how far it must be moved if it is the only one, where that suffices.
+    """
+
+    parameters: Table[float] = field(default_factory=Table)
+    amounts: Table[float] = field(default_factory=Table)
+    conflict: tuple[str, ...] = ()
+    alone: Table[float] = field(default_factory=Table)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``."""
+        return {
+            "amounts": dict(self.amounts),
+            "conflict": list(self.conflict),
+            "alone": dict(self.alone),
+            "parameters": dict(self.parameters),
+        }
+
+
+@dataclass(frozen=True)
 class Solution:
     """What `solve` found.
 
@@ -68,6 +96,10 @@ class Solution:
         freedom: parameters against conditions, before solving.
         branches: other solutions of a square system.
         notes: sentences for the reader.
+        worst: with scenarios or tolerances, the case with the largest abscissa, which is the one reported.
+        cover: what is known of every case together, proven or not.
+        sides: part of the box, such as ``forward tilt`` → its best objective, nan where it has no feasible design.
+        relaxation: of an infeasible problem, the smallest move of its limits that leaves a feasible design.
     """
 
     problem: Problem
@@ -89,6 +121,10 @@ class Solution:
     freedom: Freedom
     branches: tuple[Branch, ...] = ()
     notes: tuple[str, ...] = field(default=())
+    worst: Case | None = None
+    cover: Cover | None = None
+    sides: Table[float] = field(default_factory=Table)
+    relaxation: Relaxation | None = None
 
     @property
     def si(self) -> dict[str, Reading]:
@@ -141,6 +177,10 @@ class Solution:
                 {"parameters": _numbers(b.parameters), "excluded_by": list(b.excluded_by)} for b in self.branches
             ],
             "notes": list(self.notes),
+            **({"worst_case": _case(self.worst)} if self.worst else {}),
+            **({"cover": asdict(self.cover)} if self.cover else {}),
+            **({"sides": _numbers(self.sides)} if self.sides else {}),
+            **({"relaxation": self.relaxation.to_json()} if self.relaxation else {}),
             **({"si": si} if si else {}),
         }
 
@@ -159,6 +199,10 @@ class NotSolved(RuntimeError):
 
     def __reduce__(self) -> tuple[type["NotSolved"], tuple[Solution]]:
         return NotSolved, (self.solution,)
+
+
+def _case(case: Case) -> dict[str, dict[str, float]]:
+    return {"at": dict(case.at), "offset": dict(case.offset)}
 
 
 def _number(value: float) -> float | None:

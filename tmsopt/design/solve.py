@@ -1,10 +1,12 @@
 """The solution of a design problem, rechecked before it is believed."""
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
 
 from tmsopt.design.bound import omega0_bound
+from tmsopt.design.cover import cover
 from tmsopt.design.errors import InputError
 from tmsopt.design.explore import Explored, Options, Progress, evaluated_cases, explore, without_any
 from tmsopt.design.finding import Finding, better, evaluated
@@ -48,14 +50,16 @@ def solve(
         raise ValueError(f"starts = {starts}; accepted: 1 or more")
     began = time.perf_counter()
     notes: tuple[str, ...] = ()
+    values: dict[str, float] = {}
     if problem.free:
         options = Options(starts, seed, exhaustive, linear_solver, progress)
         explored = [explore(problem, side, options) for side in sides(problem)]
         finding = _winner(problem, explored) or without_any(problem, explored, options)
         notes = _sides_note(problem, explored, finding)
+        values = _side_values(explored)
     else:
         finding = evaluated(problem, evaluated_cases(problem, problem.ordered({})))
-    solution = _assembled(problem, finding, notes, began)
+    solution = _assembled(problem, finding, notes, values, began)
     if throw and solution.status != "optimal":
         raise NotSolved(solution)
     return solution
@@ -71,6 +75,17 @@ def _winner(problem: Problem, explored: Sequence[Explored]) -> Finding | None:
         return best
     every = [c for part in explored for c in part.candidates]
     return replace(best, starts=Starts(len(every), sum(c.feasible for c in every), best.starts.at_best))
+
+
+def _side_values(explored: Sequence[Explored]) -> dict[str, float]:
+    """The best objective of each part of the box; nan where it has no optimal design."""
+    return {
+        part.side.name: part.finding.checked.objective
+        if part.finding is not None and part.finding.status == "optimal"
+        else math.nan
+        for part in explored
+        if part.side.name
+    }
 
 
 def _sides_note(problem: Problem, explored: Sequence[Explored], finding: Finding) -> tuple[str, ...]:
@@ -90,8 +105,12 @@ def _sides_note(problem: Problem, explored: Sequence[Explored], finding: Finding
     return ("; ".join(sentences),)
 
 
-def _assembled(problem: Problem, finding: Finding, notes: tuple[str, ...], began: float) -> Solution:
+def _assembled(
+    problem: Problem, finding: Finding, notes: tuple[str, ...], sides: dict[str, float], began: float
+) -> Solution:
     checked, optimal = finding.checked, finding.status == "optimal"
+    listed = bool(problem.variations or problem.tolerances)
+    covered = cover(problem, finding.parameters, checked.structure.abscissa) if listed and optimal else None
     return Solution(
         problem=problem,
         status=finding.status,
@@ -112,6 +131,10 @@ def _assembled(problem: Problem, finding: Finding, notes: tuple[str, ...], began
         freedom=freedom(problem),
         branches=finding.branches,
         notes=(*finding.notes, *notes, *_stability_note(problem, checked, optimal)),
+        worst=checked.worst if listed else None,
+        cover=covered,
+        sides=Table(sides),
+        relaxation=finding.relaxation,
     )
 
 

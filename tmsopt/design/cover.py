@@ -1,0 +1,126 @@
+"""Proof by interval arithmetic that a design keeps its abscissa over whole bands and tolerance boxes."""
+
+import heapq
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import count, product
+from typing import Any
+
+import flint
+
+from tmsopt.design.cases import Band
+from tmsopt.design.problem import Problem
+from tmsopt.roots import lienard_chipart, shift
+
+SLACK = 1e-6
+"""Above the worst abscissa found, relative to 1 + |abscissa|: a bound that is met with equality cannot be proved."""
+
+BOXES = 4000
+"""Boxes looked at before the proof is given up: a second or so."""
+
+_DIGITS = 30
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Cover:
+    """What is known of every case together.
+
+    Attributes:
+        limit: no root of any case is right of it, if `proven`.
+        proven: by interval arithmetic over all the boxes; else by a search for the worst case alone.
+        boxes: parts that bands and tolerances were divided into.
+    """
+
+    limit: float
+    proven: bool
+    boxes: int
+
+
+def cover(problem: Problem, parameters: Mapping[str, float], worst: float, boxes: int = BOXES) -> Cover:
+    """Prove that no case has a root right of `worst` plus SLACK: Liénard–Chipart signs of p(t + limit) in balls.
+
+    Boxes whose signs are undecided are halved, widest first, until none is left.
+    """
+    limit = worst + SLACK * (1 + abs(worst))
+    order = count()
+    heap: list[tuple[float, int, _Box]] = [(-1.0, next(order), box) for box in _first(problem)]
+    done = 0
+    with flint.ctx.workdps(_DIGITS):
+        gamma = flint.arb(limit)
+        while heap and done < boxes:
+            box = heapq.heappop(heap)[2]
+            done += 1
+            if not _left_of(problem, parameters, box, gamma):
+                halves = box.halves()
+                if not halves:
+                    return Cover(limit, False, done)
+                for half in halves:
+                    heapq.heappush(heap, (-half.width, next(order), half))
+    return Cover(limit, not heap, done)
+
+
+@dataclass(frozen=True)
+class _Box:
+    """Intervals of scenario values and tolerances.
+
+    Attributes:
+        width: of the widest side, as a share of what the problem states.
+    """
+
+    at: Mapping[str, Interval]
+    offset: Mapping[str, Interval]
+    shares: Mapping[str, float]
+
+    @property
+    def width(self) -> float:
+        return max(self.shares.values(), default=0.0)
+
+    def halves(self) -> "tuple[_Box, ...]":
+        """Both halves across the widest side; none where it cannot be divided."""
+        if not self.shares:
+            return ()
+        key = max(self.shares, key=lambda k: self.shares[k])
+        table, name = key.split(" ")
+        lower, upper = getattr(self, table)[name]
+        middle = (lower + upper) / 2
+        if not lower < middle < upper:
+            return ()
+        shares = {**self.shares, key: self.shares[key] / 2}
+        parts: list[_Box] = []
+        for part in ((lower, middle), (middle, upper)):
+            changed: dict[str, Any] = {"at": self.at, "offset": self.offset}
+            changed[table] = {**changed[table], name: part}
+            parts.append(_Box(**changed, shares=shares))
+        return tuple(parts)
+
+
+def _first(problem: Problem) -> Iterator[_Box]:
+    """Bands and tolerances whole, one box for each choice of separate scenario values."""
+    choices = [[(s.min, s.max)] if isinstance(s, Band) else [(v, v) for v in s] for s in problem.variations.values()]
+    offset = {n: (-t, t) for n, t in problem.tolerances.items()}
+    for values in product(*choices):
+        at = dict(zip(problem.variations, values, strict=True))
+        shares = {f"at {n}": 1.0 for n, (lo, hi) in at.items() if hi > lo} | {f"offset {n}": 1.0 for n in offset}
+        yield _Box(at, offset, shares)
+
+
+def _left_of(problem: Problem, parameters: Mapping[str, float], box: _Box, gamma: Any) -> bool:
+    """Whether every design of a box certainly has all roots left of a vertical line."""
+    balls = {n: flint.arb(v) for n, v in parameters.items()}
+    balls |= {n: _ball(*ends) for n, ends in box.at.items()}
+    for n, ends in box.offset.items():
+        balls[n] = balls[n] + _ball(*ends)
+    a = problem.model.coefficients(balls, problem.parameter_set)
+    if not (a[0] > 0 or a[0] < 0):
+        return False
+    sign = 1 if a[0] > 0 else -1
+    return all(quantity > 0 for quantity in lienard_chipart([sign * c for c in shift(a, gamma)]))
+
+
+def _ball(lower: float, upper: float) -> Any:
+    if lower == upper:
+        return flint.arb(lower)
+    low, high = flint.arb(lower), flint.arb(upper)
+    return low.union(high)

@@ -1,0 +1,239 @@
+"""What stands in the way of a problem without an answer: limits in conflict, and the least that frees it."""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from tmsopt.design.cases import Case
+from tmsopt.design.finding import Trial, survivor
+from tmsopt.design.formulations import formulate, middle
+from tmsopt.design.frozen import Table
+from tmsopt.design.nlp import NLP, Lift
+from tmsopt.design.problem import Problem
+from tmsopt.design.recheck import FEASIBLE, excesses
+from tmsopt.design.search import Candidate, Runner, same
+from tmsopt.design.solution import Relaxation
+from tmsopt.design.starts import designs
+from tmsopt.models import Values
+
+_TRIED = 16  # starts of a relaxation at most
+_FEW = 3  # starts for one limit alone, besides the relaxed design
+_AGREE = 3  # of them at the best value that end it
+_WIDER = 3.0  # widths of the box by which its bounds may give way
+_INSET = 1e-3  # share of the width kept from a physical end that is excluded
+_HOLDS = 1e-7  # multiplier, in the scale of the relaxation, above which a limit takes part in the conflict
+_ROUND_UP = 1e-12  # of an amount, so that the relaxed design is inside
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A constraint, or an end of a free parameter's range such as ``Fr.max``, that a relaxation may move.
+
+    Attributes:
+        scale: the amount that counts as 1 when amounts are added up.
+        parameter, end: of an end of a range, whose it is and where it lies.
+    """
+
+    name: str
+    scale: float
+    parameter: str = ""
+    end: float = 0.0
+
+    def needed(self, parameters: Mapping[str, float], excess: Mapping[str, float]) -> float:
+        """By how much the limit must be moved for a design."""
+        if not self.parameter:
+            return excess.get(self.name, 0.0)
+        beyond = parameters[self.parameter] - self.end
+        return max(beyond if self.name.endswith(".max") else -beyond, 0.0)
+
+
+def relax(problem: Problem, seed: int, linear_solver: str, cases: Sequence[Case] = ()) -> Relaxation | None:
+    """The least relaxation: of the constraints, or of the box too where these alone cannot help; None if none is found.
+
+    Amounts are added up in units of the size of the two sides of a constraint at the middle of the box, at least 1,
+    and in widths of the box.
+    """
+    listed = tuple(cases) or problem.cases
+    for wide, limits in _stages(problem):
+        trial, nlp, touching = _least(wide, limits, seed, linear_solver, listed)
+        if trial is None:
+            continue
+        amounts = _amounts(wide, limits, trial.parameters, nlp.cases)
+        conflict = _conflict(nlp, limits, trial)
+        alone = _alone(problem, conflict, trial, linear_solver, nlp.cases, touching) if len(conflict) > 1 else {}
+        return Relaxation(Table(trial.parameters), Table(amounts), conflict, Table(alone))
+    return None
+
+
+def _stages(problem: Problem) -> Iterator[tuple[Problem, list[Limit]]]:
+    """The problem with limits to move: the constraints in its own box, then also the box."""
+    constraints = _constraint_limits(problem)
+    if constraints:
+        yield problem, constraints
+    yield _widened(problem, problem.free), [*constraints, *_bound_limits(problem)]
+
+
+def _constraint_limits(problem: Problem) -> list[Limit]:
+    values = problem.values(problem.ordered(middle(problem)))
+    found = []
+    for name, condition in problem.conditions.items():
+        size = max((abs(s) for s in condition.sides(values) if np.isfinite(s)), default=1.0)
+        found.append(Limit(name, max(1.0, size)))
+    return found
+
+
+def _bound_limits(problem: Problem) -> list[Limit]:
+    return [
+        Limit(f"{name}.{end}", ends[1] - ends[0], name, ends[k])
+        for name, ends in problem.free.items()
+        for k, end in enumerate(("min", "max"))
+    ]
+
+
+def _widened(problem: Problem, names: Collection[str]) -> Problem:
+    """The problem in a larger box, inside what is physical."""
+    free = dict(problem.free)
+    for name in names:
+        lower, upper = problem.free[name]
+        physical, width = problem.parameter_set[name].range, upper - lower
+        inset = 0.0 if physical.closed else _INSET * min(width, 1.0)
+        least, most = lower - _WIDER * width, upper + _WIDER * width
+        free[name] = (min(max(least, physical.lower + inset), lower), max(min(most, physical.upper - inset), upper))
+    return replace(problem, free=free)
+
+
+def _least(
+    wide: Problem, limits: Sequence[Limit], seed: int, linear_solver: str, cases: Sequence[Case]
+) -> tuple[Trial | None, NLP, bool]:
+    """The design with the least weighted sum of amounts that a few starts reach."""
+    nlp = _elastic(wide, formulate(wide, cases), limits)
+    candidates = _ends(wide, nlp, seed, linear_solver, touching=False)
+    trial = survivor(_unlimited(wide, limits), nlp, candidates)
+    touching = bool(nlp.touches) and trial is not None and _overclaims(wide, nlp, limits, trial)
+    if touching:
+        candidates = _ends(wide, nlp, seed, linear_solver, touching=True)
+        trial = survivor(_unlimited(wide, limits), nlp, candidates)
+    return (trial if trial is not None and not trial.checked.violations else None), nlp, touching
+
+
+def _ends(wide: Problem, nlp: NLP, seed: int, linear_solver: str, touching: bool) -> list[Candidate]:
+    run = Runner(wide, nlp, linear_solver, touching)
+    candidates: list[Candidate] = []
+    for design in designs(wide, seed, _TRIED):
+        candidates.append(run.ended(design, hopeful=any(c.feasible for c in candidates)))
+        feasible = [c.objective for c in candidates if c.feasible]
+        if feasible and sum(same(f, min(feasible)) for f in feasible) >= _AGREE and len(candidates) >= 2 * _AGREE:
+            break
+    return candidates
+
+
+def _unlimited(problem: Problem, limits: Sequence[Limit]) -> Problem:
+    """The problem without the constraints that may move, whose violation is the point of it."""
+    moved = {limit.name for limit in limits}
+    kept = {n: c for n, c in problem.constraints.items() if n not in moved}
+    return replace(problem, constraints=kept, minimize=None, maximize=None)
+
+
+def _overclaims(wide: Problem, nlp: NLP, limits: Sequence[Limit], trial: Trial) -> bool:
+    """Whether the design needs more than the solver claims: a bound on a root quantity stood for the quantity."""
+    excess = excesses(wide, trial.parameters, nlp.cases)
+    real = sum(abs(limit.needed(trial.parameters, excess)) / limit.scale for limit in limits)
+    return real > trial.point.objective + 1e-6
+
+
+def _amounts(
+    wide: Problem, limits: Sequence[Limit], parameters: Mapping[str, float], cases: Sequence[Case]
+) -> dict[str, float]:
+    """What the design itself needs, whatever the solver claims."""
+    excess = excesses(wide, parameters, cases)
+    needed = {limit.name: (limit.needed(parameters, excess), limit.scale) for limit in limits}
+    return {
+        name: amount * (1 + _ROUND_UP) for name, (amount, scale) in needed.items() if abs(amount) > FEASIBLE * scale
+    }
+
+
+def _conflict(nlp: NLP, limits: Sequence[Limit], trial: Trial) -> tuple[str, ...]:
+    """Limits with a multiplier: were one of them not there, less would do."""
+    scales = {limit.name: limit.scale for limit in limits}
+    names = [
+        row
+        for row, multiplier in zip(nlp.rows, trial.point.row_multipliers.tolist(), strict=True)
+        if row in scales and abs(multiplier) * scales[row] > _HOLDS
+    ]
+    for k, name in enumerate(trial.candidate.nlp.variables):
+        multiplier = float(trial.point.bound_multipliers[k])
+        if name.removeprefix("tan(").removesuffix(")") in trial.parameters and abs(multiplier) > _HOLDS:
+            names.append(f"{name.removeprefix('tan(').removesuffix(')')}.{'max' if multiplier > 0 else 'min'}")
+    return tuple(dict.fromkeys(names))
+
+
+def _alone(
+    problem: Problem, conflict: Sequence[str], trial: Trial, linear_solver: str, cases: Sequence[Case], touching: bool
+) -> dict[str, float]:
+    """How far each limit of a conflict must be moved if nothing else is; those that cannot do it alone are left out."""
+    limits = {limit.name: limit for limit in (*_constraint_limits(problem), *_bound_limits(problem))}
+    found: dict[str, float] = {}
+    for limit in (limits[name] for name in conflict):
+        wide = _widened(problem, [limit.parameter] if limit.parameter else [])
+        nlp = _elastic(wide, formulate(wide, cases), [limit])
+        run = Runner(wide, nlp, linear_solver, touching=touching)
+        here = {n: min(max(trial.parameters[n], lo), hi) for n, (lo, hi) in wide.free.items()}
+        candidates = [run.ended(here, near=True), *(run.ended(d) for d in designs(wide, 0, _FEW))]
+        ended = survivor(_unlimited(wide, [limit]), nlp, candidates)
+        if ended is not None and not ended.checked.violations:
+            found |= _amounts(wide, [limit], ended.parameters, nlp.cases)
+    return found
+
+
+def _elastic(wide: Problem, nlp: NLP, limits: Sequence[Limit]) -> NLP:
+    """minimise Σ slack / scale, with each limit moved by its slack; everything else holds."""
+    names = [limit.name for limit in limits]
+    x, slack = ca.SX.sym("x", len(nlp.variables)), ca.SX.sym("s", len(limits))
+    g = nlp.functions(x)[1]
+    rows: list[tuple[str, Any, float, float]] = []
+    for k, name in enumerate(nlp.rows):
+        lower, upper = nlp.row_lower[k], nlp.row_upper[k]
+        if name not in names:
+            rows.append((name, g[k], lower, upper))
+            continue
+        s = slack[names.index(name)]
+        if np.isfinite(upper):
+            rows.append((name, g[k] - s, -np.inf, upper))
+        if np.isfinite(lower):
+            rows.append((name, g[k] + s, lower, np.inf))
+    for number, limit in enumerate(limits):
+        if limit.parameter:
+            at = list(wide.free).index(limit.parameter)
+            value = ca.atan(x[at]) if wide.parameter_set[limit.parameter].tangent else x[at]
+            most = limit.name.endswith(".max")
+            ends = (-np.inf, limit.end) if most else (limit.end, np.inf)
+            rows.append((limit.name, value - slack[number] if most else value + slack[number], *ends))
+    objective = sum((slack[k] / limit.scale for k, limit in enumerate(limits)), ca.SX(0))
+    variables = ca.vertcat(x, slack)
+    body = ca.densify(ca.vertcat(*(r[1] for r in rows)))
+    return replace(
+        nlp,
+        formulation="elastic",
+        variables=(*nlp.variables, *(f"slack of {n}" for n in names)),
+        functions=ca.Function("elastic", [variables], [ca.densify(objective), body], ["x"], ["f", "g"]),
+        lower=(*nlp.lower, *(0.0 for _ in names)),
+        upper=(*nlp.upper, *(np.inf for _ in names)),
+        rows=tuple(r[0] for r in rows),
+        row_lower=tuple(r[2] for r in rows),
+        row_upper=tuple(r[3] for r in rows),
+        lifts=(*nlp.lifts, Lift("slack", len(names), partial(_slack_guess, wide, names))),
+    )
+
+
+def _slack_guess(wide: Problem, names: Sequence[str], values: Sequence[Values], z: Any) -> list[list[float]]:
+    """What a design needs, and a little more."""
+    found = []
+    for name in names:
+        condition = wide.conditions.get(name)
+        differences = [abs(float(condition(v))) for v in values] if condition else [0.0]
+        found.append(max((d for d in differences if np.isfinite(d)), default=1.0) + 1e-3)
+    return [found]
