@@ -77,6 +77,13 @@ class _Box:
     def width(self) -> float:
         return max(self.shares.values(), default=0.0)
 
+    def varied(self, parameters: Mapping[str, float], middle: bool = False, moving: str = "") -> dict[str, Any]:
+        """The designs of the box as balls, or the one in its middle; `moving` is the name of a series' variable."""
+        balls = {n: flint.arb(v) for n, v in parameters.items()}
+        balls |= {n: _within(ends, middle) for n, ends in self.at.items()}
+        balls |= {n: balls[n] + _within(ends, middle) for n, ends in self.offset.items()}
+        return {n: flint.arb_series([v, 1], prec=2) if n == moving else v for n, v in balls.items()}
+
     def halves(self) -> "tuple[_Box, ...]":
         """Both halves across the widest side; none where it cannot be divided."""
         if not self.shares:
@@ -108,19 +115,40 @@ def _first(problem: Problem) -> Iterator[_Box]:
 
 def _left_of(problem: Problem, parameters: Mapping[str, float], box: _Box, gamma: Any) -> bool:
     """Whether every design of a box certainly has all roots left of a vertical line."""
-    balls = {n: flint.arb(v) for n, v in parameters.items()}
-    balls |= {n: _ball(*ends) for n, ends in box.at.items()}
-    for n, ends in box.offset.items():
-        balls[n] = balls[n] + _ball(*ends)
-    a = problem.model.coefficients(balls, problem.parameter_set)
-    if not (a[0] > 0 or a[0] < 0):
+    sides = [(table, n) for table in ("at", "offset") for n, (lo, hi) in getattr(box, table).items() if hi > lo]
+    over = _tests(problem, box.varied(parameters), gamma)
+    if all(test > 0 for test in over):
+        return True
+    middle = _tests(problem, box.varied(parameters, middle=True), gamma)
+    if not all(test > 0 for test in middle):
         return False
-    sign = 1 if a[0] > 0 else -1
-    return all(quantity > 0 for quantity in lienard_chipart([sign * c for c in shift(a, gamma)]))
+    # The mean value form, f(m) + Σ ∂f/∂x (x − m), is off by the square of the width, the plain one by the width.
+    slopes = []
+    for table, name in sides:
+        series = _tests(problem, box.varied(parameters, moving=name), gamma)
+        lower, upper = getattr(box, table)[name]
+        slopes.append([_slope(test) * (_ball(lower, upper) - (lower + upper) / 2) for test in series])
+    return all(test + sum(moves) > 0 for test, *moves in zip(middle, *slopes, strict=True))
+
+
+def _tests(problem: Problem, parameters: Mapping[str, Any], gamma: Any) -> list[Any]:
+    """Quantities that are all positive exactly when every root is left of the line; a0 first, by its sign."""
+    a = problem.model.coefficients(parameters, problem.parameter_set)
+    lead = a[0] if isinstance(a[0], flint.arb) else a[0][0]
+    sign = -1 if lead < 0 else 1
+    shifted = [sign * c for c in shift(a, gamma)]
+    return [shifted[0], *lienard_chipart(shifted)]
+
+
+def _slope(test: Any) -> Any:
+    return flint.arb(0) if isinstance(test, flint.arb) else test[1]
+
+
+def _within(ends: Interval, middle: bool) -> Any:
+    return flint.arb((ends[0] + ends[1]) / 2) if middle else _ball(*ends)
 
 
 def _ball(lower: float, upper: float) -> Any:
     if lower == upper:
         return flint.arb(lower)
-    low, high = flint.arb(lower), flint.arb(upper)
-    return low.union(high)
+    return flint.arb(lower).union(flint.arb(upper))
