@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from tmsopt.study.compare import Comparison, compare
     from tmsopt.study.domain import Domain, domain
     from tmsopt.study.explain import Explanation, explain
+    from tmsopt.study.front import Front
+    from tmsopt.study.pareto import pareto
     from tmsopt.study.swallowtail import Swallowtail, swallowtail
     from tmsopt.study.trace import trace
 
@@ -27,6 +29,7 @@ __all__ = [
     "Comparison",
     "Domain",
     "Explanation",
+    "Front",
     "InputError",
     "Nearest",
     "NotSolved",
@@ -43,6 +46,7 @@ __all__ = [
     "load",
     "models",
     "nearest",
+    "pareto",
     "robustness",
     "roots",
     "solve",
@@ -57,6 +61,7 @@ _HOMES = {
     "Comparison": "tmsopt.study.compare",
     "Domain": "tmsopt.study.domain",
     "Explanation": "tmsopt.study.explain",
+    "Front": "tmsopt.study.front",
     "InputError": "tmsopt.design.errors",
     "Nearest": "tmsopt.design.nearest",
     "NotSolved": "tmsopt.design.solution",
@@ -72,6 +77,7 @@ _HOMES = {
     "load": "tmsopt.design.files",
     "nearest": "tmsopt.design.nearest",
     "robustness": "tmsopt.design.nearest",
+    "pareto": "tmsopt.study.pareto",
     "solve": "tmsopt.design.solve",
     "swallowtail": "tmsopt.study.swallowtail",
     "trace": "tmsopt.study.trace",

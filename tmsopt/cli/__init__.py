@@ -37,6 +37,7 @@ def main() -> None:
     \b
     Examples:
       tmsopt solve problems/ep4.toml
+      tmsopt solve problems/pareto.toml --plot front.png
       tmsopt compare problems/ep4.toml
       tmsopt trace problems/ep_set.toml --plot ep_set.png
       tmsopt chart problems/chart.toml --plot chart.png

@@ -33,6 +33,10 @@ Examples:
   tmsopt solve problems/realistic.toml --plot growth.png
   tmsopt solve problems/realistic.toml --brief
   tmsopt solve problems/benchmark.toml --json | python -m json.tool
+  tmsopt solve problems/pareto.toml --points 40 --plot front.png --csv front.csv
+
+A file with pareto = ["abscissa", "Fr"] under [objective] gives the front: two or three expressions, each minimised; a
+minus sign maximises, as in "-lambda_s".
 
 Exit status: 0 solved, 2 bad input, 3 infeasible, 4 not converged.
 """
@@ -53,7 +57,10 @@ def _common(command: Command) -> Command:
     """Options that every solving command has."""
     for option in (
         click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table."),
-        click.option("--starts", type=click.IntRange(min=1), default=None, help="Starts tried at most. [default: 64]"),
+        click.option(
+            "--starts", type=click.IntRange(min=1), default=None,
+            help="Starts tried at most; of a front, new ones per point. [default: 64, of a front 2]",
+        ),
         click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts."),
         click.option(
             "--linear-solver", type=click.Choice(["mumps", "spral"]), default="mumps", show_default=True,
@@ -68,8 +75,12 @@ def _common(command: Command) -> Command:
 @click.argument("file", type=click.Path(path_type=Path))
 @_common
 @click.option(
-    "--plot", type=click.Path(path_type=Path), help="Draw growth rates and frequencies over Fr (png, pdf, svg)."
+    "--plot",
+    type=click.Path(path_type=Path),
+    help="Draw growth rates and frequencies over Fr, or the front (png, pdf, svg).",
 )
+@click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write the points of a front.")
+@click.option("--points", type=click.IntRange(min=2), default=None, help="Points of a front. [default: 25]")
 @click.option(
     "--wheelbase",
     default="1",
@@ -83,31 +94,49 @@ def _common(command: Command) -> Command:
     help="Likewise, the mass m_B of the rear frame, in kg or with a unit.",
 )
 @click.option("--brief", is_flag=True, help="Leave out what the optimum means: gains of limits moved, rounding.")
+@click.pass_context
 def solve(
+    context: click.Context,
     file: Path,
     as_json: bool,
     starts: int | None,
     seed: int,
     linear_solver: str,
     plot: Path | None,
+    csv_file: Path | None,
+    points: int | None,
     wheelbase: str,
     rear_mass: str,
     brief: bool,
 ) -> None:
-    """Find the best design that the problem FILE asks for."""
+    """Find the best design that the problem FILE asks for, or the front of the best ones."""
     with bad_input():
+        from tmsopt.cli.front import check_options, write_front
         from tmsopt.design.files import load
 
         w, m_B = _scale("--wheelbase", wheelbase, "m"), _scale("--rear-mass", rear_mass, "kg")
         check_output("--plot", plot, FIGURES)
+        check_output("--csv", csv_file, ("csv",))
         problem = load(file)
+        check_options(problem, _given(context))
     from tmsopt.design.search import STARTS
+    from tmsopt.design.solution import NotSolved
     from tmsopt.design.solve import solve as solve_problem
 
-    with progress() as update:
-        solution = solve_problem(
-            problem, starts=starts or STARTS, seed=seed, linear_solver=linear_solver, throw=False, progress=update
-        )
+    if problem.pareto:
+        try:
+            write_front(
+                problem, points=points, as_json=as_json, starts=starts, seed=seed, linear_solver=linear_solver,
+                plot=plot, csv_file=csv_file,
+            )  # fmt: skip
+            return
+        except NotSolved as error:
+            solution, plot = error.solution, None
+    else:
+        with progress() as update:
+            solution = solve_problem(
+                problem, starts=starts or STARTS, seed=seed, linear_solver=linear_solver, throw=False, progress=update
+            )
     if as_json:
         write_json(solution.to_json() | ({} if brief else {"meaning": _explained(solution).to_json()}))
     else:
@@ -129,9 +158,13 @@ def solve(
 def compare(file: Path, as_json: bool, starts: int | None, seed: int, linear_solver: str) -> None:
     """Set the optimum of FILE beside the closed-form laws, and one formulation beside the other."""
     with bad_input():
+        from tmsopt.design.errors import InputError
         from tmsopt.design.files import load
+        from tmsopt.design.problem import unasked
 
         problem = load(file)
+        if problem.pareto:
+            raise InputError(unasked(problem))
     from tmsopt.design.search import STARTS
     from tmsopt.show.tables import comparison_table
     from tmsopt.study.compare import compare as compare_design
@@ -145,6 +178,13 @@ def compare(file: Path, as_json: bool, starts: int | None, seed: int, linear_sol
     else:
         click.echo(comparison_table(comparison))
     sys.exit(_EXIT[comparison.design.status])
+
+
+def _given(context: click.Context) -> list[str]:
+    """Options that were written on the command line."""
+    written = click.core.ParameterSource.COMMANDLINE
+    named = [p for p in context.command.params if p.name and context.get_parameter_source(p.name) == written]
+    return [p.opts[0] for p in named]
 
 
 def _scale(option: str, text: str, unit: str) -> float:

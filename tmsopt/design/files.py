@@ -43,6 +43,7 @@ class _Band(_Table):
 class _Objective(_Table):
     minimize: StrictStr | None = None
     maximize: StrictStr | None = None
+    pareto: list[StrictStr] | None = None
     locate: StrictStr | None = None
 
 
@@ -101,13 +102,14 @@ def load(path: str | PathLike[str], asks: bool = True) -> Problem:
                 constraints=parsed.constraints,
                 minimize=parsed.objective.minimize,
                 maximize=parsed.objective.maximize,
+                pareto=() if parsed.objective.pareto is None else parsed.objective.pareto,
                 locate=parsed.objective.locate,
                 title=parsed.title or Path(file).stem,
             )
         except InputError as error:
             reported = {f.key[:2] for f in faults} | {f.key[:1] for f in faults if f.key[:1] == ("objective",)}
             faults = faults + [f for f in error.faults if f.key[:2] not in reported]
-    if problem is not None and asks:
+    if problem is not None and asks and not problem.pareto:
         faults = [*faults, *unasked(problem)]
     if problem is None or faults:
         placed = [f.at(file, _line_of(lines, f.key)) for f in faults]
@@ -169,7 +171,7 @@ def _without(data: Mapping[str, Any], key: tuple[str, ...]) -> dict[str, Any]:
     return {k: v for k, v in data.items() if k != key[0]}
 
 
-def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:  # noqa: PLR0911 - one per case
+def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:  # noqa: PLR0911, PLR0912 - one per case
     """One pydantic complaint in the words of the problem file."""
     tags = ("_FreeParameter", "_Band", "float", "int", "str")
     key = tuple(str(k) for k in where if k not in tags)
@@ -196,6 +198,8 @@ def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault: 
             return Fault(f"found {_short(found)}; accepted: {accepted}", key[:2])
         case (("tolerances" | "weights"), _, *_):
             return Fault(f"found {_short(found)}; accepted: a number, or a text with a unit such as '5 mm'", key[:2])
+        case ("objective", "pareto", *_):
+            return Fault(f"found {_short(found)}; accepted: two or three texts, such as ['abscissa', 'Fr']", key[:2])
         case ("constraints", *_):
             return Fault(f"found {_short(found)}; accepted: a comparison in quotes, such as 'nu_H >= 0.02'", key)
         case _:

@@ -27,6 +27,7 @@ class Problem:
         free: (least, greatest) value per free parameter.
         constraints: name → comparison of expressions, e.g. ``{"trail": "nu_H >= 0.02"}``.
         minimize, maximize: an expression; at most one of the two.
+        pareto: two or three expressions to minimise at once, instead of one; a minus sign maximises, ``"-lambda_s"``.
         locate: name of a root pattern to realise, e.g. ``"EP4"``.
         start: values to start from, for any of the free parameters.
         title: one line for reports.
@@ -52,6 +53,7 @@ class Problem:
     scenarios: Mapping[str, Scenario | Sequence[float] | Mapping[str, float]] = field(default_factory=dict)
     tolerances: Mapping[str, float] = field(default_factory=dict)
     weights: Mapping[str, float] = field(default_factory=dict)
+    pareto: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "scenarios", {n: as_scenario(s) for n, s in self.scenarios.items()})
@@ -69,6 +71,7 @@ class Problem:
         object.__setattr__(self, "tolerances", {n: float(t) for n, t in self.tolerances.items()})
         object.__setattr__(self, "weights", {n: float(w) for n, w in self.weights.items()})
         object.__setattr__(self, "start", {n: float(v) for n, v in self.start.items() if n in ends})
+        object.__setattr__(self, "pareto", tuple(self.pareto))
 
     @property
     def variations(self) -> dict[str, Scenario]:
@@ -98,11 +101,13 @@ class Problem:
 
     @property
     def sense(self) -> str:
-        """``minimize``, ``maximize``, ``locate``, or ``evaluate`` when nothing is asked."""
+        """``minimize``, ``maximize``, ``pareto``, ``locate``, or ``evaluate`` when nothing is asked."""
         if self.minimize is not None:
             return "minimize"
         if self.maximize is not None:
             return "maximize"
+        if self.pareto:
+            return "pareto"
         return "locate" if self.locate else "evaluate"
 
     @cached_property
@@ -110,6 +115,11 @@ class Problem:
         """The expression to optimise, if there is one."""
         text = self.minimize if self.minimize is not None else self.maximize
         return None if text is None else parse_value(text, self.vocabulary)
+
+    @cached_property
+    def objectives(self) -> tuple[Expression, ...]:
+        """The expressions of a front, each to be minimised."""
+        return tuple(parse_value(text, self.vocabulary) for text in self.pareto)
 
     @cached_property
     def conditions(self) -> dict[str, Expression]:
@@ -152,11 +162,16 @@ def checked(problem: object) -> Problem:
 
 
 def unasked(problem: Problem) -> list[Fault]:
-    """What is wrong with solving a problem that frees parameters without a question; a chart needs none."""
+    """What is wrong with solving a problem that has not one question; a chart needs none."""
+    if problem.pareto:
+        message = (
+            "asks for a front, not for one design; use tmsopt.pareto, or write minimize with one of the expressions"
+        )
+        return [Fault(message, ("objective", "pareto"))]
     if not problem.free or problem.sense != "evaluate":
         return []
     message = (
-        "parameters are free, but nothing is asked of them; write minimize, maximize or locate "
-        "(chart and trace need none: in Python, load(file, asks=False))"
+        "parameters are free, but nothing is asked of them; write minimize, maximize or locate, "
+        "or pareto for a front (chart and trace need none: in Python, load(file, asks=False))"
     )
     return [Fault(message, ("objective",))]

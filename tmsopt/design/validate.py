@@ -178,8 +178,18 @@ def _objective_faults(problem: Stated) -> Iterator[Fault]:
     key = ("objective",)
     if problem.minimize is not None and problem.maximize is not None:
         yield Fault("minimize and maximize together; keep one of them", key)
+    if problem.pareto and (problem.minimize is not None or problem.maximize is not None):
+        yield Fault("pareto beside minimize or maximize; keep one of them", key)
+    yield from _pareto_faults(problem.pareto)
     if problem.locate is not None and problem.locate not in PATTERNS:
         yield Fault(f"unknown pattern {problem.locate!r}; {suggest(str(problem.locate), PATTERNS)}", (*key, "locate"))
+
+
+def _pareto_faults(texts: Any) -> Iterator[Fault]:
+    accepted = "accepted: two or three different expressions to minimise, such as ['abscissa', 'Fr', '-lambda_s']"
+    listed = isinstance(texts, Sequence) and not isinstance(texts, str)
+    if not listed or len(texts) not in (0, 2, 3) or len({str(t).strip() for t in texts}) < len(texts):
+        yield Fault(f"found {texts!r}; {accepted}, where a minus sign maximises", ("objective", "pareto"))
 
 
 def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
@@ -187,6 +197,9 @@ def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     for sense, text in (("minimize", problem.minimize), ("maximize", problem.maximize)):
         if text is not None:
             yield from _parse_faults(parse_value, text, accepted, ("objective", sense))
+    if isinstance(problem.pareto, Sequence) and not isinstance(problem.pareto, str):
+        for text in problem.pareto:
+            yield from _parse_faults(parse_value, text, accepted, ("objective", "pareto"))
     for name, text in problem.constraints.items():
         yield from _parse_faults(parse_comparison, text, accepted, ("constraints", name))
 

@@ -1,0 +1,75 @@
+"""The front of a file with several objectives, a part of `tmsopt solve`."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from tmsopt.cli.common import progress, saving, write_json
+
+if TYPE_CHECKING:
+    from tmsopt.design.problem import Problem
+
+
+def check_options(problem: "Problem", given: Sequence[str]) -> None:
+    """Refuse options that mean nothing for this problem.
+
+    Raises:
+        InputError: naming each of them.
+    """
+    from tmsopt.design.errors import Fault, InputError
+
+    if problem.pareto:
+        wrong = [o for o in given if o in ("--wheelbase", "--rear-mass")]
+        message = "scales one design, and the file asks for a front; write the problem in SI instead"
+    else:
+        wrong = [o for o in given if o in ("--points", "--csv")]
+        message = 'is for a front; write pareto = ["abscissa", "Fr"] under [objective], or leave the option out'
+    if wrong:
+        raise InputError([Fault(message, (option,)) for option in wrong])
+
+
+def write_front(
+    problem: "Problem",
+    *,
+    points: int | None,
+    as_json: bool,
+    starts: int | None,
+    seed: int,
+    linear_solver: str,
+    plot: Path | None,
+    csv_file: Path | None,
+) -> None:
+    """Find the front and write it where it is asked for.
+
+    Raises:
+        NotSolved: when an objective has no optimum.
+    """
+    from tmsopt.study.front import write_csv
+    from tmsopt.study.pareto import POINTS, STARTS, pareto
+
+    with progress("sub-problem") as update:
+        front = pareto(
+            problem,
+            points or POINTS,
+            starts=STARTS if starts is None else starts,
+            seed=seed,
+            linear_solver=linear_solver,
+            progress=update,
+        )
+    if as_json:
+        write_json(front.to_json())
+    else:
+        from tmsopt.show.front import front_table
+
+        click.echo(front_table(front))
+    if csv_file is not None:
+        with saving("--csv", csv_file):
+            write_csv(front, csv_file)
+    if plot is not None:
+        from tmsopt.show.front import front_figure
+        from tmsopt.show.style import save
+
+        with saving("--plot", plot):
+            save(front_figure(front), plot)

@@ -1,0 +1,111 @@
+"""A Pareto front as a table, as a curve of two objectives, or as coloured points of three."""
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tmsopt.show.labels import Name, place_names
+from tmsopt.show.style import CAPSIZE, COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, legend_below, new_figure
+from tmsopt.show.text import columns, number, with_unit
+from tmsopt.study.front import Front, FrontPoint
+
+_STYLES = {
+    "EP4": (MARK, "D"), "EP3": (MARK, "^"), "2EP2": (REAL, "s"), "EP2": (REAL, "v"), "CEP2": (COMPLEX, "s"),
+    "pair+real": (CRITICAL, "o"), "two pairs": (STABLE, "o"), "pair": (HEAVY, "o"), "real": (CAPSIZE, "o"),
+}  # fmt: skip
+"""Colour and marker of each structure; others are black crosses."""
+
+
+def front_table(front: Front) -> str:
+    """Points one a row: objectives, free parameters, structure, limits that bind, ends and kinks."""
+    of = front.problem.parameter_set
+    texts = [t.strip() for t in front.objectives]
+    free = [n for n in front.problem.free if n not in texts]
+    count = f"{len(front)} point" + ("s" if len(front) != 1 else "")
+    where = f", designs with {front.problem.locate}" if front.problem.locate else ""
+    lines = [
+        front.problem.title or "untitled problem",
+        f"front of least {', '.join(texts)}{where}: {count}, {_counted(front)}"
+        f"{front.solved} sub-problems; {front.seconds:.2f} s",
+        "",
+    ]
+    headings = [with_unit(of, t) if t in of.names else t for t in texts]
+    rows = [(*headings, *(with_unit(of, n) for n in free), "structure", "limits that bind", "")]
+    for p in front.points:
+        numbers = [number(v) for v in p.objectives] + [f"{p.solution.parameters[n]:.8g}" for n in free]
+        rows.append((*numbers, p.structure, ", ".join(p.limits), p.label))
+    lines += columns(rows)
+    remarks = [f"gap: {gap.reason}" for gap in front.gaps] + [f"note: {note}" for note in front.notes]
+    return "\n".join(line.rstrip() for line in [*lines, *([""] if remarks else []), *remarks])
+
+
+def front_figure(front: Front) -> Figure:
+    """Two objectives: the curve, cut at gaps, points by structure. Three: points, the third objective as colour."""
+    figure = new_figure(6.4, 5.0)
+    ax = figure.subplots()
+    label_objectives(ax, front)
+    ax.set_title(front.problem.title or "Pareto front", fontsize=11)
+    if len(front.objectives) == 2:
+        names = draw_front(ax, front)
+        legend_below(figure, ax.get_legend_handles_labels()[0])
+    else:
+        names = _draw_three(figure, ax, front)
+    ax.margins(0.08)
+    place_names(ax, names)
+    return figure
+
+
+def draw_front(ax: Axes, front: Front) -> list[Name]:
+    """The curve of two objectives; the names of its ends and kinks, to place."""
+    values = np.array([p.objectives for p in front.points])
+    cuts = [g.index + 1 for g in front.gaps]
+    for part in np.split(np.arange(len(front)), cuts):
+        ax.plot(values[part, 0], values[part, 1], color=LINE, linewidth=1.0, zorder=2)
+    for k, gap in enumerate(front.gaps):
+        ends = values[gap.index : gap.index + 2]
+        label = "not solved" if gap.failed else "gap: no efficient design"
+        known = any(h.get_label() == label for h in ax.get_lines())
+        ax.plot(*ends.T, color=CAPSIZE, linewidth=0.8, linestyle=":", zorder=1, label=None if k and known else label)
+    for structure in dict.fromkeys(p.structure for p in front.points):
+        own = values[[p.structure == structure for p in front.points]]
+        colour, marker = _STYLES.get(structure, (LINE, "x"))
+        ax.plot(*own.T, marker, color=colour, markersize=4, zorder=3, label=structure, linestyle="none")
+    return _names(front.points)
+
+
+def label_objectives(ax: Axes, front: Front) -> None:
+    """Symbols of the first two objectives, with a unit for a parameter, or their text."""
+    ax.set_xlabel(_axis(front, front.objectives[0]))
+    ax.set_ylabel(_axis(front, front.objectives[1]))
+
+
+def _draw_three(figure: Figure, ax: Axes, front: Front) -> list[Name]:
+    values = np.array([p.objectives for p in front.points])
+    drawn = ax.scatter(values[:, 0], values[:, 1], c=values[:, 2], cmap=matplotlib.colormaps["viridis"], s=22, zorder=3)
+    figure.colorbar(drawn, ax=ax, label=_axis(front, front.objectives[2]))
+    return _names(front.points)
+
+
+def _names(points: tuple[FrontPoint, ...]) -> list[Name]:
+    words = [(p, [w for w in p.label.split("; ") if w and not w.startswith("gap ")]) for p in points]
+    return [Name(", ".join(w).replace("->", "→"), p.objectives[0], p.objectives[1]) for p, w in words if w]
+
+
+def _axis(front: Front, text: str) -> str:
+    plain = text.strip()
+    name = plain.removeprefix("-").strip()
+    sign = "-" if name != plain else ""
+    of = front.problem.parameter_set
+    if name in of.names:
+        unit = "" if of[name].unit == "1" else f" in {of[name].unit}"
+        return f"${sign}{of[name].latex}${unit}"
+    return plain
+
+
+def _counted(front: Front) -> str:
+    words = ""
+    for found, word in ((front.kinks, "kink"), (front.gaps, "gap")):
+        if found:
+            words += f"{len(found)} {word}{'s' if len(found) > 1 else ''}, "
+    return words

@@ -1,0 +1,159 @@
+"""Sub-problems of a Pareto front: one objective minimised, the others held below a value (eps-constraints)."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from tmsopt.design.problem import Problem
+from tmsopt.design.search import STARTS
+from tmsopt.design.solution import Solution
+from tmsopt.design.solve import solve
+from tmsopt.study.front import FrontPoint
+
+_RETRY = 16  # starts for a sub-problem that the neighbours' designs and a few starts did not solve
+_SLACK = 1e-9  # of a best value held while the next is minimised: what the recheck of a constraint forgives
+_AT_END = 1e-6  # of a parameter's range: IPOPT stays inside it, and where limits are degenerate polishing keeps that
+_WORTH = 1e-4  # gain at an end that its slack does not explain: at a smooth optimum it buys sqrt(1e-9) = 3e-5
+
+
+@dataclass(frozen=True)
+class Asker:
+    """What all sub-problems of one front share.
+
+    Attributes:
+        problem: with `pareto`.
+        starts: new starts per sub-problem, against branches that the neighbours do not lead to.
+        seed: of the first of them.
+        ranges: of the objectives over the front, once its ends are known.
+    """
+
+    problem: Problem
+    starts: int
+    seed: int
+    linear_solver: str = "mumps"
+    ranges: tuple[float, ...] = ()
+
+    def solve(self, problem: Problem, starts: int) -> Solution:
+        """The rechecked solution of a sub-problem, whatever its status."""
+        return solve(problem, starts=starts, seed=self.seed, linear_solver=self.linear_solver, throw=False)
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """The objectives."""
+        return tuple(self.problem.pareto)
+
+
+def best_first(ask: Asker, order: Sequence[int]) -> Solution:
+    """An end of the front: objectives minimised in order, each held at its best while the next is minimised.
+
+    Its status is not ``optimal`` when the first objective has no optimum.
+    """
+    first = order[0]
+    found = ask.solve(subproblem(ask, first, {}), STARTS)
+    held: dict[int, float] = {}
+    for done, k in pairwise(order):
+        if found.status != "optimal":
+            break
+        values = objectives(ask, found)
+        held[done] = values[done] + _SLACK * (1 + abs(values[done]))
+        better = least(ask, k, held, [found], pin=first)
+        if better is None:
+            continue
+        exact = len(held) == 1 and len(better.problem.free) < len(ask.problem.free)  # pinned, so without slack
+        if objectives(ask, better)[k] < values[k] - (_SLACK if exact else _WORTH) * (1 + abs(values[k])):
+            found = better
+    return found
+
+
+def least(
+    ask: Asker, k: int, limits: Mapping[int, float], near: Sequence[Solution], few: bool = False, pin: int | None = None
+) -> Solution | None:
+    """Objective `k` minimised with others limited, from designs near by and, unless `few`, from new starts.
+
+    Args:
+        pin: an objective that has its best value: where that is the end of a parameter's range, the parameter is fixed.
+
+    Returns: the best that is optimal, or None.
+    """
+    asked = subproblem(ask, k, limits)
+    if pin is not None and near:
+        asked = _pinned(ask, asked, pin, near[0])
+    trials = [(_started(asked, n), 1 if few or m else 1 + ask.starts) for m, n in enumerate(near)] or [(asked, _RETRY)]
+    ended = [ask.solve(problem, starts) for problem, starts in trials]
+    if not few and all(s.status != "optimal" for s in ended):
+        ended.append(replace(ask, seed=ask.seed + 1).solve(asked, _RETRY))
+    found = min((s for s in ended if s.status == "optimal"), key=lambda s: s.value, default=None)
+    return found if found is None or not ask.ranges else _tightened(ask, k, limits, found)
+
+
+def solvable(ask: Asker, k: int, limits: Mapping[int, float]) -> bool:
+    """Whether a sub-problem without an optimum may have one: False when no start satisfied its limits."""
+    return ask.solve(subproblem(ask, k, limits), _RETRY).status != "infeasible"
+
+
+def subproblem(ask: Asker, k: int, limits: Mapping[int, float]) -> Problem:
+    """The problem that minimises objective `k`, with a limit on the value of others."""
+    names = eps_names(ask)
+    eps = {names[j]: f"({ask.texts[j]}) <= {float(value)!r}" for j, value in limits.items()}
+    constraints = {**ask.problem.constraints, **eps}
+    return replace(ask.problem, pareto=(), minimize=ask.texts[k], constraints=constraints)
+
+
+def eps_names(ask: Asker) -> tuple[str, ...]:
+    """A constraint name per objective that is none of the user's."""
+    names = []
+    for text in ask.texts:
+        name = f"{text} <= eps"
+        while name in ask.problem.constraints:
+            name += "'"
+        names.append(name)
+    return tuple(names)
+
+
+def objectives(ask: Asker, solution: Solution) -> tuple[float, ...]:
+    """Values of all objectives, from the parameters alone."""
+    problem = ask.problem
+    values = problem.values(solution.parameters)
+    return tuple(float(expression(values)) for expression in problem.objectives)
+
+
+def point(ask: Asker, solution: Solution) -> FrontPoint:
+    """A design as a point of the front."""
+    active = [n for n in solution.active if n in ask.problem.constraints]
+    for name, (low, high) in ask.problem.free.items():
+        value = solution.parameters[name]
+        for end, at in (("min", low), ("max", high)):
+            if abs(value - at) <= _AT_END * (high - low):
+                active.append(f"{name}.{end}")
+    return FrontPoint(objectives(ask, solution), solution, tuple(active))
+
+
+def _tightened(ask: Asker, k: int, limits: Mapping[int, float], found: Solution) -> Solution:
+    """A design as good in objective `k` and better in the others, if a limit that does not bind leaves one."""
+    names, values = eps_names(ask), objectives(ask, found)
+    loose = [j for j in limits if names[j] not in found.active and ask.ranges[j] > 0]
+    if not loose:
+        return found
+    held = {**limits, k: values[k] + _SLACK * (1 + abs(values[k]))}
+    rest = " + ".join(f"({ask.texts[j]}) / {ask.ranges[j]!r}" for j in loose)
+    asked = _pinned(ask, replace(subproblem(ask, k, held), minimize=rest), k, found)
+    better = ask.solve(_started(asked, found), 1 + ask.starts)
+    gain = sum((values[j] - b) / ask.ranges[j] for j, b in enumerate(objectives(ask, better)) if j in loose)
+    return better if better.status == "optimal" and gain > _WORTH else found
+
+
+def _started(problem: Problem, near: Solution) -> Problem:
+    ends = {n: (lo, hi, near.parameters[n]) for n, (lo, hi) in problem.free.items()}
+    return replace(problem, start={n: min(max(v, lo), hi) for n, (lo, hi, v) in ends.items()})
+
+
+def _pinned(ask: Asker, asked: Problem, k: int, best: Solution) -> Problem:
+    """The problem without slack where objective `k` is a parameter, or minus one, that ended at its bound."""
+    name = ask.texts[k].strip().removeprefix("-").strip()
+    if name not in asked.free or best.parameters[name] not in asked.free[name]:
+        return asked
+    fixed = {**asked.fixed, name: best.parameters[name]}
+    free = {n: ends for n, ends in asked.free.items() if n != name}
+    constraints = {n: text for n, text in asked.constraints.items() if n != eps_names(ask)[k]}
+    start = {n: v for n, v in asked.start.items() if n in free}
+    return replace(asked, fixed=fixed, free=free, constraints=constraints, start=start)

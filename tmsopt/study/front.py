@@ -1,0 +1,161 @@
+"""A Pareto front as data: efficient designs, where the way they are limited changes, and what is missing."""
+
+import csv
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tmsopt.design.problem import Problem
+from tmsopt.design.solution import Solution
+
+SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class FrontPoint:
+    """An efficient design: nothing found improves one objective without loss in another.
+
+    Attributes:
+        objectives: their values, in the order of the problem.
+        solution: the rechecked design; its problem minimises one objective with limits on the others.
+        limits: names of the user's constraints and bounds that bind.
+        label: what the point is besides, e.g. ``least Fr``, ``EP3 -> pair+real``; empty for most.
+    """
+
+    objectives: tuple[float, ...]
+    solution: Solution
+    limits: tuple[str, ...]
+    label: str = ""
+
+    @property
+    def structure(self) -> str:
+        """The roots on the rightmost line, e.g. ``EP4``."""
+        return self.solution.structure
+
+
+@dataclass(frozen=True)
+class Kink:
+    """A change along the front, in the order of its points.
+
+    Attributes:
+        name: e.g. ``EP3 -> pair+real``, ``lambda_s.min begins to bind``.
+        index: of the point, the last before the change.
+        width: of the interval that holds the change, in ranges of the objectives.
+    """
+
+    name: str
+    index: int
+    width: float
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A stretch without points of the front.
+
+    Attributes:
+        reason: that no efficient design lies there, or that a sub-problem was not solved.
+        index: of the point before it; of two objectives the next point ends it.
+        failed: whether it is the search that failed.
+    """
+
+    reason: str
+    index: int
+    failed: bool
+
+
+@dataclass(frozen=True)
+class Front:
+    """What `pareto` found.
+
+    Attributes:
+        objectives: the expressions, each minimised.
+        points: by the first objective, best first; none dominates another.
+        kinks, gaps: of two objectives; gaps of three are sub-problems that failed.
+        ideal, nadir: least and greatest value of each objective over the points.
+        solved: sub-problems solved.
+        notes: sentences for the reader.
+    """
+
+    problem: Problem
+    objectives: tuple[str, ...]
+    points: tuple[FrontPoint, ...]
+    kinks: tuple[Kink, ...]
+    gaps: tuple[Gap, ...]
+    solved: int
+    seconds: float
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @property
+    def ideal(self) -> tuple[float, ...]:
+        """Least value of each objective."""
+        return tuple(min(column) for column in zip(*(p.objectives for p in self.points), strict=True))
+
+    @property
+    def nadir(self) -> tuple[float, ...]:
+        """Greatest value of each objective on the front."""
+        return tuple(max(column) for column in zip(*(p.objectives for p in self.points), strict=True))
+
+    def rows(self) -> Iterable[dict[str, Any]]:
+        """One record per point, as written to CSV: objectives, parameters, abscissa, structure, limits, label."""
+        for point in self.points:
+            values = dict(zip(self.objectives, point.objectives, strict=True))
+            yield {
+                **values,
+                **{name: value for name, value in point.solution.parameters.items() if name not in values},
+                "abscissa": point.solution.abscissa,
+                "structure": point.structure,
+                "limits": "; ".join(point.limits),
+                "label": point.label,
+            }
+
+    def to_json(self) -> dict[str, Any]:
+        """The JSON of `tmsopt solve` for a front; numbers that do not exist are None."""
+        return {
+            "schema": SCHEMA,
+            "title": self.problem.title,
+            "model": self.problem.model.name,
+            "status": "optimal",
+            "objective": {"sense": "pareto", "expressions": list(self.objectives)},
+            "ideal": list(self.ideal),
+            "nadir": list(self.nadir),
+            "points": [_point(p) for p in self.points],
+            "kinks": [{"name": k.name, "index": k.index, "width": k.width} for k in self.kinks],
+            "gaps": [{"reason": g.reason, "index": g.index, "failed": g.failed} for g in self.gaps],
+            "notes": list(self.notes),
+            "solved": self.solved,
+            "seconds": round(self.seconds, 4),
+        }
+
+
+def write_csv(front: Front, path: Path) -> None:
+    """The points in one table.
+
+    Raises:
+        OSError: when the file cannot be written.
+    """
+    rows = list(front.rows())
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, fieldnames=list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _point(point: FrontPoint) -> dict[str, Any]:
+    return {
+        "objectives": list(point.objectives),
+        "parameters": {n: _finite(v) for n, v in point.solution.parameters.items()},
+        "abscissa": _finite(point.solution.abscissa),
+        "abscissa_realised": _finite(point.solution.abscissa_realised),
+        "structure": point.structure,
+        "limits": list(point.limits),
+        "label": point.label,
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

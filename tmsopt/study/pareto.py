@@ -1,0 +1,91 @@
+"""Pareto fronts by eps-constraints, warm-started along the front."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from tmsopt.design.errors import Fault, InputError
+from tmsopt.design.problem import Problem, checked
+from tmsopt.design.solution import NotSolved, Solution
+from tmsopt.study.epsilon import Asker, best_first, point
+from tmsopt.study.front import Front, FrontPoint
+from tmsopt.study.payoff import surface
+from tmsopt.study.sweep import curve
+
+Progress = Callable[[int, int], None]
+
+POINTS = 25
+STARTS = 2
+"""New starts per sub-problem, beside the neighbours' designs."""
+
+_ALIKE = 1e-7  # relative difference of ends that counts as no conflict, that of optima that count as the same
+
+
+def pareto(
+    problem: Problem,
+    points: int = POINTS,
+    *,
+    starts: int = STARTS,
+    seed: int = 0,
+    linear_solver: str = "mumps",
+    progress: Progress | None = None,
+) -> Front:
+    """The front of two or three objectives, each minimised, with its ends, kinks and gaps.
+
+    Two objectives: minimise one subject to the other ≤ eps, the next eps where neighbours are farthest apart and on
+    the objective that changes more, then sweeps both ways that keep the better design. Three: a grid of eps over the
+    payoff table, at most 12 × 12. Gaps narrower than the spacing of the points may be missed.
+
+    Args:
+        problem: with ``pareto``; ``locate`` and constraints narrow the designs.
+        points: asked for along the front; kinks and ends of gaps come on top.
+        starts: new starts per sub-problem, beside the designs of the neighbours.
+        seed: of the quasi-random starting designs.
+        linear_solver: ``mumps`` or ``spral``.
+        progress: called with (sub-problems solved, about how many in all).
+
+    Raises:
+        NotSolved: when an objective has no optimum, carrying the best point found.
+        InputError: for a problem without ``pareto``.
+        ValueError: for fewer than 2 points or 0 starts.
+    """
+    if not checked(problem).pareto:
+        message = 'no front is asked for; write e.g. pareto = ["abscissa", "Fr"], or use tmsopt.solve'
+        raise InputError([Fault(message, ("objective",))])
+    if points < 2 or starts < 0:
+        raise ValueError(f"points = {points}, starts = {starts}; accepted: 2 or more, 0 or more")
+    began = time.perf_counter()
+    ask = Asker(problem, starts, seed, linear_solver)
+    n = len(ask.texts)
+    ends = tuple(_labelled(ask, k, _believed(best_first(ask, [(k + j) % n for j in range(n)]))) for k in range(n))
+    front = Front(problem, ask.texts, ends[:1], (), (), n, 0.0)
+    ranges = [max(p.objectives[k] for p in ends) - min(p.objectives[k] for p in ends) for k in range(n)]
+    conflict = [r > _ALIKE * (1 + max(abs(p.objectives[k]) for p in ends)) for k, r in enumerate(ranges)]
+    ask = replace(ask, ranges=tuple(ranges))
+    if n == 2:
+        front = curve(ask, ends, points, progress) if all(conflict) else _no_conflict(front, ends)
+    elif any(conflict):
+        found, gaps, solved = surface(ask, ends, points, progress)
+        front = replace(front, points=found, gaps=gaps, solved=solved)
+    else:
+        front = _no_conflict(front, ends)
+    return replace(front, seconds=time.perf_counter() - began)
+
+
+def _believed(solution: Solution) -> Solution:
+    if solution.status != "optimal":
+        raise NotSolved(solution)
+    return solution
+
+
+def _labelled(ask: Asker, k: int, solution: Solution) -> FrontPoint:
+    text = ask.texts[k].strip()
+    opposite = text.removeprefix("-").strip()
+    greatest = text != opposite and opposite.isidentifier()
+    return replace(point(ask, solution), label=f"greatest {opposite}" if greatest else f"least {text}")
+
+
+def _no_conflict(front: Front, ends: Sequence[FrontPoint]) -> Front:
+    best = min(ends, key=lambda p: sum(p.objectives))
+    note = "the objectives are not in conflict: one design is best in all of them, and the front is that point"
+    return replace(front, points=(replace(best, label="best in all"),), notes=(note,))
