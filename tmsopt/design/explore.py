@@ -4,10 +4,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from tmsopt.design.cases import Case
-from tmsopt.design.finding import Finding, Trial, counted, found, honest, survivor
+from tmsopt.design.finding import Finding, Trial, counted, found, survivor
 from tmsopt.design.formulations import design_of, formulate, middle
 from tmsopt.design.frozen import Table
 from tmsopt.design.nlp import NLP
@@ -18,6 +16,7 @@ from tmsopt.design.relax import relax
 from tmsopt.design.search import Candidate, follow, same, search
 from tmsopt.design.sides import Side
 from tmsopt.design.solution import Starts
+from tmsopt.design.variation import overclaims
 from tmsopt.design.worst import worst_cases
 
 _ROUNDS = 40
@@ -25,7 +24,6 @@ _ROUNDS = 40
 
 _LEADERS = 3  # optima followed when cases are added: a better one may do worse between the old cases
 _NEARER = 1e-7  # share of the radius
-_FAR = 1e8  # of a variable: a root quantity that nothing holds runs away
 
 Progress = Callable[[int, int], None]
 
@@ -58,7 +56,8 @@ class Explored:
 def explore(problem: Problem, side: Side, options: Options) -> Explored:
     """Search one part of the box from many starts, exactly and in all cases."""
     nlp = side.narrowed(formulate(problem, problem.cases))
-    candidates, touching = _searched(side, nlp, options)
+    touching = overclaims(problem)
+    candidates = _searched(side, nlp, options, touching)
     trial = survivor(problem, nlp, candidates)
     starts = counted(candidates, trial.candidate.objective if trial else math.nan)
     if problem.cases:
@@ -107,40 +106,18 @@ def evaluated_cases(problem: Problem, parameters: Mapping[str, float]) -> tuple[
     return (*listed, *(w.case for w in worst_cases(problem, parameters).values())) if listed else ()
 
 
-def _searched(side: Side, nlp: NLP, options: Options) -> tuple[list[Candidate], bool]:
-    """Where the starts ended; once more with root quantities held exact, if a bound on them claims too much."""
-
-    def run(touching: bool) -> list[Candidate]:
-        return search(
-            side.problem,
-            nlp,
-            starts=options.starts,
-            seed=options.seed,
-            exhaustive=options.exhaustive,
-            linear_solver=options.linear_solver,
-            progress=options.progress,
-            touching=touching,
-        )
-
-    candidates = run(touching=False)
-    if not nlp.touches or not _overclaims(side.problem, nlp, candidates):
-        return candidates, False
-    return run(touching=True), True
-
-
-def _overclaims(problem: Problem, nlp: NLP, candidates: Sequence[Candidate]) -> bool:
-    """Whether the best end owes its rank to a root quantity that the design does not have."""
-    feasible = [c for c in candidates if c.feasible]
-    if not feasible:
-        return any(float(np.abs(c.run.x).max()) > _FAR for c in candidates)
-    best = min(feasible, key=lambda c: c.objective)
-    trial = survivor(problem, nlp, [best])
-    if trial is None:
-        return False
-    far = {n for n, c in problem.conditions.items() if RADIUS in c.names}  # these are for more directions to settle
-    excess = sum(v for n, v in trial.checked.violations.items() if n not in far)
-    objective = problem.objective is not None and RADIUS in problem.objective.names
-    return excess > math.sqrt(FEASIBLE) or not (objective or honest(problem, trial))
+def _searched(side: Side, nlp: NLP, options: Options, touching: bool) -> list[Candidate]:
+    """Where the starts ended."""
+    return search(
+        side.problem,
+        nlp,
+        starts=options.starts,
+        seed=options.seed,
+        exhaustive=options.exhaustive,
+        linear_solver=options.linear_solver,
+        progress=options.progress,
+        touching=touching,
+    )
 
 
 def _covered(

@@ -15,11 +15,11 @@ import numpy as np
 
 from tmsopt.design.cases import Case
 from tmsopt.design.expression import Expression
-from tmsopt.design.lifts import lift_abscissa, lift_damping_ratio, lift_quantity, lift_radius
+from tmsopt.design.lifts import lift_abscissa, lift_damping_ratio, lift_quantity, lift_radius, lift_real_roots
 from tmsopt.design.nlp import NLP, Factor, Lift, Touch
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_QUANTITIES
-from tmsopt.design.variation import varies
+from tmsopt.design.variation import demands_heavy_damping, varies
 from tmsopt.models import Quantity, Values
 from tmsopt.roots import Pattern
 
@@ -53,14 +53,21 @@ def freedom(problem: Problem) -> Freedom:
     return Freedom(len(problem.free), (problem.pattern.codimension if problem.pattern else 0) + equalities)
 
 
-def formulate(problem: Problem, cases: Sequence[Case] = ()) -> NLP:
-    """The formulation that the problem asks for: ``matching`` for a pattern, else ``abscissa``."""
-    return matching(problem, cases=cases) if problem.pattern else abscissa(problem, cases)
+def formulate(problem: Problem, cases: Sequence[Case] = (), elastic: bool = False) -> NLP:
+    """The formulation that the problem asks for: ``matching`` for a pattern, else ``abscissa``.
+
+    Args:
+        cases: what the design must stand up to; the nominal design alone, without any.
+        elastic: leave every constraint a row that can be relaxed.
+    """
+    return matching(problem, cases=cases) if problem.pattern else abscissa(problem, cases, elastic)
 
 
-def abscissa(problem: Problem, cases: Sequence[Case] = ()) -> NLP:
-    """Optimise the objective with every root quantity carried by factors, in every case."""
+def abscissa(problem: Problem, cases: Sequence[Case] = (), elastic: bool = False) -> NLP:
+    """Optimise the objective with every root quantity carried by factors, in every case; real ones if all must be."""
     build = _Builder(problem, cases)
+    if not elastic and demands_heavy_damping(problem):
+        build.real_roots()
     build.constraints()
     build.optimise()
     return build.finish("abscissa")
@@ -162,9 +169,19 @@ class _Builder:
         for a, b in zip(left[1:], right[1:], strict=True):
             self.row(name, a - b, 0.0, 0.0)
 
+    def real_roots(self) -> None:
+        """Every case heavily damped."""
+        lifted = lift_real_roots(self, self.covered, self.values)
+        self.lifts.append(lifted.lift)
+        self.touches["abscissa"] = lifted.touches
+        self.shared |= {"abscissa": lifted.symbol, "damping_ratio": ca.SX(1.0)}
+
     def constraints(self) -> None:
         ends = {"<=": (-np.inf, 0.0), ">=": (0.0, np.inf), "==": (0.0, 0.0)}
         for name, condition in self.problem.conditions.items():
+            alone = condition.names == ("damping_ratio",) and "damping_ratio" in self.shared
+            if alone and condition.violation({"damping_ratio": 1.0}) == 0:
+                continue  # the real roots see to it
             for value in self.in_each_case(condition):
                 self.row(name, value, *ends[condition.comparison])
 

@@ -85,6 +85,25 @@ def lift_damping_ratio(build: Rows, covered: Sequence[int], values: Sequence[Val
     return Lifted(zeta, Lift("damping_ratio", 1 + 2 * len(touches), guess), tuple(touches), tuple(products))
 
 
+def lift_real_roots(build: Rows, covered: Sequence[int], values: Sequence[Values]) -> Lifted:
+    """Heavy damping: γ ≤ 0 and roots γ − d₁, γ − d₁ − d₂, …, all dᵢ ≥ 0, in every case.
+
+    As many equations as sectors and half-planes need twice over, and regular at multiple roots, where the dᵢ between
+    them are at their bound 0; p² ≥ 4q has dependent gradients there. d₁ = 0 puts a root on the line Re s = γ.
+    """
+    gamma = build.variable("abscissa", upper=0.0)
+    touches: list[Touch] = []
+    for case in covered:
+        a = values[case].coefficients
+        at = build.size[0]
+        steps = [build.variable(f"d{k}.{case}", 0.0) for k in range(1, len(a))]
+        touches.append(Touch(partial(_step_distance, at), variable=at))
+        distances = [sum(steps[:k], 0) for k in range(1, len(a))]
+        build.equal("abscissa", shift(a, gamma), [a[0] * c for c in product(*([1, d] for d in distances))])
+    size = 1 + sum(len(values[case].coefficients) - 1 for case in covered)
+    return Lifted(gamma, Lift("abscissa", size, partial(_real_guess, covered)), tuple(touches), ())
+
+
 def lift_radius(build: Rows, radius: Any, directions: Sequence[tuple[int, Case]], values: Sequence[Values]) -> Lift:
     """Stability at the distance `radius` in the given directions: p = a0 ∏ (s² + βᵢ s + κᵢ) at each, a0 of one sign."""
     size = 0
@@ -119,6 +138,11 @@ def _real_distance(at: int, x: Array) -> float:
     return float(kappa / (beta or 1.0)) if beta * beta >= 4 * kappa else np.inf
 
 
+def _step_distance(at: int, x: Array) -> float:
+    """Distance of the rightmost root from the line."""
+    return float(x[at])
+
+
 def _sector_distance(at: int, x: Array) -> float:
     """Damping ratio of the pair, the least of which is on the edge."""
     p, w = x[at], x[at + 1]
@@ -144,6 +168,14 @@ def _abscissa_guess(covered: Sequence[int], values: Sequence[Values], z: Sequenc
     every = np.concatenate([z[case] for case in covered])
     gamma = float(every.real.max()) + 0.05 * float(np.abs(every).mean()) + 1e-3
     return [[gamma, *(c for case in covered for c in _factors(z[case], gamma))]]
+
+
+def _real_guess(covered: Sequence[int], values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
+    """Roots on the real axis below their own, and left of 0."""
+    every = np.concatenate([z[case] for case in covered])
+    gamma = min(float(every.real.max()) + 0.05 * float(np.abs(every).mean()) + 1e-3, -1e-3)
+    steps = [np.diff(np.sort(np.maximum(gamma - z[case].real, 1e-3)), prepend=0.0) for case in covered]
+    return [[gamma, *(float(d) for part in steps for d in part)]]
 
 
 def _damping_guess(covered: Sequence[int], values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import flint
+import numpy as np
 
 from tmsopt.design.cases import Case
 from tmsopt.design.expression import Expression
@@ -14,7 +15,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
 from tmsopt.design.variation import varies
 from tmsopt.models import Values
-from tmsopt.roots import PATTERNS, Structure, exact_abscissa, pattern_distance
+from tmsopt.roots import PATTERNS, Structure, exact_abscissa, pattern_distance, roots
 
 FEASIBLE = 1e-9
 """Violation, relative to the size of the two sides, up to which a constraint counts as satisfied."""
@@ -22,6 +23,7 @@ FEASIBLE = 1e-9
 MATCHED = 1e-10
 """Relative change of a coefficient up to which a pattern counts as located."""
 
+_SCATTER = 2e-3  # of the largest root: five times what numeric roots beside a 4-fold one are off
 _DIGITS = 120  # products of five doubles are exact, and the tangent is right far beyond the answer
 
 
@@ -113,15 +115,28 @@ def _look(problem: Problem, parameters: Mapping[str, float], cases: Sequence[Cas
     listed = [case for case in cases if not case.direction]
     nominal = problem.values(parameters)
     each = [problem.values(case.applied(parameters)) for case in listed] or [nominal]
-    top = max(range(len(each)), key=lambda k: _or_infinite(each[k]["abscissa"]))
-    roots = {"abscissa": each[top]["abscissa"], "damping_ratio": min(v["damping_ratio"] for v in each)}
+    near_top, near_least = _candidates(each)
+    top = max(near_top, key=lambda k: _or_infinite(each[k]["abscissa"]))
+    worst = {"abscissa": each[top]["abscissa"], "damping_ratio": min(each[k]["damping_ratio"] for k in near_least)}
     around = robustness(problem, parameters=parameters) if problem.asks_radius else None
     if around is not None:
-        roots[RADIUS] = around.radius
+        worst[RADIUS] = around.radius
     for values in (nominal, *each):
-        for name, value in roots.items():
+        for name, value in worst.items():
             values.define(name, value)
     return _Look(listed, nominal, each, top, around)
+
+
+def _candidates(each: Sequence[Values]) -> tuple[list[int], list[int]]:
+    """Cases that may have the largest abscissa, and the least damping ratio: numeric roots are off by 4e-4 at most."""
+    a = np.array([[float(c) for c in values.coefficients] for values in each])
+    if len(each) == 1 or not np.all(np.isfinite(a)) or np.any(a[:, 0] == 0):
+        return list(range(len(each))), list(range(len(each)))
+    z = roots(a)
+    size = np.abs(z).max(axis=1)
+    high, ratio = z.real.max(axis=1), np.min(-z.real / (np.abs(z) + 1e-300), axis=1)
+    top = np.flatnonzero(high + _SCATTER * size >= (high - _SCATTER * size).max())
+    return top.tolist(), np.flatnonzero(ratio <= ratio.min() + 2 * _SCATTER).tolist()
 
 
 def _objective(problem: Problem, nominal: Values, each: Sequence[Values], cases: Sequence[Case]) -> float:

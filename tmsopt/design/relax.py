@@ -18,11 +18,13 @@ from tmsopt.design.recheck import FEASIBLE, excesses
 from tmsopt.design.search import Candidate, Runner, same
 from tmsopt.design.solution import Relaxation
 from tmsopt.design.starts import designs
+from tmsopt.design.variation import overclaims
 from tmsopt.models import Values
 
 _TRIED = 16  # starts of a relaxation at most
 _FEW = 3  # starts for one limit alone, besides the relaxed design
 _AGREE = 3  # of them at the best value that end it
+_TIE = 1e-3  # of a scale, by which equal limits differ: one moved is easier to read than two moved by halves
 _WIDER = 3.0  # widths of the box by which its bounds may give way
 _INSET = 1e-3  # share of the width kept from a physical end that is excluded
 _HOLDS = 1e-7  # multiplier, in the scale of the relaxation, above which a limit takes part in the conflict
@@ -59,12 +61,12 @@ def relax(problem: Problem, seed: int, linear_solver: str, cases: Sequence[Case]
     """
     listed = tuple(cases) or problem.cases
     for wide, limits in _stages(problem):
-        trial, nlp, touching = _least(wide, limits, seed, linear_solver, listed)
+        trial, nlp = _least(wide, limits, seed, linear_solver, listed)
         if trial is None:
             continue
         amounts = _amounts(wide, limits, trial.parameters, nlp.cases)
         conflict = _conflict(nlp, limits, trial)
-        alone = _alone(problem, conflict, trial, linear_solver, nlp.cases, touching) if len(conflict) > 1 else {}
+        alone = _alone(problem, conflict, trial, linear_solver, nlp.cases) if len(conflict) > 1 else {}
         return Relaxation(Table(trial.parameters), Table(amounts), conflict, Table(alone))
     return None
 
@@ -79,10 +81,10 @@ def _stages(problem: Problem) -> Iterator[tuple[Problem, list[Limit]]]:
 
 def _constraint_limits(problem: Problem) -> list[Limit]:
     values = problem.values(problem.ordered(middle(problem)))
-    found = []
+    found: list[Limit] = []
     for name, condition in problem.conditions.items():
         size = max((abs(s) for s in condition.sides(values) if np.isfinite(s)), default=1.0)
-        found.append(Limit(name, max(1.0, size)))
+        found.append(Limit(name, max(1.0, size) * (1 + _TIE * len(found))))
     return found
 
 
@@ -108,20 +110,16 @@ def _widened(problem: Problem, names: Collection[str]) -> Problem:
 
 def _least(
     wide: Problem, limits: Sequence[Limit], seed: int, linear_solver: str, cases: Sequence[Case]
-) -> tuple[Trial | None, NLP, bool]:
+) -> tuple[Trial | None, NLP]:
     """The design with the least weighted sum of amounts that a few starts reach."""
-    nlp = _elastic(wide, formulate(wide, cases), limits)
-    candidates = _ends(wide, nlp, seed, linear_solver, touching=False)
+    nlp = _elastic(wide, formulate(wide, cases, elastic=True), limits)
+    candidates = _ends(wide, nlp, seed, linear_solver)
     trial = survivor(_unlimited(wide, limits), nlp, candidates)
-    touching = bool(nlp.touches) and trial is not None and _overclaims(wide, nlp, limits, trial)
-    if touching:
-        candidates = _ends(wide, nlp, seed, linear_solver, touching=True)
-        trial = survivor(_unlimited(wide, limits), nlp, candidates)
-    return (trial if trial is not None and not trial.checked.violations else None), nlp, touching
+    return (trial if trial is not None and not trial.checked.violations else None), nlp
 
 
-def _ends(wide: Problem, nlp: NLP, seed: int, linear_solver: str, touching: bool) -> list[Candidate]:
-    run = Runner(wide, nlp, linear_solver, touching)
+def _ends(wide: Problem, nlp: NLP, seed: int, linear_solver: str) -> list[Candidate]:
+    run = Runner(wide, nlp, linear_solver, overclaims(wide))
     candidates: list[Candidate] = []
     for design in designs(wide, seed, _TRIED):
         candidates.append(run.ended(design, hopeful=any(c.feasible for c in candidates)))
@@ -136,13 +134,6 @@ def _unlimited(problem: Problem, limits: Sequence[Limit]) -> Problem:
     moved = {limit.name for limit in limits}
     kept = {n: c for n, c in problem.constraints.items() if n not in moved}
     return replace(problem, constraints=kept, minimize=None, maximize=None)
-
-
-def _overclaims(wide: Problem, nlp: NLP, limits: Sequence[Limit], trial: Trial) -> bool:
-    """Whether the design needs more than the solver claims: a bound on a root quantity stood for the quantity."""
-    excess = excesses(wide, trial.parameters, nlp.cases)
-    real = sum(abs(limit.needed(trial.parameters, excess)) / limit.scale for limit in limits)
-    return real > trial.point.objective + 1e-6
 
 
 def _amounts(
@@ -172,15 +163,15 @@ def _conflict(nlp: NLP, limits: Sequence[Limit], trial: Trial) -> tuple[str, ...
 
 
 def _alone(
-    problem: Problem, conflict: Sequence[str], trial: Trial, linear_solver: str, cases: Sequence[Case], touching: bool
+    problem: Problem, conflict: Sequence[str], trial: Trial, linear_solver: str, cases: Sequence[Case]
 ) -> dict[str, float]:
     """How far each limit of a conflict must be moved if nothing else is; those that cannot do it alone are left out."""
     limits = {limit.name: limit for limit in (*_constraint_limits(problem), *_bound_limits(problem))}
     found: dict[str, float] = {}
     for limit in (limits[name] for name in conflict):
         wide = _widened(problem, [limit.parameter] if limit.parameter else [])
-        nlp = _elastic(wide, formulate(wide, cases), [limit])
-        run = Runner(wide, nlp, linear_solver, touching=touching)
+        nlp = _elastic(wide, formulate(wide, cases, elastic=True), [limit])
+        run = Runner(wide, nlp, linear_solver, touching=overclaims(wide))
         here = {n: min(max(trial.parameters[n], lo), hi) for n, (lo, hi) in wide.free.items()}
         candidates = [run.ended(here, near=True), *(run.ended(d) for d in designs(wide, 0, _FEW))]
         ended = survivor(_unlimited(wide, [limit]), nlp, candidates)

@@ -1,36 +1,100 @@
-"""Whether an expression differs between the cases of a problem."""
+"""What an expression depends on: the case of a problem, and root quantities in which direction."""
 
 from collections.abc import Sequence
+from functools import lru_cache, partial
+from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from tmsopt.design.cases import Case
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ROOT_NAMES
+from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTITIES
+from tmsopt.models import Model, Quantity, Values
 
-_DESIGNS = 4
+_DESIGNS = 32  # designs at which the direction of a root quantity is looked at
+_GUESSES = (-2.0, -1.0, -0.3, 0.1, 0.7)  # values of a root quantity
+_STEP = 1e-3
 
 
 def varies(problem: Problem, expression: Expression, cases: Sequence[Case]) -> bool:
-    """Whether the value of an expression changes with the case, its root quantities aside; equalities do not count.
+    """Whether the value of an expression depends on what differs between cases, its root quantities aside.
 
-    Those are shared by all cases, as the worst of them; an equality is one of the nominal design, for it cannot hold
-    at two corners of a box. Decided by numbers: a quantity that no case changes is the same to the last bit.
+    Those are shared by all cases, as the worst of them. An equality is one of the nominal design, for it cannot hold
+    at two corners of a box.
     """
-    varied = [case for case in cases if not case.direction]
-    if not varied or expression.comparison == "==" or not set(expression.names) - set(ROOT_NAMES):
+    varied = {name for case in cases for table in (case.at, case.offset) for name in table}
+    if not varied or expression.comparison == "==":
+        return False
+    return bool(varied & _dependencies(problem.model, problem.parameter_set.name, expression))
+
+
+def overclaims(problem: Problem) -> bool:
+    """Whether a bound on a root quantity, in place of the quantity, would make a problem easier than it is.
+
+    The factors bound the abscissa from above and the damping ratio from below; that is exact where the objective and
+    the constraints get no better as the abscissa grows or the ratio falls.
+    """
+    asked = [(1.0 if problem.sense != "maximize" else -1.0, problem.objective)]
+    for condition in problem.conditions.values():
+        asked.append((-1.0 if condition.comparison == ">=" else 1.0, condition))
+    return any(e is not None and _tempts(problem, sign, e) for sign, e in asked)
+
+
+def demands_heavy_damping(problem: Problem) -> bool:
+    """Whether a constraint on the damping ratio alone leaves nothing but 1: all roots real and negative."""
+    for condition in problem.conditions.values():
+        if condition.names == ("damping_ratio",):
+            below, at = (float(condition({"damping_ratio": ratio})) for ratio in (1 - 1e-9, 1.0))
+            sign = -1.0 if condition.comparison == ">=" else 1.0
+            equal = condition.comparison == "=="
+            if (at == 0 != below) if equal else (sign * at <= 0 < sign * below):
+                return True
+    return False
+
+
+def _tempts(problem: Problem, sign: float, expression: Expression) -> bool:
+    """Whether an expression, the smaller the better, falls as a root quantity gets worse; an equality, if at all."""
+    named = [n for n in ROOT_NAMES if n in expression.names and n != RADIUS]
+    if not named:
         return False
     rng = np.random.default_rng(0)
     ends = np.array([problem.free[n] for n in problem.free]).reshape(-1, 2)
     for _ in range(_DESIGNS):
-        drawn = dict(zip(problem.free, rng.uniform(*ends.T).tolist(), strict=True))
-        parameters = problem.ordered(drawn)
-        values = [problem.values(p) for p in (parameters, *(c.applied(parameters) for c in varied))]
-        for value in values:
-            for name in ROOT_NAMES:
-                value.define(name, -1.0)
-        found = np.array([float(expression(v)) for v in values])
-        if np.any((found != found[0]) & ~(np.isnan(found) & np.isnan(found[0]))):
-            return True
+        values = problem.values(problem.ordered(dict(zip(problem.free, rng.uniform(*ends.T).tolist(), strict=True))))
+        found = {n: float(rng.choice(_GUESSES)) for n in ROOT_NAMES}
+        before = _with(values, expression, found)
+        for name in named:
+            worse = found[name] + (_STEP if name == "abscissa" else -_STEP)
+            change = sign * (_with(values, expression, {**found, name: worse}) - before)
+            if change < 0 or (expression.comparison == "==" and change != 0):
+                return True
     return False
+
+
+def _with(values: Values, expression: Expression, known: dict[str, float]) -> float:
+    for name, value in known.items():
+        values.define(name, value)
+    return float(expression(values))
+
+
+@lru_cache(maxsize=4096)
+def _dependencies(model: Model, set_name: str, expression: Expression) -> frozenset[str]:
+    """Parameters that an expression depends on, directly or through quantities other than those of the roots."""
+    of = model.parameter_set(set_name)
+    symbols = {name: ca.SX.sym(name) for name in of.names}
+    extra = (*ROOT_QUANTITIES, NO_RADIUS)
+    values = Values(model, of, symbols, extra=extra, lift=partial(_stand_in, symbols))
+    found = ca.SX(expression.symbolic(values))
+    return frozenset(name for name, symbol in symbols.items() if ca.depends_on(found, symbol))
+
+
+def _stand_in(symbols: dict[str, Any], quantity: Quantity, values: Values) -> Any:
+    """In place of a quantity, something that depends on the same parameters; None where its formula can be used."""
+    if quantity.name in ROOT_NAMES:
+        return ca.SX.sym(quantity.name)
+    if quantity.equation is None:
+        return None
+    equation = ca.SX(quantity.equation(values, ca.SX.sym(quantity.name)))
+    return sum((s for s in symbols.values() if ca.depends_on(equation, s)), ca.SX(0))

@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 
 _LINE = 1025  # points looked at along a band when nothing else varies
 _PLANE = 2048  # points, besides the corners, where more varies
+_EDGES = 8192  # points on the edges of the box, where most worst cases lie
 _PEAKS = 4  # worst points that are looked at closely
 _AROUND = 48  # points of each closer look
 _SHRINK = 0.25
@@ -174,9 +175,15 @@ def _grid(size: int) -> Array:
     if size == 1:
         return np.linspace(0, 1, _LINE)[:, None]
     corners = np.array(list(product((0.0, 1.0), repeat=size)))
+    along = np.linspace(0, 1, max(17, min(_LINE, _EDGES // (size * len(corners)))))
+    edges = [
+        np.insert(np.repeat(rest[None, :], len(along), axis=0), k, along, axis=1)
+        for k in range(size)
+        for rest in np.unique(np.delete(corners, k, axis=1), axis=0)
+    ]
     middles = np.array(list(product((0.0, 0.5, 1.0), repeat=size))) if size <= 5 else corners
     steps = np.arange(1, _PLANE + 1)[:, None] * golden_steps(size)
-    return np.concatenate([corners, middles, (0.5 + steps) % 1.0])
+    return np.concatenate([corners, middles, *edges, (0.5 + steps) % 1.0])
 
 
 def _apart(u: Array, high: Array, distance: float) -> list[int]:

@@ -58,7 +58,9 @@ def _Fr_c(v: Mapping[str, Any]) -> Any:
     terms, denominator = _weave_condition(v)
     numerator = sum(terms)
     rounding = 4 * np.finfo(float).eps * sum(np.abs(t) for t in terms)
-    return sqrt(_quotient(np.where(np.abs(numerator) <= rounding, 0.0, numerator), denominator))
+    level = np.abs(v["chi_B"] - v["chi_H"]) <= 4 * np.finfo(float).eps * (np.abs(v["chi_B"]) + np.abs(v["chi_H"]))
+    squared = _quotient(np.where(np.abs(numerator) <= rounding, 0.0, numerator), np.where(level, 0.0, denominator))
+    return np.abs(sqrt(squared))  # without the sign of −0
 
 
 def _Fr_c_equation(v: Mapping[str, Any], x: Any) -> Any:
