@@ -21,6 +21,7 @@ from tmsopt.cli.common import (
 )
 
 if TYPE_CHECKING:
+    from tmsopt.design.nearest import Robustness
     from tmsopt.design.solution import Solution
     from tmsopt.study.explain import Explanation
 
@@ -93,7 +94,9 @@ def _common(command: Command) -> Command:
     show_default=True,
     help="Likewise, the mass m_B of the rear frame, in kg or with a unit.",
 )
-@click.option("--brief", is_flag=True, help="Leave out what the optimum means: gains of limits moved, rounding.")
+@click.option(
+    "--brief", is_flag=True, help="Leave out what the optimum means: gains of limits moved, rounding, robustness."
+)
 @click.pass_context
 def solve(
     context: click.Context,
@@ -138,7 +141,7 @@ def solve(
                 problem, starts=starts or STARTS, seed=seed, linear_solver=linear_solver, throw=False, progress=update
             )
     if as_json:
-        write_json(solution.to_json() | ({} if brief else {"meaning": _explained(solution).to_json()}))
+        write_json(solution.to_json() | ({} if brief else _meaning(solution)))
     else:
         from tmsopt.show.tables import solution_table
 
@@ -147,6 +150,10 @@ def solve(
             from tmsopt.show.explained import explained_lines
 
             click.echo("\n".join(["", *explained_lines(_explained(solution))]))
+            if robust := _robust(solution):
+                from tmsopt.show.robust import robustness_table
+
+                click.echo("\n" + robustness_table(robust))
     if plot is not None:
         _draw(solution, plot, w, m_B)
     sys.exit(_EXIT[solution.status])
@@ -208,6 +215,24 @@ def _explained(solution: "Solution") -> "Explanation":
     from tmsopt.study.explain import explain
 
     return explain(solution)
+
+
+def _robust(solution: "Solution") -> "Robustness | None":
+    """The nearest boundaries; None where a root is at infinity, or nothing feasible was found."""
+    from tmsopt.design.nearest import robustness
+
+    if not math.isfinite(solution.abscissa) or solution.status == "infeasible":
+        return None
+    return robustness(solution)
+
+
+def _meaning(solution: "Solution") -> dict[str, Any]:
+    """What the optimum means, for JSON."""
+    robust = _robust(solution)
+    return {
+        "meaning": _explained(solution).to_json(),
+        **({"robustness": robust.to_json()} if robust else {}),
+    }
 
 
 def _draw(solution: "Solution", path: Path, w: float, m_B: float) -> None:

@@ -8,6 +8,7 @@ from tmsopt.design.units import reading
 from tmsopt.models.tms import GRAVITY, tms, to_si
 from tmsopt.roots import Root
 from tmsopt.show.build import pitching, quantity_rows
+from tmsopt.show.limits import case_lines, relaxation_lines
 from tmsopt.show.text import columns, number
 from tmsopt.study.compare import Comparison
 
@@ -97,6 +98,7 @@ def _facts(solution: Solution) -> list[str]:
         lines.append(
             f"bound: no design in the box is below {number(bound.value)} ({bound.method}); gap {bound.gap:.1e}"
         )
+    lines += case_lines(solution)
     free = solution.freedom
     if solution.problem.locate:
         lines.append(f"freedom: {free.kind}, {free.free} free parameters and {free.conditions} conditions")
@@ -106,6 +108,7 @@ def _facts(solution: Solution) -> list[str]:
     for name, value in solution.violations.items():
         text = solution.problem.constraints.get(name, "pattern" if name == solution.problem.locate else "must not be 0")
         lines.append(f"violated: {name} ({text}) by {value:.4g}")
+    lines += relaxation_lines(solution)
     for branch in solution.branches:
         where = ", ".join(f"{n} = {branch.parameters[n]:.10g}" for n in solution.problem.free)
         lines.append(f"also solved by {where}; excluded by {', '.join(branch.excluded_by) or 'nothing'}")

@@ -8,10 +8,14 @@ from typing import Any
 import flint
 import numpy as np
 
+from tmsopt.design.cases import Case
 from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import RADIUS
 from tmsopt.design.recheck import FEASIBLE, realised_abscissa
 from tmsopt.design.solution import Solution
+from tmsopt.design.variation import varies
+from tmsopt.models import Values
 from tmsopt.roots import roots
 from tmsopt.study.steps import reported_unit
 
@@ -32,7 +36,8 @@ class Rounded:
     Attributes:
         digits: significant digits.
         written: rounded parameter → the decimal number with its unit, e.g. ``23.5 deg``.
-        realised: abscissa of the decimals, exact to double precision; the other parameters as stored.
+        realised: abscissa of the decimals, exact to double precision; the other parameters as stored. With scenarios
+            or tolerances, the worst of the cases that the design was made for.
         loss: realised minus ideal abscissa of the design.
         damping_ratio: of the rounded design, in double precision.
         objective: value of the objective expression; nan without one.
@@ -78,18 +83,22 @@ def rounded(solution: Solution, names: Iterable[str], digits: int) -> Rounded:
     with flint.ctx.workdps(_WORKING):
         exact: dict[str, Any] = {n: _exact(text, of[n].unit) for n, text in written.items()}
     plain = {**solution.parameters, **{n: float(x.mid()) for n, x in exact.items()}}
-    realised = realised_abscissa(problem, {**solution.parameters, **exact})
+    cases = _cases(solution)
+    realised = max(realised_abscissa(problem, c.applied({**solution.parameters, **exact})) for c in cases)
+    each = [problem.values(case.applied(plain)) for case in cases]
+    ratio = min(_damping_ratio([float(c) for c in values.coefficients]) for values in each)
     values = problem.values(plain)
-    values.define("abscissa", realised)  # known already, and better than by fitting structures
-    values.define("damping_ratio", _damping_ratio([float(c) for c in values.coefficients]))
+    for one in (values, *each):
+        one.define("abscissa", realised)  # known already, and better than by fitting structures
+        one.define("damping_ratio", ratio)
     return Rounded(
         digits=digits,
         written=Table({n: _with_unit(text, of[n].unit) for n, text in written.items()}),
         realised=realised,
         loss=realised - solution.abscissa,
-        damping_ratio=float(values["damping_ratio"]),
+        damping_ratio=ratio,
         objective=float(problem.objective(values)) if problem.objective else math.nan,
-        violations=Table(_violations(problem, plain, values)),
+        violations=Table(_violations(problem, plain, [values, *each])),
     )
 
 
@@ -99,13 +108,28 @@ def worst(alone: Mapping[str, Rounded]) -> str:
     return max(losing, key=lambda name: losing[name], default="")
 
 
-def _violations(problem: Problem, parameters: Mapping[str, float], values: Mapping[str, Any]) -> dict[str, float]:
-    found = {name: condition.violation(values) for name, condition in problem.conditions.items()}
+def _cases(solution: Solution) -> list[Case]:
+    """The cases of a design; one that changes nothing, where there are none."""
+    listed = [case for case in solution.problem.cases if not case.direction]
+    return [*listed, *([solution.worst] if solution.worst else [])] or [Case()]
+
+
+def _violations(problem: Problem, parameters: Mapping[str, float], each: Sequence[Values]) -> dict[str, float]:
+    """What is violated in any case; the first values are of the nominal design."""
+    found = {}
+    for name, condition in problem.conditions.items():
+        if RADIUS not in condition.names:  # it takes a search of its own
+            at = each if varies(problem, condition, problem.cases) else each[:1]
+            found[name] = max((condition.violation(values) for values in at), key=_or_infinite)
     for name, (lower, upper) in problem.free.items():
         x = parameters[name]
         found[f"{name}.min"] = (lower - x) / max(1.0, abs(lower))
         found[f"{name}.max"] = (x - upper) / max(1.0, abs(upper))
     return {name: v for name, v in found.items() if not v <= FEASIBLE}
+
+
+def _or_infinite(value: float) -> float:
+    return math.inf if math.isnan(value) else value
 
 
 def _damping_ratio(coefficients: Sequence[float]) -> float:

@@ -1,0 +1,62 @@
+"""Worst cases, and limits in conflict, as lines for a reader."""
+
+import math
+
+from tmsopt.design.problem import Problem
+from tmsopt.design.solution import Solution
+from tmsopt.design.units import reading
+from tmsopt.models import ParameterSet
+from tmsopt.show.text import number
+
+
+def case_lines(solution: Solution) -> list[str]:
+    """The worst case, and what is known of all of them."""
+    if solution.worst is None:
+        return []
+    of = solution.problem.parameter_set
+    at = [f"{n} = {_short(of, n, v)}" for n, v in solution.worst.at.items()]
+    at += [f"{n} {'+' if v >= 0 else '−'} {_short(of, n, abs(v))}" for n, v in solution.worst.offset.items()]
+    lines = [f"worst case: {', '.join(at)}; abscissa, roots and structure are those there"]
+    cover = solution.cover
+    if cover is not None:
+        means = f"by interval arithmetic on {cover.boxes} boxes" if cover.proven else "looked for, not proven"
+        lines.append(f"every case: abscissa at most {number(cover.limit)}, {means}")
+    return lines
+
+
+def relaxation_lines(solution: Solution) -> list[str]:
+    """What is in conflict, and what frees it."""
+    relaxation = solution.relaxation
+    if relaxation is None or not relaxation.amounts:
+        return []
+    problem = solution.problem
+    lines = [f"in conflict: {', '.join(relaxation.conflict) or ', '.join(relaxation.amounts)}"]
+    moves = [_move(problem, name, amount) for name, amount in relaxation.amounts.items()]
+    lines.append(f"smallest relaxation found: {'; '.join(moves)}")
+    single = {n: a for n, a in relaxation.alone.items() if relaxation.amounts.keys() != {n}}
+    lines += [f"  or alone: {_move(problem, name, amount)}" for name, amount in single.items()]
+    return lines
+
+
+def _move(problem: Problem, name: str, amount: float) -> str:
+    """A limit moved, in words, rounded up so that it suffices."""
+    parameter, _, end = name.partition(".")
+    if name in problem.constraints or parameter not in problem.free:
+        return f"{name} ({problem.constraints.get(name, name)}) by {_up(amount)}"
+    of = problem.parameter_set
+    value, unit = reading(amount, of[parameter].unit)
+    direction = "up" if end == "max" else "down"
+    return f"{name} {direction} by {_up(value)}{'' if unit == '1' else ' ' + unit}"
+
+
+def _up(amount: float) -> str:
+    """Six digits, rounded away from zero."""
+    if amount == 0:
+        return "0"
+    step = 10.0 ** (math.floor(math.log10(abs(amount))) - 5)
+    return f"{math.copysign(math.ceil(abs(amount) / step) * step, amount):.6g}"
+
+
+def _short(of: ParameterSet, name: str, value: float) -> str:
+    number_, unit = reading(value, of[name].unit)
+    return f"{number_:.9g}{'' if unit == '1' else ' ' + unit}"
