@@ -87,7 +87,7 @@ class Problem:
     @property
     def asks_radius(self) -> bool:
         """Whether the objective or a constraint names the robustness radius."""
-        return any(RADIUS in e.names for e in (self.objective, *self.conditions.values()) if e)
+        return any(RADIUS in e.names for e in (self.objective, *self.objectives, *self.conditions.values()) if e)
 
     @cached_property
     def parameter_set(self) -> ParameterSet:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from tmsopt.design.problem import Problem
+from tmsopt.design.recheck import recheck
 from tmsopt.design.search import STARTS
 from tmsopt.design.solution import Solution
 from tmsopt.design.solve import solve
@@ -111,10 +112,14 @@ def eps_names(ask: Asker) -> tuple[str, ...]:
 
 
 def objectives(ask: Asker, solution: Solution) -> tuple[float, ...]:
-    """Values of all objectives, from the parameters alone."""
+    """Values of all objectives, from the parameters alone; the worst over the cases that the design was made for."""
     problem = ask.problem
-    values = problem.values(solution.parameters)
-    return tuple(float(expression(values)) for expression in problem.objectives)
+    if not (problem.variations or problem.tolerances or solution.problem.asks_radius):
+        values = problem.values(solution.parameters)
+        return tuple(float(expression(values)) for expression in problem.objectives)
+    cases = (*problem.cases, *([solution.worst] if solution.worst else []))
+    alone = (replace(problem, pareto=(), minimize=text) for text in ask.texts)
+    return tuple(recheck(one, solution.parameters, cases).objective for one in alone)
 
 
 def point(ask: Asker, solution: Solution) -> FrontPoint:
