@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from tmsopt.design.cases import Case
-from tmsopt.design.finding import Finding, Trial, counted, found, survivor
+from tmsopt.design.finding import Finding, Trial, ahead, counted, found, survivor
 from tmsopt.design.formulations import design_of, formulate, middle
 from tmsopt.design.frozen import Table
 from tmsopt.design.nlp import NLP
@@ -13,7 +13,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
 from tmsopt.design.recheck import FEASIBLE, recheck
 from tmsopt.design.relax import relax
-from tmsopt.design.search import Candidate, follow, same, search
+from tmsopt.design.search import Candidate, Runner, follow, same, search
 from tmsopt.design.sides import Side
 from tmsopt.design.solution import Starts
 from tmsopt.design.variation import overclaims
@@ -59,6 +59,11 @@ def explore(problem: Problem, side: Side, options: Options) -> Explored:
     touching = overclaims(problem)
     candidates = _searched(side, nlp, options, touching)
     trial = survivor(problem, nlp, candidates)
+    if trial is None and "damping_ratio" in nlp.touches:  # a positive real root has −1, and no sector of its own
+        unstable = side.narrowed(formulate(problem, problem.cases, damping_ratio=-1.0))
+        candidates = _searched(side, unstable, options, touching)
+        if (trial := survivor(problem, unstable, candidates)) is not None:
+            nlp = unstable
     starts = counted(candidates, trial.candidate.objective if trial else math.nan)
     if problem.cases:
         finding = _covered(problem, side, nlp, candidates, trial, starts, touching, options)
@@ -131,19 +136,21 @@ def _covered(
     options: Options,
 ) -> Finding | None:
     """The best design once cases have been added until none between them is worse."""
+    best = trial
     for _ in range(_ROUNDS):
-        if trial is None:
+        if trial is None or best is None:
             return None
         more = [*_uncovered(problem, trial), *_nearer(problem, nlp, trial)]
         if not more:
             break
-        leaders = _leaders(problem, candidates)
+        best = trial if ahead(problem, trial, best) else best
+        leaders = [best.parameters, trial.parameters, *_leaders(problem, candidates)]
         nlp = side.narrowed(formulate(problem, (*nlp.cases, *more)))
-        for near in (True, False):
-            candidates = [follow(problem, nlp, d, options.linear_solver, near, touching) for d in leaders]
-            trial = survivor(problem, nlp, candidates)
-            if trial is not None:
-                break
+        run = Runner(problem, nlp, options.linear_solver, touching)
+        candidates = [run.ended(design, near=True) for design in leaders]
+        if not any(c.feasible for c in candidates):
+            candidates = [run.ended(design) for design in leaders]
+        trial = survivor(problem, nlp, candidates)
     if trial is None:
         return None
     others = [c for c in evaluated_cases(problem, trial.parameters) if c not in nlp.cases]

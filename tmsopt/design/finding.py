@@ -121,7 +121,7 @@ def survivor(problem: Problem, nlp: NLP, candidates: Sequence[Candidate]) -> Tri
         point = polish(candidate.run, candidate.nlp)
         parameters = problem.ordered(design_of(problem, point.x.tolist()))
         trial = Trial(candidate, point, parameters, recheck(problem, parameters, nlp.cases))
-        if kept is None or _rank(problem, trial) < _rank(problem, kept):
+        if kept is None or ahead(problem, trial, kept):
             kept = trial
         if not trial.checked.violations and point.stationarity <= _STATIONARY:
             break
@@ -144,6 +144,11 @@ def better(problem: Problem, one: Finding, other: Finding) -> bool:
         for f in (one, other)
     ]
     return ranks[0] < ranks[1]
+
+
+def ahead(problem: Problem, one: Trial, other: Trial) -> bool:
+    """Whether one trial beats another: by violation first, then by the objective that the recheck found."""
+    return _rank(problem, one) < _rank(problem, other)
 
 
 def _rank(problem: Problem, trial: Trial) -> tuple[float, float]:

@@ -19,7 +19,7 @@ from tmsopt.design.lifts import lift_abscissa, lift_damping_ratio, lift_quantity
 from tmsopt.design.nlp import NLP, Factor, Lift, Touch
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_QUANTITIES
-from tmsopt.design.variation import demands_heavy_damping, varies
+from tmsopt.design.variation import demands_heavy_damping, tempts, varies
 from tmsopt.models import Quantity, Values
 from tmsopt.roots import Pattern
 
@@ -53,20 +53,29 @@ def freedom(problem: Problem) -> Freedom:
     return Freedom(len(problem.free), (problem.pattern.codimension if problem.pattern else 0) + equalities)
 
 
-def formulate(problem: Problem, cases: Sequence[Case] = (), elastic: bool = False) -> NLP:
+def formulate(
+    problem: Problem, cases: Sequence[Case] = (), elastic: bool = False, damping_ratio: float | None = None
+) -> NLP:
     """The formulation that the problem asks for: ``matching`` for a pattern, else ``abscissa``.
 
     Args:
         cases: what the design must stand up to; the nominal design alone, without any.
         elastic: leave every constraint a row that can be relaxed.
+        damping_ratio: take this for it, and leave it to the recheck whether it is.
     """
-    return matching(problem, cases=cases) if problem.pattern else abscissa(problem, cases, elastic)
+    if problem.pattern:
+        return matching(problem, cases=cases)
+    return abscissa(problem, cases, elastic, damping_ratio)
 
 
-def abscissa(problem: Problem, cases: Sequence[Case] = (), elastic: bool = False) -> NLP:
+def abscissa(
+    problem: Problem, cases: Sequence[Case] = (), elastic: bool = False, damping_ratio: float | None = None
+) -> NLP:
     """Optimise the objective with every root quantity carried by factors, in every case; real ones if all must be."""
     build = _Builder(problem, cases)
-    if not elastic and demands_heavy_damping(problem):
+    if damping_ratio is not None:
+        build.shared["damping_ratio"] = ca.SX(damping_ratio)
+    elif not elastic and demands_heavy_damping(problem):
         build.real_roots()
     build.constraints()
     build.optimise()
@@ -109,6 +118,9 @@ def design_of(problem: Problem, x: Sequence[float]) -> dict[str, float]:
 def middle(problem: Problem) -> dict[str, float]:
     """The start of each free parameter, or the middle of its range."""
     return {n: problem.start.get(n, (lo + hi) / 2) for n, (lo, hi) in problem.free.items()}
+
+
+_LEEWAY = 1e-9  # below a constant that a quantity is never less than
 
 
 class _Builder:
@@ -255,11 +267,17 @@ class _Builder:
             self.products += lifted.products
             self.shared[name] = lifted.symbol
             return lifted.symbol
-        if quantity.equation is None:
+        if quantity.equation is None and (not quantity.pieces or tempts(self.problem, name)):
             return None
-        symbol, lift = lift_quantity(self, name, case, (quantity.range.lower, quantity.range.upper))
+        ends = (-np.inf, np.inf) if quantity.pieces else (quantity.range.lower, quantity.range.upper)
+        symbol, lift = lift_quantity(self, name, case, ends)
         self.lifts.append(lift)
-        self.row(name, quantity.equation(values, symbol), 0.0, 0.0)
+        if quantity.equation is not None:
+            self.row(name, quantity.equation(values, symbol), 0.0, 0.0)
+        for piece in quantity.pieces:
+            above = ca.SX(symbol - piece(values))
+            # A limit that equals a constant piece would share its multiplier with it.
+            self.row(name, above, 0.0 if len(ca.symvar(above)) > 1 else -_LEEWAY, np.inf)
         return symbol
 
 

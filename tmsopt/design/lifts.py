@@ -191,5 +191,6 @@ def _damping_guess(covered: Sequence[int], values: Sequence[Values], z: Sequence
 
 
 def _radius_guess(directions: Sequence[int], values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
-    """A small radius, at which the roots are nearly those of the design itself."""
-    return [[1e-3, *(max(c, 0.0) for _ in directions for c in _factors(z[0], 0.0))]]
+    """The radius at which the cases were evaluated, and their factors."""
+    radius = float(values[0]["radius"])
+    return [[radius, *(max(c, 0.0) for case in directions for c in _factors(z[case], 0.0))]]

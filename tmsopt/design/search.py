@@ -105,7 +105,7 @@ class Runner:
 
     def ended(self, design: Mapping[str, float], near: bool = False, hopeful: bool = True) -> Candidate:
         """Where a start ends, with the factors shared out anew as long as that helps."""
-        best = self._once(design, near)
+        best = self._once(design, "near" if near else "exact" if self.nlp.cases else "far")
         for again in range(_AGAIN):
             if best.feasible and best.run.status == _SUCCESS and not best.nlp.tangled(best.run.x):
                 break
@@ -113,24 +113,32 @@ class Runner:
                 break
             if not np.all(np.isfinite(best.run.x)):
                 break
-            ended = self._once(design_of(self.problem, best.run.x.tolist()), near=again % 2 == 0)
+            ended = self._once(design_of(self.problem, best.run.x.tolist()), "near" if again % 2 == 0 else "far")
             if best.feasible and (not ended.feasible or ended.objective >= best.objective - _SAME):
                 break
             best = ended
         return best
 
-    def _once(self, design: Mapping[str, float], near: bool) -> Candidate:
+    def _once(self, design: Mapping[str, float], start: str) -> Candidate:
         x = complete(self.nlp, self.problem, design)
         limits = self.nlp.touching(x) if self.touching else self.nlp
-        return _candidate(self.problem, limits, (self._near if near else self._far)(x, limits))
+        return _candidate(self.problem, limits, self._run[start](x, limits))
 
     @cached_property
-    def _far(self) -> Callable[..., Run]:
-        return ipopt(self.nlp, self.linear_solver)
+    def _run(self) -> "_Runs":
+        return _Runs(self.nlp, self.linear_solver)
 
-    @cached_property
-    def _near(self) -> Callable[..., Run]:
-        return ipopt(self.nlp, self.linear_solver, near=True)
+
+class _Runs(dict[str, Callable[..., Run]]):
+    """Solvers by what is expected of a start, built when first used."""
+
+    def __init__(self, nlp: NLP, linear_solver: str) -> None:
+        super().__init__()
+        self.nlp, self.linear_solver = nlp, linear_solver
+
+    def __missing__(self, start: str) -> Callable[..., Run]:
+        self[start] = ipopt(self.nlp, self.linear_solver, start=start)
+        return self[start]
 
 
 def claim(problem: Problem, candidate: Candidate) -> float:

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from tmsopt.design.formulations import middle, variables_of
 from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES, regular
+from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES, RADIUS, regular
 from tmsopt.design.sequence import golden_steps
 from tmsopt.models import Values
-from tmsopt.roots import roots
+from tmsopt.roots import is_stable, roots
 from tmsopt.roots.structure import guess_distance
 
 Array = NDArray[np.float64]
@@ -20,29 +20,54 @@ Array = NDArray[np.float64]
 _CANDIDATES = 16
 """Designs looked at for each that is started from: a start near the good ones needs half the iterations."""
 
+_RADII = tuple(float(r) for r in np.geomspace(0.5, 1e-3, 28))
+
 _BATCH = 16  # starts whose candidates are looked at together
 
 
 def designs(problem: Problem, seed: int, count: int) -> Iterator[dict[str, float]]:
     """`count` designs to start from: the most promising of each few of a quasi-random sequence over the box.
 
-    Every other one is chosen by the constraints alone, lest all starts fall into the basin of one good region.
+    Every other one is chosen by the constraints alone, lest all starts fall into the basin of one good region; every
+    third from designs moved to the faces of the box, where many optima lie in basins of their own.
     """
     pool_of = spread(problem, seed)
     for done in range(0, count, _BATCH):
         size = min(_BATCH, count - done)
         pool = list(islice(pool_of, _CANDIDATES * size))
+        pool = [_cornered(problem, d) if k // _CANDIDATES % 3 == 2 else d for k, d in enumerate(pool)]
         columns = {n: np.array([d[n] for d in pool]) for n in problem.free}
         objective, violation = (m.reshape(size, _CANDIDATES) for m in _merit(problem, columns))
         merit = violation + objective * (np.arange(size) % 2 == 0)[:, None]
         yield from (pool[row * _CANDIDATES + int(np.argmin(merit[row]))] for row in range(size))
 
 
+def _stable_radius(nlp: NLP, problem: Problem, nominal: Mapping[str, float]) -> float:
+    """A radius at which the design is stable in all directions of an NLP; small where there is none."""
+    directed = [case for case in nlp.cases if case.direction]
+    for radius in _RADII if directed else ():
+        at = [case.applied(nominal, radius, problem.weights) for case in directed]
+        if np.all(is_stable([[float(c) for c in problem.values(p).coefficients] for p in at])):
+            return radius
+    return _RADII[-1]
+
+
+def _cornered(problem: Problem, design: Mapping[str, float]) -> dict[str, float]:
+    """A design with each parameter in the outer thirds of its range moved to the end of it."""
+    moved = {}
+    for name, (lower, upper) in problem.free.items():
+        share = (design[name] - lower) / (upper - lower)
+        moved[name] = lower if share < 1 / 3 else upper if share > 2 / 3 else design[name]
+    return moved
+
+
 def complete(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Array:
     """Start of all variables of an NLP: the design, and lifted variables that satisfy their equations with it."""
     nominal = problem.ordered(design)
-    varied = (case.applied(nominal, 0.0, problem.weights) for case in nlp.cases)
+    radius = _stable_radius(nlp, problem, nominal)
+    varied = (case.applied(nominal, radius, problem.weights) for case in nlp.cases)
     values = [problem.values(parameters) for parameters in (nominal, *varied)]
+    values[0].define(RADIUS, radius)
     z = list(roots(regular(np.array([[float(c) for c in v.coefficients] for v in values]))))
     x = variables_of(problem, design)
     for lift in nlp.lifts:

@@ -10,7 +10,7 @@ import numpy as np
 from tmsopt.design.cases import Case
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTITIES
+from tmsopt.design.quantities import NO_RADIUS, ROOT_NAMES, ROOT_QUANTITIES
 from tmsopt.models import Model, Quantity, Values
 
 _DESIGNS = 32  # designs at which the direction of a root quantity is looked at
@@ -36,10 +36,16 @@ def overclaims(problem: Problem) -> bool:
     The factors bound the abscissa from above and the damping ratio from below; that is exact where the objective and
     the constraints get no better as the abscissa grows or the ratio falls.
     """
-    asked = [(1.0 if problem.sense != "maximize" else -1.0, problem.objective)]
+    return tempts(problem, "abscissa") or tempts(problem, "damping_ratio", worse=-1.0)
+
+
+def tempts(problem: Problem, name: str, worse: float = 1.0) -> bool:
+    """Whether objective or constraints get better, at some design, as a quantity moves up (or down: `worse` −1)."""
+    sense = -1.0 if problem.sense == "maximize" else 1.0
+    asked = [(sense, problem.objective)]
     for condition in problem.conditions.values():
         asked.append((-1.0 if condition.comparison == ">=" else 1.0, condition))
-    return any(e is not None and _tempts(problem, sign, e) for sign, e in asked)
+    return any(e is not None and _falls(problem, sign, e, name, worse) for sign, e in asked)
 
 
 def demands_heavy_damping(problem: Problem) -> bool:
@@ -54,22 +60,24 @@ def demands_heavy_damping(problem: Problem) -> bool:
     return False
 
 
-def _tempts(problem: Problem, sign: float, expression: Expression) -> bool:
-    """Whether an expression, the smaller the better, falls as a root quantity gets worse; an equality, if at all."""
-    named = [n for n in ROOT_NAMES if n in expression.names and n != RADIUS]
-    if not named:
+def _falls(problem: Problem, sign: float, expression: Expression, name: str, worse: float) -> bool:
+    """Whether an expression, the smaller the better, falls as a quantity changes; an equality, if it does anything."""
+    if name in ROOT_NAMES and name not in expression.names:
         return False
     rng = np.random.default_rng(0)
     ends = np.array([problem.free[n] for n in problem.free]).reshape(-1, 2)
     for _ in range(_DESIGNS):
-        values = problem.values(problem.ordered(dict(zip(problem.free, rng.uniform(*ends.T).tolist(), strict=True))))
+        drawn = problem.ordered(dict(zip(problem.free, rng.uniform(*ends.T).tolist(), strict=True)))
         found = {n: float(rng.choice(_GUESSES)) for n in ROOT_NAMES}
-        before = _with(values, expression, found)
-        for name in named:
-            worse = found[name] + (_STEP if name == "abscissa" else -_STEP)
-            change = sign * (_with(values, expression, {**found, name: worse}) - before)
-            if change < 0 or (expression.comparison == "==" and change != 0):
-                return True
+        if name not in found:
+            found[name] = float(rng.uniform(0.1, 2.0))
+        before, after = (
+            _with(problem.values(drawn), expression, {**found, name: value})
+            for value in (found[name], found[name] + worse * _STEP)
+        )
+        change = sign * (after - before)
+        if change < 0 or (expression.comparison == "==" and change != 0):
+            return True
     return False
 
 

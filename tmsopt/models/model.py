@@ -67,6 +67,8 @@ class Quantity:
         value: the quantity for given values (of parameters and other quantities); nan where it does not exist.
         equation: an expression without division or radical, of the values and the quantity x itself, that is 0
             exactly when x is the quantity, within `range`. An optimiser then carries x as a variable.
+        pieces: where the quantity is the greatest of several, each of these. An optimiser then carries a variable
+            above all of them, if more of the quantity is never an advantage.
     """
 
     name: str
@@ -76,6 +78,7 @@ class Quantity:
     value: Formula
     equation: Callable[[Mapping[str, Any], Any], Any] | None = None
     range: Range = Range()
+    pieces: tuple[Formula, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -81,12 +81,25 @@ def _load_rear(v: Mapping[str, Any]) -> Any:
     return (1 - v["chi_B"] + v["mu"] * (1 - v["chi_H"])) / (1 + v["mu"])
 
 
+def _rear_lift(v: Mapping[str, Any]) -> Any:
+    """What the rear wheel lacks, as a mass per mass of the rear frame."""
+    return -v["load_rear"] * (1 + v["mu"])
+
+
+def _front_lift(v: Mapping[str, Any]) -> Any:
+    return -v["load_front"] * (1 + v["mu"])
+
+
 def _ballast_rear(v: Mapping[str, Any]) -> Any:
-    return positive_part(-v["load_rear"]) * (1 + v["mu"])
+    return positive_part(_rear_lift(v))
 
 
 def _ballast_front(v: Mapping[str, Any]) -> Any:
-    return positive_part(-v["load_front"]) * (1 + v["mu"])
+    return positive_part(_front_lift(v))
+
+
+def _none(v: Mapping[str, Any]) -> Any:
+    return 0
 
 
 def _mass_margin(v: Mapping[str, Any]) -> Any:
@@ -150,11 +163,13 @@ NATIVE_QUANTITIES = (
         "ballast_rear", "1", "mass at the rear contact that keeps the rear wheel down, per mass of the rear frame",
         r"m_R/m_B", _ballast_rear,
         range=_NOT_NEGATIVE,
+        pieces=(_none, _rear_lift),
     ),
     Quantity(
         "ballast_front", "1", "mass at the front contact that keeps the front wheel down, per mass of the rear frame",
         r"m_F/m_B", _ballast_front,
         range=_NOT_NEGATIVE,
+        pieces=(_none, _front_lift),
     ),
     Quantity(
         "mass_margin", "1", "smallest eigenvalue of the mass matrix, 0 where it is singular (equation matrices)",

@@ -54,7 +54,7 @@ def backward_error(coefficients: ArrayLike, values: NDArray[np.complex128]) -> A
     c = np.asarray(coefficients, dtype=float)
     size = _elementary(-np.abs(values)).real
     error = np.abs(_elementary(values).real - c / c[..., :1])
-    with np.errstate(invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.max(np.where(error == 0, 0.0, error / size), axis=-1))
 
 
@@ -118,8 +118,12 @@ def _newton_step(factors: Array, monic: Array) -> Array:
     columns = np.stack([unit, unit**2], axis=-1).reshape(rows, 2 * half)
     if n % 2:
         jacobian[:, :, -1] = 0  # the lone root's q stays 0
-    balanced = jacobian * columns[:, None, :] / size[:, :, None]
-    step = np.linalg.pinv(balanced) @ (residual / size)[:, :, None]
+    with np.errstate(all="ignore"):
+        balanced = jacobian * columns[:, None, :] / size[:, :, None]
+        target = residual / size
+    regular = np.all(np.isfinite(balanced), axis=(1, 2)) & np.all(np.isfinite(target), axis=1)
+    balanced, target = np.where(regular[:, None, None], balanced, 0.0), np.where(regular[:, None], target, 0.0)
+    step = np.linalg.pinv(balanced) @ target[:, :, None]
     return np.asarray((step[:, :, 0] * columns).reshape(rows, half, 2))
 
 
