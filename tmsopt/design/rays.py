@@ -12,10 +12,10 @@ from tmsopt.roots import discriminant, hurwitz_minors, is_stable, roots
 Array = NDArray[np.float64]
 Truth = NDArray[np.bool_]
 
-_DIRECTIONS = 300
+_DIRECTIONS = 1000
 _RADII = np.concatenate([[0.0], np.geomspace(1e-4, 4.0, 36)])
 _COARSE, _FINE = (16, 2), (256, 6)  # parts and times: all crossings, and those that are kept to all digits
-_KEPT = 3
+_KEPT = 5
 _ALIKE = 0.9  # cosine between directions that lead to one start
 _POINTS = 400  # looked at on the straight way to a nearest point
 _AROUND = np.array([0.1, 0.3, 1.0])
