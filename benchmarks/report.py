@@ -44,6 +44,7 @@ def keep(path: Path, name: str, text: str) -> None:
 
 
 def origin(command: str) -> str:
+    """Where and with what a section was made."""
     versions = ", ".join([f"Python {platform.python_version()}", *(f"{p} {version(p)}" for p in _PACKAGES)])
     return f"`{command}`, {datetime.now(UTC):%Y-%m-%d}, {versions}, {os.cpu_count()} cores."
 
@@ -56,21 +57,21 @@ def _counts(records: Sequence[Record]) -> str:
         ("problems", len(records)),
         ("solvable: some method found a feasible design", len(solvable)),
         ("of these, no stable design known", sum(r.best >= 0 for r in solvable)),
-        ("**solved at default settings, within 1e-8 of the best known**", f"**{_share(solved, len(solvable))}**"),
+        ("**solved at default settings, within 1e-8 of the best known**", f"**{share(solved, len(solvable))}**"),
         ("claimed infeasible, and no method found a feasible design", sum(not r.solvable for r in claimed)),
         ("claimed infeasible, but a method found a feasible design", sum(r.contradicted for r in records)),
         ("neither: no feasible design found, none excluded", len(records) - len(solvable) - _excluded(records)),
-        ("median time per start", _milliseconds(r.default.per_start for r in solvable)),
-        ("90 % of times per start below", _milliseconds((r.default.per_start for r in solvable), 0.9)),
-        ("median time of a solve", _milliseconds(r.default.seconds for r in solvable)),
-        ("median time of a solve that ends infeasible", _milliseconds(r.default.seconds for r in claimed)),
+        ("median time per start", milliseconds(r.default.per_start for r in solvable)),
+        ("90 % of times per start below", milliseconds((r.default.per_start for r in solvable), 0.9)),
+        ("median time of a solve", milliseconds(r.default.seconds for r in solvable)),
+        ("median time of a solve that ends infeasible", milliseconds(r.default.seconds for r in claimed)),
     ]
     note = (
         f"The best known is the least abscissa of {REFERENCE_STARTS} starts with another seed, of solves that start "
         "where a rival ended, of the rivals and of the default solve itself. Errors are relative to it, or to 1e-3 "
         "where it is smaller. A time per start is the time of the whole solve over the starts that it tried."
     )
-    return _table(("", ""), rows) + "\n\n" + note
+    return table(("", ""), rows) + "\n\n" + note
 
 
 def _excluded(records: Iterable[Record]) -> int:
@@ -88,12 +89,12 @@ def _by_freedom(records: Sequence[Record]) -> str:
                 len(group),
                 len(solvable),
                 sum(r.solved for r in solvable),
-                _milliseconds(r.default.per_start for r in solvable),
-                _milliseconds(r.default.seconds for r in solvable),
+                milliseconds(r.default.per_start for r in solvable),
+                milliseconds(r.default.seconds for r in solvable),
                 _digits(_quantile(r.default.tried for r in solvable)),
             )
         )
-    return _table(("free", "problems", "solvable", "solved", "time per start", "time", "starts"), rows)
+    return table(("free", "problems", "solvable", "solved", "time per start", "time", "starts"), rows)
 
 
 def _rivals(records: Sequence[Record]) -> str:
@@ -112,13 +113,13 @@ def _rivals(records: Sequence[Record]) -> str:
         "penalty for violations. Times of these three are taken with all cores busy."
     )
     header = ("method", "solvable problems", "feasible", *(f"within {t:.0e}" for t in _TOLERANCES), "median time")
-    return _table(header, rows) + "\n\n" + note
+    return table(header, rows) + "\n\n" + note
 
 
 def _row(name: str, ends: Sequence[tuple[float, float]]) -> tuple[object, ...]:
     errors = [e for e, _ in ends]
-    shares = [_share(sum(e <= t for e in errors), len(ends)) for t in (1e300, *_TOLERANCES)]
-    return (name, len(ends), *shares, _milliseconds(s for _, s in ends))
+    shares = [share(sum(e <= t for e in errors), len(ends)) for t in (1e300, *_TOLERANCES)]
+    return (name, len(ends), *shares, milliseconds(s for _, s in ends))
 
 
 def _ratios(records: Sequence[Record]) -> str:
@@ -131,7 +132,7 @@ def _ratios(records: Sequence[Record]) -> str:
             (f"{name}, where the default solve is equal or better", len(fair), *_speedups(fair)),
         ]
     header = ("time of differential evolution over that of", "problems", "a default solve", "10 % below", "one start")
-    return _table(header, rows)
+    return table(header, rows)
 
 
 def _speedups(pairs: Sequence[tuple[Record, Found]]) -> tuple[str, str, str]:
@@ -156,7 +157,7 @@ def _failures(records: Sequence[Record]) -> str:
         )
         for r in failed
     ]
-    return _table(("problem", "free", "status", "value", "best known", "error", "reached by"), rows)
+    return table(("problem", "free", "status", "value", "best known", "error", "reached by"), rows)
 
 
 def _unsettled(record: Record) -> bool:
@@ -172,7 +173,8 @@ def _attained(record: Record) -> Iterator[str]:
             yield f"{name} (violation {found.violation:.0e})"
 
 
-def _share(part: int, whole: int) -> str:
+def share(part: int, whole: int) -> str:
+    """``3 of 4 (75.0 %)``."""
     return f"{part} of {whole} ({100 * part / whole:.1f} %)" if whole else "–"
 
 
@@ -181,7 +183,8 @@ def _quantile(numbers: Iterable[float], q: float = 0.5) -> float:
     return float(np.quantile(found, q)) if found else math.nan
 
 
-def _milliseconds(seconds: Iterable[float], q: float = 0.5) -> str:
+def milliseconds(seconds: Iterable[float], q: float = 0.5) -> str:
+    """A quantile, by default the median."""
     return _digits(1e3 * _quantile(seconds, q)) + " ms"
 
 
@@ -189,6 +192,7 @@ def _digits(number: float) -> str:
     return "–" if math.isnan(number) else f"{number:.0f}" if number >= 100 else f"{number:.2g}"
 
 
-def _table(header: Sequence[object], rows: Iterable[Sequence[object]]) -> str:
+def table(header: Sequence[object], rows: Iterable[Sequence[object]]) -> str:
+    """A table in Markdown."""
     lines = [header, ["---"] * len(header), *rows]
     return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)

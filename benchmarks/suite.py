@@ -14,7 +14,7 @@ SEED = 2018
 
 Box = tuple[float, float]
 
-_RANGES: Mapping[str, Box] = {
+RANGES: Mapping[str, Box] = {
     "Fr": (0.1, 8.0),
     "mu": (0.01, 25.0),
     "chi_B": (0.3, 3.0),
@@ -26,7 +26,7 @@ _RANGES: Mapping[str, Box] = {
 _LOGARITHMIC = ("mu",)
 
 # Expressions with one bound each, whose value is drawn from the values that the expression has in the box.
-_TEMPLATES: tuple[tuple[str, str], ...] = (
+TEMPLATES: tuple[tuple[str, str], ...] = (
     ("chi_B - chi_H", ">="),
     ("chi_B + chi_H", "<="),
     ("chi_T", "<="),
@@ -82,7 +82,7 @@ def random_problems(count: int = 200, seed: int = SEED) -> list[Problem]:
 def random_problem(index: int, seed: int = SEED) -> Problem:
     """One problem of the suite, the same whatever the others are."""
     rng = np.random.default_rng([seed, index])
-    draw = _draw(rng, 1 + index % len(_RANGES))
+    draw = _draw(rng, 1 + index % len(RANGES))
     constraints = _constraints(rng, draw)
     return Problem(
         model=tms,
@@ -112,29 +112,31 @@ class _Draw:
 
 
 def _draw(rng: np.random.Generator, count: int) -> _Draw:
-    free = {str(n) for n in rng.choice(list(_RANGES), count, replace=False)}
+    free = {str(n) for n in rng.choice(list(RANGES), count, replace=False)}
     tilt = rng.choice(["forward", "backward", "either"], p=[0.75, 0.15, 0.1])
-    ranges = dict(_RANGES) | {
+    ranges = dict(RANGES) | {
         "lambda_s": {"forward": (0.02, 1.3), "backward": (-1.3, -0.02), "either": (-1.0, 1.2)}[tilt]
     }
-    boxes = {n: _box(rng, n, ranges[n]) for n in ranges if n in free}
-    fixed = {n: _round(_inside(rng, n, ranges[n])) for n in ranges if n not in free}
+    boxes = {n: drawn_box(rng, n, ranges[n]) for n in ranges if n in free}
+    fixed = {n: rounded(drawn_value(rng, n, ranges[n])) for n in ranges if n not in free}
     if "chi_H" in fixed and rng.random() < 0.35:
         fixed["chi_H"] = 1.0
     problem = Problem(model=tms, fixed=fixed, free=boxes, minimize="abscissa")
     return _Draw(problem, {n: rng.uniform(*ends, _SPREAD) for n, ends in problem.free.items()})
 
 
-def _box(rng: np.random.Generator, name: str, ends: Box) -> Box:
+def drawn_box(rng: np.random.Generator, name: str, ends: Box) -> Box:
+    """A range within the given one, in a quarter of the draws all of it."""
     if rng.random() < 0.25:
         return ends
     while True:
-        lower, upper = sorted(_round(_inside(rng, name, ends)) for _ in range(2))
+        lower, upper = sorted(rounded(drawn_value(rng, name, ends)) for _ in range(2))
         if upper - lower >= 0.05 * abs(upper):
             return lower, upper
 
 
-def _inside(rng: np.random.Generator, name: str, ends: Box) -> float:
+def drawn_value(rng: np.random.Generator, name: str, ends: Box) -> float:
+    """A value within a range, even in the logarithm for a mass ratio."""
     if name in _LOGARITHMIC:
         return float(np.exp(rng.uniform(*np.log(ends))))
     return float(rng.uniform(*ends))
@@ -156,19 +158,19 @@ def _distance(rng: np.random.Generator, draw: _Draw) -> str:
     """A limit that keeps the mass matrix regular, on a side of 0 that the box has."""
     nu = draw.values("nu_H")
     assert nu is not None
-    least = _round(rng.uniform(0.005, 0.1))
+    least = rounded(rng.uniform(0.005, 0.1))
     return f"nu_H >= {least}" if rng.choice(nu) > 0 else f"nu_H <= {-least}"
 
 
 def _equality(rng: np.random.Generator, draw: _Draw) -> list[str]:
     expression = str(rng.choice(_EQUALITIES))
     values = draw.values(expression)
-    return [] if values is None else [f"{expression} == {_round(rng.choice(values))}"]
+    return [] if values is None else [f"{expression} == {rounded(rng.choice(values))}"]
 
 
 def _inequality(rng: np.random.Generator, draw: _Draw, contradictory: bool) -> str:
     while True:
-        expression, comparison = _TEMPLATES[int(rng.integers(len(_TEMPLATES)))]
+        expression, comparison = TEMPLATES[int(rng.integers(len(TEMPLATES)))]
         values = draw.values(expression)
         if values is None:
             continue
@@ -178,9 +180,9 @@ def _inequality(rng: np.random.Generator, draw: _Draw, contradictory: bool) -> s
             limit = float(values.max()) + beyond if comparison == ">=" else float(values.min()) - beyond
         elif expression == "chi_T" and comparison == "<=" and rng.random() < 0.7:
             limit = 1.0
-        return f"{expression} {comparison} {_round(limit)}"
+        return f"{expression} {comparison} {rounded(limit)}"
 
 
-def _round(value: float) -> float:
+def rounded(value: float) -> float:
     """Three significant digits, as a person would write."""
     return round(value, 2 - math.floor(math.log10(abs(value)))) if value else 0.0
