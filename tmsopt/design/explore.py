@@ -148,13 +148,29 @@ def _covered(
         nlp = side.narrowed(formulate(problem, (*nlp.cases, *more)))
         run = Runner(problem, nlp, options.linear_solver, touching)
         candidates = [run.ended(design, near=True) for design in leaders]
-        if not any(c.feasible for c in candidates):
-            candidates = [run.ended(design) for design in leaders]
         trial = survivor(problem, nlp, candidates)
+        if _lost(problem, trial, leaders, nlp):
+            candidates = [*candidates, *(run.ended(design) for design in leaders)]
+            trial = survivor(problem, nlp, candidates)
+        if _lost(problem, trial, leaders, nlp) and not problem.asks_radius:
+            candidates = [*candidates, *_searched(side, nlp, options, touching)]
+            trial = survivor(problem, nlp, candidates)
     if trial is None:
         return None
     others = [c for c in evaluated_cases(problem, trial.parameters) if c not in nlp.cases]
     return found(problem, nlp, trial, starts, (*nlp.cases, *others))
+
+
+def _lost(problem: Problem, trial: Trial | None, leaders: Sequence[Mapping[str, float]], nlp: NLP) -> bool:
+    """Whether a trial is worse, in the cases of an NLP, than one of the designs that it was started from."""
+    if trial is None:
+        return True
+    if problem.objective is None:
+        return False
+    sign = -1.0 if problem.sense == "maximize" else 1.0
+    own = [recheck(problem, problem.ordered(design), nlp.cases) for design in leaders]
+    known = min((sign * c.objective for c in own if not c.violations), default=math.inf)
+    return sign * trial.checked.objective > known and not same(sign * trial.checked.objective, known)
 
 
 def _uncovered(problem: Problem, trial: Trial) -> list[Case]:

@@ -88,7 +88,7 @@ def load(path: str | PathLike[str], asks: bool = True) -> Problem:
         numbers = _numbers(parsed, model)
         faults = shape_faults + numbers.faults
         for fault in shape_faults:
-            if fault.key[:1] == ("parameters",) and len(fault.key) > 1:
+            if fault.key[:1] in (("parameters",), ("scenarios",)) and len(fault.key) > 1:
                 numbers.fixed[fault.key[1]] = math.nan  # known to be given, and already reported
         try:
             problem = Problem(

@@ -183,10 +183,14 @@ class _Builder:
 
     def real_roots(self) -> None:
         """Every case heavily damped."""
-        lifted = lift_real_roots(self, self.covered, self.values)
+        asked = (self.problem.objective, *self.problem.conditions.values())
+        line = any("abscissa" in expression.names for expression in asked if expression)
+        lifted = lift_real_roots(self, self.covered, self.values, line)
         self.lifts.append(lifted.lift)
-        self.touches["abscissa"] = lifted.touches
-        self.shared |= {"abscissa": lifted.symbol, "damping_ratio": ca.SX(1.0)}
+        self.shared["damping_ratio"] = ca.SX(1.0)
+        if line:
+            self.touches["abscissa"] = lifted.touches
+            self.shared["abscissa"] = lifted.symbol
 
     def constraints(self) -> None:
         ends = {"<=": (-np.inf, 0.0), ">=": (0.0, np.inf), "==": (0.0, 0.0)}
@@ -253,6 +257,7 @@ class _Builder:
             cases=self.cases,
             touches=self.touches,
             products=tuple(self.products),
+            exact=bool(self.products) and formulation == "abscissa",
         )
 
     def _lift(self, case: int, quantity: Quantity, values: Values) -> Any:

@@ -1,6 +1,6 @@
 """Root quantities as variables with factors: statements about roots without a root."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
@@ -85,13 +85,13 @@ def lift_damping_ratio(build: Rows, covered: Sequence[int], values: Sequence[Val
     return Lifted(zeta, Lift("damping_ratio", 1 + 2 * len(touches), guess), tuple(touches), tuple(products))
 
 
-def lift_real_roots(build: Rows, covered: Sequence[int], values: Sequence[Values]) -> Lifted:
-    """Heavy damping: γ ≤ 0 and roots γ − d₁, γ − d₁ − d₂, …, all dᵢ ≥ 0, in every case.
+def lift_real_roots(build: Rows, covered: Sequence[int], values: Sequence[Values], line: bool) -> Lifted:
+    """Heavy damping: γ ≤ 0 and roots γ − d₁, γ − d₁ − d₂, …, all dᵢ ≥ 0, in every case; γ = 0 unless a `line` is asked.
 
     As many equations as sectors and half-planes need twice over, and regular at multiple roots, where the dᵢ between
     them are at their bound 0; p² ≥ 4q has dependent gradients there. d₁ = 0 puts a root on the line Re s = γ.
     """
-    gamma = build.variable("abscissa", upper=0.0)
+    gamma = build.variable("abscissa", upper=0.0) if line else 0.0
     touches: list[Touch] = []
     for case in covered:
         a = values[case].coefficients
@@ -100,8 +100,8 @@ def lift_real_roots(build: Rows, covered: Sequence[int], values: Sequence[Values
         touches.append(Touch(partial(_step_distance, at), variable=at))
         distances = [sum(steps[:k], 0) for k in range(1, len(a))]
         build.equal("abscissa", shift(a, gamma), [a[0] * c for c in product(*([1, d] for d in distances))])
-    size = 1 + sum(len(values[case].coefficients) - 1 for case in covered)
-    return Lifted(gamma, Lift("abscissa", size, partial(_real_guess, covered)), tuple(touches), ())
+    size = int(line) + sum(len(values[case].coefficients) - 1 for case in covered)
+    return Lifted(gamma, Lift("abscissa", size, partial(_real_guess, covered, line)), tuple(touches), ())
 
 
 def lift_radius(build: Rows, radius: Any, directions: Sequence[tuple[int, Case]], values: Sequence[Values]) -> Lift:
@@ -123,7 +123,7 @@ def lift_quantity(build: Rows, name: str, case: int, ends: tuple[float, float]) 
     return symbol, Lift(name, 1, lambda values, z: [[_finite(values[case][name])]])
 
 
-Measure = Callable[[Array], float]
+_DOUBLE = 1e-3  # of the largest root: distance of two real ones that may be meant to be one
 
 
 def _pair_distance(at: int, x: Array) -> float:
@@ -154,8 +154,15 @@ def _finite(value: Any) -> float:
 
 
 def _paired(z: Roots) -> list[Roots]:
-    """Roots two by two, conjugates together, as `roots` orders them."""
-    return [z[k : k + 2] for k in range(0, len(z), 2)]
+    """Roots two by two: conjugates together, nearly equal real ones together, then real neighbours."""
+    pairs, real = [z[k : k + 2] for k in range(0, len(z) - 1, 2) if z[k].imag], np.sort(z[z.imag == 0].real)
+    while len(real) > 2:
+        gaps = np.diff(real)
+        k = int(np.argmin(gaps))
+        k = k if gaps[k] <= _DOUBLE * np.abs(z).max() else 0
+        pairs.append(real[k : k + 2].astype(complex))
+        real = np.delete(real, [k, k + 1])
+    return [*pairs, *([real.astype(complex)] if len(real) else [])]
 
 
 def _factors(z: Roots, gamma: float) -> list[float]:
@@ -170,12 +177,12 @@ def _abscissa_guess(covered: Sequence[int], values: Sequence[Values], z: Sequenc
     return [[gamma, *(c for case in covered for c in _factors(z[case], gamma))]]
 
 
-def _real_guess(covered: Sequence[int], values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
+def _real_guess(covered: Sequence[int], line: bool, values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
     """Roots on the real axis below their own, and left of 0."""
     every = np.concatenate([z[case] for case in covered])
-    gamma = min(float(every.real.max()) + 0.05 * float(np.abs(every).mean()) + 1e-3, -1e-3)
+    gamma = min(float(every.real.max()) + 0.05 * float(np.abs(every).mean()) + 1e-3, -1e-3) if line else 0.0
     steps = [np.diff(np.sort(np.maximum(gamma - z[case].real, 1e-3)), prepend=0.0) for case in covered]
-    return [[gamma, *(float(d) for part in steps for d in part)]]
+    return [[*([gamma] if line else []), *(float(d) for part in steps for d in part)]]
 
 
 def _damping_guess(covered: Sequence[int], values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import combinations
 
 import casadi as ca
 import numpy as np
@@ -14,7 +14,7 @@ from tmsopt.roots.patterns import Roots
 
 Array = NDArray[np.float64]
 
-_TANGLED = 1e-6  # overlap of two factors that no lack of digits explains
+_TANGLED = 1e-3  # relative distance of roots that may be meant to be one: where two factors share it, digits are lost
 
 Guess = Callable[[Sequence[Values], Sequence[Roots]], list[list[float]]]
 """Starting values of lifted variables for a numeric design and its roots, the nominal design first and then each
@@ -74,6 +74,7 @@ class NLP:
         cases: the variations of the design that its rows cover.
         touches: root quantity → the ways in which it is met exactly; unless one is held, the NLP only bounds it.
         products: the factors of each polynomial.
+        exact: whether starts satisfy the equations of all cases.
     """
 
     formulation: str
@@ -88,6 +89,7 @@ class NLP:
     cases: tuple[Case, ...] = field(repr=False, default=())
     touches: Mapping[str, tuple[Touch, ...]] = field(repr=False, default_factory=dict)
     products: tuple[tuple[Factor, ...], ...] = field(repr=False, default=())
+    exact: bool = False
 
     @property
     def equations(self) -> int:
@@ -106,14 +108,16 @@ class NLP:
         return replace(self, upper=tuple(upper), row_upper=tuple(row_upper))
 
     def tangled(self, x: Array) -> bool:
-        """Whether real roots are shared out among factors other than neighbour by neighbour.
+        """Whether two factors share a root that is double in neither of them.
 
-        Where two neighbours of different factors meet, the double root cannot become a pair, so the point may be
-        stationary for the NLP and not for the design: factored anew, the way is open.
+        Such a double root cannot become a pair, so the point may be stationary for the NLP and not for the design:
+        with both of it in one factor, the way is open.
         """
         for factors in self.products:
-            pairs = sorted(pair for factor in factors if (pair := factor.real_roots(x)) is not None)
-            for (_, high), (low, top) in pairwise(pairs):
-                if high - low > _TANGLED * (1 + abs(high) + abs(low)) and top - low > 0:
+            pairs = [pair for factor in factors if (pair := factor.real_roots(x)) is not None]
+            for one, other in combinations(pairs, 2):
+                near = _TANGLED * (1 + max(map(abs, (*one, *other))))
+                shared = min(abs(r - t) for r in one for t in other) <= near
+                if shared and min(one[1] - one[0], other[1] - other[0]) > near:
                     return True
         return False

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 _STEPS = 12
 _STATIONARY = 1e-9
-_SINGULAR = 1e6  # size of a solution, per size of the right side, that betrays a singular matrix
+_SINGULAR = 1e11  # size of a solution, for a right side of size 1, that betrays a singular matrix
 _ACTIVE = 1e-5  # slack below which a bound may be active although its multiplier is nearly 0
 
 
@@ -122,14 +122,17 @@ def _newton(conditions: _Conditions, run: Run, loose: bool) -> Point | None:
 
 
 def _solved(matrix: Array, right: Array) -> Array:
-    """Solution of a linear system; the shortest of least squares where it is singular, which takes 20 times as long."""
+    """Solution of a linear system; the shortest of least squares where it is singular, which takes 20 times as long.
+
+    What the matrix makes of arbitrary right sides shows how singular it is.
+    """
+    probes = np.random.default_rng(0).standard_normal((len(right), 2))
     try:
-        solution = np.linalg.solve(matrix, right)
+        solved = np.linalg.solve(matrix, np.column_stack([right, probes]))
     except np.linalg.LinAlgError:
-        solution = np.full(len(right), np.nan)
-    size = 1 + float(np.abs(right).max(initial=0.0))
-    if np.all(np.isfinite(solution)) and np.abs(solution).max(initial=0.0) <= _SINGULAR * size:
-        return np.asarray(solution)
+        solved = np.full((len(right), 3), np.nan)
+    if np.all(np.isfinite(solved)) and np.abs(solved[:, 1:]).max(initial=0.0) <= _SINGULAR:
+        return np.asarray(solved[:, 0])
     return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-13)[0])
 
 

@@ -102,7 +102,7 @@ def _widened(problem: Problem, names: Collection[str]) -> Problem:
     for name in names:
         lower, upper = problem.free[name]
         physical, width = problem.parameter_set[name].range, upper - lower
-        inset = 0.0 if physical.closed else _INSET * min(width, 1.0)
+        inset = problem.tolerances.get(name, 0.0) + (0.0 if physical.closed else _INSET * min(width, 1.0))
         least, most = lower - _WIDER * width, upper + _WIDER * width
         free[name] = (min(max(least, physical.lower + inset), lower), max(min(most, physical.upper - inset), upper))
     return replace(problem, free=free)

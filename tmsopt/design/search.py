@@ -105,7 +105,7 @@ class Runner:
 
     def ended(self, design: Mapping[str, float], near: bool = False, hopeful: bool = True) -> Candidate:
         """Where a start ends, with the factors shared out anew as long as that helps."""
-        best = self._once(design, "near" if near else "exact" if self.nlp.cases else "far")
+        best = self._once(design, "near" if near else "exact" if self.nlp.cases and self.nlp.exact else "far")
         for again in range(_AGAIN):
             if best.feasible and best.run.status == _SUCCESS and not best.nlp.tangled(best.run.x):
                 break
