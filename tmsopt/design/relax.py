@@ -27,7 +27,7 @@ _AGREE = 3  # of them at the best value that end it
 _TIE = 1e-3  # of a scale, by which equal limits differ: one moved is easier to read than two moved by halves
 _WIDER = 3.0  # widths of the box by which its bounds may give way
 _INSET = 1e-3  # share of the width kept from a physical end that is excluded
-_HOLDS = 1e-7  # multiplier, in the scale of the relaxation, above which a limit takes part in the conflict
+_HOLDS = 1e-5  # multiplier, per scale or width of the box, above which a limit takes part in the conflict
 _ROUND_UP = 1e-12  # of an amount, so that the relaxed design is inside
 
 
@@ -60,6 +60,7 @@ def relax(problem: Problem, seed: int, linear_solver: str, cases: Sequence[Case]
     and in widths of the box.
     """
     listed = tuple(cases) or problem.cases
+    problem = replace(problem, minimize=None, maximize=None, pareto=())  # what is asked beside the limits plays no part
     for wide, limits in _stages(problem):
         trial, nlp = _least(wide, limits, seed, linear_solver, listed)
         if trial is None:
@@ -157,8 +158,10 @@ def _conflict(nlp: NLP, limits: Sequence[Limit], trial: Trial) -> tuple[str, ...
     ]
     for k, name in enumerate(trial.candidate.nlp.variables):
         multiplier = float(trial.point.bound_multipliers[k])
-        if name.removeprefix("tan(").removesuffix(")") in trial.parameters and abs(multiplier) > _HOLDS:
-            names.append(f"{name.removeprefix('tan(').removesuffix(')')}.{'max' if multiplier > 0 else 'min'}")
+        parameter = name.removeprefix("tan(").removesuffix(")")
+        width = trial.candidate.nlp.upper[k] - trial.candidate.nlp.lower[k]
+        if parameter in trial.parameters and abs(multiplier) * width > _HOLDS:
+            names.append(f"{parameter}.{'max' if multiplier > 0 else 'min'}")
     return tuple(dict.fromkeys(names))
 
 
@@ -173,7 +176,7 @@ def _alone(
         nlp = _elastic(wide, formulate(wide, cases, elastic=True), [limit])
         run = Runner(wide, nlp, linear_solver, touching=overclaims(wide))
         here = {n: min(max(trial.parameters[n], lo), hi) for n, (lo, hi) in wide.free.items()}
-        candidates = [run.ended(here, near=True), *(run.ended(d) for d in designs(wide, 0, _FEW))]
+        candidates = [run.ended(here, near=True), *(run.ended(d, hopeful=False) for d in designs(wide, 0, _FEW))]
         ended = survivor(_unlimited(wide, [limit]), nlp, candidates)
         if ended is not None and not ended.checked.violations:
             found |= _amounts(wide, [limit], ended.parameters, nlp.cases)
