@@ -276,7 +276,8 @@ def test_band_is_held_at_every_speed_and_not_only_at_seven():
 def test_workshop_is_held_in_the_whole_box_of_errors():
     design = solved("workshop")
     value, _ = in_workshop({n: np.asarray(v) for n, v in design.parameters.items()}, FINE_STEPS)
-    assert value == pytest.approx(design.value, abs=1e-9)
+    # Three corners tie, and at one of them two roots are equal: eigenvalues there are right to half the digits.
+    assert value == pytest.approx(design.value, abs=1e-6)
     law = laws.ep4_chi_H_1(-0.4, -0.2)
     ep4 = {"x_B": np.asarray(law.chi_B), "lambda_s": np.asarray(law.lambda_s), "v": law.Fr * sqrt(9.81)}
     of_ep4, _ = in_workshop({**hunt.read("workshop")[0], **ep4})

@@ -276,12 +276,6 @@ def test_no_stable_design_is_said():
     assert any("no stable design" in note for note in design.notes)
 
 
-def test_maximising_the_abscissa_is_not_called_optimal():
-    """The factored form bounds the abscissa from above only, so its maximum must be refused by the recheck."""
-    design = tmsopt.solve(ep4_problem(minimize=None, maximize="abscissa"), throw=False, starts=4)
-    assert design.status != "optimal"
-
-
 @pytest.mark.parametrize("linear_solver", ["mumps", "spral"])
 def test_silence(capfd, linear_solver):
     tmsopt.solve(

@@ -19,8 +19,10 @@ from tmsopt.design.search import Candidate, Runner, same
 from tmsopt.design.solution import Relaxation
 from tmsopt.design.starts import designs
 from tmsopt.design.variation import overclaims
+from tmsopt.design.worst import worst_cases
 from tmsopt.models import Values
 
+_ROUNDS = 12  # times that cases are added
 _TRIED = 16  # starts of a relaxation at most
 _FEW = 3  # starts for one limit alone, besides the relaxed design
 _AGREE = 3  # of them at the best value that end it
@@ -63,6 +65,10 @@ def relax(problem: Problem, seed: int, linear_solver: str, cases: Sequence[Case]
     problem = replace(problem, minimize=None, maximize=None, pareto=())  # what is asked beside the limits plays no part
     for wide, limits in _stages(problem):
         trial, nlp = _least(wide, limits, seed, linear_solver, listed)
+        for _ in range(_ROUNDS if listed else 0):
+            if trial is None or not (more := _beyond(wide, limits, trial, nlp.cases)):
+                break
+            trial, nlp = _least(wide, limits, seed, linear_solver, (*nlp.cases, *more))
         if trial is None:
             continue
         amounts = _amounts(wide, limits, trial.parameters, nlp.cases)
@@ -135,6 +141,14 @@ def _unlimited(problem: Problem, limits: Sequence[Limit]) -> Problem:
     moved = {limit.name for limit in limits}
     kept = {n: c for n, c in problem.constraints.items() if n not in moved}
     return replace(problem, constraints=kept, minimize=None, maximize=None)
+
+
+def _beyond(wide: Problem, limits: Sequence[Limit], trial: Trial, cases: Sequence[Case]) -> list[Case]:
+    """Cases between those listed in which a design needs more."""
+    worst = [w.case for w in worst_cases(wide, trial.parameters).values()]
+    known, all_ = (_amounts(wide, limits, trial.parameters, c) for c in (cases, (*cases, *worst)))
+    grown = any(abs(a) > abs(known.get(n, 0.0)) + FEASIBLE * (1 + abs(a)) for n, a in all_.items())
+    return [case for case in worst if case not in cases] if grown else []
 
 
 def _amounts(

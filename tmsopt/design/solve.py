@@ -91,7 +91,7 @@ def _side_values(explored: Sequence[Explored]) -> dict[str, float]:
 def _sides_note(problem: Problem, explored: Sequence[Explored], finding: Finding) -> tuple[str, ...]:
     """Which part of the box the best design is in, and what the other one offers."""
     won = next((part for part in explored if part.finding and part.finding.parameters == finding.parameters), None)
-    if len(explored) == 1 or won is None:
+    if len(explored) == 1 or won is None or finding.status != "optimal":
         return ()
     sentences = [f"both signs were searched: {won.side.name} wins"]
     for part in explored:
@@ -141,6 +141,9 @@ def _assembled(
 def _stability_note(problem: Problem, checked: Checked, optimal: bool) -> tuple[str, ...]:
     if "a0" in checked.violations:
         return ("the mass matrix is singular (a0 = 0), so a root is at infinity; keep nu_H and zeta_B away from 0",)
+    asked = [n for n, c in problem.conditions.items() if n in checked.violations and "abscissa" in c.names]
+    if asked and checked.structure.abscissa >= 0:
+        return ("no stable design was found that meets the other limits; this is the least unstable one",)
     if not optimal or checked.structure.abscissa < 0:
         return ()
     if problem.free and (problem.minimize or "").strip() == "abscissa":

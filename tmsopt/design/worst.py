@@ -25,7 +25,7 @@ _EDGES = 8192  # points on the edges of the box, where most worst cases lie
 _PEAKS = 4  # worst points that are looked at closely
 _AROUND = 48  # points of each closer look
 _SHRINK = 0.25
-_LOOKS = 14  # 0.25^14 of a grid step is 4e-9 of it: at a smooth maximum the value is then exact
+_LOOKS = 14  # times that the look closes in: at a smooth maximum the value is then exact
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,11 @@ class _Space:
         for k in _apart(u, high, 4 * step):
             best, value, reach = u[k], high[k], step
             for _ in range(_LOOKS):
-                around = np.clip(best + reach * rng.uniform(-1, 1, (_AROUND, size)), 0, 1)
+                moves = reach * rng.uniform(-1, 1, (_AROUND, size))
+                moves[::2] *= np.arange(size) == rng.integers(
+                    0, size, (len(moves[::2]), 1)
+                )  # along one side: edges stay
+                around = np.clip(best + moves, 0, 1)
                 trial = badness(around)
                 top = int(np.argmax(trial))
                 if trial[top] > value:

@@ -61,7 +61,8 @@ def best_first(ask: Asker, order: Sequence[int]) -> Solution:
         if better is None:
             continue
         exact = len(held) == 1 and len(better.problem.free) < len(ask.problem.free)  # pinned, so without slack
-        if objectives(ask, better)[k] < values[k] - (_SLACK if exact else _WORTH) * (1 + abs(values[k])):
+        gain = values[k] - objectives(ask, better)[k]
+        if gain >= 0 if exact else gain > _WORTH * (1 + abs(values[k])):
             found = better
     return found
 
