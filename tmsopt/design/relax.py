@@ -30,6 +30,7 @@ _TIE = 1e-3  # of a scale, by which equal limits differ: one moved is easier to 
 _WIDER = 3.0  # widths of the box by which its bounds may give way
 _INSET = 1e-3  # share of the width kept from a physical end that is excluded
 _HOLDS = 1e-5  # multiplier, per scale or width of the box, above which a limit takes part in the conflict
+_NOTHING = 1e-12  # sum of amounts at which the problem is feasible as it is
 _ROUND_UP = 1e-12  # of an amount, so that the relaxed design is inside
 
 
@@ -68,7 +69,7 @@ def relax(problem: Problem, seed: int, linear_solver: str, cases: Sequence[Case]
         for _ in range(_ROUNDS if listed else 0):
             if trial is None or not (more := _beyond(wide, limits, trial, nlp.cases)):
                 break
-            trial, nlp = _least(wide, limits, seed, linear_solver, (*nlp.cases, *more))
+            trial, nlp = _least(wide, limits, seed, linear_solver, (*nlp.cases, *more), trial)
         if trial is None:
             continue
         amounts = _amounts(wide, limits, trial.parameters, nlp.cases)
@@ -116,11 +117,20 @@ def _widened(problem: Problem, names: Collection[str]) -> Problem:
 
 
 def _least(
-    wide: Problem, limits: Sequence[Limit], seed: int, linear_solver: str, cases: Sequence[Case]
+    wide: Problem,
+    limits: Sequence[Limit],
+    seed: int,
+    linear_solver: str,
+    cases: Sequence[Case],
+    before: Trial | None = None,
 ) -> tuple[Trial | None, NLP]:
-    """The design with the least weighted sum of amounts that a few starts reach."""
+    """The design with the least weighted sum of amounts that a few starts reach, or the one `before` leads to."""
     nlp = _elastic(wide, formulate(wide, cases, elastic=True), limits)
-    candidates = _ends(wide, nlp, seed, linear_solver)
+    candidates: list[Candidate] = []
+    if before is not None:
+        candidates = [Runner(wide, nlp, linear_solver, overclaims(wide)).ended(before.parameters, near=True)]
+    if not any(c.feasible for c in candidates):
+        candidates = _ends(wide, nlp, seed, linear_solver)
     trial = survivor(_unlimited(wide, limits), nlp, candidates)
     return (trial if trial is not None and not trial.checked.violations else None), nlp
 
@@ -131,6 +141,8 @@ def _ends(wide: Problem, nlp: NLP, seed: int, linear_solver: str) -> list[Candid
     for design in designs(wide, seed, _TRIED):
         candidates.append(run.ended(design, hopeful=any(c.feasible for c in candidates)))
         feasible = [c.objective for c in candidates if c.feasible]
+        if feasible and min(feasible) <= _NOTHING:
+            break
         if feasible and sum(same(f, min(feasible)) for f in feasible) >= _AGREE and len(candidates) >= 2 * _AGREE:
             break
     return candidates
