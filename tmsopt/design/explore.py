@@ -19,7 +19,7 @@ from tmsopt.design.solution import Starts
 from tmsopt.design.variation import overclaims
 from tmsopt.design.worst import worst_cases
 
-_ROUNDS = 40
+_ROUNDS, _FAR_ROUNDS = 12, 40
 """Times that cases are added; each time the worst one between them shrinks to its square, roughly."""
 
 _LEADERS = 3  # optima followed when cases are added: a better one may do worse between the old cases
@@ -137,9 +137,11 @@ def _covered(
 ) -> Finding | None:
     """The best design once cases have been added until none between them is worse."""
     best = trial
-    for _ in range(_ROUNDS):
+    for _ in range(_FAR_ROUNDS if problem.asks_radius else _ROUNDS):
         if trial is None or best is None:
             return None
+        if sum(trial.checked.violations.values()) > math.sqrt(FEASIBLE) and not problem.asks_radius:
+            break  # not even the cases at hand are met
         more = [*_uncovered(problem, trial), *_nearer(problem, nlp, trial)]
         if not more:
             break
