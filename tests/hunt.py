@@ -135,10 +135,12 @@ def least(
     for turn in range(rounds + 1):
         around = centre_ if centre_ is not None else (low + high) / 2
         half = (high - low) / 2 * width
-        bounds = list(zip(np.maximum(low, around - half), np.minimum(high, around + half), strict=True))
+        lower, upper = np.maximum(low, around - half), np.minimum(high, around + half)
+        inside = 1e-14 * (upper - lower) + 1e-15 * (abs(lower) + abs(upper))  # SciPy may round a start beyond its bound
+        known = None if centre_ is None else np.clip(centre_, lower + inside, upper - inside)
         found = differential_evolution(
-            cost, bounds, maxiter=generations, popsize=population, tol=0, atol=1e-13, rng=seed + turn,
-            vectorized=True, updating="deferred", polish=False, mutation=(0.4, 0.9), recombination=0.9, x0=centre_,
+            cost, list(zip(lower, upper, strict=True)), maxiter=generations, popsize=population, tol=0, atol=1e-13, rng=seed + turn,
+            vectorized=True, updating="deferred", polish=False, mutation=(0.4, 0.9), recombination=0.9, x0=known,
         )  # fmt: skip
         if found.fun <= best:
             centre_, best = found.x, float(found.fun)
