@@ -202,8 +202,10 @@ def shared_out(pairs):
     ("pairs", "tangled"),
     [
         ([(-1.0, -2.0), (-3.0, -4.0)], False),  # neighbours together
-        ([(-1.0, -3.0), (-2.0, -4.0)], True),
-        ([(-1.0, -4.0), (-2.0, -3.0)], True),
+        ([(-1.0, -3.0), (-2.0, -4.0)], False),  # in another order, but no root is double
+        ([(-1.0, -4.0), (-2.0, -3.0)], False),
+        ([(-1.0, -2.0), (-2.0, -3.0)], True),  # neighbours share a double root
+        ([(-1.0, -2.0), (-2.0, -2.0)], False),  # EP3: two of the three are in one factor
         ([(-1.0, -1.0), (-2.0, -2.0)], False),  # two double roots, each of which can become a pair
         ([(-1.0, -2.0), (-1.0, -2.0)], True),  # the same, and neither can
         ([(-1.0, -1.0), (-1.0, -1.0)], False),  # EP4
@@ -218,6 +220,8 @@ def test_sharing_out_anew_gives_the_same_polynomial():
     rng = np.random.default_rng(5)
     for _ in range(50):
         r = -rng.uniform(0, 3, 4)
+        if np.diff(np.sort(r)).min() < 0.02:
+            continue  # so close that they may be meant to be one
         whole = np.poly(r)
         for order in permutations(range(4)):
             _, x = shared_out([r[list(order[:2])], r[list(order[2:])]])
