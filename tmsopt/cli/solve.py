@@ -153,7 +153,8 @@ def solve(
             if robust := _robust(solution):
                 from tmsopt.show.robust import robustness_table
 
-                click.echo("\n" + robustness_table(robust))
+                nominal = "of the nominal design, without its scenarios and tolerances:\n" if solution.worst else ""
+                click.echo("\n" + nominal + robustness_table(robust))
     if plot is not None:
         _draw(solution, plot, w, m_B)
     sys.exit(_EXIT[solution.status])
