@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from test_build import ROBOT
 
 import tmsopt
 from tmsopt.design.solution import Solution
@@ -155,29 +156,12 @@ def test_a_singular_mass_matrix_is_reported_all_the_same() -> None:
     json.dumps(data, allow_nan=False)
 
 
-FILE = """
-title = "A robot, in the units of its builder"
-model = "tms"
-
-[parameters]
-w = "80 cm"
-v = { min = "5 km/h", max = "15 km/h" }
-lambda_s = { min = "5 deg", max = "30 deg" }
-m_B = "10 kg"
-x_B = { min = "20 cm", max = "120 cm" }
-z_B = { min = "-60 cm", max = "-300 mm" }
-m_H = { min = "500 g", max = "2 kg" }
-x_H = { min = "600 mm", max = "1 m" }
-z_H = { min = "-50 cm", max = "-10 cm" }
-
-[objective]
-minimize = "abscissa"
-
-[constraints]
-ballast = "m_ballast_rear <= 2"
+FILE = (
+    ROBOT
+    % """ballast = "m_ballast_rear <= 2"
 offset = "u_H >= 0.015"
-inertia = "mass_margin >= 1e-4"
-"""
+inertia = "mass_margin >= 1e-4\""""
+)
 
 
 def test_from_a_file_in_units_to_a_report_in_units(tmp_path: Path) -> None:

@@ -83,3 +83,17 @@ def test_a_relaxation_does_not_depend_on_the_objective():
         T, zeta_H = np.tan(0.939), (-1.15 + 0.0952) / 2
         needed = (0.924 - 1 - zeta_H * T) / np.sqrt(1 + T * T) + 0.107
         assert dict(relaxation.amounts) == {"high": pytest.approx(needed, abs=1e-9)}
+
+
+def test_the_bound_over_scenarios_is_that_of_one_of_them():
+    """omega0 = −(zeta_B zeta_H)^(−1/4): heights −0.4 and −0.8 are asked for, and nothing of the mean, −0.6."""
+    problem = tmsopt.Problem(
+        TMS,
+        fixed={"chi_H": 1.0, "mu": 0.1, "zeta_H": -0.2},
+        free={**WIDE, "Fr": (0.1, 5.0)},
+        scenarios={"zeta_B": [-0.4, -0.8]},
+        minimize="abscissa",
+    )
+    found = tmsopt.solve(problem)
+    assert found.bound.value == pytest.approx(-((0.4 * 0.2) ** -0.25), rel=1e-12)
+    assert found.value > -((0.8 * 0.2) ** -0.25)

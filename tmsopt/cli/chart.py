@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import FIGURES, bad_input, check_output, plane, progress, saving, write_json
+from tmsopt.cli.common import FIGURES, bad_input, check_output, nominal_of, plane, progress, saving, write_json
 
 _EXAMPLES = """
 \b
@@ -69,7 +69,7 @@ def chart(
 
         check_output("--plot", plot, FIGURES)
         check_output("--output", output, ("npz",))
-        problem = load(file, asks=False)
+        problem = nominal_of(load(file, asks=False))
         plane_of(problem)
         names = plane(problem, axes)
         with progress("design") as update:

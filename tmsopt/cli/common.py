@@ -91,5 +91,13 @@ def plane(problem: "Problem", axes: str | None) -> tuple[str, str]:
     return names[0], names[1]
 
 
+def nominal_of(problem: "Problem") -> "Problem":
+    """A problem about one design; says so where it has scenarios or tolerances."""
+    if problem.nominal is not problem:
+        values = ", ".join(f"{n} = {problem.fixed[n]:.6g}" for n in problem.scenarios)
+        click.echo(f"scenarios and tolerances are left aside{': ' + values if values else ''}", err=True)
+    return problem.nominal
+
+
 def write_json(data: dict[str, Any]) -> None:
     click.echo(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))

@@ -15,6 +15,7 @@ from tmsopt.cli.common import (
     NOT_CONVERGED,
     bad_input,
     check_output,
+    nominal_of,
     progress,
     saving,
     write_json,
@@ -170,7 +171,7 @@ def compare(file: Path, as_json: bool, starts: int | None, seed: int, linear_sol
         from tmsopt.design.files import load
         from tmsopt.design.problem import unasked
 
-        problem = load(file)
+        problem = nominal_of(load(file))
         if problem.pareto:
             raise InputError(unasked(problem))
     from tmsopt.design.search import STARTS

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import FIGURES, bad_input, check_output, plane, progress, saving, write_json
+from tmsopt.cli.common import FIGURES, bad_input, check_output, nominal_of, plane, progress, saving, write_json
 
 _EXAMPLES = """
 \b
@@ -59,7 +59,7 @@ def trace(
 
         check_output("--plot", plot, FIGURES)
         check_output("--csv", csv_file, ("csv",))
-        problem = load(file, asks=False)
+        problem = nominal_of(load(file, asks=False))
         if plot is None and axes is not None:
             raise InputError([Fault("says what --plot draws; add --plot FILE", ("--axes",))])
         if axes is not None:

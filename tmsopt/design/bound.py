@@ -6,6 +6,7 @@ The product of the roots is aₙ/a0, so the abscissa is at least −|aₙ/a0|^(1
 import itertools
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -35,7 +36,12 @@ def bounded(problem: Problem) -> bool:
 
 
 def omega0_bound(problem: Problem, value: float) -> Bound:
-    """Lower bound on the abscissa over the whole box, constraints ignored, and the gap of a value to it."""
+    """Lower bound on the abscissa over the whole box, constraints ignored, and the gap of a value to it.
+
+    With scenarios, that of the first of them: the worst is no better.
+    """
+    if problem.scenarios:
+        problem = replace(problem.nominal, fixed={**problem.fixed, **problem.cases[0].at})
     largest = _largest_product(problem) if bounded(problem) else math.inf
     if not math.isfinite(largest):
         return Bound()

@@ -1,7 +1,7 @@
 """A design problem as data: which parameters are fixed, which are free, and what is asked of them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -83,6 +83,11 @@ class Problem:
         """The cases that a search starts with; none for a problem that asks about one design alone."""
         far = weighted(self.parameter_set, self.weights) if self.asks_radius else ()
         return first_cases(self.variations, self.tolerances, far)
+
+    @property
+    def nominal(self) -> "Problem":
+        """The same question about one design at its nominal values: no scenarios, no tolerances."""
+        return replace(self, scenarios={}, tolerances={}) if self.scenarios or self.tolerances else self
 
     @property
     def asks_radius(self) -> bool:

@@ -124,6 +124,8 @@ def compare(
 ) -> Comparison:
     """Set a design beside the laws of the paper and solve it by the other formulation.
 
+    The laws are of one design at one speed: scenarios and tolerances are left aside, and the problem is solved again.
+
     Args:
         design: a solution, or a problem to solve first.
         starts, seed, linear_solver, progress: as for `solve`, for the solves that this takes.
@@ -135,6 +137,9 @@ def compare(
     def solved(problem: Problem) -> Solution:
         return solve(problem, starts=starts, seed=seed, linear_solver=linear_solver, throw=False, progress=progress)
 
+    problem = design if isinstance(design, Problem) else design.problem
+    if problem.scenarios or problem.tolerances:
+        design = problem.nominal
     if isinstance(design, Problem):
         design = solved(design)
     if design.problem.model is not tms:
