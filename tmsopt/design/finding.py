@@ -113,7 +113,7 @@ def survivor(problem: Problem, nlp: NLP, candidates: Sequence[Candidate]) -> Tri
     tried: list[float] = []
     for candidate in sorted((c for c in candidates if c.feasible), key=lambda c: c.objective):
         alike = sum(same(candidate.objective, value) for value in tried)
-        if kept and not kept.checked.violations and not alike:
+        if kept and not kept.checked.violations and honest(problem, kept) and not alike:
             break
         if alike >= _ALIKE:
             continue
@@ -123,7 +123,7 @@ def survivor(problem: Problem, nlp: NLP, candidates: Sequence[Candidate]) -> Tri
         trial = Trial(candidate, point, parameters, recheck(problem, parameters, nlp.cases))
         if kept is None or ahead(problem, trial, kept):
             kept = trial
-        if not trial.checked.violations and point.stationarity <= _STATIONARY:
+        if not trial.checked.violations and point.stationarity <= _STATIONARY and honest(problem, trial):
             break
     return kept
 

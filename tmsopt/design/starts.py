@@ -1,11 +1,14 @@
 """Designs to start from, spread over the box, and starting values of the lifted variables that fit them."""
 
 from collections.abc import Iterator, Mapping
-from itertools import islice
+from functools import reduce
+from itertools import islice, product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.design.expression import Expression
 from tmsopt.design.formulations import middle, variables_of
 from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
@@ -22,6 +25,8 @@ _CANDIDATES = 16
 
 _RADII = tuple(float(r) for r in np.geomspace(0.5, 1e-3, 28))
 
+_CORNERS = 10  # free parameters up to which all corners of the box are looked at
+
 _BATCH = 16  # starts whose candidates are looked at together
 
 
@@ -29,8 +34,15 @@ def designs(problem: Problem, seed: int, count: int) -> Iterator[dict[str, float
     """`count` designs to start from: the most promising of each few of a quasi-random sequence over the box.
 
     Every other one is chosen by the constraints alone, lest all starts fall into the basin of one good region; every
-    third from designs moved to the faces of the box, where many optima lie in basins of their own.
+    third from designs moved to the faces of the box, where many optima lie in basins of their own. The first one is
+    the most promising corner.
     """
+    if count > 1 and len(problem.free) <= _CORNERS:
+        corners = np.array(list(product(*problem.free.values())))
+        objective, violation = _merit(problem, dict(zip(problem.free, corners.T, strict=True)))
+        best = corners[int(np.argmin(objective + violation))]
+        yield dict(zip(problem.free, best.tolist(), strict=True))
+        count -= 1
     pool_of = spread(problem, seed)
     for done in range(0, count, _BATCH):
         size = min(_BATCH, count - done)
@@ -92,24 +104,47 @@ def spread(problem: Problem, seed: int) -> Iterator[dict[str, float]]:
 
 
 def _merit(problem: Problem, columns: Mapping[str, Array]) -> tuple[Array, Array]:
-    """Objective, and violated constraints, of many designs, each in units of its own spread; small is good."""
-    parameters = problem.ordered(columns)
+    """Objective, and violated constraints, of many designs in their worst cases, each in units of its own spread."""
     shape = next(iter(columns.values())).shape
-    arrays = {name: np.broadcast_to(np.asarray(value, dtype=float), shape) for name, value in parameters.items()}
-    values = Values(problem.model, problem.parameter_set, arrays, extra=ARRAY_ROOT_QUANTITIES)
+    nominal = problem.ordered(columns)
+    listed = [case for case in problem.cases if not case.direction]
+    each = [_values(problem, case.applied(nominal), shape) for case in listed] or [_values(problem, nominal, shape)]
+    asked = [e for e in (problem.objective, *problem.conditions.values()) if e]
+    for name, worst in (("abscissa", np.maximum), ("damping_ratio", np.minimum)):
+        if len(each) > 1 and any(name in e.names for e in asked):
+            found = reduce(worst, [values[name] for values in each])
+            for values in each:
+                values.define(name, found)
     objective, violation = np.zeros(shape), np.zeros(shape)
     if problem.objective is not None:
         sign = -1.0 if problem.sense == "maximize" else 1.0
-        objective += _in_spreads(sign * np.broadcast_to(problem.objective(values), shape))
+        every = [sign * np.broadcast_to(problem.objective(values), shape) for values in each]
+        objective += _in_spreads(reduce(np.maximum, every))
     if problem.pattern is not None:
-        a = regular(np.stack(np.broadcast_arrays(*values.coefficients), axis=-1))
+        a = regular(np.stack(np.broadcast_arrays(*_values(problem, nominal, shape).coefficients), axis=-1))
         mismatch = [guess_distance(problem.pattern, c, z) for c, z in zip(a, roots(a), strict=True)]
         violation += 3 * _in_spreads(np.array(mismatch))
     for condition in problem.conditions.values():
-        difference = np.broadcast_to(np.asarray(condition(values), dtype=float), shape)
-        sides = {"<=": np.maximum(difference, 0), ">=": np.maximum(-difference, 0), "==": np.abs(difference)}
-        violation += 3 * _in_spreads(sides[condition.comparison])
+        sides = [_excess(condition, values, shape) for values in each]
+        violation += 3 * _in_spreads(reduce(np.maximum, sides))
     return objective, violation
+
+
+def _values(problem: Problem, parameters: Mapping[str, Any], shape: tuple[int, ...]) -> Values:
+    arrays = {name: np.broadcast_to(np.asarray(value, dtype=float), shape) for name, value in parameters.items()}
+    return Values(problem.model, problem.parameter_set, arrays, extra=ARRAY_ROOT_QUANTITIES)
+
+
+def _excess(condition: Expression, values: Values, shape: tuple[int, ...]) -> Array:
+    """By how much a comparison is violated."""
+    difference = np.broadcast_to(np.asarray(condition(values), dtype=float), shape)
+    match condition.comparison:
+        case "<=":
+            return np.asarray(np.maximum(difference, 0))
+        case ">=":
+            return np.asarray(np.maximum(-difference, 0))
+        case _:
+            return np.asarray(np.abs(difference))
 
 
 def _in_spreads(column: Array) -> Array:
