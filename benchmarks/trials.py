@@ -17,7 +17,7 @@ from benchmarks.variety import varied_problem
 from tmsopt.design.problem import Problem
 from tmsopt.design.solve import solve
 
-REFERENCE_STARTS = 48
+REFERENCE_STARTS = 16
 """Starts of the long run, all of them tried."""
 
 SOLVED = 1e-6

@@ -107,7 +107,11 @@ def load(path: str | PathLike[str], asks: bool = True) -> Problem:
                 title=parsed.title or Path(file).stem,
             )
         except InputError as error:
-            reported = {f.key[:2] for f in faults} | {f.key[:1] for f in faults if f.key[:1] == ("objective",)}
+            reported = (
+                {f.key[:2] for f in faults}
+                | {("parameters", *f.key[1:2]) for f in faults}
+                | {f.key[:1] for f in faults if f.key[:1] == ("objective",)}
+            )
             faults = faults + [f for f in error.faults if f.key[:2] not in reported]
     if problem is not None and asks and not problem.pareto:
         faults = [*faults, *unasked(problem)]

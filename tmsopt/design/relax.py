@@ -10,12 +10,13 @@ import numpy as np
 
 from tmsopt.design.cases import Case
 from tmsopt.design.finding import Trial, survivor
-from tmsopt.design.formulations import formulate, middle
+from tmsopt.design.formulations import formulate
 from tmsopt.design.frozen import Table
 from tmsopt.design.nlp import NLP, Lift
 from tmsopt.design.problem import Problem
 from tmsopt.design.recheck import FEASIBLE, excesses
 from tmsopt.design.search import Candidate, Runner, same
+from tmsopt.design.sides import sides
 from tmsopt.design.solution import Relaxation
 from tmsopt.design.starts import designs
 from tmsopt.design.variation import overclaims
@@ -59,19 +60,17 @@ class Limit:
 def relax(problem: Problem, seed: int, linear_solver: str, cases: Sequence[Case] = ()) -> Relaxation | None:
     """The least relaxation: of the constraints, or of the box too where these alone cannot help; None if none is found.
 
-    Amounts are added up in units of the size of the two sides of a constraint at the middle of the box, at least 1,
-    and in widths of the box.
+    Amounts are added up relative to the limits as written, those of the box in its widths. One limit that can do it
+    alone for less than all together shows that the search for these was caught, and wins.
     """
     listed = tuple(cases) or problem.cases
     problem = replace(problem, minimize=None, maximize=None, pareto=())  # what is asked beside the limits plays no part
     for wide, limits in _stages(problem):
-        trial, nlp = _least(wide, limits, seed, linear_solver, listed)
-        for _ in range(_ROUNDS if listed else 0):
-            if trial is None or not (more := _beyond(wide, limits, trial, nlp.cases)):
-                break
-            trial, nlp = _least(wide, limits, seed, linear_solver, (*nlp.cases, *more), trial)
-        if trial is None:
+        ended = [_least_covered(side.problem, limits, seed, linear_solver, listed) for side in sides(wide)]
+        reached = [(trial, nlp) for trial, nlp in ended if trial is not None]
+        if not reached:
             continue
+        trial, nlp = min(reached, key=lambda found: found[0].point.objective)
         amounts = _amounts(wide, limits, trial.parameters, nlp.cases)
         conflict = _conflict(nlp, limits, trial)
         alone = _alone(problem, conflict, trial, linear_solver, nlp.cases) if len(conflict) > 1 else {}
@@ -88,11 +87,16 @@ def _stages(problem: Problem) -> Iterator[tuple[Problem, list[Limit]]]:
 
 
 def _constraint_limits(problem: Problem) -> list[Limit]:
-    values = problem.values(problem.ordered(middle(problem)))
+    """Constraints in units of the limit as written, or of the size of the sides where it is 0 or no number."""
+    ends = [{n: lo + share * (hi - lo) for n, (lo, hi) in problem.free.items()} for share in (0.5, 0.3)]
+    one, other = (problem.values(problem.ordered(design)) for design in ends)
     found: list[Limit] = []
     for name, condition in problem.conditions.items():
-        size = max((abs(s) for s in condition.sides(values) if np.isfinite(s)), default=1.0)
-        found.append(Limit(name, max(1.0, size) * (1 + _TIE * len(found))))
+        pairs = list(zip(condition.sides(one), condition.sides(other), strict=True))
+        written = [abs(a) for a, b in pairs if a == b != 0]
+        sides = [abs(a) for a, _ in pairs if np.isfinite(a) and a]
+        size = min(written) if written else max(sides, default=1.0)
+        found.append(Limit(name, size * (1 + _TIE * len(found))))
     return found
 
 
@@ -116,6 +120,32 @@ def _widened(problem: Problem, names: Collection[str]) -> Problem:
     return replace(problem, free=free)
 
 
+def _least_covered(
+    wide: Problem, limits: Sequence[Limit], seed: int, linear_solver: str, listed: Sequence[Case]
+) -> tuple[Trial | None, NLP]:
+    """The least relaxation of one part of the box, with cases added until none between them needs more."""
+    trial, nlp = _least(wide, limits, seed, linear_solver, listed)
+    movable = [limit for limit in limits if not limit.parameter]
+    if trial is not None and trial.point.objective > _NOTHING and len(movable) > 1:
+        for limit in movable:
+            single = _least(wide, [limit], seed, linear_solver, listed, few=True)
+            if single[0] is not None and single[0].point.objective < trial.point.objective * (1 - _TIE):
+                elastic = _elastic(wide, formulate(wide, listed, elastic=True), limits)
+                run = Runner(wide, elastic, linear_solver, overclaims(wide))
+                again = survivor(_unlimited(wide, limits), elastic, [run.ended(single[0].parameters, near=True)])
+                if again is not None and not again.checked.violations and _ahead(again, trial):
+                    trial, nlp = again, elastic
+    for _ in range(_ROUNDS if listed else 0):
+        if trial is None or not (more := _beyond(wide, limits, trial, nlp.cases)):
+            break
+        trial, nlp = _least(wide, limits, seed, linear_solver, (*nlp.cases, *more), trial)
+    return trial, nlp
+
+
+def _ahead(one: Trial, other: Trial) -> bool:
+    return one.point.objective < other.point.objective
+
+
 def _least(
     wide: Problem,
     limits: Sequence[Limit],
@@ -123,6 +153,7 @@ def _least(
     linear_solver: str,
     cases: Sequence[Case],
     before: Trial | None = None,
+    few: bool = False,
 ) -> tuple[Trial | None, NLP]:
     """The design with the least weighted sum of amounts that a few starts reach, or the one `before` leads to."""
     nlp = _elastic(wide, formulate(wide, cases, elastic=True), limits)
@@ -130,15 +161,15 @@ def _least(
     if before is not None:
         candidates = [Runner(wide, nlp, linear_solver, overclaims(wide)).ended(before.parameters, near=True)]
     if not any(c.feasible for c in candidates):
-        candidates = _ends(wide, nlp, seed, linear_solver)
+        candidates = _ends(wide, nlp, seed, linear_solver, 2 * _FEW if few else _TRIED)
     trial = survivor(_unlimited(wide, limits), nlp, candidates)
     return (trial if trial is not None and not trial.checked.violations else None), nlp
 
 
-def _ends(wide: Problem, nlp: NLP, seed: int, linear_solver: str) -> list[Candidate]:
+def _ends(wide: Problem, nlp: NLP, seed: int, linear_solver: str, most: int) -> list[Candidate]:
     run = Runner(wide, nlp, linear_solver, overclaims(wide))
     candidates: list[Candidate] = []
-    for design in designs(wide, seed, _TRIED):
+    for design in designs(wide, seed, most):
         candidates.append(run.ended(design, hopeful=any(c.feasible for c in candidates)))
         feasible = [c.objective for c in candidates if c.feasible]
         if feasible and min(feasible) <= _NOTHING:

@@ -88,7 +88,8 @@ def _read(symbol: str, si: Mapping[str, float]) -> tuple[str, str]:
 
 
 def _freedom(solution: Solution, name: str) -> str:
-    return "free" if name in solution.problem.free else "fixed"
+    problem = solution.problem
+    return "free" if name in problem.free else "scenario" if name in problem.scenarios else "fixed"
 
 
 def _facts(solution: Solution) -> list[str]:
