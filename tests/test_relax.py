@@ -78,7 +78,8 @@ def test_conflicts_name_the_limits_that_hold_and_no_others():
     assert failed("ep4 above the law").relaxation.conflict == ("chi_B.min",)
     assert set(failed("equal, below").relaxation.conflict) == {"place", "chi_B.min"}
     assert set(failed("equal, above").relaxation.conflict) == {"place", "chi_B.max"}
-    assert set(failed("slow and stable").relaxation.conflict) == {"decay", "slow"}
+    # At a lower tilt less would do: 0.5690 in place of 0.5695.
+    assert set(failed("slow and stable").relaxation.conflict) == {"decay", "slow", "lambda_s.min"}
 
 
 def test_limits_alone():
@@ -130,7 +131,7 @@ def test_the_amount_of_one_limit_is_the_least_by_a_search():
     for slow, decay in ((1.2 + 0.99 * (slowest - 1.2), -1.0), (1.2, -1 + 0.99 * (fastest + 1))):
         _, least = hunt.least(lambda d, s=slow, a=decay: (violation(d, s, a), 0 * d["Fr"]), FIXED, BOX, 1, 60, 5)
         assert least > 1e-3
-    # And together: the sum of the amounts, each in its own scale of at least 1, is no more than of one alone.
+    # And together: the sum of the amounts, each relative to the limit, is no more than of one alone.
     assert sum(relaxation.amounts.values()) <= 1.5 * max(slowest - 1.2, fastest + 1)
     own = {n: np.asarray(v) for n, v in relaxation.parameters.items()}
     assert (

@@ -24,6 +24,8 @@ _DEEPEST = 200
 _LANGUAGE = f"numbers, names, + - * / **, parentheses and {' '.join(FUNCTIONS)}"
 _NOT_ACCEPTED = re.compile(r"[^ -~]|#")  # look-alike letters, line breaks and comments
 
+_UNIT = re.compile(r"\d\s*(mm|cm|m|kg|g|km/h|m/s|deg|rad|N|s)\b")
+
 _BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -145,7 +147,9 @@ def _parse(text: str) -> ast.expr:
             return ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         column = f" at character {error.offset}" if isinstance(error, SyntaxError) and error.offset else ""
-        raise ExpressionError(f"'{text}' does not parse{column}; accepted: {_LANGUAGE}") from None
+        unit = _UNIT.search(text)
+        hint = f" ({unit[0]}: units are not written here; numbers are in m, rad, kg, m/s and N)" if unit else ""
+        raise ExpressionError(f"'{text}' does not parse{column}{hint}; accepted: {_LANGUAGE}") from None
 
 
 def _checked_names(  # noqa: PLR0912 - one case per kind of node

@@ -33,6 +33,7 @@ class Checked:
 
     Attributes:
         worst: the case with the largest abscissa, of those looked at.
+        least_damped: the case with the least damping ratio.
         around: the boundaries nearest to the design, where the problem asks for the robustness radius.
     """
 
@@ -43,6 +44,7 @@ class Checked:
     quantities: Table[float]
     dimensionless: Table[float]
     worst: Case = field(default_factory=Case)
+    least_damped: Case = field(default_factory=Case)
     around: Robustness | None = None
 
 
@@ -74,6 +76,7 @@ def recheck(problem: Problem, parameters: Mapping[str, float], cases: Sequence[C
         quantities=Table({name: float(nominal[name]) for name in names}),
         dimensionless=Table({n: float(v) for n, v in of.native(parameters).items()}),
         worst=listed[top] if listed else Case(),
+        least_damped=listed[looked.least] if listed else Case(),
         around=around,
     )
 
@@ -98,12 +101,14 @@ class _Look:
 
     Attributes:
         top: number of the case with the largest abscissa.
+        least: number of the case with the least damping ratio.
     """
 
     cases: list[Case]
     nominal: Values
     each: list[Values]
     top: int
+    least: int
     around: Robustness | None
 
     def at(self, problem: Problem, condition: Expression) -> list[Values]:
@@ -117,14 +122,15 @@ def _look(problem: Problem, parameters: Mapping[str, float], cases: Sequence[Cas
     each = [problem.values(case.applied(parameters)) for case in listed] or [nominal]
     near_top, near_least = _candidates(each)
     top = max(near_top, key=lambda k: _or_infinite(each[k]["abscissa"]))
-    worst = {"abscissa": each[top]["abscissa"], "damping_ratio": min(each[k]["damping_ratio"] for k in near_least)}
+    least = min(near_least, key=lambda k: float(each[k]["damping_ratio"]))
+    worst = {"abscissa": each[top]["abscissa"], "damping_ratio": each[least]["damping_ratio"]}
     around = robustness(problem, parameters=parameters) if problem.asks_radius else None
     if around is not None:
         worst[RADIUS] = around.radius
     for values in (nominal, *each):
         for name, value in worst.items():
             values.define(name, value)
-    return _Look(listed, nominal, each, top, around)
+    return _Look(listed, nominal, each, top, least, around)
 
 
 def _candidates(each: Sequence[Values]) -> tuple[list[int], list[int]]:

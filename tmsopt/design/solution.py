@@ -97,6 +97,7 @@ class Solution:
         branches: other solutions of a square system.
         notes: sentences for the reader.
         worst: with scenarios or tolerances, the case with the largest abscissa, which is the one reported.
+        least_damped: likewise, the case with the least damping ratio.
         cover: what is known of every case together, proven or not.
         sides: part of the box, such as ``forward tilt`` → its best objective, nan where it has no feasible design.
         relaxation: of an infeasible problem, the smallest move of its limits that leaves a feasible design.
@@ -122,6 +123,7 @@ class Solution:
     branches: tuple[Branch, ...] = ()
     notes: tuple[str, ...] = field(default=())
     worst: Case | None = None
+    least_damped: Case | None = None
     cover: Cover | None = None
     sides: Table[float] = field(default_factory=Table)
     relaxation: Relaxation | None = None
@@ -178,6 +180,7 @@ class Solution:
             ],
             "notes": list(self.notes),
             **({"worst_case": _case(self.worst)} if self.worst else {}),
+            **({"least_damped_case": _case(self.least_damped)} if self.least_damped else {}),
             **({"cover": asdict(self.cover)} if self.cover else {}),
             **({"sides": _numbers(self.sides)} if self.sides else {}),
             **({"relaxation": self.relaxation.to_json()} if self.relaxation else {}),

@@ -132,6 +132,7 @@ def _assembled(
         branches=finding.branches,
         notes=(*finding.notes, *notes, *_stability_note(problem, checked, optimal)),
         worst=checked.worst if listed else None,
+        least_damped=checked.least_damped if listed else None,
         cover=covered,
         sides=Table(sides),
         relaxation=finding.relaxation,

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from tmsopt.design.readings import decay_time, frequencies, growth_time
 from tmsopt.design.recheck import FEASIBLE
@@ -39,18 +40,27 @@ def quantity_rows(solution: Solution, si: Mapping[str, float]) -> list[Row]:
 
 
 def pitching(solution: Solution, si: Mapping[str, float]) -> str:
-    """One line: whether the bicycle pitches over, and the ballast that prevents it."""
-    loads = {"front": solution.quantities["load_front"], "rear": solution.quantities["load_rear"]}
+    """One line: whether the bicycle pitches over, in any of its cases, and the ballast that prevents it."""
+    problem, parameters = solution.problem, solution.parameters
+    listed = [case for case in problem.cases if not case.direction]
+    listed += [case for case in (solution.worst, solution.least_damped) if case]
+    each: list[Mapping[str, Any]] = [problem.values(case.applied(parameters)) for case in listed]
+    each = each or [solution.quantities]
+    in_case = " in the worst case" if listed else ""
     for lifted, over in (("rear", "front"), ("front", "rear")):
-        if abs(loads[lifted]) <= FEASIBLE:  # a limit chi_T <= 1 that binds is met within this
-            return f"balance: on the verge of pitching over the {over} wheel; the {lifted} wheel carries no load"
-        if loads[lifted] < 0:
-            ballast = solution.quantities[f"ballast_{lifted}"]
+        load = min(float(values[f"load_{lifted}"]) for values in each)
+        if abs(load) <= FEASIBLE:  # a limit chi_T <= 1 that binds is met within this
             return (
-                f"balance: pitches over the {over} wheel; more than {ballast * si['m_B']:.4g} kg ({ballast:.4g} m_B) "
-                f"of ballast at the {lifted} contact prevents it, without any effect on the lateral motion"
+                f"balance: on the verge of pitching over the {over} wheel{in_case}; the {lifted} wheel carries no load"
             )
-    return "balance: stands on both wheels"
+        if load < 0:
+            ballast = max(float(values[f"ballast_{lifted}"]) for values in each)
+            mass = f"{ballast * si['m_B']:.4g} kg ({ballast:.4g} m_B)"
+            return (
+                f"balance: pitches over the {over} wheel{in_case}; more than {mass} of ballast at the {lifted} contact "
+                "prevents it, without any effect on the lateral motion"
+            )
+    return "balance: stands on both wheels" + (" in every case listed" if listed else "")
 
 
 def _read(value: float, unit: str) -> tuple[str, str]:

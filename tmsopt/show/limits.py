@@ -2,6 +2,7 @@
 
 import math
 
+from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.design.units import reading
@@ -14,14 +15,22 @@ def case_lines(solution: Solution) -> list[str]:
     if solution.worst is None:
         return []
     of = solution.problem.parameter_set
-    at = [f"{n} = {_short(of, n, v)}" for n, v in solution.worst.at.items()]
-    at += [f"{n} {'+' if v >= 0 else '−'} {_short(of, n, abs(v))}" for n, v in solution.worst.offset.items()]
-    lines = [f"worst case: {', '.join(at)}; abscissa, roots and structure are those there"]
+    lines = [f"worst case: {_place(of, solution.worst)}; abscissa, roots and structure are those there"]
+    if solution.least_damped is not None and solution.least_damped != solution.worst:
+        lines.append(f"least damped case: {_place(of, solution.least_damped)}; the damping ratio is that there")
+    lines.append("parameters, loads and the other quantities are those of the nominal design")
     cover = solution.cover
     if cover is not None:
         means = f"by interval arithmetic on {cover.boxes} boxes" if cover.proven else "looked for, not proven"
         lines.append(f"every case: abscissa at most {number(cover.limit)}, {means}")
     return lines
+
+
+def _place(of: ParameterSet, case: Case) -> str:
+    """Values of scenarios and errors of parameters in a case."""
+    at = [f"{n} = {_short(of, n, v)}" for n, v in case.at.items()]
+    at += [f"{n} {'+' if v >= 0 else '−'} {_short(of, n, abs(v))}" for n, v in case.offset.items()]
+    return ", ".join(at)
 
 
 def relaxation_lines(solution: Solution) -> list[str]:
