@@ -184,3 +184,29 @@ def test_from_a_file_in_units_to_a_report_in_units(tmp_path: Path) -> None:
     assert read(table.stdout, "w") == (800, "mm")
     assert ["15", "km/h"] in rows(table.stdout)
     assert "more than 2 kg (0.2 m_B) of ballast at the rear contact" in balance(table.stdout)
+
+
+def test_a_bicycle_that_pitches_over_in_its_worst_case_is_said_to():
+    """Moments about the front contact: m_B (w − x_B) against m_H (x_H − w), 1 against 0.75 kg m, and 0.25 with 15 kg less."""
+    numbers = {"w": 0.6, "v": 5.0, "m_B": 20.0, "x_B": 0.55, "z_B": -0.3, "m_H": 5.0, "x_H": 0.75, "z_H": -0.4}
+    problem = tmsopt.Problem(tms, fixed={**numbers, "lambda_s": -0.3})
+    assert balance(solution_table(tmsopt.solve(problem))) == "stands on both wheels"
+    worst = tmsopt.solve(tmsopt.Problem(tms, fixed={**numbers, "lambda_s": -0.3}, tolerances={"m_B": 15.0}))
+    line = balance(solution_table(worst))
+    needed = (0.75 - 0.25) / 0.6  # kg at the rear contact, a wheelbase from the front one
+    assert line.startswith("pitches over the front wheel in the worst case")
+    assert f"more than {needed:.4g} kg" in line
+
+
+def test_laws_charts_and_traces_are_of_the_nominal_design():
+    band = {"Fr": {"min": 1.2, "max": 2.4}}
+    heights = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}
+    free = {"chi_B": (1.01, 3.0), "lambda_s": (0.05, 1.2)}
+    asked = tmsopt.Problem(
+        tms, fixed=heights, free=free, scenarios=band, tolerances={"chi_B": 0.01}, minimize="abscissa"
+    )
+    plain = tmsopt.Problem(tms, fixed={**heights, "Fr": 1.8}, free=free, minimize="abscissa")
+    assert (asked.nominal.scenarios, asked.nominal.tolerances) == ({}, {})
+    assert asked.nominal.fixed == pytest.approx(plain.fixed, abs=1e-15)
+    assert plain.nominal is plain
+    assert tmsopt.compare(asked).design.abscissa == pytest.approx(tmsopt.solve(plain).abscissa, abs=1e-12)

@@ -54,8 +54,13 @@ def pitching(solution: Solution, si: Mapping[str, float]) -> str:
                 f"balance: on the verge of pitching over the {over} wheel{in_case}; the {lifted} wheel carries no load"
             )
         if load < 0:
-            ballast = max(float(values[f"ballast_{lifted}"]) for values in each)
-            mass = f"{ballast * si['m_B']:.4g} kg ({ballast:.4g} m_B)"
+            own = problem.parameter_set.name == "SI"
+            shares = [float(values[f"ballast_{lifted}"]) for values in each]
+            masses = [
+                float(values[f"m_ballast_{lifted}"]) if own else si["m_B"] * float(values[f"ballast_{lifted}"])
+                for values in each
+            ]
+            mass = f"{max(masses):.4g} kg ({max(shares):.4g} m_B)"
             return (
                 f"balance: pitches over the {over} wheel{in_case}; more than {mass} of ballast at the {lifted} contact "
                 "prevents it, without any effect on the lateral motion"
