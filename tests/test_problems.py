@@ -218,7 +218,8 @@ def test_robot_is_the_best_of_all_designs_with_a_four_fold_root():
     assert design.structure == "EP4"
     assert design.value == pytest.approx(best, abs=1e-9)
     assert delivery_robot(dict(design.parameters))[1] <= FEASIBLE
-    assert abscissa_60(polynomial_60(**hunt.native(dict(design.parameters)))) == pytest.approx(best, abs=1e-3)
+    # Parameters rounded to doubles move a 4-fold root of this size by ε^(1/4) of it, 4e-4 each, seven of them.
+    assert abscissa_60(polynomial_60(**hunt.native(dict(design.parameters)))) == pytest.approx(best, abs=5e-3)
     # No splitting of the four roots does better around it, nor does any design that a coarse global search finds.
     ep4 = {**point, **dict.fromkeys(FACTORS, 0.0)}
     _, split = hunt.least(robot_with_roots, {}, HEIGHTS | FACTORS, generations=80, rounds=1, start=ep4)

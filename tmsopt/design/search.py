@@ -22,6 +22,7 @@ STARTS = 64
 _ENOUGH = 12  # starts tried before agreement counts
 _AGREE = 5  # starts at the best value that end the search
 _HOPELESS = 16  # starts without a feasible end after which the least-violating design is looked for instead
+_MET = 1e-14  # sum of squares of coefficients at which more conditions than parameters are met
 _SAME = 1e-7  # relative difference of objectives that counts as the same
 _FEASIBLE = 1e-6  # of the rows, before polishing; the recheck has the last word
 _SCATTER = 0.01  # of the largest root: roots in double precision beside a 4-fold one are off by 4e-4
@@ -187,8 +188,9 @@ def _settled(problem: Problem, candidates: list[Candidate]) -> bool:
     if record and _proven(problem, candidates[-1]):
         return True
     agreeing = sum(same(c.objective, best) for c in feasible)
-    if problem.objective is None:  # any point of a square pattern will do
-        return agreeing >= (1 if freedom(problem).count <= 0 else _AGREE)
+    if problem.objective is None:  # any point of a square pattern will do, and any that meets too many conditions
+        count = freedom(problem).count
+        return agreeing >= (1 if count == 0 or (count < 0 and best <= _MET) else _AGREE)
     n, w = len(feasible), _different([c.objective for c in feasible])
     seen = n > w + 2 and w * (n - 1) <= (w + 0.5) * (n - w - 2)
     return len(candidates) >= _ENOUGH and agreeing >= _AGREE and seen
