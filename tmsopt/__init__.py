@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from tmsopt.study.domain import Domain, domain
     from tmsopt.study.explain import Explanation, explain
     from tmsopt.study.front import Front
+    from tmsopt.study.optimality import Optimality, optimality
     from tmsopt.study.pareto import pareto
     from tmsopt.study.swallowtail import Swallowtail, swallowtail
     from tmsopt.study.trace import trace
@@ -33,6 +34,7 @@ __all__ = [
     "InputError",
     "Nearest",
     "NotSolved",
+    "Optimality",
     "Problem",
     "Robustness",
     "Solution",
@@ -46,6 +48,7 @@ __all__ = [
     "load",
     "models",
     "nearest",
+    "optimality",
     "pareto",
     "robustness",
     "roots",
@@ -65,6 +68,7 @@ _HOMES = {
     "InputError": "tmsopt.design.errors",
     "Nearest": "tmsopt.design.nearest",
     "NotSolved": "tmsopt.design.solution",
+    "Optimality": "tmsopt.study.optimality",
     "Problem": "tmsopt.design.problem",
     "Robustness": "tmsopt.design.nearest",
     "Solution": "tmsopt.design.solution",
@@ -76,6 +80,7 @@ _HOMES = {
     "explain": "tmsopt.study.explain",
     "load": "tmsopt.design.files",
     "nearest": "tmsopt.design.nearest",
+    "optimality": "tmsopt.study.optimality",
     "robustness": "tmsopt.design.nearest",
     "pareto": "tmsopt.study.pareto",
     "solve": "tmsopt.design.solve",

@@ -4,12 +4,13 @@ from collections.abc import Mapping, Sequence
 
 from tmsopt.show.text import columns, number
 from tmsopt.study.explain import Explanation
+from tmsopt.study.optimality import NOT_COVERED, OnLine, Optimality
 from tmsopt.study.rounding import ALONE, Rounded
 
 
 def explained_lines(explanation: Explanation) -> list[str]:
-    """Summary, levers, rounding, precision and warnings."""
-    lines = [f"meaning: {explanation.summary}"]
+    """Summary, local optimality, levers, rounding, precision and warnings."""
+    lines = [f"meaning: {explanation.summary}", *optimality_lines(explanation.optimality)]
     lines += [f"warning: {text}" for text in explanation.warnings]
     if explanation.levers:
         lines += ["", "what moving a limit buys, solved again:"]
@@ -20,6 +21,24 @@ def explained_lines(explanation: Explanation) -> list[str]:
     if explanation.worst:
         lines.append(f"rounding {explanation.worst} alone to {ALONE} digits costs most")
     return [line.rstrip() for line in lines]
+
+
+def optimality_lines(optimality: Optimality) -> list[str]:
+    """The verdict, then the multipliers of each root on the rightmost line."""
+    if optimality.verdict == NOT_COVERED:
+        return [f"local optimality: not judged, for {optimality.reason}"]
+    lines = [f"local optimality: {optimality.reason}", *map(_root_line, optimality.roots)]
+    if optimality.roots:
+        lines[-1] += f"; stationary within {optimality.residual:.1g}"
+    return lines
+
+
+def _root_line(root: OnLine) -> str:
+    place = f"{root.re:.5g}" + (f" ± {root.im:.5g}i" if root.im else "")
+    times = f" ({root.multiplicity}-fold)" if root.multiplicity > 1 else ""
+    share = f" bears {100 * root.share:.3g} % of the line," if root.share < 1 - 1e-9 else ""
+    kappa = f", of kappa {root.kappa:.4g}" if root.multiplicity > 1 else ""
+    return f"  {place}{times}{share} multiplier of beta {root.beta:.4g}{kappa}"
 
 
 def _rows(explanation: Explanation) -> list[Sequence[str]]:

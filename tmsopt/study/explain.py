@@ -6,6 +6,7 @@ from typing import Any
 from tmsopt.design.frozen import Table
 from tmsopt.design.solution import Bound, Solution
 from tmsopt.study.levers import Lever, levers
+from tmsopt.study.optimality import Optimality, optimality
 from tmsopt.study.remarks import summary, warnings
 from tmsopt.study.rounding import Rounded, rounded_alone, rounded_together, worst
 
@@ -18,6 +19,7 @@ class Explanation:
         summary: one sentence: the structure on the rightmost line, and how good the design is.
         structure: of the design, as in the solution.
         bound: of the design, as in the solution.
+        optimality: whether the design is a local optimum, by the multipliers of its factors.
         levers: the limits that bind, the most valuable first; empty unless the design is optimal.
         rounding: free parameter → the design with it alone rounded to 3 digits.
         worst: the parameter whose rounding costs most; empty where none costs anything.
@@ -28,6 +30,7 @@ class Explanation:
     summary: str
     structure: str
     bound: Bound
+    optimality: Optimality
     levers: tuple[Lever, ...]
     rounding: Table[Rounded]
     worst: str
@@ -38,6 +41,7 @@ class Explanation:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
         return {
             "summary": self.summary,
+            "optimality": self.optimality.to_json(),
             "levers": [lever.to_json() for lever in self.levers],
             "rounding": {name: row.to_json() for name, row in self.rounding.items()},
             "worst": self.worst or None,
@@ -58,6 +62,7 @@ def explain(solution: Solution, *, resolve: bool = True) -> Explanation:
         summary=summary(solution),
         structure=solution.structure,
         bound=solution.bound,
+        optimality=optimality(solution),
         levers=levers(solution, resolve),
         rounding=alone,
         worst=worst(alone),
