@@ -5,7 +5,7 @@ pattern. Both share how parameters, quantities and constraints become variables 
 must stand up to has factors of its own, and shares the design and the root quantities with the others.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -15,7 +15,7 @@ import numpy as np
 
 from tmsopt.design.cases import Case
 from tmsopt.design.expression import Expression
-from tmsopt.design.lifts import lift_abscissa, lift_damping_ratio, lift_quantity, lift_radius, lift_real_roots
+from tmsopt.design.lifts import Lifted, lift_abscissa, lift_damping_ratio, lift_quantity, lift_radius, lift_real_roots
 from tmsopt.design.nlp import NLP, Factor, Lift, Touch
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_QUANTITIES
@@ -72,7 +72,7 @@ def abscissa(
     problem: Problem, cases: Sequence[Case] = (), elastic: bool = False, damping_ratio: float | None = None
 ) -> NLP:
     """Optimise the objective with every root quantity carried by factors, in every case; real ones if all must be."""
-    build = _Builder(problem, cases)
+    build = Builder(problem, cases)
     if damping_ratio is not None:
         build.shared["damping_ratio"] = ca.SX(damping_ratio)
     elif not elastic and demands_heavy_damping(problem):
@@ -91,7 +91,7 @@ def matching(problem: Problem, pattern: Pattern | None = None, cases: Sequence[C
     pattern = pattern or problem.pattern
     if pattern is None:
         raise ValueError("matching needs a pattern; give the problem locate = 'EP4' or another")
-    build = _Builder(problem, cases)
+    build = Builder(problem, cases)
     build.pattern(pattern)
     build.constraints()
     left = freedom(problem).count
@@ -120,14 +120,22 @@ def middle(problem: Problem) -> dict[str, float]:
     return {n: problem.start.get(n, (lo + hi) / 2) for n, (lo, hi) in problem.free.items()}
 
 
+Lifting = Callable[["Builder", Sequence[int], Sequence[Values]], Lifted]
+"""Variables and rows for a root quantity in the covered ones of all cases."""
+
 _LEEWAY = 1e-9  # below a constant that a quantity is never less than
 
 
-class _Builder:
-    """Collects variables and rows; discarded once the NLP is finished."""
+class Builder:
+    """Collects variables and rows; discarded once the NLP is finished.
 
-    def __init__(self, problem: Problem, cases: Sequence[Case]) -> None:
+    Args:
+        lifts: root quantity → how it is carried by variables; by default by factors.
+    """
+
+    def __init__(self, problem: Problem, cases: Sequence[Case], lifts: Mapping[str, Lifting] | None = None) -> None:
         self.problem = problem
+        self.lifting = _LIFTED if lifts is None else lifts
         self.cases = tuple(cases)
         self.names: list[str] = []
         self.x: list[Any] = []
@@ -265,8 +273,8 @@ class _Builder:
         name = quantity.name
         if name in self.shared:
             return self.shared[name]
-        if name in _LIFTED:
-            lifted = _LIFTED[name](self, self.covered, self.values)
+        if name in self.lifting:
+            lifted = self.lifting[name](self, self.covered, self.values)
             self.lifts.append(lifted.lift)
             self.touches[name] = lifted.touches
             self.products += lifted.products
@@ -286,7 +294,7 @@ class _Builder:
         return symbol
 
 
-_LIFTED = {"abscissa": lift_abscissa, "damping_ratio": lift_damping_ratio}
+_LIFTED: Mapping[str, Lifting] = {"abscissa": lift_abscissa, "damping_ratio": lift_damping_ratio}
 
 
 def _worst_guess(

@@ -153,7 +153,7 @@ def _finite(value: Any) -> float:
     return float(value) if np.isfinite(value) else 1.0
 
 
-def _paired(z: Roots) -> list[Roots]:
+def quadratic_pairs(z: Roots) -> list[Roots]:
     """Roots two by two: conjugates together, nearly equal real ones together, then real neighbours."""
     pairs, real = [z[k : k + 2] for k in range(0, len(z) - 1, 2) if z[k].imag], np.sort(z[z.imag == 0].real)
     while len(real) > 2:
@@ -167,7 +167,7 @@ def _paired(z: Roots) -> list[Roots]:
 
 def _factors(z: Roots, gamma: float) -> list[float]:
     """β and κ of the factors about the line Re s = γ."""
-    return [float(c) for pair in _paired(z) for c in (-(pair - gamma).sum().real, (pair - gamma).prod().real)]
+    return [float(c) for pair in quadratic_pairs(z) for c in (-(pair - gamma).sum().real, (pair - gamma).prod().real)]
 
 
 def _abscissa_guess(covered: Sequence[int], values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
@@ -191,7 +191,7 @@ def _damping_guess(covered: Sequence[int], values: Sequence[Values], z: Sequence
     factors = [
         float(c)
         for case in covered
-        for pair in _paired(z[case])
+        for pair in quadratic_pairs(z[case])
         for c in (-pair.sum().real, np.sqrt(abs(pair.prod().real)))
     ]
     return [[min(max(ratio - 0.05, -0.95), 0.95), *factors]]

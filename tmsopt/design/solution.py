@@ -23,14 +23,27 @@ class Bound:
     Attributes:
         value: the bound, −inf where there is none.
         gap: objective minus bound.
-        proven: whether the gap is closed, so that the design is globally optimal, up to rounding.
-        method: how the bound was found, e.g. ``omega0``; ``none``.
+        proven: whether the gap is closed, so that the design is globally optimal: up to rounding, by ``scip`` up to
+            1e-4 of the objective; of an infeasible problem, whether it is certain that no design is feasible.
+        method: how the bound was found, e.g. ``omega0`` or ``scip``; ``none``.
+        seconds: that branch and bound took.
+        nodes: that it needed.
+        tolerance: its feasibility tolerance; it is a proof in floating-point arithmetic. 0 without it.
     """
 
     value: float = -math.inf
     gap: float = math.inf
     proven: bool = False
     method: str = "none"
+    seconds: float = 0.0
+    nodes: int = 0
+    tolerance: float = 0.0
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``."""
+        known = {"value": _number(self.value), "gap": _number(self.gap), "proven": self.proven, "method": self.method}
+        search = {"seconds": round(self.seconds, 4), "nodes": self.nodes, "feasibility_tolerance": self.tolerance}
+        return known | (search if self.tolerance else {})
 
 
 @dataclass(frozen=True)
@@ -154,12 +167,7 @@ class Solution:
             "structure": self.structure,
             "active": _numbers(self.active),
             "violations": _numbers(self.violations),
-            "bound": {
-                "value": _number(self.bound.value),
-                "gap": _number(self.bound.gap),
-                "proven": self.bound.proven,
-                "method": self.bound.method,
-            },
+            "bound": self.bound.to_json(),
             "starts": {
                 "tried": self.starts.tried,
                 "converged": self.starts.converged,

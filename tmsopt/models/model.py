@@ -115,6 +115,8 @@ class Model:
         algebraic: native parameters → the numbers in which the coefficients are polynomials.
         polynomial: algebraic parameters → coefficients, descending, by ``+ - *`` alone.
         quantities: derived quantities, besides the coefficients ``a0 …``.
+        compact: like `polynomial`, the coefficients divided by a positive number, in few products and quotients, each
+            shared by all that need it: interval arithmetic and relaxations are the tighter for it.
     """
 
     name: str
@@ -124,6 +126,7 @@ class Model:
     algebraic: Callable[[Mapping[str, Any]], dict[str, Any]] = field(repr=False)
     polynomial: Callable[..., list[Any]] = field(repr=False)
     quantities: tuple[Quantity, ...] = field(default=(), repr=False)
+    compact: Callable[..., list[Any]] | None = field(default=None, repr=False)
 
     def coefficients(self, parameters: Mapping[str, Any], of: ParameterSet | None = None) -> list[Any]:
         """Coefficients a0 … aₙ, descending, for values of any kind: floats, arrays, CasADi, balls."""

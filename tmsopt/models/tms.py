@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.models.model import Model, Parameter, ParameterSet, Range
-from tmsopt.models.tms_equations import copo, matrices
+from tmsopt.models.tms_equations import compact_copo, copo, matrices
 from tmsopt.models.tms_quantities import NATIVE_QUANTITIES, SI_QUANTITIES
 from tmsopt.roots.elementary import sqrt, tan
 
@@ -106,5 +106,6 @@ tms = Model(
     algebraic=_algebraic,
     polynomial=copo,
     quantities=NATIVE_QUANTITIES,
+    compact=compact_copo,
 )
 """The two-mass-skate bicycle."""

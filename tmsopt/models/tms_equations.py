@@ -17,6 +17,20 @@ def copo(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, T: 
     ]
 
 
+def compact_copo(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, T: Any) -> list[Any]:
+    """The same coefficients divided by −ζ_B > 0, in nine products and one quotient."""
+    behind, below = chi_H - 1, zeta_B - zeta_H
+    lever, arm = Fr * (chi_H - chi_B), Fr * below
+    gravity = T + mu * behind / zeta_B
+    return [
+        zeta_B * (zeta_H * T - behind),
+        -zeta_H * lever - chi_H * arm,
+        zeta_H * gravity + zeta_B * T - behind - Fr * arm,
+        -lever,
+        gravity,
+    ]
+
+
 def matrices(
     Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, sine: Any, cosine: Any
 ) -> tuple[list[list[Any]], list[list[Any]], list[list[Any]]]:

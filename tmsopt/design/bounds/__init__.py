@@ -1,0 +1,1 @@
+"""Bounds on what any design of a box can reach."""

@@ -1,0 +1,195 @@
+"""How good a design is at best: bounds proved by spatial branch and bound, and better designs where it finds them."""
+
+import math
+from dataclasses import replace
+
+from tmsopt.design.bounds.answer import Answer, Clock, Progress, answer, doubt
+from tmsopt.design.bounds.program import Question
+from tmsopt.design.bounds.scip import FEASIBILITY, INFEASIBLE, available
+from tmsopt.design.bounds.walk import NotAccepted
+from tmsopt.design.cases import Case
+from tmsopt.design.errors import Fault, InputError
+from tmsopt.design.problem import Problem, unasked
+from tmsopt.design.solution import Bound, Solution
+from tmsopt.design.solve import solve
+
+SECONDS = 60.0
+"""Time for a proof, by default."""
+
+PROVEN = 1e-4
+"""Gap, relative to the objective or to 0.1, below which branch and bound counts as a proof of global optimality."""
+
+_FINER = 1e-6  # proved next: closer to SCIP's own tolerance a smaller gap would be an illusion
+_COARSER = (1e-2, 1e-1, 1.0, 10.0)  # proved where the first cannot be
+_FLOOR = 0.1
+_SHARE = 0.6  # of the time that is left, for a gap that is not the last one to be tried
+_BETTER = 1e-9  # relative gain that counts as one
+_REPLACED = 5  # times that a design is replaced by a better one
+_SMALL = 1e-6  # of roots at 0 or at infinity, which say nothing of the others
+_STARTS = (1, 8)  # from SCIP's design alone, then with others
+
+
+def certify(design: Solution | Problem, *, seconds: float = SECONDS, progress: Progress | None = None) -> Solution:
+    """The same design with a bound that no design of the box can beat; or a better design, where one is found.
+
+    SCIP is asked whether any design does better than this one by a gap; the answer no is the bound. It is a proof in
+    floating-point arithmetic, to SCIP's feasibility tolerance. Of an infeasible problem, it is a proof that it is.
+
+    Args:
+        design: what `solve` found, with throw=False where that is no optimum; or a problem, which is solved first.
+        seconds: for the whole proof.
+        progress: called with the seconds that passed and those there are.
+
+    Raises:
+        InputError: where SCIP is not installed, for a time that is not positive, or for a problem that asks nothing.
+    """
+    check_installed()
+    if not seconds > 0:
+        raise InputError([Fault(f"found {seconds}; accepted: a positive number of seconds", ("seconds",))])
+    if isinstance(design, Problem):
+        design = solve(design, throw=False)
+    problem = design.problem
+    if faults := unasked(problem):
+        raise InputError(faults)
+    if not problem.free:
+        return _noted(design, "nothing is free, so there is nothing to bound")
+    if problem.objective is None and design.status == "optimal":
+        return _noted(design, "nothing is minimised or maximised, so there is nothing to bound")
+    clock = Clock(seconds, progress)
+    try:
+        for _ in range(_REPLACED):
+            design, replaced = (_bounded if design.status == "optimal" else _excluded)(design, clock)
+            if not replaced:
+                break
+    except NotAccepted as error:
+        return _noted(design, f"branch and bound cannot take {error}, so there is no bound")
+    return design
+
+
+def check_installed() -> None:
+    """Refuse where SCIP is missing.
+
+    Raises:
+        InputError: with what to install.
+    """
+    if not available():
+        message = "PySCIPOpt is not installed; pip install 'tmsopt[certify]', from a checkout pip install '.[certify]'"
+        raise InputError([Fault(message, ("certify",))])
+
+
+def _bounded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
+    """An optimum with the smallest gap that can be proved, or a better one in its place."""
+    known = _known(design)
+    if known.proven:
+        return replace(design, bound=known), False
+    if words := doubt(_question(design, -PROVEN), _free(design)):
+        return _noted(design, f"no bound: {words}"), False
+    proved, level = math.inf, PROVEN
+    while True:
+        last = level in (_FINER, _COARSER[-1])
+        answered = answer(_question(design, level), clock, 1.0 if last else _SHARE)
+        if (better := _from(design, answered)) is not None:
+            return better, True
+        if answered.verdict == INFEASIBLE:
+            proved = level
+        coarser = [c for c in _COARSER if c > level]
+        if level == PROVEN and proved == PROVEN:
+            level = _FINER
+        elif proved < math.inf or level == _FINER or not coarser:
+            break
+        else:
+            level = coarser[0]
+    return replace(design, bound=_stronger(design, known, _bound(design, proved, clock))), False
+
+
+def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
+    """No design was found: the proof that there is none, or one after all."""
+    answered = answer(Question(design.problem, _cases(design), None, _unit(design)), clock, 1.0)
+    if (found := _from(design, answered)) is not None:
+        return found, True
+    if answered.verdict == INFEASIBLE:
+        none = -math.inf if design.problem.sense == "maximize" else math.inf
+        bound = Bound(none, 0.0, True, "scip", clock.used, clock.nodes, FEASIBILITY)
+        return replace(design, status="infeasible", bound=bound), False
+    words = "branch and bound did not decide in time whether any design is feasible"
+    return _noted(replace(design, bound=_bound(design, math.inf, clock)), words), False
+
+
+def _known(design: Solution) -> Bound:
+    """The bound there is without a search; a damping ratio is at most 1."""
+    if design.problem.sense == "maximize" and (design.problem.maximize or "").strip() == "damping_ratio":
+        gap = max(1.0 - design.value, 0.0)
+        return Bound(1.0, gap, gap == 0, "definition")
+    return design.bound
+
+
+def _question(design: Solution, level: float) -> Question:
+    """Whether any design is better by a gap of some level."""
+    limit = design.value - _sense(design.problem) * _gap(design.value, level)
+    return Question(design.problem, _cases(design), limit, _unit(design))
+
+
+def _bound(design: Solution, level: float, clock: Clock) -> Bound:
+    """What has been proved."""
+    gap = _gap(design.value, level) if math.isfinite(level) else math.inf
+    value = design.value - _sense(design.problem) * gap if math.isfinite(gap) else -_sense(design.problem) * math.inf
+    return Bound(value, gap, level <= PROVEN, "scip", clock.used, clock.nodes, FEASIBILITY)
+
+
+def _stronger(design: Solution, known: Bound, searched: Bound) -> Bound:
+    """The better of two bounds, with what the search took."""
+    if searched.gap <= known.gap or not math.isfinite(known.value):
+        return searched
+    proven = known.gap <= _gap(design.value, PROVEN)
+    return replace(searched, value=known.value, gap=known.gap, proven=proven, method=known.method)
+
+
+def _from(design: Solution, answered: Answer) -> Solution | None:
+    """A better design, solved for from the one that SCIP found; None where that is not confirmed."""
+    if answered.design is None:
+        return None
+    problem = design.problem
+    for starts in _STARTS:
+        found = solve(replace(problem, start=answered.design), starts=starts, throw=False)
+        if found.status == "optimal" and (design.status != "optimal" or _gain(design, found) > _BETTER):
+            before = f"{design.value:.9g}" if design.status == "optimal" else "none"
+            words = f"branch and bound found a better design than the search from many starts: {before} before"
+            return _noted(replace(found, problem=problem), words)
+    return None
+
+
+def _gain(design: Solution, found: Solution) -> float:
+    """Relative improvement of the objective."""
+    if design.problem.objective is None:
+        return 0.0
+    return _sense(design.problem) * (design.value - found.value) / max(_FLOOR, abs(design.value))
+
+
+def _sense(problem: Problem) -> float:
+    return -1.0 if problem.sense == "maximize" else 1.0
+
+
+def _gap(value: float, level: float) -> float:
+    return level * max(_FLOOR, abs(value))
+
+
+def _free(design: Solution) -> dict[str, float]:
+    return {name: design.parameters[name] for name in design.problem.free}
+
+
+def _cases(design: Solution) -> tuple[Case, ...]:
+    """The cases listed, and those found to be the worst ones between them."""
+    listed = design.problem.cases
+    worst = [case for case in (design.worst, design.least_damped) if case is not None and case not in listed]
+    return (*listed, *dict.fromkeys(worst)) if listed else ()
+
+
+def _unit(design: Solution) -> float:
+    """Geometric mean of the sizes of the roots, as a power of two."""
+    sizes = [math.hypot(r.re, r.im) for r in design.roots for _ in range(r.multiplicity)]
+    known = [math.log2(size) for size in sizes if _SMALL < size < 1 / _SMALL]
+    return float(2.0 ** round(sum(known) / len(known))) if known else 1.0
+
+
+def _noted(design: Solution, words: str) -> Solution:
+    return replace(design, notes=(*design.notes, words))

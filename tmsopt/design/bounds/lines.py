@@ -1,0 +1,124 @@
+"""Root quantities for branch and bound: half-planes by interlacing parts, sectors by bounded factors."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from tmsopt.design.bounds.interlace import interlace, squares_of, unknowns
+from tmsopt.design.bounds.ranges import Interval, ranges, root_bound
+from tmsopt.design.formulations import Builder
+from tmsopt.design.lifts import Lifted, quadratic_pairs
+from tmsopt.design.nlp import Lift
+from tmsopt.models import Model, Values
+from tmsopt.roots import Pattern, product, shift
+from tmsopt.roots.patterns import Roots
+
+
+@dataclass(frozen=True)
+class Frame:
+    """How coefficients are looked at.
+
+    Attributes:
+        signs: case → sign of the leading one; cases without are left aside.
+        unit: usual size of the roots, a power of two.
+        touching: whether a line must have a root on it, lest more be claimed than is so.
+    """
+
+    model: Model
+    signs: Mapping[int, int]
+    unit: float
+    touching: bool = False
+
+    def coefficients(self, values: Sequence[Values], case: int) -> list[Any]:
+        """Coefficients for roots in the unit, with a leading one that is positive, in the compact form of the model."""
+        return [self.signs[case] * c / self.unit**k for k, c in enumerate(compact(self.model, values[case]))]
+
+    def about(self, values: Sequence[Values], case: int, line: Any) -> list[Any]:
+        """The same of p(t + line)."""
+        return shift(self.coefficients(values, case), line / self.unit)
+
+
+def compact(model: Model, values: Values) -> list[Any]:
+    """Coefficients but for a positive factor, in as few products as the model knows."""
+    if model.compact is None:
+        return list(values.coefficients)
+    return model.compact(**model.algebraic({name: values[name] for name in model.sets[0].names}))
+
+
+def over(build: Builder, expressions: Sequence[Any]) -> list[Interval]:
+    """Ranges of expressions over the variables so far, by interval arithmetic."""
+    function = ca.Function("over", [ca.vertcat(*build.x)], [ca.densify(ca.vertcat(*map(ca.SX, expressions)))])
+    return ranges(function, build.bounds)[0]
+
+
+def half_planes(
+    frame: Frame, build: Builder, covered: Sequence[int], values: Sequence[Values], line: float | None = None
+) -> Lifted:
+    """Every root of every case at or left of a line: a known one, or a variable."""
+    at = build.variable("abscissa") if line is None else line
+    looked = [case for case in covered if case in frame.signs]
+    for case in looked:
+        c = frame.about(values, case, at)
+        edges = interlace(build, case, c, root_bound(over(build, c)))
+        if line is None and frame.touching and len(covered) == 1:
+            build.row("abscissa", math.prod(edges), 0.0, 0.0)
+    size = (line is None) + len(looked) * unknowns(frame.model.degree)
+    return Lifted(ca.SX(at), Lift("abscissa", size, partial(_half_plane_guess, frame, looked, line)), (), ())
+
+
+def sectors(
+    frame: Frame, build: Builder, covered: Sequence[int], values: Sequence[Values], ratio: float | None = None
+) -> Lifted:
+    """Every root of every case with at least a damping ratio: p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ."""
+    zeta = build.variable("damping_ratio", -1.0, 1.0) if ratio is None else ratio
+    looked = [case for case in covered if case in frame.signs]
+    for case in looked:
+        a = frame.coefficients(values, case)
+        largest = root_bound(over(build, a))
+        pairs = []
+        for k in range(1, (len(a) - 1) // 2 + 1):
+            p = build.variable(f"p{k}.{case}", -2 * largest, 2 * largest)
+            pairs.append((p, build.variable(f"w{k}.{case}", 0.0, largest)))
+            build.row("damping_ratio", pairs[-1][0] - 2 * zeta * pairs[-1][1], 0.0, np.inf)
+        build.equal("damping_ratio", a, [a[0] * c for c in product(*([1, p, w * w] for p, w in pairs))])
+    size = (ratio is None) + len(looked) * 2 * (frame.model.degree // 2)
+    return Lifted(ca.SX(zeta), Lift("damping_ratio", size, partial(_sector_guess, frame, looked, ratio)), (), ())
+
+
+def bound_unknowns(frame: Frame, build: Builder, pattern: Pattern) -> None:
+    """Ranges for the unknown factor coefficients of a pattern, the last variables so far: C(m, k) R^k for degree m."""
+    count = len(pattern.unknowns)
+    largest = root_bound(over(build, compact(frame.model, build.values[0])))
+    symbols = build.x[-count:]
+    for factor in pattern.factors(symbols):
+        for k, c in enumerate(factor[1:], start=1):
+            for j, symbol in enumerate(symbols):
+                if any(ca.is_equal(ca.SX(c), e, 2) for e in (symbol, -symbol)):
+                    most = math.comb(len(factor) - 1, k) * largest**k
+                    lower, upper = build.bounds[j - count]
+                    build.bounds[j - count] = (max(lower, -most), min(upper, most))
+
+
+def _half_plane_guess(
+    frame: Frame, covered: Sequence[int], line: float | None, values: Sequence[Values], z: Sequence[Roots]
+) -> list[list[float]]:
+    """The least line, if it is not known, and squared frequencies."""
+    at = max(float(values[case]["abscissa"]) for case in covered) if line is None else line
+    squares = [squares_of([float(c) for c in frame.about(values, case, at)]) for case in covered]
+    return [[*([at] if line is None else []), *(x for part in squares for x in part)]]
+
+
+def _sector_guess(
+    frame: Frame, covered: Sequence[int], ratio: float | None, values: Sequence[Values], z: Sequence[Roots]
+) -> list[list[float]]:
+    least = min(float(values[case]["damping_ratio"]) for case in covered)
+    factors = []
+    for case in covered:
+        for pair in quadratic_pairs(z[case] / frame.unit):
+            factors += [float(-pair.sum().real), math.sqrt(abs(float(pair.prod().real)))]
+    return [[*([least] if ratio is None else []), *factors]]

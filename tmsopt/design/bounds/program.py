@@ -1,0 +1,104 @@
+"""A problem as questions for branch and bound: is there any design that does as well as a limit?
+
+With the abscissa the objective, the limit is a vertical line that is known, and the question is one about the
+coefficients alone. If the answer is no, the limit is a bound on what any design of the box can reach.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import casadi as ca
+import numpy as np
+
+from tmsopt.design.bounds.lines import Frame, bound_unknowns, compact, half_planes, over, sectors
+from tmsopt.design.cases import Case
+from tmsopt.design.expression import Expression
+from tmsopt.design.formulations import Builder, Lifting
+from tmsopt.design.nlp import NLP
+from tmsopt.design.problem import Problem
+from tmsopt.design.variation import tempts
+
+_DEEP = 99  # levels to which expressions are compared
+
+_WORSE = {"abscissa": 1.0, "damping_ratio": -1.0}
+"""Direction in which a root quantity gets worse."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """Whether any design reaches a limit.
+
+    Attributes:
+        cases: what the design must stand up to; fewer ask for less, and bound what more of them can reach.
+        limit: value of the objective to reach; None asks for any feasible design.
+        unit: usual size of the roots, a power of two.
+    """
+
+    problem: Problem
+    cases: tuple[Case, ...] = ()
+    limit: float | None = None
+    unit: float = 1.0
+
+    def programs(self) -> dict[int, NLP]:
+        """The question as data, for each sign that a0 can have in the box; a design answers the one of its own sign."""
+        build = Builder(self.problem, self.cases)
+        leading = [ca.SX(compact(self.problem.model, values)[0]) for values in build.values]
+        can = [(upper > 0, lower < 0) for lower, upper in over(build, leading)]
+        alike = [ca.is_equal(a, leading[build.covered[0]], _DEEP) for a in leading]
+        asked = {}
+        for sign, possible in zip((1, -1), can[build.covered[0]], strict=True):
+            if possible:
+                known = {k: 1 if c[0] else -1 for k, c in enumerate(can) if c[0] != c[1]}
+                same = {k: sign for k, equal in enumerate(alike) if equal}
+                asked[sign] = self._program({**known, **same})
+        return asked
+
+    def _program(self, signs: Mapping[int, int]) -> NLP:
+        problem = self.problem
+        frame = Frame(problem.model, signs, self.unit, tempts(problem, "abscissa"))
+        carried = {"abscissa": partial(half_planes, frame), "damping_ratio": partial(sectors, frame)}
+        lifts: Mapping[str, Lifting] = carried
+        build = Builder(problem, self.cases, lifts)
+        first = build.covered[0]
+        build.row("a0", frame.coefficients(build.values, first)[0], 0.0, np.inf)
+        if problem.pattern is not None:
+            build.pattern(problem.pattern)
+            bound_unknowns(frame, build, problem.pattern)
+        for name, lift in carried.items():
+            value = self._known(name)
+            if value is not None and name not in build.shared:
+                build.shared[name] = ca.SX(value)
+                build.lifts.append(lift(build, build.covered, build.values, value).lift)
+        build.constraints()
+        if self.limit is not None:
+            build.optimise()
+            sense = -1.0 if problem.sense == "maximize" else 1.0
+            build.row("limit", build.objective, -np.inf, sense * self.limit)
+        build.objective = ca.SX(0)
+        return build.finish("bound")
+
+    def _known(self, name: str) -> float | None:
+        """The value that a root quantity must reach, where nothing else is asked of it; None where it must be found."""
+        problem, worse = self.problem, _WORSE[name]
+        reach: list[float | None] = []
+        if self.limit is not None and problem.objective is not None and name in problem.objective.names:
+            alone = problem.objective.text.strip() == name and not tempts(problem, name, worse)
+            reach.append(self.limit if alone else None)
+        reach += [_threshold(c, name, worse) for c in problem.conditions.values() if name in c.names]
+        found = [value for value in reach if value is not None]
+        if not reach or len(found) < len(reach):
+            return None
+        return min(found) if worse > 0 else max(found)
+
+
+def _threshold(condition: Expression, name: str, worse: float) -> float | None:
+    """The value that a comparison allows a quantity at worst, where it is linear in that and nothing else."""
+    if condition.names != (name,) or condition.comparison == "==":
+        return None
+    at = [float(condition({name: value})) for value in (0.0, 0.5, 1.0)]
+    slope = at[2] - at[0]
+    if not abs(at[0] - 2 * at[1] + at[2]) <= 1e-12 * abs(slope):
+        return None
+    falls = -1.0 if condition.comparison == ">=" else 1.0
+    return -at[0] / slope if slope * falls * worse > 0 else None

@@ -1,0 +1,88 @@
+"""A CasADi function, one instruction after the other, in another arithmetic: balls, or the expressions of SCIP."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+Arithmetic = Mapping[int, Callable[..., Any]]
+"""CasADi operation → what it does to its one or two operands; for `ca.OP_CONST`, to a float."""
+
+
+class NotAccepted(ValueError):
+    """An operation that an arithmetic lacks; the message is its name."""
+
+
+def walk(
+    function: ca.Function,
+    arguments: Sequence[Any],
+    arithmetic: Arithmetic,
+    shared: Callable[[Any], Any] = lambda value: value,
+) -> list[list[Any]]:
+    """The outputs of a function of one vector, whose entries are given; each output as the list of its entries.
+
+    Args:
+        shared: applied to every result that is used more than once.
+
+    Raises:
+        NotAccepted: for an operation that the arithmetic does not have.
+    """
+    steps = list(_steps(function))
+    uses = Counter(k for step in steps for k in step.operands)
+    values: list[Any] = []
+    outputs: list[list[Any]] = [[arithmetic[ca.OP_CONST](0.0)] * function.nnz_out(k) for k in range(function.n_out())]
+    for step in steps:
+        match step.operation:
+            case ca.OP_INPUT:
+                value = arguments[step.place[1]]
+            case ca.OP_OUTPUT:
+                value = values[step.operands[0]]
+                outputs[step.place[0]][step.place[1]] = value
+            case ca.OP_CONST:
+                value = arithmetic[ca.OP_CONST](step.constant)
+            case operation if operation in arithmetic:
+                value = arithmetic[operation](*(values[k] for k in step.operands))
+                value = shared(value) if uses[len(values)] > 1 else value
+            case operation:
+                raise NotAccepted(_NAMES.get(operation, f"operation {operation}"))
+        values.append(value)
+    return outputs
+
+
+@dataclass(frozen=True)
+class _Step:
+    """One instruction.
+
+    Attributes:
+        operands: numbers of the steps whose results it takes.
+        place: of an input or output, which one and which entry.
+    """
+
+    operation: int
+    operands: tuple[int, ...] = ()
+    place: tuple[int, int] = (0, 0)
+    constant: float = 0.0
+
+
+def _steps(function: ca.Function) -> Iterator[_Step]:
+    """The instructions, with the numbers of steps in place of registers, which CasADi uses again."""
+    held: dict[int, int] = {}
+    for k in range(function.n_instructions()):
+        operation = function.instruction_id(k)
+        inputs, outputs = function.instruction_input(k), function.instruction_output(k)
+        match operation:
+            case ca.OP_INPUT:
+                yield _Step(operation, place=(inputs[0], inputs[1]))
+            case ca.OP_OUTPUT:
+                yield _Step(operation, (held[inputs[0]],), place=(outputs[0], outputs[1]))
+                continue
+            case ca.OP_CONST:
+                yield _Step(operation, constant=function.instruction_constant(k))
+            case _:
+                yield _Step(operation, tuple(held[r] for r in inputs))
+        held[outputs[0]] = k
+
+
+_NAMES = {getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")}
