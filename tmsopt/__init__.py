@@ -9,6 +9,8 @@ if TYPE_CHECKING:
     from tmsopt.design.files import load
     from tmsopt.design.nearest import Nearest, Robustness, nearest, robustness
     from tmsopt.design.problem import Problem
+    from tmsopt.design.proof.proof import Proof
+    from tmsopt.design.prove import prove
     from tmsopt.design.solution import NotSolved, Solution
     from tmsopt.design.solve import solve
     from tmsopt.study.branch import Branch, Trace
@@ -36,6 +38,7 @@ __all__ = [
     "NotSolved",
     "Optimality",
     "Problem",
+    "Proof",
     "Robustness",
     "Solution",
     "Swallowtail",
@@ -50,6 +53,7 @@ __all__ = [
     "nearest",
     "optimality",
     "pareto",
+    "prove",
     "robustness",
     "roots",
     "solve",
@@ -70,6 +74,7 @@ _HOMES = {
     "NotSolved": "tmsopt.design.solution",
     "Optimality": "tmsopt.study.optimality",
     "Problem": "tmsopt.design.problem",
+    "Proof": "tmsopt.design.proof.proof",
     "Robustness": "tmsopt.design.nearest",
     "Solution": "tmsopt.design.solution",
     "Swallowtail": "tmsopt.study.swallowtail",
@@ -83,6 +88,7 @@ _HOMES = {
     "optimality": "tmsopt.study.optimality",
     "robustness": "tmsopt.design.nearest",
     "pareto": "tmsopt.study.pareto",
+    "prove": "tmsopt.design.prove",
     "solve": "tmsopt.design.solve",
     "swallowtail": "tmsopt.study.swallowtail",
     "trace": "tmsopt.study.trace",

@@ -10,6 +10,7 @@ from tmsopt import __version__
 from tmsopt.cli.chart import chart
 from tmsopt.cli.common import BAD_INPUT
 from tmsopt.cli.figure import figure
+from tmsopt.cli.prove import prove
 from tmsopt.cli.solve import compare, solve
 from tmsopt.cli.trace import trace
 from tmsopt.cli.verify import verify
@@ -39,6 +40,7 @@ def main() -> None:
       tmsopt solve problems/ep4.toml
       tmsopt solve problems/pareto.toml --plot front.png
       tmsopt compare problems/ep4.toml
+      tmsopt prove problems/ep4.toml
       tmsopt trace problems/ep_set.toml --plot ep_set.png
       tmsopt chart problems/chart.toml --plot chart.png
       tmsopt figure all --output figures
@@ -49,5 +51,5 @@ def main() -> None:
             stream.reconfigure(errors="replace")  # a narrow terminal encoding must not lose a result
 
 
-for _command in (solve, compare, trace, chart, figure, verify):
+for _command in (solve, compare, prove, trace, chart, figure, verify):
     main.add_command(_command)

@@ -10,24 +10,28 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
+import flint
 import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Bound
 from tmsopt.models import Model
+from tmsopt.roots.elementary import as_ball, exact, quotient
 from tmsopt.roots.exact import rational
 
 PROVEN = 1e-9
 """Gap, relative to 1 + |bound|, below which a design counts as proven optimal."""
 
-_ROUNDING = 1e-15  # of the two coefficients, their quotient and its root
+_ROUNDING = 1e-15  # of the quotient to a double, and of its root
 _NODES = np.linspace(-1, 1, 9)
+_BITS = 212  # the parameters of a set are doubles, so exact; what follows from them is right far beyond the answer
 _DEGREE = 4  # in any one parameter; nine nodes fit it
 _FIT = np.linalg.pinv(np.vander(_NODES, _DEGREE + 1))
 
 Array = NDArray[np.float64]
 Box = Mapping[str, tuple[float, float]]
+Known = Mapping[tuple[str, float], Any]
 
 
 def bounded(problem: Problem) -> bool:
@@ -61,7 +65,7 @@ def _largest_product(problem: Problem) -> float:
     Along a parameter in which aₙ and a0 are linear the quotient is monotone, so its extremes are at the ends. One
     further parameter may enter otherwise; along it the stationary points are polynomial roots.
     """
-    model, box = problem.model, _algebraic_box(problem)
+    model, (box, known) = problem.model, _algebraic_box(problem)
     constant = [n for n, (lo, hi) in box.items() if lo == hi or _plays_no_role(model, n, box)]
     varying = [n for n in box if n not in constant]
     curved = [n for n in varying if not _linear(model, n, box)]
@@ -69,23 +73,34 @@ def _largest_product(problem: Problem) -> float:
         return math.inf
     ends = [box[n] if n in varying and n not in curved else ((box[n][0] + box[n][1]) / 2,) for n in box]
     corners = dict(zip(box, np.array(list(itertools.product(*ends))).T, strict=True))
-    quotients, signs = _along(model, corners, curved[0], box) if curved else _at(model, corners)
+    quotients, signs = _along(model, corners, curved[0], box, known) if curved else _at(model, corners, known)
     if len(signs) != 1:
         return math.inf
     return float(quotients.max())
 
 
-def _at(model: Model, points: Mapping[str, Array]) -> tuple[Array, set[bool]]:
-    """|aₙ/a0| at points, and the signs of a0. Where both vanish the quotient is constant along the edges that end."""
+def _at(model: Model, points: Mapping[str, Array], known: Known) -> tuple[Array, set[bool]]:
+    """|aₙ/a0| at points, and the signs of a0. Where both vanish the quotient is constant along the edges that end.
+
+    The largest are upper ends of balls: a small a0 is a difference, of which doubles lose as many digits as cancel.
+    """
     a = model.polynomial(**points)
     last, first = np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in (a[-1], a[0])))
     both = (last == 0) & (first == 0)
     if np.any((first == 0) & ~both) or np.all(both):
         return np.array([math.inf]), set()
-    return np.abs(last[~both] / first[~both]), set((first[~both] > 0).tolist())
+    with np.errstate(over="ignore"):
+        quotients = np.where(both, 0.0, np.abs(last / np.where(both, 1.0, first)))
+    with flint.ctx.workprec(_BITS):
+        for k in np.flatnonzero(quotients >= quotients.max() / 2):
+            at = {n: float(np.broadcast_to(column, last.shape)[k]) for n, column in points.items()}
+            a = model.polynomial(**{n: known.get((n, v), exact(v)) for n, v in at.items()})
+            upper = as_ball(abs(quotient(a[-1], a[0]))).upper()
+            quotients[k] = float(upper) if upper.is_finite() else math.inf
+    return quotients[~both], set((first[~both] > 0).tolist())
 
 
-def _along(model: Model, corners: Mapping[str, Array], name: str, box: Box) -> tuple[Array, set[bool]]:
+def _along(model: Model, corners: Mapping[str, Array], name: str, box: Box, known: Known) -> tuple[Array, set[bool]]:
     """The same at the ends and stationary points of the one curved parameter; no sign at all if it has a pole."""
     lower, upper = box[name]
     y = (lower + upper) / 2 + (upper - lower) / 2 * _NODES
@@ -101,7 +116,7 @@ def _along(model: Model, corners: Mapping[str, Array], name: str, box: Box) -> t
         at = {n: float(column[k]) for n, column in corners.items()}
         for u in (-1.0, 1.0, *_inside(turning)):
             points.append({**at, name: (lower + upper) / 2 + (upper - lower) / 2 * float(u)})
-    return _at(model, {n: np.array([p[n] for p in points]) for n in corners})
+    return _at(model, {n: np.array([p[n] for p in points]) for n in corners}, known)
 
 
 def _inside(polynomial: Array) -> Array:
@@ -112,12 +127,27 @@ def _inside(polynomial: Array) -> Array:
     return np.asarray(np.clip(found.real[close], -1.0, 1.0))
 
 
-def _algebraic_box(problem: Problem) -> dict[str, tuple[float, float]]:
-    """Range of each algebraic parameter: they are monotone in every parameter of a set, so corners suffice."""
+def _algebraic_box(problem: Problem) -> tuple[dict[str, tuple[float, float]], Known]:
+    """Range of each algebraic parameter: they are monotone in every parameter of a set, so corners suffice.
+
+    Beside the ends as doubles, the balls that these are rounded from.
+    """
     of = problem.parameter_set
     corners = np.array(list(itertools.product(*(problem.free.get(n) or (problem.fixed[n],) for n in of.names))))
     values = problem.model.algebraic(of.native(dict(zip(of.names, corners.T, strict=True))))
-    return {n: (float(np.min(column)), float(np.max(column))) for n, column in values.items()}
+    box, known = {}, {}
+    balls: dict[int, dict[str, Any]] = {}
+    for n, given in values.items():
+        column = np.broadcast_to(np.asarray(given, dtype=float), len(corners))
+        ends = [int(column.argmin()), int(column.argmax())]
+        for k in ends:
+            if k not in balls:
+                with flint.ctx.workprec(_BITS):
+                    design = {m: exact(float(v)) for m, v in zip(of.names, corners[k], strict=True)}
+                    balls[k] = problem.model.algebraic(of.native(design))
+            known[n, float(column[k])] = balls[k][n]
+        box[n] = (float(column[ends[0]]), float(column[ends[1]]))
+    return box, known
 
 
 def _plays_no_role(model: Model, name: str, box: Box) -> bool:

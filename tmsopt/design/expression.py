@@ -7,16 +7,18 @@ import re
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
+import flint
 import numpy as np
 
 from tmsopt.design.errors import suggest
+from tmsopt.roots import elementary
 
 FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "exp", "log", "abs", "min", "max")
-CONSTANTS: Mapping[str, float] = {"pi": math.pi}
+CONSTANTS = ("pi",)
 COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
 
 _LONGEST = 2000  # characters; longer texts could exhaust the parser's stack
@@ -26,6 +28,26 @@ _NOT_ACCEPTED = re.compile(r"[^ -~]|#")  # look-alike letters, line breaks and c
 
 _UNIT = re.compile(r"\d\s*(mm|cm|m|kg|g|km/h|m/s|deg|rad|N|s)\b")
 
+
+@dataclass(frozen=True)
+class _Arithmetic:
+    """What the functions, operators and numbers of an expression mean for one kind of values."""
+
+    functions: Mapping[str, Callable[..., Any]]
+    number: Callable[[Any], Any]
+    operators: Mapping[type[ast.operator], Callable[[Any, Any], Any]]
+    pi: Any = lambda: math.pi
+
+
+def _as_array(value: Any) -> Any:
+    """Python floats as NumPy's, which give nan and inf where Python raises."""
+    return np.float64(value) if isinstance(value, float | int) else value
+
+
+def _method(name: str) -> Callable[[Any], Any]:
+    return lambda x: getattr(elementary.as_ball(x), name)()
+
+
 _BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -33,20 +55,35 @@ _BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
 }
-_SYMBOLIC: Mapping[str, Callable[..., Any]] = {
-    **{name: getattr(ca, name) for name in FUNCTIONS[:9]},
-    "abs": ca.fabs,
-    "min": ca.fmin,
-    "max": ca.fmax,
-}
-_NUMERIC: Mapping[str, Callable[..., Any]] = {
-    **{name: getattr(np, name) for name in ("sin", "cos", "tan", "sqrt", "exp", "log", "abs")},
-    "asin": np.arcsin,
-    "acos": np.arccos,
-    "atan": np.arctan,
-    "min": np.minimum,
-    "max": np.maximum,
-}
+_SYMBOLIC = _Arithmetic(
+    {**{name: getattr(ca, name) for name in FUNCTIONS[:9]}, "abs": ca.fabs, "min": ca.fmin, "max": ca.fmax},
+    _as_array,
+    _BINARY,
+)
+_NUMERIC = _Arithmetic(
+    {
+        **{name: getattr(np, name) for name in ("sin", "cos", "tan", "sqrt", "exp", "log", "abs")},
+        "asin": np.arcsin,
+        "acos": np.arccos,
+        "atan": np.arctan,
+        "min": np.minimum,
+        "max": np.maximum,
+    },
+    _as_array,
+    _BINARY,
+)
+_BALLS = _Arithmetic(
+    {
+        **{name: _method(name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "exp", "log")},
+        "sqrt": elementary.sqrt,
+        "abs": elementary.magnitude,
+        "min": elementary.lesser,
+        "max": elementary.greater,
+    },
+    elementary.exact,
+    {**_BINARY, ast.Div: elementary.quotient, ast.Pow: elementary.power},
+    flint.arb.pi,
+)
 
 
 class ExpressionError(ValueError):
@@ -76,6 +113,14 @@ class Expression:
         """CasADi expression; of a comparison, left minus right."""
         return self._evaluate(values, _SYMBOLIC)
 
+    def enclosure(self, values: Mapping[str, Any], number: Callable[[Any], Any] = elementary.exact) -> Any:
+        """Ball that certainly holds the value, for balls or exact fractions; of a comparison, left minus right.
+
+        A number in the text stands for the double nearest to it, unless `number` makes it another fraction, and pi for
+        the number π. The ball is nan where the value does not exist, or may not.
+        """
+        return self._evaluate(values, _BALLS if number is elementary.exact else replace(_BALLS, number=number))
+
     def violation(self, values: Mapping[str, Any]) -> float:
         """By how much a numeric design violates a comparison, relative to the size of its sides; nan if undefined."""
         left, right = self.sides(values)
@@ -93,8 +138,8 @@ class Expression:
         body = _parse(self.text)
         return [body.left, *body.comparators] if isinstance(body, ast.Compare) else [body]
 
-    def _evaluate(self, values: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]]) -> Any:
-        sides = [_value(side, values, functions) for side in self._sides()]
+    def _evaluate(self, values: Mapping[str, Any], arithmetic: _Arithmetic) -> Any:
+        sides = [arithmetic.number(_value(side, values, arithmetic)) for side in self._sides()]
         return sides[0] - sides[1] if len(sides) == 2 else sides[0]
 
 
@@ -215,28 +260,25 @@ def _number(node: ast.Constant, text: str) -> float:
     return number
 
 
-def _value(node: ast.expr, values: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]]) -> Any:
+def _value(node: ast.expr, values: Mapping[str, Any], arithmetic: _Arithmetic) -> Any:
     """Value of a checked tree."""
+    number = arithmetic.number
     match node:
         case ast.Constant():
             return _number(node, "")
         case ast.Name(id=name):
-            return CONSTANTS[name] if name in CONSTANTS else values[name]
+            return arithmetic.pi() if name in CONSTANTS else values[name]
         case ast.UnaryOp(op=op, operand=operand):
-            value = _value(operand, values, functions)
+            value = _value(operand, values, arithmetic)
             return -value if isinstance(op, ast.USub) else value
         case ast.BinOp(left=left, op=op, right=right):
-            a, b = _value(left, values, functions), _value(right, values, functions)
-            return _BINARY[type(op)](_as_array(a), _as_array(b))
+            a, b = _value(left, values, arithmetic), _value(right, values, arithmetic)
+            return arithmetic.operators[type(op)](number(a), number(b))
         case ast.Call(func=ast.Name(id=name), args=args):
-            operands = [_as_array(_value(a, values, functions)) for a in args]
-            result = functions[name](*operands[:2]) if len(operands) > 1 else functions[name](operands[0])
+            function = arithmetic.functions[name]
+            operands = [number(_value(a, values, arithmetic)) for a in args]
+            result = function(*operands[:2]) if len(operands) > 1 else function(operands[0])
             for operand in operands[2:]:
-                result = functions[name](result, operand)
+                result = function(result, operand)
             return result
     raise AssertionError(ast.dump(node))  # unreachable: the tree was checked when parsed
-
-
-def _as_array(value: Any) -> Any:
-    """Python floats as NumPy's, which give nan and inf where Python raises."""
-    return np.float64(value) if isinstance(value, float | int) else value

@@ -82,11 +82,26 @@ def _polished(conditions: _Conditions, run: Run) -> Point:
             best = refined
         if best is refined and best.stationarity <= _STATIONARY:
             break
+    pulling = _pulling(conditions, best)
+    if pulling.any():
+        freed = _newton(conditions, run, True, pulling)
+        if freed is not None and _better(freed, best) and not _pulling(conditions, freed).any():
+            best = freed if freed.stationarity <= _STATIONARY else best
     return best
 
 
-def _newton(conditions: _Conditions, run: Run, loose: bool) -> Point | None:
-    """Newton's method with the active limits held as equations; least squares where they are dependent."""
+def _pulling(conditions: _Conditions, point: Point) -> NDArray[np.bool_]:
+    """Rows held at a limit although their multiplier pulls away from it: at two limits so close that both were held."""
+    small = _STATIONARY * (1 + np.abs(point.row_multipliers).max(initial=0.0))
+    below = np.isinf(conditions.row_upper) & (point.row_multipliers > small)
+    return np.asarray(below | (np.isinf(conditions.row_lower) & (point.row_multipliers < -small)))
+
+
+def _newton(conditions: _Conditions, run: Run, loose: bool, freed: NDArray[np.bool_] | bool = False) -> Point | None:
+    """Newton's method with the active limits held as equations; least squares where they are dependent.
+
+    Rows that are `freed` are not held.
+    """
     lower, upper = conditions.lower, conditions.upper
     at_lower, at_upper = _active(run.x, lower, upper, run.bound_multipliers, loose)
     x = np.where(at_lower, lower, np.where(at_upper, upper, run.x))
@@ -95,7 +110,7 @@ def _newton(conditions: _Conditions, run: Run, loose: bool) -> Point | None:
     if not np.all(np.isfinite(g)):
         return None
     low, high = _active(g, conditions.row_lower, conditions.row_upper, run.row_multipliers, loose)
-    held = np.logical_or(low, high)
+    held = np.logical_or(low, high) & ~np.asarray(freed)
     target = np.where(low, conditions.row_lower, conditions.row_upper)[held]
     rows = np.where(held, run.row_multipliers, 0.0)
     n, m = int(free.sum()), int(held.sum())

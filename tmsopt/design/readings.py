@@ -1,17 +1,17 @@
 """A design in the units that its builder reads: seconds, hertz, millimetres, km/h, degrees."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
 
-from tmsopt.design.units import reading
+from tmsopt.design.units import read_in
 from tmsopt.models import ParameterSet
-from tmsopt.roots import Root
 
 Reading = float | tuple[float, ...]
 """A number, or one for each of several roots; nan where it does not exist."""
 
 
-def decay_time(abscissa: float, rate: float) -> float:
+def decay_time(abscissa: Any, rate: Any) -> Any:
     """Seconds in which the slowest part of a disturbance falls to 1/e; nan unless it falls.
 
     Args:
@@ -21,38 +21,37 @@ def decay_time(abscissa: float, rate: float) -> float:
     return 1 / (-abscissa * rate) if abscissa < 0 else math.nan
 
 
-def growth_time(abscissa: float, rate: float) -> float:
+def growth_time(abscissa: Any, rate: Any) -> Any:
     """Seconds in which the fastest part of a disturbance grows e-fold; nan unless it grows."""
     return decay_time(-abscissa, rate)
 
 
-def frequencies(roots: Iterable[Root], rate: float) -> tuple[float, ...]:
+def frequencies(roots: Iterable[Any], rate: Any, pi: Any = math.pi) -> tuple[Any, ...]:
     """Frequency in Hz of each distinct oscillating pair of roots, in the order of the roots."""
-    return tuple(root.im * rate / (2 * math.pi) for root in roots if root.im > 0)
+    return tuple(root.im * rate / (2 * pi) for root in roots if root.im > 0)
 
 
 def readings(
     of: ParameterSet,
-    parameters: Mapping[str, float],
-    quantities: Mapping[str, float],
-    abscissa: float,
-    roots: Iterable[Root],
-) -> dict[str, Reading]:
+    parameters: Mapping[str, Any],
+    quantities: Mapping[str, Any],
+    abscissa: Any,
+    roots: Iterable[Any],
+    pi: Any = math.pi,
+) -> Iterator[tuple[str, Any, int]]:
     """Times, frequencies, and everything with a unit, by names that end in the unit: ``v_kmh``, ``x_B_mm``.
 
-    Empty for a set that has no unit of time.
+    Numbers of any kind, each with the decimal digits to round it to, 0 for none. Nothing for a set that has no unit of
+    time.
     """
     if of.rate is None:
-        return {}
-    rate = float(of.rate(parameters))
-    found: dict[str, Reading] = {
-        "decay_time_s": decay_time(abscissa, rate),
-        "growth_time_s": growth_time(abscissa, rate),
-        "frequencies_Hz": frequencies(roots, rate),
-    }
+        return
+    rate = of.rate(parameters)
+    yield "decay_time_s", decay_time(abscissa, rate), 0
+    yield "growth_time_s", growth_time(abscissa, rate), 0
+    yield "frequencies_Hz", frequencies(roots, rate, pi), 0
     units = {p.name: p.unit for p in of.parameters} | {q.name: q.unit for q in of.quantities}
-    known = {**parameters, **quantities}
     for name in (n for n, unit in units.items() if unit != "1"):
-        value, unit = reading(known[name], units[name])
-        found[f"{name}_{''.join(filter(str.isalnum, unit))}"] = value
-    return found
+        value = parameters[name] if name in parameters else quantities[name]
+        read, unit, digits = read_in(value, units[name], pi)
+        yield f"{name}_{''.join(filter(str.isalnum, unit))}", read, digits

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from typing import Any
 
 from tmsopt.design.cases import Case
@@ -10,10 +11,13 @@ from tmsopt.design.cover import Cover
 from tmsopt.design.formulations import Freedom
 from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
-from tmsopt.design.readings import Reading, readings
+from tmsopt.design.proof.proof import DIGITS, Proof, prove_design
+from tmsopt.design.readings import Reading
 from tmsopt.roots import Root
 
 SCHEMA = 1
+GAIN_DIGITS = 6
+SIDE_DIGITS = 9
 
 
 @dataclass(frozen=True)
@@ -99,7 +103,8 @@ class Solution:
         parameters: every parameter of the set the problem is written in (rad, SI units).
         abscissa: largest real part of the roots of the ideal design, dimensionless (per √(w/g)).
         abscissa_realised: the same for the parameters exactly as stored in double precision.
-        roots: roots of the ideal design with multiplicities.
+        roots: roots of the ideal design with multiplicities: of the polynomial nearest to the design's own that has
+            the structure, as `roots.enclosed.nearest` defines it; for simple roots of the design's own.
         structure: which roots stand on the rightmost line, e.g. ``EP4``.
         active: constraint or bound (``Fr.max``) → gain of the objective per unit that the limit is relaxed.
         violations: name → violation relative to the size of the two sides, where beyond tolerance.
@@ -114,6 +119,7 @@ class Solution:
         cover: what is known of every case together, proven or not.
         sides: part of the box, such as ``forward tilt`` → its best objective, nan where it has no feasible design.
         relaxation: of an infeasible problem, the smallest move of its limits that leaves a feasible design.
+        si: the design in s, Hz, mm, km/h, degrees, N and kg; empty unless the problem is written in SI.
     """
 
     problem: Problem
@@ -140,14 +146,29 @@ class Solution:
     cover: Cover | None = None
     sides: Table[float] = field(default_factory=Table)
     relaxation: Relaxation | None = None
+    si: Table[Reading] = field(default_factory=Table)
 
-    @property
-    def si(self) -> dict[str, Reading]:
-        """The design in s, Hz, mm, km/h, degrees, N and kg; empty unless the problem is written in SI."""
-        return readings(self.problem.parameter_set, self.parameters, self.quantities, self.abscissa, self.roots)
+    @cached_property
+    def proof(self) -> Proof:
+        """That the design exists, proved in ball arithmetic to 30 digits, or why it is not."""
+        return self.proved()
+
+    def proved(self, digits: int = DIGITS, exact: Mapping[str, Any] | None = None) -> Proof:
+        """The proof to other digits, or with exact numbers for parameters; see `prove`."""
+        if self.status != "optimal":
+            reason = f"the problem is not solved ({self.status}): there is no design to prove"
+            return Proof(f"a design of '{self.problem.title or 'the problem'}' exists", False, reason, digits=digits)
+        return prove_design(self.problem, self.parameters, self.structure, digits, exact, self.worst)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data for ``json.dumps``; numbers that do not exist are None."""
+        """Plain data for ``json.dumps``; numbers that do not exist are None.
+
+        Objective, abscissae, roots, quantities, dimensionless parameters and readings follow from the parameters
+        alone and are the doubles nearest to their true values (readings in mm, km/h and degrees: to 15 digits).
+        ``active`` comes from the optimisation and has the 6 digits that the first-order conditions, solved
+        independently at 60 digits, confirm; so have ``violations``. ``sides`` are objectives of designs that are not
+        shown, to 9 digits.
+        """
         problem = self.problem
         text = problem.minimize or problem.maximize or problem.locate or "abscissa"
         objective: dict[str, Any] = {"sense": problem.sense, "expression": text, "value": _number(self.value)}
@@ -165,8 +186,8 @@ class Solution:
             "abscissa_realised": _number(self.abscissa_realised),
             "roots": [{"re": r.re, "im": r.im, "multiplicity": r.multiplicity} for r in self.roots],
             "structure": self.structure,
-            "active": _numbers(self.active),
-            "violations": _numbers(self.violations),
+            "active": _digits(self.active, GAIN_DIGITS),
+            "violations": _digits(self.violations, GAIN_DIGITS),
             "bound": self.bound.to_json(),
             "starts": {
                 "tried": self.starts.tried,
@@ -190,7 +211,7 @@ class Solution:
             **({"worst_case": _case(self.worst)} if self.worst else {}),
             **({"least_damped_case": _case(self.least_damped)} if self.least_damped else {}),
             **({"cover": asdict(self.cover)} if self.cover else {}),
-            **({"sides": _numbers(self.sides)} if self.sides else {}),
+            **({"sides": _digits(self.sides, SIDE_DIGITS)} if self.sides else {}),
             **({"relaxation": self.relaxation.to_json()} if self.relaxation else {}),
             **({"si": si} if si else {}),
         }
@@ -222,3 +243,8 @@ def _number(value: float) -> float | None:
 
 def _numbers(table: Mapping[str, float]) -> dict[str, float | None]:
     return {name: _number(value) for name, value in table.items()}
+
+
+def _digits(table: Mapping[str, float], digits: int) -> dict[str, float | None]:
+    """Numbers to so many significant digits."""
+    return {name: _number(float(f"{value:.{digits}g}")) for name, value in table.items()}

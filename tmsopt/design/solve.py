@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from tmsopt.design.bound import omega0_bound
+from tmsopt.design.certified import certified
 from tmsopt.design.cover import cover
 from tmsopt.design.errors import InputError
 from tmsopt.design.explore import Explored, Options, Progress, evaluated_cases, explore, without_any
@@ -109,24 +110,25 @@ def _assembled(
     problem: Problem, finding: Finding, notes: tuple[str, ...], sides: dict[str, float], began: float
 ) -> Solution:
     checked, optimal = finding.checked, finding.status == "optimal"
+    numbers = certified(problem, finding.parameters, checked, finding.cases)
     listed = bool(problem.variations or problem.tolerances)
-    covered = cover(problem, finding.parameters, checked.structure.abscissa) if listed and optimal else None
+    covered = cover(problem, finding.parameters, numbers.abscissa) if listed and optimal else None
     return Solution(
         problem=problem,
         status=finding.status,
-        value=checked.objective,
+        value=numbers.value,
         parameters=Table(finding.parameters),
-        abscissa=checked.structure.abscissa,
-        abscissa_realised=checked.realised,
-        roots=checked.structure.roots,
+        abscissa=numbers.abscissa,
+        abscissa_realised=numbers.realised,
+        roots=numbers.roots,
         structure=checked.structure.name,
         active=Table(finding.active),
         violations=checked.violations,
-        bound=omega0_bound(problem, checked.objective) if optimal else Bound(),
+        bound=omega0_bound(problem, numbers.value) if optimal else Bound(),
         starts=finding.starts,
         seconds=time.perf_counter() - began,
-        quantities=checked.quantities,
-        dimensionless=checked.dimensionless,
+        quantities=numbers.quantities,
+        dimensionless=numbers.dimensionless,
         formulation=finding.formulation,
         freedom=freedom(problem),
         branches=finding.branches,
@@ -136,6 +138,7 @@ def _assembled(
         cover=covered,
         sides=Table(sides),
         relaxation=finding.relaxation,
+        si=numbers.si,
     )
 
 

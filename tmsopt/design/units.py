@@ -21,18 +21,29 @@ _EXAMPLES = {
     "m/s^2": "'9.81 m/s^2'",
 }
 
-_READ_IN = MappingProxyType({"m": ("mm", 1000.0), "m/s": ("km/h", 3.6), "rad": ("deg", 180 / math.pi)})
+_READ_IN = MappingProxyType({"m": ("mm", 1000), "m/s": ("km/h", 18), "rad": ("deg", 180)})
+
+
+READ_DIGITS = 15
+"""Digits of a reading in another unit: what was written as 15 km/h reads 15 again, not what roundings made of it."""
+
+
+def read_in(value: Any, unit: str, pi: Any = math.pi) -> tuple[Any, str, int]:
+    """A number in SI as a builder reads it: in mm, km/h and degrees, others as they are.
+
+    Returns:
+        The number, of any kind; its unit; and the decimal digits to round it to, 0 where it is not converted.
+    """
+    if unit not in _READ_IN:
+        return value, unit, 0
+    name, factor = _READ_IN[unit]
+    return value * factor / {"mm": 1, "km/h": 5, "deg": pi}[name], name, READ_DIGITS
 
 
 def reading(value: float, unit: str) -> tuple[float, str]:
-    """A number in SI as a builder reads it, with its unit: mm, km/h and degrees; others stay as they are.
-
-    To 15 digits, so that what was written as 15 km/h reads 15 again, and not what two roundings made of it.
-    """
-    if unit not in _READ_IN:
-        return value, unit
-    name, factor = _READ_IN[unit]
-    return float(f"{value * factor:.15g}"), name
+    """A number in SI as a builder reads it, with its unit, to 15 digits where it is converted."""
+    value, unit, digits = read_in(value, unit)
+    return float(f"{value:.{digits}g}") if digits else value, unit
 
 
 def with_unit(text: str, unit: str) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 
 from tmsopt.models.model import Quantity, Range
 from tmsopt.models.tms_equations import matrices
-from tmsopt.roots.elementary import positive_part, sqrt, tan
+from tmsopt.roots.elementary import is_ball, positive_part, quotient, sqrt, tan
 
 _NOT_NEGATIVE = Range(lower=0.0)
 _NOT_POSITIVE = Range(upper=0.0)
@@ -21,13 +21,7 @@ def _nu_H(v: Mapping[str, Any]) -> Any:
 
 
 def _omega0(v: Mapping[str, Any]) -> Any:
-    return -sqrt(sqrt(_quotient(v["a4"], v["a0"])))
-
-
-def _quotient(a: Any, b: Any) -> Any:
-    """a / b, nan where b is 0: a quantity that does not exist, not an infinite one."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(np.equal(b, 0), np.nan, np.divide(a, b))[()]
+    return -sqrt(sqrt(quotient(v["a4"], v["a0"])))
 
 
 def _omega0_equation(v: Mapping[str, Any], x: Any) -> Any:
@@ -57,9 +51,11 @@ def _weave_condition(v: Mapping[str, Any]) -> tuple[list[Any], Any]:
 def _Fr_c(v: Mapping[str, Any]) -> Any:
     terms, denominator = _weave_condition(v)
     numerator = sum(terms)
+    if is_ball(numerator):  # which knows for certain what is 0
+        return sqrt(quotient(numerator, denominator))
     rounding = 4 * np.finfo(float).eps * sum(np.abs(t) for t in terms)
     level = np.abs(v["chi_B"] - v["chi_H"]) <= 4 * np.finfo(float).eps * (np.abs(v["chi_B"]) + np.abs(v["chi_H"]))
-    squared = _quotient(np.where(np.abs(numerator) <= rounding, 0.0, numerator), np.where(level, 0.0, denominator))
+    squared = quotient(np.where(np.abs(numerator) <= rounding, 0.0, numerator), np.where(level, 0.0, denominator))
     return np.abs(sqrt(squared))  # without the sign of −0
 
 

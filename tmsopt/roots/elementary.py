@@ -1,8 +1,13 @@
-"""tan, sqrt and positive part of whatever number a formula is given: floats, arrays, CasADi expressions, balls."""
+"""Elementary functions of whatever number a formula is given: floats, arrays, CasADi expressions, balls.
+
+A ball is an exact fraction (`flint.fmpq`), an interval with a middle and a radius (`flint.arb`), or a power series of
+these (`flint.arb_series`). A value that does not exist, or that the balls are too wide to tell, is a ball nan.
+"""
 
 from typing import Any
 
 import casadi as ca
+import flint
 import numpy as np
 
 
@@ -10,11 +15,15 @@ def tan(x: Any) -> Any:
     """Tangent of x (radians); of a symbolic arctangent, its argument, so that formulas in tan stay polynomial."""
     if hasattr(x, "is_op") and x.is_op(ca.OP_ATAN):
         return x.dep(0)
+    if isinstance(x, flint.fmpq):
+        return as_ball(x).tan()
     return x.tan() if hasattr(x, "tan") else np.tan(np.asarray(x, dtype=float))[()]
 
 
 def sqrt(x: Any) -> Any:
     """Square root of x; nan, without a warning, for a negative float."""
+    if isinstance(x, flint.fmpq):
+        return _exact_sqrt(x)
     if hasattr(x, "sqrt"):
         return x.sqrt()
     with np.errstate(invalid="ignore"):
@@ -23,4 +32,88 @@ def sqrt(x: Any) -> Any:
 
 def positive_part(x: Any) -> Any:
     """x where it is positive, else 0; exact, for (x + |x|)/2 only doubles and halves."""
-    return (x + abs(x)) / 2
+    return (x + magnitude(x)) / 2
+
+
+def magnitude(x: Any) -> Any:
+    """|x|; where the sign of a series is not certain, its slopes may have either."""
+    if not isinstance(x, flint.arb_series):
+        return abs(x)
+    constant = x[0]
+    if constant > 0:
+        return x
+    if constant < 0:
+        return -x
+    either = x * flint.arb(0, 1)
+    return flint.arb_series([abs(constant), *(either[k] for k in range(1, x.prec))], prec=x.prec)
+
+
+def greater(a: Any, b: Any) -> Any:
+    """The greater of two balls."""
+    return _chosen(a, b, 1)
+
+
+def lesser(a: Any, b: Any) -> Any:
+    """The lesser of two balls."""
+    return _chosen(a, b, -1)
+
+
+def quotient(a: Any, b: Any) -> Any:
+    """a / b, nan where b is 0: a quantity that does not exist, not an infinite one."""
+    if is_ball(a) or is_ball(b):
+        try:
+            return a / b
+        except (ZeroDivisionError, ValueError):  # of fractions, of series
+            return flint.arb("nan")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(np.equal(b, 0), np.nan, np.divide(a, b))[()]
+
+
+def power(a: Any, b: Any) -> Any:
+    """a to the power b for balls; nan for a negative a and a b that is not whole."""
+    if isinstance(b, flint.fmpq) and b.q == 1 and abs(b.p) <= _WHOLE:
+        try:
+            return a ** int(b.p)
+        except (ZeroDivisionError, ValueError):
+            return flint.arb("nan")
+    return as_ball(a) ** as_ball(b)
+
+
+def is_ball(x: Any) -> bool:
+    """Whether x is a number of ball arithmetic, exact fractions among them."""
+    return isinstance(x, flint.fmpq | flint.arb | flint.arb_series)
+
+
+def exact(x: Any) -> Any:
+    """A number as an exact fraction, a double as the binary number that it is; balls unchanged."""
+    if is_ball(x):
+        return x
+    return flint.fmpq(*x.as_integer_ratio())
+
+
+def as_ball(x: Any) -> Any:
+    """An exact fraction as a ball of the working precision; balls and series unchanged."""
+    return flint.arb(x) if isinstance(x, flint.fmpq) else x
+
+
+_WHOLE = 1000  # exponent up to which a power is a product
+
+
+def _exact_sqrt(x: flint.fmpq) -> Any:
+    """Of a square the exact root."""
+    if x >= 0 and x.p.is_square() and x.q.is_square():
+        return flint.fmpq(x.p.isqrt(), x.q.isqrt())
+    return flint.arb(x).sqrt()
+
+
+def _chosen(a: Any, b: Any, sign: int) -> Any:
+    """(a + b + sign |a − b|)/2, and exactly one of the two where it is certain which."""
+    difference = a - b
+    constant = difference[0] if isinstance(difference, flint.arb_series) else difference
+    if sign * constant >= 0:
+        return a
+    if sign * constant <= 0:
+        return b
+    if isinstance(difference, flint.arb):
+        return as_ball(a).max(as_ball(b)) if sign > 0 else as_ball(a).min(as_ball(b))
+    return (a + b + sign * magnitude(difference)) / 2

@@ -101,6 +101,15 @@ def pattern_distance(pattern: Pattern, coefficients: ArrayLike) -> float:
     return min((fit.distance for fit in _fits(pattern, c, numeric_roots(c), np.inf)), default=float("inf"))
 
 
+def nearest_unknowns(pattern: Pattern, coefficients: ArrayLike) -> list[tuple[float, ...]]:
+    """Unknowns of the polynomials of a pattern nearest to a quartic, one for each of its guesses, the nearest first."""
+    c = _quartic(coefficients)
+    found = numeric_roots(c)
+    fits = [_gauss_newton(pattern, np.array(guess), c / c[0], _size(found)) for guess in pattern.guesses(found)]
+    fits.sort(key=lambda u: _distance(pattern, u, c, found))
+    return [tuple(float(x) for x in u) for u in fits]
+
+
 def guess_distance(pattern: Pattern, coefficients: Array, found: Roots) -> float:
     """Relative distance of a quartic with known roots from its best guess of a pattern, cheaply; inf without one."""
     guesses = pattern.guesses(found)

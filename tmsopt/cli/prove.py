@@ -1,0 +1,83 @@
+"""The command that proves that a design exists."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from tmsopt.cli.common import DONE, INFEASIBLE, NOT_CONVERGED, bad_input, progress, write_json
+
+if TYPE_CHECKING:
+    from tmsopt.design.problem import Problem
+    from tmsopt.design.solution import Solution
+
+_EXAMPLES = """
+\b
+Examples:
+  tmsopt prove problems/ep4.toml
+  tmsopt prove problems/optimised_benchmark.toml --digits 60
+  tmsopt prove problems/ep_set.toml --json
+  tmsopt prove problems/heavily_damped.toml --exact "lambda_s=10 deg"
+
+The problem is solved first. An interval Newton test (Krawczyk) then proves that exactly one design with the root
+pattern that is located, or that the roots show, lies within the stated radius of the numbers given, and that the
+stored design is this one up to rounding; stability and heavy damping follow by signs of balls. Where the test fails,
+nothing is claimed, and the reason is given.
+
+A number of FILE stands for the decimal it is written as, an angle for the decimal of its radians. --exact gives
+another: a fraction, an angle in degrees, or tan(lambda_s).
+
+Exit status: 0 proved, 2 bad input, 3 no design found, 4 not proved.
+"""
+
+
+@click.command(epilog=_EXAMPLES)
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of text.")
+@click.option(
+    "--digits", type=click.IntRange(min=1, max=1000), default=30, show_default=True, help="Of every number."
+)  # fmt: skip
+@click.option("--exact", multiple=True, metavar="NAME=VALUE", help="What a parameter is exactly, e.g. zeta_B=-1/3.")
+@click.option("--starts", type=click.IntRange(min=1), default=None, help="Starts tried at most. [default: 64]")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts.")
+def prove(file: Path, as_json: bool, digits: int, exact: tuple[str, ...], starts: int | None, seed: int) -> None:
+    """Prove that the design which FILE asks for exists, and whether it is stable and heavily damped."""
+    with bad_input():
+        from tmsopt.design.errors import InputError
+        from tmsopt.design.files import load
+        from tmsopt.design.problem import unasked
+
+        given = _named(exact)
+        problem = load(file)
+        if problem.pareto:
+            raise InputError(unasked(problem))
+        solution = _solved(problem, starts, seed)
+        proof = solution.proved(digits, given)
+    if as_json:
+        write_json({"title": problem.title, "status": solution.status, **proof.to_json()})
+    else:
+        from tmsopt.show.proved import proof_text
+
+        click.echo(proof_text(problem, proof))
+    sys.exit(DONE if proof.proved else NOT_CONVERGED if solution.status == "optimal" else INFEASIBLE)
+
+
+def _named(exact: tuple[str, ...]) -> dict[str, str]:
+    """Numbers of the command line by name."""
+    from tmsopt.design.errors import Fault, InputError
+
+    pairs = [text.partition("=") for text in exact]
+    if faults := [
+        Fault(f"found '{n}'; accepted: NAME=VALUE, such as zeta_B=-1/3", ("--exact",)) for n, e, _ in pairs if not e
+    ]:
+        raise InputError(faults)
+    return {name.strip(): value.strip() for name, _, value in pairs}
+
+
+def _solved(problem: "Problem", starts: int | None, seed: int) -> "Solution":
+    from tmsopt.design.search import STARTS
+    from tmsopt.design.solve import solve
+
+    with progress() as update:
+        return solve(problem, starts=starts or STARTS, seed=seed, throw=False, progress=update)

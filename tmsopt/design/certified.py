@@ -1,0 +1,240 @@
+"""The numbers of a design, each the double nearest to its true value: ball arithmetic on the parameters as stored.
+
+The parameters are doubles, so exact binary numbers, and a case adds its offset to them exactly. Every quantity is then
+a definite real number, enclosed in a ball that is narrowed until only one double is nearest to it.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any
+
+import flint
+
+from tmsopt.design.cases import Case
+from tmsopt.design.frozen import Table
+from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import RADIUS
+from tmsopt.design.readings import Reading, readings
+from tmsopt.design.recheck import Checked
+from tmsopt.design.variation import varies
+from tmsopt.models import Values
+from tmsopt.roots import Root, Structure
+from tmsopt.roots.elementary import exact, greater, lesser
+from tmsopt.roots.enclosed import Enclosed, enclosed_roots, nearest, nearest_decimal, nearest_double
+
+_PRECISIONS = (212, 424, 848, 1696)
+"""Bits carried, one after the other until they suffice; the first are 60 digits, half of which a fit may lose."""
+
+_SIMPLE = ("real", "pair", "undecided")
+
+_Key = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Certified:
+    """The numbers of a design that follow from its parameters alone; see `Solution` for each."""
+
+    value: float
+    abscissa: float
+    realised: float
+    roots: tuple[Root, ...]
+    quantities: Table[float]
+    dimensionless: Table[float]
+    si: Table[Reading]
+
+
+def certified(
+    problem: Problem, parameters: Mapping[str, float], checked: Checked, cases: Sequence[Case] = ()
+) -> Certified:
+    """The numbers of a design, correctly rounded.
+
+    Which cases are the worst and which structure the roots have is taken from the recheck. A number that the balls
+    cannot settle, such as one that only happens to be 0, stays what the recheck found.
+
+    Args:
+        cases: those that the design was checked in; an objective that differs between them is the worst of all.
+    """
+    listed = [case for case in cases if not case.direction]
+    design = _Design(problem, parameters, checked, listed, _least(problem, parameters, checked))
+    known = _known(checked)
+    numbers: dict[_Key, float] = {}
+    for precision in _PRECISIONS:
+        last = precision == _PRECISIONS[-1]
+        with flint.ctx.workprec(precision):
+            roots = design.roots(last)
+            balls = {} if roots is None else {k: b for k, *b in design.balls(roots) if k not in numbers}
+            for key, (ball, digits) in balls.items():
+                number = nearest_decimal(ball, digits) if digits else nearest_double(ball)
+                expected = last or math.isnan(known.get(key, math.nan))
+                if number is not None and (expected or not math.isnan(number)):
+                    numbers[key] = number
+        if roots is not None and all(key in numbers for key in balls):
+            break
+    return _assembled(checked, {**known, **numbers})
+
+
+def _known(checked: Checked) -> dict[_Key, float]:
+    """What the recheck found in double precision."""
+    found: dict[_Key, float] = {("value",): checked.objective, ("realised",): checked.realised}
+    found["abscissa",] = checked.structure.abscissa
+    found |= {("quantities", n): v for n, v in checked.quantities.items()}
+    return found | {("dimensionless", n): v for n, v in checked.dimensionless.items()}
+
+
+def _least(problem: Problem, parameters: Mapping[str, float], checked: Checked) -> Structure:
+    """Structure of the roots in the case with the least damping ratio."""
+    if checked.least_damped == checked.worst:
+        return checked.structure
+    found = problem.values(checked.least_damped.applied(parameters))["structure"]
+    assert isinstance(found, Structure)
+    return found
+
+
+_Several = tuple[Enclosed, ...]
+
+
+@dataclass(frozen=True)
+class _Roots:
+    """Roots of a design.
+
+    Attributes:
+        stored: of the parameters as stored, in the case with the largest abscissa.
+        ideal: there, of the nearest polynomial that has the structure.
+        damped: likewise in the case with the least damping ratio.
+    """
+
+    stored: _Several
+    ideal: _Several
+    damped: _Several
+
+
+@dataclass(frozen=True)
+class _Design:
+    """A design with all that its numbers depend on."""
+
+    problem: Problem
+    parameters: Mapping[str, float]
+    checked: Checked
+    cases: Sequence[Case]
+    least: Structure
+
+    def balls(self, roots: "_Roots") -> Iterator[tuple[_Key, Any, int]]:
+        """Every number as a ball at the working precision, with the decimal digits to round it to, 0 for a double."""
+        checked = self.checked
+        nominal = self.values(Case())
+        known = {}
+        if checked.around and math.isfinite(checked.around.radius):
+            known[RADIUS] = exact(checked.around.radius)
+        if roots.stored:
+            yield ("realised",), _rightmost(roots.stored), 0
+        if roots.ideal:
+            known["abscissa"] = _rightmost(roots.ideal)
+            yield ("abscissa",), known["abscissa"], 0
+            for k, root in enumerate(roots.ideal):
+                for part, ball in (("re", root.re), ("im", root.im), ("multiplicity", exact(root.multiplicity))):
+                    yield ("roots", str(k), part), ball, 0
+        if roots.damped:
+            known["damping_ratio"] = reduce(lesser, (_ratio(r) for r in roots.damped))
+            yield ("quantities", "damping_ratio"), known["damping_ratio"], 0
+        for name in checked.quantities:
+            if name not in ("damping_ratio", RADIUS):
+                yield ("quantities", name), nominal[name], 0
+        native = self.problem.parameter_set.native(_exact(self.parameters))
+        for name in checked.dimensionless:
+            yield ("dimensionless", name), native[name], 0
+        yield from self.si(nominal, known.get("abscissa", math.nan), roots.ideal)
+        objective = self.objective(known)
+        if objective is not None:
+            yield ("value",), objective, 0
+
+    def si(self, nominal: Values, abscissa: Any, roots: _Several) -> Iterator[tuple[_Key, Any, int]]:
+        """The readings; of several frequencies also how many there are."""
+        of = self.problem.parameter_set
+        for name, values, digits in readings(of, _exact(self.parameters), nominal, abscissa, roots, flint.arb.pi()):
+            for k, ball in enumerate(values if isinstance(values, tuple) else [values]):
+                yield ("si", name, str(k)), ball, digits
+            if isinstance(values, tuple):
+                yield ("si", name, "count"), exact(len(values)), 0
+
+    def roots(self, last: bool) -> "_Roots | None":
+        """The roots that the numbers rest on; None where they are not decided, the `last` time what was found."""
+        checked = self.checked
+        stored = enclosed_roots(self.values(checked.worst).coefficients)
+        ideal = self.ideal(checked.worst, checked.structure, stored)
+        damped = ideal if checked.least_damped == checked.worst else self.ideal(checked.least_damped, self.least, None)
+        if None not in (stored, ideal, damped) or last:
+            found = [_as_found(s) if r is None else r for r, s in ((ideal, checked.structure), (damped, self.least))]
+            return _Roots(stored or (), *found)
+        return None
+
+    def ideal(self, case: Case, found: Structure, stored: _Several | None) -> _Several | None:
+        """Roots in a case of the nearest polynomial that has the structure; none for a root at infinity."""
+        if not found.roots:
+            return ()
+        coefficients = self.values(case).coefficients
+        if found.name in _SIMPLE:
+            return stored or enclosed_roots(coefficients)
+        return nearest(found.name, coefficients, found.roots)
+
+    def values(self, case: Case) -> Values:
+        """Everything derived from the exact parameters in a case, root quantities excluded."""
+        varied = Case(Table(_exact(case.at)), Table(_exact(case.offset))).applied(_exact(self.parameters))
+        return Values(self.problem.model, self.problem.parameter_set, varied)
+
+    def objective(self, known: Mapping[str, Any]) -> Any:
+        """Ball of the objective, the worst over the cases where it differs between them; None without one."""
+        objective = self.problem.objective
+        if objective is None or not set(objective.names) & {*_ROOTS} <= set(known):
+            return None
+        each = self.cases if varies(self.problem, objective, self.cases) else [Case()]
+        found = []
+        for case in each:
+            values = self.values(case)
+            for name, ball in known.items():
+                values.define(name, ball)
+            found.append(objective.enclosure(values))
+        return reduce(lesser if self.problem.sense == "maximize" else greater, found)
+
+
+_ROOTS = ("abscissa", "damping_ratio", RADIUS)
+
+
+def _exact(table: Mapping[str, float]) -> dict[str, Any]:
+    return {name: exact(value) for name, value in table.items()}
+
+
+def _as_found(found: Structure) -> _Several:
+    return tuple(Enclosed(flint.arb(r.re), flint.arb(r.im), r.multiplicity) for r in found.roots)
+
+
+def _rightmost(roots: _Several) -> Any:
+    return reduce(greater, (root.re for root in roots))
+
+
+def _ratio(root: Enclosed) -> Any:
+    """−Re s/|s|; 0 for a root at 0."""
+    return flint.arb(0) if root.re == 0 and root.im == 0 else -root.re / root.modulus
+
+
+def _assembled(checked: Checked, numbers: Mapping[_Key, float]) -> Certified:
+    count = sum(key[0] == "roots" and key[2] == "multiplicity" for key in numbers)
+    parts = [[numbers.get(("roots", str(k), part)) for part in ("re", "im", "multiplicity")] for k in range(count)]
+    roots = tuple(Root(re, im, int(m)) for re, im, m in parts if re is not None and im is not None and m is not None)
+    si: dict[str, Reading] = {}
+    for key in numbers:
+        if key[0] == "si":
+            name = key[1]
+            length = numbers.get(("si", name, "count"))
+            each = [numbers.get(("si", name, str(k)), math.nan) for k in range(1 if length is None else int(length))]
+            si[name] = each[0] if length is None else tuple(each)
+    return Certified(
+        value=numbers["value",],
+        abscissa=numbers["abscissa",],
+        realised=numbers["realised",],
+        roots=roots if roots and len(roots) == count else checked.structure.roots,
+        quantities=Table({n: numbers["quantities", n] for n in checked.quantities}),
+        dimensionless=Table({n: numbers["dimensionless", n] for n in checked.dimensionless}),
+        si=Table(si),
+    )

@@ -1,0 +1,234 @@
+"""That a design with a root pattern exists beside a stored one, and that it is what the stored one stands for."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import flint
+
+from tmsopt.design.problem import Problem
+from tmsopt.design.proof import rational
+from tmsopt.design.proof.balls import GUARD, largest_radius, upper
+from tmsopt.design.proof.exact import Written
+from tmsopt.design.proof.factors import Factored, of_pattern
+from tmsopt.design.proof.krawczyk import Enclosure, Refused, enclosed, refined
+from tmsopt.design.proof.system import ROUNDINGS, Equations, choose, equations
+from tmsopt.roots import Pattern
+from tmsopt.roots.structure import nearest_unknowns
+
+_EXTRA = 25  # decimal digits carried beyond those asked for
+_TIMES = 3  # times that the digits carried are doubled
+_INSIDE = 1e-9  # of the width of its range: nearer to an end a parameter is taken to be there
+
+
+@dataclass(frozen=True)
+class Existing:
+    """A design with a pattern, proved.
+
+    Attributes:
+        parameters: every parameter as a ball, angles in radians.
+        tangents: of the angles.
+        unknowns: those of the pattern, and quantities with an equation of their own.
+        uniqueness: no other solution is this near, in every number moved and unknown; inf where nothing is moved.
+        radius: largest of those of the balls.
+        distance, explained: of the parameter that the stored design is off most, and how far rounding explains.
+    """
+
+    method: str
+    coefficients: Sequence[Any]
+    parameters: Mapping[str, Any]
+    tangents: Mapping[str, Any]
+    unknowns: Mapping[str, Any]
+    factored: Factored
+    moved: tuple[str, ...] = ()
+    uniqueness: float = float("inf")
+    radius: float = 0.0
+    distance: float = 0.0
+    explained: float = 0.0
+
+
+def exactly(problem: Problem, pattern: Pattern, design: Written) -> Existing | None:
+    """The design itself, if its numbers are fractions and have the pattern exactly."""
+    a = exact_coefficients(problem, design)
+    if a is None or len(a) != 5 or not rational.has(pattern.name, a):
+        return None
+    equalities = [c for c in problem.conditions.values() if c.comparison == "=="]
+    if equalities:
+        return None
+    balls = design.balls()
+    tangents = {n: balls[n].tan() for n in balls if problem.parameter_set[n].tangent}
+    tangents |= {n: e.ball() for n, e in design.tangents.items()}
+    return Existing("exact factorisation", a, balls, tangents, {}, rational.factored(a))
+
+
+def exact_coefficients(problem: Problem, design: Written) -> list[Any] | None:
+    """Coefficients as fractions, where the numbers of the design make them so."""
+    of = problem.parameter_set
+    numbers = design.fractions(of)
+    if numbers is None:
+        return None
+    a = problem.model.coefficients(numbers, of)
+    return a if all(isinstance(c, flint.fmpq) for c in a) else None
+
+
+def beside(problem: Problem, pattern: Pattern, design: Written, stored: Mapping[str, float], digits: int) -> Existing:
+    """The design with a pattern that a stored one stands for, by Krawczyk's test.
+
+    Raises:
+        Refused: with the reason in words.
+    """
+    carried = digits + _EXTRA
+    for _ in range(_TIMES):
+        with flint.ctx.workdps(carried):
+            found = _beside(problem, pattern, design, stored, carried - _EXTRA // 2)
+            small = flint.arb(10) ** -(digits + GUARD)
+            balls = [*found.parameters.values(), *found.unknowns.values()]
+            if all(b.rad() <= small * (1 + abs(b)) for b in balls):
+                return found
+        carried *= 2
+    raise Refused(f"the balls do not shrink to {digits} digits; ask for fewer")
+
+
+def _beside(problem: Problem, pattern: Pattern, design: Written, stored: Mapping[str, float], digits: int) -> Existing:
+    system = equations(problem, pattern, stored)
+    held = _numbers(problem, design)
+    free = [n for n in problem.free if n not in {_name(s) for s in design.stated}]
+    reasons: list[str] = []
+    for among in _choices(problem, stored, free, system.conditions):
+        for unknowns in _starts(system, held, problem):
+            start = {**held, **unknowns}
+            try:
+                return _proved(system, start, among, digits)
+            except Refused as refusal:
+                reasons.append(str(refusal))
+    raise Refused(reasons[0] if reasons else f"no {pattern.name} is anywhere near the design")
+
+
+def _choices(
+    problem: Problem, stored: Mapping[str, float], free: list[str], count: int
+) -> Iterator[list[str]]:  # fmt: skip
+    """Free parameters to move: first only those inside their ranges, so that the proved design stays in the box."""
+    ends = {n: problem.free[n] for n in free}
+    inner = [n for n, (lo, hi) in ends.items() if min(stored[n] - lo, hi - stored[n]) > _INSIDE * (hi - lo)]
+    if len(inner) >= count:
+        yield inner
+    if inner != free or len(inner) < count:
+        yield free
+
+
+def _starts(system: Equations, held: Mapping[str, Any], problem: Problem) -> Iterator[dict[str, Any]]:
+    """Unknowns to start from: those of the nearest polynomials of the pattern, and the quantities' own values."""
+    of = problem.parameter_set
+    own = {n: float(held[n].atan()) if of[n].tangent else float(held[n]) for n in of.names}
+    values = problem.values(own)
+    lifted = {q.name: flint.arb(float(values[q.name])) for q in system.lifted}
+    coefficients = [float(c) for c in problem.model.coefficients(own, of)]
+    try:
+        fits = nearest_unknowns(system.pattern, coefficients)
+    except ValueError:
+        raise Refused("a0 is 0, or a coefficient does not exist: a root is at infinity") from None
+    for fit in fits[:2]:
+        yield lifted | {n: flint.arb(x) for n, x in zip(system.pattern.unknowns, fit, strict=True)}
+
+
+def _proved(system: Equations, start: Mapping[str, Any], among: list[str], digits: int) -> Existing:
+    problem, pattern = system.problem, system.pattern
+    of = problem.parameter_set
+    chosen = choose(system, start, among)
+    names = [*chosen.moved, *system.unknowns]
+    middle = refined(system, start, names, digits)
+    enclosure = enclosed(system, middle, names, digits)
+    at = {**middle, **enclosure.balls}
+    distance, explained = _distance(chosen.explained, start, enclosure)
+    tangents = {n: at[n] for n in of.names if of[n].tangent}
+    parameters = {n: at[n].atan() if n in tangents else at[n] for n in of.names}
+    coefficients = problem.model.coefficients(parameters, of)
+    unknowns = [at[n] for n in pattern.unknowns]
+    _checked(system, coefficients, at)
+    return Existing(
+        "Krawczyk",
+        coefficients,
+        parameters,
+        tangents,
+        {n: at[n] for n in system.unknowns},
+        of_pattern(pattern, unknowns),
+        chosen.moved,
+        enclosure.uniqueness,
+        largest_radius([at[n] for n in names]),
+        distance,
+        explained,
+    )
+
+
+def _distance(explained: Mapping[str, float], start: Mapping[str, Any], enclosure: Enclosure) -> tuple[float, float]:
+    """The moved parameter that the stored design is off most, against what rounding explains.
+
+    Raises:
+        Refused: if it is off by more, or if rounding takes it out of the box in which the solution is unique.
+    """
+    off = {n: upper(abs(enclosure.balls[n] - start[n])) for n in explained}
+    loose = max(explained, key=lambda n: explained[n], default=None)
+    if loose and not explained[loose] < enclosure.uniqueness:
+        raise Refused(
+            f"nearly singular: rounding alone moves {loose} by {explained[loose]:.2g}, and the solution is the only "
+            f"one within {enclosure.uniqueness:.2g} only; hold another parameter, or give exact numbers"
+        )
+    worst = max(explained, key=lambda n: off[n] / explained[n], default=None)
+    if worst is None:
+        return 0.0, 0.0
+    if off[worst] > explained[worst]:
+        raise Refused(
+            f"not the design's: the nearest one is {off[worst]:.2g} from the stored {worst}, of which rounding of the "
+            f"stored numbers explains {explained[worst]:.2g} ({ROUNDINGS} roundings of each); solve again, or give all "
+            "digits"
+        )
+    return off[worst], explained[worst]
+
+
+def _checked(system: Equations, coefficients: Sequence[Any], at: Mapping[str, Any]) -> None:
+    """What the equations alone do not say.
+
+    Raises:
+        Refused: for a0 = 0, a quantity of the wrong sign, or another kind of pattern.
+    """
+    if coefficients[0].contains(0):
+        raise Refused("a0 cannot be told from 0: a root may be at infinity, and all equations hold where all a are 0")
+    for quantity in system.lifted:
+        r, x = quantity.range, at[quantity.name]
+        if not (x >= r.lower and x <= r.upper):
+            raise Refused(f"the solution found has {quantity.name} = {float(x):.6g}, out of its range {r}")
+    pattern = system.pattern
+    for value in pattern.nonnegative([at[n] for n in pattern.unknowns]):
+        if value < 0:
+            raise Refused(_other_kind(pattern))
+        if not value > 0:
+            raise Refused(_undecided_kind(pattern))
+
+
+def _other_kind(pattern: Pattern) -> str:
+    kinds = {
+        "2EP2": "the double pair is complex: a CEP2, not a 2EP2",
+        "CEP2": "two real double roots: a 2EP2, not a CEP2",
+    }
+    return kinds.get(pattern.name, f"the factors have no imaginary roots: no {pattern.name}")
+
+
+def _undecided_kind(pattern: Pattern) -> str:
+    if pattern.name in ("2EP2", "CEP2"):
+        return "b² − 4c cannot be told from 0, so not 2EP2 from CEP2 and EP4; locate EP4, with a parameter more free"
+    return "the imaginary part cannot be told from 0"
+
+
+def _numbers(problem: Problem, design: Written) -> dict[str, Any]:
+    """Every parameter as it is taken exactly: a ball, of an angle that of its tangent."""
+    of = problem.parameter_set
+    numbers = {n: e.ball() for n, e in design.values.items()}
+    return {
+        n: design.tangents[n].ball() if n in design.tangents else numbers[n].tan() if of[n].tangent else numbers[n]
+        for n in of.names
+    }
+
+
+def _name(stated: str) -> str:
+    """The parameter of ``tan(parameter)``."""
+    return stated.removeprefix("tan(").removesuffix(")")

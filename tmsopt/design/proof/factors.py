@@ -1,0 +1,191 @@
+"""A polynomial as a product of factors in balls: its roots, and whether it is stable and heavily damped."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import flint
+
+from tmsopt.roots import Pattern, lienard_chipart
+
+_LIKE = (0.7390851, 1.3247179, 2.6854520)  # unknowns with no relation, to see which factors are the same
+
+Factor = Sequence[Any]
+"""Monic coefficients, descending."""
+
+
+@dataclass(frozen=True)
+class BallRoot:
+    """A root as balls; a real one has the imaginary part 0 exactly."""
+
+    re: Any
+    im: Any
+    multiplicity: int = 1
+
+    @property
+    def real(self) -> bool:
+        """Whether it is certainly real."""
+        return bool(self.im == 0)
+
+
+@dataclass(frozen=True)
+class Factored:
+    """Different factors, each with how often it occurs."""
+
+    factors: tuple[tuple[Factor, int], ...]
+
+    @cached_property
+    def roots(self) -> tuple[BallRoot, ...] | None:
+        """All roots, rightmost first, with exact multiplicities; None where the balls cannot tell two apart."""
+        found: list[BallRoot] = []
+        for factor, multiplicity in self.factors:
+            own = roots_of(factor)
+            if own is None:
+                return None
+            found += [BallRoot(z.re, z.im, multiplicity) for z in own]
+        if any(a.re.overlaps(b.re) and a.im.overlaps(b.im) for k, a in enumerate(found) for b in found[k + 1 :]):
+            return None
+        return tuple(sorted(found, key=lambda z: (-float(z.re), -float(z.im))))
+
+    @cached_property
+    def abscissa(self) -> Any:
+        """The largest real part; None where no factor tells."""
+        tops = [_rightmost(factor) for factor, _ in self.factors]
+        top = tops[0]
+        for other in tops[1:]:
+            top = None if top is None or other is None else top.max(other)
+        return top
+
+    @cached_property
+    def damping_ratio(self) -> Any:
+        """The least −Re s/|s|; None where the balls cannot tell."""
+        ratios = [_ratio(z) for z in self.roots or ()]
+        least = ratios[0] if ratios else None
+        for other in ratios[1:]:
+            least = None if least is None or other is None else least.min(other)
+        return least
+
+    @cached_property
+    def stable(self) -> bool | None:
+        """Whether all roots are left of the imaginary axis: Liénard–Chipart signs of each factor."""
+        signs = [_all_positive(lienard_chipart([flint.arb(c) for c in factor])) for factor, _ in self.factors]
+        return _every(signs)
+
+    @cached_property
+    def heavily_damped(self) -> bool | None:
+        """Whether all roots are real and negative, multiple ones included."""
+        if self.stable is False:
+            return False
+        signs: list[bool | None] = []
+        for factor, _ in self.factors:
+            own = roots_of(factor)
+            signs.append(None if own is None else all(z.real for z in own))
+        return _every([self.stable, *signs])
+
+
+def of_pattern(pattern: Pattern, unknowns: Sequence[Any]) -> Factored:
+    """The factors of a pattern, equal ones counted."""
+    signs = [tuple(f) for f in pattern.factors(_LIKE)]
+    factors = pattern.factors(unknowns)
+    return Factored(tuple((factors[signs.index(s)], signs.count(s)) for s in dict.fromkeys(signs)))
+
+
+def abscissa_formula(pattern: Pattern, unknowns: Sequence[Any]) -> Any:
+    """Largest real part as a formula of one factor, the one whose root is rightmost in the middles; nan for none."""
+    formulas: list[Any] = []
+    for factor, _ in of_pattern(pattern, unknowns).factors:
+        if len(factor) == 2:
+            formulas.append(-factor[1])
+        elif len(factor) == 3:
+            _, b, c = factor
+            discriminant = b * b - 4 * c
+            formulas.append((discriminant.sqrt() - b) / 2 if _constant(discriminant) > 0 else -b / 2 + 0 * c)
+        else:
+            return flint.arb("nan")
+    return max(formulas, key=lambda f: float(_constant(f)))
+
+
+def roots_of(factor: Factor) -> list[BallRoot] | None:
+    """Roots of a factor that are certainly simple; None where the balls cannot tell."""
+    nothing = flint.arb(0)
+    match [flint.arb(c) for c in factor]:
+        case [_, c]:
+            return [BallRoot(-c, nothing)]
+        case [_, b, c]:
+            discriminant = b * b - 4 * c
+            if discriminant > 0:
+                width = discriminant.sqrt()
+                far = (-b - width) / 2 if b > 0 else (width - b) / 2
+                return [BallRoot(far, nothing), BallRoot(-b - far if far.contains(0) else c / far, nothing)]
+            if discriminant < 0:
+                height = (-discriminant).sqrt() / 2
+                return [BallRoot(-b / 2, height), BallRoot(-b / 2, -height)]
+            return None
+        case balls:
+            return _isolated(balls)
+
+
+def _isolated(coefficients: Sequence[Any]) -> list[BallRoot] | None:
+    """Simple roots of a polynomial of any degree, isolated; None where that fails.
+
+    A ball that touches the real axis holds a real root if its mirror image meets no other ball: the conjugate of
+    its root is then in it too, and it holds one root only.
+    """
+    polynomial: Any = flint.acb_poly([flint.acb(c) for c in reversed(coefficients)])
+    balls = _balls(polynomial, flint.arb(10) ** (-3 * flint.ctx.dps // 4)) or _balls(polynomial, None)
+    if balls is None:
+        return None
+    found = []
+    for k, z in enumerate(balls):
+        if not z.imag.contains(0):
+            found.append(BallRoot(z.real, z.imag))
+        elif any(z.conjugate().overlaps(w) for j, w in enumerate(balls) if j != k):
+            return None
+        else:
+            found.append(BallRoot(z.real, flint.arb(0)))
+    return found if len(found) == len(coefficients) - 1 else None
+
+
+def _balls(polynomial: Any, tolerance: Any) -> list[Any] | None:
+    try:
+        found: list[Any] = polynomial.roots(tolerance)
+    except (ValueError, ZeroDivisionError):
+        return None
+    return found
+
+
+def _rightmost(factor: Factor) -> Any:
+    """Largest real part of the roots of a factor; of a quadratic one whatever the sign of its discriminant."""
+    if len(factor) == 3:
+        b, c = flint.arb(factor[1]), flint.arb(factor[2])
+        discriminant = b * b - 4 * c
+        if not (discriminant > 0 or discriminant < 0):
+            return (discriminant.nonnegative_part().sqrt() - b) / 2
+    own = roots_of(factor)
+    if own is None:
+        return None
+    top = own[0].re
+    for z in own[1:]:
+        top = top.max(z.re)
+    return top
+
+
+def _ratio(root: BallRoot) -> Any:
+    if root.real:
+        return flint.arb(1) if root.re < 0 else flint.arb(-1) if root.re > 0 else None
+    return -root.re / (root.re * root.re + root.im * root.im).sqrt()
+
+
+def _all_positive(quantities: Iterable[Any]) -> bool | None:
+    return _every([True if q > 0 else False if q <= 0 else None for q in quantities])
+
+
+def _every(signs: Sequence[bool | None]) -> bool | None:
+    if any(sign is False for sign in signs):
+        return False
+    return None if any(sign is None for sign in signs) else True
+
+
+def _constant(value: Any) -> Any:
+    return value[0] if isinstance(value, flint.arb_series) else flint.arb(value)

@@ -1,0 +1,111 @@
+"""What follows for a design whose roots are known in balls: stability, heavy damping, its place in the problem."""
+
+from typing import Any
+
+import flint
+
+from tmsopt.design.problem import Problem
+from tmsopt.design.proof.balls import largest_radius
+from tmsopt.design.proof.exact import Written, decimal, decimal_fraction
+from tmsopt.design.proof.existence import Existing, exact_coefficients
+from tmsopt.design.proof.factors import Factored
+from tmsopt.design.proof.rational import factored
+from tmsopt.design.proof.verdict import Verdict
+from tmsopt.design.quantities import RADIUS
+from tmsopt.models import Values
+from tmsopt.roots.exact import rational
+
+BINDS = 1e-9
+"""Room between the sides of an inequality up to which it binds: what a solver leaves."""
+
+
+def as_stored(problem: Problem, design: Written) -> Existing | None:
+    """The design as its numbers are, whatever its roots; None where a0 cannot be told from 0."""
+    balls = design.balls()
+    of = problem.parameter_set
+    tangents = {n: b.tan() for n, b in balls.items() if of[n].tangent}
+    exact = exact_coefficients(problem, design)
+    a = problem.model.coefficients(balls, of) if exact is None else exact
+    if exact is not None and a[0] != 0:
+        return Existing("exact factorisation", a, balls, tangents, {}, factored(a))
+    if a[0] == 0 or flint.arb(a[0]).contains(0) or not all(flint.arb(c).is_finite() for c in a):
+        return None
+    whole = Factored((([c / a[0] for c in a], 1),))
+    return Existing("isolated roots", a, balls, tangents, {}, whole, radius=largest_radius(list(balls.values())))
+
+
+def stability(factored: Factored) -> Verdict:
+    """Whether all roots are left of the imaginary axis, by the signs of Liénard and Chipart in balls."""
+    if factored.stable:
+        return Verdict(True, "all roots are left of the imaginary axis (Routh–Hurwitz signs in balls)")
+    if factored.stable is None:
+        return Verdict(None, "a Routh–Hurwitz sign cannot be told from 0; ask for more digits")
+    axis = [z for z in factored.roots or () if z.re == 0]
+    right = [z for z in factored.roots or () if z.re > 0]
+    left = [z for z in factored.roots or () if z.re < 0]
+    if axis and not right:
+        at = "a root is 0" if all(z.real for z in axis) else "a pair is imaginary"
+        rest = ", the others left of the axis: on the boundary of stability" if len(axis) + len(left) > 3 else ""
+        return Verdict(False, at + rest)
+    return Verdict(
+        False, "a root is right of the imaginary axis" if right else "a root is not left of the imaginary axis"
+    )
+
+
+def heavy_damping(factored: Factored) -> Verdict:
+    """Whether all roots are real and negative, and whether strictly."""
+    if factored.heavily_damped is None:
+        return Verdict(None, "real and complex roots cannot be told apart; ask for more digits")
+    if not factored.heavily_damped:
+        return Verdict(False, "a root is complex" if factored.stable else "a root is not negative")
+    if any(multiplicity > 1 for _, multiplicity in factored.factors) or factored.roots is None:
+        return Verdict(True, "all roots are real and negative, some of them equal: on the edge of heavy damping")
+    return Verdict(True, "all roots are real, negative and different: strictly inside heavy damping")
+
+
+def inside(problem: Problem, design: Written, found: Existing) -> Verdict:
+    """Whether every free parameter is certainly within its limits."""
+    if not problem.free:
+        return Verdict(True, "nothing is free")
+    undecided = []
+    for name, (least, greatest) in problem.free.items():
+        value: Any = flint.arb(found.parameters[name])
+        if name not in found.moved and name not in design.tangents and not design.values[name].degrees:
+            value = rational(design.values[name].value)
+        if {name, f"tan({name})"} & set(design.stated) and float(value) in (least, greatest):
+            continue  # the exact form of a limit
+        lo, hi = rational(decimal(least)), rational(decimal(greatest))
+        if value < lo or value > hi:
+            return Verdict(False, f"{name} is outside its limits")
+        if not (value >= lo and value <= hi):
+            undecided.append(name)
+    if undecided:
+        return Verdict(None, f"{', '.join(undecided)} cannot be told from a limit")
+    return Verdict(True, "every free parameter is within its limits")
+
+
+def limits(problem: Problem, found: Existing) -> dict[str, str]:
+    """Each inequality at the nominal design; none where it must hold in several cases."""
+    if problem.variations or problem.tolerances:
+        return {}
+    values = Values(problem.model, problem.parameter_set, found.parameters)
+    nothing = flint.arb("nan")
+    for name, value in (
+        ("abscissa", found.factored.abscissa),
+        ("damping_ratio", found.factored.damping_ratio),
+        (RADIUS, None),
+    ):
+        values.define(name, nothing if value is None else value)
+    verdicts = {}
+    for name, condition in problem.conditions.items():
+        if condition.comparison == "==":
+            continue
+        difference = flint.arb(condition.enclosure(values, decimal_fraction))
+        verdicts[name] = _met(difference if condition.comparison == ">=" else -difference)
+    return verdicts
+
+
+def _met(room: Any) -> str:
+    if abs(room) <= BINDS:
+        return "binds"
+    return "met" if room > 0 else "violated" if room < 0 else "cannot be told"

@@ -1,0 +1,255 @@
+"""What is proved about one design, as data."""
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import flint
+
+from tmsopt.design.cases import Case
+from tmsopt.design.errors import Fault, InputError
+from tmsopt.design.frozen import Table
+from tmsopt.design.problem import Problem
+from tmsopt.design.proof.balls import Number, ProvedRoot, fraction, number
+from tmsopt.design.proof.exact import Written, written
+from tmsopt.design.proof.existence import Existing, beside, exactly
+from tmsopt.design.proof.facts import as_stored, heavy_damping, inside, limits, stability
+from tmsopt.design.proof.krawczyk import Refused
+from tmsopt.design.proof.verdict import NOTHING, Verdict
+from tmsopt.roots import PATTERNS, Pattern
+from tmsopt.roots.patterns import LINES
+
+DIGITS = 30
+"""Digits by default."""
+
+MOST = 1000
+"""Digits at most."""
+
+_EXTRA = 50  # decimal digits carried beyond twice those asked for, where a design is taken as it is
+
+_IMPLIES = {"EP4": ("EP3", "2EP2", "CEP2", "EP2"), "EP3": ("EP2",), "2EP2": ("EP2",)}
+_DECIDED = tuple(PATTERNS[n] for n in ("EP4", "2EP2", "CEP2", "EP3", "EP2"))  # most degenerate first
+_SIMPLE = {"pair": "the rightmost roots are a simple complex pair", "real": "the rightmost root is real and simple"}
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What is proved about a design in ball arithmetic; plain data, decimals as text.
+
+    Attributes:
+        claim: what was to be proved.
+        proved: whether it is.
+        reason: if not, what failed and what to do.
+        pattern: the root pattern, ``pair`` or ``real``.
+        method: ``Krawczyk``, ``exact factorisation``, ``isolated roots`` or ``none``.
+        digits: asked for.
+        stored: whether all numbers below are of the design as stored, since nothing else is proved.
+        parameters: every parameter of the proved design (rad, SI units).
+        tangents: of its angles, in which the equations are solved.
+        unknowns: factor coefficients of the pattern, and quantities with an equation of their own.
+        moved: parameters that were solved for; the others are held.
+        held: parameter, or ``tan(parameter)`` → the fraction that it is taken for, exactly.
+        stated: of these, those given exactly by the user.
+        radius: of the largest ball among the numbers solved for.
+        uniqueness: no other solution is this near, in each of these numbers; inf where none is solved for.
+        distance: from the proved to the stored design, in the parameter for which it is largest against `explained`.
+        explained: how far rounding of the stored numbers may move that parameter.
+        roots: with exact multiplicities, rightmost first; none where two cannot be told apart.
+        abscissa: the largest real part.
+        stable: whether all roots are left of the imaginary axis.
+        heavily_damped: whether all roots are real and negative.
+        inside: whether the proved design is in the problem's box.
+        limits: inequality of the problem → ``met``, ``violated``, ``binds`` or ``cannot be told``, at this design.
+        seconds: that the proof took.
+    """
+
+    claim: str
+    proved: bool
+    reason: str = ""
+    pattern: str = ""
+    method: str = "none"
+    digits: int = DIGITS
+    stored: bool = False
+    parameters: Table[Number] = field(default_factory=Table)
+    tangents: Table[Number] = field(default_factory=Table)
+    unknowns: Table[Number] = field(default_factory=Table)
+    moved: tuple[str, ...] = ()
+    held: Table[str] = field(default_factory=Table)
+    stated: tuple[str, ...] = ()
+    radius: float = math.nan
+    uniqueness: float = math.nan
+    distance: float = math.nan
+    explained: float = math.nan
+    roots: tuple[ProvedRoot, ...] = ()
+    abscissa: Number | None = None
+    stable: Verdict = NOTHING
+    heavily_damped: Verdict = NOTHING
+    inside: Verdict = NOTHING
+    limits: Table[str] = field(default_factory=Table)
+    seconds: float = 0.0
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``: decimals as text, summaries as numbers, None for what does not exist."""
+        tables = {
+            n: {k: asdict(v) for k, v in getattr(self, n).items()} for n in ("parameters", "tangents", "unknowns")
+        }
+        summaries = {
+            n: x if math.isfinite(x := getattr(self, n)) else None
+            for n in ("radius", "uniqueness", "distance", "explained")
+        }
+        return {
+            "claim": self.claim,
+            "proved": self.proved,
+            "reason": self.reason,
+            "pattern": self.pattern,
+            "method": self.method,
+            "digits": self.digits,
+            "of": "the design as stored" if self.stored else "the proved design",
+            **tables,
+            "moved": list(self.moved),
+            "held": dict(self.held),
+            "stated": list(self.stated),
+            **summaries,
+            "roots": [asdict(r) for r in self.roots],
+            "abscissa": asdict(self.abscissa) if self.abscissa else None,
+            "stable": asdict(self.stable),
+            "heavily_damped": asdict(self.heavily_damped),
+            "inside": asdict(self.inside),
+            "limits": dict(self.limits),
+            "seconds": round(self.seconds, 4),
+        }
+
+
+def prove_design(
+    problem: Problem,
+    parameters: Mapping[str, float],
+    structure: str,
+    digits: int = DIGITS,
+    exact: Mapping[str, Any] | None = None,
+    case: Case | None = None,
+) -> Proof:
+    """Prove that the pattern which a problem locates, or which a design's roots show, exists; and what follows.
+
+    Args:
+        parameters: the design, near which the pattern is looked for.
+        structure: name of a pattern, ``pair`` or ``real``: the structure of the design's rightmost roots.
+        digits: that every number is given to.
+        exact: parameter, or ``tan(parameter)`` → the exact number that it stands for; such a parameter is held. All
+            other numbers stand for the shortest decimals that print them.
+        case: of scenarios and tolerances, the one to which the structure belongs.
+
+    Raises:
+        InputError: for digits out of range, or exact numbers that are not the design's.
+    """
+    if isinstance(digits, bool) or not isinstance(digits, int) or not 1 <= digits <= MOST:
+        raise InputError([Fault(f"found {digits!r}; accepted: a whole number from 1 to {MOST}", ("digits",))])
+    began = time.perf_counter()
+    varied = case.applied(parameters) if case else dict(parameters)
+    design = written(problem.parameter_set, varied, exact)
+    with flint.ctx.workdps(2 * digits + _EXTRA):
+        return replace(_proved(_asked(problem, case), design, varied, structure, digits), seconds=_since(began))
+
+
+def _since(began: float) -> float:
+    return time.perf_counter() - began
+
+
+def _asked(problem: Problem, case: Case | None) -> Problem:
+    """The problem about one case alone: its constraints are those of the nominal design, or of every case."""
+    return replace(problem.nominal, constraints={}) if case and (case.at or case.offset) else problem
+
+
+def _proved(problem: Problem, design: Written, varied: Mapping[str, float], structure: str, digits: int) -> Proof:
+    """The first proof that succeeds, or why none does with what holds for the design as stored."""
+    reasons: list[str] = []
+    patterns = _patterns(problem, structure)
+    for pattern in patterns or (_DECIDED if structure not in _SIMPLE else ()):
+        if exact := exactly(problem, pattern, design):
+            return _assembled(problem, design, pattern.name, exact, digits)
+    for pattern in patterns:
+        try:
+            found = beside(problem, pattern, design, varied, digits)
+        except Refused as refusal:
+            reasons.append(str(refusal))
+        else:
+            return _assembled(problem, design, pattern.name, found, digits)
+    name = problem.locate or structure
+    stored = as_stored(problem, design)
+    if stored is None:
+        reason = reasons[0] if reasons else "a0 cannot be told from 0: a root may be at infinity"
+        return Proof(_claim(name), False, reason, name, digits=digits)
+    return _assembled(problem, design, name, stored, digits, reasons or _of_simple(structure, stored), stored=True)
+
+
+def _patterns(problem: Problem, structure: str) -> list[Pattern]:
+    """Patterns to prove: that of the structure, if it has the one that is located, and then the latter."""
+    every = {**PATTERNS, **LINES}
+    named = [structure] if not problem.locate or problem.locate in _IMPLIES.get(structure, ()) else []
+    return [every[n] for n in dict.fromkeys([*named, *([problem.locate] if problem.locate else [])]) if n in every]
+
+
+def _of_simple(structure: str, found: Existing) -> list[str]:
+    """Why the structure of a design without multiple roots is not proved; nothing if it is."""
+    if structure not in _SIMPLE:
+        return [f"the structure is {structure}: double precision cannot tell it; locate the pattern that is meant"]
+    roots = found.factored.roots
+    if roots is None:
+        return ["the roots cannot be isolated: some are equal, or too near; locate the pattern that is meant"]
+    rest = roots[1:] if roots[0].real else roots[2:]
+    if roots[0].real == (structure == "real") and all(z.re < roots[0].re for z in rest):
+        return []
+    return [f"the rightmost root of the design as stored is not certainly a {structure}"]
+
+
+def _assembled(
+    problem: Problem,
+    design: Written,
+    name: str,
+    found: Existing,
+    digits: int,
+    reasons: Sequence[str] = (),
+    stored: bool = False,
+) -> Proof:
+    numbers = {
+        n: number(ball, digits)
+        if n in found.moved or n in design.tangents or design.values[n].degrees
+        else fraction(design.values[n].value, digits)
+        for n, ball in found.parameters.items()
+    }
+    abscissa = found.factored.abscissa
+    return Proof(
+        claim=_claim(name),
+        proved=not reasons,
+        reason=reasons[0] if reasons else "",
+        pattern=name,
+        method=found.method,
+        digits=digits,
+        stored=stored,
+        parameters=Table({n: numbers[n] for n in problem.parameter_set.names}),
+        tangents=Table({n: number(ball, digits) for n, ball in found.tangents.items()}),
+        unknowns=Table({n: number(ball, digits) for n, ball in found.unknowns.items()}),
+        moved=found.moved,
+        held=Table(dict(design.text(n) for n in problem.parameter_set.names if n not in found.moved)),
+        stated=design.stated,
+        radius=found.radius,
+        uniqueness=found.uniqueness,
+        distance=found.distance,
+        explained=found.explained,
+        roots=tuple(
+            ProvedRoot(number(z.re, digits), number(z.im, digits), z.multiplicity) for z in found.factored.roots or ()
+        ),
+        abscissa=None if abscissa is None else number(abscissa, digits),
+        stable=stability(found.factored),
+        heavily_damped=heavy_damping(found.factored),
+        inside=inside(problem, design, found),
+        limits=Table(limits(problem, found)),
+    )
+
+
+def _claim(name: str) -> str:
+    pattern = PATTERNS.get(name) or LINES.get(name)
+    if pattern is None:
+        return _SIMPLE.get(name, f"structure {name}")
+    return f"a design with {name} exists: {pattern.meaning}"

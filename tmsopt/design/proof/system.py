@@ -1,0 +1,145 @@
+"""The square system whose solution has a root pattern: a_k = a0 c_k, and the problem's equalities."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import qr
+
+from tmsopt.design.expression import Expression
+from tmsopt.design.problem import Problem
+from tmsopt.design.proof.exact import decimal_fraction
+from tmsopt.design.proof.factors import abscissa_formula
+from tmsopt.design.proof.krawczyk import Refused, slopes
+from tmsopt.design.quantities import RADIUS
+from tmsopt.models import Quantity, Values
+from tmsopt.roots import Pattern
+
+ROUNDINGS = 64
+"""Roundings of every number of an equation that a stored design may be off by."""
+
+_DEPENDENT = 1e-9  # relative size of what a parameter adds to the others, below which it adds nothing
+_EPS = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True)
+class Equations:
+    """Left sides of the pattern's and the problem's equations.
+
+    A number goes by its parameter's name, angles by their tangent; by the name of a quantity that has an equation
+    of its own; or by that of an unknown of the pattern.
+
+    Attributes:
+        equalities: the == constraints.
+        lifted: quantities in them that are unknowns with an equation.
+    """
+
+    problem: Problem
+    pattern: Pattern
+    equalities: tuple[Expression, ...]
+    lifted: tuple[Quantity, ...]
+
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """What is unknown besides parameters."""
+        return (*(q.name for q in self.lifted), *self.pattern.unknowns)
+
+    @property
+    def conditions(self) -> int:
+        """Number of conditions on the parameters."""
+        return self.pattern.codimension + len(self.equalities)
+
+    def __call__(self, at: Mapping[str, Any]) -> list[Any]:
+        """The left sides."""
+        of = self.problem.parameter_set
+        own = {n: at[n].atan() if of[n].tangent else at[n] for n in of.names}
+        known = {q.name for q in self.lifted}
+        values = Values(
+            self.problem.model, of, own, lift=lambda q, v: at[q.name] if q.name in known else None
+        )  # fmt: skip
+        u = [at[n] for n in self.pattern.unknowns]
+        a = values.coefficients
+        left = [p - a[0] * c for p, c in zip(a[1:], self.pattern.monic(u)[1:], strict=True)]
+        left += [q.equation(values, at[q.name]) for q in self.lifted if q.equation]
+        if self.equalities:
+            values.define("abscissa", abscissa_formula(self.pattern, u))
+        return left + [expression.enclosure(values, decimal_fraction) for expression in self.equalities]
+
+
+def equations(problem: Problem, pattern: Pattern, parameters: Mapping[str, float]) -> Equations:
+    """The equations of a pattern in a problem.
+
+    Raises:
+        Refused: for an equality that cannot be evaluated in balls.
+    """
+    equalities = tuple(c for c in problem.conditions.values() if c.comparison == "==")
+    beyond = [n for n in (RADIUS, "damping_ratio") if any(n in c.names for c in equalities)]
+    if beyond:
+        raise Refused(f"an == constraint uses {beyond[0]}, which has no equation in balls; drop it to prove the rest")
+    met: dict[str, Quantity] = {}
+
+    def note(quantity: Quantity, values: Values) -> None:
+        if quantity.equation is not None:
+            met[quantity.name] = quantity
+
+    values = Values(problem.model, problem.parameter_set, parameters, lift=note)
+    values.define("abscissa", math.nan)
+    for equality in equalities:
+        equality(values)
+    return Equations(problem, pattern, equalities, tuple(met.values()))
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """Parameters to move, and how well they are determined.
+
+    Attributes:
+        explained: moved parameter → how far ROUNDINGS of every number may move it.
+    """
+
+    moved: tuple[str, ...]
+    explained: Mapping[str, float]
+
+
+def choose(system: Equations, at: Mapping[str, Any], among: Sequence[str]) -> Chosen:
+    """The best conditioned of the free parameters: QR with column pivoting, once the unknowns are projected out.
+
+    Raises:
+        Refused: with too few parameters, or none that the equations depend on.
+    """
+    count, of = system.conditions, system.problem.parameter_set
+    if len(among) < count:
+        raise Refused(
+            f"{_many(count, 'condition')} and {_many(len(among), 'free parameter')}: rounded numbers meet them "
+            f"nowhere exactly; free {count - len(among)} more, or give exact numbers that have the pattern"
+        )
+    names = [*of.names, *system.unknowns]
+    jacobian = np.array([[float(e) for e in row] for row in slopes(system, at, names).tolist()])
+    values = np.array([abs(float(at[n])) for n in names])
+    rounding = np.abs(jacobian) @ values + 1e-300
+    scale = np.where(values > 0, values, 1.0)
+    scaled = jacobian / rounding[:, None] * scale
+    if not np.all(np.isfinite(scaled)):
+        raise Refused("the equations have no finite derivatives at the design; move it off the edge of its range")
+    outside = [names.index(n) for n in system.unknowns]
+    free = [names.index(n) for n in among]
+    basis = np.linalg.qr(scaled[:, outside], mode="complete")[0][:, len(outside) :] if outside else np.eye(len(scaled))
+    reduced = basis.T @ scaled[:, free]
+    _, triangle, order = qr(reduced, pivoting=True, mode="economic")
+    pivots = np.abs(np.diag(triangle)[:count])
+    if count and not pivots[-1] > _DEPENDENT * max(pivots[0], 1e-3):
+        idle = [n for n, column in zip(among, reduced.T, strict=True) if not np.abs(column).max() > _DEPENDENT]
+        why = f"; they do not depend on {', '.join(idle)}" if idle else ""
+        raise Refused(
+            f"the equations are (nearly) singular in the free parameters {', '.join(among)}{why}; free another one"
+        )
+    moved = tuple(sorted((among[k] for k in order[:count]), key=of.names.index))
+    square = jacobian[:, [names.index(n) for n in (*moved, *system.unknowns)]]
+    effect = np.abs(np.linalg.pinv(square)) @ rounding * (ROUNDINGS * _EPS)
+    return Chosen(moved, {n: float(e) + 2 * _EPS * abs(float(at[n])) for n, e in zip(moved, effect, strict=False)})
+
+
+def _many(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"

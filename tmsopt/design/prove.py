@@ -1,0 +1,32 @@
+"""The existence of what a problem asks for, proved: solve first, then prove."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from tmsopt.design.problem import Problem, checked
+from tmsopt.design.proof.proof import DIGITS, Proof
+from tmsopt.design.solution import Solution
+from tmsopt.design.solve import solve
+
+
+def prove(
+    problem: Problem | Solution, digits: int = DIGITS, *, exact: Mapping[str, Any] | None = None, **options: Any
+) -> Proof:
+    """Prove that the design a problem asks for exists, in ball arithmetic, with what follows for its stability.
+
+    An interval Newton test (Krawczyk) on a_k = a0 c_k with the problem's equalities proves that exactly one solution
+    lies within a stated radius, and that it is the one the stored numbers stand for. What cannot be proved is refused
+    in `Proof.reason`, never guessed.
+
+    Args:
+        problem: a problem, which is solved first, or its solution.
+        digits: that every number is given to.
+        exact: parameter, or ``tan(lambda_s)`` → the number that it is exactly: an int, a Fraction, a ``flint.fmpq``,
+            text such as ``"-2/5"`` or ``"20 deg"``. Other numbers stand for the shortest decimals that print them.
+        options: of `solve`, e.g. ``starts``.
+
+    Raises:
+        InputError: for a problem that asks nothing, digits out of range, or exact numbers that are not the design's.
+    """
+    solution = problem if isinstance(problem, Solution) else solve(checked(problem), throw=False, **options)
+    return solution.proved(digits, exact)

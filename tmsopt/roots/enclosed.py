@@ -1,0 +1,224 @@
+"""Roots as balls: of a polynomial whose coefficients are balls, and of the nearest polynomial with a structure.
+
+Everything here works at the precision of `flint.ctx`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import ROUND_HALF_EVEN, Context, Decimal
+from fractions import Fraction
+from typing import Any
+
+import flint
+import numpy as np
+
+from tmsopt.roots.elementary import as_ball
+from tmsopt.roots.exact import rational
+from tmsopt.roots.patterns import LINES, PATTERNS, Pattern
+from tmsopt.roots.polynomial import evaluate, product
+from tmsopt.roots.structure import Root
+
+_STEPS = 80
+_FLOOR = 1000  # a root smaller than the median root by more than this counts as this much smaller
+_HALF = 2  # of the digits that are carried, the share that a converged fit is trusted to
+
+
+@dataclass(frozen=True)
+class Enclosed:
+    """A root within balls, with its multiplicity; the imaginary part of a real root is exactly 0."""
+
+    re: Any
+    im: Any
+    multiplicity: int = 1
+
+    @property
+    def modulus(self) -> Any:
+        """Ball of |s|."""
+        return abs(self.re) if self.im == 0 else (self.re * self.re + self.im * self.im).sqrt()
+
+
+def enclosed_roots(coefficients: Sequence[Any]) -> tuple[Enclosed, ...] | None:
+    """Every root of a real polynomial, coefficients descending as balls or exact fractions; None where not decided.
+
+    The roots z of the polynomial p₀ in the middle are isolated first; a disc of radius n |p(z)/p′(z)| about z then
+    holds a root of every p in the balls (Laguerre), exactly one if the discs are disjoint, and a real one if z is.
+    Multiple roots are accepted at 0 and of coefficients that are exact. Rightmost first.
+    """
+    terms = [as_ball(c) for c in coefficients]
+    zeros = 0
+    while terms and terms[-1] == 0:
+        terms.pop()
+        zeros += 1
+    while terms and terms[0] == 0:
+        terms.pop(0)
+    found = [Enclosed(flint.arb(0), flint.arb(0), zeros)] if zeros else []
+    degree = len(terms) - 1
+    if degree > 0:
+        slope = [(degree - k) * c for k, c in enumerate(terms[:-1])]
+        for z, multiplicity in _isolated([rational(t) for t in terms]):
+            if multiplicity > 1:
+                if not all(t.is_exact() for t in terms):
+                    return None
+                found.append(Enclosed(z.real, z.imag, multiplicity))
+                continue
+            middle = z.real.mid() if z.imag == 0 else flint.acb(z.real.mid(), z.imag.mid())
+            distance = (degree * abs(evaluate(terms, middle) / evaluate(slope, middle))).upper()
+            ball = flint.arb(0, distance)
+            found.append(Enclosed(z.real.mid() + ball, flint.arb(0) if z.imag == 0 else z.imag.mid() + ball))
+    if not all(a.re.is_finite() and a.im.is_finite() for a in found) or _overlap(found):
+        return None
+    return _sorted(found)
+
+
+def nearest(name: str, coefficients: Sequence[Any], roots: Sequence[Root]) -> tuple[Enclosed, ...] | None:
+    """Roots of the polynomial nearest to a quartic among those of a pattern; None where the fit does not converge.
+
+    Nearest is: least in the sum over k = 1 … 4 of (Δₖ/wₖ)², where Δₖ is the change of the k-th coefficient of the
+    monic polynomial and wₖ the k-th coefficient of ∏ (s + |zᵢ|), zᵢ the roots of the nearest polynomial itself; one
+    below a thousandth of the median |z| counts as that. So the unknowns u of the factored form solve
+    Σₖ Δₖ(u)/wₖ(u)² · ∂Δₖ/∂uⱼ = 0 for each j: a property of the coefficients alone. The slopes of wₖ are left out.
+
+    Gauss–Newton steps, from the roots of a fit in double precision, until they change nothing; half of the digits
+    carried count as certain.
+    """
+    pattern = {**PATTERNS, **LINES}[name]
+    monic = [as_ball(c) / as_ball(coefficients[0]) for c in coefficients]
+    if not all(c.is_finite() for c in monic):
+        return None
+    target = [c.mid() for c in monic]
+    u = _start(pattern, [float(c) for c in target], roots)
+    small = flint.arb(2) ** (30 - flint.ctx.prec)
+    sure = flint.arb(2) ** (-flint.ctx.prec // _HALF)
+    for _ in range(_STEPS):
+        step = _step(pattern, u, target)
+        if step is None:
+            return None
+        u = [(x + d).mid() for x, d in zip(u, step, strict=True)]
+        size = max(abs(x) for x in u)
+        if all(abs(d) <= small * size for d in step):
+            balls = [x + flint.arb(0, (size * sure).upper()) for x in u]
+            return _sorted(_roots_of(pattern, balls))
+    return None
+
+
+def nearest_double(ball: Any) -> float | None:
+    """The double that a ball rounds to; None where its ends round differently, nan where it is not finite."""
+    if not _finite(ball):
+        return float("nan")
+    ends = {_double(end) for end in _ends(ball)}
+    return ends.pop() + 0.0 if len(ends) == 1 else None
+
+
+def nearest_decimal(ball: Any, digits: int) -> float | None:
+    """The double nearest to a ball rounded to so many significant decimal digits; as `nearest_double`."""
+    if not _finite(ball):
+        return float("nan")
+    context = Context(prec=digits, rounding=ROUND_HALF_EVEN)
+    ends = {context.divide(Decimal(e.numerator), Decimal(e.denominator)) for e in _ends(ball)}
+    return float(ends.pop()) + 0.0 if len(ends) == 1 else None
+
+
+def _finite(ball: Any) -> bool:
+    return ball.is_finite() if isinstance(ball, flint.arb) else isinstance(ball, flint.fmpq)
+
+
+def _ends(ball: Any) -> set[Fraction]:
+    """Both ends without rounding, at any working precision."""
+    if isinstance(ball, flint.fmpq):
+        return {_fraction(ball)}
+    middle, radius = (_fraction(rational(part)) for part in (ball.mid(), ball.rad()))
+    return {middle - radius, middle + radius}
+
+
+def _fraction(x: flint.fmpq) -> Fraction:
+    return Fraction(int(x.p), int(x.q))
+
+
+def _double(x: Fraction) -> float:
+    try:
+        return x.numerator / x.denominator  # rounded correctly, whatever the length of the two
+    except OverflowError:
+        return float("inf") if x > 0 else float("-inf")
+
+
+def _isolated(terms: Sequence[flint.fmpq]) -> list[tuple[Any, int]]:
+    """Distinct roots of a polynomial with rational coefficients, each as a ball with its multiplicity."""
+    common = flint.fmpz(1)
+    for term in terms:
+        common = common.lcm(term.q)
+    polynomial = flint.fmpz_poly([int(t.p * (common // t.q)) for t in reversed(terms)])
+    isolated: Any = polynomial.complex_roots()
+    return [(z, int(m)) for z, m in isolated]
+
+
+def _overlap(found: Sequence[Enclosed]) -> bool:
+    balls = [flint.acb(root.re, root.im) for root in found]
+    return any(a.overlaps(b) for k, a in enumerate(balls) for b in balls[:k])
+
+
+def _sorted(roots: Sequence[Enclosed]) -> tuple[Enclosed, ...]:
+    return tuple(sorted(roots, key=lambda r: (-float(r.re), -float(r.im))))
+
+
+def _start(pattern: Pattern, target: list[float], roots: Sequence[Root]) -> list[Any]:
+    """The guess from the roots of a fit that rebuilds the coefficients best."""
+    z = np.array([complex(r.re, r.im) for r in roots for _ in range(r.multiplicity)])
+    scale = np.abs(z).max()
+
+    def error(u: list[float]) -> float:
+        off: list[float] = [
+            (float(a) - b) / scale**k for k, (a, b) in enumerate(zip(pattern.monic(u), target, strict=True))
+        ]
+        return sum((x * x for x in off), 0.0)
+
+    return [flint.arb(x) for x in min(pattern.guesses(z), key=error)]
+
+
+def _step(pattern: Pattern, u: Sequence[Any], target: Sequence[Any]) -> list[Any] | None:
+    """Gauss–Newton step of the weighted least squares, with the weights of where it starts."""
+    weights = _weights(_roots_of(pattern, u))
+    offs = [(a - b) / w for a, b, w in zip(pattern.monic(u), target, weights, strict=True)]
+    columns = []
+    for j in range(len(u)):
+        moved = pattern.monic([flint.arb_series([x, 1], prec=2) if k == j else x for k, x in enumerate(u)])
+        columns.append(
+            [(m[1] if isinstance(m, flint.arb_series) else 0) / w for m, w in zip(moved, weights, strict=True)]
+        )
+    normal = flint.arb_mat([[sum(a * b for a, b in zip(p, q, strict=True)) for q in columns] for p in columns])
+    right = flint.arb_mat([[-sum(a * b for a, b in zip(p, offs, strict=True))] for p in columns])
+    try:
+        return [normal.solve(right)[j, 0] for j in range(len(u))]
+    except ZeroDivisionError:
+        return None
+
+
+def _weights(roots: Sequence[Enclosed]) -> list[Any]:
+    """Coefficients of ∏ (s + |zᵢ|), sizes of the terms that each coefficient is summed from."""
+    sizes = sorted((r.modulus.mid() for r in roots for _ in range(r.multiplicity)), key=float)
+    floor = (sizes[1] + sizes[2]) / (2 * _FLOOR)
+    return [as_ball(c) for c in product(*([flint.arb(1), size.max(floor).mid()] for size in sizes))]
+
+
+def _roots_of(pattern: Pattern, u: Sequence[Any]) -> list[Enclosed]:
+    """Roots of the linear and quadratic factors, equal factors counted as multiplicity."""
+    counted: dict[tuple[Any, ...], tuple[list[Any], int]] = {}
+    for factor in pattern.factors(u):
+        key = tuple((int(p), int(q)) for p, q in (flint.arb(c).mid().man_exp() for c in factor))
+        counted[key] = (factor, counted[key][1] + 1 if key in counted else 1)
+    found: list[Enclosed] = []
+    for factor, count in counted.values():
+        found += [Enclosed(re, im, count) for re, im in _factor_roots(factor)]
+    return found
+
+
+def _factor_roots(factor: Sequence[Any]) -> list[tuple[Any, Any]]:
+    zero = flint.arb(0)
+    if len(factor) == 2:
+        return [(-factor[1], zero)]
+    half = -factor[1] / 2
+    square = half * half - factor[2]
+    if square >= 0:
+        apart = square.sqrt()
+        return [(half + apart, zero), (half - apart, zero)]
+    apart = (-square).sqrt()
+    return [(half, apart), (half, -apart)]

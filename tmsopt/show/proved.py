@@ -1,0 +1,103 @@
+"""A proof as text."""
+
+from fractions import Fraction
+
+from tmsopt.design.problem import Problem
+from tmsopt.design.proof.balls import Number, fraction
+from tmsopt.design.proof.proof import Proof
+from tmsopt.design.proof.verdict import Verdict
+from tmsopt.show.text import columns
+
+
+def proof_text(problem: Problem, proof: Proof) -> str:
+    """What is proved, the numbers with their radii, and what they were taken for."""
+    lines = [problem.title or "untitled problem"]
+    lines.append(f"{'proved' if proof.proved else 'not proved'}: {proof.claim}")
+    if proof.reason:
+        lines.append(f"why: {proof.reason}")
+    if problem.scenarios or problem.tolerances:
+        lines.append("of the worst case that was found")
+    if proof.parameters:
+        lines += _numbers(problem, proof) + _place(proof) + _facts(proof) + _held(problem, proof)
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _numbers(problem: Problem, proof: Proof) -> list[str]:
+    """What was solved for, and the roots."""
+    rows = []
+    for name in proof.moved:
+        rows.append((name, *_cells(proof.parameters[name]), _unit(problem, name)))
+        if name in proof.tangents:
+            rows.append((f"tan({name})", *_cells(proof.tangents[name]), ""))
+    rows += [(name, *_cells(number), "") for name, number in proof.unknowns.items()]
+    if proof.abscissa:
+        rows.append(("abscissa", *_cells(proof.abscissa), ""))
+    told = {number.value for number in proof.unknowns.values()}
+    for root in (r for r in proof.roots if r.re.value not in told or r.im.value != "0"):
+        times = f" ({root.multiplicity}-fold)" if root.multiplicity > 1 else ""
+        if root.im.value == "0":
+            rows.append((f"root{times}", *_cells(root.re), ""))
+        elif not root.im.value.startswith("-"):
+            rows += [(f"pair{times}, re", *_cells(root.re), ""), ("  im ±", *_cells(root.im), "")]
+    head = ["", "the design as stored:"] if proof.stored and proof.reason else [""]
+    return [*head, *columns(rows), ""] if rows else [""]
+
+
+def _place(proof: Proof) -> list[str]:
+    """How near, and how alone."""
+    if proof.method == "exact factorisation":
+        return ["method: square-free factorisation of the polynomial, whose coefficients are fractions"]
+    if not proof.moved and proof.method != "Krawczyk":
+        return ["method: roots of the design as stored, isolated in balls"]
+    return [
+        "method: Krawczyk's interval Newton test on a_k = a0 c_k"
+        + (" and the == constraints" if len(proof.unknowns) + len(proof.moved) > 4 else ""),
+        f"exists within {proof.radius:.1e} of these numbers, and is the only one within {proof.uniqueness:.2g}",
+        f"the stored design is {proof.distance:.1e} from it; rounding explains up to {proof.explained:.1e}",
+    ]
+
+
+def _facts(proof: Proof) -> list[str]:
+    of = " (of the design as stored)" if proof.stored and proof.reason else ""
+    facts = [
+        _verdict(f"stable{of}", proof.stable),
+        _verdict(f"heavily damped{of}", proof.heavily_damped),
+        _verdict("in the box", proof.inside),
+    ]
+    return facts + [f"{name}: {verdict}" for name, verdict in proof.limits.items()]
+
+
+def _held(problem: Problem, proof: Proof) -> list[str]:
+    """Numbers that were taken exactly, and a word on angles."""
+    if not proof.held:
+        return []
+    lines = [f"taken exactly: {', '.join(f'{name} = {_fraction(value)}' for name, value in proof.held.items())}"]
+    of = problem.parameter_set
+    angles = [n for n in proof.held if n in of.names and of[n].tangent and n not in proof.stated]
+    angles = [n for n in angles if proof.parameters[n].value != "0"]
+    if angles:
+        lines.append(f"  {', '.join(angles)}: the decimal of the double in radians, not an angle in degrees")
+    return lines
+
+
+def _fraction(text: str) -> str:
+    """A fraction; a decimal where that is shorter."""
+    try:
+        decimal = fraction(Fraction(text), 30)
+    except ValueError:  # degrees
+        return text
+    return decimal.value if decimal.radius == "0" and len(decimal.value) <= len(text) + 1 else text
+
+
+def _cells(number: Number) -> tuple[str, str]:
+    return number.value, "exact" if number.radius == "0" else f"± {number.radius}"
+
+
+def _unit(problem: Problem, name: str) -> str:
+    unit = problem.parameter_set[name].unit
+    return "" if unit == "1" else unit
+
+
+def _verdict(what: str, verdict: Verdict) -> str:
+    answer = {True: "yes", False: "no", None: "cannot be told"}[verdict.holds]
+    return f"{what}: {answer}, {verdict.words}"
