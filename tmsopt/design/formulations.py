@@ -5,7 +5,7 @@ pattern. Both share how parameters, quantities and constraints become variables 
 must stand up to has factors of its own, and shares the design and the root quantities with the others.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -200,9 +200,12 @@ class Builder:
             self.touches["abscissa"] = lifted.touches
             self.shared["abscissa"] = lifted.symbol
 
-    def constraints(self) -> None:
+    def constraints(self, without: Collection[str] = ()) -> None:
+        """A row for each constraint in each case that it differs in."""
         ends = {"<=": (-np.inf, 0.0), ">=": (0.0, np.inf), "==": (0.0, 0.0)}
         for name, condition in self.problem.conditions.items():
+            if name in without:
+                continue
             alone = condition.names == ("damping_ratio",) and "damping_ratio" in self.shared
             if alone and condition.violation({"damping_ratio": 1.0}) == 0:
                 continue  # the real roots see to it

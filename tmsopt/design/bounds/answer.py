@@ -1,27 +1,37 @@
 """Questions put to branch and bound, within a time, and whether they admit the design that they are about."""
 
+import math
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
 
 import numpy as np
 
 from tmsopt.design.bounds.program import Question
+from tmsopt.design.bounds.race import Crew
 from tmsopt.design.bounds.ranges import ranges
-from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, UNDECIDED, decide
+from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, UNDECIDED, Decision, Task, task
 from tmsopt.design.formulations import design_of
+from tmsopt.design.solution import Solution
 from tmsopt.design.starts import complete
 
 _HOLDS = 1e-6  # of a row, relative to its range: SCIP itself asks for 1e-9, and multiple roots have half the digits
 
+_TIGHTENING = 1.0  # seconds to keep a0 away from 0
+_FIRST = 2.0  # seconds for the first turn, twice as many for each that follows
+_WAYS = (((1.0, False), (1.0, True)), ((4.0, False), (0.25, False)), ((16.0, False), (4.0, True)))
+"""Turns: units, as multiples of the usual one, and whether compact."""
+
+Confirm = Callable[[Mapping[str, float]], Solution | None]
 Progress = Callable[[float, float], None]
 
 
 class Clock:
     """Time and nodes that a proof has used."""
 
-    def __init__(self, seconds: float, progress: Progress | None = None) -> None:
-        self.seconds, self.progress = seconds, progress
+    def __init__(self, seconds: float, crew: Crew, progress: Progress | None = None) -> None:
+        self.seconds, self.crew, self.progress = seconds, crew, progress
         self.began = time.perf_counter()
         self.nodes = 0
 
@@ -35,6 +45,12 @@ class Clock:
         """Seconds to the end."""
         return max(self.seconds - self.used, 0.0)
 
+    def race(self, tasks: Sequence[Task]) -> list[Decision]:
+        """Decisions on tasks, all at once until one is shown to have no feasible point."""
+        decisions = self.crew.race(tasks, self.tick)
+        self.nodes += sum(decision.nodes for decision in decisions)
+        return decisions
+
     def tick(self) -> None:
         """Tell the reader how far it is."""
         if self.progress:
@@ -47,31 +63,54 @@ class Answer:
 
     Attributes:
         verdict: ``infeasible``: no design; ``found``; ``undecided``.
-        design: the free parameters that were found.
+        better: what was made of the design that was found.
     """
 
     verdict: str
-    design: Mapping[str, float] | None = None
+    better: Solution | None = None
 
 
-def answer(question: Question, clock: Clock, share: float) -> Answer:
+def answer(question: Question, clock: Clock, share: float, confirm: Confirm) -> Answer:
     """Ask for each sign of a0 in turn, within a share of the time that is left.
+
+    The time that branch and bound needs varies wildly with how a question is put. So it is put in two ways at once, for
+    a short time, and then anew in others for longer.
+
+    Args:
+        confirm: makes a better design of one that was found; None if it is none, but for SCIP's tolerance.
 
     Raises:
         NotAccepted: for an operation that cannot be written for SCIP.
     """
     end = clock.used + share * clock.left
-    verdict = INFEASIBLE
-    for nlp in question.programs().values():
-        decision = decide(nlp, min(end, clock.seconds) - clock.used, tick=clock.tick)
-        clock.nodes += decision.nodes
-        if decision.interrupted:
-            clock.seconds = 0.0
-        if decision.verdict == FOUND and decision.point is not None:
-            return Answer(FOUND, design_of(question.problem, decision.point.tolist()))
-        if decision.verdict != INFEASIBLE:
-            verdict = UNDECIDED
-    return Answer(verdict)
+    for sign in question.signs():
+        told = _asked(question, sign, clock, end, confirm)
+        if told.verdict != INFEASIBLE:
+            return told
+    return Answer(INFEASIBLE)
+
+
+def _asked(question: Question, sign: int, clock: Clock, end: float, confirm: Confirm) -> Answer:
+    """One sign of a0."""
+    least = 0.0
+    if (leading := question.leading(sign)) is not None:
+        least = clock.race([task(leading, min(_TIGHTENING, end - clock.used), least=True)])[0].bound
+        if least == math.inf:  # not even the constraints can be met
+            return Answer(INFEASIBLE)
+    for turn in count():
+        if end - clock.used <= 0:
+            return Answer(UNDECIDED)
+        seconds = min(end - clock.used, _FIRST * 2**turn)
+        ways = [replace(question, unit=question.unit * u, compact=c) for u, c in _WAYS[turn % len(_WAYS)]]
+        decisions = clock.race([task(way.program(sign, max(least, 0.0)), seconds) for way in ways])
+        if any(decision.verdict == INFEASIBLE for decision in decisions):
+            return Answer(INFEASIBLE)
+        for decision in decisions:
+            if decision.point is not None:
+                better = confirm(design_of(question.problem, decision.point.tolist()))
+                if better is not None:
+                    return Answer(FOUND, better)
+    raise AssertionError  # unreachable: time ends
 
 
 def doubt(question: Question, design: Mapping[str, float]) -> str:
@@ -80,7 +119,8 @@ def doubt(question: Question, design: Mapping[str, float]) -> str:
     A wrong limit, range or equation would exclude the design itself: what is proved of the others would be worthless.
     """
     nearest: list[tuple[float, str]] = []
-    for nlp in question.programs().values():
+    for sign in question.signs():
+        nlp = question.program(sign)
         x = complete(nlp, question.problem, design)
         rows = np.array(nlp.functions(x)[1]).ravel()
         sizes = np.array(

@@ -1,10 +1,13 @@
 """How good a design is at best: bounds proved by spatial branch and bound, and better designs where it finds them."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 
-from tmsopt.design.bounds.answer import Answer, Clock, Progress, answer, doubt
+from tmsopt.design.bounds.answer import Clock, Progress, answer, doubt
 from tmsopt.design.bounds.program import Question
+from tmsopt.design.bounds.race import Crew
 from tmsopt.design.bounds.scip import FEASIBILITY, INFEASIBLE, available
 from tmsopt.design.bounds.walk import NotAccepted
 from tmsopt.design.cases import Case
@@ -55,14 +58,15 @@ def certify(design: Solution | Problem, *, seconds: float = SECONDS, progress: P
         return _noted(design, "nothing is free, so there is nothing to bound")
     if problem.objective is None and design.status == "optimal":
         return _noted(design, "nothing is minimised or maximised, so there is nothing to bound")
-    clock = Clock(seconds, progress)
-    try:
-        for _ in range(_REPLACED):
-            design, replaced = (_bounded if design.status == "optimal" else _excluded)(design, clock)
-            if not replaced:
-                break
-    except NotAccepted as error:
-        return _noted(design, f"branch and bound cannot take {error}, so there is no bound")
+    with Crew() as crew:
+        clock = Clock(seconds, crew, progress)
+        try:
+            for _ in range(_REPLACED):
+                design, replaced = (_bounded if design.status == "optimal" else _excluded)(design, clock)
+                if not replaced:
+                    break
+        except NotAccepted as error:
+            return _noted(design, f"branch and bound cannot take {error}, so there is no bound")
     return design
 
 
@@ -87,9 +91,9 @@ def _bounded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     proved, level = math.inf, PROVEN
     while True:
         last = level in (_FINER, _COARSER[-1])
-        answered = answer(_question(design, level), clock, 1.0 if last else _SHARE)
-        if (better := _from(design, answered)) is not None:
-            return better, True
+        answered = answer(_question(design, level), clock, 1.0 if last else _SHARE, partial(_from, design))
+        if answered.better is not None:
+            return answered.better, True
         if answered.verdict == INFEASIBLE:
             proved = level
         coarser = [c for c in _COARSER if c > level]
@@ -104,9 +108,10 @@ def _bounded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
 
 def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     """No design was found: the proof that there is none, or one after all."""
-    answered = answer(Question(design.problem, _cases(design), None, _unit(design)), clock, 1.0)
-    if (found := _from(design, answered)) is not None:
-        return found, True
+    anything = Question(design.problem, _cases(design), None, _unit(design))
+    answered = answer(anything, clock, 1.0, partial(_from, design))
+    if answered.better is not None:
+        return answered.better, True
     if answered.verdict == INFEASIBLE:
         none = -math.inf if design.problem.sense == "maximize" else math.inf
         bound = Bound(none, 0.0, True, "scip", clock.used, clock.nodes, FEASIBILITY)
@@ -144,13 +149,11 @@ def _stronger(design: Solution, known: Bound, searched: Bound) -> Bound:
     return replace(searched, value=known.value, gap=known.gap, proven=proven, method=known.method)
 
 
-def _from(design: Solution, answered: Answer) -> Solution | None:
+def _from(design: Solution, start: Mapping[str, float]) -> Solution | None:
     """A better design, solved for from the one that SCIP found; None where that is not confirmed."""
-    if answered.design is None:
-        return None
     problem = design.problem
     for starts in _STARTS:
-        found = solve(replace(problem, start=answered.design), starts=starts, throw=False)
+        found = solve(replace(problem, start=start), starts=starts, throw=False)
         if found.status == "optimal" and (design.status != "optimal" or _gain(design, found) > _BETTER):
             before = f"{design.value:.9g}" if design.status == "optimal" else "none"
             words = f"branch and bound found a better design than the search from many starts: {before} before"

@@ -14,7 +14,10 @@ from typing import Any
 import numpy as np
 
 from tmsopt.design.lifts import Rows
-from tmsopt.roots import evaluate, product
+from tmsopt.roots import product
+
+Square = tuple[Any, Any]
+"""x/y of x and y ≥ 0: infinite where y = 0."""
 
 
 def unknowns(degree: int) -> int:
@@ -22,7 +25,7 @@ def unknowns(degree: int) -> int:
     return (degree - 1) // 2
 
 
-def interlacing(coefficients: Sequence[Any], squares: Sequence[Any]) -> tuple[list[Any], list[Any]]:
+def interlacing(coefficients: Sequence[Any], squares: Sequence[Square]) -> tuple[list[Any], list[Any]]:
     """Expressions that vanish, and that are not negative, exactly if all roots have Re t ≤ 0.
 
     Args:
@@ -30,21 +33,33 @@ def interlacing(coefficients: Sequence[Any], squares: Sequence[Any]) -> tuple[li
         squares: x1 ≥ x2 ≥ … ≥ 0, squared frequencies at which the second part vanishes.
     """
     first, second = coefficients[0::2], coefficients[1::2]
-    expanded = product(*([1, x] for x in squares))
-    equations = [c - second[0] * e for c, e in zip(second[1:], expanded[1:], strict=True)]
-    alternating = [c if k % 2 == 0 else -c for k, c in enumerate(first)]
-    signs = [(-1) ** (j + 1) * evaluate(alternating, x) for j, x in enumerate(squares)]
-    return equations, [*coefficients, *signs, *(x - y for x, y in pairwise(squares))]
+    expanded = product(*([y, x] for x, y in squares))
+    equations = [c * expanded[0] - second[0] * e for c, e in zip(second[1:], expanded[1:], strict=True)]
+    signs = [(-1) ** (j + 1) * _alternating(first, *square) for j, square in enumerate(squares)]
+    return equations, [*coefficients, *signs, *(x * v - u * y for (x, y), (u, v) in pairwise(squares))]
 
 
-def interlace(build: Rows, case: int, coefficients: Sequence[Any], largest: float) -> list[Any]:
+def _alternating(part: Sequence[Any], x: Any, y: Any) -> Any:
+    """c0 x^m − c2 x^(m−1) y + …"""
+    total, scale = part[0], 1
+    for k, c in enumerate(part[1:], start=1):
+        scale = scale * y
+        total = total * x + (-1) ** k * c * scale
+    return total
+
+
+def interlace(build: Rows, case: int, coefficients: Sequence[Any], largest: float, compact: bool) -> list[Any]:
     """Variables and rows that hold all roots in Re t ≤ 0, none larger than `largest`; what vanishes with a root on it.
 
     Of the returned expressions, none negative, one can be 0 exactly if some root has Re t = 0.
+
+    Args:
+        compact: take X/(1 − X) for the squares, so that no bound on the roots is needed.
     """
     count = unknowns(len(coefficients) - 1)
-    squares = [build.variable(f"x{k}.{case}", 0.0, largest * largest) for k in range(1, count + 1)]
-    equations, nonnegative = interlacing(coefficients, squares)
+    most = 1.0 if compact else largest * largest
+    unknown = [build.variable(f"x{k}.{case}", 0.0, most) for k in range(1, count + 1)]
+    equations, nonnegative = interlacing(coefficients, [(x, 1 - x if compact else 1) for x in unknown])
     for expression in equations:
         build.row("abscissa", expression, 0.0, 0.0)
     for expression in nonnegative:
@@ -59,7 +74,7 @@ def squares_of(coefficients: Sequence[float]) -> list[float]:
 
 
 def _violation(coefficients: Sequence[float], squares: Sequence[float]) -> float:
-    equations, nonnegative = interlacing(coefficients, squares)
+    equations, nonnegative = interlacing(coefficients, [(x, 1.0) for x in squares])
     return float(max(*map(abs, equations), *(-e for e in nonnegative), 0.0))
 
 

@@ -27,12 +27,16 @@ class Frame:
         signs: case → sign of the leading one; cases without are left aside.
         unit: usual size of the roots, a power of two.
         touching: whether a line must have a root on it, lest more be claimed than is so.
+        compact: whether squared frequencies are taken as X/(1 − X).
+        least: what the leading coefficient of the first case is not below, in absolute value.
     """
 
     model: Model
     signs: Mapping[int, int]
     unit: float
     touching: bool = False
+    compact: bool = False
+    least: float = 0.0
 
     def coefficients(self, values: Sequence[Values], case: int) -> list[Any]:
         """Coefficients for roots in the unit, with a leading one that is positive, in the compact form of the model."""
@@ -41,6 +45,11 @@ class Frame:
     def about(self, values: Sequence[Values], case: int, line: Any) -> list[Any]:
         """The same of p(t + line)."""
         return shift(self.coefficients(values, case), line / self.unit)
+
+    def largest(self, ranges: Sequence[Interval]) -> float:
+        """Bound on the roots for coefficients in ranges."""
+        (lower, upper), *others = ranges
+        return root_bound([(max(lower, self.least), max(upper, self.least)), *others])
 
 
 def compact(model: Model, values: Values) -> list[Any]:
@@ -64,7 +73,7 @@ def half_planes(
     looked = [case for case in covered if case in frame.signs]
     for case in looked:
         c = frame.about(values, case, at)
-        edges = interlace(build, case, c, root_bound(over(build, c)))
+        edges = interlace(build, case, c, frame.largest(over(build, c)), frame.compact)
         if line is None and frame.touching and len(covered) == 1:
             build.row("abscissa", math.prod(edges), 0.0, 0.0)
     size = (line is None) + len(looked) * unknowns(frame.model.degree)
@@ -79,7 +88,7 @@ def sectors(
     looked = [case for case in covered if case in frame.signs]
     for case in looked:
         a = frame.coefficients(values, case)
-        largest = root_bound(over(build, a))
+        largest = frame.largest(over(build, a))
         pairs = []
         for k in range(1, (len(a) - 1) // 2 + 1):
             p = build.variable(f"p{k}.{case}", -2 * largest, 2 * largest)
@@ -109,8 +118,8 @@ def _half_plane_guess(
 ) -> list[list[float]]:
     """The least line, if it is not known, and squared frequencies."""
     at = max(float(values[case]["abscissa"]) for case in covered) if line is None else line
-    squares = [squares_of([float(c) for c in frame.about(values, case, at)]) for case in covered]
-    return [[*([at] if line is None else []), *(x for part in squares for x in part)]]
+    squares = [x for case in covered for x in squares_of([float(c) for c in frame.about(values, case, at)])]
+    return [[*([at] if line is None else []), *(x / (1 + x) if frame.compact else x for x in squares)]]
 
 
 def _sector_guess(

@@ -17,6 +17,7 @@ from tmsopt.design.expression import Expression
 from tmsopt.design.formulations import Builder, Lifting
 from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.design.variation import tempts
 
 _DEEP = 99  # levels to which expressions are compared
@@ -33,30 +34,41 @@ class Question:
         cases: what the design must stand up to; fewer ask for less, and bound what more of them can reach.
         limit: value of the objective to reach; None asks for any feasible design.
         unit: usual size of the roots, a power of two.
+        compact: put squared frequencies on a finite range; slower, but nothing grows with them.
     """
 
     problem: Problem
     cases: tuple[Case, ...] = ()
     limit: float | None = None
     unit: float = 1.0
+    compact: bool = False
 
-    def programs(self) -> dict[int, NLP]:
-        """The question as data, for each sign that a0 can have in the box; a design answers the one of its own sign."""
+    def signs(self) -> dict[int, dict[int, int]]:
+        """Each sign that a0 can have in the box, with that of every case where it is known then."""
         build = Builder(self.problem, self.cases)
         leading = [ca.SX(compact(self.problem.model, values)[0]) for values in build.values]
         can = [(upper > 0, lower < 0) for lower, upper in over(build, leading)]
-        alike = [ca.is_equal(a, leading[build.covered[0]], _DEEP) for a in leading]
-        asked = {}
-        for sign, possible in zip((1, -1), can[build.covered[0]], strict=True):
-            if possible:
-                known = {k: 1 if c[0] else -1 for k, c in enumerate(can) if c[0] != c[1]}
-                same = {k: sign for k, equal in enumerate(alike) if equal}
-                asked[sign] = self._program({**known, **same})
-        return asked
+        first = build.covered[0]
+        known = {k: 1 if positive else -1 for k, (positive, negative) in enumerate(can) if positive != negative}
+        alike = [k for k, a in enumerate(leading) if ca.is_equal(a, leading[first], _DEEP)]
+        possible = [sign for sign, some in zip((1, -1), can[first], strict=True) if some]
+        return {sign: known | dict.fromkeys(alike, sign) for sign in possible}
 
-    def _program(self, signs: Mapping[int, int]) -> NLP:
-        problem = self.problem
-        frame = Frame(problem.model, signs, self.unit, tempts(problem, "abscissa"))
+    def leading(self, sign: int) -> NLP | None:
+        """The least leading coefficient under the constraints; None where the box alone keeps it away from 0."""
+        build = Builder(self.problem, self.cases)
+        first = build.covered[0]
+        build.objective = sign * ca.SX(compact(self.problem.model, build.values[first])[0])
+        if over(build, [build.objective])[0][0] > 0:
+            return None
+        rooted = [name for name, c in self.problem.conditions.items() if set(c.names) & set(ROOT_NAMES)]
+        build.constraints(without=rooted)
+        return build.finish("leading")
+
+    def program(self, sign: int, least: float = 0.0) -> NLP:
+        """The question as data, for one sign of a0, which is not below `least` in size."""
+        problem, signs = self.problem, self.signs()[sign]
+        frame = Frame(problem.model, signs, self.unit, tempts(problem, "abscissa"), self.compact, least)
         carried = {"abscissa": partial(half_planes, frame), "damping_ratio": partial(sectors, frame)}
         lifts: Mapping[str, Lifting] = carried
         build = Builder(problem, self.cases, lifts)

@@ -6,10 +6,8 @@ what the formula shares, the relaxation shares. Quotients, radicals and arctange
 
 import importlib.util
 import math
-import threading
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -25,7 +23,7 @@ FEASIBILITY = 1e-9
 """SCIP's feasibility tolerance: rows, scaled to about 1, may be off by so much."""
 
 _LEAST = 0.01  # seconds
-_TICK = 0.1
+_MARGIN = 1e-6  # relative, for what tolerances do to a bound
 
 INFEASIBLE, FOUND, UNDECIDED = "infeasible", "found", "undecided"
 
@@ -37,16 +35,26 @@ class Decision:
     Attributes:
         verdict: ``infeasible``, ``found``, or ``undecided`` when time ran out.
         point: of the NLP, where one was found.
-        bound: no feasible point has a lesser objective.
-        interrupted: whether the user stopped it.
+        bound: no feasible point has a lesser objective, if that was asked.
     """
 
     verdict: str
     point: NDArray[np.float64] | None = None
     bound: float = -math.inf
     nodes: int = 0
-    seconds: float = 0.0
-    interrupted: bool = False
+
+
+@dataclass(frozen=True)
+class Task:
+    """What SCIP is asked.
+
+    Attributes:
+        least: whether for the least objective; else for any feasible point.
+    """
+
+    nlp: NLP
+    seconds: float
+    least: bool = False
 
 
 @dataclass(frozen=True)
@@ -71,44 +79,38 @@ def available() -> bool:
     return importlib.util.find_spec("pyscipopt") is not None
 
 
-def decide(nlp: NLP, seconds: float, *, tick: Callable[[], None] = lambda: None) -> Decision:
-    """Whether an NLP has any feasible point.
+def task(nlp: NLP, seconds: float, *, least: bool = False) -> Task:
+    """An NLP for SCIP: whether it has any feasible point, or a bound on its objective."""
+    bare = replace(nlp, lifts=(), touches={}, products=(), cases=())  # what SCIP does not need cannot always be pickled
+    return Task(bare, seconds, least)
 
-    Args:
-        tick: called several times a second.
+
+def decide(asked: Task) -> Decision:
+    """Branch and bound.
 
     Raises:
         NotAccepted: for an operation that cannot be written for SCIP.
     """
-    if seconds <= 0:
-        return Decision(UNDECIDED)
     began = time.perf_counter()
-    translated = translate(nlp)
+    translated = translate(asked.nlp)
     if translated.impossible:
         return Decision(INFEASIBLE, bound=math.inf)
-    translated.model.setParam("limits/solutions", 1)
-    return run(translated, seconds - (time.perf_counter() - began), tick)
-
-
-def run(translated: Translated, seconds: float, tick: Callable[[], None] = lambda: None) -> Decision:
-    """Branch and bound on a model as it is, with an objective or without."""
     model = translated.model
-    model.setParam("limits/time", max(seconds, _LEAST))
+    if asked.least:
+        model.setObjective(translated.objective)
+    else:
+        model.setParam("limits/solutions", 1)
+    model.setParam("limits/time", max(asked.seconds - (time.perf_counter() - began), _LEAST))
     model.setParam("numerics/feastol", FEASIBILITY)
-    at_work = threading.Thread(target=model.optimizeNogil)
-    at_work.start()
-    while at_work.is_alive():
-        at_work.join(_TICK)
-        tick()
+    model.optimize()
     status, found = model.getStatus(), model.getNSols() > 0
     point = np.array([model.getVal(symbol) * scale for symbol, scale in translated.variables]) if found else None
+    bound = float(model.getDualbound())
     return Decision(
         verdict=INFEASIBLE if status == "infeasible" else FOUND if found else UNDECIDED,
         point=point,
-        bound=math.inf if status == "infeasible" else float(model.getDualbound()),
+        bound=math.inf if status == "infeasible" else bound - FEASIBILITY - _MARGIN * abs(bound),
         nodes=int(model.getNTotalNodes()),
-        seconds=float(model.getSolvingTime()),
-        interrupted=status == "userinterrupt",
     )
 
 
@@ -167,7 +169,7 @@ class _Translation:
 
     def free(self, lower: float, upper: float, over: Any = None) -> _Term:
         """A variable, scaled by a power of two to about 1."""
-        scale = _power_of_two(max(abs(lower), abs(upper)))
+        scale = min(_power_of_two(max(abs(lower), abs(upper))), 1.0)
         ends = [e / scale if math.isfinite(e) else None for e in (lower, upper)]
         self.count += 1
         symbol = self.scip.addVar(f"v{self.count}", lb=ends[0], ub=ends[1])
@@ -194,7 +196,7 @@ class _Translation:
         if term.degree == 0:
             self.impossible |= not lower - FEASIBILITY <= term.expression <= upper + FEASIBILITY
             return
-        size = size or _power_of_two(max(map(abs, term.ends)))
+        size = size or min(_power_of_two(max(map(abs, term.ends))), 1.0)
         if lower == upper:
             self.scip.addCons(term.expression / size == lower / size)
             return

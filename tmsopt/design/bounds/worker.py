@@ -1,0 +1,35 @@
+"""A process that runs SCIP: questions in on its standard input, decisions out on its standard output, pickled.
+
+SCIP can crash, and two of it in the threads of one process do. In a process of its own it takes nothing with it, can be
+stopped at any moment, and what it prints is not seen.
+"""
+
+import os
+import pickle
+
+from tmsopt.design.bounds.scip import Decision, Task, decide
+from tmsopt.design.bounds.walk import NotAccepted
+
+
+def serve() -> None:
+    """Answer until there are no more questions."""
+    questions, decisions = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    silence = os.open(os.devnull, os.O_RDWR)
+    for stream in (0, 1, 2):
+        os.dup2(silence, stream)
+    while True:
+        try:
+            task = pickle.load(questions)
+        except EOFError:
+            return
+        assert isinstance(task, Task)
+        try:
+            answer: Decision | NotAccepted = decide(task)
+        except NotAccepted as error:
+            answer = error
+        pickle.dump(answer, decisions)
+        decisions.flush()
+
+
+if __name__ == "__main__":
+    serve()
