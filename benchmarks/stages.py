@@ -139,9 +139,14 @@ def _reference(index: int, seed: int, ends: Sequence[Mapping[str, float]], claim
     problem = random_problem(index, seed)
     found = [_own(problem, starts=REFERENCE_STARTS, seed=1, exhaustive=not claimed_infeasible)]
     for end in ends:
-        start = {n: min(max(end[n], lower), upper) for n, (lower, upper) in problem.free.items()}
-        found.append(_own(replace(problem, start=start), starts=1))
+        found.append(_own(started_at(problem, end), starts=1))
     return min(found, key=lambda own: own.value if own.optimal else math.inf)
+
+
+def started_at(problem: Problem, design: Mapping[str, float]) -> Problem:
+    """The problem with a design, or the one nearest to it in the box, as its first start."""
+    start = {n: min(max(design[n], lower), upper) for n, (lower, upper) in problem.free.items()}
+    return replace(problem, start=start)
 
 
 def _own(problem: Problem, **options: Any) -> Own:

@@ -13,6 +13,7 @@ from tqdm import tqdm
 
 from benchmarks.evolution import Evolved, evolve
 from benchmarks.judge import NOWHERE, Verdict, verdict
+from benchmarks.stages import started_at
 from benchmarks.variety import varied_problem
 from tmsopt.design.problem import Problem
 from tmsopt.design.solve import solve
@@ -173,8 +174,7 @@ def _trial(index: int, seed: int, default: Attempt, starts: int = REFERENCE_STAR
 
 def _others(problem: Problem, evolved: Evolved, starts: int, exhaustive: bool) -> Iterator[Attempt]:
     """Where the default solve found nothing feasible, the search may give up early: the evolutions check that claim."""
-    start = {n: min(max(evolved.parameters[n], lo), hi) for n, (lo, hi) in problem.free.items()}
-    yield attempt("from the evolution", replace(problem, start=start), starts=1)
+    yield attempt("from the evolution", started_at(problem, evolved.parameters), starts=1)
     if starts:
         yield attempt(f"{starts} starts", problem, starts=starts, seed=1, exhaustive=exhaustive)
 
