@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tmsopt import laws, models, roots
+    from tmsopt.design.bounds.certify import certify
     from tmsopt.design.errors import InputError
     from tmsopt.design.files import load
     from tmsopt.design.nearest import Nearest, Robustness, nearest, robustness
@@ -43,6 +44,7 @@ __all__ = [
     "Solution",
     "Swallowtail",
     "Trace",
+    "certify",
     "chart",
     "compare",
     "domain",
@@ -79,6 +81,7 @@ _HOMES = {
     "Solution": "tmsopt.design.solution",
     "Swallowtail": "tmsopt.study.swallowtail",
     "Trace": "tmsopt.study.branch",
+    "certify": "tmsopt.design.bounds.certify",
     "chart": "tmsopt.study.chart",
     "compare": "tmsopt.study.compare",
     "domain": "tmsopt.study.domain",

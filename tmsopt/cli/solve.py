@@ -34,6 +34,7 @@ Examples:
   tmsopt solve problems/ep4.toml
   tmsopt solve problems/realistic.toml --plot growth.png
   tmsopt solve problems/realistic.toml --brief
+  tmsopt solve problems/realistic.toml --certify 30
   tmsopt solve problems/benchmark.toml --json | python -m json.tool
   tmsopt solve problems/pareto.toml --points 40 --plot front.png --csv front.csv
 
@@ -98,6 +99,15 @@ def _common(command: Command) -> Command:
 @click.option(
     "--brief", is_flag=True, help="Leave out what the optimum means: gains of limits moved, rounding, robustness."
 )
+@click.option(
+    "--certify",
+    type=click.FloatRange(min=0, min_open=True),
+    is_flag=False,
+    flag_value=60.0,
+    default=None,
+    metavar="[SECONDS]",
+    help="Prove within SECONDS that nothing better exists, or find it (SCIP). Write it after FILE. [60 if left out]",
+)
 @click.pass_context
 def solve(
     context: click.Context,
@@ -112,6 +122,7 @@ def solve(
     wheelbase: str,
     rear_mass: str,
     brief: bool,
+    certify: float | None,
 ) -> None:
     """Find the best design that the problem FILE asks for, or the front of the best ones."""
     with bad_input():
@@ -123,6 +134,10 @@ def solve(
         check_output("--csv", csv_file, ("csv",))
         problem = load(file)
         check_options(problem, _given(context))
+        if certify:
+            from tmsopt.design.bounds.certify import check_installed
+
+            check_installed()
     from tmsopt.design.search import STARTS
     from tmsopt.design.solution import NotSolved
     from tmsopt.design.solve import solve as solve_problem
@@ -141,6 +156,8 @@ def solve(
             solution = solve_problem(
                 problem, starts=starts or STARTS, seed=seed, linear_solver=linear_solver, throw=False, progress=update
             )
+        if certify:
+            solution = _certified(solution, certify)
     if as_json:
         write_json(solution.to_json() | ({} if brief else _meaning(solution)))
     else:
@@ -187,6 +204,14 @@ def compare(file: Path, as_json: bool, starts: int | None, seed: int, linear_sol
     else:
         click.echo(comparison_table(comparison))
     sys.exit(_EXIT[comparison.design.status])
+
+
+def _certified(solution: "Solution", seconds: float) -> "Solution":
+    """The solution with its bound, within seconds."""
+    from tmsopt.design.bounds.certify import certify
+
+    with progress("second") as update:
+        return certify(solution, seconds=seconds, progress=lambda done, most: update(round(done), round(most)))
 
 
 def _given(context: click.Context) -> list[str]:

@@ -10,6 +10,24 @@ from tmsopt.models import ParameterSet
 from tmsopt.show.text import number
 
 
+def bound_lines(solution: Solution) -> list[str]:
+    """What no design of the box can beat, and how that is known."""
+    bound = solution.bound
+    search = f"branch and bound with SCIP, {bound.nodes} nodes, {bound.seconds:.1f} s"
+    kind = f"a floating-point proof, feasibility tolerance {bound.tolerance:.0e}"
+    if solution.status == "infeasible":
+        return [f"proved: no design in the box satisfies all constraints ({search}); {kind}"] if bound.proven else []
+    if not math.isfinite(bound.value):
+        return [f"bound: none found in time ({search})"] if bound.tolerance else []
+    side = "above" if solution.problem.sense == "maximize" else "below"
+    lines = [f"bound: no design in the box is {side} {number(bound.value)} ({bound.method}); gap {bound.gap:.1e}"]
+    if bound.method == "scip":
+        lines.append(f"       {search}; {kind}")
+    elif bound.tolerance:
+        lines.append(f"       {search} found none better in time")
+    return lines
+
+
 def case_lines(solution: Solution) -> list[str]:
     """The worst case, and what is known of all of them."""
     if solution.worst is None:

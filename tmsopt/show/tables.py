@@ -1,6 +1,5 @@
 """Solutions and comparisons as text for a reader."""
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from tmsopt.design.solution import Solution
@@ -8,7 +7,7 @@ from tmsopt.design.units import reading
 from tmsopt.models.tms import GRAVITY, tms, to_si
 from tmsopt.roots import Root
 from tmsopt.show.build import pitching, quantity_rows
-from tmsopt.show.limits import case_lines, relaxation_lines
+from tmsopt.show.limits import bound_lines, case_lines, relaxation_lines
 from tmsopt.show.text import columns, number
 from tmsopt.study.compare import Comparison
 
@@ -59,8 +58,11 @@ def _headline(solution: Solution) -> str:
     text = problem.minimize or problem.maximize
     asked = f"{problem.sense} {text} = {number(solution.value)}" if text else ""
     located = f"locate {problem.locate}" if problem.locate else ""
-    proven = ", proven globally" if solution.bound.proven else ""
+    by = f" to {solution.bound.gap:.0e}" if solution.bound.tolerance else ""
+    proven = f", proven globally{by}" if solution.bound.proven else ""
     words = solution.status.replace("_", " ")
+    if solution.status == "infeasible":
+        proven = ", proven" if solution.bound.proven else ""
     return "   ".join(part for part in (f"{words}{proven}", located, asked, f"structure {solution.structure}") if part)
 
 
@@ -94,11 +96,7 @@ def _freedom(solution: Solution, name: str) -> str:
 
 def _facts(solution: Solution) -> list[str]:
     lines = ["roots: " + (", ".join(_roots(solution.roots)) or "none")]
-    bound = solution.bound
-    if math.isfinite(bound.value):
-        lines.append(
-            f"bound: no design in the box is below {number(bound.value)} ({bound.method}); gap {bound.gap:.1e}"
-        )
+    lines += bound_lines(solution)
     lines += case_lines(solution)
     free = solution.freedom
     if solution.problem.locate:

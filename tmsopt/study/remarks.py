@@ -69,12 +69,19 @@ def _quality(solution: Solution) -> str:
         count = solution.freedom.count
         left = f"; {count} more parameters are free than that takes" if count > 0 else ""
         return f"a design with {problem.locate}, as asked{left}"
+    by = f" by more than {bound.gap:.1e}" if bound.tolerance else ""
+    if bound.proven and text == "abscissa":
+        return f"no design in the box {faster}{by} (proven)"
     if bound.proven:
-        return f"no design in the box {faster} (proven)"
+        return (
+            f"no design in the box has a {'greater' if problem.sense == 'maximize' else 'lesser'} {text}{by} (proven)"
+        )
     tried = f"the best of {solution.starts.tried} starts, not proven"
     if math.isfinite(bound.value):
+        side = "above" if problem.sense == "maximize" else "below"
+        quantity = "an abscissa" if text == "abscissa" else f"a value of {text}"
         return (
-            f"{tried}; no design in the box has an abscissa below {bound.value:.6g}, which leaves {bound.gap:.2g} open"
+            f"{tried}; no design in the box has {quantity} {side} {bound.value:.6g}, which leaves {bound.gap:.2g} open"
         )
     end = "greatest" if problem.sense == "maximize" else "least"
     unit = problem.parameter_set[text].unit if text in problem.parameter_set.names else "1"

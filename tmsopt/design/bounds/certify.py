@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
+from tmsopt.design.bound import omega0_bound
 from tmsopt.design.bounds.answer import Clock, Progress, answer, doubt
 from tmsopt.design.bounds.program import Question
 from tmsopt.design.bounds.race import Crew
@@ -121,11 +122,11 @@ def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
 
 
 def _known(design: Solution) -> Bound:
-    """The bound there is without a search; a damping ratio is at most 1."""
+    """The bound there is without a search, found anew; a damping ratio is at most 1."""
     if design.problem.sense == "maximize" and (design.problem.maximize or "").strip() == "damping_ratio":
         gap = max(1.0 - design.value, 0.0)
         return Bound(1.0, gap, gap == 0, "definition")
-    return design.bound
+    return omega0_bound(design.problem, design.value)
 
 
 def _question(design: Solution, level: float) -> Question:

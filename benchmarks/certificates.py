@@ -1,0 +1,36 @@
+"""Random designs proved globally best, and what each idea does for it: ``python -m benchmarks.certificates``."""
+
+from pathlib import Path
+
+import click
+
+from benchmarks.proving import prove_suite, proved_section
+from benchmarks.report import keep
+from benchmarks.suite import SEED
+
+
+@click.group()
+def main() -> None:
+    """Global bounds on the random designs of the solve benchmark."""
+
+
+@main.command()
+@click.option("--count", default=200, show_default=True, help="problems")
+@click.option("--seconds", default=60.0, show_default=True, help="for each proof")
+@click.option(
+    "--output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    default=Path("benchmarks/results.md"),
+    show_default=True,
+    help="file that keeps the table",
+)
+def suite(count: int, seconds: float, output: Path) -> None:
+    """Prove each random design best, or each infeasible problem infeasible, and judge the bounds by the references."""
+    command = f"python -m benchmarks.certificates suite --count {count} --seconds {seconds:g}"
+    text = proved_section(prove_suite(count, SEED, seconds), command)
+    click.echo(text)
+    keep(output, "certificates", text)
+
+
+if __name__ == "__main__":
+    main()
