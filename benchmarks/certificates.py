@@ -4,6 +4,8 @@ from pathlib import Path
 
 import click
 
+from benchmarks.ladder import ladder as climb_ladder
+from benchmarks.ladder import ladder_section
 from benchmarks.proving import prove_suite, proved_section
 from benchmarks.report import keep
 from benchmarks.suite import SEED
@@ -30,6 +32,24 @@ def suite(count: int, seconds: float, output: Path) -> None:
     text = proved_section(prove_suite(count, SEED, seconds), command)
     click.echo(text)
     keep(output, "certificates", text)
+
+
+@main.command()
+@click.option("--seconds", default=10.0, show_default=True, help="for each proof")
+@click.option("--workers", default=2, show_default=True, help="processes")
+@click.option(
+    "--output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    default=Path("benchmarks/results.md"),
+    show_default=True,
+    help="file that keeps the table",
+)
+def ladder(seconds: float, workers: int, output: Path) -> None:
+    """Start from the plain model for SCIP and add one idea after the other."""
+    command = f"python -m benchmarks.certificates ladder --seconds {seconds:g}"
+    text = ladder_section(climb_ladder(seconds, workers), seconds, command)
+    click.echo(text)
+    keep(output, "ladder", text)
 
 
 if __name__ == "__main__":

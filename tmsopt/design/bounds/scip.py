@@ -114,13 +114,16 @@ def decide(asked: Task) -> Decision:
     )
 
 
-def translate(nlp: NLP) -> Translated:
+def translate(nlp: NLP, *, sharing: bool = True) -> Translated:
     """The SCIP model of an NLP.
+
+    Args:
+        sharing: give variables to what is used twice; otherwise all is multiplied out.
 
     Raises:
         NotAccepted: for an operation that cannot be written for SCIP.
     """
-    built = _Translation()
+    built = _Translation(sharing)
     x = [built.free(*ends) for ends in zip(nlp.lower, nlp.upper, strict=True)]
     objective, rows = walk(nlp.functions, x, built.arithmetic(), built.variable)
     for row, lower, upper in zip(rows, nlp.row_lower, nlp.row_upper, strict=True):
@@ -156,9 +159,10 @@ class _Term:
 class _Translation:
     """Collects variables and rows of a SCIP model; discarded once it is solved."""
 
-    def __init__(self) -> None:
+    def __init__(self, sharing: bool) -> None:
         import pyscipopt
 
+        self.sharing = sharing
         self.functions = pyscipopt
         self.scip = pyscipopt.Model()
         self.scip.hideOutput()
@@ -182,7 +186,7 @@ class _Translation:
 
     def variable(self, term: _Term) -> _Term:
         """The same, at most affine: what is of degree 2 gets a variable, once."""
-        if term.degree < 2:
+        if term.degree < 2 or not self.sharing:
             return term
         if id(term) not in self.known:
             new = self.defined(term.ball)
