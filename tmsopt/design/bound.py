@@ -50,6 +50,8 @@ def omega0_bound(problem: Problem, value: float) -> Bound:
     if not math.isfinite(largest):
         return Bound()
     bound = -(largest ** (1 / problem.model.degree)) * (1 + _ROUNDING)
+    if value < bound - PROVEN * (1 + abs(bound)):  # a feasible design contradicts it: it cannot be right
+        return Bound()
     gap = max(value - bound, 0.0)
     return Bound(bound, gap, closed(gap, bound), "omega0")
 

@@ -21,6 +21,7 @@ _ALIKE = 3  # candidates of one objective looked at closely
 _CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found")
 _SPURIOUS = 1e-3  # violation that no lack of digits explains: equations met only because all coefficients vanish
 _MULTIPLIER = 1e-9  # below it a limit does not bind
+_TOUCHES = 1e-10  # of a range: distance that IPOPT may leave to an end that binds
 _CLAIMED = 1e-6  # relative difference of the claimed objective from the design's own
 
 
@@ -175,7 +176,10 @@ def _active(problem: Problem, nlp: NLP, point: Point) -> dict[str, float]:
     for k, name in enumerate(problem.free):
         multiplier, x = float(point.bound_multipliers[k]), float(point.x[k])
         ends = [float(np.tan(e)) if of[name].tangent else e for e in problem.free[name]]
-        if abs(multiplier) > _MULTIPLIER and x in ends:  # not where two sides of the box meet
+        apart = _TOUCHES * (ends[1] - ends[0])
+        if (
+            abs(multiplier) > _MULTIPLIER and min(abs(x - e) for e in ends) <= apart
+        ):  # not where two sides of the box meet
             slope = 1 + x * x if of[name].tangent else 1.0  # d tan λ / dλ
             active[f"{name}.{'max' if multiplier > 0 else 'min'}"] = abs(multiplier) * slope
     return active

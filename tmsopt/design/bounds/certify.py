@@ -26,6 +26,7 @@ PROVEN = 1e-4
 _FINER = 1e-6  # proved next: closer to SCIP's own tolerance a smaller gap would be an illusion
 _COARSER = (1e-2, 1e-1, 1.0, 10.0)  # proved where the first cannot be
 _FLOOR = 0.1
+_CLOSE = 1.5  # ratio of a gap proved and one not proved that is not worth narrowing
 _SHARE = 0.6  # of the time that is left, for a gap that is not the last one to be tried
 _BETTER = 1e-9  # relative gain that counts as one
 _REPLACED = 5  # times that a design is replaced by a better one
@@ -89,22 +90,28 @@ def _bounded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
         return replace(design, bound=known), False
     if words := doubt(_question(design, -PROVEN), _free(design)):
         return _noted(design, f"no bound: {words}"), False
-    proved, level = math.inf, PROVEN
-    while True:
-        last = level in (_FINER, _COARSER[-1])
-        answered = answer(_question(design, level), clock, 1.0 if last else _SHARE, partial(_from, design))
+    proved, failed = math.inf, 0.0
+    while (level := _next(proved, failed)) is not None and clock.left > 0:
+        share = 1.0 if level in (_FINER, _COARSER[-1]) else _SHARE
+        answered = answer(_question(design, level), clock, share, partial(_from, design))
         if answered.better is not None:
             return answered.better, True
         if answered.verdict == INFEASIBLE:
             proved = level
-        coarser = [c for c in _COARSER if c > level]
-        if level == PROVEN and proved == PROVEN:
-            level = _FINER
-        elif proved < math.inf or level == _FINER or not coarser:
-            break
         else:
-            level = coarser[0]
+            failed = level
     return replace(design, bound=_stronger(design, known, _bound(design, proved, clock))), False
+
+
+def _next(proved: float, failed: float) -> float | None:
+    """The gap to try after the least one proved and the last one not proved; None when that is enough."""
+    if proved == math.inf:
+        return next((level for level in (PROVEN, *_COARSER) if level > failed), None)
+    if failed == 0:
+        return _FINER if proved > _FINER else None
+    if proved <= PROVEN or proved < _CLOSE * failed:
+        return None
+    return max(PROVEN, math.sqrt(proved * failed))
 
 
 def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
