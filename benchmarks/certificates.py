@@ -10,6 +10,14 @@ from benchmarks.proving import prove_suite, proved_section
 from benchmarks.report import keep
 from benchmarks.suite import SEED
 
+kept = click.option(
+    "--output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    default=Path("benchmarks/results.md"),
+    show_default=True,
+    help="file that keeps the table",
+)
+
 
 @click.group()
 def main() -> None:
@@ -19,13 +27,7 @@ def main() -> None:
 @main.command()
 @click.option("--count", default=200, show_default=True, help="problems")
 @click.option("--seconds", default=60.0, show_default=True, help="for each proof")
-@click.option(
-    "--output",
-    type=click.Path(dir_okay=False, path_type=Path),
-    default=Path("benchmarks/results.md"),
-    show_default=True,
-    help="file that keeps the table",
-)
+@kept
 def suite(count: int, seconds: float, output: Path) -> None:
     """Prove each random design best, or each infeasible problem infeasible, and judge the bounds by the references."""
     command = f"python -m benchmarks.certificates suite --count {count} --seconds {seconds:g}"
@@ -37,13 +39,7 @@ def suite(count: int, seconds: float, output: Path) -> None:
 @main.command()
 @click.option("--seconds", default=10.0, show_default=True, help="for each proof")
 @click.option("--workers", default=2, show_default=True, help="processes")
-@click.option(
-    "--output",
-    type=click.Path(dir_okay=False, path_type=Path),
-    default=Path("benchmarks/results.md"),
-    show_default=True,
-    help="file that keeps the table",
-)
+@kept
 def ladder(seconds: float, workers: int, output: Path) -> None:
     """Start from the plain model for SCIP and add one idea after the other."""
     command = f"python -m benchmarks.certificates ladder --seconds {seconds:g}"

@@ -32,6 +32,11 @@ class Enclosed:
     multiplicity: int = 1
 
     @property
+    def real(self) -> bool:
+        """Whether it is certainly real."""
+        return bool(self.im == 0)
+
+    @property
     def modulus(self) -> Any:
         """Ball of |s|."""
         return abs(self.re) if self.im == 0 else (self.re * self.re + self.im * self.im).sqrt()

@@ -9,7 +9,8 @@ from tmsopt.design.bound import omega0_bound
 from tmsopt.design.bounds.answer import Clock, Progress, answer, doubt
 from tmsopt.design.bounds.program import Question
 from tmsopt.design.bounds.race import Crew
-from tmsopt.design.bounds.scip import FEASIBILITY, INFEASIBLE, available
+from tmsopt.design.bounds.scip import INFEASIBLE, available
+from tmsopt.design.bounds.translation import FEASIBILITY
 from tmsopt.design.bounds.walk import NotAccepted
 from tmsopt.design.cases import Case
 from tmsopt.design.errors import Fault, InputError

@@ -8,25 +8,12 @@ from typing import Any
 import flint
 
 from tmsopt.roots import Pattern, lienard_chipart
+from tmsopt.roots.enclosed import Enclosed
 
 _LIKE = (0.7390851, 1.3247179, 2.6854520)  # unknowns with no relation, to see which factors are the same
 
 Factor = Sequence[Any]
 """Monic coefficients, descending."""
-
-
-@dataclass(frozen=True)
-class BallRoot:
-    """A root as balls; a real one has the imaginary part 0 exactly."""
-
-    re: Any
-    im: Any
-    multiplicity: int = 1
-
-    @property
-    def real(self) -> bool:
-        """Whether it is certainly real."""
-        return bool(self.im == 0)
 
 
 @dataclass(frozen=True)
@@ -36,14 +23,14 @@ class Factored:
     factors: tuple[tuple[Factor, int], ...]
 
     @cached_property
-    def roots(self) -> tuple[BallRoot, ...] | None:
+    def roots(self) -> tuple[Enclosed, ...] | None:
         """All roots, rightmost first, with exact multiplicities; None where the balls cannot tell two apart."""
-        found: list[BallRoot] = []
+        found: list[Enclosed] = []
         for factor, multiplicity in self.factors:
             own = roots_of(factor)
             if own is None:
                 return None
-            found += [BallRoot(z.re, z.im, multiplicity) for z in own]
+            found += [Enclosed(z.re, z.im, multiplicity) for z in own]
         if any(a.re.overlaps(b.re) and a.im.overlaps(b.im) for k, a in enumerate(found) for b in found[k + 1 :]):
             return None
         return tuple(sorted(found, key=lambda z: (-float(z.re), -float(z.im))))
@@ -106,27 +93,27 @@ def abscissa_formula(pattern: Pattern, unknowns: Sequence[Any]) -> Any:
     return max(formulas, key=lambda f: float(_constant(f)))
 
 
-def roots_of(factor: Factor) -> list[BallRoot] | None:
+def roots_of(factor: Factor) -> list[Enclosed] | None:
     """Roots of a factor that are certainly simple; None where the balls cannot tell."""
     nothing = flint.arb(0)
     match [flint.arb(c) for c in factor]:
         case [_, c]:
-            return [BallRoot(-c, nothing)]
+            return [Enclosed(-c, nothing)]
         case [_, b, c]:
             discriminant = b * b - 4 * c
             if discriminant > 0:
                 width = discriminant.sqrt()
                 far = (-b - width) / 2 if b > 0 else (width - b) / 2
-                return [BallRoot(far, nothing), BallRoot(-b - far if far.contains(0) else c / far, nothing)]
+                return [Enclosed(far, nothing), Enclosed(-b - far if far.contains(0) else c / far, nothing)]
             if discriminant < 0:
                 height = (-discriminant).sqrt() / 2
-                return [BallRoot(-b / 2, height), BallRoot(-b / 2, -height)]
+                return [Enclosed(-b / 2, height), Enclosed(-b / 2, -height)]
             return None
         case balls:
             return _isolated(balls)
 
 
-def _isolated(coefficients: Sequence[Any]) -> list[BallRoot] | None:
+def _isolated(coefficients: Sequence[Any]) -> list[Enclosed] | None:
     """Simple roots of a polynomial of any degree, isolated; None where that fails.
 
     A ball that touches the real axis holds a real root if its mirror image meets no other ball: the conjugate of
@@ -139,11 +126,11 @@ def _isolated(coefficients: Sequence[Any]) -> list[BallRoot] | None:
     found = []
     for k, z in enumerate(balls):
         if not z.imag.contains(0):
-            found.append(BallRoot(z.real, z.imag))
+            found.append(Enclosed(z.real, z.imag))
         elif any(z.conjugate().overlaps(w) for j, w in enumerate(balls) if j != k):
             return None
         else:
-            found.append(BallRoot(z.real, flint.arb(0)))
+            found.append(Enclosed(z.real, flint.arb(0)))
     return found if len(found) == len(coefficients) - 1 else None
 
 
@@ -171,7 +158,7 @@ def _rightmost(factor: Factor) -> Any:
     return top
 
 
-def _ratio(root: BallRoot) -> Any:
+def _ratio(root: Enclosed) -> Any:
     if root.real:
         return flint.arb(1) if root.re < 0 else flint.arb(-1) if root.re > 0 else None
     return -root.re / (root.re * root.re + root.im * root.im).sqrt()

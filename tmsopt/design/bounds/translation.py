@@ -1,0 +1,306 @@
+"""An NLP as factorable polynomial equations for SCIP.
+
+Every product of two expressions that are not affine gets a variable, and so does every expression that is used twice:
+what the formula shares, the relaxation shares. Quotients, radicals and arctangents become equations without them.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import flint
+
+from tmsopt.design.bounds.ranges import BALLS, Interval, ball, interval
+from tmsopt.design.bounds.walk import walk
+from tmsopt.design.nlp import NLP
+
+FEASIBILITY = 1e-9
+"""SCIP's feasibility tolerance: rows may be off by so much."""
+
+
+@dataclass(frozen=True)
+class Translated:
+    """An NLP as a SCIP model.
+
+    Attributes:
+        model: of pyscipopt; its objective is not set.
+        variables: SCIP's variable for each of the NLP's, and what it is to be multiplied by.
+        objective: expression to minimise.
+        impossible: whether a row without any variable is violated.
+    """
+
+    model: Any
+    variables: tuple[tuple[Any, float], ...]
+    objective: Any
+    impossible: bool
+
+
+def translate(nlp: NLP, *, sharing: bool = True) -> Translated:
+    """The SCIP model of an NLP.
+
+    Args:
+        sharing: give variables to what is used twice; otherwise all is multiplied out.
+
+    Raises:
+        NotAccepted: for an operation that cannot be written for SCIP.
+    """
+    built = _Translation(sharing)
+    x = [built.free(*ends) for ends in zip(nlp.lower, nlp.upper, strict=True)]
+    objective, rows = walk(nlp.functions, x, built.arithmetic(), built.variable)
+    for row, lower, upper in zip(rows, nlp.row_lower, nlp.row_upper, strict=True):
+        built.between(row, lower, upper)
+    least = built.variable(objective[0]).expression
+    return Translated(built.scip, tuple((v.symbol, v.scale) for v in x), least, built.impossible)
+
+
+@dataclass(frozen=True)
+class _Term:
+    """A result on the way: an expression of SCIP with its degree and range.
+
+    Attributes:
+        expression: a number where it is constant.
+        degree: 0, 1 or 2.
+        ball: its range.
+        tangent: what it is the arctangent of.
+        symbol, scale: of a variable, which is the expression divided by its scale.
+    """
+
+    expression: Any
+    degree: int
+    ball: Any
+    tangent: "_Term | None" = None
+    symbol: Any = None
+    scale: float = 1.0
+
+    @property
+    def ends(self) -> Interval:
+        return interval(self.ball) if self.degree else (self.expression, self.expression)
+
+
+class _Translation:
+    """Collects variables and rows of a SCIP model; discarded once it is solved."""
+
+    def __init__(self, sharing: bool) -> None:
+        import pyscipopt
+
+        self.sharing = sharing
+        self.functions = pyscipopt
+        self.scip = pyscipopt.Model()
+        self.scip.hideOutput()
+        self.count = 0
+        self.impossible = False
+        self.known: dict[int, _Term] = {}
+        self.kept: list[_Term] = []
+
+    def free(self, lower: float, upper: float, over: Any = None) -> _Term:
+        """A variable, scaled by a power of two to about 1."""
+        scale = min(_power_of_two(max(abs(lower), abs(upper))), 1.0)
+        ends = [e / scale if math.isfinite(e) else None for e in (lower, upper)]
+        self.count += 1
+        symbol = self.scip.addVar(f"v{self.count}", lb=ends[0], ub=ends[1])
+        return _Term(scale * symbol, 1, ball((lower, upper)) if over is None else over, symbol=symbol, scale=scale)
+
+    def defined(self, over: Any, lower: float = -math.inf) -> _Term:
+        """A variable for something with a known range."""
+        ends = interval(over)
+        return self.free(max(ends[0], lower), ends[1], over)
+
+    def variable(self, term: _Term) -> _Term:
+        """The same, at most affine: what is of degree 2 gets a variable, once."""
+        if term.degree < 2 or not self.sharing:
+            return term
+        if id(term) not in self.known:
+            new = self.defined(term.ball)
+            self.between(_Term(new.expression - term.expression, 2, term.ball), 0.0, 0.0, size=new.scale)
+            self.known[id(term)] = new
+            self.kept.append(term)
+        return self.known[id(term)]
+
+    def between(self, term: _Term, lower: float, upper: float, size: float | None = None) -> None:
+        """A row, scaled to about 1."""
+        if term.degree == 0:
+            self.impossible |= not lower - FEASIBILITY <= term.expression <= upper + FEASIBILITY
+            return
+        size = size or min(_power_of_two(max(map(abs, term.ends))), 1.0)
+        if lower == upper:
+            self.scip.addCons(term.expression / size == lower / size)
+            return
+        if math.isfinite(lower):
+            self.scip.addCons(term.expression / size >= lower / size)
+        if math.isfinite(upper):
+            self.scip.addCons(term.expression / size <= upper / size)
+
+    def arithmetic(self) -> dict[int, Any]:
+        """CasADi's operations."""
+        nonlinear = {"exp": ca.OP_EXP, "log": ca.OP_LOG, "sin": ca.OP_SIN, "cos": ca.OP_COS}
+        return {
+            ca.OP_CONST: _constant,
+            ca.OP_ADD: lambda a, b: self.sum(a, b, 1.0),
+            ca.OP_SUB: lambda a, b: self.sum(a, b, -1.0),
+            ca.OP_NEG: lambda a: self.times(a, -1.0),
+            ca.OP_TWICE: lambda a: self.times(a, 2.0),
+            ca.OP_MUL: self.product,
+            ca.OP_SQ: self.square,
+            ca.OP_DIV: self.quotient,
+            ca.OP_INV: lambda a: self.quotient(_constant(1.0), a),
+            ca.OP_SQRT: self.root,
+            ca.OP_POW: self.power,
+            ca.OP_CONSTPOW: self.power,
+            ca.OP_TAN: self.tangent,
+            ca.OP_ATAN: self.arctangent,
+            ca.OP_ASIN: lambda a: self.inverse(a, "sin", ca.OP_ASIN),
+            ca.OP_ACOS: lambda a: self.inverse(a, "cos", ca.OP_ACOS),
+            ca.OP_FABS: self.size,
+            ca.OP_FMAX: lambda a, b: self.extreme(a, b, 0.5),
+            ca.OP_FMIN: lambda a, b: self.extreme(a, b, -0.5),
+            **{op: lambda a, name=name, op=op: self.applied(a, name, op) for name, op in nonlinear.items()},
+        }
+
+    def sum(self, a: _Term, b: _Term, sign: float) -> _Term:
+        over = BALLS[ca.OP_ADD](a.ball, sign * b.ball)
+        return _Term(a.expression + sign * b.expression, max(a.degree, b.degree), over)
+
+    def times(self, a: _Term, factor: float) -> _Term:
+        return _Term(factor * a.expression, a.degree, factor * a.ball)
+
+    def product(self, a: _Term, b: _Term) -> _Term:
+        for constant, other in ((a, b), (b, a)):
+            if constant.degree == 0:
+                return self.times(other, constant.expression)
+        a, b = self.variable(a), self.variable(b)
+        return _Term(a.expression * b.expression, 2, a.ball * b.ball)
+
+    def square(self, a: _Term) -> _Term:
+        if a.degree == 0:
+            return _constant(a.expression**2)
+        a = self.variable(a)
+        return _Term(a.expression * a.expression, 2, BALLS[ca.OP_SQ](a.ball))
+
+    def quotient(self, a: _Term, b: _Term) -> _Term:
+        """q with q b = a; where b may vanish, of any size."""
+        if b.degree == 0:
+            return self.times(a, 1 / b.expression) if b.expression else self.undefined()
+        b = self.variable(b)
+        q = self.defined(a.ball / b.ball)
+        over = _Term(None, 2, a.ball)
+        self.between(_Term(q.expression * b.expression - a.expression, 2, over.ball), 0.0, 0.0)
+        return q
+
+    def root(self, a: _Term) -> _Term:
+        """r ≥ 0 with r² = a."""
+        if a.degree == 0:
+            return _constant(math.sqrt(a.expression)) if a.expression >= 0 else self.undefined()
+        least, most = (max(e, 0.0) for e in a.ends)
+        self.impossible |= a.ends[1] < 0
+        r = self.free(math.nextafter(math.sqrt(least), 0), math.nextafter(math.sqrt(most), math.inf))
+        self.between(_Term(r.expression * r.expression - a.expression, 2, a.ball), 0.0, 0.0)
+        return r
+
+    def power(self, a: _Term, b: _Term) -> _Term:
+        if b.degree > 0:  # a^b = exp(b log a)
+            return self.applied(self.product(b, self.applied(a, "log", ca.OP_LOG)), "exp", ca.OP_EXP)
+        exponent = b.expression
+        if exponent == 0.5:
+            return self.root(a)
+        if exponent != int(exponent):
+            return self.power(a, _Term(None, 1, b.ball)) if a.degree == 0 else self._fractional(a, b)
+        if exponent < 0:
+            return self.quotient(_constant(1.0), self.power(a, _constant(-exponent)))
+        if exponent == 0:
+            return _constant(1.0)
+        half = self.power(a, _constant(exponent // 2)) if exponent > 1 else _constant(1.0)
+        even = self.square(half) if exponent > 1 else half
+        return self.product(even, a) if exponent % 2 else even
+
+    def _fractional(self, a: _Term, b: _Term) -> _Term:
+        logarithm = self.applied(a, "log", ca.OP_LOG)
+        return self.applied(self.times(logarithm, b.expression), "exp", ca.OP_EXP)
+
+    def applied(self, a: _Term, name: str, operation: int) -> _Term:
+        """A function that SCIP has."""
+        if a.degree == 0:
+            return _constant(getattr(math, name)(a.expression))
+        if a.tangent is not None and name in ("sin", "cos"):
+            cosine, sine = self.on_circle(a.tangent)
+            return sine if name == "sin" else cosine
+        a = self.variable(a)
+        v = self.defined(BALLS[operation](a.ball))
+        self.scip.addCons(v.expression / v.scale == getattr(self.functions, name)(a.expression) / v.scale)
+        return v
+
+    def on_circle(self, t: _Term) -> tuple[_Term, _Term]:
+        """Cosine and sine of the arctangent of t: C > 0, S = t C, C² + S² = 1."""
+        key = -id(t)
+        if key not in self.known:
+            angle = t.ball.atan()
+            cosine, sine = self.defined(angle.cos(), lower=0.0), self.defined(angle.sin())
+            self.between(self.sum(sine, self.product(t, cosine), -1.0), 0.0, 0.0)
+            self.between(self.sum(self.square(sine), self.square(cosine), 1.0), 1.0, 1.0)
+            self.known[key] = _Term((cosine, sine), 1, None)
+            self.kept.append(t)
+        pair: tuple[_Term, _Term] = self.known[key].expression
+        return pair
+
+    def arctangent(self, t: _Term) -> _Term:
+        """An angle, its sine and cosine through its tangent."""
+        if t.degree == 0:
+            return _constant(math.atan(t.expression))
+        t = self.variable(t)
+        key = id(t)
+        if key not in self.known:
+            angle = self.defined(t.ball.atan())
+            self.known[key] = _Term(angle.expression, 1, angle.ball, tangent=t)
+            self.kept.append(t)
+            cosine, sine = self.on_circle(t)
+            for part, name in ((cosine, "cos"), (sine, "sin")):
+                self.scip.addCons(part.expression == getattr(self.functions, name)(angle.expression))
+        return self.known[key]
+
+    def tangent(self, a: _Term) -> _Term:
+        if a.tangent is not None:
+            return a.tangent
+        return self.quotient(self.applied(a, "sin", ca.OP_SIN), self.applied(a, "cos", ca.OP_COS))
+
+    def inverse(self, a: _Term, name: str, operation: int) -> _Term:
+        """An angle whose sine or cosine is given."""
+        if a.degree == 0:
+            return _constant(float(BALLS[operation](flint.arb(a.expression))))
+        ends = (-math.pi / 2, math.pi / 2) if name == "sin" else (0.0, math.pi)
+        over = BALLS[operation](a.ball)
+        angle = self.defined(over) if over.is_finite() else self.free(*ends)
+        self.scip.addCons(self.variable(a).expression == getattr(self.functions, name)(angle.expression))
+        return angle
+
+    def size(self, a: _Term) -> _Term:
+        """|a|, which SCIP has."""
+        if a.degree == 0:
+            return _constant(abs(a.expression))
+        a = self.variable(a)
+        lower, upper = a.ends
+        if lower >= 0 or upper <= 0:
+            return self.times(a, 1.0 if lower >= 0 else -1.0)
+        v = self.defined(abs(a.ball), lower=0.0)
+        self.scip.addCons(v.expression / v.scale == abs(a.expression) / v.scale)
+        return v
+
+    def extreme(self, a: _Term, b: _Term, half: float) -> _Term:
+        """The greater of two, for half 1/2, or the lesser, for −1/2: (a + b)/2 ± |a − b|/2."""
+        middle = self.times(self.sum(a, b, 1.0), 0.5)
+        return self.sum(middle, self.times(self.size(self.sum(a, b, -1.0)), half), 1.0)
+
+    def undefined(self) -> _Term:
+        """What does not exist, for any design."""
+        self.impossible = True
+        return _constant(0.0)
+
+
+def _constant(value: float) -> _Term:
+    return _Term(float(value), 0, flint.arb(value))
+
+
+def _power_of_two(size: float) -> float:
+    """Nearest power of two, from above; 1 where there is no size."""
+    if not (math.isfinite(size) and size > 0):
+        return 1.0
+    return float(2.0 ** math.ceil(math.log2(size)))
