@@ -80,6 +80,9 @@ def found(
         converged = False
         claimed = claim(problem, trial.candidate)
         notes = (f"the solver's objective {claimed:.9g} is not the design's, {checked.objective:.9g}",)
+    if problem.objective is not None and not math.isfinite(checked.objective):
+        converged = False
+        notes = ("the objective does not exist at the design where the search ended; constrain what it divides by",)
     status = "optimal" if converged and not checked.violations else "not_converged"
     if counted.kind == "over-determined" and checked.violations:
         status = "infeasible"

@@ -23,7 +23,6 @@ _FIRST = 2.0  # seconds for the first turn, twice as many for each that follows
 _WAYS = (((1.0, False), (1.0, True)), ((4.0, False), (0.25, False)), ((16.0, False), (4.0, True)))
 """Turns: units, as multiples of the usual one, and whether compact."""
 
-Confirm = Callable[[Mapping[str, float]], Solution | None]
 Progress = Callable[[float, float], None]
 
 
@@ -34,6 +33,7 @@ class Clock:
         self.seconds, self.crew, self.progress = seconds, crew, progress
         self.began = time.perf_counter()
         self.nodes = 0
+        self.interrupted = False
 
     @property
     def used(self) -> float:
@@ -42,12 +42,16 @@ class Clock:
 
     @property
     def left(self) -> float:
-        """Seconds to the end."""
-        return max(self.seconds - self.used, 0.0)
+        """Seconds to the end; none after an interruption."""
+        return 0.0 if self.interrupted else max(self.seconds - self.used, 0.0)
 
     def race(self, tasks: Sequence[Task]) -> list[Decision]:
-        """Decisions on tasks, all at once until one is shown to have no feasible point."""
-        decisions = self.crew.race(tasks, self.tick)
+        """Decisions on tasks, all at once until one is shown to have no feasible point; none if the user interrupts."""
+        try:
+            decisions = self.crew.race(tasks, self.tick)
+        except KeyboardInterrupt:
+            self.interrupted = True
+            return [Decision(UNDECIDED)]
         self.nodes += sum(decision.nodes for decision in decisions)
         return decisions
 
@@ -63,11 +67,16 @@ class Answer:
 
     Attributes:
         verdict: ``infeasible``: no design; ``found``; ``undecided``.
-        better: what was made of the design that was found.
+        better: the optimum that was reached from the design that was found.
+        other: that design, where it is feasible and better, and no optimum was reached from it.
     """
 
     verdict: str
     better: Solution | None = None
+    other: Mapping[str, float] | None = None
+
+
+Confirm = Callable[[Mapping[str, float]], Answer]
 
 
 def answer(question: Question, clock: Clock, share: float, confirm: Confirm) -> Answer:
@@ -77,7 +86,7 @@ def answer(question: Question, clock: Clock, share: float, confirm: Confirm) -> 
     a short time, and then anew in others for longer.
 
     Args:
-        confirm: makes a better design of one that was found; None if it is none, but for SCIP's tolerance.
+        confirm: what to make of a design that was found; ``undecided`` if it is none, but for SCIP's tolerance.
 
     Raises:
         NotAccepted: for an operation that cannot be written for SCIP.
@@ -98,18 +107,19 @@ def _asked(question: Question, sign: int, clock: Clock, end: float, confirm: Con
         if least == math.inf:  # not even the constraints can be met
             return Answer(INFEASIBLE)
     for turn in count():
-        if end - clock.used <= 0:
+        left = min(end - clock.used, clock.left)
+        if left <= 0:
             return Answer(UNDECIDED)
-        seconds = min(end - clock.used, _FIRST * 2**turn)
+        seconds = min(left, _FIRST * 2**turn)
         ways = [replace(question, unit=question.unit * u, compact=c) for u, c in _WAYS[turn % len(_WAYS)]]
         decisions = clock.race([task(way.program(sign, max(least, 0.0)), seconds) for way in ways])
         if any(decision.verdict == INFEASIBLE for decision in decisions):
             return Answer(INFEASIBLE)
         for decision in decisions:
             if decision.point is not None:
-                better = confirm(design_of(question.problem, decision.point.tolist()))
-                if better is not None:
-                    return Answer(FOUND, better)
+                found = confirm(design_of(question.problem, decision.point.tolist()))
+                if found.verdict == FOUND:
+                    return found
     raise AssertionError  # unreachable: time ends
 
 

@@ -6,15 +6,16 @@ from dataclasses import replace
 from functools import partial
 
 from tmsopt.design.bound import omega0_bound
-from tmsopt.design.bounds.answer import Clock, Progress, answer, doubt
+from tmsopt.design.bounds.answer import Answer, Clock, Progress, answer, doubt
 from tmsopt.design.bounds.program import Question
 from tmsopt.design.bounds.race import Crew
-from tmsopt.design.bounds.scip import INFEASIBLE, available
+from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, UNDECIDED, available
 from tmsopt.design.bounds.translation import FEASIBILITY
 from tmsopt.design.bounds.walk import NotAccepted
 from tmsopt.design.cases import Case
 from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.problem import Problem, unasked
+from tmsopt.design.recheck import recheck
 from tmsopt.design.solution import Bound, Solution
 from tmsopt.design.solve import solve
 
@@ -70,7 +71,7 @@ def certify(design: Solution | Problem, *, seconds: float = SECONDS, progress: P
                     break
         except NotAccepted as error:
             return _noted(design, f"branch and bound cannot take {error}, so there is no bound")
-    return design
+        return _noted(design, "the proof was interrupted") if clock.interrupted else design
 
 
 def check_installed() -> None:
@@ -97,6 +98,8 @@ def _bounded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
         answered = answer(_question(design, level), clock, share, partial(_from, design))
         if answered.better is not None:
             return answered.better, True
+        if answered.other is not None:
+            design = _beaten(design, answered.other)
         if answered.verdict == INFEASIBLE:
             proved = level
         else:
@@ -126,7 +129,8 @@ def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
         bound = Bound(none, 0.0, True, "scip", clock.used, clock.nodes, FEASIBILITY)
         return replace(design, status="infeasible", bound=bound), False
     words = "branch and bound did not decide in time whether any design is feasible"
-    return _noted(replace(design, bound=_bound(design, math.inf, clock)), words), False
+    left = replace(design, bound=_bound(design, math.inf, clock))
+    return _noted(_beaten(left, answered.other) if answered.other else left, words), False
 
 
 def _known(design: Solution) -> Bound:
@@ -158,23 +162,34 @@ def _stronger(design: Solution, known: Bound, searched: Bound) -> Bound:
     return replace(searched, value=known.value, gap=known.gap, proven=proven, method=known.method)
 
 
-def _from(design: Solution, start: Mapping[str, float]) -> Solution | None:
-    """A better design, solved for from the one that SCIP found; None where that is not confirmed."""
+def _from(design: Solution, start: Mapping[str, float]) -> Answer:
+    """What the design that SCIP found leads to: a better optimum, or itself, if it is feasible and better at all."""
     problem = design.problem
     for starts in _STARTS:
         found = solve(replace(problem, start=start), starts=starts, throw=False)
-        if found.status == "optimal" and (design.status != "optimal" or _gain(design, found) > _BETTER):
-            before = f"{design.value:.9g}" if design.status == "optimal" else "none"
-            words = f"branch and bound found a better design than the search from many starts: {before} before"
-            return _noted(replace(found, problem=problem), words)
-    return None
+        if found.status == "optimal" and (design.status != "optimal" or _gain(design, found.value) > _BETTER):
+            before = f"{design.value:.9g} before" if design.status == "optimal" else "none before"
+            words = f"branch and bound found a better design than the search from many starts: {before}"
+            return Answer(FOUND, better=_noted(replace(found, problem=problem), words))
+    checked = recheck(problem, problem.ordered(start), _cases(design))
+    if not checked.violations and (design.status != "optimal" or _gain(design, checked.objective) > _BETTER):
+        return Answer(FOUND, other={**start, "objective": checked.objective})
+    return Answer(UNDECIDED)
 
 
-def _gain(design: Solution, found: Solution) -> float:
+def _beaten(design: Solution, other: Mapping[str, float]) -> Solution:
+    """The design, with the words that it is not the best one."""
+    of = ", ".join(f"{name} = {value:.9g}" for name, value in other.items())
+    words = f"not the best: branch and bound found {of}, from which the solver did not converge; start it from there"
+    kept = tuple(note for note in design.notes if not note.startswith("not the best"))
+    return replace(design, notes=(*kept, words))
+
+
+def _gain(design: Solution, value: float) -> float:
     """Relative improvement of the objective."""
-    if design.problem.objective is None:
+    if design.problem.objective is None or not math.isfinite(value):
         return 0.0
-    return _sense(design.problem) * (design.value - found.value) / max(_FLOOR, abs(design.value))
+    return _sense(design.problem) * (design.value - value) / max(_FLOOR, abs(design.value))
 
 
 def _sense(problem: Problem) -> float:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import casadi as ca
@@ -69,8 +70,8 @@ def half_planes(
     frame: Frame, build: Builder, covered: Sequence[int], values: Sequence[Values], line: float | None = None
 ) -> Lifted:
     """Every root of every case at or left of a line: a known one, or a variable."""
-    at = build.variable("abscissa") if line is None else line
     looked = [case for case in covered if case in frame.signs]
+    at = build.variable("abscissa", *_reach(frame, build, looked, values)) if line is None else line
     for case in looked:
         c = frame.about(values, case, at)
         edges = interlace(build, case, c, frame.largest(over(build, c)), frame.compact)
@@ -78,6 +79,12 @@ def half_planes(
             build.row("abscissa", math.prod(edges), 0.0, 0.0)
     size = (line is None) + len(looked) * unknowns(frame.model.degree)
     return Lifted(ca.SX(at), Lift("abscissa", size, partial(_half_plane_guess, frame, looked, line)), (), ())
+
+
+def _reach(frame: Frame, build: Builder, looked: Sequence[int], values: Sequence[Values]) -> tuple[float, float]:
+    """Range of the abscissa: it is no larger than the largest root."""
+    most = max(frame.unit * frame.largest(over(build, frame.coefficients(values, case))) for case in looked)
+    return -most, most
 
 
 def sectors(
@@ -94,6 +101,8 @@ def sectors(
             p = build.variable(f"p{k}.{case}", -2 * largest, 2 * largest)
             pairs.append((p, build.variable(f"w{k}.{case}", 0.0, largest)))
             build.row("damping_ratio", pairs[-1][0] - 2 * zeta * pairs[-1][1], 0.0, np.inf)
+        for one, other in pairwise(pairs):  # their order means nothing
+            build.row("damping_ratio", other[0] - one[0], 0.0, np.inf)
         build.equal("damping_ratio", a, [a[0] * c for c in product(*([1, p, w * w] for p, w in pairs))])
     size = (ratio is None) + len(looked) * 2 * (frame.model.degree // 2)
     return Lifted(ca.SX(zeta), Lift("damping_ratio", size, partial(_sector_guess, frame, looked, ratio)), (), ())
@@ -128,6 +137,7 @@ def _sector_guess(
     least = min(float(values[case]["damping_ratio"]) for case in covered)
     factors = []
     for case in covered:
-        for pair in quadratic_pairs(z[case] / frame.unit):
-            factors += [float(-pair.sum().real), math.sqrt(abs(float(pair.prod().real)))]
+        pairs = quadratic_pairs(z[case] / frame.unit)
+        for p, q in sorted((float(-pair.sum().real), abs(float(pair.prod().real))) for pair in pairs):
+            factors += [p, math.sqrt(q)]
     return [[*([least] if ratio is None else []), *factors]]

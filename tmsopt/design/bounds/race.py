@@ -93,4 +93,10 @@ class _Job:
 
 def _started() -> Any:
     command = [sys.executable, "-m", "tmsopt.design.bounds.worker"]
-    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    return subprocess.Popen(
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,  # an interrupt is for this process alone
+    )
