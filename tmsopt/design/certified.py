@@ -72,7 +72,9 @@ def certified(
                     numbers[key] = number
         if roots is not None and all(key in numbers for key in balls):
             break
-    return _assembled(checked, {**known, **numbers})
+    # At the very end of where a quantity exists, as Fr_c = 0, rounding of the parameters alone may carry it beyond.
+    lost = {key for key, number in numbers.items() if math.isnan(number) and math.isfinite(known.get(key, math.nan))}
+    return _assembled(checked, {**known, **{key: x for key, x in numbers.items() if key not in lost}})
 
 
 def _known(checked: Checked) -> dict[_Key, float]:
