@@ -7,6 +7,7 @@ four of two factors, and where it and the line are known, what is asked of the c
 c3 = x c1 and c2 x ≥ c0 x² + c4.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any
@@ -56,8 +57,11 @@ def interlace(build: Rows, case: int, coefficients: Sequence[Any], largest: floa
     Args:
         compact: take X/(1 − X) for the squares, so that no bound on the roots is needed.
     """
-    count = unknowns(len(coefficients) - 1)
-    most = 1.0 if compact else largest * largest
+    degree = len(coefficients) - 1
+    count = unknowns(degree)
+    # The phase of p(iω) is least where all roots are at −R: degree · atan(ω/R), at the last frequency (degree − 2) π/2.
+    reach = max(1.0, math.tan(math.pi / 2 - math.pi / degree)) if degree > 4 else 1.0
+    most = 1.0 if compact else (largest * reach) ** 2
     unknown = [build.variable(f"x{k}.{case}", 0.0, most) for k in range(1, count + 1)]
     equations, nonnegative = interlacing(coefficients, [(x, 1 - x if compact else 1) for x in unknown])
     for expression in equations:

@@ -47,10 +47,11 @@ class Frame:
         """The same of p(t + line)."""
         return shift(self.coefficients(values, case), line / self.unit)
 
-    def largest(self, ranges: Sequence[Interval]) -> float:
-        """Bound on the roots for coefficients in ranges."""
+    def largest(self, ranges: Sequence[Interval], first: bool) -> float:
+        """Bound on the roots for coefficients in ranges, of the first case or of another."""
         (lower, upper), *others = ranges
-        return root_bound([(max(lower, self.least), max(upper, self.least)), *others])
+        least = self.least if first else -math.inf
+        return root_bound([(max(lower, least), max(upper, least)), *others])
 
 
 def compact(model: Model, values: Values) -> list[Any]:
@@ -74,7 +75,7 @@ def half_planes(
     at = build.variable("abscissa", *_reach(frame, build, looked, values)) if line is None else line
     for case in looked:
         c = frame.about(values, case, at)
-        edges = interlace(build, case, c, frame.largest(over(build, c)), frame.compact)
+        edges = interlace(build, case, c, frame.largest(over(build, c), case == covered[0]), frame.compact)
         if line is None and frame.touching and len(covered) == 1:
             build.row("abscissa", math.prod(edges), 0.0, 0.0)
     size = (line is None) + len(looked) * unknowns(frame.model.degree)
@@ -82,29 +83,40 @@ def half_planes(
 
 
 def _reach(frame: Frame, build: Builder, looked: Sequence[int], values: Sequence[Values]) -> tuple[float, float]:
-    """Range of the abscissa: it is no larger than the largest root."""
-    most = max(frame.unit * frame.largest(over(build, frame.coefficients(values, case))) for case in looked)
-    return -most, most
+    """Range of the abscissa: it is no larger than the largest root, unless that is one of a case not looked at."""
+    most = max(
+        frame.unit * frame.largest(over(build, frame.coefficients(values, case)), case == looked[0]) for case in looked
+    )
+    return -most, most if len(values) == 1 or not frame.touching else math.inf
 
 
 def sectors(
     frame: Frame, build: Builder, covered: Sequence[int], values: Sequence[Values], ratio: float | None = None
 ) -> Lifted:
-    """Every root of every case with at least a damping ratio: p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ."""
+    """Every root of every case with at least a damping ratio: p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ.
+
+    A root s > 0 has ζ = −1, and with another s < 0 no such factor. Where ζ may be −1, the factors are s² + pᵢ s + qᵢ,
+    with qᵢ = wᵢ² asked only of other ζ: (1 + ζ)(wᵢ² − qᵢ) = 0; where it is known to be, nothing is asked.
+    """
     zeta = build.variable("damping_ratio", -1.0, 1.0) if ratio is None else ratio
-    looked = [case for case in covered if case in frame.signs]
+    looked = [case for case in covered if case in frame.signs and (ratio is None or ratio > -1)]
     for case in looked:
         a = frame.coefficients(values, case)
-        largest = frame.largest(over(build, a))
+        largest = frame.largest(over(build, a), case == covered[0])
         pairs = []
         for k in range(1, (len(a) - 1) // 2 + 1):
             p = build.variable(f"p{k}.{case}", -2 * largest, 2 * largest)
-            pairs.append((p, build.variable(f"w{k}.{case}", 0.0, largest)))
-            build.row("damping_ratio", pairs[-1][0] - 2 * zeta * pairs[-1][1], 0.0, np.inf)
-        for one, other in pairwise(pairs):  # their order means nothing
-            build.row("damping_ratio", other[0] - one[0], 0.0, np.inf)
-        build.equal("damping_ratio", a, [a[0] * c for c in product(*([1, p, w * w] for p, w in pairs))])
-    size = (ratio is None) + len(looked) * 2 * (frame.model.degree // 2)
+            w = build.variable(f"w{k}.{case}", 0.0, largest)
+            q = build.variable(f"q{k}.{case}", -largest * largest, largest * largest) if ratio is None else w * w
+            pairs.append((p, q))
+            build.row("damping_ratio", p - 2 * zeta * w, 0.0, np.inf)
+            if ratio is None:
+                build.row("damping_ratio", (1 + zeta) * (w * w - q), 0.0, 0.0)
+                build.row("damping_ratio", w * w - q, 0.0, np.inf)
+        for (one, _), (other, _) in pairwise(pairs):  # their order means nothing
+            build.row("damping_ratio", other - one, 0.0, np.inf)
+        build.equal("damping_ratio", a, [a[0] * c for c in product(*([1, p, q] for p, q in pairs))])
+    size = (ratio is None) + len(looked) * (2 + (ratio is None)) * (frame.model.degree // 2)
     return Lifted(ca.SX(zeta), Lift("damping_ratio", size, partial(_sector_guess, frame, looked, ratio)), (), ())
 
 
@@ -134,10 +146,12 @@ def _half_plane_guess(
 def _sector_guess(
     frame: Frame, covered: Sequence[int], ratio: float | None, values: Sequence[Values], z: Sequence[Roots]
 ) -> list[list[float]]:
-    least = min(float(values[case]["damping_ratio"]) for case in covered)
     factors = []
     for case in covered:
         pairs = quadratic_pairs(z[case] / frame.unit)
-        for p, q in sorted((float(-pair.sum().real), abs(float(pair.prod().real))) for pair in pairs):
-            factors += [p, math.sqrt(q)]
-    return [[*([least] if ratio is None else []), *factors]]
+        for p, q in sorted((float(-pair.sum().real), float(pair.prod().real)) for pair in pairs):
+            unstable = q < 0 or (p < 0 and p * p >= 4 * q)  # a root s > 0
+            factors += [p, abs(p) / 2 if unstable else math.sqrt(q), *([q] if ratio is None else [])]
+    if ratio is not None:
+        return [factors]
+    return [[min(float(values[case]["damping_ratio"]) for case in covered), *factors]]

@@ -108,9 +108,11 @@ def _threshold(condition: Expression, name: str, worse: float) -> float | None:
     """The value that a comparison allows a quantity at worst, where it is linear in that and nothing else."""
     if condition.names != (name,) or condition.comparison == "==":
         return None
-    at = [float(condition({name: value})) for value in (0.0, 0.5, 1.0)]
-    slope = at[2] - at[0]
-    if not abs(at[0] - 2 * at[1] + at[2]) <= 1e-12 * abs(slope):
+    symbol = ca.SX.sym(name)
+    difference = ca.SX(condition.symbolic({name: symbol}))
+    if not ca.is_linear(difference, symbol):  # |ζ| ≥ 1/2 looks linear from 0 to 1
         return None
+    at = [float(condition({name: value})) for value in (0.0, 1.0)]
+    slope = at[1] - at[0]
     falls = -1.0 if condition.comparison == ">=" else 1.0
     return -at[0] / slope if slope * falls * worse > 0 else None

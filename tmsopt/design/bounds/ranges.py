@@ -55,8 +55,8 @@ def root_bound(coefficients: Sequence[Interval]) -> float:
 
 def square(x: Any) -> Any:
     """x², not negative."""
-    size = abs(x)
-    return (size.lower() ** 2).union(size.upper() ** 2) if x.is_finite() else flint.arb(0, math.inf)
+    # abs(x) of a ball around 0 reaches below 0, by as much as the ball has on its lesser side
+    return (x.abs_lower() ** 2).union(x.abs_upper() ** 2) if x.is_finite() else flint.arb(0, math.inf)
 
 
 def power(x: Any, y: Any) -> Any:

@@ -12,11 +12,16 @@ import casadi as ca
 import flint
 
 from tmsopt.design.bounds.ranges import BALLS, Interval, ball, interval
-from tmsopt.design.bounds.walk import walk
+from tmsopt.design.bounds.walk import NotAccepted, walk
 from tmsopt.design.nlp import NLP
 
 FEASIBILITY = 1e-9
 """SCIP's feasibility tolerance: rows may be off by so much."""
+
+_LEAST_POWER = -60  # of two, of a scale: what is smaller is as good as 0
+_LARGE = 1e3  # numbers up to which a coefficient below 1e-9 counts for nothing: SCIP drops it
+_WHOLE = 1000  # exponent up to which a power is taken
+_HUGE = 1e15  # beyond which numbers are left to nobody: from 1e20 SCIP takes them for infinite
 
 
 @dataclass(frozen=True)
@@ -95,7 +100,7 @@ class _Translation:
 
     def free(self, lower: float, upper: float, over: Any = None) -> _Term:
         """A variable, scaled by a power of two to about 1."""
-        scale = min(_power_of_two(max(abs(lower), abs(upper))), 1.0)
+        scale = _scale(max(abs(lower), abs(upper)))
         ends = [e / scale if math.isfinite(e) else None for e in (lower, upper)]
         self.count += 1
         symbol = self.scip.addVar(f"v{self.count}", lb=ends[0], ub=ends[1])
@@ -122,7 +127,7 @@ class _Translation:
         if term.degree == 0:
             self.impossible |= not lower - FEASIBILITY <= term.expression <= upper + FEASIBILITY
             return
-        size = size or min(_power_of_two(max(map(abs, term.ends))), 1.0)
+        size = size or _scale(max(map(abs, term.ends)))
         if lower == upper:
             self.scip.addCons(term.expression / size == lower / size)
             return
@@ -162,6 +167,8 @@ class _Translation:
         return _Term(a.expression + sign * b.expression, max(a.degree, b.degree), over)
 
     def times(self, a: _Term, factor: float) -> _Term:
+        if 0 < abs(factor) < FEASIBILITY:
+            _refuse_huge(a.ball, "a small multiple", _LARGE)
         return _Term(factor * a.expression, a.degree, factor * a.ball)
 
     def product(self, a: _Term, b: _Term) -> _Term:
@@ -198,35 +205,56 @@ class _Translation:
         return r
 
     def power(self, a: _Term, b: _Term) -> _Term:
-        if b.degree > 0:  # a^b = exp(b log a)
+        if b.degree > 0:  # a^b = exp(b log a), where a cannot be 0, nor negative with a b that is whole
+            if not a.ends[0] > 0:
+                raise NotAccepted("a power with a variable exponent of what may be 0 or negative")
             return self.applied(self.product(b, self.applied(a, "log", ca.OP_LOG)), "exp", ca.OP_EXP)
         exponent = b.expression
         if exponent == 0.5:
             return self.root(a)
-        if exponent != int(exponent):
-            return self.power(a, _Term(None, 1, b.ball)) if a.degree == 0 else self._fractional(a, b)
+        if abs(exponent) > _WHOLE:
+            raise NotAccepted(f"a power with an exponent beyond {_WHOLE}")
+        if a.degree > 0 and a.ball.is_finite():
+            _refuse_huge(BALLS[ca.OP_POW](a.ball, b.ball), "a power")
         if exponent < 0:
             return self.quotient(_constant(1.0), self.power(a, _constant(-exponent)))
+        if exponent != int(exponent):
+            return self.fractional(a, exponent)
         if exponent == 0:
             return _constant(1.0)
         half = self.power(a, _constant(exponent // 2)) if exponent > 1 else _constant(1.0)
         even = self.square(half) if exponent > 1 else half
         return self.product(even, a) if exponent % 2 else even
 
-    def _fractional(self, a: _Term, b: _Term) -> _Term:
-        logarithm = self.applied(a, "log", ca.OP_LOG)
-        return self.applied(self.times(logarithm, b.expression), "exp", ca.OP_EXP)
+    def fractional(self, a: _Term, exponent: float) -> _Term:
+        """a ≥ 0 to a positive power, 0 included."""
+        least, most = (max(e, 0.0) for e in a.ends)
+        self.impossible |= a.ends[1] < 0
+        if a.degree == 0:
+            return _constant(least**exponent)
+        a = self.variable(a)
+        low, high = (
+            flint.arb(e) ** flint.arb(exponent) if math.isfinite(e) else flint.arb("inf") for e in (least, most)
+        )
+        v = self.free(max(interval(low)[0], 0.0), interval(high)[1])
+        self.scip.addCons(v.expression / v.scale == a.expression**exponent / v.scale)
+        return v
 
     def applied(self, a: _Term, name: str, operation: int) -> _Term:
         """A function that SCIP has."""
         if a.degree == 0:
             return _constant(getattr(math, name)(a.expression))
+        if name == "exp":
+            _refuse_huge(BALLS[operation](a.ball), "exp")
         if a.tangent is not None and name in ("sin", "cos"):
             cosine, sine = self.on_circle(a.tangent)
             return sine if name == "sin" else cosine
         a = self.variable(a)
         v = self.defined(BALLS[operation](a.ball))
-        self.scip.addCons(v.expression / v.scale == getattr(self.functions, name)(a.expression) / v.scale)
+        if name == "log":  # SCIP keeps the argument of its own away from 0
+            self.scip.addCons(a.expression / a.scale == self.functions.exp(v.expression) / a.scale)
+        else:
+            self.scip.addCons(v.expression / v.scale == getattr(self.functions, name)(a.expression) / v.scale)
         return v
 
     def on_circle(self, t: _Term) -> tuple[_Term, _Term]:
@@ -296,11 +324,24 @@ class _Translation:
 
 
 def _constant(value: float) -> _Term:
+    if math.isfinite(value) and abs(value) > _HUGE:
+        raise NotAccepted(f"numbers beyond {_HUGE:g}")
     return _Term(float(value), 0, flint.arb(value))
+
+
+def _refuse_huge(over: Any, name: str, most: float = _HUGE) -> None:
+    if over.is_finite() and max(map(abs, interval(over))) > most:
+        raise NotAccepted(f"{name} of numbers beyond {most:g}")
+
+
+def _scale(size: float) -> float:
+    """What to divide a variable or row by that is at most so large."""
+    power = _power_of_two(size)
+    return min(power, 1.0)
 
 
 def _power_of_two(size: float) -> float:
     """Nearest power of two, from above; 1 where there is no size."""
     if not (math.isfinite(size) and size > 0):
         return 1.0
-    return float(2.0 ** math.ceil(math.log2(size)))
+    return float(2.0 ** min(max(math.ceil(math.log2(size)), _LEAST_POWER), 1000))
