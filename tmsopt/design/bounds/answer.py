@@ -12,12 +12,13 @@ from tmsopt.design.bounds.program import Question
 from tmsopt.design.bounds.race import Crew
 from tmsopt.design.bounds.ranges import ranges
 from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, UNDECIDED, Decision, Task, task
-from tmsopt.design.formulations import design_of
+from tmsopt.design.formulations import design_of, variables_of
 from tmsopt.design.solution import Solution
 from tmsopt.design.starts import complete
 
 _HOLDS = 1e-6  # of a row, relative to its range: SCIP itself asks for 1e-9, and multiple roots have half the digits
 
+_AROUND = 1e-4  # of a range
 _TIGHTENING = 1.0  # seconds to keep a0 away from 0
 _FIRST = 2.0  # seconds for the first turn, twice as many for each that follows
 _WAYS = (((1.0, False), (1.0, True)), ((4.0, False), (0.25, False)), ((16.0, False), (4.0, True)))
@@ -146,3 +147,18 @@ def doubt(question: Question, design: Mapping[str, float]) -> str:
         return "the question admits no design, so not even the one that was found"
     excess, name = min(nearest)
     return "" if excess <= _HOLDS else f"the question excludes the design that was found: {name} by {excess:.2g}"
+
+
+def contradicted(question: Question, design: Mapping[str, float], clock: Clock) -> bool:
+    """Whether SCIP finds nothing feasible even close around a design that is: then its other answers are worthless too.
+
+    `doubt` looks at the equations; this looks at what became of them in SCIP, its ranges and tolerances included.
+    """
+    at = variables_of(question.problem, design)
+    verdicts = []
+    for sign in question.signs():
+        nlp = question.program(sign)
+        ends = [(lo, hi, _AROUND * (hi - lo)) for lo, hi in zip(nlp.lower, nlp.upper, strict=True)]
+        near = tuple((max(lo, x - d), min(hi, x + d)) for x, (lo, hi, d) in zip(at, ends, strict=False))
+        verdicts += [d.verdict for d in clock.race([task(nlp, min(_TIGHTENING, clock.left), within=near)])]
+    return all(verdict == INFEASIBLE for verdict in verdicts)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 
 from tmsopt.design.bound import omega0_bound
-from tmsopt.design.bounds.answer import Answer, Clock, Progress, answer, doubt
+from tmsopt.design.bounds.answer import Answer, Clock, Progress, answer, contradicted, doubt
 from tmsopt.design.bounds.program import Question
 from tmsopt.design.bounds.race import Crew
 from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, UNDECIDED, available
@@ -90,8 +90,11 @@ def _bounded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     known = _known(design)
     if known.proven:
         return replace(design, bound=known), False
-    if words := doubt(_question(design, -PROVEN), _free(design)):
+    admitted = _question(design, -PROVEN)
+    if words := doubt(admitted, _free(design)):
         return _noted(design, f"no bound: {words}"), False
+    if contradicted(admitted, _free(design), clock):
+        return _noted(design, "no bound: SCIP's relaxation excludes the design that was found"), False
     proved, failed = math.inf, 0.0
     while (level := _next(proved, failed)) is not None and clock.left > 0:
         share = 1.0 if level in (_FINER, _COARSER[-1]) else _SHARE

@@ -39,11 +39,13 @@ class Task:
 
     Attributes:
         least: whether for the least objective; else for any feasible point.
+        within: limits for the first variables, narrower than their ranges.
     """
 
     nlp: NLP
     seconds: float
     least: bool = False
+    within: tuple[tuple[float, float], ...] = ()
 
 
 def available() -> bool:
@@ -51,10 +53,10 @@ def available() -> bool:
     return importlib.util.find_spec("pyscipopt") is not None
 
 
-def task(nlp: NLP, seconds: float, *, least: bool = False) -> Task:
+def task(nlp: NLP, seconds: float, *, least: bool = False, within: tuple[tuple[float, float], ...] = ()) -> Task:
     """An NLP for SCIP: whether it has any feasible point, or a bound on its objective."""
     bare = replace(nlp, lifts=(), touches={}, products=(), cases=())  # what SCIP does not need cannot always be pickled
-    return Task(bare, seconds, least)
+    return Task(bare, seconds, least, within)
 
 
 def decide(asked: Task) -> Decision:
@@ -68,6 +70,9 @@ def decide(asked: Task) -> Decision:
     if translated.impossible:
         return Decision(INFEASIBLE, bound=math.inf)
     model = translated.model
+    for (symbol, scale), (lower, upper) in zip(translated.variables, asked.within, strict=False):
+        model.chgVarLb(symbol, lower / scale)
+        model.chgVarUb(symbol, upper / scale)
     if asked.least:
         model.setObjective(translated.objective)
     else:

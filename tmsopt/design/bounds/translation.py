@@ -11,17 +11,16 @@ from typing import Any
 import casadi as ca
 import flint
 
-from tmsopt.design.bounds.ranges import BALLS, Interval, ball, interval
+from tmsopt.design.bounds.ranges import BALLS, ball, interval
+from tmsopt.design.bounds.terms import Term, constant, refuse_huge, scale_of
 from tmsopt.design.bounds.walk import NotAccepted, walk
 from tmsopt.design.nlp import NLP
 
 FEASIBILITY = 1e-9
 """SCIP's feasibility tolerance: rows may be off by so much."""
 
-_LEAST_POWER = -60  # of two, of a scale: what is smaller is as good as 0
 _LARGE = 1e3  # numbers up to which a coefficient below 1e-9 counts for nothing: SCIP drops it
 _WHOLE = 1000  # exponent up to which a power is taken
-_HUGE = 1e15  # beyond which numbers are left to nobody: from 1e20 SCIP takes them for infinite
 
 
 @dataclass(frozen=True)
@@ -59,30 +58,6 @@ def translate(nlp: NLP, *, sharing: bool = True) -> Translated:
     return Translated(built.scip, tuple((v.symbol, v.scale) for v in x), least, built.impossible)
 
 
-@dataclass(frozen=True)
-class _Term:
-    """A result on the way: an expression of SCIP with its degree and range.
-
-    Attributes:
-        expression: a number where it is constant.
-        degree: 0, 1 or 2.
-        ball: its range.
-        tangent: what it is the arctangent of.
-        symbol, scale: of a variable, which is the expression divided by its scale.
-    """
-
-    expression: Any
-    degree: int
-    ball: Any
-    tangent: "_Term | None" = None
-    symbol: Any = None
-    scale: float = 1.0
-
-    @property
-    def ends(self) -> Interval:
-        return interval(self.ball) if self.degree else (self.expression, self.expression)
-
-
 class _Translation:
     """Collects variables and rows of a SCIP model; discarded once it is solved."""
 
@@ -95,39 +70,39 @@ class _Translation:
         self.scip.hideOutput()
         self.count = 0
         self.impossible = False
-        self.known: dict[int, _Term] = {}
-        self.kept: list[_Term] = []
+        self.known: dict[int, Term] = {}
+        self.kept: list[Term] = []
 
-    def free(self, lower: float, upper: float, over: Any = None) -> _Term:
+    def free(self, lower: float, upper: float, over: Any = None) -> Term:
         """A variable, scaled by a power of two to about 1."""
-        scale = _scale(max(abs(lower), abs(upper)))
+        scale = scale_of(max(abs(lower), abs(upper)))
         ends = [e / scale if math.isfinite(e) else None for e in (lower, upper)]
         self.count += 1
         symbol = self.scip.addVar(f"v{self.count}", lb=ends[0], ub=ends[1])
-        return _Term(scale * symbol, 1, ball((lower, upper)) if over is None else over, symbol=symbol, scale=scale)
+        return Term(scale * symbol, 1, ball((lower, upper)) if over is None else over, symbol=symbol, scale=scale)
 
-    def defined(self, over: Any, lower: float = -math.inf) -> _Term:
+    def defined(self, over: Any, lower: float = -math.inf) -> Term:
         """A variable for something with a known range."""
         ends = interval(over)
         return self.free(max(ends[0], lower), ends[1], over)
 
-    def variable(self, term: _Term) -> _Term:
+    def variable(self, term: Term) -> Term:
         """The same, at most affine: what is of degree 2 gets a variable, once."""
         if term.degree < 2 or not self.sharing:
             return term
         if id(term) not in self.known:
             new = self.defined(term.ball)
-            self.between(_Term(new.expression - term.expression, 2, term.ball), 0.0, 0.0, size=new.scale)
+            self.between(Term(new.expression - term.expression, 2, term.ball), 0.0, 0.0, size=new.scale)
             self.known[id(term)] = new
             self.kept.append(term)
         return self.known[id(term)]
 
-    def between(self, term: _Term, lower: float, upper: float, size: float | None = None) -> None:
+    def between(self, term: Term, lower: float, upper: float, size: float | None = None) -> None:
         """A row, scaled to about 1."""
         if term.degree == 0:
             self.impossible |= not lower - FEASIBILITY <= term.expression <= upper + FEASIBILITY
             return
-        size = size or _scale(max(map(abs, term.ends)))
+        size = size or scale_of(max(map(abs, term.ends)))
         if lower == upper:
             self.scip.addCons(term.expression / size == lower / size)
             return
@@ -140,7 +115,7 @@ class _Translation:
         """CasADi's operations."""
         nonlinear = {"exp": ca.OP_EXP, "log": ca.OP_LOG, "sin": ca.OP_SIN, "cos": ca.OP_COS}
         return {
-            ca.OP_CONST: _constant,
+            ca.OP_CONST: constant,
             ca.OP_ADD: lambda a, b: self.sum(a, b, 1.0),
             ca.OP_SUB: lambda a, b: self.sum(a, b, -1.0),
             ca.OP_NEG: lambda a: self.times(a, -1.0),
@@ -148,7 +123,7 @@ class _Translation:
             ca.OP_MUL: self.product,
             ca.OP_SQ: self.square,
             ca.OP_DIV: self.quotient,
-            ca.OP_INV: lambda a: self.quotient(_constant(1.0), a),
+            ca.OP_INV: lambda a: self.quotient(constant(1.0), a),
             ca.OP_SQRT: self.root,
             ca.OP_POW: self.power,
             ca.OP_CONSTPOW: self.power,
@@ -162,49 +137,49 @@ class _Translation:
             **{op: lambda a, name=name, op=op: self.applied(a, name, op) for name, op in nonlinear.items()},
         }
 
-    def sum(self, a: _Term, b: _Term, sign: float) -> _Term:
+    def sum(self, a: Term, b: Term, sign: float) -> Term:
         over = BALLS[ca.OP_ADD](a.ball, sign * b.ball)
-        return _Term(a.expression + sign * b.expression, max(a.degree, b.degree), over)
+        return Term(a.expression + sign * b.expression, max(a.degree, b.degree), over)
 
-    def times(self, a: _Term, factor: float) -> _Term:
+    def times(self, a: Term, factor: float) -> Term:
         if 0 < abs(factor) < FEASIBILITY:
-            _refuse_huge(a.ball, "a small multiple", _LARGE)
-        return _Term(factor * a.expression, a.degree, factor * a.ball)
+            refuse_huge(a.ball, "a small multiple", _LARGE)
+        return Term(factor * a.expression, a.degree, factor * a.ball)
 
-    def product(self, a: _Term, b: _Term) -> _Term:
-        for constant, other in ((a, b), (b, a)):
-            if constant.degree == 0:
-                return self.times(other, constant.expression)
+    def product(self, a: Term, b: Term) -> Term:
+        for fixed, other in ((a, b), (b, a)):
+            if fixed.degree == 0:
+                return self.times(other, fixed.expression)
         a, b = self.variable(a), self.variable(b)
-        return _Term(a.expression * b.expression, 2, a.ball * b.ball)
+        return Term(a.expression * b.expression, 2, a.ball * b.ball)
 
-    def square(self, a: _Term) -> _Term:
+    def square(self, a: Term) -> Term:
         if a.degree == 0:
-            return _constant(a.expression**2)
+            return constant(a.expression**2)
         a = self.variable(a)
-        return _Term(a.expression * a.expression, 2, BALLS[ca.OP_SQ](a.ball))
+        return Term(a.expression * a.expression, 2, BALLS[ca.OP_SQ](a.ball))
 
-    def quotient(self, a: _Term, b: _Term) -> _Term:
+    def quotient(self, a: Term, b: Term) -> Term:
         """q with q b = a; where b may vanish, of any size."""
         if b.degree == 0:
             return self.times(a, 1 / b.expression) if b.expression else self.undefined()
         b = self.variable(b)
         q = self.defined(a.ball / b.ball)
-        over = _Term(None, 2, a.ball)
-        self.between(_Term(q.expression * b.expression - a.expression, 2, over.ball), 0.0, 0.0)
+        over = Term(None, 2, a.ball)
+        self.between(Term(q.expression * b.expression - a.expression, 2, over.ball), 0.0, 0.0)
         return q
 
-    def root(self, a: _Term) -> _Term:
+    def root(self, a: Term) -> Term:
         """r ≥ 0 with r² = a."""
         if a.degree == 0:
-            return _constant(math.sqrt(a.expression)) if a.expression >= 0 else self.undefined()
+            return constant(math.sqrt(a.expression)) if a.expression >= 0 else self.undefined()
         least, most = (max(e, 0.0) for e in a.ends)
         self.impossible |= a.ends[1] < 0
         r = self.free(math.nextafter(math.sqrt(least), 0), math.nextafter(math.sqrt(most), math.inf))
-        self.between(_Term(r.expression * r.expression - a.expression, 2, a.ball), 0.0, 0.0)
+        self.between(Term(r.expression * r.expression - a.expression, 2, a.ball), 0.0, 0.0)
         return r
 
-    def power(self, a: _Term, b: _Term) -> _Term:
+    def power(self, a: Term, b: Term) -> Term:
         if b.degree > 0:  # a^b = exp(b log a), where a cannot be 0, nor negative with a b that is whole
             if not a.ends[0] > 0:
                 raise NotAccepted("a power with a variable exponent of what may be 0 or negative")
@@ -215,23 +190,23 @@ class _Translation:
         if abs(exponent) > _WHOLE:
             raise NotAccepted(f"a power with an exponent beyond {_WHOLE}")
         if a.degree > 0 and a.ball.is_finite():
-            _refuse_huge(BALLS[ca.OP_POW](a.ball, b.ball), "a power")
+            refuse_huge(BALLS[ca.OP_POW](a.ball, b.ball), "a power")
         if exponent < 0:
-            return self.quotient(_constant(1.0), self.power(a, _constant(-exponent)))
+            return self.quotient(constant(1.0), self.power(a, constant(-exponent)))
         if exponent != int(exponent):
             return self.fractional(a, exponent)
         if exponent == 0:
-            return _constant(1.0)
-        half = self.power(a, _constant(exponent // 2)) if exponent > 1 else _constant(1.0)
+            return constant(1.0)
+        half = self.power(a, constant(exponent // 2)) if exponent > 1 else constant(1.0)
         even = self.square(half) if exponent > 1 else half
         return self.product(even, a) if exponent % 2 else even
 
-    def fractional(self, a: _Term, exponent: float) -> _Term:
+    def fractional(self, a: Term, exponent: float) -> Term:
         """a ≥ 0 to a positive power, 0 included."""
         least, most = (max(e, 0.0) for e in a.ends)
         self.impossible |= a.ends[1] < 0
         if a.degree == 0:
-            return _constant(least**exponent)
+            return constant(least**exponent)
         a = self.variable(a)
         low, high = (
             flint.arb(e) ** flint.arb(exponent) if math.isfinite(e) else flint.arb("inf") for e in (least, most)
@@ -240,12 +215,12 @@ class _Translation:
         self.scip.addCons(v.expression / v.scale == a.expression**exponent / v.scale)
         return v
 
-    def applied(self, a: _Term, name: str, operation: int) -> _Term:
+    def applied(self, a: Term, name: str, operation: int) -> Term:
         """A function that SCIP has."""
         if a.degree == 0:
-            return _constant(getattr(math, name)(a.expression))
+            return constant(getattr(math, name)(a.expression))
         if name == "exp":
-            _refuse_huge(BALLS[operation](a.ball), "exp")
+            refuse_huge(BALLS[operation](a.ball), "exp")
         if a.tangent is not None and name in ("sin", "cos"):
             cosine, sine = self.on_circle(a.tangent)
             return sine if name == "sin" else cosine
@@ -257,7 +232,7 @@ class _Translation:
             self.scip.addCons(v.expression / v.scale == getattr(self.functions, name)(a.expression) / v.scale)
         return v
 
-    def on_circle(self, t: _Term) -> tuple[_Term, _Term]:
+    def on_circle(self, t: Term) -> tuple[Term, Term]:
         """Cosine and sine of the arctangent of t: C > 0, S = t C, C² + S² = 1."""
         key = -id(t)
         if key not in self.known:
@@ -265,45 +240,45 @@ class _Translation:
             cosine, sine = self.defined(angle.cos(), lower=0.0), self.defined(angle.sin())
             self.between(self.sum(sine, self.product(t, cosine), -1.0), 0.0, 0.0)
             self.between(self.sum(self.square(sine), self.square(cosine), 1.0), 1.0, 1.0)
-            self.known[key] = _Term((cosine, sine), 1, None)
+            self.known[key] = Term((cosine, sine), 1, None)
             self.kept.append(t)
-        pair: tuple[_Term, _Term] = self.known[key].expression
+        pair: tuple[Term, Term] = self.known[key].expression
         return pair
 
-    def arctangent(self, t: _Term) -> _Term:
+    def arctangent(self, t: Term) -> Term:
         """An angle, its sine and cosine through its tangent."""
         if t.degree == 0:
-            return _constant(math.atan(t.expression))
+            return constant(math.atan(t.expression))
         t = self.variable(t)
         key = id(t)
         if key not in self.known:
             angle = self.defined(t.ball.atan())
-            self.known[key] = _Term(angle.expression, 1, angle.ball, tangent=t)
+            self.known[key] = Term(angle.expression, 1, angle.ball, tangent=t)
             self.kept.append(t)
             cosine, sine = self.on_circle(t)
             for part, name in ((cosine, "cos"), (sine, "sin")):
                 self.scip.addCons(part.expression == getattr(self.functions, name)(angle.expression))
         return self.known[key]
 
-    def tangent(self, a: _Term) -> _Term:
+    def tangent(self, a: Term) -> Term:
         if a.tangent is not None:
             return a.tangent
         return self.quotient(self.applied(a, "sin", ca.OP_SIN), self.applied(a, "cos", ca.OP_COS))
 
-    def inverse(self, a: _Term, name: str, operation: int) -> _Term:
+    def inverse(self, a: Term, name: str, operation: int) -> Term:
         """An angle whose sine or cosine is given."""
         if a.degree == 0:
-            return _constant(float(BALLS[operation](flint.arb(a.expression))))
+            return constant(float(BALLS[operation](flint.arb(a.expression))))
         ends = (-math.pi / 2, math.pi / 2) if name == "sin" else (0.0, math.pi)
         over = BALLS[operation](a.ball)
         angle = self.defined(over) if over.is_finite() else self.free(*ends)
         self.scip.addCons(self.variable(a).expression == getattr(self.functions, name)(angle.expression))
         return angle
 
-    def size(self, a: _Term) -> _Term:
+    def size(self, a: Term) -> Term:
         """|a|, which SCIP has."""
         if a.degree == 0:
-            return _constant(abs(a.expression))
+            return constant(abs(a.expression))
         a = self.variable(a)
         lower, upper = a.ends
         if lower >= 0 or upper <= 0:
@@ -312,36 +287,12 @@ class _Translation:
         self.scip.addCons(v.expression / v.scale == abs(a.expression) / v.scale)
         return v
 
-    def extreme(self, a: _Term, b: _Term, half: float) -> _Term:
+    def extreme(self, a: Term, b: Term, half: float) -> Term:
         """The greater of two, for half 1/2, or the lesser, for −1/2: (a + b)/2 ± |a − b|/2."""
         middle = self.times(self.sum(a, b, 1.0), 0.5)
         return self.sum(middle, self.times(self.size(self.sum(a, b, -1.0)), half), 1.0)
 
-    def undefined(self) -> _Term:
+    def undefined(self) -> Term:
         """What does not exist, for any design."""
         self.impossible = True
-        return _constant(0.0)
-
-
-def _constant(value: float) -> _Term:
-    if math.isfinite(value) and abs(value) > _HUGE:
-        raise NotAccepted(f"numbers beyond {_HUGE:g}")
-    return _Term(float(value), 0, flint.arb(value))
-
-
-def _refuse_huge(over: Any, name: str, most: float = _HUGE) -> None:
-    if over.is_finite() and max(map(abs, interval(over))) > most:
-        raise NotAccepted(f"{name} of numbers beyond {most:g}")
-
-
-def _scale(size: float) -> float:
-    """What to divide a variable or row by that is at most so large."""
-    power = _power_of_two(size)
-    return min(power, 1.0)
-
-
-def _power_of_two(size: float) -> float:
-    """Nearest power of two, from above; 1 where there is no size."""
-    if not (math.isfinite(size) and size > 0):
-        return 1.0
-    return float(2.0 ** min(max(math.ceil(math.log2(size)), _LEAST_POWER), 1000))
+        return constant(0.0)

@@ -1,0 +1,61 @@
+"""Results on the way to SCIP's expressions, and numbers that it cannot be trusted with."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import flint
+
+from tmsopt.design.bounds.ranges import Interval, interval
+from tmsopt.design.bounds.walk import NotAccepted
+
+_LEAST_POWER = -60  # of two, of a scale: what is smaller is as good as 0
+_HUGE = 1e15  # beyond which numbers are left to nobody: from 1e20 SCIP takes them for infinite
+
+
+@dataclass(frozen=True)
+class Term:
+    """A result on the way: an expression of SCIP with its degree and range.
+
+    Attributes:
+        expression: a number where it is constant.
+        degree: 0, 1 or 2.
+        ball: its range.
+        tangent: what it is the arctangent of.
+        symbol, scale: of a variable, which is the expression divided by its scale.
+    """
+
+    expression: Any
+    degree: int
+    ball: Any
+    tangent: "Term | None" = None
+    symbol: Any = None
+    scale: float = 1.0
+
+    @property
+    def ends(self) -> Interval:
+        return interval(self.ball) if self.degree else (self.expression, self.expression)
+
+
+def constant(value: float) -> Term:
+    if math.isfinite(value) and abs(value) > _HUGE:
+        raise NotAccepted(f"numbers beyond {_HUGE:g}")
+    return Term(float(value), 0, flint.arb(value))
+
+
+def refuse_huge(over: Any, name: str, most: float = _HUGE) -> None:
+    if over.is_finite() and max(map(abs, interval(over))) > most:
+        raise NotAccepted(f"{name} of numbers beyond {most:g}")
+
+
+def scale_of(size: float) -> float:
+    """What to divide a variable or row by that is at most so large."""
+    power = _power_of_two(size)
+    return min(power, 1.0)
+
+
+def _power_of_two(size: float) -> float:
+    """Nearest power of two, from above; 1 where there is no size."""
+    if not (math.isfinite(size) and size > 0):
+        return 1.0
+    return float(2.0 ** min(max(math.ceil(math.log2(size)), _LEAST_POWER), 1000))
