@@ -21,11 +21,11 @@ def check_options(problem: "Problem", given: Sequence[str]) -> None:
     from tmsopt.design.errors import Fault, InputError
 
     if problem.pareto:
-        wrong = [o for o in given if o in ("--wheelbase", "--rear-mass", "--certify")]
-        message = (
-            "is for one design, and the file asks for a front; write the problem in SI for other scales, and minimize "
-            "one of the expressions for a bound on it"
-        )
+        if "--certify" in given:
+            message = "is for one design, and the file asks for a front; write minimize with one of the expressions"
+            raise InputError([Fault(message, ("--certify",))])
+        wrong = [o for o in given if o in ("--wheelbase", "--rear-mass")]
+        message = "scales one design, and the file asks for a front; write the problem in SI instead"
     else:
         wrong = [o for o in given if o in ("--points", "--csv")]
         message = 'is for a front; write pareto = ["abscissa", "Fr"] under [objective], or leave the option out'

@@ -74,6 +74,22 @@ def _common(command: Command) -> Command:
     return command
 
 
+class _Seconds(click.ParamType[float]):
+    """A time, or what was meant for another argument."""
+
+    name = "seconds"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The number of seconds."""
+        try:
+            seconds = float(value)
+        except ValueError:
+            seconds = math.nan
+        if not 0 < seconds < math.inf:
+            self.fail(f"found {value!r}; accepted: a positive number of seconds, or none. Write FILE before --certify.")
+        return seconds
+
+
 @click.command(epilog=_SOLVE_EXAMPLES)
 @click.argument("file", type=click.Path(path_type=Path))
 @_common
@@ -101,7 +117,7 @@ def _common(command: Command) -> Command:
 )
 @click.option(
     "--certify",
-    type=click.FloatRange(min=0, min_open=True),
+    type=_Seconds(),
     is_flag=False,
     flag_value=60.0,
     default=None,

@@ -81,6 +81,8 @@ def ipopt(nlp: NLP, linear_solver: str = "mumps", max_iterations: int = 150, sta
         rows = {"lbg": np.array(limits.row_lower), "ubg": np.array(limits.row_upper)}
         answer = solver(x0=x0, lbx=lower, ubx=upper, **rows)
         stats = solver.stats()
+        if stats["return_status"] == "User_Requested_Stop":  # CasADi keeps the interrupt to itself
+            raise KeyboardInterrupt
         return Run(
             x=np.clip(np.array(answer["x"]).ravel(), lower, upper),
             row_multipliers=np.array(answer["lam_g"]).ravel(),

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.proof.proof import DIGITS, Proof
 from tmsopt.design.solution import Solution
@@ -26,7 +27,14 @@ def prove(
         options: of `solve`, e.g. ``starts``.
 
     Raises:
-        InputError: for a problem that asks nothing, digits out of range, or exact numbers that are not the design's.
+        InputError: for a problem that asks nothing, options beside a solution, digits out of range, or exact numbers
+            that are not the design's.
     """
-    solution = problem if isinstance(problem, Solution) else solve(checked(problem), throw=False, **options)
-    return solution.proved(digits, exact)
+    if isinstance(problem, Solution):
+        if options:
+            message = (
+                f"found {', '.join(options)}; options are for solving, and this is solved: give the problem instead"
+            )
+            raise InputError([Fault(message, ("options",))])
+        return problem.proved(digits, exact)
+    return solve(checked(problem), throw=False, **options).proved(digits, exact)

@@ -2,11 +2,14 @@
 
 import math
 import re
+from fractions import Fraction
 from functools import cache
 from types import MappingProxyType
 from typing import Any
 
 _LONGEST = 80
+_LARGEST_DENOMINATOR = 10**6  # of a factor between units, such as 5/18
+_ROUNDED = 4e-16  # relative error of a factor in double precision
 _QUANTITY = re.compile(r"(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.+-].*)?", re.ASCII)
 _POWER = r"(?:\s*(?:\*\*|\^)\s*-?\d)?"
 _UNIT = re.compile(rf"[A-Za-zµμ°%]+{_POWER}(?:\s*[*/ ]\s*[A-Za-zµμ°%]+{_POWER})*", re.ASCII)
@@ -73,7 +76,10 @@ def with_unit(text: str, unit: str) -> float:
         raise ValueError(f"found the unit '{written}', which is not known or not a unit of {unit}; {accepted}")
     if not math.isfinite(number * factor):
         raise ValueError(f"found '{text}', a number beyond double precision; {accepted}")
-    return number * factor
+    share = Fraction(factor).limit_denominator(_LARGEST_DENOMINATOR)
+    if abs(share - Fraction(factor)) > _ROUNDED * share:  # an angle
+        return number * factor
+    return float(Fraction(parts["number"]) * share)  # the double nearest to what is written: 70 cm is 0.7 m
 
 
 @cache

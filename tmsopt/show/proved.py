@@ -52,7 +52,7 @@ def _place(proof: Proof) -> list[str]:
     return [
         "method: Krawczyk's interval Newton test on a_k = a0 c_k"
         + (" and the == constraints" if len(proof.unknowns) + len(proof.moved) > 4 else ""),
-        f"exists within {proof.radius:.1e} of these numbers, and is the only one within {proof.uniqueness:.2g}",
+        f"located to {proof.radius:.1e} before rounding to these digits; the only one within {proof.uniqueness:.2g}",
         f"the stored design is {proof.distance:.1e} from it; rounding explains up to {proof.explained:.1e}",
     ]
 

@@ -196,7 +196,8 @@ def _verdict(solution: Solution, around: Program, found: Conditions, beyond: Bet
     idle = f"; without effect: {', '.join(around.idle)}" if around.idle else ""
     if np.isnan(found.curvature):
         return STRICT, 1, f"{name} a strict {extreme}: {held}, a vertex, so the first-order conditions suffice{idle}"
-    return STRICT, 2, f"{name} a strict {extreme}: {held}, and along what these leave free it curves upwards{idle}"
+    bend = "downwards" if solution.problem.sense == "maximize" else "upwards"
+    return STRICT, 2, f"{name} a strict {extreme}: {held}, and along what these leave free it curves {bend}{idle}"
 
 
 def _doubt(around: Program, found: Conditions) -> str:
@@ -211,7 +212,7 @@ def _doubt(around: Program, found: Conditions) -> str:
         return "the multiplier of kappa vanishes"  # then c₄ ≤ c₂² may outweigh it
     if curved(found.curvature) <= 0 and not np.isnan(found.curvature):
         return (
-            f"along what is left free it {'curves downwards' if curved(found.curvature) else 'is flat'} to second order"
+            f"along what is left free it {'gains' if curved(found.curvature) else 'is flat'} to second order"
         )
     return ""
 

@@ -7,6 +7,7 @@ from functools import partial
 
 from tmsopt.design.bound import omega0_bound
 from tmsopt.design.bounds.answer import Answer, Clock, Progress, answer, contradicted, doubt
+from tmsopt.design.bounds.lines import over
 from tmsopt.design.bounds.program import Question
 from tmsopt.design.bounds.race import Crew
 from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, UNDECIDED, available
@@ -14,7 +15,9 @@ from tmsopt.design.bounds.translation import FEASIBILITY
 from tmsopt.design.bounds.walk import NotAccepted
 from tmsopt.design.cases import Case
 from tmsopt.design.errors import Fault, InputError
-from tmsopt.design.problem import Problem, unasked
+from tmsopt.design.formulations import Builder
+from tmsopt.design.problem import Problem, checked, unasked
+from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.design.recheck import recheck
 from tmsopt.design.solution import Bound, Solution
 from tmsopt.design.solve import solve
@@ -33,7 +36,8 @@ _SHARE = 0.6  # of the time that is left, for a gap that is not the last one to 
 _BETTER = 1e-9  # relative gain that counts as one
 _REPLACED = 5  # times that a design is replaced by a better one
 _SMALL = 1e-6  # of roots at 0 or at infinity, which say nothing of the others
-_STARTS = (1, 8)  # from SCIP's design alone, then with others
+_STARTS = 4  # from SCIP's design, and others
+_NEARLY = 1e-3  # violation and loss beyond which a design that SCIP found is none
 
 
 def certify(design: Solution | Problem, *, seconds: float = SECONDS, progress: Progress | None = None) -> Solution:
@@ -51,10 +55,10 @@ def certify(design: Solution | Problem, *, seconds: float = SECONDS, progress: P
         InputError: where SCIP is not installed, for a time that is not positive, or for a problem that asks nothing.
     """
     check_installed()
-    if not seconds > 0:
-        raise InputError([Fault(f"found {seconds}; accepted: a positive number of seconds", ("seconds",))])
-    if isinstance(design, Problem):
-        design = solve(design, throw=False)
+    if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0 < seconds < math.inf:
+        raise InputError([Fault(f"found {seconds!r}; accepted: a positive number of seconds", ("seconds",))])
+    if not isinstance(design, Solution):
+        design = solve(checked(design), throw=False)
     problem = design.problem
     if faults := unasked(problem):
         raise InputError(faults)
@@ -141,7 +145,21 @@ def _known(design: Solution) -> Bound:
     if design.problem.sense == "maximize" and (design.problem.maximize or "").strip() == "damping_ratio":
         gap = max(1.0 - design.value, 0.0)
         return Bound(1.0, gap, gap == 0, "definition")
-    return omega0_bound(design.problem, design.value)
+    bound = omega0_bound(design.problem, design.value)
+    return bound if math.isfinite(bound.value) else _over_the_box(design)
+
+
+def _over_the_box(design: Solution) -> Bound:
+    """The range of an objective that is none of the roots, by interval arithmetic."""
+    problem = design.problem
+    if problem.objective is None or set(problem.objective.names) & set(ROOT_NAMES) or not math.isfinite(design.value):
+        return Bound()
+    build = Builder(problem, _cases(design))
+    build.optimise()
+    lower, upper = over(build, [build.objective])[0]  # of the negative, where it is maximised
+    sense = _sense(problem)
+    gap = max(sense * design.value - lower, 0.0)
+    return Bound(sense * lower, gap, gap == 0, "interval") if math.isfinite(lower) and upper >= lower else Bound()
 
 
 def _question(design: Solution, level: float) -> Question:
@@ -168,15 +186,18 @@ def _stronger(design: Solution, known: Bound, searched: Bound) -> Bound:
 def _from(design: Solution, start: Mapping[str, float]) -> Answer:
     """What the design that SCIP found leads to: a better optimum, or itself, if it is feasible and better at all."""
     problem = design.problem
-    for starts in _STARTS:
-        found = solve(replace(problem, start=start), starts=starts, throw=False)
-        if found.status == "optimal" and (design.status != "optimal" or _gain(design, found.value) > _BETTER):
-            before = f"{design.value:.9g} before" if design.status == "optimal" else "none before"
-            words = f"branch and bound found a better design than the search from many starts: {before}"
-            return Answer(FOUND, better=_noted(replace(found, problem=problem), words))
-    checked = recheck(problem, problem.ordered(start), _cases(design))
-    if not checked.violations and (design.status != "optimal" or _gain(design, checked.objective) > _BETTER):
-        return Answer(FOUND, other={**start, "objective": checked.objective})
+    known = design.value if not design.violations and problem.objective is not None else None
+    seen = recheck(problem, problem.ordered(start), _cases(design))
+    gain = _gain(problem, known, seen.objective)
+    if max(seen.violations.values(), default=0.0) > _NEARLY or gain < -_NEARLY:
+        return Answer(UNDECIDED)  # what SCIP's tolerance made of it
+    found = solve(replace(problem, start=start), starts=_STARTS, throw=False)
+    if found.status == "optimal" and _gain(problem, known, found.value) > _BETTER:
+        before = "" if known is None else f": {known:.9g} before"
+        words = f"branch and bound found a better design than the search from many starts{before}"
+        return Answer(FOUND, better=_noted(replace(found, problem=problem), words))
+    if not seen.violations and gain > _BETTER:
+        return Answer(FOUND, other={**start, "objective": seen.objective})
     return Answer(UNDECIDED)
 
 
@@ -188,11 +209,13 @@ def _beaten(design: Solution, other: Mapping[str, float]) -> Solution:
     return replace(design, notes=(*kept, words))
 
 
-def _gain(design: Solution, value: float) -> float:
-    """Relative improvement of the objective."""
-    if design.problem.objective is None or not math.isfinite(value):
-        return 0.0
-    return _sense(design.problem) * (design.value - value) / max(_FLOOR, abs(design.value))
+def _gain(problem: Problem, known: float | None, value: float) -> float:
+    """Relative improvement of the objective; inf where none is known, −inf for a value that does not exist."""
+    if known is None or not math.isfinite(known):
+        return math.inf
+    if not math.isfinite(value):
+        return -math.inf
+    return _sense(problem) * (known - value) / max(_FLOOR, abs(known))
 
 
 def _sense(problem: Problem) -> float:

@@ -79,7 +79,7 @@ def decide(asked: Task) -> Decision:
         model.setParam("limits/solutions", 1)
     model.setParam("limits/time", max(asked.seconds - (time.perf_counter() - began), _LEAST))
     model.setParam("numerics/feastol", FEASIBILITY)
-    model.optimize()
+    model.optimizeNogil()  # other threads of the process may see that there is nobody left to answer to
     status, found = model.getStatus(), model.getNSols() > 0
     point = np.array([model.getVal(symbol) * scale for symbol, scale in translated.variables]) if found else None
     bound = float(model.getDualbound())

@@ -6,6 +6,9 @@ stopped at any moment, and what it prints is not seen.
 
 import os
 import pickle
+import queue
+import threading
+from typing import IO, Any
 
 from tmsopt.design.bounds.scip import Decision, Task, decide
 from tmsopt.design.bounds.walk import NotAccepted
@@ -17,11 +20,10 @@ def serve() -> None:
     silence = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1, 2):
         os.dup2(silence, stream)
+    waiting: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(questions, waiting), daemon=True).start()
     while True:
-        try:
-            task = pickle.load(questions)
-        except EOFError:
-            return
+        task = waiting.get()
         assert isinstance(task, Task)
         try:
             answer: Decision | NotAccepted = decide(task)
@@ -29,6 +31,15 @@ def serve() -> None:
             answer = error
         pickle.dump(answer, decisions)
         decisions.flush()
+
+
+def _listen(questions: IO[bytes], waiting: "queue.SimpleQueue[Any]") -> None:
+    """Pass questions on; end the process when there is nobody left to answer to."""
+    while True:
+        try:
+            waiting.put(pickle.load(questions))
+        except (EOFError, OSError):
+            os._exit(0)
 
 
 if __name__ == "__main__":

@@ -85,7 +85,7 @@ def inside(problem: Problem, design: Written, found: Existing) -> Verdict:
 
 
 def limits(problem: Problem, found: Existing) -> dict[str, str]:
-    """Each inequality at the nominal design; none where it must hold in several cases."""
+    """Each comparison at the nominal design; none where it must hold in several cases."""
     if problem.variations or problem.tolerances:
         return {}
     values = Values(problem.model, problem.parameter_set, found.parameters)
@@ -98,11 +98,19 @@ def limits(problem: Problem, found: Existing) -> dict[str, str]:
         values.define(name, nothing if value is None else value)
     verdicts = {}
     for name, condition in problem.conditions.items():
-        if condition.comparison == "==":
-            continue
         difference = flint.arb(condition.enclosure(values, decimal_fraction))
-        verdicts[name] = _met(difference if condition.comparison == ">=" else -difference)
+        if condition.comparison == "==":
+            verdicts[name] = _equal(difference, equations=found.method == "Krawczyk")
+        else:
+            verdicts[name] = _met(difference if condition.comparison == ">=" else -difference)
     return verdicts
+
+
+def _equal(difference: Any, equations: bool) -> str:
+    if difference == 0 or (equations and difference.contains(0)):
+        return "met"
+    off = "cannot be told" if not difference.is_finite() else f"met but for {abs(float(difference.mid())):.1e}"
+    return off if abs(difference) <= BINDS or not difference.is_finite() else "violated"
 
 
 def _met(room: Any) -> str:
