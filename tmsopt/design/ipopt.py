@@ -1,6 +1,9 @@
 """The one place that calls IPOPT."""
 
-from collections.abc import Callable
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -79,10 +82,9 @@ def ipopt(nlp: NLP, linear_solver: str = "mumps", max_iterations: int = 150, sta
     def run(x0: Array, limits: NLP = nlp) -> Run:
         lower, upper = np.array(limits.lower), np.array(limits.upper)
         rows = {"lbg": np.array(limits.row_lower), "ubg": np.array(limits.row_upper)}
-        answer = solver(x0=x0, lbx=lower, ubx=upper, **rows)
+        with _interruptible():
+            answer = solver(x0=x0, lbx=lower, ubx=upper, **rows)
         stats = solver.stats()
-        if stats["return_status"] == "User_Requested_Stop":  # CasADi keeps the interrupt to itself
-            raise KeyboardInterrupt
         return Run(
             x=np.clip(np.array(answer["x"]).ravel(), lower, upper),
             row_multipliers=np.array(answer["lam_g"]).ravel(),
@@ -92,3 +94,23 @@ def ipopt(nlp: NLP, linear_solver: str = "mumps", max_iterations: int = 150, sta
         )
 
     return run
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Raise an interrupt once IPOPT is done: CasADi takes the exception for a failed evaluation and goes on.
+
+    Only in the main thread, and where the user has no handler of his own.
+    """
+    main = threading.current_thread() is threading.main_thread()
+    if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    heard: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, frame: heard.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    if heard:
+        raise KeyboardInterrupt

@@ -211,9 +211,7 @@ def _doubt(around: Program, found: Conditions) -> str:
     if any(around.line[h.cluster].multiplicity > 3 for h in loose):
         return "the multiplier of kappa vanishes"  # then c₄ ≤ c₂² may outweigh it
     if curved(found.curvature) <= 0 and not np.isnan(found.curvature):
-        return (
-            f"along what is left free it {'gains' if curved(found.curvature) else 'is flat'} to second order"
-        )
+        return f"along what is left free it {'gains' if curved(found.curvature) else 'is flat'} to second order"
     return ""
 
 
