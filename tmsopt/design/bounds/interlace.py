@@ -2,8 +2,9 @@
 
 Let F(X) = c0 X^m − c2 X^(m−1) + … and S(X) = c1 X^l − c3 X^(l−1) + … be the two parts of p(iω), in X = ω². All roots of
 p, c0 > 0, lie in Re t ≤ 0 exactly if all c_k ≥ 0 and the roots of the two parts are real and interlace: there are
-x1 ≥ x2 ≥ … ≥ 0 with S(X) = c1 (X − x1)(X − x2)… and (−1)^j F(xj) ≥ 0. For a quartic that is one unknown instead of the
-four of two factors, and where it and the line are known, what is asked of the coefficients is linear:
+x1 ≥ x2 ≥ … ≥ 0 with S(X) = c1 (X − x1)(X − x2)… and (−1)^j F(xj) ≥ 0. From degree 5 a little more satisfies that, where
+S has a multiple zero at which F vanishes: a bound is no less valid for it. For a quartic that is one unknown instead of
+the four of two factors, and where it and the line are known, what is asked of the coefficients is linear:
 c3 = x c1 and c2 x ≥ c0 x² + c4.
 """
 
@@ -27,7 +28,7 @@ def unknowns(degree: int) -> int:
 
 
 def interlacing(coefficients: Sequence[Any], squares: Sequence[Square]) -> tuple[list[Any], list[Any]]:
-    """Expressions that vanish, and that are not negative, exactly if all roots have Re t ≤ 0.
+    """Expressions that vanish, and that are not negative, if all roots have Re t ≤ 0; up to degree 4 only then.
 
     Args:
         coefficients: descending, with a leading one that is positive.

@@ -116,6 +116,7 @@ def sectors(
         for (one, _), (other, _) in pairwise(pairs):  # their order means nothing
             build.row("damping_ratio", other - one, 0.0, np.inf)
         build.equal("damping_ratio", a, [a[0] * c for c in product(*([1, p, q] for p, q in pairs))])
+    build.row("damping_ratio", 1 - zeta, 0.0, np.inf)  # real roots would satisfy any larger one, too
     size = (ratio is None) + len(looked) * (2 + (ratio is None)) * (frame.model.degree // 2)
     return Lifted(ca.SX(zeta), Lift("damping_ratio", size, partial(_sector_guess, frame, looked, ratio)), (), ())
 

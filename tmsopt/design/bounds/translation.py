@@ -12,7 +12,7 @@ import casadi as ca
 import flint
 
 from tmsopt.design.bounds.ranges import BALLS, ball, interval
-from tmsopt.design.bounds.terms import Term, constant, refuse_huge, scale_of
+from tmsopt.design.bounds.terms import CANCELLED, Term, constant, refuse_huge, scale_of
 from tmsopt.design.bounds.walk import NotAccepted, walk
 from tmsopt.design.nlp import NLP
 
@@ -79,7 +79,8 @@ class _Translation:
         ends = [e / scale if math.isfinite(e) else None for e in (lower, upper)]
         self.count += 1
         symbol = self.scip.addVar(f"v{self.count}", lb=ends[0], ub=ends[1])
-        return Term(scale * symbol, 1, ball((lower, upper)) if over is None else over, symbol=symbol, scale=scale)
+        over = ball((lower, upper)) if over is None else over
+        return Term(scale * symbol, 1, over, max(abs(lower), abs(upper)), symbol=symbol, scale=scale)
 
     def defined(self, over: Any, lower: float = -math.inf) -> Term:
         """A variable for something with a known range."""
@@ -92,17 +93,17 @@ class _Translation:
             return term
         if id(term) not in self.known:
             new = self.defined(term.ball)
-            self.between(Term(new.expression - term.expression, 2, term.ball), 0.0, 0.0, size=new.scale)
+            self.between(Term(new.expression - term.expression, 2, term.ball, term.size), 0.0, 0.0)
             self.known[id(term)] = new
             self.kept.append(term)
         return self.known[id(term)]
 
-    def between(self, term: Term, lower: float, upper: float, size: float | None = None) -> None:
+    def between(self, term: Term, lower: float, upper: float) -> None:
         """A row, scaled to about 1."""
         if term.degree == 0:
             self.impossible |= not lower - FEASIBILITY <= term.expression <= upper + FEASIBILITY
             return
-        size = size or scale_of(max(map(abs, term.ends)))
+        size = term.unit
         if lower == upper:
             self.scip.addCons(term.expression / size == lower / size)
             return
@@ -139,25 +140,25 @@ class _Translation:
 
     def sum(self, a: Term, b: Term, sign: float) -> Term:
         over = BALLS[ca.OP_ADD](a.ball, sign * b.ball)
-        return Term(a.expression + sign * b.expression, max(a.degree, b.degree), over)
+        return Term(a.expression + sign * b.expression, max(a.degree, b.degree), over, max(a.size, b.size))
 
     def times(self, a: Term, factor: float) -> Term:
         if 0 < abs(factor) < FEASIBILITY:
             refuse_huge(a.ball, "a small multiple", _LARGE)
-        return Term(factor * a.expression, a.degree, factor * a.ball)
+        return Term(factor * a.expression, a.degree, factor * a.ball, abs(factor) * a.size)
 
     def product(self, a: Term, b: Term) -> Term:
         for fixed, other in ((a, b), (b, a)):
             if fixed.degree == 0:
                 return self.times(other, fixed.expression)
         a, b = self.variable(a), self.variable(b)
-        return Term(a.expression * b.expression, 2, a.ball * b.ball)
+        return Term(a.expression * b.expression, 2, a.ball * b.ball, a.size * b.size)
 
     def square(self, a: Term) -> Term:
         if a.degree == 0:
             return constant(a.expression**2)
         a = self.variable(a)
-        return Term(a.expression * a.expression, 2, BALLS[ca.OP_SQ](a.ball))
+        return Term(a.expression * a.expression, 2, BALLS[ca.OP_SQ](a.ball), a.size * a.size)
 
     def quotient(self, a: Term, b: Term) -> Term:
         """q with q b = a; where b may vanish, of any size."""
@@ -165,8 +166,7 @@ class _Translation:
             return self.times(a, 1 / b.expression) if b.expression else self.undefined()
         b = self.variable(b)
         q = self.defined(a.ball / b.ball)
-        over = Term(None, 2, a.ball)
-        self.between(Term(q.expression * b.expression - a.expression, 2, over.ball), 0.0, 0.0)
+        self.between(Term(q.expression * b.expression - a.expression, 2, a.ball, a.size), 0.0, 0.0)
         return q
 
     def root(self, a: Term) -> Term:
@@ -176,7 +176,7 @@ class _Translation:
         least, most = (max(e, 0.0) for e in a.ends)
         self.impossible |= a.ends[1] < 0
         r = self.free(math.nextafter(math.sqrt(least), 0), math.nextafter(math.sqrt(most), math.inf))
-        self.between(Term(r.expression * r.expression - a.expression, 2, a.ball), 0.0, 0.0)
+        self.between(Term(r.expression * r.expression - a.expression, 2, a.ball, a.size), 0.0, 0.0)
         return r
 
     def power(self, a: Term, b: Term) -> Term:
@@ -229,7 +229,10 @@ class _Translation:
         if name == "log":  # SCIP keeps the argument of its own away from 0
             self.scip.addCons(a.expression / a.scale == self.functions.exp(v.expression) / a.scale)
         else:
-            self.scip.addCons(v.expression / v.scale == getattr(self.functions, name)(a.expression) / v.scale)
+            size = (
+                v.scale if name == "exp" else max(v.scale, CANCELLED)
+            )  # others are as small as their argument is known
+            self.scip.addCons(v.expression / size == getattr(self.functions, name)(a.expression) / size)
         return v
 
     def on_circle(self, t: Term) -> tuple[Term, Term]:
@@ -240,7 +243,7 @@ class _Translation:
             cosine, sine = self.defined(angle.cos(), lower=0.0), self.defined(angle.sin())
             self.between(self.sum(sine, self.product(t, cosine), -1.0), 0.0, 0.0)
             self.between(self.sum(self.square(sine), self.square(cosine), 1.0), 1.0, 1.0)
-            self.known[key] = Term((cosine, sine), 1, None)
+            self.known[key] = Term((cosine, sine), 1, None, 1.0)
             self.kept.append(t)
         pair: tuple[Term, Term] = self.known[key].expression
         return pair
@@ -253,7 +256,7 @@ class _Translation:
         key = id(t)
         if key not in self.known:
             angle = self.defined(t.ball.atan())
-            self.known[key] = Term(angle.expression, 1, angle.ball, tangent=t)
+            self.known[key] = Term(angle.expression, 1, angle.ball, angle.size, tangent=t)
             self.kept.append(t)
             cosine, sine = self.on_circle(t)
             for part, name in ((cosine, "cos"), (sine, "sin")):
