@@ -18,7 +18,8 @@ from tmsopt.design.starts import complete
 
 _HOLDS = 1e-6  # of a row, relative to its range: SCIP itself asks for 1e-9, and multiple roots have half the digits
 
-_AROUND = 1e-4  # of a range
+_AROUND = 1e-4  # of a range, which counts as
+_COARSE = 1e-2  # at least: SCIP cannot look closer
 _TIGHTENING = 1.0  # seconds to keep a0 away from 0
 _FIRST = 2.0  # seconds for the first turn, twice as many for each that follows
 _WAYS = (((1.0, False), (1.0, True)), ((4.0, False), (0.25, False)), ((16.0, False), (4.0, True)))
@@ -158,7 +159,10 @@ def contradicted(question: Question, design: Mapping[str, float], clock: Clock) 
     verdicts = []
     for sign in question.signs():
         nlp = question.program(sign)
-        ends = [(lo, hi, _AROUND * (hi - lo)) for lo, hi in zip(nlp.lower, nlp.upper, strict=True)]
-        near = tuple((max(lo, x - d), min(hi, x + d)) for x, (lo, hi, d) in zip(at, ends, strict=False))
+        near = tuple(
+            (max(lo, x - d), min(hi, x + d))
+            for x, lo, hi in zip(at, nlp.lower, nlp.upper, strict=False)
+            for d in [_AROUND * max(hi - lo, _COARSE * (1 + abs(x)))]
+        )
         verdicts += [d.verdict for d in clock.race([task(nlp, min(_TIGHTENING, clock.left), within=near)])]
     return all(verdict == INFEASIBLE for verdict in verdicts)
