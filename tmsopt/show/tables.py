@@ -100,7 +100,9 @@ def _facts(solution: Solution) -> list[str]:
     lines += case_lines(solution)
     free = solution.freedom
     if solution.problem.locate:
-        lines.append(f"freedom: {free.kind}, {free.free} free parameters and {free.conditions} conditions")
+        parameters = "parameter" if free.free == 1 else "parameters"
+        conditions = "condition" if free.conditions == 1 else "conditions"
+        lines.append(f"freedom: {free.kind}, {free.free} free {parameters} and {free.conditions} {conditions}")
     if solution.active:
         gains = ", ".join(f"{name} ({value:.4g})" for name, value in solution.active.items())
         lines.append(f"limits that bind (gain per unit relaxed): {gains}")

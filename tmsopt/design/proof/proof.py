@@ -106,7 +106,7 @@ class Proof:
             "pattern": self.pattern,
             "method": self.method,
             "digits": self.digits,
-            "of": "the design as stored" if self.stored else "the proved design",
+            "of": "the design as stored" if self.stored or not self.proved else "the proved design",
             **tables,
             "moved": list(self.moved),
             "held": dict(self.held),
