@@ -117,7 +117,9 @@ def objectives(ask: Asker, solution: Solution) -> tuple[float, ...]:
     problem = ask.problem
     if not (problem.variations or problem.tolerances or solution.problem.asks_radius):
         values = problem.values(solution.parameters)
-        return tuple(float(expression(values)) for expression in problem.objectives)
+        known = {**solution.quantities, "abscissa": solution.abscissa}  # certified, where an objective is one of these
+        found = ((expression, expression.text.strip()) for expression in problem.objectives)
+        return tuple(known[text] if text in known else float(expression(values)) for expression, text in found)
     cases = (*problem.cases, *([solution.worst] if solution.worst else []))
     alone = (replace(problem, pareto=(), minimize=text) for text in ask.texts)
     return tuple(recheck(one, solution.parameters, cases).objective for one in alone)
