@@ -137,7 +137,7 @@ def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
         return replace(design, status="infeasible", bound=bound), False
     words = "branch and bound did not decide in time whether any design is feasible"
     left = replace(design, bound=_bound(design, math.inf, clock))
-    return _noted(_beaten(left, answered.other) if answered.other else left, words), False
+    return _beaten(left, answered.other) if answered.other else _noted(left, words), False
 
 
 def _known(design: Solution) -> Bound:
