@@ -132,6 +132,8 @@ def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     if answered.better is not None:
         return answered.better, True
     if answered.verdict == INFEASIBLE:
+        if not recheck(design.problem, design.parameters, _cases(design)).violations:
+            return _noted(design, "no proof: SCIP's relaxation excludes the feasible design that was found"), False
         none = -math.inf if design.problem.sense == "maximize" else math.inf
         bound = Bound(none, 0.0, True, "scip", clock.used, clock.nodes, FEASIBILITY)
         return replace(design, status="infeasible", bound=bound), False
