@@ -7,16 +7,8 @@ import click
 from benchmarks.ladder import ladder as climb_ladder
 from benchmarks.ladder import ladder_section
 from benchmarks.proving import prove_suite, proved_section
-from benchmarks.report import keep
+from benchmarks.report import keep, kept
 from benchmarks.suite import SEED
-
-kept = click.option(
-    "--output",
-    type=click.Path(dir_okay=False, path_type=Path),
-    default=Path("benchmarks/results.md"),
-    show_default=True,
-    help="file that keeps the table",
-)
 
 
 @click.group()

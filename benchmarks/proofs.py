@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from benchmarks.report import keep, origin, table
+from benchmarks.report import keep, kept, origin, table
 from tmsopt import Problem, Proof, Solution, models, solve
 from tmsopt.design.proof.proof import prove_design
 
@@ -186,10 +186,7 @@ def _answers(proof: Proof) -> str:
 
 
 @click.command()
-@click.option(
-    "--output", type=click.Path(dir_okay=False, path_type=Path), default=Path("benchmarks/results.md"),
-    show_default=True, help="file that keeps the table",
-)  # fmt: skip
+@kept
 def main(output: Path) -> None:
     """Prove every exceptional point of the paper, print the table and keep it."""
     text = section("python -m benchmarks.proofs")

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
+import click
 import numpy as np
 
 from benchmarks.rivals import FEASIBLE, LOCAL, SCALAR, STARTS, VECTORISED, Found
@@ -15,6 +16,15 @@ from benchmarks.stages import REFERENCE_STARTS, Record
 
 _PACKAGES = ("casadi", "numpy", "scipy")
 _TOLERANCES = (1e-3, 1e-6, 1e-8)
+
+kept = click.option(
+    "--output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    default=Path("benchmarks/results.md"),
+    show_default=True,
+    help="file that keeps the table",
+)
+"""Option of every benchmark that keeps its table."""
 
 
 def section(records: Sequence[Record], command: str) -> str:

@@ -10,7 +10,7 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.report import keep, origin
+from benchmarks.report import keep, kept, origin
 from tmsopt import Problem, chart, domain, laws, models, trace
 from tmsopt.models.tms import copo
 from tmsopt.roots import PATTERNS, discriminant
@@ -155,10 +155,7 @@ def section(command: str) -> str:
 
 
 @click.command()
-@click.option(
-    "--output", type=click.Path(dir_okay=False, path_type=Path), default=Path("benchmarks/results.md"),
-    show_default=True, help="file that keeps the table",
-)  # fmt: skip
+@kept
 def main(output: Path) -> None:
     """Trace the EP set in three ways, print the tables and keep them."""
     text = section("python -m benchmarks.trace")
