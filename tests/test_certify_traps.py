@@ -2,14 +2,17 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
-from tmsopt import Problem
+from tmsopt import Problem, certify, solve
 from tmsopt.design.bounds.interlace import interlace, squares_of
 from tmsopt.design.bounds.program import Question
+from tmsopt.design.bounds.race import Crew
 from tmsopt.design.bounds.ranges import ball, interval, square
+from tmsopt.design.bounds.scip import INFEASIBLE, Decision
 from tmsopt.design.bounds.walk import NotAccepted
 from tmsopt.models import tms
 
@@ -101,3 +104,20 @@ def test_squared_frequencies_of_equal_roots_are_within_their_range(degree):
     coefficients = [float(math.comb(degree, k)) for k in range(degree + 1)]
     interlace(Rows(), 0, coefficients, 1.0, False)
     assert all(most >= max(squares_of(coefficients)) * (1 - 1e-12) for most in upper)
+
+
+def test_a_search_that_finds_nothing_anywhere_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SCIP that says no to every question says no to the one that the known design answers: then no bound, no proof."""
+    monkeypatch.setattr(Crew, "race", lambda self, tasks, tick=None: [Decision(INFEASIBLE, bound=1.0) for _ in tasks])
+    asked = Problem(
+        model=tms,
+        fixed={"chi_H": 1.05, "zeta_H": -0.3, "zeta_B": -0.6, "mu": 0.5, "chi_B": 1.3},
+        free={"Fr": (0.5, 4), "lambda_s": (0.05, 1.0)},
+        constraints={"distance": "nu_H >= 0.05"},
+        minimize="abscissa",
+    )
+    design = solve(asked)
+    assert not certify(design, seconds=2).bound.proven
+    lost = replace(design, status="not_converged")
+    assert not certify(lost, seconds=2).bound.proven
+    assert certify(lost, seconds=2).status == "not_converged"

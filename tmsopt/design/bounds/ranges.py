@@ -71,14 +71,6 @@ def power(x: Any, y: Any) -> Any:
     return x**y
 
 
-def _greater(a: Any, b: Any) -> Any:
-    return a.max(b)
-
-
-def _lesser(a: Any, b: Any) -> Any:
-    return a.min(b)
-
-
 BALLS: Arithmetic = {
     ca.OP_CONST: flint.arb,
     ca.OP_ADD: lambda a, b: a + b,
@@ -101,7 +93,7 @@ BALLS: Arithmetic = {
     ca.OP_ACOS: lambda a: a.acos(),
     ca.OP_ATAN: lambda a: a.atan(),
     ca.OP_FABS: abs,
-    ca.OP_FMAX: _greater,
-    ca.OP_FMIN: _lesser,
+    ca.OP_FMAX: lambda a, b: a.max(b),
+    ca.OP_FMIN: lambda a, b: a.min(b),
 }
 """Operations on balls."""
