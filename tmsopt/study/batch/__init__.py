@@ -1,0 +1,1 @@
+"""Studies: one question asked of many designs, with their store and engines."""

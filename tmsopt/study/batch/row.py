@@ -1,0 +1,88 @@
+"""One row of a study: a design as it was solved, as plain data."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from tmsopt.design.frozen import Table
+
+STATUSES = ("optimal", "infeasible", "not_converged", "failed", "quarantined")
+"""Of a row: those of a solution; ``failed`` where the row cannot be posed or solving it broke; ``quarantined`` where it
+ended its worker, twice."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """What one row of a study came to; a failure is a row with a cause.
+
+    Attributes:
+        number: of the row, from 0.
+        seed: of its starts.
+        varied: name → value that the study gave it (rad, SI units).
+        status: one of `STATUSES`.
+        cause: why the status is not ``optimal``; empty where it is.
+        objective: value of the objective expression; nan where there is none.
+        parameters: every parameter of the set the problem is written in.
+        reports: the expressions that the study asked for.
+        bound: a value that no design in the box can beat; −inf where none is known.
+        method: how the bound was found; ``none``.
+        laws: label of a law of the paper → relative residual, where the law applies.
+        violations: name → violation relative to the size of the two sides.
+        starts: tried.
+        warm: whether it was started from a neighbour's optimum.
+        seconds, host: how long it took and where; the only ones that differ when a row is solved again.
+    """
+
+    number: int
+    seed: int
+    varied: Table[float]
+    status: str
+    cause: str = ""
+    objective: float = math.nan
+    abscissa: float = math.nan
+    damping_ratio: float = math.nan
+    structure: str = ""
+    parameters: Table[float] = field(default_factory=Table)
+    reports: Table[float] = field(default_factory=Table)
+    bound: float = -math.inf
+    gap: float = math.inf
+    proven: bool = False
+    method: str = "none"
+    laws: Table[float] = field(default_factory=Table)
+    violations: Table[float] = field(default_factory=Table)
+    starts: int = 0
+    warm: bool = False
+    seconds: float = 0.0
+    host: str = ""
+
+    @property
+    def identity(self) -> str:
+        """Everything but `seconds` and `host`, as text: equal for equal bits, nan included."""
+        kept = {name: value for name, value in self.to_json().items() if name not in ("seconds", "host")}
+        return json.dumps(kept, sort_keys=True)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``; numbers that do not exist are None."""
+        return {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
+
+    @staticmethod
+    def from_json(data: Mapping[str, Any]) -> "Row":
+        """The row that `to_json` was made of, bit by bit."""
+        absent = {"bound": -math.inf, "gap": math.inf}
+        made: dict[str, Any] = {}
+        for name, value in data.items():
+            if isinstance(value, Mapping):
+                made[name] = Table({n: math.nan if v is None else float(v) for n, v in value.items()})
+            else:
+                made[name] = absent.get(name, math.nan) if value is None else value
+        return Row(**made)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _plain(v) for name, v in value.items()}
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value
