@@ -25,7 +25,7 @@ def other_branches(problem: Problem, nlp: NLP, found: Mapping[str, float]) -> tu
     """
     of = problem.parameter_set
     x = ca.SX.sym("x", len(nlp.variables))
-    g = nlp.functions(x)[1]
+    g = nlp.at(x)[1]
     equalities = [k for k in range(len(nlp.rows)) if nlp.row_lower[k] == nlp.row_upper[k]]
     if len(equalities) != len(nlp.variables):
         return ()

@@ -2,9 +2,10 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from tmsopt.design.cases import Case
+from tmsopt.design.family import Family
 from tmsopt.design.finding import Finding, Trial, ahead, counted, found, survivor
 from tmsopt.design.formulations import design_of, formulate, middle
 from tmsopt.design.frozen import Table
@@ -37,6 +38,8 @@ class Options:
     exhaustive: bool
     linear_solver: str
     progress: Progress | None
+    near: Mapping[str, float] | None = None
+    family: Family = field(default_factory=Family)
 
 
 @dataclass(frozen=True)
@@ -55,14 +58,15 @@ class Explored:
 
 def explore(problem: Problem, side: Side, options: Options) -> Explored:
     """Search one part of the box from many starts, exactly and in all cases."""
-    nlp = side.narrowed(formulate(problem, problem.cases))
+    family = options.family
+    nlp = side.narrowed(family.formulate(problem, problem.cases))
     touching = overclaims(problem)
     candidates = _searched(side, nlp, options, touching)
-    trial = survivor(problem, nlp, candidates)
+    trial = survivor(problem, nlp, candidates, family)
     if trial is None and "damping_ratio" in nlp.touches:  # a positive real root has −1, and no sector of its own
-        unstable = side.narrowed(formulate(problem, problem.cases, damping_ratio=-1.0))
+        unstable = side.narrowed(family.formulate(problem, problem.cases, damping_ratio=-1.0))
         candidates = _searched(side, unstable, options, touching)
-        if (trial := survivor(problem, unstable, candidates)) is not None:
+        if (trial := survivor(problem, unstable, candidates, family)) is not None:
             nlp = unstable
     starts = counted(candidates, trial.candidate.objective if trial else math.nan)
     if problem.cases:
@@ -122,6 +126,8 @@ def _searched(side: Side, nlp: NLP, options: Options, touching: bool) -> list[Ca
         linear_solver=options.linear_solver,
         progress=options.progress,
         touching=touching,
+        near=options.near,
+        family=options.family,
     )
 
 
@@ -136,7 +142,7 @@ def _covered(
     options: Options,
 ) -> Finding | None:
     """The best design once cases have been added until none between them is worse."""
-    best = trial
+    best, family = trial, options.family
     for _ in range(_FAR_ROUNDS if problem.asks_radius else _ROUNDS):
         if trial is None or best is None:
             return None
@@ -147,16 +153,16 @@ def _covered(
             break
         best = trial if ahead(problem, trial, best) else best
         leaders = [best.parameters, trial.parameters, *_leaders(problem, candidates)]
-        nlp = side.narrowed(formulate(problem, (*nlp.cases, *more)))
-        run = Runner(problem, nlp, options.linear_solver, touching)
+        nlp = side.narrowed(family.formulate(problem, (*nlp.cases, *more)))
+        run = Runner(problem, nlp, options.linear_solver, touching, family)
         candidates = [run.ended(design, near=True) for design in leaders]
-        trial = survivor(problem, nlp, candidates)
+        trial = survivor(problem, nlp, candidates, family)
         if _lost(problem, trial, leaders, nlp):
             candidates = [*candidates, *(run.ended(design) for design in leaders)]
-            trial = survivor(problem, nlp, candidates)
+            trial = survivor(problem, nlp, candidates, family)
         if _lost(problem, trial, leaders, nlp) and not problem.asks_radius:
             candidates = [*candidates, *_searched(side, nlp, options, touching)]
-            trial = survivor(problem, nlp, candidates)
+            trial = survivor(problem, nlp, candidates, family)
     if trial is None:
         return None
     others = [c for c in evaluated_cases(problem, trial.parameters) if c not in nlp.cases]

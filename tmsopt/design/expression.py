@@ -86,6 +86,18 @@ _BALLS = _Arithmetic(
 )
 
 
+@dataclass(frozen=True)
+class Limit:
+    """A number that a constraint compares with.
+
+    Attributes:
+        sign: 1 where it stands on the left of the comparison, −1 on the right.
+    """
+
+    value: float
+    sign: float
+
+
 class ExpressionError(ValueError):
     """An expression that cannot be used, with the reason."""
 
@@ -133,6 +145,30 @@ class Expression:
         with np.errstate(all="ignore"):
             left, right = (float(_value(side, values, _NUMERIC)) for side in self._sides())
         return left, right
+
+    @property
+    def limit(self) -> "Limit | None":
+        """The number that a comparison compares with, where one side is nothing but a number."""
+        for side, sign in zip(self._sides(), (1.0, -1.0), strict=False) if self.comparison else ():
+            match side:
+                case ast.Constant(value=int() | float() as value):
+                    return Limit(float(value), sign)
+                case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=int() | float() as value)):
+                    return Limit(-float(value), sign)
+        return None
+
+    def limited(self, value: float) -> "Expression":
+        """The same comparison with another number.
+
+        Raises:
+            ExpressionError: where neither side is a number.
+        """
+        limit = self.limit
+        if limit is None:
+            raise ExpressionError(f"'{self.text}' compares with no plain number; write e.g. 'nu_H >= 0.02'")
+        left, right = re.split("<=|>=|==", self.text)
+        ends = (repr(value), right.strip()) if limit.sign > 0 else (left.strip(), repr(value))
+        return replace(self, text=f"{ends[0]} {self.comparison} {ends[1]}")
 
     def _sides(self) -> list[ast.expr]:
         body = _parse(self.text)

@@ -8,9 +8,10 @@ import numpy as np
 
 from tmsopt.design.branches import other_branches
 from tmsopt.design.cases import Case
+from tmsopt.design.family import Family
 from tmsopt.design.formulations import design_of, freedom
 from tmsopt.design.nlp import NLP
-from tmsopt.design.polish import Point, polisher
+from tmsopt.design.polish import Point
 from tmsopt.design.problem import Problem
 from tmsopt.design.recheck import Checked, recheck
 from tmsopt.design.search import Candidate, claim, same
@@ -110,9 +111,9 @@ def counted(candidates: Sequence[Candidate], at_best: float) -> Starts:
     )
 
 
-def survivor(problem: Problem, nlp: NLP, candidates: Sequence[Candidate]) -> Trial | None:
+def survivor(problem: Problem, nlp: NLP, candidates: Sequence[Candidate], family: Family | None = None) -> Trial | None:
     """The first of the best candidates to pass the recheck once polished, or the one that fails it least."""
-    polish = polisher(nlp)
+    polish = (family or Family()).polisher(nlp)
     kept: Trial | None = None
     tried: list[float] = []
     for candidate in sorted((c for c in candidates if c.feasible), key=lambda c: c.objective):

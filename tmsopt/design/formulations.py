@@ -54,7 +54,11 @@ def freedom(problem: Problem) -> Freedom:
 
 
 def formulate(
-    problem: Problem, cases: Sequence[Case] = (), elastic: bool = False, damping_ratio: float | None = None
+    problem: Problem,
+    cases: Sequence[Case] = (),
+    elastic: bool = False,
+    damping_ratio: float | None = None,
+    settings: Mapping[str, Any] | None = None,
 ) -> NLP:
     """The formulation that the problem asks for: ``matching`` for a pattern, else ``abscissa``.
 
@@ -62,17 +66,22 @@ def formulate(
         cases: what the design must stand up to; the nominal design alone, without any.
         elastic: leave every constraint a row that can be relaxed.
         damping_ratio: take this for it, and leave it to the recheck whether it is.
+        settings: symbols for numbers of the problem that are to be parameters of the NLP; see `Family`.
     """
     if problem.pattern:
-        return matching(problem, cases=cases)
-    return abscissa(problem, cases, elastic, damping_ratio)
+        return matching(problem, cases=cases, settings=settings)
+    return abscissa(problem, cases, elastic, damping_ratio, settings)
 
 
 def abscissa(
-    problem: Problem, cases: Sequence[Case] = (), elastic: bool = False, damping_ratio: float | None = None
+    problem: Problem,
+    cases: Sequence[Case] = (),
+    elastic: bool = False,
+    damping_ratio: float | None = None,
+    settings: Mapping[str, Any] | None = None,
 ) -> NLP:
     """Optimise the objective with every root quantity carried by factors, in every case; real ones if all must be."""
-    build = Builder(problem, cases)
+    build = Builder(problem, cases, settings=settings)
     if damping_ratio is not None:
         build.shared["damping_ratio"] = ca.SX(damping_ratio)
     elif not elastic and demands_heavy_damping(problem):
@@ -82,7 +91,12 @@ def abscissa(
     return build.finish("abscissa")
 
 
-def matching(problem: Problem, pattern: Pattern | None = None, cases: Sequence[Case] = ()) -> NLP:
+def matching(
+    problem: Problem,
+    pattern: Pattern | None = None,
+    cases: Sequence[Case] = (),
+    settings: Mapping[str, Any] | None = None,
+) -> NLP:
     """Match coefficients with a pattern: a_k = a0 · c_k(unknowns).
 
     Square: the equations alone. Under-determined: the objective, or the distance to the start relative to the box.
@@ -91,7 +105,7 @@ def matching(problem: Problem, pattern: Pattern | None = None, cases: Sequence[C
     pattern = pattern or problem.pattern
     if pattern is None:
         raise ValueError("matching needs a pattern; give the problem locate = 'EP4' or another")
-    build = Builder(problem, cases)
+    build = Builder(problem, cases, settings=settings)
     build.pattern(pattern)
     build.constraints()
     left = freedom(problem).count
@@ -123,6 +137,9 @@ def middle(problem: Problem) -> dict[str, float]:
 Lifting = Callable[["Builder", Sequence[int], Sequence[Values]], Lifted]
 """Variables and rows for a root quantity in the covered ones of all cases."""
 
+LIMIT = ".limit"
+"""Ending of the name of the number that a constraint compares with."""
+
 _LEEWAY = 1e-9  # below a constant that a quantity is never less than
 
 
@@ -131,10 +148,18 @@ class Builder:
 
     Args:
         lifts: root quantity → how it is carried by variables; by default by factors.
+        settings: symbols that stand for numbers of the problem.
     """
 
-    def __init__(self, problem: Problem, cases: Sequence[Case], lifts: Mapping[str, Lifting] | None = None) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        cases: Sequence[Case],
+        lifts: Mapping[str, Lifting] | None = None,
+        settings: Mapping[str, Any] | None = None,
+    ) -> None:
         self.problem = problem
+        self.settings = dict(settings or {})
         self.lifting = _LIFTED if lifts is None else lifts
         self.cases = tuple(cases)
         self.names: list[str] = []
@@ -147,7 +172,8 @@ class Builder:
         self.shared: dict[str, Any] = {}
         self.objective: Any = ca.SX(0)
         self.design = {name: self.parameter(name, *ends) for name, ends in problem.free.items()}
-        nominal = problem.ordered(self.design)
+        given = {n: s for n, s in self.settings.items() if n in problem.fixed}
+        nominal = problem.ordered({**self.design, **given})
         directed = [(k, case) for k, case in enumerate(self.cases, start=1) if case.direction]
         radius = self.variable(RADIUS, 0.0) if directed else ca.SX(0)
         varied = [case.applied(nominal, radius, problem.weights) for case in self.cases]
@@ -210,7 +236,14 @@ class Builder:
             if alone and condition.violation({"damping_ratio": 1.0}) == 0:
                 continue  # the real roots see to it
             for value in self.in_each_case(condition):
-                self.row(name, value, *ends[condition.comparison])
+                self.row(name, value + self._moved(name, condition), *ends[condition.comparison])
+
+    def _moved(self, name: str, condition: Expression) -> Any:
+        """What a setting in place of the number that a constraint compares with adds to left minus right."""
+        symbol = self.settings.get(name + LIMIT)
+        if symbol is None or condition.limit is None:
+            return 0
+        return condition.limit.sign * (symbol - condition.limit.value)
 
     def optimise(self) -> None:
         """The objective: where it differs between cases, the worst of them."""
@@ -252,9 +285,11 @@ class Builder:
 
     def finish(self, formulation: str) -> NLP:
         g = ca.vertcat(*[r[1] for r in self.rows]) if self.rows else ca.SX(0, 1)
-        functions = ca.Function(
-            "nlp", [ca.vertcat(*self.x)], [ca.densify(self.objective), ca.densify(g)], ["x"], ["f", "g"]
-        )
+        inputs = {"x": ca.vertcat(*self.x)}
+        if self.settings:
+            inputs["p"] = ca.vertcat(*self.settings.values())
+        outputs = {"f": ca.densify(self.objective), "g": ca.densify(g)}
+        functions = ca.Function("nlp", [*inputs.values()], [*outputs.values()], [*inputs], [*outputs])
         return NLP(
             formulation=formulation,
             variables=tuple(self.names),
@@ -269,6 +304,7 @@ class Builder:
             touches=self.touches,
             products=tuple(self.products),
             exact=bool(self.products) and formulation == "abscissa",
+            settings=(np.nan,) * len(self.settings),
         )
 
     def _lift(self, case: int, quantity: Quantity, values: Values) -> Any:

@@ -75,15 +75,15 @@ def ipopt(nlp: NLP, linear_solver: str = "mumps", max_iterations: int = 150, sta
         "ipopt.max_iter": max_iterations,
         **{f"ipopt.{name}": value for name, value in _SETTINGS[start].items()},
     }
-    x = ca.SX.sym("x", len(nlp.variables))
-    f, g = nlp.functions(x)
-    solver = ca.nlpsol("solver", "ipopt", {"x": x, "f": f, "g": g}, options)
+    x, p = ca.SX.sym("x", len(nlp.variables)), ca.SX.sym("p", len(nlp.settings))
+    f, g = nlp.at(x, p)
+    solver = ca.nlpsol("solver", "ipopt", {"x": x, "p": p, "f": f, "g": g}, options)
 
     def run(x0: Array, limits: NLP = nlp) -> Run:
         lower, upper = np.array(limits.lower), np.array(limits.upper)
         rows = {"lbg": np.array(limits.row_lower), "ubg": np.array(limits.row_upper)}
         with _interruptible():
-            answer = solver(x0=x0, lbx=lower, ubx=upper, **rows)
+            answer = solver(x0=x0, p=limits.settings, lbx=lower, ubx=upper, **rows)
         stats = solver.stats()
         return Run(
             x=np.clip(np.array(answer["x"]).ravel(), lower, upper),

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -68,13 +69,14 @@ class NLP:
     Attributes:
         formulation: ``abscissa`` or ``matching``.
         variables: names; the free parameters come first, each as itself or as its tangent.
-        functions: CasADi function x → (f, g).
+        functions: CasADi function x → (f, g); with settings, (x, p) → (f, g).
         rows: name of each row of g: a constraint's name, or the equation it belongs to.
         lifts: the variables after the free parameters, in order.
         cases: the variations of the design that its rows cover.
         touches: root quantity → the ways in which it is met exactly; unless one is held, the NLP only bounds it.
         products: the factors of each polynomial.
         exact: whether starts satisfy the equations of all cases.
+        settings: values of the numbers p that differ between the problems of a family.
     """
 
     formulation: str
@@ -90,6 +92,13 @@ class NLP:
     touches: Mapping[str, tuple[Touch, ...]] = field(repr=False, default_factory=dict)
     products: tuple[tuple[Factor, ...], ...] = field(repr=False, default=())
     exact: bool = False
+    settings: tuple[float, ...] = ()
+
+    def at(self, x: Any, settings: Any = None) -> Any:
+        """f and g for numbers or CasADi expressions; with the NLP's own settings unless others are given."""
+        return (
+            self.functions(x, self.settings if settings is None else settings) if self.settings else self.functions(x)
+        )
 
     @property
     def equations(self) -> int:

@@ -39,13 +39,14 @@ def polisher(nlp: NLP) -> Callable[[Run, NLP], Point]:
     """A function that refines runs of one NLP under given limits; the better of refined and raw point is returned."""
     x = ca.SX.sym("x", len(nlp.variables))
     multipliers = ca.SX.sym("m", len(nlp.rows))
-    f, g = nlp.functions(x)
+    p = ca.SX.sym("p", len(nlp.settings))
+    f, g = nlp.at(x, p)
     hessian = ca.hessian(f + ca.dot(multipliers, g), x)[0]
-    expand = ca.Function("kkt", [x, multipliers], [f, ca.gradient(f, x), g, ca.jacobian(g, x), hessian])
+    expand = ca.Function("kkt", [x, multipliers, p], [f, ca.gradient(f, x), g, ca.jacobian(g, x), hessian])
 
     def polish(run: Run, limits: NLP) -> Point:
         ends = (np.array(e) for e in (limits.lower, limits.upper, limits.row_lower, limits.row_upper))
-        return _polished(_Conditions(expand, *ends), run)
+        return _polished(_Conditions(expand, limits.settings, *ends), run)
 
     return polish
 
@@ -55,6 +56,7 @@ class _Conditions:
     """The optimality conditions of one NLP: its functions with derivatives, and its limits."""
 
     expand: ca.Function
+    settings: tuple[float, ...]
     lower: Array
     upper: Array
     row_lower: Array
@@ -62,7 +64,7 @@ class _Conditions:
 
     def at(self, x: Array, rows: Array) -> tuple[float, Array, Array, Array, Array]:
         """Objective, its gradient, rows, their Jacobian, and the Hessian of the Lagrangian."""
-        f, gradient, g, jacobian, hessian = (np.array(part) for part in self.expand(x, rows))
+        f, gradient, g, jacobian, hessian = (np.array(part) for part in self.expand(x, rows, self.settings))
         return float(f.item()), gradient.ravel(), g.ravel(), jacobian, hessian
 
     def point(self, x: Array, rows: Array, bounds: Array) -> Point:

@@ -244,7 +244,7 @@ def _elastic(wide: Problem, nlp: NLP, limits: Sequence[Limit]) -> NLP:
     """minimise Σ slack / scale, with each limit moved by its slack; everything else holds."""
     names = [limit.name for limit in limits]
     x, slack = ca.SX.sym("x", len(nlp.variables)), ca.SX.sym("s", len(limits))
-    g = nlp.functions(x)[1]
+    g = nlp.at(x)[1]
     rows: list[tuple[str, Any, float, float]] = []
     for k, name in enumerate(nlp.rows):
         lower, upper = nlp.row_lower[k], nlp.row_upper[k]

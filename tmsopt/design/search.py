@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
 from tmsopt.design.bound import bounded, closed, omega0_bound
+from tmsopt.design.family import Family
 from tmsopt.design.formulations import abscissa, design_of, freedom, middle
 from tmsopt.design.ipopt import Run, ipopt
 from tmsopt.design.nlp import NLP, Array
@@ -61,16 +61,22 @@ def search(
     linear_solver: str,
     progress: Progress | None,
     touching: bool = False,
+    near: Mapping[str, float] | None = None,
+    family: Family | None = None,
 ) -> list[Candidate]:
     """Where every start ended that was tried, in order.
 
     Args:
+        near: a design close to the optimum, perhaps, tried before all others.
+        family: that the problem is one of.
         touching: hold every root quantity at its exact value, in the way that each start is closest to, where a mere
             bound on it would let the optimiser claim too much.
     """
-    run = Runner(problem, nlp, linear_solver, touching)
+    run = Runner(problem, nlp, linear_solver, touching, family or Family())
     candidates: list[Candidate] = []
-    if problem.start:  # the user's own
+    if near:
+        candidates.append(run.ended({**middle(problem), **near}, near=True))
+    if problem.start and len(candidates) < starts:  # the user's own
         candidates.append(run.ended(middle(problem), near=True))
     for design in designs(problem, seed, max(starts - len(candidates), 0)):
         candidates.append(run.ended(design, hopeful=any(c.feasible for c in candidates)))
@@ -103,6 +109,7 @@ class Runner:
     nlp: NLP
     linear_solver: str
     touching: bool
+    family: Family = field(default_factory=Family)
 
     def ended(self, design: Mapping[str, float], near: bool = False, hopeful: bool = True) -> Candidate:
         """Where a start ends, with the factors shared out anew as long as that helps."""
@@ -123,23 +130,7 @@ class Runner:
     def _once(self, design: Mapping[str, float], start: str) -> Candidate:
         x = complete(self.nlp, self.problem, design)
         limits = self.nlp.touching(x) if self.touching else self.nlp
-        return _candidate(self.problem, limits, self._run[start](x, limits))
-
-    @cached_property
-    def _run(self) -> "_Runs":
-        return _Runs(self.nlp, self.linear_solver)
-
-
-class _Runs(dict[str, Callable[..., Run]]):
-    """Solvers by what is expected of a start, built when first used."""
-
-    def __init__(self, nlp: NLP, linear_solver: str) -> None:
-        super().__init__()
-        self.nlp, self.linear_solver = nlp, linear_solver
-
-    def __missing__(self, start: str) -> Callable[..., Run]:
-        self[start] = ipopt(self.nlp, self.linear_solver, start=start)
-        return self[start]
+        return _candidate(self.problem, limits, self.family.ipopt(self.nlp, self.linear_solver, start)(x, limits))
 
 
 def claim(problem: Problem, candidate: Candidate) -> float:
@@ -153,7 +144,7 @@ def same(a: float, b: float) -> bool:
 
 
 def _candidate(problem: Problem, nlp: NLP, run: Run) -> Candidate:
-    f, g = nlp.functions(run.x)
+    f, g = nlp.at(run.x)
     rows = np.array(g).ravel()
     if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(run.x)) and math.isfinite(float(f))):
         return Candidate(nlp, run, math.inf, False)

@@ -1,5 +1,6 @@
 """Classes of designs that are searched apart, such as forward and backward steer axis tilt."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,13 +24,22 @@ class Side:
     name: str
     problem: Problem
 
+    def holds(self, design: Mapping[str, float]) -> bool:
+        """Whether a design, as far as it is given, is on this part."""
+        return all(lower <= design.get(n, lower) <= upper for n, (lower, upper) in self.problem.free.items())
+
     def narrowed(self, nlp: NLP) -> NLP:
         """The NLP of the whole problem, on this part of the box."""
-        of = self.problem.parameter_set
-        lower, upper = list(nlp.lower), list(nlp.upper)
-        for k, (name, ends) in enumerate(self.problem.free.items()):
-            lower[k], upper[k] = (float(np.tan(e)) if of[name].tangent else e for e in ends)
-        return replace(nlp, lower=tuple(lower), upper=tuple(upper))
+        return narrowed(nlp, self.problem)
+
+
+def narrowed(nlp: NLP, problem: Problem) -> NLP:
+    """An NLP with the box of a problem that has the same free parameters."""
+    of = problem.parameter_set
+    lower, upper = list(nlp.lower), list(nlp.upper)
+    for k, (name, ends) in enumerate(problem.free.items()):
+        lower[k], upper[k] = (float(np.tan(e)) if of[name].tangent else e for e in ends)
+    return replace(nlp, lower=tuple(lower), upper=tuple(upper))
 
 
 def sides(problem: Problem) -> tuple[Side, ...]:

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from tmsopt.design.bound import omega0_bound
@@ -10,6 +10,7 @@ from tmsopt.design.certified import certified
 from tmsopt.design.cover import cover
 from tmsopt.design.errors import InputError
 from tmsopt.design.explore import Explored, Options, Progress, evaluated_cases, explore, without_any
+from tmsopt.design.family import Family
 from tmsopt.design.finding import Finding, better, evaluated
 from tmsopt.design.formulations import freedom
 from tmsopt.design.frozen import Table
@@ -29,6 +30,8 @@ def solve(
     linear_solver: str = "mumps",
     throw: bool = True,
     progress: Progress | None = None,
+    near: Mapping[str, float] | None = None,
+    family: Family | None = None,
 ) -> Solution:
     """Find the best design, from several starts, and check it independently of the solver.
 
@@ -39,6 +42,9 @@ def solve(
         linear_solver: ``mumps`` or ``spral``.
         throw: raise NotSolved unless the status is ``optimal``; otherwise return the best point with its status.
         progress: called with (starts done, starts at most).
+        near: a design that may be close to the optimum, tried first; where both signs of a parameter are searched,
+            only its own is.
+        family: what was built for other problems that differ in numbers alone, to be used again.
 
     Raises:
         NotSolved: carrying the best point found, when `throw`.
@@ -53,8 +59,10 @@ def solve(
     notes: tuple[str, ...] = ()
     values: dict[str, float] = {}
     if problem.free:
-        options = Options(starts, seed, exhaustive, linear_solver, progress)
-        explored = [explore(problem, side, options) for side in sides(problem)]
+        family = family or Family()
+        near = near and {n: min(max(near[n], lo), hi) for n, (lo, hi) in problem.free.items()}
+        options = Options(starts, seed, exhaustive, linear_solver, progress, near, family)
+        explored = [explore(problem, side, options) for side in sides(problem) if near is None or side.holds(near)]
         finding = _winner(problem, explored) or without_any(problem, explored, options)
         notes = _sides_note(problem, explored, finding)
         values = _side_values(explored)

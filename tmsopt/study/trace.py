@@ -103,7 +103,7 @@ def prepare(problem: Problem) -> Traced:
     equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].comparison == "=="}
     nlp = matching(replace(problem, constraints=equalities))
     x = ca.SX.sym("x", len(nlp.variables))
-    g = nlp.functions(x)[1]
+    g = nlp.at(x)[1]
     rows = [k for k in range(len(nlp.rows)) if nlp.row_lower[k] == nlp.row_upper[k]]
     if len(rows) != len(nlp.variables) - 1:
         names = ", ".join(equalities)

@@ -134,7 +134,7 @@ def doubt(question: Question, design: Mapping[str, float]) -> str:
     for sign in question.signs():
         nlp = question.program(sign)
         x = complete(nlp, question.problem, design)
-        rows = np.array(nlp.functions(x)[1]).ravel()
+        rows = np.array(nlp.at(x)[1]).ravel()
         sizes = np.array(
             [max(map(abs, ends)) for ends in ranges(nlp.functions, list(zip(nlp.lower, nlp.upper, strict=True)))[1]]
         )

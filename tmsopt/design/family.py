@@ -1,0 +1,112 @@
+"""Problems that differ in numbers alone: their NLPs and solvers, built once and used again for each."""
+
+from collections import OrderedDict
+from collections.abc import Callable, Collection, Hashable, Sequence
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import casadi as ca
+
+from tmsopt.design.cases import Case
+from tmsopt.design.formulations import LIMIT, formulate, freedom, middle
+from tmsopt.design.ipopt import Run, ipopt
+from tmsopt.design.nlp import NLP
+from tmsopt.design.polish import Point, polisher
+from tmsopt.design.problem import Problem
+from tmsopt.design.sides import narrowed
+from tmsopt.design.variation import demands_heavy_damping, tempts
+from tmsopt.models import Quantity, Values
+
+_KEPT = 32
+"""NLPs kept, with three solvers each: where cases are added row by row, most are not met again."""
+
+T = TypeVar("T")
+
+
+class Family:
+    """NLPs, solvers and polishers that have been built, of problems that differ in some numbers.
+
+    Not to be shared between threads, as no solver is. A lone problem is a family in which nothing varies.
+
+    Args:
+        varied: names of the numbers that differ: fixed parameters, and ``trail.limit`` for the number that the
+            constraint ``trail`` compares with. They are parameters of the NLPs; the box may differ too.
+    """
+
+    def __init__(self, varied: Collection[str] = ()) -> None:
+        self.varied = tuple(varied)
+        self._nlps: OrderedDict[Hashable, NLP] = OrderedDict()
+        self._made: OrderedDict[Hashable, tuple[ca.Function, Any]] = OrderedDict()
+
+    def formulate(self, problem: Problem, cases: Sequence[Case] = (), damping_ratio: float | None = None) -> NLP:
+        """What `formulations.formulate` gives, with the problem's numbers in place of another's of the family."""
+        if not self.varied:
+            return formulate(problem, cases, damping_ratio=damping_ratio)
+        symbols = {name: ca.SX.sym(name) for name in self.varied}
+        nlp = _kept(
+            self._nlps,
+            (tuple(cases), damping_ratio, *_decisions(problem)),
+            lambda: formulate(problem, cases, damping_ratio=damping_ratio, settings=symbols),
+        )
+        return narrowed(replace(nlp, settings=tuple(_value(problem, name) for name in self.varied)), problem)
+
+    def ipopt(self, nlp: NLP, linear_solver: str, start: str) -> Callable[..., Run]:
+        """A solver of an NLP of the family; see `ipopt`."""
+        return self._of(nlp, (linear_solver, start), lambda: ipopt(nlp, linear_solver, start=start))
+
+    def polisher(self, nlp: NLP) -> Callable[[Run, NLP], Point]:
+        """A polisher of an NLP of the family; see `polisher`."""
+        return self._of(nlp, (), lambda: polisher(nlp))
+
+    def _of(self, nlp: NLP, options: Hashable, make: Callable[[], T]) -> T:
+        """Something made of an NLP's functions, which are kept with it lest another gets their address."""
+        made: T = _kept(self._made, (id(nlp.functions), options), lambda: (nlp.functions, make()), 3 * _KEPT)[1]
+        return made
+
+
+def _kept(known: OrderedDict[Hashable, T], key: Hashable, make: Callable[[], T], most: int = _KEPT) -> T:
+    """What is known, or is made now; of too many, the one that was not used for longest goes."""
+    if key not in known:
+        known[key] = make()
+        if len(known) > most:
+            known.popitem(last=False)
+    known.move_to_end(key)
+    return known[key]
+
+
+def _value(problem: Problem, name: str) -> float:
+    if name.endswith(LIMIT):
+        limit = problem.conditions[name.removesuffix(LIMIT)].limit
+        assert limit is not None  # a study checks what it varies
+        return limit.value
+    return problem.fixed[name]
+
+
+def _decisions(problem: Problem) -> tuple[Hashable, ...]:
+    """What decides on variables and rows beside the numbers that are parameters of the NLP."""
+    heavy = problem.pattern is None and demands_heavy_damping(problem)
+    texts = tuple(problem.constraints.items()) if heavy else ()
+    nearest = problem.pattern is not None and problem.objective is None and freedom(problem).count > 0
+    box = (tuple(problem.free.items()), tuple(middle(problem).items())) if nearest else tuple(problem.free)
+    return heavy, texts, box, tuple(tempts(problem, name) for name in _pieced(problem))
+
+
+def _pieced(problem: Problem) -> list[str]:
+    """Quantities in pieces that are asked for: whether they become variables depends on what more of them does."""
+    found: dict[str, None] = {}
+
+    def seen(quantity: Quantity, values: Values) -> Any:
+        if quantity.pieces:
+            found[quantity.name] = None
+        return ca.SX.sym(quantity.name) if quantity.pieces or quantity.equation is not None else None
+
+    names = {n for e in (problem.objective, *problem.conditions.values()) if e for n in e.names}
+    quantities = {q.name: q for q in (*problem.model.quantities, *problem.parameter_set.quantities)}
+    asked = names & quantities.keys()
+    if any(q.pieces for q in quantities.values()) and asked:
+        values = Values(
+            problem.model, problem.parameter_set, {n: ca.SX.sym(n) for n in problem.parameter_set.names}, lift=seen
+        )
+        for name in sorted(asked):
+            values[name]
+    return sorted(found)
