@@ -121,9 +121,14 @@ class Expression:
         with np.errstate(all="ignore"):
             return self._evaluate(values, _NUMERIC)
 
-    def symbolic(self, values: Mapping[str, Any]) -> Any:
-        """CasADi expression; of a comparison, left minus right."""
-        return self._evaluate(values, _SYMBOLIC)
+    def symbolic(self, values: Mapping[str, Any], limit: Any = None) -> Any:
+        """CasADi expression; of a comparison, left minus right, with `limit` in place of the number on one side."""
+        if limit is None or self.limit is None:
+            return self._evaluate(values, _SYMBOLIC)
+        left, right = self._sides()
+        if self.limit.sign > 0:
+            return limit - _value(right, values, _SYMBOLIC)
+        return _value(left, values, _SYMBOLIC) - limit
 
     def enclosure(self, values: Mapping[str, Any], number: Callable[[Any], Any] = elementary.exact) -> Any:
         """Ball that certainly holds the value, for balls or exact fractions; of a comparison, left minus right.

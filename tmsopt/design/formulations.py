@@ -235,15 +235,8 @@ class Builder:
             alone = condition.names == ("damping_ratio",) and "damping_ratio" in self.shared
             if alone and condition.violation({"damping_ratio": 1.0}) == 0:
                 continue  # the real roots see to it
-            for value in self.in_each_case(condition):
-                self.row(name, value + self._moved(name, condition), *ends[condition.comparison])
-
-    def _moved(self, name: str, condition: Expression) -> Any:
-        """What a setting in place of the number that a constraint compares with adds to left minus right."""
-        symbol = self.settings.get(name + LIMIT)
-        if symbol is None or condition.limit is None:
-            return 0
-        return condition.limit.sign * (symbol - condition.limit.value)
+            for value in self.in_each_case(condition, self.settings.get(name + LIMIT)):
+                self.row(name, value, *ends[condition.comparison])
 
     def optimise(self) -> None:
         """The objective: where it differs between cases, the worst of them."""
@@ -260,10 +253,10 @@ class Builder:
             for value in values:
                 self.row("objective", value - self.objective, -np.inf, 0.0)
 
-    def in_each_case(self, expression: Expression) -> list[Any]:
-        """The expression's value in every case that it differs in, or the nominal one."""
+    def in_each_case(self, expression: Expression, limit: Any = None) -> list[Any]:
+        """The expression's value in every case that it differs in, or the nominal one; see `Expression.symbolic`."""
         covered = self.covered if varies(self.problem, expression, self.cases) else [0]
-        return [expression.symbolic(self.values[k]) for k in covered]
+        return [expression.symbolic(self.values[k], limit) for k in covered]
 
     def pattern(self, pattern: Pattern) -> None:
         unknowns = [self.variable(f"{pattern.name}.{u}") for u in pattern.unknowns]

@@ -145,7 +145,7 @@ def compare(
     if design.problem.model is not tms:
         raise ValueError(f"no closed-form laws are known for the model '{design.problem.model.name}'; accepted: tms")
     other, reason = _other_formulation(design, solved)
-    return Comparison(design, tuple(_law_rows(design)), other, reason)
+    return Comparison(design, tuple(law_rows(design)), other, reason)
 
 
 def _other_formulation(design: Solution, solved: Callable[[Problem], Solution]) -> tuple[Solution | None, str]:
@@ -169,7 +169,7 @@ def _other_formulation(design: Solution, solved: Callable[[Problem], Solution]) 
     return other, ""
 
 
-def _law_rows(design: Solution) -> Iterator[LawRow]:
+def law_rows(design: Solution) -> Iterator[LawRow]:
     """Every law, with the reason where its conditions do not hold."""
     p = {name: float(value) for name, value in design.dimensionless.items()}
     heights = {k: p[k] for k in ("zeta_B", "zeta_H")}
