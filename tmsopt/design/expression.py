@@ -218,6 +218,18 @@ def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
     return Expression(text, names, symbol)
 
 
+def written_sides(text: str) -> tuple[str, str, str]:
+    """Left side, sign and right side of a comparison, as written.
+
+    Raises:
+        ExpressionError: for anything else.
+    """
+    body = _parse(text)
+    if not isinstance(body, ast.Compare) or len(body.ops) > 1 or type(body.ops[0]) not in COMPARISONS:
+        raise ExpressionError(f"'{text}' is not a comparison by <=, >= or ==")
+    return _source(body.left, text), COMPARISONS[type(body.ops[0])], _source(body.comparators[0], text)
+
+
 _ONE_AT_A_TIME = threading.Lock()
 """Neither ast.parse (python/cpython#106905) nor warnings.catch_warnings may run in two threads at once."""
 

@@ -1,10 +1,20 @@
 """A study as data: a problem, and what varies from row to row."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+import numpy as np
+
+from tmsopt.design.errors import Fault, InputError
+from tmsopt.design.frozen import Table
+from tmsopt.design.limit import with_limit
 from tmsopt.design.problem import Problem
 from tmsopt.design.search import STARTS
+from tmsopt.study.batch.column import Column
+from tmsopt.study.batch.samples import grid
+from tmsopt.study.batch.stated import faults
+
+_SEEDS = 2**31
 
 
 @dataclass(frozen=True)
@@ -13,14 +23,21 @@ class Study:
 
     Attributes:
         problem: what is asked of every row; what varies has some value here too.
-        columns: what varies → its value in every row; all of the same length. Names are fixed parameters,
-            ``lambda_s.min`` and ``lambda_s.max`` of a free one, and ``trail.limit``, the number that the constraint
-            ``trail`` compares with.
+        columns: what varies → its value in every row (rad, SI units); all of the same length. Names are fixed
+            parameters, ``lambda_s.min`` and ``lambda_s.max`` of a free one, and ``trail.limit``, the number that the
+            constraint ``trail`` compares with.
         title: one line for reports.
         seed: the rows' own seeds follow from it.
         starts: of a row, at most.
         warm: whether neighbours start each other.
         report: expressions recorded for every row beside parameters and abscissa.
+        grid_shape: of a full grid, axis → how many values it has, in the order of the columns, the last one fastest;
+            None for other studies.
+        method: how the columns were made, one of `METHODS`; rows do not depend on it.
+        notes: sentences for the reader.
+
+    Raises:
+        InputError: listing everything that is wrong, each with the accepted values.
     """
 
     problem: Problem
@@ -30,3 +47,83 @@ class Study:
     starts: int = STARTS
     warm: bool = False
     report: Sequence[str] = ()
+    grid_shape: Mapping[str, int] | None = None
+    method: str = "list"
+    notes: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        if found := list(faults(self)):
+            raise InputError(found)
+        columns = {n: c if isinstance(c, Column) else Column(c) for n, c in self.columns.items()}
+        object.__setattr__(self, "columns", Table(columns))
+        object.__setattr__(self, "report", tuple(dict.fromkeys(self.report)))
+        object.__setattr__(self, "notes", tuple(self.notes))
+        if self.grid_shape is not None:
+            object.__setattr__(self, "grid_shape", Table(self.grid_shape))
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())))
+
+    def varied(self, row: int) -> Table[float]:
+        """What the study gives a row, counted from 0.
+
+        Raises:
+            InputError: for a row that the study has not.
+        """
+        if not 0 <= row < len(self):
+            message = f"found {row}; accepted: 0 to {len(self) - 1}, for the study has {len(self)} rows"
+            raise InputError([Fault(message, ("row",))])
+        return Table({name: float(column[row]) for name, column in self.columns.items()})
+
+    def row_problem(self, row: int) -> Problem:
+        """The problem of a row; a start outside the row's own bounds is moved to the nearer one.
+
+        Raises:
+            InputError: for a row that cannot be posed, such as one with lambda_s.min above lambda_s.max.
+        """
+        fixed, constraints = dict(self.problem.fixed), dict(self.problem.constraints)
+        ends = {name: list(pair) for name, pair in self.problem.free.items()}
+        for name, value in self.varied(row).items():
+            stem, _, end = name.rpartition(".")
+            if not stem:
+                fixed[name] = value
+            elif end == "limit":
+                constraints[stem] = with_limit(constraints[stem], value)
+            else:
+                ends[stem][("min", "max").index(end)] = value
+        free = {name: (low, high) for name, (low, high) in ends.items()}
+        start = {name: min(max(value, free[name][0]), free[name][1]) for name, value in self.problem.start.items()}
+        return replace(self.problem, fixed=fixed, free=free, constraints=constraints, start=start)
+
+    def seed_of(self, row: int) -> int:
+        """The seed of a row's starts, by which the row can be solved alone."""
+        state = np.random.SeedSequence(self.seed, spawn_key=(row,)).generate_state(1)
+        return int(state[0]) % _SEEDS
+
+
+def over_grid(
+    problem: Problem,
+    axes: Mapping[str, Sequence[float]],
+    *,
+    title: str = "",
+    seed: int = 0,
+    starts: int = STARTS,
+    warm: bool = False,
+    report: Sequence[str] = (),
+) -> Study:
+    """The study of every combination of the axes' values, the last axis fastest.
+
+    Raises:
+        InputError: listing everything that is wrong with it.
+    """
+    return Study(
+        problem=problem,
+        columns=grid(axes),
+        title=title,
+        seed=seed,
+        starts=starts,
+        warm=warm,
+        report=report,
+        grid_shape={name: len(values) for name, values in axes.items()},
+        method="grid",
+    )

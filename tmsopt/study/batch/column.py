@@ -1,0 +1,48 @@
+"""Many numbers that cannot be changed, in eight bytes each."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+class Column(Sequence[float]):
+    """Numbers in order, read-only; equal where every number is."""
+
+    __slots__ = ("_values",)
+
+    def __init__(self, values: ArrayLike) -> None:
+        self._values = np.array(values, dtype=np.float64)
+        self._values.flags.writeable = False
+
+    @overload
+    def __getitem__(self, where: int) -> float: ...
+
+    @overload
+    def __getitem__(self, where: slice) -> "Column": ...
+
+    def __getitem__(self, where: int | slice) -> "float | Column":
+        return Column(self._values[where]) if isinstance(where, slice) else float(self._values[where])
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __iter__(self) -> Iterator[float]:
+        return iter(self._values.tolist())
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Column) and np.array_equal(self._values, other._values)
+
+    def __hash__(self) -> int:
+        return hash(self._values.tobytes())
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[np.float64]:
+        return self._values if dtype in (None, np.float64) and not copy else np.array(self._values, dtype)
+
+    def __reduce__(self) -> tuple[type["Column"], tuple[NDArray[np.float64]]]:
+        return Column, (self._values,)
+
+    def __repr__(self) -> str:
+        shown = ", ".join(f"{value:.6g}" for value in self._values[:4].tolist())
+        return f"Column({shown}{', …' if len(self) > 4 else ''}; {len(self)})"

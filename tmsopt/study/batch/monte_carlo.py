@@ -1,0 +1,174 @@
+"""Monte Carlo over tolerances: a design built many times, each time a little off."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.design.errors import Fault, InputError, suggest
+from tmsopt.design.problem import Problem
+from tmsopt.design.search import STARTS
+from tmsopt.design.solution import NotSolved, Solution
+from tmsopt.design.solve import solve
+from tmsopt.study.batch.column import Column
+from tmsopt.study.batch.plan import Study
+from tmsopt.study.batch.stated import MOST_ROWS
+
+DISTRIBUTIONS = ("uniform", "normal")
+"""Of an error: uniform within ± tolerance; normal with a third of the tolerance as its deviation, cut off at ± tolerance
+(0.27 % would lie beyond, and are drawn within)."""
+
+_DEVIATIONS = 3  # standard deviations in a tolerance
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """A Monte Carlo study whose design has yet to be found; `planned` makes it a Study.
+
+    Attributes:
+        problem: its optimum is the design; its tolerances are drawn from, unless `tolerances` are given.
+        rows: designs drawn.
+        seed: of the draws; the nominal design is solved from the starts of seed 0.
+        distribution: one of `DISTRIBUTIONS`.
+        starts: of the nominal design, at most.
+    """
+
+    problem: Problem
+    rows: int
+    seed: int = 0
+    distribution: str = "uniform"
+    tolerances: Mapping[str, float] = field(default_factory=dict)
+    title: str = ""
+    starts: int = STARTS
+    report: Sequence[str] = ()
+
+
+def planned(asked: Study | Sampling, progress: Callable[[int, int], None] | None = None) -> Study:
+    """The study with all its rows: of a Monte Carlo study, once its nominal design is solved.
+
+    Raises:
+        NotSolved: when there is no design to draw around.
+        InputError: when the design cannot be drawn around.
+    """
+    if isinstance(asked, Study):
+        return asked
+    design = solve(asked.problem, starts=asked.starts, progress=progress)
+    return monte_carlo(
+        design,
+        asked.rows,
+        asked.seed,
+        asked.distribution,
+        asked.tolerances or None,
+        title=asked.title,
+        report=asked.report,
+    )
+
+
+def monte_carlo(
+    design: Solution,
+    rows: int,
+    seed: int = 0,
+    distribution: str = "uniform",
+    tolerances: Mapping[str, float] | None = None,
+    *,
+    title: str = "",
+    report: Sequence[str] = (),
+) -> Study:
+    """The study of `rows` designs drawn around one, in which nothing is free.
+
+    Each parameter with a tolerance is drawn on its own; the others stay as they are. Inequalities and scenarios stay,
+    so that a row is infeasible where one is violated. Equalities and a pattern to locate are left out: no drawn design
+    meets them. The first rows of a longer study are those of a shorter one.
+
+    Args:
+        tolerances: parameter → how far it may be off either way; those of the design's problem where None.
+
+    Raises:
+        NotSolved: for a design that is not optimal.
+        InputError: listing everything else that is wrong.
+    """
+    if design.status != "optimal":
+        raise NotSolved(design)
+    stated = design.problem.tolerances if tolerances is None else tolerances
+    drawn, notes = _as_built(design)
+    if found := [*_faults(drawn, stated), *_draw_faults(rows, seed, distribution)]:
+        raise InputError(found)
+    errors = _errors(len(stated), rows, seed, distribution)
+    columns = {
+        name: Column(drawn.fixed[name] + float(tolerance) * error)
+        for (name, tolerance), error in zip(stated.items(), errors, strict=True)
+    }
+    return Study(
+        problem=drawn,
+        columns=columns,
+        title=title or design.problem.title,
+        seed=seed,
+        report=report,
+        method="monte_carlo",
+        notes=notes,
+    )
+
+
+def _as_built(design: Solution) -> tuple[Problem, tuple[str, ...]]:
+    """The design's problem with everything fixed and nothing asked that no product can meet; what was left out."""
+    problem = design.problem
+    equal = [name for name, condition in problem.conditions.items() if condition.comparison == "=="]
+    left_out = equal + ([f"the pattern {problem.locate}"] if problem.locate else [])
+    notes = (f"left out, for no drawn design meets it exactly: {', '.join(left_out)}",) if left_out else ()
+    fixed = replace(
+        problem,
+        fixed=dict(design.parameters),
+        free={},
+        start={},
+        tolerances={},
+        locate=None,
+        constraints={n: text for n, text in problem.constraints.items() if n not in equal},
+    )
+    return fixed, notes
+
+
+def _faults(drawn: Problem, tolerances: Any) -> list[Fault]:
+    """What is wrong with tolerances around a design."""
+    if not isinstance(tolerances, Mapping) or not tolerances:
+        example = "{'lambda_s': 0.01}"
+        found = "no tolerances" if not tolerances else f"found {tolerances!r}"
+        return [Fault(f"{found}; accepted: parameter and how far it may be off, such as {example}", ("tolerances",))]
+    found_faults: list[Fault] = []
+    for name, value in tolerances.items():
+        key = ("tolerances", str(name))
+        if name not in drawn.fixed:
+            found_faults.append(Fault(f"unknown parameter '{name}'; {suggest(str(name), drawn.fixed)}", key))
+        elif name in drawn.scenarios:
+            message = f"{name} has a scenario too, in place of a drawn value; leave out the tolerance or the scenario"
+            found_faults.append(Fault(message, key))
+        else:
+            try:
+                replace(drawn, tolerances={name: value})
+            except InputError as error:
+                found_faults += error.faults
+    return found_faults
+
+
+def _draw_faults(rows: Any, seed: Any, distribution: Any) -> list[Fault]:
+    found = []
+    if isinstance(rows, bool) or not isinstance(rows, int) or not 1 <= rows <= MOST_ROWS:
+        found.append(Fault(f"found {rows!r}; accepted: a whole number from 1 to {MOST_ROWS}", ("rows",)))
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        found.append(Fault(f"found {seed!r}; accepted: a whole number, 0 or more", ("seed",)))
+    if distribution not in DISTRIBUTIONS:
+        found.append(Fault(f"found {distribution!r}; {suggest(str(distribution), DISTRIBUTIONS)}", ("distribution",)))
+    return found
+
+
+def _errors(parameters: int, rows: int, seed: int, distribution: str) -> NDArray[np.float64]:
+    """Errors in tolerances, from −1 to 1: (parameters, rows)."""
+    shares = np.random.default_rng(seed).random((rows, parameters)).T
+    if distribution == "uniform":
+        return np.asarray(2 * shares - 1)
+    from scipy.special import ndtr, ndtri
+
+    low = ndtr(-_DEVIATIONS)
+    return np.clip(ndtri(low + shares * (1 - 2 * low)) / _DEVIATIONS, -1, 1)

@@ -1,0 +1,147 @@
+"""Rows of a study by rule: every combination of values, or a sample of a box."""
+
+import inspect
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.design.errors import Fault, InputError
+from tmsopt.study.batch.column import Column
+from tmsopt.study.batch.stated import MOST_ROWS
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Span:
+    """From `low` to `high`, evenly or, with `log`, by equal factors, for which both ends have one sign."""
+
+    low: float
+    high: float
+    log: bool = False
+
+    def at(self, share: Array) -> Array:
+        """The numbers at shares from 0 to 1."""
+        low, high = float(self.low), float(self.high)
+        inside = low * (high / low) ** share if self.log else low + share * (high - low)
+        return np.clip(inside, min(low, high), max(low, high))
+
+    def points(self, count: int) -> Array:
+        """So many numbers, both ends included, exactly."""
+        values = np.array(self.at(np.linspace(0, 1, count)))
+        values[-1], values[0] = self.high, self.low
+        return values
+
+
+def grid(axes: Mapping[str, Sequence[float]]) -> dict[str, Column]:
+    """Every combination of the axes' values, the last axis fastest, as `itertools.product` has them.
+
+    Raises:
+        InputError: for more rows than a study may have, or an axis that is no list of numbers.
+    """
+    lists = {name: _axis(name, values) for name, values in axes.items()}
+    sizes = [len(values) for values in lists.values()]
+    if math.prod(sizes) > MOST_ROWS:
+        found = f"{' x '.join(map(str, sizes))} = {math.prod(sizes)} rows"
+        raise InputError([Fault(f"found {found}; accepted: up to {MOST_ROWS}; take fewer points", ("columns",))])
+    crossed = np.meshgrid(*lists.values(), indexing="ij")
+    return {name: Column(values.ravel()) for name, values in zip(lists, crossed, strict=True)}
+
+
+def latin_hypercube(ranges: Mapping[str, Any], rows: int, seed: int = 0) -> dict[str, Column]:
+    """A Latin hypercube sample: cut into `rows` equal parts, the range of each column has one value in each part.
+
+    Args:
+        ranges: name → (least, greatest), or a `Span`.
+
+    Raises:
+        InputError: listing everything that is wrong.
+    """
+    spans = _spans(ranges, rows, seed)
+    from scipy.stats import qmc
+
+    return _placed(spans, qmc.LatinHypercube(len(spans), **_stream(qmc.LatinHypercube, seed)).random(rows))
+
+
+def sobol(ranges: Mapping[str, Any], rows: int, seed: int = 0) -> dict[str, Column]:
+    """The first `rows` points of a scrambled Sobol sequence; see `sobol_note`.
+
+    Args:
+        ranges: name → (least, greatest), or a `Span`.
+
+    Raises:
+        InputError: listing everything that is wrong.
+    """
+    spans = _spans(ranges, rows, seed)
+    from scipy.stats import qmc
+
+    whole = qmc.Sobol(len(spans), scramble=True, **_stream(qmc.Sobol, seed)).random_base2(math.ceil(math.log2(rows)))
+    return _placed(spans, whole[:rows])
+
+
+def sobol_note(rows: int) -> str:
+    """What the reader should know of a number of rows that is no power of 2; empty where it is one."""
+    if rows & (rows - 1) == 0:
+        return ""
+    near = 2 ** round(math.log2(rows))
+    return f"a Sobol sample is evenly balanced for a power of 2; {rows} rows are not, {near} would be"
+
+
+def span_faults(name: str, span: Span) -> Iterator[Fault]:
+    """What is wrong with a range."""
+    key = ("ranges", name)
+    try:
+        low, high = float(span.low), float(span.high)
+    except (TypeError, ValueError, OverflowError):
+        low = high = math.nan
+    if not (math.isfinite(low) and math.isfinite(high)):
+        yield Fault(f"found {span.low!r} to {span.high!r}; accepted: finite numbers", key)
+    elif low > high:
+        yield Fault(f"min = {low:.6g} is greater than max = {high:.6g}; swap them", key)
+    elif span.log and not low * high > 0:
+        yield Fault(f"log from {low:.6g} to {high:.6g}; accepted: both ends positive, or both negative", key)
+
+
+def _axis(name: str, values: Any) -> Array:
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        array = np.zeros((0, 0))
+    if array.ndim != 1 or not array.size:
+        raise InputError([Fault(f"found {values!r}; accepted: a list of numbers, such as [0.1, 0.2]", (name,))])
+    return array
+
+
+def _spans(ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Span]:
+    found: list[Fault] = []
+    spans: dict[str, Span] = {}
+    for name, stated in ranges.items():
+        try:
+            spans[name] = stated if isinstance(stated, Span) else Span(*stated)
+            found += span_faults(name, spans[name])
+        except TypeError:
+            accepted = "(least, greatest), or a Span"
+            found.append(Fault(f"found {stated!r}; accepted: {accepted}", ("ranges", name)))
+    if not ranges:
+        found.append(Fault("nothing varies; give a range", ("ranges",)))
+    if not (isinstance(rows, int) and 1 <= rows <= MOST_ROWS):
+        found.append(Fault(f"found {rows!r}; accepted: a whole number from 1 to {MOST_ROWS}", ("rows",)))
+    if not (isinstance(seed, int) and seed >= 0):
+        found.append(Fault(f"found {seed!r}; accepted: a whole number, 0 or more", ("seed",)))
+    if found:
+        raise InputError(found)
+    return spans
+
+
+def _stream(sampler: Any, seed: int) -> dict[str, Any]:
+    """The sampler's argument for random numbers, which SciPy 1.15 renamed."""
+    name = "rng" if "rng" in inspect.signature(sampler).parameters else "seed"
+    return {name: np.random.default_rng(seed)}
+
+
+def _placed(spans: Mapping[str, Span], shares: Array) -> dict[str, Column]:
+    return {name: Column(span.at(share)) for (name, span), share in zip(spans.items(), shares.T, strict=True)}

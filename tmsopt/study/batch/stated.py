@@ -1,0 +1,154 @@
+"""Everything that can be wrong with a study, each fault with its place and the accepted values."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from tmsopt.design.errors import Fault, suggest
+from tmsopt.design.expression import ExpressionError, parse_value
+from tmsopt.design.limit import limit_of
+from tmsopt.design.problem import Problem, unasked
+
+MOST_ROWS = 10_000_000
+"""Rows of a study; one with more is another kind of question, such as a chart."""
+
+METHODS = ("grid", "list", "latin_hypercube", "sobol", "csv", "monte_carlo")
+"""How the rows of a study are made."""
+
+Stated = Any
+"""A Study as its author stated it: any field may be of any type."""
+
+
+def faults(study: Stated) -> Iterator[Fault]:
+    """What is wrong with a study, everything at once."""
+    if not isinstance(study.problem, Problem):
+        message = f"found {study.problem!r}; accepted: a Problem, such as tmsopt.load('problems/least_speed.toml')"
+        yield Fault(message, ("problem",))
+        return
+    yield from (Fault(f.message, ("problem", *f.key)) for f in unasked(study.problem))
+    if isinstance(study.columns, Mapping):
+        yield from _column_faults(study)
+    else:
+        accepted = "what varies with its value in every row, such as {'mu': [0.1, 0.2]}"
+        yield Fault(f"found {study.columns!r}; accepted: {accepted}", ("columns",))
+    yield from _option_faults(study)
+
+
+def variable_names(problem: Problem) -> tuple[str, ...]:
+    """What may vary from row to row of a study of a problem."""
+    fixed = tuple(n for n in problem.parameter_set.names if n in problem.fixed and n not in problem.scenarios)
+    ends = tuple(f"{n}.{end}" for n in problem.parameter_set.names if n in problem.free for end in ("min", "max"))
+    limits = tuple(f"{n}.limit" for n, text in problem.constraints.items() if limit_of(text) is not None)
+    return fixed + ends + limits
+
+
+def name_fault(problem: Problem, name: str) -> str:
+    """Why a name cannot vary; empty where it can."""
+    accepted = variable_names(problem)
+    if name in accepted:
+        return ""
+    stem, _, end = str(name).rpartition(".")
+    if name in problem.free:
+        return f"{name} is free, so each row finds its own; fix it, or vary {name}.min or {name}.max"
+    if name in problem.scenarios:
+        return f"{name} has a scenario, which every row must do in; leave the scenario out to vary it from row to row"
+    if end in ("min", "max") and stem in problem.fixed:
+        return f"{stem} is fixed, so it has no {end}; vary {stem} itself, or free it"
+    if end == "limit" and stem in problem.constraints:
+        text = problem.constraints[stem]
+        return f"neither side of '{text}' is a number; write the constraint with a number alone on one side"
+    return f"unknown name '{name}'; {suggest(str(name), accepted)}"
+
+
+def _column_faults(study: Stated) -> Iterator[Fault]:
+    columns = study.columns
+    if not columns:
+        accepted = " ".join(variable_names(study.problem))
+        yield Fault(f"nothing varies; give at least one column, of: {accepted}", ("columns",))
+    lengths: dict[str, int] = {}
+    for name, values in columns.items():
+        key = ("columns", str(name))
+        if wrong := name_fault(study.problem, name):
+            yield Fault(wrong, key)
+        array = _numbers(values)
+        if array is None:
+            yield Fault(f"found {_short(values)}; accepted: a list of numbers, such as [0.1, 0.2]", key)
+            continue
+        lengths[name] = len(array)
+        if bad := np.flatnonzero(~np.isfinite(array)).tolist():
+            more = f" and {len(bad) - 1} more rows" if len(bad) > 1 else ""
+            yield Fault(f"found {array[bad[0]]} in row {bad[0]}{more}; accepted: finite numbers", key)
+    if len(set(lengths.values())) > 1:
+        found = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        yield Fault(f"columns of different lengths: {found}; give every column one value per row", ("columns",))
+    elif lengths:
+        rows = next(iter(lengths.values()))
+        if not 1 <= rows <= MOST_ROWS:
+            yield Fault(f"found {rows} rows; accepted: 1 to {MOST_ROWS}", ("columns",))
+        elif study.grid_shape is not None and len(lengths) == len(columns):
+            yield from _shape_faults(study, rows)
+
+
+def _numbers(values: Any) -> Any:
+    """A column as an array of doubles; None where it is something else."""
+    if isinstance(values, str | bytes | Mapping):
+        return None
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind not in "fiu" and array.size:
+            return None
+        array = array.astype(np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return array if array.ndim == 1 else None
+
+
+def _shape_faults(study: Stated, rows: int) -> Iterator[Fault]:
+    """Whether the columns are what the grid's shape says."""
+    shape, key = study.grid_shape, ("grid_shape",)
+    if not isinstance(shape, Mapping) or tuple(shape) != tuple(study.columns):
+        found = tuple(shape) if isinstance(shape, Mapping) else shape
+        yield Fault(f"found {found!r}; accepted: an entry for each column in turn: {', '.join(study.columns)}", key)
+        return
+    sizes = tuple(shape.values())
+    if not all(_is_count(n, 1) for n in sizes) or math.prod(sizes) != rows:
+        yield Fault(f"found {' x '.join(map(str, sizes))} for {rows} rows; accepted: sizes with that product", key)
+        return
+    for axis, (name, values) in enumerate(study.columns.items()):
+        block = np.moveaxis(np.asarray(values, dtype=np.float64).reshape(sizes), axis, 0).reshape(sizes[axis], -1)
+        if np.any(block != block[:, :1]):
+            yield Fault(f"{name} is not that of a grid of this shape, the last axis fastest; see over_grid", key)
+
+
+def _option_faults(study: Stated) -> Iterator[Fault]:
+    for name in ("title", "method"):
+        if not isinstance(getattr(study, name), str):
+            yield Fault(f"found {getattr(study, name)!r}; accepted: a text", (name,))
+    if isinstance(study.method, str) and study.method not in METHODS:
+        yield Fault(f"unknown method '{study.method}'; {suggest(study.method, METHODS)}", ("method",))
+    for name, least in (("seed", 0), ("starts", 1)):
+        if not _is_count(getattr(study, name), least):
+            yield Fault(f"found {getattr(study, name)!r}; accepted: a whole number, {least} or more", (name,))
+    if not isinstance(study.warm, bool):
+        yield Fault(f"found {study.warm!r}; accepted: true or false", ("warm",))
+    if isinstance(study.report, str) or not isinstance(study.report, Sequence):
+        yield Fault(f"found {study.report!r}; accepted: a list of expressions, such as ['nu_H', '2*Fr_c']", ("report",))
+        return
+    for text in study.report:
+        try:
+            if not isinstance(text, str):
+                raise ExpressionError(f"found {text!r}; accepted: an expression in quotes")
+            parse_value(text, study.problem.vocabulary)
+        except ExpressionError as error:
+            yield Fault(str(error), ("report",))
+
+
+def _is_count(value: Any, least: int) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and value >= least
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "…"
