@@ -1,0 +1,182 @@
+"""How the rows of a study are solved: each for itself, or from neighbour to neighbour."""
+
+import platform
+import time
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from tmsopt.design.errors import InputError
+from tmsopt.design.expression import parse_value
+from tmsopt.design.family import Family
+from tmsopt.design.frozen import Table
+from tmsopt.design.search import same
+from tmsopt.design.solution import Solution
+from tmsopt.design.solve import solve
+from tmsopt.models import tms
+from tmsopt.study.batch.neighbours import blocks
+from tmsopt.study.batch.plan import Study
+from tmsopt.study.batch.row import Row
+from tmsopt.study.compare import law_rows
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A row, and the solution that it says the most important of; None where there is none."""
+
+    row: Row
+    solution: Solution | None = None
+
+
+def alone(study: Study, number: int) -> Answer:
+    """One row solved without the others, to the same bits; with warm starts, with the other rows of its block.
+
+    Raises:
+        InputError: for a row that the study has not.
+    """
+    study.varied(number)
+    solver = Solver(study)
+    unit = next((block for block in blocks(study) if number in block), ()) if study.warm else (number,)
+    return next(answer for answer in solver.answers(unit) if answer.row.number == number)
+
+
+@dataclass(frozen=True)
+class Solver:
+    """Solves rows of one study; what it has built stays with it and is not pickled.
+
+    A unit is one row, or with warm starts a whole block of neighbours: rows of a part of a block are solved as if the
+    study were cold.
+    """
+
+    study: Study
+
+    def __call__(self, numbers: Sequence[int]) -> list[Row]:
+        """The rows of a unit."""
+        return [answer.row for answer in self.answers(numbers)]
+
+    def answers(self, numbers: Sequence[int]) -> list[Answer]:
+        """The rows of a unit, each with its solution."""
+        if self.study.warm and len(numbers) > 1:
+            return self._block(numbers)
+        return [self._answer(number) for number in numbers]
+
+    def lost(self, number: int, cause: str) -> Row:
+        """A row that ended its worker."""
+        return self._unsolved(number, "quarantined", cause)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"study": self.study}
+
+    @cached_property
+    def _family(self) -> Family:
+        free = {f"{name}.{end}" for name in self.study.problem.free for end in ("min", "max")}
+        return Family([name for name in self.study.columns if name not in free])
+
+    def _block(self, numbers: Sequence[int]) -> list[Answer]:
+        """Both ends from many starts, the others from their neighbours; back again where the far end is better.
+
+        An optimum that is carried along from one end can be overtaken by another on the way: then the far end, which
+        does not know it, is better than what arrives there, and is carried back as far as it is better.
+        """
+        found = [self._answer(numbers[0])]
+        for number in numbers[1:]:
+            found.append(self._answer(number, found[-1].row))
+        back = self._answer(numbers[-1])
+        for k in range(len(numbers) - 1, -1, -1):
+            if not self._better(back.row, found[k].row):
+                break
+            found[k] = back
+            if k:
+                back = self._answer(numbers[k - 1], back.row)
+        return found
+
+    def _better(self, one: Row, other: Row) -> bool:
+        """Whether one solution of a row beats another by more than rounding."""
+        if one.status != "optimal" or other.status != "optimal":
+            return one.status == "optimal" and other.status != "optimal"
+        sign = -1.0 if self.study.problem.sense == "maximize" else 1.0
+        return sign * one.objective < sign * other.objective and not same(one.objective, other.objective)
+
+    def _answer(self, number: int, neighbour: Row | None = None) -> Answer:
+        """One row, near a neighbour's optimum if that leads to one."""
+        began = time.perf_counter()
+        try:
+            problem = self.study.row_problem(number)
+            options: dict[str, Any] = {"seed": self.study.seed_of(number), "throw": False, "family": self._family}
+            solution = None
+            if neighbour is not None and neighbour.status == "optimal":
+                near = {name: neighbour.parameters[name] for name in problem.free}
+                solution = solve(problem, starts=1, near=near, **options)
+            warm = solution is not None and solution.status == "optimal"
+            if solution is None or not warm:
+                solution = solve(problem, starts=self.study.starts, **options)
+            row = self._solved(number, solution, warm)
+        except InputError as error:
+            cause = "; ".join(str(fault) for fault in error.faults)
+            return Answer(self._unsolved(number, "failed", cause, began))
+        except Exception as error:  # a row that breaks the program must not end a study
+            return Answer(self._unsolved(number, "failed", f"{type(error).__name__}: {error}", began))
+        return Answer(replace(row, seconds=time.perf_counter() - began), solution)
+
+    def _unsolved(self, number: int, status: str, cause: str, began: float | None = None) -> Row:
+        return Row(
+            number=number,
+            seed=self.study.seed_of(number),
+            varied=self.study.varied(number),
+            status=status,
+            cause=cause,
+            seconds=0.0 if began is None else time.perf_counter() - began,
+            host=platform.node(),
+        )
+
+    def _solved(self, number: int, solution: Solution, warm: bool) -> Row:
+        problem, bound = solution.problem, solution.bound
+        values = problem.values(solution.parameters)
+        reports = {text: float(parse_value(text, problem.vocabulary)(values)) for text in self.study.report}
+        return Row(
+            number=number,
+            seed=self.study.seed_of(number),
+            varied=self.study.varied(number),
+            status=solution.status,
+            cause=_cause(solution),
+            objective=solution.value,
+            abscissa=solution.abscissa,
+            damping_ratio=solution.quantities["damping_ratio"],
+            structure=solution.structure,
+            parameters=solution.parameters,
+            reports=Table(reports),
+            bound=bound.value,
+            gap=bound.gap,
+            proven=bound.proven,
+            method=bound.method,
+            laws=Table(_laws(solution)),
+            violations=solution.violations,
+            starts=solution.starts.tried,
+            warm=warm,
+            host=platform.node(),
+        )
+
+
+def _cause(solution: Solution) -> str:
+    """Why a solution is not optimal, in words."""
+    if solution.status == "optimal":
+        return ""
+    violated = ", ".join(f"{name} by {amount:.3g}" for name, amount in solution.violations.items())
+    conflict = solution.relaxation.conflict if solution.relaxation else ()
+    parts = [
+        f"violated: {violated}" if violated else "",
+        f"in conflict: {', '.join(conflict)}" if conflict else "",
+        *solution.notes,
+    ]
+    return "; ".join(part for part in parts if part)
+
+
+def _laws(solution: Solution) -> Mapping[str, float]:
+    """Relative residual of each law that applies to an optimal design."""
+    if solution.status != "optimal" or solution.problem.model is not tms:
+        return {}
+    rows = [row for row in law_rows(solution) if row.applies]
+    shared = Counter(row.label for row in rows)
+    return {row.label if shared[row.label] == 1 else f"{row.label} {row.subject}": row.relative for row in rows}
