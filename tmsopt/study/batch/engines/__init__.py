@@ -1,0 +1,12 @@
+"""How rows are carried out: in this process, in processes of this machine, on a Dask cluster.
+
+Every engine takes the work and its units and yields finished rows as they come, in any order; the rows are the same
+bits on all of them. They differ in what a crash costs: `in_process` ends with it, the others lose the unit being
+solved, try it again alone, and quarantine a row that ends its worker twice.
+"""
+
+from tmsopt.study.batch.engines.cluster import cluster
+from tmsopt.study.batch.engines.local import cores, in_process, processes
+from tmsopt.study.batch.engines.work import EngineError, Note, Unit, Work
+
+__all__ = ["EngineError", "Note", "Unit", "Work", "cluster", "cores", "in_process", "processes"]
