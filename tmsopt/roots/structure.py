@@ -1,6 +1,6 @@
 """The multiplicity structure of a quartic within a stated tolerance, decided on coefficients."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,19 +105,20 @@ def nearest_unknowns(pattern: Pattern, coefficients: ArrayLike) -> list[tuple[fl
     """Unknowns of the polynomials of a pattern nearest to a quartic, one for each of its guesses, the nearest first."""
     c = _quartic(coefficients)
     found = numeric_roots(c)
-    fits = [_gauss_newton(pattern, np.array(guess), c / c[0], _size(found)) for guess in pattern.guesses(found)]
-    fits.sort(key=lambda u: _distance(pattern, u, c, found))
+    size = _size(found)
+    fits = [_gauss_newton(pattern, np.array(guess), c / c[0], size) for guess in pattern.guesses(found)]
+    fits.sort(key=lambda u: _distance(pattern, u, c, size))
     return [tuple(float(x) for x in u) for u in fits]
 
 
 def guess_distance(pattern: Pattern, coefficients: Array, found: Roots) -> float:
     """Relative distance of a quartic with known roots from its best guess of a pattern, cheaply; inf without one."""
-    guesses = pattern.guesses(found)
-    return min((_distance(pattern, np.array(g), coefficients, found) for g in guesses), default=float("inf"))
+    size = _size(found)
+    return min((_distance(pattern, g, coefficients, size) for g in pattern.guesses(found)), default=float("inf"))
 
 
-def _distance(pattern: Pattern, unknowns: Array, c: Array, found: Roots) -> float:
-    return float(np.linalg.norm((np.array(pattern.monic(list(unknowns)), dtype=float) - c / c[0]) / _size(found)))
+def _distance(pattern: Pattern, unknowns: Sequence[float] | Array, c: Array, size: Array) -> float:
+    return float(np.linalg.norm((np.array(pattern.monic(list(unknowns)), dtype=float) - c / c[0]) / size))
 
 
 def _size(found: Roots) -> Array:
@@ -151,12 +152,13 @@ def _sorted(roots: list[Root]) -> tuple[Root, ...]:
 def _fits(pattern: Pattern, c: Array, found: Roots, near: float) -> Iterator[Structure]:
     """Polynomials of a pattern close to c, one per guess that starts within `near`, the nearest first."""
     fits = []
+    size = _size(found)
     for guess in pattern.guesses(found):
-        if _distance(pattern, np.array(guess), c, found) > near:
+        if _distance(pattern, guess, c, size) > near:
             continue
-        unknowns = _gauss_newton(pattern, np.array(guess), c / c[0], _size(found))
+        unknowns = _gauss_newton(pattern, np.array(guess), c / c[0], size)
         if all(value >= -_CLOSED * np.abs(found).max() ** 2 for value in pattern.nonnegative(list(unknowns))):
-            distance = _distance(pattern, unknowns, c, found)
+            distance = _distance(pattern, unknowns, c, size)
             fits.append(Structure(pattern.name, _roots_of(pattern, unknowns), distance))
     yield from sorted(fits, key=lambda fit: fit.distance)
 
