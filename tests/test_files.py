@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import tmsopt
-from tmsopt.design.files import LARGEST
+from tmsopt.design.page import LARGEST
 
 GOOD = """\
 title = "EP4 of the chi_H = 1 bicycle"

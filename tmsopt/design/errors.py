@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -47,3 +48,9 @@ def suggest(name: str, accepted: Iterable[str]) -> str:
     near = by_case or get_close_matches(name, names, n=1, cutoff=0.5)
     hint = f"did you mean '{near[0]}'? " if near else ""
     return f"{hint}accepted: {' '.join(names)}"
+
+
+def short(value: Any) -> str:
+    """A value as found, cut where it is long."""
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "…"

@@ -9,17 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.errors import Fault, InputError, suggest
-from tmsopt.design.problem import Problem
+from tmsopt.design.frozen import Table
+from tmsopt.design.problem import Problem, checked, unasked
 from tmsopt.design.search import STARTS
 from tmsopt.design.solution import NotSolved, Solution
 from tmsopt.design.solve import solve
 from tmsopt.study.batch.column import Column
 from tmsopt.study.batch.plan import Study
-from tmsopt.study.batch.stated import MOST_ROWS
+from tmsopt.study.batch.stated import MOST_ROWS, common_faults, count_faults
 
 DISTRIBUTIONS = ("uniform", "normal")
-"""Of an error: uniform within ± tolerance; normal with a third of the tolerance as its deviation, cut off at ± tolerance
-(0.27 % would lie beyond, and are drawn within)."""
+"""Of an error: uniform within ± tolerance; or normal, its standard deviation a third of the tolerance, cut off at
+± tolerance, as if the 0.27 % beyond were sorted out."""
 
 _DEVIATIONS = 3  # standard deviations in a tolerance
 
@@ -34,6 +35,9 @@ class Sampling:
         seed: of the draws; the nominal design is solved from the starts of seed 0.
         distribution: one of `DISTRIBUTIONS`.
         starts: of the nominal design, at most.
+
+    Raises:
+        InputError: listing everything that is wrong, as far as it shows before the design is known.
     """
 
     problem: Problem
@@ -44,6 +48,15 @@ class Sampling:
     title: str = ""
     starts: int = STARTS
     report: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        problem = checked(self.problem)
+        found = [*unasked(problem), *_tolerance_faults(problem, self.tolerances or problem.tolerances)]
+        found += [*common_faults(self), *_draw_faults(self.rows, self.seed, self.distribution)]
+        if found:
+            raise InputError(found)
+        object.__setattr__(self, "tolerances", Table({n: float(t) for n, t in self.tolerances.items()}))
+        object.__setattr__(self, "report", tuple(self.report))
 
 
 def planned(asked: Study | Sampling, progress: Callable[[int, int], None] | None = None) -> Study:
@@ -94,7 +107,8 @@ def monte_carlo(
         raise NotSolved(design)
     stated = design.problem.tolerances if tolerances is None else tolerances
     drawn, notes = _as_built(design)
-    if found := [*_faults(drawn, stated), *_draw_faults(rows, seed, distribution)]:
+    found = [*_tolerance_faults(drawn, stated), *_draw_faults(rows, seed, distribution)]
+    if found := found or _room_faults(drawn, stated):
         raise InputError(found)
     errors = _errors(len(stated), rows, seed, distribution)
     columns = {
@@ -130,34 +144,39 @@ def _as_built(design: Solution) -> tuple[Problem, tuple[str, ...]]:
     return fixed, notes
 
 
-def _faults(drawn: Problem, tolerances: Any) -> list[Fault]:
-    """What is wrong with tolerances around a design."""
+def _tolerance_faults(problem: Problem, tolerances: Any) -> list[Fault]:
+    """What is wrong with tolerances to draw from."""
     if not isinstance(tolerances, Mapping) or not tolerances:
-        example = "{'lambda_s': 0.01}"
-        found = "no tolerances" if not tolerances else f"found {tolerances!r}"
-        return [Fault(f"{found}; accepted: parameter and how far it may be off, such as {example}", ("tolerances",))]
-    found_faults: list[Fault] = []
+        found = f"found {tolerances!r}" if tolerances else "no tolerances"
+        accepted = "parameters and how far each may be off, such as lambda_s = 0.01"
+        return [Fault(f"{found}; accepted: {accepted}", ("tolerances",))]
+    names = problem.parameter_set.names
+    faults = []
     for name, value in tolerances.items():
         key = ("tolerances", str(name))
-        if name not in drawn.fixed:
-            found_faults.append(Fault(f"unknown parameter '{name}'; {suggest(str(name), drawn.fixed)}", key))
-        elif name in drawn.scenarios:
-            message = f"{name} has a scenario too, in place of a drawn value; leave out the tolerance or the scenario"
-            found_faults.append(Fault(message, key))
-        else:
-            try:
-                replace(drawn, tolerances={name: value})
-            except InputError as error:
-                found_faults += error.faults
-    return found_faults
+        if name not in names:
+            faults.append(Fault(f"unknown parameter '{name}'; {suggest(str(name), names)}", key))
+        elif name in problem.scenarios:
+            message = f"{name} has a scenario, which a drawn value would not change; leave out one of the two"
+            faults.append(Fault(message, key))
+        elif isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
+            faults.append(Fault(f"found {value!r}; accepted: a finite number greater than 0", key))
+    return faults
+
+
+def _room_faults(drawn: Problem, tolerances: Mapping[str, float]) -> list[Fault]:
+    """Tolerances that take the design out of its physical range."""
+    faults: list[Fault] = []
+    for name, value in tolerances.items():
+        try:
+            replace(drawn, tolerances={name: value})
+        except InputError as error:
+            faults += error.faults
+    return faults
 
 
 def _draw_faults(rows: Any, seed: Any, distribution: Any) -> list[Fault]:
-    found = []
-    if isinstance(rows, bool) or not isinstance(rows, int) or not 1 <= rows <= MOST_ROWS:
-        found.append(Fault(f"found {rows!r}; accepted: a whole number from 1 to {MOST_ROWS}", ("rows",)))
-    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-        found.append(Fault(f"found {seed!r}; accepted: a whole number, 0 or more", ("seed",)))
+    found = [*count_faults("rows", rows, 1, MOST_ROWS), *count_faults("seed", seed, 0)]
     if distribution not in DISTRIBUTIONS:
         found.append(Fault(f"found {distribution!r}; {suggest(str(distribution), DISTRIBUTIONS)}", ("distribution",)))
     return found

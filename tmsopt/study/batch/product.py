@@ -45,8 +45,8 @@ class Yield:
         feasible: every constraint met.
         good: both.
         failed: rows without an answer.
-        abscissa: quantile, such as ``0.95`` → the abscissa of the row there, in the worst scenario; inf where that has a
-            root at infinity.
+        abscissa: quantile, such as ``0.95`` → the abscissa of the row there, in the worst scenario; inf where that
+            row has a root at infinity.
     """
 
     stable: Share

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tmsopt.design.errors import Fault, InputError
 from tmsopt.study.batch.column import Column
-from tmsopt.study.batch.stated import MOST_ROWS
+from tmsopt.study.batch.stated import MOST_ROWS, count_faults
 
 Array = NDArray[np.float64]
 
@@ -128,10 +128,7 @@ def _spans(ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Span]:
             found.append(Fault(f"found {stated!r}; accepted: {accepted}", ("ranges", name)))
     if not ranges:
         found.append(Fault("nothing varies; give a range", ("ranges",)))
-    if not (isinstance(rows, int) and 1 <= rows <= MOST_ROWS):
-        found.append(Fault(f"found {rows!r}; accepted: a whole number from 1 to {MOST_ROWS}", ("rows",)))
-    if not (isinstance(seed, int) and seed >= 0):
-        found.append(Fault(f"found {seed!r}; accepted: a whole number, 0 or more", ("seed",)))
+    found += [*count_faults("rows", rows, 1, MOST_ROWS), *count_faults("seed", seed, 0)]
     if found:
         raise InputError(found)
     return spans

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.design.errors import Fault, suggest
+from tmsopt.design.errors import Fault, short, suggest
 from tmsopt.design.expression import ExpressionError, parse_value
 from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Problem, unasked
@@ -74,7 +74,7 @@ def _column_faults(study: Stated) -> Iterator[Fault]:
             yield Fault(wrong, key)
         array = _numbers(values)
         if array is None:
-            yield Fault(f"found {_short(values)}; accepted: a list of numbers, such as [0.1, 0.2]", key)
+            yield Fault(f"found {short(values)}; accepted: a list of numbers, such as [0.1, 0.2]", key)
             continue
         lengths[name] = len(array)
         if bad := np.flatnonzero(~np.isfinite(array)).tolist():
@@ -123,16 +123,19 @@ def _shape_faults(study: Stated, rows: int) -> Iterator[Fault]:
 
 
 def _option_faults(study: Stated) -> Iterator[Fault]:
-    for name in ("title", "method"):
-        if not isinstance(getattr(study, name), str):
-            yield Fault(f"found {getattr(study, name)!r}; accepted: a text", (name,))
-    if isinstance(study.method, str) and study.method not in METHODS:
-        yield Fault(f"unknown method '{study.method}'; {suggest(study.method, METHODS)}", ("method",))
-    for name, least in (("seed", 0), ("starts", 1)):
-        if not _is_count(getattr(study, name), least):
-            yield Fault(f"found {getattr(study, name)!r}; accepted: a whole number, {least} or more", (name,))
+    if not isinstance(study.method, str) or study.method not in METHODS:
+        yield Fault(f"found {study.method!r}; {suggest(str(study.method), METHODS)}", ("method",))
     if not isinstance(study.warm, bool):
         yield Fault(f"found {study.warm!r}; accepted: true or false", ("warm",))
+    yield from common_faults(study)
+
+
+def common_faults(study: Stated) -> Iterator[Fault]:
+    """What is wrong with the title, the seed, the starts and the report of a study or a sampling."""
+    if not isinstance(study.title, str):
+        yield Fault(f"found {study.title!r}; accepted: a text", ("title",))
+    yield from count_faults("seed", study.seed, 0)
+    yield from count_faults("starts", study.starts, 1)
     if isinstance(study.report, str) or not isinstance(study.report, Sequence):
         yield Fault(f"found {study.report!r}; accepted: a list of expressions, such as ['nu_H', '2*Fr_c']", ("report",))
         return
@@ -145,10 +148,12 @@ def _option_faults(study: Stated) -> Iterator[Fault]:
             yield Fault(str(error), ("report",))
 
 
+def count_faults(name: str, value: Any, least: int, most: int | None = None) -> Iterator[Fault]:
+    """What is wrong with a whole number."""
+    if not _is_count(value, least) or (most is not None and value > most):
+        accepted = f"a whole number, {least} or more" if most is None else f"a whole number from {least} to {most}"
+        yield Fault(f"found {value!r}; accepted: {accepted}", (name,))
+
+
 def _is_count(value: Any, least: int) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and value >= least
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "…"

@@ -1,0 +1,169 @@
+"""A TOML file that knows at which line each of its keys is, so that every fault can be placed."""
+
+import re
+import tomllib
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, StrictFloat, StrictInt, StrictStr, ValidationError
+
+from tmsopt.design.errors import Fault, InputError, suggest
+
+LARGEST = 1_000_000
+"""Bytes; a longer file is not a problem file."""
+
+Number = StrictFloat | StrictInt | StrictStr
+"""A number, or a text with a unit."""
+
+
+class Section(BaseModel):
+    """A table of a file, in which no other key may stand."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+S = TypeVar("S", bound=Section)
+Key = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Page:
+    """A TOML file as read.
+
+    Attributes:
+        data: its tables.
+        lines: section or key that begins a line → number of that line.
+    """
+
+    file: str
+    data: Mapping[str, Any]
+    lines: Mapping[Key, int]
+
+    def error(self, faults: Iterable[Fault]) -> InputError:
+        """The faults, each at its line of this file unless it is placed already, in the order of the lines."""
+        placed = [f if f.file else f.at(self.file, self._line_of(f.key)) for f in faults]
+        return InputError(sorted(placed, key=lambda f: f.line))
+
+    def _line_of(self, key: Key) -> int:
+        """Line of the longest part of a key path that the file has; 1 for something missing altogether."""
+        for end in range(len(key), 0, -1):
+            if key[:end] in self.lines:
+                return self.lines[key[:end]]
+        return 1
+
+
+def read_page(path: str | PathLike[str], kind: str) -> Page:
+    """Read a TOML file of some kind, such as ``problem``.
+
+    Raises:
+        InputError: for a file that cannot be read, or is not TOML.
+    """
+    file = str(path)
+    text = read_text(file, f"TOML {kind} file")
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        place = re.search(r"line (\d+)", str(error))
+        message = f"not TOML: {error}"
+        raise InputError([Fault(message).at(file, int(place[1]) if place else text.count("\n") + 1)]) from None
+    except RecursionError:
+        raise InputError([Fault("not TOML: nested too deeply", file=file)]) from None
+    return Page(file, data, _lines(text))
+
+
+def read_text(file: str, kind: str, largest: int = LARGEST) -> str:
+    """The text of a file in UTF-8, a byte order mark left out.
+
+    Args:
+        kind: what is accepted, such as ``TOML problem file``; its first word is the format.
+
+    Raises:
+        InputError: for a file that is not there, no file, too long, or no text.
+    """
+    path, form = Path(file), kind.split(maxsplit=1)[0]
+    try:
+        if path.is_dir():
+            raise InputError([Fault(f"is a directory; accepted: a {kind}", file=file)])
+        if not path.exists():
+            others = path.parent.glob(f"*.{form.lower()}") if path.parent.is_dir() else ()
+            near = suggest(path.name, sorted(p.name for p in others))
+            hint = f"; {near}" if "did you mean" in near else ""
+            raise InputError([Fault(f"no such file{hint}", file=file)])
+        if not path.is_file():
+            raise InputError([Fault(f"is not a regular file; accepted: a {kind}", file=file)])
+        with path.open("rb") as stream:
+            raw = stream.read(largest + 1)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        if isinstance(error, InputError):
+            raise
+        raise InputError([Fault(f"cannot be read: {reason}", file=file)]) from None
+    if len(raw) > largest:
+        raise InputError([Fault(f"is larger than {largest} bytes; accepted: a {kind} of less", file=file)])
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw[: error.start].count(b"\n") + 1
+        raise InputError([Fault(f"not {form}: byte {raw[error.start]:#x} is not UTF-8").at(file, line)]) from None
+
+
+def fitted(
+    data: Mapping[str, Any], schema: type[S], explain: Callable[[tuple[int | str, ...], str, Any], Fault]
+) -> tuple[list[Fault], S | None]:
+    """Faults of shape, and what is left of the data without the faulty keys.
+
+    Args:
+        explain: place, kind and found value of a complaint → the fault in the words of the file.
+    """
+    faults: dict[Key, Fault] = {}
+    pruned: dict[str, Any] = dict(data)
+    for _ in range(2):
+        try:
+            return list(faults.values()), schema.model_validate(pruned)
+        except ValidationError as error:
+            found = [explain(d["loc"], d["type"], d.get("input")) for d in error.errors(include_url=False)]
+            deepest = {f.key[:2]: max(len(g.key) for g in found if g.key[:2] == f.key[:2]) for f in found}
+            for fault in found:
+                if len(fault.key) == deepest[fault.key[:2]]:
+                    faults.setdefault(fault.key, fault)
+        for key in faults:
+            pruned = _without(pruned, key[:2])
+    return list(faults.values()), None
+
+
+def within(section: str, faults: Iterable[Fault]) -> list[Fault]:
+    """Faults of a table that is itself in a section."""
+    return [replace(f, key=(section, *f.key)) for f in faults]
+
+
+def _without(data: Mapping[str, Any], key: Key) -> dict[str, Any]:
+    inner = data.get(key[0])
+    if len(key) == 2 and isinstance(inner, dict):
+        return {**data, key[0]: {k: v for k, v in inner.items() if k != key[1]}}
+    return {k: v for k, v in data.items() if k != key[0]}
+
+
+_HEADER = re.compile(r"\s*\[+\s*([^\]]+?)\s*\]+")
+_KEY = re.compile(r"\s*([A-Za-z0-9_\-.\"' ]+?)\s*=")
+_PART = re.compile(r"\"[^\"]*\"|'[^']*'|[^.\"']+")
+
+
+def _lines(text: str) -> dict[Key, int]:
+    """Line number of every section and key that begins a line."""
+    section: Key = ()
+    lines: dict[Key, int] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        if header := _HEADER.match(line):
+            section = _path(header[1])
+            lines.setdefault(section, number)
+        elif key := _KEY.match(line):
+            lines.setdefault((*section, *_path(key[1])), number)
+    return lines
+
+
+def _path(dotted: str) -> Key:
+    parts = (part.strip() for part in _PART.findall(dotted))
+    return tuple(part.strip("\"'") for part in parts if part)
