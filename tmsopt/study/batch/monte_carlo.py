@@ -52,7 +52,10 @@ class Sampling:
     def __post_init__(self) -> None:
         problem = checked(self.problem)
         found = [*unasked(problem), *_tolerance_faults(problem, self.tolerances or problem.tolerances)]
-        found += [*common_faults(self), *_draw_faults(self.rows, self.seed, self.distribution)]
+        found += [
+            *common_faults(problem, self.seed, self.starts, self.report),
+            *_draw_faults(self.rows, self.distribution),
+        ]
         if found:
             raise InputError(found)
         object.__setattr__(self, "tolerances", Table({n: float(t) for n, t in self.tolerances.items()}))
@@ -107,7 +110,7 @@ def monte_carlo(
         raise NotSolved(design)
     stated = design.problem.tolerances if tolerances is None else tolerances
     drawn, notes = _as_built(design)
-    found = [*_tolerance_faults(drawn, stated), *_draw_faults(rows, seed, distribution)]
+    found = [*_tolerance_faults(drawn, stated), *_draw_faults(rows, distribution), *count_faults("seed", seed, 0)]
     if found := found or _room_faults(drawn, stated):
         raise InputError(found)
     errors = _errors(len(stated), rows, seed, distribution)
@@ -175,8 +178,8 @@ def _room_faults(drawn: Problem, tolerances: Mapping[str, float]) -> list[Fault]
     return faults
 
 
-def _draw_faults(rows: Any, seed: Any, distribution: Any) -> list[Fault]:
-    found = [*count_faults("rows", rows, 1, MOST_ROWS), *count_faults("seed", seed, 0)]
+def _draw_faults(rows: Any, distribution: Any) -> list[Fault]:
+    found = [*count_faults("rows", rows, 1, MOST_ROWS)]
     if distribution not in DISTRIBUTIONS:
         found.append(Fault(f"found {distribution!r}; {suggest(str(distribution), DISTRIBUTIONS)}", ("distribution",)))
     return found

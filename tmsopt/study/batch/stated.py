@@ -123,27 +123,27 @@ def _shape_faults(study: Stated, rows: int) -> Iterator[Fault]:
 
 
 def _option_faults(study: Stated) -> Iterator[Fault]:
+    if not isinstance(study.title, str):
+        yield Fault(f"found {study.title!r}; accepted: a text", ("title",))
     if not isinstance(study.method, str) or study.method not in METHODS:
         yield Fault(f"found {study.method!r}; {suggest(str(study.method), METHODS)}", ("method",))
     if not isinstance(study.warm, bool):
         yield Fault(f"found {study.warm!r}; accepted: true or false", ("warm",))
-    yield from common_faults(study)
+    yield from common_faults(study.problem, study.seed, study.starts, study.report)
 
 
-def common_faults(study: Stated) -> Iterator[Fault]:
-    """What is wrong with the title, the seed, the starts and the report of a study or a sampling."""
-    if not isinstance(study.title, str):
-        yield Fault(f"found {study.title!r}; accepted: a text", ("title",))
-    yield from count_faults("seed", study.seed, 0)
-    yield from count_faults("starts", study.starts, 1)
-    if isinstance(study.report, str) or not isinstance(study.report, Sequence):
-        yield Fault(f"found {study.report!r}; accepted: a list of expressions, such as ['nu_H', '2*Fr_c']", ("report",))
+def common_faults(problem: Problem, seed: Any, starts: Any, report: Any) -> Iterator[Fault]:
+    """What is wrong with the seed, the starts and the report of a study."""
+    yield from count_faults("seed", seed, 0)
+    yield from count_faults("starts", starts, 1)
+    if isinstance(report, str) or not isinstance(report, Sequence):
+        yield Fault(f"found {report!r}; accepted: a list of expressions, such as ['nu_H', '2*Fr_c']", ("report",))
         return
-    for text in study.report:
+    for text in report:
         try:
             if not isinstance(text, str):
                 raise ExpressionError(f"found {text!r}; accepted: an expression in quotes")
-            parse_value(text, study.problem.vocabulary)
+            parse_value(text, problem.vocabulary)
         except ExpressionError as error:
             yield Fault(str(error), ("report",))
 

@@ -1,0 +1,161 @@
+"""The table [vary] of a study file: what varies, as the columns of a study."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from tmsopt.design.errors import Fault, InputError, short, suggest
+from tmsopt.design.expression import written_sides
+from tmsopt.design.problem import Problem
+from tmsopt.design.units import with_unit
+from tmsopt.study.batch.column import Column
+from tmsopt.study.batch.samples import Span, grid, latin_hypercube, sobol, sobol_note, span_faults
+from tmsopt.study.batch.stated import MOST_ROWS, name_fault
+
+_RANGE = "{ min = 0.1, max = 1 }"
+_AXIS = "{ min = 0.1, max = 1, points = 10 }"
+_ACCEPTED = {
+    "grid": f"a list of values such as [0.1, 0.2], or {_AXIS}, with log = true for equal factors",
+    "list": "a list with a value for every row, such as [0.1, 0.2]",
+    "latin_hypercube": f"{_RANGE}, with log = true for equal factors",
+    "sobol": f"{_RANGE}, with log = true for equal factors",
+}
+
+Key = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Varied:
+    """What a table comes to.
+
+    Attributes:
+        faults: with keys as written in the table.
+        grid_shape: axis → number of values, of a grid.
+    """
+
+    faults: list[Fault] = field(default_factory=list)
+    columns: Mapping[str, Column] = field(default_factory=dict)
+    grid_shape: Mapping[str, int] | None = None
+    notes: tuple[str, ...] = ()
+
+
+def varied(problem: Problem, table: Mapping[str, Any], method: str, rows: int, seed: int) -> Varied:
+    """The columns of a grid, a list or a sample."""
+    entries = _entries(table)
+    if not entries:
+        example = f"mu = {_ACCEPTED[method].split(',', maxsplit=1)[0]}"
+        return Varied([Fault(f"nothing varies; write what does under [vary], such as {example}", ("vary",))])
+    faults: list[Fault] = []
+    read: dict[str, Any] = {}
+    for name, (key, spec) in entries.items():
+        if wrong := name_fault(problem, name):
+            faults.append(Fault(wrong, key))
+        else:
+            read[name] = _Reader(problem, name, key, faults).read(spec, method)
+    if faults:
+        return Varied(faults)
+    try:
+        return _made(read, method, rows, seed)
+    except InputError as error:
+        return Varied([Fault(f.message, ("vary",)) for f in error.faults])
+
+
+def _made(read: Mapping[str, Any], method: str, rows: int, seed: int) -> Varied:
+    match method:
+        case "list":
+            return Varied(columns={name: Column(values) for name, values in read.items()})
+        case "latin_hypercube":
+            return Varied(columns=latin_hypercube(read, rows, seed))
+        case "sobol":
+            return Varied(columns=sobol(read, rows, seed), notes=tuple(filter(None, [sobol_note(rows)])))
+        case _:
+            return Varied(columns=grid(read), grid_shape={name: len(values) for name, values in read.items()})
+
+
+def unit_of(problem: Problem, name: str) -> str:
+    """The unit in which what varies is a number; empty where that is not known."""
+    of = problem.parameter_set
+    if name in of.names:
+        return of[name].unit
+    stem, _, end = name.rpartition(".")
+    if end in ("min", "max") and stem in of.names:
+        return of[stem].unit
+    if end == "limit" and not name_fault(problem, name):
+        left, _, right = written_sides(problem.constraints[stem])
+        known = {p.name: p.unit for p in of.parameters}
+        known |= {q.name: q.unit for q in (*problem.model.quantities, *of.quantities)}
+        return known.get(left) or known.get(right) or ""
+    return ""
+
+
+def _entries(table: Mapping[str, Any]) -> dict[str, tuple[Key, Any]]:
+    """Name → its place and what is written there; ``trail.limit = …`` without quotes is a table in TOML."""
+    found: dict[str, tuple[Key, Any]] = {}
+    for name, spec in table.items():
+        if isinstance(spec, Mapping) and any(isinstance(inner, list | Mapping) for inner in spec.values()):
+            found |= {f"{name}.{end}": (("vary", name, end), inner) for end, inner in spec.items()}
+        else:
+            found[name] = (("vary", name), spec)
+    return found
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """Reads one entry; adds what is wrong with it to `faults`."""
+
+    problem: Problem
+    name: str
+    key: Key
+    faults: list[Fault]
+
+    def read(self, spec: Any, method: str) -> Any:
+        """A list of numbers, or a span of a sample."""
+        if isinstance(spec, list) and spec and method in ("grid", "list"):
+            return [self._number(value, self.key) for value in spec]
+        if isinstance(spec, Mapping) and method != "list":
+            return self._range(spec, points=method == "grid")
+        self.faults.append(Fault(f"found {short(spec)}; accepted: {_ACCEPTED[method]}", self.key))
+        return None
+
+    def _range(self, spec: Mapping[str, Any], points: bool) -> Any:
+        before = len(self.faults)
+        accepted = ("min", "max", "points", "log") if points else ("min", "max", "log")
+        for end in spec:
+            if end not in accepted:
+                message = f"unknown key '{end}' of {self.name}; {suggest(end, accepted)}"
+                if end == "points":
+                    message = "points are those of a grid; a sample has rows, under [study]"
+                self.faults.append(Fault(message, (*self.key, end)))
+        for end in accepted[:-1]:
+            if end not in spec:
+                example = f"{self.name} = {_AXIS if points else _RANGE}"
+                self.faults.append(Fault(f"missing {end} of {self.name}; write e.g. {example}", self.key))
+        low, high = (self._number(spec.get(end, 0.0), (*self.key, end)) for end in ("min", "max"))
+        log, count = spec.get("log", False), spec.get("points", 2)
+        if not isinstance(log, bool):
+            self.faults.append(Fault(f"found {short(log)}; accepted: true or false", (*self.key, "log")))
+        if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MOST_ROWS:
+            message = f"found {short(count)}; accepted: a whole number from 2 to {MOST_ROWS}"
+            self.faults.append(Fault(message, (*self.key, "points")))
+        if len(self.faults) > before:
+            return None
+        span = Span(low, high, log)
+        self.faults.extend(Fault(f.message, self.key) for f in span_faults(self.name, span))
+        if len(self.faults) > before:
+            return None
+        return span.points(count) if points else span
+
+    def _number(self, value: Any, key: Key) -> float:
+        if isinstance(value, str):
+            unit = unit_of(self.problem, self.name)
+            try:
+                if not unit:
+                    raise ValueError(f"found '{value[:60]}'; accepted: a number without quotes, as in the constraint")
+                return with_unit(value, unit)
+            except ValueError as error:
+                self.faults.append(Fault(str(error), key))
+        elif isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < float("inf"):
+            self.faults.append(Fault(f"found {short(value)}; accepted: a finite number", key))
+        else:
+            return float(value)
+        return 0.0
