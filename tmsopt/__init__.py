@@ -14,6 +14,11 @@ if TYPE_CHECKING:
     from tmsopt.design.prove import prove
     from tmsopt.design.solution import NotSolved, Solution
     from tmsopt.design.solve import solve
+    from tmsopt.study.batch.files import load_study
+    from tmsopt.study.batch.monte_carlo import monte_carlo
+    from tmsopt.study.batch.plan import Study, over_grid
+    from tmsopt.study.batch.run import Results, run_study
+    from tmsopt.study.batch.samples import latin_hypercube, sobol
     from tmsopt.study.branch import Branch, Trace
     from tmsopt.study.chart import Chart, chart
     from tmsopt.study.compare import Comparison, compare
@@ -40,8 +45,10 @@ __all__ = [
     "Optimality",
     "Problem",
     "Proof",
+    "Results",
     "Robustness",
     "Solution",
+    "Study",
     "Swallowtail",
     "Trace",
     "certify",
@@ -49,15 +56,21 @@ __all__ = [
     "compare",
     "domain",
     "explain",
+    "latin_hypercube",
     "laws",
     "load",
+    "load_study",
     "models",
+    "monte_carlo",
     "nearest",
     "optimality",
+    "over_grid",
     "pareto",
     "prove",
     "robustness",
     "roots",
+    "run_study",
+    "sobol",
     "solve",
     "swallowtail",
     "trace",
@@ -77,8 +90,10 @@ _HOMES = {
     "Optimality": "tmsopt.study.optimality",
     "Problem": "tmsopt.design.problem",
     "Proof": "tmsopt.design.proof.proof",
+    "Results": "tmsopt.study.batch.run",
     "Robustness": "tmsopt.design.nearest",
     "Solution": "tmsopt.design.solution",
+    "Study": "tmsopt.study.batch.plan",
     "Swallowtail": "tmsopt.study.swallowtail",
     "Trace": "tmsopt.study.branch",
     "certify": "tmsopt.design.bounds.certify",
@@ -86,12 +101,18 @@ _HOMES = {
     "compare": "tmsopt.study.compare",
     "domain": "tmsopt.study.domain",
     "explain": "tmsopt.study.explain",
+    "latin_hypercube": "tmsopt.study.batch.samples",
     "load": "tmsopt.design.files",
+    "load_study": "tmsopt.study.batch.files",
+    "monte_carlo": "tmsopt.study.batch.monte_carlo",
     "nearest": "tmsopt.design.nearest",
     "optimality": "tmsopt.study.optimality",
-    "robustness": "tmsopt.design.nearest",
+    "over_grid": "tmsopt.study.batch.plan",
     "pareto": "tmsopt.study.pareto",
     "prove": "tmsopt.design.prove",
+    "robustness": "tmsopt.design.nearest",
+    "run_study": "tmsopt.study.batch.run",
+    "sobol": "tmsopt.study.batch.samples",
     "solve": "tmsopt.design.solve",
     "swallowtail": "tmsopt.study.swallowtail",
     "trace": "tmsopt.study.trace",

@@ -12,6 +12,7 @@ from tmsopt.cli.common import BAD_INPUT
 from tmsopt.cli.figure import figure
 from tmsopt.cli.prove import prove
 from tmsopt.cli.solve import compare, solve
+from tmsopt.cli.study import study
 from tmsopt.cli.trace import trace
 from tmsopt.cli.verify import verify
 
@@ -43,6 +44,7 @@ def main() -> None:
       tmsopt prove problems/ep4.toml
       tmsopt trace problems/ep_set.toml --plot ep_set.png
       tmsopt chart problems/chart.toml --plot chart.png
+      tmsopt study problems/study_heights.toml
       tmsopt figure all --output figures
       tmsopt verify
     """
@@ -51,5 +53,5 @@ def main() -> None:
             stream.reconfigure(errors="replace")  # a narrow terminal encoding must not lose a result
 
 
-for _command in (solve, compare, prove, trace, chart, figure, verify):
+for _command in (solve, compare, prove, trace, chart, study, figure, verify):
     main.add_command(_command)

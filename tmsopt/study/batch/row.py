@@ -64,25 +64,39 @@ class Row:
         return json.dumps(kept, sort_keys=True)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data for ``json.dumps``; numbers that do not exist are None."""
-        return {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
+        """Plain data for ``json.dumps``: None is nan, or no bound; other infinities are text, ``"-inf"``."""
+        return {f.name: _plain(getattr(self, f.name), f.type, _ABSENT.get(f.name, math.nan)) for f in _FIELDS}
 
     @staticmethod
     def from_json(data: Mapping[str, Any]) -> "Row":
         """The row that `to_json` was made of, bit by bit."""
-        absent = {"bound": -math.inf, "gap": math.inf}
         made: dict[str, Any] = {}
-        for name, value in data.items():
+        for f in _FIELDS:
+            if f.name not in data:
+                continue
+            value = data[f.name]
             if isinstance(value, Mapping):
-                made[name] = Table({n: math.nan if v is None else float(v) for n, v in value.items()})
+                made[f.name] = Table({n: _number(v, math.nan) for n, v in value.items()})
             else:
-                made[name] = absent.get(name, math.nan) if value is None else value
+                made[f.name] = _number(value, _ABSENT.get(f.name, math.nan)) if f.type is float else value
         return Row(**made)
 
 
-def _plain(value: Any) -> Any:
+_FIELDS = fields(Row)
+_ABSENT = {"bound": -math.inf, "gap": math.inf}
+
+
+def _plain(value: Any, kind: Any, absent: float) -> Any:
+    if kind is float:
+        return number if math.isfinite(number := float(value)) else _text(number, absent)
     if isinstance(value, Mapping):
-        return {name: _plain(v) for name, v in value.items()}
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    return value
+        return {n: v if math.isfinite(v := float(given)) else _text(v, math.nan) for n, given in value.items()}
+    return kind(value)  # NumPy's integers and truths are not JSON
+
+
+def _text(number: float, absent: float) -> str | None:
+    return None if number == absent or (math.isnan(number) and math.isnan(absent)) else str(number)
+
+
+def _number(value: float | str | None, absent: float) -> float:
+    return absent if value is None else float(value)

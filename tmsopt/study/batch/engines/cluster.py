@@ -4,7 +4,7 @@ import hashlib
 import pickle
 import time
 import uuid
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -23,7 +23,7 @@ _LATE = 2.0  # s that finished units may come after word that their batch is don
 _FAILURES = 3  # batches in a row that fail by something else than a row
 
 
-def cluster(work: Work, units: Sequence[Unit], address: str, note: Note = silent) -> Iterator[Row]:
+def cluster(work: Work, units: Sequence[Unit], address: str, note: Note = silent) -> Generator[Row]:
     """Rows of the units as they come, solved by the workers of the Dask scheduler at an address.
 
     Every batch is sent to one worker by name and started once, whatever the scheduler's settings: which units are tried

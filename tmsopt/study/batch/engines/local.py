@@ -3,7 +3,7 @@
 import multiprocessing
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
@@ -37,13 +37,13 @@ def cores() -> int:
     return int(loky.cpu_count())
 
 
-def in_process(work: Work, units: Sequence[Unit], note: Note = silent) -> Iterator[Row]:
+def in_process(work: Work, units: Sequence[Unit], note: Note = silent) -> Generator[Row]:
     """Rows of the units, solved here one after the other. A crash of the solver is the end."""
     for unit in units:
         yield from attempt(work, unit)
 
 
-def processes(work: Work, units: Sequence[Unit], workers: int, note: Note = silent) -> Iterator[Row]:
+def processes(work: Work, units: Sequence[Unit], workers: int, note: Note = silent) -> Generator[Row]:
     """Rows of the units as they come, solved by processes of this machine with one thread each.
 
     Every worker has a pipe of its own, so a finished unit that it has sent survives it, and what it was doing when it

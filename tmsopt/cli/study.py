@@ -1,0 +1,175 @@
+"""The command that solves a problem many times over."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tmsopt.cli.common import BAD_INPUT, bad_input, check_output, saving, write_json
+
+if TYPE_CHECKING:
+    from tmsopt.study.batch.plan import Study
+    from tmsopt.study.batch.store.store import Store
+
+INTERRUPTED = 130
+"""Exit status of a study that was stopped; what it has solved is in its store."""
+
+_EXPORTS = ("csv", "parquet", "nc")
+
+_EXAMPLES = """
+\b
+Examples:
+  tmsopt study problems/study_grid.toml
+  tmsopt study problems/study_grid.toml --row 17
+  tmsopt study problems/study_grid.toml --workers 4 --export rows.csv
+  tmsopt study problems/study_monte_carlo.toml --json
+  tmsopt study problems/study_grid.toml --scheduler tcp://host:8786
+
+Every row goes to the store, an SQLite file, as soon as it is solved. The same command goes on where it was stopped, and
+shows the rows that are there already. A row solved again, by --row or by any engine, has the same bits.
+
+A Dask cluster needs the same tmsopt on every worker, and one thread each: dask worker HOST:8786 --nthreads 1.
+
+Exit status: 0 done, failed rows included; 2 bad input; 130 stopped by Ctrl-C.
+"""
+
+
+@click.command(epilog=_EXAMPLES)
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "--store", type=click.Path(path_type=Path), help="SQLite file of the rows. [default: FILE's name.sqlite, here]"
+)
+@click.option("--fresh", is_flag=True, help="Move a store that is there aside, and start anew.")
+@click.option("--row", type=click.IntRange(min=0), default=None, help="Solve this row alone and show it; no store.")
+@click.option(
+    "--workers", type=click.IntRange(min=1), default=None,
+    help="Processes of this machine. [default: as many as cores; 1 for few rows]",
+)  # fmt: skip
+@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, in place of workers.")
+@click.option(
+    "--export", "exports", type=click.Path(path_type=Path), multiple=True,
+    help="Write all rows (csv; parquet and nc with the extra data). May be given again.",
+)  # fmt: skip
+@click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
+def study(
+    file: Path,
+    store: Path | None,
+    fresh: bool,
+    row: int | None,
+    workers: int | None,
+    scheduler: str | None,
+    exports: tuple[Path, ...],
+    as_json: bool,
+) -> None:
+    """Solve the problem of the study FILE for every row of what varies in it."""
+    with bad_input():
+        from tmsopt.study.batch.files import load_study
+
+        for path in exports:
+            check_output("--export", path, _EXPORTS)
+        path = store or Path(f"{file.stem}.sqlite")
+        if row is None:
+            check_output("--store", path, (path.suffix.lstrip(".").lower(),))
+        asked = _planned(load_study(file))
+        if row is not None:
+            _show_row(asked, row, as_json)
+            return
+        from tmsopt.study.batch.definition import definition
+        from tmsopt.study.batch.store.store import open_store
+
+        with open_store(path, definition(asked), fresh=fresh) as opened:
+            for line in (*opened.warnings, *([f"moved the old store to {opened.moved}"] if opened.moved else [])):
+                click.echo(line, err=True)
+            figures = _filled(asked, opened, workers, scheduler)
+            _show(asked, opened, figures, as_json)
+            for target in exports:
+                from tmsopt.study.batch.store.export import export
+
+                with saving("--export", target):
+                    export(opened.rows(), target, opened.about())
+    if figures.get("interrupted"):
+        click.echo(f"stopped: the rows solved so far are in {path}; the same command goes on", err=True)
+        sys.exit(INTERRUPTED)
+
+
+def _planned(asked: Any) -> "Study":
+    """The study, with the design of a Monte Carlo one solved first."""
+    from tmsopt.design.solution import NotSolved
+    from tmsopt.study.batch.monte_carlo import planned
+
+    try:
+        return planned(asked)
+    except NotSolved as error:
+        click.echo(f"there is no design to draw around: {error}", err=True)
+        sys.exit(BAD_INPUT)
+
+
+def _filled(asked: "Study", opened: "Store", workers: int | None, scheduler: str | None) -> dict[str, Any]:
+    """Solve what is missing, with a progress bar; figures of the run."""
+    from tqdm import tqdm
+
+    from tmsopt.study.batch.engines.work import EngineError
+    from tmsopt.study.batch.run import fill
+
+    present = len(opened.done())
+    figures: dict[str, Any] = {"store": str(opened.path), "rows_found": present}
+    if present:
+        click.echo(f"{present} of {len(asked)} rows are in {opened.path}", err=True)
+    if present == len(asked):
+        return figures
+    with tqdm(
+        total=len(asked), initial=present, desc="rows", unit="row", delay=1, disable=None, leave=False, file=sys.stderr
+    ) as bar:
+
+        def update(done: int, most: int) -> None:
+            bar.update(done - bar.n)
+
+        def note(line: str) -> None:
+            bar.write(line, file=sys.stderr)
+
+        try:
+            solved, seconds, engine = fill(
+                asked, opened, workers=workers, scheduler=scheduler, progress=update, note=note
+            )
+        except KeyboardInterrupt:
+            return figures | {"interrupted": True}
+        except EngineError as error:
+            click.echo(f"{error}; the rows solved so far are in {opened.path}", err=True)
+            sys.exit(BAD_INPUT)
+    return figures | {"rows_solved": solved, "seconds": round(seconds, 4), "engine": engine}
+
+
+def _show(asked: "Study", opened: "Store", figures: dict[str, Any], as_json: bool) -> None:
+    from tmsopt.show.study import study_table
+    from tmsopt.study.batch.summary import summary
+
+    found = summary(asked, opened.rows())
+    if as_json:
+        head = {"schema": 1, "title": asked.title, "model": asked.problem.model.name, "method": asked.method}
+        write_json(head | found.to_json() | {"run": figures})
+        return
+    click.echo(study_table(asked, found, opened.rows()))
+    if figures.get("rows_solved"):
+        rate = figures["rows_solved"] / max(figures["seconds"], 1e-9)
+        click.echo(
+            f"{figures['rows_solved']} rows solved in {figures['seconds']:.3g} s, {rate:.3g} a second, "
+            f"{figures['engine']}; store: {opened.path}"
+        )
+
+
+def _show_row(asked: "Study", number: int, as_json: bool) -> None:
+    """One row, solved alone."""
+    from tmsopt.study.batch.solving import alone
+
+    solved = alone(asked, number)
+    if as_json:
+        solution = {} if solved.solution is None else {"solution": solved.solution.to_json()}
+        write_json({"schema": 1, **solved.row.to_json(), **solution})
+        return
+    from tmsopt.show.study import row_lines
+    from tmsopt.show.tables import solution_table
+
+    click.echo(row_lines(solved.row))
+    if solved.solution is not None:
+        click.echo("\n" + solution_table(solved.solution))

@@ -1,0 +1,147 @@
+"""A study carried out: rows by an engine, into a store."""
+
+import time
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+from tmsopt.study.batch.definition import definition
+from tmsopt.study.batch.engines.cluster import cluster
+from tmsopt.study.batch.engines.local import cores, in_process, processes
+from tmsopt.study.batch.engines.work import Note, Unit, silent
+from tmsopt.study.batch.monte_carlo import Sampling, planned
+from tmsopt.study.batch.neighbours import blocks
+from tmsopt.study.batch.plan import Study
+from tmsopt.study.batch.row import Row
+from tmsopt.study.batch.solving import Solver
+from tmsopt.study.batch.store.store import Store, open_store
+
+_COMMIT = 0.2
+"""s of rows in one transaction: what a kill may cost, and some 20 times what a transaction takes."""
+
+_FEW = 32  # rows for which no workers are started unless asked for: they take seconds to come up
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Results:
+    """A study with its rows, all of them unless it was interrupted.
+
+    Attributes:
+        solved: rows solved now; the others were in the store.
+        seconds: that they took.
+        engine: ``in process``, ``2 processes`` or the address of a cluster.
+    """
+
+    study: Study
+    rows: tuple[Row, ...]
+    solved: int
+    seconds: float
+    engine: str
+
+
+def run_study(
+    study: Study | Sampling,
+    store: str | PathLike[str] | None = None,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    fresh: bool = False,
+    progress: Progress | None = None,
+    note: Note = silent,
+) -> Results:
+    """Solve every row of a study that its store does not have yet.
+
+    The rows are the same, bit by bit, whoever solves them and in whatever order.
+
+    Args:
+        store: path of an SQLite file that keeps each row as soon as it is solved; the same call goes on after an
+            interruption. Rows are held in memory only, without it.
+        workers: processes of this machine; 1 solves in this one. By default as many as cores, or 1 for few rows.
+        scheduler: address of a Dask scheduler, such as ``tcp://host:8786``, in place of workers.
+        fresh: move a store that is there aside, and start anew.
+        progress: called with rows done and in all.
+        note: called with a line about workers that end.
+
+    Raises:
+        InputError: for a store of another study, and whatever else cannot be done as asked.
+        NotSolved: where a Monte Carlo study has no design to draw around.
+    """
+    asked = planned(study)
+    if store is None:
+        kept: list[Row] = []
+        began, engine, solved = time.perf_counter(), "", 0
+        rows, engine = _solved(asked, set(), workers, scheduler, note)
+        for row in _counted(rows, 0, len(asked), progress):
+            kept.append(row)
+            solved += 1
+        kept.sort(key=lambda row: row.number)
+        return Results(asked, tuple(kept), solved, time.perf_counter() - began, engine)
+    with open_store(Path(store), definition(asked), fresh=fresh) as opened:
+        solved, seconds, engine = fill(
+            asked, opened, workers=workers, scheduler=scheduler, progress=progress, note=note
+        )
+        return Results(asked, tuple(opened.rows()), solved, seconds, engine)
+
+
+def fill(
+    study: Study,
+    store: Store,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+    note: Note = silent,
+) -> tuple[int, float, str]:
+    """Solve the rows that an open store lacks; how many, in how many seconds, and by which engine."""
+    began = time.perf_counter()
+    done = store.done()
+    rows, engine = _solved(study, done, workers, scheduler, note)
+    fresh: list[Row] = []
+    solved, last = 0, began
+    with closing(rows):
+        try:
+            for row in _counted(rows, len(done), len(study), progress):
+                if row.number in done:
+                    continue  # of a block that had been stored in part
+                fresh.append(row)
+                solved += 1
+                if time.perf_counter() - last >= _COMMIT:
+                    store.add(fresh)
+                    fresh, last = [], time.perf_counter()
+        finally:
+            store.add(fresh)  # interrupted or not, what was solved is kept
+    return solved, time.perf_counter() - began, engine
+
+
+def _solved(
+    study: Study, done: set[int], workers: int | None, scheduler: str | None, note: Note
+) -> tuple[Generator[Row], str]:
+    """Rows as they come, and the name of the engine."""
+    units = list(_units(study, done))
+    work = Solver(study)
+    if scheduler is not None:
+        return cluster(work, units, scheduler, note), scheduler
+    missing = len(study) - len(done)
+    count = workers or (1 if missing <= _FEW else cores())
+    if count == 1:
+        return in_process(work, units, note), "in process"
+    return processes(work, units, count, note), f"{count} processes"
+
+
+def _units(study: Study, done: set[int]) -> Iterable[Unit]:
+    """What is left to be solved; a block of neighbours as a whole."""
+    if study.warm:
+        return (block for block in blocks(study) if not done.issuperset(block))
+    return ((number,) for number in range(len(study)) if number not in done)
+
+
+def _counted(rows: Iterable[Row], done: int, most: int, progress: Progress | None) -> Iterator[Row]:
+    for row in rows:
+        yield row
+        done += 1
+        if progress:
+            progress(min(done, most), most)

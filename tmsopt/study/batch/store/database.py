@@ -1,0 +1,238 @@
+"""The file of a store: its tables, how it is made as a whole, recognised, opened and moved aside."""
+
+import json
+import sqlite3
+import time
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from tmsopt.design.errors import Fault, InputError
+from tmsopt.study.batch.store.provenance import host, now
+from tmsopt.study.batch.store.recorded import Definition, pack, unpack
+
+APPLICATION = 0x746D736F
+"""In the header of every store, where `file` and SQLite look for it: "tmso"."""
+
+SCHEMA = 1
+
+PATIENCE = 60.0
+"""Seconds to wait for somebody who reads or writes just now."""
+
+_TABLES = """
+CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL);
+CREATE TABLE columns (name TEXT PRIMARY KEY, count INTEGER NOT NULL, checksum INTEGER NOT NULL, doubles BLOB NOT NULL);
+CREATE TABLE sessions (id INTEGER PRIMARY KEY, started TEXT NOT NULL, ended TEXT, pid INTEGER NOT NULL,
+    host TEXT NOT NULL, versions TEXT NOT NULL, rows INTEGER NOT NULL DEFAULT 0);
+CREATE TABLE rows (number INTEGER PRIMARY KEY, status TEXT NOT NULL, checksum INTEGER NOT NULL, data TEXT NOT NULL);
+CREATE INDEX by_status ON rows (status);
+"""  # The index is a hundredth of the rows, and all that `done` and `counts` read.
+
+_PAUSE = 0.001  # seconds between two questions to a store that is locked
+
+_COMPANIONS = ("-wal", "-journal", "-shm")
+
+_MEANINGS = {
+    sqlite3.SQLITE_FULL: "the disk is full; make room and run the same command again, the rows in the store are safe",
+    sqlite3.SQLITE_IOERR: "reading or writing fails, or the disk is full; the rows in the store are safe",
+    sqlite3.SQLITE_READONLY: "cannot be written; give a place that can",
+    sqlite3.SQLITE_PERM: "cannot be written; give a place that can",
+    sqlite3.SQLITE_CANTOPEN: "cannot be opened or written here; give a file in a folder that can be written",
+    sqlite3.SQLITE_CORRUPT: "is damaged; --fresh moves it aside and starts a new store, or give another --store",
+    sqlite3.SQLITE_NOTADB: "is no store of tmsopt; give another file",
+    sqlite3.SQLITE_BUSY: f"another program kept it locked for {PATIENCE:g} s; end that and run the same command again",
+    sqlite3.SQLITE_LOCKED: "another program keeps it locked; end that and run the same command again",
+}
+
+
+def refuse(path: Path, *lines: str) -> InputError:
+    """The error that says these lines about a store."""
+    return InputError([Fault(lines[0], file=str(path)), *(Fault(f"  {line}") for line in lines[1:])])
+
+
+@contextmanager
+def explained(path: Path) -> Iterator[None]:
+    """What SQLite complains of, in words of a store.
+
+    Raises:
+        InputError: for any error of the file or the place where it is; a fault of the program stays one.
+    """
+    try:
+        yield
+    except sqlite3.DatabaseError as error:
+        code = getattr(error, "sqlite_errorcode", None)
+        if code is None or code & 0xFF not in _MEANINGS:
+            raise
+        raise refuse(path, f"{_MEANINGS[code & 0xFF]} ({error})") from error
+
+
+def check(path: Path) -> None:
+    """That a file is a store of this version of tmsopt or an earlier one; the file is only read.
+
+    Raises:
+        InputError: when it is not.
+    """
+    if not path.is_file():
+        raise refuse(path, "is no regular file; give the name of a store, such as study.sqlite")
+    # Opened as what nobody changes: no lock, no journal, not a byte of another program's file touched. Both numbers are
+    # in the header and never change. Not opened by Python: if this process has the store open already, the system would
+    # drop all its locks when any other descriptor of the file is closed, and SQLite knows how to prevent that.
+    header = f"{path.as_uri()}?mode=ro&immutable=1"
+    with explained(path), closing(sqlite3.connect(header, uri=True)) as connection:
+        (application,) = connection.execute("PRAGMA application_id").fetchone()
+        (schema,) = connection.execute("PRAGMA user_version").fetchone()
+    if application != APPLICATION:
+        raise refuse(path, "is no store of tmsopt; give another file")
+    if schema > SCHEMA:
+        raise refuse(
+            path,
+            f"is a store of a newer tmsopt: its schema is {schema}, this version reads up to {SCHEMA}; "
+            "update tmsopt or give another --store",
+        )
+
+
+def create(path: Path, definition: Definition, versions: Mapping[str, str], platform: str) -> None:
+    """Write a new store without rows. It gets its name when complete, so what has the name is a store."""
+    unfinished = path.with_name(f"{path.name}.new")  # one name: the lock is held, and a killed one's is overwritten
+    for ending in ("", *_COMPANIONS):
+        Path(f"{unfinished}{ending}").unlink(missing_ok=True)
+    about = {
+        "definition": json.dumps(definition.plain),
+        "seed": json.dumps(definition.plain.get("seed")),
+        "created": now(),
+        "host": host(),
+        "platform": platform,
+        "versions": json.dumps(versions),
+    }
+    try:
+        with closing(sqlite3.connect(unfinished, isolation_level=None)) as connection:
+            connection.execute(f"PRAGMA application_id={APPLICATION}")
+            connection.execute(f"PRAGMA user_version={SCHEMA}")
+            connection.executescript(f"BEGIN; {_TABLES}")
+            connection.executemany("INSERT INTO about VALUES (?, ?)", about.items())
+            for name, values in definition.columns.items():
+                packed = pack(values)
+                row = (name, len(values), zlib.crc32(packed), packed)
+                connection.execute("INSERT INTO columns VALUES (?, ?, ?, ?)", row)
+            connection.execute("COMMIT")
+        unfinished.rename(path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def definition(connection: sqlite3.Connection, path: Path) -> Definition:
+    """Of the study that a store was made for.
+
+    Raises:
+        InputError: when it is damaged.
+    """
+    try:
+        (plain,) = ask(connection, "SELECT value FROM about WHERE name = 'definition'")[0]
+        columns = {}
+        for name, count, checksum, packed in ask(connection, "SELECT * FROM columns ORDER BY rowid"):
+            values = unpack(packed)
+            if zlib.crc32(packed) != checksum or len(values) != count:
+                raise ValueError(name)
+            columns[name] = values
+        return Definition(json.loads(plain), columns)
+    except (IndexError, TypeError, ValueError, zlib.error) as error:
+        message = "the definition of its study is damaged; --fresh moves it aside and starts a new store"
+        raise refuse(path, f"{message} ({error})") from error
+
+
+def connect_to_write(path: Path, journal: str) -> sqlite3.Connection:
+    """A connection whose commits survive ``kill -9`` of this process at any moment.
+
+    They do once they have reached the system, whatever `synchronous` says. It says what a power cut may cost. With a
+    write-ahead log and NORMAL the log is forced to disk when it is copied into the store, every 1000 pages: a power cut
+    may cost the rows since then, which are solved again, and damages nothing. A rollback journal could be damaged with
+    NORMAL; FULL forces every commit to disk, and costs no row that was acknowledged.
+    """
+    connection = sqlite3.connect(path, isolation_level=None, timeout=PATIENCE, check_same_thread=False)
+    try:
+        connection.execute(f"PRAGMA journal_mode={journal}").fetchone()
+        (kept,) = connection.execute("PRAGMA journal_mode").fetchone()  # a reader may keep it from changing
+        connection.execute(f"PRAGMA synchronous={'NORMAL' if kept == 'wal' else 'FULL'}")
+    except BaseException:
+        connection.close()
+        raise
+    return connection
+
+
+def connect_to_read(path: Path) -> sqlite3.Connection:
+    """A connection that changes no row, while another process writes or none does.
+
+    Where the folder can be written SQLite may have to finish what a killed writer began. Where it cannot, a store that
+    was closed is one file that can be read as it is.
+    """
+    for number, way in enumerate(("mode=rw", "mode=ro", "mode=ro&immutable=1")):
+        connection = sqlite3.connect(
+            f"{path.as_uri()}?{way}", uri=True, isolation_level=None, timeout=0, check_same_thread=False
+        )
+        try:
+            connection.execute("PRAGMA query_only=ON")
+            ask(connection, "SELECT count(*) FROM sessions")
+            return connection
+        except sqlite3.OperationalError as error:
+            connection.close()
+            denied = error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY)
+            if number == 2 or not denied or (number == 1 and Path(f"{path}-wal").exists()):
+                raise
+        except BaseException:
+            connection.close()
+            raise
+    raise AssertionError("unreachable")
+
+
+def ask(connection: sqlite3.Connection, query: str, values: Sequence[Any] | Mapping[str, Any] = ()) -> list[Any]:
+    """All that a query finds. It asks often while the store is locked.
+
+    SQLite asks ten times a second, and a writer with a rollback journal, who locks the store for most of the time while
+    he waits for the disk, would let a reader in once a minute.
+    """
+    end = time.monotonic() + PATIENCE
+    while True:
+        try:
+            return connection.execute(query, values).fetchall()
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode & 0xFF != sqlite3.SQLITE_BUSY or time.monotonic() > end:
+                raise
+            time.sleep(_PAUSE)
+
+
+def finish(connection: sqlite3.Connection) -> None:
+    """Close a store that was written; without readers it is left as one plain file, readable from any place."""
+    connection.execute("PRAGMA busy_timeout=0")
+    with suppress(sqlite3.Error):
+        connection.execute("PRAGMA journal_mode=DELETE").fetchone()
+    connection.close()
+
+
+def aside(path: Path) -> Path:
+    """Move a store to ``name.1.sqlite``, or the first number that is free; the lock must be held.
+
+    Raises:
+        OSError: when it cannot be moved, e.g. while somebody reads it on Windows.
+    """
+    if path.exists():
+        with suppress(sqlite3.Error):  # a damaged one is moved as it is
+            finish(sqlite3.connect(path, isolation_level=None))
+    number = 1
+    while any(Path(f"{_numbered(path, number)}{ending}").exists() for ending in ("", *_COMPANIONS)):
+        number += 1
+    moved = _numbered(path, number)
+    for ending in ("", *_COMPANIONS):
+        if Path(f"{path}{ending}").exists():
+            Path(f"{path}{ending}").rename(f"{moved}{ending}")
+    return moved
+
+
+def leftovers(path: Path) -> bool:
+    """Whether journals lie beside a store that is gone: SQLite would play them into a new one of that name."""
+    return any(Path(f"{path}{ending}").exists() for ending in _COMPANIONS)
+
+
+def _numbered(path: Path, number: int) -> Path:
+    return path.with_name(f"{path.stem}.{number}{path.suffix}")
