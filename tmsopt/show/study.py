@@ -79,7 +79,10 @@ def _facts(study: Study, found: Summary) -> list[str]:
     if found.best is not None and study.problem.free:
         given = ", ".join(f"{name} = {number(value)}" for name, value in found.best.varied.items())
         lines.append(f"best: row {found.best.number}, {number(found.best.objective)} at {given}")
+    same = (study.problem.minimize or "").strip() == "abscissa"
     for name, (least, median, most) in found.spread.items():
+        if same and name == "objective":
+            continue
         lines.append(f"{name}: {_short(least)} to {_short(most)}, median {_short(median)}")
     if found.structures:
         lines.append("structures: " + ", ".join(f"{name} {count}" for name, count in found.structures.items()))
