@@ -22,6 +22,9 @@ from tmsopt.models.tms import copo, tms
 
 Array = NDArray[np.float64]
 
+Watch = Callable[[Array, Array], None]
+"""Told of every evaluation: designs of shape (n, m) and their abscissae (m,)."""
+
 FEASIBLE = 1e-6
 """Violation, relative to the size of the two sides, up to which a rival's design counts as feasible."""
 
@@ -69,8 +72,9 @@ class Found:
 class Reduced:
     """A problem without its equality: the free parameters that are left, the abscissa and g(x) >= 0, vectorised."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, watch: Watch | None = None) -> None:
         self.problem = problem
+        self._watch = watch
         conditions = list(problem.conditions.values())
         equalities = [c.text for c in conditions if c.comparison == "=="]
         self._solved = _solvable(problem, equalities[0]) if equalities else ""
@@ -96,21 +100,35 @@ class Reduced:
             values[self._solved] = self._eliminated(values)
         return values
 
+    def coefficients(self, x: Array) -> Array:
+        """Those of the polynomial, of shape (5,) or (m, 5)."""
+        return np.stack(np.broadcast_arrays(*_coefficients(self.parameters(x)), x[0])[:-1], axis=-1)
+
     def abscissa(self, x: Array) -> float:
         """Largest real part of the eigenvalues of one design."""
-        coefficients = np.array(_coefficients(self.parameters(x)))
-        if not np.all(np.isfinite(coefficients)):
-            return _NOWHERE
-        return float(np.roots(coefficients).real.max(initial=-_NOWHERE))
+        coefficients = self.coefficients(x)
+        regular = bool(np.all(np.isfinite(coefficients)))
+        value = float(np.roots(coefficients).real.max(initial=-_NOWHERE)) if regular else _NOWHERE
+        if self._watch:
+            self._watch(x[:, None], np.array([value]))
+        return value
 
     def abscissae(self, x: Array) -> Array:
         """The same for designs of shape (n, m), by stacked companion matrices as in `numpy.roots`."""
-        a = np.stack(np.broadcast_arrays(*_coefficients(self.parameters(x)), x[0])[:-1], axis=-1)
+        a = self.coefficients(x)
         regular = np.all(np.isfinite(a), axis=-1) & (a[:, 0] != 0)
         companion = np.zeros((len(a), 4, 4))
         companion[:, 0, :] = -np.where(regular[:, None], a[:, 1:], 0.0) / np.where(regular, a[:, 0], 1.0)[:, None]
         companion[:, np.arange(1, 4), np.arange(3)] = 1
-        return np.where(regular, np.linalg.eigvals(companion).real.max(axis=-1), _NOWHERE)
+        values = np.where(regular, np.linalg.eigvals(companion).real.max(axis=-1), _NOWHERE)
+        if self._watch:
+            self._watch(x, values)
+        return values
+
+    def penalised(self, x: Array) -> Any:
+        """Abscissa with violations as an exact penalty, of one design (n,) or of many (n, m)."""
+        abscissa = self.abscissa(x) if x.ndim == 1 else self.abscissae(x)
+        return abscissa + _PENALTY * np.maximum(-self.rows(x), 0.0).sum(axis=0)
 
     def rows(self, x: Array) -> Array:
         """g(x) of shape (rows,) or (rows, m), at least 0 where a design is feasible."""
@@ -123,7 +141,9 @@ class Reduced:
         for value in solved:
             lower, upper = self.problem.free[self._solved]
             g += [value - lower, upper - value]
-        found = np.array([np.broadcast_to(row, np.shape(x)[1:]) for row in g], dtype=float)
+        found = np.array([np.broadcast_to(row, np.shape(x)[1:]) for row in g], dtype=float).reshape(
+            len(g), *x.shape[1:]
+        )
         return np.where(np.isfinite(found), found, -_NOWHERE)
 
     def found(self, method: str, x: Array, seconds: float) -> Found:
@@ -138,9 +158,9 @@ class Reduced:
         return 0.25 - 0.5 * first / (second - first)
 
 
-def differential(problem: Problem, seed: int = 0, vectorized: bool = False) -> Found:
+def differential(problem: Problem, seed: int = 0, vectorized: bool = False, watch: Watch | None = None) -> Found:
     """Differential evolution with the constraints as such (Lampinen's rule), polished by SciPy's own choice."""
-    reduced = Reduced(problem)
+    reduced = Reduced(problem, watch)
     bounds = Bounds(reduced.lower, reduced.upper)
     constraints: Any = NonlinearConstraint(reduced.rows, 0.0, np.inf) if reduced.constrained else ()
     objective: Callable[[Array], Any] = reduced.abscissae if vectorized else reduced.abscissa
@@ -160,37 +180,34 @@ def differential(problem: Problem, seed: int = 0, vectorized: bool = False) -> F
         return reduced.found(VECTORISED if vectorized else SCALAR, answer.x, time.perf_counter() - began)
 
 
-def slsqp(problem: Problem) -> Found:
+def slsqp(problem: Problem, starts: int = STARTS, watch: Watch | None = None) -> Found:
     """SLSQP from the first starts."""
 
     def run(reduced: Reduced, x: Array) -> Array:
         options = {"ftol": 1e-14, "maxiter": 300}
         return _minimized(reduced, reduced.abscissa, x, method="SLSQP", constraints=_rows(reduced), options=options)
 
-    return _multistart("SLSQP", problem, run)
+    return _multistart("SLSQP", Reduced(problem, watch), starts, run)
 
 
-def cobyla(problem: Problem) -> Found:
+def cobyla(problem: Problem, starts: int = STARTS, watch: Watch | None = None) -> Found:
     """COBYLA from the first starts."""
 
     def run(reduced: Reduced, x: Array) -> Array:
         options = {"maxiter": 5000, "tol": 1e-12, "rhobeg": 0.1 * float((reduced.upper - reduced.lower).min())}
         return _minimized(reduced, reduced.abscissa, x, method="COBYLA", constraints=_rows(reduced), options=options)
 
-    return _multistart("COBYLA", problem, run)
+    return _multistart("COBYLA", Reduced(problem, watch), starts, run)
 
 
-def nelder_mead(problem: Problem) -> Found:
+def nelder_mead(problem: Problem, starts: int = STARTS, watch: Watch | None = None) -> Found:
     """Nelder–Mead from the first starts, violations as an exact penalty."""
 
     def run(reduced: Reduced, x: Array) -> Array:
-        def penalised(x: Array) -> float:
-            return reduced.abscissa(x) + _PENALTY * float(np.maximum(-reduced.rows(x), 0.0).sum())
-
         options = {"xatol": 1e-12, "fatol": 1e-12, "maxiter": 1000 * len(x), "maxfev": 1000 * len(x)}
-        return _minimized(reduced, penalised, x, method="Nelder-Mead", options=options)
+        return _minimized(reduced, reduced.penalised, x, method="Nelder-Mead", options=options)
 
-    return _multistart("Nelder–Mead", problem, run)
+    return _multistart("Nelder–Mead", Reduced(problem, watch), starts, run)
 
 
 def _rows(reduced: Reduced) -> list[dict[str, Any]]:
@@ -202,17 +219,16 @@ def _minimized(reduced: Reduced, function: Callable[[Array], float], x: Array, *
     return np.asarray(answer.x)
 
 
-LOCAL: Mapping[str, Callable[[Problem], Found]] = {"SLSQP": slsqp, "Nelder–Mead": nelder_mead, "COBYLA": cobyla}
+LOCAL: Mapping[str, Callable[..., Found]] = {"SLSQP": slsqp, "Nelder–Mead": nelder_mead, "COBYLA": cobyla}
 """The local rivals by name."""
 
 
-def _multistart(method: str, problem: Problem, run: Callable[[Reduced, Array], Array]) -> Found:
-    reduced = Reduced(problem)
+def _multistart(method: str, reduced: Reduced, starts: int, run: Callable[[Reduced, Array], Array]) -> Found:
     began = time.perf_counter()
     ends: list[Found] = []
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
-        for design in designs(problem, 0, STARTS):
+        for design in designs(reduced.problem, 0, starts):
             x = run(reduced, np.array([design[n] for n in reduced.names]))
             ends.append(reduced.found(method, x, 0.0))
     best = min(ends, key=lambda f: (not f.feasible, f.value if f.feasible else f.violation))
