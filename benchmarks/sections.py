@@ -75,7 +75,7 @@ def _load() -> str:
     return f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
 
 
-def chosen(only: str, sections: Sequence[Section] = SECTIONS) -> list[Section]:
+def chosen(only: str, sections: Sequence[Section]) -> list[Section]:
     """Sections by letters or names, separated by commas; all of them for an empty text.
 
     Raises:
@@ -119,7 +119,7 @@ def main(only: str, quick: bool, listed: bool, output: Path | None) -> None:
 
     Sections that fail say so and the others go on; the exit status is then 1.
     """
-    sections = chosen(only)
+    sections = chosen(only, SECTIONS)
     if listed:
         click.echo("\n".join(f"{s.letter}  {s.name:8}  {s.about}" for s in sections))
         return
@@ -127,7 +127,7 @@ def main(only: str, quick: bool, listed: bool, output: Path | None) -> None:
     failed = []
     for section in sections:
         click.echo(f"{section.letter}  {section.name}: {section.about}", err=True)
-        command = f"python -m benchmarks --only {section.letter}{' --quick' if quick else ''}"
+        command = f"python -m benchmarks --only {section.name}{' --quick' if quick else ''}"
         outcome = run(section, command, quick)
         click.echo(outcome.text)
         if path:

@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import import_module
+from importlib.metadata import version
 from importlib.util import find_spec
 from itertools import count
 from typing import Any
@@ -55,6 +56,11 @@ class Seeker:
         except ImportError as error:
             return f"cannot be imported: {error}"
         return ""
+
+    @property
+    def versions(self) -> str:
+        """Of its packages, as they are distributed."""
+        return ", ".join(f"{n} {version(n)}" for n in self.packages if "." not in n)
 
 
 def _local(rival: Callable[..., Any]) -> Seeker:

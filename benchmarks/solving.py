@@ -65,18 +65,24 @@ def section(command: str, quick: bool = False) -> str:
     heats = [heat(title, p, optimum(p, closed), SEEKERS, limit) for title, p, closed in problems(quick)]
     parts = [
         "## Solving at equal accuracy",
-        origin(command),
-        _overview(heats),
+        " ".join(
+            [
+                origin(command),
+                *(f"{name}: {s.versions}." for name, s in SEEKERS.items() if s.packages and not s.obstacle),
+            ]
+        ),
+        overview(heats),
         "The time of a method over that of `tmsopt.solve` until it is within a relative error of the optimum, on the "
         f"problems where it ever is: the median; a rival has {limit:.0f} s for each problem.",
         _problems(heats),
-        _details(heats),
+        details(heats),
         _note(limit),
     ]
     return "\n\n".join(parts) + "\n"
 
 
-def _overview(heats: Sequence[Heat]) -> str:
+def overview(heats: Sequence[Heat]) -> str:
+    """A row per method: on how many problems it got within each tolerance, and the median of its times over ours."""
     rows = []
     for first in heats[0].runs:
         runs = [r for h in heats for r in h.runs if r.method == first.method]
@@ -110,7 +116,8 @@ def _problems(heats: Sequence[Heat]) -> str:
     return table(("problem", "free", "constraints", "least abscissa", "known by", OWN), rows)
 
 
-def _details(heats: Sequence[Heat]) -> str:
+def details(heats: Sequence[Heat]) -> str:
+    """A row per problem and method."""
     rows = [
         (h.title, r.method, *[_cell(h, r, t) for t in TOLERANCES], r.evaluations, _off(h.off(r)))
         for h in heats

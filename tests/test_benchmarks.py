@@ -1,0 +1,189 @@
+"""The benchmark command: what is measured, that a failure costs one section, and that nobody is credited unduly."""
+
+import inspect
+import math
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+from types import SimpleNamespace
+
+import click
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import benchmarks.measure
+from benchmarks import sections
+from benchmarks.measure import best, exponent
+from benchmarks.race import OWN, Heat, Moment, Run, median_ratio, own, run
+from benchmarks.rivals import Reduced, Watch
+from benchmarks.sections import SECTIONS, Section, chosen
+from benchmarks.seekers import Seeker, slopes
+from benchmarks.solving import details, overview
+from benchmarks.suite import random_problem
+from tmsopt import Problem, models
+
+HEIGHTS = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
+OPTIMUM = -((0.4 * 0.2) ** -0.25)
+"""Least abscissa at these heights, at the EP4 of the paper."""
+EP4 = {
+    "Fr": 3 * math.sqrt(110 * math.sqrt(2) - 120) / 8,
+    "chi_B": math.sqrt(2),
+    "lambda_s": math.atan(15 / 4 - 75 * math.sqrt(2) / 32),
+}
+BOX = {"Fr": (0.01, 10.0), "chi_B": (1.01, 5.0), "lambda_s": (0.02, 1.4)}
+PROBLEM = Problem(models.tms, fixed=HEIGHTS, free=BOX, minimize="abscissa")
+GOAL = OPTIMUM * (1 - 1e-3)  # double roots of a rounded EP4 scatter by 4e-4
+
+
+def test_sections_have_letters_names_and_a_report() -> None:
+    assert [s.letter for s in SECTIONS] == sorted(s.letter for s in SECTIONS)
+    assert {s.letter for s in SECTIONS} == set("abcdef")
+    assert len({s.name for s in SECTIONS}) == len(SECTIONS)
+    there = [s for s in SECTIONS if find_spec(s.module)]
+    assert {s.letter for s in there} >= set("abdef")
+    for section in there:
+        assert list(inspect.signature(section.report()).parameters) == ["command", "quick"]
+
+
+def test_sections_are_chosen_by_letter_or_name() -> None:
+    assert [s.letter for s in chosen("", SECTIONS)] == [s.letter for s in SECTIONS]
+    assert [s.name for s in chosen("growth, a", SECTIONS)] == ["solving", "growth"]
+    with pytest.raises(click.BadParameter, match="found 'x'; accepted: a or solving"):
+        chosen("x", SECTIONS)
+
+
+def test_a_section_that_fails_says_so_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def fails(command: str, quick: bool) -> str:
+        raise RuntimeError("out of luck")
+
+    fakes: dict[str, Callable[[str, bool], str]] = {"fails": fails, "works": lambda c, q: f"## Works\n\n`{c}`\n"}
+    for name, section in fakes.items():
+        monkeypatch.setitem(sys.modules, f"fake_{name}", SimpleNamespace(section=section))
+    names = ("fails", "absent", "works")
+    made = tuple(Section(letter, n, f"fake_{n}", "about") for letter, n in zip("abc", names, strict=True))
+    monkeypatch.setattr(sections, "SECTIONS", made)
+    path = tmp_path / "kept.md"
+    answer = CliRunner().invoke(sections.main, ["--quick", "--output", str(path)])
+    assert answer.exit_code == 1
+    kept = path.read_text(encoding="utf-8")
+    assert "failed: RuntimeError: out of luck" in kept
+    assert "not installed: fake_absent" in kept
+    assert "`python -m benchmarks --only works --quick`" in kept
+    assert kept.index("<!-- fails -->") < kept.index("<!-- absent -->") < kept.index("<!-- works -->")
+
+
+def test_quick_numbers_are_kept_nowhere_by_default(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(sys.modules, "fake_works", SimpleNamespace(section=lambda command, quick: "## Works\n"))
+    monkeypatch.setattr(sections, "SECTIONS", (Section("a", "works", "fake_works", "about"),))
+    monkeypatch.chdir(tmp_path)
+    answer = CliRunner().invoke(sections.main, ["--quick"])
+    assert answer.exit_code == 0
+    assert "## Works" in answer.output
+    assert not list(tmp_path.iterdir())
+
+
+def test_methods_take_turns_and_the_least_time_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [0.0]
+    turns = []
+
+    def work(name: str, seconds: list[float]) -> Callable[[], None]:
+        def one() -> None:
+            turns.append(name)
+            clock[0] += seconds.pop(0)
+
+        return one
+
+    monkeypatch.setattr(benchmarks.measure.time, "perf_counter", lambda: clock[0])
+    assert best({"a": work("a", [5, 2, 3]), "b": work("b", [4, 8, 6])}, 3) == {"a": 2, "b": 4}
+    assert turns == ["a", "b"] * 3
+
+
+def test_exponent_of_a_power() -> None:
+    assert exponent([1, 10, 1000], [3.0, 300.0, 3e6]) == pytest.approx(2, abs=1e-12)
+    assert exponent([1, 10, 100], [5.0, 50.0, math.nan]) == pytest.approx(1, abs=1e-12)
+    assert math.isnan(exponent([1], [3.0]))
+
+
+def seen(*designs: dict[str, float]) -> Seeker:
+    """A rival that evaluates some designs and claims an abscissa of −100 for each."""
+
+    def search(problem: Problem, watch: Watch) -> None:
+        for design in designs:
+            watch(np.array([[design[n]] for n in problem.free]), np.array([-100.0]))
+
+    return Seeker(search)
+
+
+FAR = {"Fr": 2.0, "chi_B": 1.4, "lambda_s": 0.4}
+
+
+def test_a_rival_is_credited_with_what_it_saw_and_not_with_what_it_claims() -> None:
+    found = run("fake", seen(FAR, EP4, FAR), PROBLEM, GOAL, math.inf)
+    assert [m.evaluations for m in found.moments] == [1, 2]  # the third was never asked for: the goal was seen
+    assert found.moments[0].value == pytest.approx(Reduced(PROBLEM).abscissa(np.array(list(FAR.values()))), abs=1e-12)
+    assert found.moments[1].value == pytest.approx(OPTIMUM, abs=1e-3)
+
+
+def test_designs_that_violate_something_are_not_credited() -> None:
+    narrow = replace(PROBLEM, constraints={"c": "Fr >= 3"})
+    assert run("fake", seen(FAR, EP4), narrow, GOAL, math.inf).moments == ()
+    outside = run("fake", seen({**EP4, "lambda_s": -0.4}), PROBLEM, GOAL, math.inf)  # judged at the end of its range
+    assert outside.best > GOAL
+
+
+def test_time_ends_a_rival_and_an_error_keeps_what_it_had() -> None:
+    assert len(run("fake", seen(FAR, EP4), PROBLEM, GOAL, 0.0).moments) == 1
+
+    def search(problem: Problem, watch: Watch) -> None:
+        seen(FAR).search(problem, watch)
+        raise ArithmeticError("lost")
+
+    found = run("fake", Seeker(search), PROBLEM, GOAL, math.inf)
+    assert (len(found.moments), found.note) == (1, "failed: ArithmeticError('lost')")
+    absent = run("fake", Seeker(search, ("no_such_package",)), PROBLEM, GOAL, math.inf)
+    assert (absent.moments, absent.note) == ((), "not installed: no_such_package")
+
+
+def test_ratios_compare_two_sides_at_equal_accuracy() -> None:
+    """Ours is there after 2 s; a rival within 1e-3 after 6 s, within 1e-6 after 20 s, and never within 1e-8."""
+
+    def moment(error: float, seconds: float) -> Moment:
+        return Moment(-1 + error, seconds, int(10 * seconds), EP4)
+
+    ours = Run(OWN, (moment(0, 2.0),), 2.0, 20)
+    rival = Run("rival", (moment(1e-4, 6.0), moment(1e-7, 20.0)), 30.0, 300)
+    never = Run("never", (moment(0.5, 1.0),), 30.0, 300)
+    absent = Run("absent", (), 0.0, 0, "not installed: it")
+    heat = Heat("fake", PROBLEM, -1.0, "closed form", EP4, (ours, rival, never, absent))
+    assert [heat.ratio(rival, t) for t in (1e-3, 1e-6, 1e-8)] == [3, 10, math.inf]
+    assert heat.error(rival) == pytest.approx(1e-7, rel=1e-6)
+    slower = replace(heat, runs=(replace(ours, moments=(moment(0, 4.0),)), rival, never, absent))
+    assert median_ratio([heat, slower], "rival", 1e-3) == (2, pytest.approx((6 / 2 + 6 / 4) / 2))
+    assert median_ratio([heat, slower], "never", 1e-3)[0] == 0
+    assert "| absent | not installed: it |" in overview([heat])
+    assert "| never | 0 of 1 | – | 0 of 1 | – | 0 of 1 | – | 5e-01 |" in overview([heat])
+    assert details([heat]).count("never: best error 1e-07") == 1
+    assert details([heat]).count("never: best error 5e-01") == 3
+
+
+def test_ours_is_as_good_as_it_says() -> None:
+    """The optimum in closed form, with IPOPT's evaluations counted."""
+    found = own(PROBLEM)
+    assert found.best == pytest.approx(OPTIMUM, rel=1e-12)
+    assert found.evaluations > 0
+
+
+@pytest.mark.parametrize("index", [3, 39])
+def test_gradients_given_to_rivals(index: int) -> None:
+    """Against differences of numpy.roots at a design with simple roots: 1e-7 steps leave 1e-7 of the slope."""
+    reduced = Reduced(random_problem(index))
+    x = 0.3 * reduced.lower + 0.7 * reduced.upper
+    step = 1e-7 * (reduced.upper - reduced.lower)
+    slope, rows = slopes(reduced, x)
+    for k, unit in enumerate(np.eye(len(x))):
+        up, down = x + step * unit, x - step * unit
+        assert slope[k] == pytest.approx((reduced.abscissa(up) - reduced.abscissa(down)) / (2 * step[k]), abs=1e-5)
+        assert rows[:, k] == pytest.approx((reduced.rows(up) - reduced.rows(down)) / (2 * step[k]), abs=1e-5)
