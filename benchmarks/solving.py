@@ -65,12 +65,7 @@ def section(command: str, quick: bool = False) -> str:
     heats = [heat(title, p, optimum(p, closed), SEEKERS, limit) for title, p, closed in problems(quick)]
     parts = [
         "## Solving at equal accuracy",
-        " ".join(
-            [
-                origin(command),
-                *(f"{name}: {s.versions}." for name, s in SEEKERS.items() if s.packages and not s.obstacle),
-            ]
-        ),
+        " ".join([origin(command), *_versions()]),
         overview(heats),
         "The time of a method over that of `tmsopt.solve` until it is within a relative error of the optimum, on the "
         f"problems where it ever is: the median; a rival has {limit:.0f} s for each problem.",
@@ -79,6 +74,10 @@ def section(command: str, quick: bool = False) -> str:
         _note(limit),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _versions() -> list[str]:
+    return [f"{name}: {s.versions}." for name, s in SEEKERS.items() if s.packages and not s.obstacle]
 
 
 def overview(heats: Sequence[Heat]) -> str:
