@@ -9,6 +9,8 @@ import pytest
 import tmsopt
 from tmsopt.design.page import LARGEST
 
+STUDIES = set(Path("problems").glob("study_*.toml"))
+
 GOOD = """\
 title = "EP4 of the chi_H = 1 bicycle"
 model = "tms"
@@ -183,6 +185,18 @@ def test_minimum_equal_to_maximum_fixes(write):
     assert "chi_B" not in problem.free
 
 
-@pytest.mark.parametrize("path", sorted(Path("problems").glob("*.toml")), ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", sorted(set(Path("problems").glob("*.toml")) - STUDIES), ids=lambda p: p.stem)
 def test_every_problem_in_the_repository_loads(path):
     assert tmsopt.load(path, asks=False).title
+
+
+def test_a_study_is_told_from_a_problem():
+    assert len(STUDIES) >= 4
+    for path in STUDIES:
+        with pytest.raises(tmsopt.InputError, match="tmsopt study"):
+            tmsopt.load(path)
+
+
+def test_a_problem_with_a_table_of_studies_has_an_unknown_key(write):
+    with pytest.raises(tmsopt.InputError, match="unknown key 'vary'"):
+        tmsopt.load(write(GOOD + "[vary]\nmu = [0.1]\n"))

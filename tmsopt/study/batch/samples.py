@@ -15,6 +15,8 @@ from tmsopt.study.batch.stated import MOST_ROWS, count_faults
 
 Array = NDArray[np.float64]
 
+_DIGITS = 15  # of a decimal number, all of which a double holds
+
 
 @dataclass(frozen=True)
 class Span:
@@ -30,11 +32,16 @@ class Span:
         inside = low * (high / low) ** share if self.log else low + share * (high - low)
         return np.clip(inside, min(low, high), max(low, high))
 
-    def points(self, count: int) -> Array:
-        """So many numbers, both ends included, exactly."""
-        values = np.array(self.at(np.linspace(0, 1, count)))
-        values[-1], values[0] = self.high, self.low
-        return values
+    def points(self, count: int) -> list[float]:
+        """So many numbers: both ends to the last bit, and between them to 15 digits, such as 0.3 for 0.1 + 0.2."""
+        inside = self.at(np.linspace(0, 1, count)).tolist()[1:-1]
+        if self.log:
+            rounded = [float(f"{value:.{_DIGITS}g}") for value in inside]
+        else:
+            largest = max(abs(self.low), abs(self.high))
+            places = _DIGITS - 1 - math.floor(math.log10(largest)) if largest else 0
+            rounded = [round(value, places) for value in inside]
+        return [float(self.low), *rounded, float(self.high)]
 
 
 def grid(axes: Mapping[str, Sequence[float]]) -> dict[str, Column]:
