@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 INTERRUPTED = 130
 """Exit status of a study that was stopped; what it has solved is in its store."""
 
-_EXPORTS = ("csv", "parquet", "nc")
-
 _EXAMPLES = """
 \b
 Examples:
@@ -66,8 +64,10 @@ def study(
     with bad_input():
         from tmsopt.study.batch.files import load_study
 
-        for path in exports:
-            check_output("--export", path, _EXPORTS)
+        for target in exports:
+            from tmsopt.study.batch.store.export import check_export
+
+            check_export(target)
         path = store or Path(f"{file.stem}.sqlite")
         if row is None:
             check_output("--store", path, (path.suffix.lstrip(".").lower(),))

@@ -1,14 +1,14 @@
 """What all figures share: colours that the colour-blind can tell apart, sizes for print, and saving."""
 
 import io
-import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+
+from tmsopt.study.whole import whole
 
 STABLE, HEAVY, LINE, MARK, CRITICAL = "#56B4E9", "#E69F00", "#000000", "#D55E00", "#0072B2"
 """Fills of stability and heavy damping, lines, marked points, the weave boundary (Okabe–Ito)."""
@@ -48,13 +48,5 @@ def save(figure: Figure, path: Path) -> None:
         figure.savefig(drawn, dpi=200, format=ending)
         path.write_bytes(drawn.getvalue())
         return
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".tmsopt-")
-    os.close(handle)
-    try:
+    with whole(path) as temporary:
         figure.savefig(temporary, dpi=200, format=ending)
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)
-        os.replace(temporary, path)
-    finally:
-        Path(temporary).unlink(missing_ok=True)
