@@ -54,7 +54,7 @@ class Replay:
 @contextmanager
 def _recorded(calls: list[Callable[[], Any]]) -> Iterator[None]:
     """Note every call of a solver, with its solver, start and limits."""
-    original = families.ipopt
+    original = families.ipopt  # type: ignore[attr-defined]
 
     def recording(*arguments: Any, **options: Any) -> Callable[..., Run]:
         solver = original(*arguments, **options)
@@ -117,7 +117,8 @@ def dask_scaling(study: Study, workers: int) -> float:
 
     from tmsopt.study.batch.engines.cluster import cluster
 
-    with LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None) as local:
+    local = LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None)  # type: ignore[no-untyped-call]
+    with local:
         units = [(number,) for number in range(len(study))]
         arrived = [time.perf_counter() for _ in cluster(Solver(study), units, local.scheduler_address)]
     skip = 4 * workers
@@ -164,8 +165,8 @@ def _overheads(studies: Sequence[Study], rounds: int) -> str:
         "over IPOPT alone", "runs of IPOPT a row",
     )  # fmt: skip
     note = (
-        "One core, the best of rounds in turns. The solves are the same ones, without engine and store; IPOPT alone does "
-        "the very same runs again from recorded starts, with the same compiled problem, without choosing starts, "
+        "One core, the best of rounds in turns. The solves are the same ones, without engine and store; IPOPT alone "
+        "does the very same runs again from recorded starts, with the same compiled problem, without choosing starts, "
         "polishing, rechecking, certified numbers and laws."
     )
     return f"### Beside bare solves\n\n{table(head, rows)}\n\n{note}"

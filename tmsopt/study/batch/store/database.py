@@ -217,8 +217,10 @@ def aside(path: Path) -> Path:
         OSError: when it cannot be moved, e.g. while somebody reads it on Windows.
     """
     if path.exists():
+        connection = sqlite3.connect(path, isolation_level=None)
         with suppress(sqlite3.Error):  # a damaged one is moved as it is
-            finish(sqlite3.connect(path, isolation_level=None))
+            connection.execute("UPDATE sessions SET rows = rows")  # clears the journal that a killed writer left
+        finish(connection)
     number = 1
     while any(Path(f"{_numbered(path, number)}{ending}").exists() for ending in ("", *_COMPANIONS)):
         number += 1

@@ -4,6 +4,7 @@ import platform
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, distribution, version
+from pathlib import Path
 
 PACKAGES = ("tmsopt", "casadi", "numpy", "scipy", "python-flint")
 
@@ -41,8 +42,8 @@ def changed(then: Mapping[str, str], today: Mapping[str, str]) -> tuple[str, ...
 def _ipopt() -> str:
     """The version in the name of the library that the CasADi wheel brings; it tells nowhere else without a solve."""
     try:
-        files = distribution("casadi").files or []
+        folder = Path(str(distribution("casadi").locate_file("casadi")))
     except PackageNotFoundError:
         return "unknown"
-    names = [f.name.removeprefix("libipopt.so.") for f in files if f.name.startswith("libipopt.so.")]
+    names = [library.name.removeprefix("libipopt.so.") for library in folder.glob("libipopt.so.*")]
     return max(names, key=len, default="unknown")
