@@ -65,6 +65,27 @@ class _File(Section):
 def load_study(path: str | PathLike[str]) -> Study | Sampling:
     """Read a study file; a Monte Carlo study is a `Sampling`, of which `planned` makes a Study.
 
+    Such a file names a problem file, or has its tables as [problem.parameters] and so on; names of files in it are
+    relative to its own place. Units are written as in problem files::
+
+        problem = "realistic.toml"
+        [study]
+        method = "grid"            # list, latin_hypercube, sobol, csv, monte_carlo
+        rows = 1024                # of latin_hypercube, sobol, monte_carlo
+        csv = "rows.csv"           # of csv
+        distribution = "uniform"   # or normal, of monte_carlo
+        seed = 0
+        starts = 64                # of a row, at most; of monte_carlo, of its nominal design
+        warm = false               # neighbours start each other
+        report = ["nu_H", "2*Fr_c"]
+        [vary]
+        mu = { min = 0.05, max = 1, points = 20, log = true }   # of a grid; samples have no points, lists only values
+        zeta_H = [-0.2, -0.25]
+        "lambda_s.max" = ["20 deg", "30 deg"]
+        "offset.limit" = [0.02, 0.05]
+        [tolerances]               # of monte_carlo, in place of those of the problem
+        chi_B = "5 mm"
+
     Raises:
         InputError: listing every fault with file, line, key, what was found and what is accepted.
     """

@@ -34,12 +34,13 @@ class Span:
 
     def points(self, count: int) -> list[float]:
         """So many numbers: both ends to the last bit, and between them to 15 digits, such as 0.3 for 0.1 + 0.2."""
-        inside = self.at(np.linspace(0, 1, count)).tolist()[1:-1]
         if self.log:
+            inside = np.geomspace(self.low, self.high, count).tolist()[1:-1]
             rounded = [float(f"{value:.{_DIGITS}g}") for value in inside]
         else:
             largest = max(abs(self.low), abs(self.high))
             places = _DIGITS - 1 - math.floor(math.log10(largest)) if largest else 0
+            inside = np.linspace(self.low, self.high, count).tolist()[1:-1]
             rounded = [round(value, places) for value in inside]
         return [float(self.low), *rounded, float(self.high)]
 
@@ -51,10 +52,7 @@ def grid(axes: Mapping[str, Sequence[float]]) -> dict[str, Column]:
         InputError: for more rows than a study may have, or an axis that is no list of numbers.
     """
     lists = {name: _axis(name, values) for name, values in axes.items()}
-    sizes = [len(values) for values in lists.values()]
-    if math.prod(sizes) > MOST_ROWS:
-        found = f"{' x '.join(map(str, sizes))} = {math.prod(sizes)} rows"
-        raise InputError([Fault(f"found {found}; accepted: up to {MOST_ROWS}; take fewer points", ("columns",))])
+    check_size([len(values) for values in lists.values()])
     crossed = np.meshgrid(*lists.values(), indexing="ij")
     return {name: Column(values.ravel()) for name, values in zip(lists, crossed, strict=True)}
 
@@ -96,6 +94,17 @@ def sobol_note(rows: int) -> str:
         return ""
     near = 2 ** round(math.log2(rows))
     return f"a Sobol sample is evenly balanced for a power of 2; {rows} rows are not, {near} would be"
+
+
+def check_size(sizes: Sequence[int]) -> None:
+    """Refuse a grid with more rows than a study may have, before they are made.
+
+    Raises:
+        InputError: saying how many there would be.
+    """
+    if math.prod(sizes) > MOST_ROWS:
+        found = f"{' x '.join(map(str, sizes))} = {math.prod(sizes)} rows"
+        raise InputError([Fault(f"found {found}; accepted: up to {MOST_ROWS}; take fewer points", ("columns",))])
 
 
 def span_faults(name: str, span: Span) -> Iterator[Fault]:

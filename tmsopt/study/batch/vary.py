@@ -9,7 +9,7 @@ from tmsopt.design.expression import written_sides
 from tmsopt.design.problem import Problem
 from tmsopt.design.units import with_unit
 from tmsopt.study.batch.column import Column
-from tmsopt.study.batch.samples import Span, grid, latin_hypercube, sobol, sobol_note, span_faults
+from tmsopt.study.batch.samples import Span, check_size, grid, latin_hypercube, sobol, sobol_note, span_faults
 from tmsopt.study.batch.stated import MOST_ROWS, name_fault
 
 _RANGE = "{ min = 0.1, max = 1 }"
@@ -69,7 +69,10 @@ def _made(read: Mapping[str, Any], method: str, rows: int, seed: int) -> Varied:
         case "sobol":
             return Varied(columns=sobol(read, rows, seed), notes=tuple(filter(None, [sobol_note(rows)])))
         case _:
-            return Varied(columns=grid(read), grid_shape={name: len(values) for name, values in read.items()})
+            sizes = {name: axis.count if isinstance(axis, _Points) else len(axis) for name, axis in read.items()}
+            check_size(list(sizes.values()))
+            axes = {n: axis.span.points(axis.count) if isinstance(axis, _Points) else axis for n, axis in read.items()}
+            return Varied(columns=grid(axes), grid_shape=sizes)
 
 
 def unit_of(problem: Problem, name: str) -> str:
@@ -100,6 +103,14 @@ def _entries(table: Mapping[str, Any]) -> dict[str, tuple[Key, Any]]:
 
 
 @dataclass(frozen=True)
+class _Points:
+    """An axis of a grid that is written as a range."""
+
+    span: Span
+    count: int
+
+
+@dataclass(frozen=True)
 class _Reader:
     """Reads one entry; adds what is wrong with it to `faults`."""
 
@@ -109,7 +120,7 @@ class _Reader:
     faults: list[Fault]
 
     def read(self, spec: Any, method: str) -> Any:
-        """A list of numbers, or a span of a sample."""
+        """A list of numbers, a range with its points, or a span of a sample."""
         if isinstance(spec, list) and spec and method in ("grid", "list"):
             return [self._number(value, self.key) for value in spec]
         if isinstance(spec, Mapping) and method != "list":
@@ -143,7 +154,7 @@ class _Reader:
         self.faults.extend(Fault(f.message, self.key) for f in span_faults(self.name, span))
         if len(self.faults) > before:
             return None
-        return span.points(count) if points else span
+        return _Points(span, count) if points else span
 
     def _number(self, value: Any, key: Key) -> float:
         if isinstance(value, str):
