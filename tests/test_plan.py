@@ -331,6 +331,8 @@ def test_all_faults_of_a_study_at_once():
     [
         (lambda: sobol({"a": (1, 0)}, 8), "min = 1 is greater than max = 0"),
         (lambda: sobol({"a": Span(-1, 1, log=True)}, 8), "both ends positive, or both negative"),
+        (lambda: sobol({"a": (-1e308, 1e308)}, 8), "wider than a double can hold"),
+        (lambda: sobol({"a": Span(-1e308, -5e-324, log=True)}, 8), "wider than a double can hold"),
         (lambda: latin_hypercube({"a": (0, math.inf)}, 8), "accepted: finite numbers"),
         (lambda: latin_hypercube({"a": 3}, 8), "found 3"),
         (lambda: latin_hypercube({}, 8), "nothing varies"),

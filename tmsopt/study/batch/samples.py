@@ -118,8 +118,10 @@ def span_faults(name: str, span: Span) -> Iterator[Fault]:
         yield Fault(f"found {span.low!r} to {span.high!r}; accepted: finite numbers", key)
     elif low > high:
         yield Fault(f"min = {low:.6g} is greater than max = {high:.6g}; swap them", key)
-    elif span.log and not low * high > 0:
+    elif span.log and not (low > 0 or high < 0):
         yield Fault(f"log from {low:.6g} to {high:.6g}; accepted: both ends positive, or both negative", key)
+    elif not math.isfinite(max(high / low, low / high) if span.log else high - low):
+        yield Fault(f"from {low:.6g} to {high:.6g} is wider than a double can hold; narrow it", key)
 
 
 def _axis(name: str, values: Any) -> Array:
