@@ -18,11 +18,11 @@ INTERRUPTED = 130
 _EXAMPLES = """
 \b
 Examples:
-  tmsopt study problems/study_grid.toml
-  tmsopt study problems/study_grid.toml --row 17
-  tmsopt study problems/study_grid.toml --workers 4 --export rows.csv
-  tmsopt study problems/study_monte_carlo.toml --json
-  tmsopt study problems/study_grid.toml --scheduler tcp://host:8786
+  tmsopt study problems/study_sway.toml
+  tmsopt study problems/study_sway.toml --row 17
+  tmsopt study problems/study_sway.toml --workers 4 --export rows.csv
+  tmsopt study problems/study_built.toml --json
+  tmsopt study problems/study_sway.toml --scheduler tcp://host:8786
 
 Every row goes to the store, an SQLite file, as soon as it is solved. The same command goes on where it was stopped, and
 shows the rows that are there already. A row solved again, by --row or by any engine, has the same bits.

@@ -1,9 +1,27 @@
 """Models whose roots can be designed."""
 
+import copyreg
+from typing import Any
+
 from tmsopt.models.model import Model, Parameter, ParameterSet, Quantity, Range, Values
 from tmsopt.models.tms import tms
 
 MODELS = {tms.name: tms}
 """Models that a problem file can name."""
 
-__all__ = ["MODELS", "Model", "Parameter", "ParameterSet", "Quantity", "Range", "Values", "tms"]
+__all__ = ["MODELS", "Model", "Parameter", "ParameterSet", "Quantity", "Range", "Values", "named", "tms"]
+
+
+def named(name: str) -> Model:
+    """The model of a name that a problem file can use."""
+    return MODELS[name]
+
+
+def _pickled(model: Model) -> Any:
+    """By name where it has one: in another process it is that process's own, and no copy of this."""
+    if MODELS.get(model.name) is model:
+        return named, (model.name,)
+    return model.__reduce_ex__(2)
+
+
+copyreg.pickle(Model, _pickled)

@@ -5,8 +5,10 @@ import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
+
+from threadpoolctl import ThreadpoolController
 
 from tmsopt.design.errors import InputError
 from tmsopt.design.expression import parse_value
@@ -58,9 +60,10 @@ class Solver:
 
     def answers(self, numbers: Sequence[int]) -> list[Answer]:
         """The rows of a unit, each with its solution."""
-        if self.study.warm and len(numbers) > 1:
-            return self._block(numbers)
-        return [self._answer(number) for number in numbers]
+        with _pools().limit(limits=1):
+            if self.study.warm and len(numbers) > 1:
+                return self._block(numbers)
+            return [self._answer(number) for number in numbers]
 
     def lost(self, number: int, cause: str) -> Row:
         """A row that ended its worker."""
@@ -157,6 +160,14 @@ class Solver:
             warm=warm,
             host=platform.node(),
         )
+
+
+@cache
+def _pools() -> ThreadpoolController:
+    """Thread pools of NumPy and SciPy: with more threads, sums are taken in another order and last digits differ."""
+    import scipy.linalg  # noqa: F401  # it brings its own
+
+    return ThreadpoolController()
 
 
 def _cause(solution: Solution) -> str:

@@ -1,0 +1,5 @@
+"""``python -m tmsopt``: the command by another way."""
+
+from tmsopt.cli import main
+
+main(prog_name="tmsopt")
