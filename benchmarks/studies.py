@@ -16,7 +16,7 @@ from tmsopt.design import family as families
 from tmsopt.design.files import load
 from tmsopt.design.ipopt import Run
 from tmsopt.study.batch.definition import definition
-from tmsopt.study.batch.engines.local import in_process, processes
+from tmsopt.study.batch.engines import cluster, in_process, processes
 from tmsopt.study.batch.plan import Study, over_grid
 from tmsopt.study.batch.run import fill, run_study
 from tmsopt.study.batch.solving import Solver
@@ -114,8 +114,6 @@ def scaling(study: Study, workers: int) -> float:
 def dask_scaling(study: Study, workers: int) -> float:
     """The same of Dask workers of this machine, one thread each."""
     from distributed import LocalCluster
-
-    from tmsopt.study.batch.engines.cluster import cluster
 
     local = LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None)  # type: ignore[no-untyped-call]
     with local:

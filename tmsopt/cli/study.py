@@ -109,7 +109,7 @@ def _filled(asked: "Study", opened: "Store", workers: int | None, scheduler: str
     """Solve what is missing, with a progress bar; figures of the run."""
     from tqdm import tqdm
 
-    from tmsopt.study.batch.engines.work import EngineError
+    from tmsopt.study.batch.engines import EngineError
     from tmsopt.study.batch.run import fill
 
     present = len(opened.done())

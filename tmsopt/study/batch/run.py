@@ -8,9 +8,8 @@ from os import PathLike
 from pathlib import Path
 
 from tmsopt.study.batch.definition import definition
-from tmsopt.study.batch.engines.cluster import cluster
-from tmsopt.study.batch.engines.local import cores, in_process, processes
-from tmsopt.study.batch.engines.work import Note, Unit, silent
+from tmsopt.study.batch.engines import Note, Unit, cluster, cores, in_process, processes
+from tmsopt.study.batch.engines.work import silent
 from tmsopt.study.batch.monte_carlo import Sampling, planned
 from tmsopt.study.batch.neighbours import blocks
 from tmsopt.study.batch.plan import Study

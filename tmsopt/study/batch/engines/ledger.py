@@ -39,7 +39,8 @@ class Ledger:
         return list(self._held)
 
     def join(self, worker: str) -> None:
-        """A worker is there and holds nothing."""
+        """A worker is there and holds nothing, whatever one of the same name held before."""
+        self.returned(worker)
         self._held[worker] = deque()
         self._fresh.add(worker)
 

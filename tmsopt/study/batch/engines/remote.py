@@ -1,10 +1,12 @@
 """The engine of many machines: a Dask cluster that somebody has started."""
 
+import asyncio
 import hashlib
 import pickle
 import time
 import uuid
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -46,6 +48,9 @@ def cluster(work: Work, units: Sequence[Unit], address: str, note: Note = silent
             yield from engine.hear()
     finally:
         with suppress(Exception):  # the scheduler may be gone; where it is not, it forgets what is not started yet
+            client.unsubscribe_topic(TOPIC)
+            client.unsubscribe_topic("all")
+        with suppress(Exception):
             client.close(timeout=_PATIENCE)
 
 
@@ -215,9 +220,8 @@ class _Engine:
                     "install them there and start it again"
                 )
             alike.append(place)
-        for place, process in self.client.run(
-            receive, self.digest, self.blob, workers=alike, on_error="return"
-        ).items():
+        taken = self.client.run(receive, self.digest, self.blob, workers=alike, on_error="return")
+        for place, process in taken.items():
             if isinstance(process, OSError):
                 continue
             if isinstance(process, Exception):
@@ -231,18 +235,39 @@ class _Engine:
 
 
 def _client(address: str) -> Any:
+    """A client of the scheduler at an address.
+
+    Whether there is one is asked before, for a `Client` that cannot connect neither gives up at once nor quietly.
+    """
     try:
-        from distributed import Client
+        import distributed
     except ImportError:
         raise _refused('a Dask cluster needs a package that is not installed: pip install "tmsopt[cluster]"') from None
-    connect: Callable[..., Any] = Client
     try:
-        return connect(address, timeout=_PATIENCE, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
+        with ThreadPoolExecutor(1) as thread:  # notebooks run a loop of their own in this one
+            found = thread.submit(asyncio.run, _what_answers(address)).result()
+        reason = "" if found == "Scheduler" else f"a Dask {found.lower()} does"
+    except Exception as error:  # whatever listens there may answer anything
+        reason = str(error) or type(error).__name__
+    if reason:
         raise _refused(
-            f"no Dask scheduler answers at '{address}' ({error}); start one with 'dask scheduler', whose address, "
-            "tcp://HOST:8786, it prints, and workers with 'dask worker ADDRESS --nthreads 1'"
-        ) from error
+            f"no Dask scheduler answers at '{address}' ({reason}); start one with 'dask scheduler', which prints its "
+            "address, tcp://HOST:8786, and workers with 'dask worker ADDRESS --nthreads 1'"
+        )
+    connect: Any = distributed.Client
+    return connect(address, timeout=_PATIENCE, set_as_default=False)
+
+
+async def _what_answers(address: str) -> str:
+    from distributed import Security, rpc
+
+    security: Any = Security
+    connect: Any = rpc
+    with suppress(TimeoutError):
+        async with asyncio.timeout(_PATIENCE):
+            async with connect(address, connection_args=security().get_connection_args("client")) as server:
+                return str((await server.identity())["type"])
+    raise OSError(f"nothing within {_PATIENCE:.0f} s")
 
 
 def _one_thread(threads: Mapping[str, int]) -> None:
