@@ -450,6 +450,17 @@ def read_all(path: Path) -> list[Row]:
         return list(opened.rows())
 
 
+@pytest.mark.parametrize("damage", ["DROP TABLE rows", "UPDATE rows SET status = CAST(x'ff' AS TEXT)"])
+def test_tables_that_are_gone_and_text_that_is_none(path: Path, damage: str) -> None:
+    with open_store(path, STUDY) as opened:
+        opened.add([row(0)])
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute(damage)
+    with read_store(path) as opened:
+        assert "is damaged" in refusal(opened.counts)
+        assert "is damaged" in refusal(lambda: list(opened.rows()))
+
+
 def test_a_damaged_definition_is_said_to_be(path: Path) -> None:
     open_store(path, STUDY).close()
     with closing(sqlite3.connect(path)) as connection, connection:

@@ -43,6 +43,7 @@ _MEANINGS = {
     sqlite3.SQLITE_CORRUPT: "is damaged; --fresh moves it aside and starts a new store, or give another --store",
     sqlite3.SQLITE_NOTADB: "is no store of tmsopt; give another file",
     sqlite3.SQLITE_BUSY: f"another program kept it locked for {PATIENCE:g} s; end that and run the same command again",
+    sqlite3.SQLITE_PROTOCOL: "locks do not work on this file system; give a --store on another disk",
     sqlite3.SQLITE_LOCKED: "another program keeps it locked; end that and run the same command again",
 }
 
@@ -62,10 +63,18 @@ def explained(path: Path) -> Iterator[None]:
     try:
         yield
     except sqlite3.DatabaseError as error:
-        code = getattr(error, "sqlite_errorcode", None)
-        if code is None or code & 0xFF not in _MEANINGS:
+        meaning = _MEANINGS.get(code(error))
+        if meaning is None:
             raise
-        raise refuse(path, f"{_MEANINGS[code & 0xFF]} ({error})") from error
+        raise refuse(path, f"{meaning} ({error})") from error
+
+
+def code(error: sqlite3.Error) -> int:
+    """SQLite's number of an error; that of a damaged file where text is no text or a table is gone; 0 for others."""
+    found = getattr(error, "sqlite_errorcode", None)
+    if isinstance(error, sqlite3.OperationalError) and (found is None or "no such" in str(error)):
+        return sqlite3.SQLITE_CORRUPT  # Python gives no number to what it cannot decode
+    return (found or 0) & 0xFF
 
 
 def check(path: Path) -> None:
@@ -177,7 +186,7 @@ def connect_to_read(path: Path) -> sqlite3.Connection:
             return connection
         except sqlite3.OperationalError as error:
             connection.close()
-            denied = error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY)
+            denied = code(error) in (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY)
             if number == 2 or not denied or (number == 1 and Path(f"{path}-wal").exists()):
                 raise
         except BaseException:
@@ -197,7 +206,7 @@ def ask(connection: sqlite3.Connection, query: str, values: Sequence[Any] | Mapp
         try:
             return connection.execute(query, values).fetchall()
         except sqlite3.OperationalError as error:
-            if error.sqlite_errorcode & 0xFF != sqlite3.SQLITE_BUSY or time.monotonic() > end:
+            if code(error) != sqlite3.SQLITE_BUSY or time.monotonic() > end:
                 raise
             time.sleep(_PAUSE)
 

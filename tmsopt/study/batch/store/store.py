@@ -66,13 +66,11 @@ class Store:
             self._connection.close()
             return
         try:
-            with explained(self.path):
+            with suppress(sqlite3.Error):  # on a full disk there is a better error than this one
                 self._connection.execute("UPDATE sessions SET ended = ? WHERE id = ?", (now(), self._session))
+            database.finish(self._connection)
         finally:
-            try:
-                database.finish(self._connection)
-            finally:
-                self._lock.release()
+            self._lock.release()
 
     def add(self, rows: Sequence[Row]) -> None:
         """Keep rows, all or none; when it returns they are safe from ``kill -9``.
