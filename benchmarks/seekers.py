@@ -99,6 +99,7 @@ def _cma_es(problem: Problem, watch: Watch) -> None:
 def _pygranso(problem: Problem, watch: Watch) -> None:
     """BFGS-SQP for constrained nonsmooth functions, with exact gradients and the box as constraints."""
     torch = import_module("torch")
+    torch.set_num_threads(1)  # a dozen numbers are not worth a second thread
     granso = import_module("pygranso.pygranso").pygranso
     struct = import_module("pygranso.pygransoStruct").pygransoStruct
     reduced = Reduced(problem, watch)

@@ -157,14 +157,14 @@ def test_ratios_compare_two_sides_at_equal_accuracy() -> None:
     rival = Run("rival", (moment(1e-4, 6.0), moment(1e-7, 20.0)), 30.0, 300)
     never = Run("never", (moment(0.5, 1.0),), 30.0, 300)
     absent = Run("absent", (), 0.0, 0, "not installed: it")
-    heat = Heat("fake", PROBLEM, -1.0, "closed form", EP4, (ours, rival, never, absent))
+    heat = Heat("fake", PROBLEM, -1.0, "closed form", EP4, (ours, rival, never, absent), 30.0)
     assert [heat.ratio(rival, t) for t in (1e-3, 1e-6, 1e-8)] == [3, 10, math.inf]
     assert heat.error(rival) == pytest.approx(1e-7, rel=1e-6)
     slower = replace(heat, runs=(replace(ours, moments=(moment(0, 4.0),)), rival, never, absent))
-    assert median_ratio([heat, slower], "rival", 1e-3) == (2, pytest.approx((6 / 2 + 6 / 4) / 2))
-    assert median_ratio([heat, slower], "never", 1e-3)[0] == 0
+    assert median_ratio([heat, slower], "rival", 1e-3) == (2, pytest.approx((6 / 2 + 6 / 4) / 2), True)
+    assert median_ratio([heat], "never", 1e-3) == (0, 30 / 2, False)  # its 30 s were not enough
     assert "| absent | not installed: it |" in overview([heat])
-    assert "| never | 0 of 1 | – | 0 of 1 | – | 0 of 1 | – | 5e-01 |" in overview([heat])
+    assert "| never | 0 of 1 | ≥ 15 | 0 of 1 | ≥ 15 | 0 of 1 | ≥ 15 | 5e-01 |" in overview([heat])
     assert details([heat]).count("never: best error 1e-07") == 1
     assert details([heat]).count("never: best error 5e-01") == 3
 
