@@ -86,18 +86,6 @@ _BALLS = _Arithmetic(
 )
 
 
-@dataclass(frozen=True)
-class Limit:
-    """A number that a constraint compares with.
-
-    Attributes:
-        sign: 1 where it stands on the left of the comparison, −1 on the right.
-    """
-
-    value: float
-    sign: float
-
-
 class ExpressionError(ValueError):
     """An expression that cannot be used, with the reason."""
 
@@ -123,12 +111,10 @@ class Expression:
 
     def symbolic(self, values: Mapping[str, Any], limit: Any = None) -> Any:
         """CasADi expression; of a comparison, left minus right, with `limit` in place of the number on one side."""
-        if limit is None or self.limit is None:
+        if limit is None:
             return self._evaluate(values, _SYMBOLIC)
-        left, right = self._sides()
-        if self.limit.sign > 0:
-            return limit - _value(right, values, _SYMBOLIC)
-        return _value(left, values, _SYMBOLIC) - limit
+        sides = [limit if _is_number(side) else _value(side, values, _SYMBOLIC) for side in self._sides()]
+        return sides[0] - sides[1]
 
     def enclosure(self, values: Mapping[str, Any], number: Callable[[Any], Any] = elementary.exact) -> Any:
         """Ball that certainly holds the value, for balls or exact fractions; of a comparison, left minus right.
@@ -150,30 +136,6 @@ class Expression:
         with np.errstate(all="ignore"):
             left, right = (float(_value(side, values, _NUMERIC)) for side in self._sides())
         return left, right
-
-    @property
-    def limit(self) -> "Limit | None":
-        """The number that a comparison compares with, where one side is nothing but a number."""
-        for side, sign in zip(self._sides(), (1.0, -1.0), strict=False) if self.comparison else ():
-            match side:
-                case ast.Constant(value=int() | float() as value):
-                    return Limit(float(value), sign)
-                case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=int() | float() as value)):
-                    return Limit(-float(value), sign)
-        return None
-
-    def limited(self, value: float) -> "Expression":
-        """The same comparison with another number.
-
-        Raises:
-            ExpressionError: where neither side is a number.
-        """
-        limit = self.limit
-        if limit is None:
-            raise ExpressionError(f"'{self.text}' compares with no plain number; write e.g. 'nu_H >= 0.02'")
-        left, right = re.split("<=|>=|==", self.text)
-        ends = (repr(value), right.strip()) if limit.sign > 0 else (left.strip(), repr(value))
-        return replace(self, text=f"{ends[0]} {self.comparison} {ends[1]}")
 
     def _sides(self) -> list[ast.expr]:
         body = _parse(self.text)
@@ -294,6 +256,11 @@ def _checked_names(  # noqa: PLR0912 - one case per kind of node
             raise ExpressionError(f"'{text}' uses the attribute '{_source(node, text)}'; accepted: plain names")
         case _:
             raise ExpressionError(f"'{text}' contains '{_source(node, text)}'; accepted: {_LANGUAGE}")
+
+
+def _is_number(node: ast.expr) -> bool:
+    """Whether a side is a number and nothing else, but for its sign."""
+    return isinstance(node.operand if isinstance(node, ast.UnaryOp) else node, ast.Constant)
 
 
 def _source(node: ast.expr, text: str) -> str:

@@ -10,6 +10,7 @@ import casadi as ca
 from tmsopt.design.cases import Case
 from tmsopt.design.formulations import LIMIT, formulate, freedom, middle
 from tmsopt.design.ipopt import Run, ipopt
+from tmsopt.design.limit import limit_of
 from tmsopt.design.nlp import NLP
 from tmsopt.design.polish import Point, polisher
 from tmsopt.design.problem import Problem
@@ -76,9 +77,9 @@ def _kept(known: OrderedDict[Hashable, T], key: Hashable, make: Callable[[], T],
 
 def _value(problem: Problem, name: str) -> float:
     if name.endswith(LIMIT):
-        limit = problem.conditions[name.removesuffix(LIMIT)].limit
+        limit = limit_of(problem.constraints[name.removesuffix(LIMIT)])
         assert limit is not None  # a study checks what it varies
-        return limit.value
+        return limit
     return problem.fixed[name]
 
 
