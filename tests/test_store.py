@@ -1,5 +1,6 @@
 """The store of a study: no acknowledged row is lost, no other file is touched, every double comes back bit by bit."""
 
+import functools
 import json
 import math
 import os
@@ -25,6 +26,7 @@ from tmsopt.design.frozen import Table
 from tmsopt.study.batch.row import Row
 from tmsopt.study.batch.store import database, store
 from tmsopt.study.batch.store.journal import _type, journal
+from tmsopt.study.batch.store.lock import lock
 from tmsopt.study.batch.store.store import Store, open_store, read_store
 
 JOURNALS = ("wal", "delete")
@@ -171,6 +173,31 @@ def test_a_forked_child_of_a_killed_writer_holds_no_lock(path: Path) -> None:
             open_store(path, STUDY).close()
         finally:
             os.killpg(process.pid, 9)
+
+
+@posix
+def test_a_lock_on_a_file_that_is_gone_does_not_count(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last holder removes the file after another process opened it: that one must not lock what has no name."""
+    name, connect, tries = path.with_name("study.sqlite.lock"), sqlite3.connect, []
+
+    class Late(sqlite3.Connection):
+        def execute(self, *given: Any) -> sqlite3.Cursor:
+            tries.append(given)
+            if len(tries) in (2, 3):  # the first makes the file
+                name.unlink()
+            done = super().execute(*given)
+            if len(tries) in (4, 5):
+                name.unlink()
+            return done
+
+    with monkeypatch.context() as late:
+        late.setattr(sqlite3, "connect", functools.partial(connect, factory=Late))
+        held = lock(path)
+    assert len(tries) > 6
+    assert held is not None
+    assert lock(path) is None
+    held.release()
+    assert not name.exists()
 
 
 # Rows
@@ -347,6 +374,16 @@ def test_fresh_keeps_what_a_killed_writer_left_in_its_log(path: Path) -> None:
         assert opened.done() == set()
     with read_store(path.with_name("study.1.sqlite")) as opened:
         assert len(opened.done()) >= acknowledged
+
+
+def test_fresh_leaves_no_journal_beside_what_it_moves(path: Path) -> None:
+    """What a writer leaves that is killed before its journal counts: SQLite clears it with the next commit."""
+    with open_store(path, STUDY) as opened:
+        opened.add([row(0)])
+    path.with_name("study.sqlite-journal").write_bytes(bytes(1000))
+    open_store(path, STUDY, fresh=True).close()
+    assert sorted(p.name for p in path.parent.iterdir()) == ["study.1.sqlite", "study.sqlite"]
+    assert len(read_all(path.with_name("study.1.sqlite"))) == 1
 
 
 def test_a_log_beside_a_store_that_is_gone_is_not_played_into_the_new_one(path: Path) -> None:

@@ -228,7 +228,10 @@ def aside(path: Path) -> Path:
     if path.exists():
         connection = sqlite3.connect(path, isolation_level=None)
         with suppress(sqlite3.Error):  # a damaged one is moved as it is
-            connection.execute("UPDATE sessions SET rows = rows")  # clears the journal that a killed writer left
+            ask(connection, "SELECT * FROM sessions")
+            # A commit clears the journal that a killed writer left; an UPDATE that changes nothing would not be one.
+            ((schema,),) = ask(connection, "PRAGMA user_version")
+            connection.execute(f"PRAGMA user_version={schema}")
         finish(connection)
     number = 1
     while any(Path(f"{_numbered(path, number)}{ending}").exists() for ending in ("", *_COMPANIONS)):

@@ -40,7 +40,9 @@ def lock(store: Path) -> Lock | None:
             connection.close()
             if error.sqlite_errorcode & 0xFF == sqlite3.SQLITE_BUSY:
                 return None
-            raise
+            if (now := _identity(path)) is not None and before in (None, now):
+                raise
+            continue  # its last holder removed the file just now, and SQLite noticed
         if before is not None and _identity(path) == before:
             return Lock(path, connection)
         connection.close()  # made just now, or removed by its last holder: what is locked may have no name any more
