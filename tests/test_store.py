@@ -182,6 +182,8 @@ def test_a_lock_on_a_file_that_is_gone_does_not_count(path: Path, monkeypatch: p
 
     class Late(sqlite3.Connection):
         def execute(self, *given: Any) -> sqlite3.Cursor:
+            if given != ("BEGIN IMMEDIATE",):
+                return super().execute(*given)
             tries.append(given)
             if len(tries) in (2, 3):  # the first makes the file
                 name.unlink()

@@ -104,7 +104,9 @@ def check(path: Path) -> None:
 
 def create(path: Path, definition: Definition, versions: Mapping[str, str], platform: str) -> None:
     """Write a new store without rows. It gets its name when complete, so what has the name is a store."""
-    unfinished = path.with_name(f"{path.name}.new")  # one name: the lock is held, and a killed one's is overwritten
+    unfinished = path.with_name(
+        f".{path.name}.unfinished"
+    )  # one name: the lock is held, and a killed one's is overwritten
     for ending in ("", *_COMPANIONS):
         Path(f"{unfinished}{ending}").unlink(missing_ok=True)
     about = {

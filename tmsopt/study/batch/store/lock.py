@@ -35,6 +35,7 @@ def lock(store: Path) -> Lock | None:
         before = _identity(path)
         connection = sqlite3.connect(path, isolation_level=None, timeout=0, check_same_thread=False)
         try:
+            connection.execute("PRAGMA journal_mode=MEMORY")  # none in a file, since nothing is written
             connection.execute("BEGIN IMMEDIATE")
         except sqlite3.OperationalError as error:
             connection.close()
