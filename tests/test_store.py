@@ -146,6 +146,22 @@ def test_reading_while_another_process_writes(journal: str, path: Path) -> None:
 
 
 @pytest.mark.parametrize("journal", JOURNALS)
+def test_a_store_is_recognised_while_another_process_writes(journal: str, path: Path) -> None:
+    """While it grows its first page may promise more pages than the file has yet."""
+    with writer(journal, path):
+        for _ in range(500):
+            database.check(path)
+
+
+def test_a_store_is_recognised_though_its_writer_was_killed_while_it_grew(path: Path) -> None:
+    open_store(path, STUDY).close()
+    with path.open("r+b") as stream:  # bytes 28 to 31 of the header: how many pages the file has
+        stream.seek(28)
+        stream.write((1000).to_bytes(4, "big"))
+    database.check(path)
+
+
+@pytest.mark.parametrize("journal", JOURNALS)
 def test_a_second_writer_is_refused_until_the_first_is_gone(journal: str, path: Path) -> None:
     with writer(journal, path, "hold") as (process, number):
         message = refusal(lambda: open_store(path, STUDY))

@@ -85,13 +85,8 @@ def check(path: Path) -> None:
     """
     if not path.is_file():
         raise refuse(path, "is no regular file; give the name of a store, such as study.sqlite")
-    # Opened as what nobody changes: no lock, no journal, not a byte of another program's file touched. Both numbers are
-    # in the header and never change. Not opened by Python: if this process has the store open already, the system would
-    # drop all its locks when any other descriptor of the file is closed, and SQLite knows how to prevent that.
-    header = f"{path.as_uri()}?mode=ro&immutable=1"
-    with explained(path), closing(sqlite3.connect(header, uri=True)) as connection:
-        (application,) = connection.execute("PRAGMA application_id").fetchone()
-        (schema,) = connection.execute("PRAGMA user_version").fetchone()
+    with explained(path):
+        application, schema = _header(path)
     if application != APPLICATION:
         raise refuse(path, "is no store of tmsopt; give another file")
     if schema > SCHEMA:
@@ -102,11 +97,31 @@ def check(path: Path) -> None:
         )
 
 
+def _header(path: Path) -> tuple[int, int]:
+    """Application and schema, which never change in a store.
+
+    Opened as what nobody changes: no lock, no journal, not a byte of another program's file touched. Where somebody
+    does change it just now, or was killed at it, the file may be shorter than its first page says, which counts as
+    damage but with `writable_schema`; a system that forbids that is asked again with a lock. Not opened by Python: if
+    this process has the store open already, the system would drop all its locks when any other descriptor of the file
+    is closed, and SQLite knows how to prevent that.
+    """
+    for way in ("mode=ro&immutable=1", "mode=ro"):
+        with closing(sqlite3.connect(f"{path.as_uri()}?{way}", uri=True, timeout=0)) as connection:
+            try:
+                connection.execute("PRAGMA writable_schema=ON")
+                ((application,),) = ask(connection, "PRAGMA application_id")
+                ((schema,),) = ask(connection, "PRAGMA user_version")
+                return application, schema
+            except sqlite3.DatabaseError as error:
+                if code(error) != sqlite3.SQLITE_CORRUPT or way == "mode=ro":
+                    raise
+    raise AssertionError("unreachable")
+
+
 def create(path: Path, definition: Definition, versions: Mapping[str, str], platform: str) -> None:
     """Write a new store without rows. It gets its name when complete, so what has the name is a store."""
-    unfinished = path.with_name(
-        f".{path.name}.unfinished"
-    )  # one name: the lock is held, and a killed one's is overwritten
+    unfinished = path.with_name(f".{path.name}.unfinished")  # one name, so that a killed one's is overwritten
     for ending in ("", *_COMPANIONS):
         Path(f"{unfinished}{ending}").unlink(missing_ok=True)
     about = {
