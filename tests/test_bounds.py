@@ -13,9 +13,9 @@ import pytest
 from tmsopt.design.bounds.interlace import interlacing, squares_of, unknowns
 from tmsopt.design.bounds.ranges import BALLS, EVERYTHING, ball, interval, ranges, root_bound
 from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, available, decide, task
-from tmsopt.design.bounds.walk import NotAccepted, walk
 from tmsopt.design.expression import parse_value
 from tmsopt.design.nlp import NLP
+from tmsopt.design.walk import NotAccepted, walk
 from tmsopt.roots import product
 
 scip = pytest.mark.skipif(not available(), reason="SCIP is not installed")

@@ -13,7 +13,7 @@ from tmsopt.design.bounds.program import Question
 from tmsopt.design.bounds.race import Crew
 from tmsopt.design.bounds.ranges import ball, interval, square
 from tmsopt.design.bounds.scip import INFEASIBLE, Decision
-from tmsopt.design.bounds.walk import NotAccepted
+from tmsopt.design.walk import NotAccepted
 from tmsopt.models import tms
 
 scip = pytest.importorskip("pyscipopt") and pytest.importorskip("tmsopt.design.bounds.scip")

@@ -352,7 +352,7 @@ def test_chart_json_is_finite(capsys):
         (["trace", "problems/ep_set.toml", "--csv", "x.txt"], "ending in csv"),
         (["trace", "problems/ep_set.toml", "--step", "0.5"], "--step"),
         (["trace", "nothing.toml"], "nothing.toml"),
-        (["chart", "problems/ep_set.toml"], "3 are free"),
+        (["chart", "problems/realistic.toml"], "are free"),
         (["chart", "problems/chart.toml", "--axes", "Fr,Fr"], "accepted: two of the free parameters"),
         (["chart", "problems/chart.toml", "--points", "1"], "accepted: a number from 2"),
         (["chart", "problems/chart.toml", "--points", "40by30"], "accepted: a number from 2"),

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from tmsopt.study.front import Front
     from tmsopt.study.optimality import Optimality, optimality
     from tmsopt.study.pareto import pareto
+    from tmsopt.study.stored import StoredChart, chart_to, open_chart
     from tmsopt.study.swallowtail import Swallowtail, swallowtail
     from tmsopt.study.trace import trace
 
@@ -48,11 +49,13 @@ __all__ = [
     "Results",
     "Robustness",
     "Solution",
+    "StoredChart",
     "Study",
     "Swallowtail",
     "Trace",
     "certify",
     "chart",
+    "chart_to",
     "compare",
     "domain",
     "explain",
@@ -63,6 +66,7 @@ __all__ = [
     "models",
     "monte_carlo",
     "nearest",
+    "open_chart",
     "optimality",
     "over_grid",
     "pareto",
@@ -93,11 +97,13 @@ _HOMES = {
     "Results": "tmsopt.study.batch.run",
     "Robustness": "tmsopt.design.nearest",
     "Solution": "tmsopt.design.solution",
+    "StoredChart": "tmsopt.study.stored",
     "Study": "tmsopt.study.batch.plan",
     "Swallowtail": "tmsopt.study.swallowtail",
     "Trace": "tmsopt.study.branch",
     "certify": "tmsopt.design.bounds.certify",
     "chart": "tmsopt.study.chart",
+    "chart_to": "tmsopt.study.stored",
     "compare": "tmsopt.study.compare",
     "domain": "tmsopt.study.domain",
     "explain": "tmsopt.study.explain",
@@ -106,6 +112,7 @@ _HOMES = {
     "load_study": "tmsopt.study.batch.files",
     "monte_carlo": "tmsopt.study.batch.monte_carlo",
     "nearest": "tmsopt.design.nearest",
+    "open_chart": "tmsopt.study.stored",
     "optimality": "tmsopt.study.optimality",
     "over_grid": "tmsopt.study.batch.plan",
     "pareto": "tmsopt.study.pareto",

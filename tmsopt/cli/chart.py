@@ -1,11 +1,18 @@
-"""The command that charts stability over a plane."""
+"""The command that charts stability over a plane or a space of parameters."""
 
 import re
+import time
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from tmsopt.cli.common import FIGURES, bad_input, check_output, nominal_of, plane, progress, saving, write_json
+
+if TYPE_CHECKING:
+    from tmsopt.design.problem import Problem
+    from tmsopt.study.chart import Chart
+    from tmsopt.study.tiles import Survey
 
 _EXAMPLES = """
 \b
@@ -13,79 +20,228 @@ Examples:
   tmsopt chart problems/chart.toml --plot chart.png
   tmsopt chart problems/chart.toml --points 1000x800 --output chart.npz
   tmsopt chart problems/chart.toml --axes lambda_s,Fr --layer abscissa --plot abscissa.pdf
+  tmsopt chart problems/chart.toml --points 10000x10000 --output big.chart --workers 2
+  tmsopt chart problems/ep_set.toml --points 400x300x50 --output space.chart --quantity "excess=Fr - Fr_c"
 
-FILE frees two parameters; it needs no [objective]. The archive of --output holds both axes under their names and the
-arrays kind (0 undefined, 1 capsize, 2 weave, 3 stable, 4 heavily damped), abscissa, damping_ratio, real_roots and
-satisfied (every constraint holds).
+FILE frees two or three parameters; it needs no [objective]. --output holds the axes under their names and the arrays
+kind (0 undefined, 1 capsize, 2 weave, 3 stable, 4 heavily damped), abscissa, damping_ratio, real_roots and satisfied
+(every constraint holds), and the quantities. A name ending in npz is a NumPy archive, in nc netCDF; both are made in
+memory. A name ending in chart is a folder of NumPy files for up to 1e9 designs: it is written in tiles, and the same
+command goes on where an earlier one was ended.
 
 Exit status: 0 done, 2 bad input.
 """
 
+_LAYERS = ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied", "margin")
+_DEFAULT_POINTS = {2: (400, 300), 3: (120, 100, 80)}
+_SHOWN = (800, 600)
+"""Points of a large chart that a figure shows."""
 
-def _points(_context: click.Context, _option: click.Parameter, value: str) -> tuple[int, int]:
-    found = re.fullmatch(r"(\d{1,5})(?:[x×](\d{1,5}))?", value)
-    if found is None or min(sizes := (int(found[1]), int(found[2] or found[1]))) < 2:
-        raise click.BadParameter(f"found {value!r}; accepted: a number from 2 to 99999, or two as in 400x300")
+
+def _points(_context: click.Context, _option: click.Parameter, value: str | None) -> tuple[int, ...] | None:
+    if value is None:
+        return None
+    found = re.fullmatch(r"\d{1,7}(?:[x×]\d{1,7}){0,2}", value)
+    if found is None or min(sizes := tuple(map(int, re.split("[x×]", value)))) < 2:
+        message = f"found {value!r}; accepted: a number from 2 to 1000000, or two or three as in 400x300"
+        raise click.BadParameter(message)
     return sizes
+
+
+def _named(_context: click.Context, _option: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
+    parts = {v.partition("=")[0].strip(): v.partition("=")[2].strip() for v in values}
+    if len(parts) < len(values) or not all(n and t for n, t in parts.items()):
+        raise click.BadParameter(f"found {', '.join(values)!r}; accepted: NAME=EXPRESSION, each name once")
+    return parts
 
 
 @click.command(epilog=_EXAMPLES)
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
-    "--points",
-    callback=_points,
-    default="400x300",
-    show_default=True,
-    metavar="N[xM]",
-    help="Grid points along the axes.",
+    "--points", callback=_points, metavar="N[xM[xL]]", help="Grid points along the axes. [default: 400x300, 120x100x80]"
 )
-@click.option("--axes", help="Horizontal and vertical parameter, e.g. Fr,lambda_s. [default: as in FILE]")
+@click.option("--axes", help="Parameters, the horizontal one first, e.g. Fr,lambda_s. [default: as in FILE]")
 @click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
-@click.option("--output", "-o", type=click.Path(path_type=Path), help="Write the arrays (npz).")
+@click.option("--output", "-o", type=click.Path(path_type=Path), help="Write the arrays (npz, nc, chart).")
+@click.option("--layers", help=f"Arrays of --output, among {','.join(_LAYERS)}. [default: all but margin]")
+@click.option(
+    "--quantity",
+    "quantities",
+    multiple=True,
+    callback=_named,
+    metavar="NAME=EXPRESSION",
+    help="Also compute an expression; may be given several times.",
+)
+@click.option("--single", is_flag=True, help="Write numbers in single precision.")
+@click.option("--fresh", is_flag=True, help="Move a folder of --output aside instead of going on with it.")
+@click.option("--engine", default="auto", show_default=True, help="numba, numpy, or numba where installed (auto).")
+@click.option("--workers", type=click.IntRange(1, 256), default=1, show_default=True, help="Threads.")
 @click.option("--plot", type=click.Path(path_type=Path), help="Draw the chart (png, pdf, svg).")
 @click.option(
     "--layer",
-    type=click.Choice(["kind", "abscissa", "damping_ratio", "real_roots"]),
     default="kind",
     show_default=True,
-    help="What --plot shows.",
+    help="What --plot shows: kind, abscissa, damping_ratio, real_roots or a quantity.",
+)
+@click.option(
+    "--slice",
+    "cut",
+    callback=lambda c, o, v: _named(c, o, (v,)) if v else {},
+    metavar="NAME=VALUE",
+    help="Of three parameters, the one that --plot holds, e.g. lambda_s=0.4.",
 )
 @click.option("--boundaries/--no-boundaries", default=True, show_default=True, help="Trace the exact boundary curves.")
 def chart(
     file: Path,
-    points: tuple[int, int],
+    points: tuple[int, ...] | None,
     axes: str | None,
     as_json: bool,
     output: Path | None,
+    layers: str | None,
+    quantities: dict[str, str],
+    single: bool,
+    fresh: bool,
+    engine: str,
+    workers: int,
     plot: Path | None,
     layer: str,
+    cut: dict[str, str],
     boundaries: bool,
-) -> None:
-    """Chart stability over the two free parameters of FILE: capsize, weave, stable, heavily damped."""
+) -> None:  # fmt: skip
+    """Chart stability over the free parameters of FILE: capsize, weave, stable, heavily damped."""
     with bad_input():
         from tmsopt.design.files import load
-        from tmsopt.study.chart import chart as chart_problem
-        from tmsopt.study.chart import plane_of, save_arrays
+        from tmsopt.study.tiles import USUAL, axes_of, survey
 
         check_output("--plot", plot, FIGURES)
-        check_output("--output", output, ("npz",))
+        check_output("--output", output, ("npz", "nc", "chart"), folders=("chart",))
         problem = nominal_of(load(file, asks=False))
-        plane_of(problem)
-        names = plane(problem, axes)
-        with progress("design") as update:
-            found = chart_problem(problem, names, points=points, boundaries=boundaries, progress=update)
+        free = axes_of(problem)
+        names = plane(problem, axes) if len(free) == 2 else _space(free, axes)
+        sizes = _sizes(points, len(free))
+        kept = tuple(n.strip() for n in layers.split(",")) if layers is not None else USUAL
+        _check_plot(plot, layer, (*_LAYERS[:4], *quantities), len(free), cut)
+        held = _held(problem, cut)
+        work = survey(problem, names, sizes, kept, quantities, engine, single)
+        with progress("design", scaled=True) as update:
+            data, found = _charted(work, output, fresh, workers, boundaries, update)
     if as_json:
-        write_json(found.to_json())
+        write_json(data)
     else:
-        from tmsopt.show.chart import chart_table
+        from tmsopt.show.chart import chart_table, summary_table
 
-        click.echo(chart_table(found))
+        click.echo(chart_table(found) if found is not None else summary_table(work.problem.parameter_set, data))
+    if output is not None and output.suffix.lower() == ".chart":
+        click.echo(f"wrote {output}", err=True)
+    if plot is not None:
+        with bad_input():
+            _draw(work, found, held, boundaries, layer, plot)
+
+
+def _charted(
+    work: "Survey", output: Path | None, fresh: bool, workers: int, boundaries: bool, update: Any
+) -> tuple[dict[str, Any], "Chart | None"]:
+    """The summary, and a plane in memory as a chart; the arrays are written."""
+    from tmsopt.design.errors import Fault, InputError
+    from tmsopt.study.archive import check_netcdf, save_layers
+    from tmsopt.study.chart import CHART_LAYERS, LARGEST, chart_of
+    from tmsopt.study.domain import domain
+    from tmsopt.study.stored import gathered, store, summary
+
+    if output is not None and output.suffix.lower() == ".chart":
+        try:
+            return store(work, output, workers=workers, fresh=fresh, progress=update).to_json(), None
+        except OSError as error:
+            message = f"'{output}' cannot be written: {error.strerror}; the same command will go on where it was"
+            raise InputError([Fault(message, ("--output",))]) from None
+    if work.grid.size > LARGEST:
+        message = f"{work.grid.size:.3g} designs do not fit into memory; give an --output that ends in chart, or fewer"
+        raise InputError([Fault(message, ("--points",))])
+    if output is not None and output.suffix.lower() == ".nc":
+        check_netcdf()
+    kept, flat = work.names, len(work.grid.axes) == 2
+    if flat:
+        work = work.with_layers(tuple(dict.fromkeys((*CHART_LAYERS, *work.layers))))
+    began = time.perf_counter()
+    arrays, counts = gathered(work, update, workers)
+    seconds = time.perf_counter() - began
+    found = chart_of(work, arrays, domain(work.problem) if boundaries else None) if flat else None
+    data = found.to_json() if found else summary(work, counts)
+    data |= {"fallbacks": counts.fallbacks, "engine": work.engine, "seconds": seconds}
+    data |= {"per_second": counts.designs / seconds}
     if output is not None:
         with saving("--output", output):
-            save_arrays(found, output)
-    if plot is not None:
-        from tmsopt.show.chart import chart_figure
-        from tmsopt.show.style import save
+            save_layers(work.problem, work.grid, {n: arrays[n] for n in kept}, output)
+    return data, found
 
-        with saving("--plot", plot):
-            save(chart_figure(found, layer), plot)
+
+def _draw(
+    work: "Survey", found: "Chart | None", held: dict[str, float], boundaries: bool, layer: str, plot: Path
+) -> None:
+    """The figure: the chart itself, some of its points, or a plane of a space."""
+    from tmsopt.show.chart import chart_figure
+    from tmsopt.show.style import save
+    from tmsopt.study.chart import CHART_LAYERS, chart_of
+    from tmsopt.study.domain import domain
+    from tmsopt.study.stored import gathered
+
+    if found is None:
+        flat = (work.plane(held) if held else work).thinned(_SHOWN).with_layers(CHART_LAYERS)
+        found = chart_of(flat, gathered(flat)[0], domain(flat.problem) if boundaries else None)
+    with saving("--plot", plot):
+        save(chart_figure(found, layer), plot)
+
+
+def _space(free: tuple[str, ...], axes: str | None) -> tuple[str, ...]:
+    from tmsopt.design.errors import Fault, InputError
+
+    names = tuple(n.strip() for n in axes.split(",")) if axes is not None else free
+    if sorted(names) != sorted(free):
+        raise InputError([Fault(f"found {axes}; accepted: {', '.join(free)} in any order", ("--axes",))])
+    return names
+
+
+def _sizes(points: tuple[int, ...] | None, axes: int) -> tuple[int, ...]:
+    from tmsopt.design.errors import Fault, InputError
+
+    if points is None:
+        return _DEFAULT_POINTS[axes]
+    sizes = points * axes if len(points) == 1 else points
+    if len(sizes) != axes:
+        message = f"found {'x'.join(map(str, points))}; accepted: one number, or one for each of the {axes} axes"
+        raise InputError([Fault(message, ("--points",))])
+    return sizes
+
+
+def _check_plot(plot: Path | None, layer: str, accepted: tuple[str, ...], axes: int, cut: dict[str, str]) -> None:
+    from tmsopt.design.errors import Fault, InputError, suggest
+
+    if layer not in accepted:
+        raise InputError([Fault(f"found '{layer}'; {suggest(layer, accepted)}", ("--layer",))])
+    if plot is not None and axes == 3 and not cut:
+        message = "three parameters are free, and a figure shows two; hold one, as in --slice lambda_s=0.4"
+        raise InputError([Fault(message, ("--plot",))])
+    if cut and axes == 2:
+        raise InputError([Fault("two parameters are free, so there is nothing to hold; leave it out", ("--slice",))])
+
+
+def _held(problem: "Problem", cut: dict[str, str]) -> dict[str, float]:
+    """The parameter that a figure holds, as a number in its box."""
+    from tmsopt.design.errors import Fault, InputError, suggest
+    from tmsopt.design.units import with_unit
+
+    held = {}
+    for name, text in cut.items():
+        if name not in problem.free:
+            raise InputError([Fault(f"found '{name}'; {suggest(name, problem.free)}", ("--slice",))])
+        low, high = problem.free[name]
+        try:
+            held[name] = float(text)
+        except ValueError:
+            try:
+                held[name] = with_unit(text, problem.parameter_set[name].unit)
+            except ValueError as error:
+                raise InputError([Fault(str(error), ("--slice", name))]) from None
+        if not low <= held[name] <= high:
+            raise InputError([Fault(f"found {text}; accepted: {low:.6g} to {high:.6g}", ("--slice", name))])
+    return held

@@ -32,29 +32,37 @@ def bad_input() -> Iterator[None]:
 
 
 @contextmanager
-def progress(what: str = "start") -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on stderr, shown on a terminal when the work takes longer than a second."""
+def progress(what: str = "start", scaled: bool = False) -> Iterator[Callable[[int, int], None]]:
+    """A progress bar on stderr, shown on a terminal when the work takes longer than a second.
+
+    Args:
+        scaled: write large numbers as 12.3M; the first call says what was done before.
+    """
     from tqdm import tqdm
 
-    with tqdm(desc=f"{what}s", unit=what, delay=1, disable=None, leave=False, file=sys.stderr) as bar:
+    options: dict[str, Any] = {"unit_scale": scaled, "delay": 1, "disable": None, "leave": False, "file": sys.stderr}
+    with tqdm(desc=f"{what}s", unit=what, **options) as bar:
 
         def update(done: int, most: int) -> None:
+            if scaled and bar.total is None:
+                bar.initial = bar.n = done
             bar.total = most
             bar.update(done - bar.n)
 
         yield update
 
 
-def check_output(option: str, path: Path | None, endings: Sequence[str]) -> None:
-    """Refuse a file that could not be written, before any work is done."""
+def check_output(option: str, path: Path | None, endings: Sequence[str], folders: Sequence[str] = ()) -> None:
+    """Refuse a file that could not be written, before any work is done; what ends in one of `folders` is a folder."""
     if path is None:
         return
     from tmsopt.design.errors import Fault, InputError
 
-    if path.suffix.lstrip(".").lower() not in endings:
+    ending = path.suffix.lstrip(".").lower()
+    if ending not in endings:
         raise InputError([Fault(f"found '{path}'; accepted: a file name ending in {', '.join(endings)}", (option,))])
     try:
-        problem = "is a directory" if path.is_dir() else ""
+        problem = "is a directory" if path.is_dir() and ending not in folders else ""
         problem = problem or ("" if path.parent.is_dir() else "is in a directory that does not exist")
     except OSError as error:  # a name longer than the file system takes
         problem = f"is no name for a file here ({error.strerror})"

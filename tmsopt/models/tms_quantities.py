@@ -7,7 +7,7 @@ import numpy as np
 
 from tmsopt.models.model import Quantity, Range
 from tmsopt.models.tms_equations import matrices
-from tmsopt.roots.elementary import is_ball, positive_part, quotient, sqrt, tan
+from tmsopt.roots.elementary import chosen, is_ball, positive_part, quotient, sqrt, tan
 
 _NOT_NEGATIVE = Range(lower=0.0)
 _NOT_POSITIVE = Range(upper=0.0)
@@ -53,10 +53,10 @@ def _Fr_c(v: Mapping[str, Any]) -> Any:
     numerator = sum(terms)
     if is_ball(numerator):  # which knows for certain what is 0
         return sqrt(quotient(numerator, denominator))
-    rounding = 4 * np.finfo(float).eps * sum(np.abs(t) for t in terms)
-    level = np.abs(v["chi_B"] - v["chi_H"]) <= 4 * np.finfo(float).eps * (np.abs(v["chi_B"]) + np.abs(v["chi_H"]))
-    squared = quotient(np.where(np.abs(numerator) <= rounding, 0.0, numerator), np.where(level, 0.0, denominator))
-    return np.abs(sqrt(squared))  # without the sign of −0
+    rounding = 4 * np.finfo(float).eps * sum(abs(t) for t in terms)
+    level = abs(v["chi_B"] - v["chi_H"]) <= 4 * np.finfo(float).eps * (abs(v["chi_B"]) + abs(v["chi_H"]))
+    squared = quotient(chosen(abs(numerator) <= rounding, 0.0, numerator), chosen(level, 0.0, denominator))
+    return abs(sqrt(squared))  # without the sign of −0
 
 
 def _Fr_c_equation(v: Mapping[str, Any], x: Any) -> Any:

@@ -1,19 +1,26 @@
 """Real polynomials and their roots: factored forms, stability, numeric and exact roots, multiplicity."""
 
+from tmsopt.roots.classes import CLASSES, Classes, quartic_classes, quartic_is_stable
 from tmsopt.roots.count import real_roots
 from tmsopt.roots.exact import exact_abscissa, exact_roots
 from tmsopt.roots.numeric import abscissa, backward_error, rebuilt, roots
 from tmsopt.roots.patterns import PATTERNS, Pattern
 from tmsopt.roots.polynomial import determinant, evaluate, product, quadratic_pencil, shift
+from tmsopt.roots.quartic import Factors, Motion, abscissa_and_damping, quartic_factors
 from tmsopt.roots.stability import discriminant, hurwitz_minors, is_stable, lienard_chipart
 from tmsopt.roots.structure import Root, Structure, pattern_distance, structure
 
 __all__ = [
+    "CLASSES",
     "PATTERNS",
+    "Classes",
+    "Factors",
+    "Motion",
     "Pattern",
     "Root",
     "Structure",
     "abscissa",
+    "abscissa_and_damping",
     "backward_error",
     "determinant",
     "discriminant",
@@ -26,6 +33,9 @@ __all__ = [
     "pattern_distance",
     "product",
     "quadratic_pencil",
+    "quartic_classes",
+    "quartic_factors",
+    "quartic_is_stable",
     "real_roots",
     "rebuilt",
     "roots",

@@ -65,8 +65,10 @@ def quotient(a: Any, b: Any) -> Any:
             return a / b
         except (ZeroDivisionError, ValueError):  # of fractions, of series
             return flint.arb("nan")
+    if is_symbolic(a) or is_symbolic(b):
+        return ca.if_else(b == 0, np.nan, a / b)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(np.equal(b, 0), np.nan, np.divide(a, b))[()]
+        return chosen(np.equal(b, 0), np.nan, np.divide(a, b))
 
 
 def power(a: Any, b: Any) -> Any:
@@ -77,6 +79,18 @@ def power(a: Any, b: Any) -> Any:
         except (ZeroDivisionError, ValueError):
             return flint.arb("nan")
     return as_ball(a) ** as_ball(b)
+
+
+def chosen(condition: Any, a: Any, b: Any) -> Any:
+    """a where the condition holds, else b: arrays or CasADi expressions."""
+    if is_symbolic(condition):
+        return ca.if_else(condition, a, b)
+    return np.where(condition, a, b)[()]
+
+
+def is_symbolic(x: Any) -> bool:
+    """Whether x is a CasADi expression."""
+    return isinstance(x, ca.SX | ca.MX)
 
 
 def is_ball(x: Any) -> bool:

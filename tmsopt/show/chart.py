@@ -15,6 +15,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.typing import LineStyleType
 from numpy.typing import NDArray
 
+from tmsopt.models import ParameterSet
 from tmsopt.show.labels import Name, label_axes, place_names
 from tmsopt.show.style import CAPSIZE, CRITICAL, LINE, MARK, legend_below, new_figure
 from tmsopt.show.text import columns, number, with_unit
@@ -76,8 +77,10 @@ def draw_violated(ax: Axes, chart: Chart) -> Patch | None:
 
 
 def draw_layer(ax: Axes, chart: Chart, layer: str) -> None:
-    """The abscissa, damping ratio or number of real roots, with its colour bar."""
-    values = np.asarray(getattr(chart, layer), dtype=float)
+    """The abscissa, damping ratio, number of real roots or a quantity, with its colour bar."""
+    quantity = chart.quantities.get(layer)
+    values = np.asarray(getattr(chart, layer) if quantity is None else quantity, dtype=float)
+    label = LAYERS.get(layer, layer)
     figure = ax.get_figure()
     assert figure is not None
     if layer == "real_roots":
@@ -85,12 +88,12 @@ def draw_layer(ax: Axes, chart: Chart, layer: str) -> None:
         shades = ListedColormap(colormaps["cividis"](np.linspace(0, 1, len(counts))))
         norm = BoundaryNorm(np.arange(len(counts) + 1) - 0.5, len(counts))
         mesh = ax.pcolormesh(*chart.grid, values, cmap=shades, norm=norm, rasterized=True)
-        figure.colorbar(mesh, ax=ax, label=LAYERS[layer], ticks=counts)
+        figure.colorbar(mesh, ax=ax, label=label, ticks=counts)
         return
     known = values[np.isfinite(values)]
     low, high = (float(np.percentile(known, q)) for q in _SHOWN) if known.size else (0.0, 1.0)
     mesh = ax.pcolormesh(*chart.grid, values, cmap="cividis", vmin=low, vmax=high, rasterized=True)
-    figure.colorbar(mesh, ax=ax, label=LAYERS[layer], extend="both" if low > known.min(initial=low) else "max")
+    figure.colorbar(mesh, ax=ax, label=label, extend="both" if low > known.min(initial=low) else "max")
 
 
 def draw_domain(ax: Axes, domain: Domain, horizontal: str, vertical: str) -> list[Name]:
@@ -168,4 +171,22 @@ def chart_table(chart: Chart) -> str:
             rows = [("corner", with_unit(of, first), with_unit(of, second))]
             rows += [(c.name, number(c.parameters[first]), number(c.parameters[second])) for c in chart.domain.corners]
             lines += ["", *columns(rows)]
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def summary_table(of: ParameterSet, data: Mapping[str, Any]) -> str:
+    """A chart that is not in memory: shares of the classes, the best grid point, and how fast it was made."""
+    axes = data["axes"]
+    size = " × ".join(str(a["points"]) for a in axes.values())
+    lines = [data["title"] or "untitled problem", f"{size} designs over {', '.join(axes)}", ""]
+    if data["classes"]:
+        lines += columns([(name, f"{100 * share:.2f} %") for name, share in data["classes"].items() if share])
+    if data["satisfied"] is not None and data["satisfied"] < 1:
+        lines.append(f"  the constraints hold on {100 * data['satisfied']:.2f} %")
+    if best := data["least_abscissa"]:
+        units = {n: "" if of[n].unit == "1" else f" {of[n].unit}" for n in axes}
+        where = ", ".join(f"{n} = {best[n]:.6g}{unit}" for n, unit in units.items())
+        lines += ["", f"least abscissa on the grid: {best['value']:.6g} at {where}"]
+    if data.get("designs"):
+        lines += ["", f"{data['per_second']:.3g} designs per second with {data['engine']}"]
     return "\n".join(line.rstrip() for line in lines)

@@ -1,8 +1,7 @@
 """Stability charts: what kind of motion each design of a two-parameter grid has."""
 
-import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,21 +10,21 @@ from numpy.typing import NDArray
 
 from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.problem import Problem, checked
-from tmsopt.design.quantities import NO_RADIUS
-from tmsopt.models import Values
-from tmsopt.roots import is_stable, real_roots, roots
+from tmsopt.study.archive import save_layers
+from tmsopt.study.classes import CLASSES, classify
 from tmsopt.study.domain import Domain, domain
-from tmsopt.study.grid import coefficients
+from tmsopt.study.stored import gathered
+from tmsopt.study.tiles import USUAL, Grid, Survey, survey
+
+__all__ = ["CHART_LAYERS", "CLASSES", "LARGEST", "Chart", "chart", "chart_of", "classify", "plane_of", "save_arrays"]
 
 Array = NDArray[np.float64]
-
-CLASSES = ("undefined", "capsize", "weave", "stable", "heavily damped")
-"""Names of the class codes 0 … 4, from worst to best; undefined is a singular mass matrix."""
 
 LARGEST = 20_000_000
 """Designs of a chart, which is held in memory at some 40 bytes each."""
 
-_BLOCK = 20_000
+CHART_LAYERS = ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied", "margin")
+"""Layers that a chart in memory has."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +42,7 @@ class Chart:
         margin: least difference of the sides of an inequality, negative where one is violated, nan where one does not
             exist.
         domain: the exact boundaries, if asked for.
+        quantities: name → values of an expression of the user's.
     """
 
     problem: Problem
@@ -55,6 +55,7 @@ class Chart:
     satisfied: NDArray[np.bool_]
     margin: Array
     domain: Domain | None
+    quantities: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
     @property
     def shares(self) -> dict[str, float]:
@@ -115,32 +116,20 @@ def chart(
     """
     names = plane_of(checked(problem), axes)
     _check(points)
-    first, second = (np.linspace(*problem.free[n], m) for n, m in zip(names, points, strict=True))
-    across, up = (part.ravel() for part in np.meshgrid(first, second))
-    count = across.size
-    kind, real = np.zeros(count, dtype=np.int8), np.zeros(count, dtype=np.int8)
-    alpha, ratio = np.full(count, np.nan), np.full(count, np.nan)
-    margin = np.full(count, np.inf)
-    for start in range(0, count, _BLOCK):
-        block = slice(start, min(start + _BLOCK, count))
-        columns = {names[0]: across[block], names[1]: up[block]}
-        with np.errstate(all="ignore"):  # a box of any size: what overflows is undefined
-            kind[block], real[block], alpha[block], ratio[block] = classify(coefficients(problem, columns))
-            margin[block] = _margin(problem, columns, alpha[block], ratio[block])
-        if progress:
-            progress(block.stop, count)
-    shape = (len(second), len(first))
+    work = survey(problem, names, points, CHART_LAYERS)
+    return chart_of(work, gathered(work, progress)[0], domain(problem) if boundaries else None)
+
+
+def chart_of(work: Survey, layers: Mapping[str, NDArray[Any]], boundaries: Domain | None) -> Chart:
+    """A chart of what was computed over a plane, `CHART_LAYERS` and quantities."""
+    across, up = work.grid.axes
     return Chart(
-        problem=problem,
-        axes=names,
-        grid=(first, second),
-        kind=kind.reshape(shape),
-        abscissa=alpha.reshape(shape),
-        damping_ratio=ratio.reshape(shape),
-        real_roots=real.reshape(shape),
-        satisfied=(margin >= 0).reshape(shape),
-        margin=margin.reshape(shape),
-        domain=domain(problem) if boundaries else None,
+        problem=work.problem,
+        axes=(across, up),
+        grid=(work.grid.values[0], work.grid.values[1]),
+        domain=boundaries,
+        quantities={n: layers[n] for n in work.quantities},
+        **{n: layers[n] for n in CHART_LAYERS},
     )
 
 
@@ -170,41 +159,6 @@ def plane_of(problem: Problem, axes: tuple[str, str] | None = None) -> tuple[str
     return axes or (free[0], free[1])
 
 
-def classify(a: Array) -> tuple[NDArray[np.int8], NDArray[np.int8], Array, Array]:
-    """Class code, number of real roots, abscissa and damping ratio for coefficients of shape (designs, n + 1)."""
-    count, n = len(a), a.shape[1] - 1
-    kind, real = np.zeros(count, dtype=np.int8), np.zeros(count, dtype=np.int8)
-    alpha, ratio = np.full(count, np.nan), np.full(count, np.nan)
-    regular = np.flatnonzero(np.all(np.isfinite(a), axis=1) & (a[:, 0] != 0))
-    if not regular.size:
-        return kind, real, alpha, ratio
-    c = a[regular]
-    negative, positive = real_roots(c)
-    zero = c[:, -1] == 0
-    stable = is_stable(c)
-    unstable = np.where((positive > 0) | zero, CLASSES.index("capsize"), CLASSES.index("weave"))
-    damped = np.where(negative == n, CLASSES.index("heavily damped"), CLASSES.index("stable"))
-    kind[regular] = np.where(stable, damped, unstable)
-    real[regular] = negative + positive + zero
-    z = roots(c)
-    alpha[regular] = z.real.max(axis=1)
-    ratio[regular] = np.min(-z.real / (np.abs(z) + 1e-300), axis=1)
-    return kind, real, alpha, ratio
-
-
-def _margin(problem: Problem, columns: Mapping[str, Array], alpha: Array, ratio: Array) -> Array:
-    """Least difference by which the inequalities hold; nan where one does not exist, such as the speed of a root."""
-    values = Values(problem.model, problem.parameter_set, problem.ordered(columns), extra=(NO_RADIUS,))
-    values.define("abscissa", alpha)
-    values.define("damping_ratio", ratio)
-    least = np.full(len(alpha), np.inf)
-    for condition in problem.conditions.values():
-        if condition.comparison != "==":
-            sign = -1.0 if condition.comparison == "<=" else 1.0
-            least = np.minimum(least, sign * np.asarray(condition(values), dtype=float))
-    return least
-
-
 def save_arrays(found: Chart, path: Path) -> None:
     """Write a chart as a NumPy archive: the axes by name, `kind`, `abscissa`, `damping_ratio`, `real_roots`,
     `satisfied`, `about`.
@@ -212,14 +166,5 @@ def save_arrays(found: Chart, path: Path) -> None:
     Raises:
         OSError: when the file cannot be written.
     """
-    about = {
-        "title": found.problem.title,
-        "model": found.problem.model.name,
-        "dimensions": [found.axes[1], found.axes[0]],
-        "classes": list(CLASSES),
-        "fixed": dict(found.problem.fixed),
-    }
-    arrays: dict[str, Any] = dict(zip(found.axes, found.grid, strict=True))
-    arrays |= {n: getattr(found, n) for n in ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied")}
-    with path.open("wb") as stream:
-        np.savez_compressed(stream, about=np.array(json.dumps(about)), **arrays)
+    grid = Grid(found.axes, found.grid)
+    save_layers(found.problem, grid, {n: getattr(found, n) for n in USUAL} | dict(found.quantities), path)

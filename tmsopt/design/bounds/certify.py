@@ -12,7 +12,6 @@ from tmsopt.design.bounds.program import Question
 from tmsopt.design.bounds.race import Crew
 from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, UNDECIDED, available
 from tmsopt.design.bounds.translation import FEASIBILITY
-from tmsopt.design.bounds.walk import NotAccepted
 from tmsopt.design.cases import Case
 from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.formulations import Builder
@@ -21,6 +20,7 @@ from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.design.recheck import recheck
 from tmsopt.design.solution import Bound, Solution
 from tmsopt.design.solve import solve
+from tmsopt.design.walk import NotAccepted
 
 SECONDS = 60.0
 """Time for a proof, by default."""

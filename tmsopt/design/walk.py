@@ -1,4 +1,4 @@
-"""A CasADi function, one instruction after the other, in another arithmetic: balls, or the expressions of SCIP."""
+"""A CasADi function, one instruction after the other, in another arithmetic: balls, the expressions of SCIP, arrays."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -29,11 +29,11 @@ def walk(
     Raises:
         NotAccepted: for an operation that the arithmetic does not have.
     """
-    steps = list(_steps(function))
-    uses = Counter(k for step in steps for k in step.operands)
+    taken = list(steps(function))
+    uses = Counter(k for step in taken for k in step.operands)
     values: list[Any] = []
     outputs: list[list[Any]] = [[arithmetic[ca.OP_CONST](0.0)] * function.nnz_out(k) for k in range(function.n_out())]
-    for step in steps:
+    for step in taken:
         match step.operation:
             case ca.OP_INPUT:
                 value = arguments[step.place[1]]
@@ -46,16 +46,17 @@ def walk(
                 value = arithmetic[operation](*(values[k] for k in step.operands))
                 value = shared(value) if uses[len(values)] > 1 else value
             case operation:
-                raise NotAccepted(_NAMES.get(operation, f"operation {operation}"))
+                raise NotAccepted(operation_name(operation))
         values.append(value)
     return outputs
 
 
 @dataclass(frozen=True)
-class _Step:
-    """One instruction.
+class Step:
+    """One instruction of a function.
 
     Attributes:
+        operation: as CasADi numbers them, ``ca.OP_ADD`` and so on.
         operands: numbers of the steps whose results it takes.
         place: of an input or output, which one and which entry.
     """
@@ -66,7 +67,7 @@ class _Step:
     constant: float = 0.0
 
 
-def _steps(function: ca.Function) -> Iterator[_Step]:
+def steps(function: ca.Function) -> Iterator[Step]:
     """The instructions, with the numbers of steps in place of registers, which CasADi uses again."""
     held: dict[int, int] = {}
     for k in range(function.n_instructions()):
@@ -74,15 +75,20 @@ def _steps(function: ca.Function) -> Iterator[_Step]:
         inputs, outputs = function.instruction_input(k), function.instruction_output(k)
         match operation:
             case ca.OP_INPUT:
-                yield _Step(operation, place=(inputs[0], inputs[1]))
+                yield Step(operation, place=(inputs[0], inputs[1]))
             case ca.OP_OUTPUT:
-                yield _Step(operation, (held[inputs[0]],), place=(outputs[0], outputs[1]))
+                yield Step(operation, (held[inputs[0]],), place=(outputs[0], outputs[1]))
                 continue
             case ca.OP_CONST:
-                yield _Step(operation, constant=function.instruction_constant(k))
+                yield Step(operation, constant=function.instruction_constant(k))
             case _:
-                yield _Step(operation, tuple(held[r] for r in inputs))
+                yield Step(operation, tuple(held[r] for r in inputs))
         held[outputs[0]] = k
+
+
+def operation_name(operation: int) -> str:
+    """Name of a CasADi operation, e.g. ``atan2``."""
+    return _NAMES.get(operation, f"operation {operation}")
 
 
 _NAMES = {getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")}

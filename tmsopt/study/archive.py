@@ -1,0 +1,76 @@
+"""Charts that fit into memory as one file: a NumPy archive, or netCDF."""
+
+import json
+from collections.abc import Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.design.errors import Fault, InputError
+from tmsopt.design.problem import Problem
+from tmsopt.study.classes import CLASSES
+from tmsopt.study.tiles import Grid
+
+ENDINGS = ("npz", "nc")
+"""Of the files that this writes."""
+
+
+def save_layers(problem: Problem, grid: Grid, layers: Mapping[str, NDArray[Any]], path: Path) -> None:
+    """Write axes and layers by name, with what they are about, as the ending of the file says.
+
+    Raises:
+        InputError: for netCDF where xarray or a library for it is not installed.
+        OSError: when the file cannot be written.
+    """
+    about: dict[str, Any] = {
+        "title": problem.title,
+        "model": problem.model.name,
+        "dimensions": list(grid.axes[::-1]),
+        "classes": list(CLASSES),
+        "fixed": dict(problem.fixed),
+    }
+    if path.suffix.lower() == ".nc":
+        _save_netcdf(problem, grid, layers, about, path)
+        return
+    arrays: dict[str, Any] = {**dict(zip(grid.axes, grid.values, strict=True)), **layers}
+    with path.open("wb") as stream:
+        np.savez_compressed(stream, about=np.array(json.dumps(about)), **arrays)
+
+
+def check_netcdf() -> None:
+    """Refuse netCDF where it could not be written.
+
+    Raises:
+        InputError: where xarray or a library for netCDF is not installed.
+    """
+    if find_spec("xarray") is None or all(find_spec(n) is None for n in ("netCDF4", "h5netcdf")):
+        message = 'netCDF needs xarray and netCDF4; run pip install "tmsopt[data]", or give a name ending in npz'
+        raise InputError([Fault(message, ("--output",))])
+
+
+def _save_netcdf(
+    problem: Problem, grid: Grid, layers: Mapping[str, NDArray[Any]], about: Mapping[str, Any], path: Path
+) -> None:
+    check_netcdf()
+    import xarray
+
+    of = problem.parameter_set
+    axes = {
+        n: (n, v, {"long_name": of[n].meaning, "units": of[n].unit})
+        for n, v in zip(grid.axes, grid.values, strict=True)
+    }
+    classes = {"flag_values": np.arange(len(CLASSES), dtype=np.int8), "flag_meanings": _words(CLASSES)}
+    variables = {
+        n: (about["dimensions"], a.view(np.int8) if a.dtype == bool else a, classes if n == "kind" else {})
+        for n, a in layers.items()
+    }
+    known = {n: about[n] for n in ("title", "model")} | {"fixed": json.dumps(about["fixed"])}
+    xarray.Dataset(variables, axes, known).to_netcdf(path)
+
+
+def _words(names: tuple[str, ...]) -> str:
+    """Names as the climate and forecast conventions want them, blanks between words only."""
+    return " ".join(n.replace(" ", "_") for n in names)

@@ -1,0 +1,76 @@
+"""What a chart sums up of its designs, tile by tile: shares of the classes, the best design."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.study.classes import CLASSES
+
+
+@dataclass(frozen=True)
+class Tally:
+    """Counts over some of the designs.
+
+    Attributes:
+        designs: how many.
+        classes: number in each class; empty where the kind was not asked for.
+        satisfied: number that satisfy every inequality; None where that was not asked for.
+        least: least abscissa of those; nan where there is none.
+        place: its place in the flat arrays, the first of equals; -1 where there is none.
+        fallbacks: number of designs whose roots came from companion eigenvalues.
+        seconds: of computing.
+    """
+
+    designs: int = 0
+    classes: tuple[int, ...] = ()
+    satisfied: int | None = None
+    least: float = math.nan
+    place: int = -1
+    fallbacks: int = 0
+    seconds: float = 0.0
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Share of the designs in each class; empty where the kind was not asked for."""
+        return {n: count / self.designs for n, count in zip(CLASSES, self.classes, strict=False)}
+
+
+def tally(layers: Mapping[str, NDArray[Any]], first: int, fallbacks: int = 0, seconds: float = 0.0) -> Tally:
+    """Counts over a tile whose first design has the place `first`."""
+    kind, satisfied, alpha = layers.get("kind"), layers.get("satisfied"), layers.get("abscissa")
+    least, place = math.nan, -1
+    if alpha is not None:
+        allowed = alpha if satisfied is None or satisfied.all() else np.where(satisfied, alpha, np.nan)
+        best = np.fmin.reduce(allowed, axis=None)
+        if np.isfinite(best):
+            least, place = float(best), first + int(np.argmax(allowed == best))
+    return Tally(
+        designs=next(iter(layers.values())).size,
+        classes=() if kind is None else tuple(int(np.count_nonzero(kind == c)) for c in range(len(CLASSES))),
+        satisfied=None if satisfied is None else int(np.count_nonzero(satisfied)),
+        least=least,
+        place=place,
+        fallbacks=fallbacks,
+        seconds=seconds,
+    )
+
+
+def total(parts: Iterable[Tally]) -> Tally:
+    """Counts of several tiles together; their order does not matter."""
+    every = list(parts)
+    known = [(t.least, t.place) for t in every if t.place >= 0]
+    least, place = min(known, default=(math.nan, -1))
+    satisfied = [t.satisfied for t in every if t.satisfied is not None]
+    return Tally(
+        designs=sum(t.designs for t in every),
+        classes=tuple(map(sum, zip(*(t.classes for t in every), strict=True))),
+        satisfied=sum(satisfied) if satisfied else None,
+        least=least,
+        place=place,
+        fallbacks=sum(t.fallbacks for t in every),
+        seconds=sum(t.seconds for t in every),
+    )
