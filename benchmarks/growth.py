@@ -1,16 +1,16 @@
 """Section (f): how the time grows with free parameters, scenarios and grid points."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from benchmarks.band import band_problems
-from benchmarks.charts import by_blocks, grid_coefficients, stacked
+from benchmarks.charts import PROBLEM, by_blocks, grid_coefficients, stacked
 from benchmarks.measure import best, duration, exponent, times
 from benchmarks.report import origin, table
 from benchmarks.suite import random_problem
@@ -19,10 +19,10 @@ from tmsopt.design.problem import Problem
 
 _FREE = (2, 3, 4, 5, 6, 7)
 _EACH = 5  # random problems with each number of free parameters
-_SPEEDS = (1, 2, 4, 8, 16, 32)
+_SPEEDS = (1, 2, 4, 8, 16)
+_BOXES = 3
 _POINTS = (10**4, 10**5, 10**6, 10**7)
 _STACKED = 10**6  # designs beyond which stacked eigenvalues need not be waited for
-_CHART = Path(__file__).parent.parent / "problems" / "chart.toml"
 
 
 @dataclass(frozen=True)
@@ -38,47 +38,46 @@ class Solved:
     optimal: bool
 
 
-def timed(problem: Problem, repeats: int) -> Solved:
-    """The fastest of a few solves."""
-    found = [solve(problem, throw=False) for _ in range(repeats)]
-    first = found[0]
-    return Solved(min(f.seconds for f in found), first.starts.tried, first.status == "optimal")
-
-
-def by_freedom(quick: bool) -> list[tuple[int, list[Solved]]]:
-    """Optimal solves of the first random designs with each number of free parameters."""
+def timed(problems: Sequence[Problem], rounds: int) -> list[Solved]:
+    """The fastest solve of each over some rounds, in which all take turns."""
+    found = [[solve(problem, throw=False) for problem in problems] for _ in range(rounds)]
     return [
-        (free, _optimal(free, 2 if quick else _EACH, 1 if quick else 3)) for free in (_FREE[:3] if quick else _FREE)
+        Solved(min(one.seconds for one in turns), turns[0].starts.tried, turns[0].status == "optimal")
+        for turns in zip(*found, strict=True)
     ]
 
 
-def _optimal(free: int, wanted: int, repeats: int) -> list[Solved]:
-    found: list[Solved] = []
-    for problem in _suite(free):
-        if len(found) < wanted and (one := timed(problem, 1)).optimal:
-            found.append(timed(problem, repeats) if repeats > 1 else one)
-        if len(found) == wanted:
-            break
-    return found
+def by_freedom(quick: bool) -> list[tuple[int, list[Solved]]]:
+    """The first random designs with each number of free parameters that have an optimum."""
+    wanted = 2 if quick else _EACH
+    groups = {free: list(islice(_with_optimum(free), wanted)) for free in (_FREE[:3] if quick else _FREE)}
+    return _grouped(groups, 1 if quick else 3)
 
 
-def _suite(free: int) -> Iterator[Problem]:
-    return (p for p in map(random_problem, range(200)) if len(p.free) == free)
+def _with_optimum(free: int) -> Iterator[Problem]:
+    every = (p for p in map(random_problem, range(200)) if len(p.free) == free)
+    return (p for p in every if solve(p, throw=False).status == "optimal")
+
+
+def _grouped(groups: Mapping[int, Sequence[Problem]], rounds: int) -> list[tuple[int, list[Solved]]]:
+    found = iter(timed([p for problems in groups.values() for p in problems], rounds))
+    return [(size, list(islice(found, len(problems)))) for size, problems in groups.items()]
 
 
 def by_scenarios(quick: bool) -> list[tuple[int, list[Solved]]]:
     """The band designs of six free parameters at 1, 2, 4 … speeds of the band, and nothing asked between them."""
-    boxes = list(band_problems().values())[: 1 if quick else None]
-    rows = []
-    for count in _SPEEDS[:3] if quick else _SPEEDS:
-        speeds = tuple(np.linspace(1.2, 2.4, count).tolist()) if count > 1 else (1.8,)
-        rows.append((count, [timed(replace(p, scenarios={"Fr": speeds}), 1 if quick else 2) for p in boxes]))
-    return rows
+    boxes = list(band_problems().values())[: 1 if quick else _BOXES]
+    groups = {n: [replace(p, scenarios={"Fr": _speeds(n)}) for p in boxes] for n in (_SPEEDS[:3] if quick else _SPEEDS)}
+    return _grouped(groups, 1 if quick else 2)
+
+
+def _speeds(count: int) -> tuple[float, ...]:
+    return tuple(np.linspace(1.2, 2.4, count).tolist()) if count > 1 else (1.8,)
 
 
 def by_points(quick: bool) -> list[tuple[int, float, float]]:
     """Designs of a chart, its seconds, and those of stacked eigenvalues; nan where they are not waited for."""
-    problem = load(_CHART, asks=False)
+    problem = load(PROBLEM, asks=False)
     rows = []
     for points in _POINTS[:2] if quick else _POINTS:
         across = math.isqrt(points)

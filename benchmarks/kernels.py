@@ -1,6 +1,5 @@
 """How fast roots and classes of many quartics come, beside stacked eigenvalues: ``python -m benchmarks.kernels``."""
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -8,6 +7,7 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.measure import best
 from benchmarks.report import keep, kept, origin, table
 from tmsopt.models import tms
 from tmsopt.roots import (
@@ -79,39 +79,29 @@ def works(a: Array) -> dict[str, Work]:
     }
 
 
-def best_seconds(timed: dict[str, Work]) -> dict[str, float]:
-    """The least time of each over interleaved rounds; a first round compiles and is left out."""
-    best = dict.fromkeys(timed, np.inf)
-    for turn in range(_REPEATS + 1):
-        for name, work in timed.items():
-            began = time.perf_counter()
-            work()
-            if turn:
-                best[name] = min(best[name], time.perf_counter() - began)
-    return best
-
-
-def _copying() -> float:
+def _copying(points: int) -> float:
     """Seconds to copy the coefficients of the points and write one number for each: the least that memory allows."""
-    source, target = np.ones(6 * _POINTS), np.empty(6 * _POINTS)
-    return best_seconds({"copy": lambda: np.copyto(target, source)})["copy"]
+    source, target = np.ones(6 * points), np.empty(6 * points)
+    return best({"copy": lambda: np.copyto(target, source)}, _REPEATS)["copy"]
 
 
-def _rows(inputs: dict[str, Array]) -> list[tuple[str, ...]]:
-    seconds = {name: best_seconds(works(a)) for name, a in inputs.items()}
+def _rows(inputs: dict[str, Array], repeats: int) -> list[tuple[str, ...]]:
+    seconds = {name: best(works(a), repeats) for name, a in inputs.items()}
+    points = next(iter(inputs.values())).shape[1]
     rows = []
     for work in next(iter(seconds.values())):
         cells = []
-        for best in seconds.values():
-            base = best[_EIGENVALUES] if "abscissa" in work or "factors" in work else best[_BASELINE_CLASS]
-            cells += [f"{1e9 * best[work] / _POINTS:.0f}", f"{base / best[work]:.1f}"]
+        for least in seconds.values():
+            base = least[_EIGENVALUES] if "abscissa" in work or "factors" in work else least[_BASELINE_CLASS]
+            cells += [f"{1e9 * least[work] / points:.0f}", f"{base / least[work]:.1f}"]
         rows.append((work, *cells))
     return rows
 
 
-def section(command: str) -> str:
+def section(command: str, quick: bool = False) -> str:
     """The report in Markdown."""
-    inputs = {"two-mass-skate designs": designs(_POINTS), "normal coefficients": random(_POINTS)}
+    points, repeats = (_POINTS // 10, 2) if quick else (_POINTS, _REPEATS)
+    inputs = {"two-mass-skate designs": designs(points), "normal coefficients": random(points)}
     header = ["work", *(cell for name in inputs for cell in (f"{name}, ns a point", "times the eigenvalues' rate"))]
     errors = []
     for name, a in inputs.items():
@@ -123,12 +113,12 @@ def section(command: str) -> str:
         "",
         origin(command),
         "",
-        f"{_POINTS} quartics from coefficients in memory, one thread, interleaved, the best of {_REPEATS} rounds:",
+        f"{points} quartics from coefficients in memory, one thread, interleaved, the best of {repeats} rounds:",
         "",
-        table(header, _rows(inputs)),
+        table(header, _rows(inputs, repeats)),
         "",
-        f"Copying five coefficients and an answer takes {1e9 * _copying() / _POINTS:.1f} ns a point. The rate of the "
-        f"eigenvalues includes building the companion matrices. Largest backward error of the factors: "
+        f"Copying five coefficients and an answer takes {1e9 * _copying(points) / points:.1f} ns a point. The rate of "
+        f"the eigenvalues includes building the companion matrices. Largest backward error of the factors: "
         f"{', '.join(errors)}.",
     ]
     return "\n".join(lines) + "\n"

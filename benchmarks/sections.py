@@ -36,6 +36,7 @@ class Section:
 SECTIONS = (
     Section("a", "solving", "benchmarks.solving", "solving at equal accuracy, beside SciPy, CMA-ES and PyGRANSO"),
     Section("b", "charts", "benchmarks.charts", "charts, beside stacked eigvals, numpy.roots and copying memory"),
+    Section("b", "kernels", "benchmarks.kernels", "roots and classes of many quartics, beside stacked eigvals"),
     Section("c", "studies", "benchmarks.studies", "studies, beside bare solves in a loop, over cores and Dask workers"),
     Section("d", "trace", "benchmarks.trace", "tracing, beside scipy.optimize.root and a contour"),
     Section("e", "startup", "benchmarks.startup", "start-up and import times, beside Python, NumPy and CasADi"),
@@ -101,6 +102,7 @@ Examples:
 Longer ones have commands of their own:
   python -m benchmarks.solve               200 random designs beside SciPy
   python -m benchmarks.design              bands of speeds, varied problems, conflicts
+  python -m benchmarks.certificates        designs proved globally best
   python -m benchmarks.proofs              exceptional points of the paper, proved
 
 Every ratio compares times of the same run. Other load on the machine spoils them: each section says how much there was.

@@ -5,7 +5,6 @@ import math
 import sys
 from collections.abc import Callable
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -42,9 +41,7 @@ def test_sections_have_letters_names_and_a_report() -> None:
     assert [s.letter for s in SECTIONS] == sorted(s.letter for s in SECTIONS)
     assert {s.letter for s in SECTIONS} == set("abcdef")
     assert len({s.name for s in SECTIONS}) == len(SECTIONS)
-    there = [s for s in SECTIONS if find_spec(s.module)]
-    assert {s.letter for s in there} >= set("abdef")
-    for section in there:
+    for section in SECTIONS:
         assert list(inspect.signature(section.report()).parameters) == ["command", "quick"]
 
 
