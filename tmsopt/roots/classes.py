@@ -12,7 +12,7 @@ from tmsopt.roots.quartic import columns, use_numba
 CLASSES = ("undefined", "capsize", "weave", "stable", "heavily damped")
 """Names of the class codes 0 … 4, from worst to best; undefined is a leading 0 or a coefficient that is not finite."""
 
-_BLOCK = 4096
+_BLOCK = 8192
 
 
 @dataclass(frozen=True)

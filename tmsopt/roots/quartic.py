@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Columns = tuple[Array, Array, Array, Array, Array]
 Four = factors.Four
 
-_BLOCK = 4096  # numbers of an array that stay in the cache between two operations
+_BLOCK = 8192  # numbers of an array that stay in the cache between two operations
 
 
 @dataclass(frozen=True)
