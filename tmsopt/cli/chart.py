@@ -75,7 +75,13 @@ def _named(_context: click.Context, _option: click.Parameter, values: tuple[str,
 @click.option("--single", is_flag=True, help="Write numbers in single precision.")
 @click.option("--fresh", is_flag=True, help="Move a folder of --output aside instead of going on with it.")
 @click.option("--engine", default="auto", show_default=True, help="numba, numpy, or numba where installed (auto).")
-@click.option("--workers", type=click.IntRange(1, 256), default=1, show_default=True, help="Threads.")
+@click.option(
+    "--workers",
+    type=click.IntRange(1, 256),
+    default=1,
+    show_default=True,
+    help="Threads; NumPy alone gains nothing by them.",
+)
 @click.option("--plot", type=click.Path(path_type=Path), help="Draw the chart (png, pdf, svg).")
 @click.option(
     "--layer",

@@ -153,7 +153,8 @@ class Survey:
     def plane(self, held: Mapping[str, float]) -> "Survey":
         """The same with some of the free parameters held."""
         free = {n: ends for n, ends in self.problem.free.items() if n not in held}
-        problem = replace(self.problem, fixed={**self.problem.fixed, **held}, free=free, start={})
+        title = ", ".join([self.problem.title, *(f"{n} = {v:.6g}" for n, v in held.items())]).removeprefix(", ")
+        problem = replace(self.problem, fixed={**self.problem.fixed, **held}, free=free, start={}, title=title)
         kept = {n: v for n, v in zip(self.grid.axes, self.grid.values, strict=True) if n not in held}
         grid = Grid(tuple(kept), tuple(kept.values()))
         return _over(problem, grid, self.layers, self.quantities, self.engine, self.single)
