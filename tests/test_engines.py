@@ -137,6 +137,11 @@ def test_work_that_cannot_be_loaded_is_an_end_with_a_reason(engine: Engine, tmp_
         list(engine(Unloadable(tmp_path), singles(3)))
 
 
+def test_no_worker_at_all_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="workers: 0; accepted: 1 or more"):
+        list(processes(Fake(tmp_path), singles(3), 0))
+
+
 # Ends
 
 

@@ -10,6 +10,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
+from tmsopt.design.errors import Fault, InputError
 from tmsopt.study.batch.engines.ledger import Ledger
 from tmsopt.study.batch.engines.serve import READY, serve
 from tmsopt.study.batch.engines.work import EngineError, Note, Unit, Work, attempt, pickled, silent
@@ -27,7 +28,7 @@ _ONE_THREAD = dict.fromkeys(
     ),
     "1",
 )
-_STILLBORN = 3  # workers in a row that end before they are ready; then it is not chance
+_STILLBORN = 8  # workers in a row that end before they are ready; then it is not chance
 
 
 def cores() -> int:
@@ -50,8 +51,11 @@ def processes(work: Work, units: Sequence[Unit], workers: int, note: Note = sile
     ended is known. Workers end when this generator is closed, interrupted, or its process is killed.
 
     Raises:
-        EngineError: if workers end before they start, or cannot unpickle the work.
+        InputError: for less than one worker.
+        EngineError: if workers end before they start, or cannot load the work.
     """
+    if workers < 1:
+        raise InputError([Fault(f"{workers}; accepted: 1 or more, here up to {cores()} are of use", ("workers",))])
     ledger = Ledger(work, units, note)
     crew: dict[Connection, _Worker] = {}
     stillborn = 0
@@ -69,10 +73,10 @@ def processes(work: Work, units: Sequence[Unit], workers: int, note: Note = sile
                 message = worker.receive()
                 if message is None:
                     del crew[worker.pipe]
-                    stillborn = 0 if worker.ready else stillborn + 1
+                    stillborn += not worker.ready
                     yield from _ended(ledger, worker, stillborn, note)
                 elif isinstance(message, str):
-                    worker.ready = _ready(message)
+                    worker.ready, stillborn = _ready(message), 0
                 else:
                     unit, rows, seconds = message
                     if ledger.delivered(worker.name, unit, seconds):

@@ -2,10 +2,11 @@
 
 import pickle
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from tmsopt.study.batch.engines.work import Unit, Work, attempt
+from tmsopt.study.batch.row import Row
 
 TOPIC = "tmsopt-rows"
 """Of the events that carry finished units. One for all studies: schedulers never forget a topic."""
@@ -13,6 +14,7 @@ TOPIC = "tmsopt-rows"
 COMPARED = ("tmsopt", "casadi", "numpy", "scipy")
 """Distributions whose versions decide about bits."""
 
+_MESSAGE = 0.02  # s of finished work that is worth a message of its own
 _KEPT = 4  # studies that a worker keeps the solvers of
 
 _WORKS: dict[str, Work] = {}
@@ -47,7 +49,10 @@ def receive(digest: str, blob: bytes, dask_worker: Any) -> str:
 
 
 def solve(run: str, number: int, digest: str, process: str, units: tuple[Unit, ...]) -> None:
-    """Solve units in order and send each to the scheduler when it is finished, which passes it on to the client.
+    """Solve units in order and send what is finished to the scheduler, which passes it on to the client.
+
+    What takes long is sent before the next unit begins. A message is on its way some milliseconds, so a worker that is
+    killed takes that much finished work with it.
 
     A scheduler may start a task again after it has ended a worker. This one then does nothing: the client decides what
     is tried again, where, and how often.
@@ -58,8 +63,13 @@ def solve(run: str, number: int, digest: str, process: str, units: tuple[Unit, .
     if worker.id != process:
         return
     work = _WORKS[digest]
+    done: list[tuple[Unit, Sequence[Row], float]] = []
+    sent = time.perf_counter()
     for unit in units:
         started = time.perf_counter()
         rows = attempt(work, unit)
-        seconds = time.perf_counter() - started
-        worker.log_event(TOPIC, {"run": run, "batch": number, "done": pickle.dumps((unit, rows, seconds))})
+        now = time.perf_counter()
+        done.append((unit, rows, now - started))
+        if now - sent >= _MESSAGE or unit == units[-1]:
+            worker.log_event(TOPIC, {"run": run, "batch": number, "done": pickle.dumps(done)})
+            done, sent = [], now

@@ -22,6 +22,7 @@ from tmsopt.study.batch.row import Row
 _PATIENCE = 10.0  # s for a scheduler to answer
 _LOOK = 2.0  # s between looks at who is there; news of it comes sooner as a rule
 _LATE = 2.0  # s that finished units may come after word that their batch is done
+_SENT = 0.05  # s in which a client has sent what it was told to; it complains if it is closed before
 _FAILURES = 3  # batches in a row that fail by something else than a row
 
 
@@ -37,9 +38,10 @@ def cluster(work: Work, units: Sequence[Unit], address: str, note: Note = silent
             thread or other versions.
         EngineError: the scheduler is lost, or workers cannot load the work.
     """
+    blob = pickled(work)
     client = _client(address)
+    engine = _Engine(client, address, Ledger(work, units, note), note, blob)
     try:
-        engine = _Engine(client, address, Ledger(work, units, note), note, pickled(work))
         client.subscribe_topic(TOPIC, lambda event: engine.inbox.put(("rows", event[1])))
         client.subscribe_topic("all", lambda event: engine.inbox.put(("news", event[1])))
         while engine.ledger.unfinished:
@@ -48,8 +50,10 @@ def cluster(work: Work, units: Sequence[Unit], address: str, note: Note = silent
             yield from engine.hear()
     finally:
         with suppress(Exception):  # the scheduler may be gone; where it is not, it forgets what is not started yet
+            engine.batches.clear()
             client.unsubscribe_topic(TOPIC)
             client.unsubscribe_topic("all")
+            time.sleep(_SENT)
         with suppress(Exception):
             client.close(timeout=_PATIENCE)
 
@@ -152,14 +156,16 @@ class _Engine:
                 kind, what = self.inbox.get_nowait()
 
     def _finished(self, number: int, done: bytes) -> Iterator[Row]:
-        unit, rows, seconds = pickle.loads(done)
         batch = self.batches.get(number)
-        if batch and self.ledger.delivered(batch.worker, unit, seconds):
-            self.failures = 0
-            batch.missing.discard(unit)
-            if not batch.missing:
-                del self.batches[number]
-            yield from rows
+        if batch is None:
+            return
+        for unit, rows, seconds in pickle.loads(done):
+            if self.ledger.delivered(batch.worker, unit, seconds):
+                self.failures = 0
+                batch.missing.discard(unit)
+                yield from rows
+        if not batch.missing:
+            self.batches.pop(number, None)
 
     def _over(self, batch: _Batch) -> None:
         """A task is over though not all of its units have come back."""
