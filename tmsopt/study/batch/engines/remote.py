@@ -111,8 +111,9 @@ class _Engine:
             self._admit([place for place in threads if place not in self.places.values()])
         except OSError as error:
             raise EngineError(self._lost) from error
-        for worker in {w for w, place in self.places.items() if place not in threads}:
-            self._recall(worker)
+        for worker, place in self.places.items():
+            if place not in threads:  # the news of it, which say why, are on their way
+                self.inbox.put(("gone", worker))
         for worker in {batch.worker for batch in self.batches.values() if batch.over and now - batch.over > _LATE}:
             self._recall(worker)
         if not self.places and not self.alone:
@@ -153,6 +154,8 @@ class _Engine:
                     self._over(self.batches[what])
                 elif kind == "news":
                     yield from self._news(what)
+                elif kind == "gone" and what in self.places:
+                    yield from self._died(what)
                 kind, what = self.inbox.get_nowait()
 
     def _finished(self, number: int, done: bytes) -> Iterator[Row]:
@@ -190,18 +193,22 @@ class _Engine:
                 self.note(f"worker {place} left")
                 self._recall(worker)
             else:
-                self._forget(worker)
-                yield from self.ledger.ended(worker, f"worker {place} died", "")
+                yield from self._died(worker)
+
+    def _died(self, worker: str) -> Sequence[Row]:
+        place = self._forget(worker)
+        return self.ledger.ended(worker, f"worker {place} died", "")
 
     def _recall(self, worker: str) -> None:
         """Nobody is to blame: what the worker holds waits again; if it is still there, the next look takes it in."""
         self._forget(worker)
         self.ledger.returned(worker)
 
-    def _forget(self, worker: str) -> None:
-        del self.places[worker]
+    def _forget(self, worker: str) -> str:
+        place = self.places.pop(worker)
         self.batches = {n: batch for n, batch in self.batches.items() if batch.worker != worker}
         self.looked = -_LOOK
+        return place
 
     def _admit(self, places: Sequence[str]) -> None:
         """Take in new workers: compare versions, send the work. Who ends meanwhile is left out."""
