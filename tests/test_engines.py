@@ -37,8 +37,12 @@ def address() -> Iterator[str]:
     distributed = pytest.importorskip("distributed")
     import dask
 
+    plan = {
+        "distributed.scheduler.allowed-failures": 0,
+        "distributed.deploy.lost-worker-timeout": "1 hour",  # it closes workers that happen to restart just then
+    }
     with (
-        dask.config.set({"distributed.scheduler.allowed-failures": 0, "distributed.admin.log-level": "critical"}),
+        dask.config.set(plan),
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL"
         ) as started,
