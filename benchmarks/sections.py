@@ -41,6 +41,8 @@ SECTIONS = (
     Section("d", "trace", "benchmarks.trace", "tracing, beside scipy.optimize.root and a contour"),
     Section("e", "startup", "benchmarks.startup", "start-up and import times, beside Python, NumPy and CasADi"),
     Section("f", "growth", "benchmarks.growth", "growth with free parameters, scenarios and grid points"),
+    Section("g", "arrays", "benchmarks.arrays", "expressions over grids, beside one design at a time and CasADi's map"),
+    Section("h", "tiles", "benchmarks.tiles", "charts to a folder and their parts; 1e8 designs in bounded memory"),
 )
 """In the order in which they are run."""
 
