@@ -1,25 +1,23 @@
 """The engine of many machines: a Dask cluster that somebody has started."""
 
-import asyncio
 import hashlib
 import pickle
+import threading
 import time
 import uuid
 from collections.abc import Generator, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from tmsopt.design.errors import Fault, InputError
+from tmsopt.study.batch.engines.admission import PATIENCE, admitted, check_threads, connected
 from tmsopt.study.batch.engines.ledger import Ledger
-from tmsopt.study.batch.engines.member import TOPIC, receive, solve, versions
+from tmsopt.study.batch.engines.member import TOPIC, solve
 from tmsopt.study.batch.engines.work import EngineError, Note, Unit, Work, pickled, silent
 from tmsopt.study.batch.row import Row
 
-_PATIENCE = 10.0  # s for a scheduler to answer
 _LOOK = 2.0  # s between looks at who is there; news of it comes sooner as a rule
 _LATE = 2.0  # s that finished units may come after word that their batch is done
 _SENT = 0.05  # s in which a client has sent what it was told to; it complains if it is closed before
@@ -39,7 +37,7 @@ def cluster(work: Work, units: Sequence[Unit], address: str, note: Note = silent
         EngineError: the scheduler is lost, or workers cannot load the work.
     """
     blob = pickled(work)
-    client = _client(address)
+    client = connected(address)
     engine = _Engine(client, address, Ledger(work, units, note), note, blob)
     try:
         client.subscribe_topic(TOPIC, lambda event: engine.inbox.put(("rows", event[1])))
@@ -55,7 +53,7 @@ def cluster(work: Work, units: Sequence[Unit], address: str, note: Note = silent
             client.unsubscribe_topic("all")
             time.sleep(_SENT)
         with suppress(Exception):
-            client.close(timeout=_PATIENCE)
+            client.close(timeout=PATIENCE)
 
 
 @dataclass
@@ -87,6 +85,7 @@ class _Engine:
     run: str = field(default_factory=lambda: uuid.uuid4().hex)
     inbox: SimpleQueue[tuple[str, Any]] = field(default_factory=SimpleQueue)
     places: dict[str, str] = field(default_factory=dict)  # id of a process → address
+    asked: set[str] = field(default_factory=set)  # addresses of workers that have not said yet who they are
     batches: dict[int, _Batch] = field(default_factory=dict)
     sent: int = 0
     failures: int = 0
@@ -107,18 +106,19 @@ class _Engine:
         self.looked = now
         try:
             threads: Mapping[str, int] = self.client.nthreads()
-            _one_thread(threads)
-            self._admit([place for place in threads if place not in self.places.values()])
+            check_threads(threads)
         except OSError as error:
             raise EngineError(self._lost) from error
+        for place in threads.keys() - {*self.places.values(), *self.asked}:
+            self._ask(place)
         for worker, place in self.places.items():
             if place not in threads:  # the news of it, which say why, are on their way
                 self.inbox.put(("gone", worker))
         for worker in {batch.worker for batch in self.batches.values() if batch.over and now - batch.over > _LATE}:
             self._recall(worker)
-        if not self.places and not self.alone:
+        if not self.places and not self.asked and not self.alone:
             self.note(f"no workers at {self.address}; rows wait until one joins")
-        self.alone = not self.places
+        self.alone = not self.places and not self.asked
 
     def send(self) -> None:
         """Give every worker what it should have."""
@@ -156,6 +156,8 @@ class _Engine:
                     yield from self._news(what)
                 elif kind == "gone" and what in self.places:
                     yield from self._died(what)
+                elif kind == "asked":
+                    self._answered(*what)
                 kind, what = self.inbox.get_nowait()
 
     def _finished(self, number: int, done: bytes) -> Iterator[Row]:
@@ -210,87 +212,31 @@ class _Engine:
         self.looked = -_LOOK
         return place
 
-    def _admit(self, places: Sequence[str]) -> None:
-        """Take in new workers: compare versions, send the work. Who ends meanwhile is left out."""
-        if not places:
-            return
-        mine = versions()()
-        found = self.client.run(versions(), workers=list(places), on_error="return")
-        alike = []
-        for place, theirs in found.items():
-            if isinstance(theirs, OSError):
-                continue
-            if isinstance(theirs, Exception):
-                raise _refused(f"worker {place} does not answer: {theirs!r}; it needs the same Python and packages")
-            other = [
-                f"{name} {theirs.get(name)} instead of {version}"
-                for name, version in mine.items()
-                if theirs.get(name) != version and "unknown" not in (version, theirs.get(name))
-            ]
-            if other:
-                raise _refused(
-                    f"worker {place} has {', '.join(other)}; rows are the same bits only with the same versions: "
-                    "install them there and start it again"
-                )
-            alike.append(place)
-        taken = self.client.run(receive, self.digest, self.blob, workers=alike, on_error="return")
-        for place, process in taken.items():
-            if isinstance(process, OSError):
-                continue
-            if isinstance(process, Exception):
-                raise EngineError(f"worker {place} cannot load the study: {process!r}") from process
-            self.places[process] = place
-            self.ledger.join(process)
+    def _ask(self, place: str) -> None:
+        """Ask a new worker who it is, on a thread of its own: one that ends just then takes half a minute to say so."""
+        self.asked.add(place)
+
+        def ask() -> None:
+            answer: object
+            try:
+                answer = admitted(self.client, place, self.digest, self.blob)
+            except Exception as error:  # told where it is heard
+                answer = error
+            self.inbox.put(("asked", (place, answer)))
+
+        threading.Thread(target=ask, daemon=True).start()
+
+    def _answered(self, place: str, answer: object) -> None:
+        self.asked.discard(place)
+        match answer:
+            case str():
+                self.places[answer] = place
+                self.ledger.join(answer)
+            case OSError():
+                self.looked = -_LOOK  # it is gone, or the next look asks again
+            case Exception():
+                raise answer
 
     @property
     def _lost(self) -> str:
         return f"the Dask scheduler at {self.address} is lost; rows that have come are kept, run again for the others"
-
-
-def _client(address: str) -> Any:
-    """A client of the scheduler at an address.
-
-    Whether there is one is asked before, for a `Client` that cannot connect neither gives up at once nor quietly.
-    """
-    try:
-        import distributed
-    except ImportError:
-        raise _refused('a Dask cluster needs a package that is not installed: pip install "tmsopt[cluster]"') from None
-    try:
-        with ThreadPoolExecutor(1) as thread:  # notebooks run a loop of their own in this one
-            found = thread.submit(asyncio.run, _what_answers(address)).result()
-        reason = "" if found == "Scheduler" else f"a Dask {found.lower()} does"
-    except Exception as error:  # whatever listens there may answer anything
-        reason = str(error) or type(error).__name__
-    if reason:
-        raise _refused(
-            f"no Dask scheduler answers at '{address}' ({reason}); start one with 'dask scheduler', which prints its "
-            "address, tcp://HOST:8786, and workers with 'dask worker ADDRESS --nthreads 1'"
-        )
-    connect: Any = distributed.Client
-    return connect(address, timeout=_PATIENCE, set_as_default=False)
-
-
-async def _what_answers(address: str) -> str:
-    from distributed import Security, rpc
-
-    security: Any = Security
-    connect: Any = rpc
-    with suppress(TimeoutError):
-        async with asyncio.timeout(_PATIENCE):
-            async with connect(address, connection_args=security().get_connection_args("client")) as server:
-                return str((await server.identity())["type"])
-    raise OSError(f"nothing within {_PATIENCE:.0f} s")
-
-
-def _one_thread(threads: Mapping[str, int]) -> None:
-    wrong = [f"{place} has {count}" for place, count in threads.items() if count != 1]
-    if wrong:
-        raise _refused(
-            f"workers need one thread each, two in one IPOPT crash the process; {', '.join(wrong)}: "
-            "start every worker with 'dask worker ADDRESS --nthreads 1'"
-        )
-
-
-def _refused(message: str) -> InputError:
-    return InputError([Fault(message, ("scheduler",))])
