@@ -10,6 +10,7 @@ import pytest
 from tmsopt import laws
 from tmsopt.design.family import Family
 from tmsopt.design.files import load
+from tmsopt.design.formulations import formulate
 from tmsopt.design.limit import with_limit
 from tmsopt.design.problem import Problem
 from tmsopt.design.solve import solve
@@ -114,8 +115,6 @@ def test_nothing_grows_without_end() -> None:
 
 def test_settings_reach_every_function() -> None:
     """Rows of the NLP at a point, against those of the problem's own NLP with the numbers built in."""
-    from tmsopt.design.formulations import formulate
-
     family = Family(["mu", "trail.limit"])
     for mu, limit in ((0.1, 0.02), (0.4, 0.07)):
         problem = with_fixed(
@@ -131,3 +130,49 @@ def test_settings_reach_every_function() -> None:
         for a, b in zip(shared.at(x), own.at(x), strict=True):
             np.testing.assert_allclose(np.array(a), np.array(b), rtol=1e-13, atol=1e-14)
     assert pickle.loads(pickle.dumps(problem)) == problem
+
+
+ALIKE = {
+    "a weight that is 1 at 0": (replace(EP4, minimize=None, maximize="radius"), "chi_H", (0.5, 0.0, -0.3), None),
+    "a piece that is a number": (
+        replace(
+            EP4,
+            fixed={**EP4.fixed, "chi_B": 1.4},
+            free={n: EP4.free[n] for n in ("Fr", "lambda_s")},
+            constraints={"weight": "ballast_rear <= 0.4"},
+        ),
+        "chi_B",
+        (0.8, 1.4),
+        None,
+    ),
+    "a second limit on the damping ratio": (
+        replace(EP4, minimize="Fr", constraints={"low": "damping_ratio >= 0.2", "high": "damping_ratio <= 1"}),
+        "high.limit",
+        (1.0, 0.5, 2.0),
+        None,
+    ),
+    "a damping ratio that is given": (
+        replace(EP4, minimize="Fr", constraints={"damped": "damping_ratio >= 0.5"}),
+        "damped.limit",
+        (0.5, 1.5, -1.0),
+        -1.0,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ALIKE)
+def test_a_member_has_the_rows_that_it_has_alone(name: str) -> None:
+    """Whichever member was formulated first: the same rows, limits and values at a point."""
+    problem, varied, values, ratio = ALIKE[name]
+    for order in (values, values[::-1]):
+        family = Family([varied])
+        for value in order:
+            stem = varied.removesuffix(".limit")
+            member = limited(problem, stem, value) if stem != varied else with_fixed(problem, **{varied: value})
+            shared = family.formulate(member, member.cases, ratio)
+            own = formulate(member, member.cases, damping_ratio=ratio)
+            for of in ("variables", "rows", "lower", "upper", "row_lower", "row_upper"):
+                assert getattr(shared, of) == getattr(own, of)
+            x = np.linspace(0.3, 1.2, len(own.variables))
+            for a, b in zip(shared.at(x), own.at(x), strict=True):
+                np.testing.assert_allclose(np.array(a), np.array(b), rtol=1e-12, atol=1e-13)

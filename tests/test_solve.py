@@ -397,3 +397,17 @@ def test_matching_counts_its_equations():
     assert nlp.equations == 4
     assert nlp.variables == ("Fr", "chi_B", "tan(lambda_s)", "EP4.r")
     assert backward_error([1.0, 4, 6, 4, 1], np.full(4, -1.0 + 0j)) == 0
+
+
+def test_two_limits_on_the_damping_ratio_both_hold_whichever_comes_first():
+    """The weaker of two limits changes nothing; neither does the order in which they are written."""
+    weak, strong, fast = (
+        {"weak": "damping_ratio >= 0.3"},
+        {"strong": "damping_ratio >= 0.9"},
+        {"fast": "abscissa <= -0.5"},
+    )
+    asked = ({**strong, **fast}, {**weak, **strong, **fast}, {**strong, **weak, **fast})
+    found = [tmsopt.solve(ep4_problem(minimize="Fr", constraints=constraints)) for constraints in asked]
+    for design in found:
+        assert design.quantities["damping_ratio"] == pytest.approx(0.9, abs=1e-9)
+        assert design.value == pytest.approx(found[0].value, rel=1e-10)

@@ -46,7 +46,7 @@ class Family:
         symbols = {name: ca.SX.sym(name) for name in self.varied}
         nlp = _kept(
             self._nlps,
-            (tuple(cases), damping_ratio, *_decisions(problem)),
+            (tuple(cases), damping_ratio, *_decisions(problem, self.varied)),
             lambda: formulate(problem, cases, damping_ratio=damping_ratio, settings=symbols),
         )
         return narrowed(replace(nlp, settings=tuple(_value(problem, name) for name in self.varied)), problem)
@@ -83,13 +83,14 @@ def _value(problem: Problem, name: str) -> float:
     return problem.fixed[name]
 
 
-def _decisions(problem: Problem) -> tuple[Hashable, ...]:
+def _decisions(problem: Problem, varied: Sequence[str]) -> tuple[Hashable, ...]:
     """What decides on variables and rows beside the numbers that are parameters of the NLP."""
     heavy = problem.pattern is None and demands_heavy_damping(problem)
     texts = tuple(problem.constraints.items()) if heavy else ()
     nearest = problem.pattern is not None and problem.objective is None and freedom(problem).count > 0
     box = (tuple(problem.free.items()), tuple(middle(problem).items())) if nearest else tuple(problem.free)
-    return heavy, texts, box, tuple(tempts(problem, name) for name in _pieced(problem))
+    zero = tuple(problem.fixed.get(name) == 0 for name in varied) if problem.asks_radius else ()
+    return heavy, texts, box, zero, tuple(tempts(problem, name) for name in _pieced(problem))
 
 
 def _pieced(problem: Problem) -> list[str]:

@@ -83,7 +83,7 @@ def abscissa(
     """Optimise the objective with every root quantity carried by factors, in every case; real ones if all must be."""
     build = Builder(problem, cases, settings=settings)
     if damping_ratio is not None:
-        build.shared["damping_ratio"] = ca.SX(damping_ratio)
+        build.take("damping_ratio", damping_ratio)
     elif not elastic and demands_heavy_damping(problem):
         build.real_roots()
     build.constraints()
@@ -170,9 +170,15 @@ class Builder:
         self.touches: dict[str, tuple[Touch, ...]] = {}
         self.products: list[tuple[Factor, ...]] = []
         self.shared: dict[str, Any] = {}
+        self.taken: set[str] = set()
         self.objective: Any = ca.SX(0)
         self.design = {name: self.parameter(name, *ends) for name, ends in problem.free.items()}
-        given = {n: s for n, s in self.settings.items() if n in problem.fixed}
+        # A weight is 1 where its parameter is 0, and else its size: a number that is 0 stays one.
+        given = {
+            n: s
+            for n, s in self.settings.items()
+            if problem.fixed.get(n) or (n in problem.fixed and not problem.asks_radius)
+        }
         nominal = problem.ordered({**self.design, **given})
         directed = [(k, case) for k, case in enumerate(self.cases, start=1) if case.direction]
         radius = self.variable(RADIUS, 0.0) if directed else ca.SX(0)
@@ -221,10 +227,15 @@ class Builder:
         line = any("abscissa" in expression.names for expression in asked if expression)
         lifted = lift_real_roots(self, self.covered, self.values, line)
         self.lifts.append(lifted.lift)
-        self.shared["damping_ratio"] = ca.SX(1.0)
+        self.take("damping_ratio", 1.0)
         if line:
             self.touches["abscissa"] = lifted.touches
             self.shared["abscissa"] = lifted.symbol
+
+    def take(self, name: str, value: float) -> None:
+        """A number for a root quantity; limits on it alone hold by the form of the factors, or the recheck tells."""
+        self.shared[name] = ca.SX(value)
+        self.taken.add(name)
 
     def constraints(self, without: Collection[str] = ()) -> None:
         """A row for each constraint in each case that it differs in."""
@@ -232,9 +243,8 @@ class Builder:
         for name, condition in self.problem.conditions.items():
             if name in without:
                 continue
-            alone = condition.names == ("damping_ratio",) and "damping_ratio" in self.shared
-            if alone and condition.violation({"damping_ratio": 1.0}) == 0:
-                continue  # the real roots see to it
+            if len(condition.names) == 1 and condition.names[0] in self.taken:
+                continue
             for value in self.in_each_case(condition, self.settings.get(name + LIMIT)):
                 self.row(name, value, *ends[condition.comparison])
 
@@ -322,7 +332,8 @@ class Builder:
         for piece in quantity.pieces:
             above = ca.SX(symbol - piece(values))
             # A limit that equals a constant piece would share its multiplier with it.
-            self.row(name, above, 0.0 if len(ca.symvar(above)) > 1 else -_LEEWAY, np.inf)
+            varies_with_design = any(ca.depends_on(above, x) for x in self.x if x is not symbol)
+            self.row(name, above, 0.0 if varies_with_design else -_LEEWAY, np.inf)
         return symbol
 
 

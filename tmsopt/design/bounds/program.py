@@ -80,7 +80,7 @@ class Question:
         for name, lift in carried.items():
             value = self._known(name)
             if value is not None and name not in build.shared:
-                build.shared[name] = ca.SX(value)
+                build.take(name, value)
                 build.lifts.append(lift(build, build.covered, build.values, value).lift)
         build.constraints()
         if self.limit is not None:
