@@ -199,6 +199,16 @@ def test_a_valley_that_is_overtaken_on_the_way_is_left() -> None:
     assert middle[-1] == pytest.approx(3, abs=1e-6)
 
 
+def test_a_valley_that_neither_end_knows_is_found_on_the_way_and_carried_both_ways() -> None:
+    """A third valley at Fr = 2, of least value 0.03, is the best from mu = 0.3 to 0.7 and nowhere else."""
+    third = "min((Fr - 0.5)**2 + 0.1*mu, min((Fr - 2)**2 + 0.03, (Fr - 3.5)**2 + 0.1*(1 - mu)))"
+    values = np.linspace(0.0, 1.0, 16).tolist()
+    warm = run_study(over_grid(replace(TWO, minimize=third), {"mu": values}, warm=True), workers=1).rows
+    assert sum(row.warm for row in warm) >= 10
+    for row, mu in zip(warm, values, strict=True):
+        assert row.objective == pytest.approx(min(0.1 * mu, 0.03, 0.1 * (1 - mu)), abs=1e-12)
+
+
 def test_warm_rows_are_the_same_alone_and_by_processes() -> None:
     study = over_grid(TWO, {"mu": np.linspace(0, 1, 40).tolist()}, warm=True)
     here = identities(run_study(study, workers=1).rows)

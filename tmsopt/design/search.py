@@ -76,6 +76,8 @@ def search(
     candidates: list[Candidate] = []
     if near:
         candidates.append(run.ended({**middle(problem), **near}, near=True))
+        if not exhaustive and _settled(problem, candidates):
+            return candidates
     if problem.start and len(candidates) < starts:  # the user's own
         candidates.append(run.ended(middle(problem), near=True))
     for design in designs(problem, seed, max(starts - len(candidates), 0)):

@@ -23,6 +23,9 @@ from tmsopt.study.batch.plan import Study
 from tmsopt.study.batch.row import Row
 from tmsopt.study.compare import law_rows
 
+_AFAR = 1
+"""Starts of a row beside the one near its neighbour: an optimum that neither end of a block knows is met on the way."""
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -78,21 +81,23 @@ class Solver:
         return Family([name for name in self.study.columns if name not in free])
 
     def _block(self, numbers: Sequence[int]) -> list[Answer]:
-        """Both ends from many starts, the others from their neighbours; back again where the far end is better.
+        """Both ends from many starts, the others from their neighbours and from afar; back again where that is better.
 
-        An optimum that is carried along from one end can be overtaken by another on the way: then the far end, which
-        does not know it, is better than what arrives there, and is carried back as far as it is better.
+        An optimum that is carried along can be overtaken by another on the way. The far end and the start from afar
+        that every row has may find that one; it is then carried back as far as it is better.
         """
         found = [self._answer(numbers[0])]
         for number in numbers[1:]:
-            found.append(self._answer(number, found[-1].row))
-        back = self._answer(numbers[-1])
-        for k in range(len(numbers) - 1, -1, -1):
-            if not self._better(back.row, found[k].row):
-                break
-            found[k] = back
-            if k:
-                back = self._answer(numbers[k - 1], back.row)
+            found.append(self._answer(number, found[-1].row, _AFAR))
+        end = self._answer(numbers[-1])
+        news = [_new(answer) for answer in found]
+        if self._better(end.row, found[-1].row):
+            found[-1], news[-1] = end, True
+        for k in range(len(numbers) - 2, -1, -1):
+            if news[k + 1]:
+                back = self._answer(numbers[k], found[k + 1].row)
+                if self._better(back.row, found[k].row):
+                    found[k], news[k] = back, True
         return found
 
     def _better(self, one: Row, other: Row) -> bool:
@@ -102,8 +107,8 @@ class Solver:
         sign = -1.0 if self.study.problem.sense == "maximize" else 1.0
         return sign * one.objective < sign * other.objective and not same(one.objective, other.objective)
 
-    def _answer(self, number: int, neighbour: Row | None = None) -> Answer:
-        """One row, near a neighbour's optimum if that leads to one."""
+    def _answer(self, number: int, neighbour: Row | None = None, afar: int = 0) -> Answer:
+        """One row, near a neighbour's optimum and from so many starts afar if that leads to an optimum."""
         began = time.perf_counter()
         try:
             problem = self.study.row_problem(number)
@@ -111,7 +116,7 @@ class Solver:
             solution = None
             if neighbour is not None and neighbour.status == "optimal":
                 near = {name: neighbour.parameters[name] for name in problem.free}
-                solution = solve(problem, starts=1, near=near, **options)
+                solution = solve(problem, starts=1 + afar, near=near, **options)
             warm = solution is not None and solution.status == "optimal"
             if solution is None or not warm:
                 solution = solve(problem, starts=self.study.starts, **options)
@@ -168,6 +173,12 @@ def _pools() -> ThreadpoolController:
     import scipy.linalg  # noqa: F401  # it brings its own
 
     return ThreadpoolController()
+
+
+def _new(answer: Answer) -> bool:
+    """Whether a row may have another optimum than the neighbour that it was started from."""
+    starts = answer.solution.starts if answer.solution is not None else None
+    return starts is not None and (not answer.row.warm or starts.at_best < starts.tried)
 
 
 def _cause(solution: Solution) -> str:
