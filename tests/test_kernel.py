@@ -311,6 +311,15 @@ def test_eigenvalues_give_the_factors_when_every_other_way_is_shut(monkeypatch: 
 
 
 @engines
+@pytest.mark.filterwarnings("error")
+def test_a_root_beyond_all_doubles_is_infinite_without_a_warning(compiled: bool) -> None:
+    """5e-324 (s⁴ + …) − 1e308 s³ has a root at 2e631."""
+    skip_without_numba(compiled)
+    found = abscissa_and_damping(5e-324, -1e308, 1.0, 1.0, 1.0, compiled=compiled)
+    assert found.abscissa == np.inf
+
+
+@engines
 def test_what_has_no_roots_is_nan_and_undefined(compiled: bool) -> None:
     skip_without_numba(compiled)
     a = np.ones((12, 5))

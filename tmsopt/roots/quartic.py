@@ -111,7 +111,8 @@ def abscissa_and_damping(
         rows = np.concatenate(remaining) if remaining else np.empty(0, dtype=int)
     (p1, q1, p2, q2), unit, fallbacks = hard_factors(np.stack([c[rows] for c in a]))
     late, ratio[rows] = _motion((p1, q1, p2, q2))
-    alpha[rows] = np.ldexp(late, unit)
+    with np.errstate(all="ignore"):  # a root of coefficients of very different sizes need not be a double
+        alpha[rows] = np.ldexp(late, unit)
     return Motion(alpha.reshape(shape), ratio.reshape(shape), fallbacks)
 
 
