@@ -310,7 +310,11 @@ def printed(design: tmsopt.Solution) -> Any:
     return json.loads(json.dumps(design.to_json()))
 
 
-FILES = sorted(path.stem for path in PROBLEMS.glob("*.toml") if path.stem not in (*SLOW, *NO_DESIGN))
+FILES = sorted(
+    path.stem
+    for path in PROBLEMS.glob("*.toml")
+    if path.stem not in (*SLOW, *NO_DESIGN) and not path.stem.startswith("study_")
+)
 
 
 @pytest.mark.parametrize("name", FILES)

@@ -20,11 +20,13 @@ from tmsopt import laws
 from tmsopt.cli import main
 from tmsopt.design.errors import InputError
 from tmsopt.design.files import load
+from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
 from tmsopt.design.solve import solve
 from tmsopt.models import tms
 from tmsopt.study.batch.monte_carlo import monte_carlo
 from tmsopt.study.batch.plan import Study, over_grid
+from tmsopt.study.batch.row import Row
 from tmsopt.study.batch.run import run_study
 from tmsopt.study.batch.solving import Solver, alone
 from tmsopt.study.batch.store.store import open_store, read_store
@@ -177,6 +179,41 @@ def test_rows_are_drawn_around_a_design() -> None:
     assert told.stable.count == 5
 
 
+def test_a_summary_of_rows_is_what_its_numbers_are_by_definition() -> None:
+    """Objectives 1, 2, 3 and 7, one row unstable, three not solved for causes that differ in their numbers alone or not."""
+    made = [Row(k, 0, Table(), "optimal", objective=v, abscissa=v - 6) for k, v in enumerate((2.0, 1.0, 3.0, 7.0))]
+    made += [Row(4 + k, 0, Table(), "infeasible", cause=c) for k, c in enumerate(("a by 0.1", "a by 2e-05", "b by 3"))]
+    told = summary(over_grid(EP4, {"mu": [0.1] * 7}), made)
+    assert told.spread["objective"] == (1.0, 2.5, 7.0)
+    assert told.best is made[1]
+    assert told.stable == 3
+    assert dict(told.causes) == {"a": 2, "b by 3": 1}
+    greatest = summary(over_grid(replace(EP4, minimize=None, maximize="Fr"), {"mu": [0.1]}), made)
+    assert greatest.best is made[3]
+
+
+def test_results_are_columns_and_files(tmp_path: Path) -> None:
+    found = run_study(GRID, workers=1)
+    np.testing.assert_array_equal(found.column("varied.zeta_H"), [-0.2, -0.3, -0.35] * 2)
+    np.testing.assert_array_equal(found.column("chi_B"), [row.parameters["chi_B"] for row in found.rows])
+    np.testing.assert_array_equal(found.column("report.2*Fr"), 2 * found.column("Fr"))
+    assert found.summary.counts == {"optimal": 6}
+    found.export(tmp_path / "rows.csv")
+    assert len((tmp_path / "rows.csv").read_text(encoding="utf-8").splitlines()) == 7
+    assert not any("," in name for row in found.rows for name in row.laws)
+    assert "Row(" not in repr(found)
+    with pytest.raises(InputError, match="did you mean 'chi_B'"):
+        found.column("chi_b")
+
+
+def test_calls_that_make_no_sense_are_refused() -> None:
+    with pytest.raises(InputError, match="accepted: a Study"):
+        run_study(EP4)  # type: ignore[arg-type]
+    for workers in (0, True, 1.5):
+        with pytest.raises(InputError, match="1 or more"):
+            run_study(GRID, workers=workers)  # type: ignore[arg-type]
+
+
 # Warm starts
 
 TWO = Problem(
@@ -235,6 +272,7 @@ def test_the_command_solves_stores_and_shows_rows(file: Path) -> None:
     told = json.loads(first.stdout)
     assert told["schema"] == 1
     assert told["counts"] == {"optimal": 6}
+    assert [row["number"] for row in told["table"]] == list(range(6))
     assert told["run"]["rows_solved"] == 6
     assert told["best"]["objective"] == pytest.approx(
         min(laws.w01(b, h) for b in HEIGHTS["zeta_B"] for h in HEIGHTS["zeta_H"]), rel=1e-12
@@ -270,6 +308,10 @@ def test_the_command_refuses_what_it_cannot_do(file: Path) -> None:
     assert command(file, "--export", "rows.xlsx").exit_code == 2
     assert command(file, "--store", "nowhere/s.sqlite").exit_code == 2
     assert command("absent.toml").exit_code == 2
+    both = command(file, "--row", 1, "--export", "rows.csv", "--fresh")
+    assert both.exit_code == 2
+    assert "--fresh, --export" in both.stderr
+    assert command(file, "--scheduler", "tcp://127.0.0.1:1", "--workers", 2).exit_code == 2
     assert command(file, "--workers", 1).exit_code == 0
     file.write_text(FILE.replace("mu = 0.1", "mu = 0.2"), encoding="utf-8")
     changed = command(file)

@@ -1,13 +1,26 @@
 """The command that charts stability over a plane or a space of parameters."""
 
 import re
+import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tmsopt.cli.common import FIGURES, bad_input, check_output, nominal_of, plane, progress, saving, write_json
+from tmsopt.cli.common import (
+    FIGURES,
+    INTERRUPTED,
+    bad_input,
+    check_output,
+    nominal_of,
+    plane,
+    progress,
+    saving,
+    write_json,
+)
 
 if TYPE_CHECKING:
     from tmsopt.design.problem import Problem
@@ -29,7 +42,7 @@ kind (0 undefined, 1 capsize, 2 weave, 3 stable, 4 heavily damped), abscissa, da
 memory. A name ending in chart is a folder of NumPy files for up to 1e9 designs: it is written in tiles, and the same
 command goes on where an earlier one was ended.
 
-Exit status: 0 done, 2 bad input.
+Exit status: 0 done, 2 bad input, 130 stopped by Ctrl-C.
 """
 
 _LAYERS = ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied", "margin")
@@ -115,7 +128,7 @@ def chart(
     boundaries: bool,
 ) -> None:  # fmt: skip
     """Chart stability over the free parameters of FILE: capsize, weave, stable, heavily damped."""
-    with bad_input():
+    with bad_input(), _stopped(output):
         from tmsopt.design.files import load
         from tmsopt.study.tiles import USUAL, axes_of, survey
 
@@ -144,6 +157,18 @@ def chart(
             _draw(work, found, held, boundaries, layer, plot)
 
 
+@contextmanager
+def _stopped(output: Path | None) -> Iterator[None]:
+    """What Ctrl-C leaves."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        kept = output is not None and output.suffix.lower() == ".chart" and output.exists()
+        said = f"the tiles done so far are in {output}; the same command goes on" if kept else "nothing was written"
+        click.echo(f"stopped: {said}", err=True)
+        sys.exit(INTERRUPTED)
+
+
 def _charted(
     work: "Survey", output: Path | None, fresh: bool, workers: int, boundaries: bool, update: Any
 ) -> tuple[dict[str, Any], "Chart | None"]:
@@ -156,7 +181,11 @@ def _charted(
 
     if output is not None and output.suffix.lower() == ".chart":
         try:
-            return store(work, output, workers=workers, fresh=fresh, progress=update).to_json(), None
+            there = set(output.parent.glob("*.chart"))
+            done = store(work, output, workers=workers, fresh=fresh, progress=update).to_json()
+            for aside in sorted(set(output.parent.glob("*.chart")) - there - {output}):
+                click.echo(f"moved the old folder to {aside}", err=True)
+            return done, None
         except OSError as error:
             message = f"'{output}' cannot be written: {error.strerror}; the same command will go on where it was"
             raise InputError([Fault(message, ("--output",))]) from None

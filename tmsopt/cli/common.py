@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 DONE, BAD_INPUT, INFEASIBLE, NOT_CONVERGED = 0, 2, 3, 4
 """Exit status."""
 
+INTERRUPTED = 130
+"""Exit status of long work that was stopped by Ctrl-C; what it has done is kept."""
+
 FIGURES = ("png", "pdf", "svg")
 """Endings of figure files."""
 

@@ -1,19 +1,17 @@
 """The command that solves a problem many times over."""
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tmsopt.cli.common import BAD_INPUT, bad_input, check_output, saving, write_json
+from tmsopt.cli.common import BAD_INPUT, INTERRUPTED, bad_input, check_output, saving, write_json
 
 if TYPE_CHECKING:
     from tmsopt.study.batch.plan import Study
     from tmsopt.study.batch.store.store import Store
-
-INTERRUPTED = 130
-"""Exit status of a study that was stopped; what it has solved is in its store."""
 
 _EXAMPLES = """
 \b
@@ -23,6 +21,16 @@ Examples:
   tmsopt study problems/study_sway.toml --workers 4 --export rows.csv
   tmsopt study problems/study_built.toml --json
   tmsopt study problems/study_sway.toml --scheduler tcp://host:8786
+
+FILE names a problem and what varies: title, problem = "ep4.toml" (or a table [problem]), then
+
+\b
+  [study]   method = "grid" (default), "list", "latin_hypercube", "sobol", "csv" or "monte_carlo"
+            rows = 1000 (of a sample), csv = "rows.csv", distribution = "uniform" (default) or "normal",
+            seed = 0, starts = 64 (a row, at most), warm = false, report = ["nu_H", "2*Fr_c"]
+  [vary]    mu = [0.1, 0.2], mu = { min = 0.05, max = 1, points = 20, log = true }, "lambda_s.max" = ["20 deg"],
+            "trail.limit" = [0.02, 0.05]: fixed parameters, ends of free ones, numbers of constraints
+  [tolerances]  of monte_carlo, by default those of the problem
 
 Every row goes to the store, an SQLite file, as soon as it is solved. The same command goes on where it was stopped, and
 shows the rows that are there already. A row solved again, by --row or by any engine, has the same bits.
@@ -64,6 +72,7 @@ def study(
     with bad_input():
         from tmsopt.study.batch.files import load_study
 
+        _check_together(row, scheduler, workers, {"--store": store, "--fresh": fresh, "--export": exports})
         for target in exports:
             from tmsopt.study.batch.store.export import check_export
 
@@ -93,6 +102,19 @@ def study(
         sys.exit(INTERRUPTED)
 
 
+def _check_together(row: int | None, scheduler: str | None, workers: int | None, kept: Mapping[str, object]) -> None:
+    """Refuse options that would have no effect."""
+    from tmsopt.design.errors import Fault, InputError
+
+    given = [*(name for name, value in kept.items() if value)]
+    given += [name for name, value in (("--scheduler", scheduler), ("--workers", workers)) if value is not None]
+    if row is not None and given:
+        message = f"solves one row in this process and keeps nothing; leave out {', '.join(given)}"
+        raise InputError([Fault(message, ("--row",))])
+    if scheduler is not None and workers is not None:
+        raise InputError([Fault("is for processes of this machine; leave it out with --scheduler", ("--workers",))])
+
+
 def _planned(asked: Any) -> "Study":
     """The study, with the design of a Monte Carlo one solved first."""
     from tmsopt.design.solution import NotSolved
@@ -118,9 +140,11 @@ def _filled(asked: "Study", opened: "Store", workers: int | None, scheduler: str
         click.echo(f"{present} of {len(asked)} rows are in {opened.path}", err=True)
     if present == len(asked):
         return figures
+    shown = sys.stderr.isatty()
     with tqdm(
-        total=len(asked), initial=present, desc="rows", unit="row", delay=1, disable=None, leave=False, file=sys.stderr
-    ) as bar:
+        total=len(asked), initial=present, desc="rows", unit="row", delay=1 if shown else 10,
+        mininterval=0.1 if shown else 10, leave=False, file=sys.stderr,
+    ) as bar:  # fmt: skip
 
         def update(done: int, most: int) -> None:
             bar.update(done - bar.n)
@@ -147,7 +171,7 @@ def _show(asked: "Study", opened: "Store", figures: dict[str, Any], as_json: boo
     found = summary(asked, opened.rows())
     if as_json:
         head = {"schema": 1, "title": asked.title, "model": asked.problem.model.name, "method": asked.method}
-        write_json(head | found.to_json() | {"run": figures})
+        write_json(head | found.to_json() | {"run": figures, "table": [row.to_json() for row in opened.rows()]})
         return
     click.echo(study_table(asked, found, opened.rows()))
     if figures.get("rows_solved"):

@@ -40,6 +40,7 @@ class Options:
     progress: Progress | None
     near: Mapping[str, float] | None = None
     family: Family = field(default_factory=Family)
+    alone: bool = True
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def explore(problem: Problem, side: Side, options: Options) -> Explored:
 def without_any(problem: Problem, explored: Sequence[Explored], options: Options) -> Finding:
     """No start ended feasible: the least-violating design, and what can be reached from it if it violates nothing."""
     nlp = formulate(problem, problem.cases)
-    relaxation = relax(problem, options.seed, options.linear_solver)
+    relaxation = relax(problem, options.seed, options.linear_solver, alone=options.alone)
     free = relaxation.parameters if relaxation else middle(problem)
     design = {n: min(max(free[n], lo), hi) for n, (lo, hi) in problem.free.items()}
     parameters = problem.ordered(design)

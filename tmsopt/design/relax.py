@@ -57,11 +57,16 @@ class Limit:
         return max(beyond if self.name.endswith(".max") else -beyond, 0.0)
 
 
-def relax(problem: Problem, seed: int, linear_solver: str, cases: Sequence[Case] = ()) -> Relaxation | None:
+def relax(
+    problem: Problem, seed: int, linear_solver: str, cases: Sequence[Case] = (), alone: bool = True
+) -> Relaxation | None:
     """The least relaxation: of the constraints, or of the box too where these alone cannot help; None if none is found.
 
     Amounts are added up relative to the limits as written, those of the box in its widths. One limit that can do it
     alone for less than all together shows that the search for these was caught, and wins.
+
+    Args:
+        alone: also find how far each limit of the conflict would have to give if no other does.
     """
     listed = tuple(cases) or problem.cases
     problem = replace(problem, minimize=None, maximize=None, pareto=())  # what is asked beside the limits plays no part
@@ -73,8 +78,9 @@ def relax(problem: Problem, seed: int, linear_solver: str, cases: Sequence[Case]
         trial, nlp = min(reached, key=lambda found: found[0].point.objective)
         amounts = _amounts(wide, limits, trial.parameters, nlp.cases)
         conflict = _conflict(nlp, limits, trial)
-        alone = _alone(problem, conflict, trial, linear_solver, nlp.cases) if len(conflict) > 1 else {}
-        return Relaxation(Table(trial.parameters), Table(amounts), conflict, Table(alone))
+        wanted = alone and len(conflict) > 1
+        single = _alone(problem, conflict, trial, linear_solver, nlp.cases) if wanted else {}
+        return Relaxation(Table(trial.parameters), Table(amounts), conflict, Table(single))
     return None
 
 

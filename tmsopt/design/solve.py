@@ -32,6 +32,7 @@ def solve(
     progress: Progress | None = None,
     near: Mapping[str, float] | None = None,
     family: Family | None = None,
+    alone: bool = True,
 ) -> Solution:
     """Find the best design, from several starts, and check it independently of the solver.
 
@@ -45,6 +46,7 @@ def solve(
         near: a design that may be close to the optimum, tried first; where both signs of a parameter are searched,
             only its own is.
         family: what was built for other problems that differ in numbers alone, to be used again.
+        alone: of an infeasible problem, also find how far each limit in conflict would have to give alone.
 
     Raises:
         NotSolved: carrying the best point found, when `throw`.
@@ -61,7 +63,7 @@ def solve(
     if problem.free:
         family = family or Family()
         near = near and {n: min(max(near[n], lo), hi) for n, (lo, hi) in problem.free.items()}
-        options = Options(starts, seed, exhaustive, linear_solver, progress, near, family)
+        options = Options(starts, seed, exhaustive, linear_solver, progress, near, family, alone)
         explored = [explore(problem, side, options) for side in sides(problem) if near is None or side.holds(near)]
         finding = _winner(problem, explored) or without_any(problem, explored, options)
         notes = _sides_note(problem, explored, finding)

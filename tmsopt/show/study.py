@@ -17,6 +17,7 @@ LISTED = 40
 _FIRST = 10  # rows of a longer one
 _CAUSES = 5
 _WORDS = {"not_converged": "not converged"}
+_EVALUATED = {"optimal": "feasible"}
 
 
 def study_table(study: Study, found: Summary, rows: Iterable[Row]) -> str:
@@ -35,7 +36,7 @@ def study_table(study: Study, found: Summary, rows: Iterable[Row]) -> str:
 def row_lines(row: Row) -> str:
     """One row in a line: its number, seed, what varies and how it ended."""
     given = ", ".join(f"{name} = {number(value)}" for name, value in row.varied.items())
-    parts = [f"row {row.number}: {given}", f"seed {row.seed}", _ended(row), row.cause]
+    parts = [f"row {row.number}: {given}", f"seed {row.seed}", _WORDS.get(row.status, row.status), row.cause]
     return "; ".join(part for part in parts if part)
 
 
@@ -45,7 +46,7 @@ def _headline(study: Study, found: Summary) -> str:
     if study.grid_shape is not None:
         names = " × ".join(f"{name} ({size})" for name, size in study.grid_shape.items())
     made = f"{study.method.replace('_', ' ')} over {names}: {found.rows} rows"
-    ended = ", ".join(f"{count} {_WORDS.get(status, status)}" for status, count in found.counts.items())
+    ended = ", ".join(f"{count} {_word(study, status)}" for status, count in found.counts.items())
     missing = found.rows - sum(found.counts.values())
     return f"{made}; {ended or 'none solved'}" + (f", {missing} not yet solved" if missing else "")
 
@@ -54,23 +55,23 @@ def _row_cells(study: Study, rows: Sequence[Row]) -> list[tuple[str, ...]]:
     of = study.problem.parameter_set
     free = [name for name in study.problem.free if name not in study.columns]
     text = study.problem.minimize or study.problem.maximize
-    asked = [text] if text and text != "abscissa" else []
+    asked = [text] if text and text != "abscissa" and text not in free else []
     heads = ["row", *(_head(of, n) for n in study.columns), "status", *asked, "abscissa", "structure"]
-    heads += [*(_head(of, n) for n in free), *study.report]
+    heads += [*(_head(of, n) for n in free), *(_report_head(study, text) for text in _reports(study))]
     return [tuple(heads), *(_cells(study, row, bool(asked), free) for row in rows)]
 
 
 def _cells(study: Study, row: Row, asked: bool, free: Sequence[str]) -> tuple[str, ...]:
-    known = row.status in ("optimal", "not_converged")
+    known = row.status in ("optimal", "not_converged") or (row.status == "infeasible" and not study.problem.free)
     return (
         str(row.number),
         *(_short(row.varied[n]) for n in study.columns),
-        _ended(row),
+        _word(study, row.status),
         *([_short(row.objective) if known else ""] if asked else []),
         _short(row.abscissa) if known else "",
         row.structure if known else "",
         *(_short(row.parameters[n]) if known and n in row.parameters else "" for n in free),
-        *(_short(row.reports[text]) if known and text in row.reports else "" for text in study.report),
+        *(_short(row.reports[text]) if known and text in row.reports else "" for text in _reports(study)),
     )
 
 
@@ -81,21 +82,23 @@ def _facts(study: Study, found: Summary) -> list[str]:
         lines.append(f"best: row {found.best.number}, {number(found.best.objective)} at {given}")
     same = (study.problem.minimize or "").strip() == "abscissa"
     for name, (least, median, most) in found.spread.items():
-        if same and name == "objective":
+        if (same and name == "objective") or found.product is not None:
             continue
         lines.append(f"{name}: {_short(least)} to {_short(most)}, median {_short(median)}")
+    if found.product is None:
+        lines.append(f"stable: {found.stable} of {sum(found.counts.values())} rows")
     if found.structures:
         lines.append("structures: " + ", ".join(f"{name} {count}" for name, count in found.structures.items()))
     if found.proven and study.problem.free:
         lines.append(f"proven globally by the bound: {found.proven} rows")
     if found.laws:
-        worst = ", ".join(f"{label} {value:.0e}" for label, value in sorted(found.laws.items()))
-        lines.append(f"greatest relative residual of each law, where it applies: {worst}")
+        label, value = max(found.laws.items(), key=lambda law: law[1])
+        lines.append(f"{len(found.laws)} laws apply; greatest relative residual {value:.0e} ({label})")
     if found.product is not None:
         for name in ("stable", "feasible", "good"):
             lines.append(f"{_SHARES[name]}: {_share(getattr(found.product, name))}")
         at = ", ".join(f"{100 * float(q):g} % {number(value)}" for q, value in found.product.abscissa.items())
-        lines.append(f"abscissa at most, for a share of the rows: {at}")
+        lines.append(f"abscissa at most, for a share of all rows: {at}")
     for cause, count in islice(found.causes.items(), _CAUSES):
         lines.append(f"{count} × {cause}")
     if len(found.causes) > _CAUSES:
@@ -119,8 +122,22 @@ def _head(of: ParameterSet, name: str) -> str:
     return name if stem not in of.names else with_unit(of, stem).replace(stem, name, 1)
 
 
-def _ended(row: Row) -> str:
-    return _WORDS.get(row.status, row.status)
+def _reports(study: Study) -> list[str]:
+    """What is recorded beside what has a column anyway."""
+    return [text for text in study.report if text not in ("abscissa", *study.problem.free, *study.columns)]
+
+
+def _report_head(study: Study, text: str) -> str:
+    """An expression, with its unit where it is a quantity."""
+    problem = study.problem
+    quantities = {q.name: q.unit for q in (*problem.model.quantities, *problem.parameter_set.quantities)}
+    unit = quantities.get(text.strip(), "1")
+    return text if unit == "1" else f"{text} {unit}"
+
+
+def _word(study: Study, status: str) -> str:
+    """A status in words; where nothing is free, a row is not optimal but feasible."""
+    return _WORDS.get(status, status) if study.problem.free else _EVALUATED.get(status, status)
 
 
 def _short(value: float) -> str:

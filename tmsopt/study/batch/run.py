@@ -3,10 +3,14 @@
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
+from numpy.typing import NDArray
+
+from tmsopt.design.errors import Fault, InputError, short, suggest
 from tmsopt.study.batch.definition import definition
 from tmsopt.study.batch.engines import Note, Unit, cluster, cores, in_process, processes
 from tmsopt.study.batch.engines.work import silent
@@ -15,7 +19,10 @@ from tmsopt.study.batch.neighbours import blocks
 from tmsopt.study.batch.plan import Study
 from tmsopt.study.batch.row import Row
 from tmsopt.study.batch.solving import Solver
+from tmsopt.study.batch.store.columns import columns
+from tmsopt.study.batch.store.export import export
 from tmsopt.study.batch.store.store import Store, open_store
+from tmsopt.study.batch.summary import Summary, summary
 
 _COMMIT = 0.2
 """s of rows in one transaction: what a kill may cost, and some 20 times what a transaction takes."""
@@ -36,10 +43,33 @@ class Results:
     """
 
     study: Study
-    rows: tuple[Row, ...]
+    rows: tuple[Row, ...] = field(repr=False)
     solved: int
     seconds: float
     engine: str
+
+    def column(self, name: str) -> NDArray[Any]:
+        """The values of one column, one per row, nan where a row has none: by a header of an exported file.
+
+        Fields such as ``status`` and ``abscissa``, parameters by their names, and ``varied.mu``, ``report.2*Fr``,
+        ``law.chib``, ``violation.trail``.
+
+        Raises:
+            InputError: for a name that no row has.
+        """
+        found = columns(self.rows)
+        if name not in found:
+            raise InputError([Fault(f"no column '{name}'; {suggest(name, found)}", ("column",))])
+        return found[name].values
+
+    @property
+    def summary(self) -> Summary:
+        """What the rows say together: counts, best, spread, causes, and of a Monte Carlo study its shares."""
+        return summary(self.study, self.rows)
+
+    def export(self, path: str | PathLike[str]) -> None:
+        """Write the rows to a CSV, Parquet or netCDF file; see `store.export.export`."""
+        export(self.rows, Path(path), {"definition": definition(self.study)})
 
 
 def run_study(
@@ -69,6 +99,8 @@ def run_study(
         InputError: for a store of another study, and whatever else cannot be done as asked.
         NotSolved: where a Monte Carlo study has no design to draw around.
     """
+    if faults := list(_faults(study, workers)):
+        raise InputError(faults)
     asked = planned(study)
     if store is None:
         kept: list[Row] = []
@@ -84,6 +116,17 @@ def run_study(
             asked, opened, workers=workers, scheduler=scheduler, progress=progress, note=note
         )
         return Results(asked, tuple(opened.rows()), solved, seconds, engine)
+
+
+def _faults(study: object, workers: object) -> Iterator[Fault]:
+    """What is wrong with the call."""
+    if not isinstance(study, Study | Sampling):
+        message = (
+            f"found {short(study)}; accepted: a Study, such as tmsopt.load_study(FILE) or tmsopt.over_grid(problem, …)"
+        )
+        yield Fault(message, ("study",))
+    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
+        yield Fault(f"found {workers!r}; accepted: a whole number, 1 or more", ("workers",))
 
 
 def fill(

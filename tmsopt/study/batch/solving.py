@@ -21,7 +21,7 @@ from tmsopt.models import tms
 from tmsopt.study.batch.neighbours import blocks
 from tmsopt.study.batch.plan import Study
 from tmsopt.study.batch.row import Row
-from tmsopt.study.compare import law_rows
+from tmsopt.study.compare import LawRow, law_rows
 
 _AFAR = 1
 """Starts of a row beside the one near its neighbour: an optimum that neither end of a block knows is met on the way."""
@@ -113,6 +113,7 @@ class Solver:
         try:
             problem = self.study.row_problem(number)
             options: dict[str, Any] = {"seed": self.study.seed_of(number), "throw": False, "family": self._family}
+            options["alone"] = False  # it takes longer than the rest of an infeasible row
             solution = None
             if neighbour is not None and neighbour.status == "optimal":
                 near = {name: neighbour.parameters[name] for name in problem.free}
@@ -201,4 +202,10 @@ def _laws(solution: Solution) -> Mapping[str, float]:
         return {}
     rows = [row for row in law_rows(solution) if row.applies]
     shared = Counter(row.label for row in rows)
-    return {row.label if shared[row.label] == 1 else f"{row.label} {row.subject}": row.relative for row in rows}
+    return {_law_name(row, shared[row.label] == 1): row.relative for row in rows}
+
+
+def _law_name(row: LawRow, only: bool) -> str:
+    """The label of a law, with what it is about where the label is of several; without commas, for tables."""
+    name = row.label if only else f"{row.label} {row.subject.split(',')[0]}"
+    return name.replace(",", "")

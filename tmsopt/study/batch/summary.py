@@ -5,6 +5,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
+from statistics import median
 from typing import Any
 
 from tmsopt.design.frozen import Table
@@ -12,6 +13,7 @@ from tmsopt.study.batch.plan import Study
 from tmsopt.study.batch.product import Yield, yield_of
 from tmsopt.study.batch.row import STATUSES, Row
 
+_AMOUNT = re.compile(r" by [-+\d.e]+")
 _NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")
 
 
@@ -23,9 +25,9 @@ class Summary:
         rows: in the study.
         counts: status → rows that have it.
         best: the optimal row with the best objective; None where there is none.
-        causes: cause of the first of the rows that are not optimal → rows with the same cause, numbers in it aside,
-            the commonest first.
+        causes: cause of rows that are not optimal → how many have it, numbers in it aside, the commonest first.
         spread: ``objective``, ``abscissa`` → least, median and greatest over the optimal rows.
+        stable: rows whose abscissa is below 0.
         structures: structure → optimal rows that have it, the commonest first.
         proven: rows whose bound is closed.
         warm: rows started from a neighbour's optimum.
@@ -39,6 +41,7 @@ class Summary:
     best: Row | None
     causes: Table[int]
     spread: Table[tuple[float, float, float]]
+    stable: int
     structures: Table[int]
     proven: int
     warm: int
@@ -54,6 +57,7 @@ class Summary:
             "best": None if self.best is None else self.best.to_json(),
             "causes": dict(self.causes),
             "spread": {n: dict(zip(("min", "median", "max"), ends, strict=True)) for n, ends in self.spread.items()},
+            "stable": self.stable,
             "structures": dict(self.structures),
             "proven": self.proven,
             "warm": self.warm,
@@ -80,6 +84,7 @@ def summary(study: Study, rows: Iterable[Row]) -> Summary:
         best=min(ranked, key=lambda row: sign * row.objective, default=None),
         causes=_causes(row for row in known if row.status != "optimal"),
         spread=Table({name: ends for name in ("objective", "abscissa") if (ends := _ends(name, optimal))}),
+        stable=sum(row.abscissa < 0 for row in known),
         structures=_ranked(row.structure for row in optimal),
         proven=sum(row.proven for row in known),
         warm=sum(row.warm for row in known),
@@ -93,7 +98,8 @@ def _causes(rows: Iterable[Row]) -> Table[int]:
     alike: dict[str, list[str]] = {}
     for row in rows:
         alike.setdefault(_NUMBER.sub("#", row.cause), []).append(row.cause)
-    return Table({causes[0]: len(causes) for causes in sorted(alike.values(), key=len, reverse=True)})
+    ranked = sorted(alike.values(), key=len, reverse=True)
+    return Table({causes[0] if len(causes) == 1 else _AMOUNT.sub("", causes[0]): len(causes) for causes in ranked})
 
 
 def _ranked(names: Iterable[str]) -> Table[int]:
@@ -102,4 +108,4 @@ def _ranked(names: Iterable[str]) -> Table[int]:
 
 def _ends(name: str, rows: Iterable[Row]) -> tuple[float, float, float] | None:
     values = sorted(v for v in (getattr(row, name) for row in rows) if math.isfinite(v))
-    return (values[0], values[len(values) // 2], values[-1]) if values else None
+    return (values[0], median(values), values[-1]) if values else None

@@ -43,8 +43,8 @@ def varied(problem: Problem, table: Mapping[str, Any], method: str, rows: int, s
     """The columns of a grid, a list or a sample."""
     entries = _entries(table)
     if not entries:
-        example = f"mu = {_ACCEPTED[method].split(',', maxsplit=1)[0]}"
-        return Varied([Fault(f"nothing varies; write what does under [vary], such as {example}", ("vary",))])
+        message = f"nothing varies; write what does under [vary], such as mu = {_ACCEPTED[method]}"
+        return Varied([Fault(message, ("vary",))])
     faults: list[Fault] = []
     read: dict[str, Any] = {}
     for name, (key, spec) in entries.items():

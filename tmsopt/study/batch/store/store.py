@@ -187,7 +187,8 @@ class Store:
         try:
             return unpacked(number, status, checksum, data)
         except ValueError as error:
-            advice = f"Store.forget([{number}]) removes it, and the same study solves it again"
+            command = f"sqlite3 '{self.path}' 'DELETE FROM rows WHERE number = {number}'"
+            advice = f"{command} (or Store.forget([{number}])) removes it, and the same study solves it again"
             raise refuse(self.path, f"row {number} is damaged ({error}); {advice}") from error
 
 
