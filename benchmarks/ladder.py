@@ -19,7 +19,7 @@ from tmsopt.design.bounds.lines import over
 from tmsopt.design.bounds.program import Question
 from tmsopt.design.bounds.ranges import root_bound
 from tmsopt.design.bounds.translation import FEASIBILITY, Translated, translate
-from tmsopt.design.formulations import Builder
+from tmsopt.design.builder import Builder
 from tmsopt.design.problem import Problem
 from tmsopt.models import Model
 from tmsopt.roots import product, shift

@@ -13,7 +13,8 @@ import tmsopt
 from tmsopt import laws
 from tmsopt.design.bound import omega0_bound
 from tmsopt.design.formulations import abscissa as abscissa_nlp
-from tmsopt.design.formulations import freedom, matching
+from tmsopt.design.formulations import matching
+from tmsopt.design.freedom import freedom
 from tmsopt.roots import PATTERNS, backward_error, pattern_distance, roots
 
 TMS = tmsopt.models.tms

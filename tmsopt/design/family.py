@@ -7,8 +7,10 @@ from typing import Any, TypeVar
 
 import casadi as ca
 
+from tmsopt.design.builder import LIMIT
 from tmsopt.design.cases import Case
-from tmsopt.design.formulations import LIMIT, formulate, freedom, middle
+from tmsopt.design.formulations import formulate, middle
+from tmsopt.design.freedom import freedom
 from tmsopt.design.ipopt import Run, ipopt
 from tmsopt.design.limit import limit_of
 from tmsopt.design.nlp import NLP

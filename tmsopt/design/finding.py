@@ -9,7 +9,8 @@ import numpy as np
 from tmsopt.design.branches import other_branches
 from tmsopt.design.cases import Case
 from tmsopt.design.family import Family
-from tmsopt.design.formulations import design_of, freedom
+from tmsopt.design.formulations import design_of
+from tmsopt.design.freedom import freedom
 from tmsopt.design.nlp import NLP
 from tmsopt.design.polish import Point
 from tmsopt.design.problem import Problem

@@ -9,7 +9,8 @@ import numpy as np
 
 from tmsopt.design.bound import bounded, closed, omega0_bound
 from tmsopt.design.family import Family
-from tmsopt.design.formulations import abscissa, design_of, freedom, middle
+from tmsopt.design.formulations import abscissa, design_of, middle
+from tmsopt.design.freedom import freedom
 from tmsopt.design.ipopt import Run, ipopt
 from tmsopt.design.nlp import NLP, Array
 from tmsopt.design.problem import Problem

@@ -8,7 +8,7 @@ from typing import Any
 
 from tmsopt.design.cases import Case
 from tmsopt.design.cover import Cover
-from tmsopt.design.formulations import Freedom
+from tmsopt.design.freedom import Freedom
 from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
 from tmsopt.design.proof.proof import DIGITS, Proof, prove_design

@@ -12,7 +12,7 @@ from tmsopt.design.errors import InputError
 from tmsopt.design.explore import Explored, Options, Progress, evaluated_cases, explore, without_any
 from tmsopt.design.family import Family
 from tmsopt.design.finding import Finding, better, evaluated
-from tmsopt.design.formulations import freedom
+from tmsopt.design.freedom import freedom
 from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.recheck import Checked

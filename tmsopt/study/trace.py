@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.errors import Fault, InputError, suggest
-from tmsopt.design.formulations import freedom, matching, variables_of
+from tmsopt.design.formulations import matching, variables_of
+from tmsopt.design.freedom import freedom
 from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.starts import spread

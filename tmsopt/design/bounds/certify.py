@@ -12,9 +12,9 @@ from tmsopt.design.bounds.program import Question
 from tmsopt.design.bounds.race import Crew
 from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, UNDECIDED, available
 from tmsopt.design.bounds.translation import FEASIBILITY
+from tmsopt.design.builder import Builder
 from tmsopt.design.cases import Case
 from tmsopt.design.errors import Fault, InputError
-from tmsopt.design.formulations import Builder
 from tmsopt.design.problem import Problem, checked, unasked
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.design.recheck import recheck

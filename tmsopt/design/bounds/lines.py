@@ -12,7 +12,7 @@ import numpy as np
 
 from tmsopt.design.bounds.interlace import interlace, squares_of, unknowns
 from tmsopt.design.bounds.ranges import Interval, ranges, root_bound
-from tmsopt.design.formulations import Builder
+from tmsopt.design.builder import Builder
 from tmsopt.design.lifts import Lifted, quadratic_pairs
 from tmsopt.design.nlp import Lift
 from tmsopt.models import Model, Values

@@ -12,9 +12,9 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.design.bounds.lines import Frame, bound_unknowns, compact, half_planes, over, sectors
+from tmsopt.design.builder import Builder, Lifting
 from tmsopt.design.cases import Case
 from tmsopt.design.expression import Expression
-from tmsopt.design.formulations import Builder, Lifting
 from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ROOT_NAMES
