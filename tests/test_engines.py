@@ -220,6 +220,22 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: P
 # The rules, with no workers at all
 
 
+def test_a_row_that_ended_a_worker_is_tried_again_in_no_company() -> None:
+    """Short units are sent several at a time, but none to a worker that holds a suspect."""
+    ledger = Ledger(Fake(Path()), singles(200), lambda line: None)
+    ledger.join("first")
+    while (batch := ledger.batch("first")) != () and len(batch) < 4:
+        for unit in batch:
+            ledger.delivered("first", unit, 0.001)
+    suspect = batch[0]
+    ledger.ended("first", "a worker died", "")
+    ledger.join("second")
+    assert ledger.batch("second") == (suspect,)
+    assert ledger.batch("second") == ()
+    ledger.delivered("second", suspect, 0.001)
+    assert len(ledger.batch("second")) > 1
+
+
 @pytest.mark.parametrize("seed", range(50))
 def test_every_row_is_settled_once_whatever_happens(seed: int) -> None:
     """Workers that come, deliver, end, leave and are late, in any order."""

@@ -84,6 +84,7 @@ def test_the_box_of_a_member_is_its_own() -> None:
         problem = replace(EP4, free={**EP4.free, "lambda_s": (0.02, most)})
         found = solve(problem, family=family)
         assert found.parameters["lambda_s"] == pytest.approx(most, abs=1e-12)  # the tilt of EP4 is 0.41
+        assert family.formulate(problem).upper == formulate(problem).upper
 
 
 def test_a_design_nearby_leads_to_the_same_optimum() -> None:

@@ -6,6 +6,8 @@ Roots are judged by the coefficients that they rebuild, in the longest doubles o
 
 import importlib.util
 from collections.abc import Callable
+from fractions import Fraction
+from itertools import pairwise
 from math import comb
 
 import curves
@@ -431,6 +433,40 @@ def test_classes_are_those_of_exact_arithmetic(compiled: bool) -> None:
             assert found.real_roots[k] == negative + zero + positive
             assert routh_exact(a[k].tolist()) == (code >= 3)
             assert {1: positive + zero > 0, 2: positive + zero == 0, 3: negative < 4, 4: negative == 4}[code]
+
+
+@engines
+def test_real_roots_beside_a_double_one_are_counted_exactly(compiled: bool) -> None:
+    """A double root, real or of a pair of pairs, whose coefficients are an ulp or so off: rounding cannot tell."""
+    skip_without_numba(compiled)
+    rng = np.random.default_rng(8)
+    r, b, c = rng.uniform(0.2, 2.0, (3, 200))
+    double = np.array([np.polymul([1, 2 * x, x * x], [1, y, z]) for x, y, z in zip(r, b, c, strict=True)])
+    twice = np.array([np.polymul([1, y, z], [1, y, z]) for y, z in zip(b, c, strict=True)])
+    a = np.concatenate([double, twice, np.array([np.poly([-x] * 4) for x in r])])
+    a = a * (1 + rng.integers(-2, 3, a.shape) * np.finfo(float).eps)
+    found = quartic_classes(*a.T, compiled=compiled)
+    assert found.real_roots.tolist() == [_different_real_roots(row) for row in a]
+    assert found.doubtful > len(a) / 3
+
+
+def _different_real_roots(a: np.ndarray) -> int:
+    """By the chain of Sturm in Fractions."""
+    p = [Fraction(float(x)) for x in a]
+    chain = [p, [x * (4 - k) for k, x in enumerate(p[:-1])]]
+    while True:
+        rest = list(chain[-2])
+        while len(rest) >= len(chain[-1]):
+            share = rest[0] / chain[-1][0]
+            rest = [x - share * y for x, y in zip(rest[1:], [*chain[-1][1:], *[Fraction(0)] * len(rest)], strict=False)]
+        while rest and rest[0] == 0:
+            rest = rest[1:]
+        if not rest:
+            break
+        chain.append([-x for x in rest])
+    ends = [[q[0] * (-1) ** (len(q) - 1) > 0 for q in chain], [q[0] > 0 for q in chain]]
+    left, right = (sum(x != y for x, y in pairwise(signs)) for signs in ends)
+    return left - right
 
 
 def test_both_engines_give_the_same_classes() -> None:

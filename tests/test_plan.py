@@ -615,6 +615,14 @@ def test_monte_carlo_normal(design):
     assert np.mean(np.abs(errors) < 1) == pytest.approx(0.6827 / 0.9973, abs=4 * math.sqrt(0.22 / 4000))
 
 
+def test_parameters_are_drawn_independently_of_each_other_and_of_the_row_before(design):
+    study = monte_carlo(design, 4000, 1, "normal", {"Fr": 0.3, "mu": 0.01, "chi_B": 0.02})
+    columns = np.array([np.asarray(column) for column in study.columns.values()])
+    every = np.concatenate([columns[:, 1:], columns[:, :-1]])
+    correlation = np.corrcoef(every) - np.eye(len(every))
+    assert np.abs(correlation).max() < 5 / math.sqrt(4000)  # five standard errors, for the greatest of fifteen
+
+
 def test_monte_carlo_is_reproducible_and_longer_ones_begin_alike(design):
     study = monte_carlo(design, 50, seed=1)
     assert study.columns == monte_carlo(design, 50, seed=1).columns != monte_carlo(design, 50, seed=2).columns

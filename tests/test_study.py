@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from threadpoolctl import threadpool_info
 
 from tmsopt import laws
 from tmsopt.cli import main
@@ -24,6 +25,7 @@ from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
 from tmsopt.design.solve import solve
 from tmsopt.models import tms
+from tmsopt.study.batch.definition import definition
 from tmsopt.study.batch.monte_carlo import monte_carlo
 from tmsopt.study.batch.plan import Study, over_grid
 from tmsopt.study.batch.row import Row
@@ -31,6 +33,7 @@ from tmsopt.study.batch.run import run_study
 from tmsopt.study.batch.solving import Solver, alone
 from tmsopt.study.batch.store.store import open_store, read_store
 from tmsopt.study.batch.summary import summary
+from tmsopt.study.compare import law_rows
 
 EP4 = load("problems/ep4.toml")
 HEIGHTS = {"zeta_B": [-0.4, -0.8], "zeta_H": [-0.2, -0.3, -0.35]}
@@ -261,6 +264,74 @@ def test_warm_starts_find_the_optima_of_cold_ones() -> None:
     assert any(row.warm for row in warm)
     for a, b in zip(warm, cold, strict=True):
         assert a.objective == pytest.approx(b.objective, rel=1e-10)
+
+
+def test_the_greatest_of_several_valleys_upside_down_is_kept() -> None:
+    """The same two valleys as hills: what is better follows the sense of the objective."""
+    hills = replace(TWO, minimize=None, maximize=f"-({TWO.minimize})")
+    values = np.linspace(0.0, 1.0, 16).tolist()
+    study = over_grid(hills, {"mu": values}, warm=True)
+    rows = run_study(study, workers=1).rows
+    for row, mu in zip(rows, values, strict=True):
+        assert row.objective == pytest.approx(-0.1 * min(mu, 1 - mu), abs=1e-12)
+    best = summary(study, rows).best
+    assert best is not None
+    assert best.objective == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_block_stored_in_part_is_finished_and_only_what_lacks_is_added(tmp_path: Path) -> None:
+    study = over_grid(TWO, {"mu": np.linspace(0, 1, 10).tolist()}, warm=True)
+    whole = run_study(study, workers=1).rows
+    with open_store(tmp_path / "s.sqlite", definition(study)) as store:
+        store.add(whole[:4])
+    resumed = run_study(study, tmp_path / "s.sqlite", workers=1)
+    assert resumed.solved == 6
+    assert identities(resumed.rows) == identities(whole)
+
+
+# What a row is solved with, and what is said of all
+
+
+def test_a_row_is_solved_from_its_own_seed_with_the_starts_of_the_study_on_one_thread(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Sums of several threads have other last digits, so that rows would depend on the machine."""
+    seen: list[tuple[int, int]] = []
+
+    def spied(problem: Problem, **options: Any) -> Any:
+        assert {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"} <= {1}
+        seen.append((options["seed"], options["starts"]))
+        return solve(problem, **options)
+
+    monkeypatch.setattr("tmsopt.study.batch.solving.solve", spied)
+    study = over_grid(EP4, HEIGHTS, seed=5, starts=3)
+    run_study(study, workers=1)
+    assert seen == [(study.seed_of(row), 3) for row in range(6)]
+
+
+def test_a_summary_by_hand() -> None:
+    """Rows that are made up: what they say together is known without solving anything."""
+    study = over_grid(replace(EP4, minimize=None, maximize="Fr"), {"mu": [0.1, 0.2, 0.3, 0.4]})
+    objectives, residuals = (1.0, 5.0, 2.0, 9.0), (1e-9, -1e-3, 1e-6, 0.0)
+    rows = [
+        Row(k, 0, study.varied(k), "optimal", objective=value, abscissa=-value, laws=Table({"w01": residual}))
+        for k, (value, residual) in enumerate(zip(objectives, residuals, strict=True))
+    ]
+    rows[3] = replace(rows[3], status="infeasible", laws=Table())
+    told = summary(study, rows)
+    assert told.best is rows[1]
+    assert told.spread["objective"] == (1.0, 2.0, 5.0)
+    assert told.spread["abscissa"] == (-5.0, -2.0, -1.0)
+    assert dict(told.laws) == {"w01": 1e-3}
+
+
+def test_a_row_tells_how_far_its_design_is_from_the_laws() -> None:
+    """The residuals are those that `tmsopt compare` shows, each under a label of its own."""
+    answer = alone(GRID, 4)
+    assert answer.solution is not None
+    applying = [law for law in law_rows(answer.solution) if law.applies]
+    assert sorted(answer.row.laws.values()) == sorted(law.relative for law in applying)
+    assert any(answer.row.laws.values())  # rounding leaves something to compare
 
 
 # The command

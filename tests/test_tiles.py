@@ -138,6 +138,18 @@ OSCILLATOR = Model(
 )
 
 
+def test_a_constraint_that_does_not_exist_is_not_satisfied():
+    """log(lambda_s) is no number for backward tilt, whatever the other constraints say."""
+    problem = dataclasses.replace(
+        PLANE, constraints={"one": "Fr <= 100", "log": "log(lambda_s) <= 5", "two": "Fr >= -100"}
+    )
+    asked = survey(problem, points=POINTS, layers=("satisfied", "margin"))
+    layers, _ = asked.tile(range(asked.grid.rows))
+    forward = np.broadcast_to(asked.grid.values[1][:, None] > 0, asked.grid.shape)
+    assert np.array_equal(layers["satisfied"], forward)
+    assert np.array_equal(np.isnan(layers["margin"]), ~forward)
+
+
 def test_a_model_of_another_degree(tmp_path):
     """s² + d s + k: stable where d, k > 0, heavily damped where d² > 4k too; k ≤ 0 has a root ≥ 0."""
     problem = Problem(model=OSCILLATOR, free={"d": (-1.9, 3.0), "k": (-0.4, 2.0)})
