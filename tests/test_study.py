@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -277,6 +278,24 @@ def test_the_greatest_of_several_valleys_upside_down_is_kept() -> None:
     best = summary(study, rows).best
     assert best is not None
     assert best.objective == pytest.approx(0.0, abs=1e-12)
+
+
+def test_rows_without_a_design_are_not_solved_again_on_the_way_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No design has Fr above 4: such rows are solved from many starts once each."""
+    tried: Counter[int] = Counter()
+    original = Solver._answer
+
+    def counting(self: Solver, number: int, neighbour: Row | None = None, afar: int = 0) -> Any:
+        if neighbour is None or neighbour.status != "optimal":
+            tried[number] += 1
+        return original(self, number, neighbour, afar)
+
+    monkeypatch.setattr(Solver, "_answer", counting)
+    problem = replace(TWO, constraints={"fast": "Fr >= 0"})
+    limits = {"fast.limit": [0.0, 1.0, 2.0, 5.0, 5.5, 6.0]}
+    rows = run_study(over_grid(problem, limits, warm=True), workers=1).rows
+    assert [row.status for row in rows] == ["optimal"] * 3 + ["infeasible"] * 3
+    assert dict(tried) == {0: 1, 4: 1, 5: 1}
 
 
 def test_a_block_stored_in_part_is_finished_and_only_what_lacks_is_added(tmp_path: Path) -> None:

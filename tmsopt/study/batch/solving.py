@@ -89,12 +89,12 @@ class Solver:
         found = [self._answer(numbers[0])]
         for number in numbers[1:]:
             found.append(self._answer(number, found[-1].row, _AFAR))
-        end = self._answer(numbers[-1])
+        end = self._answer(numbers[-1]) if found[-1].row.warm else found[-1]
         news = [_new(answer) for answer in found]
         if self._better(end.row, found[-1].row):
             found[-1], news[-1] = end, True
         for k in range(len(numbers) - 2, -1, -1):
-            if news[k + 1]:
+            if news[k + 1] and found[k + 1].row.status == "optimal":
                 back = self._answer(numbers[k], found[k + 1].row)
                 if self._better(back.row, found[k].row):
                     found[k], news[k] = back, True
