@@ -152,8 +152,11 @@ def _workers(wanted: bool) -> Iterator[tuple[str | None, Callable[[], list[int]]
     if not wanted:
         yield None, list
         return
+    import dask
     from distributed import LocalCluster
 
+    settings: Any = dask.config
+    settings.set({"distributed.deploy.lost-worker-timeout": "1 hour"})  # it closes workers that restart just then
     local = LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None)  # type: ignore[no-untyped-call]
     with local:
         yield local.scheduler_address, lambda: [n.pid for n in local.workers.values() if n.pid is not None]

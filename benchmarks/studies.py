@@ -197,8 +197,8 @@ def _scalings(study: Study, rounds: int) -> str:
     ]
     took = duration(time.perf_counter() - began)
     note = (
-        f"{len(study)} rows of {study.title}, from the time that every worker is at work; the best of {rounds} rounds in "
-        f"turns; {took} in all."
+        f"{len(study)} rows of {study.title}, from the time that every worker is at work; the best of {rounds} rounds "
+        f"in turns; {took} in all."
     )
     return f"### Engines\n\n{table(('engine', 'rows a second', ''), rows)}\n\n{note}"
 
