@@ -11,7 +11,7 @@ from tmsopt.design.expression import Expression, parse_comparison, parse_value
 from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTITIES, STRUCTURE
 from tmsopt.design.validate import faults, guess_parameter_set
 from tmsopt.models import Model, ParameterSet, Values
-from tmsopt.roots import PATTERNS, Pattern
+from tmsopt.roots import Pattern, pattern
 
 _POINT = 1e-12
 """Relative width below which a range is a number: a few roundings leave nothing to move in."""
@@ -102,7 +102,7 @@ class Problem:
     @property
     def pattern(self) -> Pattern | None:
         """The pattern to locate."""
-        return PATTERNS[self.locate] if self.locate else None
+        return pattern(self.locate, self.model.degree) if self.locate else None
 
     @property
     def sense(self) -> str:

@@ -15,7 +15,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
 from tmsopt.design.variation import varies
 from tmsopt.models import Values
-from tmsopt.roots import PATTERNS, Structure, exact_abscissa, pattern_distance, roots
+from tmsopt.roots import Structure, exact_abscissa, pattern_distance, roots
 
 FEASIBLE = 1e-9
 """Violation, relative to the size of the two sides, up to which a constraint counts as satisfied."""
@@ -60,10 +60,10 @@ def recheck(problem: Problem, parameters: Mapping[str, float], cases: Sequence[C
     structure = each[top]["structure"]
     if not math.isfinite(structure.abscissa):
         violations["a0"] = 1.0  # a singular mass matrix
-    if problem.locate:
-        distance = pattern_distance(PATTERNS[problem.locate], [float(c) for c in nominal.coefficients])
+    if problem.pattern is not None:
+        distance = pattern_distance(problem.pattern, [float(c) for c in nominal.coefficients])
         if not distance <= MATCHED:
-            violations[problem.locate] = distance
+            violations[problem.pattern.name] = distance
     of = problem.parameter_set
     names = [n for n in (*problem.model.quantity_names(of), "damping_ratio") if n not in problem.model.sets[0].names]
     if around is not None:

@@ -9,7 +9,8 @@ from tmsopt.design.errors import Fault, suggest
 from tmsopt.design.expression import ExpressionError, parse_comparison, parse_value
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.models import Model, ParameterSet
-from tmsopt.roots import PATTERNS
+from tmsopt.roots import pattern
+from tmsopt.roots.composed import pattern_names
 
 VARIATIONS = ("scenarios", "tolerances", "weights")
 """Tables of a problem that name parameters beside those of `fixed` and `free`."""
@@ -181,8 +182,19 @@ def _objective_faults(problem: Stated) -> Iterator[Fault]:
     if problem.pareto and (problem.minimize is not None or problem.maximize is not None):
         yield Fault("pareto beside minimize or maximize; keep one of them", key)
     yield from _pareto_faults(problem.pareto)
-    if problem.locate is not None and problem.locate not in PATTERNS:
-        yield Fault(f"unknown pattern {problem.locate!r}; {suggest(str(problem.locate), PATTERNS)}", (*key, "locate"))
+    if problem.locate is not None:
+        yield from pattern_faults(problem.locate, problem.model.degree, (*key, "locate"))
+
+
+def pattern_faults(name: Any, degree: int, key: tuple[str, ...]) -> Iterator[Fault]:
+    """What is wrong with the name of a pattern for polynomials of a degree."""
+    try:
+        if not isinstance(name, str):
+            raise ValueError(f"{name!r} is no pattern")
+        pattern(name, degree)
+    except ValueError as error:
+        joined = ", or several, joined by +" if degree > 4 else ""
+        yield Fault(f"unknown pattern: {error}; {suggest(str(name), pattern_names(degree))}{joined}", key)
 
 
 def _pareto_faults(texts: Any) -> Iterator[Fault]:

@@ -8,6 +8,9 @@ import numpy as np
 
 Formula = Callable[[Mapping[str, Any]], Any]
 
+Matrix = list[list[Any]]
+"""Rows of any numbers."""
+
 
 @dataclass(frozen=True)
 class Range:
@@ -117,6 +120,8 @@ class Model:
         quantities: derived quantities, besides the coefficients ``a0 …``.
         compact: like `polynomial`, the coefficients divided by a positive number, in few products and quotients, each
             shared by all that need it: interval arithmetic and relaxations are the tighter for it.
+        pencil: native parameters → matrices of the matrix polynomial with these roots, in descending powers: M, D, K
+            of M s² + D s + K, or I, −A.
     """
 
     name: str
@@ -127,6 +132,7 @@ class Model:
     polynomial: Callable[..., list[Any]] = field(repr=False)
     quantities: tuple[Quantity, ...] = field(default=(), repr=False)
     compact: Callable[..., list[Any]] | None = field(default=None, repr=False)
+    pencil: Callable[[Mapping[str, Any]], tuple[Matrix, ...]] | None = field(default=None, repr=False)
 
     def coefficients(self, parameters: Mapping[str, Any], of: ParameterSet | None = None) -> list[Any]:
         """Coefficients a0 … aₙ, descending, for values of any kind: floats, arrays, CasADi, balls."""

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.models.model import Model, Parameter, ParameterSet, Range
+from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Range
 from tmsopt.models.tms_equations import compact_copo, copo, matrices
 from tmsopt.models.tms_quantities import NATIVE_QUANTITIES, SI_QUANTITIES
 from tmsopt.roots.elementary import sqrt, tan
@@ -75,6 +75,14 @@ def to_si(p: Mapping[str, Any], w: Any = 1.0, m_B: Any = 1.0, g: Any = GRAVITY) 
     }
 
 
+def _pencil(p: Mapping[str, Any]) -> tuple[Matrix, ...]:
+    """M, V, P from tan λ_s alone: cos λ_s = 1/√(1 + tan² λ_s) on the open interval of tilts."""
+    T = tan(p["lambda_s"])
+    cosine = 1 / sqrt(1 + T * T)
+    dimensions = {name: p[name] for name in _NATIVE.names if name != "lambda_s"}
+    return matrices(**dimensions, sine=T * cosine, cosine=cosine)
+
+
 def _rate(p: Mapping[str, Any]) -> Any:
     return sqrt(p["g"] / p["w"])
 
@@ -107,5 +115,6 @@ tms = Model(
     polynomial=copo,
     quantities=NATIVE_QUANTITIES,
     compact=compact_copo,
+    pencil=_pencil,
 )
 """The two-mass-skate bicycle."""

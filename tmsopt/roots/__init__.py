@@ -1,6 +1,7 @@
 """Real polynomials and their roots: factored forms, stability, numeric and exact roots, multiplicity."""
 
 from tmsopt.roots.classes import CLASSES, Classes, quartic_classes, quartic_is_stable
+from tmsopt.roots.composed import pattern
 from tmsopt.roots.count import real_roots
 from tmsopt.roots.exact import exact_abscissa, exact_roots
 from tmsopt.roots.numeric import abscissa, backward_error, rebuilt, roots
@@ -30,6 +31,7 @@ __all__ = [
     "hurwitz_minors",
     "is_stable",
     "lienard_chipart",
+    "pattern",
     "pattern_distance",
     "product",
     "quadratic_pencil",

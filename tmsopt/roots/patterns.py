@@ -1,4 +1,4 @@
-"""Root patterns of a quartic as products of monic factors with unknown coefficients.
+"""Root patterns as products of monic factors with unknown coefficients, and those of a quartic by name.
 
 ``p(s) = a0 · product(factors(unknowns))`` is a smooth system in the parameters and the unknowns, regular where
 the roots themselves are not.
@@ -23,7 +23,7 @@ _NAME = "<U16"
 
 @dataclass(frozen=True)
 class Pattern:
-    """A set of quartics given by a factored form.
+    """A set of polynomials given by a factored form.
 
     Attributes:
         name: as written in a problem file.
@@ -38,6 +38,7 @@ class Pattern:
             it means nothing.
         marks: name of a more special pattern → expression of the unknowns that is 0 where it is met.
         ends: unknown → what happens where it reaches 0 and the pattern ends.
+        degree: of the polynomials.
     """
 
     name: str
@@ -51,14 +52,15 @@ class Pattern:
     test: Callable[[Sequence[Any]], Any] | None = None
     marks: Mapping[str, Callable[[Sequence[Any]], Any]] = field(default_factory=dict)
     ends: Mapping[str, str] = field(default_factory=dict)
+    degree: int = 4
 
     @property
     def codimension(self) -> int:
-        """Number of conditions on the parameters: four coefficients less the unknowns."""
-        return 4 - len(self.unknowns)
+        """Number of conditions on the parameters: monic coefficients less the unknowns."""
+        return self.degree - len(self.unknowns)
 
     def monic(self, unknowns: Sequence[Any]) -> list[Any]:
-        """The five coefficients of the product of the factors, descending from 1."""
+        """Coefficients of the product of the factors, descending from 1."""
         return product(*self.factors(unknowns))
 
     def remaining(self, unknowns: Sequence[Any]) -> list[list[Any]]:
@@ -67,10 +69,11 @@ class Pattern:
 
     def kind(self, unknowns: Sequence[Any]) -> NDArray[np.str_]:
         """Name of the pattern at each point: 2EP2 and CEP2 are one set, told apart by the sign of b² − 4c."""
-        if self.name not in ("2EP2", "CEP2"):
+        plain = self.name.removeprefix("2").removeprefix("C")
+        if self.name not in (f"2{plain}", f"C{plain}"):
             return np.full(np.shape(unknowns[0]), self.name, dtype=_NAME)
-        b, c = unknowns
-        return np.where(b * b - 4 * c >= 0, "2EP2", "CEP2").astype(_NAME)
+        b, c = unknowns[:2]
+        return np.where(b * b - 4 * c >= 0, f"2{plain}", f"C{plain}").astype(_NAME)
 
 
 def quadratic(pair: Roots) -> list[float]:
@@ -191,7 +194,7 @@ PATTERNS: Mapping[str, Pattern] = MappingProxyType(
         )
     }
 )
-"""Every pattern that ``locate`` knows, by name."""
+"""Patterns of a quartic, by name."""
 
 
 LINES: Mapping[str, Pattern] = MappingProxyType(
