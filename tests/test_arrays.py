@@ -17,8 +17,8 @@ from tmsopt.design.machine import EXACT, engine_of, machine
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import NO_RADIUS
 from tmsopt.design.tape import tape
-from tmsopt.design.walk import NotAccepted
 from tmsopt.models import Quantity, Values, tms
+from tmsopt.models.walk import NotAccepted
 from tmsopt.roots import roots
 
 try:

@@ -15,7 +15,7 @@ from tmsopt.design.bounds.ranges import BALLS, EVERYTHING, ball, interval, range
 from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, available, decide, task
 from tmsopt.design.expression import parse_value
 from tmsopt.design.nlp import NLP
-from tmsopt.design.walk import NotAccepted, walk
+from tmsopt.models.walk import NotAccepted, walk
 from tmsopt.roots import product
 
 scip = pytest.mark.skipif(not available(), reason="SCIP is not installed")

@@ -18,8 +18,8 @@ from tmsopt.design.machine import engine_of, machine
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES, NO_RADIUS, ROOT_QUANTITIES
 from tmsopt.design.tape import Tape, tape
-from tmsopt.design.walk import NotAccepted
 from tmsopt.models import Model, ParameterSet, Values
+from tmsopt.models.walk import NotAccepted
 
 Array = NDArray[np.float64]
 

@@ -158,6 +158,18 @@ def parse_value(text: str, accepted: Iterable[str]) -> Expression:
     return Expression(text, _checked_names(body, text, list(accepted)))
 
 
+def parse_formula(text: str) -> Expression:
+    """Parse an expression in names of the author's own, such as an entry of a matrix.
+
+    Raises:
+        ExpressionError: with what was found and what is accepted.
+    """
+    body = _parse(text)
+    if isinstance(body, ast.Compare):
+        raise ExpressionError(f"'{text}' is a comparison; accepted: a value, such as 'k1 + k2'")
+    return Expression(text, _checked_names(body, text, None))
+
+
 def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
     """Parse a constraint, two values joined by one of ``<= >= ==``.
 
@@ -213,9 +225,9 @@ def _parse(text: str) -> ast.expr:
 
 
 def _checked_names(  # noqa: PLR0912 - one case per kind of node
-    node: ast.expr, text: str, accepted: list[str], depth: int = 0
+    node: ast.expr, text: str, accepted: list[str] | None, depth: int = 0
 ) -> tuple[str, ...]:
-    """Names that an expression uses; raises on anything but the accepted arithmetic."""
+    """Names that an expression uses, of those accepted if these are given; raises on all but accepted arithmetic."""
     if depth > _DEEPEST:
         raise ExpressionError(f"'{text[:60]}…' is nested deeper than {_DEEPEST} levels")
 
@@ -234,7 +246,7 @@ def _checked_names(  # noqa: PLR0912 - one case per kind of node
                 return ()
             if name in FUNCTIONS:
                 raise ExpressionError(f"'{text}' names the function {name} without its argument; write {name}(…)")
-            if name not in accepted:
+            if accepted is not None and name not in accepted:
                 raise ExpressionError(f"'{text}' uses the unknown name '{name}'; {suggest(name, accepted)}")
             return (name,)
         case ast.UnaryOp(op=ast.UAdd() | ast.USub(), operand=operand):

@@ -13,6 +13,7 @@ from tmsopt.design.cases import POINTS, Band
 from tmsopt.design.errors import Fault, InputError, short, suggest
 from tmsopt.design.page import Number, Section, fitted, read_page
 from tmsopt.design.problem import Problem, unasked
+from tmsopt.design.stated_model import stated_model
 from tmsopt.design.units import with_unit
 from tmsopt.design.validate import VARIATIONS, guess_parameter_set
 from tmsopt.models import MODELS, Model
@@ -41,7 +42,7 @@ class _File(Section):
     """The shape of a problem file."""
 
     title: StrictStr = ""
-    model: StrictStr = "tms"
+    model: StrictStr | dict[str, Any] = "tms"
     parameters: dict[str, _FreeParameter | StrictFloat | StrictInt | StrictStr]
     objective: _Objective = Field(default_factory=_Objective)
     constraints: dict[str, StrictStr] = Field(default_factory=dict)
@@ -75,10 +76,8 @@ def posed(data: Mapping[str, Any], title: str, asks: bool = True) -> tuple[list[
         title: of a problem that has none.
     """
     shape_faults, parsed = fitted(data, _File, _shape_fault)
-    model = MODELS.get(str(data.get("model", "tms")))
-    if model is None:
-        name = str(data["model"])
-        shape_faults.append(Fault(f"unknown model '{name}'; {suggest(name, MODELS)}", ("model",)))
+    model_faults, model = _model(data.get("model", "tms"))
+    shape_faults += model_faults
     faults, problem = shape_faults, None
     if model is not None and parsed is not None:
         numbers = _numbers(parsed, model)
@@ -114,13 +113,26 @@ def posed(data: Mapping[str, Any], title: str, asks: bool = True) -> tuple[list[
     return faults, problem
 
 
+def _model(written: Any) -> tuple[list[Fault], Model | None]:
+    """The model of that name, or of a table that states one."""
+    if isinstance(written, dict):
+        return stated_model(written)
+    if not isinstance(written, str):
+        return [], None  # a fault of shape
+    model = MODELS.get(written)
+    unknown = f"unknown model '{written}'; {suggest(written, MODELS)}; your own goes in a table [model]"
+    return ([Fault(unknown, ("model",))] if model is None else []), model
+
+
 def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:  # noqa: PLR0911, PLR0912 - one per case
     """One pydantic complaint in the words of the problem file."""
-    tags = ("_FreeParameter", "_Band", "float", "int", "str")
+    tags = ("_FreeParameter", "_Band", "float", "int", "str", "dict[str,any]")
     key = tuple(str(k) for k in where if k not in tags)
     match key:
         case (section,) if kind == "extra_forbidden":
             return Fault(f"unknown key '{section}'; {suggest(section, _File.model_fields)}", key)
+        case ("model",):
+            return Fault(f"found {short(found)}; accepted: the name of a model in quotes, or a table [model]", key)
         case ("parameters",) if kind == "missing":
             return Fault("missing section [parameters]", key)
         case ("parameters", name, end) if kind == "extra_forbidden":

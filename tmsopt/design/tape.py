@@ -13,7 +13,8 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.design.machine import EXACT, Machine
-from tmsopt.design.walk import NotAccepted, operation_name, steps
+from tmsopt.models.arithmetic import NUMPY
+from tmsopt.models.walk import NotAccepted, operation_name, steps
 
 Shape = tuple[int, ...]
 
@@ -70,7 +71,7 @@ class Tape:
                     if node.content in given:
                         known[k] = np.asarray(given[node.content], dtype=float)[()]
                 elif all(o in known for o in node.operands):
-                    known[k] = _FORMULAS[node.operation](*(known[o] for o in node.operands))
+                    known[k] = NUMPY[node.operation](*(known[o] for o in node.operands))
         nodes = [Node(ca.OP_CONST, (), known[k]) if k in known else node for k, node in enumerate(self.nodes)]
         return _pruned(nodes, self.outputs)
 
@@ -108,7 +109,7 @@ def tape(function: ca.Function, inputs: Iterable[str], outputs: Iterable[str]) -
                 places[k] = _power(put, operands[0], operands[1], nodes[operands[1]].content)
             case operation if operation in _IN_OTHERS:
                 places[k] = _IN_OTHERS[operation](put, *operands)
-            case operation if operation in _FORMULAS:
+            case operation if operation in NUMPY:
                 places[k] = put(operation, *operands)
             case operation:
                 raise NotAccepted(operation_name(operation))
@@ -177,7 +178,7 @@ class _Run:
                 shapes.append(np.broadcast_shapes(*(shapes[o] for o in node.operands)))
                 if machine is None or node.operation not in EXACT or shapes[k] != self.shape:
                     self._compute([o for o in node.operands if self.values[o] is None])
-                    value = _FORMULAS[node.operation](*(self.values[o] for o in node.operands))
+                    value = NUMPY[node.operation](*(self.values[o] for o in node.operands))
             else:
                 shapes.append(np.shape(value))
             self.values.append(value)
@@ -206,52 +207,3 @@ class _Run:
         sources = {k: self.values[k] for k in needed if self.values[k] is not None}
         for k, array in zip(wanted, self.machine(program, sources, wanted, self.shape), strict=True):
             self.values[k] = array
-
-
-def _truth(relation: Callable[..., Any]) -> Callable[..., Any]:
-    return lambda *operands: np.where(relation(*operands), 1.0, 0.0)[()]
-
-
-_FORMULAS: Mapping[int, Callable[..., Any]] = {
-    ca.OP_ADD: np.add,
-    ca.OP_SUB: np.subtract,
-    ca.OP_MUL: np.multiply,
-    ca.OP_DIV: np.divide,
-    ca.OP_NEG: np.negative,
-    ca.OP_SQRT: np.sqrt,
-    ca.OP_FABS: np.abs,
-    ca.OP_SIGN: np.sign,
-    ca.OP_FMIN: np.minimum,  # nan where either is: CasADi's own would take the other
-    ca.OP_FMAX: np.maximum,
-    ca.OP_LT: _truth(np.less),
-    ca.OP_LE: _truth(np.less_equal),
-    ca.OP_EQ: _truth(np.equal),
-    ca.OP_NOT: _truth(np.logical_not),
-    ca.OP_AND: _truth(np.logical_and),
-    ca.OP_OR: _truth(np.logical_or),
-    ca.OP_IF_ELSE_ZERO: lambda c, x: np.where(np.not_equal(c, 0), x, 0.0)[()],
-    ca.OP_FLOOR: np.floor,
-    ca.OP_CEIL: np.ceil,
-    ca.OP_POW: np.power,
-    ca.OP_EXP: np.exp,
-    ca.OP_LOG: np.log,
-    ca.OP_LOG1P: np.log1p,
-    ca.OP_EXPM1: np.expm1,
-    ca.OP_SIN: np.sin,
-    ca.OP_COS: np.cos,
-    ca.OP_TAN: np.tan,
-    ca.OP_ASIN: np.arcsin,
-    ca.OP_ACOS: np.arccos,
-    ca.OP_ATAN: np.arctan,
-    ca.OP_ATAN2: np.arctan2,
-    ca.OP_SINH: np.sinh,
-    ca.OP_COSH: np.cosh,
-    ca.OP_TANH: np.tanh,
-    ca.OP_ASINH: np.arcsinh,
-    ca.OP_ACOSH: np.arccosh,
-    ca.OP_ATANH: np.arctanh,
-    ca.OP_FMOD: np.fmod,
-    ca.OP_HYPOT: np.hypot,
-    ca.OP_COPYSIGN: np.copysign,
-}
-"""What each operation does to arrays; the machine follows those of them that are exactly rounded."""

@@ -4,12 +4,26 @@ import copyreg
 from typing import Any
 
 from tmsopt.models.model import Model, Parameter, ParameterSet, Quantity, Range, Values
+from tmsopt.models.stated import Unfit, from_coefficients, from_matrices
 from tmsopt.models.tms import tms
 
 MODELS = {tms.name: tms}
 """Models that a problem file can name."""
 
-__all__ = ["MODELS", "Model", "Parameter", "ParameterSet", "Quantity", "Range", "Values", "named", "tms"]
+__all__ = [
+    "MODELS",
+    "Model",
+    "Parameter",
+    "ParameterSet",
+    "Quantity",
+    "Range",
+    "Unfit",
+    "Values",
+    "from_coefficients",
+    "from_matrices",
+    "named",
+    "tms",
+]
 
 
 def named(name: str) -> Model:
@@ -18,9 +32,11 @@ def named(name: str) -> Model:
 
 
 def _pickled(model: Model) -> Any:
-    """By name where it has one: in another process it is that process's own, and no copy of this."""
+    """By name or origin where it has one: in another process it is that process's own, and no copy of this."""
     if MODELS.get(model.name) is model:
         return named, (model.name,)
+    if model.origin is not None:
+        return model.origin
     return model.__reduce_ex__(2)
 
 

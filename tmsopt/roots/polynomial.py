@@ -58,6 +58,8 @@ def determinant(matrix: Sequence[Sequence[Coefficients]]) -> list[Any]:
         row = matrix[len(matrix) - len(columns)]
         total: list[Any] = [0]
         for k, j in enumerate(columns):
+            if all(isinstance(x, int) and x == 0 for x in row[j]):
+                continue
             term = product(row[j], minor(columns[:k] + columns[k + 1 :]))
             total = _sum(total, term if k % 2 == 0 else [-t for t in term])
         return total
@@ -69,3 +71,24 @@ def _sum(a: Coefficients, b: Coefficients) -> list[Any]:
     n = max(len(a), len(b))
     left, right = [0] * (n - len(a)) + list(a), [0] * (n - len(b)) + list(b)
     return [x + y for x, y in zip(left, right, strict=True)]
+
+
+def characteristic_polynomial(A: Sequence[Sequence[Any]]) -> list[Any]:
+    """Coefficients of det(s I − A), descending from 1, without division (Samuelson and Berkowitz; n⁴/4 products)."""
+    monic: list[Any] = [1]
+    for n in range(len(A)):
+        row, column = A[n][:n], [A[i][n] for i in range(n)]
+        first: list[Any] = [1, -A[n][n]]
+        for _ in range(n):
+            first.append(-_dot(row, column))
+            column = [_dot(A[i][:n], column) for i in range(n)]
+        monic = [_dot(first[k::-1], monic[: k + 1]) for k in range(n + 2)]
+    return monic
+
+
+def _dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
+    """Sum of the products of as many terms as both have."""
+    total: Any = 0
+    for x, y in zip(a, b, strict=False):
+        total = total + x * y
+    return total

@@ -22,12 +22,16 @@ def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float
 
 
 def solution_table(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> str:
-    """A design, dimensionless and in SI side by side, with its roots, bound, limits and remarks."""
-    si = si_parameters(solution, w, m_B, g)
+    """A design with its roots, bound, limits and remarks; the two-mass skate dimensionless and in SI side by side."""
     lines = [solution.problem.title or "untitled problem", _headline(solution), ""]
-    lines += [*columns(_parameter_rows(solution, si)), ""]
-    lines += [*columns(quantity_rows(solution, si)), ""]
-    lines += [pitching(solution, si), *_facts(solution)]
+    if solution.problem.model is tms:
+        si = si_parameters(solution, w, m_B, g)
+        lines += [*columns(_parameter_rows(solution, si)), ""]
+        lines += [*columns(quantity_rows(solution, si)), ""]
+        lines += [pitching(solution, si)]
+    else:
+        lines += [*columns(_own_rows(solution)), ""]
+    lines += _facts(solution)
     return "\n".join(line.rstrip() for line in lines).rstrip()
 
 
@@ -80,6 +84,21 @@ def _parameter_rows(solution: Solution, si: Mapping[str, float]) -> list[Sequenc
             rows.append((name, number(value), symbol, *_read(symbol, si), free))
     if own:
         rows += [("", "", n, *_read(n, si), _freedom(solution, n)) for n in ("w", "m_B")]
+    return rows
+
+
+def _own_rows(solution: Solution) -> list[Sequence[str]]:
+    """Parameters, then derived quantities, in the model's own units."""
+    problem = solution.problem
+    of = problem.parameter_set
+    rows: list[Sequence[str]] = []
+    for name, value in solution.parameters.items():
+        read, unit = reading(value, of[name].unit)
+        rows.append((name, number(read), "" if unit == "1" else unit, _freedom(solution, name)))
+    derived = {q.name: q.unit for q in (*problem.model.quantities, *of.quantities)}
+    for name, value in solution.quantities.items():
+        unit = derived.get(name, "1")
+        rows.append((name, number(value), "" if unit == "1" else unit, "quantity"))
     return rows
 
 

@@ -20,7 +20,7 @@ from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.design.recheck import recheck
 from tmsopt.design.solution import Bound, Solution
 from tmsopt.design.solve import solve
-from tmsopt.design.walk import NotAccepted
+from tmsopt.models.walk import NotAccepted
 
 SECONDS = 60.0
 """Time for a proof, by default."""

@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import flint
 
-from tmsopt.design.walk import Arithmetic, walk
+from tmsopt.models.walk import Arithmetic, walk
 
 Interval = tuple[float, float]
 

@@ -14,7 +14,7 @@ import flint
 from tmsopt.design.bounds.ranges import BALLS, ball, interval
 from tmsopt.design.bounds.terms import CANCELLED, Term, constant, refuse_huge, scale_of
 from tmsopt.design.nlp import NLP
-from tmsopt.design.walk import NotAccepted, walk
+from tmsopt.models.walk import NotAccepted, walk
 
 FEASIBILITY = 1e-9
 """SCIP's feasibility tolerance: rows may be off by so much."""

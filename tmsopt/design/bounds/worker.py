@@ -11,7 +11,7 @@ import threading
 from typing import IO, Any
 
 from tmsopt.design.bounds.scip import Decision, Task, decide
-from tmsopt.design.walk import NotAccepted
+from tmsopt.models.walk import NotAccepted
 
 
 def serve() -> None:

@@ -48,7 +48,7 @@ def _problem(problem: Problem) -> dict[str, Any]:
         "start": _floats(problem.start),
     }
     return {
-        "model": problem.model.name,
+        "model": problem.model.name if problem.model.statement is None else dict(problem.model.statement),
         "parameters": problem.parameter_set.name,
         "objective": {sense: text for sense, text in asked.items() if text is not None},
         **tables,

@@ -1,0 +1,267 @@
+"""Models of any system that a user states: by its matrices, or by its characteristic polynomial."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+import flint
+
+from tmsopt.models.formulas import Formulas, formulas
+from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
+from tmsopt.roots.elementary import is_ball
+from tmsopt.roots.polynomial import characteristic_polynomial, quadratic_pencil
+
+MOST = {"M": 6, "A": 12, "coefficients": 12}
+"""Largest size of M, D, K; of A; largest degree."""
+
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+"""What a name of a parameter or quantity looks like."""
+
+_GREEK = [
+    "alpha",
+    "beta",
+    "gamma",
+    "delta",
+    "epsilon",
+    "zeta",
+    "eta",
+    "theta",
+    "kappa",
+    "lambda",
+    "mu",
+    "nu",
+    "xi",
+    "pi",
+    "rho",
+    "sigma",
+    "tau",
+    "phi",
+    "chi",
+    "psi",
+    "omega",
+    "Gamma",
+    "Delta",
+    "Theta",
+    "Lambda",
+    "Xi",
+    "Pi",
+    "Sigma",
+    "Phi",
+    "Psi",
+    "Omega",
+]
+_SAMPLES = 3  # designs at which a leading coefficient must vanish to count as none
+_DIGITS = 60
+
+
+class Unfit(ValueError):
+    """A statement that makes no model.
+
+    Attributes:
+        key: the part of it that is at fault, e.g. ``M``.
+    """
+
+    def __init__(self, key: str, message: str) -> None:
+        self.key = key
+        super().__init__(f"{key}: {message}")
+
+
+def from_matrices(
+    M: Any = None,
+    D: Any = None,
+    K: Any = None,
+    *,
+    A: Any = None,
+    name: str = "stated",
+    quantities: Mapping[str, Any] | None = None,
+) -> Model:
+    """A model of M q″ + D q′ + K q = 0, or of x′ = A x, from CasADi expressions.
+
+    Args:
+        M, D, K: square, up to 6 × 6, as nested lists or SX; D left out is 0.
+        A: square, up to 12 × 12, instead of these.
+        name: one word or more for reports.
+        quantities: name → expression of the same symbols, for objectives and constraints.
+
+    The parameters are the symbols (``ca.SX.sym("k")``), in the order in which they appear.
+
+    Raises:
+        Unfit: for matrices that are not square, of different sizes or too large, or that make no polynomial.
+    """
+    if A is not None:
+        if M is not None or D is not None or K is not None:
+            raise Unfit("A", "stands beside M, D or K; give either A, or M and K with D")
+        matrices: dict[str, Matrix] = {"A": _square("A", A)}
+    else:
+        missing = [n for n, value in (("M", M), ("K", K)) if value is None]
+        if missing:
+            raise Unfit(missing[0], "is missing; give M and K (and D), or A, or coefficients")
+        matrices = {n: _square(n, value) for n, value in (("M", M), ("D", D), ("K", K)) if value is not None}
+        sizes = {n: len(rows) for n, rows in matrices.items()}
+        for n, size in sizes.items():
+            if size != sizes["M"]:
+                raise Unfit(n, f"is {size} × {size}, and M is {sizes['M']} × {sizes['M']}; give all the same size")
+    return _made("matrices", name, matrices, quantities)
+
+
+def from_coefficients(coefficients: Any, *, name: str = "stated", quantities: Mapping[str, Any] | None = None) -> Model:
+    """A model by the coefficients of its characteristic polynomial, descending, as CasADi expressions.
+
+    Raises:
+        Unfit: for fewer than two coefficients, more than 13, or a leading one that is 0.
+    """
+    row = _listed(coefficients)
+    if row is None or any(_listed(x) is not None for x in row) or not 2 <= len(row) <= MOST["coefficients"] + 1:
+        found = "no list" if row is None else f"{len(row)} entries" if row else "none"
+        raise Unfit("coefficients", f"found {found}; accepted: from 2 to {MOST['coefficients'] + 1}, descending")
+    return _made("coefficients", name, {"coefficients": [row]}, quantities)
+
+
+def _listed(value: Any) -> list[Any] | None:
+    """The entries of a list or of a CasADi vector; None for anything else."""
+    if isinstance(value, ca.SX | ca.DM):
+        return [value[k] for k in range(value.numel())] if 1 in value.shape and value.numel() > 1 else None
+    return list(value) if isinstance(value, Sequence) and not isinstance(value, str) else None
+
+
+def _square(key: str, value: Any) -> Matrix:
+    if isinstance(value, ca.SX | ca.DM):
+        rows: list[Any] = [[value[i, j] for j in range(value.shape[1])] for i in range(value.shape[0])]
+    else:
+        listed = list(value) if isinstance(value, Sequence) and not isinstance(value, str) else [None]
+        rows = [list(r) if isinstance(r, Sequence) and not isinstance(r, str) else None for r in listed]
+    if not rows or any(row is None or len(row) != len(rows) for row in rows):
+        shape = " + ".join("?" if row is None else str(len(row)) for row in rows)
+        raise Unfit(key, f"found rows of {shape or 'no'} entries; accepted: as many rows as entries in each")
+    most = MOST["A" if key == "A" else "M"]
+    if len(rows) > most:
+        raise Unfit(key, f"is {len(rows)} × {len(rows)}; accepted: up to {most} × {most}")
+    return rows
+
+
+def _made(kind: str, name: str, matrices: dict[str, Matrix], quantities: Mapping[str, Any] | None) -> Model:
+    """The model of a statement; the same object for the same statement."""
+    derived = dict(quantities or {})
+    entries = [ca.SX(x) for rows in matrices.values() for row in rows for x in row]
+    values = [ca.SX(x) for x in derived.values()]
+    if any(e.numel() != 1 for e in (*entries, *values)):
+        raise Unfit(next(iter(matrices)), "has an entry that is a matrix; accepted: scalar expressions")
+    symbols = ca.symvar(ca.vertcat(*entries, *values))
+    names = tuple(x.name() for x in symbols)
+    twice = {n for n in names if names.count(n) > 1}
+    if twice:
+        raise Unfit(next(iter(matrices)), f"has two symbols named {min(twice)}; make one and use it everywhere")
+    if not names:
+        raise Unfit(next(iter(matrices)), "names no parameter, so there is nothing to design")
+    shapes = tuple((n, len(rows), len(rows[0])) for n, rows in matrices.items())
+    function = ca.Function("stated", [ca.vertcat(*symbols)], [ca.densify(ca.vertcat(*entries, *values))])
+    return _rebuilt(kind, name, names, shapes, tuple(derived), function.serialize())
+
+
+@lru_cache(maxsize=64)
+def _rebuilt(
+    kind: str,
+    name: str,
+    names: tuple[str, ...],
+    shapes: tuple[tuple[str, int, int], ...],
+    derived: tuple[str, ...],
+    serialized: str,
+) -> Model:
+    """A model from plain data; in each process there is one of each."""
+    entry = Formulas(names, ca.Function.deserialize(serialized))
+    count = sum(rows * columns for _, rows, columns in shapes)
+    symbols = {n: ca.SX.sym(n) for n in names}
+    written = [ca.SX(e) for e in entry(symbols)]
+    zero = [e.is_zero() for e in written]
+
+    def blocks(values: Mapping[str, Any]) -> dict[str, Matrix]:
+        found = [0 if zero[k] else x for k, x in enumerate(entry(values)[:count])]
+        taken, at = {}, 0
+        for n, rows, columns in shapes:
+            taken[n] = [found[at + i * columns : at + (i + 1) * columns] for i in range(rows)]
+            at += rows * columns
+        return taken
+
+    def every(values: Mapping[str, Any]) -> list[Any]:
+        return _polynomial(kind, blocks(values))
+
+    lost = _vanishing(every, names)
+    if lost is None:
+        raise Unfit(shapes[0][0], "makes a polynomial without a root that depends on s")
+    quick = formulas(every(symbols)[lost:], names)
+
+    def coefficients(**values: Any) -> list[Any]:
+        # The determinant of the entries themselves where numbers are exact: CasADi folds constants as doubles.
+        return every(values)[lost:] if any(map(is_ball, values.values())) else quick(values)
+
+    of = ParameterSet("stated", tuple(Parameter(n, "1", "parameter", latex(n)) for n in names), native=dict)
+    made = Model(
+        name=name,
+        title=name,
+        degree=len(written[:count]) - 1 - lost if kind == "coefficients" else _degree(shapes) - lost,
+        sets=(of,),
+        algebraic=dict,
+        polynomial=coefficients,
+        quantities=tuple(
+            Quantity(n, "1", "quantity", latex(n), _quantity(formulas([written[count + k]], names)))
+            for k, n in enumerate(derived)
+        ),
+        pencil=None if kind == "coefficients" else lambda values: _pencil(blocks(values)),
+    )
+    origin = (_rebuilt, (kind, name, names, shapes, derived, serialized))
+    statement = {"kind": kind, "parameters": list(names), "entries": [str(e) for e in written]}
+    return replace(made, origin=origin, statement=statement)
+
+
+def _degree(shapes: Sequence[tuple[str, int, int]]) -> int:
+    key, size, _ = shapes[0]
+    return size if key == "A" else 2 * size
+
+
+def _quantity(formula: Formulas) -> Any:
+    def value(values: Mapping[str, Any]) -> Any:
+        return formula(values)[0]
+
+    return value
+
+
+def _polynomial(kind: str, blocks: dict[str, Matrix]) -> list[Any]:
+    if kind == "coefficients":
+        return blocks["coefficients"][0]
+    if "A" in blocks:
+        return characteristic_polynomial(blocks["A"])
+    M, K = blocks["M"], blocks["K"]
+    return quadratic_pencil(M, blocks.get("D") or [[0] * len(M) for _ in M], K)
+
+
+def _pencil(blocks: dict[str, Matrix]) -> tuple[Matrix, ...]:
+    if "A" in blocks:
+        A = blocks["A"]
+        return [[int(i == j) for j in range(len(A))] for i in range(len(A))], [[-x for x in row] for row in A]
+    M = blocks["M"]
+    return M, blocks.get("D") or [[0] * len(M) for _ in M], blocks["K"]
+
+
+def _vanishing(polynomial: Any, names: Sequence[str]) -> int | None:
+    """Number of leading coefficients that are 0 for all parameters, as of a singular M; None if all but the last are.
+
+    Decided in balls of 60 digits at a few designs, where a formula that is not 0 is not.
+    """
+    with flint.ctx.workdps(_DIGITS):
+        samples = [
+            polynomial({n: flint.fmpq(7 + 3 * k + 5 * i, 4 + k + 2 * i) for k, n in enumerate(names)})
+            for i in range(_SAMPLES)
+        ]
+        zero = [all(flint.arb(row[k]).contains(0) for row in samples) for k in range(len(samples[0]) - 1)]
+    return next((k for k, z in enumerate(zero) if not z), None)
+
+
+def latex(name: str) -> str:
+    """A name as a symbol: ``mu_1`` and ``mu1`` as μ with an index."""
+    parts = re.fullmatch(r"([A-Za-z]+?)_?(\d*|(?<=_).*)", name)
+    head, index = (parts[1], parts[2]) if parts else (name, "")
+    symbol = f"\\{head}" if head in _GREEK else head if len(head) == 1 else rf"\mathrm{{{head}}}"
+    return f"{symbol}_{{{index}}}" if index else symbol
