@@ -14,6 +14,7 @@ from tmsopt.design.lifts import Lifted, lift_abscissa, lift_damping_ratio, lift_
 from tmsopt.design.nlp import NLP, Factor, Lift, Touch
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_QUANTITIES
+from tmsopt.design.scale import scale_of
 from tmsopt.design.variation import tempts, varies
 from tmsopt.models import Quantity, Values
 from tmsopt.roots import Pattern
@@ -68,11 +69,20 @@ class Builder:
         radius = self.variable(RADIUS, 0.0) if directed else ca.SX(0)
         varied = [case.applied(nominal, radius, problem.weights) for case in self.cases]
         self.values = [self.derived(k, parameters) for k, parameters in enumerate([nominal, *varied])]
-        self.a = self.values[0].coefficients
+        self.scale = scale_of(problem)
+        self.a = self.polynomial(0)
         self.covered = [k for k, case in enumerate(self.cases, start=1) if not case.direction] or [0]
         if directed:
             self.lifts.append(lift_radius(self, radius, directed, self.values))
             self.shared[RADIUS] = radius
+
+    @property
+    def unit(self) -> float:
+        return self.scale.unit
+
+    def polynomial(self, case: int) -> list[Any]:
+        """Coefficients in one case, near 1 as roots and mass matrices go."""
+        return self.scale.scaled(self.values[case].coefficients)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -156,7 +166,7 @@ class Builder:
         unknowns = [self.variable(f"{pattern.name}.{u}") for u in pattern.unknowns]
         self.lifts.append(Lift(pattern.name, len(unknowns), lambda v, z: pattern.guesses(z[0])))
         if pattern.abscissa is not None and self.covered == [0]:
-            self.shared["abscissa"] = pattern.abscissa(unknowns)
+            self.shared["abscissa"] = self.unit * pattern.abscissa(unknowns)
         matched = [self.a[0] * c for c in pattern.monic(unknowns)]
         if freedom(self.problem).count >= 0:
             self.equal(pattern.name, self.a, matched)
@@ -192,6 +202,7 @@ class Builder:
             products=tuple(self.products),
             exact=bool(self.products) and formulation == "abscissa",
             settings=(np.nan,) * len(self.settings),
+            unit=self.unit,
         )
 
     def _lift(self, case: int, quantity: Quantity, values: Values) -> Any:

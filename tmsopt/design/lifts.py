@@ -26,6 +26,13 @@ class Rows(Protocol):
     def equal(self, name: str, left: Sequence[Any], right: Sequence[Any]) -> None:
         """Equations between coefficient lists."""
 
+    def polynomial(self, case: int) -> list[Any]:
+        """Coefficients in one case, in the NLP's own unit of the roots."""
+
+    @property
+    def unit(self) -> float:
+        """The NLP's own unit of the roots."""
+
     @property
     def size(self) -> tuple[int, int]:
         """Number of variables and rows so far."""
@@ -44,45 +51,55 @@ class Lifted:
 def lift_abscissa(build: Rows, covered: Sequence[int], values: Sequence[Values]) -> Lifted:
     """γ with p(t + γ) = a0 ∏ (t² + βᵢ t + κᵢ), βᵢ, κᵢ ≥ 0, in every case: at or right of every root.
 
-    Some β₁ = 0 or κ₁ = 0 puts a root on the line Re s = γ.
+    An odd degree has one factor t + δ, δ ≥ 0, more. Some β = 0, κ = 0 or δ = 0 puts a root on the line Re s = γ.
     """
     gamma = build.variable("abscissa")
     touches: list[Touch] = []
     products: list[tuple[Factor, ...]] = []
     for case in covered:
-        a, pairs, factors = values[case].coefficients, [], []
+        a, monic, factors = build.polynomial(case), [], []
         for k in range(1, (len(a) - 1) // 2 + 1):
             at = build.size[0]
             factors.append(Factor(at, squared=False))
-            pairs.append((build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)))
+            monic.append([1, build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)])
             touches.append(Touch(partial(_pair_distance, at), variable=at))
             touches.append(Touch(partial(_real_distance, at), variable=at + 1))
-        build.equal("abscissa", shift(a, gamma), [a[0] * c for c in product(*([1, *p] for p in pairs))])
+        if len(a) % 2 == 0:
+            at = build.size[0]
+            factors.append(Factor(at, linear=True))
+            monic.append([1, build.variable(f"delta.{case}", 0.0)])
+            touches.append(Touch(partial(_step_distance, at), variable=at))
+        build.equal("abscissa", shift(a, gamma), [a[0] * c for c in product(*monic)])
         products.append(tuple(factors))
     guess = partial(_abscissa_guess, covered)
-    return Lifted(gamma, Lift("abscissa", 1 + len(touches), guess), tuple(touches), tuple(products))
+    return Lifted(build.unit * gamma, Lift("abscissa", 1 + len(touches), guess), tuple(touches), tuple(products))
 
 
 def lift_damping_ratio(build: Rows, covered: Sequence[int], values: Sequence[Values]) -> Lifted:
     """ζ with p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ, in every case: at or below every damping ratio.
 
-    pᵢ = 2 ζ wᵢ puts a pair on the edge of the sector.
+    pᵢ = 2 ζ wᵢ puts a pair on the edge of the sector. An odd degree has one factor s + d, d ≥ 0, more.
     """
     zeta = build.variable("damping_ratio", -1.0, 1.0)
     touches: list[Touch] = []
     products: list[tuple[Factor, ...]] = []
     for case in covered:
-        a, pairs, factors = values[case].coefficients, [], []
+        a, monic, factors = build.polynomial(case), [], []
         for k in range(1, (len(a) - 1) // 2 + 1):
             at, row = build.size
             factors.append(Factor(at, squared=True))
-            pairs.append((build.variable(f"p{k}.{case}"), build.variable(f"w{k}.{case}", 0.0)))
-            build.row("damping_ratio", pairs[-1][0] - 2 * zeta * pairs[-1][1], 0.0, np.inf)
+            p, w = build.variable(f"p{k}.{case}"), build.variable(f"w{k}.{case}", 0.0)
+            monic.append([1, p, w * w])
+            build.row("damping_ratio", p - 2 * zeta * w, 0.0, np.inf)
             touches.append(Touch(partial(_sector_distance, at), row=row))
-        build.equal("damping_ratio", a, [a[0] * c for c in product(*([1, p, w * w] for p, w in pairs))])
+        if len(a) % 2 == 0:
+            factors.append(Factor(build.size[0], linear=True))
+            monic.append([1, build.variable(f"d.{case}", 0.0)])
+        build.equal("damping_ratio", a, [a[0] * c for c in product(*monic)])
         products.append(tuple(factors))
+    size = 1 + sum(len(values[case].coefficients) - 1 for case in covered)
     guess = partial(_damping_guess, covered)
-    return Lifted(zeta, Lift("damping_ratio", 1 + 2 * len(touches), guess), tuple(touches), tuple(products))
+    return Lifted(zeta, Lift("damping_ratio", size, guess), tuple(touches), tuple(products))
 
 
 def lift_real_roots(build: Rows, covered: Sequence[int], values: Sequence[Values], line: bool) -> Lifted:
@@ -94,26 +111,30 @@ def lift_real_roots(build: Rows, covered: Sequence[int], values: Sequence[Values
     gamma = build.variable("abscissa", upper=0.0) if line else 0.0
     touches: list[Touch] = []
     for case in covered:
-        a = values[case].coefficients
+        a = build.polynomial(case)
         at = build.size[0]
         steps = [build.variable(f"d{k}.{case}", 0.0) for k in range(1, len(a))]
         touches.append(Touch(partial(_step_distance, at), variable=at))
         distances = [sum(steps[:k], 0) for k in range(1, len(a))]
         build.equal("abscissa", shift(a, gamma), [a[0] * c for c in product(*([1, d] for d in distances))])
     size = int(line) + sum(len(values[case].coefficients) - 1 for case in covered)
-    return Lifted(gamma, Lift("abscissa", size, partial(_real_guess, covered, line)), tuple(touches), ())
+    return Lifted(build.unit * gamma, Lift("abscissa", size, partial(_real_guess, covered, line)), tuple(touches), ())
 
 
 def lift_radius(build: Rows, radius: Any, directions: Sequence[tuple[int, Case]], values: Sequence[Values]) -> Lift:
     """Stability at the distance `radius` in the given directions: p = a0 ∏ (s² + βᵢ s + κᵢ) at each, a0 of one sign."""
     size = 0
     for case, _ in directions:
-        a, pairs = values[case].coefficients, []
-        for k in range(1, (len(a) - 1) // 2 + 1):
-            pairs.append((build.variable(f"b{k}.{case}", 0.0), build.variable(f"c{k}.{case}", 0.0)))
-            size += 2
-        build.row("radius", a[0] * values[0].coefficients[0], 0.0, np.inf)
-        build.equal("radius", a, [a[0] * c for c in product(*([1, *p] for p in pairs))])
+        a = build.polynomial(case)
+        monic = [
+            [1, build.variable(f"b{k}.{case}", 0.0), build.variable(f"c{k}.{case}", 0.0)]
+            for k in range(1, (len(a) - 1) // 2 + 1)
+        ]
+        if len(a) % 2 == 0:
+            monic.append([1, build.variable(f"b.{case}", 0.0)])
+        size += len(a) - 1
+        build.row("radius", a[0] * build.polynomial(0)[0], 0.0, np.inf)
+        build.equal("radius", a, [a[0] * c for c in product(*monic)])
     return Lift("radius", 1 + size, partial(_radius_guess, [case for case, _ in directions]))
 
 
@@ -154,20 +175,30 @@ def _finite(value: Any) -> float:
 
 
 def quadratic_pairs(z: Roots) -> list[Roots]:
-    """Roots two by two: conjugates together, nearly equal real ones together, then real neighbours."""
+    """Roots two by two: conjugates together, nearly equal real ones together, then real neighbours.
+
+    Of an odd number, one real root comes last and alone: the leftmost of those that are not nearly equal.
+    """
     pairs, real = [z[k : k + 2] for k in range(0, len(z) - 1, 2) if z[k].imag], np.sort(z[z.imag == 0].real)
-    while len(real) > 2:
+    alone = real[:0]
+    while len(real) > 1:
         gaps = np.diff(real)
         k = int(np.argmin(gaps))
-        k = k if gaps[k] <= _DOUBLE * np.abs(z).max() else 0
+        if gaps[k] > _DOUBLE * np.abs(z).max():
+            if len(real) % 2:
+                alone, real = real[:1], real[1:]
+                continue
+            k = 0
         pairs.append(real[k : k + 2].astype(complex))
         real = np.delete(real, [k, k + 1])
-    return [*pairs, *([real.astype(complex)] if len(real) else [])]
+    lone = real if len(real) else alone
+    return [*pairs, *([lone.astype(complex)] if len(lone) else [])]
 
 
 def _factors(z: Roots, gamma: float) -> list[float]:
-    """β and κ of the factors about the line Re s = γ."""
-    return [float(c) for pair in quadratic_pairs(z) for c in (-(pair - gamma).sum().real, (pair - gamma).prod().real)]
+    """β and κ of the factors about the line Re s = γ; δ of a linear one."""
+    pairs = [pair - gamma for pair in quadratic_pairs(z)]
+    return [float(c) for pair in pairs for c in (-pair.sum().real, pair.prod().real)[: len(pair)]]
 
 
 def _abscissa_guess(covered: Sequence[int], values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
@@ -192,7 +223,7 @@ def _damping_guess(covered: Sequence[int], values: Sequence[Values], z: Sequence
         float(c)
         for case in covered
         for pair in quadratic_pairs(z[case])
-        for c in (-pair.sum().real, np.sqrt(abs(pair.prod().real)))
+        for c in (-pair.sum().real, np.sqrt(abs(pair.prod().real)))[: len(pair)]
     ]
     return [[min(max(ratio - 0.05, -0.95), 0.95), *factors]]
 

@@ -46,20 +46,24 @@ class Touch:
 
 @dataclass(frozen=True)
 class Factor:
-    """Where an NLP keeps a factor t² + βt + κ, or s² + ps + w².
+    """Where an NLP keeps a factor t² + βt + κ, or s² + ps + w², or t + δ.
 
     Attributes:
         squared: whether the second variable is w, not its square.
+        linear: whether there is no second one.
     """
 
     first: int
-    squared: bool
+    squared: bool = False
+    linear: bool = False
 
-    def real_roots(self, x: Array) -> tuple[float, float] | None:
-        """Both roots, the smaller first; None for a complex pair."""
+    def real_roots(self, x: Array) -> tuple[float, ...]:
+        """Its real roots, the smaller first; none of a complex pair."""
+        if self.linear:
+            return (-float(x[self.first]),)
         half, q = -x[self.first] / 2, x[self.first + 1]
         rest = half * half - (q * q if self.squared else q)
-        return (float(half - np.sqrt(rest)), float(half + np.sqrt(rest))) if rest >= 0 else None
+        return (float(half - np.sqrt(rest)), float(half + np.sqrt(rest))) if rest >= 0 else ()
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,7 @@ class NLP:
         products: the factors of each polynomial.
         exact: whether starts satisfy the equations of all cases.
         settings: values of the numbers p that differ between the problems of a family.
+        unit: of the roots in its variables.
     """
 
     formulation: str
@@ -93,6 +98,7 @@ class NLP:
     products: tuple[tuple[Factor, ...], ...] = field(repr=False, default=())
     exact: bool = False
     settings: tuple[float, ...] = ()
+    unit: float = 1.0
 
     def at(self, x: Any, settings: Any = None) -> Any:
         """f and g for numbers or CasADi expressions; with the NLP's own settings unless others are given."""
@@ -123,10 +129,11 @@ class NLP:
         with both of it in one factor, the way is open.
         """
         for factors in self.products:
-            pairs = [pair for factor in factors if (pair := factor.real_roots(x)) is not None]
-            for one, other in combinations(pairs, 2):
+            real = [found for factor in factors if (found := factor.real_roots(x))]
+            for one, other in combinations(real, 2):
                 near = _TANGLED * (1 + max(map(abs, (*one, *other))))
                 shared = min(abs(r - t) for r in one for t in other) <= near
-                if shared and min(one[1] - one[0], other[1] - other[0]) > near:
+                double = any(len(pair) == 2 and pair[1] - pair[0] <= near for pair in (one, other))
+                if shared and not double:
                     return True
         return False

@@ -164,7 +164,7 @@ def _spurious(problem: Problem, nlp: NLP, run: Run) -> bool:
     if np.any(a[:, 0] == 0):
         return True
     z = roots(a)
-    claimed = run.x[nlp.variables.index("abscissa")]
+    claimed = run.x[nlp.variables.index("abscissa")] * nlp.unit
     return bool(np.any(claimed < z.real.max(axis=1) - _SCATTER * np.abs(z).max(axis=1)))
 
 

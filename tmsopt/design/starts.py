@@ -80,7 +80,7 @@ def complete(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Array:
     varied = (case.applied(nominal, radius, problem.weights) for case in nlp.cases)
     values = [problem.values(parameters) for parameters in (nominal, *varied)]
     values[0].define(RADIUS, radius)
-    z = list(roots(regular(np.array([[float(c) for c in v.coefficients] for v in values]))))
+    z = list(roots(regular(np.array([[float(c) for c in v.coefficients] for v in values]))) / nlp.unit)
     x = variables_of(problem, design)
     for lift in nlp.lifts:
         guesses = lift.guess(values, z) or [[0.0] * lift.size]

@@ -122,6 +122,7 @@ class Model:
             shared by all that need it: interval arithmetic and relaxations are the tighter for it.
         pencil: native parameters → matrices of the matrix polynomial with these roots, in descending powers: M, D, K
             of M s² + D s + K, or I, −A.
+        natural: whether coefficients and roots are near 1 in the model's own units.
         origin: a function and its arguments, plain data, that make this model again in another process.
         statement: of a model that a user states, plain data that tell it from others.
     """
@@ -135,6 +136,7 @@ class Model:
     quantities: tuple[Quantity, ...] = field(default=(), repr=False)
     compact: Callable[..., list[Any]] | None = field(default=None, repr=False)
     pencil: Callable[[Mapping[str, Any]], tuple[Matrix, ...]] | None = field(default=None, repr=False)
+    natural: bool = False
     origin: tuple[Callable[..., "Model"], tuple[Any, ...]] | None = field(default=None, repr=False)
     statement: Mapping[str, Any] | None = field(default=None, repr=False)
 

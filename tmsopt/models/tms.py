@@ -116,5 +116,6 @@ tms = Model(
     quantities=NATIVE_QUANTITIES,
     compact=compact_copo,
     pencil=_pencil,
+    natural=True,
 )
 """The two-mass-skate bicycle."""
