@@ -7,6 +7,7 @@ if TYPE_CHECKING:
     from tmsopt import laws, models, roots
     from tmsopt.design.bounds.certify import certify
     from tmsopt.design.errors import InputError
+    from tmsopt.design.every import Every, solve_all
     from tmsopt.design.files import load
     from tmsopt.design.nearest import Nearest, Robustness, nearest, robustness
     from tmsopt.design.problem import Problem
@@ -38,6 +39,7 @@ __all__ = [
     "Chart",
     "Comparison",
     "Domain",
+    "Every",
     "Explanation",
     "Front",
     "InputError",
@@ -76,6 +78,7 @@ __all__ = [
     "run_study",
     "sobol",
     "solve",
+    "solve_all",
     "swallowtail",
     "trace",
 ]
@@ -121,6 +124,8 @@ _HOMES = {
     "run_study": "tmsopt.study.batch.run",
     "sobol": "tmsopt.study.batch.samples",
     "solve": "tmsopt.design.solve",
+    "solve_all": "tmsopt.design.every",
+    "Every": "tmsopt.design.every",
     "swallowtail": "tmsopt.study.swallowtail",
     "trace": "tmsopt.study.trace",
 }

@@ -4,7 +4,7 @@ import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
@@ -23,6 +23,7 @@ from tmsopt.cli.common import (
 
 if TYPE_CHECKING:
     from tmsopt.design.nearest import Robustness
+    from tmsopt.design.problem import Problem
     from tmsopt.design.solution import Solution
     from tmsopt.study.explain import Explanation
 
@@ -36,6 +37,7 @@ Examples:
   tmsopt solve problems/realistic.toml --brief
   tmsopt solve problems/realistic.toml --certify 30
   tmsopt solve problems/benchmark.toml --json | python -m json.tool
+  tmsopt solve problems/ep4_matching.toml --all
   tmsopt solve problems/pareto.toml --points 40 --plot front.png --csv front.csv
 
 A file with pareto = ["abscissa", "Fr"] under [objective] gives the front: two or three expressions, each minimised; a
@@ -124,6 +126,9 @@ class _Seconds(click.ParamType[float]):
     metavar="[SECONDS]",
     help="Prove within SECONDS that nothing better exists, or find it (SCIP). Write it after FILE. [60 if left out]",
 )
+@click.option(
+    "--all", "every", is_flag=True, help="Of a pattern that leaves no freedom: all designs in the box that have it."
+)
 @click.pass_context
 def solve(
     context: click.Context,
@@ -139,6 +144,7 @@ def solve(
     rear_mass: str,
     brief: bool,
     certify: float | None,
+    every: bool,
 ) -> None:
     """Find the best design that the problem FILE asks for, or the front of the best ones."""
     with bad_input():
@@ -154,6 +160,8 @@ def solve(
             from tmsopt.design.bounds.certify import check_installed
 
             check_installed()
+    if every:
+        _solve_all(problem, as_json=as_json, starts=starts, seed=seed, linear_solver=linear_solver)
     from tmsopt.design.search import STARTS
     from tmsopt.design.solution import NotSolved
     from tmsopt.design.solve import solve as solve_problem
@@ -192,6 +200,21 @@ def solve(
     if plot is not None:
         _draw(solution, plot, w, m_B)
     sys.exit(_EXIT[solution.status])
+
+
+def _solve_all(problem: "Problem", as_json: bool, starts: int | None, **options: Any) -> NoReturn:
+    """Write all designs with a pattern, and end."""
+    from tmsopt.design.every import MOST, solve_all
+
+    with bad_input(), progress() as update:
+        found = solve_all(problem, starts=starts or MOST, progress=update, **options)
+    if as_json:
+        write_json({"schema": 1, "title": problem.title, "model": problem.model.name, **found.to_json()})
+    else:
+        from tmsopt.show.tables import every_table
+
+        click.echo(every_table(found))
+    sys.exit(DONE if found.solutions else INFEASIBLE)
 
 
 @click.command(epilog=_COMPARE_EXAMPLES)

@@ -24,19 +24,15 @@ def other_branches(problem: Problem, nlp: NLP, found: Mapping[str, float]) -> tu
     Damped Newton from a few designs and their mirror images outside the box: what it finds exists, but more may.
     """
     of = problem.parameter_set
-    x = ca.SX.sym("x", len(nlp.variables))
-    g = nlp.at(x)[1]
-    equalities = [k for k in range(len(nlp.rows)) if nlp.row_lower[k] == nlp.row_upper[k]]
-    if len(equalities) != len(nlp.variables):
+    system = square_system(nlp)
+    if system is None:
         return ()
-    equations = ca.vertcat(*[g[k] for k in equalities])
-    system = ca.Function("system", [x], [equations, ca.jacobian(equations, x), g])
     branches: list[Branch] = []
     known = [np.array([found[n] for n in problem.free])]
     for start in designs(problem, 0, _STARTS):
         origin = complete(nlp, problem, start)
         for mirrored in (origin, *_mirrors(problem, origin)):
-            end = _newton(system, mirrored)
+            end = newton(system, mirrored)
             if end is None:
                 continue
             values = np.array([np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, end, strict=False)])
@@ -46,6 +42,17 @@ def other_branches(problem: Problem, nlp: NLP, found: Mapping[str, float]) -> tu
             parameters = problem.ordered(dict(zip(problem.free, values.tolist(), strict=True)))
             branches.append(Branch(Table(parameters), _excluded(problem, nlp, end, system)))
     return tuple(sorted(branches, key=lambda b: len(b.excluded_by)))
+
+
+def square_system(nlp: NLP) -> ca.Function | None:
+    """x → the equations of an NLP, their Jacobian and all rows; None unless there are as many as variables."""
+    x = ca.SX.sym("x", len(nlp.variables))
+    g = nlp.at(x)[1]
+    equalities = [k for k in range(len(nlp.rows)) if nlp.row_lower[k] == nlp.row_upper[k]]
+    if len(equalities) != len(nlp.variables):
+        return None
+    equations = ca.vertcat(*[g[k] for k in equalities])
+    return ca.Function("system", [x], [equations, ca.jacobian(equations, x), g])
 
 
 def _mirrors(problem: Problem, x: NDArray[np.float64]) -> list[NDArray[np.float64]]:
@@ -58,8 +65,8 @@ def _mirrors(problem: Problem, x: NDArray[np.float64]) -> list[NDArray[np.float6
     return images
 
 
-def _newton(system: ca.Function, x: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """An isolated solution of the equations, or None."""
+def newton(system: ca.Function, x: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """An isolated solution of the equations near a point, by damped steps, or None."""
     residual = np.inf
     for _ in range(_STEPS):
         value, jacobian, _ = (np.array(part) for part in system(x))

@@ -89,6 +89,15 @@ def complete(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Array:
     return np.array(x)
 
 
+def completions(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Iterator[Array]:
+    """Starts from a design with every guess of the one lift that an NLP has, such as a pattern's unknowns."""
+    (lift,) = nlp.lifts
+    values = [problem.values(problem.ordered(design))]
+    z = list(roots(regular(np.array([[float(c) for c in v.coefficients] for v in values]))) / nlp.unit)
+    for guess in lift.guess(values, z):
+        yield np.array(variables_of(problem, design) + guess)
+
+
 def spread(problem: Problem, seed: int) -> Iterator[dict[str, float]]:
     """The middle of the box, then a quasi-random sequence without end."""
     yield middle(problem)

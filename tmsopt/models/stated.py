@@ -11,7 +11,7 @@ import flint
 
 from tmsopt.models.formulas import Formulas, formulas
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
-from tmsopt.roots.elementary import is_ball
+from tmsopt.roots.elementary import exact, is_ball
 from tmsopt.roots.polynomial import characteristic_polynomial, quadratic_pencil
 
 MOST = {"M": 6, "A": 12, "coefficients": 12}
@@ -195,7 +195,10 @@ def _rebuilt(
 
     def coefficients(**values: Any) -> list[Any]:
         # The determinant of the entries themselves where numbers are exact: CasADi folds constants as doubles.
-        return every(values)[lost:] if any(map(is_ball, values.values())) else quick(values)
+        if not any(map(is_ball, values.values())):
+            return quick(values)
+        number = exact if all(isinstance(x, flint.fmpq) for x in values.values()) else _ball
+        return [number(c) for c in every(values)[lost:]]
 
     of = ParameterSet("stated", tuple(Parameter(n, "1", "parameter", latex(n)) for n in names), native=dict)
     made = Model(
@@ -214,6 +217,11 @@ def _rebuilt(
     origin = (_rebuilt, (kind, name, names, shapes, derived, serialized))
     statement = {"kind": kind, "parameters": list(names), "entries": [str(e) for e in written]}
     return replace(made, origin=origin, statement=statement)
+
+
+def _ball(x: Any) -> Any:
+    """A coefficient as a ball, or as the series that it is."""
+    return x if isinstance(x, flint.arb_series) else flint.arb(exact(x))
 
 
 def _degree(shapes: Sequence[tuple[str, int, int]]) -> int:

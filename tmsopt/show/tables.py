@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from tmsopt.design.every import Every
 from tmsopt.design.solution import Solution
 from tmsopt.design.units import reading
 from tmsopt.models.tms import GRAVITY, tms, to_si
@@ -32,6 +33,26 @@ def solution_table(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: floa
     else:
         lines += [*columns(_own_rows(solution)), ""]
     lines += _facts(solution)
+    return "\n".join(line.rstrip() for line in lines).rstrip()
+
+
+def every_table(every: Every) -> str:
+    """All designs with a pattern, one column each, and what the search covers."""
+    found, coverage = every.solutions, every.coverage
+    if not found:
+        return f"no solution was met in {coverage.starts} starts over the box"
+    problem = found[0].problem
+    names = [n for n in found[0].parameters if n in problem.free]
+    rows = [("", *(str(k) for k in range(1, len(found) + 1)))]
+    rows += [(n, *(number(s.parameters[n]) for s in found)) for n in names]
+    rows += [("abscissa", *(number(s.abscissa) for s in found)), ("structure", *(s.structure for s in found))]
+    rows += [("met", *(str(h) for h in coverage.hits))]
+    many = f"{len(found)} solutions" if len(found) > 1 else "1 solution"
+    lines = [problem.title or "untitled problem", f"locate {problem.locate}: {many} in the box", "", *columns(rows), ""]
+    lines += [
+        f"coverage: {coverage.starts} starts over the box; {coverage.expected:.2f} solutions to be expected in all; "
+        f"the chance that one more start finds another is below {coverage.chance:.2g} (95 % confidence; no proof)"
+    ]
     return "\n".join(line.rstrip() for line in lines).rstrip()
 
 

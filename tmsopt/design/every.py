@@ -1,0 +1,176 @@
+"""All designs with a pattern in a box, as far as many starts find them, with a statement of what they cover."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.design.branches import newton, square_system
+from tmsopt.design.errors import Fault, InputError
+from tmsopt.design.formulations import design_of, matching
+from tmsopt.design.freedom import freedom
+from tmsopt.design.nlp import NLP
+from tmsopt.design.problem import Problem
+from tmsopt.design.recheck import recheck
+from tmsopt.design.search import Runner
+from tmsopt.design.solution import Solution
+from tmsopt.design.solve import solve
+from tmsopt.design.starts import completions, spread
+
+Array = NDArray[np.float64]
+
+MOST = 1024
+"""Starts at most."""
+
+_FEWEST = 48
+_AGAIN = 3  # times that every solution must have been met before the search may end
+_SAME = 1e-7  # of the box: distance of designs that are one solution, whatever their factors are called
+_INSIDE = 1e-9  # of the box: how far outside an end counts as on it
+_BY_IPOPT = 4  # every so many starts, IPOPT is asked too: it reaches what Newton's method runs away from
+_CONFIDENCE = 3.0  # −ln 5 %: what was met in none of n starts is met in fewer than 3/n of them, with 95 %
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """What a search of many starts says about what it has not found.
+
+    Attributes:
+        starts: designs that were started from, spread evenly over the box.
+        hits: starts that led to each solution.
+        expected: number of solutions to be expected in all, from how often each was met (Boender and Rinnooy Kan
+            1987); it is an estimate, not a proof.
+        chance: with 95 % confidence, the chance that one more start finds another is smaller.
+    """
+
+    starts: int
+    hits: tuple[int, ...]
+    expected: float
+    chance: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``."""
+        expected = round(self.expected, 4) if math.isfinite(self.expected) else None
+        return {"starts": self.starts, "hits": list(self.hits), "expected": expected, "chance": round(self.chance, 6)}
+
+
+@dataclass(frozen=True)
+class Every:
+    """All solutions found, those met most often first."""
+
+    solutions: tuple[Solution, ...]
+    coverage: Coverage
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``."""
+        return {"solutions": [s.to_json() for s in self.solutions], "coverage": self.coverage.to_json()}
+
+
+def solve_all(
+    problem: Problem,
+    *,
+    starts: int = MOST,
+    seed: int = 0,
+    linear_solver: str = "mumps",
+    progress: Callable[[int, int], None] | None = None,
+) -> Every:
+    """Every design in the box with the pattern that a problem locates, where that leaves no freedom.
+
+    Newton's method runs from designs spread over the box with every way to share out their roots, and IPOPT from some
+    of them, until each solution was met three times and an estimate expects no more, or after `starts`. Solutions are
+    told apart by their parameters, so factors that change places are no other solution.
+
+    Raises:
+        InputError: for a problem that locates no pattern, or leaves freedom.
+    """
+    _check(problem)
+    nlp = matching(problem)
+    system = square_system(nlp)
+    assert system is not None  # as many conditions as parameters
+    runner = Runner(problem, nlp, linear_solver, touching=False)
+    width = np.array([hi - lo for lo, hi in problem.free.values()])
+    found: list[Array] = []
+    hits: list[int] = []
+    done = 0
+    for design in spread(problem, seed):
+        if done >= starts or _covered(done, hits):
+            break
+        ends = [newton(system, x) for x in completions(nlp, problem, design)]
+        if done % _BY_IPOPT == 0:
+            ended = runner.ended(design)
+            ends.append(newton(system, ended.run.x) if ended.feasible else None)
+        met: set[int] = set()
+        for end in ends:
+            point = None if end is None else _inside(problem, nlp, end)
+            if point is None:
+                continue
+            known = next((k for k, other in enumerate(found) if np.max(np.abs(point - other) / width) <= _SAME), None)
+            if known is None:
+                if recheck(problem, problem.ordered(_named(problem, point))).violations:
+                    continue
+                known = len(found)
+                found.append(point)
+                hits.append(0)
+            met.add(known)
+        for k in met:
+            hits[k] += 1
+        done += 1
+        if progress:
+            progress(done, starts)
+    order = np.argsort([-h for h in hits], kind="stable")
+    solutions = [_solution(problem, _named(problem, found[k])) for k in order]
+    return Every(tuple(solutions), _coverage(done, [hits[k] for k in order]))
+
+
+def _check(problem: Problem) -> None:
+    counted = freedom(problem)
+    if problem.pattern is None or problem.objective is not None:
+        message = "all solutions are those of a pattern; write locate = 'EP3', or another, and no minimize or maximize"
+        raise InputError([Fault(message, ("objective",))])
+    if counted.kind != "square" or problem.cases:
+        advice = "free fewer, or add == constraints" if counted.count > 0 else "free more, or ask for less"
+        message = (
+            f"{counted.free} free parameters and {counted.conditions} conditions do not make single solutions; {advice}"
+        )
+        raise InputError([Fault(message, ("parameters",))])
+
+
+def _named(problem: Problem, point: Array) -> dict[str, float]:
+    return dict(zip(problem.free, point.tolist(), strict=True))
+
+
+def _inside(problem: Problem, nlp: NLP, x: Array) -> Array | None:
+    """The free parameters of a solution in the box; None for one outside."""
+    lower, upper = (np.array(ends[: len(problem.free)]) for ends in (nlp.lower, nlp.upper))
+    room = _INSIDE * (upper - lower)
+    own = x[: len(problem.free)]
+    if np.any(own < lower - room) or np.any(own > upper + room):
+        return None
+    return np.array(list(design_of(problem, x.tolist()).values()))
+
+
+def _covered(done: int, hits: list[int]) -> bool:
+    """Whether more starts would be waste."""
+    if done < _FEWEST:
+        return False
+    return not hits or (min(hits) >= _AGAIN and _expected(hits) <= len(hits) + 0.5)
+
+
+def _expected(hits: list[int]) -> float:
+    """w (n − 1)/(n − w − 2) solutions in all, for w different ones among n that were met."""
+    w, n = len(hits), sum(hits)
+    return w * (n - 1) / (n - w - 2) if n > w + 2 else math.inf if w else 0.0
+
+
+def _coverage(done: int, hits: list[int]) -> Coverage:
+    once = sum(h == 1 for h in hits)
+    chance = min(1.0, (once + _CONFIDENCE * math.sqrt(max(once, 1))) / max(done, 1))
+    return Coverage(done, tuple(hits), _expected(hits), chance)
+
+
+def _solution(problem: Problem, design: Mapping[str, float]) -> Solution:
+    """A design with its standing: of the same problem, where nothing is free."""
+    fixed = solve(replace(problem, fixed=problem.ordered(design), free={}, start={}), throw=False)
+    return replace(fixed, problem=problem, freedom=freedom(problem), formulation="matching")
