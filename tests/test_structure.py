@@ -246,9 +246,9 @@ def test_a_structure_near_the_origin_of_its_own_scale() -> None:
 
 
 @pytest.mark.parametrize(
-    "bad", [[1, 2, 3], [1] * 6, [0, 1, 2, 3, 4], [1, 2, 3, 4, np.nan], [1, 2, np.inf, 4, 5], 5.0, [[1, 4, 6, 4, 1]]]
+    "bad", [[1], [1] * 14, [0, 1, 2, 3, 4], [1, 2, 3, 4, np.nan], [1, 2, np.inf, 4, 5], 5.0, [[1, 4, 6, 4, 1]]]
 )
-def test_structure_refuses_what_is_no_quartic(bad: object) -> None:
+def test_structure_refuses_what_is_no_polynomial_of_degree_1_to_12(bad: object) -> None:
     with pytest.raises(ValueError, match="coefficient"):
         structure(bad)
     assert pattern_distance(PATTERNS["EP4"], bad) == np.inf

@@ -176,7 +176,7 @@ class _Design:
         if not found.roots:
             return ()
         coefficients = self.values(case).coefficients
-        if found.name in _SIMPLE:
+        if found.name in _SIMPLE and all(root.multiplicity == 1 for root in found.roots):
             return stored or enclosed_roots(coefficients)
         return nearest(found.name, coefficients, found.roots)
 

@@ -3,7 +3,8 @@
 Everything here works at the precision of `flint.ctx`.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Context, Decimal
 from fractions import Fraction
@@ -14,12 +15,15 @@ import numpy as np
 
 from tmsopt.roots.elementary import as_ball
 from tmsopt.roots.exact import rational
+from tmsopt.roots.fitting import Form
 from tmsopt.roots.patterns import LINES, PATTERNS, Pattern
 from tmsopt.roots.polynomial import evaluate, product
+from tmsopt.roots.shape import Group, Shape
 from tmsopt.roots.structure import Root
 
 _STEPS = 80
 _FLOOR = 1000  # a root smaller than the median root by more than this counts as this much smaller
+_LOST = 7.5  # bits for each degree that the normal equations may lose
 _HALF = 2  # of the digits that are carried, the share that a converged fit is trusted to
 
 
@@ -76,33 +80,53 @@ def enclosed_roots(coefficients: Sequence[Any]) -> tuple[Enclosed, ...] | None:
 
 
 def nearest(name: str, coefficients: Sequence[Any], roots: Sequence[Root]) -> tuple[Enclosed, ...] | None:
-    """Roots of the polynomial nearest to a quartic among those of a pattern; None where the fit does not converge.
+    """Roots of the polynomial nearest to a given one among those of a structure; None where the fit does not converge.
 
-    Nearest is: least in the sum over k = 1 … 4 of (Δₖ/wₖ)², where Δₖ is the change of the k-th coefficient of the
+    Nearest is: least in the sum over k = 1 … n of (Δₖ/wₖ)², where Δₖ is the change of the k-th coefficient of the
     monic polynomial and wₖ the k-th coefficient of ∏ (s + |zᵢ|), zᵢ the roots of the nearest polynomial itself; one
-    below a thousandth of the median |z| counts as that. So the unknowns u of the factored form solve
+    below a thousandth of the median |z| (of the largest, if that is 0) counts as that. So the unknowns u of the
+    factored form solve
     Σₖ Δₖ(u)/wₖ(u)² · ∂Δₖ/∂uⱼ = 0 for each j: a property of the coefficients alone. The slopes of wₖ are left out.
 
     Gauss–Newton steps, from the roots of a fit in double precision, until they change nothing; half of the digits
     carried count as certain.
+
+    Args:
+        name: of a quartic, its structure. Of other degrees the roots alone tell the structure: by multiplicities, and
+            by real parts that equal the largest.
     """
-    pattern = {**PATTERNS, **LINES}[name]
-    monic = [as_ball(c) / as_ball(coefficients[0]) for c in coefficients]
+    terms = [as_ball(c) for c in coefficients]
+    monic = [c / terms[0] for c in terms]
     if not all(c.is_finite() for c in monic):
         return None
-    target = [c.mid() for c in monic]
-    u = _start(pattern, [float(c) for c in target], roots)
-    small = flint.arb(2) ** (30 - flint.ctx.prec)
+    if len(monic) == 5:
+        pattern = {**PATTERNS, **LINES}[name]
+        target = [c.mid() for c in monic]
+        u = _start(pattern, [float(c) for c in target], roots)
+        return _converged(pattern, u, target, lambda u: _roots_of(pattern, u))
+    unit = flint.arb(2) ** round(math.log2(max(1e-300, *(abs(complex(r.re, r.im)) for r in roots))))
+    shape, start = _shape([Root(float(r.re / unit), float(r.im / unit), r.multiplicity) for r in roots])
+    target = [(c / unit**k).mid() for k, c in enumerate(monic)]
+    found = _converged(shape, start, target, lambda u: _roots_of_shape(shape, u))
+    return None if found is None else tuple(Enclosed(z.re * unit, z.im * unit, z.multiplicity) for z in found)
+
+
+_Rooted = Callable[[Sequence[Any]], "list[Enclosed] | None"]
+
+
+def _converged(form: Form, u: list[Any], target: Sequence[Any], roots_at: _Rooted) -> tuple[Enclosed, ...] | None:
+    """Roots of the nearest polynomial of a form, from a start."""
+    small = flint.arb(2) ** (_LOST * (len(target) - 1) - flint.ctx.prec)
     sure = flint.arb(2) ** (-flint.ctx.prec // _HALF)
     for _ in range(_STEPS):
-        step = _step(pattern, u, target)
+        step = _step(form, u, target, roots_at)
         if step is None:
             return None
         u = [(x + d).mid() for x, d in zip(u, step, strict=True)]
         size = max(abs(x) for x in u)
         if all(abs(d) <= small * size for d in step):
-            balls = [x + flint.arb(0, (size * sure).upper()) for x in u]
-            return _sorted(_roots_of(pattern, balls))
+            found = roots_at([x + flint.arb(0, (size * sure).upper()) for x in u])
+            return None if found is None else _sorted(found)
     return None
 
 
@@ -179,13 +203,39 @@ def _start(pattern: Pattern, target: list[float], roots: Sequence[Root]) -> list
     return [flint.arb(x) for x in min(pattern.guesses(z), key=error)]
 
 
-def _step(pattern: Pattern, u: Sequence[Any], target: Sequence[Any]) -> list[Any] | None:
+def _shape(roots: Sequence[Root]) -> tuple[Shape, list[Any]]:
+    """The shape that roots show: multiple ones, and those on the rightmost line if several; with its unknowns."""
+    upper = [r for r in roots if r.im >= 0]
+    right = max(r.re for r in upper)
+    several = sum(r.re == right for r in upper) > 1
+    line = [several and r.re == right for r in upper]
+    kept = [(r, Group(r.multiplicity, r.im == 0, tied)) for r, tied in zip(upper, line, strict=True)]
+    grouped = [(r, g) for r, g in kept if g.tied or g.multiplicity > 1]
+    free = [r for r, g in kept if not g.tied and g.multiplicity == 1]
+    rest = product(*([1, -r.re] if r.im == 0 else [1, -2 * r.re, r.re**2 + r.im**2] for r in free))
+    shape = Shape(tuple(g for _, g in grouped), len(rest) - 1)
+    return shape, [flint.arb(x) for x in shape.start([complex(r.re, r.im) for r, _ in grouped], rest)]
+
+
+def _roots_of_shape(shape: Shape, u: Sequence[Any]) -> list[Enclosed] | None:
+    """Roots of each group, and those of the rest; None where these are not decided."""
+    found: list[Enclosed] = []
+    for factor, group in zip(shape.group_factors(u), shape.groups, strict=True):
+        found += [Enclosed(re, im, group.multiplicity) for re, im in _factor_roots(factor)]
+    rest = enclosed_roots([flint.arb(c) for c in shape.rest_factor(u)])
+    return None if rest is None else [*found, *rest]
+
+
+def _step(form: Form, u: Sequence[Any], target: Sequence[Any], roots_at: _Rooted) -> list[Any] | None:
     """Gauss–Newton step of the weighted least squares, with the weights of where it starts."""
-    weights = _weights(_roots_of(pattern, u))
-    offs = [(a - b) / w for a, b, w in zip(pattern.monic(u), target, weights, strict=True)]
+    found = roots_at(u)
+    if found is None:
+        return None
+    weights = _weights(found)
+    offs = [(a - b) / w for a, b, w in zip(form.monic(u), target, weights, strict=True)]
     columns = []
     for j in range(len(u)):
-        moved = pattern.monic([flint.arb_series([x, 1], prec=2) if k == j else x for k, x in enumerate(u)])
+        moved = form.monic([flint.arb_series([x, 1], prec=2) if k == j else x for k, x in enumerate(u)])
         columns.append(
             [(m[1] if isinstance(m, flint.arb_series) else 0) / w for m, w in zip(moved, weights, strict=True)]
         )
@@ -200,7 +250,9 @@ def _step(pattern: Pattern, u: Sequence[Any], target: Sequence[Any]) -> list[Any
 def _weights(roots: Sequence[Enclosed]) -> list[Any]:
     """Coefficients of ∏ (s + |zᵢ|), sizes of the terms that each coefficient is summed from."""
     sizes = sorted((r.modulus.mid() for r in roots for _ in range(r.multiplicity)), key=float)
-    floor = (sizes[1] + sizes[2]) / (2 * _FLOOR)
+    n = len(sizes)
+    median = (sizes[(n - 1) // 2] + sizes[n // 2]) / 2
+    floor = (sizes[-1] if median == 0 else median) / _FLOOR
     return [as_ball(c) for c in product(*([flint.arb(1), size.max(floor).mid()] for size in sizes))]
 
 

@@ -4,6 +4,9 @@ Next to a k-fold root each single root is uncertain by the k-th root of the roun
 together, by the coefficients that they rebuild.
 """
 
+from typing import Any
+
+import flint
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -11,13 +14,15 @@ Array = NDArray[np.float64]
 
 _POLISHED = 4e-15  # backward error below which more Newton steps are not worth their time
 _STEPS = 6  # Newton doubles the digits at each step; companion eigenvalues start with 4 or more
+_JOINT = 1e-13  # backward error above which the roots are isolated exactly; seen for roots of very different size
 
 
 def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
     """All roots of real polynomials: coefficients of shape (…, n + 1), descending; roots of shape (…, n).
 
     Companion eigenvalues, then Newton's method on the quadratic factors (and one linear factor for odd n) with
-    the step kept only where it lowers the backward error. Conjugate pairs are exact and adjacent.
+    the step kept only where it lowers the backward error. Where that does not suffice, as it may not for many roots
+    of very different size, they are isolated in exact arithmetic. Conjugate pairs are exact and adjacent.
 
     Raises:
         ValueError: for a leading coefficient 0 or coefficients that are not finite.
@@ -31,8 +36,10 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
     scaled = monic / scale[:, None] ** np.arange(n + 1)
     factors = _factors(_companion_eigenvalues(scaled))
     with np.errstate(over="ignore", invalid="ignore"):  # roots 300 orders apart: what overflows is not an improvement
-        factors = _newton(factors, scaled)
+        factors, error = _newton(factors, scaled)
         found = _factor_roots(factors)[:, :n] * scale[:, None]
+    for row in np.flatnonzero(error > _JOINT):
+        found[row] = _isolated(c.reshape(-1, n + 1)[row], found[row])
     return found.reshape(*c.shape[:-1], n)
 
 
@@ -85,8 +92,18 @@ def _factors(values: NDArray[np.complex128]) -> Array:
     return np.stack([-(first + second).real, (first * second).real], axis=-1)
 
 
-def _newton(factors: Array, monic: Array) -> Array:
-    """Newton's method on the factor coefficients, on the rows that need it."""
+def _isolated(coefficients: Array, found: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """The roots of one polynomial, correctly rounded; those found already where they do not fit into doubles."""
+    ratios = [float(x).as_integer_ratio() for x in coefficients[::-1]]
+    common = max(q for _, q in ratios)  # a power of two, as all are
+    isolated: Any = flint.fmpz_poly([p * (common // q) for p, q in ratios]).complex_roots()
+    each = [complex(float(z.real.mid()), float(z.imag.mid())) for z, m in isolated for _ in range(m)]
+    exact = np.array(sorted(each, key=lambda z: (z.imag == 0, z.real, abs(z.imag), -z.imag)))
+    return exact if exact.shape == found.shape and np.all(np.isfinite(exact)) else found
+
+
+def _newton(factors: Array, monic: Array) -> tuple[Array, Array]:
+    """Newton's method on the factor coefficients, on the rows that need it; with the backward errors left."""
     n = monic.shape[-1] - 1
     error = backward_error(monic, _factor_roots(factors)[:, :n])
     for _ in range(_STEPS):
@@ -100,7 +117,7 @@ def _newton(factors: Array, monic: Array) -> Array:
             break
         factors[rows[better]] = trial[better]
         error[rows[better]] = trial_error[better]
-    return factors
+    return factors, error
 
 
 def _newton_step(factors: Array, monic: Array) -> Array:
@@ -129,12 +146,13 @@ def _newton_step(factors: Array, monic: Array) -> Array:
 
 
 def _multiply(factors: Array) -> Array:
-    result = np.ones((len(factors), 1))
+    result = np.zeros((len(factors), 2 * factors.shape[1] + 1))
+    result[:, 0] = 1.0
     for k in range(factors.shape[1]):
-        padded = np.pad(result, ((0, 0), (0, 2)))
-        padded[:, 1:-1] += factors[:, k, :1] * result
-        padded[:, 2:] += factors[:, k, 1:] * result
-        result = padded
+        end = 2 * k + 3
+        shorter = result[:, : end - 2].copy()
+        result[:, 1 : end - 1] += factors[:, k, :1] * shorter
+        result[:, 2:end] += factors[:, k, 1:] * shorter
     return result
 
 

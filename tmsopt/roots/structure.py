@@ -1,19 +1,23 @@
-"""The multiplicity structure of a quartic within a stated tolerance, decided on coefficients."""
+"""The multiplicity structure of a polynomial within a stated tolerance, decided on coefficients."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tmsopt.roots.numeric import rebuilt
+from tmsopt.roots.fitting import Array, gauss_newton, relative_distance, sizes
+from tmsopt.roots.multiplicity import Fit, decided
 from tmsopt.roots.numeric import roots as numeric_roots
 from tmsopt.roots.patterns import LINES, PATTERNS, Pattern, Roots
 
 ROUNDING = 8 * np.finfo(float).eps
-"""Relative error that coefficients computed in double precision carry anyway."""
+"""Relative error that coefficients of a quartic computed in double precision carry anyway."""
 
-# Most degenerate first: pattern, multiplicity of its rightmost root, roots on its rightmost line.
+HIGHEST = 12
+"""Degree of a polynomial whose structure can be decided."""
+
+# Of a quartic, most degenerate first: pattern, multiplicity of its rightmost root, roots on its rightmost line.
 _CANDIDATES = (
     (PATTERNS["EP4"], 4, 4),
     (PATTERNS["2EP2"], 2, 2),
@@ -26,11 +30,8 @@ _CANDIDATES = (
 )
 
 _NEAR = 0.05  # relative distance of a guess that can still lead to a pattern within any sensible tolerance
-_STEPS = 20
 _CLOSED = 1e-10  # of the squared root size: a pattern contains its own boundary, as CEP2 and 2EP2 contain EP4
 _LINE = 1e-6  # relative difference of real parts on one vertical line, for roots of an exact pattern
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -47,9 +48,11 @@ class Structure:
     """Which roots stand on the rightmost vertical line.
 
     Attributes:
-        name: ``EP4``, ``EP3``, ``2EP2``, ``CEP2``, ``EP2+pair``, ``EP2``, ``pair+real``, ``two pairs``,
-            ``pair``, ``real``, or ``undecided`` where double precision cannot tell.
-        roots: all roots with multiplicities, of the nearest polynomial that has the structure.
+        name: ``EPk`` for a k-fold real root, ``CEPk`` for a k-fold complex pair, ``real``, ``pair``, ``two pairs`` …
+            for simple ones, joined by ``+`` as in ``EP2+pair``, or ``undecided`` where double precision cannot tell.
+            Of a quartic with two real double roots ``2EP2``.
+        roots: all roots with multiplicities, of the nearest polynomial that has the structure. Those of a quartic
+            whose rightmost root is simple and alone are its own.
         distance: relative change of the coefficients (root sum of squares) that takes the polynomial there.
     """
 
@@ -64,7 +67,7 @@ class Structure:
 
 
 def structure(coefficients: ArrayLike, tolerance: float = 1e-12) -> Structure:
-    """Structure of the rightmost roots of a real quartic, coefficients descending, shape (5,).
+    """Structure of the roots of a real polynomial of degree 1 to 12, coefficients descending, shape (n + 1,).
 
     A structure holds when a polynomial that has it exactly lies within `tolerance`: the root sum of squares of
     the changes of the coefficients, each relative to the terms that make it up. The most degenerate structure that
@@ -74,7 +77,54 @@ def structure(coefficients: ArrayLike, tolerance: float = 1e-12) -> Structure:
     Raises:
         ValueError: for another shape, coefficients that are not finite, or a leading 0.
     """
-    c = _quartic(coefficients)
+    c = _checked(coefficients)
+    return _of_quartic(c, tolerance) if len(c) == 5 else _of_any(c, tolerance)
+
+
+def pattern_distance(pattern: Pattern, coefficients: ArrayLike) -> float:
+    """Relative change of the coefficients (root sum of squares) to reach a pattern of their degree; inf if none."""
+    try:
+        c = _matching(pattern, coefficients)
+    except ValueError:
+        return float("inf")
+    return min((fit.distance for fit in _fits(pattern, c, numeric_roots(c), np.inf)), default=float("inf"))
+
+
+def nearest_unknowns(pattern: Pattern, coefficients: ArrayLike) -> list[tuple[float, ...]]:
+    """Unknowns of the polynomials of a pattern nearest to a given one, one for each guess, the nearest first."""
+    c = _matching(pattern, coefficients)
+    found = numeric_roots(c)
+    size = sizes(found)
+    fits = [gauss_newton(pattern, np.array(guess), c / c[0], size) for guess in pattern.guesses(found)]
+    fits.sort(key=lambda u: relative_distance(pattern, u, c / c[0], size))
+    return [tuple(float(x) for x in u) for u in fits]
+
+
+def guess_distance(pattern: Pattern, coefficients: Array, found: Roots) -> float:
+    """Relative distance of a polynomial with known roots from its best guess of a pattern, cheaply; inf without one."""
+    size, monic = sizes(found), coefficients / coefficients[0]
+    return min((relative_distance(pattern, g, monic, size) for g in pattern.guesses(found)), default=float("inf"))
+
+
+def _checked(coefficients: ArrayLike) -> Array:
+    c = np.asarray(coefficients, dtype=float)
+    if c.ndim != 1 or not 2 <= c.size <= HIGHEST + 1:
+        raise ValueError(f"found coefficients of shape {c.shape}; accepted: 2 to {HIGHEST + 1} of them, descending")
+    if not np.all(np.isfinite(c)) or c[0] == 0:
+        raise ValueError("found a coefficient that is not finite, or a leading 0; accepted: a polynomial's")
+    return c
+
+
+def _matching(pattern: Pattern, coefficients: ArrayLike) -> Array:
+    """The coefficients, if they are of the pattern's degree."""
+    c = _checked(coefficients)
+    degree = sum(len(factor) - 1 for factor in pattern.factors([1.0] * len(pattern.unknowns)))
+    if len(c) - 1 != degree:
+        raise ValueError(f"found coefficients of degree {len(c) - 1}; accepted: degree {degree}, as {pattern.name} has")
+    return c
+
+
+def _of_quartic(c: Array, tolerance: float) -> Structure:
     found = numeric_roots(c)
     undecided: Structure | None = None
     for pattern, multiplicity, on_line in _CANDIDATES:
@@ -86,59 +136,51 @@ def structure(coefficients: ArrayLike, tolerance: float = 1e-12) -> Structure:
                 return candidate
             if candidate.distance <= tolerance + ROUNDING and undecided is None:
                 undecided = Structure("undecided", _simple(found), candidate.distance)
-    if undecided:
-        return undecided
-    rightmost = found[np.argmax(found.real)]
-    return Structure("pair" if rightmost.imag else "real", _simple(found), 0.0)
+    return undecided or Structure(_simple_name(found), _simple(found), 0.0)
 
 
-def pattern_distance(pattern: Pattern, coefficients: ArrayLike) -> float:
-    """Relative change of the coefficients (root sum of squares) that takes a quartic to a pattern; inf if none."""
-    try:
-        c = _quartic(coefficients)
-    except ValueError:
-        return float("inf")
-    return min((fit.distance for fit in _fits(pattern, c, numeric_roots(c), np.inf)), default=float("inf"))
-
-
-def nearest_unknowns(pattern: Pattern, coefficients: ArrayLike) -> list[tuple[float, ...]]:
-    """Unknowns of the polynomials of a pattern nearest to a quartic, one for each of its guesses, the nearest first."""
-    c = _quartic(coefficients)
+def _of_any(c: Array, tolerance: float) -> Structure:
     found = numeric_roots(c)
-    size = _size(found)
-    fits = [_gauss_newton(pattern, np.array(guess), c / c[0], size) for guess in pattern.guesses(found)]
-    fits.sort(key=lambda u: _distance(pattern, u, c, size))
-    return [tuple(float(x) for x in u) for u in fits]
+    nonzero = np.abs(found[found != 0])
+    unit = 2.0 ** np.round(np.mean(np.log2(nonzero))) if nonzero.size else 1.0
+    monic = c / c[0] / unit ** np.arange(len(c))
+    size = sizes(found / unit)
+    rounding = ROUNDING * (len(c) - 1) / 4
+    fit = decided(monic, size, tolerance + rounding, rounding)
+    if fit.distance < tolerance - rounding or not fit.shape.groups:
+        return _named(fit, found, unit)
+    definite = _named(decided(monic, size, tolerance - rounding, rounding), found, unit)
+    if definite.name not in ("pair", "real"):
+        return definite
+    return Structure("undecided", _simple(found), fit.distance)
 
 
-def guess_distance(pattern: Pattern, coefficients: Array, found: Roots) -> float:
-    """Relative distance of a quartic with known roots from its best guess of a pattern, cheaply; inf without one."""
-    size = _size(found)
-    return min((_distance(pattern, g, coefficients, size) for g in pattern.guesses(found)), default=float("inf"))
+def _named(fit: Fit, found: Roots, unit: float) -> Structure:
+    """The structure of a fit, in the unit of the polynomial."""
+    if not fit.shape.groups:
+        return Structure(_simple_name(found), _simple(found), 0.0)
+    each = [(z * unit, group.multiplicity) for z, group in zip(fit.places, fit.shape.groups, strict=True)]
+    each += [(z * unit, 1) for z in (numeric_roots(fit.rest) if fit.shape.rest else ()) if z.imag >= 0]
+    right = max(z.real for z, _ in each)
+    line = [(multiplicity, z.imag == 0) for z, multiplicity in each if z.real == right]
+    roots = [Root(w.real, w.imag, m) for z, m in each for w in ((z, z.conjugate()) if z.imag else (z,))]
+    return Structure(_line_name(line), _sorted(roots), fit.distance)
 
 
-def _distance(pattern: Pattern, unknowns: Sequence[float] | Array, c: Array, size: Array) -> float:
-    return float(np.linalg.norm((np.array(pattern.monic(list(unknowns)), dtype=float) - c / c[0]) / size))
+def _line_name(line: Sequence[tuple[int, bool]]) -> str:
+    """Name of the roots and pairs on a vertical line, given by multiplicity and whether they are real."""
+    multiple = sorted(((m, real) for m, real in line if m > 1), reverse=True)
+    names = [f"EP{m}" if real else f"CEP{m}" for m, real in multiple]
+    pairs = sum(m == 1 and not real for m, real in line)
+    names += [f"{_COUNTS[pairs]}pair" + ("s" if pairs > 1 else "")] if pairs else []
+    return "+".join([*names, *("real" for m, real in line if m == 1 and real)])
 
 
-def _size(found: Roots) -> Array:
-    """Size of the terms that each monic coefficient is summed from.
-
-    A root far smaller than the others counts as a thousandth of their median, so that a coefficient that a root
-    at 0 makes vanish is judged by the others' size and not by its own rounding.
-    """
-    radius = np.abs(found)
-    floor = 1e-3 * float(np.median(radius))
-    return np.maximum(rebuilt((-np.maximum(radius, floor)).astype(complex)), 1e-100)
+_COUNTS = ("", "", "two ", "three ", "four ", "five ", "six ")
 
 
-def _quartic(coefficients: ArrayLike) -> Array:
-    c = np.asarray(coefficients, dtype=float)
-    if c.shape != (5,):
-        raise ValueError(f"found coefficients of shape {c.shape}; accepted: the five of a quartic, descending")
-    if not np.all(np.isfinite(c)) or c[0] == 0:
-        raise ValueError("found a coefficient that is not finite, or a leading 0; accepted: a quartic")
-    return c
+def _simple_name(found: Roots) -> str:
+    return "pair" if found[np.argmax(found.real)].imag else "real"
 
 
 def _simple(found: Roots) -> tuple[Root, ...]:
@@ -152,31 +194,15 @@ def _sorted(roots: list[Root]) -> tuple[Root, ...]:
 def _fits(pattern: Pattern, c: Array, found: Roots, near: float) -> Iterator[Structure]:
     """Polynomials of a pattern close to c, one per guess that starts within `near`, the nearest first."""
     fits = []
-    size = _size(found)
+    size, monic = sizes(found), c / c[0]
     for guess in pattern.guesses(found):
-        if _distance(pattern, guess, c, size) > near:
+        if relative_distance(pattern, guess, monic, size) > near:
             continue
-        unknowns = _gauss_newton(pattern, np.array(guess), c / c[0], size)
+        unknowns = gauss_newton(pattern, np.array(guess, dtype=float), monic, size)
         if all(value >= -_CLOSED * np.abs(found).max() ** 2 for value in pattern.nonnegative(list(unknowns))):
-            distance = _distance(pattern, unknowns, c, size)
+            distance = relative_distance(pattern, unknowns, monic, size)
             fits.append(Structure(pattern.name, _roots_of(pattern, unknowns), distance))
     yield from sorted(fits, key=lambda fit: fit.distance)
-
-
-def _gauss_newton(pattern: Pattern, guess: Array, target: Array, size: Array) -> Array:
-    """Least squares of the relative coefficient residuals, with a complex-step Jacobian."""
-    u = guess
-
-    def residual(v: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        return np.asarray((np.array(pattern.monic(list(v)), dtype=complex) - target.astype(complex)) / size)
-
-    for _ in range(_STEPS):
-        columns = [residual(u + 1e-100j * unit).imag / 1e-100 for unit in np.eye(len(u))]
-        step = np.linalg.lstsq(np.stack(columns, axis=1), -residual(u.astype(complex)).real, rcond=None)[0]
-        u = u + step
-        if np.all(np.abs(step) <= 1e-15 * np.abs(u)):
-            break
-    return u
 
 
 def _roots_of(pattern: Pattern, unknowns: Array) -> tuple[Root, ...]:
