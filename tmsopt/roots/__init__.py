@@ -8,7 +8,7 @@ from tmsopt.roots.numeric import abscissa, backward_error, rebuilt, roots
 from tmsopt.roots.patterns import PATTERNS, Pattern
 from tmsopt.roots.polynomial import determinant, evaluate, product, quadratic_pencil, shift
 from tmsopt.roots.quartic import Factors, Motion, abscissa_and_damping, quartic_factors
-from tmsopt.roots.stability import discriminant, hurwitz_minors, is_stable, lienard_chipart
+from tmsopt.roots.stability import discriminant, hurwitz_minors, is_stable, lienard_chipart, routh
 from tmsopt.roots.structure import Root, Structure, pattern_distance, structure
 
 __all__ = [
@@ -41,6 +41,7 @@ __all__ = [
     "real_roots",
     "rebuilt",
     "roots",
+    "routh",
     "shift",
     "structure",
 ]

@@ -1,62 +1,24 @@
 """Number of real roots from the coefficients alone, by Sturm's theorem, for arrays of polynomials."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tmsopt.roots.bounded import Bounded, beside, rounded
+from tmsopt.roots.discs import real_counts
 from tmsopt.roots.exact import exact_roots
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int_]
 
-_UNIT = 2 * np.finfo(float).eps
-"""Bound of the rounding of one operation, relative to its result; the double of it pays for that of the bounds."""
-
 _SMALLEST = 1e-290  # scaled coefficients below may have lost digits
-
-
-@dataclass(frozen=True)
-class _Bounded:
-    """Numbers with bounds of their errors, which every operation carries on."""
-
-    value: Array
-    error: Array
-
-    def __getitem__(self, index: Any) -> "_Bounded":
-        return _Bounded(self.value[index], self.error[index])
-
-    def __sub__(self, other: "_Bounded") -> "_Bounded":
-        return _rounded(self.value - other.value, self.error + other.error)
-
-    def __mul__(self, other: "_Bounded") -> "_Bounded":
-        own, others = np.abs(self.value), np.abs(other.value)
-        return _rounded(self.value * other.value, own * other.error + (others + other.error) * self.error)
-
-    def __truediv__(self, other: "_Bounded") -> "_Bounded":
-        quotient = self.value / other.value
-        room = np.abs(other.value) - other.error
-        error = (self.error + np.abs(quotient) * other.error) / np.where(room > 0, room, np.nan)
-        return _rounded(quotient, np.where(room > 0, error, np.inf))
-
-
-def _rounded(value: Array, error: Array) -> _Bounded:
-    return _Bounded(value, error + _UNIT * np.abs(value))
-
-
-def _beside(parts: Sequence[_Bounded]) -> _Bounded:
-    """Columns side by side."""
-    return _Bounded(np.concatenate([p.value for p in parts], 1), np.concatenate([p.error for p in parts], 1))
 
 
 def real_roots(coefficients: ArrayLike) -> tuple[Counts, Counts]:
     """Numbers of negative and of positive real roots, each multiple root counted once.
 
     Coefficients of shape (…, n + 1), descending, with a leading one other than 0; both answers have shape (…).
-    The rows in which rounding could change a sign of the sequence, as beside an exceptional point, are decided in
-    exact arithmetic from the coefficients as stored.
+    The rows in which rounding could change a sign of the sequence are decided by discs around numeric roots, and those
+    in which discs touch, as beside an exceptional point, in exact arithmetic from the coefficients as stored.
 
     Raises:
         ValueError: for a leading coefficient 0 or coefficients that are not finite.
@@ -65,14 +27,18 @@ def real_roots(coefficients: ArrayLike) -> tuple[Counts, Counts]:
     if c.ndim == 0 or c.shape[-1] < 2 or not np.all(np.isfinite(c)) or np.any(c[..., 0] == 0):
         raise ValueError("real_roots takes finite coefficients, two or more, with a leading one other than 0")
     rows = c.reshape(-1, c.shape[-1])
-    negative, positive, doubtful = _sturm(_scaled(rows))
+    scaled = _scaled(rows)
+    negative, positive, doubtful = _sturm(scaled)
+    left = np.flatnonzero(doubtful & np.all(scaled.error == 0, axis=1))
+    if left.size:
+        negative[left], positive[left], doubtful[left] = real_counts(scaled.value[left])
     for k in np.flatnonzero(doubtful):
         real = [r.re for r in exact_roots(rows[k].tolist()) if r.im == 0]
         negative[k], positive[k] = sum(r < 0 for r in real), sum(r > 0 for r in real)
     return negative.reshape(c.shape[:-1]), positive.reshape(c.shape[:-1])
 
 
-def _scaled(c: Array) -> _Bounded:
+def _scaled(c: Array) -> Bounded:
     """In units near the largest term of the Fujiwara bound, a leading one near 1: powers of 2, so without rounding."""
     n = np.arange(c.shape[1])
     _, exponent = np.frexp(c)
@@ -80,18 +46,18 @@ def _scaled(c: Array) -> _Bounded:
     unit = np.where(np.isfinite(above), np.ceil(above), 0).astype(int)
     value = np.ldexp(c, -exponent[:, :1] - unit[:, None] * n)
     lost = (np.abs(value) < _SMALLEST) & (c != 0)
-    return _Bounded(value, np.where(lost, np.inf, 0.0))
+    return Bounded(value, np.where(lost, np.inf, 0.0))
 
 
-def _sturm(c: _Bounded) -> tuple[Counts, Counts, NDArray[np.bool_]]:
+def _sturm(c: Bounded) -> tuple[Counts, Counts, NDArray[np.bool_]]:
     """Counts by sign changes at −∞, 0 and ∞, and where a sign that they rest on is in doubt."""
     n = c.value.shape[1] - 1
     power = np.arange(n, 0, -1.0)
-    chain = [c, _rounded(c.value[:, :-1] * power, c.error[:, :-1] * power)]
+    chain = [c, rounded(c.value[:, :-1] * power, c.error[:, :-1] * power)]
     with np.errstate(all="ignore"):
         for _ in range(n - 1):
             chain.append(_next(chain[-2], chain[-1]))
-    ends = [_beside([p[:, end] for p in chain]) for end in (slice(0, 1), slice(-1, None))]
+    ends = [beside([p[:, end] for p in chain]) for end in (slice(0, 1), slice(-1, None))]
     certain = [np.all(np.abs(end.value) > end.error, axis=1) for end in ends]
     lead, constant = (np.sign(end.value) for end in ends)
     at_minus = lead * (-1.0) ** np.arange(n, -1, -1)
@@ -99,17 +65,17 @@ def _sturm(c: _Bounded) -> tuple[Counts, Counts, NDArray[np.bool_]]:
     return left - middle, middle - right, ~(certain[0] & certain[1])
 
 
-def _next(p: _Bounded, q: _Bounded) -> _Bounded:
+def _next(p: Bounded, q: Bounded) -> Bounded:
     """−(p mod q) for degrees one apart, in units of its largest coefficient."""
     lead = q[:, :1]
     first = p[:, :1] / lead
     rest = p[:, 1:-1] - first * q[:, 1:]
     second = rest[:, :1] / lead
-    tail = _beside([rest[:, 1:], p[:, -1:]])
+    tail = beside([rest[:, 1:], p[:, -1:]])
     remainder = second * q[:, 1:] - tail
     largest = np.abs(remainder.value).max(axis=1, keepdims=True)
     _, exponent = np.frexp(np.where(np.isfinite(largest) & (largest > 0), largest, 1.0))
-    return _Bounded(np.ldexp(remainder.value, -exponent), np.ldexp(remainder.error, -exponent))
+    return Bounded(np.ldexp(remainder.value, -exponent), np.ldexp(remainder.error, -exponent))
 
 
 def _variations(signs: Array) -> Counts:

@@ -1,11 +1,19 @@
 """Stability and discriminant from the coefficients alone, with no root computed."""
 
+from collections.abc import Sequence
 from typing import Any
 
+import flint
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tmsopt.roots.bounded import Bounded
 from tmsopt.roots.polynomial import Coefficients, determinant
+
+Array = NDArray[np.float64]
+
+_SMALL = 4
+"""Up to this degree the Liénard–Chipart conditions have few terms; above, Routh's scheme takes fewer operations."""
 
 
 def hurwitz_minors(coefficients: Coefficients) -> list[Any]:
@@ -33,38 +41,69 @@ def lienard_chipart(coefficients: Coefficients) -> list[Any]:
     return [coefficients[k] for k in range(n, 0, -2)] + [_hurwitz_minor(coefficients, m) for m in range(n - 1, 0, -2)]
 
 
+def routh(coefficients: Coefficients) -> list[Any]:
+    """First column of Routh's scheme after a0: all positive exactly when every root has Re s < 0, given a0 > 0.
+
+    Numbers that can be divided: floats, arrays, fractions, balls. In fewer operations than `lienard_chipart`, which
+    does without division; what follows an entry that is 0 means nothing.
+    """
+    above, row = list(coefficients[0::2]), list(coefficients[1::2])
+    column = []
+    while row:
+        column.append(row[0])
+        ratio = above[0] / row[0]
+        padded = [*row[1:], None]
+        above, row = row, [a if b is None else a - ratio * b for a, b in zip(above[1:], padded, strict=False)]
+    return column
+
+
 def is_stable(coefficients: ArrayLike) -> NDArray[np.bool_]:
     """Whether all roots have Re s < 0: coefficients of shape (…, n + 1), descending; the answer has shape (…).
 
-    Up to degree 4 by the conditions of Liénard and Chipart, above by the scheme of Routh: for a stable polynomial all
-    its numbers are positive and elimination is accurate in each entry (de Boor and Pinkus, 1977, of totally positive
-    matrices), and numbers that are all positive are those of a stable polynomial within rounding of each coefficient.
+    Above degree 4, where rounding could change an answer, exact arithmetic gives it from the coefficients as stored.
     """
     c = np.asarray(coefficients, dtype=float)
     sign = np.sign(c[..., 0])
+    if c.shape[-1] - 1 > _SMALL:
+        return _by_routh(sign[..., None] * c)
+    normalised = [sign * c[..., k] for k in range(c.shape[-1])]
     stable = sign != 0
-    if c.shape[-1] > _LARGEST + 1:
-        return np.asarray(stable & _routh(sign[..., None] * c))
-    for quantity in lienard_chipart([sign * c[..., k] for k in range(c.shape[-1])]):
+    for quantity in lienard_chipart(normalised):
         stable = stable & (quantity > 0)
     return np.asarray(stable)
 
 
-_LARGEST = 4  # degree up to which minors are as cheap as elimination
-
-
-def _routh(c: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether the first column of Routh's scheme is positive, with the coefficients themselves."""
-    stable = np.asarray(np.all(c > 0, axis=-1))
-    above, row = c[..., 0::2], c[..., 1::2]
+def _by_routh(c: Array) -> NDArray[np.bool_]:
+    flat = c.reshape(-1, c.shape[-1])
+    stable = np.all(np.isfinite(flat) & (flat > 0), axis=1)
+    rows = np.flatnonzero(stable)
+    if not rows.size:
+        return stable.reshape(c.shape[:-1])
     with np.errstate(all="ignore"):
-        while row.shape[-1]:
-            stable = stable & (row[..., 0] > 0)
-            ratio = above[..., :1] / row[..., :1]
-            width = above.shape[-1] - 1
-            longer = np.concatenate([row, np.zeros_like(above[..., :1])], axis=-1)[..., 1 : width + 1]
-            above, row = row, above[..., 1:] - ratio * longer
-    return stable
+        column = routh([Bounded(x, np.zeros(len(rows))) for x in flat[rows].T])
+        value, error = (np.stack([getattr(x, part) for x in column], axis=1) for part in ("value", "error"))
+        positive, negative = value > error, value < -error
+    # An entry after one that is not positive decides nothing, so the first that is not tells.
+    first = np.argmin(np.concatenate([positive, np.zeros((len(rows), 1), bool)], axis=1), axis=1)
+    certain = positive.all(axis=1)
+    refuted = np.concatenate([negative, np.zeros((len(rows), 1), bool)], axis=1)[np.arange(len(rows)), first]
+    stable[rows] = certain
+    for k in rows[~(certain | refuted)]:
+        stable[k] = _exactly_stable(flat[k].tolist())
+    return stable.reshape(c.shape[:-1])
+
+
+def _exactly_stable(coefficients: Sequence[float]) -> bool:
+    """Routh's scheme in fractions."""
+    row = [flint.fmpq(*c.as_integer_ratio()) for c in coefficients]
+    above, row = row[0::2], row[1::2]
+    while row:
+        if row[0] <= 0:
+            return False
+        ratio = above[0] / row[0]
+        padded = [*row[1:], flint.fmpq(0)]
+        above, row = row, [a - ratio * b for a, b in zip(above[1:], padded, strict=False)]
+    return True
 
 
 def discriminant(coefficients: Coefficients) -> Any:
