@@ -74,14 +74,15 @@ def _nlp(place: Place, edge: Edge, sign: float, size: float) -> NLP:
     x = ca.SX.sym("x", n + extra)
     y, unknowns = [x[k] for k in range(n)], [x[n + k] for k in range(extra)]
     c = [sign * a for a in place.scaled(place.displaced([size * v for v in y]))]
-    equations, others = edge.equations(c, unknowns), edge.nonnegative(c, unknowns)
+    equations = [e / place.sizes[k] for e, k in zip(edge.equations(c, unknowns), edge.powers, strict=True)]
+    others = edge.nonnegative(c, unknowns)
     f, g = sum(v * v for v in y), ca.vertcat(*equations, *others)
     return NLP(
         formulation="nearest",
         variables=(*place.weights, *edge.unknowns),
         functions=ca.Function("nlp", [x], [f, g]),
         lower=(*(place.space.lower / size).tolist(), *[0.0] * extra),
-        upper=(*(place.space.upper / size).tolist(), *[1.0 if name == "e" else np.inf for name in edge.unknowns]),
+        upper=(*(place.space.upper / size).tolist(), *edge.upper),
         rows=(*[edge.name] * len(equations), *["others"] * len(others)),
         row_lower=(0.0,) * (len(equations) + len(others)),
         row_upper=(*[0.0] * len(equations), *[np.inf] * len(others)),

@@ -6,43 +6,128 @@ positive where the roots are left of the imaginary axis. Every form stays regula
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.roots import PATTERNS, discriminant, is_stable, pattern_distance, product, roots
+from tmsopt.design.rests import quotient, regular, rest, terms
+from tmsopt.roots import discriminant, hurwitz_minors, is_stable, product, real_roots, roots
 
 Array = NDArray[np.float64]
 Truth = NDArray[np.bool_]
 
 MATCHED = 1e-10
-"""Relative change of a coefficient up to which a quartic counts as on an edge."""
+"""Relative change of a coefficient up to which a polynomial counts as on an edge."""
 
-_LEAD = 1e-9  # of the largest coefficient: a smaller a0 is replaced before roots are guessed from
+_BY_SIGNS = 3
+"""Up to this degree Hurwitz's inequalities give all limits of stable polynomials; above, they admit others too."""
+
+_STEPS = 20
 
 
 @dataclass(frozen=True)
 class Edge:
-    """A piece of a boundary: the quartics for which the equations have unknowns e in [0, 1] and A, B, C ≥ 0.
+    """A piece of a boundary: the polynomials for which the equations have unknowns that are ≥ 0.
 
-    A factor with unknown roots is e s² + 1 − e, or e s + 1 − e, which reaches infinity at e = 0, times A s² + B s + C.
+    A factor with unknown roots is e s² + 1 − e, or e s + 1 − e, which reaches infinity at e = 0, times a `Rest`.
 
     Attributes:
         name: ``weave``, ``capsize``, ``infinity``, ``EP2``, and ``capsize, real`` and ``infinity, real``, where
             all other roots are real.
-        unknowns: names of factor coefficients.
+        unknowns, upper: names of factor coefficients, and what they are at most.
         equations: expressions of the coefficients and the unknowns that are 0.
+        powers: which coefficient each equation is about.
         nonnegative: expressions that are ≥ 0: the other roots are not right of the axis, or are real.
         guess: unknowns to start from, for numeric coefficients.
+        divisor: the factor of the edge itself for e, where it has one.
     """
 
     name: str
     unknowns: tuple[str, ...]
+    upper: tuple[float, ...]
     equations: Callable[[Sequence[Any], Sequence[Any]], list[Any]]
+    powers: tuple[int, ...]
     nonnegative: Callable[[Sequence[Any], Sequence[Any]], list[Any]]
     guess: Callable[[Array], list[float]]
+    divisor: Callable[[Any], list[Any]] | None = None
+
+
+@lru_cache(maxsize=16)
+def edges(degree: int) -> Mapping[str, Edge]:
+    """Every piece of a boundary among the polynomials of a degree ≥ 2, by name."""
+    return MappingProxyType(
+        {
+            edge.name: edge
+            for edge in (
+                _divided("weave", degree, _pair, real=False),
+                _ended("capsize", degree, degree, real=False),
+                _ended("infinity", degree, 0, real=False),
+                _divided("EP2", degree, _double, real=True),
+                _ended("capsize, real", degree, degree, real=True),
+                _ended("infinity, real", degree, 0, real=True),
+            )
+        }
+    )
+
+
+def _pair(e: Any) -> list[Any]:
+    """e s² + 1 − e: a pair on the imaginary axis."""
+    return [e, 0, 1 - e]
+
+
+def _double(e: Any) -> list[Any]:
+    """(e s + 1 − e)²: a double root ≤ 0."""
+    return [e * e, 2 * e * (1 - e), (1 - e) * (1 - e)]
+
+
+def _divided(name: str, degree: int, divisor: Callable[[Any], list[Any]], real: bool) -> Edge:
+    """The multiples of a factor with one unknown."""
+    others = rest(degree - 2, real)
+
+    def guess(c: Array) -> list[float]:
+        e, left = _nearest(c, divisor, _candidates(c, name), terms(c))
+        return [e, *others.guess(left)]
+
+    return Edge(
+        name,
+        ("e", *others.unknowns),
+        (1.0, *others.upper),
+        lambda c, u: _difference(c, divisor(u[0]), *others.factors(u[1:])),
+        tuple(range(degree + 1)),
+        lambda c, u: others.nonnegative(u[1:]),
+        guess,
+        divisor,
+    )
+
+
+def _ended(name: str, degree: int, end: int, real: bool) -> Edge:
+    """Where the first or the last coefficient is 0: a root at infinity, or at 0."""
+    inner = slice(0, degree) if end else slice(1, degree + 1)
+    if not real and degree - 1 <= _BY_SIGNS:
+        return Edge(name, (), (), lambda c, u: [c[end]], (end,), lambda c, u: _limits_of_stable(c[inner]), lambda c: [])
+    others = rest(degree - 1, real)
+
+    def equations(c: Sequence[Any], u: Sequence[Any]) -> list[Any]:
+        matched = _difference(c[inner], *others.factors(u))
+        return [*matched, c[end]] if end else [c[end], *matched]
+
+    return Edge(
+        name,
+        others.unknowns,
+        others.upper,
+        equations,
+        tuple(range(degree + 1)),
+        lambda c, u: others.nonnegative(u),
+        lambda c: others.guess(c[inner]),
+    )
+
+
+def _limits_of_stable(c: Sequence[Any]) -> list[Any]:
+    """≥ 0 exactly for the limits of stable polynomials of degree 3 at most: the coefficients, and c1 c2 − c0 c3."""
+    return [*c, *([hurwitz_minors(c)[1]] if len(c) - 1 == _BY_SIGNS else [])]
 
 
 def _difference(c: Sequence[Any], *factors: Sequence[Any]) -> list[Any]:
@@ -50,101 +135,25 @@ def _difference(c: Sequence[Any], *factors: Sequence[Any]) -> list[Any]:
     return [a - b for a, b in zip(c, product(*factors), strict=True)]
 
 
-def _linear(u: Sequence[Any]) -> list[Any]:
-    """e s + 1 − e, with 0 ≤ e ≤ 1: every root ≤ 0, infinity included."""
-    return [u[0], 1 - u[0]]
+def _candidates(c: Array, name: str) -> list[float]:
+    """Values of e at which an edge may be near: every pair as if on the axis, or every two neighbours as if one."""
+    z = roots(regular(c))
+    if name == "weave":
+        return [1 / (1 + abs(x) ** 2) for x in z[z.imag > 0]] + [0.0, 1.0]
+    real = np.sort(z[z.imag == 0].real)
+    doubles = [*((real[1:] + real[:-1]) / 2), *z[z.imag > 0].real]
+    return [1 / (1 - x) for x in doubles if x < 0] or [1 / (1 + float(np.abs(z).mean()))]
 
 
-def _real(u: Sequence[Any]) -> Any:
-    """≥ 0 where A s² + B s + C has real roots."""
-    return u[2] * u[2] - 4 * u[1] * u[3]
+def _nearest(c: Array, divisor: Callable[[Any], list[Any]], among: Sequence[float], size: Array) -> tuple[float, Array]:
+    """The e with which the factor divides c most nearly, and the quotient."""
 
+    def left(e: float) -> Array:
+        return quotient(c, np.array(divisor(e)), size)
 
-def _unknowns(x: float, c: Array, divisor: Callable[[float], list[float]]) -> list[float]:
-    """e for a root −x, or for W = x, and the quotient of c by the factor with that e."""
-    e = 1 / (1 + max(x, 0.0))
-    factor = np.array(divisor(e))
-    columns = np.stack([np.convolve(factor, unit) for unit in np.eye(len(c) - len(factor) + 1)], axis=1)
-    return [e, *np.linalg.lstsq(columns, c, rcond=None)[0].tolist()]
+    best = min(among, key=lambda e: float(np.abs((c - np.convolve(divisor(e), left(e))) / size).max()))
+    return float(best), left(best)
 
-
-def _weave_guess(c: Array) -> list[float]:
-    """The pair whose W = c3/c1, as on the boundary."""
-    return _unknowns(float(c[3] / c[1]) if c[1] else 0.0, c, lambda e: [e, 0.0, 1 - e])
-
-
-def _regular(c: Array) -> Array:
-    size = float(np.abs(c).max()) or 1.0
-    return np.concatenate([[c[0] if abs(c[0]) > _LEAD * size else _LEAD * size], c[1:]])
-
-
-def _double_guess(c: Array) -> list[float]:
-    """The two roots that are nearest to a double one; the others as they are."""
-    lead = _regular(c)
-    found = roots(lead)
-    pattern = PATTERNS["EP2"]
-    guesses = [g for g in pattern.guesses(found) if g[0] < 0] or [[float(found.mean().real), 1.0, 0.25]]
-    size = np.abs(lead / lead[0]) + 1e-300
-    r = min(guesses, key=lambda g: float(np.abs((np.array(pattern.monic(g)) - lead / lead[0]) / size).max()))[0]
-    return _unknowns(-r, c, lambda e: [e * e, 2 * e * (1 - e), (1 - e) ** 2])
-
-
-def _split_guess(c: Array) -> list[float]:
-    """A cubic with its rightmost root split off."""
-    return _unknowns(float(-roots(_regular(c)).real.max()), c, lambda e: [e, 1 - e])
-
-
-EDGES: Mapping[str, Edge] = MappingProxyType(
-    {
-        e.name: e
-        for e in (
-            Edge(
-                "weave",
-                ("e", "A", "B", "C"),
-                lambda c, u: _difference(c, [u[0], 0, 1 - u[0]], u[1:]),
-                lambda c, u: [],
-                _weave_guess,
-            ),
-            # A cubic is in the closure of the stable ones where its coefficients and c1 c2 − c0 c3 are ≥ 0.
-            Edge(
-                "capsize",
-                (),
-                lambda c, u: [c[4]],
-                lambda c, u: [c[0], c[1], c[2], c[3], c[1] * c[2] - c[0] * c[3]],
-                lambda c: [],
-            ),
-            Edge(
-                "infinity",
-                (),
-                lambda c, u: [c[0]],
-                lambda c, u: [c[1], c[2], c[3], c[4], c[2] * c[3] - c[1] * c[4]],
-                lambda c: [],
-            ),
-            Edge(
-                "EP2",
-                ("e", "A", "B", "C"),
-                lambda c, u: _difference(c, _linear(u), _linear(u), u[1:]),
-                lambda c, u: [_real(u)],
-                _double_guess,
-            ),
-            Edge(
-                "capsize, real",
-                ("e", "A", "B", "C"),
-                lambda c, u: [c[4], *_difference(c[:4], _linear(u), u[1:])],
-                lambda c, u: [_real(u)],
-                lambda c: _split_guess(c[:4]),
-            ),
-            Edge(
-                "infinity, real",
-                ("e", "A", "B", "C"),
-                lambda c, u: [c[0], *_difference(c[1:], _linear(u), u[1:])],
-                lambda c, u: [_real(u)],
-                lambda c: _split_guess(c[1:]),
-            ),
-        )
-    }
-)
-"""Every piece of a boundary, by name."""
 
 KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -158,32 +167,66 @@ KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 
 
 def heavily_damped(c: Array) -> Truth:
-    """Whether all roots are real, negative and different, for coefficients of shape (…, 5): by signs, no root.
+    """Whether all roots are real, negative and different, for coefficients of shape (…, n + 1), without roots.
 
     A quartic has four different real roots where Δ > 0, 8 c0 c2 < 3 c1² and 64 c0³ c4 − 16 c0² c2² + 16 c0 c1² c2 −
-    16 c0² c1 c3 − 3 c1⁴ < 0.
+    16 c0² c1 c3 − 3 c1⁴ < 0, a cubic or a quadratic as many as it can where Δ > 0; others are counted (Sturm).
     """
+    n = c.shape[-1] - 1
+    stable = is_stable(c)
+    if n > 4:
+        return _counted(c, stable)
+    real = stable & (discriminant([c[..., k] for k in range(n + 1)]) > 0)
+    if n < 4:
+        return np.asarray(real)
     a, b, p, q, r = (c[..., k] for k in range(5))
     second = 64 * a**3 * r - 16 * a * a * p * p + 16 * a * b * b * p - 16 * a * a * b * q - 3 * b**4
-    return np.asarray(is_stable(c) & (discriminant([a, b, p, q, r]) > 0) & (8 * a * p < 3 * b * b) & (second < 0))
+    return np.asarray(real & (8 * a * p < 3 * b * b) & (second < 0))
 
 
-def lies_on(c: Array, edge: Edge) -> bool:
-    """Whether a quartic, signed as on the inner side, is on an edge within 1e-10 of its coefficients."""
-    size = float(np.abs(c).max()) or 1.0
-    if edge.name.startswith("capsize"):
-        rest, on = c[:4], abs(c[4])
-    elif edge.name.startswith("infinity"):
-        rest, on = c[1:], abs(c[0])
-    else:
-        # Inverted roots keep both patterns, and keep clear of infinity.
-        return pattern_distance(PATTERNS[edge.name], c if abs(c[0]) >= abs(c[4]) else c[::-1]) <= MATCHED
-    return bool(on <= MATCHED * size and np.all(rest >= -MATCHED * size))
+def _counted(c: Array, stable: Truth) -> Truth:
+    """As many real roots as the degree; Newton's inequalities c_k² > (1 + 1/k)(1 + 1/(n − k)) c_{k−1} c_{k+1} first."""
+    n = c.shape[-1] - 1
+    k = np.arange(1, n)
+    newton = c[..., 1:-1] ** 2 > (1 - 1e-9) * (1 + 1 / k) * (1 + 1 / (n - k)) * c[..., :-2] * c[..., 2:]
+    damped = np.asarray(stable & np.all(newton, axis=-1))
+    damped[damped] = real_roots(c[damped])[0] == n
+    return damped
+
+
+def lies_on(c: Array, edge: Edge, sizes: Array) -> bool:
+    """Whether a polynomial, signed as on the inner side, is on an edge within 1e-10 of the sizes of its coefficients.
+
+    Args:
+        sizes: of the terms of each coefficient of a design that is not on the edge; larger coefficients count more.
+    """
+    size = np.maximum(np.abs(c), sizes)
+    if edge.divisor is not None:
+        # Inverted roots keep both factors, and keep clear of infinity.
+        return _distance(*((c, size) if abs(c[0]) >= abs(c[-1]) else (c[::-1], size[::-1])), edge) <= MATCHED
+    inner, end = (slice(0, -1), -1) if edge.name.startswith("capsize") else (slice(1, None), 0)
+    return bool(abs(c[end]) <= MATCHED * size[end] and np.all(c[inner] >= -MATCHED * size[inner]))
+
+
+def _distance(c: Array, size: Array, edge: Edge) -> float:
+    """Relative change of the coefficients that makes the factor of an edge divide them, by Gauss and Newton."""
+    assert edge.divisor is not None
+    e, left = _nearest(c, edge.divisor, _candidates(c, edge.name), size)
+    for _ in range(_STEPS):
+        factor, slope = np.array(edge.divisor(e)), np.array(edge.divisor(e + 1e-100j)).imag / 1e-100
+        columns = [np.convolve(factor, unit) for unit in np.eye(len(left))]
+        jacobian = np.stack([np.convolve(slope, left), *columns], axis=1) / size[:, None]
+        step = np.linalg.lstsq(jacobian, (c - np.convolve(factor, left)) / size, rcond=None)[0]
+        e, left = e + float(step[0]), left + step[1:]
+        if abs(step[0]) <= 1e-15:
+            break
+    inside = -MATCHED <= e <= 1 + MATCHED
+    return float(np.linalg.norm((c - np.convolve(edge.divisor(e), left)) / size)) if inside else np.inf
 
 
 def losses(c: Array, heavy: bool) -> tuple[str, ...]:
-    """The edges that a quartic just beyond them has crossed, c signed as on the other side."""
-    passed = [n for n, k in (("capsize", 4), ("infinity", 0)) if c[k] <= 0]
+    """The edges that a polynomial just beyond them has crossed, c signed as on the other side."""
+    passed = [n for n, k in (("capsize", -1), ("infinity", 0)) if c[k] <= 0]
     if heavy:
         return tuple(f"{n}, real" for n in passed) or ("EP2",)
     return tuple(passed) or ("weave",)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.approach import ALIKE, Approach, approach
-from tmsopt.design.edges import EDGES, KINDS, Edge, lies_on
+from tmsopt.design.edges import KINDS, Edge, edges, lies_on
 from tmsopt.design.errors import Fault, InputError, suggest
 from tmsopt.design.frozen import Table
 from tmsopt.design.place import Place, placed
@@ -201,8 +201,9 @@ def _nearest(place: Place, seen: list[Crossing], kind: str) -> Nearest:
         return Nearest(kind, 0.0, Table(place.parameters), Table(zero), refined=True, direct=True)
     mine = [s for s in seen if s.edge in KINDS[kind]]
     best = Approach(np.zeros(0), False)
+    pieces = edges(place.problem.model.degree)
     for edge, sign, starts in _pieces(place, mine, kind):
-        best = min(best, _best(place, EDGES[edge], sign, starts), key=_length)
+        best = min(best, _best(place, pieces[edge], sign, starts), key=_length)
     if mine and mine[0].distance < _length(best) * (1 - ALIKE):
         best = Approach(mine[0].u, False)
     if not best.u.size:
@@ -242,7 +243,7 @@ def _best(place: Place, edge: Edge, sign: float, starts: list[Array]) -> Approac
     for _ in range(_ROUNDS):
         for u in starts:
             found = run(u, _length(best))
-            if found is not None and lies_on(sign * place.space.coefficients(found.u), edge):
+            if found is not None and lies_on(sign * place.space.coefficients(found.u), edge, place.sizes):
                 best = found
         if not best.u.size:
             break

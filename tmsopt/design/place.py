@@ -13,13 +13,13 @@ from tmsopt.design.errors import Fault, InputError, suggest
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import STRUCTURE_TOLERANCE
 from tmsopt.design.rays import Space
+from tmsopt.design.rests import terms
 from tmsopt.models import Range
-from tmsopt.roots import PATTERNS, is_stable, pattern_distance, real_roots, roots
+from tmsopt.roots import is_stable, multiple_real_roots, real_roots
 
 Array = NDArray[np.float64]
 
 _OPEN = 1e-6  # of the size of the parameter: how near an end that its range excludes it may come
-_COMPLEX = 1e-6  # of the largest root: imaginary parts that a double root may show
 
 
 @dataclass(frozen=True)
@@ -69,18 +69,21 @@ class Place:
     @cached_property
     def heavily_damped(self) -> bool:
         """Whether all roots are real and negative, multiple ones included."""
-        return self.on_edge or bool(self._own[0] != 0 and real_roots(self._own)[0] == 4)
+        degree = len(self._own) - 1
+        return self.on_edge or bool(self._own[0] != 0 and real_roots(self._own)[0] == degree)
 
     @cached_property
     def on_edge(self) -> bool:
         """Whether all roots are real and negative and two of them equal, decided by coefficients."""
         if self._own[0] == 0 or not self.stable:
             return False
-        if any(pattern_distance(PATTERNS[n], self._own) <= STRUCTURE_TOLERANCE for n in ("EP4", "EP3", "2EP2")):
-            return True
-        z = roots(self._own)  # a double root at most, so their imaginary parts are right to half the digits
-        real = np.abs(z.imag).max() <= _COMPLEX * np.abs(z).max()
-        return bool(real and pattern_distance(PATTERNS["EP2"], self._own) <= STRUCTURE_TOLERANCE)
+        found = multiple_real_roots(self._own, STRUCTURE_TOLERANCE)
+        return found is not None and all(r.re < 0 for r in found)
+
+    @cached_property
+    def sizes(self) -> Array:
+        """Size of the terms of each coefficient: an equation between coefficients is judged by it."""
+        return terms(self._own) if self._own.any() else np.ones(len(self._own))
 
     @cached_property
     def _own(self) -> Array:

@@ -27,7 +27,7 @@ class Space:
     """Designs around one, in units of the weights.
 
     Attributes:
-        coefficients: displacements of shape (…, n) → coefficients of shape (…, 5), scaled to the size of 1.
+        coefficients: displacements of shape (…, n) → coefficients of shape (…, degree + 1), scaled to the size of 1.
         lower, upper: physical ranges.
     """
 
@@ -111,9 +111,24 @@ def most_damped(space: Space, sign: float, seed: int = 0) -> list[Array]:
 
 
 def _tests(c: Array) -> Array:
-    """What vanishes on the edges: a0, a4, the Hurwitz determinant and the discriminant, shape (…, 4)."""
-    by_power = [c[..., k] for k in range(5)]
-    return np.stack([c[..., 0], c[..., 4], hurwitz_minors(by_power)[2], discriminant(by_power)], axis=-1)
+    """What vanishes on the edges: a0, aₙ, the Hurwitz determinant and the discriminant, shape (…, 4)."""
+    n = c.shape[-1] - 1
+    if n > 4:
+        pair, double = _of_pairs(c)
+    else:
+        by_power = [c[..., k] for k in range(n + 1)]
+        pair, double = hurwitz_minors(by_power)[n - 2], discriminant(by_power)
+    return np.stack([c[..., 0], c[..., -1], pair, double], axis=-1)
+
+
+def _of_pairs(c: Array) -> tuple[Array, Array]:
+    """∏ −(zᵢ + zⱼ) and ∏ (zᵢ − zⱼ)² over pairs of roots: Δₙ₋₁ (Orlando) and the discriminant without powers of a0."""
+    proper = np.all(np.isfinite(c), axis=-1) & (c[..., 0] != 0)
+    z = roots(np.where(proper[..., None], c, np.eye(c.shape[-1])[0]))
+    first, second = np.triu_indices(z.shape[-1], 1)
+    sums, differences = z[..., first] + z[..., second], z[..., first] - z[..., second]
+    pair, double = np.prod(-sums, axis=-1).real, np.prod(differences * differences, axis=-1).real
+    return np.where(proper, pair, np.nan), np.where(proper, double, np.nan)
 
 
 def _different(unit: Array, rows: list[int]) -> NDArray[np.int_]:

@@ -4,6 +4,7 @@ from tmsopt.roots.classes import CLASSES, Classes, quartic_classes, quartic_is_s
 from tmsopt.roots.composed import pattern
 from tmsopt.roots.count import real_roots
 from tmsopt.roots.exact import exact_abscissa, exact_roots
+from tmsopt.roots.multiple import multiple_real_roots
 from tmsopt.roots.numeric import abscissa, backward_error, rebuilt, roots
 from tmsopt.roots.patterns import PATTERNS, Pattern
 from tmsopt.roots.polynomial import determinant, evaluate, product, quadratic_pencil, shift
@@ -31,6 +32,7 @@ __all__ = [
     "hurwitz_minors",
     "is_stable",
     "lienard_chipart",
+    "multiple_real_roots",
     "pattern",
     "pattern_distance",
     "product",

@@ -78,7 +78,7 @@ def _by_routh(c: Array) -> NDArray[np.bool_]:
     stable = np.all(np.isfinite(flat) & (flat > 0), axis=1)
     rows = np.flatnonzero(stable)
     if not rows.size:
-        return stable.reshape(c.shape[:-1])
+        return np.asarray(stable.reshape(c.shape[:-1]))
     with np.errstate(all="ignore"):
         column = routh([Bounded(x, np.zeros(len(rows))) for x in flat[rows].T])
         value, error = (np.stack([getattr(x, part) for x in column], axis=1) for part in ("value", "error"))
@@ -90,7 +90,7 @@ def _by_routh(c: Array) -> NDArray[np.bool_]:
     stable[rows] = certain
     for k in rows[~(certain | refuted)]:
         stable[k] = _exactly_stable(flat[k].tolist())
-    return stable.reshape(c.shape[:-1])
+    return np.asarray(stable.reshape(c.shape[:-1]))
 
 
 def _exactly_stable(coefficients: Sequence[float]) -> bool:

@@ -1,0 +1,50 @@
+"""Real-rooted polynomials with a multiple root, recognised by coefficients."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tmsopt.roots.numeric import rebuilt, roots
+from tmsopt.roots.structure import Root
+
+Array = NDArray[np.float64]
+
+_STEPS = 20
+
+
+def multiple_real_roots(coefficients: ArrayLike, tolerance: float) -> tuple[Root, ...] | None:
+    """Roots of the nearest polynomial whose roots are all real and two of them equal; None where none is near.
+
+    Numeric roots are gathered from the closest neighbours on, the most degenerate first, and ∏ (s − rᵢ)^mᵢ is fitted
+    to the coefficients, descending, shape (n + 1,), with a leading one other than 0. It is near within `tolerance`:
+    the root sum of squares of the changes, each relative to the terms that make up a coefficient.
+    """
+    c = np.asarray(coefficients, dtype=float)
+    z = roots(c)
+    z = z[np.lexsort((z.imag, z.real))]
+    size = np.maximum(rebuilt(-np.abs(z).astype(complex)), 1e-100)
+    gaps = np.abs(np.diff(z)) / (np.abs(z[1:]) + np.abs(z[:-1]) + 1e-300)
+    for cuts in range(len(z) - 1):
+        ends = np.sort(np.argsort(-gaps, kind="stable")[:cuts]) + 1
+        groups = np.split(z, ends)
+        fitted, distance = _fit(c / c[0], np.array([g.mean().real for g in groups]), [len(g) for g in groups], size)
+        if distance <= tolerance:
+            found = [Root(float(r), 0.0, len(g)) for r, g in zip(fitted, groups, strict=True)]
+            return tuple(sorted(found, key=lambda r: -r.re))
+    return None
+
+
+def _fit(monic: Array, r: Array, multiplicity: list[int], size: Array) -> tuple[Array, float]:
+    """Least squares of the relative residuals by Gauss and Newton."""
+
+    def powers(drop: int | None = None) -> Array:
+        less = [m - (k == drop) for k, m in enumerate(multiplicity)]
+        return rebuilt(np.repeat(r, less).astype(complex))
+
+    for _ in range(_STEPS):
+        columns = [-m * np.concatenate([[0.0], powers(k)]) for k, m in enumerate(multiplicity)]
+        jacobian = np.stack(columns, axis=1) / size[:, None]
+        step = np.linalg.lstsq(jacobian, (monic - powers()) / size, rcond=None)[0]
+        r = r + step
+        if np.all(np.abs(step) <= 1e-15 * np.abs(r)):
+            break
+    return r, float(np.linalg.norm((monic - powers()) / size))
