@@ -73,7 +73,7 @@ def _nlp(place: Place, edge: Edge, sign: float, size: float) -> NLP:
     n, extra = len(place.weights), len(edge.unknowns)
     x = ca.SX.sym("x", n + extra)
     y, unknowns = [x[k] for k in range(n)], [x[n + k] for k in range(extra)]
-    c = [sign * a for a in place.scaled(place.displaced([size * v for v in y]))]
+    c = ca.vertsplit(sign * place.symbolic(size * x[:n]))
     equations = [e / place.sizes[k] for e, k in zip(edge.equations(c, unknowns), edge.powers, strict=True)]
     others = edge.nonnegative(c, unknowns)
     f, g = sum(v * v for v in y), ca.vertcat(*equations, *others)

@@ -167,13 +167,13 @@ KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 
 
 def heavily_damped(c: Array) -> Truth:
-    """Whether all roots are real, negative and different, for coefficients of shape (…, n + 1), without roots.
+    """Whether all roots are real, negative and different, for coefficients of shape (…, n + 1), up to rounding.
 
     A quartic has four different real roots where Δ > 0, 8 c0 c2 < 3 c1² and 64 c0³ c4 − 16 c0² c2² + 16 c0 c1² c2 −
     16 c0² c1 c3 − 3 c1⁴ < 0, a cubic or a quadratic as many as it can where Δ > 0; others are counted (Sturm).
     """
     n = c.shape[-1] - 1
-    stable = is_stable(c)
+    stable = is_stable(c, exact=False)
     if n > 4:
         return _counted(c, stable)
     real = stable & (discriminant([c[..., k] for k in range(n + 1)]) > 0)
@@ -190,7 +190,7 @@ def _counted(c: Array, stable: Truth) -> Truth:
     k = np.arange(1, n)
     newton = c[..., 1:-1] ** 2 > (1 - 1e-9) * (1 + 1 / k) * (1 + 1 / (n - k)) * c[..., :-2] * c[..., 2:]
     damped = np.asarray(stable & np.all(newton, axis=-1))
-    damped[damped] = real_roots(c[damped])[0] == n
+    damped[damped] = real_roots(c[damped], exact=False)[0] == n
     return damped
 
 

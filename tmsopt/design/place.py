@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -60,6 +61,12 @@ class Place:
         """The polynomials around the design."""
         ends = [_ends(self.problem.parameter_set[n].range, self.parameters[n], w) for n, w in self.weights.items()]
         return Space(self._coefficients, np.array([lo for lo, _ in ends]), np.array([hi for _, hi in ends]))
+
+    @cached_property
+    def symbolic(self) -> ca.Function:
+        """Displacement → scaled coefficients, for CasADi: built once for all edges."""
+        u = ca.SX.sym("u", len(self.weights))
+        return ca.Function("coefficients", [u], [ca.vertcat(*self.scaled(self.displaced(ca.vertsplit(u))))])
 
     @cached_property
     def stable(self) -> bool:

@@ -9,6 +9,7 @@ from tmsopt.roots.structure import Root
 Array = NDArray[np.float64]
 
 _STEPS = 20
+_NEAR = 0.05  # relative distance of a guess that can still lead to a polynomial within any sensible tolerance
 
 
 def multiple_real_roots(coefficients: ArrayLike, tolerance: float) -> tuple[Root, ...] | None:
@@ -26,25 +27,30 @@ def multiple_real_roots(coefficients: ArrayLike, tolerance: float) -> tuple[Root
     for cuts in range(len(z) - 1):
         ends = np.sort(np.argsort(-gaps, kind="stable")[:cuts]) + 1
         groups = np.split(z, ends)
-        fitted, distance = _fit(c / c[0], np.array([g.mean().real for g in groups]), [len(g) for g in groups], size)
-        if distance <= tolerance:
+        means, multiplicity = np.array([g.mean().real for g in groups]), [len(g) for g in groups]
+        if _distance(c / c[0], means, multiplicity, size) > _NEAR:
+            continue
+        fitted = _fit(c / c[0], means, multiplicity, size)
+        if _distance(c / c[0], fitted, multiplicity, size) <= tolerance:
             found = [Root(float(r), 0.0, len(g)) for r, g in zip(fitted, groups, strict=True)]
             return tuple(sorted(found, key=lambda r: -r.re))
     return None
 
 
-def _fit(monic: Array, r: Array, multiplicity: list[int], size: Array) -> tuple[Array, float]:
+def _distance(monic: Array, r: Array, multiplicity: list[int], size: Array) -> float:
+    return float(np.linalg.norm((monic - rebuilt(np.repeat(r, multiplicity).astype(complex))) / size))
+
+
+def _fit(monic: Array, r: Array, multiplicity: list[int], size: Array) -> Array:
     """Least squares of the relative residuals by Gauss and Newton."""
-
-    def powers(drop: int | None = None) -> Array:
-        less = [m - (k == drop) for k, m in enumerate(multiplicity)]
-        return rebuilt(np.repeat(r, less).astype(complex))
-
     for _ in range(_STEPS):
-        columns = [-m * np.concatenate([[0.0], powers(k)]) for k, m in enumerate(multiplicity)]
-        jacobian = np.stack(columns, axis=1) / size[:, None]
-        step = np.linalg.lstsq(jacobian, (monic - powers()) / size, rcond=None)[0]
+        whole = rebuilt(np.repeat(r, multiplicity).astype(complex))
+        columns = []
+        for k in range(len(r)):
+            less = [m - (j == k) for j, m in enumerate(multiplicity)]
+            columns.append(-multiplicity[k] * np.concatenate([[0.0], rebuilt(np.repeat(r, less).astype(complex))]))
+        step = np.linalg.lstsq(np.stack(columns, axis=1) / size[:, None], (monic - whole) / size, rcond=None)[0]
         r = r + step
         if np.all(np.abs(step) <= 1e-15 * np.abs(r)):
             break
-    return r, float(np.linalg.norm((monic - powers()) / size))
+    return r
