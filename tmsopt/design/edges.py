@@ -36,7 +36,7 @@ class Edge:
 
     Attributes:
         name: ``weave``, ``capsize``, ``infinity``, ``EP2``, and ``capsize, real`` and ``infinity, real``, where
-            all other roots are real.
+            all other roots are real; ``real`` for heavy damping itself, as it is seen from outside.
         unknowns, upper: names of factor coefficients, and what they are at most.
         equations: expressions of the coefficients and the unknowns that are 0.
         powers: which coefficient each equation is about.
@@ -68,6 +68,7 @@ def edges(degree: int) -> Mapping[str, Edge]:
                 _divided("EP2", degree, _double, real=True),
                 _ended("capsize, real", degree, degree, real=True),
                 _ended("infinity, real", degree, 0, real=True),
+                _whole(degree),
             )
         }
     )
@@ -125,6 +126,20 @@ def _ended(name: str, degree: int, end: int, real: bool) -> Edge:
     )
 
 
+def _whole(degree: int) -> Edge:
+    """All roots real: from outside the nearest of these polynomials is on an edge, be it of several at once."""
+    every = rest(degree, True)
+    return Edge(
+        "real",
+        every.unknowns,
+        every.upper,
+        lambda c, u: _difference(c, *every.factors(u)),
+        tuple(range(degree + 1)),
+        lambda c, u: every.nonnegative(u),
+        every.guess,
+    )
+
+
 def _limits_of_stable(c: Sequence[Any]) -> list[Any]:
     """≥ 0 exactly for the limits of stable polynomials of degree 3 at most: the coefficients, and c1 c2 − c0 c3."""
     return [*c, *([hurwitz_minors(c)[1]] if len(c) - 1 == _BY_SIGNS else [])]
@@ -160,7 +175,7 @@ KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "weave": ("weave",),
         "capsize": ("capsize",),
         "infinity": ("infinity",),
-        "heavy damping": ("EP2", "capsize, real", "infinity, real"),
+        "heavy damping": ("EP2", "capsize, real", "infinity, real", "real"),
     }
 )
 """Boundary → the pieces it is made of."""
@@ -204,6 +219,8 @@ def lies_on(c: Array, edge: Edge, sizes: Array) -> bool:
     if edge.divisor is not None:
         # Inverted roots keep both factors, and keep clear of infinity.
         return _distance(*((c, size) if abs(c[0]) >= abs(c[-1]) else (c[::-1], size[::-1])), edge) <= MATCHED
+    if edge.name == "real":  # what was matched to factors is there
+        return bool(np.all(c >= -MATCHED * size))
     inner, end = (slice(0, -1), -1) if edge.name.startswith("capsize") else (slice(1, None), 0)
     return bool(abs(c[end]) <= MATCHED * size[end] and np.all(c[inner] >= -MATCHED * size[inner]))
 

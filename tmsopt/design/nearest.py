@@ -230,7 +230,7 @@ def _pieces(place: Place, seen: list[Crossing], kind: str) -> Iterator[tuple[str
         starts.setdefault((crossing.edge, crossing.sign), []).append(crossing.u)
     if kind == "heavy damping" and not place.heavily_damped:
         sign = float(np.sign(place.space.coefficients(np.zeros(len(place.weights)))[0]))
-        starts.setdefault(("EP2", sign), []).extend(most_damped(place.space, sign))
+        starts.setdefault(("real", sign), []).extend(most_damped(place.space, sign))
     for (edge, sign), points in starts.items():
         yield edge, sign, points
 
