@@ -21,8 +21,10 @@ from tmsopt.design.errors import InputError
 from tmsopt.design.files import load
 from tmsopt.design.problem import Problem
 from tmsopt.models import tms
+from tmsopt.roots import CLASSES
 from tmsopt.show.chart import chart_table
-from tmsopt.study.chart import CLASSES, chart, classify, save_arrays
+from tmsopt.study.chart import chart, save_arrays
+from tmsopt.study.classes import classify
 from tmsopt.study.domain import domain
 from tmsopt.study.trace import trace
 

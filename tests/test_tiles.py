@@ -11,7 +11,8 @@ from tmsopt.design.errors import InputError
 from tmsopt.design.files import load
 from tmsopt.design.problem import Problem
 from tmsopt.models import Model, Parameter, ParameterSet
-from tmsopt.study.chart import CLASSES, chart
+from tmsopt.roots import CLASSES
+from tmsopt.study.chart import chart
 from tmsopt.study.stored import chart_to
 from tmsopt.study.tally import tally, total
 from tmsopt.study.tiles import LAYERS, Grid, survey

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.problem import Problem
-from tmsopt.study.classes import CLASSES
+from tmsopt.roots import CLASSES
 from tmsopt.study.tiles import Grid
 
 ENDINGS = ("npz", "nc")

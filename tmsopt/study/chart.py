@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 
 from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.problem import Problem, checked
+from tmsopt.roots import CLASSES
 from tmsopt.study.archive import save_layers
-from tmsopt.study.classes import CLASSES, classify
 from tmsopt.study.domain import Domain, domain
 from tmsopt.study.stored import gathered
 from tmsopt.study.tiles import USUAL, Grid, Survey, survey
-
-__all__ = ["CHART_LAYERS", "CLASSES", "LARGEST", "Chart", "chart", "chart_of", "classify", "plane_of", "save_arrays"]
 
 Array = NDArray[np.float64]
 

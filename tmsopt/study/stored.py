@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.problem import Problem
+from tmsopt.roots import CLASSES
 from tmsopt.study import folder
-from tmsopt.study.classes import CLASSES
 from tmsopt.study.tally import Tally, tally, total
 from tmsopt.study.tiles import USUAL, Grid, Survey, survey
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.study.classes import CLASSES
+from tmsopt.roots import CLASSES
 
 
 @dataclass(frozen=True)
