@@ -82,14 +82,14 @@ def test_growth_bands_of_the_benchmark_begin_at_the_critical_speed(benchmark):
     data = growth(benchmark)
     assert len(data.stable) == 1
     assert data.stable[0][0] == pytest.approx(0.90706414955081164, rel=1e-12)
-    assert data.stable[0][1] == data.Fr[-1]
-    assert data.Fr_c == pytest.approx(0.90706414955081164, rel=1e-14)
+    assert data.stable[0][1] == data.values[-1]
+    assert data.critical == pytest.approx(0.90706414955081164, rel=1e-14)
 
 
 def test_growth_roots_are_those_of_the_stored_design(benchmark):
     data = growth(benchmark)
-    for k in range(0, len(data.Fr), 211):
-        p = {**benchmark.dimensionless, "Fr": float(data.Fr[k])}
+    for k in range(0, len(data.values), 211):
+        p = {**benchmark.dimensionless, "Fr": float(data.values[k])}
         assert data.roots[k].real.max() == pytest.approx(float(abscissa_60(polynomial_60(**p))), rel=1e-9, abs=1e-11)
 
 

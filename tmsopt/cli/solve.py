@@ -310,6 +310,9 @@ def _draw(solution: "Solution", path: Path, w: float, m_B: float) -> None:
     if not math.isfinite(solution.abscissa):
         click.echo("--plot: nothing to draw, a root is at infinity", err=True)
         return
-    si = si_parameters(solution, w, m_B)
+    unit = None
+    if solution.problem.model.name == "tms":
+        si = si_parameters(solution, w, m_B)
+        unit = (si["g"] * si["w"]) ** 0.5
     with saving("--plot", path):
-        save(growth_figure(growth(solution), solution.problem.title, (si["g"] * si["w"]) ** 0.5), path)
+        save(growth_figure(growth(solution), solution.problem.title, unit), path)

@@ -74,7 +74,7 @@ def _growth() -> "Figure":
     figure = new_figure(9.2, 4.2)
     left, right = figure.subplots(1, 2, sharey=True)
     for ax, design, name in ((left, fastest, "(a) benchmark"), (right, best, "(b) optimised benchmark")):
-        draw_growth_rates(ax, growth(design, Fr_max=4.0))
+        draw_growth_rates(ax, growth(design, end=4.0))
         ax.axhline(design.abscissa, color="0.5", linewidth=0.8, linestyle=":")
         ax.plot(
             [design.dimensionless["Fr"]], [design.abscissa], linestyle="none", marker="o", markersize=6, zorder=5,

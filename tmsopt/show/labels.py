@@ -8,7 +8,7 @@ import textalloc
 from matplotlib.axes import Axes
 from matplotlib.patheffects import withStroke
 
-from tmsopt.models import ParameterSet
+from tmsopt.models import Parameter, ParameterSet
 
 _SIZE = 8
 
@@ -67,6 +67,10 @@ def place_names(ax: Axes, names: Sequence[Name]) -> None:
 
 def label_axes(ax: Axes, of: ParameterSet, horizontal: str, vertical: str) -> None:
     """Symbols and units of two parameters."""
-    for name, label in ((horizontal, ax.set_xlabel), (vertical, ax.set_ylabel)):
-        unit = "" if of[name].unit == "1" else f" in {of[name].unit}"
-        label(f"${of[name].latex}${unit}")
+    ax.set_xlabel(axis_label(of[horizontal]))
+    ax.set_ylabel(axis_label(of[vertical]))
+
+
+def axis_label(parameter: Parameter) -> str:
+    """Symbol and unit of a parameter."""
+    return f"${parameter.latex}$" + ("" if parameter.unit == "1" else f" in {parameter.unit}")

@@ -1,4 +1,4 @@
-"""Roots of a design over the Froude number, with its stable and heavily damped speeds."""
+"""Roots of a design over its speed, or another parameter, with the stable and heavily damped values of it."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -8,12 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.design.errors import Fault, InputError, suggest
 from tmsopt.design.solution import Solution
-from tmsopt.models import Values
+from tmsopt.models import Parameter, ParameterSet, Values
 from tmsopt.roots import is_stable, roots
 
 Array = NDArray[np.float64]
 Band = tuple[float, float]
+
+SPEEDS = ("Fr", "v")
+"""Native parameters that roots are shown over unless another is named; of a model without a speed, the first free."""
 
 _POINTS = 801
 _BISECTIONS = 60
@@ -21,59 +25,101 @@ _BISECTIONS = 60
 
 @dataclass(frozen=True)
 class Growth:
-    """Roots of one design over the Froude number.
+    """Roots of one design over one parameter.
 
     Attributes:
-        Fr: Froude numbers, ascending, shape (n,).
-        roots: shape (n, 4); columns are not modes, for modes cannot be told apart at an exceptional point.
-        Fr_c: critical Froude number, nan if there is none.
-        Fr_design: Froude number of the design.
+        over: the parameter.
+        values: of it, ascending, shape (n,).
+        roots: shape (n, degree); columns are not modes, for modes cannot be told apart at an exceptional point.
+        critical: critical value that the model knows, such as Fr_c, nan if there is none.
+        design: value of the design.
         structure: structure of its rightmost roots.
-        stable, heavily_damped: bands of Fr with all Re s < 0; with all s real and negative.
+        stable, heavily_damped: bands of values with all Re s < 0; with all s real and negative.
     """
 
-    Fr: Array
+    over: Parameter
+    values: Array
     roots: NDArray[np.complex128]
-    Fr_c: float
-    Fr_design: float
+    critical: float
+    design: float
     structure: str
     stable: tuple[Band, ...]
     heavily_damped: tuple[Band, ...]
 
 
-def growth(design: Solution, Fr_max: float | None = None) -> Growth:
-    """Roots over 0 < Fr ≤ Fr_max (default: twice the larger of the design's Fr and Fr_c), all else as designed.
+def growth(design: Solution, end: float | None = None, over: str | None = None) -> Growth:
+    """Roots over a parameter, all else as designed.
 
-    Points crowd around the design, where roots near an exceptional point move like a fractional power of Fr.
+    Points crowd around the design, where roots near an exceptional point move like a fractional power of the parameter.
+
+    Args:
+        end: of a range that begins at 0; by default twice the larger of the design's and the critical speed, or for
+            another parameter its box if it is free, and else up to twice the design's value.
+        over: a native parameter or one of the problem; by default the speed, or the first free one.
+
+    Raises:
+        InputError: for an unknown parameter.
     """
+    of, parameters, name = _written(design, over)
     model = design.problem.model
-    native: dict[str, float] = dict(design.dimensionless)
-    at, critical = native["Fr"], float(Values(model, model.sets[0], native)["Fr_c"])
-    end = Fr_max or 2 * max(at, critical if math.isfinite(critical) else 0.0, 0.5)
-    crowd = np.linspace(-1, 1, 301) ** 5 * end
-    grid = np.unique(np.concatenate([np.linspace(end / _POINTS, end, _POINTS), at + crowd]))
-    Fr = grid[(grid > 0) & (grid <= end)]
+    at, critical = parameters[name], _critical(design, of, parameters, name)
+    low, high = _ends(design, name, end, at, critical)
+    crowd = np.linspace(-1, 1, 301) ** 5 * (high - low)
+    first = low + (high - low) / _POINTS if name in SPEEDS else low  # at rest a speed leaves roots 0
+    grid = np.unique(np.concatenate([np.linspace(first, high, _POINTS), at + crowd]))
+    values = grid[(grid > low) & (grid <= high)] if name in SPEEDS else grid[(grid >= low) & (grid <= high)]
 
-    def coefficients(speeds: Array) -> Array:
-        columns: Mapping[str, Any] = {**native, "Fr": speeds}
-        return np.stack(np.broadcast_arrays(*model.coefficients(columns)), axis=-1).astype(float)
+    def coefficients(along: Array) -> Array:
+        columns: Mapping[str, Any] = {**parameters, name: along}
+        return np.stack(np.broadcast_arrays(*model.coefficients(columns, of), along)[:-1], axis=-1).astype(float)
 
-    def heavily_damped(speeds: Array) -> NDArray[np.bool_]:
-        a = coefficients(speeds)
+    def heavily_damped(along: Array) -> NDArray[np.bool_]:
+        a = coefficients(along)
         return np.asarray(is_stable(a) & np.all(roots(a).imag == 0, axis=-1))
 
-    def stable(speeds: Array) -> NDArray[np.bool_]:
-        return is_stable(coefficients(speeds))
+    def stable(along: Array) -> NDArray[np.bool_]:
+        return is_stable(coefficients(along))
 
+    values = values[coefficients(values)[:, 0] != 0]  # a root at infinity cannot be shown
     return Growth(
-        Fr=Fr,
-        roots=roots(coefficients(Fr)),
-        Fr_c=critical,
-        Fr_design=at,
+        over=of[name],
+        values=values,
+        roots=roots(coefficients(values)),
+        critical=critical,
+        design=at,
         structure=design.structure,
-        stable=_bands(Fr, stable),
-        heavily_damped=_bands(Fr, heavily_damped),
+        stable=_bands(values, stable),
+        heavily_damped=_bands(values, heavily_damped),
     )
+
+
+def _written(design: Solution, over: str | None) -> tuple[ParameterSet, dict[str, float], str]:
+    """The parameters of a design in the set that has the one asked for, and its name."""
+    problem = design.problem
+    native = problem.model.sets[0]
+    if over is None:
+        over = next((n for n in SPEEDS if n in native.names), None) or next(iter(problem.free), native.names[0])
+    if over in native.names:
+        return native, dict(design.dimensionless), over
+    if over in problem.parameter_set.names:
+        return problem.parameter_set, dict(design.parameters), over
+    accepted = dict.fromkeys((*native.names, *problem.parameter_set.names))
+    raise InputError([Fault(f"found '{over}'; {suggest(over, accepted)}", ("over",))])
+
+
+def _critical(design: Solution, of: ParameterSet, parameters: Mapping[str, float], name: str) -> float:
+    model = design.problem.model
+    known = f"{name}_c" in model.quantity_names(of)
+    return float(Values(model, of, parameters)[f"{name}_c"]) if known else math.nan
+
+
+def _ends(design: Solution, name: str, end: float | None, at: float, critical: float) -> Band:
+    if end is not None:
+        return min(end, 0.0), max(end, 0.0)
+    if name in SPEEDS:
+        return 0.0, 2 * max(at, critical if math.isfinite(critical) else 0.0, 0.5)
+    low, high = design.problem.free.get(name, (min(2 * at, 0.0), max(2 * at, 0.0)))
+    return (low, high) if low < high else (low - 1.0, high + 1.0)
 
 
 def _bands(grid: Array, holds: Callable[[Array], NDArray[np.bool_]]) -> tuple[Band, ...]:
