@@ -1,0 +1,226 @@
+"""Published problems: what the literature says, proved here from the matrices of the files, and what the program finds.
+
+A closed form is checked on the file's own matrices by exact algebra that shares nothing with the package; then the
+program must end at it. Where a file's header says that no figure was found in print, the answer is derived here.
+"""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import mpmath  # type: ignore[import-untyped]
+import numpy as np
+import pytest
+import sympy as sp  # type: ignore[import-untyped]
+from scipy.optimize import differential_evolution
+from sympy.polys.matrices import DomainMatrix  # type: ignore[import-untyped]
+
+import tmsopt
+
+PROBLEMS = Path(__file__).parent.parent / "problems"
+s = sp.Symbol("s")
+
+MET = 1e-9  # of a design: regular in the factored form, so IPOPT's 1e-12 times the condition of a few hundred
+
+
+# The models, by exact algebra
+
+
+@cache
+def polynomial(name: str) -> sp.Poly:
+    """Characteristic polynomial of a file's model, its coefficients exact in the parameters."""
+    model = tomllib.loads((PROBLEMS / f"{name}.toml").read_text(encoding="utf-8"))["model"]
+
+    def exact(text: str) -> sp.Expr:
+        return sp.sympify(text, locals={n: sp.Symbol(n) for n in ("gain", "k", "y", "p")}, rational=True)
+
+    def matrix(key: str) -> sp.Matrix:
+        return sp.Matrix([[exact(text) for text in row] for row in model[key]])
+
+    if "coefficients" in model:
+        return sp.Poly([exact(text) for text in model["coefficients"]], s)
+    if "A" in model:
+        A = matrix("A")
+        pencil = s * sp.eye(A.rows) - A
+    else:
+        pencil = matrix("M") * s**2 + matrix("D") * s + matrix("K")
+    determinant = DomainMatrix.from_Matrix(pencil.applyfunc(sp.expand)).charpoly()[-1]
+    return sp.Poly(determinant.as_expr() * (-1) ** pencil.rows if hasattr(determinant, "as_expr") else determinant, s)
+
+
+def at(name: str, values: Mapping[str, Any]) -> sp.Poly:
+    """The same with numbers for the parameters, fixed ones from the file."""
+    written = tomllib.loads((PROBLEMS / f"{name}.toml").read_text(encoding="utf-8"))["parameters"]
+    fixed = {n: sp.Rational(str(v)) for n, v in written.items() if not isinstance(v, dict)}
+    return sp.Poly(polynomial(name).as_expr().subs({**fixed, **values}), s)
+
+
+def vanishes(p: sp.Poly | sp.Expr) -> bool:
+    """Whether every coefficient is 0, at 60 digits: algebraic numbers of this size are 0 then."""
+    return all(abs(sp.N(c, 60)) < 1e-50 for c in sp.Poly(p, s).all_coeffs())
+
+
+# What is published, or derived here
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A design in closed form: its parameters, the factors of its polynomial, what is optimised, the structure."""
+
+    parameters: Mapping[str, sp.Expr]
+    polynomial: sp.Expr
+    abscissa: sp.Expr
+    structure: str
+    value: sp.Expr | None = None
+
+
+def two_mass_spring() -> Answer:
+    """(s + r)⁶, where s³ has twice the coefficient of s⁵: 20 r³ = 12 r."""
+    r = sp.sqrt(15) / 5
+    found = {"x0": 7, "x1": 6 * r, "y0": r**6, "y1": 6 * r**5, "y2": 15 * r**4 - 14}
+    return Answer(found, (s + r) ** 6, -r, "EP6", -r)
+
+
+def freitas_lancaster(k: Any = 4) -> Answer:
+    """(s + r)⁴ with r⁴ = k: the trace of D is 4 r, d1 k + d2 = 4 r³, det D = 6 r² − 1 − k."""
+    r = sp.root(k, 4)
+    found = {"d1": 4 * r / (r**2 + 1), "d2": 4 * r**3 / (r**2 + 1), "d12": (r**2 - 1) ** 2 / (r**2 + 1)}
+    return Answer(found, (s + r) ** 4, -r, "EP4", -r)
+
+
+def chocolate(delta: Any = sp.Rational(9, 10)) -> Answer:
+    """(s + r)⁵ with a and b of the file: y = p/b at the roots e^(±it) of a must be real, so 5 arg(e^(it) + r) = t + π/2.
+
+    No other polynomial is better. At e^(it) a factor s + c with c > r, or a pair left of −r, turns by less than s + r
+    or its square; five of them turn by more than 0 and less than t + π/2, and y is not real in between.
+    """
+    t = sp.acos(delta)
+    f = (t + sp.pi / 2) / 5
+    r = sp.sin(t - f) / sp.sin(f)
+    y = sp.N(sp.re(((sp.exp(sp.I * t) + r) ** 5 / (2 * sp.I * sp.sin(t) * sp.exp(sp.I * t))).evalf(70)), 70)
+    x, _ = sp.div(sp.Poly(((s + r) ** 5 - y * (s**2 - 1)).evalf(70), s), sp.Poly(s**2 - 2 * delta * s + 1, s))
+    x2, x1, x0 = x.all_coeffs()[1:]
+    return Answer({"x0": x0, "x1": x1, "x2": x2, "y": y}, (s + r) ** 5, -r, "EP5", -r)
+
+
+def chocolate_limit() -> Answer:
+    """r = 0: 5 t = t + π/2."""
+    delta, y = sp.sqrt(2 + sp.sqrt(2)) / 2, sp.sqrt(1 + 1 / sp.sqrt(2))
+    return Answer({"delta": delta, "x0": y, "x1": 1 + sp.sqrt(2), "x2": 2 * delta, "y": y}, s**5, sp.S(0), "EP5", delta)
+
+
+def three_masses() -> Answer:
+    """det(L + x − K) = x³: with u = mu + 1 − L, v = nu + 1 − L, S = u + v, uv = S² + 2 and S (uv + 1) = 0."""
+    w = sp.sqrt(3)
+    found = {"mu_r": sp.Rational(3, 2), "mu_i": 3 * w / 2, "nu_r": sp.Rational(1, 2), "nu_i": 3 * w / 2}
+    return Answer(found, (s**2 - 4 * s + 7) ** 3, sp.S(2), "CEP3")
+
+
+def three_masses_pt() -> Answer:
+    """The case S = 0."""
+    return Answer({"a": sp.S(1), "g": sp.sqrt(2)}, (s - 2) ** 3, sp.S(2), "EP3")
+
+
+def pt_pair(loss: Any = sp.Rational(1, 10)) -> Answer:
+    """s³ and s vanish for gain = loss and k = 1 only; then (s² + 1)² − loss² s² − eps² is a square."""
+    eps = loss * sp.sqrt(1 - loss**2 / 4)
+    return Answer({"gain": loss, "k": sp.S(1), "eps": eps}, (s**2 + 1 - loss**2 / 2) ** 2, sp.S(0), "CEP2")
+
+
+def pt_pair_strong() -> Answer:
+    """s⁴ + (2 − loss²) s² + 1 − eps²."""
+    return Answer({"eps": sp.S(1)}, s**2 * (s**2 + sp.Rational(199, 100)), sp.S(0), "EP2+pair")
+
+
+def ziegler(b: Any = sp.Rational(1, 10)) -> Answer:
+    """2 s⁴ + 7 b s³ + (7 − 2 p + b²) s² + 2 b s + 1, and Hurwitz' determinant of it: 57/14 = 7 − 2 p + b²."""
+    p = sp.Rational(41, 28) + b**2 / 2
+    w = sp.Rational(2, 7)
+    return Answer({"p": p}, (s**2 + w) * (2 * s**2 + 7 * b * s + 1 / w), sp.S(0), "pair", p)
+
+
+def ziegler_undamped() -> Answer:
+    """2 s⁴ + (7 − 2 p) s² + 1."""
+    p = sp.Rational(7, 2) - sp.sqrt(2)
+    return Answer({"b1": sp.S(0), "b2": sp.S(0), "p": p}, 2 * (s**2 + 1 / sp.sqrt(2)) ** 2, sp.S(0), "CEP2")
+
+
+def brake_squeal(c1: Any = sp.Rational(1, 10), c2: Any = sp.Rational(1, 10)) -> Answer:
+    """s⁴ + (c1 + c2) s³ + (4 + c1 c2) s² + 2 (c1 + c2) s + 3 + Delta, and Hurwitz' determinant of it."""
+    Delta = 1 + 2 * c1 * c2
+    factors = (s**2 + 2) * (s**2 + (c1 + c2) * s + 2 + c1 * c2)
+    return Answer({"Delta": Delta}, factors, sp.S(0), "pair", Delta)
+
+
+def brake_squeal_coupling() -> Answer:
+    """(s² + b s + c)²: c = 2 by s³ and s, so Delta = 1, and then (c1 − c2)² = 0."""
+    c = sp.Rational(1, 10)
+    return Answer({"c2": c, "Delta": sp.S(1)}, (s**2 + c * s + 2) ** 2, -c / 2, "CEP2")
+
+
+@cache
+def transport_aircraft() -> Answer:
+    """A double pair at −b ± i w, by Newton's method at 70 digits on p = p' = 0."""
+    p = polynomial("transport_aircraft")
+    k_n, k_q = sp.symbols("k_n k_q")
+    slope = p.diff(s)
+    value = sp.lambdify((s, k_n, k_q), p.as_expr(), "mpmath")
+    derivative = sp.lambdify((s, k_n, k_q), slope.as_expr(), "mpmath")
+
+    def residuals(n: Any, q: Any, b: Any, w: Any) -> list[Any]:
+        root = mpmath.mpc(-b, w)
+        u, v = value(root, n, q), derivative(root, n, q)
+        return [u.real, u.imag, v.real, v.imag]
+
+    with mpmath.workdps(70):
+        n, q, b, w = (sp.Float(str(x), 65) for x in mpmath.findroot(residuals, (1.328, -0.434, 0.09025, 0.4582)))
+    found = {k_n: n, k_q: q}
+    pair = sp.Poly((s + b) ** 2 + w**2, s)
+    rest, _ = sp.div(sp.Poly(p.as_expr().subs(found), s), pair**2)
+    return Answer({"k_n": n, "k_q": q}, pair.as_expr() ** 2 * rest.as_expr(), -b, "CEP2", -b)
+
+
+ANSWERS = {
+    answer.__name__: answer
+    for answer in (
+        two_mass_spring, freitas_lancaster, chocolate, chocolate_limit, three_masses, three_masses_pt, pt_pair,
+        pt_pair_strong, ziegler, ziegler_undamped, brake_squeal, brake_squeal_coupling, transport_aircraft,
+    )
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ANSWERS)
+def test_answer_is_exact(name: str) -> None:
+    answer = ANSWERS[name]()
+    assert vanishes(at(name, answer.parameters) - answer.polynomial)
+
+
+@cache
+def problem(name: str) -> tmsopt.Problem:
+    return tmsopt.load(PROBLEMS / f"{name}.toml")
+
+
+@cache
+def solved(name: str) -> tmsopt.Solution:
+    return tmsopt.solve(problem(name))
+
+
+def close(design: tmsopt.Solution, answer: Answer) -> bool:
+    """Whether a design has the parameters and the abscissa of a closed form."""
+    parameters = all(abs(design.parameters[n] - float(v)) < MET for n, v in answer.parameters.items())
+    return parameters and abs(design.abscissa - float(answer.abscissa)) < MET
+
+
+@pytest.mark.parametrize("name", ANSWERS)
+def test_program_ends_at_the_answer(name: str) -> None:
+    design, answer = solved(name), ANSWERS[name]()
+    assert design.status == "optimal"
+    for parameter, value in answer.parameters.items():
+        assert design.parameters[parameter] == pytest.approx(float(value), abs=MET), parameter
+    assert design.abscissa == pytest.approx(float(answer.abscissa), abs=MET)
+    assert design.structure == answer.structure
+    if answer.value is not None:
+        assert design.value == pytest.approx(float(answer.value), abs=MET)
