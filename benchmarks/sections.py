@@ -43,6 +43,7 @@ SECTIONS = (
     Section("f", "growth", "benchmarks.growth", "growth with free parameters, scenarios and grid points"),
     Section("g", "arrays", "benchmarks.arrays", "expressions over grids, beside one design at a time and CasADi's map"),
     Section("h", "tiles", "benchmarks.tiles", "charts to a folder and their parts; 1e8 designs in bounded memory"),
+    Section("i", "systems", "benchmarks.systems", "a 6-fold root from random starts, beside HANSO and PyGRANSO"),
 )
 """In the order in which they are run."""
 
