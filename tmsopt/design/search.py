@@ -26,7 +26,8 @@ _HOPELESS = 16  # starts without a feasible end after which the least-violating 
 _MET = 1e-14  # sum of squares of coefficients at which more conditions than parameters are met
 _SAME = 1e-7  # relative difference of objectives that counts as the same
 _FEASIBLE = 1e-6  # of the rows, before polishing; the recheck has the last word
-_SCATTER = 0.01  # of the largest root: roots in double precision beside a 4-fold one are off by 4e-4
+_SCATTER = 0.01  # of the size of the roots: in double precision those beside a 4-fold one are off by 4e-4
+_RESIDUAL = 1e-11  # of the equations: an n-fold root is off by its n-th root
 _RESCUES = 4  # starts from abscissa optima, for a pattern that no start reached
 
 _AGAIN = 4  # times that a start is taken up again where it ended badly
@@ -165,7 +166,8 @@ def _spurious(problem: Problem, nlp: NLP, run: Run) -> bool:
         return True
     z = roots(a)
     claimed = run.x[nlp.variables.index("abscissa")] * nlp.unit
-    return bool(np.any(claimed < z.real.max(axis=1) - _SCATTER * np.abs(z).max(axis=1)))
+    size = np.maximum(np.abs(z).max(axis=1), nlp.unit)  # all of them may be at 0
+    return bool(np.any(claimed < z.real.max(axis=1) - max(_SCATTER, _RESIDUAL ** (1 / problem.model.degree)) * size))
 
 
 def _settled(problem: Problem, candidates: list[Candidate]) -> bool:
