@@ -6,8 +6,9 @@ from typing import Any
 from tmsopt.models.model import Model, Parameter, ParameterSet, Quantity, Range, Values
 from tmsopt.models.stated import Unfit, from_coefficients, from_matrices
 from tmsopt.models.tms import tms
+from tmsopt.models.whipple import whipple
 
-MODELS = {tms.name: tms}
+MODELS = {tms.name: tms, whipple.name: whipple}
 """Models that a problem file can name."""
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "from_matrices",
     "named",
     "tms",
+    "whipple",
 ]
 
 

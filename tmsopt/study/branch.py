@@ -82,7 +82,7 @@ class Branch:
                 "arclength": float(self.arclength[k]),
                 **{name: float(column[k]) for name, column in self.parameters.items()},
                 **{f"d_{name}": float(column[k]) for name, column in self.tangent.items()},
-                **{name: float(column[k]) for name, column in self.unknowns.items()},
+                **{self._told_apart(name): float(column[k]) for name, column in self.unknowns.items()},
                 "abscissa": float(self.abscissa[k]),
                 "kind": str(self.kinds[k]),
                 "stable": bool(self.stable[k]),
@@ -90,6 +90,10 @@ class Branch:
                 "constraints": bool(self.satisfied[k]),
                 "event": "; ".join(marks.get(k, [])),
             }
+
+    def _told_apart(self, unknown: str) -> str:
+        """The name of an unknown, with the pattern's before it where a parameter has it too."""
+        return f"{self.pattern}.{unknown}" if unknown in self.parameters else unknown
 
     def to_json(self) -> dict[str, Any]:
         """Columns and events; numbers that do not exist are null."""

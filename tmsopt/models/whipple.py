@@ -1,0 +1,93 @@
+"""The Carvallo–Whipple bicycle in SI (Meijaard et al. 2007): two wheels, rear frame and handlebar, with trail.
+
+What is left out is not there: without wheels, trail and moments of inertia this is the two-mass-skate bicycle, written
+in the same parameters, with the same roots per second.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Range
+from tmsopt.models.tms import GRAVITY
+from tmsopt.models.whipple_equations import carvallo_whipple, matrices
+from tmsopt.models.whipple_quantities import QUANTITIES, algebraic, canonical
+
+__all__ = ["canonical", "carvallo_whipple", "matrices", "whipple"]
+
+_POSITIVE = Range(lower=0.0, closed=False)
+_NOT_NEGATIVE = Range(lower=0.0)
+_NOT_POSITIVE = Range(upper=0.0)
+_TILT = Range(-np.pi / 2, np.pi / 2, closed=False)
+
+
+def _length(name: str, meaning: str, latex: str, range: Range = Range(), default: float | None = None) -> Parameter:
+    return Parameter(name, "m", meaning, latex, range, default)
+
+
+def _mass(name: str, meaning: str, range: Range = _NOT_NEGATIVE, default: float | None = None) -> Parameter:
+    return Parameter(name, "kg", f"mass of the {meaning}", name, range, default)
+
+
+def _inertia(name: str, meaning: str, range: Range = _NOT_NEGATIVE) -> Parameter:
+    body, axes = name[2], name[3:]
+    return Parameter(name, "kg m^2", meaning, rf"I_{{{body}{axes}}}", range, default=0.0)
+
+
+_SI = ParameterSet(
+    "SI",
+    (
+        _length("w", "wheelbase", "w", _POSITIVE),
+        _length("c", "trail, how far the steer axis meets the ground ahead of the front contact", "c", default=0.0),
+        Parameter(
+            "lambda_s", "rad", "steer axis tilt", r"\lambda_s", _TILT,
+            tangent=True, sides=("backward tilt", "forward tilt"),
+        ),
+        Parameter("g", "m/s^2", "gravity", "g", _POSITIVE, default=GRAVITY),
+        Parameter("v", "m/s", "forward speed", "v", _NOT_NEGATIVE),
+        _length("r_R", "radius of the rear wheel", "r_R", _NOT_NEGATIVE, 0.0),
+        _mass("m_R", "rear wheel", default=0.0),
+        _inertia("I_Rxx", "moment of inertia of the rear wheel about a diameter"),
+        _inertia("I_Ryy", "moment of inertia of the rear wheel about its axle"),
+        _length("x_B", "rear frame centre of mass, forward of the rear contact", "x_B"),
+        _length("z_B", "rear frame centre of mass, downward", "z_B", _NOT_POSITIVE),
+        _mass("m_B", "rear frame with a rider who does not move", _POSITIVE),
+        _inertia("I_Bxx", "moment of inertia of the rear frame about a forward axis"),
+        _inertia("I_Bzz", "moment of inertia of the rear frame about a vertical axis"),
+        _inertia("I_Bxz", "product of inertia of the rear frame, the negative of ∫ x z dm", Range()),
+        _length("x_H", "handlebar and fork, centre of mass, forward of the rear contact", "x_H"),
+        _length("z_H", "handlebar and fork, centre of mass, downward", "z_H", _NOT_POSITIVE),
+        _mass("m_H", "handlebar and fork"),
+        _inertia("I_Hxx", "moment of inertia of handlebar and fork about a forward axis"),
+        _inertia("I_Hzz", "moment of inertia of handlebar and fork about a vertical axis"),
+        _inertia("I_Hxz", "product of inertia of handlebar and fork, the negative of ∫ x z dm", Range()),
+        _length("r_F", "radius of the front wheel", "r_F", _NOT_NEGATIVE, 0.0),
+        _mass("m_F", "front wheel", default=0.0),
+        _inertia("I_Fxx", "moment of inertia of the front wheel about a diameter"),
+        _inertia("I_Fyy", "moment of inertia of the front wheel about its axle"),
+    ),
+    native=dict,
+    quantities=QUANTITIES,
+    rate=lambda p: 1,
+)  # fmt: skip
+
+
+def _pencil(p: Mapping[str, Any]) -> tuple[Matrix, ...]:
+    """M, v C1 and g K0 + v² K2."""
+    M, C1, K0, K2 = canonical(p)
+    v, g = p["v"], p["g"]
+    D = [[v * e for e in row] for row in C1]
+    return M, D, [[g * a + v * v * b for a, b in zip(*rows, strict=True)] for rows in zip(K0, K2, strict=True)]
+
+
+whipple = Model(
+    name="whipple",
+    title="Carvallo–Whipple bicycle",
+    degree=4,
+    sets=(_SI,),
+    algebraic=algebraic,
+    polynomial=carvallo_whipple,
+    pencil=_pencil,
+)
+"""The Carvallo–Whipple bicycle; its roots are in 1/s."""

@@ -1,0 +1,101 @@
+"""The linear Carvallo–Whipple bicycle: its matrices and its characteristic polynomial, without division.
+
+Meijaard, Papadopoulos, Ruina and Schwab (2007), appendix A, with x forward and z down from the rear contact. Two things
+are written otherwise there. The front assembly is summed over its bodies, handlebar and wheel, about the steer axis
+instead of about their common centre, which a massless one has not. And a wheel comes with its spin S = I_yy/r, its
+angular momentum at a speed of 1, beside its radius: then a wheel of no size is a number like any other.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+Matrix = Sequence[Sequence[Any]]
+
+
+def matrices(
+    w: Any, c: Any, r_R: Any, m_R: Any, I_Rxx: Any, S_R: Any, x_B: Any, z_B: Any, m_B: Any, I_Bxx: Any, I_Bzz: Any,
+    I_Bxz: Any, x_H: Any, z_H: Any, m_H: Any, I_Hxx: Any, I_Hzz: Any, I_Hxz: Any, r_F: Any, m_F: Any, I_Fxx: Any,
+    S_F: Any, sine: Any, cosine: Any, turn: Any,
+) -> tuple[list[list[Any]], list[list[Any]], list[list[Any]], list[list[Any]]]:  # fmt: skip
+    """M, C1, K0, K2 of M q″ + v C1 q′ + (g K0 + v² K2) q = 0, q = (lean, steer); nested lists, any numbers.
+
+    Args:
+        S_R, S_F: spins I_yy/r of the wheels.
+        sine, cosine: of the steer axis tilt.
+        turn: cosine/w, the curvature of the path per steer angle.
+
+    A steer angle in another unit, k times as large, is `sine`, `cosine` and `turn` multiplied by k.
+    """
+    m_T = m_R + m_B + m_H + m_F
+    first_x = x_B * m_B + x_H * m_H + w * m_F
+    first_z = z_B * m_B + z_H * m_H - r_R * m_R - r_F * m_F
+    I_Txx = I_Rxx + I_Bxx + I_Hxx + I_Fxx
+    I_Txx = I_Txx + m_R * r_R * r_R + m_B * z_B * z_B + m_H * z_H * z_H + m_F * r_F * r_F
+    I_Txz = I_Bxz + I_Hxz - m_B * x_B * z_B - m_H * x_H * z_H + m_F * w * r_F
+    I_Tzz = I_Rxx + I_Bzz + I_Hzz + I_Fxx + m_B * x_B * x_B + m_H * x_H * x_H + m_F * w * w
+
+    # The front assembly about the steer axis, which meets the ground the trail c ahead of the contact.
+    u_H = (x_H - w - c) * cosine - z_H * sine
+    u_F = r_F * sine - c * cosine
+    first_u = m_H * u_H + m_F * u_F
+    about_x = (I_Hxx + I_Fxx) * sine + I_Hxz * cosine
+    about_z = I_Hxz * sine + (I_Hzz + I_Fxx) * cosine
+    I_All = m_H * u_H * u_H + m_F * u_F * u_F + about_x * sine + about_z * cosine
+    I_Alx = m_F * u_F * r_F - m_H * u_H * z_H + about_x
+    I_Alz = m_H * u_H * x_H + m_F * u_F * w + about_z
+
+    yaw = c * turn  # of the rear frame, per steer angle
+    S_A = first_u + yaw * first_x
+    S_T = S_R + S_F
+    spin = yaw * S_T + S_F * cosine
+    zero = 0 * m_T
+
+    mixed = I_Alx + yaw * I_Txz
+    M = [[I_Txx, mixed], [mixed, I_All + 2 * yaw * I_Alz + yaw * yaw * I_Tzz]]
+    C1 = [[zero, spin + I_Txz * turn - yaw * first_z], [-spin, I_Alz * turn + yaw * (S_A + I_Tzz * turn)]]
+    K0 = [[first_z, -S_A], [-S_A, -S_A * sine]]
+    K2 = [[zero, (S_T - first_z) * turn], [zero, (S_A + S_F * sine) * turn]]
+    return M, C1, K0, K2
+
+
+def powers_of_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix) -> tuple[Any, ...]:
+    """The numbers b of det(M s² + v C1 s + g K0 + v² K2): a0, a1/v, the two of a2, of a3/v and of a4.
+
+    With g and v they make a0 = b0, a1 = v b1, a2 = g b2 + v² b3, a3 = v (g b4 + v² b5), a4 = g (g b6 + v² b7): the
+    lean has neither damping nor stiffness from the speed, so no higher power appears.
+    """
+    return (
+        M[0][0] * M[1][1] - M[0][1] * M[1][0],
+        _mixed(M, C1),
+        _mixed(M, K0),
+        _mixed(M, K2) - C1[0][1] * C1[1][0],
+        _mixed(C1, K0),
+        -C1[1][0] * K2[0][1],
+        K0[0][0] * K0[1][1] - K0[0][1] * K0[1][0],
+        K0[0][0] * K2[1][1] - K0[1][0] * K2[0][1],
+    )
+
+
+def carvallo_whipple(
+    v: Any, g: Any, T: Any, w: Any, c: Any, r_R: Any, m_R: Any, I_Rxx: Any, S_R: Any, x_B: Any, z_B: Any, m_B: Any,
+    I_Bxx: Any, I_Bzz: Any, I_Bxz: Any, x_H: Any, z_H: Any, m_H: Any, I_Hxx: Any, I_Hzz: Any, I_Hxz: Any, r_F: Any,
+    m_F: Any, I_Fxx: Any, S_F: Any,
+) -> list[Any]:  # fmt: skip
+    """Coefficients a0 … a4 of det(M s² + v C1 s + g K0 + v² K2) · (w/cos λ)², with T = tan λ, by ``+ - *`` alone.
+
+    The factor is that of a steer angle in units of cos λ/w, in which the equations are polynomials in T and w.
+    """
+    b = powers_of_speed(
+        *matrices(
+            w=w, c=c, r_R=r_R, m_R=m_R, I_Rxx=I_Rxx, S_R=S_R, x_B=x_B, z_B=z_B, m_B=m_B, I_Bxx=I_Bxx, I_Bzz=I_Bzz,
+            I_Bxz=I_Bxz, x_H=x_H, z_H=z_H, m_H=m_H, I_Hxx=I_Hxx, I_Hzz=I_Hzz, I_Hxz=I_Hxz, r_F=r_F, m_F=m_F,
+            I_Fxx=I_Fxx, S_F=S_F, sine=w * T, cosine=w, turn=1,
+        )
+    )  # fmt: skip
+    v2 = v * v
+    return [b[0], v * b[1], g * b[2] + v2 * b[3], v * (g * b[4] + v2 * b[5]), g * (g * b[6] + v2 * b[7])]
+
+
+def _mixed(A: Matrix, B: Matrix) -> Any:
+    """The part of det(A + B) that is linear in each."""
+    return A[0][0] * B[1][1] + A[1][1] * B[0][0] - A[0][1] * B[1][0] - A[1][0] * B[0][1]

@@ -1,0 +1,246 @@
+"""Quantities derived from the parameters of the Carvallo–Whipple bicycle: speeds, loads, trail, spins."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from tmsopt.models.model import Quantity, Range
+from tmsopt.models.whipple_equations import matrices, powers_of_speed
+from tmsopt.roots.elementary import chosen, is_ball, is_symbolic, positive_part, quotient, sqrt, tan
+
+Design = Mapping[str, Any]
+
+_NOT_NEGATIVE = Range(lower=0.0)
+_NOT_POSITIVE = Range(upper=0.0)
+_TINY = 1e-300  # keeps 0/0 away for an optimiser, and changes nothing else
+
+_IN_MATRICES = (
+    "w", "c", "r_R", "m_R", "I_Rxx", "x_B", "z_B", "m_B", "I_Bxx", "I_Bzz", "I_Bxz", "x_H", "z_H", "m_H", "I_Hxx",
+    "I_Hzz", "I_Hxz", "r_F", "m_F", "I_Fxx",
+)  # fmt: skip
+
+
+def spin(I_yy: Any, r: Any) -> Any:
+    """Angular momentum I_yy/r of a rolling wheel at a speed of 1; 0 for a wheel without inertia, whatever its radius.
+
+    A wheel of a given kind has I_yy ≤ m r², so its spin vanishes with its radius. One without radius that has inertia
+    would turn infinitely fast: its spin is nan.
+    """
+    if is_symbolic(I_yy) or is_symbolic(r):
+        return I_yy * r / (r * r + _TINY) if is_symbolic(r) else I_yy / r if r != 0 else 0 * I_yy
+    if is_ball(I_yy) or is_ball(r):
+        return 0 * r if _vanishes(I_yy) else quotient(I_yy, r)
+    return chosen(np.equal(I_yy, 0), 0.0, quotient(I_yy, r))
+
+
+def _vanishes(x: Any) -> bool:
+    """Whether a ball, or every term of a series, is certainly 0."""
+    return all(x[k] == 0 for k in range(x.prec)) if hasattr(x, "prec") else bool(x == 0)
+
+
+def algebraic(p: Design) -> dict[str, Any]:
+    """The numbers in which the coefficients are polynomials: T = tan λ_s and the spins instead of I_yy."""
+    return {
+        **{name: p[name] for name in ("v", "g", *_IN_MATRICES)},
+        "T": tan(p["lambda_s"]),
+        "S_R": spin(p["I_Ryy"], p["r_R"]),
+        "S_F": spin(p["I_Fyy"], p["r_F"]),
+    }
+
+
+def canonical(p: Design) -> tuple[list[list[Any]], list[list[Any]], list[list[Any]], list[list[Any]]]:
+    """M, C1, K0 and K2 of Meijaard et al. for the native parameters (v and g have no part in them), any numbers."""
+    sine, cosine = _sine_cosine(p)
+    bodies = {name: p[name] for name in _IN_MATRICES}
+    spins = {"S_R": spin(p["I_Ryy"], p["r_R"]), "S_F": spin(p["I_Fyy"], p["r_F"])}
+    return matrices(**bodies, **spins, sine=sine, cosine=cosine, turn=cosine / p["w"])
+
+
+def _sine_cosine(p: Design) -> tuple[Any, Any]:
+    """By tan alone: cos λ_s = 1/√(1 + tan² λ_s) on the open interval of tilts."""
+    T = tan(p["lambda_s"])
+    cosine = 1 / sqrt(1 + T * T)
+    return T * cosine, cosine
+
+
+def _powers(v: Design) -> tuple[Any, ...]:
+    """b0 … b7 of `powers_of_speed`, for a steer angle in units of cos λ_s/w."""
+    of = algebraic(v)
+    bodies = {name: of[name] for name in (*_IN_MATRICES, "S_R", "S_F")}
+    return powers_of_speed(*matrices(**bodies, sine=of["w"] * of["T"], cosine=of["w"], turn=1))
+
+
+def _S_R(v: Design) -> Any:
+    return spin(v["I_Ryy"], v["r_R"])
+
+
+def _S_F(v: Design) -> Any:
+    return spin(v["I_Fyy"], v["r_F"])
+
+
+def _omega0(v: Design) -> Any:
+    return -sqrt(sqrt(quotient(v["a4"], v["a0"])))
+
+
+def _omega0_equation(v: Design, x: Any) -> Any:
+    return x * x * x * x * v["a0"] - v["a4"]
+
+
+def _v_capsize(v: Design) -> Any:
+    b = _powers(v)
+    return sqrt(v["g"] * quotient(-b[6], b[7]))
+
+
+def _v_capsize_equation(v: Design, x: Any) -> Any:
+    b = _powers(v)
+    return x * x * b[7] + v["g"] * b[6]
+
+
+def _v_weave(v: Design) -> Any:
+    """√(g y) with the least y = v²/g > 0 that has a pair ± iω.
+
+    The Hurwitz condition a1 a2 a3 = a0 a3² + a4 a1² is quadratic in y once v² g² is divided out. The pair of a root of
+    it is imaginary where ω² = a3/a1 = g (b4 + y b5)/b1 is positive; otherwise it is ± a real number.
+    """
+    b = _powers(v)
+    second = b[5] * (b[1] * b[3] - b[0] * b[5])
+    first = b[1] * (b[2] * b[5] + b[3] * b[4]) - 2 * b[0] * b[4] * b[5] - b[7] * b[1] * b[1]
+    last = b[4] * (b[1] * b[2] - b[0] * b[4]) - b[6] * b[1] * b[1]
+    return sqrt(v["g"] * _least(*_both(second, first, last), b))
+
+
+def _both(a: Any, b: Any, c: Any) -> tuple[Any, Any]:
+    """Roots of a y² + b y + c without cancellation, each nan where it does not exist; one of them for a = 0."""
+    radical = sqrt(b * b - 4 * a * c)
+    if is_ball(a):
+        far = -(b + radical) / 2 if b > 0 else -(b - radical) / 2
+    else:
+        far = -(b + chosen(b > 0, radical, -radical)) / 2
+    return quotient(far, a), quotient(c, far)
+
+
+def _least(one: Any, other: Any, b: tuple[Any, ...]) -> Any:
+    """The lesser of those y that are positive and have a positive ω²; nan without any."""
+    if is_ball(b[0]):
+        held = [y for y in (one, other) if y > 0 and (b[4] + y * b[5]) * b[1] > 0]
+        return quotient(0 * b[0], 0 * b[0]) if not held else held[0] if len(held) == 1 or held[0] < held[1] else held[1]
+    above = 1e300  # any y that counts is less
+    one, other = (chosen((b[4] + y * b[5]) * b[1] > 0, chosen(y > 0, y, above), above) for y in (one, other))
+    least = chosen(other < one, other, one)
+    return chosen(least < above, least, np.nan)
+
+
+def _m_T(v: Design) -> Any:
+    return v["m_R"] + v["m_B"] + v["m_H"] + v["m_F"]
+
+
+def _x_T(v: Design) -> Any:
+    return (v["m_B"] * v["x_B"] + v["m_H"] * v["x_H"] + v["m_F"] * v["w"]) / v["m_T"]
+
+
+def _z_T(v: Design) -> Any:
+    moment = v["m_B"] * v["z_B"] + v["m_H"] * v["z_H"] - v["m_R"] * v["r_R"] - v["m_F"] * v["r_F"]
+    return moment / v["m_T"]
+
+
+def _load_front(v: Design) -> Any:
+    return v["x_T"] / v["w"]
+
+
+def _load_rear(v: Design) -> Any:
+    """1 − x_T/w with the subtraction inside the moments, so that a small load keeps its digits."""
+    w = v["w"]
+    return (v["m_R"] * w + v["m_B"] * (w - v["x_B"]) + v["m_H"] * (w - v["x_H"])) / (v["m_T"] * w)
+
+
+def _N_F(v: Design) -> Any:
+    return v["load_front"] * v["m_T"] * v["g"]
+
+
+def _N_R(v: Design) -> Any:
+    return v["load_rear"] * v["m_T"] * v["g"]
+
+
+def _rear_lift(v: Design) -> Any:
+    return -v["load_rear"] * v["m_T"]
+
+
+def _m_ballast_rear(v: Design) -> Any:
+    return positive_part(_rear_lift(v))
+
+
+def _none(v: Design) -> Any:
+    return 0
+
+
+def _mechanical_trail(v: Design) -> Any:
+    return v["c"] * _sine_cosine(v)[1]
+
+
+def _fork_offset(v: Design) -> Any:
+    sine, cosine = _sine_cosine(v)
+    return v["r_F"] * sine - v["c"] * cosine
+
+
+def _u_H(v: Design) -> Any:
+    sine, cosine = _sine_cosine(v)
+    return (v["x_H"] - v["w"] - v["c"]) * cosine - v["z_H"] * sine
+
+
+def _u_A(v: Design) -> Any:
+    return quotient(v["m_H"] * v["u_H"] + v["m_F"] * v["fork_offset"], v["m_H"] + v["m_F"])
+
+
+def _mass_margin(v: Design) -> Any:
+    """Smaller eigenvalue of M as 2 det/(tr + √((M11 − M22)² + 4 M12²))."""
+    (first, mixed), (_, second) = canonical(v)[0]
+    determinant = first * second - mixed * mixed
+    apart = sqrt((first - second) * (first - second) + 4 * mixed * mixed)
+    return 2 * determinant / (first + second + apart + _TINY)
+
+
+QUANTITIES = (
+    Quantity(
+        "omega0", "1/s", "−(a4/a0)^(1/4), the mean decay of the roots", r"\omega_0", _omega0,
+        equation=_omega0_equation,
+        range=_NOT_POSITIVE,
+    ),
+    Quantity("v_weave", "m/s", "least speed at which a pair of roots is imaginary", r"v_\mathrm{w}", _v_weave),
+    Quantity(
+        "v_capsize", "m/s", "speed at which a root is 0", r"v_\mathrm{c}", _v_capsize,
+        equation=_v_capsize_equation,
+        range=_NOT_NEGATIVE,
+    ),
+    Quantity("mechanical_trail", "m", "distance of the front contact from the steer axis", r"c_m", _mechanical_trail),
+    Quantity("fork_offset", "m", "distance of the front wheel centre from the steer axis", r"o_F", _fork_offset),
+    Quantity("u_H", "m", "distance of the handlebar's centre of mass from the steer axis", "u_H", _u_H),
+    Quantity("u_A", "m", "distance of the centre of mass of handlebar and front wheel from the steer axis", "u_A", _u_A),
+    Quantity("m_T", "kg", "mass of the whole bicycle", "m_T", _m_T),
+    Quantity("x_T", "m", "centre of mass of the whole bicycle, forward of the rear contact", "x_T", _x_T),
+    Quantity("z_T", "m", "centre of mass of the whole bicycle, downward", "z_T", _z_T),
+    Quantity(
+        "load_front", "1", "share of the weight on the front wheel, negative where it lifts", r"N_F/(N_F + N_R)",
+        _load_front,
+    ),
+    Quantity(
+        "load_rear", "1", "share of the weight on the rear wheel, negative where it lifts", r"N_R/(N_F + N_R)",
+        _load_rear,
+    ),
+    Quantity("N_F", "N", "load on the front wheel at rest, negative where it lifts", "N_F", _N_F),
+    Quantity("N_R", "N", "load on the rear wheel at rest, negative where it lifts", "N_R", _N_R),
+    Quantity(
+        "m_ballast_rear", "kg", "mass at the rear contact that keeps the rear wheel down", r"m_\mathrm{ballast}",
+        _m_ballast_rear,
+        range=_NOT_NEGATIVE,
+        pieces=(_none, _rear_lift),
+    ),
+    Quantity("S_R", "kg m", "spin of the rear wheel, I_Ryy/r_R", "S_R", _S_R),
+    Quantity("S_F", "kg m", "spin of the front wheel, I_Fyy/r_F", "S_F", _S_F),
+    Quantity(
+        "mass_margin", "kg m^2", "smallest eigenvalue of the mass matrix, 0 where it is singular", r"\min\sigma(M)",
+        _mass_margin,
+        range=_NOT_NEGATIVE,
+    ),
+)  # fmt: skip
+"""Quantities of a design. A mass at the rear contact has no part in the lateral motion."""
