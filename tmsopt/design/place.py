@@ -133,10 +133,10 @@ def placed(problem: Problem, parameters: Mapping[str, float], weights: Mapping[s
 
 
 def relative(problem: Problem, parameters: Mapping[str, float]) -> dict[str, float]:
-    """|value| per parameter without a default; for a value 0 the largest |value| of the same unit, 1 without one."""
+    """|value| per parameter that may change; for a value 0 the largest |value| of the same unit, 1 without one."""
     of = problem.parameter_set
     weights = {}
-    for p in (p for p in of.parameters if p.default is None):
+    for p in (p for p in of.parameters if p.may_change(parameters[p.name])):
         alike = [abs(parameters[q.name]) for q in of.parameters if q.unit == p.unit and p.unit not in ("1", "rad")]
         weights[p.name] = abs(parameters[p.name]) or max(alike, default=0.0) or 1.0
     return weights

@@ -1,5 +1,6 @@
 """A design problem as data: which parameters are fixed, which are free, and what is asked of them."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -81,7 +82,7 @@ class Problem:
     @cached_property
     def cases(self) -> tuple[Case, ...]:
         """The cases that a search starts with; none for a problem that asks about one design alone."""
-        far = weighted(self.parameter_set, self.weights) if self.asks_radius else ()
+        far = weighted(self.parameter_set, self.weights, self.fixed) if self.asks_radius else ()
         return first_cases(self.variations, self.tolerances, far)
 
     @property
@@ -147,11 +148,15 @@ class Problem:
         return {name: complete[name] for name in self.parameter_set.names}
 
 
-def weighted(of: ParameterSet, weights: Mapping[str, float]) -> tuple[str, ...]:
-    """Parameters that the robustness radius lets change: by default all but constants of nature."""
+def weighted(of: ParameterSet, weights: Mapping[str, float], fixed: Mapping[str, float]) -> tuple[str, ...]:
+    """Parameters that the robustness radius lets change: by default all but constants of nature and what is not there.
+
+    Args:
+        fixed: values of those that are not free.
+    """
     if weights:
         return tuple(n for n, w in weights.items() if w > 0)
-    return tuple(p.name for p in of.parameters if p.default is None)
+    return tuple(p.name for p in of.parameters if p.may_change(fixed.get(p.name, math.inf)))
 
 
 def checked(problem: object) -> Problem:

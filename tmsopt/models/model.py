@@ -61,6 +61,10 @@ class Parameter:
     multiple_of: str = ""
     sides: tuple[str, str] | None = None
 
+    def may_change(self, value: float) -> bool:
+        """Whether a builder may get it wrong: no constant of nature, nor something that a design does not have."""
+        return self.default is None or (self.default == 0 and value != 0)
+
 
 @dataclass(frozen=True)
 class Quantity:

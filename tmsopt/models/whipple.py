@@ -19,10 +19,11 @@ __all__ = ["canonical", "carvallo_whipple", "matrices", "whipple"]
 _POSITIVE = Range(lower=0.0, closed=False)
 _NOT_NEGATIVE = Range(lower=0.0)
 _NOT_POSITIVE = Range(upper=0.0)
+_ANY = Range()
 _TILT = Range(-np.pi / 2, np.pi / 2, closed=False)
 
 
-def _length(name: str, meaning: str, latex: str, range: Range = Range(), default: float | None = None) -> Parameter:
+def _length(name: str, meaning: str, latex: str, range: Range = _ANY, default: float | None = None) -> Parameter:
     return Parameter(name, "m", meaning, latex, range, default)
 
 
@@ -55,13 +56,13 @@ _SI = ParameterSet(
         _mass("m_B", "rear frame with a rider who does not move", _POSITIVE),
         _inertia("I_Bxx", "moment of inertia of the rear frame about a forward axis"),
         _inertia("I_Bzz", "moment of inertia of the rear frame about a vertical axis"),
-        _inertia("I_Bxz", "product of inertia of the rear frame, the negative of ∫ x z dm", Range()),
+        _inertia("I_Bxz", "product of inertia of the rear frame, the negative of ∫ x z dm", _ANY),
         _length("x_H", "handlebar and fork, centre of mass, forward of the rear contact", "x_H"),
         _length("z_H", "handlebar and fork, centre of mass, downward", "z_H", _NOT_POSITIVE),
         _mass("m_H", "handlebar and fork"),
         _inertia("I_Hxx", "moment of inertia of handlebar and fork about a forward axis"),
         _inertia("I_Hzz", "moment of inertia of handlebar and fork about a vertical axis"),
-        _inertia("I_Hxz", "product of inertia of handlebar and fork, the negative of ∫ x z dm", Range()),
+        _inertia("I_Hxz", "product of inertia of handlebar and fork, the negative of ∫ x z dm", _ANY),
         _length("r_F", "radius of the front wheel", "r_F", _NOT_NEGATIVE, 0.0),
         _mass("m_F", "front wheel", default=0.0),
         _inertia("I_Fxx", "moment of inertia of the front wheel about a diameter"),

@@ -215,7 +215,7 @@ QUANTITIES = (
     Quantity("mechanical_trail", "m", "distance of the front contact from the steer axis", r"c_m", _mechanical_trail),
     Quantity("fork_offset", "m", "distance of the front wheel centre from the steer axis", r"o_F", _fork_offset),
     Quantity("u_H", "m", "distance of the handlebar's centre of mass from the steer axis", "u_H", _u_H),
-    Quantity("u_A", "m", "distance of the centre of mass of handlebar and front wheel from the steer axis", "u_A", _u_A),
+    Quantity("u_A", "m", "distance of the centre of mass of the front assembly from the steer axis", "u_A", _u_A),
     Quantity("m_T", "kg", "mass of the whole bicycle", "m_T", _m_T),
     Quantity("x_T", "m", "centre of mass of the whole bicycle, forward of the rear contact", "x_T", _x_T),
     Quantity("z_T", "m", "centre of mass of the whole bicycle, downward", "z_T", _z_T),

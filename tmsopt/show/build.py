@@ -54,18 +54,22 @@ def pitching(solution: Solution, si: Mapping[str, float]) -> str:
                 f"balance: on the verge of pitching over the {over} wheel{in_case}; the {lifted} wheel carries no load"
             )
         if load < 0:
-            own = problem.parameter_set.name == "SI"
-            shares = [float(values[f"ballast_{lifted}"]) for values in each]
-            masses = [
-                float(values[f"m_ballast_{lifted}"]) if own else si["m_B"] * float(values[f"ballast_{lifted}"])
-                for values in each
-            ]
-            mass = f"{max(masses):.4g} kg ({max(shares):.4g} m_B)"
-            return (
-                f"balance: pitches over the {over} wheel{in_case}; more than {mass} of ballast at the {lifted} contact "
-                "prevents it, without any effect on the lateral motion"
-            )
+            return f"balance: pitches over the {over} wheel{in_case}{_prevented(solution, si, each, lifted)}"
     return "balance: stands on both wheels" + (" in every case listed" if listed else "")
+
+
+def _prevented(solution: Solution, si: Mapping[str, float], each: Sequence[Mapping[str, Any]], lifted: str) -> str:
+    """The ballast at a wheel's contact that has no part in the lateral motion: with trail, at the rear one alone."""
+    if f"m_ballast_{lifted}" not in (names := solution.problem.vocabulary) and f"ballast_{lifted}" not in names:
+        return ""
+    if f"m_ballast_{lifted}" in names:
+        masses = [float(values[f"m_ballast_{lifted}"]) for values in each]
+    else:
+        masses = [si["m_B"] * float(values[f"ballast_{lifted}"]) for values in each]
+    mass = f"{max(masses):.4g} kg ({max(masses) / si['m_B']:.4g} m_B)"
+    return (
+        f"; more than {mass} of ballast at the {lifted} contact prevents it, without any effect on the lateral motion"
+    )
 
 
 def _read(value: float, unit: str) -> tuple[str, str]:

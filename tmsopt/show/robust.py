@@ -8,6 +8,9 @@ from tmsopt.show.text import columns
 _MAIN = 0.5
 """Share of the largest change above which a parameter is named in the headline."""
 
+_WIDE = 12
+"""Parameters up to which each has a column; of more, each has a row."""
+
 _WORDS = {
     "weave": "weave",
     "capsize": "capsize",
@@ -30,7 +33,7 @@ def robustness_table(found: Robustness) -> str:
     """The sentence, then the nearest point of every boundary: its distance and the change of each parameter."""
     names = list(found.weights)
     kinds = (found.weave, found.capsize, found.infinity, found.heavy_damping)
-    rows = [("relative changes" if found.relative else "changes in weights", "distance", *names)]
+    rows: list[tuple[str, ...]] = [("relative changes" if found.relative else "changes in weights", "distance", *names)]
     for n in kinds:
         moves = (f"{n.direction[name]:+.2%}" for name in names) if n.found else ["" for _ in names]
         rows.append((_row(n, found), _percent(n.distance) if n.found else "none found", *moves))
@@ -38,6 +41,8 @@ def robustness_table(found: Robustness) -> str:
     for n in kinds:
         if n.found and n.distance > 0:
             rows.append((f"at {n.kind}", "", *(f"{n.parameters[name]:.8g}" for name in names)))
+    if len(names) > _WIDE:
+        rows = list(zip(*rows, strict=True))
     return "\n".join(line.rstrip() for line in [robustness_line(found), "", *columns(rows)])
 
 

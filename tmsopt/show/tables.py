@@ -7,6 +7,7 @@ from tmsopt.design.solution import Solution
 from tmsopt.design.units import reading
 from tmsopt.models.tms import GRAVITY, tms, to_si
 from tmsopt.roots import Root
+from tmsopt.show import plain
 from tmsopt.show.build import pitching, quantity_rows
 from tmsopt.show.limits import bound_lines, case_lines, relaxation_lines
 from tmsopt.show.text import columns, number
@@ -17,21 +18,22 @@ _SI = tms.parameter_set("SI")
 
 
 def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> Mapping[str, float]:
-    """SI parameters: as solved for, or for the given wheelbase, rear mass and gravity."""
-    own = solution.problem.parameter_set.name == "SI"
+    """SI parameters: as solved for, or of dimensionless skates for the given wheelbase, rear mass and gravity."""
+    own = solution.problem.model is not tms or solution.problem.parameter_set.name == "SI"
     return solution.parameters if own else to_si(solution.dimensionless, w, m_B, g)
 
 
 def solution_table(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> str:
-    """A design with its roots, bound, limits and remarks; the two-mass skate dimensionless and in SI side by side."""
+    """A design with its roots, bound, limits and remarks; of skates, dimensionless and in SI side by side."""
     lines = [solution.problem.title or "untitled problem", _headline(solution), ""]
     if solution.problem.model is tms:
         si = si_parameters(solution, w, m_B, g)
-        lines += [*columns(_parameter_rows(solution, si)), ""]
-        lines += [*columns(quantity_rows(solution, si)), ""]
-        lines += [pitching(solution, si)]
+        lines += [*columns(_parameter_rows(solution, si)), "", *columns(quantity_rows(solution, si)), ""]
+        lines.append(pitching(solution, si))
     else:
-        lines += [*columns(_own_rows(solution)), ""]
+        lines += [*columns(plain.parameter_rows(solution)), "", *columns(plain.quantity_rows(solution)), ""]
+        if "load_rear" in solution.quantities:
+            lines.append(pitching(solution, solution.parameters))
     lines += _facts(solution)
     return "\n".join(line.rstrip() for line in lines).rstrip()
 
@@ -105,21 +107,6 @@ def _parameter_rows(solution: Solution, si: Mapping[str, float]) -> list[Sequenc
             rows.append((name, number(value), symbol, *_read(symbol, si), free))
     if own:
         rows += [("", "", n, *_read(n, si), _freedom(solution, n)) for n in ("w", "m_B")]
-    return rows
-
-
-def _own_rows(solution: Solution) -> list[Sequence[str]]:
-    """Parameters, then derived quantities, in the model's own units."""
-    problem = solution.problem
-    of = problem.parameter_set
-    rows: list[Sequence[str]] = []
-    for name, value in solution.parameters.items():
-        read, unit = reading(value, of[name].unit)
-        rows.append((name, number(read), "" if unit == "1" else unit, _freedom(solution, name)))
-    derived = {q.name: q.unit for q in (*problem.model.quantities, *of.quantities)}
-    for name, value in solution.quantities.items():
-        unit = derived.get(name, "1")
-        rows.append((name, number(value), "" if unit == "1" else unit, "quantity"))
     return rows
 
 

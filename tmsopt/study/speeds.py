@@ -1,0 +1,179 @@
+"""The speeds at which a bicycle changes its kind of motion: weave, capsize, and roots that meet, all of them."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import flint
+
+from tmsopt.design.errors import Fault, InputError, suggest
+from tmsopt.design.frozen import Table
+from tmsopt.design.problem import Problem, checked
+from tmsopt.design.solution import Solution
+from tmsopt.models import ParameterSet
+from tmsopt.roots.crossings import Crossing, crossings, interpolated
+from tmsopt.roots.elementary import exact
+from tmsopt.roots.exact import rational
+
+_DIGITS = 120  # of what is no fraction, such as the tangent of an angle
+_STRAIGHT = 1e-100  # relative; a number that is linear in the speed is so within the digits carried
+
+Band = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Speeds:
+    """What happens to one design over all its speeds.
+
+    Attributes:
+        parameter: the speed, or whatever was asked for, e.g. ``v``.
+        parameters: every parameter of the design.
+        lower, upper: the range that was looked through, its ends left out; an upper end may be inf.
+        found: every speed at which a root crosses the imaginary axis or roots meet, in ascending order.
+        stable: bands of speeds with all Re s < 0.
+        heavily_damped: bands with all s real and negative.
+        always: ``capsize``, ``weave`` or ``EP2`` where that holds at every speed.
+    """
+
+    problem: Problem
+    parameter: str
+    parameters: Table[float]
+    lower: float
+    upper: float
+    found: tuple[Crossing, ...]
+    stable: tuple[Band, ...]
+    heavily_damped: tuple[Band, ...]
+    always: tuple[str, ...]
+
+    @property
+    def weave(self) -> tuple[float, ...]:
+        """Speeds with a pair of roots on the imaginary axis."""
+        return tuple(c.at for c in self.found if c.kind == "weave")
+
+    @property
+    def capsize(self) -> tuple[float, ...]:
+        """Speeds with a root 0."""
+        return tuple(c.at for c in self.found if c.kind == "capsize")
+
+    @property
+    def exceptional(self) -> tuple[Crossing, ...]:
+        """Where roots meet."""
+        return tuple(c for c in self.found if "EP" in c.kind)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``; an end at infinity is null."""
+        return {
+            "schema": 1,
+            "title": self.problem.title,
+            "model": self.problem.model.name,
+            "parameter": self.parameter,
+            "unit": self.problem.parameter_set[self.parameter].unit,
+            "range": [_finite(self.lower), _finite(self.upper)],
+            "found": [
+                {
+                    self.parameter: c.at,
+                    "kind": c.kind,
+                    "re": _finite(c.root.re),
+                    "im": _finite(c.root.im),
+                    "multiplicity": c.root.multiplicity,
+                    "rightmost": c.rightmost,
+                    "stability_changes": c.changes,
+                }
+                for c in self.found
+            ],
+            "stable": [[_finite(e) for e in band] for band in self.stable],
+            "heavily_damped": [[_finite(e) for e in band] for band in self.heavily_damped],
+            "always": list(self.always),
+            "parameters": dict(self.parameters),
+        }
+
+
+def speeds(
+    design: Problem | Solution | Mapping[str, float],
+    parameter: str | None = None,
+    *,
+    between: tuple[float, float] | None = None,
+    problem: Problem | None = None,
+) -> Speeds:
+    """Every weave and capsize speed of a design and every speed at which roots meet, by exact root isolation.
+
+    The coefficients are polynomials in the speed, so these speeds are the roots of polynomials too, and none is missed.
+
+    Args:
+        design: a problem in which nothing else is free, a solution, or the parameters of a design of `problem`.
+        parameter: what varies, by default the speed; any parameter that the coefficients are polynomials in.
+        between: the range to look through; by default the parameter's box, or all of its physical range.
+
+    Raises:
+        InputError: where other parameters are free, or the parameter does not enter as a polynomial.
+    """
+    asked, own = _design(design, problem)
+    of = asked.parameter_set
+    name = parameter if parameter is not None else speed_of(of)
+    if name is None:
+        message = f"the model '{asked.model.name}' has no parameter that is a speed; accepted: {' '.join(of.names)}"
+        raise InputError([Fault(message, ("parameter",))])
+    if name not in of.names:
+        raise InputError([Fault(f"unknown parameter '{name}'; {suggest(name, of.names)}", ("parameter",))])
+    if others := [n for n in asked.free if n != name and n not in own]:
+        message = f"also free: {', '.join(others)}; fix them, or give the solution of the problem"
+        raise InputError([Fault(message, ("parameters",))])
+    allowed = of[name].range
+    lower, upper = between or asked.free.get(name) or (allowed.lower, allowed.upper)
+    if not math.isfinite(lower) or not lower < upper:
+        message = f"found {lower:.6g} … {upper:.6g}; accepted: a least and a greater value"
+        raise InputError([Fault(message, ("between",))])
+    at = _linear(asked, own, name)
+    a = interpolated(lambda x: asked.model.polynomial(**{n: p if q == 0 else p + q * x for n, (p, q) in at.items()}))
+    if a is None or not any(any(c != 0 for c in p) for p in a):
+        raise InputError([Fault(f"the coefficients are no polynomials in {name}, or all 0", ("parameter",))])
+    met = crossings(a, exact(float(lower)), exact(float(upper)) if math.isfinite(upper) else None)
+    return Speeds(
+        asked, name, Table(own), float(lower), float(upper), met.found, met.stable, met.heavily_damped, met.always
+    )
+
+
+def speed_of(of: ParameterSet) -> str | None:
+    """The parameter of a set that is a speed: in m/s, or the Froude number."""
+    return next((p.name for p in of.parameters if p.unit == "m/s" or p.name == "Fr"), None)
+
+
+def _design(design: Any, problem: Problem | None) -> tuple[Problem, dict[str, float]]:
+    if isinstance(design, Solution):
+        return design.problem.nominal, dict(design.parameters)
+    if isinstance(design, Problem) or problem is None:
+        asked = checked(design).nominal
+        return asked, dict(asked.fixed)
+    return problem.nominal, {**problem.fixed, **design}
+
+
+def _linear(problem: Problem, own: Mapping[str, float], name: str) -> dict[str, tuple[Any, Any]]:
+    """The algebraic parameters as α + β x.
+
+    Raises:
+        InputError: where one is no such function.
+    """
+    of, model = problem.parameter_set, problem.model
+    with flint.ctx.workdps(_DIGITS):
+        first, second, third = (
+            {n: flint.arb(v) for n, v in model.algebraic(of.native(_exact(own, of, name, k))).items()}
+            for k in (1, 2, 3)
+        )
+        found = {}
+        for n, a in first.items():
+            slope, bend = second[n] - a, third[n] - second[n] - (second[n] - a)
+            if not abs(bend) < _STRAIGHT * (1 + abs(a)):
+                message = f"{n} is not linear in {name}, so the coefficients are no polynomials in it"
+                raise InputError([Fault(message, ("parameter",))])
+            moves = not slope.contains(0)
+            found[n] = (rational(a - slope) if moves else rational(a), rational(slope) if moves else flint.fmpq(0))
+    return found
+
+
+def _exact(own: Mapping[str, float], of: ParameterSet, name: str, value: int) -> dict[str, Any]:
+    return {n: flint.fmpq(value) if n == name else exact(float(own[n])) for n in of.names}
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
