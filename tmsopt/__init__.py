@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from tmsopt.study.front import Front
     from tmsopt.study.optimality import Optimality, optimality
     from tmsopt.study.pareto import pareto
+    from tmsopt.study.speeds import Speeds, speeds
     from tmsopt.study.stored import StoredChart, chart_to, open_chart
     from tmsopt.study.swallowtail import Swallowtail, swallowtail
     from tmsopt.study.trace import trace
@@ -51,6 +52,7 @@ __all__ = [
     "Results",
     "Robustness",
     "Solution",
+    "Speeds",
     "StoredChart",
     "Study",
     "Swallowtail",
@@ -79,6 +81,7 @@ __all__ = [
     "sobol",
     "solve",
     "solve_all",
+    "speeds",
     "swallowtail",
     "trace",
 ]
@@ -100,6 +103,7 @@ _HOMES = {
     "Results": "tmsopt.study.batch.run",
     "Robustness": "tmsopt.design.nearest",
     "Solution": "tmsopt.design.solution",
+    "Speeds": "tmsopt.study.speeds",
     "StoredChart": "tmsopt.study.stored",
     "Study": "tmsopt.study.batch.plan",
     "Swallowtail": "tmsopt.study.swallowtail",
@@ -126,6 +130,7 @@ _HOMES = {
     "solve": "tmsopt.design.solve",
     "solve_all": "tmsopt.design.every",
     "Every": "tmsopt.design.every",
+    "speeds": "tmsopt.study.speeds",
     "swallowtail": "tmsopt.study.swallowtail",
     "trace": "tmsopt.study.trace",
 }

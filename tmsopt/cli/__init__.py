@@ -12,6 +12,7 @@ from tmsopt.cli.common import BAD_INPUT
 from tmsopt.cli.figure import figure
 from tmsopt.cli.prove import prove
 from tmsopt.cli.solve import compare, solve
+from tmsopt.cli.speeds import speeds
 from tmsopt.cli.study import study
 from tmsopt.cli.trace import trace
 from tmsopt.cli.verify import verify
@@ -42,6 +43,7 @@ def main() -> None:
       tmsopt solve problems/pareto.toml --plot front.png
       tmsopt compare problems/ep4.toml
       tmsopt prove problems/ep4.toml
+      tmsopt speeds problems/whipple_benchmark.toml
       tmsopt trace problems/ep_set.toml --plot ep_set.png
       tmsopt chart problems/chart.toml --plot chart.png
       tmsopt study problems/study_heights.toml
@@ -53,5 +55,5 @@ def main() -> None:
             stream.reconfigure(errors="replace")  # a narrow terminal encoding must not lose a result
 
 
-for _command in (solve, compare, prove, trace, chart, study, figure, verify):
+for _command in (solve, compare, prove, speeds, trace, chart, study, figure, verify):
     main.add_command(_command)

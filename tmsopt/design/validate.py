@@ -39,6 +39,7 @@ def faults(problem: Stated) -> Iterator[Fault]:
     yield from _name_faults(problem, of)
     for name in of.names:
         yield from _value_faults(problem, of, name)
+    yield from _need_faults(problem, of)
     yield from _variation_faults(problem, of)
     yield from _objective_faults(problem)
     yield from _expression_faults(problem, of)
@@ -100,6 +101,25 @@ def _value_faults(problem: Stated, of: ParameterSet, name: str) -> Iterator[Faul
             f"start = {problem.start[name]:.6g} lies outside the bounds {lower:.6g} … {upper:.6g}",
             (*key, "start"),
         )
+
+
+def _need_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
+    """Parameters that may differ from 0 where one that they need may be 0."""
+    for name, (needed, otherwise) in of.needs.items():
+        try:
+            least = min(_reached(problem, of, needed))
+            some = any(value != 0 for value in _reached(problem, of, name))
+        except (TypeError, ValueError):
+            continue  # reported as a value
+        if some and not least > 0:
+            message = f"{needed} may be 0 while {name} is not: {otherwise}; keep {needed} above 0, or leave {name} out"
+            yield Fault(message, ("parameters", needed))
+
+
+def _reached(problem: Stated, of: ParameterSet, name: str) -> list[float]:
+    """The ends of what a parameter may be."""
+    given = problem.free.get(name) or points_of(problem.scenarios.get(name, ()))
+    return [float(x) for x in (given or (problem.fixed.get(name, of[name].default),))]
 
 
 def _variation_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:

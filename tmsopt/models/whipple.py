@@ -36,6 +36,12 @@ def _inertia(name: str, meaning: str, range: Range = _NOT_NEGATIVE) -> Parameter
     return Parameter(name, "kg m^2", meaning, rf"I_{{{body}{axes}}}", range, default=0.0)
 
 
+def _per_second(p: Mapping[str, Any]) -> int:
+    return 1
+
+
+_NO_RADIUS = "a wheel without radius would turn infinitely fast"
+
 _SI = ParameterSet(
     "SI",
     (
@@ -70,7 +76,8 @@ _SI = ParameterSet(
     ),
     native=dict,
     quantities=QUANTITIES,
-    rate=lambda p: 1,
+    rate=_per_second,
+    needs={"I_Ryy": ("r_R", _NO_RADIUS), "I_Fyy": ("r_F", _NO_RADIUS)},
 )  # fmt: skip
 
 

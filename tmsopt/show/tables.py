@@ -59,7 +59,7 @@ def every_table(every: Every) -> str:
 
 
 def comparison_table(comparison: Comparison) -> str:
-    """Law beside number, then the two formulations beside each other."""
+    """Law beside number where laws are known, then the two formulations beside each other."""
     design = comparison.design
     lines = [design.problem.title or "untitled problem", _headline(design), ""]
     rows = [("law", "of", "numeric", "law says", "relative", "")]
@@ -68,7 +68,10 @@ def comparison_table(comparison: Comparison) -> str:
         relative = f"{row.relative:.1e}" if row.applies else ""
         law = number(row.law) if row.applies else ""
         rows.append((row.label, row.subject, number(row.numeric), law, relative, verdict))
-    lines += columns(rows)
+    known = design.problem.model is tms
+    lines += (
+        columns(rows) if known else [f"no laws are known of the {design.problem.model.title}, only of skates (tms)"]
+    )
     lines.append("")
     if comparison.other is None:
         lines.append(f"other formulation: none, {comparison.reason}")

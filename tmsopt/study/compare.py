@@ -122,16 +122,13 @@ def compare(
     linear_solver: str = "mumps",
     progress: Progress | None = None,
 ) -> Comparison:
-    """Set a design beside the laws of the paper and solve it by the other formulation.
+    """Set a design beside the laws of the paper, which are of skates alone, and solve it by the other formulation.
 
     The laws are of one design at one speed: scenarios and tolerances are left aside, and the problem is solved again.
 
     Args:
         design: a solution, or a problem to solve first.
         starts, seed, linear_solver, progress: as for `solve`, for the solves that this takes.
-
-    Raises:
-        ValueError: for a model that has no laws.
     """
 
     def solved(problem: Problem) -> Solution:
@@ -142,10 +139,8 @@ def compare(
         design = problem.nominal
     if isinstance(design, Problem):
         design = solved(design)
-    if design.problem.model is not tms:
-        raise ValueError(f"no closed-form laws are known for the model '{design.problem.model.name}'; accepted: tms")
     other, reason = _other_formulation(design, solved)
-    return Comparison(design, tuple(law_rows(design)), other, reason)
+    return Comparison(design, tuple(law_rows(design)) if design.problem.model is tms else (), other, reason)
 
 
 def _other_formulation(design: Solution, solved: Callable[[Problem], Solution]) -> tuple[Solution | None, str]:
@@ -161,12 +156,18 @@ def _other_formulation(design: Solution, solved: Callable[[Problem], Solution]) 
     else:
         square = len(problem.free) == PATTERNS[design.structure].codimension and not problem.constraints
         restated = replace(problem, locate=design.structure, start={})
-        if square:
-            restated = replace(restated, minimize=None, maximize=None)
+        if square:  # there may be several such designs: the one near this
+            restated = replace(restated, minimize=None, maximize=None, start=_near(design))
     other = solved(restated)
     if other.status != "optimal":
         return None, f"the {other.formulation} formulation ended {other.status}"
     return other, ""
+
+
+def _near(design: Solution) -> dict[str, float]:
+    """The free parameters to two digits, within their box."""
+    box = design.problem.free
+    return {n: min(max(float(f"{design.parameters[n]:.2g}"), low), high) for n, (low, high) in box.items()}
 
 
 def law_rows(design: Solution) -> Iterator[LawRow]:

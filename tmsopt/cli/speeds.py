@@ -1,0 +1,77 @@
+"""The command that finds every speed at which the motion of a design changes."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from tmsopt.cli.common import INFEASIBLE, NOT_CONVERGED, bad_input, nominal_of, progress, write_json
+
+if TYPE_CHECKING:
+    from tmsopt.design.problem import Problem
+    from tmsopt.design.solution import Solution
+
+_EXAMPLES = """
+\b
+Examples:
+  tmsopt speeds problems/whipple_benchmark.toml
+  tmsopt speeds problems/whipple_benchmark.toml --parameter c --between -0.2,0.3
+  tmsopt speeds problems/ep4.toml --json
+
+Weave, capsize, roots that meet (EP2, CEP2, …) and roots through infinity: the coefficients are polynomials in the
+speed, so these speeds are roots of polynomials, isolated exactly, and none is missed. A file that frees parameters is
+solved first, and the design found is looked at; where only the speed is free, its box is the range.
+
+Exit status: 0 done, 2 bad input, 3 infeasible, 4 not converged.
+"""
+
+
+def _ends(_context: click.Context, _option: click.Parameter, value: str | None) -> tuple[float, float] | None:
+    if value is None:
+        return None
+    try:
+        low, high = (float(part) for part in value.split(","))
+    except ValueError:
+        raise click.BadParameter(f"found {value!r}; accepted: two numbers, as in 0,12") from None
+    return low, high
+
+
+@click.command(epilog=_EXAMPLES)
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--parameter", help="What varies. [default: the speed]")
+@click.option("--between", callback=_ends, metavar="LOW,HIGH", help="The range to look through. [default: all]")
+@click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
+def speeds(file: Path, parameter: str | None, between: tuple[float, float] | None, as_json: bool) -> None:
+    """Find every weave and capsize speed of FILE, and every speed at which roots meet."""
+    with bad_input():
+        from tmsopt.design.errors import InputError
+        from tmsopt.design.files import load
+        from tmsopt.design.problem import unasked
+        from tmsopt.show.speeds import speeds_table
+        from tmsopt.study.speeds import speed_of
+        from tmsopt.study.speeds import speeds as find
+
+        problem = nominal_of(load(file, asks=False))
+        name = parameter or speed_of(problem.parameter_set)
+        if set(problem.free) <= {name}:
+            found = find(problem, parameter, between=between)
+        else:
+            if faults := unasked(problem):
+                raise InputError(faults)
+            found = find(_solved(problem), parameter, between=between)
+    if as_json:
+        write_json(found.to_json())
+    else:
+        click.echo(speeds_table(found))
+
+
+def _solved(problem: "Problem") -> "Solution":
+    """The design that a problem asks for; without one the command ends."""
+    from tmsopt.design.solve import solve
+
+    with progress() as update:
+        solution = solve(problem, throw=False, progress=update)
+    if solution.status != "optimal":
+        click.echo(f"{problem.title}: {solution.status.replace('_', ' ')}; there is no design to look at", err=True)
+        raise SystemExit(INFEASIBLE if solution.status == "infeasible" else NOT_CONVERGED)
+    return solution

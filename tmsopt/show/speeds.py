@@ -1,0 +1,72 @@
+"""The speeds at which the motion of a design changes, as text."""
+
+import math
+from collections.abc import Sequence
+
+from tmsopt.design.units import reading
+from tmsopt.roots.crossings import Crossing
+from tmsopt.show.text import columns
+from tmsopt.study.speeds import Speeds
+
+_DIGITS = 15
+
+_ALWAYS = {
+    "capsize": "a root is 0 at every speed",
+    "weave": "the roots are mirrored in the imaginary axis at every speed",
+    "EP2": "a root is multiple at every speed",
+    "infinity": "a root is at infinity at every speed",
+}
+
+
+def speeds_table(found: Speeds) -> str:
+    """Every speed with what happens there, then the stable and the heavily damped bands."""
+    unit = found.problem.parameter_set[found.parameter].unit
+    read = reading(1.0, unit)[1]
+    symbol = found.parameter + ("" if unit == "1" else f" {unit}")
+    lines = [
+        found.problem.title or "untitled problem",
+        f"{_range(found)}, by exact root isolation for the numbers as stored",
+        "",
+    ]
+    rows: list[Sequence[str]] = [("", symbol, read if read != unit else "", "root", "")]
+    for c in found.found:
+        other = f"{reading(c.at, unit)[0]:.8g}" if read != unit else ""
+        rows.append((c.kind, f"{c.at:.{_DIGITS}g}", other, _root(c), _meaning(c)))
+    lines += [*columns(rows), ""] if found.found else ["no root meets another or the imaginary axis", ""]
+    lines += [_ALWAYS[kind] for kind in found.always]
+    lines.append(f"stable: {_bands(found, found.stable)}")
+    lines.append(f"heavily damped: {_bands(found, found.heavily_damped)}")
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _range(found: Speeds) -> str:
+    end = f" < {found.upper:.6g}" if math.isfinite(found.upper) else ""
+    return f"{found.lower:.6g} < {found.parameter}{end}"
+
+
+def _root(c: Crossing) -> str:
+    if c.kind == "infinity":
+        return "infinite"
+    times = f" ({c.root.multiplicity}-fold)" if c.root.multiplicity > 1 else ""
+    if not c.root.im:
+        return f"{c.root.re:.12g}{times}"
+    real = f"{c.root.re:.12g} " if c.root.re else ""
+    return f"{real}± {c.root.im:.12g}i{times}"
+
+
+def _meaning(c: Crossing) -> str:
+    if c.changes:
+        return "stability changes"
+    return "rightmost" if c.rightmost else ""
+
+
+def _bands(found: Speeds, bands: Sequence[tuple[float, float]]) -> str:
+    """Bands as a reader writes them."""
+    words = []
+    for low, high in bands:
+        begin = "" if low == found.lower else f"from {low:.8g}"
+        end = "" if high == found.upper else f"to {high:.8g}"
+        words.append(" ".join(part for part in (begin, end) if part) or "everywhere")
+    unit = found.problem.parameter_set[found.parameter].unit
+    text = ", ".join(words) or "nowhere"
+    return text if unit == "1" or text in ("nowhere", "everywhere") else f"{text} {unit}"
