@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tmsopt import laws, models, roots
+    from tmsopt.design.bicycle_files import Bicycle, read_bicycle, write_bicycle
     from tmsopt.design.bounds.certify import certify
     from tmsopt.design.errors import InputError
     from tmsopt.design.every import Every, solve_all
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "Bicycle",
     "Branch",
     "Chart",
     "Comparison",
@@ -75,6 +77,7 @@ __all__ = [
     "over_grid",
     "pareto",
     "prove",
+    "read_bicycle",
     "robustness",
     "roots",
     "run_study",
@@ -84,10 +87,12 @@ __all__ = [
     "speeds",
     "swallowtail",
     "trace",
+    "write_bicycle",
 ]
 
 # Imported when first used, so that `tmsopt --help` need not wait for CasADi.
 _HOMES = {
+    "Bicycle": "tmsopt.design.bicycle_files",
     "Branch": "tmsopt.study.branch",
     "Chart": "tmsopt.study.chart",
     "Comparison": "tmsopt.study.compare",
@@ -124,6 +129,7 @@ _HOMES = {
     "over_grid": "tmsopt.study.batch.plan",
     "pareto": "tmsopt.study.pareto",
     "prove": "tmsopt.design.prove",
+    "read_bicycle": "tmsopt.design.bicycle_files",
     "robustness": "tmsopt.design.nearest",
     "run_study": "tmsopt.study.batch.run",
     "sobol": "tmsopt.study.batch.samples",
@@ -133,6 +139,7 @@ _HOMES = {
     "speeds": "tmsopt.study.speeds",
     "swallowtail": "tmsopt.study.swallowtail",
     "trace": "tmsopt.study.trace",
+    "write_bicycle": "tmsopt.design.bicycle_files",
 }
 
 

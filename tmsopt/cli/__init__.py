@@ -9,6 +9,7 @@ import click
 from tmsopt import __version__
 from tmsopt.cli.chart import chart
 from tmsopt.cli.common import BAD_INPUT
+from tmsopt.cli.convert import convert
 from tmsopt.cli.figure import figure
 from tmsopt.cli.prove import prove
 from tmsopt.cli.solve import compare, solve
@@ -55,5 +56,5 @@ def main() -> None:
             stream.reconfigure(errors="replace")  # a narrow terminal encoding must not lose a result
 
 
-for _command in (solve, compare, prove, speeds, trace, chart, study, figure, verify):
+for _command in (solve, compare, prove, speeds, trace, chart, study, figure, verify, convert):
     main.add_command(_command)

@@ -9,6 +9,7 @@ from typing import Any
 
 from pydantic import Field, StrictFloat, StrictInt, StrictStr
 
+from tmsopt.design.bicycle_files import read_bicycle
 from tmsopt.design.cases import POINTS, Band
 from tmsopt.design.errors import Fault, InputError, short, suggest
 from tmsopt.design.page import Number, Section, fitted, read_page
@@ -43,6 +44,7 @@ class _File(Section):
 
     title: StrictStr = ""
     model: StrictStr | dict[str, Any] = "tms"
+    bicycle: StrictStr | None = None
     parameters: dict[str, _FreeParameter | StrictFloat | StrictInt | StrictStr]
     objective: _Objective = Field(default_factory=_Objective)
     constraints: dict[str, StrictStr] = Field(default_factory=dict)
@@ -63,10 +65,20 @@ def load(path: str | PathLike[str], asks: bool = True) -> Problem:
         own = f"its problem, {written}" if isinstance(written, str) else "a file with its [problem] alone"
         message = f"is a study of many designs, not one problem; run tmsopt study {page.file}, or give {own}"
         raise InputError([Fault(message, file=page.file)])
-    faults, problem = posed(page.data, Path(page.file).stem, asks)
+    faults, problem = posed(_with_bicycle(page.data, Path(page.file).parent), Path(page.file).stem, asks)
     if problem is None or faults:
         raise page.error(faults)
     return problem
+
+
+def _with_bicycle(data: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
+    """The tables with the parameters of the bicycle that they name, which those of the file itself go before."""
+    named = data.get("bicycle")
+    if not isinstance(named, str) or not isinstance(given := data.get("parameters", {}), dict):
+        return data
+    scenarios = data.get("scenarios", {})
+    measured = {n: v for n, v in read_bicycle(folder / named).parameters.items() if n not in scenarios}
+    return {"model": "whipple", **data, "parameters": {**measured, **given}}
 
 
 def posed(data: Mapping[str, Any], title: str, asks: bool = True) -> tuple[list[Fault], Problem | None]:

@@ -1,4 +1,4 @@
-"""Where the roots of a polynomial that depends on one number meet, or meet the imaginary axis: all places, exactly.
+"""Where the roots of a polynomial in s that depends on y meet, or meet the imaginary axis: all such places, exactly.
 
 The coefficients are polynomials with rational coefficients in that number y. A root 0, a root at infinity, a pair ± iω
 and a multiple root are then roots of polynomials in y: of aₙ, of a0, of the Hurwitz minor Δₙ₋₁ and of the discriminant.

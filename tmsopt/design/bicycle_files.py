@@ -1,0 +1,197 @@
+"""Bicycles in the files of the BicycleParameters program: text with uncertainties, and YAML.
+
+Text has lines such as ``rF = 0.344+/-0.0001``; several values after commas are averaged; ``#`` begins a comment. YAML
+has its numbers under ``values:``, or at the top. The names are those of Meijaard et al. (2007) as that program writes
+them: ``lam`` is lambda_s, ``IFyy`` is I_Fyy. ``IByy`` and ``IHyy`` have no part in the linear motion.
+"""
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+
+from tmsopt.design.errors import Fault, InputError, suggest
+from tmsopt.design.frozen import Table
+from tmsopt.design.page import read_text
+from tmsopt.models import whipple
+
+_OF = whipple.sets[0]
+_WRITTEN = {p.name: "lam" if p.name == "lambda_s" else p.name.replace("_", "") for p in _OF.parameters}
+_OWN = {written: name for name, written in _WRITTEN.items()}
+_NO_PART = ("IByy", "IHyy", "yB", "yH", "yR", "yF")
+"""Names that the files have and the linear motion does not depend on."""
+
+_OPTIONAL = ("v", "g")
+_YAML = (".yml", ".yaml")
+_TEXT = (".txt", ".ini")
+_KINDS = ("benchmark", "meijaard2007")
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_MEASURED = re.compile(
+    rf"\(?\s*(?P<value>{_NUMBER})\s*(?:(?:\+/-|±)\s*(?P<off>{_NUMBER}))?\s*\)?(?P<power>[eE][+-]?\d+)?"
+)
+
+
+@dataclass(frozen=True)
+class Bicycle:
+    """A bicycle as measured.
+
+    Attributes:
+        name: of the file.
+        parameters: those of the model ``whipple`` that the file gives, in SI units and radians; not always the speed.
+        uncertainties: standard deviations of those that have one above 0.
+        others: what the linear motion does not depend on, by its name in the file.
+    """
+
+    name: str
+    parameters: Table[float]
+    uncertainties: Table[float] = field(default_factory=Table)
+    others: Table[float] = field(default_factory=Table)
+
+    def tolerances(self, deviations: float = 2.0, most: int = 8) -> dict[str, float]:
+        """Tolerances of a problem: so many standard deviations of the parameters that are least certain, relatively."""
+        share = {n: u / (abs(self.parameters[n]) or math.inf) for n, u in self.uncertainties.items()}
+        chosen = sorted(share, key=lambda n: -share[n])[:most]
+        return {n: deviations * self.uncertainties[n] for n in self.parameters if n in chosen}
+
+
+def read_bicycle(path: str | PathLike[str]) -> Bicycle:
+    """Read a parameter file of BicycleParameters, such as ``BrowserBenchmark.txt`` or ``benchmark-browser.yml``.
+
+    Raises:
+        InputError: listing every line that is not understood, names that are unknown, and names that are missing.
+    """
+    file = Path(path)
+    kind = "YAML" if file.suffix.lower() in _YAML else "TXT"
+    text = read_text(str(path), f"{kind} file of bicycle parameters")
+    entries = list(_yaml(text) if kind == "YAML" else _lines(text))
+    faults, found, off, others = [], {}, {}, {}
+    for number, name, written in entries:
+        numbers = _numbers(written)
+        if kind == "YAML" and name == "parameterization":
+            if written.strip("'\" ").lower() not in _KINDS:
+                message = f"found the parameterization '{written}'; accepted: Meijaard2007 or benchmark"
+                faults.append(Fault(message).at(str(path), number))
+        elif name not in _OWN and name not in _NO_PART:
+            message = f"unknown name '{name}'; {suggest(name, [*_OWN, *_NO_PART])}"
+            faults.append(Fault(message).at(str(path), number))
+        elif numbers is None:
+            message = (
+                f"{name}: found '{written}'; accepted: a number, with +/- its uncertainty, or several after commas"
+            )
+            faults.append(Fault(message).at(str(path), number))
+        elif name in _NO_PART:
+            others[name] = numbers[0]
+        else:
+            found[_OWN[name]], off[_OWN[name]] = numbers
+    reported = {name for _, name, _ in entries}
+    missing = [w for n, w in _WRITTEN.items() if w not in reported and n not in _OPTIONAL]
+    if missing:
+        raw = " These are the raw measurements; make the Benchmark file with that program." if "hbb" in reported else ""
+        faults.append(Fault(f"missing: {', '.join(missing)}.{raw}", file=str(path)))
+    faults += [f.at(str(path), 0) for f in _range_faults(found)]
+    if faults:
+        raise InputError(faults)
+    ordered = {n: found[n] for n in _OF.names if n in found}
+    return Bicycle(file.stem, Table(ordered), Table({n: off[n] for n in ordered if off[n] > 0}), Table(others))
+
+
+def write_bicycle(bicycle: Bicycle | Mapping[str, float], path: str | PathLike[str]) -> None:
+    """Write a bicycle, or the parameters of a ``whipple`` design, for BicycleParameters, as the ending says.
+
+    Every number is written so that it reads back the same. YAML takes no uncertainties.
+
+    Raises:
+        InputError: for another ending, or parameters that are missing.
+        OSError: when the file cannot be written.
+    """
+    file = Path(path)
+    ending = file.suffix.lower()
+    if ending not in (*_TEXT, *_YAML):
+        raise InputError([Fault(f"found '{path}'; accepted: a file name ending in {', '.join((*_TEXT, *_YAML))}")])
+    own = bicycle if isinstance(bicycle, Bicycle) else Bicycle(file.stem, Table(bicycle))
+    defaults = {p.name: p.default for p in _OF.parameters if p.default is not None}
+    values = {**defaults, **own.parameters}
+    missing = [n for n in _OF.names if n not in values and n not in _OPTIONAL]
+    if missing:
+        raise InputError([Fault(f"missing parameter {', '.join(missing)}", ("parameters",))])
+    rows = {written: (values[n], own.uncertainties.get(n, 0.0)) for n, written in _WRITTEN.items() if n in values}
+    rows |= {n: (float(own.others.get(n, 0.0)), 0.0) for n in ("IByy", "IHyy")}
+    if ending in _TEXT:
+        lines = [f"{n} = {_decimal(v)}" + (f"+/-{_decimal(u)}" if u else "") for n, (v, u) in sorted(rows.items())]
+    else:
+        head = ["parameterization: Meijaard2007", f"parameters: {_quoted(own.name)}", "rider: null", "description: ''"]
+        lines = [*head, "values:", *(f"  {n}: {_decimal(v)}" for n, (v, _) in sorted(rows.items()))]
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def problem_text(bicycle: Bicycle, speed: float | None = None) -> str:
+    """A problem file of a bicycle: every parameter fixed, at the speed given, or the file's, or else at 5 m/s."""
+    v = speed if speed is not None else bicycle.parameters.get("v", 5.0)
+    lines = [f"title = {_quoted(bicycle.name)}", 'model = "whipple"', "", "[parameters]"]
+    for parameter in _OF.parameters:
+        name = parameter.name
+        value = v if name == "v" else bicycle.parameters.get(name, parameter.default)
+        comment = f"{parameter.meaning}, {parameter.unit}"
+        if name in bicycle.uncertainties:
+            comment += f"; ± {bicycle.uncertainties[name]:.6g}"
+        lines.append(f"{name} = {_decimal(float(value or 0.0))}  # {comment}")
+    return "\n".join(lines) + "\n"
+
+
+def _lines(text: str) -> Iterator[tuple[int, str, str]]:
+    """Line number, name and what is written of each line that says something."""
+    for number, line in enumerate(text.splitlines(), start=1):
+        said = line.split("#", 1)[0].strip()
+        if said:
+            name, _, written = said.partition("=")
+            yield number, name.strip(), written.strip()
+
+
+def _yaml(text: str) -> Iterator[tuple[int, str, str]]:
+    """The numbers of the two layouts that occur: under ``values:``, or all at the top; no YAML beyond these."""
+    table, top = "values", not re.search(r"^values\s*:", text, re.MULTILINE)
+    section = ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        said = re.split(r"(?:^|\s)#", line, maxsplit=1)[0].rstrip()
+        if not said:
+            continue
+        name, _, written = said.strip().partition(":")
+        if said[0].isspace():
+            if section == table:
+                yield number, name.strip(), written.strip()
+            continue
+        section = name.strip()
+        if top or section == "parameterization":
+            yield number, section, written.strip()
+
+
+def _numbers(written: str) -> tuple[float, float] | None:
+    """Mean of the values and its standard deviation; None for what is no number."""
+    parts = [_MEASURED.fullmatch(part.strip()) for part in written.split(",")]
+    known = [part for part in parts if part is not None]
+    if len(known) < len(parts):
+        return None
+    values = [float(part["value"] + (part["power"] or "")) for part in known]
+    offs = [float((part["off"] or "0") + (part["power"] or "")) for part in known]
+    if not all(map(math.isfinite, (*values, *offs))):
+        return None
+    return sum(values) / len(values), math.hypot(*offs) / len(values)
+
+
+def _range_faults(found: Mapping[str, float]) -> Iterator[Fault]:
+    for name, value in found.items():
+        if value not in _OF[name].range:
+            yield Fault(f"{_WRITTEN[name]} = {value:.6g} is not physical; {_OF[name].meaning} is {_OF[name].range}")
+
+
+def _decimal(value: float) -> str:
+    """The shortest decimal that reads back the same, with a point, as YAML asks of a float."""
+    text = repr(float(value))
+    return text.replace("e", ".0e") if "e" in text and "." not in text else text
+
+
+def _quoted(text: str) -> str:
+    return '"' + "".join(c for c in text if c.isprintable() and c not in '"\\') + '"'
