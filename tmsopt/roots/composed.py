@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.roots.meetings import meeting, weave_test
 from tmsopt.roots.numeric import rebuilt
 from tmsopt.roots.patterns import PATTERNS, Pattern, Roots, quadratic
 from tmsopt.roots.polynomial import evaluate
@@ -57,7 +58,7 @@ def pattern(name: str, degree: int) -> Pattern:
 @cache
 def _pattern(name: str, degree: int) -> Pattern:
     groups = _groups(name)
-    canonical = "+".join(g.name for g in groups)
+    canonical = _joined(name)
     if degree == PATTERNS["EP4"].degree and canonical in PATTERNS:
         return PATTERNS[canonical]
     taken = sum(g.roots for g in groups)
@@ -200,7 +201,7 @@ def _composed(name: str, groups: tuple[_Group, ...], degree: int) -> Pattern:
         abscissa=_abscissa(whole),
         rest=off_axis if any(g.kind in _AXIS for g in groups) else None,
         test=_test(alone),
-        marks=_marks(alone, at, others),
+        marks=_marks(groups, slices, others),
         ends={"W": "the pair meets in a double root 0"} if "W" in names else {},
         degree=degree,
     )
@@ -231,42 +232,40 @@ def _test(alone: _Group | None) -> Any:
         case "capsize", _, _:
             return lambda a: a[-1]
         case "weave", _, _:
-            return partial(_symmetric, sums=True)
+            return weave_test
         case "EP", 2, 1:
-            return partial(_symmetric, sums=False)
+            return meeting
     return None
 
 
-def _symmetric(a: Sequence[Any], sums: bool) -> Any:
-    """Sign and size of ∏ (zⱼ + zₖ), j < k (Orlando's formula), or ∏ (zⱼ − zₖ)² (the discriminant), of scaled roots."""
-    from tmsopt.roots.numeric import roots  # numeric roots of arrays
-
-    c = np.stack(np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in a)), axis=-1)
-    regular = np.all(np.isfinite(c), axis=-1) & (c[..., 0] != 0)
-    safe = np.where(regular[..., None], c, np.eye(1, c.shape[-1])[0])
-    z = roots(safe)
-    z = z / (np.abs(z).max(axis=-1, keepdims=True) + 1e-300)
-    value = np.ones(z.shape[:-1], dtype=complex)
-    for j, k in combinations(range(z.shape[-1]), 2):
-        value = value * (z[..., j] + z[..., k] if sums else (z[..., j] - z[..., k]) ** 2)
-    return np.where(regular, value.real, np.nan)
-
-
-def _marks(alone: _Group | None, at: int, others: int) -> dict[str, Any]:
+def _marks(groups: Sequence[_Group], slices: Sequence[slice], others: int) -> dict[str, Any]:
     """More special patterns that a curve may pass."""
-    if alone is None or not others:
-        return {}
     marks: dict[str, Any] = {}
-    if alone.kind == "EP" and alone.count == 1:
-        marks[f"EP{alone.order + 1}"] = lambda u: evaluate([1, *u[at:]], u[0])
-        marks["double zero" if alone.order == 2 else f"{alone.order}-fold zero"] = lambda u: u[0]
+    roots = [(g, s.start) for g, s in zip(groups, slices, strict=True) if g.unknowns == ("r",)]
+    for (one, j), (other, k) in combinations(roots, 2):
+        rest = [g.name for g in groups if g not in (one, other)]
+        marks[_joined(f"EP{one.order + other.order}", *rest)] = lambda u, j=j, k=k: u[j] - u[k]
+    if len(groups) > 1:
+        return marks
+    (alone,), end = groups, slices[-1].stop
     if alone.in_quadratics and len(alone.unknowns) == 2:
         marks[f"EP{2 * alone.order}"] = lambda u: u[0] * u[0] - 4 * u[1]
-    if alone.kind in ("EP", "CEP"):
+    if others and alone.unknowns == ("r",):
+        marks[f"EP{alone.order + 1}"] = lambda u: evaluate([1, *u[end:]], u[0])
+        marks["double zero" if alone.order == 2 else f"{alone.order}-fold zero"] = lambda u: u[0]
+    if others and alone.kind in ("EP", "CEP"):
         marks["capsize"] = lambda u: u[-1]
-    if alone.kind == "capsize":
+    if others and alone.kind == "capsize":
         marks["double zero"] = lambda u: u[-1]
+    if others > 1 and alone.kind not in ("weave", "resonance"):
+        name = "EP2" if alone.kind == "capsize" else _joined(alone.name, "EP2")
+        marks[name] = lambda u: meeting([1, *u[end:]])
     return marks
+
+
+def _joined(*names: str) -> str:
+    """The name of several patterns together."""
+    return "+".join(g.name for g in _groups("+".join(names)))
 
 
 def _real_means(z: Roots, order: int) -> list[float]:

@@ -7,6 +7,7 @@ the roots themselves are not.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
+from math import comb
 from types import MappingProxyType
 from typing import Any
 
@@ -18,7 +19,7 @@ from tmsopt.roots.stability import discriminant, hurwitz_minors
 
 Roots = NDArray[np.complex128]
 
-_NAME = "<U16"
+_NAME = "<U32"
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,18 @@ class Pattern:
         """Number of conditions on the parameters: monic coefficients less the unknowns."""
         return self.degree - len(self.unknowns)
 
+    @property
+    def powers(self) -> tuple[int, ...]:
+        """Power of a rate that each unknown is: 1 of a root, 2 of W; the first coefficient that it stands in."""
+        base = self.monic([0] * len(self.unknowns))
+        units = ([int(k == j) for j in range(len(self.unknowns))] for k in range(len(self.unknowns)))
+        return tuple(next(k for k, (c, d) in enumerate(zip(self.monic(u), base, strict=True)) if c != d) for u in units)
+
+    def reduced(self, unknowns: Sequence[Any]) -> list[Any]:
+        """Unknowns of arrays in units of the size of the roots, so that nothing depends on the unit of time."""
+        size = mean_size(self.monic(unknowns)) + 1e-300
+        return [u / size**power for u, power in zip(unknowns, self.powers, strict=True)]
+
     def monic(self, unknowns: Sequence[Any]) -> list[Any]:
         """Coefficients of the product of the factors, descending from 1."""
         return product(*self.factors(unknowns))
@@ -74,6 +87,13 @@ class Pattern:
             return np.full(np.shape(unknowns[0]), self.name, dtype=_NAME)
         b, c = unknowns[:2]
         return np.where(b * b - 4 * c >= 0, f"2{plain}", f"C{plain}").astype(_NAME)
+
+
+def mean_size(monic: Sequence[Any]) -> NDArray[np.float64]:
+    """Mean size of the roots by the largest of Maclaurin's means of the coefficients; |r| for an n-fold root r."""
+    n = len(monic) - 1
+    means = [(np.abs(monic[k]) / comb(n, k)) ** (1 / k) for k in range(1, n + 1)]
+    return np.asarray(np.max(np.broadcast_arrays(*means), axis=0), dtype=float)
 
 
 def quadratic(pair: Roots) -> list[float]:

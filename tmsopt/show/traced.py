@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tmsopt.roots import PATTERNS
+from tmsopt.roots import pattern
 from tmsopt.show.labels import Name, label_axes, place_names
 from tmsopt.show.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, legend_below, new_figure
 from tmsopt.show.text import columns, number, with_unit
@@ -16,9 +16,9 @@ COLOURS = {
     "EP4": MARK, "EP3": MARK, "2EP2": REAL, "CEP2": COMPLEX, "EP2": LINE, "weave": CRITICAL, "capsize": CAPSIZE,
     "resonance": COMPLEX,
 }  # fmt: skip
-"""Colour of each pattern; CEP2 is dashed besides."""
+"""Colour of each pattern; complex ones are dashed besides."""
 
-_LABELLED = ("EP4", "EP3", "2EP2", "double zero", "weave", "capsize", "EP2")
+_UNLABELLED = ("fold", "constraint", "end")
 
 
 def trace_table(trace: Trace) -> str:
@@ -48,7 +48,7 @@ def draw_trace(ax: Axes, trace: Trace, horizontal: str, vertical: str) -> list[N
     """
     for branch in trace.branches:
         draw_branch(ax, branch, horizontal, vertical)
-    marked = [e for e in trace.events if e.name in _LABELLED]
+    marked = [e for e in trace.events if e.name not in _UNLABELLED]
     names = [Name(e.name, e.parameters[horizontal], e.parameters[vertical]) for e in marked]
     for name in names:
         ax.plot([name.x], [name.y], "o", color=MARK, markersize=4, zorder=4)
@@ -68,13 +68,20 @@ def draw_branch(ax: Axes, branch: Branch, horizontal: str, vertical: str, width:
         ax.plot(
             x[first:end],
             y[first:end],
-            color=COLOURS[kind],
+            color=colour(kind),
             linewidth=width if satisfied else width / 2,
-            linestyle="--" if kind == "CEP2" else "-" if satisfied else ":",
+            linestyle="--" if kind.startswith("CEP") else "-" if satisfied else ":",
             alpha=1.0 if stable else 0.35,
             label=_label(ax, kind + ("" if stable else ", unstable") + ("" if satisfied else ", constraint violated")),
         )
         start = stop
+
+
+def colour(kind: str) -> str:
+    """Colour of a pattern of any degree: one for all higher roots, for several real ones, and for complex pairs."""
+    if kind in COLOURS:
+        return COLOURS[kind]
+    return COMPLEX if "CEP" in kind else REAL if "+" in kind or kind[0].isdigit() else MARK
 
 
 def trace_figure(trace: Trace, horizontal: str, vertical: str) -> Figure:
@@ -101,7 +108,11 @@ def varying(trace: Trace) -> list[str]:
 
 def _summary(branch: Branch, trace: Trace) -> str:
     share = f"{100 * float(np.mean(branch.stable)):.0f} % of its points"
-    states = f"bounds stability on {share}" if PATTERNS[branch.pattern].rest else f"stable on {share}"
+    states = (
+        f"bounds stability on {share}"
+        if pattern(branch.pattern, trace.problem.model.degree).rest
+        else f"stable on {share}"
+    )
     if any(c.comparison != "==" for c in trace.problem.conditions.values()):
         states += f", constraints hold on {100 * float(np.mean(branch.satisfied)):.0f} %"
     form = "closed" if branch.closed else "open"

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem, checked
-from tmsopt.roots import PATTERNS, real_roots
+from tmsopt.roots import pattern, real_roots
+from tmsopt.roots.meetings import nearest_two
 from tmsopt.study.branch import Branch, Event
 from tmsopt.study.continuation import INFINITE, SINGULAR
 from tmsopt.study.infinity import Infinity, through_infinity
@@ -161,16 +162,24 @@ def _near(problem: Problem, event: Event, corners: Sequence[Corner]) -> list[Cor
 
 def _parts(branch: Branch) -> NDArray[np.bool_]:
     """Where one side has a positive real root and the other, unstable too, has none."""
-    names = ("b", "c", "d")[: 3 if branch.pattern == "capsize" else 2]
-    rest = np.stack([np.ones(len(branch)), *(branch.unknowns[n] for n in names)], axis=-1)
-    alone = real_roots(rest)[1] == 0
+    rest = _rest(branch)
+    alone = np.ones(len(branch), dtype=bool)
+    if len(rest) > 1:
+        alone = real_roots(np.stack(np.broadcast_arrays(*rest), axis=-1))[1] == 0
     return np.asarray(alone & (branch.unknowns["r"] > 0 if branch.pattern == "EP2" else ~branch.stable))
+
+
+def _rest(branch: Branch) -> list[Any]:
+    """The other roots of a curve of double roots or of roots 0, as one factor; [1] without any."""
+    return [np.ones(len(branch)), *(column for name, column in branch.unknowns.items() if name != "r")]
 
 
 def _once(branch: Branch) -> NDArray[np.bool_]:
     """Where a curve of two double roots is met by the larger of them: the other draws the same curve again."""
-    r, b = branch.unknowns["r"], branch.unknowns["b"]
-    return np.asarray((branch.kinds != "2EP2") | (2 * r + b >= -1e-12 * np.abs(b)))
+    if not np.any(branch.kinds == "2EP2"):
+        return np.ones(len(branch), dtype=bool)
+    r, other = branch.unknowns["r"], nearest_two(_rest(branch))
+    return np.asarray((branch.kinds != "2EP2") | (r - other >= -1e-12 * np.abs(other)))
 
 
 def _corners(
@@ -179,15 +188,15 @@ def _corners(
     """Events where a boundary of a domain turns, crosses another or ends inside the box."""
     inside = damped if branch.pattern == "EP2" else stable
     for event in branch.events:
-        if _turns(branch, event) and np.any(inside[max(event.index - 1, 0) : event.index + 2]):
+        if _turns(branch, event, problem) and np.any(inside[max(event.index - 1, 0) : event.index + 2]):
             name = "double zero" if event.name == "end" else event.name
             yield Corner(name, event.detail, {n: event.parameters[n] for n in problem.free})
 
 
-def _turns(branch: Branch, event: Event) -> bool:
+def _turns(branch: Branch, event: Event, problem: Problem) -> bool:
     if event.name == "end":
-        return event.detail in PATTERNS[branch.pattern].ends.values()
-    return event.name in ("EP4", "EP3", "2EP2", "double zero", "weave", "capsize", "EP2")
+        return event.detail in pattern(branch.pattern, problem.model.degree).ends.values()
+    return event.name not in ("fold", "constraint")
 
 
 def _distinct(corners: Sequence[Corner]) -> list[Corner]:

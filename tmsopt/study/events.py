@@ -1,5 +1,6 @@
 """What happens along a traced curve: its events, those at one place as one, put in among its points."""
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +11,7 @@ from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
 from tmsopt.models import Values
 from tmsopt.roots import Pattern
+from tmsopt.roots.patterns import mean_size
 from tmsopt.study.branch import Branch, Event
 from tmsopt.study.continuation import CLOSED, Curve, End, Walk
 from tmsopt.study.fourfold import touched, with_EP4
@@ -23,7 +25,8 @@ _SAME_DESIGN = 1e-6
 
 _FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
 
-_RANK = ("EP4", "EP3", "2EP2", "double zero", "weave", "capsize", "EP2", "constraint", "fold")
+_KINDS = ("EP", "several", "zero", "weave", "capsize", "EP2", "constraint", "fold")
+"""Kinds of events of one codimension, the most telling first."""
 
 
 def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walked: Walk) -> Branch:
@@ -33,14 +36,14 @@ def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, wal
     merged = _merged(with_EP4(problem, pattern, on, found), len(problem.free))
     rows, y, t = _inserted(walked, merged)
     x = y * on.scale
-    if pattern.unknowns[-2:] == ("b", "c"):
-        for event, row in zip(merged, rows, strict=True):
-            if event.name in ("EP4", "2EP2"):  # a double root of the last factor: exact, or it scatters by 1e-8
-                x[row, unknowns.stop - 1] = x[row, unknowns.stop - 2] ** 2 / 4
+    square, doubled = _doubled(pattern)
+    for event, row in zip(merged, rows, strict=True):
+        if event.name in doubled:  # a double root of a quadratic factor: exact, or it scatters by 1e-8
+            x[row, unknowns.start + square + 1] = x[row, unknowns.start + square] ** 2 / 4
     columns = parameters_of(problem, x)
     u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]
     kinds = pattern.kind(u)
-    special = [m for m in pattern.marks if vanishes(pattern.marks[m](u), u)]
+    special = [m for m, mark in pattern.marks.items() if vanishes(mark, pattern, u)]
     for name in special:
         kinds[:] = name
     for event, row in zip(merged, rows, strict=True):
@@ -66,13 +69,22 @@ def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, wal
         arclength=np.concatenate([[0.0], np.cumsum(np.linalg.norm(width, axis=1))]),
         kinds=kinds,
         stable=stability(pattern.remaining(u), len(x)),
-        heavily_damped=all_real(pattern.remaining(u), len(x)) & (pattern.name not in ("weave", "resonance")),
+        heavily_damped=all_real(pattern.remaining(u), len(x)) & ("W" not in pattern.unknowns),
         satisfied=satisfied(problem, values, len(x)),
         abscissa=np.broadcast_to(values["abscissa"], len(x)),
         events=tuple(sorted(events, key=lambda e: e.index)),
         closed=walked.closed,
         residual=float(np.max(_residual(values, pattern.monic(u), u))),
     )
+
+
+def _doubled(pattern: Pattern) -> tuple[int, tuple[str, ...]]:
+    """Where b of a factor s² + bs + c stands among the unknowns, and the events at which it is a square."""
+    if pattern.name.lstrip("2C") != pattern.name and pattern.unknowns[:2] == ("b", "c"):
+        return 0, tuple(m for m in pattern.marks if re.fullmatch(r"EP\d+", m))
+    if pattern.name == "EP2" and pattern.unknowns[-2:] == ("b", "c"):
+        return len(pattern.unknowns) - 2, ("EP4", "2EP2")
+    return 0, ()
 
 
 def _merged(found: list[Found], free: int) -> list[Found]:
@@ -88,12 +100,13 @@ def _merged(found: list[Found], free: int) -> list[Found]:
 
 
 def _one(group: list[Found]) -> Found:
-    group = sorted(group, key=lambda e: _RANK.index(e.name))
+    group = sorted(group, key=lambda e: _rank(e.name))
     names = {e.name for e in group}
     name = "double zero" if {"weave", "capsize"} <= names else group[0].name
     folds = dict.fromkeys(e.detail for e in group if e.name == "fold")
-    special = [m for m in ("EP3", "2EP2") if m in names]
-    others = ["beside an EP4"] if name == "EP3" and len(special) == 2 else []
+    special = [m for m in names if "EP" in m and _rank(m)[0] < -1]
+    higher = _beside(name, names)
+    others = [f"beside an {higher}"] if higher else []
     others += [
         e.detail if e.name == name else f"{e.name} {e.detail}".strip()
         for e in group
@@ -105,6 +118,26 @@ def _one(group: list[Found]) -> Found:
     elif folds:
         others.append(("" if name == "fold" else "fold in ") + ", ".join(folds))
     return replace(group[0], name=name, detail="; ".join(others))
+
+
+def _beside(name: str, names: set[str]) -> str:
+    """EP(k+1) where EPk and EP(k−1)+EP2, the two ways in which EP(k−1) comes near it, are at one place; else empty."""
+    match = re.fullmatch(r"EP(\d+)", name)
+    order = int(match[1]) if match else 0
+    return f"EP{order + 1}" if ("2EP2" if order == 3 else f"EP{order - 1}+EP2") in names else ""
+
+
+def _rank(name: str) -> tuple[int, int]:
+    """The most special first: by conditions that the event takes, then by kind."""
+    parts = [re.fullmatch(r"(\d*)(C?)EP(\d+)", part) for part in name.split("+")]
+    if all(parts):
+        numbers = [(int(m[1] or 1), bool(m[2]), int(m[3])) for m in parts if m]
+        taken = sum(count * (order - 1) * (2 if pair else 1) for count, pair, order in numbers)
+        kind = "EP2" if name == "EP2" else "EP" if name.startswith("EP") and len(parts) == 1 else "several"
+        return -taken, _KINDS.index(kind)
+    if zero := re.fullmatch(r"(double|(\d+)-fold) zero", name):
+        return -int(zero[2] or 2), _KINDS.index("zero")
+    return -int(name in ("weave", "capsize")), _KINDS.index(name)
 
 
 def _inserted(walked: Walk, events: list[Found]) -> tuple[list[int], Array, Array]:
@@ -129,9 +162,10 @@ def _natural_tangent(problem: Problem, on: Curve, x: Array, t: Array) -> Array:
 def _residual(values: Values, monic: list[Any], u: list[Array]) -> Array:
     """Largest mismatch of a coefficient at each point, relative to the terms that it is made of."""
     a0 = np.asarray(values.coefficients[0], dtype=float)
+    unit = mean_size(monic) + 1e-300
     worst = np.zeros(np.shape(u[0]))
-    for a, c in zip(values.coefficients, monic, strict=True):
-        size = np.abs(a) + np.abs(a0 * c) + np.abs(a0)
+    for k, (a, c) in enumerate(zip(values.coefficients, monic, strict=True)):
+        size = np.abs(a) + np.abs(a0 * c) + np.abs(a0) * unit**k
         worst = np.maximum(worst, np.abs(a - a0 * c) / size)
     return worst
 

@@ -1,4 +1,4 @@
-"""EP4 along traced curves: exact by its own equations, for the traced ones are singular there."""
+"""EP4 along traced curves of EP2: exact by its own equations, for the traced ones are singular there."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
 from tmsopt.models import Values
-from tmsopt.roots import PATTERNS, Pattern, roots
+from tmsopt.roots import Pattern, roots
+from tmsopt.roots import pattern as pattern_of
+from tmsopt.roots.patterns import mean_size
 from tmsopt.study.continuation import Curve, Walk, project
 from tmsopt.study.locate import Found
 
@@ -17,6 +19,9 @@ Array = NDArray[np.float64]
 
 _NEAR = 1e-3
 """Distance within which an EP4 is looked for beside an EP3 and a 2EP2."""
+
+_TOUCHING = {"EP3", "2EP2"}
+"""What a double root meets at an EP4, a triple root and a second double one."""
 
 _LOW = 1e-2
 """Relative size of the marks beside a place where they may touch 0: they grow with the square of a step of 0.1."""
@@ -26,11 +31,11 @@ _EXACT = 1e-13  # mismatch of a coefficient of an EP4, relative to its terms: so
 
 def touched(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walked: Walk) -> Iterator[Found]:
     """EP4 where a curve of EP2 passes through it in a section: EP3 and 2EP2 touch 0 there, and keep their signs."""
-    if pattern.name != "EP2":
+    if pattern.name != "EP2" or not {*pattern.marks} >= _TOUCHING:
         return
     x = walked.y * on.scale
     u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]
-    value = sum(np.abs(mark(u)) for mark in pattern.marks.values()) / (1 + np.max(np.abs(u), axis=0) ** 2)
+    value = np.asarray(sum(np.abs(pattern.marks[name](pattern.reduced(u))) for name in _TOUCHING))
     least = (value[1:-1] <= value[:-2]) & (value[1:-1] <= value[2:]) & (value[1:-1] < _LOW)
     for k in np.flatnonzero(least) + 1:
         beside = Found("EP4", "", walked.y[k], walked.t[k], int(k), 0.0)
@@ -61,26 +66,31 @@ def with_EP4(problem: Problem, pattern: Pattern, on: Curve, found: list[Found]) 
 def _exact_EP4(problem: Problem, pattern: Pattern, on: Curve, event: Found) -> Found | None:
     """The EP4 beside an event, by its own equations; None if there is none."""
     free = len(problem.free)
-    x = ca.SX.sym("x", free + 1)
-    symbols = {n: ca.atan(x[k]) if problem.parameter_set[n].tangent else x[k] for k, n in enumerate(problem.free)}
-    a = Values(problem.model, problem.parameter_set, problem.ordered(symbols)).coefficients
-    matched = [a[0] * c for c in PATTERNS["EP4"].monic([x[free]])]
-    equations = ca.vertcat(*[p - q for p, q in zip(a[1:], matched[1:], strict=True)])
-    mismatch = ca.Function(
-        "mismatch",
-        [x],
-        [equations / ca.vertcat(*[ca.fabs(p) + ca.fabs(q) for p, q in zip(a[1:], matched[1:], strict=True)])],
-    )
+    special = pattern_of("EP4", problem.model.degree)
     start = event.y * on.scale
     u = list(start[free : free + len(pattern.unknowns)])
-    mean = float(np.concatenate([roots(f) for f in pattern.factors(u)]).real.mean())
-    end = project(ca.Function("EP4", [x], [equations, ca.jacobian(equations, x)]), np.append(start[:free], mean))
-    if end is None or np.abs((end[:free] - start[:free]) / on.scale[:free]).max() > _NEAR:
+    z = np.concatenate([roots(np.array(f, dtype=float)) for f in pattern.factors(u)])
+    guess = special.guesses(z)[0]
+    size = float(mean_size(special.monic(guess))) or 1.0
+    scale = np.array([*on.scale[:free], *(size**power for power in special.powers)])
+    y = ca.SX.sym("y", free + len(special.unknowns))
+    x = y * ca.DM(scale)
+    symbols = {n: ca.atan(x[k]) if problem.parameter_set[n].tangent else x[k] for k, n in enumerate(problem.free)}
+    a = Values(problem.model, problem.parameter_set, problem.ordered(symbols)).coefficients
+    matched = [a[0] * c for c in special.monic(ca.vertsplit(x[free:]))]
+    rows = [(p - q) / size**k for k, (p, q) in enumerate(zip(a, matched, strict=True))][1:]
+    terms = [(ca.fabs(p) + ca.fabs(q)) / size**k for k, (p, q) in enumerate(zip(a, matched, strict=True))][1:]
+    equations = ca.vertcat(*rows)
+    mismatch = ca.Function("mismatch", [y], [equations / ca.vertcat(*terms)])
+    system = ca.Function("EP4", [y], [equations, ca.densify(ca.jacobian(equations, y))])
+    end = project(system, np.array([*start[:free], *guess]) / scale)
+    if end is None or np.abs(end[:free] - event.y[:free]).max() > _NEAR:
         return None
     if np.any(np.abs(np.array(mismatch(end)).ravel()) > _EXACT):
         return None  # a section beside an EP4, not through it
-    y = event.y.copy()
-    y[:free] = end[:free] / on.scale[:free]
-    fourfold = np.full(4, end[free], dtype=complex)
-    y[free : free + len(u)] = np.array(pattern.guesses(fourfold)[0]) / on.scale[free : free + len(u)]
-    return replace(event, name="EP4", detail="", y=y)
+    exact = event.y.copy()
+    exact[:free] = end[:free]
+    factors = special.factors([float(v) for v in (end * scale)[free:]])
+    fourfold = np.concatenate([roots(np.array(f, dtype=float)) for f in factors])
+    exact[free : free + len(u)] = np.array(pattern.guesses(fourfold)[0]) / on.scale[free : free + len(u)]
+    return replace(event, name="EP4", detail="", y=exact)

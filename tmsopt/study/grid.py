@@ -7,12 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
+from tmsopt.roots.meetings import CLOSED
 
 Array = NDArray[np.float64]
 Truth = NDArray[np.bool_]
 
 POINTS = 256
 """Along each axis; an edge of the grid is as long as a step of a trace."""
+
+FEWER = 96
+"""Likewise where the tests take roots, above the degrees with closed forms: 9 216 polynomials take a second or two."""
 
 _PATIENCE = 32  # designs in a row that lead to nothing new
 
@@ -45,7 +49,7 @@ def _apart_from(
     while len(left) and vain < patience:
         for line in lines[seen:]:
             points = np.stack([line[n] for n in problem.free], axis=-1)
-            left = left[apart(left, (points - low) / (high - low), 1 / (POINTS - 1))]
+            left = left[apart(left, (points - low) / (high - low), 1 / (points_of(problem) - 1))]
         seen = len(lines)
         if len(left):
             yield dict(zip(problem.free, (low + left[0] * (high - low)).tolist(), strict=True))
@@ -53,11 +57,17 @@ def _apart_from(
             vain, known = (vain + 1 if len(lines) == known else 0), len(lines)
 
 
-def changes(problem: Problem, test: Callable[[Sequence[Any]], Any], points: int = POINTS) -> tuple[Array, Array]:
+def points_of(problem: Problem) -> int:
+    """Points of the grid along each axis."""
+    return POINTS if problem.model.degree <= CLOSED else FEWER
+
+
+def changes(problem: Problem, test: Callable[[Sequence[Any]], Any], points: int | None = None) -> tuple[Array, Array]:
     """Middles of the edges over which a function of the coefficients changes sign, in shares of the box, shape (n, 2).
 
     Two parts: those where a0 keeps its sign, or is the function, and the others. Where it is nan it does not count.
     """
+    points = points or points_of(problem)
     share = np.linspace(0, 1, points)
     x, y = np.meshgrid(share, share, indexing="ij")
     ends = problem.free.items()

@@ -15,16 +15,19 @@ from numpy.typing import NDArray
 from tmsopt.design.problem import Problem
 from tmsopt.design.starts import spread
 from tmsopt.models import Values
-from tmsopt.roots import discriminant, is_stable, lienard_chipart, real_roots
+from tmsopt.roots import is_stable, real_roots
+from tmsopt.roots.meetings import meeting
 from tmsopt.study.continuation import Curve, Walk, between, both_ways, contains, crossing, curve, project
 from tmsopt.study.grid import unexplained
-from tmsopt.study.marks import sign_changes
+from tmsopt.study.marks import margins, sign_changes
 from tmsopt.study.trace import design_at
 
 Array = NDArray[np.float64]
 Truth = NDArray[np.bool_]
 
-_NOTHING = 1e-12  # of the largest coefficient: a constant term this small all along the curve vanishes with a0
+_NOTHING = 1e-12  # of its size over the box: a constant term this small all along the curve vanishes with a0
+
+_SAMPLE = 32  # designs by which that size is judged
 
 _MOST = 10**6
 
@@ -61,8 +64,10 @@ def through_infinity(problem: Problem, step: float, starts: int, seed: int) -> I
     on = curve(x, ca.SX(a[0]), upper - lower, lower, upper)
     along = ca.dot(ca.gradient(a[0], x), ca.gradient(ca.SX(a[-1]), x))
     rest = ca.Function("rest", [x], [ca.vertcat(*a[1:], along)])
+    usual = np.median([abs(float(problem.values(problem.ordered(d)).coefficients[-1]))
+                       for d in islice(spread(problem, 0), _SAMPLE)])  # fmt: skip
     for walked in _walks(problem, on, step, starts, seed):
-        x_on, bounds, changes = _judged(on, walked, rest)
+        x_on, bounds, changes = _judged(on, walked, rest, float(usual))
         yield Infinity(design_at(problem, x_on), *bounds, changes)
 
 
@@ -83,24 +88,24 @@ def _walks(problem: Problem, on: Curve, step: float, starts: int, seed: int) -> 
             yield walked
 
 
-def _judged(on: Curve, walked: Walk, rest: ca.Function) -> tuple[Array, tuple[Truth, Truth, Truth], dict[int, str]]:
+def _judged(
+    on: Curve, walked: Walk, rest: ca.Function, usual: float
+) -> tuple[Array, tuple[Truth, Truth, Truth], dict[int, str]]:
     """Points with every change among them, and what each segment between them bounds."""
 
     def values(y: Array) -> Array:
         return np.array(rest.map(len(y))((y * on.scale).T)).T
 
     known = values(walked.y)
-    size = np.abs(known[:, :-1]).max(axis=1)
-    vanishing = bool(np.all(np.abs(known[:, -2]) <= _NOTHING * size))
+    vanishing = bool(np.all(np.abs(known[:, -2]) <= _NOTHING * usual))
 
     def quantities(v: Array) -> tuple[Array, list[str]]:
         """Columns without a zero wherever the other roots keep their class, and what a zero means."""
         c = v[:, : -2 if vanishing else -1]
-        degree = c.shape[1] - 1
-        tests = lienard_chipart(list(c.T))
+        tests = margins(list(c.T))
         named = [(c[:, 0], "infinity"), *zip(tests, ["capsize"] + ["weave"] * len(tests), strict=False)]
-        if degree in (2, 3, 4):
-            named.append((discriminant(list(c.T)), "EP2"))
+        if c.shape[1] > 2:
+            named.append((meeting(list(c.T)), "EP2"))
         if vanishing:
             named.append((v[:, -1], "capsize"))
         return np.stack([q for q, _ in named], axis=-1), [name for _, name in named]

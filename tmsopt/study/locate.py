@@ -96,7 +96,7 @@ def located(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walk
 def _live(problem: Problem, pattern: Pattern, unknowns: slice, x: Array, t: Array) -> Iterator[tuple[Mark, Array]]:
     """The marks that are not 0 all along the curve, with their values."""
     u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]
-    within = [name for name, special in pattern.marks.items() if vanishes(special(u), u)]
+    within = [name for name, special in pattern.marks.items() if vanishes(special, pattern, u)]
     for mark in marks(problem, pattern, unknowns, within):
         value = np.broadcast_to(mark.value(x, t), len(x))
         if mark.name not in within and (mark.name != "fold" or np.abs(value).max() > NOTHING):

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,8 @@ from numpy.typing import NDArray
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import NO_RADIUS, ROOT_QUANTITIES
 from tmsopt.models import Values
-from tmsopt.roots import Pattern, lienard_chipart, roots
+from tmsopt.roots import Pattern, is_stable, lienard_chipart, roots
+from tmsopt.roots.meetings import CLOSED, balance, nearest_two
 
 Array = NDArray[np.float64]
 Truth = NDArray[np.bool_]
@@ -74,6 +76,9 @@ def stability(factors: list[list[Any]], count: int) -> Truth:
     """Where every factor has its roots left of the imaginary axis, from coefficients; no factor counts as stable."""
     stable = np.ones(count, dtype=bool)
     for factor in factors:
+        if len(factor) - 1 > CLOSED:
+            stable &= is_stable(_rows(factor, count))
+            continue
         for quantity in lienard_chipart(factor):
             stable &= np.broadcast_to(np.asarray(quantity, dtype=float) > 0, count)
     return stable
@@ -83,10 +88,15 @@ def all_real(factors: list[list[Any]], count: int) -> Truth:
     """Where every root of the factors is real and negative."""
     real = stability(factors, count)
     for factor in factors:
-        rows = np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in factor), np.zeros(count)), axis=-1)
-        z = roots(rows[:, :-1])
+        z = roots(_rows(factor, count))
         real &= np.all(np.abs(z.imag) <= _REAL * np.abs(z), axis=-1)
     return real
+
+
+def _rows(factor: list[Any], count: int) -> Array:
+    """Coefficients of one factor along a curve, shape (count, degree + 1)."""
+    columns = (np.broadcast_to(np.asarray(c, dtype=float), count) for c in factor)
+    return np.stack(list(columns), axis=-1)
 
 
 def satisfied(problem: Problem, values: Values, count: int) -> Truth:
@@ -105,19 +115,19 @@ def marks(problem: Problem, pattern: Pattern, unknowns: slice, within: Sequence[
         return lambda x, t: np.asarray(function([x[:, k] for k in range(unknowns.start, unknowns.stop)]))
 
     def of_factor(number: int, k: int) -> Function:
-        return of_unknowns(lambda u: lienard_chipart(pattern.remaining(u)[number])[k])
+        return of_unknowns(lambda u: margins(pattern.remaining(u)[number])[k])
 
     def of_tangent(k: int) -> Function:
         free = len(problem.free)  # by the arclength in the parameters: the unknowns may move much faster
         return lambda x, t: np.asarray(t[:, k] / (np.linalg.norm(t[:, :free], axis=1) + 1e-300))
 
     for name, special in pattern.marks.items():
-        yield Mark(name, "", of_unknowns(special))
-    if pattern.name == "EP2" and "2EP2" in within:
-        yield Mark("EP4", "", of_unknowns(lambda u: 2 * u[0] + u[1]))  # q(r) has a double zero here
+        yield Mark(name, "", of_unknowns(partial(_reduced, pattern, special)))
+    if pattern.name == "EP2" and "2EP2" in within:  # q(r) has a double zero where r is the double root of q
+        yield Mark("EP4", "", of_unknowns(lambda u: u[0] - nearest_two(pattern.factors(u)[-1])))
     example = [np.ones(1)] * len(pattern.unknowns)
     for number, factor in enumerate(pattern.remaining(example)):
-        for k in range(len(lienard_chipart(factor))):
+        for k in range(len(margins(factor))):
             name = "capsize" if k == 0 else "weave"  # the first quantity is the constant term
             yield Mark(name, CHANGES, of_factor(number, k))
     for k, parameter in enumerate(problem.free):
@@ -125,6 +135,15 @@ def marks(problem: Problem, pattern: Pattern, unknowns: slice, within: Sequence[
     for name, condition in problem.conditions.items():
         if condition.comparison != "==":
             yield Mark("constraint", name, _condition(problem, pattern, unknowns, condition))
+
+
+def _reduced(pattern: Pattern, special: Callable[[Sequence[Any]], Any], u: list[Array]) -> Any:
+    return special(pattern.reduced(u))
+
+
+def margins(factor: list[Any]) -> list[Any]:
+    """Quantities of which one vanishes wherever a root of the factor comes to the imaginary axis, the first at 0."""
+    return lienard_chipart(factor) if len(factor) - 1 <= CLOSED else [factor[-1], balance(factor)]
 
 
 def _condition(problem: Problem, pattern: Pattern, unknowns: slice, condition: Callable[[Values], Any]) -> Function:
@@ -145,7 +164,6 @@ def sign_changes(value: Array) -> Truth:
     return np.asarray(sign[1:] * sign[:-1] < 0)
 
 
-def vanishes(value: Any, u: list[Array]) -> bool:
-    """Whether a function is 0 along the whole curve, up to rounding."""
-    size = np.max(np.abs(u), axis=0)
-    return bool(np.median(np.abs(value) / (1 + size * size)) <= NOTHING)
+def vanishes(special: Callable[[Sequence[Any]], Any], pattern: Pattern, u: list[Array]) -> bool:
+    """Whether a mark of a pattern is 0 along the whole curve, up to rounding."""
+    return bool(np.median(np.abs(special(pattern.reduced(u)))) <= NOTHING)

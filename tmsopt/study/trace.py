@@ -1,5 +1,6 @@
 """Trace a root pattern through parameter space: every branch in the box, with its events."""
 
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,7 +17,11 @@ from tmsopt.design.freedom import freedom
 from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.starts import spread
-from tmsopt.roots import PATTERNS, Pattern, roots
+from tmsopt.roots import Pattern, roots
+from tmsopt.roots import pattern as pattern_of
+from tmsopt.roots.composed import pattern_names
+from tmsopt.roots.numeric import rebuilt
+from tmsopt.roots.patterns import mean_size
 from tmsopt.study.branch import Branch, Trace
 from tmsopt.study.continuation import INFINITE, Curve, Walk, both_ways, contains, curve, project
 from tmsopt.study.events import describe
@@ -37,6 +42,7 @@ class Traced:
     Attributes:
         problem: with the pattern to locate and every constraint.
         unknowns: where the unknowns of the pattern stand among the variables.
+        sizes: of each coefficient over the box, 0 of one that is 0 there.
     """
 
     problem: Problem
@@ -44,6 +50,7 @@ class Traced:
     nlp: NLP
     on: Curve
     unknowns: slice
+    sizes: Array
 
 
 def trace(
@@ -63,8 +70,8 @@ def trace(
         pattern: name; by default the one that the problem locates.
         step: longest step, in widths of the box.
         starts: designs from which branches are looked for. With two free parameters and one condition (EP2, weave,
-            capsize) a grid of 256 × 256 designs shows what they missed; otherwise the search ends when so many in
-            a row find nothing new, and a branch far from all of them can be missed.
+            capsize) a grid of 256 × 256 designs, of 96 × 96 above degree 4, shows what they missed; otherwise the
+            search ends when so many in a row find nothing new, and a branch far from all of them can be missed.
         most: points of a branch in one direction.
         through: designs (values of every free parameter, in the box) to begin at, before the others.
         progress: called with the number of starts done and in all.
@@ -100,7 +107,7 @@ def trace(
 
 def prepare(problem: Problem) -> Traced:
     """The equations of a pattern problem, compiled for tracing."""
-    pattern = PATTERNS[str(problem.locate)]
+    pattern = pattern_of(str(problem.locate), problem.model.degree)
     equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].comparison == "=="}
     nlp = matching(replace(problem, constraints=equalities))
     x = ca.SX.sym("x", len(nlp.variables))
@@ -118,12 +125,43 @@ def prepare(problem: Problem) -> Traced:
             lower[free + k] = 0.0
     scale = np.ones(len(nlp.variables))
     scale[:free] = upper[:free] - lower[:free]
-    sample = [_variables(nlp, problem, d, guess=0) for d, _ in zip(spread(problem, 0), range(32), strict=False)]
-    known = np.array([s for s in sample if s is not None]).reshape(-1, len(nlp.variables))
+    sizes, terms, rate = _sizes(problem)
+    unit = np.array([rate**power for power in pattern.powers])
+    sample = [_variables(nlp, problem, d, 1) for d, _ in zip(spread(problem, 0), range(_SAMPLE), strict=False)]
+    known = np.array([s[0] for s in sample if s]).reshape(-1, len(nlp.variables))
+    scale[unknowns] = unit
     if known.size:
-        scale[free:] = np.clip(np.median(np.abs(known[:, free:]), axis=0), 0.1, 1e3)
-    on = curve(x, ca.vertcat(*[g[k] for k in rows]), scale, lower, upper)
-    return Traced(problem, pattern, nlp, on, unknowns)
+        scale[unknowns] = np.clip(np.median(np.abs(known[:, unknowns]), axis=0), 0.1 * unit, 1e3 * unit)
+        scale[unknowns.stop :] = np.clip(np.median(np.abs(known[:, unknowns.stop :]), axis=0), 0.1, 1e3)
+    weights = [
+        terms[k + 1] if nlp.rows[row] == pattern.name and k < pattern.degree else 1.0 for k, row in enumerate(rows)
+    ]
+    on = curve(x, ca.vertcat(*[g[row] / w for row, w in zip(rows, weights, strict=True)]), scale, lower, upper)
+    return Traced(problem, pattern, nlp, on, unknowns, sizes)
+
+
+def _sizes(problem: Problem) -> tuple[Array, Array, float]:
+    """Over the box: median sizes of the coefficients, and of the terms that they are made of; and of the roots.
+
+    The last two are powers of 2, by which a division rounds nothing.
+    """
+    n = problem.model.degree
+    found = []
+    for design, _ in zip(spread(problem, 0), range(_SAMPLE), strict=False):
+        a = np.array([float(c) for c in problem.values(problem.ordered(design)).coefficients])
+        if a[0] and np.all(np.isfinite(a)):
+            found.append(
+                [*np.abs(a), *(np.abs(a[0]) * rebuilt(-np.abs(roots(a)).astype(complex))), mean_size(a / a[0])]
+            )
+    if not found:
+        return np.zeros(n + 1), np.ones(n + 1), 1.0
+    middle = np.median(np.array(found, dtype=float), axis=0)
+    sizes, terms, rate = middle[: n + 1], middle[n + 1 : 2 * n + 2], middle[-1]
+    return sizes, np.array([_power_of_2(t) for t in terms]), _power_of_2(rate)
+
+
+def _power_of_2(x: float) -> float:
+    return float(2.0 ** round(math.log2(x))) if x > 0 else 1.0
 
 
 def branch_of(ready: Traced, walked: Walk) -> Branch:
@@ -134,11 +172,16 @@ def branch_of(ready: Traced, walked: Walk) -> Branch:
 def _asked(problem: Problem, name: str | None) -> Problem:
     """The problem with the pattern as its only question, checked to leave a curve."""
     name = name or problem.locate
+    names = pattern_names(problem.model.degree)
     if name is None:
-        message = f"no pattern to trace; write locate = 'EP2' or another, or name one. accepted: {' '.join(PATTERNS)}"
+        message = f"no pattern to trace; write locate = 'EP2' or another, or name one. accepted: {' '.join(names)}"
         raise InputError([Fault(message, ("objective", "locate"))])
-    if name not in PATTERNS:
-        raise InputError([Fault(f"unknown pattern '{name}'; {suggest(str(name), PATTERNS)}", ("objective", "locate"))])
+    try:
+        name = pattern_of(str(name), problem.model.degree).name
+    except ValueError as error:
+        unknown = str(error).endswith("is no pattern")
+        message = f"unknown pattern '{name}'; {suggest(str(name), names)}" if unknown else str(error)
+        raise InputError([Fault(message, ("objective", "locate"))]) from error
     asked = replace(problem, locate=name, minimize=None, maximize=None)
     count = freedom(asked)
     if count.count != 1:
@@ -190,7 +233,7 @@ _BACK = 300.0  # size of an unknown from which a curve is looked for on the othe
 
 _FAR = 1e5  # unknowns of a seed, in units of their scale: beyond, a0 all but vanishes
 
-_PAIRS = 6  # of four roots
+_SAMPLE = 32  # designs by which sizes are judged
 
 _PATIENCE = 8  # times the starts asked for, at most
 
@@ -267,11 +310,8 @@ def _floats(design: Mapping[str, Any]) -> dict[str, float]:
 def _seed(ready: Traced, design: Mapping[str, float], guess: int | None, held: int | None) -> Array | None:
     """A point of the curve near a design, from a guess of that number, or the best guess."""
     on, free = ready.on, len(ready.problem.free)
-    if guess is None:
-        tried = [_variables(ready.nlp, ready.problem, design, k) for k in range(_PAIRS)]
-        x = min((t for t in tried if t is not None), key=lambda t: _mismatch(on, t), default=None)
-    else:
-        x = _variables(ready.nlp, ready.problem, design, guess)
+    tried = _variables(ready.nlp, ready.problem, design, None if guess is None else guess + 1)
+    x = min(tried, key=lambda t: _mismatch(on, t), default=None) if guess is None else next(iter(tried[guess:]), None)
     if x is None:
         return None
     y = project(on.evaluate, x / on.scale, held)
@@ -279,8 +319,8 @@ def _seed(ready: Traced, design: Mapping[str, float], guess: int | None, held: i
         return None
     y = np.clip(y, on.lower, on.upper)
     a = ready.problem.values(ready.problem.ordered(design_at(ready.problem, y * on.scale))).coefficients
-    size = max(abs(float(c)) for c in a)
-    return y if abs(float(a[0])) > 1e-9 * size else None  # at a0 = a1 = … = 0 any unknowns fit
+    shares = [abs(float(c)) / size for c, size in zip(a, ready.sizes, strict=True) if size > 0]
+    return y if abs(float(a[0])) > 1e-9 * ready.sizes[0] * max(shares) else None  # at a0 = a1 = … = 0 any unknowns fit
 
 
 def _mismatch(on: Curve, x: Array) -> float:
@@ -293,18 +333,16 @@ def design_at(problem: Problem, x: Array) -> dict[str, Any]:
     return {n: np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, x.T, strict=False)}
 
 
-def _variables(nlp: NLP, problem: Problem, design: Mapping[str, float], guess: int) -> Array | None:
-    """All variables for a design, with the guess of that number for the pattern's unknowns; None without one."""
+def _variables(nlp: NLP, problem: Problem, design: Mapping[str, float], count: int | None) -> list[Array]:
+    """All variables for a design, for the first guesses of the pattern's unknowns, as many as asked for, or all."""
     values = problem.values(problem.ordered(design))
     a = np.array([float(c) for c in values.coefficients])
     if a[0] == 0 or not np.all(np.isfinite(a)):
-        return None
+        return []
     z = roots(a)
+    guesses = [lift.guess([values], [z]) for lift in nlp.lifts]
+    if not all(guesses):
+        return []
+    others = [c for guess in guesses[1:] for c in guess[0]]
     x = variables_of(problem, design)
-    for number, lift in enumerate(nlp.lifts):
-        guesses = lift.guess([values], [z])
-        chosen = guess if number == 0 else 0
-        if chosen >= len(guesses):
-            return None
-        x = x + guesses[chosen]
-    return np.array(x)
+    return [np.array([*x, *first, *others]) for first in guesses[0][:count]]
