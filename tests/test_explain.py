@@ -16,9 +16,9 @@ from tmsopt.cli import main
 from tmsopt.models import Range, tms
 from tmsopt.show.explained import explained_lines
 from tmsopt.study.levers import moved
-from tmsopt.study.remarks import STRUCTURES
 from tmsopt.study.rounding import rounded
 from tmsopt.study.steps import natural_step, step_within
+from tmsopt.study.words import STRUCTURES
 
 ZETA_B, ZETA_H = -0.4, -0.2
 CHI_H_1 = {"chi_H": 1.0, "zeta_B": ZETA_B, "zeta_H": ZETA_H, "mu": 0.1}

@@ -162,7 +162,8 @@ def _natural_tangent(problem: Problem, on: Curve, x: Array, t: Array) -> Array:
 def _residual(values: Values, monic: list[Any], u: list[Array]) -> Array:
     """Largest mismatch of a coefficient at each point, relative to the terms that it is made of."""
     a0 = np.asarray(values.coefficients[0], dtype=float)
-    unit = mean_size(monic) + 1e-300
+    unit = np.broadcast_to(mean_size(monic), np.shape(u[0]))
+    unit = np.maximum(unit, np.median(unit)) + 1e-300  # where all roots come to 0, that of the curve
     worst = np.zeros(np.shape(u[0]))
     for k, (a, c) in enumerate(zip(values.coefficients, monic, strict=True)):
         size = np.abs(a) + np.abs(a0 * c) + np.abs(a0) * unit**k

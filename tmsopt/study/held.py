@@ -128,7 +128,8 @@ def program(problem: Problem, solution: Solution) -> Program:
     design = {n: ca.atan(s) if problem.parameter_set[n].tangent else s
               for n, s in zip(problem.free, ca.vertsplit(symbols), strict=False)}  # fmt: skip
     gamma = symbols[names.index("abscissa")]
-    factored = _factored(problem.model.coefficients(problem.ordered(design), problem.parameter_set), gamma, line, rest)
+    a = problem.model.coefficients(problem.ordered(design), problem.parameter_set)
+    factored = _factored(a, float(values.coefficients[0]), gamma, line, rest)
     build.add(factored)
     expression = ca.vertcat(f, *build.rows)
     idle = tuple(n for k, n in enumerate(problem.free) if not ca.depends_on(expression, symbols[k]))
@@ -213,8 +214,8 @@ class _Factored:
     rows: list[Any]
 
 
-def _factored(a: Sequence[Any], gamma: Any, line: Sequence[Root], rest: Sequence[Root]) -> _Factored:
-    """p(t + γ) = a0 · ∏ q · r with the roots of the structure as the values of the unknowns."""
+def _factored(a: Sequence[Any], lead: float, gamma: Any, line: Sequence[Root], rest: Sequence[Root]) -> _Factored:
+    """p(t + γ) = a0 · ∏ q · r with the roots of the structure as the values of the unknowns; `lead` is a0's."""
     made = _Factored([], [], [], [], [], [])
     size = max(np.hypot(r.re, r.im) for r in (*line, *rest))
 
@@ -248,7 +249,7 @@ def _factored(a: Sequence[Any], gamma: Any, line: Sequence[Root], rest: Sequence
     factors.append([1, *(unknown(f"r{k}", float(monic[k]), k) for k in range(1, len(monic)))])
     moved, matched = shift(a, gamma), product(*factors)
     for k in range(1, len(moved)):
-        made.held.append(Held("roots", False, size=size**k))
+        made.held.append(Held("roots", False, size=abs(lead) * size**k))
         made.rows.append(moved[k] - a[0] * matched[k])
     return made
 

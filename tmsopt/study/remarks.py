@@ -11,21 +11,7 @@ from tmsopt.design.quantities import ROOT_QUANTITIES
 from tmsopt.design.solution import Solution
 from tmsopt.study.levers import is_physical
 from tmsopt.study.steps import with_reported_unit
-
-STRUCTURES = {
-    "EP4": "four roots meet in one (EP4)",
-    "EP3": "the three rightmost roots meet in one (EP3)",
-    "2EP2": "the roots meet two by two in two real ones (2EP2)",
-    "CEP2": "two complex pairs meet in one (CEP2)",
-    "EP2": "the two rightmost roots meet in a real one (EP2)",
-    "EP2+pair": "a real double root and a complex pair stand on one vertical line (EP2+pair)",
-    "pair+real": "a complex pair and a real root stand on one vertical line (pair+real)",
-    "two pairs": "two complex pairs stand on one vertical line (two pairs)",
-    "pair": "one complex pair is rightmost (pair)",
-    "real": "one real root is rightmost (real)",
-    "undecided": "double precision cannot tell which roots meet (undecided)",
-}
-"""Each structure of the rightmost line in words."""
+from tmsopt.study.words import in_words
 
 _ROOTS = {q.name for q in ROOT_QUANTITIES}
 _PARTS = (0.0, 0.29, 0.5, 0.83, 1.0)  # of a range: a change along it shows at one of these
@@ -40,7 +26,7 @@ def summary(solution: Solution) -> str:
         if not solution.problem.free:
             return f"the design as given violates {names}"
         return f"no design in the box was found that meets all that is asked; the nearest one violates {names}"
-    words = STRUCTURES.get(solution.structure, solution.structure)
+    words = in_words(solution.structure, solution.problem.model.degree)
     if solution.status != "optimal":
         return f"{words}; the search did not converge, so a better design may be near"
     return f"{words}: {_quality(solution)}"

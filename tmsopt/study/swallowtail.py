@@ -18,10 +18,12 @@ from tmsopt.design.problem import Problem
 from tmsopt.roots import determinant, is_stable, real_roots
 from tmsopt.study.branch import Trace
 from tmsopt.study.continuation import project
-from tmsopt.study.trace import Traced, prepare, trace
+from tmsopt.study.trace import STARTS, Traced, prepare, trace
 
 Array = NDArray[np.float64]
 Cut = tuple[float, str]
+
+_LEAST = 4  # degree
 
 _SCAN = 2000
 _BESIDE = np.array([1e-7, 4e-5, 1e-4, 1e-3, 4e-3, 0.012])
@@ -61,17 +63,25 @@ class Swallowtail:
     crossing: Trace
 
 
-def swallowtail(problem: Problem, rows: int = 48, across: int = 24) -> Swallowtail:
+def swallowtail(problem: Problem, rows: int = 48, across: int = 24, starts: int = STARTS) -> Swallowtail:
     """The surface of real negative double roots in the box of three free parameters: one, and an affine pair.
 
     Args:
         problem: with Fr, chi_B and lambda_s free, or three parameters of another model of which the coefficients
             are affine in the last two (their tangents, for angles).
         rows, across: points along the first parameter, and along r between two edges.
+        starts: of the traces of its edges; see `trace`.
 
     Raises:
-        InputError: for another number of free parameters, or coefficients that are not affine in two of them.
+        InputError: for another number of free parameters, coefficients that are not affine in two of them, or a
+            model of degree 2 or 3, whose roots cannot meet two by two.
     """
+    if problem.model.degree < _LEAST:
+        message = (
+            f"model '{problem.model.name}' has degree {problem.model.degree}; accepted: {_LEAST} or more, for a "
+            "swallowtail crosses itself where two double roots stand side by side; trace EP2 and EP3 instead"
+        )
+        raise InputError([Fault(message, ("model",))])
     if len(problem.free) != 3:
         message = f"a surface takes three free parameters, and {len(problem.free)} are free"
         raise InputError([Fault(message, ("parameters",))])
@@ -79,8 +89,8 @@ def swallowtail(problem: Problem, rows: int = 48, across: int = 24) -> Swallowta
     names = list(plain.free)
     axes = (names[0], names[1], names[2])
     affine = _Affine(plain, axes)
-    cusps = trace(plain, "EP3")
-    crossing = trace(plain, "2EP2")
+    cusps = trace(plain, "EP3", starts=starts)
+    crossing = trace(plain, "2EP2", starts=starts)
     critical = _critical(cusps, crossing, axes[0])
     low, high = plain.free[axes[0]]
     grid = np.unique(np.concatenate([np.linspace(low, high, rows), *(value + _AROUND for value in critical)]))

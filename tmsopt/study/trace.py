@@ -1,6 +1,5 @@
 """Trace a root pattern through parameter space: every branch in the box, with its events."""
 
-import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,12 +19,11 @@ from tmsopt.design.starts import spread
 from tmsopt.roots import Pattern, roots
 from tmsopt.roots import pattern as pattern_of
 from tmsopt.roots.composed import pattern_names
-from tmsopt.roots.numeric import rebuilt
-from tmsopt.roots.patterns import mean_size
 from tmsopt.study.branch import Branch, Trace
 from tmsopt.study.continuation import INFINITE, Curve, Walk, both_ways, contains, curve, project
 from tmsopt.study.events import describe
 from tmsopt.study.grid import unexplained
+from tmsopt.study.sizes import Sizes, sizes
 
 Array = NDArray[np.float64]
 Report = Callable[[int, int], None]
@@ -42,7 +40,7 @@ class Traced:
     Attributes:
         problem: with the pattern to locate and every constraint.
         unknowns: where the unknowns of the pattern stand among the variables.
-        sizes: of each coefficient over the box, 0 of one that is 0 there.
+        size: of the coefficients over the box.
     """
 
     problem: Problem
@@ -50,7 +48,7 @@ class Traced:
     nlp: NLP
     on: Curve
     unknowns: slice
-    sizes: Array
+    size: Sizes
 
 
 def trace(
@@ -125,43 +123,18 @@ def prepare(problem: Problem) -> Traced:
             lower[free + k] = 0.0
     scale = np.ones(len(nlp.variables))
     scale[:free] = upper[:free] - lower[:free]
-    sizes, terms, rate = _sizes(problem)
-    unit = np.array([rate**power for power in pattern.powers])
+    size = sizes(problem)
+    unit = np.array([size.rate**power for power in pattern.powers])
     sample = [_variables(nlp, problem, d, 1) for d, _ in zip(spread(problem, 0), range(_SAMPLE), strict=False)]
     known = np.array([s[0] for s in sample if s]).reshape(-1, len(nlp.variables))
     scale[unknowns] = unit
     if known.size:
         scale[unknowns] = np.clip(np.median(np.abs(known[:, unknowns]), axis=0), 0.1 * unit, 1e3 * unit)
         scale[unknowns.stop :] = np.clip(np.median(np.abs(known[:, unknowns.stop :]), axis=0), 0.1, 1e3)
-    weights = [
-        terms[k + 1] if nlp.rows[row] == pattern.name and k < pattern.degree else 1.0 for k, row in enumerate(rows)
-    ]
+    matched = [k < pattern.degree and nlp.rows[row] == pattern.name for k, row in enumerate(rows)]
+    weights = [size.terms[k + 1] if of_pattern else 1.0 for k, of_pattern in enumerate(matched)]
     on = curve(x, ca.vertcat(*[g[row] / w for row, w in zip(rows, weights, strict=True)]), scale, lower, upper)
-    return Traced(problem, pattern, nlp, on, unknowns, sizes)
-
-
-def _sizes(problem: Problem) -> tuple[Array, Array, float]:
-    """Over the box: median sizes of the coefficients, and of the terms that they are made of; and of the roots.
-
-    The last two are powers of 2, by which a division rounds nothing.
-    """
-    n = problem.model.degree
-    found = []
-    for design, _ in zip(spread(problem, 0), range(_SAMPLE), strict=False):
-        a = np.array([float(c) for c in problem.values(problem.ordered(design)).coefficients])
-        if a[0] and np.all(np.isfinite(a)):
-            found.append(
-                [*np.abs(a), *(np.abs(a[0]) * rebuilt(-np.abs(roots(a)).astype(complex))), mean_size(a / a[0])]
-            )
-    if not found:
-        return np.zeros(n + 1), np.ones(n + 1), 1.0
-    middle = np.median(np.array(found, dtype=float), axis=0)
-    sizes, terms, rate = middle[: n + 1], middle[n + 1 : 2 * n + 2], middle[-1]
-    return sizes, np.array([_power_of_2(t) for t in terms]), _power_of_2(rate)
-
-
-def _power_of_2(x: float) -> float:
-    return float(2.0 ** round(math.log2(x))) if x > 0 else 1.0
+    return Traced(problem, pattern, nlp, on, unknowns, size)
 
 
 def branch_of(ready: Traced, walked: Walk) -> Branch:
@@ -179,8 +152,8 @@ def _asked(problem: Problem, name: str | None) -> Problem:
     try:
         name = pattern_of(str(name), problem.model.degree).name
     except ValueError as error:
-        unknown = str(error).endswith("is no pattern")
-        message = f"unknown pattern '{name}'; {suggest(str(name), names)}" if unknown else str(error)
+        why = "" if str(error).endswith("is no pattern") else f": {error}"
+        message = f"unknown pattern '{name}'{why}; {suggest(str(name), names)}"
         raise InputError([Fault(message, ("objective", "locate"))]) from error
     asked = replace(problem, locate=name, minimize=None, maximize=None)
     count = freedom(asked)
@@ -319,8 +292,7 @@ def _seed(ready: Traced, design: Mapping[str, float], guess: int | None, held: i
         return None
     y = np.clip(y, on.lower, on.upper)
     a = ready.problem.values(ready.problem.ordered(design_at(ready.problem, y * on.scale))).coefficients
-    shares = [abs(float(c)) / size for c, size in zip(a, ready.sizes, strict=True) if size > 0]
-    return y if abs(float(a[0])) > 1e-9 * ready.sizes[0] * max(shares) else None  # at a0 = a1 = … = 0 any unknowns fit
+    return y if ready.size.leads(np.array([float(c) for c in a])) else None
 
 
 def _mismatch(on: Curve, x: Array) -> float:
