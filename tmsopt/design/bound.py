@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
+from tmsopt.design.relation import relation_bound
 from tmsopt.design.solution import Bound
 from tmsopt.models import Model
 from tmsopt.roots.elementary import as_ball, exact, quotient
@@ -39,21 +40,37 @@ def bounded(problem: Problem) -> bool:
     return problem.sense == "minimize" and (problem.minimize or "").strip() == "abscissa"
 
 
+def instant_bound(problem: Problem, value: float) -> Bound:
+    """The better one of `omega0_bound` and, where that leaves a gap, the bound by relations of the coefficients."""
+    known = omega0_bound(problem, value)
+    if known.proven or not bounded(problem):
+        return known
+    other = _bound(relation_bound(_one_case(problem)), value, "relation")
+    return other if other.value > known.value else known
+
+
 def omega0_bound(problem: Problem, value: float) -> Bound:
     """Lower bound on the abscissa over the whole box, constraints ignored, and the gap of a value to it.
 
     With scenarios, that of the first of them: the worst is no better.
     """
-    if problem.scenarios:
-        problem = replace(problem.nominal, fixed={**problem.fixed, **problem.cases[0].at})
-    largest = _largest_product(problem) if bounded(problem) else math.inf
-    if not math.isfinite(largest):
-        return Bound()
-    bound = -(largest ** (1 / problem.model.degree)) * (1 + _ROUNDING)
-    if value < bound - PROVEN * (1 + abs(bound)):  # a feasible design contradicts it: it cannot be right
+    largest = _largest_product(_one_case(problem)) if bounded(problem) else math.inf
+    return _bound(-(largest ** (1 / problem.model.degree)) * (1 + _ROUNDING), value, "omega0")
+
+
+def _one_case(problem: Problem) -> Problem:
+    """The problem at the first of its scenarios."""
+    if not problem.scenarios:
+        return problem
+    return replace(problem.nominal, fixed={**problem.fixed, **problem.cases[0].at})
+
+
+def _bound(bound: float, value: float, method: str) -> Bound:
+    """A bound and the gap of a value to it; none where it is infinite, or a feasible design contradicts it."""
+    if not math.isfinite(bound) or value < bound - PROVEN * (1 + abs(bound)):
         return Bound()
     gap = max(value - bound, 0.0)
-    return Bound(bound, gap, closed(gap, bound), "omega0")
+    return Bound(bound, gap, closed(gap, bound), method)
 
 
 def closed(gap: float, bound: float) -> bool:

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tmsopt.design.bound import bounded, closed, omega0_bound
+from tmsopt.design.bound import bounded, closed, instant_bound
 from tmsopt.design.family import Family
 from tmsopt.design.formulations import abscissa, design_of, middle
 from tmsopt.design.freedom import freedom
@@ -204,7 +204,7 @@ def _proven(problem: Problem, candidate: Candidate) -> bool:
         return False
     a = _coefficients(problem, candidate.nlp, candidate.run)[0]
     own = -(abs(a[-1] / a[0]) ** (1 / problem.model.degree)) if a[0] else -math.inf
-    return closed(candidate.objective - own, own) and omega0_bound(problem, candidate.objective).proven
+    return closed(candidate.objective - own, own) and instant_bound(problem, candidate.objective).proven
 
 
 def _coefficients(problem: Problem, nlp: NLP, run: Run) -> Array:

@@ -5,7 +5,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from tmsopt.design.bound import omega0_bound
+from tmsopt.design.bound import instant_bound
 from tmsopt.design.certified import certified
 from tmsopt.design.cover import cover
 from tmsopt.design.errors import InputError
@@ -134,7 +134,7 @@ def _assembled(
         structure=checked.structure.name,
         active=Table(finding.active),
         violations=checked.violations,
-        bound=omega0_bound(problem, numbers.value) if optimal else Bound(),
+        bound=instant_bound(problem, numbers.value) if optimal else Bound(),
         starts=finding.starts,
         seconds=time.perf_counter() - began,
         quantities=numbers.quantities,

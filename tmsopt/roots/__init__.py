@@ -1,7 +1,7 @@
 """Real polynomials and their roots: factored forms, stability, numeric and exact roots, multiplicity."""
 
 from tmsopt.roots.classes import CLASSES, Classes, quartic_classes, quartic_is_stable
-from tmsopt.roots.composed import pattern
+from tmsopt.roots.composed import composition, pattern
 from tmsopt.roots.count import real_roots
 from tmsopt.roots.exact import exact_abscissa, exact_roots
 from tmsopt.roots.multiple import multiple_real_roots
@@ -24,6 +24,7 @@ __all__ = [
     "abscissa",
     "abscissa_and_damping",
     "backward_error",
+    "composition",
     "determinant",
     "discriminant",
     "evaluate",

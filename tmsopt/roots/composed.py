@@ -55,6 +55,11 @@ def pattern(name: str, degree: int) -> Pattern:
     return _pattern("".join(name.split()), degree)
 
 
+def composition(name: str) -> list[tuple[str, int, int]]:
+    """What a pattern is made of: (kind, multiplicity, count), of kind ``EP``, ``CEP`` or one of the imaginary axis."""
+    return [(g.kind, g.order, g.count) for g in _groups("".join(name.split()))]
+
+
 @cache
 def _pattern(name: str, degree: int) -> Pattern:
     groups = _groups(name)

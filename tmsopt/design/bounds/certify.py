@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
-from tmsopt.design.bound import omega0_bound
+from tmsopt.design.bound import instant_bound
 from tmsopt.design.bounds.answer import Answer, Clock, Progress, answer, contradicted, doubt
 from tmsopt.design.bounds.lines import over
 from tmsopt.design.bounds.program import Question
@@ -147,7 +147,7 @@ def _known(design: Solution) -> Bound:
     if design.problem.sense == "maximize" and (design.problem.maximize or "").strip() == "damping_ratio":
         gap = max(1.0 - design.value, 0.0)
         return Bound(1.0, gap, gap == 0, "definition")
-    bound = omega0_bound(design.problem, design.value)
+    bound = instant_bound(design.problem, design.value)
     return bound if math.isfinite(bound.value) else _over_the_box(design)
 
 

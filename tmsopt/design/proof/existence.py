@@ -50,7 +50,7 @@ class Existing:
 def exactly(problem: Problem, pattern: Pattern, design: Written) -> Existing | None:
     """The design itself, if its numbers are fractions and have the pattern exactly."""
     a = exact_coefficients(problem, design)
-    if a is None or len(a) != 5 or not rational.has(pattern.name, a):
+    if a is None or not rational.has(pattern.name, a):
         return None
     equalities = [c for c in problem.conditions.values() if c.comparison == "=="]
     if equalities:
@@ -210,13 +210,23 @@ def _other_kind(pattern: Pattern) -> str:
         "2EP2": "the double pair is complex: a CEP2, not a 2EP2",
         "CEP2": "two real double roots: a 2EP2, not a CEP2",
     }
-    return kinds.get(pattern.name, f"the factors have no imaginary roots: no {pattern.name}")
+    other = f"the factors have no imaginary roots: no {pattern.name}"
+    if _of_quadratics(pattern):
+        other = f"the multiple roots are complex where they must be real, or the other way round: no {pattern.name}"
+    return kinds.get(pattern.name, other)
 
 
 def _undecided_kind(pattern: Pattern) -> str:
     if pattern.name in ("2EP2", "CEP2"):
         return "b² − 4c cannot be told from 0, so not 2EP2 from CEP2 and EP4; locate EP4, with a parameter more free"
+    if _of_quadratics(pattern):
+        return f"b² − 4c cannot be told from 0, so neither whether it is {pattern.name}; locate what the roots meet in"
     return "the imaginary part cannot be told from 0"
+
+
+def _of_quadratics(pattern: Pattern) -> bool:
+    """Whether the sign of a b² − 4c tells the pattern from another."""
+    return any(u.startswith("b") for u in pattern.unknowns) and "EP" in pattern.name
 
 
 def _numbers(problem: Problem, design: Written) -> dict[str, Any]:

@@ -7,10 +7,11 @@ from typing import Any
 
 import flint
 
-from tmsopt.roots import Pattern, lienard_chipart
+from tmsopt.roots import Pattern, evaluate, lienard_chipart
 from tmsopt.roots.enclosed import Enclosed
 
-_LIKE = (0.7390851, 1.3247179, 2.6854520)  # unknowns with no relation, to see which factors are the same
+_LIKE = tuple(p**0.5 for p in (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37))
+"""Unknowns with no relation, to see which factors are the same."""
 
 Factor = Sequence[Any]
 """Monic coefficients, descending."""
@@ -73,24 +74,39 @@ class Factored:
 
 def of_pattern(pattern: Pattern, unknowns: Sequence[Any]) -> Factored:
     """The factors of a pattern, equal ones counted."""
-    signs = [tuple(f) for f in pattern.factors(_LIKE)]
+    signs = [tuple(f) for f in pattern.factors(_LIKE[: len(pattern.unknowns)])]
     factors = pattern.factors(unknowns)
     return Factored(tuple((factors[signs.index(s)], signs.count(s)) for s in dict.fromkeys(signs)))
 
 
 def abscissa_formula(pattern: Pattern, unknowns: Sequence[Any]) -> Any:
     """Largest real part as a formula of one factor, the one whose root is rightmost in the middles; nan for none."""
-    formulas: list[Any] = []
-    for factor, _ in of_pattern(pattern, unknowns).factors:
-        if len(factor) == 2:
-            formulas.append(-factor[1])
-        elif len(factor) == 3:
-            _, b, c = factor
-            discriminant = b * b - 4 * c
-            formulas.append((discriminant.sqrt() - b) / 2 if _constant(discriminant) > 0 else -b / 2 + 0 * c)
-        else:
-            return flint.arb("nan")
-    return max(formulas, key=lambda f: float(_constant(f)))
+    formulas = [_formula(factor) for factor, _ in of_pattern(pattern, unknowns).factors]
+    return (
+        max(formulas, key=lambda f: float(_constant(f))) if all(f is not None for f in formulas) else flint.arb("nan")
+    )
+
+
+def _formula(factor: Factor) -> Any:
+    """The largest real part of the roots of a factor, balls or series; None where they cannot be told apart."""
+    if len(factor) == 2:
+        return -factor[1]
+    if len(factor) == 3:
+        _, b, c = factor
+        discriminant = b * b - 4 * c
+        return (discriminant.sqrt() - b) / 2 if _constant(discriminant) > 0 else -b / 2 + 0 * c
+    constants = [_constant(c) for c in factor]
+    own = roots_of(constants)
+    if own is None:
+        return None
+    z = max(own, key=lambda z: float(z.re))
+    if not any(isinstance(c, flint.arb_series) for c in factor):
+        return z.re
+    # The root moves by −Σ δc_k s^(n−k)/p′(s), with s anywhere in its ball.
+    s, n = flint.acb(z.re, z.im), len(factor) - 1
+    slope = evaluate([(n - k) * c for k, c in enumerate(constants[:-1])], s)
+    change = evaluate([c[1] if isinstance(c, flint.arb_series) else 0 for c in factor], s)
+    return flint.arb_series([z.re, -(change / slope).real], prec=2)
 
 
 def roots_of(factor: Factor) -> list[Enclosed] | None:

@@ -45,7 +45,8 @@ def stability(factored: Factored) -> Verdict:
     left = [z for z in factored.roots or () if z.re < 0]
     if axis and not right:
         at = "a root is 0" if all(z.real for z in axis) else "a pair is imaginary"
-        rest = ", the others left of the axis: on the boundary of stability" if len(axis) + len(left) > 3 else ""
+        simple = all(z.multiplicity == 1 for z in axis + left)
+        rest = ", the others left of the axis: on the boundary of stability" if simple else ""
         return Verdict(False, at + rest)
     return Verdict(
         False, "a root is right of the imaginary axis" if right else "a root is not left of the imaginary axis"
