@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
-from tmsopt.design.relation import relation_bound
+from tmsopt.design.relation import is_rational, relation_bound
 from tmsopt.design.solution import Bound
 from tmsopt.models import Model
 from tmsopt.roots.elementary import as_ball, exact, quotient
@@ -28,6 +28,7 @@ _ROUNDING = 1e-15  # of the quotient to a double, and of its root
 _NODES = np.linspace(-1, 1, 9)
 _BITS = 212  # the parameters of a set are doubles, so exact; what follows from them is right far beyond the answer
 _DEGREE = 4  # in any one parameter; nine nodes fit it
+_CORNERS = 12  # free parameters, beyond which their ranges have too many
 _FIT = np.linalg.pinv(np.vander(_NODES, _DEGREE + 1))
 
 Array = NDArray[np.float64]
@@ -84,18 +85,31 @@ def _largest_product(problem: Problem) -> float:
     Along a parameter in which aₙ and a0 are linear the quotient is monotone, so its extremes are at the ends. One
     further parameter may enter otherwise; along it the stationary points are polynomial roots.
     """
+    if len(problem.free) > _CORNERS or not is_rational(problem.model, problem.model.sets[0]):
+        return _enclosed_product(problem)
     model, (box, known) = problem.model, _algebraic_box(problem)
     constant = [n for n, (lo, hi) in box.items() if lo == hi or _plays_no_role(model, n, box)]
     varying = [n for n in box if n not in constant]
     curved = [n for n in varying if not _linear(model, n, box)]
-    if len(curved) > 1:
-        return math.inf
+    if len(curved) > 1 or not all(_linear(model, n, box, _DEGREE + 1) for n in curved):
+        return _enclosed_product(problem)
     ends = [box[n] if n in varying and n not in curved else ((box[n][0] + box[n][1]) / 2,) for n in box]
     corners = dict(zip(box, np.array(list(itertools.product(*ends))).T, strict=True))
     quotients, signs = _along(model, corners, curved[0], box, known) if curved else _at(model, corners, known)
     if len(signs) != 1:
         return math.inf
     return float(quotients.max())
+
+
+def _enclosed_product(problem: Problem) -> float:
+    """An upper end of |aₙ/a0| over the box, by balls; inf where they contain a0 = 0."""
+    of = problem.parameter_set
+    with flint.ctx.workprec(_BITS):
+        ends = {n: (exact(lo), exact(hi)) for n, (lo, hi) in problem.free.items()}
+        box = {n: as_ball(lo).union(as_ball(hi)) for n, (lo, hi) in ends.items()}
+        a = problem.model.coefficients(problem.ordered({n: exact(v) for n, v in problem.fixed.items()} | box), of)
+        upper = as_ball(abs(quotient(as_ball(a[-1]), as_ball(a[0])))).upper()
+        return float(upper) if upper.is_finite() else math.inf
 
 
 def _at(model: Model, points: Mapping[str, Array], known: Known) -> tuple[Array, set[bool]]:
@@ -173,18 +187,23 @@ def _plays_no_role(model: Model, name: str, box: Box) -> bool:
     """Whether aₙ/a0 is free of a parameter: exact arithmetic at points where a difference would show."""
     for part in (Fraction(1, 2), Fraction(2, 3)):
         (last, first), (last2, first2) = _exact(model, name, box, part, [Fraction(3, 7), Fraction(11, 5)])
-        if last * first2 != last2 * first:
+        if not last * first2 == last2 * first:  # of balls, neither may be certain
             return False
     return True
 
 
-def _linear(model: Model, name: str, box: Box) -> bool:
-    """Whether aₙ and a0 are linear in a parameter: exact second differences, at points where others would show."""
+def _linear(model: Model, name: str, box: Box, order: int = 2) -> bool:
+    """Whether the exact differences of an order of aₙ and a0 vanish, at points where others would show.
+
+    Those of order 2 do where both are linear in the parameter, those of order k where they are of a degree below k.
+    """
     for part in (Fraction(1, 2), Fraction(2, 3)):
-        at = _exact(model, name, box, part, [Fraction(1, 3), Fraction(4, 3), Fraction(7, 3), Fraction(10, 3)])
-        for a, b, c, d in zip(*at, strict=True):
-            if a - 2 * b + c != 0 or b - 2 * c + d != 0:
-                return False
+        at = _exact(model, name, box, part, [Fraction(1, 3) + k for k in range(order + 2)])
+        for row in zip(*at, strict=True):
+            for first in range(2):
+                terms = row[first : first + order + 1]
+                if not sum((-1) ** k * math.comb(order, k) * c for k, c in enumerate(terms)) == 0:
+                    return False
     return True
 
 

@@ -9,43 +9,63 @@ that of a1 = c a0.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
 import casadi as ca
 import flint
+import numpy as np
 
 from tmsopt.design.problem import Problem
-from tmsopt.design.walk import Arithmetic, NotAccepted, walk
+from tmsopt.design.proof.exact import Tilt
 from tmsopt.models import Model, ParameterSet
-from tmsopt.roots.elementary import exact, sqrt
+from tmsopt.models.walk import steps
+from tmsopt.roots.elementary import exact
 
 _BITS = 212  # zeros of h by isolation; far beyond the answer, which is a double
-_TERMS = 20_000  # of a product, before they are gathered
-_POWER = 24  # exponent up to which a power is taken
+_MORE = 8  # designs at which a relation is tried beyond those that determine it
+_DEPENDENT = 1e-9  # singular value of the coefficients at random designs, relative, above which there is no relation
+_FINENESS = 2**40  # steps of a range, one of which an exact design takes at random
+
+_RATIONAL = {
+    *(ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST, ca.OP_ADD, ca.OP_SUB, ca.OP_NEG, ca.OP_TWICE, ca.OP_MUL, ca.OP_SQ),
+    *(ca.OP_DIV, ca.OP_INV),
+}
+"""Operations that make rational functions; CasADi writes whole powers with these."""
 
 
 def relation_bound(problem: Problem) -> float:
     """The greatest of the bounds on the abscissa by relations of the coefficients; −inf without any.
 
-    Constraints and the ranges of the free parameters play no role. A relation is an identity of polynomials, found and
-    held without rounding; only numbers that are fractions are looked at, so no angle that is fixed.
+    Constraints and the ranges of the free parameters play no role. Relations are looked for only among coefficients
+    that are rational functions of the free parameters (tangents of angles) with fractions for coefficients, and
+    without rounding: they hold at designs drawn at random, more of them than they are determined by.
     """
-    coefficients = _polynomials(problem)
-    if coefficients is None:
+    if not (is_rational(problem.model, problem.parameter_set) and _dependent(problem)):
+        return -math.inf
+    rows = _exact_rows(problem)
+    if rows is None:
         return -math.inf
     with flint.ctx.workprec(_BITS):
-        return max((_bound(relation) for relation in relations(coefficients)), default=-math.inf)
+        return max((_bound(relation) for relation in relations(rows)), default=-math.inf)
 
 
-def relations(coefficients: Sequence[Mapping[Any, Any]]) -> list[list[Any]]:
-    """Independent b with Σ b_k a_k = 0 for coefficients a_k given as monomial → fraction; the simplest that there are.
+@lru_cache(maxsize=64)
+def is_rational(model: Model, of: ParameterSet) -> bool:
+    """Whether the coefficients are rational functions of the parameters of a set, or of the tangents of angles."""
+    symbols = {n: ca.SX.sym(n) for n in of.names}
+    own = {n: ca.atan(s) if of[n].tangent else s for n, s in symbols.items()}
+    column = ca.vertcat(*map(ca.SX, model.coefficients(own, of)))
+    function = ca.Function("coefficients", [ca.vertcat(*symbols.values())], [ca.densify(column)])
+    return all(step.operation in _RATIONAL for step in steps(function))
+
+
+def relations(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
+    """Independent b with Σ b_k a_k = 0 for every row a of fractions.
 
     Each is reduced: from the leading coefficient on, and from the last one.
     """
-    monomials = sorted({m for a in coefficients for m in a})
-    rows = [[a.get(m, flint.fmpq(0)) for a in coefficients] for m in monomials]
     forward = _null_space(rows)
     backward = [relation[::-1] for relation in _null_space([row[::-1] for row in rows])]
     return forward + [b for b in backward if b not in forward]
@@ -53,9 +73,7 @@ def relations(coefficients: Sequence[Mapping[Any, Any]]) -> list[list[Any]]:
 
 def _null_space(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
     """Reduced basis of the vectors that every row is orthogonal to."""
-    width = len(rows[0]) if rows else 0
-    if not rows:
-        return []
+    width = len(rows[0])
     reduced, rank = flint.fmpq_mat([list(row) for row in rows]).rref()
     pivots = [next(j for j in range(width) if reduced[i, j] != 0) for i in range(rank)]
     basis = []
@@ -75,92 +93,44 @@ def _bound(relation: Sequence[Any]) -> float:
         return -math.inf
     zeros = []
     while h.degree() > 0:
-        zeros += [z.real.upper() for z, _ in _integral(h).complex_roots() if z.imag == 0]
+        integral: Any = flint.fmpz_poly([int(c) for c in (h * h.denom()).coeffs()])
+        zeros += [float(z.real.upper()) for z, _ in integral.complex_roots() if z.imag == 0]
         h = h.derivative()
-    bound = -float(max(zeros, key=lambda z: z))
-    return math.nextafter(bound, -math.inf)
+    return math.nextafter(-max(zeros), -math.inf)
 
 
-def _integral(h: Any) -> Any:
-    """The same polynomial times a whole number."""
-    return flint.fmpz_poly([int(c) for c in (h * h.denom()).coeffs()])
+def _dependent(problem: Problem) -> bool:
+    """Whether the coefficients at random designs look dependent, in doubles."""
+    of, rng = problem.parameter_set, np.random.default_rng(0)
+    count = 2 * problem.model.degree + _MORE
+    drawn = {n: rng.uniform(*ends, count) for n, ends in problem.free.items()}
+    a = problem.model.coefficients(problem.ordered(drawn), of)
+    columns = np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in a), np.zeros(count))[:-1], axis=1)
+    if not np.all(np.isfinite(columns)):
+        return False
+    rows = columns / np.maximum(np.abs(columns).max(axis=1, keepdims=True), 1e-300)
+    sizes = np.linalg.norm(rows, axis=0)
+    if np.any(sizes == 0):
+        return True
+    values = np.linalg.svd(rows / sizes, compute_uv=False)
+    return bool(values[-1] <= _DEPENDENT * values[0])
 
 
-def _polynomials(problem: Problem) -> list[dict[Any, Any]] | None:
-    """Each coefficient as monomial of the free parameters (tangents of angles) → fraction; None where it is no polynomial."""
-    of = problem.parameter_set
-    context = flint.fmpq_mpoly_ctx.get(tuple(problem.free) or ("nothing",), "lex")
-    free = dict(zip(problem.free, context.gens(), strict=False))
-    arguments = []
-    for name in of.names:
-        value = free.get(name)
-        if value is None:
-            if of[name].tangent and problem.fixed[name] != 0:
-                return None
-            value = context.constant(exact(problem.fixed[name]))
-        arguments.append(value)
-    try:
-        (row,) = walk(_function(problem.model, of), arguments, _arithmetic(context))
-    except NotAccepted:
+def _exact_rows(problem: Problem) -> list[list[Any]] | None:
+    """Coefficients at random designs of the box; None where one is no fraction."""
+    of, rng = problem.parameter_set, np.random.default_rng(0)
+    fixed = {n: exact(v) for n, v in problem.fixed.items()}
+    if any(of[n].tangent and v != 0 for n, v in problem.fixed.items()):
         return None
-    return [dict(a.to_dict()) for a in row]
-
-
-@lru_cache(maxsize=64)
-def _function(model: Model, of: ParameterSet) -> ca.Function:
-    """The coefficients as a function of the parameters of a set, angles by their tangent."""
-    symbols = {n: ca.SX.sym(n) for n in of.names}
-    own = {n: ca.atan(s) if of[n].tangent else s for n, s in symbols.items()}
-    a = ca.vertcat(*map(ca.SX, model.coefficients(own, of)))
-    return ca.Function("coefficients", [ca.vertcat(*symbols.values())], [ca.densify(a)])
-
-
-def _arithmetic(context: Any) -> Arithmetic:
-    """CasADi's operations on polynomials without rounding; of others, only those on numbers that stay fractions."""
-
-    def number(x: float) -> Any:
-        if not math.isfinite(x):
-            raise NotAccepted("a number that is not finite")
-        return context.constant(exact(x))
-
-    def times(a: Any, b: Any) -> Any:
-        if len(a) * len(b) > _TERMS:
-            raise NotAccepted("a product of so many terms")
-        return a * b
-
-    def inverse(a: Any) -> Any:
-        if not a.is_constant() or a == 0:
-            raise NotAccepted("a quotient")
-        return context.constant(1 / _constant(a))
-
-    def power(a: Any, b: Any) -> Any:
-        exponent = _constant(b) if b.is_constant() else None
-        if exponent is None or exponent.q != 1 or not 0 <= exponent <= _POWER:
-            raise NotAccepted("a power")
-        return a ** int(exponent.p)
-
-    def root(a: Any) -> Any:
-        found = sqrt(_constant(a)) if a.is_constant() else None
-        if not isinstance(found, flint.fmpq):
-            raise NotAccepted("a square root")
-        return context.constant(found)
-
-    return {
-        ca.OP_CONST: number,
-        ca.OP_ADD: lambda a, b: a + b,
-        ca.OP_SUB: lambda a, b: a - b,
-        ca.OP_NEG: lambda a: -a,
-        ca.OP_TWICE: lambda a: 2 * a,
-        ca.OP_MUL: times,
-        ca.OP_SQ: lambda a: times(a, a),
-        ca.OP_INV: inverse,
-        ca.OP_DIV: lambda a, b: a * inverse(b),
-        ca.OP_POW: power,
-        ca.OP_CONSTPOW: power,
-        ca.OP_SQRT: root,
-    }
-
-
-def _constant(a: Any) -> Any:
-    """The fraction that a constant polynomial is."""
-    return next(iter(a.to_dict().values()), flint.fmpq(0))
+    rows = []
+    for _ in range(problem.model.degree + 1 + _MORE):
+        drawn: dict[str, Any] = {n: Tilt(flint.fmpq(0)) if of[n].tangent else v for n, v in fixed.items()}
+        for n, ends in problem.free.items():
+            lower, upper = (exact(math.tan(e)) if of[n].tangent else exact(e) for e in ends)
+            at = lower + (upper - lower) * flint.fmpq(int(rng.integers(_FINENESS)), _FINENESS)
+            drawn[n] = Tilt(at) if of[n].tangent else at
+        row = problem.model.coefficients({n: drawn[n] for n in of.names}, of)
+        if not all(isinstance(c, int | flint.fmpq) for c in row):
+            return None
+        rows.append([flint.fmpq(c) if isinstance(c, int) else c for c in row])
+    return rows
