@@ -187,7 +187,7 @@ def _plays_no_role(model: Model, name: str, box: Box) -> bool:
     """Whether aₙ/a0 is free of a parameter: exact arithmetic at points where a difference would show."""
     for part in (Fraction(1, 2), Fraction(2, 3)):
         (last, first), (last2, first2) = _exact(model, name, box, part, [Fraction(3, 7), Fraction(11, 5)])
-        if not last * first2 == last2 * first:  # of balls, neither may be certain
+        if not _vanishes(last * first2 - last2 * first):
             return False
     return True
 
@@ -202,9 +202,14 @@ def _linear(model: Model, name: str, box: Box, order: int = 2) -> bool:
         for row in zip(*at, strict=True):
             for first in range(2):
                 terms = row[first : first + order + 1]
-                if not sum((-1) ** k * math.comb(order, k) * c for k, c in enumerate(terms)) == 0:
+                if not _vanishes(sum((-1) ** k * math.comb(order, k) * c for k, c in enumerate(terms))):
                     return False
     return True
+
+
+def _vanishes(x: Any) -> bool:
+    """Whether a number is 0 for certain; not so a quotient that does not exist, a ball nan."""
+    return bool(x == 0)
 
 
 def _exact(model: Model, name: str, box: Box, part: Fraction, at: Sequence[Fraction]) -> list[tuple[Any, Any]]:
