@@ -158,7 +158,7 @@ class Solution:
         if self.status != "optimal":
             reason = f"the problem is not solved ({self.status}): there is no design to prove"
             return Proof(f"a design of '{self.problem.title or 'the problem'}' exists", False, reason, digits=digits)
-        return prove_design(self.problem, self.parameters, self.structure, digits, exact, self.worst)
+        return prove_design(self.problem, self.parameters, self.structure, digits, exact, self.worst, self.roots)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None.

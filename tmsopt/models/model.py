@@ -144,7 +144,7 @@ class Model:
     pencil: Callable[[Mapping[str, Any]], tuple[Matrix, ...]] | None = field(default=None, repr=False)
     natural: bool = False
     origin: tuple[Callable[..., "Model"], tuple[Any, ...]] | None = field(default=None, repr=False)
-    statement: Mapping[str, Any] | None = field(default=None, repr=False)
+    statement: Mapping[str, Any] | None = field(default=None, repr=False, hash=False)
 
     def coefficients(self, parameters: Mapping[str, Any], of: ParameterSet | None = None) -> list[Any]:
         """Coefficients a0 … aₙ, descending, for values of any kind: floats, arrays, CasADi, balls."""

@@ -18,7 +18,8 @@ from tmsopt.roots.exact import rational
 from tmsopt.roots.fitting import Form
 from tmsopt.roots.patterns import LINES, PATTERNS, Pattern
 from tmsopt.roots.polynomial import evaluate, product
-from tmsopt.roots.shape import Group, Shape
+from tmsopt.roots.shape import Shape
+from tmsopt.roots.shown import shown
 from tmsopt.roots.structure import Root
 
 _STEPS = 80
@@ -105,7 +106,8 @@ def nearest(name: str, coefficients: Sequence[Any], roots: Sequence[Root]) -> tu
         u = _start(pattern, [float(c) for c in target], roots)
         return _converged(pattern, u, target, lambda u: _roots_of(pattern, u))
     unit = flint.arb(2) ** round(math.log2(max(1e-300, *(abs(complex(r.re, r.im)) for r in roots))))
-    shape, start = _shape([Root(float(r.re / unit), float(r.im / unit), r.multiplicity) for r in roots])
+    shape, places = shown([Root(float(r.re / unit), float(r.im / unit), r.multiplicity) for r in roots])
+    start = [flint.arb(x) for x in places]
     target = [(c / unit**k).mid() for k, c in enumerate(monic)]
     found = _converged(shape, start, target, lambda u: _roots_of_shape(shape, u))
     return None if found is None else tuple(Enclosed(z.re * unit, z.im * unit, z.multiplicity) for z in found)
@@ -201,20 +203,6 @@ def _start(pattern: Pattern, target: list[float], roots: Sequence[Root]) -> list
         return sum((x * x for x in off), 0.0)
 
     return [flint.arb(x) for x in min(pattern.guesses(z), key=error)]
-
-
-def _shape(roots: Sequence[Root]) -> tuple[Shape, list[Any]]:
-    """The shape that roots show: multiple ones, and those on the rightmost line if several; with its unknowns."""
-    upper = [r for r in roots if r.im >= 0]
-    right = max(r.re for r in upper)
-    several = sum(r.re == right for r in upper) > 1
-    line = [several and r.re == right for r in upper]
-    kept = [(r, Group(r.multiplicity, r.im == 0, tied)) for r, tied in zip(upper, line, strict=True)]
-    grouped = [(r, g) for r, g in kept if g.tied or g.multiplicity > 1]
-    free = [r for r, g in kept if not g.tied and g.multiplicity == 1]
-    rest = product(*([1, -r.re] if r.im == 0 else [1, -2 * r.re, r.re**2 + r.im**2] for r in free))
-    shape = Shape(tuple(g for _, g in grouped), len(rest) - 1)
-    return shape, [flint.arb(x) for x in shape.start([complex(r.re, r.im) for r, _ in grouped], rest)]
 
 
 def _roots_of_shape(shape: Shape, u: Sequence[Any]) -> list[Enclosed] | None:

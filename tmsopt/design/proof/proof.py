@@ -12,14 +12,17 @@ from tmsopt.design.cases import Case
 from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
+from tmsopt.design.proof import rational
 from tmsopt.design.proof.balls import Number, ProvedRoot, fraction, number
 from tmsopt.design.proof.exact import Written, written
-from tmsopt.design.proof.existence import Existing, beside, exactly
+from tmsopt.design.proof.existence import Existing, beside, exact_coefficients, exactly
 from tmsopt.design.proof.facts import as_stored, heavy_damping, inside, limits, stability
 from tmsopt.design.proof.krawczyk import Refused
 from tmsopt.design.proof.verdict import NOTHING, Verdict
-from tmsopt.roots import PATTERNS, Pattern
+from tmsopt.roots import PATTERNS, Pattern, Root
+from tmsopt.roots import pattern as pattern_of
 from tmsopt.roots.patterns import LINES
+from tmsopt.roots.shown import implies, shown_pattern
 
 DIGITS = 30
 """Digits by default."""
@@ -30,7 +33,7 @@ MOST = 1000
 _EXTRA = 50  # decimal digits carried beyond twice those asked for, where a design is taken as it is
 
 _IMPLIES = {"EP4": ("EP3", "2EP2", "CEP2", "EP2"), "EP3": ("EP2",), "2EP2": ("EP2",)}
-_DECIDED = tuple(PATTERNS[n] for n in ("EP4", "2EP2", "CEP2", "EP3", "EP2"))  # most degenerate first
+_QUARTIC = 4  # of which every structure has a pattern of its own
 _SIMPLE = {"pair": "the rightmost roots are a simple complex pair", "real": "the rightmost root is real and simple"}
 
 
@@ -129,6 +132,7 @@ def prove_design(
     digits: int = DIGITS,
     exact: Mapping[str, Any] | None = None,
     case: Case | None = None,
+    roots: Sequence[Root] = (),
 ) -> Proof:
     """Prove that the pattern which a problem locates, or which a design's roots show, exists; and what follows.
 
@@ -139,6 +143,7 @@ def prove_design(
         exact: parameter, or ``tan(parameter)`` → the exact number that it stands for; such a parameter is held. All
             other numbers stand for the shortest decimals that print them.
         case: of scenarios and tolerances, the one to which the structure belongs.
+        roots: of the design with multiplicities; other than for quartics, they tell the structure in full.
 
     Raises:
         InputError: for digits out of range, or exact numbers that are not the design's.
@@ -149,7 +154,9 @@ def prove_design(
     varied = case.applied(parameters) if case else dict(parameters)
     design = written(problem.parameter_set, varied, exact)
     with flint.ctx.workdps(2 * digits + _EXTRA):
-        return replace(_proved(_asked(problem, case), design, varied, structure, digits), seconds=_since(began))
+        patterns = _patterns(problem, structure, roots)
+        proof = _proved(_asked(problem, case), design, varied, structure, patterns, digits)
+        return replace(proof, seconds=_since(began))
 
 
 def _since(began: float) -> float:
@@ -161,33 +168,54 @@ def _asked(problem: Problem, case: Case | None) -> Problem:
     return replace(problem.nominal, constraints={}) if case and (case.at or case.offset) else problem
 
 
-def _proved(problem: Problem, design: Written, varied: Mapping[str, float], structure: str, digits: int) -> Proof:
+def _proved(
+    problem: Problem,
+    design: Written,
+    varied: Mapping[str, float],
+    structure: str,
+    patterns: Sequence[Pattern],
+    digits: int,
+) -> Proof:
     """The first proof that succeeds, or why none does with what holds for the design as stored."""
     reasons: list[str] = []
-    patterns = _patterns(problem, structure)
-    for pattern in patterns or (_DECIDED if structure not in _SIMPLE else ()):
+    for pattern in patterns or ([] if structure in _SIMPLE else _decided(problem, design)):
         if exact := exactly(problem, pattern, design):
-            return _assembled(problem, design, pattern.name, exact, digits)
+            return _assembled(problem, design, pattern.name, pattern, exact, digits)
     for pattern in patterns:
         try:
             found = beside(problem, pattern, design, varied, digits)
         except Refused as refusal:
             reasons.append(str(refusal))
         else:
-            return _assembled(problem, design, pattern.name, found, digits)
+            return _assembled(problem, design, pattern.name, pattern, found, digits)
     name = problem.locate or structure
+    meant = next((p for p in patterns if p.name == name), None)
     stored = as_stored(problem, design)
     if stored is None:
         reason = reasons[0] if reasons else "a0 cannot be told from 0: a root may be at infinity"
-        return Proof(_claim(name), False, reason, name, digits=digits)
-    return _assembled(problem, design, name, stored, digits, reasons or _of_simple(structure, stored), stored=True)
+        return Proof(_claim(name, meant), False, reason, name, digits=digits)
+    why = reasons or _of_simple(structure, stored)
+    return _assembled(problem, design, name, meant, stored, digits, why, stored=True)
 
 
-def _patterns(problem: Problem, structure: str) -> list[Pattern]:
+def _patterns(problem: Problem, structure: str, roots: Sequence[Root]) -> list[Pattern]:
     """Patterns to prove: that of the structure, if it has the one that is located, and then the latter."""
-    every = {**PATTERNS, **LINES}
-    named = [structure] if not problem.locate or problem.locate in _IMPLIES.get(structure, ()) else []
-    return [every[n] for n in dict.fromkeys([*named, *([problem.locate] if problem.locate else [])]) if n in every]
+    located = problem.pattern
+    if problem.model.degree == _QUARTIC:
+        known = {**PATTERNS, **LINES}.get(structure)
+        named = [known] if known and (not located or located.name in _IMPLIES.get(structure, ())) else []
+    elif roots and (not located or implies(roots, located.name)):
+        named = [p for everywhere in (True, False) if (p := shown_pattern(roots, everywhere))]
+    else:
+        named = []
+    return list({p.name: p for p in [*named, *([located] if located else [])]}.values())
+
+
+def _decided(problem: Problem, design: Written) -> list[Pattern]:
+    """The pattern of all multiple roots of a design that is exact."""
+    a = exact_coefficients(problem, design)
+    name = rational.multiple(a) if a else ""
+    return [pattern_of(name, problem.model.degree)] if name else []
 
 
 def _of_simple(structure: str, found: Existing) -> list[str]:
@@ -207,6 +235,7 @@ def _assembled(
     problem: Problem,
     design: Written,
     name: str,
+    pattern: Pattern | None,
     found: Existing,
     digits: int,
     reasons: Sequence[str] = (),
@@ -220,7 +249,7 @@ def _assembled(
     }
     abscissa = found.factored.abscissa
     return Proof(
-        claim=_claim(name),
+        claim=_claim(name, pattern),
         proved=not reasons,
         reason=reasons[0] if reasons else "",
         pattern=name,
@@ -248,8 +277,7 @@ def _assembled(
     )
 
 
-def _claim(name: str) -> str:
-    pattern = PATTERNS.get(name) or LINES.get(name)
+def _claim(name: str, pattern: Pattern | None) -> str:
     if pattern is None:
         return _SIMPLE.get(name, f"structure {name}")
     return f"a design with {name} exists: {pattern.meaning}"

@@ -27,9 +27,12 @@ def has(pattern: str, coefficients: Sequence[Any]) -> bool:
     Multiple roots are told apart by isolating them; for weave and resonance the even and the odd part of the polynomial
     have a root s² < 0 in common.
     """
+    try:
+        wanted = composition(pattern)
+    except ValueError:  # a tie of the rightmost line
+        return False
     if coefficients[0] == 0:
         return False
-    wanted = composition(pattern)
     found = _multiple(coefficients)
     kinds = {kind for kind, _, _ in wanted}
     if "CEP" in kinds and kinds & {"weave", "resonance"} and _on_axis(coefficients, twice=True):

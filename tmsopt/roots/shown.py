@@ -1,0 +1,107 @@
+"""What roots show, with their multiplicities: a shape, and the pattern that it is."""
+
+from collections import Counter
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+from tmsopt.roots.composed import composition
+from tmsopt.roots.patterns import Pattern
+from tmsopt.roots.polynomial import product
+from tmsopt.roots.shape import Group, Shape
+from tmsopt.roots.structure import Root
+
+
+def shown(roots: Sequence[Root], everywhere: bool = True) -> tuple[Shape, list[Any]]:
+    """The shape that roots show: multiple ones, and those on the rightmost line if several; with its unknowns.
+
+    Args:
+        everywhere: whether multiple roots that are not on the rightmost line count too.
+    """
+    upper = [r for r in roots if r.im >= 0]
+    right = max(r.re for r in upper)
+    several = sum(r.re == right for r in upper) > 1
+    line = [several and r.re == right for r in upper]
+    grouped = [
+        (r, Group(r.multiplicity, r.im == 0, tied))
+        for r, tied in zip(upper, line, strict=True)
+        if tied or (r.multiplicity > 1 and (everywhere or r.re == right))
+    ]
+    free = [r for r in upper for _ in range(r.multiplicity) if r not in [q for q, _ in grouped]]
+    rest = product(*([1, -r.re] if r.im == 0 else [1, -2 * r.re, r.re**2 + r.im**2] for r in free))
+    shape = Shape(tuple(g for _, g in grouped), len(rest) - 1)
+    return shape, shape.start([complex(r.re, r.im) for r, _ in grouped], rest)
+
+
+def shown_pattern(roots: Sequence[Root], everywhere: bool = True) -> Pattern | None:
+    """The pattern of the shape that roots show, which starts from these; None where all are simple and none is tied.
+
+    Its name is that of the rightmost line, such as ``EP2+pair``, ``beside`` those of other multiple roots; of multiple
+    roots alone it is that of the pattern that they make, such as ``EP3+CEP2``.
+    """
+    shape, start = shown(roots, everywhere)
+    if not shape.groups:
+        return None
+    tied, others = ([g for g in shape.groups if g.tied is on] for on in (True, False))
+    return Pattern(
+        name=" beside ".join(_name(groups) for groups in (tied, others) if groups),
+        meaning=_meaning(tied, others) + (" beside other roots" if shape.rest else ""),
+        unknowns=shape.unknowns,
+        factors=partial(_factors, shape),
+        guesses=lambda z: [[float(x) for x in start]],
+        nonnegative=shape.gaps,
+        degree=shape.degree,
+    )
+
+
+def implies(roots: Sequence[Root], name: str) -> bool:
+    """Whether roots with these multiplicities have the multiple roots of a pattern, where those may coincide.
+
+    A 4-fold real root is a double complex pair that meets on the axis, too.
+    """
+    real = [r.multiplicity for r in roots if r.im == 0]
+    pairs = [r.multiplicity for r in roots if r.im > 0]
+    for kind, order, count in composition(name):
+        for _ in range(count):
+            if kind == "CEP" and max(pairs, default=0) >= order:
+                _take(pairs, order)
+            elif kind in ("EP", "CEP") and max(real, default=0) >= order * (1 + (kind == "CEP")):
+                _take(real, order * (1 + (kind == "CEP")))
+            else:
+                return False
+    return True
+
+
+def _take(left: list[int], order: int) -> None:
+    """Use up so many roots of the least multiple one that has them."""
+    k = left.index(min(m for m in left if m >= order))
+    left[k] -= order
+
+
+def _factors(shape: Shape, unknowns: Sequence[Any]) -> list[list[Any]]:
+    each = zip(shape.group_factors(unknowns), shape.groups, strict=True)
+    repeated = [f for f, g in each for _ in range(g.multiplicity)]
+    return [*repeated, shape.rest_factor(unknowns)] if shape.rest else repeated
+
+
+def _name(groups: Sequence[Group]) -> str:
+    """``EP3``, ``2EP2+CEP2``, ``EP2+two pairs+real``: real roots first, the highest multiplicity first."""
+    counted = Counter((not g.real, -g.multiplicity) for g in groups if g.multiplicity > 1)
+    names = [
+        f"{count if count > 1 else ''}{'C' if pair else ''}EP{-order}"
+        for (pair, order), count in sorted(counted.items())
+    ]
+    pairs = sum(g.multiplicity == 1 and not g.real for g in groups)
+    names += [("", "pair", "two pairs", "three pairs", "four pairs", "five pairs", "six pairs")[pairs]] if pairs else []
+    return "+".join([*names, *("real" for g in groups if g.multiplicity == 1 and g.real)])
+
+
+def _meaning(tied: Sequence[Group], others: Sequence[Group]) -> str:
+    words = " and ".join(_words(g) for g in tied)
+    parts = [f"{words} on one vertical line"] if tied else []
+    return ", and ".join([*parts, *([" and ".join(_words(g) for g in others)] if others else [])])
+
+
+def _words(group: Group) -> str:
+    what = "real root" if group.real else "complex pair"
+    return f"a {group.multiplicity}-fold {what}" if group.multiplicity > 1 else f"a {what}"
