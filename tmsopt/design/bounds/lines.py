@@ -96,35 +96,48 @@ def sectors(
     """Every root of every case with at least a damping ratio: p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ.
 
     A root s > 0 has ζ = −1, and with another s < 0 no such factor. Where ζ may be −1, the factors are s² + pᵢ s + qᵢ,
-    with qᵢ = wᵢ² asked only of other ζ: (1 + ζ)(wᵢ² − qᵢ) = 0; where it is known to be, nothing is asked.
+    with qᵢ = wᵢ² asked only of other ζ: (1 + ζ)(wᵢ² − qᵢ) = 0; where it is known to be, nothing is asked. An odd degree
+    has one factor s + d more, d ≥ 0 asked only of other ζ: (1 + ζ)(e − d) = 0, e ≥ 0, e ≥ d.
     """
     zeta = build.variable("damping_ratio", -1.0, 1.0) if ratio is None else ratio
     looked = [case for case in covered if case in frame.signs and (ratio is None or ratio > -1)]
+    size = int(ratio is None)
     for case in looked:
         a = frame.coefficients(values, case)
         largest = frame.largest(over(build, a), case == covered[0])
-        pairs = []
+        pairs, monic = [], []
         for k in range(1, (len(a) - 1) // 2 + 1):
             p = build.variable(f"p{k}.{case}", -2 * largest, 2 * largest)
             w = build.variable(f"w{k}.{case}", 0.0, largest)
             q = build.variable(f"q{k}.{case}", -largest * largest, largest * largest) if ratio is None else w * w
-            pairs.append((p, q))
+            size += 2 + (ratio is None)
+            pairs.append(p)
+            monic.append([1, p, q])
             build.row("damping_ratio", p - 2 * zeta * w, 0.0, np.inf)
             if ratio is None:
                 build.row("damping_ratio", (1 + zeta) * (w * w - q), 0.0, 0.0)
                 build.row("damping_ratio", w * w - q, 0.0, np.inf)
-        for (one, _), (other, _) in pairwise(pairs):  # their order means nothing
+        if len(a) % 2 == 0:
+            d = build.variable(f"d.{case}", 0.0 if ratio is not None else -largest, largest)
+            size += 1 + (ratio is None)
+            monic.append([1, d])
+            if ratio is None:
+                e = build.variable(f"e.{case}", 0.0, largest)
+                build.row("damping_ratio", (1 + zeta) * (e - d), 0.0, 0.0)
+                build.row("damping_ratio", e - d, 0.0, np.inf)
+        for one, other in pairwise(pairs):  # their order means nothing
             build.row("damping_ratio", other - one, 0.0, np.inf)
-        build.equal("damping_ratio", a, [a[0] * c for c in product(*([1, p, q] for p, q in pairs))])
+        build.equal("damping_ratio", a, [a[0] * c for c in product(*monic)])
     build.row("damping_ratio", 1 - zeta, 0.0, np.inf)  # real roots would satisfy any larger one, too
-    size = (ratio is None) + len(looked) * (2 + (ratio is None)) * (frame.model.degree // 2)
-    return Lifted(ca.SX(zeta), Lift("damping_ratio", size, partial(_sector_guess, frame, looked, ratio)), (), ())
+    return Lifted(
+        ca.SX(zeta), Lift("damping_ratio", size, partial(_sector_guess, frame, looked, ratio, build.unit)), (), ()
+    )
 
 
 def bound_unknowns(frame: Frame, build: Builder, pattern: Pattern) -> None:
     """Ranges for the unknown factor coefficients of a pattern, the last variables so far: C(m, k) R^k for degree m."""
     count = len(pattern.unknowns)
-    largest = root_bound(over(build, compact(frame.model, build.values[0])))
+    largest = root_bound(over(build, compact(frame.model, build.values[0]))) / build.unit
     symbols = build.x[-count:]
     for factor in pattern.factors(symbols):
         for k, c in enumerate(factor[1:], start=1):
@@ -145,14 +158,22 @@ def _half_plane_guess(
 
 
 def _sector_guess(
-    frame: Frame, covered: Sequence[int], ratio: float | None, values: Sequence[Values], z: Sequence[Roots]
+    frame: Frame,
+    covered: Sequence[int],
+    ratio: float | None,
+    unit: float,
+    values: Sequence[Values],
+    z: Sequence[Roots],
 ) -> list[list[float]]:
+    """Damping ratio, if it is not known, and factors; the roots are given in the unit of the NLP."""
     factors = []
     for case in covered:
-        pairs = quadratic_pairs(z[case] / frame.unit)
-        for p, q in sorted((float(-pair.sum().real), float(pair.prod().real)) for pair in pairs):
+        split = quadratic_pairs(z[case] * unit / frame.unit)
+        for p, q in sorted((float(-r.sum().real), float(r.prod().real)) for r in split if len(r) == 2):
             unstable = q < 0 or (p < 0 and p * p >= 4 * q)  # a root s > 0
             factors += [p, abs(p) / 2 if unstable else math.sqrt(q), *([q] if ratio is None else [])]
+        for d in (-float(r[0].real) for r in split if len(r) == 1):
+            factors += [d, abs(d)] if ratio is None else [d]
     if ratio is not None:
         return [factors]
     return [[min(float(values[case]["damping_ratio"]) for case in covered), *factors]]
