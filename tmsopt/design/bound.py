@@ -118,7 +118,7 @@ def _at(model: Model, points: Mapping[str, Array], known: Known) -> tuple[Array,
     The largest are upper ends of balls: a small a0 is a difference, of which doubles lose as many digits as cancel.
     """
     a = model.polynomial(**points)
-    last, first = np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in (a[-1], a[0])))
+    last, first, *_ = np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in (a[-1], a[0], *points.values())))
     both = (last == 0) & (first == 0)
     if np.any((first == 0) & ~both) or np.all(both):
         return np.array([math.inf]), set()

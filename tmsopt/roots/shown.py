@@ -12,15 +12,16 @@ from tmsopt.roots.shape import Group, Shape
 from tmsopt.roots.structure import Root
 
 
-def shown(roots: Sequence[Root], everywhere: bool = True) -> tuple[Shape, list[Any]]:
+def shown(roots: Sequence[Root], everywhere: bool = True, ties: bool = True) -> tuple[Shape, list[Any]]:
     """The shape that roots show: multiple ones, and those on the rightmost line if several; with its unknowns.
 
     Args:
         everywhere: whether multiple roots that are not on the rightmost line count too.
+        ties: whether it counts that roots are on one line.
     """
     upper = [r for r in roots if r.im >= 0]
     right = max(r.re for r in upper)
-    several = sum(r.re == right for r in upper) > 1
+    several = ties and sum(r.re == right for r in upper) > 1
     line = [several and r.re == right for r in upper]
     grouped = [
         (r, Group(r.multiplicity, r.im == 0, tied))
@@ -33,15 +34,18 @@ def shown(roots: Sequence[Root], everywhere: bool = True) -> tuple[Shape, list[A
     return shape, shape.start([complex(r.re, r.im) for r, _ in grouped], rest)
 
 
-def shown_pattern(roots: Sequence[Root], everywhere: bool = True) -> Pattern | None:
-    """The pattern of the shape that roots show, which starts from these; None where all are simple and none is tied.
+def shown_patterns(roots: Sequence[Root]) -> list[Pattern]:
+    """The patterns that roots show, what says most first: all multiple roots and ties of the rightmost line, those on
+    this line alone, all multiple roots alone.
 
-    Its name is that of the rightmost line, such as ``EP2+pair``, ``beside`` those of other multiple roots; of multiple
-    roots alone it is that of the pattern that they make, such as ``EP3+CEP2``.
+    A name is that of the rightmost line, such as ``EP2+pair``, ``beside`` those of other multiple roots; of multiple
+    roots alone it is that of the pattern that they make, such as ``EP3+CEP2``. Each starts from the roots.
     """
-    shape, start = shown(roots, everywhere)
-    if not shape.groups:
-        return None
+    every = [_pattern(*shown(roots, *which)) for which in ((True, True), (False, True), (True, False), (False, False))]
+    return list({p.name: p for p in every if p.name}.values())
+
+
+def _pattern(shape: Shape, start: Sequence[Any]) -> Pattern:
     tied, others = ([g for g in shape.groups if g.tied is on] for on in (True, False))
     return Pattern(
         name=" beside ".join(_name(groups) for groups in (tied, others) if groups),
@@ -92,16 +96,22 @@ def _name(groups: Sequence[Group]) -> str:
         for (pair, order), count in sorted(counted.items())
     ]
     pairs = sum(g.multiplicity == 1 and not g.real for g in groups)
-    names += [("", "pair", "two pairs", "three pairs", "four pairs", "five pairs", "six pairs")[pairs]] if pairs else []
+    names += ["pair" if pairs == 1 else f"{_COUNTS[pairs]} pairs"] if pairs else []
     return "+".join([*names, *("real" for g in groups if g.multiplicity == 1 and g.real)])
 
 
 def _meaning(tied: Sequence[Group], others: Sequence[Group]) -> str:
-    words = " and ".join(_words(g) for g in tied)
-    parts = [f"{words} on one vertical line"] if tied else []
-    return ", and ".join([*parts, *([" and ".join(_words(g) for g in others)] if others else [])])
+    parts = [f"{_words(tied)} on one vertical line"] if tied else []
+    return ", and ".join([*parts, *([_words(others)] if others else [])])
 
 
-def _words(group: Group) -> str:
-    what = "real root" if group.real else "complex pair"
-    return f"a {group.multiplicity}-fold {what}" if group.multiplicity > 1 else f"a {what}"
+def _words(groups: Sequence[Group]) -> str:
+    counted = Counter((not g.real, -g.multiplicity) for g in groups)
+    words = []
+    for (pair, order), count in sorted(counted.items()):
+        fold = f"{-order}-fold " if order < -1 else ""
+        words.append(f"{_COUNTS[count]} {fold}{'complex pair' if pair else 'real root'}{'s' if count > 1 else ''}")
+    return " and ".join(words)
+
+
+_COUNTS = ("no", "a", "two", "three", "four", "five", "six")

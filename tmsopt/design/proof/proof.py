@@ -22,7 +22,7 @@ from tmsopt.design.proof.verdict import NOTHING, Verdict
 from tmsopt.roots import PATTERNS, Pattern, Root
 from tmsopt.roots import pattern as pattern_of
 from tmsopt.roots.patterns import LINES
-from tmsopt.roots.shown import implies, shown_pattern
+from tmsopt.roots.shown import implies, shown_patterns
 
 DIGITS = 30
 """Digits by default."""
@@ -205,7 +205,7 @@ def _patterns(problem: Problem, structure: str, roots: Sequence[Root]) -> list[P
         known = {**PATTERNS, **LINES}.get(structure)
         named = [known] if known and (not located or located.name in _IMPLIES.get(structure, ())) else []
     elif roots and (not located or implies(roots, located.name)):
-        named = [p for everywhere in (True, False) if (p := shown_pattern(roots, everywhere))]
+        named = shown_patterns(roots)
     else:
         named = []
     return list({p.name: p for p in [*named, *([located] if located else [])]}.values())
