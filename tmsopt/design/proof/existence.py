@@ -128,7 +128,7 @@ def _starts(system: Equations, held: Mapping[str, Any], problem: Problem) -> Ite
     except ValueError:
         raise Refused("a0 is 0, or a coefficient does not exist: a root is at infinity") from None
     for fit in fits[:2]:
-        yield lifted | {n: flint.arb(x) for n, x in zip(system.factors, fit, strict=True)}
+        yield lifted | {n: flint.arb(x) for n, x in zip(system.of_pattern, fit, strict=True)}
 
 
 def _proved(system: Equations, start: Mapping[str, Any], among: list[str], digits: int) -> Existing:
@@ -143,7 +143,7 @@ def _proved(system: Equations, start: Mapping[str, Any], among: list[str], digit
     tangents = {n: at[n] for n in of.names if of[n].tangent}
     parameters = {n: at[n].atan() if n in tangents else at[n] for n in of.names}
     coefficients = problem.model.coefficients(parameters, of)
-    unknowns = [at[n] for n in system.factors]
+    unknowns = [at[n] for n in system.of_pattern]
     _checked(system, coefficients, at)
     return Existing(
         "Krawczyk",
@@ -198,7 +198,7 @@ def _checked(system: Equations, coefficients: Sequence[Any], at: Mapping[str, An
         if not (x >= r.lower and x <= r.upper):
             raise Refused(f"the solution found has {quantity.name} = {float(x):.6g}, out of its range {r}")
     pattern = system.pattern
-    for value in pattern.nonnegative([at[n] for n in system.factors]):
+    for value in pattern.nonnegative([at[n] for n in system.of_pattern]):
         if value < 0:
             raise Refused(_other_kind(pattern))
         if not value > 0:

@@ -29,7 +29,7 @@ class Equations:
     """Left sides of the pattern's and the problem's equations.
 
     A number goes by its parameter's name, angles by their tangent; by the name of a quantity that has an equation
-    of its own; or by that of an unknown of the pattern, with the pattern's name before it where a parameter has it too.
+    of its own; or by that of an unknown of the pattern, see `of_pattern`.
 
     Attributes:
         equalities: the == constraints.
@@ -44,14 +44,14 @@ class Equations:
     @property
     def unknowns(self) -> tuple[str, ...]:
         """What is unknown besides parameters."""
-        return (*(q.name for q in self.lifted), *self.factors)
+        return (*(q.name for q in self.lifted), *self.of_pattern)
 
     @property
-    def factors(self) -> tuple[str, ...]:
-        """Those of the pattern."""
+    def of_pattern(self) -> tuple[str, ...]:
+        """Unknowns of the pattern, by names that no parameter or quantity has."""
         of = self.problem.parameter_set
         taken = {*of.names, *self.problem.model.quantity_names(of)}
-        return tuple(f"{self.pattern.name}.{n}" if n in taken else n for n in self.pattern.unknowns)
+        return tuple(f"{self.pattern.name}.{u}" if u in taken else u for u in self.pattern.unknowns)
 
     @property
     def conditions(self) -> int:
@@ -66,7 +66,7 @@ class Equations:
         values = Values(
             self.problem.model, of, own, lift=lambda q, v: at[q.name] if q.name in known else None
         )  # fmt: skip
-        u = [at[n] for n in self.factors]
+        u = [at[n] for n in self.of_pattern]
         a = values.coefficients
         left = [p - a[0] * c for p, c in zip(a[1:], self.pattern.monic(u)[1:], strict=True)]
         left += [q.equation(values, at[q.name]) for q in self.lifted if q.equation]
