@@ -29,7 +29,7 @@ class Bound:
         gap: objective minus bound.
         proven: whether the gap is closed, so that the design is globally optimal: up to rounding, by ``scip`` up to
             1e-4 of the objective; of an infeasible problem, whether it is certain that no design is feasible.
-        method: how the bound was found, e.g. ``omega0`` or ``scip``; ``none``.
+        method: how the bound was found: ``omega0``, ``relation`` (of the coefficients), ``scip``, …; ``none``.
         seconds: that branch and bound took.
         nodes: that it needed.
         tolerance: its feasibility tolerance; it is a proof in floating-point arithmetic. 0 without it.

@@ -18,7 +18,7 @@ def proof_text(problem: Problem, proof: Proof) -> str:
     if problem.scenarios or problem.tolerances:
         lines.append("of the worst case that was found")
     if proof.parameters:
-        lines += _numbers(problem, proof) + _place(proof) + _facts(proof) + _held(problem, proof)
+        lines += _numbers(problem, proof) + _place(problem, proof) + _facts(proof) + _held(problem, proof)
     return "\n".join(line.rstrip() for line in lines)
 
 
@@ -43,7 +43,7 @@ def _numbers(problem: Problem, proof: Proof) -> list[str]:
     return [*head, *columns(rows), ""] if rows else [""]
 
 
-def _place(proof: Proof) -> list[str]:
+def _place(problem: Problem, proof: Proof) -> list[str]:
     """How near, and how alone."""
     if proof.method == "exact factorisation":
         return ["method: square-free factorisation of the polynomial, whose coefficients are fractions"]
@@ -51,7 +51,7 @@ def _place(proof: Proof) -> list[str]:
         return ["method: roots of the design as stored, isolated in balls"]
     return [
         "method: Krawczyk's interval Newton test on a_k = a0 c_k"
-        + (" and the == constraints" if len(proof.unknowns) + len(proof.moved) > 4 else ""),
+        + (" and the == constraints" if len(proof.unknowns) + len(proof.moved) > problem.model.degree else ""),
         f"located to {proof.radius:.1e} before rounding to these digits; the only one within {proof.uniqueness:.2g}",
         f"the stored design is {proof.distance:.1e} from it; rounding explains up to {proof.explained:.1e}",
     ]
