@@ -15,6 +15,7 @@ from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, UNDECIDED, Decision, Ta
 from tmsopt.design.formulations import design_of, variables_of
 from tmsopt.design.solution import Solution
 from tmsopt.design.starts import complete
+from tmsopt.models.walk import NotAccepted
 
 _HOLDS = 1e-6  # of a row, relative to its range: SCIP itself asks for 1e-9, and multiple roots have half the digits
 
@@ -114,7 +115,12 @@ def _asked(question: Question, sign: int, clock: Clock, end: float, confirm: Con
             return Answer(UNDECIDED)
         seconds = min(left, _FIRST * 2**turn)
         ways = [replace(question, unit=question.unit * u, compact=c) for u, c in _WAYS[turn % len(_WAYS)]]
-        decisions = clock.race([task(way.program(sign, max(least, 0.0)), seconds) for way in ways])
+        try:
+            decisions = clock.race([task(way.program(sign, max(least, 0.0)), seconds) for way in ways])
+        except NotAccepted:
+            if turn == 0:
+                raise
+            continue  # numbers are too large or too small in these units alone
         if any(decision.verdict == INFEASIBLE for decision in decisions):
             return Answer(INFEASIBLE)
         for decision in decisions:

@@ -19,6 +19,8 @@ from tmsopt.models import Model, Values
 from tmsopt.roots import Pattern, product, shift
 from tmsopt.roots.patterns import Roots
 
+_PLAIN = 4  # degree up to which the powers of the unit are near enough to 1
+
 
 @dataclass(frozen=True)
 class Frame:
@@ -29,7 +31,7 @@ class Frame:
         unit: usual size of the roots, a power of two.
         touching: whether a line must have a root on it, lest more be claimed than is so.
         compact: whether squared frequencies are taken as X/(1 − X).
-        least: what the leading coefficient of the first case is not below, in absolute value.
+        least: what the leading coefficient of the model is not below in the first case, in absolute value.
     """
 
     model: Model
@@ -41,7 +43,13 @@ class Frame:
 
     def coefficients(self, values: Sequence[Values], case: int) -> list[Any]:
         """Coefficients for roots in the unit, with a leading one that is positive, in the compact form of the model."""
-        return [self.signs[case] * c / self.unit**k for k, c in enumerate(compact(self.model, values[case]))]
+        a = compact(self.model, values[case])
+        return [self.signs[case] * c * self.lead / self.unit**k for k, c in enumerate(a)]
+
+    @property
+    def lead(self) -> float:
+        """What all coefficients are multiplied by, so that none is far smaller than the others are large."""
+        return float(self.unit ** (self.model.degree // 2)) if self.model.degree > _PLAIN else 1.0
 
     def about(self, values: Sequence[Values], case: int, line: Any) -> list[Any]:
         """The same of p(t + line)."""
@@ -50,7 +58,7 @@ class Frame:
     def largest(self, ranges: Sequence[Interval], first: bool) -> float:
         """Bound on the roots for coefficients in ranges, of the first case or of another."""
         (lower, upper), *others = ranges
-        least = self.least if first else -math.inf
+        least = self.least * self.lead if first else -math.inf
         return root_bound([(max(lower, least), max(upper, least)), *others])
 
 

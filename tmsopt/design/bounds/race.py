@@ -38,7 +38,7 @@ class Crew:
         """Decisions on tasks, run all at once, until one is shown to have no feasible point.
 
         Raises:
-            NotAccepted: for an operation that cannot be written for SCIP.
+            NotAccepted: for operations or numbers that cannot be written for SCIP, if no task can.
             KeyboardInterrupt: when the user stops it; no process is left behind.
         """
         self.ahead(len(tasks))
@@ -59,9 +59,9 @@ class Crew:
                     job.worker.communicate()
                 else:
                     self.idle.append(job.worker)
-        for job in jobs:
-            if isinstance(job.decision, NotAccepted):
-                raise job.decision
+        refused = [job.decision for job in jobs if isinstance(job.decision, NotAccepted)]
+        if refused and len(refused) == len(jobs):
+            raise refused[0]
         return [job.decision for job in jobs if isinstance(job.decision, Decision)]
 
 
