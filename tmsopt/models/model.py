@@ -104,7 +104,7 @@ class ParameterSet:
     native: Callable[[Mapping[str, Any]], dict[str, Any]]
     quantities: tuple[Quantity, ...] = ()
     rate: Formula | None = None
-    needs: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    needs: Mapping[str, tuple[str, str]] = field(default_factory=dict, hash=False)
 
     @property
     def names(self) -> tuple[str, ...]:
