@@ -260,16 +260,15 @@ def tmsopt(*arguments, cwd=None):
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, cwd=cwd, encoding="utf-8")
 
 
-def test_trace_writes_table_csv_and_figure(tmp_path):
+def test_trace_writes_table_csv_and_figure(tmp_path, capsys):
     table, figure = tmp_path / "branches.csv", tmp_path / "branches.svg"
-    done = tmsopt(
-        "trace", "problems/ep_set.toml", "--starts", 8, "--csv", table, "--plot", figure, "--axes", "lambda_s,Fr"
-    )
-    assert done.returncode == 0
-    assert done.stderr.splitlines() == [f"wrote {table}", f"wrote {figure}"]
-    assert "EP4" in done.stdout
-    assert "1.41421356237" in done.stdout  # chi_B = √2, Table 1
-    assert "2.23631751" in done.stdout  # Fr_EP4, printed in the paper
+    asked = ("trace", "problems/ep_set.toml", "--starts", 8, "--csv", table, "--plot", figure, "--axes", "lambda_s,Fr")
+    status, out, err = run(capsys, *asked)
+    assert status == 0
+    assert err.splitlines() == [f"wrote {table}", f"wrote {figure}"]
+    assert "EP4" in out
+    assert "1.41421356237" in out  # chi_B = √2, Table 1
+    assert "2.23631751" in out  # Fr_EP4, printed in the paper
     assert figure.read_bytes().startswith(b"<?xml")
     with table.open(encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
@@ -283,10 +282,10 @@ def test_trace_writes_table_csv_and_figure(tmp_path):
     assert "EP4" in ep4["event"]
 
 
-def test_trace_json_is_finite_and_of_another_pattern_where_asked():
-    done = tmsopt("trace", "problems/off_law.toml", "--pattern", "weave", "--starts", 8, "--json")
-    assert (done.returncode, done.stderr) == (0, "")
-    data = json.loads(done.stdout, parse_constant=pytest.fail)
+def test_trace_json_is_finite_and_of_another_pattern_where_asked(capsys):
+    status, out, err = run(capsys, "trace", "problems/off_law.toml", "--pattern", "weave", "--starts", 8, "--json")
+    assert (status, err) == (0, "")
+    data = json.loads(out, parse_constant=pytest.fail)
     assert data["schema"] == 1
     assert data["pattern"] == "weave"
     assert data["free"] == ["Fr", "lambda_s"]
@@ -392,12 +391,12 @@ def test_an_output_name_that_no_file_system_takes_ends_with_2():
     assert stop.value.code == 2
 
 
-def test_help_shows_examples():
+def test_help_shows_examples(capsys):
     for command in ("trace", "chart"):
-        done = tmsopt(command, "--help")
-        assert done.returncode == 0
-        assert f"tmsopt {command} problems/" in done.stdout
-        assert "Exit status" in done.stdout
+        status, out, _ = run(capsys, command, "--help")
+        assert status == 0
+        assert f"tmsopt {command} problems/" in out
+        assert "Exit status" in out
 
 
 @pytest.mark.parametrize("points", [(1, 5), (0, 5), 50, (5,), (99_999, 99_999), ("a", 5)])

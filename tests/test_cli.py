@@ -1,4 +1,4 @@
-"""The command line by its contract: streams, exit status, JSON, figures; always in a process of its own."""
+"""The command line by its contract: streams, exit status, JSON, figures; in a process of its own where that matters."""
 
 import json
 import math
@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
+
+from tmsopt.cli import main
 
 KEYS = {
     "schema", "title", "model", "status", "objective", "parameters", "abscissa", "abscissa_realised", "roots",
@@ -20,13 +22,21 @@ def tmsopt(*arguments, cwd=None):
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, cwd=cwd, encoding="utf-8")
 
 
-def test_help_names_the_commands_and_examples():
+def run(capsys, *arguments):
+    """In this process, to save starting so many: exit status, stdout, stderr."""
+    with pytest.raises(SystemExit) as stop:
+        main(args=[*map(str, arguments)], prog_name="tmsopt")
+    written = capsys.readouterr()
+    return stop.value.code, written.out, written.err
+
+
+def test_help_names_the_commands_and_examples(capsys):
     done = tmsopt("--help")
     assert done.returncode == 0
     assert "solve" in done.stdout
     assert "compare" in done.stdout
     for command in ("solve", "compare"):
-        assert "tmsopt " + command in tmsopt(command, "--help").stdout  # an example
+        assert "tmsopt " + command in run(capsys, command, "--help")[1]  # an example
 
 
 def test_json_of_solve_is_the_contract():
@@ -46,19 +56,19 @@ def test_json_of_solve_is_the_contract():
     assert set(data["starts"]) == {"tried", "converged", "at_best"}
 
 
-def test_table_of_solve_shows_both_scales():
-    done = tmsopt("solve", "problems/ep4.toml", "--wheelbase", "2 m")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "1.41421356237" in done.stdout  # chi_B
-    assert "2828.42712475" in done.stdout  # x_B = chi_B w, in mm
-    assert "23.5300893481" in done.stdout  # the tilt in degrees, atan(15/4 - 75 sqrt(2)/32)
-    assert "proven" in done.stdout
+def test_table_of_solve_shows_both_scales(capsys):
+    status, out, err = run(capsys, "solve", "problems/ep4.toml", "--wheelbase", "2 m")
+    assert (status, err) == (0, "")
+    assert "1.41421356237" in out  # chi_B
+    assert "2828.42712475" in out  # x_B = chi_B w, in mm
+    assert "23.5300893481" in out  # the tilt in degrees, atan(15/4 - 75 sqrt(2)/32)
+    assert "proven" in out
 
 
-def test_benchmark_prints_the_published_critical_speed():
-    done = tmsopt("solve", "problems/benchmark.toml")
-    assert "2.8410083" in done.stdout
-    assert "0.907064149551" in done.stdout
+def test_benchmark_prints_the_published_critical_speed(capsys):
+    _, out, _ = run(capsys, "solve", "problems/benchmark.toml")
+    assert "2.8410083" in out
+    assert "0.907064149551" in out
 
 
 def test_compare_shows_laws_and_formulations():
@@ -77,8 +87,8 @@ zeta_H = -0.2
 zeta_B = -0.4
 mu = 0.1
 chi_B = { min = 1.01, max = 5 }
-Fr = { min = 0.01, max = 10 }
-lambda_s = { min = 0.02, max = 1.4 }
+Fr = 2.0
+lambda_s = 0.4
 [objective]
 minimize = "abscissa"
 [constraints]
@@ -87,7 +97,7 @@ high = "chi_B >= 1.5"
 """
 
 
-def test_infeasible_ends_with_3_and_still_reports(tmp_path):
+def test_infeasible_ends_with_3_and_still_reports(tmp_path, capsys):
     path = tmp_path / "x.toml"
     path.write_text(INFEASIBLE)
     done = tmsopt("solve", path, "--json")
@@ -96,7 +106,9 @@ def test_infeasible_ends_with_3_and_still_reports(tmp_path):
     assert data["status"] == "infeasible"
     assert data["violations"]
     assert data["parameters"]["Fr"] > 0
-    assert "violated" in tmsopt("solve", path).stdout
+    status, out, _ = run(capsys, "solve", path)
+    assert status == 3
+    assert "violated" in out
 
 
 @pytest.mark.parametrize(
@@ -109,27 +121,32 @@ def test_infeasible_ends_with_3_and_still_reports(tmp_path):
         ["compare", "pyproject.toml"],
     ],
 )  # fmt: skip
-def test_bad_usage_ends_with_2_and_one_message(arguments):
-    done = tmsopt(*arguments)
-    assert done.returncode == 2
-    assert done.stdout == ""
+def test_bad_usage_ends_with_2_and_one_message(arguments, capsys):
+    status, out, err = run(capsys, *arguments)
+    assert status == 2
+    assert out == ""
+    assert err.strip()
+    assert "Traceback" not in err
+
+
+def test_bad_usage_ends_a_process_with_2_and_no_traceback():
+    done = tmsopt("solve", "nothing.toml")
+    assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.strip()
     assert "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize("ending", ["png", "pdf", "svg"])
-def test_plot_is_written_whole(tmp_path, ending):
+def test_plot_is_written_whole(tmp_path, ending, capsys):
     path = tmp_path / f"growth.{ending}"
-    done = tmsopt("solve", "problems/ep4.toml", "--plot", path)
-    assert done.returncode == 0
+    assert run(capsys, "solve", "problems/ep4.toml", "--plot", path)[0] == 0
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
     start = path.read_bytes()[:200]
     assert start.startswith({"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}[ending])
 
 
-def test_plot_that_cannot_be_written_leaves_nothing(tmp_path):
-    done = tmsopt("solve", tmp_path / "missing.toml", "--plot", tmp_path / "x.png")
-    assert done.returncode == 2
+def test_plot_that_cannot_be_written_leaves_nothing(tmp_path, capsys):
+    assert run(capsys, "solve", tmp_path / "missing.toml", "--plot", tmp_path / "x.png")[0] == 2
     assert list(tmp_path.iterdir()) == []
 
 

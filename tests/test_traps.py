@@ -15,7 +15,7 @@ BAND_OPTIMUM = -0.3778543571
 """Of the band Fr = 1.2 … 2.4, by differential evolution over 2 401 speeds (tests/test_problems.py, speed_band)."""
 
 
-@pytest.mark.parametrize("points", [2, 6, 9])
+@pytest.mark.parametrize("points", [2, 6])  # 7 in tests/test_problems.py
 def test_points_of_a_band_do_not_matter(points):
     """With 6 points a search once ended where two factors share a double root, which then cannot become a pair."""
     band = {"Fr": {"min": 1.2, "max": 2.4, "points": points}}
@@ -58,7 +58,7 @@ def test_no_warning_where_a_start_runs_into_a_singular_mass_matrix():
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = tmsopt.solve(problem, throw=False)
+        found = tmsopt.solve(problem, throw=False, starts=16)
     assert found.status == "optimal" or not any("wins" in note for note in found.notes)
 
 

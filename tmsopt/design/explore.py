@@ -153,15 +153,16 @@ def _covered(
         if not more:
             break
         best = trial if ahead(problem, trial, best) else best
-        leaders = [best.parameters, trial.parameters, *_leaders(problem, candidates)]
+        ours = [best.parameters] if best is trial else [best.parameters, trial.parameters]
+        leaders = [*ours, *_leaders(problem, candidates)]
         nlp = side.narrowed(family.formulate(problem, (*nlp.cases, *more)))
         run = Runner(problem, nlp, options.linear_solver, touching, family)
         candidates = [run.ended(design, near=True) for design in leaders]
         trial = survivor(problem, nlp, candidates, family)
-        if _lost(problem, trial, leaders, nlp):
+        if _lost(problem, trial, leaders, nlp, family):
             candidates = [*candidates, *(run.ended(design) for design in leaders)]
             trial = survivor(problem, nlp, candidates, family)
-        if _lost(problem, trial, leaders, nlp) and not problem.asks_radius:
+        if _lost(problem, trial, leaders, nlp, family) and not problem.asks_radius:
             candidates = [*candidates, *_searched(side, nlp, options, touching)]
             trial = survivor(problem, nlp, candidates, family)
     if trial is None:
@@ -170,14 +171,17 @@ def _covered(
     return found(problem, nlp, trial, starts, (*nlp.cases, *others))
 
 
-def _lost(problem: Problem, trial: Trial | None, leaders: Sequence[Mapping[str, float]], nlp: NLP) -> bool:
+def _lost(
+    problem: Problem, trial: Trial | None, leaders: Sequence[Mapping[str, float]], nlp: NLP, family: Family
+) -> bool:
     """Whether a trial is worse, in the cases of an NLP, than one of the designs that it was started from."""
     if trial is None:
         return True
     if problem.objective is None:
         return False
     sign = -1.0 if problem.sense == "maximize" else 1.0
-    own = [recheck(problem, problem.ordered(design), nlp.cases) for design in leaders]
+    designs = [problem.ordered(design) for design in leaders]
+    own = [recheck(problem, design, nlp.cases, family.around(problem, design)) for design in designs]
     known = min((sign * c.objective for c in own if not c.violations), default=math.inf)
     return sign * trial.checked.objective > known and not same(sign * trial.checked.objective, known)
 

@@ -1,7 +1,7 @@
 """Problems that differ in numbers alone: their NLPs and solvers, built once and used again for each."""
 
 from collections import OrderedDict
-from collections.abc import Callable, Collection, Hashable, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -13,6 +13,7 @@ from tmsopt.design.formulations import formulate, middle
 from tmsopt.design.freedom import freedom
 from tmsopt.design.ipopt import Run, ipopt
 from tmsopt.design.limit import limit_of
+from tmsopt.design.nearest import Robustness, robustness
 from tmsopt.design.nlp import NLP
 from tmsopt.design.polish import Point, polisher
 from tmsopt.design.problem import Problem
@@ -41,6 +42,7 @@ class Family:
         self.varied = tuple(varied)
         self._nlps: OrderedDict[Hashable, NLP] = OrderedDict()
         self._made: OrderedDict[Hashable, tuple[ca.Function, Any]] = OrderedDict()
+        self._around: OrderedDict[Hashable, Robustness] = OrderedDict()
 
     def formulate(self, problem: Problem, cases: Sequence[Case] = (), damping_ratio: float | None = None) -> NLP:
         """What `formulations.formulate` gives, with the problem's numbers in place of another's of the family."""
@@ -61,6 +63,13 @@ class Family:
     def polisher(self, nlp: NLP) -> Callable[[Run, NLP], Point]:
         """A polisher of an NLP of the family; see `polisher`."""
         return self._of(nlp, (), lambda: polisher(nlp))
+
+    def around(self, problem: Problem, parameters: Mapping[str, float]) -> Robustness | None:
+        """The boundaries nearest to a design, where the problem asks for the radius; met again as cases are added."""
+        if not problem.asks_radius:
+            return None
+        key = (tuple(parameters.items()), tuple(problem.weights.items()))
+        return _kept(self._around, key, lambda: robustness(problem, parameters=parameters))
 
     def _of(self, nlp: NLP, options: Hashable, make: Callable[[], T]) -> T:
         """Something made of an NLP's functions, which are kept with it lest another gets their address."""

@@ -72,7 +72,7 @@ def found(
     if trial is None:
         return None
     point, parameters = trial.point, trial.parameters
-    checked = trial.checked if cases is None else recheck(problem, parameters, cases)
+    checked = trial.checked if cases is None else recheck(problem, parameters, cases, trial.checked.around)
     counted = freedom(problem)
     if sum(checked.violations.values()) > _SPURIOUS and counted.count >= 0:
         return None
@@ -114,7 +114,8 @@ def counted(candidates: Sequence[Candidate], at_best: float) -> Starts:
 
 def survivor(problem: Problem, nlp: NLP, candidates: Sequence[Candidate], family: Family | None = None) -> Trial | None:
     """The first of the best candidates to pass the recheck once polished, or the one that fails it least."""
-    polish = (family or Family()).polisher(nlp)
+    family = family or Family()
+    polish = family.polisher(nlp)
     kept: Trial | None = None
     tried: list[float] = []
     for candidate in sorted((c for c in candidates if c.feasible), key=lambda c: c.objective):
@@ -126,7 +127,8 @@ def survivor(problem: Problem, nlp: NLP, candidates: Sequence[Candidate], family
         tried.append(candidate.objective)
         point = polish(candidate.run, candidate.nlp)
         parameters = problem.ordered(design_of(problem, point.x.tolist()))
-        trial = Trial(candidate, point, parameters, recheck(problem, parameters, nlp.cases))
+        checked = recheck(problem, parameters, nlp.cases, family.around(problem, parameters))
+        trial = Trial(candidate, point, parameters, checked)
         if kept is None or ahead(problem, trial, kept):
             kept = trial
         if not trial.checked.violations and point.stationarity <= _STATIONARY and honest(problem, trial):

@@ -48,9 +48,18 @@ class Checked:
     around: Robustness | None = None
 
 
-def recheck(problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case] | None = None) -> Checked:
-    """Evaluate a design independently of any solver: constraints, pattern, roots and objective, in the given cases."""
-    looked = _look(problem, parameters, problem.cases if cases is None else cases)
+def recheck(
+    problem: Problem,
+    parameters: Mapping[str, float],
+    cases: Sequence[Case] | None = None,
+    around: Robustness | None = None,
+) -> Checked:
+    """Evaluate a design independently of any solver: constraints, pattern, roots and objective, in the given cases.
+
+    Args:
+        around: the boundaries nearest to this design, where they are known already.
+    """
+    looked = _look(problem, parameters, problem.cases if cases is None else cases, around)
     listed, nominal, each, top, around = looked.cases, looked.nominal, looked.each, looked.top, looked.around
     violations = {}
     for name, condition in problem.conditions.items():
@@ -116,7 +125,9 @@ class _Look:
         return self.each if varies(problem, condition, self.cases) else [self.nominal]
 
 
-def _look(problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case]) -> _Look:
+def _look(
+    problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case], around: Robustness | None = None
+) -> _Look:
     listed = [case for case in cases if not case.direction]
     nominal = problem.values(parameters)
     each = [problem.values(case.applied(parameters)) for case in listed] or [nominal]
@@ -124,7 +135,8 @@ def _look(problem: Problem, parameters: Mapping[str, float], cases: Sequence[Cas
     top = max(near_top, key=lambda k: _or_infinite(each[k]["abscissa"]))
     least = min(near_least, key=lambda k: float(each[k]["damping_ratio"]))
     worst = {"abscissa": each[top]["abscissa"], "damping_ratio": each[least]["damping_ratio"]}
-    around = robustness(problem, parameters=parameters) if problem.asks_radius else None
+    if around is None and problem.asks_radius:
+        around = robustness(problem, parameters=parameters)
     if around is not None:
         worst[RADIUS] = around.radius
     for values in (nominal, *each):
