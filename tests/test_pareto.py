@@ -230,7 +230,8 @@ def test_objectives_without_conflict_give_one_point():
 
 def test_a_front_over_a_pattern_is_the_ep_set():
     """From EP4, the greatest tilt with two real double roots, to the fold at Fr = √5 (equation epset)."""
-    found = tmsopt.pareto(problem(locate="2EP2", pareto=["-lambda_s", "Fr"], constraints={}), 3, starts=0)
+    around = {"Fr": (1.5, 4.0), "chi_B": (1.2, 2.0), "lambda_s": (math.radians(2), 0.6)}  # the set, and room about it
+    found = tmsopt.pareto(problem(free=around, locate="2EP2", pareto=["-lambda_s", "Fr"], constraints={}), 3, starts=0)
     assert found.points[0].objectives == pytest.approx((-math.atan(15 / 4 - 75 * SQRT2 / 32), EP4[1]), abs=1e-8)
     assert found.points[0].label == "greatest lambda_s"
     assert found.points[-1].objectives[1] == pytest.approx(math.sqrt(5), abs=1e-10)

@@ -33,14 +33,14 @@ def on(side, stated):
 def test_the_winner_is_named_and_each_side_is_its_own_problem(fixed, winner):
     """Heights exchanged, the EP4 tilts the other way, by the law; its mirror is as stable."""
     stated = problem(fixed, minimize="abscissa")
-    design = tmsopt.solve(stated)
+    design = tmsopt.solve(stated, starts=16)
     law = laws.ep4_chi_H_1(fixed["zeta_B"], fixed["zeta_H"])
     assert design.value == pytest.approx(-(12.5**0.25), abs=1e-11)
     assert np.tan(design.parameters["lambda_s"]) == pytest.approx(float(law.tan_lambda_s), abs=1e-10)
     assert np.sign(design.parameters["lambda_s"]) == (1 if winner == FORWARD else -1)
     assert list(design.sides) == [FORWARD, BACKWARD]
     for side, value in design.sides.items():
-        assert value == pytest.approx(tmsopt.solve(on(side, stated)).value, abs=1e-6 * (1 + abs(value)))
+        assert value == pytest.approx(tmsopt.solve(on(side, stated), starts=16).value, abs=1e-6 * (1 + abs(value)))
     (note,) = [n for n in design.notes if "both signs" in n]
     loser = BACKWARD if winner == FORWARD else FORWARD
     assert f"{winner} wins" in note
@@ -52,8 +52,8 @@ def test_the_winner_is_named_and_each_side_is_its_own_problem(fixed, winner):
 def test_the_dual_of_a_problem_has_the_dual_of_its_answer():
     """(ζ_B, ζ_H, χ_B, T, Fr) → (ζ_H, ζ_B, 1/χ_B, −T/χ_B², Fr/χ_B) keeps the spectrum: Fr becomes Fr/χ_B, and so back."""
     decay = {"decay": "abscissa <= -0.8"}
-    forward = tmsopt.solve(problem(minimize="Fr", constraints=decay))
-    backward = tmsopt.solve(problem(SWAPPED, minimize="Fr/chi_B", constraints=decay))
+    forward = tmsopt.solve(problem(minimize="Fr", constraints=decay), starts=16)
+    backward = tmsopt.solve(problem(SWAPPED, minimize="Fr/chi_B", constraints=decay), starts=16)
     assert forward.sides[FORWARD] == pytest.approx(backward.sides[BACKWARD], abs=1e-9)
     assert any("backward tilt wins" in n for n in backward.notes)
     own = {n: forward.parameters[n] for n in ("Fr", "chi_B", "zeta_B", "zeta_H", "lambda_s")}
