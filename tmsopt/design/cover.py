@@ -16,10 +16,11 @@ SLACK = 1e-6
 """Above the worst abscissa found, relative to 1 + |abscissa|: a bound that is met with equality cannot be proved."""
 
 BOXES = 4000
-"""Boxes looked at before the proof is given up: a second or so."""
+"""Boxes looked at before the proof is given up, a second or so; from degree 5 on ever fewer, for each takes longer."""
+
+_FEWEST = 32
 
 _DIGITS = 30
-
 Interval = tuple[float, float]
 
 
@@ -38,11 +39,13 @@ class Cover:
     boxes: int
 
 
-def cover(problem: Problem, parameters: Mapping[str, float], worst: float, boxes: int = BOXES) -> Cover:
+def cover(problem: Problem, parameters: Mapping[str, float], worst: float, boxes: int | None = None) -> Cover:
     """Prove that no case has a root right of `worst` plus SLACK: Liénard–Chipart signs of p(t + limit) in balls.
 
     Boxes whose signs are undecided are halved, widest first, until none is left.
     """
+    if boxes is None:
+        boxes = max(BOXES >> max(problem.model.degree - 4, 0), _FEWEST)
     limit = worst + SLACK * (1 + abs(worst))
     order = count()
     heap: list[tuple[float, int, _Box]] = [(-1.0, next(order), box) for box in _first(problem)]
@@ -133,7 +136,8 @@ def _left_of(problem: Problem, parameters: Mapping[str, float], box: _Box, gamma
 
 def _tests(problem: Problem, parameters: Mapping[str, Any], gamma: Any) -> list[Any]:
     """Quantities that are all positive exactly when every root is left of the line; a0 first, by its sign."""
-    a = problem.model.coefficients(parameters, problem.parameter_set)
+    given = problem.model.coefficients(parameters, problem.parameter_set)
+    a = [flint.arb(c) if isinstance(c, int | float) else c for c in given]  # a model may have plain numbers too
     lead = a[0] if isinstance(a[0], flint.arb) else a[0][0]
     sign = -1 if lead < 0 else 1
     shifted = [sign * c for c in shift(a, gamma)]
