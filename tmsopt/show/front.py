@@ -1,5 +1,7 @@
 """A Pareto front as a table, as a curve of two objectives, or as coloured points of three."""
 
+import re
+
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,6 +17,12 @@ _STYLES = {
     "pair+real": (CRITICAL, "o"), "two pairs": (STABLE, "o"), "pair": (HEAVY, "o"), "real": (CAPSIZE, "o"),
 }  # fmt: skip
 """Colour and marker of each structure; others are black crosses."""
+
+
+def _style(structure: str) -> tuple[str, str]:
+    """A root of five or more drawn as EP4 is, and so with pairs."""
+    higher = re.fullmatch(r"(C?)EP\d+", structure)
+    return _STYLES.get(structure) or (_STYLES["CEP2" if higher[1] else "EP4"] if higher else (LINE, "x"))
 
 
 def front_table(front: Front) -> str:
@@ -69,7 +77,7 @@ def draw_front(ax: Axes, front: Front) -> list[Name]:
         ax.plot(*ends.T, color=CAPSIZE, linewidth=0.8, linestyle=":", zorder=1, label=None if k and known else label)
     for structure in dict.fromkeys(p.structure for p in front.points):
         own = values[[p.structure == structure for p in front.points]]
-        colour, marker = _STYLES.get(structure, (LINE, "x"))
+        colour, marker = _style(structure)
         ax.plot(*own.T, marker, color=colour, markersize=4, zorder=3, label=structure, linestyle="none")
     return _names(front.points)
 
