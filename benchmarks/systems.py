@@ -206,8 +206,8 @@ def ends(problem: Problem, quick: bool) -> Iterator[tuple[str, list[End] | str]]
     """Of every method; or why it could not run."""
     at, rng, count = poles(problem), np.random.default_rng(0), _QUICK if quick else _STARTS
     normal = rng.normal(size=(count, len(problem.free)))
-    low, high = np.array(list(problem.free.values())).T
-    uniform = rng.uniform(low, high, size=normal.shape)
+    lower, upper = np.array(list(problem.free.values())).T
+    uniform = rng.uniform(lower, upper, normal.shape)
     solve(problem)  # whatever is built once
     yield f"{_OWN} its own starts", [_end(at, partial(_solved, problem, seed=k)) for k in range(count)]
     for name, starts in (("uniform ones", uniform), ("normal ones", normal)):

@@ -106,10 +106,18 @@ def chocolate(delta: Any = 9 * TENTH) -> Answer:
     return Answer({"x0": x0, "x1": x1, "x2": x2, "y": y}, (s + r) ** 5, -r, "EP5", -r)
 
 
+@cache
 def chocolate_limit() -> Answer:
-    """r = 0: 5 t = t + π/2."""
-    delta, y = sp.sqrt(2 + sp.sqrt(2)) / 2, sp.sqrt(1 + 1 / sp.sqrt(2))
-    return Answer({"delta": delta, "x0": y, "x1": 1 + sp.sqrt(2), "x2": 2 * delta, "y": y}, s**5, sp.S(0), "EP5", delta)
+    """The delta at which r is 0.1."""
+
+    def excess(t: Any) -> Any:
+        f = (t + mpmath.pi / 2) / 5
+        return mpmath.sin(t - f) - mpmath.sin(f) / 10
+
+    with mpmath.workdps(70):
+        delta = sp.Float(str(mpmath.cos(mpmath.findroot(excess, 0.44))), 65)
+    found = {**chocolate(delta).parameters, "delta": delta}
+    return Answer(found, (s + TENTH) ** 5, -TENTH, "EP5", delta)
 
 
 def three_masses() -> Answer:
@@ -223,7 +231,7 @@ def ends_at(design: tmsopt.Solution, answer: Answer) -> None:
         assert design.value == pytest.approx(float(answer.value), abs=MET)
 
 
-@pytest.mark.parametrize("name", ANSWERS)
+@pytest.mark.parametrize("name", [name for name in ANSWERS if name != "three_masses"])  # all of its EP3 are below
 def test_program_ends_at_the_answer(name: str) -> None:
     ends_at(solved(name), ANSWERS[name]())
 
@@ -259,6 +267,15 @@ def test_best_damping_need_not_be_positive() -> None:
     assert solved("freitas_lancaster").quantities["det_D"] == pytest.approx(7, abs=MET)
 
 
+def test_chocolate_of_third_order_ends_at_cos_22_degrees_and_a_half() -> None:
+    """r = 0: 5 t = t + π/2, and x is stable there."""
+    delta, y = sp.sqrt(2 + sp.sqrt(2)) / 2, sp.sqrt(1 + 1 / sp.sqrt(2))
+    found = {"delta": delta, "x0": y, "x1": 1 + sp.sqrt(2), "x2": 2 * delta, "y": y}
+    assert vanishes(at("chocolate_limit", found) - s**5)
+    assert sp.radsimp(delta - sp.cos(sp.pi / 8)) == 0
+    assert (found["x1"] * found["x2"] - found["x0"]).is_positive
+
+
 def test_chocolate_controllers_are_stable() -> None:
     for name in ("chocolate", "chocolate_limit"):
         x = [1.0, *(solved(name).parameters[n] for n in ("x2", "x1", "x0"))]
@@ -266,19 +283,33 @@ def test_chocolate_controllers_are_stable() -> None:
 
 
 def test_three_masses_have_six_ep3() -> None:
-    """det(L + x − K) = x³ in complex mu, nu and L: every solution, by elimination."""
-    mu, nu, L, x = sp.symbols("mu nu L x")
-    K = sp.Matrix([[mu + 1, -1, 0], [-1, 2, -1], [0, -1, nu + 1]])
-    conditions = sp.Poly(((L + x) * sp.eye(3) - K).det(), x).all_coeffs()[1:]
-    found = {tuple(sp.nsimplify(sp.expand_complex(v)) for v in point) for point in sp.solve(conditions, [mu, nu, L])}
-    w = 3 * sp.sqrt(3) * sp.I
-    one = {((3 + w) / 2, (1 + w) / 2, 2 + w / 3), (1 + sp.sqrt(2) * sp.I, 1 - sp.sqrt(2) * sp.I, sp.S(2))}
-    exchanged = one | {(b, a, c) for a, b, c in one}
-    every = exchanged | {tuple(sp.conjugate(v) for v in point) for point in exchanged}
+    """det(L + x − K) = x³ in complex mu, nu and L, where the trace gives L: every solution, by elimination."""
+    u, v, x = sp.symbols("u v x")
+    L = 2 + u + v
+    K = sp.Matrix([[u + L, -1, 0], [-1, 2, -1], [0, -1, v + L]])
+    trace, *conditions = sp.Poly(((L + x) * sp.eye(3) - K).det(), x).all_coeffs()[1:]
+    assert sp.expand(trace) == 0
+    found = sp.solve(conditions, [u, v])
+    w, half = sp.sqrt(3) * sp.I / 2, sp.Rational(1, 2)
+    known = [(sp.sqrt(2) * sp.I, -sp.sqrt(2) * sp.I), (half + w, w - half), (half - w, -w - half)]
+    every = {p for one in known for p in (one, one[::-1])}
     assert len(every) == 6
-    assert {tuple(sp.N(sp.expand(v), 30) for v in p) for p in found} == {
-        tuple(sp.N(sp.expand(v), 30) for v in p) for p in every
-    }
+    assert {tuple(sp.expand_complex(c) for c in point) for point in found} == every
+    mu, nu = (sp.expand(c + L.subs({u: half + w, v: w - half}) - 1) for c in (half + w, w - half))
+    exact = three_masses().parameters
+    assert sp.expand(mu - exact["mu_r"] - sp.I * exact["mu_i"]) == 0
+    assert sp.expand(nu - exact["nu_r"] - sp.I * exact["nu_i"]) == 0
+
+
+def test_all_ep3_of_three_masses_are_found() -> None:
+    """With mu_r ≥ nu_r two of the four that are complex, conjugates; the file asks for one."""
+    asked = problem("three_masses")
+    both = replace(asked, free={**asked.free, "mu_i": (-5.0, 5.0), "nu_i": (-5.0, 5.0)})
+    found = tmsopt.solve_all(both, starts=24).solutions
+    height = float(three_masses().parameters["mu_i"])
+    assert all(d.status == "optimal" and d.structure == "CEP3" for d in found)
+    ends = sorted([d.parameters[n] for n in asked.free] for d in found)
+    assert ends == [pytest.approx([1.5, sign * height, 0.5, sign * height], abs=MET) for sign in (-1, 1)]
 
 
 def test_little_damping_need_not_weaken_the_pendulum() -> None:
@@ -293,7 +324,7 @@ def test_little_damping_need_not_weaken_the_pendulum() -> None:
     free = replace(problem("ziegler"), fixed={"b2": 0.01}, free={"p": (0.0, 3.0), "b1": (0.0, 1.0)})
     design = tmsopt.solve(free)
     slope = sp.lambdify(b1, sp.diff(load.subs(b2, sp.Rational(1, 100)), b1), "mpmath")
-    best = mpmath.findroot(slope, 0.11)
+    best = mpmath.findroot(slope, (0.1, 0.12), solver="anderson")
     assert design.parameters["b1"] == pytest.approx(float(best), abs=1e-6)  # a maximum is flat
     assert design.value == pytest.approx(float(load.subs({b1: best, b2: 0.01})), abs=MET)
 
@@ -313,10 +344,10 @@ def test_no_controller_of_two_masses_is_faster() -> None:
 
 
 def test_no_controller_of_third_order_is_faster() -> None:
-    """The poles turn p at e^(it) by less than y needs, as `chocolate` says: a million choices of five left of −r."""
+    """The poles turn p at e^(it) by less than y needs, as `chocolate` says: many choices of five left of −r."""
     t = np.arccos(0.9)
     r, root, rng = -float(chocolate().abscissa), np.exp(1j * t), np.random.default_rng(0)
-    left, height = r + rng.exponential(1, (5, 1_000_000)) ** 3, rng.exponential(1, (2, 1_000_000)) ** 3
+    left, height = r + rng.exponential(1, (5, 200_000)) ** 3, rng.exponential(1, (2, 200_000)) ** 3
     turns = np.angle(root + left)
     pairs = np.angle((root + left[:2]) ** 2 + height**2)
     for turn in (turns.sum(axis=0), turns[2:].sum(axis=0) + pairs[0], turns[4] + pairs.sum(axis=0)):
