@@ -250,8 +250,8 @@ def sixfold(quick: bool) -> str:
         "default, and what the rivals have here, who search without bounds. The optimum, all six poles at −√15/5, is "
         "proved in `tests/test_published.py`. A method on eigenvalues states its best eigenvalue, ours the root of "
         "the factored form. *As stored* is the true abscissa of the parameters in double precision, at 60 digits: "
-        "rounding them moves a 6-fold root by some 2e-3, whatever found them. The papers that could be read print no "
-        "digits for this problem, so the methods are run."
+        "rounding them moves a 6-fold root by some 2e-3, whatever found them. HANSO is MATLAB: its two phases are "
+        "written here after the papers. None of those that could be read prints digits for this problem."
     )
     return table(header, rows) + "\n\n" + note
 
