@@ -34,7 +34,7 @@ OPTIMUM: Mapping[str, float] = {"x0": 7.0, "x1": -6 * _ROOT, "y0": 0.216, "y1": 
 """The controller whose six poles are all at −√15/5."""
 
 _FILE = Path(__file__).parent.parent / "problems" / "two_mass_spring.toml"
-_STARTS, _RIVAL_STARTS = 200, 40
+_STARTS, _RIVAL_STARTS = 100, 20
 _QUICK = 4
 _WITHIN = (1e-9, 1e-6, 1e-3)
 _STEPS = 1000
