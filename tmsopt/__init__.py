@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from tmsopt.study.branch import Branch, Trace
     from tmsopt.study.chart import Chart, chart
     from tmsopt.study.compare import Comparison, compare
+    from tmsopt.study.diagnosis import Diagnosis, diagnose
     from tmsopt.study.domain import Domain, domain
     from tmsopt.study.explain import Explanation, explain
     from tmsopt.study.front import Front
@@ -41,6 +42,7 @@ __all__ = [
     "Branch",
     "Chart",
     "Comparison",
+    "Diagnosis",
     "Domain",
     "Every",
     "Explanation",
@@ -63,6 +65,7 @@ __all__ = [
     "chart",
     "chart_to",
     "compare",
+    "diagnose",
     "domain",
     "explain",
     "latin_hypercube",
@@ -96,6 +99,7 @@ _HOMES = {
     "Branch": "tmsopt.study.branch",
     "Chart": "tmsopt.study.chart",
     "Comparison": "tmsopt.study.compare",
+    "Diagnosis": "tmsopt.study.diagnosis",
     "Domain": "tmsopt.study.domain",
     "Explanation": "tmsopt.study.explain",
     "Front": "tmsopt.study.front",
@@ -117,6 +121,7 @@ _HOMES = {
     "chart": "tmsopt.study.chart",
     "chart_to": "tmsopt.study.stored",
     "compare": "tmsopt.study.compare",
+    "diagnose": "tmsopt.study.diagnosis",
     "domain": "tmsopt.study.domain",
     "explain": "tmsopt.study.explain",
     "latin_hypercube": "tmsopt.study.batch.samples",

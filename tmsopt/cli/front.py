@@ -21,9 +21,9 @@ def check_options(problem: "Problem", given: Sequence[str]) -> None:
     from tmsopt.design.errors import Fault, InputError
 
     if problem.pareto:
-        if "--certify" in given:
+        if alone := [o for o in given if o in ("--certify", "--diagnose")]:
             message = "is for one design, and the file asks for a front; write minimize with one of the expressions"
-            raise InputError([Fault(message, ("--certify",))])
+            raise InputError([Fault(message, (option,)) for option in alone])
         wrong = [o for o in given if o in ("--wheelbase", "--rear-mass")]
         message = "scales one design, and the file asks for a front; write the problem in SI instead"
     else:

@@ -20,12 +20,11 @@ from tmsopt.cli.common import (
     saving,
     write_json,
 )
+from tmsopt.cli.meaning import meaning, meaning_lines
 
 if TYPE_CHECKING:
-    from tmsopt.design.nearest import Robustness
     from tmsopt.design.problem import Problem
     from tmsopt.design.solution import Solution
-    from tmsopt.study.explain import Explanation
 
 _EXIT = {"optimal": DONE, "infeasible": INFEASIBLE, "not_converged": NOT_CONVERGED}
 
@@ -118,6 +117,12 @@ class _Seconds(click.ParamType[float]):
     "--brief", is_flag=True, help="Leave out what the optimum means: gains of limits moved, rounding, robustness."
 )
 @click.option(
+    "--diagnose",
+    "details",
+    is_flag=True,
+    help="Of multiple roots, show how they split when each parameter changes. JSON has this always, but for --brief.",
+)
+@click.option(
     "--certify",
     type=_Seconds(),
     is_flag=False,
@@ -143,6 +148,7 @@ def solve(
     wheelbase: str,
     rear_mass: str,
     brief: bool,
+    details: bool,
     certify: float | None,
     every: bool,
 ) -> None:
@@ -183,20 +189,13 @@ def solve(
         if certify:
             solution = _certified(solution, certify)
     if as_json:
-        write_json(solution.to_json() | ({} if brief else _meaning(solution)))
+        write_json(solution.to_json() | ({} if brief else meaning(solution)))
     else:
         from tmsopt.show.tables import solution_table
 
         click.echo(solution_table(solution, w, m_B))
-        if not brief:
-            from tmsopt.show.explained import explained_lines
-
-            click.echo("\n".join(["", *explained_lines(_explained(solution))]))
-            if robust := _robust(solution):
-                from tmsopt.show.robust import robustness_table
-
-                nominal = "of the nominal design, without its scenarios and tolerances:\n" if solution.worst else ""
-                click.echo("\n" + nominal + robustness_table(robust))
+        for line in meaning_lines(solution, brief, details):
+            click.echo(line)
     if plot is not None:
         _draw(solution, plot, w, m_B)
     sys.exit(_EXIT[solution.status])
@@ -275,30 +274,6 @@ def _scale(option: str, text: str, unit: str) -> float:
     except ValueError as error:
         raise InputError([Fault(str(error), (option,))]) from None
     return value
-
-
-def _explained(solution: "Solution") -> "Explanation":
-    from tmsopt.study.explain import explain
-
-    return explain(solution)
-
-
-def _robust(solution: "Solution") -> "Robustness | None":
-    """The nearest boundaries; None where a root is at infinity, or nothing feasible was found."""
-    from tmsopt.design.nearest import robustness
-
-    if not math.isfinite(solution.abscissa) or solution.status == "infeasible":
-        return None
-    return robustness(solution)
-
-
-def _meaning(solution: "Solution") -> dict[str, Any]:
-    """What the optimum means, for JSON."""
-    robust = _robust(solution)
-    return {
-        "meaning": _explained(solution).to_json(),
-        **({"robustness": robust.to_json()} if robust else {}),
-    }
 
 
 def _draw(solution: "Solution", path: Path, w: float, m_B: float) -> None:

@@ -54,7 +54,7 @@ def enclosed_roots(coefficients: Sequence[Any]) -> tuple[Enclosed, ...] | None:
     holds a root of every p in the balls (Laguerre), exactly one if the discs are disjoint, and a real one if z is.
     Multiple roots are accepted at 0 and of coefficients that are exact. Rightmost first.
     """
-    terms = [as_ball(c) for c in coefficients]
+    terms = [flint.arb(as_ball(c)) for c in coefficients]
     zeros = 0
     while terms and terms[-1] == 0:
         terms.pop()
@@ -96,7 +96,7 @@ def nearest(name: str, coefficients: Sequence[Any], roots: Sequence[Root]) -> tu
         name: of a quartic, its structure. Of other degrees the roots alone tell the structure: by multiplicities, and
             by real parts that equal the largest.
     """
-    terms = [as_ball(c) for c in coefficients]
+    terms = [flint.arb(as_ball(c)) for c in coefficients]
     monic = [c / terms[0] for c in terms]
     if not all(c.is_finite() for c in monic):
         return None

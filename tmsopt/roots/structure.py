@@ -118,9 +118,8 @@ def _checked(coefficients: ArrayLike) -> Array:
 def _matching(pattern: Pattern, coefficients: ArrayLike) -> Array:
     """The coefficients, if they are of the pattern's degree."""
     c = _checked(coefficients)
-    degree = sum(len(factor) - 1 for factor in pattern.factors([1.0] * len(pattern.unknowns)))
-    if len(c) - 1 != degree:
-        raise ValueError(f"found coefficients of degree {len(c) - 1}; accepted: degree {degree}, as {pattern.name} has")
+    if len(c) - 1 != pattern.degree:
+        raise ValueError(f"found coefficients of degree {len(c) - 1}; accepted: those of degree {pattern.degree}")
     return c
 
 

@@ -1,0 +1,73 @@
+"""How a multiple root splits under a small change: the leading terms of Puiseux series, by Newton's polygon."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+from math import gcd
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Branches:
+    """Roots s0 + t that leave a multiple root s0 alike: t^denominator = constant · ε^numerator, to leading order.
+
+    Attributes:
+        roots: how many.
+        constants: one for each cycle of `denominator` roots.
+    """
+
+    roots: int
+    numerator: int
+    denominator: int
+    constants: tuple[complex, ...]
+
+    @property
+    def exponent(self) -> Fraction:
+        """Of ε."""
+        return Fraction(self.numerator, self.denominator)
+
+    @property
+    def size(self) -> float:
+        """The largest |t| is this times |ε| to the exponent."""
+        return float(max(abs(c) for c in self.constants) ** (1 / self.denominator))
+
+    def shifts(self, eps: float) -> list[complex]:
+        """Every t for a real ε, to leading order."""
+        found: list[complex] = []
+        for constant in self.constants:
+            power = complex(constant) * eps**self.numerator
+            first = power ** (1 / self.denominator)
+            found += [first * np.exp(2j * np.pi * k / self.denominator) for k in range(self.denominator)]
+        return found
+
+
+def branches(terms: Sequence[Sequence[complex]]) -> tuple[tuple[Branches, ...], int]:
+    """Branches of Σ terms[m][j] ε^m t^j = 0 that start at t = 0, fastest first, and how many roots do not move.
+
+    terms[0][j] is 0 for all j below the multiplicity, which is the last j. What is 0 must be 0 exactly. Roots that do
+    not move in the orders given are counted as unmoved.
+    """
+    k = len(terms[0]) - 1
+    first = {j: next((m for m, row in enumerate(terms) if row[j] != 0), None) for j in range(k + 1)}
+    points = [(j, m) for j, m in first.items() if m is not None]
+    hull: list[tuple[int, int]] = []
+    for j, m in points:  # lower convex hull from left to right
+        while len(hull) > 1 and _slope(hull[-2], hull[-1]) >= _slope(hull[-2], (j, m)):
+            hull.pop()
+        hull.append((j, m))
+    found = []
+    for (j1, m1), (j2, m2) in pairwise(hull):
+        width, drop = j2 - j1, m1 - m2
+        q = width // gcd(width, drop)
+        polynomial = [0j] * (width // q + 1)
+        for i in range(width // q + 1):
+            polynomial[-1 - i] = complex(terms[m1 - i * q * drop // width][j1 + i * q])
+        constants = tuple(complex(z) for z in np.roots(np.array(polynomial)))
+        found.append(Branches(width, drop * q // width, q, constants))
+    return tuple(sorted(found, key=lambda b: b.exponent)), hull[0][0]
+
+
+def _slope(a: tuple[int, int], b: tuple[int, int]) -> Fraction:
+    return Fraction(b[1] - a[1], b[0] - a[0])
