@@ -146,7 +146,33 @@ def test_two_equal_oscillators_are_semisimple() -> None:
     assert coupled.unmoved == 1  # both masses together do not feel the spring between them
     assert coupled.laws[0].branches.constants[0] == pytest.approx(-2 / (4 * s0 + 0.6), rel=1e-12)
     both = response(found, "m").laws[0].branches
-    assert (both.roots, both.constants) == (2, pytest.approx([-2 * s0**2 / (4 * s0 + 0.6)] * 2, rel=1e-6))
+    assert (both.roots, both.constants) == (2, pytest.approx([-2 * s0**2 / (4 * s0 + 0.6)] * 2, rel=1e-12))
+
+
+def test_six_uncoupled_oscillators_with_critical_damping() -> None:
+    """(s² + c s + 1)⁶ at c = 2: six chains of two, each moved by t² = 2 ε for c (1 + ε)."""
+    c, k = symbols("c k")
+    eye = np.eye(6, dtype=int).tolist()
+    model = from_matrices(eye, [[c * x for x in row] for row in eye], [[k * x for x in row] for row in eye])
+    found = diagnosis_of(model, c=2.0, k=1.0)
+    assert (found.kind, found.algebraic, found.partial) == ("partly defective", 12, (2,) * 6)
+    law = response(found, "c").laws[0].branches
+    assert (law.roots, str(law.exponent)) == (12, "1/2")
+    assert law.constants == pytest.approx([2] * 6, rel=1e-10)
+
+
+def test_the_sixfold_root_of_two_masses_and_a_controller() -> None:
+    """(s⁴ + 2s²)(x0 + x1 s + s²) + y0 + y1 s + y2 s² = (s + r)⁶ with r = √15/5; y0 (1 + ε): t⁶ = −r⁶ ε exactly."""
+    x0, x1, y0, y1, y2 = symbols("x0 x1 y0 y1 y2")
+    model = from_coefficients([1, x1, x0 + 2, 2 * x1, 2 * x0 + y2, y1, y0])
+    r = sqrt(15) / 5
+    free = {"x0": 15 * r**2 - 2, "x1": 6 * r, "y0": r**6, "y1": 6 * r**5, "y2": 15 * r**4 - 2 * (15 * r**2 - 2)}
+    found = diagnosis_of(model, **free)
+    assert (found.algebraic, found.re) == (6, pytest.approx(-r, rel=1e-14))
+    (law,) = response(found, "y0").laws
+    assert str(law.branches.exponent) == "1/6"
+    assert law.branches.constants[0] == pytest.approx(-(r**6), rel=1e-12)
+    assert (law.below, law.above) == (1.0, 1.0)
 
 
 def test_a_defective_pair_of_first_order() -> None:

@@ -7,6 +7,9 @@ from itertools import pairwise
 from math import gcd
 
 import numpy as np
+from numpy.typing import NDArray
+
+_SAME = 1e-9  # relative to the terms of a coefficient, up to which an edge is the power of a linear polynomial
 
 
 @dataclass(frozen=True)
@@ -64,9 +67,19 @@ def branches(terms: Sequence[Sequence[complex]]) -> tuple[tuple[Branches, ...], 
         polynomial = [0j] * (width // q + 1)
         for i in range(width // q + 1):
             polynomial[-1 - i] = complex(terms[m1 - i * q * drop // width][j1 + i * q])
-        constants = tuple(complex(z) for z in np.roots(np.array(polynomial)))
-        found.append(Branches(width, drop * q // width, q, constants))
+        found.append(Branches(width, drop * q // width, q, _roots(np.array(polynomial))))
     return tuple(sorted(found, key=lambda b: b.exponent)), hull[0][0]
+
+
+def _roots(polynomial: NDArray[np.complex128]) -> tuple[complex, ...]:
+    """Roots of the polynomial of an edge; of the power of a linear one, as where all roots move alike, their mean."""
+    k = len(polynomial) - 1
+    mean = -polynomial[1] / (k * polynomial[0])
+    power = polynomial[0] * np.poly(np.full(k, mean))
+    terms = np.abs(polynomial[0]) * np.poly(np.full(k, -np.abs(mean)))
+    if np.all(np.abs(power - polynomial) <= _SAME * terms):
+        return (complex(mean),) * k
+    return tuple(complex(z) for z in np.roots(polynomial))
 
 
 def _slope(a: tuple[int, int], b: tuple[int, int]) -> Fraction:

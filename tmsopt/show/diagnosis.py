@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from tmsopt.show.text import columns
 from tmsopt.study.diagnosis import DEVIATION, Diagnosis, Law, Response
 
+_ROUNDING = 1e-16
+
 
 def diagnosis_lines(diagnoses: Sequence[Diagnosis], details: bool = False) -> list[str]:
     """Two sentences for each multiple root: what it is, and how it splits; the laws of every parameter as details."""
@@ -22,11 +24,13 @@ def _kind(found: Diagnosis) -> str:
     if found.jordan is None:
         why = "there are no matrices to judge by, so one chain, as a companion matrix has"
     else:
-        why = f"{vectors}: relative singular value {found.jordan.zero:.1g}"
+        zero = f"{found.jordan.zero:.1g}" if found.jordan.zero > _ROUNDING else f"below {_ROUNDING:g}"
+        why = f"{vectors}: relative singular value {zero}"
         why += f" beside {found.jordan.nonzero:.2g}" if found.jordan.nonzero < float("inf") else ", and no other"
     chains = f"Jordan chains of length {', '.join(map(str, found.partial))}" if found.partial else "chains not decided"
     chains = chains.replace("chains", "chain", 1) if len(found.partial) == 1 else chains
-    return f"{found.algebraic}-fold root {place}: {found.kind}, {chains} ({why})"
+    what = "pair" if found.im else "root"
+    return f"{found.algebraic}-fold {what} {place}: {found.kind}, {chains} ({why})"
 
 
 def _splitting(found: Diagnosis) -> list[str]:
