@@ -18,6 +18,7 @@ from tmsopt.roots.structure import Root
 
 _DIGITS = 120  # of y: a k-fold root then scatters by 1e-120/k, which must stay below `_SAME`
 _SAME = 1e-12  # relative to the largest root: difference of two that are one
+_NOTHING = flint.fmpq(1, 10**90)  # of the largest coefficient: one that is 0 but for the digits of y
 _FURTHER = 4  # divided differences that must vanish for a function to be taken as a polynomial
 
 Polynomial = Sequence[Any]
@@ -112,7 +113,9 @@ def _named(a: Sequence[Polynomial], kind: str, y: Any) -> Iterator[tuple[str, Ro
     if kind == "infinity":
         yield kind, Root(float("nan"), 0.0), False
         return
-    roots = _grouped(_at(a, y))
+    roots = _grouped(_finite_part(_at(a, y)))
+    if not roots:
+        return
     size = max(abs(complex(r.re, r.im)) for r in roots)
     line = max(r.re for r in roots)
 
@@ -132,10 +135,17 @@ def _named(a: Sequence[Polynomial], kind: str, y: Any) -> Iterator[tuple[str, Ro
                 yield f"{'CEP' if root.im else 'EP'}{root.multiplicity}", root, first(root)
 
 
+def _finite_part(coefficients: Sequence[Any]) -> Sequence[Any]:
+    """Without leading coefficients that are 0 but for the digits of y: their roots are at infinity."""
+    largest = max(abs(c) for c in coefficients)
+    first = next((k for k, c in enumerate(coefficients) if abs(c) > _NOTHING * largest), len(coefficients) - 1)
+    return coefficients[first:]
+
+
 def _grouped(coefficients: Sequence[Any]) -> list[Root]:
     """Roots of a polynomial that is known to many digits, those that are one to a few of these as one."""
-    left = list(exact_roots(coefficients, _DIGITS))
-    size = max(abs(complex(r.re, r.im)) for r in left) or 1.0
+    left = list(exact_roots(coefficients, _DIGITS)) if len(coefficients) > 1 else []
+    size = max((abs(complex(r.re, r.im)) for r in left), default=1.0) or 1.0
     groups: list[Root] = []
     while left:
         z = complex(left[0].re, left[0].im)
