@@ -96,7 +96,7 @@ def draw(path):
         places = np.array([displacements(e, *KINDS[name]) for e in exact[:41]]) + float(root.mid())
         right.plot(places.real.ravel(), places.imag.ravel(), ".", markersize=3, label=name)
     right.plot([float(root.mid())], [0], "k*", markersize=9)
-    right.annotate("EP4", (float(root.mid()), 0), xytext=(8, 8), textcoords="offset points")
+    right.annotate("EP4", (float(root.mid()), 0), xytext=(-36, -14), textcoords="offset points")
     right.set_xlabel(r"$\mathrm{Re}\,s$ in 1/s")
     right.set_ylabel(r"$\mathrm{Im}\,s$ in 1/s")
     right.set_title(r"roots up to $\varepsilon = 10^{-3}$", fontsize=9.5)

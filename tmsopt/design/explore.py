@@ -95,7 +95,7 @@ def without_any(problem: Problem, explored: Sequence[Explored], options: Options
         trial = survivor(problem, nlp, ended)
         if finding := found(problem, nlp, trial, Starts(tried + 2, sum(c.feasible for c in ended), 1)):
             return finding
-        advice = "try more starts, give one, or keep a0 away from 0 (for tms, nu_H >= 0.02)"
+        advice = "try more starts, give one, or keep a0 away from 0 (for tms, nu_H >= 0.02; for whipple, u_H >= 0.02)"
         status, note = "not_converged", f"feasible designs exist, but {none} converged; {advice}"
     return Finding(
         parameters,

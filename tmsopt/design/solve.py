@@ -154,7 +154,9 @@ def _assembled(
 
 def _stability_note(problem: Problem, checked: Checked, optimal: bool) -> tuple[str, ...]:
     if "a0" in checked.violations:
-        return ("the mass matrix is singular (a0 = 0), so a root is at infinity; keep nu_H and zeta_B away from 0",)
+        known = {"tms": "nu_H and zeta_B", "whipple": "mass_margin"}
+        keep = known.get(problem.model.name, "a0")
+        return (f"the mass matrix is singular (a0 = 0), so a root is at infinity; keep {keep} away from 0",)
     asked = [n for n, c in problem.conditions.items() if n in checked.violations and "abscissa" in c.names]
     if asked and checked.structure.abscissa >= 0:
         return ("no stable design was found that meets the other limits; this is the least unstable one",)
