@@ -103,7 +103,10 @@ def program(problem: Problem, solution: Solution) -> Program:
     values = problem.values(solution.parameters)
     point = dict(zip(problem.free, variables_of(problem, solution.parameters), strict=True))
     names = [*problem.free, *nlp.variables[len(problem.free) :]]
-    known = {n: point[n] if n in point else solution.abscissa if n == "abscissa" else _value(values, n) for n in names}
+    known = {
+        n: point[n] if n in point else solution.abscissa / nlp.unit if n == "abscissa" else _value(values, n)
+        for n in names
+    }
     at = ca.Function("rows", [symbols], [g])
     reached = np.array(at([known[n] if np.isfinite(known[n]) else 0.0 for n in names])).ravel()
     steady = [i for i, name in enumerate(names) if _steady(nlp, name, reached)]
@@ -127,7 +130,7 @@ def program(problem: Problem, solution: Solution) -> Program:
     line, rest = on_the_line(solution)
     design = {n: ca.atan(s) if problem.parameter_set[n].tangent else s
               for n, s in zip(problem.free, ca.vertsplit(symbols), strict=False)}  # fmt: skip
-    gamma = symbols[names.index("abscissa")]
+    gamma = nlp.unit * symbols[names.index("abscissa")]
     a = problem.model.coefficients(problem.ordered(design), problem.parameter_set)
     factored = _factored(a, float(values.coefficients[0]), gamma, line, rest)
     build.add(factored)
@@ -141,8 +144,9 @@ def program(problem: Problem, solution: Solution) -> Program:
                 bound = symbols[k] - known[names[k]]
                 build.one(Held(f"{names[k]}.{end}", True), bound if end == "min" else -bound)
     size = max(np.hypot(r.re, r.im) for r in solution.roots)
-    widths = [max(abs(known[names[k]]), _width(problem, names[k]), 1e-12) if names[k] in problem.free
-              else size if names[k] == "abscissa" else max(abs(known[names[k]]), 1e-3) for k in kept]  # fmt: skip
+    widths = [_natural_size(problem, names[k], known[names[k]]) if names[k] in problem.free
+              else size / nlp.unit if names[k] == "abscissa"
+              else max(abs(known[names[k]]), 1e-3) for k in kept]  # fmt: skip
     x = ca.vertcat(*(symbols[k] for k in kept), *factored.unknowns)
     return Program(
         problem=problem,
@@ -280,8 +284,8 @@ def _value(values: Mapping[str, Any], name: str) -> float:
     return float(values[name]) if name in set(values) else np.nan
 
 
-def _width(problem: Problem, name: str) -> float:
-    """Width of a parameter's range as the program sees it, at most 1: a wide box says nothing about sizes."""
+def _natural_size(problem: Problem, name: str, value: float) -> float:
+    """Size of a parameter: its own, or the width of its range as the program sees it, which beyond 1 says nothing."""
     ends = problem.free[name]
     low, high = (float(np.tan(e)) if problem.parameter_set[name].tangent else e for e in ends)
-    return min(high - low, 1.0)
+    return max(abs(value), min(high - low, 1.0), 1e-12)

@@ -20,14 +20,13 @@ from tmsopt.roots.meetings import meeting
 from tmsopt.study.continuation import Curve, Walk, between, both_ways, contains, crossing, curve, project
 from tmsopt.study.grid import unexplained
 from tmsopt.study.marks import margins, sign_changes
+from tmsopt.study.sizes import sizes
 from tmsopt.study.trace import design_at
 
 Array = NDArray[np.float64]
 Truth = NDArray[np.bool_]
 
 _NOTHING = 1e-12  # of its size over the box: a constant term this small all along the curve vanishes with a0
-
-_SAMPLE = 32  # designs by which that size is judged
 
 _MOST = 10**6
 
@@ -64,10 +63,9 @@ def through_infinity(problem: Problem, step: float, starts: int, seed: int) -> I
     on = curve(x, ca.SX(a[0]), upper - lower, lower, upper)
     along = ca.dot(ca.gradient(a[0], x), ca.gradient(ca.SX(a[-1]), x))
     rest = ca.Function("rest", [x], [ca.vertcat(*a[1:], along)])
-    usual = np.median([abs(float(problem.values(problem.ordered(d)).coefficients[-1]))
-                       for d in islice(spread(problem, 0), _SAMPLE)])  # fmt: skip
+    usual = float(sizes(problem).of[-1])
     for walked in _walks(problem, on, step, starts, seed):
-        x_on, bounds, changes = _judged(on, walked, rest, float(usual))
+        x_on, bounds, changes = _judged(on, walked, rest, usual)
         yield Infinity(design_at(problem, x_on), *bounds, changes)
 
 

@@ -108,33 +108,29 @@ def prepare(problem: Problem) -> Traced:
     pattern = pattern_of(str(problem.locate), problem.model.degree)
     equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].comparison == "=="}
     nlp = matching(replace(problem, constraints=equalities))
+    free = len(problem.free)
+    unknowns = slice(free, free + len(pattern.unknowns))
+    unit = np.ones(len(nlp.variables))
+    unit[unknowns] = np.array([nlp.unit**power for power in pattern.powers])  # of the NLP; x has natural units
     x = ca.SX.sym("x", len(nlp.variables))
-    g = nlp.at(x)[1]
+    g = nlp.at(x / ca.DM(unit))[1]
     rows = [k for k in range(len(nlp.rows)) if nlp.row_lower[k] == nlp.row_upper[k]]
     if len(rows) != len(nlp.variables) - 1:
         names = ", ".join(equalities)
         message = f"an equality of a root quantity cannot be traced along {pattern.name}; leave out {names}"
         raise InputError([Fault(message, ("constraints",))])
-    free = len(problem.free)
-    unknowns = slice(free, free + len(pattern.unknowns))
     lower, upper = np.array(nlp.lower), np.array(nlp.upper)
     for k, name in enumerate(pattern.unknowns):
         if name in pattern.ends:
             lower[free + k] = 0.0
-    scale = np.ones(len(nlp.variables))
+    scale = unit.copy()
     scale[:free] = upper[:free] - lower[:free]
-    size = sizes(problem)
-    unit = np.array([size.rate**power for power in pattern.powers])
     sample = [_variables(nlp, problem, d, 1) for d, _ in zip(spread(problem, 0), range(_SAMPLE), strict=False)]
     known = np.array([s[0] for s in sample if s]).reshape(-1, len(nlp.variables))
-    scale[unknowns] = unit
     if known.size:
-        scale[unknowns] = np.clip(np.median(np.abs(known[:, unknowns]), axis=0), 0.1 * unit, 1e3 * unit)
-        scale[unknowns.stop :] = np.clip(np.median(np.abs(known[:, unknowns.stop :]), axis=0), 0.1, 1e3)
-    matched = [k < pattern.degree and nlp.rows[row] == pattern.name for k, row in enumerate(rows)]
-    weights = [size.terms[k + 1] if of_pattern else 1.0 for k, of_pattern in enumerate(matched)]
-    on = curve(x, ca.vertcat(*[g[row] / w for row, w in zip(rows, weights, strict=True)]), scale, lower, upper)
-    return Traced(problem, pattern, nlp, on, unknowns, size)
+        scale[free:] = np.clip(np.median(np.abs(known[:, free:]), axis=0), 0.1 * unit[free:], 1e3 * unit[free:])
+    on = curve(x, ca.vertcat(*[g[k] for k in rows]), scale, lower, upper)
+    return Traced(problem, pattern, nlp, on, unknowns, sizes(problem))
 
 
 def branch_of(ready: Traced, walked: Walk) -> Branch:
@@ -312,7 +308,9 @@ def _variables(nlp: NLP, problem: Problem, design: Mapping[str, float], count: i
     if a[0] == 0 or not np.all(np.isfinite(a)):
         return []
     z = roots(a)
-    guesses = [lift.guess([values], [z]) for lift in nlp.lifts]
+    guesses = [
+        lift.guess([values], [z / nlp.unit if k else z]) for k, lift in enumerate(nlp.lifts)
+    ]  # those in its unit
     if not all(guesses):
         return []
     others = [c for guess in guesses[1:] for c in guess[0]]
