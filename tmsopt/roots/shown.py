@@ -50,7 +50,7 @@ def _pattern(shape: Shape, start: Sequence[Any]) -> Pattern:
     return Pattern(
         name=" beside ".join(_name(groups) for groups in (tied, others) if groups),
         meaning=_meaning(tied, others) + (" beside other roots" if shape.rest else ""),
-        unknowns=shape.unknowns,
+        unknowns=_unknowns(shape),
         factors=partial(_factors, shape),
         guesses=lambda z: [[float(x) for x in start]],
         nonnegative=shape.gaps,
@@ -82,6 +82,14 @@ def _take(left: list[int], order: int) -> None:
     left[k] -= order
 
 
+def _unknowns(shape: Shape) -> tuple[str, ...]:
+    """Names as in other patterns, numbered only where there are several of a kind."""
+    kinds = [u.rstrip("0123456789") for u in shape.unknowns]
+    return tuple(
+        kind if kind != "d" and kinds.count(kind) == 1 else u for u, kind in zip(shape.unknowns, kinds, strict=True)
+    )
+
+
 def _factors(shape: Shape, unknowns: Sequence[Any]) -> list[list[Any]]:
     each = zip(shape.group_factors(unknowns), shape.groups, strict=True)
     repeated = [f for f, g in each for _ in range(g.multiplicity)]
@@ -106,11 +114,13 @@ def _meaning(tied: Sequence[Group], others: Sequence[Group]) -> str:
 
 
 def _words(groups: Sequence[Group]) -> str:
-    counted = Counter((not g.real, -g.multiplicity) for g in groups)
+    """In the order of the name: multiple real roots, multiple pairs, simple pairs, a simple real root."""
+    counted = Counter(groups)
     words = []
-    for (pair, order), count in sorted(counted.items()):
-        fold = f"{-order}-fold " if order < -1 else ""
-        words.append(f"{_COUNTS[count]} {fold}{'complex pair' if pair else 'real root'}{'s' if count > 1 else ''}")
+    for group in sorted(counted, key=lambda g: (g.multiplicity == 1, g.real == (g.multiplicity == 1), -g.multiplicity)):
+        count, fold = counted[group], f"{group.multiplicity}-fold " if group.multiplicity > 1 else ""
+        what = "real root" if group.real else "complex pair"
+        words.append(f"{_COUNTS[count]} {fold}{what}{'s' if count > 1 else ''}")
     return " and ".join(words)
 
 
