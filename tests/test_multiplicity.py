@@ -9,12 +9,15 @@ from collections.abc import Sequence
 from fractions import Fraction as F
 from types import SimpleNamespace
 
+import casadi as ca
 import flint
 import numpy as np
 import pytest
 import sympy
 from mpmath import mp
 
+import tmsopt
+from tmsopt.models import from_matrices
 from tmsopt.roots import (
     backward_error,
     discriminant,
@@ -290,3 +293,27 @@ def test_discriminant_of_any_degree() -> None:
     assert discriminant([F(x) for x in polynomial(LARGE[2])[:]]) == 0
     with pytest.raises(ValueError, match="degree"):
         discriminant([1, 2])
+
+
+# Solved and proved
+
+
+def test_three_pairs_on_one_line_are_proved() -> None:
+    """Three masses in a chain, dampers on two, the last spring free: three pairs at −1/2 for c = (2, 1), k1 = 1.
+
+    The trace of the damping matrix is twice the sum of the pairs' decay rates, so 3/2 is shared by three.
+    """
+    c1, c2, k1 = (ca.SX.sym(n) for n in ("c1", "c2", "k1"))
+    model = from_matrices(
+        [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+        [[c1, 0, 0], [0, c2, 0], [0, 0, 0]],
+        [[2, -1, 0], [-1, 2, -1], [0, -1, k1]],
+        name="chain",
+    )
+    free = {"c1": (0.0, 10.0), "c2": (0.0, 10.0), "k1": (1.0, 4.0)}
+    design = tmsopt.solve(tmsopt.Problem(model=model, free=free, minimize="abscissa"))
+    assert design.structure == "three pairs"
+    assert design.abscissa == pytest.approx(-sum(design.parameters[n] for n in ("c1", "c2")) / 6, rel=1e-14)
+    assert (design.proof.proved, design.proof.pattern) == (True, "three pairs")
+    assert design.proof.abscissa is not None
+    assert float(design.proof.abscissa) == pytest.approx(-0.5, abs=1e-14)
