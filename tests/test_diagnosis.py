@@ -24,7 +24,8 @@ from tmsopt.roots import structure
 from tmsopt.roots.jordan import is_regular, jordan
 from tmsopt.roots.puiseux import branches
 from tmsopt.show.diagnosis import diagnosis_lines
-from tmsopt.study.diagnosis import Diagnosis, Response, diagnosed
+from tmsopt.study.diagnosis import Diagnosis, diagnosed
+from tmsopt.study.splitting import Response
 
 # Jordan chains
 

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 
 from tmsopt.show.text import columns
-from tmsopt.study.diagnosis import DEVIATION, Diagnosis, Law, Response
+from tmsopt.study.diagnosis import Diagnosis
+from tmsopt.study.splitting import DEVIATION, Law, Response
 
 _ROUNDING = 1e-16
 

@@ -1,63 +1,23 @@
 """What a multiple root is: its multiplicities and Jordan chains, and how its parts move when a parameter changes."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from math import comb
 from typing import Any
 
 import flint
-import numpy as np
 
 from tmsopt.design.solution import Solution
 from tmsopt.models import Model, ParameterSet
-from tmsopt.roots import Root, Structure, product
+from tmsopt.roots import Root, Structure
 from tmsopt.roots.elementary import exact
 from tmsopt.roots.enclosed import nearest
 from tmsopt.roots.jordan import Jordan, is_regular, jordan
-from tmsopt.roots.puiseux import Branches, branches
+from tmsopt.study.splitting import DEVIATION, Ideal, Law, Response, response
 
-DEVIATION = 0.1
-"""Share by which a root may be off the leading term while the law is said to hold."""
-
-_BITS = 424  # 127 digits: changes down to 1e-20 are differences of coefficients
+_BITS = 424  # 127 digits: changes down to 1e-16 are differences of coefficients
 _RANK = 1e-7  # relative singular value that counts as 0; of a nearly semisimple root it is the root of the distance
 _TIMES = 10.0  # likewise, times the root of the distance from the structure
-_NOTHING = 1e-9  # of its terms: a derivative that vanishes at the exact multiple root, and not quite at the stored one
-_FAINT = 1e-13  # of the coefficients' own terms: a derivative that rounding of the design alone may bring about
-_DECADES = range(-16, 1)  # of the changes at which a law is tried
-_WITHIN = (0.75, 0.5, 0.25)  # and, before the first decade at which it fails
-
-
-@dataclass(frozen=True)
-class Law:
-    """Roots that leave the multiple root alike when a parameter changes.
-
-    Attributes:
-        branches: tᵠ = C εᵖ for the shift t of each, to leading order.
-        below, above: |ε| up to which every sampled shift is within `DEVIATION` of it, for ε < 0 and ε > 0; sampled at
-            each decade from 1e-16 to 1, and four times in the last one that is reached; 0 if it fails at 1e-16.
-    """
-
-    branches: Branches
-    below: float
-    above: float
-
-
-@dataclass(frozen=True)
-class Response:
-    """How a multiple root answers to one parameter.
-
-    Attributes:
-        relative: whether ε is relative to the parameter's value; of a parameter that is 0 it is absolute.
-        laws: fastest first; empty if no root moves.
-        unmoved: roots that stay, to the orders looked at.
-    """
-
-    parameter: str
-    relative: bool
-    laws: tuple[Law, ...]
-    unmoved: int
 
 
 @dataclass(frozen=True)
@@ -140,11 +100,7 @@ def diagnosed(
         )
 
 
-_Ideal = Sequence[tuple[Root, Any]]
-"""Each root of the nearest polynomial with the structure, and as a complex ball without a radius."""
-
-
-def _ideal(model: Model, of: ParameterSet, design: Mapping[str, float], structure: Structure) -> _Ideal:
+def _ideal(model: Model, of: ParameterSet, design: Mapping[str, float], structure: Structure) -> Ideal:
     coefficients = model.coefficients({n: exact(x) for n, x in design.items()}, of)
     balls = nearest(structure.name, coefficients, structure.roots)
     if balls is None:
@@ -156,7 +112,7 @@ def _ideal(model: Model, of: ParameterSet, design: Mapping[str, float], structur
 
 
 def _diagnosis(
-    model: Model, of: ParameterSet, design: Mapping[str, float], structure: Structure, ideal: _Ideal, place: int
+    model: Model, of: ParameterSet, design: Mapping[str, float], structure: Structure, ideal: Ideal, place: int
 ) -> Diagnosis:
     root, s = ideal[place]
     k = root.multiplicity
@@ -164,7 +120,7 @@ def _diagnosis(
     partial = ranks.partial if ranks else (k,)
     geometric = ranks.geometric if ranks else 1
     kind = "semisimple" if geometric == k else "defective" if geometric == 1 else "partly defective"
-    responses = [_response(model, of, design, ideal, place, name) for name in of.names]
+    responses = [response(model, of, design, ideal, place, name) for name in of.names]
     return Diagnosis(
         re=root.re,
         im=root.im,
@@ -194,97 +150,6 @@ def _sensitivity(response: Response) -> tuple[float, float]:
         return math.inf, 0.0
     first = response.laws[0].branches
     return float(first.exponent), -first.size
-
-
-def _response(
-    model: Model, of: ParameterSet, design: Mapping[str, float], ideal: _Ideal, place: int, name: str
-) -> Response:
-    root, s = ideal[place]
-    k = root.multiplicity
-    relative = design[name] != 0
-    step = exact(design[name]) if relative else exact(1.0)
-
-    def changed(by: Any) -> list[Any]:
-        varied: dict[str, Any] = {n: flint.arb(x) for n, x in design.items()}
-        varied[name] = varied[name] + flint.arb(step) * by
-        return model.coefficients(varied, of)
-
-    own = [_ball(c) for c in changed(flint.arb(0))]
-    base = [own[0] * c for c in product(*([1, -z] for r, z in ideal for _ in range(r.multiplicity)))]
-    series = changed(flint.arb_series([0, 1], prec=k + 1))
-    unit = abs(s) if abs(s) > 0 else abs(max((z for _, z in ideal), key=lambda z: float(abs(z)))) or flint.arb(1)
-    size = _taylor([abs(c) for c in base], abs(s), unit, k)
-    terms = [[0j] * k + [_number(_taylor(base, s, unit, k)[k])]]
-    for m in range(1, k + 1):
-        order = [c[m] if isinstance(c, flint.arb_series) else flint.arb(0) for c in series]
-        values, sizes = _taylor(order, s, unit, k), _taylor([abs(c) for c in order], abs(s), unit, k)
-        floors = [_NOTHING * _middle(a) + _FAINT * _middle(b) for a, b in zip(sizes, size, strict=True)]
-        terms.append([z if abs(z := _number(v)) > f else 0j for v, f in zip(values, floors, strict=True)])
-    found, unmoved = branches(terms)
-    laws = []
-    for branch in found:
-        below, above = (_holds(branch, k, base, own, changed, (s, unit), sign) for sign in (-1, 1))
-        laws.append(Law(_in_unit(branch, float(unit.mid())), below, above))
-    return Response(name, relative, tuple(laws), unmoved)
-
-
-def _holds(
-    branch: Branches, k: int, base: Sequence[Any], own: Sequence[Any], changed: Any, about: tuple[Any, Any], sign: int
-) -> float:
-    """The largest sampled change up to which the roots are where the leading term has them; about = root, unit."""
-
-    def held(eps: float) -> bool:
-        change = changed(flint.arb(sign) * eps)
-        coefficients = [b + _ball(c) - o for b, c, o in zip(base, change, own, strict=True)]
-        return _deviation(branch.shifts(sign * eps), k, coefficients, *about) <= DEVIATION
-
-    first = next((m for m in _DECADES if not held(10.0**m)), None)
-    if first is None:
-        return 10.0 ** _DECADES[-1]
-    if first == _DECADES[0]:
-        return 0.0
-    return 10.0 ** next((first - 1 + share for share in _WITHIN if held(10.0 ** (first - 1 + share))), first - 1)
-
-
-def _deviation(predicted: Sequence[complex], k: int, coefficients: Sequence[Any], s: Any, unit: Any) -> float:
-    """The largest distance of a predicted shift from the nearest true one, relative; inf where there is none."""
-    scale = max(abs(t) for t in predicted)
-    shifted = _taylor(coefficients, s, unit * scale, len(coefficients) - 1)
-    # Of 1/t, so that those sought are the largest roots: companion eigenvalues have these to all digits.
-    values = np.array([_number(c / shifted[k].abs_upper()) for c in shifted])
-    if not np.all(np.isfinite(values)) or not np.any(values[: k + 1]):
-        return math.inf
-    inverse = np.roots(values)
-    actual = scale / inverse[inverse != 0]
-    return max(float(np.abs(actual - t).min(initial=np.inf)) / abs(t) for t in predicted)
-
-
-def _in_unit(branch: Branches, unit: float) -> Branches:
-    """With the shift in the unit of s."""
-    constants = tuple(c * unit**branch.denominator for c in branch.constants)
-    return Branches(branch.roots, branch.numerator, branch.denominator, constants)
-
-
-def _taylor(coefficients: Sequence[Any], s: Any, unit: Any, last: int) -> list[Any]:
-    """Coefficients in t of p(s + unit t), ascending, up to a power."""
-    n = len(coefficients) - 1
-    found = []
-    for j in range(last + 1):
-        terms = (comb(n - i, j) * c * s ** (n - i - j) for i, c in enumerate(coefficients[: n - j + 1]))
-        found.append(flint.acb(sum(terms, flint.acb(0)) * unit**j))
-    return found
-
-
-def _ball(x: Any) -> Any:
-    return x[0] if isinstance(x, flint.arb_series) else flint.arb(x)
-
-
-def _number(x: Any) -> complex:
-    return complex(float(x.real.mid()), float(x.imag.mid()))
-
-
-def _middle(x: Any) -> float:
-    return float(abs(x).mid())
 
 
 def _law(law: Law) -> dict[str, Any]:

@@ -1,0 +1,150 @@
+"""How a multiple root splits when a parameter changes, and how far the leading term tells it."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import comb
+from typing import Any
+
+import flint
+import numpy as np
+
+from tmsopt.models import Model, ParameterSet
+from tmsopt.roots import Root, product
+from tmsopt.roots.elementary import exact
+from tmsopt.roots.puiseux import Branches, branches
+
+DEVIATION = 0.1
+"""Share by which a root may be off the leading term while the law is said to hold."""
+
+_NOTHING = 1e-9  # of its terms: a derivative that vanishes at the exact multiple root, and not quite at the stored one
+_FAINT = 1e-13  # of the coefficients' own terms: a derivative that rounding of the design alone may bring about
+_DECADES = range(-16, 1)  # of the changes at which a law is tried
+_WITHIN = (0.75, 0.5, 0.25)  # and, before the first decade at which it fails
+
+
+Ideal = Sequence[tuple[Root, Any]]
+"""Each root of the nearest polynomial with the structure, and as a complex ball without a radius."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """Roots that leave the multiple root alike when a parameter changes.
+
+    Attributes:
+        branches: tᵠ = C εᵖ for the shift t of each, to leading order.
+        below, above: |ε| up to which every sampled shift is within `DEVIATION` of it, for ε < 0 and ε > 0; sampled at
+            each decade from 1e-16 to 1, and four times in the last one that is reached; 0 if it fails at 1e-16.
+    """
+
+    branches: Branches
+    below: float
+    above: float
+
+
+@dataclass(frozen=True)
+class Response:
+    """How a multiple root answers to one parameter.
+
+    Attributes:
+        relative: whether ε is relative to the parameter's value; of a parameter that is 0 it is absolute.
+        laws: fastest first; empty if no root moves.
+        unmoved: roots that stay, to the orders looked at.
+    """
+
+    parameter: str
+    relative: bool
+    laws: tuple[Law, ...]
+    unmoved: int
+
+
+def response(
+    model: Model, of: ParameterSet, design: Mapping[str, float], ideal: Ideal, place: int, name: str
+) -> Response:
+    """How one of the multiple roots of the ideal polynomial answers to a parameter, at the precision of `flint.ctx`."""
+    root, s = ideal[place]
+    k = root.multiplicity
+    relative = design[name] != 0
+    step = exact(design[name]) if relative else exact(1.0)
+
+    def changed(by: Any) -> list[Any]:
+        varied: dict[str, Any] = {n: flint.arb(x) for n, x in design.items()}
+        varied[name] = varied[name] + flint.arb(step) * by
+        return model.coefficients(varied, of)
+
+    own = [_ball(c) for c in changed(flint.arb(0))]
+    base = [own[0] * c for c in product(*([1, -z] for r, z in ideal for _ in range(r.multiplicity)))]
+    series = changed(flint.arb_series([0, 1], prec=k + 1))
+    unit = abs(s) if abs(s) > 0 else abs(max((z for _, z in ideal), key=lambda z: float(abs(z)))) or flint.arb(1)
+    size = _taylor([abs(c) for c in base], abs(s), unit, k)
+    terms = [[0j] * k + [_number(_taylor(base, s, unit, k)[k])]]
+    for m in range(1, k + 1):
+        order = [c[m] if isinstance(c, flint.arb_series) else flint.arb(0) for c in series]
+        values, sizes = _taylor(order, s, unit, k), _taylor([abs(c) for c in order], abs(s), unit, k)
+        floors = [_NOTHING * _middle(a) + _FAINT * _middle(b) for a, b in zip(sizes, size, strict=True)]
+        terms.append([z if abs(z := _number(v)) > f else 0j for v, f in zip(values, floors, strict=True)])
+    found, unmoved = branches(terms)
+    laws = []
+    for branch in found:
+        below, above = (_holds(branch, k, base, own, changed, (s, unit), sign) for sign in (-1, 1))
+        laws.append(Law(_in_unit(branch, float(unit.mid())), below, above))
+    return Response(name, relative, tuple(laws), unmoved)
+
+
+def _holds(
+    branch: Branches, k: int, base: Sequence[Any], own: Sequence[Any], changed: Any, about: tuple[Any, Any], sign: int
+) -> float:
+    """The largest sampled change up to which the roots are where the leading term has them; about = root, unit."""
+
+    def held(eps: float) -> bool:
+        change = changed(flint.arb(sign) * eps)
+        coefficients = [b + _ball(c) - o for b, c, o in zip(base, change, own, strict=True)]
+        return _deviation(branch.shifts(sign * eps), k, coefficients, *about) <= DEVIATION
+
+    first = next((m for m in _DECADES if not held(10.0**m)), None)
+    if first is None:
+        return 10.0 ** _DECADES[-1]
+    if first == _DECADES[0]:
+        return 0.0
+    return 10.0 ** next((first - 1 + share for share in _WITHIN if held(10.0 ** (first - 1 + share))), first - 1)
+
+
+def _deviation(predicted: Sequence[complex], k: int, coefficients: Sequence[Any], s: Any, unit: Any) -> float:
+    """The largest distance of a predicted shift from the nearest true one, relative; inf where there is none."""
+    scale = max(abs(t) for t in predicted)
+    shifted = _taylor(coefficients, s, unit * scale, len(coefficients) - 1)
+    # Of 1/t, so that those sought are the largest roots: companion eigenvalues have these to all digits.
+    values = np.array([_number(c / shifted[k].abs_upper()) for c in shifted])
+    if not np.all(np.isfinite(values)) or not np.any(values[: k + 1]):
+        return math.inf
+    inverse = np.roots(values)
+    actual = scale / inverse[inverse != 0]
+    return max(float(np.abs(actual - t).min(initial=np.inf)) / abs(t) for t in predicted)
+
+
+def _in_unit(branch: Branches, unit: float) -> Branches:
+    """With the shift in the unit of s."""
+    constants = tuple(c * unit**branch.denominator for c in branch.constants)
+    return Branches(branch.roots, branch.numerator, branch.denominator, constants)
+
+
+def _taylor(coefficients: Sequence[Any], s: Any, unit: Any, last: int) -> list[Any]:
+    """Coefficients in t of p(s + unit t), ascending, up to a power."""
+    n = len(coefficients) - 1
+    found = []
+    for j in range(last + 1):
+        terms = (comb(n - i, j) * c * s ** (n - i - j) for i, c in enumerate(coefficients[: n - j + 1]))
+        found.append(flint.acb(sum(terms, flint.acb(0)) * unit**j))
+    return found
+
+
+def _ball(x: Any) -> Any:
+    return x[0] if isinstance(x, flint.arb_series) else flint.arb(x)
+
+
+def _number(x: Any) -> complex:
+    return complex(float(x.real.mid()), float(x.imag.mid()))
+
+
+def _middle(x: Any) -> float:
+    return float(abs(x).mid())
