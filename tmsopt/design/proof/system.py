@@ -21,6 +21,7 @@ ROUNDINGS = 64
 """Roundings of every number of an equation that a stored design may be off by."""
 
 _DEPENDENT = 1e-9  # relative size of what a parameter adds to the others, below which it adds nothing
+_NOTHING = 1e-30  # of a range: what a solver leaves of a 0
 _EPS = float(np.finfo(float).eps)
 
 
@@ -145,7 +146,9 @@ def choose(system: Equations, at: Mapping[str, Any], among: Sequence[str]) -> Ch
     moved = tuple(sorted((among[k] for k in order[:count]), key=of.names.index))
     square = jacobian[:, [names.index(n) for n in (*moved, *system.unknowns)]]
     effect = np.abs(np.linalg.pinv(square)) @ rounding * (ROUNDINGS * _EPS)
-    return Chosen(moved, {n: float(e) + 2 * _EPS * abs(float(at[n])) for n, e in zip(moved, effect, strict=False)})
+    floors = {n: _NOTHING * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
+    explained = {n: float(e) + 2 * _EPS * abs(float(at[n])) + floors[n] for n, e in zip(moved, effect, strict=False)}
+    return Chosen(moved, explained)
 
 
 def _many(count: int, noun: str) -> str:
