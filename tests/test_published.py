@@ -276,6 +276,17 @@ def test_chocolate_of_third_order_ends_at_cos_22_degrees_and_a_half() -> None:
     assert (found["x1"] * found["x2"] - found["x0"]).is_positive
 
 
+def test_poles_far_smaller_than_the_rates_of_the_system_meet_too() -> None:
+    """Poles at −0.05 of a system of rate 1: the last coefficient, 3e-7, is a difference of numbers near 1."""
+    problem = tmsopt.load(PROBLEMS / "chocolate_limit.toml")
+    slow = replace(problem, constraints={**problem.constraints, "decay": "abscissa <= -0.05"})
+    design = tmsopt.solve(slow)
+    t = sp.acos(sp.Float(design.parameters["delta"], 30))
+    f = (t + sp.pi / 2) / 5
+    assert design.structure == "EP5"
+    assert float(sp.sin(t - f) / sp.sin(f)) == pytest.approx(0.05, abs=MET)
+
+
 def test_chocolate_controllers_are_stable() -> None:
     for name in ("chocolate", "chocolate_limit"):
         x = [1.0, *(solved(name).parameters[n] for n in ("x2", "x1", "x0"))]

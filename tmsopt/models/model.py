@@ -4,7 +4,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import flint
 import numpy as np
+
+from tmsopt.roots.elementary import as_ball, exact
+
+_BITS = 106  # the parameters' own roundings are all that widens a ball
+_EPSILON = 2.0**-53
 
 Formula = Callable[[Mapping[str, Any]], Any]
 
@@ -185,6 +191,7 @@ class Values(Mapping[str, Any]):
     ) -> None:
         native = of.native(parameters)
         self.coefficients = model.polynomial(**model.algebraic(native))
+        self._at = (model, of, dict(parameters))
         self._known = {
             **native,
             **dict(zip(model.coefficient_names(), self.coefficients, strict=True)),
@@ -199,6 +206,14 @@ class Values(Mapping[str, Any]):
             lifted = self._lift(quantity, self) if self._lift else None
             self._known[name] = quantity.value(self) if lifted is None else lifted
         return self._known[name]
+
+    def roundings(self) -> list[float]:
+        """How far each coefficient of a numeric design may be off as its parameters are rounded to doubles."""
+        model, of, parameters = self._at
+        with flint.ctx.workprec(_BITS):
+            balls = {n: flint.arb(float(x), abs(float(x)) * _EPSILON) for n, x in parameters.items()}
+            found = [as_ball(exact(c)) for c in model.coefficients(balls, of)]
+        return [float(c.rad()) if c.is_finite() else np.inf for c in found]
 
     def define(self, name: str, value: Any) -> None:
         """Give a quantity a value that is known otherwise, instead of its formula."""
