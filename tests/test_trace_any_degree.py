@@ -14,11 +14,14 @@ from flint import fmpq, fmpq_poly
 
 from tmsopt.cli import main
 from tmsopt.design.errors import InputError
+from tmsopt.design.files import load
 from tmsopt.design.problem import Problem
-from tmsopt.models import from_coefficients, from_matrices
+from tmsopt.design.solve import solve
+from tmsopt.models import from_coefficients, from_matrices, whipple
 from tmsopt.roots import pattern, product, shift
 from tmsopt.show.traced import trace_figure, trace_table
 from tmsopt.study.domain import domain
+from tmsopt.study.optimality import optimality
 from tmsopt.study.swallowtail import swallowtail
 from tmsopt.study.trace import trace
 from tmsopt.study.words import in_words
@@ -331,6 +334,23 @@ def test_swallowtail_beside_another_root_is_the_same_surface():
         assert branch.parameters["z"] == pytest.approx(branch.parameters["x"] ** 2 / 4, abs=EXACT)
 
 
+# The conditions of an optimum
+
+
+@pytest.mark.parametrize("unit", [1.0, 1000.0])
+def test_a_cubic_is_fastest_with_one_triple_root(unit):
+    """s³ + a s² + b s + 1: the product of the roots is given, so (s + 1)³ is best, with multipliers 1/(3 ωᵏ⁻¹)."""
+    a, b = symbols("a b")
+    model = from_coefficients([1, a * unit, b * unit**2, unit**3])
+    design = solve(Problem(model=model, free={"a": (0.1, 6.0), "b": (0.1, 6.0)}, minimize="abscissa"))
+    assert (design.structure, design.abscissa) == ("EP3", pytest.approx(-unit, rel=EXACT))
+    found = optimality(design)
+    assert (found.verdict, found.order) == ("strict minimum", 1)
+    (root,) = found.roots
+    assert (root.multiplicity, root.share) == (3, pytest.approx(1))
+    assert (root.beta, root.kappa, *root.ties) == pytest.approx([1 / 3, 1 / 3 / unit, 1 / 3 / unit**2], rel=1e-9)
+
+
 # What is said
 
 
@@ -370,6 +390,30 @@ def test_structures_in_words():
 def test_powers_of_unknowns_are_those_of_rates():
     assert pattern("EP3+CEP2", 9).powers == (1, 1, 2, 1, 2)
     assert pattern("weave", 6).powers == (2, 1, 2, 3, 4)
+
+
+def test_columns_of_unknowns_are_told_from_parameters_of_the_same_name():
+    """The oscillator's c beside c1 of s (s + c1): c = c1 on the line k = 0."""
+    c1, k = symbols("c1 k")
+    found = traced(from_matrices([[1]], [[c1]], [[k]]), "capsize", {"c1": (0.1, 4.0), "k": (-1.0, 1.0)})
+    columns = found.to_json()["branches"][0]["columns"]
+    assert columns["c1"] == pytest.approx(columns["capsize.c1"], abs=EXACT)
+    assert np.ptp(columns["c1"]) == pytest.approx(3.9, abs=EXACT)
+
+
+@pytest.mark.parametrize(
+    ("name", "speed", "root"),
+    [("weave", 4.29238253634110, 0.0), ("capsize", 6.02426201538836, 0.0), ("EP2", 0.684283078892, 3.782904051293)],
+)
+def test_curves_of_the_benchmark_bicycle_start_at_its_published_speeds(name, speed, root):
+    """Meijaard et al. (2007), with the trail c = 0.08 m of the benchmark as the end of the box."""
+    fixed = load("problems/whipple_benchmark.toml", asks=False).fixed
+    rest = {n: value for n, value in fixed.items() if n not in ("v", "c")}
+    branch = only(traced(whipple, name, {"v": (0.1, 10.0), "c": (0.08, 0.15)}, rest))
+    (end,) = (e for e in branch.events if e.detail == "c.min")
+    # printed to 14 digits, the double root to 12
+    assert end.parameters["v"] == pytest.approx(speed, abs=1e-12 if root == 0 else 1e-11)
+    assert (branch.unknowns["r"][end.index] if root else 0.0) == pytest.approx(root, abs=1e-11)
 
 
 def test_table_figure_and_command(real_pairs, tmp_path):

@@ -95,6 +95,10 @@ class Branch:
         """The name of an unknown, with the pattern's before it where a parameter has it too."""
         return f"{self.pattern}.{unknown}" if unknown in self.parameters else unknown
 
+    def _column(self, unknown: str) -> str:
+        """The name of an unknown's column, told from a parameter of the same name, such as a damping c."""
+        return f"{self.pattern}.{unknown}" if unknown in self.parameters else unknown
+
     def to_json(self) -> dict[str, Any]:
         """Columns and events; numbers that do not exist are null."""
         columns: dict[str, list[Any]] = {}
