@@ -14,8 +14,9 @@ Examples:
   tmsopt trace problems/off_law.toml --pattern weave --csv weave.csv
 
 A curve takes one free parameter more than the pattern has conditions (EP2, weave, capsize: 1; EP3, 2EP2, CEP2: 2;
-EP4, resonance: 3) and == constraints add; other constraints are marked where they are crossed. Where two parameters
-are free, a grid shows the branches that the starts missed, if they are no thinner than 1/256 of the box.
+EP4, resonance: 3; EPk: k - 1, CEPk: 2k - 2; those of EP2+CEP2 add up) and == constraints add; other constraints are
+marked where they are crossed. Where two parameters are free, a grid shows the branches that the starts missed, if they
+are no thinner than 1/256 of the box, or 1/96 for polynomials of degree 5 and more.
 
 Exit status: 0 traced, 2 bad input, 3 nothing of the pattern found in the box.
 """
