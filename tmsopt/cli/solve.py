@@ -277,6 +277,7 @@ def _scale(option: str, text: str, unit: str) -> float:
 
 
 def _draw(solution: "Solution", path: Path, w: float, m_B: float) -> None:
+    from tmsopt.models import tms
     from tmsopt.show.growth import growth_figure
     from tmsopt.show.style import save
     from tmsopt.show.tables import si_parameters
@@ -286,7 +287,7 @@ def _draw(solution: "Solution", path: Path, w: float, m_B: float) -> None:
         click.echo("--plot: nothing to draw, a root is at infinity", err=True)
         return
     unit = None
-    if solution.problem.model.name == "tms":
+    if solution.problem.model is tms:
         si = si_parameters(solution, w, m_B)
         unit = (si["g"] * si["w"]) ** 0.5
     with saving("--plot", path):

@@ -1,6 +1,7 @@
 """Expressions of a problem file: parsed to a small checked tree, never run as Python."""
 
 import ast
+import keyword
 import math
 import operator
 import re
@@ -220,7 +221,9 @@ def _parse(text: str) -> ast.expr:
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         column = f" at character {error.offset}" if isinstance(error, SyntaxError) and error.offset else ""
         unit = _UNIT.search(text)
+        kept = next((word for word in re.findall(r"[A-Za-z_]\w*", text) if keyword.iskeyword(word)), None)
         hint = f" ({unit[0]}: units are not written here; numbers are in m, rad, kg, m/s and N)" if unit else ""
+        hint = f"; '{kept}' is a reserved word, write e.g. {kept}_" if kept else hint
         raise ExpressionError(f"'{text}' does not parse{column}{hint}; accepted: {_LANGUAGE}") from None
 
 

@@ -158,8 +158,11 @@ class Model:
         return self.polynomial(**self.algebraic(native))
 
     def coefficient_names(self) -> tuple[str, ...]:
-        """``a0 … an``."""
-        return tuple(f"a{k}" for k in range(self.degree + 1))
+        """``a0 … an``, or ``coefficient0 …`` where a parameter or quantity has one of these names."""
+        taken = {n for of in self.sets for n in (*of.names, *(q.name for q in of.quantities))}
+        taken |= {q.name for q in self.quantities}
+        plain = tuple(f"a{k}" for k in range(self.degree + 1))
+        return plain if taken.isdisjoint(plain) else tuple(f"coefficient{k}" for k in range(self.degree + 1))
 
     def quantity_names(self, of: ParameterSet) -> tuple[str, ...]:
         """Everything that an expression may use beside the parameters of a set and the root quantities."""

@@ -1,6 +1,6 @@
 """Models of any system that a user states: by its matrices, or by its characteristic polynomial."""
 
-import re
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -8,65 +8,21 @@ from typing import Any
 
 import casadi as ca
 import flint
+import numpy as np
 
+from tmsopt.models.entries import Unfit, scalar
 from tmsopt.models.formulas import Formulas, formulas
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
+from tmsopt.models.words import latex, spelled, unusable
 from tmsopt.roots.elementary import exact, is_ball
 from tmsopt.roots.polynomial import characteristic_polynomial, quadratic_pencil
 
 MOST = {"M": 6, "A": 12, "coefficients": 12}
 """Largest size of M, D, K; of A; largest degree."""
 
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-"""What a name of a parameter or quantity looks like."""
-
-_GREEK = [
-    "alpha",
-    "beta",
-    "gamma",
-    "delta",
-    "epsilon",
-    "zeta",
-    "eta",
-    "theta",
-    "kappa",
-    "lambda",
-    "mu",
-    "nu",
-    "xi",
-    "pi",
-    "rho",
-    "sigma",
-    "tau",
-    "phi",
-    "chi",
-    "psi",
-    "omega",
-    "Gamma",
-    "Delta",
-    "Theta",
-    "Lambda",
-    "Xi",
-    "Pi",
-    "Sigma",
-    "Phi",
-    "Psi",
-    "Omega",
-]
-_SAMPLES = 3  # designs at which a leading coefficient must vanish to count as none
+_SAMPLES = 24  # designs at which a leading coefficient must vanish to count as none
 _DIGITS = 60
-
-
-class Unfit(ValueError):
-    """A statement that makes no model.
-
-    Attributes:
-        key: the part of it that is at fault, e.g. ``M``.
-    """
-
-    def __init__(self, key: str, message: str) -> None:
-        self.key = key
-        super().__init__(f"{key}: {message}")
+_GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 def from_matrices(
@@ -81,7 +37,7 @@ def from_matrices(
     """A model of M q″ + D q′ + K q = 0, or of x′ = A x, from CasADi expressions.
 
     Args:
-        M, D, K: square, up to 6 × 6, as nested lists or SX; D left out is 0.
+        M, D, K: square, up to 6 × 6, as nested lists, NumPy arrays, SX or DM; D left out is 0.
         A: square, up to 12 × 12, instead of these.
         name: one word or more for reports.
         quantities: name → expression of the same symbols, for objectives and constraints.
@@ -89,7 +45,8 @@ def from_matrices(
     The parameters are the symbols (``ca.SX.sym("k")``), in the order in which they appear.
 
     Raises:
-        Unfit: for matrices that are not square, of different sizes or too large, or that make no polynomial.
+        Unfit: for matrices that are not square, of different sizes or too large, for entries that are no finite
+            numbers or SX expressions, for names that are taken, or where no polynomial comes of it.
     """
     if A is not None:
         if M is not None or D is not None or K is not None:
@@ -121,44 +78,70 @@ def from_coefficients(coefficients: Any, *, name: str = "stated", quantities: Ma
 
 
 def _listed(value: Any) -> list[Any] | None:
-    """The entries of a list or of a CasADi vector; None for anything else."""
+    """The entries of a list, a vector of CasADi or an array of one dimension; None for anything else."""
     if isinstance(value, ca.SX | ca.DM):
         return [value[k] for k in range(value.numel())] if 1 in value.shape and value.numel() > 1 else None
+    if isinstance(value, np.ndarray):
+        return list(value) if value.ndim == 1 else None
     return list(value) if isinstance(value, Sequence) and not isinstance(value, str) else None
 
 
-def _square(key: str, value: Any) -> Matrix:
+def _rows(value: Any) -> list[list[Any] | None] | None:
+    """The rows of a matrix, None for one that is no list; None for what is no matrix."""
     if isinstance(value, ca.SX | ca.DM):
-        rows: list[Any] = [[value[i, j] for j in range(value.shape[1])] for i in range(value.shape[0])]
-    else:
-        listed = list(value) if isinstance(value, Sequence) and not isinstance(value, str) else [None]
-        rows = [list(r) if isinstance(r, Sequence) and not isinstance(r, str) else None for r in listed]
-    if not rows or any(row is None or len(row) != len(rows) for row in rows):
+        return [[value[i, j] for j in range(value.shape[1])] for i in range(value.shape[0])]
+    if isinstance(value, np.ndarray):
+        return [list(row) for row in value] if value.ndim == 2 else None
+    rows = _listed(value)
+    return None if rows is None else [_listed(row) for row in rows]
+
+
+def _square(key: str, value: Any) -> Matrix:
+    rows = _rows(value)
+    if rows is None:
+        found = f"an array of {value.ndim} dimensions" if isinstance(value, np.ndarray) else type(value).__name__
+        raise Unfit(key, f"found {found}; accepted: a matrix as nested lists, a NumPy array, SX or DM")
+    square = [row for row in rows if row is not None and len(row) == len(rows)]
+    if not rows or len(square) < len(rows):
         shape = " + ".join("?" if row is None else str(len(row)) for row in rows)
         raise Unfit(key, f"found rows of {shape or 'no'} entries; accepted: as many rows as entries in each")
     most = MOST["A" if key == "A" else "M"]
     if len(rows) > most:
         raise Unfit(key, f"is {len(rows)} × {len(rows)}; accepted: up to {most} × {most}")
-    return rows
+    return square
 
 
-def _made(kind: str, name: str, matrices: dict[str, Matrix], quantities: Mapping[str, Any] | None) -> Model:
+def _made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> Model:
     """The model of a statement; the same object for the same statement."""
+    key = next(iter(matrices))
+    if not isinstance(name, str) or not name.strip() or not name.isprintable():
+        raise Unfit("name", f"found {name!r}; accepted: a text of one line")
+    if not isinstance(quantities or {}, Mapping):
+        raise Unfit("quantities", f"found {type(quantities).__name__}; accepted: a mapping of names to expressions")
     derived = dict(quantities or {})
-    entries = [ca.SX(x) for rows in matrices.values() for row in rows for x in row]
-    values = [ca.SX(x) for x in derived.values()]
-    if any(e.numel() != 1 for e in (*entries, *values)):
-        raise Unfit(next(iter(matrices)), "has an entry that is a matrix; accepted: scalar expressions")
+    entries = [
+        scalar(n, f"entry {j}" if kind == "coefficients" else f"row {i}, column {j}", x)
+        for n, rows in matrices.items()
+        for i, row in enumerate(rows, start=1)
+        for j, x in enumerate(row, start=1)
+    ]
+    values = [scalar("quantities", str(n), x) for n, x in derived.items()]
     symbols = ca.symvar(ca.vertcat(*entries, *values))
     names = tuple(x.name() for x in symbols)
     twice = {n for n in names if names.count(n) > 1}
     if twice:
-        raise Unfit(next(iter(matrices)), f"has two symbols named {min(twice)}; make one and use it everywhere")
+        raise Unfit(key, f"has two symbols named {min(twice)}; make one and use it everywhere")
     if not names:
-        raise Unfit(next(iter(matrices)), "names no parameter, so there is nothing to design")
+        raise Unfit(key, "names no parameter, so there is nothing to design")
+    for n in names:
+        if why := unusable(n):
+            raise Unfit(key, f"has a symbol named {n!r}, which {why}; give it another name")
+    for n in derived:
+        if why := "is the name of a parameter" if n in names else unusable(n):
+            raise Unfit("quantities", f"{n!r} {why}; give the quantity a name of its own")
     shapes = tuple((n, len(rows), len(rows[0])) for n, rows in matrices.items())
     function = ca.Function("stated", [ca.vertcat(*symbols)], [ca.densify(ca.vertcat(*entries, *values))])
-    return _rebuilt(kind, name, names, shapes, tuple(derived), function.serialize())
+    return _rebuilt(kind, name.strip(), names, shapes, tuple(derived), function.serialize())
 
 
 @lru_cache(maxsize=64)
@@ -190,7 +173,7 @@ def _rebuilt(
 
     lost = _vanishing(every, names)
     if lost is None:
-        raise Unfit(shapes[0][0], "makes a polynomial without a root that depends on s")
+        raise Unfit(shapes[0][0], "makes a polynomial without s, which has no root")
     quick = formulas(every(symbols)[lost:], names)
 
     def coefficients(**values: Any) -> list[Any]:
@@ -215,8 +198,16 @@ def _rebuilt(
         pencil=None if kind == "coefficients" else lambda values: _pencil(blocks(values)),
     )
     origin = (_rebuilt, (kind, name, names, shapes, derived, serialized))
-    statement = {"kind": kind, "parameters": list(names), "entries": [str(e) for e in written]}
-    return replace(made, origin=origin, statement=statement)
+    return replace(made, origin=origin, statement=_statement(entry, shapes, derived))
+
+
+def _statement(entry: Formulas, shapes: Sequence[tuple[str, int, int]], derived: Sequence[str]) -> dict[str, Any]:
+    """What tells a model from others, every number in full."""
+    texts, shared = spelled(entry.function, entry.names)
+    rest = iter(texts)
+    matrices = {n: [[next(rest) for _ in range(columns)] for _ in range(rows)] for n, rows, columns in shapes}
+    quantities = dict(zip(derived, rest, strict=True))
+    return {"parameters": list(entry.names), **matrices, "quantities": quantities, "shared": shared}
 
 
 def _ball(x: Any) -> Any:
@@ -256,20 +247,24 @@ def _pencil(blocks: dict[str, Matrix]) -> tuple[Matrix, ...]:
 def _vanishing(polynomial: Any, names: Sequence[str]) -> int | None:
     """Number of leading coefficients that are 0 for all parameters, as of a singular M; None if all but the last are.
 
-    Decided in balls of 60 digits at a few designs, where a formula that is not 0 is not.
+    Decided in balls of 60 digits at designs of many sizes and signs, where a formula that is not 0 is not everywhere.
     """
+    lost, known = 0, False
     with flint.ctx.workdps(_DIGITS):
-        samples = [
-            polynomial({n: flint.fmpq(7 + 3 * k + 5 * i, 4 + k + 2 * i) for k, n in enumerate(names)})
-            for i in range(_SAMPLES)
-        ]
-        zero = [all(flint.arb(row[k]).contains(0) for row in samples) for k in range(len(samples[0]) - 1)]
-    return next((k for k, z in enumerate(zero) if not z), None)
-
-
-def latex(name: str) -> str:
-    """A name as a symbol: ``mu_1`` and ``mu1`` as μ with an index."""
-    parts = re.fullmatch(r"([A-Za-z]+?)_?(\d*|(?<=_).*)", name)
-    head, index = (parts[1], parts[2]) if parts else (name, "")
-    symbol = f"\\{head}" if head in _GREEK else head if len(head) == 1 else rf"\mathrm{{{head}}}"
-    return f"{symbol}_{{{index}}}" if index else symbol
+        for i in range(_SAMPLES):
+            share = [math.modf((i * len(names) + k + 1) * _GOLDEN)[0] for k in range(len(names))]
+            # Both signs, sizes from 1/8 to 8; at first a design of positive numbers, where most formulas exist.
+            signs = [-1 if i % 3 == 2 and math.modf(8 * x)[0] < 0.5 else 1 for x in share]
+            row = polynomial({
+                n: flint.fmpq(sign * round(2.0 ** (16 + 6 * x - 3)), 2**16)
+                for n, sign, x in zip(names, signs, share, strict=True)
+            })  # fmt: skip
+            found = [flint.arb(c) for c in row]
+            nonzero = next(
+                (k for k, c in enumerate(found[:-1]) if not c.contains(0) or not c.is_finite()), len(row) - 1
+            )
+            if all(c.is_finite() for c in found[: nonzero + 1]):
+                lost, known = (min(lost, nonzero) if known else nonzero), True
+            if known and lost == 0:
+                return 0
+    return lost if not known or lost < len(row) - 1 else None

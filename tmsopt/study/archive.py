@@ -28,6 +28,7 @@ def save_layers(problem: Problem, grid: Grid, layers: Mapping[str, NDArray[Any]]
     about: dict[str, Any] = {
         "title": problem.title,
         "model": problem.model.name,
+        **({} if problem.model.statement is None else {"statement": dict(problem.model.statement)}),
         "dimensions": list(grid.axes[::-1]),
         "classes": list(CLASSES),
         "fixed": dict(problem.fixed),

@@ -231,6 +231,7 @@ def _about(work: Survey, tile: int) -> dict[str, Any]:
         "title": problem.title,
         "problem": {
             "model": problem.model.name,
+            **({} if problem.model.statement is None else {"statement": dict(problem.model.statement)}),
             "fixed": dict(problem.fixed),
             "constraints": {n: t for n, t in problem.constraints.items() if problem.conditions[n].comparison != "=="},
         },

@@ -1,0 +1,78 @@
+"""Names and formulas of a stated model in words: which names it may use, what they look like in figures."""
+
+import keyword
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import casadi as ca
+
+from tmsopt.models.walk import operation_name, steps
+
+TAKEN = (
+    *("abscissa", "damping_ratio", "radius", "structure", "objective", "pi"),
+    *("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "exp", "log", "abs", "min", "max"),
+)
+"""Names that an expression of a problem uses for something else."""
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_GREEK = re.compile(
+    "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|kappa|lambda|mu|nu|xi|pi|rho|sigma|tau|phi|chi|psi|omega"
+    "|Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Phi|Psi|Omega"
+)
+_LONG = 80  # characters; what is longer has a number, and is written once
+_INFIX = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/", ca.OP_POW: "**", ca.OP_CONSTPOW: "**"}
+_SHORT = {ca.OP_NEG: "(-{})", ca.OP_SQ: "({}**2)", ca.OP_TWICE: "(2*{})", ca.OP_INV: "(1/{})"}
+
+
+def unusable(name: Any) -> str:
+    """Why no parameter or quantity may have a name; empty where one may."""
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        return "is no name: a letter, then letters, digits and _"
+    if keyword.iskeyword(name):
+        return "is a reserved word"
+    return "is what tmsopt computes" if name in TAKEN else ""
+
+
+def latex(name: str) -> str:
+    """A name as a symbol: ``mu_1`` and ``mu1`` as μ with an index, ``k_max`` with an upright one."""
+    first, *indices = filter(None, name.split("_"))
+    if numbered := re.fullmatch(r"([A-Za-z]+)(\d+)", first):
+        first, indices = numbered[1], [numbered[2], *indices]
+    symbol = f"\\{first}" if _GREEK.fullmatch(first) else _upright(first)
+    return f"{symbol}_{{{','.join(map(_upright, indices))}}}" if indices else symbol
+
+
+def _upright(word: str) -> str:
+    """A word, a letter or a number; only letters alone are slanted."""
+    return word if len(word) == 1 or word.isdigit() else rf"\mathrm{{{word}}}"
+
+
+def spelled(function: ca.Function, names: Sequence[str]) -> tuple[list[str], list[str]]:
+    """The outputs of a function of one vector as texts, every number in full, and the parts that they share.
+
+    Equal texts are equal formulas; CasADi's own leave out digits.
+    """
+    texts: list[str] = []
+    shared: list[str] = []
+    outputs = ["0"] * function.nnz_out(0)
+    for step in steps(function):
+        operands = [texts[k] for k in step.operands]
+        match step.operation:
+            case ca.OP_INPUT:
+                text = names[step.place[1]]
+            case ca.OP_CONST:
+                text = repr(step.constant).removesuffix(".0")
+            case ca.OP_OUTPUT:
+                text = outputs[step.place[1]] = operands[0]
+            case operation if operation in _INFIX:
+                text = f"({operands[0]} {_INFIX[operation]} {operands[1]})"
+            case operation if operation in _SHORT:
+                text = _SHORT[operation].format(*operands)
+            case operation:
+                text = f"{operation_name(operation)}({', '.join(operands)})"
+        if len(text) > _LONG and step.operation != ca.OP_OUTPUT:
+            shared.append(text)
+            text = f"[{len(shared)}]"
+        texts.append(text)
+    return outputs, shared
