@@ -148,20 +148,42 @@ def _without(data: Mapping[str, Any], key: Key) -> dict[str, Any]:
 
 _HEADER = re.compile(r"\s*\[+\s*([^\]]+?)\s*\]+")
 _KEY = re.compile(r"\s*([A-Za-z0-9_\-.\"' ]+?)\s*=")
+_LONG_QUOTES = ('"""', "'''")
+_TOKEN = re.compile(r"""\"{3}|'{3}|\"(?:[^\"\\]|\\.)*\"|'[^']*'|[][{}#]""")
 _PART = re.compile(r"\"[^\"]*\"|'[^']*'|[^.\"']+")
 
 
 def _lines(text: str) -> dict[Key, int]:
-    """Line number of every section and key that begins a line."""
+    """Line number of every section and key that begins a line, but for lines inside a list or a text of several."""
     section: Key = ()
     lines: dict[Key, int] = {}
+    depth, inside = 0, ""
     for number, line in enumerate(text.splitlines(), start=1):
-        if header := _HEADER.match(line):
-            section = _path(header[1])
-            lines.setdefault(section, number)
-        elif key := _KEY.match(line):
-            lines.setdefault((*section, *_path(key[1])), number)
+        if depth == 0 and not inside:
+            if header := _HEADER.match(line):
+                section = _path(header[1])
+                lines.setdefault(section, number)
+                continue
+            if key := _KEY.match(line):
+                lines.setdefault((*section, *_path(key[1])), number)
+        depth, inside = _open(line, depth, inside)
     return lines
+
+
+def _open(line: str, depth: int, inside: str) -> tuple[int, str]:
+    """How many brackets are open after a line, and the quotes of a text that goes on."""
+    for token in _TOKEN.findall(line):
+        if inside:
+            inside = "" if token == inside else inside
+        elif token in _LONG_QUOTES:
+            inside = token
+        elif token == "#":
+            break
+        elif token in "[{":
+            depth += 1
+        elif token in "]}":
+            depth -= 1
+    return depth, inside
 
 
 def _path(dotted: str) -> Key:
