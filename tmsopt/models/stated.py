@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
@@ -10,9 +11,11 @@ import casadi as ca
 import flint
 import numpy as np
 
+from tmsopt.models.arithmetic import BALLS
 from tmsopt.models.entries import Unfit, scalar
 from tmsopt.models.formulas import Formulas, formulas
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
+from tmsopt.models.walk import walk
 from tmsopt.models.words import latex, spelled, unusable
 from tmsopt.roots.elementary import exact, is_ball
 from tmsopt.roots.polynomial import characteristic_polynomial, quadratic_pencil
@@ -22,6 +25,7 @@ MOST = {"M": 6, "A": 12, "coefficients": 12}
 
 _SAMPLES = 24  # designs at which a leading coefficient must vanish to count as none
 _DIGITS = 60
+_DECIMALS = {**BALLS, ca.OP_CONST: lambda x: flint.fmpq(*Fraction(repr(x)).as_integer_ratio())}
 _GOLDEN = (math.sqrt(5) - 1) / 2
 
 
@@ -160,8 +164,8 @@ def _rebuilt(
     written = [ca.SX(e) for e in entry(symbols)]
     zero = [e.is_zero() for e in written]
 
-    def blocks(values: Mapping[str, Any]) -> dict[str, Matrix]:
-        found = [0 if zero[k] else x for k, x in enumerate(entry(values)[:count])]
+    def blocks(entries: Sequence[Any]) -> dict[str, Matrix]:
+        found = [0 if zero[k] else x for k, x in enumerate(entries[:count])]
         taken, at = {}, 0
         for n, rows, columns in shapes:
             taken[n] = [found[at + i * columns : at + (i + 1) * columns] for i in range(rows)]
@@ -169,9 +173,12 @@ def _rebuilt(
         return taken
 
     def every(values: Mapping[str, Any]) -> list[Any]:
-        return _polynomial(kind, blocks(values))
+        return _polynomial(kind, blocks(entry(values)))
 
-    lost = _vanishing(every, names)
+    def as_printed(values: Mapping[str, Any]) -> list[Any]:
+        return _polynomial(kind, blocks(walk(entry.function, [values[n] for n in names], _DECIMALS)[0]))
+
+    lost = _vanishing(as_printed, names)
     if lost is None:
         raise Unfit(shapes[0][0], "makes a polynomial without s, which has no root")
     quick = formulas(every(symbols)[lost:], names)
@@ -195,7 +202,7 @@ def _rebuilt(
             Quantity(n, "1", "quantity", latex(n), _quantity(formulas([written[count + k]], names)))
             for k, n in enumerate(derived)
         ),
-        pencil=None if kind == "coefficients" else lambda values: _pencil(blocks(values)),
+        pencil=None if kind == "coefficients" else lambda values: _pencil(blocks(entry(values))),
     )
     origin = (_rebuilt, (kind, name, names, shapes, derived, serialized))
     return replace(made, origin=origin, statement=_statement(entry, shapes, derived))
@@ -247,18 +254,18 @@ def _pencil(blocks: dict[str, Matrix]) -> tuple[Matrix, ...]:
 def _vanishing(polynomial: Any, names: Sequence[str]) -> int | None:
     """Number of leading coefficients that are 0 for all parameters, as of a singular M; None if all but the last are.
 
-    Decided in balls of 60 digits at designs of many sizes and signs, where a formula that is not 0 is not everywhere.
+    Decided in balls of 60 digits at designs of many sizes and signs, where a formula that is not 0 is not everywhere,
+    for numbers as they print: [[0.1, 0.2], [0.3, 0.6]] is meant to be singular, and in binary it is not.
     """
     lost, known = 0, False
     with flint.ctx.workdps(_DIGITS):
         for i in range(_SAMPLES):
             share = [math.modf((i * len(names) + k + 1) * _GOLDEN)[0] for k in range(len(names))]
-            # Both signs, sizes from 1/8 to 8; at first a design of positive numbers, where most formulas exist.
+            # Both signs, sizes near 1 and then from 1e-6 to 1e6; at first positive numbers, where most formulas exist.
             signs = [-1 if i % 3 == 2 and math.modf(8 * x)[0] < 0.5 else 1 for x in share]
-            row = polynomial({
-                n: flint.fmpq(sign * round(2.0 ** (16 + 6 * x - 3)), 2**16)
-                for n, sign, x in zip(names, signs, share, strict=True)
-            })  # fmt: skip
+            reach = 6 if i < _SAMPLES // 2 else 40
+            design = [sign * 2.0 ** (reach * (x - 0.5)) for sign, x in zip(signs, share, strict=True)]
+            row = polynomial({n: exact(x) for n, x in zip(names, design, strict=True)})
             found = [flint.arb(c) for c in row]
             nonzero = next(
                 (k for k, c in enumerate(found[:-1]) if not c.contains(0) or not c.is_finite()), len(row) - 1
