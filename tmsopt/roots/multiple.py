@@ -3,12 +3,13 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tmsopt.roots.fitting import gauss_newton, relative_distance
 from tmsopt.roots.numeric import rebuilt, roots
+from tmsopt.roots.shape import Group, Shape
 from tmsopt.roots.structure import Root
 
 Array = NDArray[np.float64]
 
-_STEPS = 20
 _NEAR = 0.05  # relative distance of a guess that can still lead to a polynomial within any sensible tolerance
 
 
@@ -27,30 +28,14 @@ def multiple_real_roots(coefficients: ArrayLike, tolerance: float) -> tuple[Root
     for cuts in range(len(z) - 1):
         ends = np.sort(np.argsort(-gaps, kind="stable")[:cuts]) + 1
         groups = np.split(z, ends)
-        means, multiplicity = np.array([g.mean().real for g in groups]), [len(g) for g in groups]
-        if _distance(c / c[0], means, multiplicity, size) > _NEAR:
+        shape, means = (
+            Shape(tuple(Group(len(g), real=True) for g in groups), 0),
+            np.array([g.mean().real for g in groups]),
+        )
+        if relative_distance(shape, means, c / c[0], size) > _NEAR:
             continue
-        fitted = _fit(c / c[0], means, multiplicity, size)
-        if _distance(c / c[0], fitted, multiplicity, size) <= tolerance:
+        fitted = gauss_newton(shape, means, c / c[0], size)
+        if relative_distance(shape, fitted, c / c[0], size) <= tolerance:
             found = [Root(float(r), 0.0, len(g)) for r, g in zip(fitted, groups, strict=True)]
             return tuple(sorted(found, key=lambda r: -r.re))
     return None
-
-
-def _distance(monic: Array, r: Array, multiplicity: list[int], size: Array) -> float:
-    return float(np.linalg.norm((monic - rebuilt(np.repeat(r, multiplicity).astype(complex))) / size))
-
-
-def _fit(monic: Array, r: Array, multiplicity: list[int], size: Array) -> Array:
-    """Least squares of the relative residuals by Gauss and Newton."""
-    for _ in range(_STEPS):
-        whole = rebuilt(np.repeat(r, multiplicity).astype(complex))
-        columns = []
-        for k in range(len(r)):
-            less = [m - (j == k) for j, m in enumerate(multiplicity)]
-            columns.append(-multiplicity[k] * np.concatenate([[0.0], rebuilt(np.repeat(r, less).astype(complex))]))
-        step = np.linalg.lstsq(np.stack(columns, axis=1) / size[:, None], (monic - whole) / size, rcond=None)[0]
-        r = r + step
-        if np.all(np.abs(step) <= 1e-15 * np.abs(r)):
-            break
-    return r
