@@ -13,6 +13,7 @@ from tmsopt.design.solution import Branch
 from tmsopt.design.starts import complete, designs
 
 _STEPS = 60
+_STALLS = 3  # steps that may lead nowhere: some way on, a solution may still be met
 _SAME = 1e-6
 _ISOLATED = 1e-9  # ratio of singular values below which a solution is one of a continuum, such as p = 0
 _STARTS = 12
@@ -67,7 +68,7 @@ def _mirrors(problem: Problem, x: NDArray[np.float64]) -> list[NDArray[np.float6
 
 def newton(system: ca.Function, x: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """An isolated solution of the equations near a point, by damped steps, or None."""
-    residual = np.inf
+    residual, stalls = np.inf, 0
     for _ in range(_STEPS):
         value, jacobian, _ = (np.array(part) for part in system(x))
         if not (np.all(np.isfinite(value)) and np.all(np.isfinite(jacobian))):
@@ -82,6 +83,10 @@ def newton(system: ca.Function, x: NDArray[np.float64]) -> NDArray[np.float64] |
             if np.all(np.isfinite(trial)) and np.abs(trial).max() < residual:
                 break
             damping /= 2
+        else:
+            stalls += 1
+            if stalls >= _STALLS:
+                return None
         x = x + damping * step
     spread = np.linalg.svd(jacobian, compute_uv=False)
     isolated = spread[-1] > _ISOLATED * spread[0]
