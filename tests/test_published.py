@@ -4,6 +4,7 @@ A closed form is checked on the file's own matrices by exact algebra that shares
 program must end at it. Where a file's header says that no figure was found in print, the answer is derived here.
 """
 
+import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -11,6 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import casadi as ca
 import mpmath  # type: ignore[import-untyped]
 import numpy as np
 import pytest
@@ -384,3 +386,16 @@ def test_no_two_gains_are_better() -> None:
     )  # fmt: skip
     assert found.fun == pytest.approx(float(transport_aircraft().abscissa), abs=1e-4)
     assert found.fun > float(transport_aircraft().abscissa) - 1e-7
+
+
+@pytest.mark.parametrize("rate", [1.0, 1e-3, 1e3])
+def test_twelve_roots_meet_whatever_the_unit_of_time(rate: float) -> None:
+    """(s + rate)¹²: with the product of the roots held, their abscissa is least where all of them are equal."""
+    c = [ca.SX.sym(f"c{k}") for k in range(1, 13)]
+    model = tmsopt.models.from_coefficients([1, *(x * rate**k for k, x in enumerate(c, start=1))])
+    free = {f"c{k}": (0.0, 2.0 * math.comb(12, k)) for k in range(1, 12)}
+    design = tmsopt.solve(tmsopt.Problem(model=model, fixed={"c12": 1.0}, free=free, minimize="abscissa"))
+    assert design.structure == "EP12"
+    assert design.bound.proven
+    assert design.abscissa == pytest.approx(-rate, rel=MET)
+    assert all(design.parameters[f"c{k}"] == pytest.approx(math.comb(12, k), rel=MET) for k in range(1, 12))

@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
 from tmsopt.design.relation import is_rational, relation_bound
+from tmsopt.design.scale import objective_size
 from tmsopt.design.solution import Bound
 from tmsopt.models import Model
 from tmsopt.roots.elementary import as_ball, exact, quotient
 from tmsopt.roots.exact import rational
 
 PROVEN = 1e-9
-"""Gap, relative to 1 + |bound|, below which a design counts as proven optimal."""
+"""Gap, relative to the size of the roots and of the bound, below which a design counts as proven optimal."""
 
 _ROUNDING = 1e-15  # of the quotient to a double, and of its root
 _NODES = np.linspace(-1, 1, 9)
@@ -46,7 +47,7 @@ def instant_bound(problem: Problem, value: float) -> Bound:
     known = omega0_bound(problem, value)
     if known.proven or not bounded(problem):
         return known
-    other = _bound(relation_bound(_one_case(problem)), value, "relation")
+    other = _bound(relation_bound(_one_case(problem)), value, "relation", objective_size(problem))
     return other if other.value > known.value else known
 
 
@@ -56,7 +57,7 @@ def omega0_bound(problem: Problem, value: float) -> Bound:
     With scenarios, that of the first of them: the worst is no better.
     """
     largest = _largest_product(_one_case(problem)) if bounded(problem) else math.inf
-    return _bound(-(largest ** (1 / problem.model.degree)) * (1 + _ROUNDING), value, "omega0")
+    return _bound(-(largest ** (1 / problem.model.degree)) * (1 + _ROUNDING), value, "omega0", objective_size(problem))
 
 
 def _one_case(problem: Problem) -> Problem:
@@ -66,17 +67,17 @@ def _one_case(problem: Problem) -> Problem:
     return replace(problem.nominal, fixed={**problem.fixed, **problem.cases[0].at})
 
 
-def _bound(bound: float, value: float, method: str) -> Bound:
+def _bound(bound: float, value: float, method: str, size: float) -> Bound:
     """A bound and the gap of a value to it; none where it is infinite, or a feasible design contradicts it."""
-    if not math.isfinite(bound) or value < bound - PROVEN * (1 + abs(bound)):
+    if not math.isfinite(bound) or value < bound - PROVEN * (size + abs(bound)):
         return Bound()
     gap = max(value - bound, 0.0)
-    return Bound(bound, gap, closed(gap, bound), method)
+    return Bound(bound, gap, closed(gap, bound, size), method)
 
 
-def closed(gap: float, bound: float) -> bool:
-    """Whether a gap is closed."""
-    return gap <= PROVEN * (1 + abs(bound))
+def closed(gap: float, bound: float, size: float = 1.0) -> bool:
+    """Whether a gap is closed, for roots of this size or larger."""
+    return gap <= PROVEN * (size + abs(bound))
 
 
 def _largest_product(problem: Problem) -> float:

@@ -14,7 +14,7 @@ from tmsopt.design.lifts import Lifted, lift_abscissa, lift_damping_ratio, lift_
 from tmsopt.design.nlp import NLP, Factor, Lift, Touch
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_QUANTITIES
-from tmsopt.design.scale import scale_of
+from tmsopt.design.scale import objective_size, scale_of
 from tmsopt.design.variation import tempts, varies
 from tmsopt.models import Quantity, Values
 from tmsopt.roots import Pattern
@@ -203,6 +203,7 @@ class Builder:
             exact=bool(self.products) and formulation == "abscissa",
             settings=(np.nan,) * len(self.settings),
             unit=self.unit,
+            size=objective_size(self.problem),
         )
 
     def _lift(self, case: int, quantity: Quantity, values: Values) -> Any:

@@ -183,7 +183,9 @@ def _lost(
     designs = [problem.ordered(design) for design in leaders]
     own = [recheck(problem, design, nlp.cases, family.around(problem, design)) for design in designs]
     known = min((sign * c.objective for c in own if not c.violations), default=math.inf)
-    return sign * trial.checked.objective > known and not same(sign * trial.checked.objective, known)
+    return sign * trial.checked.objective > known and not same(
+        sign * trial.checked.objective, known, trial.candidate.nlp.size
+    )
 
 
 def _uncovered(problem: Problem, trial: Trial) -> list[Case]:
@@ -230,6 +232,6 @@ def _leaders(problem: Problem, candidates: Sequence[Candidate]) -> list[dict[str
     """The designs of the best few different optima."""
     kept: list[Candidate] = []
     for candidate in sorted((c for c in candidates if c.feasible), key=lambda c: c.objective):
-        if not any(same(candidate.objective, k.objective) for k in kept):
+        if not any(same(candidate.objective, k.objective, candidate.nlp.size) for k in kept):
             kept.append(candidate)
     return [design_of(problem, c.run.x.tolist()) for c in kept[:_LEADERS]]

@@ -108,7 +108,7 @@ def counted(candidates: Sequence[Candidate], at_best: float) -> Starts:
     return Starts(
         tried=len(candidates),
         converged=sum(c.feasible for c in candidates),
-        at_best=sum(c.feasible and same(c.objective, at_best) for c in candidates),
+        at_best=sum(c.feasible and same(c.objective, at_best, c.nlp.size) for c in candidates),
     )
 
 
@@ -119,7 +119,7 @@ def survivor(problem: Problem, nlp: NLP, candidates: Sequence[Candidate], family
     kept: Trial | None = None
     tried: list[float] = []
     for candidate in sorted((c for c in candidates if c.feasible), key=lambda c: c.objective):
-        alike = sum(same(candidate.objective, value) for value in tried)
+        alike = sum(same(candidate.objective, value, nlp.size) for value in tried)
         if kept and not kept.checked.violations and honest(problem, kept) and not alike:
             break
         if alike >= _ALIKE:

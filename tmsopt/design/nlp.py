@@ -82,6 +82,7 @@ class NLP:
         exact: whether starts satisfy the equations of all cases.
         settings: values of the numbers p that differ between the problems of a family.
         unit: of the roots in its variables.
+        size: of the objective, as far as it is known beforehand.
     """
 
     formulation: str
@@ -99,6 +100,7 @@ class NLP:
     exact: bool = False
     settings: tuple[float, ...] = ()
     unit: float = 1.0
+    size: float = 1.0
 
     def at(self, x: Any, settings: Any = None) -> Any:
         """f and g for numbers or CasADi expressions; with the NLP's own settings unless others are given."""

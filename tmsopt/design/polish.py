@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 _STEPS = 12
 _STATIONARY = 1e-9
 _SINGULAR = 1e11  # size of a solution, for a right side of size 1, that betrays a singular matrix
+_ROUNDINGS = 32 * float(np.finfo(float).eps)  # shifts of high degrees are sums of sums
 _ACTIVE = 1e-5  # slack below which a bound may be active although its multiplier is nearly 0
 
 
@@ -25,6 +26,7 @@ class Point:
     Attributes:
         violation: largest violation of a row or bound, absolute.
         stationarity: largest component of the gradient of the Lagrangian.
+        rounding: what the terms of the rows leave of a violation that is 0.
     """
 
     x: Array
@@ -33,6 +35,7 @@ class Point:
     stationarity: float
     row_multipliers: Array
     bound_multipliers: Array
+    rounding: float = 0.0
 
 
 def polisher(nlp: NLP) -> Callable[[Run, NLP], Point]:
@@ -73,7 +76,8 @@ class _Conditions:
         outside = np.concatenate([self.row_lower - g, g - self.row_upper, self.lower - x, x - self.upper, [0.0]])
         violation = float(outside.max()) if np.all(np.isfinite(g)) else np.inf
         slope = np.abs(gradient + jacobian.T @ rows + bounds).max(initial=0.0)
-        return Point(x, objective, violation, float(slope), rows, bounds)
+        terms = float((np.abs(jacobian) @ np.abs(x)).max(initial=0.0))
+        return Point(x, objective, violation, float(slope), rows, bounds, _ROUNDINGS * terms)
 
 
 def _polished(conditions: _Conditions, run: Run) -> Point:
@@ -171,7 +175,7 @@ def _better(refined: Point, raw: Point) -> bool:
     """A refined point counts when it is as feasible, and no worse than rounding and feasibility explain."""
     scale = 1 + abs(raw.objective)
     return (
-        refined.violation <= max(raw.violation, 1e-14 * scale)
+        refined.violation <= max(raw.violation, 1e-14 * scale, refined.rounding)
         and refined.objective <= raw.objective + 1e-7 * scale
         and np.abs(refined.x - raw.x).max(initial=0.0) <= 1e-2 * (1 + np.abs(raw.x).max(initial=0.0))
     )

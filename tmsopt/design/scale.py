@@ -58,5 +58,11 @@ def scale_of(problem: Problem) -> Scale:
     return Scale(_power_of_two(size), _power_of_two(np.abs(a[:, 0])))
 
 
+def objective_size(problem: Problem) -> float:
+    """Size below which differences of the objective are none, relative: that of the roots where it is about these."""
+    about = problem.objective.names if problem.objective else ()
+    return min(1.0, scale_of(problem).unit) if about == ("abscissa",) else 1.0
+
+
 def _power_of_two(sizes: Any) -> float:
     return float(2.0 ** np.round(np.log2(np.median(sizes)))) if len(sizes) else 1.0

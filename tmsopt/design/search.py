@@ -142,9 +142,9 @@ def claim(problem: Problem, candidate: Candidate) -> float:
     return -candidate.objective if problem.sense == "maximize" else candidate.objective
 
 
-def same(a: float, b: float) -> bool:
-    """Whether two objectives count as the same optimum."""
-    return abs(a - b) <= _SAME * (1 + abs(b))
+def same(a: float, b: float, size: float = 1.0) -> bool:
+    """Whether two objectives, of this size or larger, count as the same optimum."""
+    return abs(a - b) <= _SAME * (size + abs(b))
 
 
 def _candidate(problem: Problem, nlp: NLP, run: Run) -> Candidate:
@@ -183,19 +183,19 @@ def _settled(problem: Problem, candidates: list[Candidate]) -> bool:
     record = candidates[-1].feasible and all(candidates[-1].objective < c.objective for c in feasible[:-1])
     if record and _proven(problem, candidates[-1]):
         return True
-    agreeing = sum(same(c.objective, best) for c in feasible)
+    agreeing = sum(same(c.objective, best, c.nlp.size) for c in feasible)
     if problem.objective is None:  # any point of a square pattern will do, and any that meets too many conditions
         count = freedom(problem).count
         return agreeing >= (1 if count == 0 or (count < 0 and best <= _MET) else _AGREE)
-    n, w = len(feasible), _different([c.objective for c in feasible])
+    n, w = len(feasible), _different([c.objective for c in feasible], feasible[0].nlp.size)
     seen = n > w + 2 and w * (n - 1) <= (w + 0.5) * (n - w - 2)
     return len(candidates) >= _ENOUGH and agreeing >= _AGREE and seen
 
 
-def _different(objectives: list[float]) -> int:
+def _different(objectives: list[float], size: float) -> int:
     """Number of different optima among the objectives."""
     ordered = sorted(objectives)
-    return 1 + sum(not same(a, b) for a, b in pairwise(ordered))
+    return 1 + sum(not same(a, b, size) for a, b in pairwise(ordered))
 
 
 def _proven(problem: Problem, candidate: Candidate) -> bool:
@@ -204,7 +204,10 @@ def _proven(problem: Problem, candidate: Candidate) -> bool:
         return False
     a = _coefficients(problem, candidate.nlp, candidate.run)[0]
     own = -(abs(a[-1] / a[0]) ** (1 / problem.model.degree)) if a[0] else -math.inf
-    return closed(candidate.objective - own, own) and instant_bound(problem, candidate.objective).proven
+    return (
+        closed(candidate.objective - own, own, candidate.nlp.size)
+        and instant_bound(problem, candidate.objective).proven
+    )
 
 
 def _coefficients(problem: Problem, nlp: NLP, run: Run) -> Array:
