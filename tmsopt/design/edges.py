@@ -189,6 +189,8 @@ def heavily_damped(c: Array) -> Truth:
     """
     n = c.shape[-1] - 1
     stable = is_stable(c, exact=False)
+    if n == 1:
+        return np.asarray(stable)
     if n > 4:
         return _counted(c, stable)
     real = stable & (discriminant([c[..., k] for k in range(n + 1)]) > 0)

@@ -69,15 +69,21 @@ ROOT_NAMES = (*(q.name for q in ROOT_QUANTITIES), RADIUS)
 
 
 def regular(coefficients: Array) -> Array:
-    """Coefficients with a leading 0, of a singular mass matrix, moved a little off: one root at infinity."""
-    size = np.abs(coefficients).max(axis=-1, initial=0.0) + 1e-300
-    lead = coefficients[..., 0]
-    return np.concatenate([np.where(lead == 0, 1e-12 * size, lead)[..., None], coefficients[..., 1:]], axis=-1)
+    """Coefficients with a leading 0, of a singular mass matrix, moved a little off: one root at infinity.
+
+    Those of a design at which one does not exist are those of sⁿ, so that a search may start there.
+    """
+    exist = np.all(np.isfinite(coefficients), axis=-1, keepdims=True)
+    a = np.where(exist, coefficients, np.eye(coefficients.shape[-1])[0])
+    size = np.abs(a).max(axis=-1, initial=0.0) + 1e-300
+    return np.concatenate([np.where(a[..., 0] == 0, 1e-12 * size, a[..., 0])[..., None], a[..., 1:]], axis=-1)
 
 
 def _array_roots(values: Mapping[str, Any]) -> NDArray[np.complex128]:
+    """Roots; nan at designs at which a coefficient does not exist."""
     assert isinstance(values, Values)
-    return roots(regular(np.stack(np.broadcast_arrays(*values.coefficients), axis=-1)))
+    a = np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in values.coefficients)), axis=-1)
+    return np.where(np.all(np.isfinite(a), axis=-1, keepdims=True), roots(regular(a)), np.nan)
 
 
 def _array_abscissa(values: Mapping[str, Any]) -> Array:

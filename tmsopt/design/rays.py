@@ -120,6 +120,8 @@ def _tests(c: Array) -> Array:
     n = c.shape[-1] - 1
     if n > 4:
         pair, double = _of_pairs(c)
+    elif n == 1:
+        pair = double = np.ones(c.shape[:-1])  # one root has no other to meet
     else:
         by_power = [c[..., k] for k in range(n + 1)]
         pair, double = hurwitz_minors(by_power)[n - 2], discriminant(by_power)

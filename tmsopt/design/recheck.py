@@ -177,6 +177,8 @@ def realised_abscissa(problem: Problem, parameters: Mapping[str, float]) -> floa
     with flint.ctx.workdps(_DIGITS):
         exact = {name: flint.arb(value) for name, value in parameters.items()}
         coefficients = problem.model.coefficients(exact, problem.parameter_set)
+    if not all(c.is_finite() for c in coefficients):
+        return math.nan
     leading = next((k for k, c in enumerate(coefficients) if c.mid() != 0), None)
     if leading is None or leading == len(coefficients) - 1:
         return math.nan

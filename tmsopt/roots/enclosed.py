@@ -55,6 +55,8 @@ def enclosed_roots(coefficients: Sequence[Any]) -> tuple[Enclosed, ...] | None:
     Multiple roots are accepted at 0 and of coefficients that are exact. Rightmost first.
     """
     terms = [flint.arb(as_ball(c)) for c in coefficients]
+    if not all(t.is_finite() for t in terms):
+        return None
     zeros = 0
     while terms and terms[-1] == 0:
         terms.pop()

@@ -69,9 +69,9 @@ def comparison_table(comparison: Comparison) -> str:
         law = number(row.law) if row.applies else ""
         rows.append((row.label, row.subject, number(row.numeric), law, relative, verdict))
     known = design.problem.model is tms
-    lines += (
-        columns(rows) if known else [f"no laws are known of the {design.problem.model.title}, only of skates (tms)"]
-    )
+    model = design.problem.model
+    named = f"the {model.title}" if model.statement is None else f"'{model.title}'"
+    lines += columns(rows) if known else [f"no laws are known of {named}, only of skates (tms)"]
     lines.append("")
     if comparison.other is None:
         lines.append(f"other formulation: none, {comparison.reason}")

@@ -29,14 +29,15 @@ def save_layers(problem: Problem, grid: Grid, layers: Mapping[str, NDArray[Any]]
         "title": problem.title,
         "model": problem.model.name,
         **({} if problem.model.statement is None else {"statement": dict(problem.model.statement)}),
-        "dimensions": list(grid.axes[::-1]),
+        "dimensions": [_axis(n, layers) for n in grid.axes[::-1]],
         "classes": list(CLASSES),
         "fixed": dict(problem.fixed),
     }
     if path.suffix.lower() == ".nc":
         _save_netcdf(problem, grid, layers, about, path)
         return
-    arrays: dict[str, Any] = {**dict(zip(grid.axes, grid.values, strict=True)), **layers}
+    axes = {_axis(n, layers): values for n, values in zip(grid.axes, grid.values, strict=True)}
+    arrays: dict[str, Any] = {**axes, **layers}
     with path.open("wb") as stream:
         np.savez_compressed(stream, about=np.array(json.dumps(about)), **arrays)
 
@@ -60,7 +61,7 @@ def _save_netcdf(
 
     of = problem.parameter_set
     axes = {
-        n: (n, v, {"long_name": of[n].meaning, "units": of[n].unit})
+        _axis(n, layers): (_axis(n, layers), v, {"long_name": of[n].meaning, "units": of[n].unit})
         for n, v in zip(grid.axes, grid.values, strict=True)
     }
     classes = {"flag_values": np.arange(len(CLASSES), dtype=np.int8), "flag_meanings": _words(CLASSES)}
@@ -70,6 +71,11 @@ def _save_netcdf(
     }
     known = {n: about[n] for n in ("title", "model")} | {"fixed": json.dumps(about["fixed"])}
     xarray.Dataset(variables, axes, known).to_netcdf(path)
+
+
+def _axis(name: str, layers: Mapping[str, Any]) -> str:
+    """What the values along an axis are called: the parameter, or ``parameter.kind`` beside a layer of that name."""
+    return f"parameter.{name}" if name in layers else name
 
 
 def _words(names: tuple[str, ...]) -> str:

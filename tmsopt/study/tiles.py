@@ -271,7 +271,8 @@ def axes_of(problem: Problem, axes: Sequence[str] | None = None) -> tuple[str, .
     free = list(problem.free)
     if len(free) not in (2, 3):
         message = f"a grid has two or three free parameters, and {len(free)} are free ({', '.join(free) or 'none'})"
-        advice = "; fix the others" if len(free) > 3 else "; write e.g. Fr = { min = 0.1, max = 5 }"
+        fixed = [n for n in problem.fixed if n in ("Fr", "v")] or [*problem.fixed, "Fr"]
+        advice = "; fix the others" if len(free) > 3 else f"; write e.g. {fixed[0]} = {{ min = 0.1, max = 5 }}"
         raise InputError([Fault(message + advice, ("parameters",))])
     if axes is not None and (isinstance(axes, str) or sorted(axes) != sorted(free)):
         raise InputError([Fault(f"found {axes!r}; accepted: {' and '.join(free)}", ("axes",))])
