@@ -68,7 +68,8 @@ def recheck(
             violations[name] = violation
     structure = each[top]["structure"]
     if not math.isfinite(structure.abscissa):
-        violations["a0"] = 1.0  # a singular mass matrix
+        exist = all(math.isfinite(float(c)) for c in each[top].coefficients)
+        violations["a0" if exist else "coefficients"] = 1.0  # a singular mass matrix, or none
     if problem.pattern is not None:
         distance = pattern_distance(problem.pattern, [float(c) for c in nominal.coefficients])
         if not distance <= tolerance(nominal, MATCHED):

@@ -153,6 +153,8 @@ def _assembled(
 
 
 def _stability_note(problem: Problem, checked: Checked, optimal: bool) -> tuple[str, ...]:
+    if "coefficients" in checked.violations:
+        return ("a coefficient has no value at this design; keep away from what divides by 0, or has no root",)
     if "a0" in checked.violations:
         known = {"tms": "nu_H and zeta_B", "whipple": "mass_margin"}
         keep = known.get(problem.model.name, "a0")

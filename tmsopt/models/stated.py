@@ -15,7 +15,9 @@ from tmsopt.models.arithmetic import BALLS
 from tmsopt.models.entries import Unfit, scalar
 from tmsopt.models.formulas import Formulas, formulas
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
+from tmsopt.models.tms import tms
 from tmsopt.models.walk import walk
+from tmsopt.models.whipple import whipple
 from tmsopt.models.words import latex, spelled, unusable
 from tmsopt.roots.elementary import exact, is_ball
 from tmsopt.roots.polynomial import characteristic_polynomial, quadratic_pencil
@@ -120,6 +122,8 @@ def _made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) ->
     key = next(iter(matrices))
     if not isinstance(name, str) or not name.strip() or not name.isprintable():
         raise Unfit("name", f"found {name!r}; accepted: a text of one line")
+    if name.strip() in (tms.name, whipple.name):
+        raise Unfit("name", f"'{name.strip()}' is a model of tmsopt's own; give yours another name")
     if not isinstance(quantities or {}, Mapping):
         raise Unfit("quantities", f"found {type(quantities).__name__}; accepted: a mapping of names to expressions")
     derived = dict(quantities or {})

@@ -15,6 +15,7 @@ from tmsopt.study.compare import Comparison
 
 _SI_OF = {"Fr": "v", "mu": "m_H", "chi_B": "x_B", "chi_H": "x_H", "zeta_B": "z_B", "zeta_H": "z_H"}
 _SI = tms.parameter_set("SI")
+_ASKED = {"a0": "must not be 0", "coefficients": "must have values"}
 
 
 def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> Mapping[str, float]:
@@ -137,7 +138,8 @@ def _facts(solution: Solution) -> list[str]:
         gains = ", ".join(f"{name} ({value:.4g})" for name, value in solution.active.items())
         lines.append(f"limits that bind (gain per unit relaxed): {gains}")
     for name, value in solution.violations.items():
-        text = solution.problem.constraints.get(name, "pattern" if name == solution.problem.locate else "must not be 0")
+        asked = "pattern" if name == solution.problem.locate else _ASKED.get(name, "")
+        text = solution.problem.constraints.get(name, asked)
         lines.append(f"violated: {name} ({text}) by {value:.4g}")
     lines += relaxation_lines(solution)
     for branch in solution.branches:
