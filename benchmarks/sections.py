@@ -44,6 +44,7 @@ SECTIONS = (
     Section("g", "arrays", "benchmarks.arrays", "expressions over grids, beside one design at a time and CasADi's map"),
     Section("h", "tiles", "benchmarks.tiles", "charts to a folder and their parts; 1e8 designs in bounded memory"),
     Section("i", "systems", "benchmarks.systems", "a 6-fold root from random starts, beside HANSO and PyGRANSO"),
+    Section("j", "random", "benchmarks.generality", "random systems of degree 3 to 12, beside differential evolution"),
 )
 """In the order in which they are run."""
 
