@@ -140,7 +140,9 @@ class Problem:
 
     def values(self, parameters: Mapping[str, float]) -> Values:
         """Everything derived from a numeric design, root quantities included."""
-        return Values(self.model, self.parameter_set, parameters, extra=(*ROOT_QUANTITIES, NO_RADIUS, STRUCTURE))
+        ranges = {n: hi - lo for n, (lo, hi) in self.free.items()}
+        extra = (*ROOT_QUANTITIES, NO_RADIUS, STRUCTURE)
+        return Values(self.model, self.parameter_set, parameters, extra=extra, ranges=ranges)
 
     def ordered(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Every parameter in the model's order: the given values of the free ones, and the fixed ones."""

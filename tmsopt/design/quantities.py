@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 
 from tmsopt.models import Quantity, Values
 from tmsopt.roots import Structure, roots, structure
-from tmsopt.roots.fitting import sizes
 
 Array = NDArray[np.float64]
 
 _ROUNDINGS = 16  # of every parameter: what a solver may leave of its equations
-_LARGEST = 1e-6  # a structure further away is not that of the design
 
 STRUCTURE_TOLERANCE = 1e-11
 """Relative change of a coefficient within which roots count as multiple: a polished optimum is within 1e-14."""
@@ -26,19 +24,17 @@ def _structure(values: Mapping[str, Any]) -> Structure:
     a = [float(c) for c in values.coefficients]
     if a[0] == 0 or not all(map(math.isfinite, a)):
         return Structure("undecided", (), math.inf)  # a singular mass matrix: a root is at infinity
-    return structure(a, tolerance(values, STRUCTURE_TOLERANCE))
+    return structure(a, STRUCTURE_TOLERANCE, explained(values, STRUCTURE_TOLERANCE))
 
 
-def tolerance(values: Values, least: float) -> float:
-    """Relative change of coefficients that the rounding of a design's parameters explains several times over.
+def explained(values: Values, tolerance: float) -> Array:
+    """Sizes of monic coefficients relative to which a tolerance covers the rounding of a design's parameters.
 
-    At least `least`, which is more than that unless coefficients are small differences of large numbers, as where a
-    multiple root is far smaller than the rates of the system.
+    More than the coefficients' own sizes where these are small differences of large numbers, as where a multiple root
+    is far smaller than the rates of the system, or 0.
     """
-    a = np.array([float(c) for c in values.coefficients])
     off = np.array(values.roundings())
-    share = _ROUNDINGS * float(np.linalg.norm(off / abs(a[0]) / sizes(roots(a))))
-    return max(least, min(share, _LARGEST))
+    return np.where(np.isfinite(off), _ROUNDINGS * off / abs(float(values.coefficients[0])) / tolerance, 0.0)
 
 
 def _abscissa(values: Mapping[str, Any]) -> float:

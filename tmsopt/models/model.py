@@ -11,6 +11,7 @@ from tmsopt.roots.elementary import as_ball, exact
 
 _BITS = 106  # the parameters' own roundings are all that widens a ball
 _EPSILON = 2.0**-53
+_NOTHING = 1e-9  # of a range
 
 Formula = Callable[[Mapping[str, Any]], Any]
 
@@ -182,6 +183,7 @@ class Values(Mapping[str, Any]):
         parameters: a value for every parameter of the set `of`.
         extra: quantities beside those of the model, e.g. of the roots.
         lift: asked first for each quantity; returns a variable that stands for it, or None for its formula.
+        ranges: width of the range of each parameter that may move: what is far smaller stands for 0.
     """
 
     def __init__(
@@ -191,10 +193,11 @@ class Values(Mapping[str, Any]):
         parameters: Mapping[str, Any],
         extra: Iterable[Quantity] = (),
         lift: Callable[[Quantity, "Values"], Any] | None = None,
+        ranges: Mapping[str, float] | None = None,
     ) -> None:
         native = of.native(parameters)
         self.coefficients = model.polynomial(**model.algebraic(native))
-        self._at = (model, of, dict(parameters))
+        self._at = (model, of, dict(parameters), dict(ranges or {}))
         self._known = {
             **native,
             **dict(zip(model.coefficient_names(), self.coefficients, strict=True)),
@@ -212,9 +215,11 @@ class Values(Mapping[str, Any]):
 
     def roundings(self) -> list[float]:
         """How far each coefficient of a numeric design may be off as its parameters are rounded to doubles."""
-        model, of, parameters = self._at
+        model, of, parameters, ranges = self._at
+        sizes = {n: abs(float(x)) for n, x in parameters.items()}
+        sizes |= {n: width for n, width in ranges.items() if sizes[n] <= _NOTHING * width}
         with flint.ctx.workprec(_BITS):
-            balls = {n: flint.arb(float(x), abs(float(x)) * _EPSILON) for n, x in parameters.items()}
+            balls = {n: flint.arb(float(x), sizes[n] * _EPSILON) for n, x in parameters.items()}
             found = [as_ball(exact(c)) for c in model.coefficients(balls, of)]
         return [float(c.rad()) if c.is_finite() else np.inf for c in found]
 

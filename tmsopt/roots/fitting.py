@@ -22,15 +22,16 @@ class Form(Protocol):
         ...
 
 
-def sizes(found: Roots) -> Array:
-    """Size of the terms that each monic coefficient is summed from.
+def sizes(found: Roots, least: Array | None = None) -> Array:
+    """Size of the terms that each monic coefficient is summed from, or `least` where that is more.
 
     A root far smaller than the others counts as a thousandth of their median, so that a coefficient that a root
     at 0 makes vanish is judged by the others' size and not by its own rounding; of the largest, if the median is 0.
     """
     radius = np.abs(found)
     floor = 1e-3 * float(np.median(radius) or radius.max())
-    return np.maximum(rebuilt((-np.maximum(radius, floor)).astype(complex)), 1e-100)
+    own = rebuilt((-np.maximum(radius, floor)).astype(complex))
+    return np.maximum(own, 1e-100 if least is None else np.maximum(least, 1e-100))
 
 
 def relative_distance(form: Form, unknowns: Sequence[float] | Array, monic: Array, size: Array) -> float:
