@@ -14,7 +14,7 @@ from tmsopt.design.lifts import Lifted, lift_abscissa, lift_damping_ratio, lift_
 from tmsopt.design.nlp import NLP, Factor, Lift, Touch
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_QUANTITIES
-from tmsopt.design.scale import objective_size, scale_of
+from tmsopt.design.scale import objective_size, objective_unit, scale_of, units_of
 from tmsopt.design.variation import tempts, varies
 from tmsopt.models import Quantity, Values
 from tmsopt.roots import Pattern
@@ -204,6 +204,8 @@ class Builder:
             settings=(np.nan,) * len(self.settings),
             unit=self.unit,
             size=objective_size(self.problem),
+            units=units_of(self.problem),
+            objective_unit=objective_unit(self.problem),
         )
 
     def _lift(self, case: int, quantity: Quantity, values: Values) -> Any:

@@ -73,22 +73,24 @@ def ipopt(nlp: NLP, linear_solver: str = "mumps", max_iterations: int = 150, sta
         "ipopt.tol": 1e-12,
         "ipopt.bound_relax_factor": 0.0,
         "ipopt.max_iter": max_iterations,
+        "ipopt.obj_scaling_factor": 1 / nlp.objective_unit,
         **{f"ipopt.{name}": value for name, value in _SETTINGS[start].items()},
     }
+    unit = np.array([*nlp.units, *[1.0] * (len(nlp.variables) - len(nlp.units))])
     x, p = ca.SX.sym("x", len(nlp.variables)), ca.SX.sym("p", len(nlp.settings))
-    f, g = nlp.at(x, p)
+    f, g = nlp.at(x if np.all(unit == 1) else x * unit, p)
     solver = ca.nlpsol("solver", "ipopt", {"x": x, "p": p, "f": f, "g": g}, options)
 
     def run(x0: Array, limits: NLP = nlp) -> Run:
         lower, upper = np.array(limits.lower), np.array(limits.upper)
         rows = {"lbg": np.array(limits.row_lower), "ubg": np.array(limits.row_upper)}
         with _interruptible():
-            answer = solver(x0=x0, p=limits.settings, lbx=lower, ubx=upper, **rows)
+            answer = solver(x0=x0 / unit, p=limits.settings, lbx=lower / unit, ubx=upper / unit, **rows)
         stats = solver.stats()
         return Run(
-            x=np.clip(np.array(answer["x"]).ravel(), lower, upper),
+            x=np.clip(np.array(answer["x"]).ravel() * unit, lower, upper),
             row_multipliers=np.array(answer["lam_g"]).ravel(),
-            bound_multipliers=np.array(answer["lam_x"]).ravel(),
+            bound_multipliers=np.array(answer["lam_x"]).ravel() / unit,
             status=str(stats["return_status"]),
             iterations=int(stats.get("iter_count", 0)),
         )

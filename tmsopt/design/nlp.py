@@ -83,6 +83,8 @@ class NLP:
         settings: values of the numbers p that differ between the problems of a family.
         unit: of the roots in its variables.
         size: of the objective, as far as it is known beforehand.
+        units: of the first variables, the free parameters, in which a solver of absolute tolerances moves them.
+        objective_unit: likewise, of the objective where it is small.
     """
 
     formulation: str
@@ -101,6 +103,8 @@ class NLP:
     settings: tuple[float, ...] = ()
     unit: float = 1.0
     size: float = 1.0
+    units: tuple[float, ...] = ()
+    objective_unit: float = 1.0
 
     def at(self, x: Any, settings: Any = None) -> Any:
         """f and g for numbers or CasADi expressions; with the NLP's own settings unless others are given."""
