@@ -13,7 +13,6 @@ from tmsopt.roots import Structure, roots, structure
 
 Array = NDArray[np.float64]
 
-_ROUNDINGS = 16  # of every parameter: what a solver may leave of its equations
 
 STRUCTURE_TOLERANCE = 1e-11
 """Relative change of a coefficient within which roots count as multiple: a polished optimum is within 1e-14."""
@@ -24,17 +23,7 @@ def _structure(values: Mapping[str, Any]) -> Structure:
     a = [float(c) for c in values.coefficients]
     if a[0] == 0 or not all(map(math.isfinite, a)):
         return Structure("undecided", (), math.inf)  # a singular mass matrix: a root is at infinity
-    return structure(a, STRUCTURE_TOLERANCE, explained(values, STRUCTURE_TOLERANCE))
-
-
-def explained(values: Values, tolerance: float) -> Array:
-    """Sizes of monic coefficients relative to which a tolerance covers the rounding of a design's parameters.
-
-    More than the coefficients' own sizes where these are small differences of large numbers, as where a multiple root
-    is far smaller than the rates of the system, or 0.
-    """
-    off = np.array(values.roundings())
-    return np.where(np.isfinite(off), _ROUNDINGS * off / abs(float(values.coefficients[0])) / tolerance, 0.0)
+    return structure(a, STRUCTURE_TOLERANCE, values.roundings())
 
 
 def _abscissa(values: Mapping[str, Any]) -> float:

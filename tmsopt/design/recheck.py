@@ -12,7 +12,7 @@ from tmsopt.design.expression import Expression
 from tmsopt.design.frozen import Table
 from tmsopt.design.nearest import Robustness, robustness
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import RADIUS, explained
+from tmsopt.design.quantities import RADIUS
 from tmsopt.design.variation import varies
 from tmsopt.models import Values
 from tmsopt.roots import Structure, exact_abscissa, pattern_distance, roots
@@ -71,9 +71,8 @@ def recheck(
         exist = all(math.isfinite(float(c)) for c in each[top].coefficients)
         violations["a0" if exist else "coefficients"] = 1.0  # a singular mass matrix, or none
     if problem.pattern is not None:
-        distance = pattern_distance(
-            problem.pattern, [float(c) for c in nominal.coefficients], explained(nominal, MATCHED)
-        )
+        a = [float(c) for c in nominal.coefficients]
+        distance = pattern_distance(problem.pattern, a, nominal.roundings(), MATCHED)
         if not distance <= MATCHED:
             violations[problem.pattern.name] = distance
     of = problem.parameter_set

@@ -60,6 +60,8 @@ def objective_size(problem: Problem) -> float:
     """Size below which differences of the objective are none, relative: that of the roots where it is about these."""
     about = problem.objective.names if problem.objective else ()
     return min(1.0, scale_of(problem).unit) if about == ("abscissa",) else 1.0
+
+
 def _designs(problem: Problem) -> dict[str, Any]:
     """Columns of designs spread over the box."""
     names = list(problem.free)

@@ -12,6 +12,8 @@ Array = NDArray[np.float64]
 Roots = NDArray[np.complex128]
 
 _STEPS = 20
+_RESOLVED = 1e6  # roundings; a solver leaves some hundreds in a coefficient that it makes vanish
+_ROUNDINGS = 16  # of every parameter: what a solver may leave of its equations
 
 
 class Form(Protocol):
@@ -22,16 +24,25 @@ class Form(Protocol):
         ...
 
 
-def sizes(found: Roots, least: Array | None = None) -> Array:
-    """Size of the terms that each monic coefficient is summed from, or `least` where that is more.
+def sizes(found: Roots, monic: Array | None = None, off: Array | None = None, tolerance: float = 0.0) -> Array:
+    """Size of the terms that each monic coefficient is summed from.
 
     A root far smaller than the others counts as a thousandth of their median, so that a coefficient that a root
     at 0 makes vanish is judged by the others' size and not by its own rounding; of the largest, if the median is 0.
+
+    Args:
+        monic, off: the coefficients, and how far rounding may put each off. One that stands far above that, as of a
+            stiff system, is not near 0 by chance, and is judged by the roots' own sizes.
+        tolerance: relative change that is to cover some roundings: a small difference of large numbers cannot be right
+            to its own size.
     """
     radius = np.abs(found)
     floor = 1e-3 * float(np.median(radius) or radius.max())
-    own = rebuilt((-np.maximum(radius, floor)).astype(complex))
-    return np.maximum(own, 1e-100 if least is None else np.maximum(least, 1e-100))
+    size = rebuilt((-np.maximum(radius, floor)).astype(complex))
+    if monic is not None and off is not None:
+        size = np.where(np.abs(monic) > _RESOLVED * off, rebuilt(-radius.astype(complex)), size)
+        size = np.maximum(size, _ROUNDINGS * off / tolerance) if tolerance else size
+    return np.maximum(size, 1e-100)
 
 
 def relative_distance(form: Form, unknowns: Sequence[float] | Array, monic: Array, size: Array) -> float:

@@ -66,7 +66,7 @@ class Structure:
         return max((root.re for root in self.roots), default=float("nan"))
 
 
-def structure(coefficients: ArrayLike, tolerance: float = 1e-12, least: Array | None = None) -> Structure:
+def structure(coefficients: ArrayLike, tolerance: float = 1e-12, off: ArrayLike | None = None) -> Structure:
     """Structure of the roots of a real polynomial of degree 1 to 12, coefficients descending, shape (n + 1,).
 
     A structure holds when a polynomial that has it exactly lies within `tolerance`: the root sum of squares of
@@ -75,27 +75,39 @@ def structure(coefficients: ArrayLike, tolerance: float = 1e-12, least: Array | 
     it must for tolerance 0 at an exceptional point.
 
     Args:
-        least: what the changes of the monic coefficients are relative to at least, shape (n + 1,): coefficients that
-            are differences of large numbers cannot be right to their own size.
+        off: how far rounding may put each coefficient off, if that is known, shape (n + 1,): those that are small
+            differences of large numbers cannot be right to their own size, and others are judged by the roots' own.
 
     Raises:
         ValueError: for another shape, coefficients that are not finite, or a leading 0.
     """
     c = _checked(coefficients)
-    return _of_quartic(c, tolerance, least) if len(c) == 5 else _of_any(c, tolerance, least)
+    size = _sizes(c, numeric_roots(c), off, tolerance)
+    return _of_quartic(c, size, tolerance) if len(c) == 5 else _of_any(c, size, tolerance)
 
 
-def pattern_distance(pattern: Pattern, coefficients: ArrayLike, least: Array | None = None) -> float:
+def _sizes(c: Array, found: Roots, off: ArrayLike | None, tolerance: float) -> Array:
+    if off is None:
+        return sizes(found)
+    known = np.abs(np.asarray(off, dtype=float) / c[0])
+    return sizes(found, c / c[0], np.where(np.isfinite(known), known, 0.0), tolerance)
+
+
+def pattern_distance(
+    pattern: Pattern, coefficients: ArrayLike, off: ArrayLike | None = None, tolerance: float = 0.0
+) -> float:
     """Relative change of the coefficients (root sum of squares) to reach a pattern of their degree; inf if none.
 
     Args:
-        least: see `structure`.
+        off, tolerance: see `structure`.
     """
     try:
         c = _matching(pattern, coefficients)
     except ValueError:
         return float("inf")
-    return min((fit.distance for fit in _fits(pattern, c, numeric_roots(c), np.inf, least)), default=float("inf"))
+    found = numeric_roots(c)
+    size = _sizes(c, found, off, tolerance)
+    return min((fit.distance for fit in _fits(pattern, c, found, size, np.inf)), default=float("inf"))
 
 
 def nearest_unknowns(pattern: Pattern, coefficients: ArrayLike) -> list[tuple[float, ...]]:
@@ -131,11 +143,11 @@ def _matching(pattern: Pattern, coefficients: ArrayLike) -> Array:
     return c
 
 
-def _of_quartic(c: Array, tolerance: float, least: Array | None) -> Structure:
+def _of_quartic(c: Array, size: Array, tolerance: float) -> Structure:
     found = numeric_roots(c)
     undecided: Structure | None = None
     for pattern, multiplicity, on_line in _CANDIDATES:
-        for candidate in _fits(pattern, c, found, _NEAR, least):
+        for candidate in _fits(pattern, c, found, size, _NEAR):
             line = [r for r in candidate.roots if r.re >= candidate.abscissa - _LINE * np.abs(found).max()]
             if line[0].multiplicity < multiplicity or sum(r.multiplicity for r in line) < on_line:
                 continue
@@ -146,13 +158,13 @@ def _of_quartic(c: Array, tolerance: float, least: Array | None) -> Structure:
     return undecided or Structure(_simple_name(found), _simple(found), 0.0)
 
 
-def _of_any(c: Array, tolerance: float, least: Array | None) -> Structure:
+def _of_any(c: Array, size: Array, tolerance: float) -> Structure:
     found = numeric_roots(c)
     nonzero = np.abs(found[found != 0])
     unit = 2.0 ** np.round(np.mean(np.log2(nonzero))) if nonzero.size else 1.0
     units = unit ** np.arange(len(c))
     monic = c / c[0] / units
-    size = sizes(found / unit, None if least is None else least / units)
+    size = size / units
     rounding = ROUNDING * (len(c) - 1) / 4
     fit = decided(monic, size, tolerance + rounding, rounding)
     if fit.distance < tolerance - rounding or not fit.shape.groups:
@@ -199,10 +211,10 @@ def _sorted(roots: list[Root]) -> tuple[Root, ...]:
     return tuple(sorted(roots, key=lambda r: (-r.re, -r.im)))
 
 
-def _fits(pattern: Pattern, c: Array, found: Roots, near: float, least: Array | None) -> Iterator[Structure]:
+def _fits(pattern: Pattern, c: Array, found: Roots, size: Array, near: float) -> Iterator[Structure]:
     """Polynomials of a pattern close to c, one per guess that starts within `near`, the nearest first."""
     fits = []
-    size, monic = sizes(found, least), c / c[0]
+    monic = c / c[0]
     for guess in pattern.guesses(found):
         if relative_distance(pattern, guess, monic, size) > near:
             continue
