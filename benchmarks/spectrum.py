@@ -229,12 +229,14 @@ def confirmed(system: System, design: Mapping[str, float], claimed: float) -> bo
 
 
 def _has(system: System, z: Roots) -> bool:
-    """Whether roots have the pattern that is asked for, if any."""
-    counted = Counter((complex(w), abs(w.imag) > 0) for w in z.tolist())
-    real = sorted((k for (_, imaginary), k in counted.items() if not imaginary), reverse=True)
-    pairs = sorted((k for (_, imaginary), k in counted.items() if imaginary), reverse=True)[::2]
+    """Whether roots have the pattern that is asked for, if any; its closure counts, as EP5 for EP2+EP2."""
+    left = Counter(z[z.imag >= 0].tolist())
     for part in filter(None, system.goal.get("locate", "").split("+")):
-        kind = pairs if part.startswith("C") else real
-        if not kind or kind.pop(0) < int(part.removeprefix("C").removeprefix("EP")):
+        pair, k = part.startswith("C"), int(part.removeprefix("C").removeprefix("EP"))
+        needs = {w: k if pair and w.imag else 2 * k if pair else k for w in left if pair or not w.imag}
+        enough = [w for w, need in needs.items() if left[w] >= need]
+        if not enough:
             return False
+        taken = max(enough, key=lambda w: left[w])
+        left[taken] -= needs[taken]
     return True

@@ -64,11 +64,13 @@ def explore(problem: Problem, side: Side, options: Options) -> Explored:
     touching = overclaims(problem)
     candidates = _searched(side, nlp, options, touching)
     trial = survivor(problem, nlp, candidates, family)
-    if trial is None and "damping_ratio" in nlp.touches:  # a positive real root has −1, and no sector of its own
+    if "damping_ratio" in nlp.touches and (trial is None or _unstable(problem, trial)):
+        # A positive real root has −1, and no sector of its own.
         unstable = side.narrowed(family.formulate(problem, problem.cases, damping_ratio=-1.0))
-        candidates = _searched(side, unstable, options, touching)
-        if (trial := survivor(problem, unstable, candidates, family)) is not None:
-            nlp = unstable
+        others = _searched(side, unstable, options, touching)
+        other = survivor(problem, unstable, others, family)
+        if other is not None and (trial is None or ahead(problem, other, trial)):
+            nlp, candidates, trial = unstable, others, other
     starts = counted(candidates, trial.candidate.objective if trial else math.nan)
     if problem.cases:
         finding = _covered(problem, side, nlp, candidates, trial, starts, touching, options)
@@ -114,6 +116,12 @@ def evaluated_cases(problem: Problem, parameters: Mapping[str, float]) -> tuple[
     """The listed cases of a design and the worst ones between them."""
     listed = problem.cases
     return (*listed, *(w.case for w in worst_cases(problem, parameters).values())) if listed else ()
+
+
+def _unstable(problem: Problem, trial: Trial) -> bool:
+    """Whether the best design may have been kept from positive real roots, where the damping ratio is not the goal."""
+    asked = problem.objective is not None and "damping_ratio" in problem.objective.names
+    return not asked and trial.checked.structure.abscissa > 0
 
 
 def _searched(side: Side, nlp: NLP, options: Options, touching: bool) -> list[Candidate]:

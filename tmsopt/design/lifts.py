@@ -71,8 +71,9 @@ def lift_abscissa(build: Rows, covered: Sequence[int], values: Sequence[Values])
             touches.append(Touch(partial(_step_distance, at), variable=at))
         build.equal("abscissa", shift(a, gamma), [a[0] * c for c in product(*monic)])
         products.append(tuple(factors))
-    guess = partial(_abscissa_guess, covered)
-    return Lifted(build.unit * gamma, Lift("abscissa", 1 + len(touches), guess), tuple(touches), tuple(products))
+    guess, close = (partial(_abscissa_guess, covered, near) for near in (False, True))
+    lift = Lift("abscissa", 1 + len(touches), guess, close)
+    return Lifted(build.unit * gamma, lift, tuple(touches), tuple(products))
 
 
 def lift_damping_ratio(build: Rows, covered: Sequence[int], values: Sequence[Values]) -> Lifted:
@@ -201,10 +202,17 @@ def _factors(z: Roots, gamma: float) -> list[float]:
     return [float(c) for pair in pairs for c in (-pair.sum().real, pair.prod().real)[: len(pair)]]
 
 
-def _abscissa_guess(covered: Sequence[int], values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
-    """γ a little right of the rightmost root and the factors of the shifted polynomials: feasible exactly."""
+def _abscissa_guess(
+    covered: Sequence[int], near: bool, values: Sequence[Values], z: Sequence[Roots]
+) -> list[list[float]]:
+    """γ a little right of the rightmost root and the factors of the shifted polynomials: feasible exactly.
+
+    `near` a solution, by no more than the abscissa may still be improved: a lightly damped system has one far smaller
+    than its roots.
+    """
     every = np.concatenate([z[case] for case in covered])
-    gamma = float(every.real.max()) + 0.05 * float(np.abs(every).mean()) + 1e-3
+    right, step = float(every.real.max()), 0.05 * float(np.abs(every).mean())
+    gamma = right + (min(step, 0.1 * abs(right)) + 1e-6 if near else step + 1e-3)
     return [[gamma, *(c for case in covered for c in _factors(z[case], gamma))]]
 
 

@@ -24,11 +24,16 @@ case; several where there is a choice."""
 
 @dataclass(frozen=True)
 class Lift:
-    """Variables that the formulation adds to the parameters, and how to start them."""
+    """Variables that the formulation adds to the parameters, and how to start them.
+
+    Attributes:
+        close: how to start them beside a solution, if otherwise.
+    """
 
     name: str
     size: int
     guess: Guess
+    close: Guess | None = None
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Multi-start: IPOPT from many designs, ended early when enough of them agree."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -14,7 +14,7 @@ from tmsopt.design.freedom import freedom
 from tmsopt.design.ipopt import Run, ipopt
 from tmsopt.design.nlp import NLP, Array
 from tmsopt.design.problem import Problem
-from tmsopt.design.starts import complete, designs
+from tmsopt.design.starts import complete, designs, opposite, worth
 from tmsopt.roots import roots
 
 STARTS = 64
@@ -87,6 +87,7 @@ def search(
         if progress:
             progress(len(candidates), starts)
         if not exhaustive and _settled(problem, candidates):
+            candidates += _beside(run, candidates, starts - len(candidates))
             break
     if problem.pattern is not None and not any(c.feasible for c in candidates):
         candidates += _rescued(problem, nlp, seed, linear_solver)
@@ -103,6 +104,24 @@ def follow(
 ) -> Candidate:
     """Where IPOPT ends from a design, close to it or not."""
     return Runner(problem, nlp, linear_solver, touching).ended(design, near)
+
+
+def _beside(run: "Runner", candidates: Sequence[Candidate], most: int) -> list[Candidate]:
+    """Starts with one parameter of the best end moved to the other end of its range, as long as better ones result.
+
+    Of optima at different faces of the box all far starts may end at the same, be it the best or not.
+    """
+    problem, found = run.problem, list[Candidate]()
+    best = min((c for c in candidates if c.feasible), key=lambda c: c.objective, default=None)
+    while best is not None and problem.objective is not None and not _proven(problem, best):
+        others = opposite(problem, design_of(problem, best.run.x.tolist()))
+        ended = [run.ended(design, near=True) for design in others[: max(most - len(found), 0)]]
+        found += ended
+        better = [c for c in ended if c.feasible and c.objective < best.objective]
+        best = min(
+            (c for c in better if not same(c.objective, best.objective)), key=lambda c: c.objective, default=None
+        )
+    return found
 
 
 @dataclass(frozen=True)
@@ -129,10 +148,17 @@ class Runner:
             if best.feasible and (not ended.feasible or ended.objective >= best.objective - _SAME):
                 break
             best = ended
-        return best
+        return best if near or not best.feasible else self._no_worse(best, design)
+
+    def _no_worse(self, best: Candidate, design: Mapping[str, float]) -> Candidate:
+        """Where it ended, or where a start that was better than that ends if IPOPT keeps to it."""
+        if self.problem.pattern is not None or worth(self.problem, design) >= best.objective - _SAME:
+            return best
+        kept = self._once(design, "near")
+        return kept if kept.feasible and kept.objective < best.objective else best
 
     def _once(self, design: Mapping[str, float], start: str) -> Candidate:
-        x = complete(self.nlp, self.problem, design)
+        x = complete(self.nlp, self.problem, design, start == "near")
         limits = self.nlp.touching(x) if self.touching else self.nlp
         return _candidate(self.problem, limits, self.family.ipopt(self.nlp, self.linear_solver, start)(x, limits))
 

@@ -27,6 +27,8 @@ _RADII = tuple(float(r) for r in np.geomspace(0.5, 1e-3, 28))
 
 _CORNERS = 10  # free parameters up to which all corners of the box are looked at
 
+_AT_END = 1e-4  # of a range: distance at which a parameter is at an end of it
+
 _BATCH = 16  # starts whose candidates are looked at together
 
 
@@ -73,8 +75,12 @@ def _cornered(problem: Problem, design: Mapping[str, float]) -> dict[str, float]
     return moved
 
 
-def complete(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Array:
-    """Start of all variables of an NLP: the design, and lifted variables that satisfy their equations with it."""
+def complete(nlp: NLP, problem: Problem, design: Mapping[str, float], near: bool = False) -> Array:
+    """Start of all variables of an NLP: the design, and lifted variables that satisfy their equations with it.
+
+    Args:
+        near: whether the design is close to a solution.
+    """
     nominal = problem.ordered(design)
     radius = _stable_radius(nlp, problem, nominal)
     varied = (case.applied(nominal, radius, problem.weights) for case in nlp.cases)
@@ -83,7 +89,8 @@ def complete(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Array:
     z = list(roots(regular(np.array([[float(c) for c in v.coefficients] for v in values]))) / nlp.unit)
     x = variables_of(problem, design)
     for lift in nlp.lifts:
-        guesses = lift.guess(values, z) or [[0.0] * lift.size]
+        guess = lift.close if near and lift.close else lift.guess
+        guesses = guess(values, z) or [[0.0] * lift.size]
         mismatches = [_mismatch(nlp, x, guess) for guess in guesses] if len(guesses) > 1 else [0.0]
         x = x + guesses[int(np.argmin(mismatches))]
     return np.array(x)
@@ -112,8 +119,41 @@ def spread(problem: Problem, seed: int) -> Iterator[dict[str, float]]:
         k += 1
 
 
+def worth(problem: Problem, design: Mapping[str, float]) -> float:
+    """Objective of a design in its worst case, by numeric roots; larger is worse, inf where a limit is violated."""
+    objective, excesses, _ = _judged(problem, {n: np.array(x) for n, x in design.items()})
+    feasible = objective is not None and np.isfinite(objective) and all(e <= 0 for e in excesses)
+    return float(objective) if feasible and objective is not None else np.inf
+
+
+def opposite(problem: Problem, design: Mapping[str, float]) -> list[dict[str, float]]:
+    """Designs with one parameter at the other end of its range, for each that is at an end of it."""
+    found = []
+    for name, (lower, upper) in problem.free.items():
+        share = (design[name] - lower) / (upper - lower)
+        if min(share, 1 - share) <= _AT_END:
+            found.append({**design, name: upper if share < 1 / 2 else lower})
+    return found
+
+
 def _merit(problem: Problem, columns: Mapping[str, Array]) -> tuple[Array, Array]:
     """Objective, and violated constraints, of many designs in their worst cases, each in units of its own spread."""
+    worst, excesses, nominal = _judged(problem, columns)
+    shape = next(iter(columns.values())).shape
+    objective, violation = np.zeros(shape), np.zeros(shape)
+    if worst is not None:
+        objective += _in_spreads(worst)
+    if problem.pattern is not None:
+        a = regular(np.stack(np.broadcast_arrays(*_values(problem, nominal, shape).coefficients), axis=-1))
+        mismatch = [guess_distance(problem.pattern, c, z) for c, z in zip(a, roots(a), strict=True)]
+        violation += 3 * _in_spreads(np.array(mismatch))
+    for excess in excesses:
+        violation += 3 * _in_spreads(excess)
+    return objective, violation
+
+
+def _judged(problem: Problem, columns: Mapping[str, Array]) -> tuple[Array | None, list[Array], Mapping[str, Any]]:
+    """Objective, larger is worse, and excess over each limit, of designs in their worst cases; and their parameters."""
     shape = next(iter(columns.values())).shape
     nominal = problem.ordered(columns)
     listed = [case for case in problem.cases if not case.direction]
@@ -124,19 +164,14 @@ def _merit(problem: Problem, columns: Mapping[str, Array]) -> tuple[Array, Array
             found = reduce(worst, [values[name] for values in each])
             for values in each:
                 values.define(name, found)
-    objective, violation = np.zeros(shape), np.zeros(shape)
+    objective = None
     if problem.objective is not None:
         sign = -1.0 if problem.sense == "maximize" else 1.0
         every = [sign * np.broadcast_to(problem.objective(values), shape) for values in each]
-        objective += _in_spreads(reduce(np.maximum, every))
-    if problem.pattern is not None:
-        a = regular(np.stack(np.broadcast_arrays(*_values(problem, nominal, shape).coefficients), axis=-1))
-        mismatch = [guess_distance(problem.pattern, c, z) for c, z in zip(a, roots(a), strict=True)]
-        violation += 3 * _in_spreads(np.array(mismatch))
-    for condition in problem.conditions.values():
-        sides = [_excess(condition, values, shape) for values in each]
-        violation += 3 * _in_spreads(reduce(np.maximum, sides))
-    return objective, violation
+        objective = reduce(np.maximum, every)
+    conditions = problem.conditions.values()
+    excesses = [reduce(np.maximum, [_excess(c, values, shape) for values in each]) for c in conditions]
+    return objective, excesses, nominal
 
 
 def _values(problem: Problem, parameters: Mapping[str, Any], shape: tuple[int, ...]) -> Values:
