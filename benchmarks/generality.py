@@ -15,7 +15,7 @@ from benchmarks.report import origin, share, table
 from benchmarks.spectrum import FLOOR, SAME, Evolved, evolve, relative
 from tmsopt import solve
 
-_QUICK = 5
+_QUICK = 3
 _EVERY = 3  # every so many systems the evolution is run beside ours
 _CLOSE = (1e-3, 1e-6, SAME)
 _WITHIN = 1e-6
