@@ -131,7 +131,7 @@ def test_of_one_root_and_of_twelve() -> None:
         (oscillators(0.3, 1.2, minimize="c1"), "all solutions are those of a pattern"),
         (
             oscillators(0.3, 1.2, locate="EP2"),
-            "2 free parameters and 1 conditions do not make single solutions; free fewer",
+            "2 free parameters and 1 condition do not make single solutions; free fewer",
         ),
         (
             oscillators(0.3, 1.2, locate="EP4"),
@@ -170,3 +170,13 @@ locate = "CEP2"
     text = CliRunner().invoke(main, ["solve", str(file), "--all"]).output
     assert "locate CEP2: 2 solutions in the box" in text
     assert "95 % confidence; no proof" in text
+
+
+def test_a_continuum_of_solutions_is_told_from_none() -> None:
+    """s⁴ + (Om² − 1 − k) s² + k: both pairs meet wherever Om = 1 + √k, a whole curve, for there is no damping."""
+    Om, k = ca.SX.sym("Om"), ca.SX.sym("k")
+    model = from_matrices([[1, 0], [0, 1]], [[0, -Om], [Om, 0]], [[-1, 0], [0, -k]])
+    problem = tmsopt.Problem(model=model, free={"Om": (0.5, 6.0), "k": (0.5, 3.0)}, locate="CEP2")
+    every = tmsopt.solve_all(problem, starts=8)
+    assert not every.solutions
+    assert every.coverage.singular > 0

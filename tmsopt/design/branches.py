@@ -1,6 +1,7 @@
 """All solutions of a square system that Newton's method finds, box or no box: the algebraic branches."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
@@ -33,9 +34,10 @@ def other_branches(problem: Problem, nlp: NLP, found: Mapping[str, float]) -> tu
     for start in designs(problem, 0, _STARTS):
         origin = complete(nlp, problem, start)
         for mirrored in (origin, *_mirrors(problem, origin)):
-            end = newton(system, mirrored)
-            if end is None:
+            ended = newton(system, mirrored)
+            if ended is None or not ended.isolated:
                 continue
+            end = ended.x
             values = np.array([np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, end, strict=False)])
             if any(np.abs(values - k).max() <= _SAME * (1 + np.abs(k).max()) for k in known):
                 continue
@@ -66,8 +68,20 @@ def _mirrors(problem: Problem, x: NDArray[np.float64]) -> list[NDArray[np.float6
     return images
 
 
-def newton(system: ca.Function, x: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """An isolated solution of the equations near a point, by damped steps, or None."""
+@dataclass(frozen=True)
+class End:
+    """A solution of the equations.
+
+    Attributes:
+        isolated: whether their Jacobian is regular there; else it may be one of a continuum, or of two that meet.
+    """
+
+    x: NDArray[np.float64]
+    isolated: bool
+
+
+def newton(system: ca.Function, x: NDArray[np.float64]) -> End | None:
+    """A solution of the equations near a point, by damped steps, or None."""
     residual, stalls = np.inf, 0
     for _ in range(_STEPS):
         value, jacobian, _ = (np.array(part) for part in system(x))
@@ -90,7 +104,7 @@ def newton(system: ca.Function, x: NDArray[np.float64]) -> NDArray[np.float64] |
         x = x + damping * step
     spread = np.linalg.svd(jacobian, compute_uv=False)
     isolated = spread[-1] > _ISOLATED * spread[0]
-    return x if isolated and residual <= 1e-11 * (1 + np.abs(x).max()) else None
+    return End(x, bool(isolated)) if residual <= 1e-11 * (1 + np.abs(x).max()) else None
 
 
 def _excluded(problem: Problem, nlp: NLP, x: NDArray[np.float64], system: ca.Function) -> tuple[str, ...]:

@@ -43,17 +43,26 @@ class Coverage:
         expected: number of solutions to be expected in all, from how often each was met (Boender and Rinnooy Kan
             1987); it is an estimate, not a proof.
         chance: with 95 % confidence, the chance that one more start finds another is smaller.
+        singular: starts that ended at designs with the pattern where the equations are singular, and at no other: one
+            of a continuum of solutions, or one where two meet. These are not counted as solutions.
     """
 
     starts: int
     hits: tuple[int, ...]
     expected: float
     chance: float
+    singular: int = 0
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
         expected = round(self.expected, 4) if math.isfinite(self.expected) else None
-        return {"starts": self.starts, "hits": list(self.hits), "expected": expected, "chance": round(self.chance, 6)}
+        return {
+            "starts": self.starts,
+            "hits": list(self.hits),
+            "expected": expected,
+            "chance": round(self.chance, 6),
+            "singular": self.singular,
+        }
 
 
 @dataclass(frozen=True)
@@ -93,7 +102,7 @@ def solve_all(
     width = np.array([hi - lo for lo, hi in problem.free.values()])
     found: list[Array] = []
     hits: list[int] = []
-    done = 0
+    done = singular = 0
     for design in spread(problem, seed):
         if done >= starts or _covered(done, hits):
             break
@@ -102,9 +111,13 @@ def solve_all(
             ended = runner.ended(design)
             ends.append(newton(system, ended.run.x) if ended.feasible else None)
         met: set[int] = set()
+        doubtful = False
         for end in ends:
-            point = None if end is None else _inside(problem, nlp, end)
-            if point is None:
+            point = None if end is None else _inside(problem, nlp, end.x)
+            if end is None or point is None:
+                continue
+            if not end.isolated:
+                doubtful = doubtful or not recheck(problem, problem.ordered(_named(problem, point))).violations
                 continue
             known = next((k for k, other in enumerate(found) if np.max(np.abs(point - other) / width) <= _SAME), None)
             if known is None:
@@ -116,12 +129,13 @@ def solve_all(
             met.add(known)
         for k in met:
             hits[k] += 1
+        singular += doubtful and not met
         done += 1
         if progress:
             progress(done, starts)
     order = np.argsort([-h for h in hits], kind="stable")
     solutions = [_solution(problem, _named(problem, found[k])) for k in order]
-    return Every(tuple(solutions), _coverage(done, [hits[k] for k in order]))
+    return Every(tuple(solutions), _coverage(done, [hits[k] for k in order], singular))
 
 
 def _check(problem: Problem) -> None:
@@ -131,9 +145,9 @@ def _check(problem: Problem) -> None:
         raise InputError([Fault(message, ("objective",))])
     if counted.kind != "square" or problem.cases:
         advice = "free fewer, or add == constraints" if counted.count > 0 else "free more, or ask for less"
-        message = (
-            f"{counted.free} free parameters and {counted.conditions} conditions do not make single solutions; {advice}"
-        )
+        free = f"{counted.free} free parameter{'' if counted.free == 1 else 's'}"
+        conditions = f"{counted.conditions} condition{'' if counted.conditions == 1 else 's'}"
+        message = f"{free} and {conditions} do not make single solutions; {advice}"
         raise InputError([Fault(message, ("parameters",))])
 
 
@@ -164,10 +178,10 @@ def _expected(hits: list[int]) -> float:
     return w * (n - 1) / (n - w - 2) if n > w + 2 else math.inf if w else 0.0
 
 
-def _coverage(done: int, hits: list[int]) -> Coverage:
+def _coverage(done: int, hits: list[int], singular: int) -> Coverage:
     once = sum(h == 1 for h in hits)
     chance = min(1.0, (once + _CONFIDENCE * math.sqrt(max(once, 1))) / max(done, 1))
-    return Coverage(done, tuple(hits), _expected(hits), chance)
+    return Coverage(done, tuple(hits), _expected(hits), chance, singular)
 
 
 def _solution(problem: Problem, design: Mapping[str, float]) -> Solution:

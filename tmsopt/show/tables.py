@@ -42,8 +42,14 @@ def solution_table(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: floa
 def every_table(every: Every) -> str:
     """All designs with a pattern, one column each, and what the search covers."""
     found, coverage = every.solutions, every.coverage
+    doubt = (
+        f"; {coverage.singular} ended at designs with the pattern where its equations are singular: one of a "
+        "continuum of solutions, or one where two meet (tmsopt solve shows one)"
+        if coverage.singular
+        else ""
+    )
     if not found:
-        return f"no solution was met in {coverage.starts} starts over the box"
+        return f"no single solution was met in {coverage.starts} starts over the box{doubt}"
     problem = found[0].problem
     names = [n for n in found[0].parameters if n in problem.free]
     rows = [("", *(str(k) for k in range(1, len(found) + 1)))]
@@ -53,7 +59,8 @@ def every_table(every: Every) -> str:
     many = f"{len(found)} solutions" if len(found) > 1 else "1 solution"
     lines = [problem.title or "untitled problem", f"locate {problem.locate}: {many} in the box", "", *columns(rows), ""]
     lines += [
-        f"coverage: {coverage.starts} starts over the box; {coverage.expected:.2f} solutions to be expected in all; "
+        f"coverage: {coverage.starts} starts over the box{doubt}; "
+        f"{coverage.expected:.2f} solutions to be expected in all; "
         f"the chance that one more start finds another is below {coverage.chance:.2g} (95 % confidence; no proof)"
     ]
     return "\n".join(line.rstrip() for line in lines).rstrip()
