@@ -259,7 +259,7 @@ def _vanishing(polynomial: Any, names: Sequence[str]) -> int | None:
     """Number of leading coefficients that are 0 for all parameters, as of a singular M; None if all but the last are.
 
     Decided in balls of 60 digits at designs of many sizes and signs, where a formula that is not 0 is not everywhere,
-    for numbers as they print: [[0.1, 0.2], [0.3, 0.6]] is meant to be singular, and in binary it is not.
+    for numbers as they print: [[0.1, 0.7], [0.3, 2.1]] is meant to be singular, and in binary it is not.
     """
     lost, known = 0, False
     with flint.ctx.workdps(_DIGITS):
