@@ -22,7 +22,8 @@ from tmsopt.models.tms import copo, to_si
 from tmsopt.models.whipple import canonical
 from tmsopt.models.whipple_quantities import spin
 from tmsopt.roots import exact_roots, quadratic_pencil
-from tmsopt.roots.crossings import crossings, interpolated
+from tmsopt.roots.crossings import crossings
+from tmsopt.roots.parametric import interpolated
 
 SI = whipple.sets[0]
 NONE = {p.name: 0.0 for p in SI.parameters if p.default == 0}

@@ -38,7 +38,7 @@ def _ends(_context: click.Context, _option: click.Parameter, value: str | None) 
 
 @click.command(epilog=_EXAMPLES)
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--parameter", help="What varies. [default: the speed]")
+@click.option("--parameter", metavar="NAME", help="What varies. [default: the speed]")
 @click.option("--between", callback=_ends, metavar="LOW,HIGH", help="The range to look through. [default: all]")
 @click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
 def speeds(file: Path, parameter: str | None, between: tuple[float, float] | None, as_json: bool) -> None:

@@ -2,27 +2,24 @@
 
 The coefficients are polynomials with rational coefficients in that number y. A root 0, a root at infinity, a pair ± iω
 and a multiple root are then roots of polynomials in y: of aₙ, of a0, of the Hurwitz minor Δₙ₋₁ and of the discriminant.
-These are isolated in ball arithmetic, so that none is missed, however close to another.
+These are isolated in ball arithmetic, so that none is missed, however close to another. What holds for every y, such as
+a root 0, is split off before (`lasting`).
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import count
 from typing import Any
 
 import flint
 
 from tmsopt.roots.exact import exact_roots, rational
+from tmsopt.roots.lasting import Lasting, Polynomial, lasting
+from tmsopt.roots.parametric import DIGITS, of_values, real_places, trimmed, value_at
 from tmsopt.roots.stability import lienard_chipart
 from tmsopt.roots.structure import Root
 
-_DIGITS = 120  # of y: a k-fold root then scatters by 1e-120/k, which must stay below `_SAME`
-_SAME = 1e-12  # relative to the largest root: difference of two that are one
+_SAME = 1e-12  # relative to the largest root: difference of two that are one; a k-fold one scatters by 1e-120/k
 _NOTHING = flint.fmpq(1, 10**90)  # of the largest coefficient: one that is 0 but for the digits of y
-_FURTHER = 4  # divided differences that must vanish for a function to be taken as a polynomial
-
-Polynomial = Sequence[Any]
-"""Coefficients in y, exact fractions, ascending."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +32,7 @@ class Crossing:
             k-fold root) or ``CEP2``, … (a k-fold pair).
         root: the root of it, with its multiplicity; the upper one of a pair. Of ``infinity`` without meaning.
         rightmost: whether no root is right of it.
-        changes: whether the polynomial is stable on one side of it and not on the other.
+        changes: whether the polynomial is stable, or marginally so, on one side of it and not on the other.
     """
 
     at: float
@@ -54,33 +51,19 @@ class Crossings:
         stable: bands with all Re s < 0, and whether each is known to begin or end at an end of the range is plain
             from its ends being those.
         heavily_damped: bands with all s real and negative.
-        always: what holds for every y: ``weave`` (roots mirrored in the axis), ``EP2`` (a multiple root), ``capsize``.
+        always: what holds for every y: ``weave`` (roots mirrored in the axis), ``EP2`` (a multiple root other than 0),
+            ``capsize`` (a root 0), ``infinity``.
+        marginal: bands with no root right of the axis, those on it simple; a root 0 that is there for every y is left
+            aside. Empty where nothing holds for every y.
+        zeros: multiplicity of the root 0 that is there for every y.
     """
 
     found: tuple[Crossing, ...]
     stable: tuple[tuple[float, float], ...]
     heavily_damped: tuple[tuple[float, float], ...]
     always: tuple[str, ...] = ()
-
-
-def interpolated(values: Callable[[Any], Sequence[Any]], most: int = 40) -> list[list[Any]] | None:
-    """Functions of an exact fraction, all given at once, as polynomials; None if they are none of degree `most`.
-
-    Newton's divided differences at 1, 2, 3, …: of a polynomial those beyond its degree vanish exactly.
-    """
-    edges: list[list[Any]] = []
-    newton: list[list[Any]] = []
-    idle = 0
-    for k in range(most + _FURTHER + 1):
-        row = [[rational(x) for x in values(flint.fmpq(k + 1))]]
-        for j, before in enumerate(edges, start=1):
-            row.append([(a - b) / j for a, b in zip(row[-1], before, strict=True)])
-        edges = row
-        newton.append(row[-1])
-        idle = idle + 1 if all(x == 0 for x in row[-1]) else 0
-        if idle >= _FURTHER:
-            return [_expanded([d[c] for d in newton[:-idle]] or [flint.fmpq(0)]) for c in range(len(row[0]))]
-    return None
+    marginal: tuple[tuple[float, float], ...] = ()
+    zeros: int = 0
 
 
 def crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any | None) -> Crossings:
@@ -90,48 +73,91 @@ def crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any | None)
         coefficients: of the polynomial in s, descending, each a polynomial in y.
     """
     lower, upper = rational(lower), None if upper is None else rational(upper)
-    a = [_trimmed(c) for c in coefficients]
-    kinds = {"capsize": a[-1], "infinity": a[0], "weave": _of_values(a, _mirrored), "EP2": _of_values(a, _double)}
-    always = tuple(kind for kind, polynomial in kinds.items() if not polynomial)
-    places = {kind: _real_roots(polynomial, lower, upper) for kind, polynomial in kinds.items() if polynomial}
-    found = [(y, *rest) for kind, ys in places.items() for y in ys for rest in _named(a, kind, y)]
+    every = [trimmed(c) for c in coefficients]
+    a = every[next(k for k, c in enumerate(every) if c) :]
+    kinds, split = _conditions(a)
+    places = {kind: real_places(polynomial, lower, upper) for kind, polynomial in kinds.items() if polynomial}
+    found = [(y, *rest) for kind, ys in places.items() for y in ys for rest in _named(a, split, kind, y)]
     found.sort(key=lambda place: place[0])
     marks = sorted({y for ys in places.values() for y in ys})
     cells = list(_cells(marks, lower, upper))
-    states = [_state(_at(a, middle)) for _, _, middle in cells]
-    sides = {float(y): (states[k][0], states[k + 1][0]) for k, y in enumerate(marks)}
+    states = [_state(value_at(a, middle)) for _, _, middle in cells]
+    marginal = [split is not None and _marginal(split, middle) for _, _, middle in cells]
+    kept = [stable or on for (stable, _), on in zip(states, marginal, strict=True)]
+    changed = {float(y): kept[k] != kept[k + 1] for k, y in enumerate(marks)}
     return Crossings(
-        tuple(Crossing(float(y), kind, root, first, len({*sides[float(y)]}) > 1) for y, kind, root, first in found),
+        tuple(Crossing(float(y), kind, root, first, changed[float(y)]) for y, kind, root, first in found),
         _bands(cells, [stable for stable, _ in states]),
         _bands(cells, [damped for _, damped in states]),
-        always,
+        (*(("infinity",) if len(a) < len(every) else ()), *_always(split)),
+        _bands(cells, marginal),
+        split.zeros if split else 0,
     )
 
 
-def _named(a: Sequence[Polynomial], kind: str, y: Any) -> Iterator[tuple[str, Root, bool]]:
+def _conditions(a: Sequence[Polynomial]) -> tuple[dict[str, Polynomial], Lasting | None]:
+    """Polynomials in y that vanish where something happens, and what holds for every y, if anything does."""
+    kinds = {"capsize": a[-1], "infinity": a[0]}
+    if len(a) > 1:
+        kinds |= {"weave": of_values(a, _mirrored), "EP2": of_values(a, _double)}
+    if all(kinds.values()):
+        return kinds, None
+    split = lasting(a)
+    kinds["capsize"] = _of_products(split.mirrored[-1], split.rest[-1])
+    kinds["weave"] = of_values(split.rest, _mirrored) if len(split.rest) > 1 else []
+    kinds["EP2"] = of_values(split.once, _double) if len(split.once) > 1 else []
+    return kinds, split
+
+
+def _of_products(first: Polynomial, second: Polynomial) -> Polynomial:
+    return trimmed(list((flint.fmpq_poly(list(first)) * flint.fmpq_poly(list(second))).coeffs()))
+
+
+def _always(split: Lasting | None) -> tuple[str, ...]:
+    if split is None:
+        return ()
+    holds = {"capsize": split.zeros > 0, "weave": len(split.mirrored) > 1, "EP2": split.repeated}
+    return tuple(kind for kind, always in holds.items() if always)
+
+
+def _marginal(split: Lasting, y: Any) -> bool:
+    """Whether no root is right of the axis, and those on it are simple, between two places; roots 0 aside."""
+    rest, mirrored = value_at(split.rest, y), value_at(split.mirrored, y)
+    if split.repeats_mirrored or not (len(rest) == 1 or _state(rest)[0]):
+        return False
+    return len(mirrored) == 1 or all(w.im == 0 and w.re < 0 for w in exact_roots(mirrored[::2]))  # in w = s²
+
+
+def _named(a: Sequence[Polynomial], split: Lasting | None, kind: str, y: Any) -> Iterator[tuple[str, Root, bool]]:
     """What is at a place: kind, root, whether rightmost. A mirrored pair that is real is nothing."""
     if kind == "infinity":
         yield kind, Root(float("nan"), 0.0), False
         return
-    roots = _grouped(_finite_part(_at(a, y)))
+    coefficients = _finite_part(value_at(a, y))
+    size = _size(a, y, coefficients)
+    roots = _grouped(coefficients, size)
     if not roots:
         return
-    size = max(abs(complex(r.re, r.im)) for r in roots)
     line = max(r.re for r in roots)
 
     def first(root: Root) -> bool:
         return root.re >= line - _SAME * size
+
+    def within(part: Sequence[Polynomial], root: Root) -> int:
+        """How often a root is one of a part."""
+        own = _grouped(_finite_part(value_at(part, y)), size)
+        return sum(o.multiplicity for o in own if abs(complex(o.re - root.re, o.im - root.im)) <= _SAME * size)
 
     if kind == "capsize":
         zero = min(roots, key=lambda r: abs(complex(r.re, r.im)))
         yield kind, Root(0.0, 0.0, zero.multiplicity), first(zero)
     elif kind == "weave":
         for root in roots:
-            if abs(root.re) <= _SAME * size and root.im > _SAME * size:
+            if abs(root.re) <= _SAME * size < root.im and (split is None or within(split.rest, root)):
                 yield kind, Root(0.0, root.im, root.multiplicity), first(root)
     else:
         for root in roots:
-            if root.multiplicity > 1 and root.im >= 0:
+            if root.multiplicity > 1 and root.im >= 0 and (split is None or within(split.once, root) > 1):
                 yield f"{'CEP' if root.im else 'EP'}{root.multiplicity}", root, first(root)
 
 
@@ -142,10 +168,17 @@ def _finite_part(coefficients: Sequence[Any]) -> Sequence[Any]:
     return coefficients[first:]
 
 
-def _grouped(coefficients: Sequence[Any]) -> list[Root]:
+def _size(a: Sequence[Polynomial], y: Any, coefficients: Sequence[Any]) -> float:
+    """A bound of the roots that is not 0 where they all come to 0: from the terms in y, which do not cancel."""
+    terms = value_at([[abs(c) for c in polynomial] for polynomial in a[len(a) - len(coefficients) :]], abs(y))
+    lead = abs(coefficients[0])
+    ratios = ((k, t / lead) for k, t in enumerate(terms) if k and t != 0)
+    return max((float((flint.arb(ratio) ** (flint.arb(1) / k)).mid()) for k, ratio in ratios), default=1.0)
+
+
+def _grouped(coefficients: Sequence[Any], size: float) -> list[Root]:
     """Roots of a polynomial that is known to many digits, those that are one to a few of these as one."""
-    left = list(exact_roots(coefficients, _DIGITS)) if len(coefficients) > 1 else []
-    size = max((abs(complex(r.re, r.im)) for r in left), default=1.0) or 1.0
+    left = list(exact_roots(coefficients, DIGITS)) if len(coefficients) > 1 else []
     groups: list[Root] = []
     while left:
         z = complex(left[0].re, left[0].im)
@@ -153,7 +186,8 @@ def _grouped(coefficients: Sequence[Any]) -> list[Root]:
         left = [r for r in left if r not in near]
         number = sum(r.multiplicity for r in near)
         middle = sum(complex(r.re, r.im) * r.multiplicity for r in near) / number
-        groups.append(Root(middle.real, middle.imag if abs(middle.imag) > _SAME * size else 0.0, number))
+        re, im = (x if abs(x) > _SAME * size else 0.0 for x in (middle.real, middle.imag))
+        groups.append(Root(re, im, number))
     return groups
 
 
@@ -187,55 +221,6 @@ def _bands(cells: Sequence[tuple[float, float, Any]], inside: Sequence[bool]) ->
     return tuple(bands)
 
 
-def _at(a: Sequence[Polynomial], y: Any) -> list[Any]:
-    """Coefficients for a y."""
-    values = []
-    for polynomial in a:
-        value = flint.fmpq(0)
-        for c in reversed(polynomial):
-            value = value * y + c
-        values.append(value)
-    return values
-
-
-def _real_roots(polynomial: Polynomial, lower: Any, upper: Any | None) -> list[Any]:
-    """Different real roots between two ends, as fractions that are right to the digits carried."""
-    common = flint.fmpz(1)
-    for c in polynomial:
-        common = common.lcm(c.q)
-    with flint.ctx.workdps(_DIGITS):
-        roots: Any = flint.fmpz_poly([int(c.p * (common // c.q)) for c in polynomial]).complex_roots()
-        real = [rational(z.real) for z, _ in roots if z.imag == 0]
-    return sorted(y for y in real if y > lower and (upper is None or y < upper))
-
-
-def _of_values(a: Sequence[Polynomial], function: Callable[[Sequence[Any]], Any]) -> Polynomial:
-    """A polynomial function of the coefficients as a polynomial in y, from its values where a0 is not 0."""
-    degree = max(len(c) - 1 for c in a) * 2 * len(a)
-    points: list[Any] = []
-    for k in count(1):
-        y = flint.fmpq(k)
-        if _at(a, y)[0] != 0:
-            points.append(y)
-        if len(points) > degree:
-            break
-    table = [function(_at(a, y)) for y in points]
-    newton = []
-    for j in range(len(points)):
-        newton.append(table[0])
-        table = [(table[i + 1] - table[i]) / (points[i + j + 1] - points[i]) for i in range(len(table) - 1)]
-    return _trimmed(_expanded(newton, points))
-
-
-def _expanded(newton: Sequence[Any], points: Sequence[Any] | None = None) -> list[Any]:
-    """Newton's form as coefficients, ascending; at 1, 2, 3, … where no points are given."""
-    result = flint.fmpq_poly([0])
-    for k in reversed(range(len(newton))):
-        point = flint.fmpq(k + 1) if points is None else points[k]
-        result = result * flint.fmpq_poly([-point, 1]) + flint.fmpq_poly([newton[k]])
-    return list(result.coeffs())
-
-
 def _mirrored(a: Sequence[Any]) -> Any:
     """Δₙ₋₁, which is 0 where two roots are s and −s."""
     n = len(a) - 1
@@ -256,11 +241,3 @@ def _double(a: Sequence[Any]) -> Any:
         value = value * (-1) ** (p.degree() * q.degree()) * lead ** (p.degree() - rest.degree())
         p, q = q, rest
     return value * q[0] ** p.degree()
-
-
-def _trimmed(polynomial: Polynomial) -> list[Any]:
-    """Without leading zeros; empty for 0."""
-    kept = [rational(c) for c in polynomial]
-    while kept and kept[-1] == 0:
-        kept.pop()
-    return kept

@@ -1,7 +1,7 @@
 """The speeds at which the motion of a design changes, as text."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from tmsopt.design.units import reading
 from tmsopt.roots.crossings import Crossing
@@ -9,13 +9,6 @@ from tmsopt.show.text import columns
 from tmsopt.study.speeds import Speeds
 
 _DIGITS = 15
-
-_ALWAYS = {
-    "capsize": "a root is 0 at every speed",
-    "weave": "the roots are mirrored in the imaginary axis at every speed",
-    "EP2": "a root is multiple at every speed",
-    "infinity": "a root is at infinity at every speed",
-}
 
 
 def speeds_table(found: Speeds) -> str:
@@ -32,11 +25,41 @@ def speeds_table(found: Speeds) -> str:
     for c in found.found:
         other = f"{reading(c.at, unit)[0]:.8g}" if read != unit else ""
         rows.append((c.kind, f"{c.at:.{_DIGITS}g}", other, _root(c), _meaning(c)))
-    lines += [*columns(rows), ""] if found.found else ["no root meets another or the imaginary axis", ""]
-    lines += [_ALWAYS[kind] for kind in found.always]
+    lines += [*columns(rows), ""] if found.found else [_nothing(found), ""]
+    lines += list(_always(found))
     lines.append(f"stable: {_bands(found, found.stable)}")
+    if found.always and (found.zeros or "weave" in found.always):
+        lines.append(f"{_marginally(found)}: {_bands(found, found.marginal)}")
     lines.append(f"heavily damped: {_bands(found, found.heavily_damped)}")
     return "\n".join(line.rstrip() for line in lines)
+
+
+def _nothing(found: Speeds) -> str:
+    if found.always:
+        return f"beside what holds for every {found.parameter}, no root meets another or the imaginary axis"
+    return "no root meets another or the imaginary axis"
+
+
+def _always(found: Speeds) -> Iterator[str]:
+    """What holds whatever the parameter; the places above are those where more happens."""
+    name = found.parameter
+    if found.zeros:
+        times = f", {found.zeros}-fold" if found.zeros > 1 else ""
+        yield f"s = 0 is a root for every {name}{times}"
+    if "weave" in found.always:
+        yield f"roots are mirrored in the imaginary axis for every {name}: no design is better than marginally stable"
+    if "EP2" in found.always:
+        yield f"a root is multiple for every {name}"
+    if "infinity" in found.always:
+        yield f"a root is at infinity for every {name}"
+
+
+def _marginally(found: Speeds) -> str:
+    """What the bands mean in which roots stay on the imaginary axis."""
+    if found.zeros > 1:
+        kind = "marginally stable" if "weave" in found.always else "stable"
+        return f"{kind} but for the {found.zeros}-fold root 0"
+    return "marginally stable (no root right of the imaginary axis, those on it simple)"
 
 
 def _range(found: Speeds) -> str:

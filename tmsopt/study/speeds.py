@@ -12,9 +12,10 @@ from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.solution import Solution
 from tmsopt.models import ParameterSet
-from tmsopt.roots.crossings import Crossing, crossings, interpolated
+from tmsopt.roots.crossings import Crossing, crossings
 from tmsopt.roots.elementary import exact
 from tmsopt.roots.exact import rational
+from tmsopt.roots.parametric import interpolated
 
 _DIGITS = 120  # of what is no fraction, such as the tangent of an angle
 _STRAIGHT = 1e-100  # relative; a number that is linear in the speed is so within the digits carried
@@ -33,7 +34,10 @@ class Speeds:
         found: every speed at which a root crosses the imaginary axis or roots meet, in ascending order.
         stable: bands of speeds with all Re s < 0.
         heavily_damped: bands with all s real and negative.
-        always: ``capsize``, ``weave`` or ``EP2`` where that holds at every speed.
+        always: ``capsize``, ``weave``, ``EP2`` or ``infinity`` where that holds at every speed.
+        marginal: bands with no root right of the imaginary axis, those on it simple, where roots stay on it; a root 0
+            that is there at every speed is left aside.
+        zeros: multiplicity of that root 0.
     """
 
     problem: Problem
@@ -45,6 +49,8 @@ class Speeds:
     stable: tuple[Band, ...]
     heavily_damped: tuple[Band, ...]
     always: tuple[str, ...]
+    marginal: tuple[Band, ...] = ()
+    zeros: int = 0
 
     @property
     def weave(self) -> tuple[float, ...]:
@@ -84,7 +90,9 @@ class Speeds:
             ],
             "stable": [[_finite(e) for e in band] for band in self.stable],
             "heavily_damped": [[_finite(e) for e in band] for band in self.heavily_damped],
+            "marginally_stable": [[_finite(e) for e in band] for band in self.marginal],
             "always": list(self.always),
+            "zeros": self.zeros,
             "parameters": dict(self.parameters),
         }
 
@@ -112,7 +120,9 @@ def speeds(
     of = asked.parameter_set
     name = parameter if parameter is not None else speed_of(of)
     if name is None:
-        message = f"the model '{asked.model.name}' has no parameter that is a speed; accepted: {' '.join(of.names)}"
+        known = " ".join(of.names)
+        message = f"the model '{asked.model.name}' has no parameter that is a speed; say which one varies, "
+        message += f"`--parameter NAME` (`parameter=` in Python); accepted: {known}"
         raise InputError([Fault(message, ("parameter",))])
     if name not in of.names:
         raise InputError([Fault(f"unknown parameter '{name}'; {suggest(name, of.names)}", ("parameter",))])
@@ -130,7 +140,17 @@ def speeds(
         raise InputError([Fault(f"the coefficients are no polynomials in {name}, or all 0", ("parameter",))])
     met = crossings(a, exact(float(lower)), exact(float(upper)) if math.isfinite(upper) else None)
     return Speeds(
-        asked, name, Table(own), float(lower), float(upper), met.found, met.stable, met.heavily_damped, met.always
+        problem=asked,
+        parameter=name,
+        parameters=Table(own),
+        lower=float(lower),
+        upper=float(upper),
+        found=met.found,
+        stable=met.stable,
+        heavily_damped=met.heavily_damped,
+        always=met.always,
+        marginal=met.marginal,
+        zeros=met.zeros,
     )
 
 
