@@ -30,7 +30,8 @@ _AGAIN = 3  # times that every solution must have been met before the search may
 _SAME = 1e-7  # of the box: distance of designs that are one solution, whatever their factors are called
 _INSIDE = 1e-9  # of the box: how far outside an end counts as on it
 _BY_IPOPT = 4  # every so many starts, IPOPT is asked too: it reaches what Newton's method runs away from
-_CONFIDENCE = 3.0  # −ln 5 %: what was met in none of n starts is met in fewer than 3/n of them, with 95 %
+_DEVIATIONS = 2.0  # beyond the estimate: with `_NEVER`, 95 % for few solutions and for many, alike and unlike
+_NEVER = 3.0  # −ln 5 %: what was met in none of n starts is met in fewer than 3/n of them, with 95 %
 
 
 @dataclass(frozen=True)
@@ -179,8 +180,9 @@ def _expected(hits: list[int]) -> float:
 
 
 def _coverage(done: int, hits: list[int], singular: int) -> Coverage:
-    once = sum(h == 1 for h in hits)
-    chance = min(1.0, (once + _CONFIDENCE * math.sqrt(max(once, 1))) / max(done, 1))
+    once, twice = (sum(h == k for h in hits) for k in (1, 2))
+    deviation = math.sqrt(once + 2 * twice)  # of n times the chance, which Turing estimates by `once` (Good 1953)
+    chance = min(1.0, (once + _DEVIATIONS * deviation + _NEVER) / max(done, 1))
     return Coverage(done, tuple(hits), _expected(hits), chance, singular)
 
 
