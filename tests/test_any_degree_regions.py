@@ -175,6 +175,14 @@ def test_oscillators_side_by_side(c, k, a):
     assert found.heavy_damping.distance == pytest.approx(float(np.linalg.norm(ways)), rel=1e-8)
 
 
+def test_a_root_0_of_an_unstable_quintic_is_no_capsize():
+    """At x = 1 a pair is right of the axis; yet s⁴ + 2.5 s³ + 3.5 s² + s + 4, the rest, passes all but one inequality."""
+    of = model(("x",), 5, lambda x: product([1, 0.5 - x, 1], [1, 3, 4], [1, 1 - x]))
+    found = robustness(Problem(model=of, fixed={"x": 0.0}), weights={"x": 1.0})
+    assert found.weave.distance == pytest.approx(0.5, rel=1e-12)
+    assert not found.capsize.found
+
+
 def test_a_mass_that_may_vanish():
     """m s² + c s + k: stable for one sign of all three, so each relative change alone may be −1; c² = 4 m k."""
     of = model(("m", "c", "k"), 2, lambda m, c, k: [m, c, k])

@@ -95,6 +95,13 @@ def test_constant_product_and_constant_mean(degree: int) -> None:
     assert relation_bound(mean) == pytest.approx(-3 / degree, rel=1e-15)
 
 
+def test_of_two_relations_the_one_without_the_leading_coefficient_counts_too() -> None:
+    """a₃ = 100 and a₄ = 1: 100 = −Σ Re 1/sₖ ≤ 4/d where all Re sₖ ≤ −d < 0; either relation alone says far less."""
+    a, b = symbols("a b")
+    both = boxed(from_coefficients([1, a, b, 100, 1]), 0.0, 200.0, minimize="abscissa")
+    assert relation_bound(both) == pytest.approx(-0.04, rel=1e-15)
+
+
 @pytest.mark.parametrize("degree", [2, 3, 4, 6, 9])
 def test_no_polynomial_of_a_family_with_one_relation_is_below_its_bound(degree: int) -> None:
     """Drawn from the family at random, and near (s + z)ⁿ with z a zero of h, where that is the optimum."""
@@ -197,6 +204,16 @@ def test_damping_ratios_of_an_odd_degree(limit: float, told: str) -> None:
         maximize="damping_ratio",
     )
     assert told in verdict(problem, limit)
+
+
+def test_the_greatest_damping_ratio_of_an_odd_degree() -> None:
+    """(s + r)(s² + p s + 1): ζ = p/2 is greatest at x = 1/5 among r = (x − 2/5)(x − 4/5) ≥ 0; beyond, p is larger."""
+    (x,) = symbols("x")
+    p = 0.6 - 10 * (x - 0.2) ** 2 + 40 * (x - 0.2) ** 3
+    model = from_coefficients(product([1, (x - 0.4) * (x - 0.8)], [1, p, 1]))
+    design = tmsopt.solve(boxed(model, 0.0, 0.7, maximize="damping_ratio"))
+    assert design.parameters["x"] == pytest.approx(0.2, abs=1e-7)  # a maximum is flat
+    assert design.value == pytest.approx(0.3, abs=1e-12)
 
 
 @scip

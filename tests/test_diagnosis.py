@@ -150,6 +150,22 @@ def test_two_equal_oscillators_are_semisimple() -> None:
     assert (both.roots, both.constants) == (2, pytest.approx([-2 * s0**2 / (4 * s0 + 0.6)] * 2, rel=1e-12))
 
 
+def test_oscillators_equal_but_for_a_millionth_have_two_eigenvectors() -> None:
+    """Their polynomial is 1e-13 from a double pair; the matrix there is the root of that from rank 0."""
+    k1, k2 = symbols("k1 k2")
+    model = from_matrices([[1, 0], [0, 1]], [[0.6, 0], [0, 0.6]], [[k1, 0], [0, k2]])
+    found = diagnosis_of(model, k1=7.0, k2=7.0 * (1 + 1e-6))
+    assert (found.kind, found.geometric, found.partial) == ("semisimple", 2, (1, 1))
+
+
+def test_a_slope_that_is_rounding_moves_nothing() -> None:
+    """(s + 1)² = x (2y² − 1): at y = √½ in doubles the slope is 2e-16, and at y = √½ none."""
+    x, y = symbols("x y")
+    found = diagnosis_of(from_coefficients([1, 2, 1 - x * (2 * y * y - 1)]), x=0.0, y=sqrt(0.5))
+    assert 2 * sqrt(0.5) ** 2 != 1
+    assert response(found, "x") == Response("x", False, (), 2)
+
+
 def test_six_uncoupled_oscillators_with_critical_damping() -> None:
     """(s² + c s + 1)⁶ at c = 2: six chains of two, each moved by t² = 2 ε for c (1 + ε)."""
     c, k = symbols("c k")
@@ -229,6 +245,23 @@ def test_flutter_of_the_undamped_ziegler_pendulum() -> None:
     assert complex(found.re, found.im) == pytest.approx(1j * 0.5**0.25, rel=1e-14)
     law = found.responses[0].laws[0].branches
     assert (str(law.exponent), law.constants[0]) == ("1/2", pytest.approx(critical / 4, rel=1e-12))
+
+
+def test_the_law_holds_farther_on_one_side() -> None:
+    """(s + 1)² = x + 2x²: t is off √x by √(1 + 2x) − 1, so by a tenth at x = 0.105 and at −0.095.
+
+    Sampled are 0.1, which is between them, and 0.1^(5/4).
+    """
+    (x,) = symbols("x")
+    (law,) = diagnosis_of(from_coefficients([1, 2, 1 - x - 2 * x * x]), x=0.0).responses[0].laws
+    assert (law.below, law.above) == (pytest.approx(10**-1.25), pytest.approx(0.1))
+
+
+def test_parameters_are_ordered_by_how_far_they_move_the_root() -> None:
+    """(s + 1)² = a + 4b + c²: t² = 4ε moves farther than t² = ε, and t = ±ε least."""
+    a, b, c = symbols("a b c")
+    found = diagnosis_of(from_coefficients([1, 2, 1 - a - 4 * b - c * c]), a=0.0, b=0.0, c=0.0)
+    assert [r.parameter for r in found.responses] == ["b", "a", "c"]
 
 
 # The EP4 of the two-mass-skate bicycle

@@ -359,6 +359,23 @@ def test_crossings_of_small_polynomials():
     assert [(c.at, c.kind) for c in crossings([y, one], -1, 1).found] == [(0, "infinity")]
     assert interpolated(lambda x: [x**3 - 2, 1 + 0 * x]) == [[-2, 0, 0, 1], [1]]
     assert interpolated(lambda x: [1 / x]) is None
+    # the first two differences vanish by chance
+    assert interpolated(lambda x: [(x - 1) * (x - 2) * (x - 3) + 5]) == [[-1, 11, -6, 1]]
+
+
+def test_crossings_of_a_polynomial_and_its_negative_are_the_same():
+    one, y = [1], [0, 1]
+    assert crossings([[-1], [0, -1], [-1]], -5, 5) == crossings([one, y, one], -5, 5)
+
+
+def test_crossings_left_of_another_root_change_no_stability():
+    """(s² + y s + 1)(s − 3): the root 3 is right of all, and is double at y = −10/3; −3 mirrors it at y = 10/3."""
+    found = crossings([[1], [-3, 1], [1, -3], [-3]], -5, 5)
+    assert [(c.at, c.kind, c.rightmost, c.changes) for c in found.found] == [
+        (-10 / 3, "EP2", True, False), (-2, "EP2", False, False), (0, "weave", False, False), (2, "EP2", False, False),
+    ]  # fmt: skip
+    assert found.stable == ()
+    assert [c.rightmost for c in crossings([[1], [0, 1], [1]], -5, 5).found] == [True, True, True]
 
 
 def test_what_speeds_refuses():
