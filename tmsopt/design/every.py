@@ -179,7 +179,7 @@ def _expected(hits: list[int]) -> float:
     return w * (n - 1) / (n - w - 2) if n > w + 2 else math.inf if w else 0.0
 
 
-def _coverage(done: int, hits: list[int], singular: int) -> Coverage:
+def _coverage(done: int, hits: list[int], singular: int = 0) -> Coverage:
     once, twice = (sum(h == k for h in hits) for k in (1, 2))
     deviation = math.sqrt(once + 2 * twice)  # of n times the chance, which Turing estimates by `once` (Good 1953)
     chance = min(1.0, (once + _DEVIATIONS * deviation + _NEVER) / max(done, 1))
