@@ -14,6 +14,7 @@ from tmsopt.study.continuation import (
     crossing,
     curve,
     project,
+    same,
     tangent_at,
     walk,
 )
@@ -236,3 +237,24 @@ def test_crossing_is_exact_at_the_ends_and_to_rounding_inside():
     assert crossing(lambda s: s - 1.0, 1.0) == 1.0
     assert crossing(lambda s: s * s - 2.0, 2.0) == pytest.approx(math.sqrt(2), abs=1e-15)
     assert crossing(lambda s: s - 1e-200, 1.0) == pytest.approx(1e-200, rel=1e-12)
+
+
+def test_a_curve_found_twice_is_recognised_by_its_ends():
+    """y = x² leaves the box −1 … 1 at (±1, 1) wherever one begins; y = x² + 1/2 leaves it elsewhere."""
+
+    def walked(height, start):
+        x = ca.SX.sym("x", 2)
+        on = curve(x, x[1] - x[0] ** 2 - height, np.ones(2), np.array([-1.0, -1.0]), np.array([1.0, 2.0]))
+        return both_ways(on, np.array([start, start**2 + height]), 0.05, 500)
+
+    assert same(walked(0.0, 0.1), walked(0.0, -0.7))
+    assert not same(walked(0.0, 0.1), walked(0.5, 0.1))
+
+
+def test_a_curve_in_an_edge_of_the_box_is_followed():
+    """y (1 + x²) = 0 with y ≥ 0: rounding on the wrong side of the edge does not end it."""
+    x = ca.SX.sym("x", 2)
+    on = curve(x, x[1] * (1 + x[0] ** 2), np.ones(2), np.array([-1.0, 0.0]), np.array([1.0, 1.0]))
+    walked = both_ways(on, np.array([0.1, -1e-17]), 0.05, 500)
+    assert sorted(walked.y[[0, -1], 0]) == [-1, 1]
+    assert np.abs(walked.y[:, 1]).max() < 1e-15

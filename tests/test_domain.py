@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from curves import certified, changes, damped, distance, equations, exact_polynomial, stable, sturm
 
+import tmsopt
 from tmsopt.design.problem import Problem
 from tmsopt.models import tms
 from tmsopt.models.model import Model, Parameter, ParameterSet
@@ -351,3 +352,27 @@ def test_a_root_0_and_one_at_infinity_meet_in_a_corner():
         if np.abs(plane.unit(a.points) - plane.unit(corner.parameters)).sum(1).min() < 1e-9
     }
     assert kinds == {"capsize", "infinity"}
+
+
+def _absorber(**free):
+    """A damped mass on an undamped one: stable wherever the damper is, its force does no work only at c = 0."""
+    import casadi as ca
+
+    c, w, mu = ca.SX.sym("c"), ca.SX.sym("w"), 0.1
+    k = mu * w**2
+    model = tmsopt.models.from_matrices([[1, 0], [0, mu]], [[c, -c], [-c, c]], [[1 + k, -k], [-k, k]])
+    return tmsopt.Problem(model, free=free)
+
+
+def test_a_boundary_in_an_edge_of_the_box_is_that_edge():
+    """Without damper, c = 0, both pairs lie on the axis: no boundary inside, no noise along the edge."""
+    found = domain(_absorber(c=(0.0, 1.0), w=(0.2, 2.0)), starts=12)
+    assert found.stability == ()
+    assert not [corner for corner in found.corners if corner.parameters["c"] < 1e-9]
+
+
+def test_the_same_boundary_inside_the_box_is_drawn():
+    found = domain(_absorber(c=(-0.5, 1.0), w=(0.2, 2.0)), starts=12)
+    lines = [arc for arc in found.stability if np.abs(arc.points["c"]).max() < 1e-12]
+    assert {arc.kind for arc in found.stability} == {"weave"}
+    assert lines

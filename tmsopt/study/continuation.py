@@ -30,6 +30,7 @@ _SOLVED = 1e-10
 _FINE = 1e-17
 _FAR = 1e6  # in units of the scale; further out the equations lose their digits
 _SAME = 1e-7
+_EDGE = 1e-12  # of a variable of order 1: rounding beside a limit that a curve lies in
 CLOSED = "closed"
 SINGULAR = "singular: the curve branches or has no direction here"
 INFINITE = "a root goes to infinity: a0 vanishes"
@@ -184,7 +185,7 @@ def walk(on: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
                 return _ended(ys, ts, End(SINGULAR))
         if len(ys) > 2 and 0 < ahead <= s and far <= 2 * s and advance.returns(y, t, ahead):
             return _ended([*ys, ys[0]], [*ts, ts[0]], End(CLOSED))
-        if slack < 0:
+        if slack < 0 and not _along(on, new, tangent):
             last, direction, end = _at_limit(on, advance, y, t, s)
             return _ended([*ys, last], [*ts, direction], end)
         ys.append(new)
@@ -229,6 +230,18 @@ def contains(on: Curve, walked: Walk, y: Array) -> bool:
         return False
     new, _ = between(on, walked.y[k], walked.t[k], float(walked.t[k] @ (y - walked.y[k])))
     return bool(np.abs(new - y).max() <= _SAME * (1 + np.abs(y).max()))
+
+
+def same(one: Walk, other: Walk) -> bool:
+    """Whether both ends of a walk are ends of another, at limits: through a regular point goes one curve only."""
+    if one.closed or other.closed or any(end.limit is None for walked in (one, other) for end in walked.ends):
+        return False
+
+    def shared(row: int) -> bool:
+        near = (k for k in (0, -1) if np.abs(one.y[row] - other.y[k]).max() <= _SAME * (1 + np.abs(one.y[row]).max()))
+        return any(abs(one.t[row] @ other.t[k]) >= _COSINE for k in near)
+
+    return shared(0) and shared(-1)
 
 
 def crossing(function: Callable[[float], float], end: float) -> float:
@@ -282,6 +295,13 @@ def _reach(on: Curve, y: Array, t: Array) -> float:
             / (np.abs(t) + 1e-300)
         )
     )
+
+
+def _along(on: Curve, y: Array, t: Array) -> bool:
+    """Whether a curve that is beyond limits runs along them: it lies in an edge of the box, up to rounding."""
+    beyond = np.maximum(on.lower - y, y - on.upper)
+    over = beyond > 0
+    return bool(np.all(beyond[over] <= _EDGE) and np.all(np.abs(t[over]) <= _EDGE))
 
 
 def _at_limit(on: Curve, advance: _Advance, y: Array, t: Array, s: float) -> tuple[Array, Array, End]:

@@ -25,6 +25,9 @@ _CLOSE = 5e-3
 """Widths of the box, a step, between the last point before infinity or a singular end and the corner it belongs to."""
 
 
+_EDGE = 1e-9  # widths of the box: a branch that starts beside an edge, not in it, leaves it by more
+
+
 @dataclass(frozen=True)
 class Arc:
     """A piece of a boundary.
@@ -52,7 +55,8 @@ class Corner:
 
 @dataclass(frozen=True)
 class Domain:
-    """Boundaries inside a box; where a domain leaves the box, its boundary ends at the edge.
+    """Boundaries inside a box; where a domain leaves the box, its boundary ends at the edge. A boundary that
+    lies in an edge, such as that of designs without damping, is that edge and is left out.
 
     Attributes:
         stability: arcs that bound asymptotic stability.
@@ -86,7 +90,8 @@ def domain(problem: Problem, *, step: float = STEP, starts: int = STARTS, seed: 
     """
     plane = replace(checked(problem), constraints={}, minimize=None, maximize=None, locate=None)
     found = {
-        name: trace(plane, name, step=step, starts=starts, seed=seed).branches for name in ("weave", "capsize", "EP2")
+        name: [b for b in trace(plane, name, step=step, starts=starts, seed=seed).branches if not _in_edge(b, plane)]
+        for name in ("weave", "capsize", "EP2")
     }
     unstable_beyond = [b for name in ("weave", "capsize") for b in found[name]]
     infinite = list(through_infinity(plane, step, starts, seed))
@@ -104,6 +109,15 @@ def domain(problem: Problem, *, step: float = STEP, starts: int = STARTS, seed: 
         tuple(damping),
         tuple(parting),
         tuple(_distinct([*corners, *(c for curve in infinite for c in _changes(curve, corners=True))])),
+    )
+
+
+def _in_edge(branch: Branch, problem: Problem) -> bool:
+    """Whether a branch lies in an edge of the box, which bounds the picture anyway: it has one side only."""
+    return any(
+        bool(np.all(np.abs(branch.parameters[n] - limit) <= _EDGE * (high - low)))
+        for n, (low, high) in problem.free.items()
+        for limit in (low, high)
     )
 
 
@@ -138,7 +152,7 @@ def _pieces(
         k = event.index
         if event.name != "end":
             marked[k] = bool(inside[max(k - 1, 0)] or inside[min(k + 1, len(branch) - 1)])
-        elif event.detail in (INFINITE, SINGULAR):
+        elif event.detail.startswith((INFINITE, SINGULAR)):
             for corner in _near(problem, event, at_infinity):
                 beyond[k] = corner
     for start, stop in _edges(marked):

@@ -82,8 +82,8 @@ def located(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walk
             def at(s: float, i: int = int(i), mark: Mark = mark) -> float:
                 return _at(on, walked, i, mark, s)
 
-            if not at(0.0) * at(end) <= 0:
-                continue  # a jump through infinity, or nan
+            if not np.sign(at(0.0)) * np.sign(at(end)) <= 0:  # of signs: the product of tiny numbers is 0
+                continue  # a jump through infinity, noise, or nan
             s = crossing(at, end)
             y, t = between(on, walked.y[i], walked.t[i], s)
             if not np.abs(y - walked.y[i]).max() <= _ASTRAY * s + TOGETHER:
