@@ -20,6 +20,8 @@ COLOURS = {
 
 _UNLABELLED = ("fold", "constraint", "end")
 
+_FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
+
 
 def trace_table(trace: Trace) -> str:
     """Branches with their events, one a row, in the free parameters."""
@@ -117,7 +119,8 @@ def _summary(branch: Branch, trace: Trace) -> str:
         states += f", constraints hold on {100 * float(np.mean(branch.satisfied)):.0f} %"
     form = "closed" if branch.closed else "open"
     kinds = " and ".join(dict.fromkeys(_sides(branch)))
-    return f"{kinds}, {len(branch)} points, {form}, {states}, coefficients met to {branch.residual:.0e}"
+    met = "met" if branch.residual <= _FITTING else "met only"
+    return f"{kinds}, {len(branch)} points, {form}, {states}, coefficients {met} to {branch.residual:.0e}"
 
 
 def _sides(branch: Branch) -> list[str]:

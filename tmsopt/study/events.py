@@ -167,7 +167,7 @@ def _residual(values: Values, monic: list[Any], u: list[Array]) -> Array:
     worst = np.zeros(np.shape(u[0]))
     for k, (a, c) in enumerate(zip(values.coefficients, monic, strict=True)):
         size = np.abs(a) + np.abs(a0 * c) + np.abs(a0) * unit**k
-        worst = np.maximum(worst, np.abs(a - a0 * c) / size)
+        worst = np.maximum(worst, np.abs(a - a0 * c) / np.where(size == 0, 1.0, size))  # 0 with roots that are all 0
     return worst
 
 

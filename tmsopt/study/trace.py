@@ -1,5 +1,6 @@
 """Trace a root pattern through parameter space: every branch in the box, with its events."""
 
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,8 +20,8 @@ from tmsopt.design.starts import spread
 from tmsopt.roots import Pattern, roots
 from tmsopt.roots import pattern as pattern_of
 from tmsopt.roots.composed import pattern_names
-from tmsopt.study.branch import Branch, Trace
-from tmsopt.study.continuation import INFINITE, Curve, Walk, both_ways, contains, curve, project
+from tmsopt.study.branch import Branch, Event, Trace
+from tmsopt.study.continuation import INFINITE, SINGULAR, Curve, Walk, both_ways, contains, curve, project, same
 from tmsopt.study.events import describe
 from tmsopt.study.grid import unexplained
 from tmsopt.study.sizes import Sizes, sizes
@@ -95,12 +96,30 @@ def trace(
         before = time.perf_counter()
         found = both_ways(ready.on, y, step, most)
         walking += time.perf_counter() - before
-        if found is not None:
+        if found is not None and not any(same(found, w) for w in walks):
             walks.append(found)
             lines.append(design_at(problem, found.y * ready.on.scale))
-    branches = (branch_of(ready, w) for w in walks)
-    ordered = tuple(sorted(branches, key=lambda b: -float(b.arclength[-1])))
+    branches = (b for b in (branch_of(ready, w) for w in walks) if b.residual <= _MET)  # not where it is nan
+    ordered = _meeting(sorted(branches, key=lambda b: -float(b.arclength[-1])), problem)
     return Trace(problem, str(problem.locate), ordered, tried, time.perf_counter() - began, walking)
+
+
+def _meeting(branches: Sequence[Branch], problem: Problem) -> tuple[Branch, ...]:
+    """The branches, with a word at singular ends that lie together: cusps or crossings, known to fewer digits."""
+    widths = {n: high - low for n, (low, high) in problem.free.items()}
+    ends = [e for b in branches for e in b.events if e.name == "end" and e.detail == SINGULAR]
+
+    def said(event: Event) -> Event:
+        if not any(event is e for e in ends):
+            return event
+        apart = [max(abs(event.parameters[n] - e.parameters[n]) / w for n, w in widths.items()) for e in ends]
+        near = min((d for d, e in zip(apart, ends, strict=True) if e is not event), default=math.inf)
+        if near > _NEAR:
+            return event
+        words = f"{SINGULAR}; {near:.0e} of the box from another such end: most likely one point, its last digits wrong"
+        return replace(event, detail=words)
+
+    return tuple(replace(b, events=tuple(said(e) for e in b.events)) for b in branches)
 
 
 def prepare(problem: Problem) -> Traced:
@@ -135,7 +154,8 @@ def prepare(problem: Problem) -> Traced:
 
 def branch_of(ready: Traced, walked: Walk) -> Branch:
     """A walked curve with its events, in the parameters of the problem."""
-    return describe(ready.problem, ready.pattern, ready.on, ready.unknowns, walked)
+    with np.errstate(all="ignore"):  # beside infinity and roots 0: what is not finite there is no event
+        return describe(ready.problem, ready.pattern, ready.on, ready.unknowns, walked)
 
 
 def _asked(problem: Problem, name: str | None) -> Problem:
@@ -202,6 +222,8 @@ _BACK = 300.0  # size of an unknown from which a curve is looked for on the othe
 
 _FAR = 1e5  # unknowns of a seed, in units of their scale: beyond, a0 all but vanishes
 
+_MET = 1e-3  # mismatch of the coefficients beyond which a curve is none of the pattern
+_NEAR = 1e-3  # widths of the box between ends that are one singular point: the equations lose digits there
 _SAMPLE = 32  # designs by which sizes are judged
 
 _PATIENCE = 8  # times the starts asked for, at most
