@@ -37,5 +37,5 @@ def test_the_chance_of_another_solution_is_claimed_with_95_percent_confidence(sh
     rng = np.random.default_rng(0)
     for starts in (50, 100, 200):
         drawn = rng.multinomial(starts, shares, size=2000)
-        kept = sum(shares[row == 0].sum() <= _coverage(starts, [int(h) for h in row if h]).chance for row in drawn)
+        kept = sum(shares[row == 0].sum() <= _coverage(starts, [int(h) for h in row if h], 0).chance for row in drawn)
         assert kept >= 0.95 * 2000

@@ -8,7 +8,6 @@ import flint
 import numpy as np
 import pytest
 
-from tmsopt.models import from_matrices
 from tmsopt.models.arithmetic import ARRAYS, BALLS
 from tmsopt.models.formulas import formulas
 from tmsopt.models.walk import operation_name, steps
@@ -86,15 +85,3 @@ def test_operations_are_those_of_python(operation: int) -> None:
         if operation in BALLS:
             ball = formula(dict(zip("xy", map(flint.arb, point), strict=True)))[0]
             assert float(flint.arb(ball).mid()) == pytest.approx(value, rel=1e-14, abs=1e-15)
-
-
-def test_a_matrix_is_singular_where_its_decimals_are() -> None:
-    """0.1 · 2.1 = 0.3 · 0.7, but not of the doubles nearest to these: a determinant without s⁴."""
-    k = ca.SX.sym("k")
-    assert flint.fmpq(*(0.1).as_integer_ratio()) * flint.fmpq(*(2.1).as_integer_ratio()) != flint.fmpq(
-        *(0.3).as_integer_ratio()
-    ) * flint.fmpq(*(0.7).as_integer_ratio())
-    model = from_matrices([[0.1, 0.3], [0.7, 2.1]], [[k, 0], [0, 1]], [[1, 0], [0, k]])
-    assert model.degree == 3
-    # By hand: 0.1 + 2.1 k; 0.1 k + 2.1 + k; k² + 1; k.
-    assert [float(c) for c in model.coefficients({"k": 2.0})] == pytest.approx([4.3, 4.3, 5, 2], rel=1e-15)
