@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-# Before NumPy is loaded. Each of the two or more workers has a core: helpers of the linear algebra only take it away
+# Before NumPy is loaded. Each of the two or more workers has a core: more threads of the linear algebra only take it away
 # from another one, and spin while they wait.
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
