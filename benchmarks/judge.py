@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.cases import Band
-from tmsopt.design.expression import FUNCTIONS
 from tmsopt.design.problem import Problem
 from tmsopt.models import Values
+from tmsopt.models.words import FUNCTIONS
 
 Array = NDArray[np.float64]
 

@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution, minimize
 
-from tmsopt.design.expression import FUNCTIONS, parse_value
+from tmsopt.design.expression import parse_value
 from tmsopt.design.problem import Problem
 from tmsopt.design.starts import designs
 from tmsopt.models.tms import copo, tms
+from tmsopt.models.words import FUNCTIONS
 
 Array = NDArray[np.float64]
 

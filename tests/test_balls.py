@@ -10,9 +10,10 @@ import pytest
 from mpmath import mp
 from test_models import designs
 
-from tmsopt.design.expression import FUNCTIONS, parse_comparison, parse_value
+from tmsopt.design.expression import parse_comparison, parse_value
 from tmsopt.models import Values, tms
 from tmsopt.models.tms import to_si
+from tmsopt.models.words import FUNCTIONS
 from tmsopt.roots.elementary import exact, greater, lesser, magnitude, positive_part, power, quotient, sqrt, tan
 
 HALF = flint.fmpq(1, 2)

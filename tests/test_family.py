@@ -4,6 +4,7 @@ import math
 import pickle
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -14,7 +15,7 @@ from tmsopt.design.formulations import formulate
 from tmsopt.design.limit import with_limit
 from tmsopt.design.problem import Problem
 from tmsopt.design.solve import solve
-from tmsopt.models import tms
+from tmsopt.models import from_coefficients, tms
 
 EP4 = Problem(
     model=tms,
@@ -177,3 +178,20 @@ def test_a_member_has_the_rows_that_it_has_alone(name: str) -> None:
             x = np.linspace(0.3, 1.2, len(own.variables))
             for a, b in zip(shared.at(x), own.at(x), strict=True):
                 np.testing.assert_allclose(np.array(a), np.array(b), rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize("varied", ["r", "k"])
+def test_a_member_of_another_size_is_solved_in_units_of_its_own(varied):
+    """s³ + a r s² + b r² s + r³, least k·abscissa: (s + r)³ by the product of the roots, with the bits it has alone."""
+    a, b, r, k = (ca.SX.sym(n) for n in ("a", "b", "r", "k"))
+    model = from_coefficients([1, a * r, b * r**2, r**3], quantities={"price": k * 1.0})
+    family = Family((varied,))
+    for size in (1.0, 1e-6, 1e3):
+        fixed = {"r": 1.0, "k": 1.0} | {varied: size}
+        free = {"a": (0.5, 6.0), "b": (0.5, 6.0)}
+        problem = Problem(model=model, fixed=fixed, free=free, minimize="k*abscissa", constraints={"tie": "a >= 0.6"})
+        units = [f.formulate(problem).objective_unit for f in (family, Family((varied,)))]
+        assert units[0] == units[1]
+        found, alone = (solve(problem, family=f) for f in (family, Family((varied,))))
+        assert dict(found.parameters) == dict(alone.parameters)
+        assert found.abscissa == pytest.approx(-fixed["r"], rel=1e-9)

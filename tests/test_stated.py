@@ -16,10 +16,9 @@ from scipy.optimize import differential_evolution
 
 import tmsopt
 from tmsopt.cli import main
-from tmsopt.design.expression import CONSTANTS, FUNCTIONS
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.models import Unfit, from_coefficients, from_matrices
-from tmsopt.models.words import TAKEN, latex
+from tmsopt.models.words import CONSTANTS, FUNCTIONS, TAKEN, latex
 from tmsopt.study.archive import save_layers
 from tmsopt.study.batch.definition import definition
 from tmsopt.study.tiles import Grid

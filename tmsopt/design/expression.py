@@ -16,10 +16,9 @@ import flint
 import numpy as np
 
 from tmsopt.design.errors import suggest
+from tmsopt.models.words import CONSTANTS, FUNCTIONS
 from tmsopt.roots import elementary
 
-FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "exp", "log", "abs", "min", "max")
-CONSTANTS = ("pi",)
 COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
 
 _LONGEST = 2000  # characters; longer texts could exhaust the parser's stack

@@ -17,7 +17,7 @@ from tmsopt.design.nearest import Robustness, robustness
 from tmsopt.design.nlp import NLP
 from tmsopt.design.polish import Point, polisher
 from tmsopt.design.problem import Problem
-from tmsopt.design.scale import scale_of
+from tmsopt.design.scale import objective_unit, scale_of, units_of
 from tmsopt.design.sides import narrowed
 from tmsopt.design.variation import demands_heavy_damping, tempts
 from tmsopt.models import Quantity, Values
@@ -102,7 +102,8 @@ def _decisions(problem: Problem, varied: Sequence[str]) -> tuple[Hashable, ...]:
     nearest = problem.pattern is not None and problem.objective is None and freedom(problem).count > 0
     box = (tuple(problem.free.items()), tuple(middle(problem).items())) if nearest else tuple(problem.free)
     zero = tuple(problem.fixed.get(name) == 0 for name in varied) if problem.asks_radius else ()
-    return scale_of(problem), heavy, texts, box, zero, tuple(tempts(problem, name) for name in _pieced(problem))
+    units = (scale_of(problem), units_of(problem), objective_unit(problem))
+    return units, heavy, texts, box, zero, tuple(tempts(problem, name) for name in _pieced(problem))
 
 
 def _pieced(problem: Problem) -> list[str]:

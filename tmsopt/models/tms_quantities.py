@@ -5,27 +5,19 @@ from typing import Any
 
 import numpy as np
 
+from tmsopt.models.common import nothing, omega0, omega0_equation, smaller_eigenvalue
 from tmsopt.models.model import Quantity, Range
 from tmsopt.models.tms_equations import matrices
 from tmsopt.roots.elementary import chosen, is_ball, positive_part, quotient, sqrt, tan
 
 _NOT_NEGATIVE = Range(lower=0.0)
 _NOT_POSITIVE = Range(upper=0.0)
-_TINY = 1e-300  # keeps 0/0 away where all masses are on the ground line, and changes nothing else
 
 
 def _nu_H(v: Mapping[str, Any]) -> Any:
     """ν_H by tan alone: cos λ_s = 1/√(1 + tan² λ_s) on the open interval of tilts."""
     T = tan(v["lambda_s"])
     return (v["chi_H"] - 1 - v["zeta_H"] * T) / sqrt(1 + T * T)
-
-
-def _omega0(v: Mapping[str, Any]) -> Any:
-    return -sqrt(sqrt(quotient(v["a4"], v["a0"])))
-
-
-def _omega0_equation(v: Mapping[str, Any], x: Any) -> Any:
-    return x * x * x * x * v["a0"] - v["a4"]
 
 
 def _chi_T(v: Mapping[str, Any]) -> Any:
@@ -94,24 +86,14 @@ def _ballast_front(v: Mapping[str, Any]) -> Any:
     return positive_part(_front_lift(v))
 
 
-def _none(v: Mapping[str, Any]) -> Any:
-    return 0
-
-
 def _mass_margin(v: Mapping[str, Any]) -> Any:
-    """Smaller eigenvalue of M as 2 det/(tr + √(tr² − 4 det)).
-
-    det M = μ ν_H² ζ_B² and tr² − 4 det = (M11 − M22)² + 4 M12² are sums and products of what is not negative, so
-    nothing cancels. There is no equation: the larger eigenvalue would satisfy it too, and the formula is smooth
-    wherever the two eigenvalues differ.
-    """
+    """Smaller eigenvalue of M, with det M = μ ν_H² ζ_B², in which nothing cancels."""
     T = tan(v["lambda_s"])
     h = sqrt(1 + T * T)
     native = {name: v[name] for name in ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H")}
     (first, mixed), (_, second) = matrices(**native, sine=T / h, cosine=1 / h)[0]
     determinant = v["mu"] * v["nu_H"] * v["nu_H"] * v["zeta_B"] * v["zeta_B"]
-    apart = sqrt((first - second) * (first - second) + 4 * mixed * mixed)
-    return 2 * determinant / (first + second + apart + _TINY)
+    return smaller_eigenvalue(first, mixed, second, determinant)
 
 
 def _weight(v: Mapping[str, Any]) -> Any:
@@ -137,8 +119,8 @@ def _m_ballast_front(v: Mapping[str, Any]) -> Any:
 NATIVE_QUANTITIES = (
     Quantity("nu_H", "1", "distance of the front centre of mass from the steer axis", r"\nu_H", _nu_H),
     Quantity(
-        "omega0", "1", "−(a4/a0)^(1/4), the mean decay of the roots (equation w0)", r"\omega_0", _omega0,
-        equation=_omega0_equation,
+        "omega0", "1", "−(a4/a0)^(1/4), the mean decay of the roots (equation w0)", r"\omega_0", omega0,
+        equation=omega0_equation,
         range=_NOT_POSITIVE,
     ),
     Quantity(
@@ -159,13 +141,13 @@ NATIVE_QUANTITIES = (
         "ballast_rear", "1", "mass at the rear contact that keeps the rear wheel down, per mass of the rear frame",
         r"m_R/m_B", _ballast_rear,
         range=_NOT_NEGATIVE,
-        pieces=(_none, _rear_lift),
+        pieces=(nothing, _rear_lift),
     ),
     Quantity(
         "ballast_front", "1", "mass at the front contact that keeps the front wheel down, per mass of the rear frame",
         r"m_F/m_B", _ballast_front,
         range=_NOT_NEGATIVE,
-        pieces=(_none, _front_lift),
+        pieces=(nothing, _front_lift),
     ),
     Quantity(
         "mass_margin", "1", "smallest eigenvalue of the mass matrix, 0 where it is singular (equation matrices)",

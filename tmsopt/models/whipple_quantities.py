@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from tmsopt.models.common import nothing, omega0, omega0_equation, smaller_eigenvalue
 from tmsopt.models.model import Quantity, Range
 from tmsopt.models.whipple_equations import matrices, powers_of_speed
 from tmsopt.roots.elementary import chosen, is_ball, is_symbolic, positive_part, quotient, sqrt, tan
@@ -13,6 +14,7 @@ Design = Mapping[str, Any]
 
 _NOT_NEGATIVE = Range(lower=0.0)
 _NOT_POSITIVE = Range(upper=0.0)
+
 _TINY = 1e-300  # keeps 0/0 away for an optimiser, and changes nothing else
 
 _IN_MATRICES = (
@@ -77,14 +79,6 @@ def _S_R(v: Design) -> Any:
 
 def _S_F(v: Design) -> Any:
     return spin(v["I_Fyy"], v["r_F"])
-
-
-def _omega0(v: Design) -> Any:
-    return -sqrt(sqrt(quotient(v["a4"], v["a0"])))
-
-
-def _omega0_equation(v: Design, x: Any) -> Any:
-    return x * x * x * x * v["a0"] - v["a4"]
 
 
 def _v_capsize(v: Design) -> Any:
@@ -170,10 +164,6 @@ def _m_ballast_rear(v: Design) -> Any:
     return positive_part(_rear_lift(v))
 
 
-def _none(v: Design) -> Any:
-    return 0
-
-
 def _mechanical_trail(v: Design) -> Any:
     return v["c"] * _sine_cosine(v)[1]
 
@@ -193,17 +183,15 @@ def _u_A(v: Design) -> Any:
 
 
 def _mass_margin(v: Design) -> Any:
-    """Smaller eigenvalue of M as 2 det/(tr + √((M11 − M22)² + 4 M12²))."""
+    """Smaller eigenvalue of M."""
     (first, mixed), (_, second) = canonical(v)[0]
-    determinant = first * second - mixed * mixed
-    apart = sqrt((first - second) * (first - second) + 4 * mixed * mixed)
-    return 2 * determinant / (first + second + apart + _TINY)
+    return smaller_eigenvalue(first, mixed, second, first * second - mixed * mixed)
 
 
 QUANTITIES = (
     Quantity(
-        "omega0", "1/s", "−(a4/a0)^(1/4), the mean decay of the roots", r"\omega_0", _omega0,
-        equation=_omega0_equation,
+        "omega0", "1/s", "−(a4/a0)^(1/4), the mean decay of the roots", r"\omega_0", omega0,
+        equation=omega0_equation,
         range=_NOT_POSITIVE,
     ),
     Quantity("v_weave", "m/s", "least speed at which a pair of roots is imaginary", r"v_\mathrm{w}", _v_weave),
@@ -233,7 +221,7 @@ QUANTITIES = (
         "m_ballast_rear", "kg", "mass at the rear contact that keeps the rear wheel down", r"m_\mathrm{ballast}",
         _m_ballast_rear,
         range=_NOT_NEGATIVE,
-        pieces=(_none, _rear_lift),
+        pieces=(nothing, _rear_lift),
     ),
     Quantity("S_R", "kg m", "spin of the rear wheel, I_Ryy/r_R", "S_R", _S_R),
     Quantity("S_F", "kg m", "spin of the front wheel, I_Fyy/r_F", "S_F", _S_F),

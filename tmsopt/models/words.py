@@ -9,10 +9,11 @@ import casadi as ca
 
 from tmsopt.models.walk import operation_name, steps
 
-TAKEN = (
-    *("abscissa", "damping_ratio", "radius", "structure", "objective", "pi"),
-    *("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "exp", "log", "abs", "min", "max"),
-)
+FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "exp", "log", "abs", "min", "max")
+CONSTANTS = ("pi",)
+"""Names that mean the same in every expression."""
+
+TAKEN = ("abscissa", "damping_ratio", "radius", "structure", "objective", *CONSTANTS, *FUNCTIONS)
 """Names that an expression of a problem uses for something else."""
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")

@@ -1,6 +1,6 @@
 """Stability and discriminant from the coefficients alone, with no root computed."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import flint
@@ -47,14 +47,17 @@ def routh(coefficients: Coefficients) -> list[Any]:
     Numbers that can be divided: floats, arrays, fractions, balls. In fewer operations than `lienard_chipart`, which
     does without division; what follows an entry that is 0 means nothing.
     """
+    return list(_column(coefficients))
+
+
+def _column(coefficients: Coefficients) -> Iterator[Any]:
+    """The same, each entry before anything is divided by it."""
     above, row = list(coefficients[0::2]), list(coefficients[1::2])
-    column = []
     while row:
-        column.append(row[0])
+        yield row[0]
         ratio = above[0] / row[0]
         padded = [*row[1:], None]
         above, row = row, [a if b is None else a - ratio * b for a, b in zip(above[1:], padded, strict=False)]
-    return column
 
 
 def is_stable(coefficients: ArrayLike, exact: bool = True) -> NDArray[np.bool_]:
@@ -100,15 +103,7 @@ def _by_routh(c: Array, exact: bool) -> NDArray[np.bool_]:
 
 def _exactly_stable(coefficients: Sequence[float]) -> bool:
     """Routh's scheme in fractions."""
-    row = [flint.fmpq(*c.as_integer_ratio()) for c in coefficients]
-    above, row = row[0::2], row[1::2]
-    while row:
-        if row[0] <= 0:
-            return False
-        ratio = above[0] / row[0]
-        padded = [*row[1:], flint.fmpq(0)]
-        above, row = row, [a - ratio * b for a, b in zip(above[1:], padded, strict=False)]
-    return True
+    return all(x > 0 for x in _column([flint.fmpq(*c.as_integer_ratio()) for c in coefficients]))
 
 
 def discriminant(coefficients: Coefficients) -> Any:
