@@ -11,12 +11,12 @@ import pytest
 from benchmarks.suite import TEMPLATES
 from tmsopt.design import machine as machines
 from tmsopt.design.arrays import array_function
-from tmsopt.design.errors import InputError
 from tmsopt.design.expression import parse_comparison, parse_value
 from tmsopt.design.machine import EXACT, engine_of, machine
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import NO_RADIUS
 from tmsopt.design.tape import tape
+from tmsopt.errors import InputError
 from tmsopt.models import Quantity, Values, tms
 from tmsopt.models.walk import NotAccepted
 from tmsopt.roots import roots

@@ -17,9 +17,9 @@ from curves import exact_polynomial, sturm
 from oracles import abscissa_60, certified_roots, polynomial_60
 
 from tmsopt.cli import main
-from tmsopt.design.errors import InputError
 from tmsopt.design.files import load
 from tmsopt.design.problem import Problem
+from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.roots import CLASSES
 from tmsopt.show.chart import chart_table

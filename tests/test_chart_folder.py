@@ -12,8 +12,8 @@ import pytest
 from charts import EXTRA, PLANE, charted, files
 
 from tmsopt.cli import main
-from tmsopt.design.errors import InputError
 from tmsopt.design.files import load
+from tmsopt.errors import InputError
 from tmsopt.study import folder
 from tmsopt.study.chart import chart
 from tmsopt.study.stored import chart_to, open_chart

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from works import Fake, Unloadable
 
-from tmsopt.design.errors import InputError
+from tmsopt.errors import InputError
 from tmsopt.study.batch.engines import EngineError, cluster, cores, in_process, processes
 from tmsopt.study.batch.engines.ledger import Ledger
 from tmsopt.study.batch.row import Row

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tmsopt.design.errors import InputError
-from tmsopt.design.frozen import Table
+from tmsopt.errors import InputError
+from tmsopt.records import Table
 from tmsopt.study.batch.row import Row
 from tmsopt.study.batch.store.columns import columns
 from tmsopt.study.batch.store.export import ENDINGS, check_export, export

@@ -18,8 +18,8 @@ from oracles import is_stable_60, polynomial_60, roots_60, weave_Fr_60
 from tmsopt import laws
 from tmsopt.cli import main
 from tmsopt.design.files import load
-from tmsopt.design.frozen import Table
 from tmsopt.models import Model, Parameter, ParameterSet, tms
+from tmsopt.records import Table
 from tmsopt.show.bicycle import draw_bicycle, draw_distance
 from tmsopt.show.experiment import draw_critical_speeds, draw_law
 from tmsopt.show.gallery import GALLERY, find

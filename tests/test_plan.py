@@ -16,9 +16,8 @@ from scipy.stats import binomtest
 
 import tmsopt
 from tmsopt.design.expression import ExpressionError
-from tmsopt.design.frozen import Table
 from tmsopt.design.limit import limit_of, with_limit
-from tmsopt.study.batch.column import Column
+from tmsopt.records import Column, Table
 from tmsopt.study.batch.definition import definition
 from tmsopt.study.batch.files import load_study
 from tmsopt.study.batch.monte_carlo import Sampling, monte_carlo, planned

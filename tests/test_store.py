@@ -21,8 +21,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tmsopt.design.errors import InputError
-from tmsopt.design.frozen import Table
+from tmsopt.errors import InputError
+from tmsopt.records import Table
 from tmsopt.study.batch.row import Row
 from tmsopt.study.batch.store import database, store
 from tmsopt.study.batch.store.journal import _type, journal

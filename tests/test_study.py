@@ -20,12 +20,12 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from tmsopt import laws
 from tmsopt.cli import main
-from tmsopt.design.errors import InputError
 from tmsopt.design.files import load
-from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
 from tmsopt.design.solve import solve
+from tmsopt.errors import InputError
 from tmsopt.models import tms
+from tmsopt.records import Table
 from tmsopt.study.batch.definition import definition
 from tmsopt.study.batch.monte_carlo import monte_carlo
 from tmsopt.study.batch.plan import Study, over_grid

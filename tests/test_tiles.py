@@ -7,9 +7,9 @@ import pytest
 from charts import EXTRA, FIXED, PLANE, POINTS, SPACE, charted, files
 
 from tmsopt.design.arrays import array_function
-from tmsopt.design.errors import InputError
 from tmsopt.design.files import load
 from tmsopt.design.problem import Problem
+from tmsopt.errors import InputError
 from tmsopt.models import Model, Parameter, ParameterSet
 from tmsopt.roots import CLASSES
 from tmsopt.study.chart import chart

@@ -19,8 +19,8 @@ from mpmath import mp
 from oracles import certified_roots, polynomial_60, roots_60, routh_exact
 
 from tmsopt import laws
-from tmsopt.design.errors import InputError
 from tmsopt.design.problem import Problem
+from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.study.branch import write_csv
 from tmsopt.study.trace import trace

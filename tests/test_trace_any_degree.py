@@ -13,10 +13,10 @@ from click.testing import CliRunner
 from flint import fmpq, fmpq_poly
 
 from tmsopt.cli import main
-from tmsopt.design.errors import InputError
 from tmsopt.design.files import load
 from tmsopt.design.problem import Problem
 from tmsopt.design.solve import solve
+from tmsopt.errors import InputError
 from tmsopt.models import from_coefficients, from_matrices, whipple
 from tmsopt.roots import pattern, product, shift
 from tmsopt.show.traced import trace_figure, trace_table

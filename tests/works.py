@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tmsopt.design.frozen import Table
+from tmsopt.records import Table
 from tmsopt.study.batch.row import Row
 
 

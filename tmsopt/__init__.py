@@ -7,7 +7,6 @@ if TYPE_CHECKING:
     from tmsopt import laws, models, roots
     from tmsopt.design.bicycle_files import Bicycle, read_bicycle, write_bicycle
     from tmsopt.design.bounds.certify import certify
-    from tmsopt.design.errors import InputError
     from tmsopt.design.every import Every, solve_all
     from tmsopt.design.files import load
     from tmsopt.design.nearest import Nearest, Robustness, nearest, robustness
@@ -16,6 +15,7 @@ if TYPE_CHECKING:
     from tmsopt.design.prove import prove
     from tmsopt.design.solution import NotSolved, Solution
     from tmsopt.design.solve import solve
+    from tmsopt.errors import InputError
     from tmsopt.study.batch.files import load_study
     from tmsopt.study.batch.monte_carlo import monte_carlo
     from tmsopt.study.batch.plan import Study, over_grid
@@ -103,7 +103,7 @@ _HOMES = {
     "Domain": "tmsopt.study.domain",
     "Explanation": "tmsopt.study.explain",
     "Front": "tmsopt.study.front",
-    "InputError": "tmsopt.design.errors",
+    "InputError": "tmsopt.errors",
     "Nearest": "tmsopt.design.nearest",
     "NotSolved": "tmsopt.design.solution",
     "Optimality": "tmsopt.study.optimality",

@@ -173,7 +173,7 @@ def _charted(
     work: "Survey", output: Path | None, fresh: bool, workers: int, boundaries: bool, update: Any
 ) -> tuple[dict[str, Any], "Chart | None"]:
     """The summary, and a plane in memory as a chart; the arrays are written."""
-    from tmsopt.design.errors import Fault, InputError
+    from tmsopt.errors import Fault, InputError
     from tmsopt.study.archive import check_netcdf, save_layers
     from tmsopt.study.chart import CHART_LAYERS, LARGEST, chart_of
     from tmsopt.study.domain import domain
@@ -228,7 +228,7 @@ def _draw(
 
 
 def _space(free: tuple[str, ...], axes: str | None) -> tuple[str, ...]:
-    from tmsopt.design.errors import Fault, InputError
+    from tmsopt.errors import Fault, InputError
 
     names = tuple(n.strip() for n in axes.split(",")) if axes is not None else free
     if sorted(names) != sorted(free):
@@ -237,7 +237,7 @@ def _space(free: tuple[str, ...], axes: str | None) -> tuple[str, ...]:
 
 
 def _sizes(points: tuple[int, ...] | None, axes: int) -> tuple[int, ...]:
-    from tmsopt.design.errors import Fault, InputError
+    from tmsopt.errors import Fault, InputError
 
     if points is None:
         return _DEFAULT_POINTS[axes]
@@ -249,7 +249,7 @@ def _sizes(points: tuple[int, ...] | None, axes: int) -> tuple[int, ...]:
 
 
 def _check_plot(plot: Path | None, layer: str, accepted: tuple[str, ...], axes: int, cut: dict[str, str]) -> None:
-    from tmsopt.design.errors import Fault, InputError, suggest
+    from tmsopt.errors import Fault, InputError, suggest
 
     if layer not in accepted:
         raise InputError([Fault(f"found '{layer}'; {suggest(layer, accepted)}", ("--layer",))])
@@ -262,8 +262,8 @@ def _check_plot(plot: Path | None, layer: str, accepted: tuple[str, ...], axes: 
 
 def _held(problem: "Problem", cut: dict[str, str]) -> dict[str, float]:
     """The parameter that a figure holds, as a number in its box."""
-    from tmsopt.design.errors import Fault, InputError, suggest
     from tmsopt.design.units import with_unit
+    from tmsopt.errors import Fault, InputError, suggest
 
     held = {}
     for name, text in cut.items():

@@ -25,7 +25,7 @@ FIGURES = ("png", "pdf", "svg")
 @contextmanager
 def bad_input() -> Iterator[None]:
     """Turn bad input into its messages on stderr and exit status 2."""
-    from tmsopt.design.errors import InputError
+    from tmsopt.errors import InputError
 
     try:
         yield
@@ -59,7 +59,7 @@ def check_output(option: str, path: Path | None, endings: Sequence[str], folders
     """Refuse a file that could not be written, before any work is done; what ends in one of `folders` is a folder."""
     if path is None:
         return
-    from tmsopt.design.errors import Fault, InputError
+    from tmsopt.errors import Fault, InputError
 
     ending = path.suffix.lstrip(".").lower()
     if ending not in endings:
@@ -90,7 +90,7 @@ def plane(problem: "Problem", axes: str | None) -> tuple[str, str]:
     Raises:
         InputError: unless there are two, both free.
     """
-    from tmsopt.design.errors import Fault, InputError
+    from tmsopt.errors import Fault, InputError
 
     free = list(problem.free)
     names = [n.strip() for n in axes.split(",")] if axes is not None else free[:2]

@@ -61,7 +61,7 @@ def figure(name: str | None, output: Path | None, ending: str | None, as_json: b
 
 
 def _wanted(name: str | None) -> "list[Item]":
-    from tmsopt.design.errors import Fault, InputError
+    from tmsopt.errors import Fault, InputError
     from tmsopt.show.gallery import GALLERY, find
 
     if name is None:
@@ -71,7 +71,7 @@ def _wanted(name: str | None) -> "list[Item]":
 
 def _files(wanted: "list[Item]", every: bool, output: Path | None, ending: str | None) -> list[Path]:
     """The files to write, refused before anything is drawn if one could not be."""
-    from tmsopt.design.errors import Fault, InputError
+    from tmsopt.errors import Fault, InputError
 
     if every:
         folder = output or Path()

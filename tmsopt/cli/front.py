@@ -18,7 +18,7 @@ def check_options(problem: "Problem", given: Sequence[str]) -> None:
     Raises:
         InputError: naming each of them.
     """
-    from tmsopt.design.errors import Fault, InputError
+    from tmsopt.errors import Fault, InputError
 
     if problem.pareto:
         if alone := [o for o in given if o in ("--certify", "--diagnose")]:

@@ -44,9 +44,9 @@ Exit status: 0 proved, 2 bad input, 3 no design found, 4 not proved.
 def prove(file: Path, as_json: bool, digits: int, exact: tuple[str, ...], starts: int | None, seed: int) -> None:
     """Prove that the design which FILE asks for exists, and whether it is stable and heavily damped."""
     with bad_input():
-        from tmsopt.design.errors import InputError
         from tmsopt.design.files import load
         from tmsopt.design.problem import unasked
+        from tmsopt.errors import InputError
 
         given = _named(exact)
         problem = load(file)
@@ -65,7 +65,7 @@ def prove(file: Path, as_json: bool, digits: int, exact: tuple[str, ...], starts
 
 def _named(exact: tuple[str, ...]) -> dict[str, str]:
     """Numbers of the command line by name."""
-    from tmsopt.design.errors import Fault, InputError
+    from tmsopt.errors import Fault, InputError
 
     pairs = [text.partition("=") for text in exact]
     if faults := [

@@ -222,9 +222,9 @@ def _solve_all(problem: "Problem", as_json: bool, starts: int | None, **options:
 def compare(file: Path, as_json: bool, starts: int | None, seed: int, linear_solver: str) -> None:
     """Set the optimum of FILE beside the closed-form laws, and one formulation beside the other."""
     with bad_input():
-        from tmsopt.design.errors import InputError
         from tmsopt.design.files import load
         from tmsopt.design.problem import unasked
+        from tmsopt.errors import InputError
 
         problem = nominal_of(load(file))
         if problem.pareto:
@@ -261,8 +261,8 @@ def _given(context: click.Context) -> list[str]:
 
 def _scale(option: str, text: str, unit: str) -> float:
     """A positive length or mass of the command line."""
-    from tmsopt.design.errors import Fault, InputError
     from tmsopt.design.units import with_unit
+    from tmsopt.errors import Fault, InputError
 
     try:
         try:

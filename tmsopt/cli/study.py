@@ -104,7 +104,7 @@ def study(
 
 def _check_together(row: int | None, scheduler: str | None, workers: int | None, kept: Mapping[str, object]) -> None:
     """Refuse options that would have no effect."""
-    from tmsopt.design.errors import Fault, InputError
+    from tmsopt.errors import Fault, InputError
 
     given = [*(name for name, value in kept.items() if value)]
     given += [name for name, value in (("--scheduler", scheduler), ("--workers", workers)) if value is not None]

@@ -53,8 +53,8 @@ def trace(
 ) -> None:
     """Trace a root pattern of FILE through parameter space, every branch in the box, with its events."""
     with bad_input():
-        from tmsopt.design.errors import Fault, InputError
         from tmsopt.design.files import load
+        from tmsopt.errors import Fault, InputError
         from tmsopt.study.branch import write_csv
         from tmsopt.study.trace import trace as trace_problem
 

@@ -26,7 +26,7 @@ Exit status: 0 when the ledger was computed, whatever the verdicts; 2 bad input.
 def verify(as_json: bool, markdown: Path | None, only: tuple[str, ...]) -> None:
     """Recompute every number and statement of the source paper, with a verdict on each."""
     with bad_input():
-        from tmsopt.design.errors import Fault, InputError
+        from tmsopt.errors import Fault, InputError
         from tmsopt.study.verify import matching
         from tmsopt.study.verify import verify as compute
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 
-from tmsopt.design.errors import Fault, InputError, suggest
-from tmsopt.design.frozen import Table
 from tmsopt.design.page import read_text
+from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import whipple
+from tmsopt.records import Table
 
 _OF = whipple.sets[0]
 _WRITTEN = {p.name: "lam" if p.name == "lambda_s" else p.name.replace("_", "") for p in _OF.parameters}

@@ -7,11 +7,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.frozen import Table
 from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Branch
 from tmsopt.design.starts import complete, designs
+from tmsopt.records import Table
 
 _STEPS = 60
 _STALLS = 3  # steps that may lead nowhere: some way on, a solution may still be met

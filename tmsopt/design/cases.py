@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.design.frozen import Table
+from tmsopt.records import Table
 
 POINTS = 7
 """Points of a band where a problem starts; more are added until the worst case between them is covered."""

@@ -13,13 +13,13 @@ from typing import Any
 import flint
 
 from tmsopt.design.cases import Case
-from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
 from tmsopt.design.readings import Reading, readings
 from tmsopt.design.recheck import Checked
 from tmsopt.design.variation import varies
 from tmsopt.models import Values
+from tmsopt.records import Table
 from tmsopt.roots import Root, Structure
 from tmsopt.roots.elementary import exact, greater, lesser
 from tmsopt.roots.enclosed import Enclosed, enclosed_roots, nearest, nearest_decimal, nearest_double

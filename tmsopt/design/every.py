@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.branches import newton, square_system
-from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.formulations import design_of, matching
 from tmsopt.design.freedom import freedom
 from tmsopt.design.nlp import NLP
@@ -19,6 +18,7 @@ from tmsopt.design.search import Runner
 from tmsopt.design.solution import Solution
 from tmsopt.design.solve import solve
 from tmsopt.design.starts import completions, spread
+from tmsopt.errors import Fault, InputError
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,6 @@ from tmsopt.design.cases import Case
 from tmsopt.design.family import Family
 from tmsopt.design.finding import Finding, Trial, ahead, counted, found, survivor
 from tmsopt.design.formulations import design_of, formulate, middle
-from tmsopt.design.frozen import Table
 from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
@@ -19,6 +18,7 @@ from tmsopt.design.sides import Side
 from tmsopt.design.solution import Starts
 from tmsopt.design.variation import overclaims
 from tmsopt.design.worst import worst_cases
+from tmsopt.records import Table
 
 _ROUNDS, _FAR_ROUNDS = 12, 40
 """Times that cases are added; each time the worst one between them shrinks to its square, roughly."""

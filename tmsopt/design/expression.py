@@ -15,7 +15,7 @@ import casadi as ca
 import flint
 import numpy as np
 
-from tmsopt.design.errors import suggest
+from tmsopt.errors import suggest
 from tmsopt.models.words import CONSTANTS, FUNCTIONS
 from tmsopt.roots import elementary
 

@@ -11,12 +11,12 @@ from pydantic import Field, StrictFloat, StrictInt, StrictStr
 
 from tmsopt.design.bicycle_files import read_bicycle
 from tmsopt.design.cases import POINTS, Band
-from tmsopt.design.errors import Fault, InputError, short, suggest
 from tmsopt.design.page import Number, Section, fitted, read_page
 from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.stated_model import stated_model
 from tmsopt.design.units import with_unit
 from tmsopt.design.validate import VARIATIONS, guess_parameter_set
+from tmsopt.errors import Fault, InputError, short, suggest
 from tmsopt.models import MODELS, Model
 
 

@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.errors import Fault, InputError
+from tmsopt.errors import Fault, InputError
 
 Array = NDArray[np.float64]
 Program = Sequence[tuple[int, int, tuple[int, ...]]]

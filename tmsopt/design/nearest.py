@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from tmsopt.design.approach import ALIKE, Approach, approach
 from tmsopt.design.edges import KINDS, Edge, edges, lies_on
-from tmsopt.design.errors import Fault, InputError, suggest
-from tmsopt.design.frozen import Table
 from tmsopt.design.place import Place, placed
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.rays import Crossing, between, crossings, most_damped
 from tmsopt.design.solution import Solution
+from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.records import Table
 
 Array = NDArray[np.float64]
 

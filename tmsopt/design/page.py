@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, StrictFloat, StrictInt, StrictStr, ValidationError
 
-from tmsopt.design.errors import Fault, InputError, suggest
+from tmsopt.errors import Fault, InputError, suggest
 
 LARGEST = 1_000_000
 """Bytes; a longer file is not a problem file."""

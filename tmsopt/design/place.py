@@ -10,11 +10,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.errors import Fault, InputError, suggest
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import STRUCTURE_TOLERANCE
 from tmsopt.design.rays import Space
 from tmsopt.design.rests import terms
+from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import Range
 from tmsopt.roots import is_stable, multiple_real_roots, real_roots
 

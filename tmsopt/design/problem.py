@@ -7,10 +7,10 @@ from functools import cached_property
 from typing import Any
 
 from tmsopt.design.cases import Band, Case, Scenario, as_scenario, first_cases, middle_of
-from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.expression import Expression, parse_comparison, parse_value
 from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTITIES, STRUCTURE
 from tmsopt.design.validate import faults, guess_parameter_set
+from tmsopt.errors import Fault, InputError
 from tmsopt.models import Model, ParameterSet, Values
 from tmsopt.roots import Pattern, pattern
 

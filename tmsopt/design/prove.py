@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from typing import Any
 
-from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.proof.proof import DIGITS, Proof
 from tmsopt.design.solution import Solution
 from tmsopt.design.solve import solve
+from tmsopt.errors import Fault, InputError
 
 
 def prove(

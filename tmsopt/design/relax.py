@@ -11,7 +11,6 @@ import numpy as np
 from tmsopt.design.cases import Case
 from tmsopt.design.finding import Trial, survivor
 from tmsopt.design.formulations import formulate
-from tmsopt.design.frozen import Table
 from tmsopt.design.nlp import NLP, Lift
 from tmsopt.design.problem import Problem
 from tmsopt.design.recheck import FEASIBLE, excesses
@@ -22,6 +21,7 @@ from tmsopt.design.starts import designs
 from tmsopt.design.variation import overclaims
 from tmsopt.design.worst import worst_cases
 from tmsopt.models import Values
+from tmsopt.records import Table
 
 _ROUNDS = 12  # times that cases are added
 _TRIED = 16  # starts of a relaxation at most

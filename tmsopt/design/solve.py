@@ -8,17 +8,17 @@ from dataclasses import replace
 from tmsopt.design.bound import instant_bound
 from tmsopt.design.certified import certified
 from tmsopt.design.cover import cover
-from tmsopt.design.errors import InputError
 from tmsopt.design.explore import Explored, Options, Progress, evaluated_cases, explore, without_any
 from tmsopt.design.family import Family
 from tmsopt.design.finding import Finding, better, evaluated
 from tmsopt.design.freedom import freedom
-from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.recheck import Checked
 from tmsopt.design.search import STARTS
 from tmsopt.design.sides import sides
 from tmsopt.design.solution import Bound, NotSolved, Solution, Starts
+from tmsopt.errors import InputError
+from tmsopt.records import Table
 
 
 def solve(

@@ -7,8 +7,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.design.errors import Fault, short, suggest
 from tmsopt.design.expression import Expression, ExpressionError, parse_formula
+from tmsopt.errors import Fault, short, suggest
 from tmsopt.models import Model, Unfit, from_coefficients, from_matrices
 from tmsopt.models.words import unusable
 

@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from tmsopt.design.cases import Band, points_of
-from tmsopt.design.errors import Fault, suggest
 from tmsopt.design.expression import ExpressionError, parse_comparison, parse_value
 from tmsopt.design.quantities import ROOT_NAMES
+from tmsopt.errors import Fault, suggest
 from tmsopt.models import Model, ParameterSet
 from tmsopt.roots import pattern
 from tmsopt.roots.composed import pattern_names

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tmsopt.design.frozen import Table
+from tmsopt.records import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,7 +37,7 @@ def find(name: str) -> Item:
     Raises:
         InputError: for an unknown name, with a suggestion.
     """
-    from tmsopt.design.errors import Fault, InputError, suggest
+    from tmsopt.errors import Fault, InputError, suggest
 
     for item in GALLERY.values():
         if name in (item.name, item.alias):

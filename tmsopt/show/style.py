@@ -8,7 +8,7 @@ from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from tmsopt.study.whole import whole
+from tmsopt.disk import whole
 
 STABLE, HEAVY, LINE, MARK, CRITICAL = "#56B4E9", "#E69F00", "#000000", "#D55E00", "#0072B2"
 """Fills of stability and heavy damping, lines, marked points, the weave boundary (Okabe–Ito)."""

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.problem import Problem
+from tmsopt.errors import Fault, InputError
 from tmsopt.roots import CLASSES
 from tmsopt.study.tiles import Grid
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
+from tmsopt.records import Table
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tmsopt.design.formulations import design_of
-from tmsopt.design.frozen import Table
 from tmsopt.design.recheck import recheck
 from tmsopt.design.solution import Solution
+from tmsopt.records import Table
 from tmsopt.study.held import Array, Program
 from tmsopt.study.multipliers import Conditions, curved
 

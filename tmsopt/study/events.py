@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
 from tmsopt.models import Values
+from tmsopt.records import Table
 from tmsopt.roots import Pattern
 from tmsopt.roots.patterns import mean_size
 from tmsopt.study.branch import Branch, Event

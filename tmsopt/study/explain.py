@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
-from tmsopt.design.frozen import Table
 from tmsopt.design.solution import Bound, Solution
+from tmsopt.records import Table
 from tmsopt.study.levers import Lever, levers
 from tmsopt.study.optimality import Optimality, optimality
 from tmsopt.study.remarks import summary, warnings

@@ -20,7 +20,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.errors import Fault, InputError
+from tmsopt.errors import Fault, InputError
 from tmsopt.study.tally import Tally
 
 SCHEMA = 1

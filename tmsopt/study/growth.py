@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.errors import Fault, InputError, suggest
 from tmsopt.design.solution import Solution
+from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import Parameter, ParameterSet, Values
 from tmsopt.roots import is_stable, roots
 

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from tmsopt.design.errors import InputError
 from tmsopt.design.expression import parse_value
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.design.solve import solve
+from tmsopt.errors import InputError
 from tmsopt.study.steps import Step, natural_step, reported_unit, step_within, unit_of, with_reported_unit
 
 DIFFERS = 0.2

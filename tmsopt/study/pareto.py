@@ -4,9 +4,9 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.solution import NotSolved, Solution
+from tmsopt.errors import Fault, InputError
 from tmsopt.study.epsilon import Asker, best_first, point
 from tmsopt.study.front import Front, FrontPoint
 from tmsopt.study.payoff import surface

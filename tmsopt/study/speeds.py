@@ -7,11 +7,11 @@ from typing import Any
 
 import flint
 
-from tmsopt.design.errors import Fault, InputError, suggest
-from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.solution import Solution
+from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import ParameterSet
+from tmsopt.records import Table
 from tmsopt.roots.crossings import Crossing, crossings
 from tmsopt.roots.elementary import exact
 from tmsopt.roots.exact import rational

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.problem import Problem
+from tmsopt.errors import Fault, InputError
 from tmsopt.roots import determinant, is_stable, real_roots
 from tmsopt.study.branch import Trace
 from tmsopt.study.continuation import project

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from tmsopt.design.arrays import ArrayFunction, array_function, parsed
-from tmsopt.design.errors import Fault, InputError, suggest
 from tmsopt.design.machine import engine_of
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.quantities import RADIUS, ROOT_NAMES
+from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.study.classes import Classified, classified
 
 Array = NDArray[np.float64]

@@ -11,12 +11,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.errors import Fault, InputError, suggest
 from tmsopt.design.formulations import matching, variables_of
 from tmsopt.design.freedom import freedom
 from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.starts import spread
+from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.roots import Pattern, roots
 from tmsopt.roots import pattern as pattern_of
 from tmsopt.roots.composed import pattern_names

@@ -14,12 +14,12 @@ from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, UNDECIDED, available
 from tmsopt.design.bounds.translation import FEASIBILITY
 from tmsopt.design.builder import Builder
 from tmsopt.design.cases import Case
-from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.problem import Problem, checked, unasked
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.design.recheck import recheck
 from tmsopt.design.solution import Bound, Solution
 from tmsopt.design.solve import solve
+from tmsopt.errors import Fault, InputError
 from tmsopt.models.walk import NotAccepted
 
 SECONDS = 60.0

@@ -9,9 +9,9 @@ from typing import Any
 
 import flint
 
-from tmsopt.design.errors import Fault, InputError, suggest
-from tmsopt.design.frozen import Table
+from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import ParameterSet
+from tmsopt.records import Table
 from tmsopt.roots.elementary import exact
 from tmsopt.roots.exact import rational
 

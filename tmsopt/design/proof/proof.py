@@ -9,8 +9,6 @@ from typing import Any
 import flint
 
 from tmsopt.design.cases import Case
-from tmsopt.design.errors import Fault, InputError
-from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
 from tmsopt.design.proof import rational
 from tmsopt.design.proof.balls import Number, ProvedRoot, fraction, number
@@ -19,6 +17,8 @@ from tmsopt.design.proof.existence import Existing, beside, exact_coefficients, 
 from tmsopt.design.proof.facts import as_stored, heavy_damping, inside, limits, stability
 from tmsopt.design.proof.krawczyk import Refused
 from tmsopt.design.proof.verdict import NOTHING, Verdict
+from tmsopt.errors import Fault, InputError
+from tmsopt.records import Table
 from tmsopt.roots import PATTERNS, Pattern, Root
 from tmsopt.roots import pattern as pattern_of
 from tmsopt.roots.patterns import LINES

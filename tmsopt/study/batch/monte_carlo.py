@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.errors import Fault, InputError, suggest
-from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem, checked, unasked
 from tmsopt.design.search import STARTS
 from tmsopt.design.solution import NotSolved, Solution
 from tmsopt.design.solve import solve
-from tmsopt.study.batch.column import Column
+from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.records import Column, Table
 from tmsopt.study.batch.plan import Study
 from tmsopt.study.batch.stated import MOST_ROWS, common_faults, count_faults
 

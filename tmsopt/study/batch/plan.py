@@ -5,12 +5,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tmsopt.design.errors import Fault, InputError
-from tmsopt.design.frozen import Table
 from tmsopt.design.limit import with_limit
 from tmsopt.design.problem import Problem
 from tmsopt.design.search import STARTS
-from tmsopt.study.batch.column import Column
+from tmsopt.errors import Fault, InputError
+from tmsopt.records import Column, Table
 from tmsopt.study.batch.samples import grid
 from tmsopt.study.batch.stated import faults
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from tmsopt.design.frozen import Table
+from tmsopt.records import Table
 from tmsopt.study.batch.row import Row
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from tmsopt.design.frozen import Table
+from tmsopt.records import Table
 
 STATUSES = ("optimal", "infeasible", "not_converged", "failed", "quarantined")
 """Of a row: those of a solution; ``failed`` where the row cannot be posed or solving it broke; ``quarantined`` where it

@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable, Iterator
 from os import PathLike
 
-from tmsopt.design.errors import Fault, InputError
 from tmsopt.design.page import read_text
 from tmsopt.design.units import with_unit
-from tmsopt.study.batch.column import Column
+from tmsopt.errors import Fault, InputError
+from tmsopt.records import Column
 
 LARGEST = 1_000_000_000
 """Bytes."""

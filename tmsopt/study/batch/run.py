@@ -10,7 +10,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from tmsopt.design.errors import Fault, InputError, short, suggest
+from tmsopt.errors import Fault, InputError, short, suggest
 from tmsopt.study.batch.definition import definition
 from tmsopt.study.batch.engines import Note, Unit, cluster, cores, in_process, processes
 from tmsopt.study.batch.engines.work import silent

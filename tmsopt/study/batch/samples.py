@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.errors import Fault, InputError
-from tmsopt.study.batch.column import Column
+from tmsopt.errors import Fault, InputError
+from tmsopt.records import Column
 from tmsopt.study.batch.stated import MOST_ROWS, count_faults
 
 Array = NDArray[np.float64]

@@ -10,14 +10,14 @@ from typing import Any
 
 from threadpoolctl import ThreadpoolController
 
-from tmsopt.design.errors import InputError
 from tmsopt.design.expression import parse_value
 from tmsopt.design.family import Family
-from tmsopt.design.frozen import Table
 from tmsopt.design.search import same
 from tmsopt.design.solution import Solution
 from tmsopt.design.solve import solve
+from tmsopt.errors import InputError
 from tmsopt.models import tms
+from tmsopt.records import Table
 from tmsopt.study.batch.neighbours import blocks
 from tmsopt.study.batch.plan import Study
 from tmsopt.study.batch.row import Row

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.design.errors import Fault, short, suggest
 from tmsopt.design.expression import ExpressionError, parse_value
 from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Problem, unasked
+from tmsopt.errors import Fault, short, suggest
 
 MOST_ROWS = 10_000_000
 """Rows of a study; one with more is another kind of question, such as a chart."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
-from tmsopt.design.frozen import Table
+from tmsopt.records import Table
 from tmsopt.study.batch.plan import Study
 from tmsopt.study.batch.product import Yield, yield_of
 from tmsopt.study.batch.row import STATUSES, Row

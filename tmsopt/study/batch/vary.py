@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from tmsopt.design.errors import Fault, InputError, short, suggest
 from tmsopt.design.expression import written_sides
 from tmsopt.design.problem import Problem
 from tmsopt.design.units import with_unit
-from tmsopt.study.batch.column import Column
+from tmsopt.errors import Fault, InputError, short, suggest
+from tmsopt.records import Column
 from tmsopt.study.batch.samples import Span, check_size, grid, latin_hypercube, sobol, sobol_note, span_faults
 from tmsopt.study.batch.stated import MOST_ROWS, name_fault
 

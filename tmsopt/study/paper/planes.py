@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt import laws
-from tmsopt.design.frozen import Table
 from tmsopt.design.problem import Problem
 from tmsopt.models import tms
+from tmsopt.records import Table
 from tmsopt.study.branch import Trace
 from tmsopt.study.chart import Chart, chart
 from tmsopt.study.paper.reference import MU, ZETA_B, ZETA_H

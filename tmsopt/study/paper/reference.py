@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 
 from tmsopt import laws
-from tmsopt.design.frozen import Table
 from tmsopt.models.tms import GRAVITY, from_si
+from tmsopt.records import Table
 
 ZETA_B, ZETA_H = laws.bench["z_B"] / laws.bench["w"], laws.bench["z_H"] / laws.bench["w"]
 """Heights of the benchmark, over the wheelbase, that the paper keeps in all its examples."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.frozen import Table
+from tmsopt.records import Table
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from typing import Any
 
-from tmsopt.design.errors import Fault, InputError
+from tmsopt.errors import Fault, InputError
 from tmsopt.study.batch.engines.member import receive, versions
 from tmsopt.study.batch.engines.work import EngineError
 

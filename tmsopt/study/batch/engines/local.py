@@ -10,7 +10,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from tmsopt.design.errors import Fault, InputError
+from tmsopt.errors import Fault, InputError
 from tmsopt.study.batch.engines.ledger import Ledger
 from tmsopt.study.batch.engines.serve import READY, serve
 from tmsopt.study.batch.engines.work import EngineError, Note, Unit, Work, attempt, pickled, silent

@@ -9,7 +9,7 @@ from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from tmsopt.design.errors import Fault, InputError
+from tmsopt.errors import Fault, InputError
 from tmsopt.study.batch.store.provenance import host, now
 from tmsopt.study.batch.store.recorded import Definition, pack, unpack
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.design.errors import Fault, InputError
+from tmsopt.disk import whole
+from tmsopt.errors import Fault, InputError
 from tmsopt.study.batch.row import Row
 from tmsopt.study.batch.store.columns import Column, columns
 from tmsopt.study.batch.store.grid import levels, places
-from tmsopt.study.whole import whole
 
 ENDINGS = ("csv", "parquet", "nc")
 

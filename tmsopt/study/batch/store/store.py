@@ -11,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from tmsopt.design.errors import InputError
+from tmsopt.errors import InputError
 from tmsopt.study.batch.row import STATUSES, Row
 from tmsopt.study.batch.store import database
 from tmsopt.study.batch.store.database import ask, explained, refuse
