@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.suite import TEMPLATES
+from tmsopt.arithmetic.walk import NotAccepted
 from tmsopt.design import machine as machines
 from tmsopt.design.arrays import array_function
 from tmsopt.design.expression import parse_comparison, parse_value
@@ -18,7 +19,6 @@ from tmsopt.design.quantities import NO_RADIUS
 from tmsopt.design.tape import tape
 from tmsopt.errors import InputError
 from tmsopt.models import Quantity, Values, tms
-from tmsopt.models.walk import NotAccepted
 from tmsopt.roots import roots
 
 try:

@@ -10,11 +10,11 @@ import pytest
 from mpmath import mp
 from test_models import designs
 
+from tmsopt.arithmetic.elementary import exact, greater, lesser, magnitude, positive_part, power, quotient, sqrt, tan
 from tmsopt.design.expression import parse_comparison, parse_value
 from tmsopt.models import Values, tms
 from tmsopt.models.tms import to_si
 from tmsopt.models.words import FUNCTIONS
-from tmsopt.roots.elementary import exact, greater, lesser, magnitude, positive_part, power, quotient, sqrt, tan
 
 HALF = flint.fmpq(1, 2)
 

@@ -10,12 +10,12 @@ import flint
 import numpy as np
 import pytest
 
+from tmsopt.arithmetic.intervals import BALLS, EVERYTHING, ball, interval, ranges, root_bound
+from tmsopt.arithmetic.walk import NotAccepted, walk
 from tmsopt.design.bounds.interlace import interlacing, squares_of, unknowns
-from tmsopt.design.bounds.ranges import BALLS, EVERYTHING, ball, interval, ranges, root_bound
 from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, available, decide, task
 from tmsopt.design.expression import parse_value
 from tmsopt.design.nlp import NLP
-from tmsopt.models.walk import NotAccepted, walk
 from tmsopt.roots import product
 
 scip = pytest.mark.skipif(not available(), reason="SCIP is not installed")

@@ -14,11 +14,11 @@ import pytest
 from mpmath import mp
 
 import tmsopt
+from tmsopt.arithmetic.balls import Number
 from tmsopt.design.bound import omega0_bound
 from tmsopt.design.bounds.program import Question
 from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, available, decide, task
 from tmsopt.design.proof import rational
-from tmsopt.design.proof.balls import Number
 from tmsopt.design.proof.factors import abscissa_formula
 from tmsopt.design.proof.proof import Proof, prove_design
 from tmsopt.design.relation import relation_bound

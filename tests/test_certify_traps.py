@@ -8,13 +8,13 @@ from typing import Any
 import pytest
 
 from tmsopt import Problem, certify, solve
+from tmsopt.arithmetic.intervals import ball, interval, square
+from tmsopt.arithmetic.walk import NotAccepted
 from tmsopt.design.bounds.interlace import interlace, squares_of
 from tmsopt.design.bounds.program import Question
 from tmsopt.design.bounds.race import Crew
-from tmsopt.design.bounds.ranges import ball, interval, square
 from tmsopt.design.bounds.scip import INFEASIBLE, Decision
 from tmsopt.models import tms
-from tmsopt.models.walk import NotAccepted
 
 scip = pytest.importorskip("pyscipopt") and pytest.importorskip("tmsopt.design.bounds.scip")
 

@@ -25,10 +25,10 @@ from oracles import elementary, polynomial_60, roots_60
 
 import tmsopt
 from benchmarks.suite import random_problem
+from tmsopt.arithmetic.elementary import exact
 from tmsopt.design.bound import omega0_bound
 from tmsopt.models import tms
 from tmsopt.roots import structure
-from tmsopt.roots.elementary import exact
 from tmsopt.roots.enclosed import enclosed_roots, nearest, nearest_decimal, nearest_double
 
 DIGITS = 60

@@ -8,9 +8,9 @@ import flint
 import numpy as np
 import pytest
 
-from tmsopt.models.arithmetic import ARRAYS, BALLS
-from tmsopt.models.formulas import formulas
-from tmsopt.models.walk import operation_name, steps
+from tmsopt.arithmetic.formulas import formulas
+from tmsopt.arithmetic.operations import ARRAYS, BALLS
+from tmsopt.arithmetic.walk import operation_name, steps
 
 x, y = ca.SX.sym("x"), ca.SX.sym("y")
 

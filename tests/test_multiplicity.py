@@ -17,6 +17,7 @@ import sympy
 from mpmath import mp
 
 import tmsopt
+from tmsopt.arithmetic.elementary import exact
 from tmsopt.models import from_matrices
 from tmsopt.roots import (
     backward_error,
@@ -28,7 +29,6 @@ from tmsopt.roots import (
     roots,
     structure,
 )
-from tmsopt.roots.elementary import exact
 from tmsopt.roots.enclosed import nearest, nearest_double
 
 Item = tuple[F, F, int]

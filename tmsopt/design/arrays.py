@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.arithmetic.walk import NotAccepted
 from tmsopt.design.expression import Expression, ExpressionError, parse_value
 from tmsopt.design.machine import engine_of, machine
 from tmsopt.design.problem import Problem
@@ -19,7 +20,6 @@ from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES, NO_RADIUS, ROOT_QUAN
 from tmsopt.design.tape import Tape, tape
 from tmsopt.errors import Fault, InputError
 from tmsopt.models import Model, ParameterSet, Values
-from tmsopt.models.walk import NotAccepted
 
 Array = NDArray[np.float64]
 

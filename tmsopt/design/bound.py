@@ -14,12 +14,12 @@ import flint
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.arithmetic.elementary import as_ball, exact, quotient
 from tmsopt.design.problem import Problem
 from tmsopt.design.relation import is_rational, relation_bound
 from tmsopt.design.scale import objective_size
 from tmsopt.design.solution import Bound
 from tmsopt.models import Model
-from tmsopt.roots.elementary import as_ball, exact, quotient
 from tmsopt.roots.exact import rational
 
 PROVEN = 1e-9

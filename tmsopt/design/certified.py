@@ -12,6 +12,7 @@ from typing import Any
 
 import flint
 
+from tmsopt.arithmetic.elementary import exact, greater, lesser
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
@@ -21,7 +22,6 @@ from tmsopt.design.variation import varies
 from tmsopt.models import Values
 from tmsopt.records import Table
 from tmsopt.roots import Root, Structure
-from tmsopt.roots.elementary import exact, greater, lesser
 from tmsopt.roots.enclosed import Enclosed, enclosed_roots, nearest, nearest_decimal, nearest_double
 
 _PRECISIONS = (212, 424, 848, 1696)

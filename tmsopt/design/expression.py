@@ -15,9 +15,9 @@ import casadi as ca
 import flint
 import numpy as np
 
+from tmsopt.arithmetic import elementary
 from tmsopt.errors import suggest
 from tmsopt.models.words import CONSTANTS, FUNCTIONS
-from tmsopt.roots import elementary
 
 COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
 

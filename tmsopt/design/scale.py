@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from tmsopt.arithmetic.sequence import golden_steps
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES, regular
-from tmsopt.design.sequence import golden_steps
 from tmsopt.models import Values
 from tmsopt.roots import roots
 

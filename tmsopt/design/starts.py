@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.arithmetic.sequence import golden_steps
 from tmsopt.design.expression import Expression
 from tmsopt.design.formulations import middle, variables_of
 from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES, RADIUS, regular
-from tmsopt.design.sequence import golden_steps
 from tmsopt.models import Values
 from tmsopt.roots import is_stable, roots
 from tmsopt.roots.structure import guess_distance

@@ -12,9 +12,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from tmsopt.arithmetic.operations import NUMPY
+from tmsopt.arithmetic.walk import NotAccepted, operation_name, steps
 from tmsopt.design.machine import EXACT, Machine
-from tmsopt.models.arithmetic import NUMPY
-from tmsopt.models.walk import NotAccepted, operation_name, steps
 
 Shape = tuple[int, ...]
 

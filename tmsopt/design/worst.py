@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.arithmetic.sequence import golden_steps
 from tmsopt.design.cases import Band, Case
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES
-from tmsopt.design.sequence import golden_steps
 from tmsopt.design.variation import varies
 from tmsopt.models import Values
 from tmsopt.records import Table

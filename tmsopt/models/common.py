@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from tmsopt.roots.elementary import quotient, sqrt
+from tmsopt.arithmetic.elementary import quotient, sqrt
 
 _TINY = 1e-300  # keeps 0/0 away where all masses are on the ground line, and changes nothing else
 

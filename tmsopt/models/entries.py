@@ -6,8 +6,8 @@ from typing import Any
 
 import casadi as ca
 
-from tmsopt.models.arithmetic import BALLS
-from tmsopt.models.walk import operation_name, steps
+from tmsopt.arithmetic.operations import BALLS
+from tmsopt.arithmetic.walk import operation_name, steps
 
 _ACCEPTED = "accepted: finite numbers, and SX expressions of them"
 _FINITE = "accepted: finite numbers, and expressions of them"

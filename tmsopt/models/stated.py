@@ -11,15 +11,15 @@ import casadi as ca
 import flint
 import numpy as np
 
-from tmsopt.models.arithmetic import BALLS
+from tmsopt.arithmetic.elementary import exact, is_ball
+from tmsopt.arithmetic.formulas import Formulas, formulas
+from tmsopt.arithmetic.operations import BALLS
+from tmsopt.arithmetic.walk import walk
 from tmsopt.models.entries import Unfit, scalar
-from tmsopt.models.formulas import Formulas, formulas
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
 from tmsopt.models.tms import tms
-from tmsopt.models.walk import walk
 from tmsopt.models.whipple import whipple
 from tmsopt.models.words import latex, spelled, unusable
-from tmsopt.roots.elementary import exact, is_ball
 from tmsopt.roots.polynomial import characteristic_polynomial, quadratic_pencil
 
 MOST = {"M": 6, "A": 12, "coefficients": 12}

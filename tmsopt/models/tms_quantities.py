@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from tmsopt.arithmetic.elementary import chosen, is_ball, positive_part, quotient, sqrt, tan
 from tmsopt.models.common import nothing, omega0, omega0_equation, smaller_eigenvalue
 from tmsopt.models.model import Quantity, Range
 from tmsopt.models.tms_equations import matrices
-from tmsopt.roots.elementary import chosen, is_ball, positive_part, quotient, sqrt, tan
 
 _NOT_NEGATIVE = Range(lower=0.0)
 _NOT_POSITIVE = Range(upper=0.0)

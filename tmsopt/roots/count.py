@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tmsopt.roots.bounded import Bounded, beside, rounded
+from tmsopt.arithmetic.rounding import Bounded, beside, rounded
 from tmsopt.roots.discs import real_counts
 from tmsopt.roots.exact import exact_roots
 

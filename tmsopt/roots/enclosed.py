@@ -13,7 +13,7 @@ from typing import Any
 import flint
 import numpy as np
 
-from tmsopt.roots.elementary import as_ball
+from tmsopt.arithmetic.elementary import as_ball
 from tmsopt.roots.exact import rational
 from tmsopt.roots.fitting import Form
 from tmsopt.roots.patterns import LINES, PATTERNS, Pattern

@@ -7,7 +7,7 @@ import flint
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tmsopt.roots.bounded import Bounded
+from tmsopt.arithmetic.rounding import Bounded
 from tmsopt.roots.polynomial import Coefficients, determinant
 
 Array = NDArray[np.float64]

@@ -2,8 +2,8 @@
 
 from fractions import Fraction
 
+from tmsopt.arithmetic.balls import Number, fraction
 from tmsopt.design.problem import Problem
-from tmsopt.design.proof.balls import Number, fraction
 from tmsopt.design.proof.proof import Proof
 from tmsopt.design.proof.verdict import Verdict
 from tmsopt.show.text import columns

@@ -7,10 +7,10 @@ from typing import Any
 
 import flint
 
+from tmsopt.arithmetic.elementary import exact
 from tmsopt.design.solution import Solution
 from tmsopt.models import Model, ParameterSet
 from tmsopt.roots import Root, Structure
-from tmsopt.roots.elementary import exact
 from tmsopt.roots.enclosed import nearest
 from tmsopt.roots.jordan import Jordan, is_regular, jordan
 from tmsopt.study.splitting import DEVIATION, Ideal, Law, Response, response

@@ -7,13 +7,13 @@ from typing import Any
 
 import flint
 
+from tmsopt.arithmetic.elementary import exact
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import ParameterSet
 from tmsopt.records import Table
 from tmsopt.roots.crossings import Crossing, crossings
-from tmsopt.roots.elementary import exact
 from tmsopt.roots.exact import rational
 from tmsopt.roots.parametric import interpolated
 

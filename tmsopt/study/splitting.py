@@ -9,9 +9,9 @@ from typing import Any
 import flint
 import numpy as np
 
+from tmsopt.arithmetic.elementary import exact
 from tmsopt.models import Model, ParameterSet
 from tmsopt.roots import Root, product
-from tmsopt.roots.elementary import exact
 from tmsopt.roots.puiseux import Branches, branches
 
 DEVIATION = 0.1

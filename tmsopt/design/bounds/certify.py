@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
+from tmsopt.arithmetic.walk import NotAccepted
 from tmsopt.design.bound import instant_bound
 from tmsopt.design.bounds.answer import Answer, Clock, Progress, answer, contradicted, doubt
 from tmsopt.design.bounds.lines import over
@@ -20,7 +21,6 @@ from tmsopt.design.recheck import recheck
 from tmsopt.design.solution import Bound, Solution
 from tmsopt.design.solve import solve
 from tmsopt.errors import Fault, InputError
-from tmsopt.models.walk import NotAccepted
 
 SECONDS = 60.0
 """Time for a proof, by default."""

@@ -10,8 +10,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from tmsopt.arithmetic.intervals import Interval, ranges, root_bound
 from tmsopt.design.bounds.interlace import interlace, squares_of, unknowns
-from tmsopt.design.bounds.ranges import Interval, ranges, root_bound
 from tmsopt.design.builder import Builder
 from tmsopt.design.lifts import Lifted, quadratic_pairs
 from tmsopt.design.nlp import Lift

@@ -7,8 +7,8 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from tmsopt.arithmetic.walk import NotAccepted
 from tmsopt.design.bounds.scip import INFEASIBLE, UNDECIDED, Decision, Task
-from tmsopt.models.walk import NotAccepted
 
 _TICK = 0.02  # seconds between looks
 _GRACE = 5.0  # seconds that SCIP may take longer than it was given, as it does in the midst of a relaxation

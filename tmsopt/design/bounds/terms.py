@@ -6,8 +6,8 @@ from typing import Any
 
 import flint
 
-from tmsopt.design.bounds.ranges import Interval, interval
-from tmsopt.models.walk import NotAccepted
+from tmsopt.arithmetic.intervals import Interval, interval
+from tmsopt.arithmetic.walk import NotAccepted
 
 _LEAST_POWER = -60  # of two, of a scale: what is smaller is as good as 0
 _HUGE = 1e15  # beyond which numbers are left to nobody: from 1e20 SCIP takes them for infinite

@@ -11,10 +11,10 @@ from typing import Any
 import casadi as ca
 import flint
 
-from tmsopt.design.bounds.ranges import BALLS, ball, interval
+from tmsopt.arithmetic.intervals import BALLS, ball, interval
+from tmsopt.arithmetic.walk import NotAccepted, walk
 from tmsopt.design.bounds.terms import CANCELLED, Term, constant, refuse_huge, scale_of
 from tmsopt.design.nlp import NLP
-from tmsopt.models.walk import NotAccepted, walk
 
 FEASIBILITY = 1e-9
 """SCIP's feasibility tolerance: rows may be off by so much."""

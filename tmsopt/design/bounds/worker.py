@@ -10,8 +10,8 @@ import queue
 import threading
 from typing import IO, Any
 
+from tmsopt.arithmetic.walk import NotAccepted
 from tmsopt.design.bounds.scip import Decision, Task, decide
-from tmsopt.models.walk import NotAccepted
 
 
 def serve() -> None:

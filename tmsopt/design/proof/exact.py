@@ -9,10 +9,10 @@ from typing import Any
 
 import flint
 
+from tmsopt.arithmetic.elementary import exact
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import ParameterSet
 from tmsopt.records import Table
-from tmsopt.roots.elementary import exact
 from tmsopt.roots.exact import rational
 
 SAME = 4e-15

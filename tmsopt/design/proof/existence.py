@@ -6,12 +6,12 @@ from typing import Any
 
 import flint
 
+from tmsopt.arithmetic.balls import GUARD, largest_radius, upper
+from tmsopt.arithmetic.krawczyk import Enclosure, Refused, enclosed, refined
 from tmsopt.design.problem import Problem
 from tmsopt.design.proof import rational
-from tmsopt.design.proof.balls import GUARD, largest_radius, upper
 from tmsopt.design.proof.exact import Written
 from tmsopt.design.proof.factors import Factored, of_pattern
-from tmsopt.design.proof.krawczyk import Enclosure, Refused, enclosed, refined
 from tmsopt.design.proof.system import ROUNDINGS, Equations, choose, equations
 from tmsopt.roots import Pattern
 from tmsopt.roots.structure import nearest_unknowns

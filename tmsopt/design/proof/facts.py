@@ -4,8 +4,8 @@ from typing import Any
 
 import flint
 
+from tmsopt.arithmetic.balls import largest_radius
 from tmsopt.design.problem import Problem
-from tmsopt.design.proof.balls import largest_radius
 from tmsopt.design.proof.exact import Written, decimal, decimal_fraction
 from tmsopt.design.proof.existence import Existing, exact_coefficients
 from tmsopt.design.proof.factors import Factored

@@ -8,14 +8,14 @@ from typing import Any
 
 import flint
 
+from tmsopt.arithmetic.balls import Number, ProvedRoot, fraction, number
+from tmsopt.arithmetic.krawczyk import Refused
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
 from tmsopt.design.proof import rational
-from tmsopt.design.proof.balls import Number, ProvedRoot, fraction, number
 from tmsopt.design.proof.exact import Written, written
 from tmsopt.design.proof.existence import Existing, beside, exact_coefficients, exactly
 from tmsopt.design.proof.facts import as_stored, heavy_damping, inside, limits, stability
-from tmsopt.design.proof.krawczyk import Refused
 from tmsopt.design.proof.verdict import NOTHING, Verdict
 from tmsopt.errors import Fault, InputError
 from tmsopt.records import Table

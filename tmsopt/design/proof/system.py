@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from scipy.linalg import qr
 
+from tmsopt.arithmetic.krawczyk import Refused, slopes
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.proof.exact import decimal_fraction
 from tmsopt.design.proof.factors import abscissa_formula
-from tmsopt.design.proof.krawczyk import Refused, slopes
 from tmsopt.design.quantities import RADIUS
 from tmsopt.models import Quantity, Values
 from tmsopt.roots import Pattern

@@ -7,9 +7,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.models.arithmetic import ARRAYS, BALLS
-from tmsopt.models.walk import walk
-from tmsopt.roots.elementary import is_ball, is_symbolic
+from tmsopt.arithmetic.elementary import is_ball, is_symbolic
+from tmsopt.arithmetic.operations import ARRAYS, BALLS
+from tmsopt.arithmetic.walk import walk
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.models.walk import Arithmetic
-from tmsopt.roots import elementary
+from tmsopt.arithmetic import elementary
+from tmsopt.arithmetic.walk import Arithmetic
 
 
 def _truth(relation: Callable[..., Any]) -> Callable[..., Any]:

@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import flint
 
-from tmsopt.models.walk import Arithmetic, walk
+from tmsopt.arithmetic.walk import Arithmetic, walk
 
 Interval = tuple[float, float]
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.design.proof.balls import lower
+from tmsopt.arithmetic.balls import lower
 
 System = Callable[[Mapping[str, Any]], list[Any]]
 """Left sides of equations for balls or series by name."""

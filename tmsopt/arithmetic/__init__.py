@@ -1,0 +1,1 @@
+"""One formula for floats, arrays, CasADi expressions, fractions, balls; interval Newton."""
