@@ -4,8 +4,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tmsopt.arithmetic.rounding import Bounded, beside, rounded
-from tmsopt.roots.discs import real_counts
 from tmsopt.roots.exact import exact_roots
+from tmsopt.roots.numeric import roots
+
+_ROOM = 1.001
+"""For the rounding of the radii themselves."""
+
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int_]
@@ -84,3 +88,28 @@ def _next(p: Bounded, q: Bounded) -> Bounded:
 def _variations(signs: Array) -> Counts:
     """Sign changes along each row, none of which is 0."""
     return np.asarray(np.sum(signs[:, 1:] * signs[:, :-1] < 0, axis=1), dtype=int)
+
+
+def real_counts(c: Array) -> tuple[NDArray[np.int_], NDArray[np.int_], NDArray[np.bool_]]:
+    """Numbers of negative and of positive real roots of the rows, and where discs touch one another, 0 or both sides.
+
+    Rows must have a leading coefficient other than 0 and be finite; a real root counts once where it is in no doubt.
+    """
+    n = c.shape[1] - 1
+    z = roots(c)
+    with np.errstate(all="ignore"):
+        value, size = np.zeros_like(z), np.zeros(z.shape)
+        for column in c.T:
+            value = value * z + column[:, None]
+            size = size * np.abs(z) + np.abs(column)[:, None]
+        apart = z[:, :, None] - z[:, None, :]
+        others = np.abs(np.prod(np.where(np.eye(n, dtype=bool), c[:, :1, None], apart), axis=2))
+        rounding = 8 * n * np.finfo(float).eps * size  # of Horner's rule in complex numbers, with room
+        radius = _ROOM * n * (np.abs(value) + rounding) / others
+        distance = np.where(np.eye(n, dtype=bool), np.inf, np.abs(apart))
+        isolated = np.all(distance > _ROOM * (radius[:, :, None] + radius[:, None, :]), axis=2)
+        real = z.imag == 0
+        decided = np.where(real, np.abs(z.real) > _ROOM * radius, np.abs(z.imag) > _ROOM * radius)
+        doubtful = ~np.all(isolated & decided, axis=1)
+    negative, positive = np.sum(real & (z.real < 0), axis=1), np.sum(real & (z.real > 0), axis=1)
+    return np.asarray(negative), np.asarray(positive), doubtful
