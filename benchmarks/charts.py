@@ -12,18 +12,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.measure import best, duration, times
 from benchmarks.report import origin, table
 from tmsopt import load
 from tmsopt.design.problem import Problem
+from tmsopt.records import Array
 from tmsopt.roots import quartic_is_stable
 from tmsopt.study.grid import coefficients
 from tmsopt.study.stored import gathered
 from tmsopt.study.tiles import USUAL, Survey, survey
-
-Array = NDArray[np.float64]
 
 STACKED = "stacked numpy.linalg.eigvals"
 PROBLEM = Path(__file__).parent.parent / "problems" / "chart.toml"

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import Bounds, differential_evolution
 
 from benchmarks.judge import Judge
 from tmsopt.design.problem import Problem
-
-Array = NDArray[np.float64]
+from tmsopt.records import Array
 
 POINTS = 33
 """Points per band of the grid on which the evolution ends."""

@@ -19,8 +19,7 @@ from tmsopt.design.cases import Band
 from tmsopt.design.problem import Problem
 from tmsopt.models import Values
 from tmsopt.models.words import FUNCTIONS
-
-Array = NDArray[np.float64]
+from tmsopt.records import Array
 
 NOWHERE = 1e3
 """Abscissa, and violation, of a design where it does not exist."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from benchmarks.measure import best
 from benchmarks.report import keep, kept, origin, table
 from tmsopt.models import tms
+from tmsopt.records import Array
 from tmsopt.roots import (
     abscissa_and_damping,
     backward_error,
@@ -21,7 +22,6 @@ from tmsopt.roots import (
     roots,
 )
 
-Array = NDArray[np.float64]
 Work = Callable[[], object]
 
 _POINTS = 100_000

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from benchmarks.suite import Box, rounded
 from tmsopt.design.problem import Problem
 from tmsopt.models import Model, from_coefficients, from_matrices
+from tmsopt.records import Array
 
 SEED = 2018
 COUNT = 100
 
-Array = NDArray[np.float64]
 Entries = list[list[str]]
 
 _BOXES: Mapping[str, Box] = {"m": (0.4, 4.0), "d": (0.0, 4.0), "k": (0.3, 8.0), "g": (-1.5, 1.5), "n": (-0.5, 0.5)}

@@ -12,15 +12,13 @@ from unittest.mock import patch
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.rivals import Reduced
 from benchmarks.seekers import Seeker
 from benchmarks.stages import EXACT
 from tmsopt.design.problem import Problem
 from tmsopt.design.solve import solve
-
-Array = NDArray[np.float64]
+from tmsopt.records import Array
 
 TOLERANCES = (1e-3, 1e-6, 1e-8)
 """Excess over the optimum, relative to it."""

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution, minimize
 
 from tmsopt.design.expression import parse_value
@@ -20,8 +19,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.starts import designs
 from tmsopt.models.tms import copo, tms
 from tmsopt.models.words import FUNCTIONS
-
-Array = NDArray[np.float64]
+from tmsopt.records import Array
 
 Watch = Callable[[Array, Array], None]
 """Told of every evaluation: designs of shape (n, m) and their abscissae (m,)."""

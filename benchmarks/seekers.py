@@ -17,14 +17,12 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import dual_annealing
 
 from benchmarks.rivals import Reduced, Watch, cobyla, differential, nelder_mead, slsqp
 from tmsopt.design.problem import Problem
 from tmsopt.design.starts import designs
-
-Array = NDArray[np.float64]
+from tmsopt.records import Array
 
 _MANY = 1_000_000
 _STEP = 1e-6  # of the box, for central differences of smooth functions: right to some 1e-10

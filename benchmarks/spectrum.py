@@ -16,8 +16,8 @@ from scipy.optimize import Bounds, differential_evolution
 from scipy.spatial.distance import pdist, squareform
 
 from benchmarks.oscillators import System
+from tmsopt.records import Array
 
-Array = NDArray[np.float64]
 Roots = NDArray[np.complex128]
 
 ROUNDED = 1e-10

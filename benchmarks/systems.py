@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize, nnls
 
 from benchmarks.measure import duration
@@ -25,9 +24,8 @@ from benchmarks.report import origin, share, table
 from benchmarks.seekers import SEEKERS
 from tmsopt import load, solve
 from tmsopt.design.problem import Problem
+from tmsopt.records import Array
 from tmsopt.roots.exact import exact_abscissa
-
-Array = NDArray[np.float64]
 
 _ROOT = -(15**0.5) / 5
 OPTIMUM: Mapping[str, float] = {"x0": 7.0, "x1": -6 * _ROOT, "y0": 0.216, "y1": -2.16 * _ROOT, "y2": -8.6}

@@ -8,14 +8,13 @@ from typing import TypeVar
 
 import click
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.report import keep, kept, origin
 from tmsopt import Problem, chart, domain, laws, models, trace
 from tmsopt.models.tms import copo
+from tmsopt.records import Array
 from tmsopt.roots import PATTERNS, discriminant
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 ZETA_B, ZETA_H = -0.4, -0.2

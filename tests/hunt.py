@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
 from tmsopt import laws
+from tmsopt.records import Array
 
-Array = NDArray[np.float64]
 Design = Mapping[str, Any]
 Merit = Callable[[dict[str, Any]], tuple[Any, Any]]
 """Design, each free parameter an array → what is to be least, and by how much the constraints are violated (≤ 0: not)."""

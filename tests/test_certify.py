@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from numpy.typing import NDArray
 from oracles import polynomial_floats
 from scipy.optimize import brentq  # type: ignore[import-untyped]
 
@@ -30,8 +29,7 @@ from tmsopt.design.bounds.race import Crew
 from tmsopt.design.bounds.scip import available
 from tmsopt.design.cases import Band
 from tmsopt.design.solution import Bound
-
-Array = NDArray[np.float64]
+from tmsopt.records import Array
 
 pytestmark = pytest.mark.skipif(not available(), reason="SCIP is not installed")
 

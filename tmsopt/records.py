@@ -1,12 +1,19 @@
 """A mapping that cannot be changed, and can be pickled."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 V = TypeVar("V")
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Truth = NDArray[np.bool_]
+
+Progress = Callable[[int, int], None]
+"""Called with what is done and what there is at most."""
 
 
 class Table(Mapping[str, V]):

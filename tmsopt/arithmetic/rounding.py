@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tmsopt.records import Array
 
 _UNIT = 2 * np.finfo(float).eps
 """Bound of the rounding of one operation, relative to its result; the double of it pays for that of the bounds."""

@@ -1,9 +1,8 @@
 """A quasi-random sequence; scipy.stats.qmc has others, but importing it takes longer than solving."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tmsopt.records import Array
 
 
 def golden_steps(size: int) -> Array:

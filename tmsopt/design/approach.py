@@ -5,15 +5,13 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.design.edges import Edge
 from tmsopt.design.ipopt import ipopt
 from tmsopt.design.nlp import NLP
 from tmsopt.design.place import Place
 from tmsopt.design.polish import polisher
-
-Array = NDArray[np.float64]
+from tmsopt.records import Array
 
 ALIKE = 1e-9
 """Relative difference of distances that is no difference."""

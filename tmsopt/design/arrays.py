@@ -10,7 +10,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.arithmetic.walk import NotAccepted
 from tmsopt.design.expression import Expression, ExpressionError, parse_value
@@ -20,8 +19,6 @@ from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES, NO_RADIUS, ROOT_QUAN
 from tmsopt.design.tape import Tape, tape
 from tmsopt.errors import Fault, InputError
 from tmsopt.models import Model, ParameterSet, Values
-
-Array = NDArray[np.float64]
 
 _LARGE = 500_000
 """Size of arrays for which numba is loaded unless an engine is named: loading it takes as long as some millions."""

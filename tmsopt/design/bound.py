@@ -12,7 +12,6 @@ from typing import Any
 
 import flint
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.arithmetic.elementary import as_ball, exact, quotient
 from tmsopt.design.problem import Problem
@@ -20,6 +19,7 @@ from tmsopt.design.relation import is_rational, relation_bound
 from tmsopt.design.scale import objective_size
 from tmsopt.design.solution import Bound
 from tmsopt.models import Model
+from tmsopt.records import Array
 from tmsopt.roots.exact import rational
 
 PROVEN = 1e-9
@@ -32,7 +32,6 @@ _DEGREE = 4  # in any one parameter; nine nodes fit it
 _CORNERS = 12  # free parameters, beyond which their ranges have too many
 _FIT = np.linalg.pinv(np.vander(_NODES, _DEGREE + 1))
 
-Array = NDArray[np.float64]
 Box = Mapping[str, tuple[float, float]]
 Known = Mapping[tuple[str, float], Any]
 

@@ -11,13 +11,10 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.design.rests import quotient, regular, rest, terms
+from tmsopt.records import Array, Truth
 from tmsopt.roots import discriminant, hurwitz_minors, is_stable, product, real_roots, roots
-
-Array = NDArray[np.float64]
-Truth = NDArray[np.bool_]
 
 MATCHED = 1e-10
 """Relative change of a coefficient up to which a polynomial counts as on an edge."""

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.design.branches import newton, square_system
 from tmsopt.design.formulations import design_of, matching
@@ -19,8 +18,7 @@ from tmsopt.design.solution import Solution
 from tmsopt.design.solve import solve
 from tmsopt.design.starts import completions, spread
 from tmsopt.errors import Fault, InputError
-
-Array = NDArray[np.float64]
+from tmsopt.records import Array
 
 MOST = 1024
 """Starts at most."""

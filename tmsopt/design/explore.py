@@ -1,7 +1,7 @@
 """The search of one part of the box, with cases added until the worst one is covered."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from tmsopt.design.cases import Case
@@ -18,15 +18,13 @@ from tmsopt.design.sides import Side
 from tmsopt.design.solution import Starts
 from tmsopt.design.variation import overclaims
 from tmsopt.design.worst import worst_cases
-from tmsopt.records import Table
+from tmsopt.records import Progress, Table
 
 _ROUNDS, _FAR_ROUNDS = 12, 40
 """Times that cases are added; each time the worst one between them shrinks to its square, roughly."""
 
 _LEADERS = 3  # optima followed when cases are added: a better one may do worse between the old cases
 _NEARER = 1e-7  # share of the radius
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)

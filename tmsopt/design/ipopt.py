@@ -9,9 +9,9 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.design.nlp import NLP
+from tmsopt.records import Array
 
 LINEAR_SOLVERS = ("mumps", "spral")
 """The linear solvers in the CasADi wheel; any other name fails there without an error."""
@@ -31,8 +31,6 @@ _NEAR = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-6}
 # throws that away, and half as many starts of band designs end at the best optimum.
 _EXACT = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-4, **dict(list(_FAR.items())[3:])}
 _SETTINGS: dict[str, dict[str, Any]] = {"far": _FAR, "exact": _EXACT, "near": _NEAR}
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

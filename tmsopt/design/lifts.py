@@ -8,8 +8,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from tmsopt.design.cases import Case
-from tmsopt.design.nlp import Array, Factor, Lift, Touch
+from tmsopt.design.nlp import Factor, Lift, Touch
 from tmsopt.models import Values
+from tmsopt.records import Array
 from tmsopt.roots import product, shift
 from tmsopt.roots.patterns import Roots
 

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.errors import Fault, InputError
+from tmsopt.records import Array
 
-Array = NDArray[np.float64]
 Program = Sequence[tuple[int, int, tuple[int, ...]]]
 """Steps in order: number of the result, CasADi's operation, numbers of the operands."""
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.design.approach import ALIKE, Approach, approach
 from tmsopt.design.edges import KINDS, Edge, edges, lies_on
@@ -15,9 +14,7 @@ from tmsopt.design.problem import Problem, checked
 from tmsopt.design.rays import Crossing, between, crossings, most_damped
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
-from tmsopt.records import Table
-
-Array = NDArray[np.float64]
+from tmsopt.records import Array, Table
 
 STABILITY = ("weave", "capsize", "infinity")
 """The boundaries of stability: a pair on the imaginary axis, a root 0, a root through infinity."""

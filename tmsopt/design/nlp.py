@@ -7,13 +7,11 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.design.cases import Case
 from tmsopt.models import Values
+from tmsopt.records import Array
 from tmsopt.roots.patterns import Roots
-
-Array = NDArray[np.float64]
 
 _TANGLED = 1e-3  # relative distance of roots that may be meant to be one: where two factors share it, digits are lost
 

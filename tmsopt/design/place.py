@@ -8,7 +8,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import STRUCTURE_TOLERANCE
@@ -16,9 +15,8 @@ from tmsopt.design.rays import Space
 from tmsopt.design.rests import terms
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import Range
+from tmsopt.records import Array
 from tmsopt.roots import is_stable, multiple_real_roots, real_roots
-
-Array = NDArray[np.float64]
 
 _OPEN = 1e-6  # of the size of the parameter: how near an end that its range excludes it may come
 

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from tmsopt.design.ipopt import Run
 from tmsopt.design.nlp import NLP
-
-Array = NDArray[np.float64]
+from tmsopt.records import Array
 
 _STEPS = 12
 _STATIONARY = 1e-9

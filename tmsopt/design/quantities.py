@@ -9,10 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.models import Quantity, Values
+from tmsopt.records import Array
 from tmsopt.roots import Structure, roots, structure
-
-Array = NDArray[np.float64]
-
 
 STRUCTURE_TOLERANCE = 1e-11
 """Relative change of a coefficient within which roots count as multiple: a polished optimum is within 1e-14."""

@@ -7,10 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.edges import heavily_damped, losses
+from tmsopt.records import Array, Truth
 from tmsopt.roots import discriminant, hurwitz_minors, is_stable, roots
-
-Array = NDArray[np.float64]
-Truth = NDArray[np.bool_]
 
 _DIRECTIONS = 1000
 _RADII = np.concatenate([[0.0], np.geomspace(1e-4, 4.0, 36)])

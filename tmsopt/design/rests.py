@@ -10,11 +10,9 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tmsopt.records import Array
 from tmsopt.roots import product, rebuilt, roots
-
-Array = NDArray[np.float64]
 
 _LEAD = 1e-9  # of the largest coefficient: a smaller leading one is replaced before roots are guessed from
 _SMALL = 1e-3

@@ -1,7 +1,7 @@
 """Multi-start: IPOPT from many designs, ended early when enough of them agree."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -12,9 +12,10 @@ from tmsopt.design.family import Family
 from tmsopt.design.formulations import abscissa, design_of, middle
 from tmsopt.design.freedom import freedom
 from tmsopt.design.ipopt import Run, ipopt
-from tmsopt.design.nlp import NLP, Array
+from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
 from tmsopt.design.starts import complete, designs, opposite, worth
+from tmsopt.records import Array, Progress
 from tmsopt.roots import roots
 
 STARTS = 64
@@ -33,8 +34,6 @@ _RESCUES = 4  # starts from abscissa optima, for a pattern that no start reached
 _AGAIN = 4  # times that a start is taken up again where it ended badly
 _AGAIN_HOPELESS = 1  # the same where rows are violated and no start has satisfied them yet
 _SUCCESS = "Solve_Succeeded"
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)

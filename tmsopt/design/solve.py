@@ -8,7 +8,7 @@ from dataclasses import replace
 from tmsopt.design.bound import instant_bound
 from tmsopt.design.certified import certified
 from tmsopt.design.cover import cover
-from tmsopt.design.explore import Explored, Options, Progress, evaluated_cases, explore, without_any
+from tmsopt.design.explore import Explored, Options, evaluated_cases, explore, without_any
 from tmsopt.design.family import Family
 from tmsopt.design.finding import Finding, better, evaluated
 from tmsopt.design.freedom import freedom
@@ -18,7 +18,7 @@ from tmsopt.design.search import STARTS
 from tmsopt.design.sides import sides
 from tmsopt.design.solution import Bound, NotSolved, Solution, Starts
 from tmsopt.errors import InputError
-from tmsopt.records import Table
+from tmsopt.records import Progress, Table
 
 
 def solve(

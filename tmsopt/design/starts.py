@@ -6,7 +6,6 @@ from itertools import islice, product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.arithmetic.sequence import golden_steps
 from tmsopt.design.expression import Expression
@@ -15,10 +14,9 @@ from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES, RADIUS, regular
 from tmsopt.models import Values
+from tmsopt.records import Array
 from tmsopt.roots import is_stable, roots
 from tmsopt.roots.structure import guess_distance
-
-Array = NDArray[np.float64]
 
 _CANDIDATES = 16
 """Designs looked at for each that is started from: a start near the good ones needs half the iterations."""

@@ -6,7 +6,6 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.arithmetic.sequence import golden_steps
 from tmsopt.design.cases import Band, Case
@@ -15,9 +14,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES
 from tmsopt.design.variation import varies
 from tmsopt.models import Values
-from tmsopt.records import Table
-
-Array = NDArray[np.float64]
+from tmsopt.records import Array, Table
 
 _LINE = 1025  # points looked at along a band when nothing else varies
 _PLANE = 2048  # points, besides the corners, where more varies

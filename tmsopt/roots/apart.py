@@ -11,10 +11,10 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.records import Array
 from tmsopt.roots import factors
 from tmsopt.roots.numeric import roots
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int_]
 
 GOOD = 4e-15

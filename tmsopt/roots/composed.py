@@ -11,7 +11,6 @@ from itertools import combinations, islice, product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.roots.meetings import meeting, weave_test
 from tmsopt.roots.numeric import rebuilt
@@ -19,8 +18,6 @@ from tmsopt.roots.parts import AXIS, Part, parts_of
 from tmsopt.roots.patterns import PATTERNS, Pattern, Roots
 from tmsopt.roots.polynomial import evaluate
 from tmsopt.roots.polynomial import product as multiplied
-
-Array = NDArray[np.float64]
 
 _GUESSES = 24  # unknowns to start from, the nearest of all ways to choose the roots
 _LOOKED_AT = 512  # ways to choose the roots at most

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tmsopt.arithmetic.rounding import Bounded, beside, rounded
+from tmsopt.records import Array
 from tmsopt.roots.exact import exact_roots
 from tmsopt.roots.numeric import roots
 
@@ -11,7 +12,6 @@ _ROOM = 1.001
 """For the rounding of the radii themselves."""
 
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.int_]
 
 _SMALLEST = 1e-290  # scaled coefficients below may have lost digits

@@ -6,9 +6,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.records import Array
 from tmsopt.roots.numeric import rebuilt
 
-Array = NDArray[np.float64]
 Roots = NDArray[np.complex128]
 
 _STEPS = 20

@@ -7,11 +7,10 @@ from typing import Any
 
 import flint
 import numpy as np
-from numpy.typing import NDArray
+
+from tmsopt.records import Array, Complex
 
 Matrix = Sequence[Sequence[Any]]
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _ELSEWHERE = ((0.31, 0.17), (-0.43, 0.71), (1.13, -0.59))
 _ROUNDING = 1e-16

@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.records import Array
 from tmsopt.roots.numeric import roots
 from tmsopt.roots.polynomial import Coefficients
 from tmsopt.roots.stability import discriminant, hurwitz_minors
-
-Array = NDArray[np.float64]
 
 CLOSED = 4
 """Degree up to which closed forms are used."""

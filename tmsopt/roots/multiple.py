@@ -1,14 +1,12 @@
 """Real-rooted polynomials with a multiple root, recognised by coefficients."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tmsopt.roots.fitting import gauss_newton, relative_distance
 from tmsopt.roots.numeric import rebuilt, roots
 from tmsopt.roots.shape import Group, Shape
 from tmsopt.roots.structure import Root
-
-Array = NDArray[np.float64]
 
 _NEAR = 0.05  # relative distance of a guess that can still lead to a polynomial within any sensible tolerance
 

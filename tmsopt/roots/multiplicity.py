@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tmsopt.roots.fitting import Array, gauss_newton, relative_distance, sizes
+from tmsopt.records import Array
+from tmsopt.roots.fitting import gauss_newton, relative_distance, sizes
 from tmsopt.roots.numeric import roots as numeric_roots
 from tmsopt.roots.shape import Group, Shape
 

@@ -10,7 +10,7 @@ import flint
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from tmsopt.records import Array
 
 _POLISHED = 4e-15  # backward error below which more Newton steps are not worth their time
 _STEPS = 6  # Newton doubles the digits at each step; companion eigenvalues start with 4 or more

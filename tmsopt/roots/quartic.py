@@ -11,10 +11,10 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tmsopt.records import Array
 from tmsopt.roots import factors
 from tmsopt.roots.apart import ACCEPTED, GOOD, STEPS, hard_factors, polish
 
-Array = NDArray[np.float64]
 Columns = tuple[Array, Array, Array, Array, Array]
 Four = factors.Four
 

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tmsopt.arithmetic.rounding import Bounded
+from tmsopt.records import Array
 from tmsopt.roots.polynomial import Coefficients, determinant
-
-Array = NDArray[np.float64]
 
 _SMALL = 4
 """Up to this degree the Liénard–Chipart conditions have few terms; above, Routh's scheme takes fewer operations."""

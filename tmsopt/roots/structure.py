@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tmsopt.roots.fitting import Array, gauss_newton, relative_distance, sizes
+from tmsopt.records import Array
+from tmsopt.roots.fitting import gauss_newton, relative_distance, sizes
 from tmsopt.roots.multiplicity import Fit, decided
 from tmsopt.roots.numeric import roots as numeric_roots
 from tmsopt.roots.patterns import LINES, PATTERNS, Pattern, Roots

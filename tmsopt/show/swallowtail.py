@@ -9,16 +9,14 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.axes3d import Axes3D  # type: ignore[import-untyped]
-from numpy.typing import NDArray
 
+from tmsopt.records import Array
 from tmsopt.show.labels import place_names
 from tmsopt.show.planes import draw_plane, plane_handles
 from tmsopt.show.style import COMPLEX, HEAVY, LINE, MARK, REAL, STABLE, legend_below, new_figure
 from tmsopt.study.branch import Trace
 from tmsopt.study.paper.planes import Plane
 from tmsopt.study.swallowtail import Swallowtail
-
-Array = NDArray[np.float64]
 
 _LIGHT = np.array([0.3, -0.6, 0.75])
 

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
-from numpy.typing import NDArray
 
+from tmsopt.records import Array
 from tmsopt.show.style import COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, new_figure
 from tmsopt.study.paper.universal import UniversalPath, ep_set, heavy_section
 
@@ -25,7 +25,6 @@ _EVENTS = {
     "CEP2": ("o", COMPLEX),
 }
 
-Array = NDArray[np.float64]
 
 _EDGE = "#8a5a00"
 

@@ -11,9 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
-from tmsopt.records import Table
-
-Array = NDArray[np.float64]
+from tmsopt.records import Array, Table
 
 SCHEMA = 1
 

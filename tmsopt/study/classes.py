@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.records import Array
 from tmsopt.roots import CLASSES, abscissa_and_damping, is_stable, quartic_classes, real_roots, roots
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,11 @@ import numpy as np
 
 from tmsopt import laws
 from tmsopt.design.problem import Problem
-from tmsopt.design.search import STARTS, Progress
+from tmsopt.design.search import STARTS
 from tmsopt.design.solution import Solution
 from tmsopt.design.solve import solve
 from tmsopt.models import tms
+from tmsopt.records import Progress
 from tmsopt.roots import PATTERNS, is_stable
 
 SAME_LAW = 1e-9

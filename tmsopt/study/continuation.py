@@ -10,10 +10,9 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-Array = NDArray[np.float64]
+from tmsopt.records import Array
 
 _CONVERGED = 1e-8
 """Last Newton step, relative to the point: the error left is its square."""

@@ -12,8 +12,8 @@ import numpy as np
 from tmsopt.design.formulations import design_of
 from tmsopt.design.recheck import recheck
 from tmsopt.design.solution import Solution
-from tmsopt.records import Table
-from tmsopt.study.held import Array, Program
+from tmsopt.records import Array, Table
+from tmsopt.study.held import Program
 from tmsopt.study.multipliers import Conditions, curved
 
 _FIRST = 0.05  # of the sizes of the variables: the longest step

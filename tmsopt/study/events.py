@@ -5,11 +5,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
 from tmsopt.models import Values
-from tmsopt.records import Table
+from tmsopt.records import Array, Table
 from tmsopt.roots import Pattern
 from tmsopt.roots.patterns import mean_size
 from tmsopt.study.branch import Branch, Event
@@ -17,8 +16,6 @@ from tmsopt.study.continuation import CLOSED, Curve, End, Walk
 from tmsopt.study.fourfold import touched, with_EP4
 from tmsopt.study.locate import TOGETHER, Found, located, refined
 from tmsopt.study.marks import all_real, parameters_of, satisfied, stability, values_of, vanishes
-
-Array = NDArray[np.float64]
 
 _SAME_DESIGN = 1e-6
 """Like `TOGETHER`, in the free parameters alone: where the traced equations are singular, the unknowns scatter."""

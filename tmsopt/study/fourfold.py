@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
 from tmsopt.models import Values
@@ -14,8 +13,6 @@ from tmsopt.roots import pattern as pattern_of
 from tmsopt.roots.patterns import mean_size
 from tmsopt.study.continuation import Curve, Walk, project
 from tmsopt.study.locate import Found
-
-Array = NDArray[np.float64]
 
 _NEAR = 1e-3
 """Distance within which an EP4 is looked for beside an EP3 and a 2EP2."""

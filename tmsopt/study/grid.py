@@ -4,13 +4,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
+from tmsopt.records import Array, Truth
 from tmsopt.roots.meetings import CLOSED
-
-Array = NDArray[np.float64]
-Truth = NDArray[np.bool_]
 
 POINTS = 256
 """Along each axis; an edge of the grid is as long as a step of a trace."""

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import Parameter, ParameterSet, Values
+from tmsopt.records import Array
 from tmsopt.roots import is_stable, roots
 
-Array = NDArray[np.float64]
 Band = tuple[float, float]
 
 SPEEDS = ("Fr", "v")

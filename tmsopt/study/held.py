@@ -22,15 +22,13 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.design.formulations import abscissa, variables_of
 from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
+from tmsopt.records import Array
 from tmsopt.roots import Root, product, shift
-
-Array = NDArray[np.float64]
 
 _ACTIVE = 2e-9  # slack, relative to 1 + |limit|, up to which a constraint is held: twice what a feasible point may have
 _AT = 1e-12  # likewise of a bound, relative to its size and the width of its range

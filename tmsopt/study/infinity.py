@@ -10,11 +10,11 @@ from itertools import chain, islice
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
 from tmsopt.design.starts import spread
 from tmsopt.models import Values
+from tmsopt.records import Array, Truth
 from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.meetings import meeting
 from tmsopt.study.continuation import Curve, Walk, between, both_ways, contains, crossing, curve, project
@@ -22,9 +22,6 @@ from tmsopt.study.grid import unexplained
 from tmsopt.study.marks import margins, sign_changes
 from tmsopt.study.sizes import sizes
 from tmsopt.study.trace import design_at
-
-Array = NDArray[np.float64]
-Truth = NDArray[np.bool_]
 
 _NOTHING = 1e-12  # of its size over the box: a constant term this small all along the curve vanishes with a0
 

@@ -4,15 +4,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from tmsopt.design.problem import Problem
+from tmsopt.records import Array
 from tmsopt.roots import Pattern
 from tmsopt.study.continuation import Curve, Walk, between, crossing
 from tmsopt.study.marks import CHANGES, NOTHING, Mark, marks, sign_changes, stability, vanishes
-
-Array = NDArray[np.float64]
 
 TOGETHER = 1e-6
 """Distance, in units of the scale, within which events are one: each is located to 1e-12 or better."""

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import NO_RADIUS, ROOT_QUANTITIES
 from tmsopt.models import Values
+from tmsopt.records import Array, Truth
 from tmsopt.roots import Pattern, is_stable, lienard_chipart, roots
 from tmsopt.roots.meetings import CLOSED, balance, nearest_two
 
-Array = NDArray[np.float64]
-Truth = NDArray[np.bool_]
 Function = Callable[[Array, Array], Array]
 
 NOTHING = 1e-9  # a function smaller than this all along the curve is 0 on it, not an event of it

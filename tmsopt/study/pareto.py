@@ -1,18 +1,17 @@
 """Pareto fronts by eps-constraints, warm-started along the front."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.solution import NotSolved, Solution
 from tmsopt.errors import Fault, InputError
+from tmsopt.records import Progress
 from tmsopt.study.epsilon import Asker, best_first, point
 from tmsopt.study.front import Front, FrontPoint
 from tmsopt.study.payoff import surface
 from tmsopt.study.sweep import curve
-
-Progress = Callable[[int, int], None]
 
 POINTS = 25
 STARTS = 2

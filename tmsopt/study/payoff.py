@@ -1,9 +1,10 @@
 """The front of three objectives: a grid of limits on two of them, over the payoff table."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from tmsopt.design.solution import Solution
+from tmsopt.records import Progress
 from tmsopt.study.dominance import efficient
 from tmsopt.study.epsilon import Asker, least, point, solvable
 from tmsopt.study.front import FrontPoint, Gap
@@ -12,8 +13,6 @@ MOST = 12
 """Limits per objective at most, so 144 sub-problems."""
 
 _SAME = 1e-7  # of the range: a corner of the table is held with a slack of 1e-9
-
-Progress = Callable[[int, int], None]
 
 
 def surface(

@@ -4,12 +4,10 @@ from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
 from tmsopt.design.starts import spread
-
-Array = NDArray[np.float64]
+from tmsopt.records import Array
 
 _SAMPLE = 32  # designs by which sizes are judged
 

@@ -3,7 +3,7 @@
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
+from tmsopt.records import Progress
 from tmsopt.roots import CLASSES
 from tmsopt.study import folder
 from tmsopt.study.tally import Tally, tally, total
@@ -25,8 +26,6 @@ TILE = 2**18
 """Designs of a tile: some 40 MB while it is computed."""
 
 _SYNC = 1.0  # seconds between two records of finished tiles
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)

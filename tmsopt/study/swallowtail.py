@@ -10,17 +10,16 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
+from tmsopt.records import Array
 from tmsopt.roots import determinant, is_stable, real_roots
 from tmsopt.study.branch import Trace
 from tmsopt.study.continuation import project
 from tmsopt.study.trace import STARTS, Traced, prepare, trace
 
-Array = NDArray[np.float64]
 Cut = tuple[float, str]
 
 _LEAST = 4  # degree

@@ -1,16 +1,16 @@
 """The front of two objectives: limits set one after the other where it is known least."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from tmsopt.design.solution import Solution
+from tmsopt.records import Progress
 from tmsopt.study.dominance import efficient
 from tmsopt.study.epsilon import Asker, least, point
 from tmsopt.study.front import Front, FrontPoint, Gap, Kink
 
-Progress = Callable[[int, int], None]
 Values = tuple[float, ...]
 
 _SAME = 1e-9  # of the range: rounding of polished optima

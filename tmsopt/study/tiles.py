@@ -13,9 +13,8 @@ from tmsopt.design.machine import engine_of
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.quantities import RADIUS, ROOT_NAMES
 from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.records import Array
 from tmsopt.study.classes import Classified, classified
-
-Array = NDArray[np.float64]
 
 LAYERS: Mapping[str, DTypeLike] = {
     "kind": np.int8,

@@ -9,7 +9,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.design.formulations import matching, variables_of
 from tmsopt.design.freedom import freedom
@@ -17,6 +16,7 @@ from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.starts import spread
 from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.records import Array
 from tmsopt.roots import Pattern, roots
 from tmsopt.roots import pattern as pattern_of
 from tmsopt.roots.composed import pattern_names
@@ -26,7 +26,6 @@ from tmsopt.study.events import describe
 from tmsopt.study.grid import unexplained
 from tmsopt.study.sizes import Sizes, sizes
 
-Array = NDArray[np.float64]
 Report = Callable[[int, int], None]
 
 STARTS = 48

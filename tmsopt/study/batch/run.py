@@ -1,7 +1,7 @@
 """A study carried out: rows by an engine, into a store."""
 
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
 from os import PathLike
@@ -11,6 +11,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from tmsopt.errors import Fault, InputError, short, suggest
+from tmsopt.records import Progress
 from tmsopt.study.batch.definition import definition
 from tmsopt.study.batch.engines import Note, Unit, cluster, cores, in_process, processes
 from tmsopt.study.batch.engines.work import silent
@@ -28,8 +29,6 @@ _COMMIT = 0.2
 """s of rows in one transaction: what a kill may cost, and some 20 times what a transaction takes."""
 
 _FEW = 32  # rows for which no workers are started unless asked for: they take seconds to come up
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.errors import Fault, InputError
-from tmsopt.records import Column
+from tmsopt.records import Array, Column
 from tmsopt.study.batch.stated import MOST_ROWS, count_faults
-
-Array = NDArray[np.float64]
 
 _DIGITS = 15  # of a decimal number, all of which a double holds
 

@@ -4,14 +4,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from tmsopt import laws
+from tmsopt.records import Array
 from tmsopt.roots import is_stable
 from tmsopt.study.paper.reference import Bicycle, benchmark, experimental, optimised
-
-Array = NDArray[np.float64]
 
 TILT = np.deg2rad(20.0)
 """Assumed steer axis tilt in rad: the source gives none for the experimental bicycle."""

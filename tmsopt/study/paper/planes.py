@@ -4,19 +4,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt import laws
 from tmsopt.design.problem import Problem
 from tmsopt.models import tms
-from tmsopt.records import Table
+from tmsopt.records import Array, Table
 from tmsopt.study.branch import Trace
 from tmsopt.study.chart import Chart, chart
 from tmsopt.study.paper.reference import MU, ZETA_B, ZETA_H
 from tmsopt.study.swallowtail import Swallowtail, swallowtail
 from tmsopt.study.trace import trace
-
-Array = NDArray[np.float64]
 
 FR, TILT, CHI_B = (0.01, 5.0), (0.01, 1.5), (1.001, 1.999)
 """Boxes of the planes; between χ_B = 1 and ζ_B/ζ_H = 2 a bicycle with λ_s > 0 can be stable."""

@@ -4,11 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tmsopt.records import Table
-
-Array = NDArray[np.float64]
+from tmsopt.records import Array, Table
 
 
 @dataclass(frozen=True)

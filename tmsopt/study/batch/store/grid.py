@@ -5,9 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.records import Array
 from tmsopt.study.batch.store.columns import PREFIXES, Column
-
-Array = NDArray[np.float64]
 
 
 def levels(columns: Mapping[str, Column]) -> dict[str, Array]:
