@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tmsopt.design.cases import Band
 from tmsopt.design.problem import Problem
 from tmsopt.models import Values
-from tmsopt.models.words import FUNCTIONS
+from tmsopt.models.names import FUNCTIONS
 from tmsopt.records import Array
 
 NOWHERE = 1e3

@@ -13,8 +13,8 @@ from test_models import designs
 from tmsopt.arithmetic.elementary import exact, greater, lesser, magnitude, positive_part, power, quotient, sqrt, tan
 from tmsopt.design.expression import parse_comparison, parse_value
 from tmsopt.models import Values, tms
+from tmsopt.models.names import FUNCTIONS
 from tmsopt.models.tms import to_si
-from tmsopt.models.words import FUNCTIONS
 
 HALF = flint.fmpq(1, 2)
 

@@ -24,7 +24,7 @@ from tmsopt.design.proof.proof import Proof, prove_design
 from tmsopt.design.relation import relation_bound
 from tmsopt.models import Model, from_coefficients, from_matrices
 from tmsopt.roots import Root, pattern, product, roots
-from tmsopt.roots.shown import implies, shown_patterns
+from tmsopt.roots.patterns.naming import implies, shown_patterns
 
 scip = pytest.mark.skipif(not available(), reason="SCIP is not installed")
 

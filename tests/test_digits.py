@@ -29,7 +29,7 @@ from tmsopt.arithmetic.elementary import exact
 from tmsopt.design.bound import omega0_bound
 from tmsopt.models import tms
 from tmsopt.roots import structure
-from tmsopt.roots.enclosed import enclosed_roots, nearest, nearest_decimal, nearest_double
+from tmsopt.roots.patterns.enclosed import enclosed_roots, nearest, nearest_decimal, nearest_double
 
 DIGITS = 60
 PROBLEMS = Path(__file__).parent.parent / "problems"

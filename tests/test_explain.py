@@ -14,11 +14,11 @@ from oracles import polynomial_60, roots_60
 import tmsopt
 from tmsopt.cli import main
 from tmsopt.models import Range, tms
+from tmsopt.roots.patterns.descriptions import STRUCTURES
 from tmsopt.show.explained import explained_lines
 from tmsopt.study.levers import moved
 from tmsopt.study.rounding import rounded
 from tmsopt.study.steps import natural_step, step_within
-from tmsopt.study.words import STRUCTURES
 
 ZETA_B, ZETA_H = -0.4, -0.2
 CHI_H_1 = {"chi_H": 1.0, "zeta_B": ZETA_B, "zeta_H": ZETA_H, "mu": 0.1}
@@ -371,7 +371,7 @@ def test_not_converged(ep4):
 
 
 def test_every_structure_has_words():
-    named = [pattern.name for pattern, *_ in import_module("tmsopt.roots.structure")._CANDIDATES]
+    named = [pattern.name for pattern, *_ in import_module("tmsopt.roots.patterns.structure")._CANDIDATES]
     assert set(STRUCTURES) == {*named, "pair", "real", "undecided"}
     assert all(f"({name})" in words for name, words in STRUCTURES.items())
 

@@ -30,8 +30,8 @@ from tmsopt.roots import (
     quartic_is_stable,
     real_roots,
 )
-from tmsopt.roots.apart import hard_factors
-from tmsopt.roots.factors import cube_root, largest_root
+from tmsopt.roots.quartics.degenerate import hard_factors
+from tmsopt.roots.quartics.factors import cube_root, largest_root
 
 JOINTLY_RIGHT = 1e-13
 """The accuracy promised of rebuilt coefficients."""
@@ -303,7 +303,7 @@ def test_eigenvalues_are_the_last_resort_and_are_counted(compiled: bool) -> None
 
 
 def test_eigenvalues_give_the_factors_when_every_other_way_is_shut(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tmsopt.roots.apart._WAYS", ())
+    monkeypatch.setattr("tmsopt.roots.quartics.degenerate._WAYS", ())
     a = made("normal", 50)
     found, unit, fallbacks = hard_factors(np.ascontiguousarray(a.T))
     assert fallbacks == 50
@@ -360,7 +360,7 @@ def test_coefficients_broadcast(compiled: bool) -> None:
 
 def test_without_numba_it_is_numpy_or_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    monkeypatch.setattr("tmsopt.roots.quartic.find_spec", lambda name: None)
+    monkeypatch.setattr("tmsopt.roots.quartics.quartic.find_spec", lambda name: None)
     assert quartic_is_stable(1, 4, 6, 4, 1)
     with pytest.raises(ModuleNotFoundError, match=r"pip install \"tmsopt\[fast\]\""):
         quartic_is_stable(1, 4, 6, 4, 1, compiled=True)

@@ -29,7 +29,7 @@ from tmsopt.roots import (
     roots,
     structure,
 )
-from tmsopt.roots.enclosed import nearest, nearest_double
+from tmsopt.roots.patterns.enclosed import nearest, nearest_double
 
 Item = tuple[F, F, int]
 """Real part, imaginary part (0 or more) and multiplicity of a real root or a pair."""

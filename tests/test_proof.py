@@ -23,9 +23,9 @@ from tmsopt.arithmetic.krawczyk import Refused, enclosed, refined
 from tmsopt.cli import main
 from tmsopt.design.cases import Case
 from tmsopt.design.proof import rational
-from tmsopt.design.proof.exact import decimal
 from tmsopt.design.proof.factors import Factored
 from tmsopt.design.proof.proof import Proof, prove_design
+from tmsopt.models.exact import decimal
 from tmsopt.roots import exact_roots, product
 from tmsopt.show.proved import proof_text
 

@@ -18,7 +18,7 @@ import tmsopt
 from tmsopt.cli import main
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.models import Unfit, from_coefficients, from_matrices
-from tmsopt.models.words import CONSTANTS, FUNCTIONS, TAKEN, latex
+from tmsopt.models.names import CONSTANTS, FUNCTIONS, TAKEN, latex
 from tmsopt.study.archive import save_layers
 from tmsopt.study.batch.definition import definition
 from tmsopt.study.tiles import Grid

@@ -19,12 +19,12 @@ from tmsopt.design.solve import solve
 from tmsopt.errors import InputError
 from tmsopt.models import from_coefficients, from_matrices, whipple
 from tmsopt.roots import pattern, product, shift
+from tmsopt.roots.patterns.descriptions import in_words
 from tmsopt.show.traced import trace_figure, trace_table
 from tmsopt.study.domain import domain
 from tmsopt.study.optimality import optimality
 from tmsopt.study.swallowtail import swallowtail
 from tmsopt.study.trace import trace
-from tmsopt.study.words import in_words
 
 EXACT = 1e-12
 """Points and events: a few roundings of a Newton step whose condition is below 1e3."""

@@ -16,8 +16,8 @@ from mpmath import mp
 import tmsopt
 from tmsopt import laws
 from tmsopt.cli import main
-from tmsopt.design.bicycle_files import problem_text
 from tmsopt.models import MODELS, Values, tms, whipple
+from tmsopt.models.bicycle_files import problem_text
 from tmsopt.models.tms import copo, to_si
 from tmsopt.models.whipple import canonical
 from tmsopt.models.whipple_quantities import spin

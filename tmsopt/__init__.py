@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tmsopt import laws, models, roots
-    from tmsopt.design.bicycle_files import Bicycle, read_bicycle, write_bicycle
     from tmsopt.design.bounds.certify import certify
     from tmsopt.design.every import Every, solve_all
     from tmsopt.design.files import load
@@ -16,6 +15,7 @@ if TYPE_CHECKING:
     from tmsopt.design.solution import NotSolved, Solution
     from tmsopt.design.solve import solve
     from tmsopt.errors import InputError
+    from tmsopt.models.bicycle_files import Bicycle, read_bicycle, write_bicycle
     from tmsopt.study.batch.files import load_study
     from tmsopt.study.batch.monte_carlo import monte_carlo
     from tmsopt.study.batch.plan import Study, over_grid
@@ -95,7 +95,7 @@ __all__ = [
 
 # Imported when first used, so that `tmsopt --help` need not wait for CasADi.
 _HOMES = {
-    "Bicycle": "tmsopt.design.bicycle_files",
+    "Bicycle": "tmsopt.models.bicycle_files",
     "Branch": "tmsopt.study.branch",
     "Chart": "tmsopt.study.chart",
     "Comparison": "tmsopt.study.compare",
@@ -134,7 +134,7 @@ _HOMES = {
     "over_grid": "tmsopt.study.batch.plan",
     "pareto": "tmsopt.study.pareto",
     "prove": "tmsopt.design.prove",
-    "read_bicycle": "tmsopt.design.bicycle_files",
+    "read_bicycle": "tmsopt.models.bicycle_files",
     "robustness": "tmsopt.design.nearest",
     "run_study": "tmsopt.study.batch.run",
     "sobol": "tmsopt.study.batch.samples",
@@ -144,7 +144,7 @@ _HOMES = {
     "speeds": "tmsopt.study.speeds",
     "swallowtail": "tmsopt.study.swallowtail",
     "trace": "tmsopt.study.trace",
-    "write_bicycle": "tmsopt.design.bicycle_files",
+    "write_bicycle": "tmsopt.models.bicycle_files",
 }
 
 

@@ -22,7 +22,7 @@ from tmsopt.design.variation import varies
 from tmsopt.models import Values
 from tmsopt.records import Table
 from tmsopt.roots import Root, Structure
-from tmsopt.roots.enclosed import Enclosed, enclosed_roots, nearest, nearest_decimal, nearest_double
+from tmsopt.roots.patterns.enclosed import Enclosed, enclosed_roots, nearest, nearest_decimal, nearest_double
 
 _PRECISIONS = (212, 424, 848, 1696)
 """Bits carried, one after the other until they suffice; the first are 60 digits, half of which a fit may lose."""

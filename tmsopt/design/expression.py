@@ -17,7 +17,7 @@ import numpy as np
 
 from tmsopt.arithmetic import elementary
 from tmsopt.errors import suggest
-from tmsopt.models.words import CONSTANTS, FUNCTIONS
+from tmsopt.models.names import CONSTANTS, FUNCTIONS
 
 COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
 

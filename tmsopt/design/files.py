@@ -9,7 +9,6 @@ from typing import Any
 
 from pydantic import Field, StrictFloat, StrictInt, StrictStr
 
-from tmsopt.design.bicycle_files import read_bicycle
 from tmsopt.design.cases import POINTS, Band
 from tmsopt.design.page import Number, Section, fitted, read_page
 from tmsopt.design.problem import Problem, unasked
@@ -18,6 +17,7 @@ from tmsopt.design.units import with_unit
 from tmsopt.design.validate import VARIATIONS, guess_parameter_set
 from tmsopt.errors import Fault, InputError, short, suggest
 from tmsopt.models import MODELS, Model
+from tmsopt.models.bicycle_files import read_bicycle
 
 
 class _FreeParameter(Section):

@@ -12,7 +12,7 @@ from tmsopt.design.nlp import Factor, Lift, Touch
 from tmsopt.models import Values
 from tmsopt.records import Array
 from tmsopt.roots import product, shift
-from tmsopt.roots.patterns import Roots
+from tmsopt.roots.patterns.pattern import Roots
 
 
 class Rows(Protocol):

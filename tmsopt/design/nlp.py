@@ -11,7 +11,7 @@ import numpy as np
 from tmsopt.design.cases import Case
 from tmsopt.models import Values
 from tmsopt.records import Array
-from tmsopt.roots.patterns import Roots
+from tmsopt.roots.patterns.pattern import Roots
 
 _TANGLED = 1e-3  # relative distance of roots that may be meant to be one: where two factors share it, digits are lost
 

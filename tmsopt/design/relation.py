@@ -20,8 +20,8 @@ import numpy as np
 from tmsopt.arithmetic.elementary import exact
 from tmsopt.arithmetic.walk import steps
 from tmsopt.design.problem import Problem
-from tmsopt.design.proof.exact import Tilt
 from tmsopt.models import Model, ParameterSet
+from tmsopt.models.exact import Tilt
 
 _BITS = 212  # zeros of h by isolation; far beyond the answer, which is a double
 _MORE = 8  # designs at which a relation is tried beyond those that determine it

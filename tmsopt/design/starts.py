@@ -16,7 +16,7 @@ from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES, RADIUS, regular
 from tmsopt.models import Values
 from tmsopt.records import Array
 from tmsopt.roots import is_stable, roots
-from tmsopt.roots.structure import guess_distance
+from tmsopt.roots.patterns.structure import guess_distance
 
 _CANDIDATES = 16
 """Designs looked at for each that is started from: a start near the good ones needs half the iterations."""

@@ -10,7 +10,7 @@ import numpy as np
 from tmsopt.design.expression import Expression, ExpressionError, parse_formula
 from tmsopt.errors import Fault, short, suggest
 from tmsopt.models import Model, Unfit, from_coefficients, from_matrices
-from tmsopt.models.words import unusable
+from tmsopt.models.names import unusable
 
 _MATRICES = ("M", "D", "K", "A")
 _KEYS = ("name", *_MATRICES, "coefficients", "quantities")

@@ -10,7 +10,7 @@ from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.errors import Fault, suggest
 from tmsopt.models import Model, ParameterSet
 from tmsopt.roots import pattern
-from tmsopt.roots.composed import pattern_names
+from tmsopt.roots.patterns.composed import pattern_names
 
 VARIATIONS = ("scenarios", "tolerances", "weights")
 """Tables of a problem that name parameters beside those of `fixed` and `free`."""

@@ -3,10 +3,9 @@
 import copyreg
 from typing import Any
 
-from tmsopt.models.entries import Unfit
 from tmsopt.models.model import Model, Parameter, ParameterSet, Quantity, Range, Values
-from tmsopt.models.stated import from_coefficients, from_matrices
 from tmsopt.models.tms import tms
+from tmsopt.models.user_defined import Unfit, from_coefficients, from_matrices
 from tmsopt.models.whipple import whipple
 
 MODELS = {tms.name: tms, whipple.name: whipple}

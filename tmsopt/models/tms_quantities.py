@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.arithmetic.elementary import chosen, is_ball, positive_part, quotient, sqrt, tan
-from tmsopt.models.common import nothing, omega0, omega0_equation, smaller_eigenvalue
+from tmsopt.models.bicycle import nothing, omega0, omega0_equation, smaller_eigenvalue
 from tmsopt.models.model import Quantity, Range
 from tmsopt.models.tms_equations import matrices
 

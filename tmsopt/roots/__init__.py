@@ -1,16 +1,16 @@
 """Real polynomials and their roots: factored forms, stability, numeric and exact roots, multiplicity."""
 
-from tmsopt.roots.classes import CLASSES, Classes, quartic_classes, quartic_is_stable
-from tmsopt.roots.composed import composition, pattern
 from tmsopt.roots.count import real_roots
 from tmsopt.roots.exact import exact_abscissa, exact_roots
-from tmsopt.roots.multiple import multiple_real_roots
 from tmsopt.roots.numeric import abscissa, backward_error, rebuilt, roots
-from tmsopt.roots.patterns import PATTERNS, Pattern
+from tmsopt.roots.patterns.composed import composition, pattern
+from tmsopt.roots.patterns.multiplicity import multiple_real_roots
+from tmsopt.roots.patterns.pattern import PATTERNS, Pattern
+from tmsopt.roots.patterns.structure import Root, Structure, pattern_distance, structure
 from tmsopt.roots.polynomial import determinant, evaluate, product, quadratic_pencil, shift
-from tmsopt.roots.quartic import Factors, Motion, abscissa_and_damping, quartic_factors
+from tmsopt.roots.quartics.classes import CLASSES, Classes, quartic_classes, quartic_is_stable
+from tmsopt.roots.quartics.quartic import Factors, Motion, abscissa_and_damping, quartic_factors
 from tmsopt.roots.stability import discriminant, hurwitz_minors, is_stable, lienard_chipart, routh
-from tmsopt.roots.structure import Root, Structure, pattern_distance, structure
 
 __all__ = [
     "CLASSES",

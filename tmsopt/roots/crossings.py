@@ -15,8 +15,8 @@ import flint
 from tmsopt.roots.exact import exact_roots, rational
 from tmsopt.roots.lasting import Lasting, Polynomial, lasting
 from tmsopt.roots.parametric import DIGITS, of_values, real_places, trimmed, value_at
+from tmsopt.roots.patterns.structure import Root
 from tmsopt.roots.stability import lienard_chipart
-from tmsopt.roots.structure import Root
 
 _SAME = 1e-12  # relative to the largest root: difference of two that are one; a k-fold one scatters by 1e-120/k
 _NOTHING = flint.fmpq(1, 10**90)  # of the largest coefficient: one that is 0 but for the digits of y

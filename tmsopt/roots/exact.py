@@ -6,7 +6,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.roots.structure import Root
+from tmsopt.roots.patterns.structure import Root
 
 DIGITS = 60
 

@@ -11,8 +11,8 @@ from tmsopt.arithmetic.elementary import exact
 from tmsopt.design.solution import Solution
 from tmsopt.models import Model, ParameterSet
 from tmsopt.roots import Root, Structure
-from tmsopt.roots.enclosed import nearest
 from tmsopt.roots.jordan import Jordan, is_regular, jordan
+from tmsopt.roots.patterns.enclosed import nearest
 from tmsopt.study.splitting import DEVIATION, Ideal, Law, Response, response
 
 _BITS = 424  # 127 digits: changes down to 1e-16 are differences of coefficients

@@ -10,7 +10,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.models import Values
 from tmsopt.records import Array, Table
 from tmsopt.roots import Pattern
-from tmsopt.roots.patterns import mean_size
+from tmsopt.roots.patterns.pattern import mean_size
 from tmsopt.study.branch import Branch, Event
 from tmsopt.study.continuation import CLOSED, Curve, End, Walk
 from tmsopt.study.fourfold import touched, with_EP4

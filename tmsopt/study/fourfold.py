@@ -10,7 +10,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.models import Values
 from tmsopt.roots import Pattern, roots
 from tmsopt.roots import pattern as pattern_of
-from tmsopt.roots.patterns import mean_size
+from tmsopt.roots.patterns.pattern import mean_size
 from tmsopt.study.continuation import Curve, Walk, project
 from tmsopt.study.locate import Found
 

@@ -19,7 +19,7 @@ from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.records import Array
 from tmsopt.roots import Pattern, roots
 from tmsopt.roots import pattern as pattern_of
-from tmsopt.roots.composed import pattern_names
+from tmsopt.roots.patterns.composed import pattern_names
 from tmsopt.study.branch import Branch, Event, Trace
 from tmsopt.study.continuation import INFINITE, SINGULAR, Curve, Walk, both_ways, contains, curve, project, same
 from tmsopt.study.events import describe

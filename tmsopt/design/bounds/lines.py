@@ -17,7 +17,7 @@ from tmsopt.design.lifts import Lifted, quadratic_pairs
 from tmsopt.design.nlp import Lift
 from tmsopt.models import Model, Values
 from tmsopt.roots import Pattern, product, shift
-from tmsopt.roots.patterns import Roots
+from tmsopt.roots.patterns.pattern import Roots
 
 _PLAIN = 4  # degree up to which the powers of the unit are near enough to 1
 

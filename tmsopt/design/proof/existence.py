@@ -10,11 +10,11 @@ from tmsopt.arithmetic.balls import GUARD, largest_radius, upper
 from tmsopt.arithmetic.krawczyk import Enclosure, Refused, enclosed, refined
 from tmsopt.design.problem import Problem
 from tmsopt.design.proof import rational
-from tmsopt.design.proof.exact import Written
 from tmsopt.design.proof.factors import Factored, of_pattern
 from tmsopt.design.proof.system import ROUNDINGS, Equations, choose, equations
+from tmsopt.models.exact import Written
 from tmsopt.roots import Pattern
-from tmsopt.roots.structure import nearest_unknowns
+from tmsopt.roots.patterns.structure import nearest_unknowns
 
 _EXTRA = 25  # decimal digits carried beyond those asked for
 _TIMES = 3  # times that the digits carried are doubled

@@ -8,7 +8,7 @@ from typing import Any
 import flint
 
 from tmsopt.roots import Pattern, evaluate, lienard_chipart
-from tmsopt.roots.enclosed import Enclosed
+from tmsopt.roots.patterns.enclosed import Enclosed
 
 _LIKE = tuple(p**0.5 for p in (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37))
 """Unknowns with no relation, to see which factors are the same."""

@@ -6,13 +6,13 @@ import flint
 
 from tmsopt.arithmetic.balls import largest_radius
 from tmsopt.design.problem import Problem
-from tmsopt.design.proof.exact import Written, decimal, decimal_fraction
 from tmsopt.design.proof.existence import Existing, exact_coefficients
 from tmsopt.design.proof.factors import Factored
 from tmsopt.design.proof.rational import factored
 from tmsopt.design.proof.verdict import Verdict
 from tmsopt.design.quantities import RADIUS
 from tmsopt.models import Values
+from tmsopt.models.exact import Written, decimal, decimal_fraction
 from tmsopt.roots.exact import rational
 
 BINDS = 1e-9

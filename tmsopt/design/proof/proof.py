@@ -13,16 +13,16 @@ from tmsopt.arithmetic.krawczyk import Refused
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
 from tmsopt.design.proof import rational
-from tmsopt.design.proof.exact import Written, written
 from tmsopt.design.proof.existence import Existing, beside, exact_coefficients, exactly
 from tmsopt.design.proof.facts import as_stored, heavy_damping, inside, limits, stability
 from tmsopt.design.proof.verdict import NOTHING, Verdict
 from tmsopt.errors import Fault, InputError
+from tmsopt.models.exact import Written, written
 from tmsopt.records import Table
 from tmsopt.roots import PATTERNS, Pattern, Root
 from tmsopt.roots import pattern as pattern_of
-from tmsopt.roots.patterns import LINES
-from tmsopt.roots.shown import implies, shown_patterns
+from tmsopt.roots.patterns.naming import implies, shown_patterns
+from tmsopt.roots.patterns.pattern import LINES
 
 DIGITS = 30
 """Digits by default."""

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tmsopt.records import Array
-from tmsopt.roots.fitting import gauss_newton, relative_distance, sizes
-from tmsopt.roots.multiplicity import Fit, decided
 from tmsopt.roots.numeric import roots as numeric_roots
-from tmsopt.roots.patterns import LINES, PATTERNS, Pattern, Roots
+from tmsopt.roots.patterns.fitting import gauss_newton, relative_distance, sizes
+from tmsopt.roots.patterns.multiplicity import Fit, decided
+from tmsopt.roots.patterns.pattern import LINES, PATTERNS, Pattern, Roots
 
 ROUNDING = 8 * np.finfo(float).eps
 """Relative error that coefficients of a quartic computed in double precision carry anyway."""

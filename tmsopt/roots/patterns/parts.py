@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.roots.patterns import Roots, quadratic
+from tmsopt.roots.patterns.pattern import Roots, quadratic
 
 _PART = re.compile(r"(?P<count>[1-9]\d*)?(?P<kind>C?EP)(?P<order>[1-9]\d*)")
 _LARGEST = 12

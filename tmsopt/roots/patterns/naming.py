@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from tmsopt.roots.composed import composition
-from tmsopt.roots.patterns import Pattern
+from tmsopt.roots.patterns.composed import composition
+from tmsopt.roots.patterns.pattern import Pattern
+from tmsopt.roots.patterns.shape import Group, Shape
+from tmsopt.roots.patterns.structure import Root
 from tmsopt.roots.polynomial import product
-from tmsopt.roots.shape import Group, Shape
-from tmsopt.roots.structure import Root
 
 
 def shown(roots: Sequence[Root], everywhere: bool = True, ties: bool = True) -> tuple[Shape, list[Any]]:

@@ -14,8 +14,8 @@ import numpy as np
 
 from tmsopt.roots.meetings import meeting, weave_test
 from tmsopt.roots.numeric import rebuilt
-from tmsopt.roots.parts import AXIS, Part, parts_of
-from tmsopt.roots.patterns import PATTERNS, Pattern, Roots
+from tmsopt.roots.patterns.parts import AXIS, Part, parts_of
+from tmsopt.roots.patterns.pattern import PATTERNS, Pattern, Roots
 from tmsopt.roots.polynomial import evaluate
 from tmsopt.roots.polynomial import product as multiplied
 

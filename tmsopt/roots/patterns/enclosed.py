@@ -15,12 +15,12 @@ import numpy as np
 
 from tmsopt.arithmetic.elementary import as_ball
 from tmsopt.roots.exact import rational
-from tmsopt.roots.fitting import Form
-from tmsopt.roots.patterns import LINES, PATTERNS, Pattern
+from tmsopt.roots.patterns.fitting import Form
+from tmsopt.roots.patterns.naming import shown
+from tmsopt.roots.patterns.pattern import LINES, PATTERNS, Pattern
+from tmsopt.roots.patterns.shape import Shape
+from tmsopt.roots.patterns.structure import Root
 from tmsopt.roots.polynomial import evaluate, product
-from tmsopt.roots.shape import Shape
-from tmsopt.roots.shown import shown
-from tmsopt.roots.structure import Root
 
 _STEPS = 80
 _FLOOR = 1000  # a root smaller than the median root by more than this counts as this much smaller

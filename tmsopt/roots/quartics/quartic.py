@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tmsopt.records import Array
-from tmsopt.roots import factors
-from tmsopt.roots.apart import ACCEPTED, GOOD, STEPS, hard_factors, polish
+from tmsopt.roots.quartics import factors
+from tmsopt.roots.quartics.degenerate import ACCEPTED, GOOD, STEPS, hard_factors, polish
 
 Columns = tuple[Array, Array, Array, Array, Array]
 Four = factors.Four
@@ -73,7 +73,7 @@ def quartic_factors(
     a, shape = columns(a0, a1, a2, a3, a4)
     p, q = np.empty((a[0].size, 2)), np.empty((a[0].size, 2))
     if use_numba(compiled):
-        from tmsopt.roots.compiled import loop
+        from tmsopt.roots.quartics.compiled import loop
 
         left = np.empty(a[0].size, dtype=bool)
         loop("factors")(*a, p, q, left)
@@ -98,7 +98,7 @@ def abscissa_and_damping(
     a, shape = columns(a0, a1, a2, a3, a4)
     alpha, ratio = np.empty(a[0].size), np.empty(a[0].size)
     if use_numba(compiled):
-        from tmsopt.roots.compiled import loop
+        from tmsopt.roots.quartics.compiled import loop
 
         left = np.empty(a[0].size, dtype=bool)
         loop("motion")(*a, alpha, ratio, left)

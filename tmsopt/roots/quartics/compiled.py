@@ -12,11 +12,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tmsopt.roots import factors, signs
-from tmsopt.roots.apart import ACCEPTED, GOOD, STEPS
-from tmsopt.roots.factors import abscissa, damping_ratio, error, monic, newton, start
-from tmsopt.roots.signs import classes as class_of
-from tmsopt.roots.signs import stable as is_stable
+from tmsopt.roots.quartics import factors, signs
+from tmsopt.roots.quartics.degenerate import ACCEPTED, GOOD, STEPS
+from tmsopt.roots.quartics.factors import abscissa, damping_ratio, error, monic, newton, start
+from tmsopt.roots.quartics.signs import classes as class_of
+from tmsopt.roots.quartics.signs import stable as is_stable
 
 _FORMULAS = (
     factors.third_of_exponent,

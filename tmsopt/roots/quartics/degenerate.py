@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.records import Array
-from tmsopt.roots import factors
 from tmsopt.roots.numeric import roots
+from tmsopt.roots.quartics import factors
 
 Rows = NDArray[np.int_]
 

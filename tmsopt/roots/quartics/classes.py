@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tmsopt.roots import signs
 from tmsopt.roots.count import real_roots
-from tmsopt.roots.quartic import columns, use_numba
+from tmsopt.roots.quartics import signs
+from tmsopt.roots.quartics.quartic import columns, use_numba
 
 CLASSES = ("undefined", "capsize", "weave", "stable", "heavily damped")
 """Names of the class codes 0 … 4, from worst to best; undefined is a leading 0 or a coefficient that is not finite."""
@@ -49,7 +49,7 @@ def quartic_classes(
     size = a[0].size
     kind, count, doubtful = np.empty(size, np.int8), np.empty(size, np.int8), np.empty(size, np.bool_)
     if use_numba(compiled):
-        from tmsopt.roots.compiled import loop
+        from tmsopt.roots.quartics.compiled import loop
 
         loop("classes")(*a, kind, count, doubtful)
     else:
@@ -70,7 +70,7 @@ def quartic_is_stable(
     a, shape = columns(a0, a1, a2, a3, a4)
     verdict = np.empty(a[0].size, np.bool_)
     if use_numba(compiled):
-        from tmsopt.roots.compiled import loop
+        from tmsopt.roots.quartics.compiled import loop
 
         loop("stable")(*a, verdict)
     else:

@@ -1,0 +1,1 @@
+"""Which roots meet: patterns by name, structures, the nearest polynomial of one."""

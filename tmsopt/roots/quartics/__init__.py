@@ -1,0 +1,1 @@
+"""Millions of quartics at once, NumPy or numba."""
