@@ -17,9 +17,9 @@ import flint
 import numpy as np
 
 import tmsopt
+from tmsopt.arithmetic.elementary import rational
 from tmsopt.models import whipple
 from tmsopt.roots import exact_roots, shift
-from tmsopt.roots.exact import rational
 
 RADIUS, TRAIL, MASS = flint.fmpq(3, 10), flint.fmpq(1, 20), flint.fmpq(1)
 KINDS = {"wheels": (1, 0), "trail": (0, 1), "both": (1, 1)}

@@ -7,7 +7,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.roots.exact import rational
+from tmsopt.arithmetic.elementary import rational
 
 GUARD = 5
 """Decimal digits written beyond those asked for."""

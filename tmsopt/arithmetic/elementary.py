@@ -4,11 +4,14 @@ A ball is an exact fraction (`flint.fmpq`), an interval with a middle and a radi
 these (`flint.arb_series`). A value that does not exist, or that the balls are too wide to tell, is a ball nan.
 """
 
+from fractions import Fraction
 from typing import Any
 
 import casadi as ca
 import flint
 import numpy as np
+
+DIGITS = 60
 
 
 def tan(x: Any) -> Any:
@@ -131,3 +134,14 @@ def _chosen(a: Any, b: Any, sign: int) -> Any:
     if isinstance(difference, flint.arb):
         return as_ball(a).max(as_ball(b)) if sign > 0 else as_ball(a).min(as_ball(b))
     return (a + b + sign * magnitude(difference)) / 2
+
+
+def rational(x: Any, digits: int = DIGITS) -> flint.fmpq:
+    """A number as an exact fraction: floats and fractions unchanged, balls by their middle at `digits`."""
+    if isinstance(x, flint.fmpq):
+        return x
+    if isinstance(x, flint.arb):
+        mantissa, exponent = x.mid().man_exp()
+        return flint.fmpq(mantissa) * flint.fmpq(2) ** int(exponent)
+    ratio = Fraction(x)
+    return flint.fmpq(ratio.numerator, ratio.denominator)

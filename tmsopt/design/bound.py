@@ -13,14 +13,13 @@ from typing import Any
 import flint
 import numpy as np
 
-from tmsopt.arithmetic.elementary import as_ball, exact, quotient
+from tmsopt.arithmetic.elementary import as_ball, exact, quotient, rational
 from tmsopt.design.problem import Problem
 from tmsopt.design.relation import is_rational, relation_bound
 from tmsopt.design.scale import objective_size
 from tmsopt.design.solution import Bound
 from tmsopt.models import Model
 from tmsopt.records import Array
-from tmsopt.roots.exact import rational
 
 PROVEN = 1e-9
 """Gap, relative to the size of the roots and of the bound, below which a design counts as proven optimal."""

@@ -9,11 +9,10 @@ from typing import Any
 
 import flint
 
-from tmsopt.arithmetic.elementary import exact
+from tmsopt.arithmetic.elementary import exact, rational
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import ParameterSet
 from tmsopt.records import Table
-from tmsopt.roots.exact import rational
 
 SAME = 4e-15
 """Relative difference of an exact value from the design's double: a few roundings, of a tangent too."""

@@ -6,8 +6,8 @@ from tmsopt.roots.numeric import abscissa, backward_error, rebuilt, roots
 from tmsopt.roots.patterns.composed import composition, pattern
 from tmsopt.roots.patterns.multiplicity import multiple_real_roots
 from tmsopt.roots.patterns.pattern import PATTERNS, Pattern
-from tmsopt.roots.patterns.structure import Root, Structure, pattern_distance, structure
-from tmsopt.roots.polynomial import determinant, evaluate, product, quadratic_pencil, shift
+from tmsopt.roots.patterns.structure import Structure, pattern_distance, structure
+from tmsopt.roots.polynomial import Root, determinant, evaluate, product, quadratic_pencil, shift
 from tmsopt.roots.quartics.classes import CLASSES, Classes, quartic_classes, quartic_is_stable
 from tmsopt.roots.quartics.quartic import Factors, Motion, abscissa_and_damping, quartic_factors
 from tmsopt.roots.stability import discriminant, hurwitz_minors, is_stable, lienard_chipart, routh

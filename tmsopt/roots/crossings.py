@@ -12,10 +12,11 @@ from typing import Any
 
 import flint
 
-from tmsopt.roots.exact import exact_roots, rational
+from tmsopt.arithmetic.elementary import rational
+from tmsopt.roots.exact import exact_roots
 from tmsopt.roots.lasting import Lasting, Polynomial, lasting
 from tmsopt.roots.parametric import DIGITS, of_values, real_places, trimmed, value_at
-from tmsopt.roots.patterns.structure import Root
+from tmsopt.roots.polynomial import Root
 from tmsopt.roots.stability import lienard_chipart
 
 _SAME = 1e-12  # relative to the largest root: difference of two that are one; a k-fold one scatters by 1e-120/k

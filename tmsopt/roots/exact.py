@@ -1,25 +1,12 @@
 """Roots of polynomials with rational coefficients, to any number of digits, multiplicities exact."""
 
 from collections.abc import Sequence
-from fractions import Fraction
 from typing import Any
 
 import flint
 
-from tmsopt.roots.patterns.structure import Root
-
-DIGITS = 60
-
-
-def rational(x: Any, digits: int = DIGITS) -> flint.fmpq:
-    """A number as an exact fraction: floats and fractions unchanged, balls by their middle at `digits`."""
-    if isinstance(x, flint.fmpq):
-        return x
-    if isinstance(x, flint.arb):
-        mantissa, exponent = x.mid().man_exp()
-        return flint.fmpq(mantissa) * flint.fmpq(2) ** int(exponent)
-    ratio = Fraction(x)
-    return flint.fmpq(ratio.numerator, ratio.denominator)
+from tmsopt.arithmetic.elementary import DIGITS, rational
+from tmsopt.roots.polynomial import Root
 
 
 def exact_roots(coefficients: Sequence[Any], digits: int = DIGITS) -> tuple[Root, ...]:

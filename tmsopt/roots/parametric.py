@@ -6,7 +6,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.roots.exact import rational
+from tmsopt.arithmetic.elementary import rational
 from tmsopt.roots.lasting import Polynomial
 
 DIGITS = 120

@@ -4,6 +4,7 @@ Only ``+ - *`` are used, so one formula serves CasADi expressions, NumPy arrays,
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -92,3 +93,12 @@ def _dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
     for x, y in zip(a, b, strict=False):
         total = total + x * y
     return total
+
+
+@dataclass(frozen=True)
+class Root:
+    """A root with its multiplicity; a complex pair is two of these."""
+
+    re: float
+    im: float
+    multiplicity: int = 1

@@ -5,6 +5,7 @@ from typing import Any
 import flint
 
 from tmsopt.arithmetic.balls import largest_radius
+from tmsopt.arithmetic.elementary import rational
 from tmsopt.design.problem import Problem
 from tmsopt.design.proof.existence import Existing, exact_coefficients
 from tmsopt.design.proof.factors import Factored
@@ -13,7 +14,6 @@ from tmsopt.design.proof.verdict import Verdict
 from tmsopt.design.quantities import RADIUS
 from tmsopt.models import Values
 from tmsopt.models.exact import Written, decimal, decimal_fraction
-from tmsopt.roots.exact import rational
 
 BINDS = 1e-9
 """Room between the sides of an inequality up to which it binds: what a solver leaves."""

@@ -13,14 +13,12 @@ from typing import Any
 import flint
 import numpy as np
 
-from tmsopt.arithmetic.elementary import as_ball
-from tmsopt.roots.exact import rational
+from tmsopt.arithmetic.elementary import as_ball, rational
 from tmsopt.roots.patterns.fitting import Form
 from tmsopt.roots.patterns.naming import shown
 from tmsopt.roots.patterns.pattern import LINES, PATTERNS, Pattern
 from tmsopt.roots.patterns.shape import Shape
-from tmsopt.roots.patterns.structure import Root
-from tmsopt.roots.polynomial import evaluate, product
+from tmsopt.roots.polynomial import Root, evaluate, product
 
 _STEPS = 80
 _FLOOR = 1000  # a root smaller than the median root by more than this counts as this much smaller

@@ -17,7 +17,7 @@ from tmsopt.roots.numeric import rebuilt, roots
 from tmsopt.roots.numeric import roots as numeric_roots
 from tmsopt.roots.patterns.fitting import gauss_newton, relative_distance, sizes
 from tmsopt.roots.patterns.shape import Group, Shape
-from tmsopt.roots.patterns.structure import Root
+from tmsopt.roots.polynomial import Root
 
 _NEAR = 0.05  # relative distance of a guess that can still lead to a polynomial within any sensible tolerance
 

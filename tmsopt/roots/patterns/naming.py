@@ -8,8 +8,7 @@ from typing import Any
 from tmsopt.roots.patterns.composed import composition
 from tmsopt.roots.patterns.pattern import Pattern
 from tmsopt.roots.patterns.shape import Group, Shape
-from tmsopt.roots.patterns.structure import Root
-from tmsopt.roots.polynomial import product
+from tmsopt.roots.polynomial import Root, product
 
 
 def shown(roots: Sequence[Root], everywhere: bool = True, ties: bool = True) -> tuple[Shape, list[Any]]:

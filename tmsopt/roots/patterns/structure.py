@@ -11,6 +11,7 @@ from tmsopt.roots.numeric import roots as numeric_roots
 from tmsopt.roots.patterns.fitting import gauss_newton, relative_distance, sizes
 from tmsopt.roots.patterns.multiplicity import Fit, decided
 from tmsopt.roots.patterns.pattern import LINES, PATTERNS, Pattern, Roots
+from tmsopt.roots.polynomial import Root
 
 ROUNDING = 8 * np.finfo(float).eps
 """Relative error that coefficients of a quartic computed in double precision carry anyway."""
@@ -33,15 +34,6 @@ _CANDIDATES = (
 _NEAR = 0.05  # relative distance of a guess that can still lead to a pattern within any sensible tolerance
 _CLOSED = 1e-10  # of the squared root size: a pattern contains its own boundary, as CEP2 and 2EP2 contain EP4
 _LINE = 1e-6  # relative difference of real parts on one vertical line, for roots of an exact pattern
-
-
-@dataclass(frozen=True)
-class Root:
-    """A root with its multiplicity; a complex pair is two of these."""
-
-    re: float
-    im: float
-    multiplicity: int = 1
 
 
 @dataclass(frozen=True)

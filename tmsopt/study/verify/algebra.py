@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 
 import flint
 
-from tmsopt.roots.exact import rational
+from tmsopt.arithmetic.elementary import rational
 from tmsopt.roots.polynomial import determinant, product, shift
 from tmsopt.roots.stability import lienard_chipart
 
