@@ -19,8 +19,7 @@ from oracles import polynomial_60, roots_60
 
 import tmsopt
 from tmsopt.arithmetic.elementary import positive_part
-from tmsopt.design.readings import decay_time, frequencies, growth_time
-from tmsopt.design.units import reading, with_unit
+from tmsopt.design.units import decay_time, frequencies, growth_time, reading, with_unit
 from tmsopt.models import Values, tms
 from tmsopt.models.tms import matrices, to_si
 from tmsopt.roots import Root

@@ -14,7 +14,7 @@ from tmsopt import laws
 from tmsopt.design.bound import omega0_bound
 from tmsopt.design.formulations import abscissa as abscissa_nlp
 from tmsopt.design.formulations import matching
-from tmsopt.design.freedom import freedom
+from tmsopt.design.problem import freedom
 from tmsopt.roots import PATTERNS, backward_error, pattern_distance, roots
 
 TMS = tmsopt.models.tms

@@ -14,11 +14,11 @@ import flint
 
 from tmsopt.arithmetic.elementary import exact, greater, lesser
 from tmsopt.design.cases import Case
+from tmsopt.design.dependence import varies
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
-from tmsopt.design.readings import Reading, readings
 from tmsopt.design.recheck import Checked
-from tmsopt.design.variation import varies
+from tmsopt.design.units import Reading, readings
 from tmsopt.models import Values
 from tmsopt.records import Table
 from tmsopt.roots import Root, Structure

@@ -9,9 +9,8 @@ import numpy as np
 
 from tmsopt.design.branches import newton, square_system
 from tmsopt.design.formulations import design_of, matching
-from tmsopt.design.freedom import freedom
 from tmsopt.design.nlp import NLP
-from tmsopt.design.problem import Problem
+from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.recheck import recheck
 from tmsopt.design.search import Runner
 from tmsopt.design.solution import Solution

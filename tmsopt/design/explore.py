@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from tmsopt.design.cases import Case
+from tmsopt.design.dependence import overclaims
 from tmsopt.design.family import Family
 from tmsopt.design.finding import Finding, Trial, ahead, counted, found, survivor
 from tmsopt.design.formulations import design_of, formulate, middle
@@ -16,7 +17,6 @@ from tmsopt.design.relax import relax
 from tmsopt.design.search import Candidate, Runner, follow, same, search
 from tmsopt.design.sides import Side
 from tmsopt.design.solution import Starts
-from tmsopt.design.variation import overclaims
 from tmsopt.design.worst import worst_cases
 from tmsopt.records import Progress, Table
 

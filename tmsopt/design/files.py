@@ -10,9 +10,9 @@ from typing import Any
 from pydantic import Field, StrictFloat, StrictInt, StrictStr
 
 from tmsopt.design.cases import POINTS, Band
-from tmsopt.design.page import Number, Section, fitted, read_page
+from tmsopt.design.model_table import stated_model
 from tmsopt.design.problem import Problem, unasked
-from tmsopt.design.stated_model import stated_model
+from tmsopt.design.toml import Number, Section, fitted, read_page
 from tmsopt.design.units import with_unit
 from tmsopt.design.validate import VARIATIONS, guess_parameter_set
 from tmsopt.errors import Fault, InputError, short, suggest

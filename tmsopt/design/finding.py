@@ -10,10 +10,9 @@ from tmsopt.design.branches import other_branches
 from tmsopt.design.cases import Case
 from tmsopt.design.family import Family
 from tmsopt.design.formulations import design_of
-from tmsopt.design.freedom import freedom
 from tmsopt.design.nlp import NLP
 from tmsopt.design.polish import Point
-from tmsopt.design.problem import Problem
+from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.recheck import Checked, recheck
 from tmsopt.design.search import Candidate, claim, same
 from tmsopt.design.solution import Branch, Relaxation, Starts

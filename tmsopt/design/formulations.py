@@ -12,10 +12,9 @@ import numpy as np
 
 from tmsopt.design.builder import Builder
 from tmsopt.design.cases import Case
-from tmsopt.design.freedom import freedom
+from tmsopt.design.dependence import demands_heavy_damping
 from tmsopt.design.nlp import NLP
-from tmsopt.design.problem import Problem
-from tmsopt.design.variation import demands_heavy_damping
+from tmsopt.design.problem import Problem, freedom
 from tmsopt.roots import Pattern
 
 

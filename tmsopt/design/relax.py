@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.design.cases import Case
+from tmsopt.design.dependence import overclaims
 from tmsopt.design.finding import Trial, survivor
 from tmsopt.design.formulations import formulate
 from tmsopt.design.nlp import NLP, Lift
@@ -18,7 +19,6 @@ from tmsopt.design.search import Candidate, Runner, same
 from tmsopt.design.sides import sides
 from tmsopt.design.solution import Relaxation
 from tmsopt.design.starts import designs
-from tmsopt.design.variation import overclaims
 from tmsopt.design.worst import worst_cases
 from tmsopt.models import Values
 from tmsopt.records import Table

@@ -8,10 +8,9 @@ from typing import Any
 
 from tmsopt.design.cases import Case
 from tmsopt.design.cover import Cover
-from tmsopt.design.freedom import Freedom
-from tmsopt.design.problem import Problem
+from tmsopt.design.problem import Freedom, Problem
 from tmsopt.design.proof.proof import DIGITS, Proof, prove_design
-from tmsopt.design.readings import Reading
+from tmsopt.design.units import Reading
 from tmsopt.records import Table
 from tmsopt.roots import Root
 

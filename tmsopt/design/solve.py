@@ -11,8 +11,7 @@ from tmsopt.design.cover import cover
 from tmsopt.design.explore import Explored, Options, evaluated_cases, explore, without_any
 from tmsopt.design.family import Family
 from tmsopt.design.finding import Finding, better, evaluated
-from tmsopt.design.freedom import freedom
-from tmsopt.design.problem import Problem, unasked
+from tmsopt.design.problem import Problem, freedom, unasked
 from tmsopt.design.recheck import Checked
 from tmsopt.design.search import STARTS
 from tmsopt.design.sides import sides

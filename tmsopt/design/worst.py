@@ -9,10 +9,10 @@ import numpy as np
 
 from tmsopt.arithmetic.sequence import golden_steps
 from tmsopt.design.cases import Band, Case
+from tmsopt.design.dependence import varies
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES
-from tmsopt.design.variation import varies
 from tmsopt.models import Values
 from tmsopt.records import Array, Table
 

@@ -4,10 +4,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tmsopt.design.readings import decay_time, frequencies, growth_time
 from tmsopt.design.recheck import FEASIBLE
 from tmsopt.design.solution import Solution
-from tmsopt.design.units import reading
+from tmsopt.design.units import decay_time, frequencies, growth_time, reading
 from tmsopt.models import Values
 from tmsopt.models.tms import tms
 from tmsopt.show.text import number

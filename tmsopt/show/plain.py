@@ -3,10 +3,9 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from tmsopt.design.readings import decay_time, frequencies, growth_time
 from tmsopt.design.recheck import FEASIBLE
 from tmsopt.design.solution import Solution
-from tmsopt.design.units import reading
+from tmsopt.design.units import decay_time, frequencies, growth_time, reading
 from tmsopt.models import Parameter, Quantity
 from tmsopt.show.text import number
 

@@ -21,9 +21,9 @@ from typing import Any
 
 import numpy as np
 
+from tmsopt.design.dependence import demands_heavy_damping, overclaims
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
-from tmsopt.design.variation import demands_heavy_damping, overclaims
 from tmsopt.records import Table
 from tmsopt.study.descent import Better, better
 from tmsopt.study.held import NotCovered, Program, program

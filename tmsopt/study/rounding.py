@@ -9,11 +9,11 @@ import flint
 import numpy as np
 
 from tmsopt.design.cases import Case
+from tmsopt.design.dependence import varies
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
 from tmsopt.design.recheck import FEASIBLE, realised_abscissa
 from tmsopt.design.solution import Solution
-from tmsopt.design.variation import varies
 from tmsopt.models import Values
 from tmsopt.records import Table
 from tmsopt.roots import roots

@@ -11,9 +11,8 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.design.formulations import matching, variables_of
-from tmsopt.design.freedom import freedom
 from tmsopt.design.nlp import NLP
-from tmsopt.design.problem import Problem, checked
+from tmsopt.design.problem import Problem, checked, freedom
 from tmsopt.design.starts import spread
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.records import Array

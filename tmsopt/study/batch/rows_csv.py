@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from os import PathLike
 
-from tmsopt.design.page import read_text
+from tmsopt.design.toml import read_text
 from tmsopt.design.units import with_unit
 from tmsopt.errors import Fault, InputError
 from tmsopt.records import Column
