@@ -17,12 +17,12 @@ import numpy as np
 
 from benchmarks.judge import eigenvalues
 from tmsopt.design.cases import Band
-from tmsopt.design.formulations import formulate
 from tmsopt.design.problem import Problem
 from tmsopt.design.search import search
 from tmsopt.design.sides import sides
 from tmsopt.design.solution import Solution
 from tmsopt.design.solve import solve
+from tmsopt.formulation.formulate import formulate
 from tmsopt.models import tms
 from tmsopt.models.tms import copo
 

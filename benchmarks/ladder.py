@@ -19,8 +19,8 @@ from tmsopt.design.bound import omega0_bound
 from tmsopt.design.bounds.lines import over
 from tmsopt.design.bounds.program import Question
 from tmsopt.design.bounds.translation import FEASIBILITY, Translated, translate
-from tmsopt.design.builder import Builder
 from tmsopt.design.problem import Problem
+from tmsopt.formulation.builder import Builder
 from tmsopt.models import Model
 from tmsopt.roots import product, shift
 

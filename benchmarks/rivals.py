@@ -16,7 +16,7 @@ from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution, 
 
 from tmsopt.design.expression import parse_value
 from tmsopt.design.problem import Problem
-from tmsopt.design.starts import designs
+from tmsopt.formulation.starts import designs
 from tmsopt.models.names import FUNCTIONS
 from tmsopt.models.tms import copo, tms
 from tmsopt.records import Array

@@ -21,7 +21,7 @@ from scipy.optimize import dual_annealing
 
 from benchmarks.rivals import Reduced, Watch, cobyla, differential, nelder_mead, slsqp
 from tmsopt.design.problem import Problem
-from tmsopt.design.starts import designs
+from tmsopt.formulation.starts import designs
 from tmsopt.records import Array
 
 _MANY = 1_000_000

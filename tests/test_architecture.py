@@ -154,7 +154,7 @@ def test_nothing_prints_below_the_command_line() -> None:
 
 
 def test_ipopt_has_one_caller() -> None:
-    assert callers_of_ipopt(SOURCES) == ["tmsopt.design.ipopt"]
+    assert callers_of_ipopt(SOURCES) == ["tmsopt.formulation.ipopt"]
 
 
 def test_no_text_is_run_as_python() -> None:

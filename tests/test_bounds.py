@@ -15,7 +15,7 @@ from tmsopt.arithmetic.walk import NotAccepted, walk
 from tmsopt.design.bounds.interlace import interlacing, squares_of, unknowns
 from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, available, decide, task
 from tmsopt.design.expression import parse_value
-from tmsopt.design.nlp import NLP
+from tmsopt.formulation.nlp import NLP
 from tmsopt.roots import product
 
 scip = pytest.mark.skipif(not available(), reason="SCIP is not installed")

@@ -11,10 +11,10 @@ import pytest
 from tmsopt import laws
 from tmsopt.design.family import Family
 from tmsopt.design.files import load
-from tmsopt.design.formulations import formulate
 from tmsopt.design.limit import with_limit
 from tmsopt.design.problem import Problem
 from tmsopt.design.solve import solve
+from tmsopt.formulation.formulate import formulate
 from tmsopt.models import from_coefficients, tms
 
 EP4 = Problem(

@@ -13,8 +13,8 @@ from benchmarks.sections import SECTIONS
 from benchmarks.spectrum import confirmed, evolve, exact_polynomial, ideals, values_of, violation, worth
 from benchmarks.stages import started_at
 from tmsopt import Problem, models, solve
-from tmsopt.design.starts import opposite
-from tmsopt.design.starts import worth as start_worth
+from tmsopt.formulation.starts import opposite
+from tmsopt.formulation.starts import worth as start_worth
 
 SUITE = list(random_systems())
 KNOWN = known()

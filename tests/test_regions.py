@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 
 import tmsopt
 from tmsopt import laws
-from tmsopt.design.nlp import NLP, Factor
+from tmsopt.formulation.nlp import NLP, Factor
 
 TMS = tmsopt.models.tms
 FIXED = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}

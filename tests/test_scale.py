@@ -6,8 +6,8 @@ import casadi as ca
 import pytest
 
 import tmsopt
-from tmsopt.design.scale import Scale, objective_size, scale_of
 from tmsopt.design.search import same
+from tmsopt.formulation.scale import Scale, objective_size, scale_of
 from tmsopt.models import from_coefficients
 from tmsopt.roots import product
 

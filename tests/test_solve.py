@@ -12,9 +12,9 @@ from oracles import abscissa_60, polynomial_60
 import tmsopt
 from tmsopt import laws
 from tmsopt.design.bound import omega0_bound
-from tmsopt.design.formulations import abscissa as abscissa_nlp
-from tmsopt.design.formulations import matching
 from tmsopt.design.problem import freedom
+from tmsopt.formulation.formulate import abscissa as abscissa_nlp
+from tmsopt.formulation.formulate import matching
 from tmsopt.roots import PATTERNS, backward_error, pattern_distance, roots
 
 TMS = tmsopt.models.tms
@@ -381,7 +381,7 @@ def test_bound_holds_on_random_designs():
 
 
 def test_start_satisfies_the_lifted_equations():
-    from tmsopt.design.starts import complete, designs
+    from tmsopt.formulation.starts import complete, designs
 
     problem = ep4_problem(constraints={"decay": "omega0 >= -9", "weave": "Fr_c <= 3"})
     nlp = abscissa_nlp(problem)

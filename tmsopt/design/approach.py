@@ -7,10 +7,10 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.design.edges import Edge
-from tmsopt.design.ipopt import ipopt
-from tmsopt.design.nlp import NLP
 from tmsopt.design.place import Place
-from tmsopt.design.polish import polisher
+from tmsopt.formulation.ipopt import ipopt
+from tmsopt.formulation.nlp import NLP
+from tmsopt.formulation.polish import polisher
 from tmsopt.records import Array
 
 ALIKE = 1e-9

@@ -16,8 +16,8 @@ import numpy as np
 from tmsopt.arithmetic.elementary import as_ball, exact, quotient, rational
 from tmsopt.design.problem import Problem
 from tmsopt.design.relation import is_rational, relation_bound
-from tmsopt.design.scale import objective_size
 from tmsopt.design.solution import Bound
+from tmsopt.formulation.scale import objective_size
 from tmsopt.models import Model
 from tmsopt.records import Array
 

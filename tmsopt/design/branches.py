@@ -7,10 +7,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Branch
-from tmsopt.design.starts import complete, designs
+from tmsopt.formulation.nlp import NLP
+from tmsopt.formulation.starts import complete, designs
 from tmsopt.records import Table
 
 _STEPS = 60

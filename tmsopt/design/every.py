@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 
 from tmsopt.design.branches import newton, square_system
-from tmsopt.design.formulations import design_of, matching
-from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.recheck import recheck
 from tmsopt.design.search import Runner
 from tmsopt.design.solution import Solution
 from tmsopt.design.solve import solve
-from tmsopt.design.starts import completions, spread
 from tmsopt.errors import Fault, InputError
+from tmsopt.formulation.formulate import design_of, matching
+from tmsopt.formulation.nlp import NLP
+from tmsopt.formulation.starts import completions, spread
 from tmsopt.records import Array
 
 MOST = 1024

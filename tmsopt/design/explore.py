@@ -8,8 +8,6 @@ from tmsopt.design.cases import Case
 from tmsopt.design.dependence import overclaims
 from tmsopt.design.family import Family
 from tmsopt.design.finding import Finding, Trial, ahead, counted, found, survivor
-from tmsopt.design.formulations import design_of, formulate, middle
-from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
 from tmsopt.design.recheck import FEASIBLE, recheck
@@ -18,6 +16,8 @@ from tmsopt.design.search import Candidate, Runner, follow, same, search
 from tmsopt.design.sides import Side
 from tmsopt.design.solution import Starts
 from tmsopt.design.worst import worst_cases
+from tmsopt.formulation.formulate import design_of, formulate, middle
+from tmsopt.formulation.nlp import NLP
 from tmsopt.records import Progress, Table
 
 _ROUNDS, _FAR_ROUNDS = 12, 40

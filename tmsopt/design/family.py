@@ -7,18 +7,18 @@ from typing import Any, TypeVar
 
 import casadi as ca
 
-from tmsopt.design.builder import LIMIT
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import demands_heavy_damping, tempts
-from tmsopt.design.formulations import formulate, middle
-from tmsopt.design.ipopt import Run, ipopt
 from tmsopt.design.limit import limit_of
 from tmsopt.design.nearest import Robustness, robustness
-from tmsopt.design.nlp import NLP
-from tmsopt.design.polish import Point, polisher
 from tmsopt.design.problem import Problem, freedom
-from tmsopt.design.scale import objective_unit, scale_of, units_of
 from tmsopt.design.sides import narrowed
+from tmsopt.formulation.builder import LIMIT
+from tmsopt.formulation.formulate import formulate, middle
+from tmsopt.formulation.ipopt import Run, ipopt
+from tmsopt.formulation.nlp import NLP
+from tmsopt.formulation.polish import Point, polisher
+from tmsopt.formulation.scale import objective_unit, scale_of, units_of
 from tmsopt.models import Quantity, Values
 
 _KEPT = 32

@@ -9,13 +9,13 @@ import numpy as np
 from tmsopt.design.branches import other_branches
 from tmsopt.design.cases import Case
 from tmsopt.design.family import Family
-from tmsopt.design.formulations import design_of
-from tmsopt.design.nlp import NLP
-from tmsopt.design.polish import Point
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.recheck import Checked, recheck
 from tmsopt.design.search import Candidate, claim, same
 from tmsopt.design.solution import Branch, Relaxation, Starts
+from tmsopt.formulation.formulate import design_of
+from tmsopt.formulation.nlp import NLP
+from tmsopt.formulation.polish import Point
 
 _STATIONARY = 1e-6  # gradient of the Lagrangian at which a point counts as converged whatever IPOPT says
 _ALIKE = 3  # candidates of one objective looked at closely

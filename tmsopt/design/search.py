@@ -9,11 +9,11 @@ import numpy as np
 
 from tmsopt.design.bound import bounded, closed, instant_bound
 from tmsopt.design.family import Family
-from tmsopt.design.formulations import abscissa, design_of, middle
-from tmsopt.design.ipopt import Run, ipopt
-from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem, freedom
-from tmsopt.design.starts import complete, designs, opposite, worth
+from tmsopt.formulation.formulate import abscissa, design_of, middle
+from tmsopt.formulation.ipopt import Run, ipopt
+from tmsopt.formulation.nlp import NLP
+from tmsopt.formulation.starts import complete, designs, opposite, worth
 from tmsopt.records import Array, Progress
 from tmsopt.roots import roots
 

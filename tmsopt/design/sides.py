@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
+from tmsopt.formulation.nlp import NLP
 
 _THIN = 1e-9
 """Width of a side below which it is not worth a search of its own."""

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tmsopt.design.formulations import design_of
 from tmsopt.design.recheck import recheck
 from tmsopt.design.solution import Solution
+from tmsopt.formulation.formulate import design_of
 from tmsopt.records import Array, Table
 from tmsopt.study.held import Program
 from tmsopt.study.multipliers import Conditions, curved

@@ -23,10 +23,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.design.formulations import abscissa, variables_of
-from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
+from tmsopt.formulation.formulate import abscissa, variables_of
+from tmsopt.formulation.nlp import NLP
 from tmsopt.records import Array
 from tmsopt.roots import Root, product, shift
 

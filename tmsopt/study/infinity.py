@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.design.problem import Problem
-from tmsopt.design.starts import spread
+from tmsopt.formulation.starts import spread
 from tmsopt.models import Values
 from tmsopt.records import Array, Truth
 from tmsopt.roots import is_stable, real_roots

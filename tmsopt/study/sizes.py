@@ -6,7 +6,7 @@ from itertools import islice
 import numpy as np
 
 from tmsopt.design.problem import Problem
-from tmsopt.design.starts import spread
+from tmsopt.formulation.starts import spread
 from tmsopt.records import Array
 
 _SAMPLE = 32  # designs by which sizes are judged

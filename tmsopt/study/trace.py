@@ -10,11 +10,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.design.formulations import matching, variables_of
-from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem, checked, freedom
-from tmsopt.design.starts import spread
 from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.formulation.formulate import matching, variables_of
+from tmsopt.formulation.nlp import NLP
+from tmsopt.formulation.starts import spread
 from tmsopt.records import Array
 from tmsopt.roots import Pattern, roots
 from tmsopt.roots import pattern as pattern_of

@@ -13,9 +13,9 @@ from tmsopt.arithmetic.walk import NotAccepted
 from tmsopt.design.bounds.program import Question
 from tmsopt.design.bounds.race import Crew
 from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, UNDECIDED, Decision, Task, task
-from tmsopt.design.formulations import design_of, variables_of
 from tmsopt.design.solution import Solution
-from tmsopt.design.starts import complete
+from tmsopt.formulation.formulate import design_of, variables_of
+from tmsopt.formulation.starts import complete
 
 _HOLDS = 1e-6  # of a row, relative to its range: SCIP itself asks for 1e-9, and multiple roots have half the digits
 

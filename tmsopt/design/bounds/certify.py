@@ -13,7 +13,6 @@ from tmsopt.design.bounds.program import Question
 from tmsopt.design.bounds.race import Crew
 from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, UNDECIDED, available
 from tmsopt.design.bounds.translation import FEASIBILITY
-from tmsopt.design.builder import Builder
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem, checked, unasked
 from tmsopt.design.quantities import ROOT_NAMES
@@ -21,6 +20,7 @@ from tmsopt.design.recheck import recheck
 from tmsopt.design.solution import Bound, Solution
 from tmsopt.design.solve import solve
 from tmsopt.errors import Fault, InputError
+from tmsopt.formulation.builder import Builder
 
 SECONDS = 60.0
 """Time for a proof, by default."""

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.design.lifts import Rows
+from tmsopt.formulation.lifts import Rows
 from tmsopt.roots import product
 
 Square = tuple[Any, Any]

@@ -12,9 +12,9 @@ import numpy as np
 
 from tmsopt.arithmetic.intervals import Interval, ranges, root_bound
 from tmsopt.design.bounds.interlace import interlace, squares_of, unknowns
-from tmsopt.design.builder import Builder
-from tmsopt.design.lifts import Lifted, quadratic_pairs
-from tmsopt.design.nlp import Lift
+from tmsopt.formulation.builder import Builder
+from tmsopt.formulation.lifts import Lifted, quadratic_pairs
+from tmsopt.formulation.nlp import Lift
 from tmsopt.models import Model, Values
 from tmsopt.roots import Pattern, product, shift
 from tmsopt.roots.patterns.pattern import Roots

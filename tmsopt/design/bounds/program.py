@@ -12,13 +12,13 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.design.bounds.lines import Frame, bound_unknowns, compact, half_planes, over, sectors
-from tmsopt.design.builder import Builder, Lifting
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import tempts
 from tmsopt.design.expression import Expression
-from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ROOT_NAMES
+from tmsopt.formulation.builder import Builder, Lifting
+from tmsopt.formulation.nlp import NLP
 
 _DEEP = 99  # levels to which expressions are compared
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.bounds.translation import FEASIBILITY, translate
-from tmsopt.design.nlp import NLP
+from tmsopt.formulation.nlp import NLP
 
 _LEAST = 0.01  # seconds
 _MARGIN = 1e-6  # relative, for what tolerances do to a bound

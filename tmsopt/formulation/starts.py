@@ -9,10 +9,10 @@ import numpy as np
 
 from tmsopt.arithmetic.sequence import golden_steps
 from tmsopt.design.expression import Expression
-from tmsopt.design.formulations import middle, variables_of
-from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES, RADIUS, regular
+from tmsopt.formulation.formulate import middle, variables_of
+from tmsopt.formulation.nlp import NLP
 from tmsopt.models import Values
 from tmsopt.records import Array
 from tmsopt.roots import is_stable, roots

@@ -10,7 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.design.nlp import NLP
+from tmsopt.formulation.nlp import NLP
 from tmsopt.records import Array
 
 LINEAR_SOLVERS = ("mumps", "spral")

@@ -7,8 +7,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.ipopt import Run
-from tmsopt.design.nlp import NLP
+from tmsopt.formulation.ipopt import Run
+from tmsopt.formulation.nlp import NLP
 from tmsopt.records import Array
 
 _STEPS = 12

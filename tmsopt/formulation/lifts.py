@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from tmsopt.design.cases import Case
-from tmsopt.design.nlp import Factor, Lift, Touch
+from tmsopt.formulation.nlp import Factor, Lift, Touch
 from tmsopt.models import Values
 from tmsopt.records import Array
 from tmsopt.roots import product, shift

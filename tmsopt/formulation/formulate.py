@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.design.builder import Builder
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import demands_heavy_damping
-from tmsopt.design.nlp import NLP
 from tmsopt.design.problem import Problem, freedom
+from tmsopt.formulation.builder import Builder
+from tmsopt.formulation.nlp import NLP
 from tmsopt.roots import Pattern
 
 

@@ -10,11 +10,18 @@ import numpy as np
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import tempts, varies
 from tmsopt.design.expression import Expression
-from tmsopt.design.lifts import Lifted, lift_abscissa, lift_damping_ratio, lift_quantity, lift_radius, lift_real_roots
-from tmsopt.design.nlp import NLP, Factor, Lift, Touch
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_QUANTITIES
-from tmsopt.design.scale import objective_size, objective_unit, scale_of, units_of
+from tmsopt.formulation.lifts import (
+    Lifted,
+    lift_abscissa,
+    lift_damping_ratio,
+    lift_quantity,
+    lift_radius,
+    lift_real_roots,
+)
+from tmsopt.formulation.nlp import NLP, Factor, Lift, Touch
+from tmsopt.formulation.scale import objective_size, objective_unit, scale_of, units_of
 from tmsopt.models import Quantity, Values
 from tmsopt.roots import Pattern
 

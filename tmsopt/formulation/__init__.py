@@ -1,0 +1,1 @@
+"""Problem -> smooth NLP by factors -> IPOPT -> polish."""
