@@ -14,9 +14,9 @@ from oracles import certified_roots, routh_exact
 
 from tmsopt.design.bound import omega0_bound
 from tmsopt.design.cover import cover
-from tmsopt.design.edges import edges, heavily_damped
-from tmsopt.design.nearest import nearest, robustness
 from tmsopt.design.problem import Problem
+from tmsopt.margins.boundaries import edges, heavily_damped
+from tmsopt.margins.nearest import nearest, robustness
 from tmsopt.models import Model, Parameter, ParameterSet
 from tmsopt.roots import (
     CLASSES,

@@ -10,9 +10,9 @@ from oracles import symbolic_copo
 
 import tmsopt
 from tmsopt import laws
-from tmsopt.design.nearest import nearest, robustness
 from tmsopt.design.problem import Problem
 from tmsopt.errors import InputError
+from tmsopt.margins.nearest import nearest, robustness
 from tmsopt.models import tms
 from tmsopt.models.tms import to_si
 from tmsopt.roots import real_roots, roots

@@ -8,13 +8,13 @@ if TYPE_CHECKING:
     from tmsopt.design.bounds.certify import certify
     from tmsopt.design.every import Every, solve_all
     from tmsopt.design.files import load
-    from tmsopt.design.nearest import Nearest, Robustness, nearest, robustness
     from tmsopt.design.problem import Problem
     from tmsopt.design.proof.proof import Proof
     from tmsopt.design.prove import prove
     from tmsopt.design.solution import NotSolved, Solution
     from tmsopt.design.solve import solve
     from tmsopt.errors import InputError
+    from tmsopt.margins.nearest import Nearest, Robustness, nearest, robustness
     from tmsopt.models.bicycle_files import Bicycle, read_bicycle, write_bicycle
     from tmsopt.study.batch.files import load_study
     from tmsopt.study.batch.monte_carlo import monte_carlo
@@ -104,13 +104,13 @@ _HOMES = {
     "Explanation": "tmsopt.study.explain",
     "Front": "tmsopt.study.front",
     "InputError": "tmsopt.errors",
-    "Nearest": "tmsopt.design.nearest",
+    "Nearest": "tmsopt.margins.nearest",
     "NotSolved": "tmsopt.design.solution",
     "Optimality": "tmsopt.study.optimality",
     "Problem": "tmsopt.design.problem",
     "Proof": "tmsopt.design.proof.proof",
     "Results": "tmsopt.study.batch.run",
-    "Robustness": "tmsopt.design.nearest",
+    "Robustness": "tmsopt.margins.nearest",
     "Solution": "tmsopt.design.solution",
     "Speeds": "tmsopt.study.speeds",
     "StoredChart": "tmsopt.study.stored",
@@ -128,14 +128,14 @@ _HOMES = {
     "load": "tmsopt.design.files",
     "load_study": "tmsopt.study.batch.files",
     "monte_carlo": "tmsopt.study.batch.monte_carlo",
-    "nearest": "tmsopt.design.nearest",
+    "nearest": "tmsopt.margins.nearest",
     "open_chart": "tmsopt.study.stored",
     "optimality": "tmsopt.study.optimality",
     "over_grid": "tmsopt.study.batch.plan",
     "pareto": "tmsopt.study.pareto",
     "prove": "tmsopt.design.prove",
     "read_bicycle": "tmsopt.models.bicycle_files",
-    "robustness": "tmsopt.design.nearest",
+    "robustness": "tmsopt.margins.nearest",
     "run_study": "tmsopt.study.batch.run",
     "sobol": "tmsopt.study.batch.samples",
     "solve": "tmsopt.design.solve",

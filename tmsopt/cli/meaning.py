@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tmsopt.design.nearest import Robustness
     from tmsopt.design.solution import Solution
+    from tmsopt.margins.nearest import Robustness
     from tmsopt.study.diagnosis import Diagnosis
     from tmsopt.study.explain import Explanation
 
@@ -47,7 +47,7 @@ def _explained(solution: "Solution") -> "Explanation":
 
 def _robust(solution: "Solution") -> "Robustness | None":
     """The nearest boundaries; None where a root is at infinity, or nothing feasible was found."""
-    from tmsopt.design.nearest import robustness
+    from tmsopt.margins.nearest import robustness
 
     if not math.isfinite(solution.abscissa) or solution.status == "infeasible":
         return None

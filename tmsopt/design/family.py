@@ -10,7 +10,6 @@ import casadi as ca
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import demands_heavy_damping, tempts
 from tmsopt.design.limit import limit_of
-from tmsopt.design.nearest import Robustness, robustness
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.sides import narrowed
 from tmsopt.formulation.builder import LIMIT
@@ -19,6 +18,7 @@ from tmsopt.formulation.ipopt import Run, ipopt
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.polish import Point, polisher
 from tmsopt.formulation.scale import objective_unit, scale_of, units_of
+from tmsopt.margins.nearest import Robustness, robustness
 from tmsopt.models import Quantity, Values
 
 _KEPT = 32

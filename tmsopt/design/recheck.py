@@ -10,9 +10,9 @@ import numpy as np
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import varies
 from tmsopt.design.expression import Expression
-from tmsopt.design.nearest import Robustness, robustness
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
+from tmsopt.margins.nearest import Robustness, robustness
 from tmsopt.models import Values
 from tmsopt.records import Table
 from tmsopt.roots import Structure, exact_abscissa, pattern_distance, roots

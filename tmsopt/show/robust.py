@@ -2,7 +2,7 @@
 
 import math
 
-from tmsopt.design.nearest import Nearest, Robustness
+from tmsopt.margins.nearest import Nearest, Robustness
 from tmsopt.show.text import columns
 
 _MAIN = 0.5

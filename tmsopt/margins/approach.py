@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from tmsopt.design.edges import Edge
-from tmsopt.design.place import Place
 from tmsopt.formulation.ipopt import ipopt
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.polish import polisher
+from tmsopt.margins.boundaries import Edge
+from tmsopt.margins.surroundings import Place
 from tmsopt.records import Array
 
 ALIKE = 1e-9

@@ -11,9 +11,9 @@ import numpy as np
 
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import STRUCTURE_TOLERANCE
-from tmsopt.design.rays import Space
-from tmsopt.design.rests import terms
 from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.margins.cofactor import terms
+from tmsopt.margins.rays import Space
 from tmsopt.models import Range
 from tmsopt.records import Array
 from tmsopt.roots import is_stable, multiple_real_roots, real_roots

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.design.approach import ALIKE, Approach, approach
-from tmsopt.design.edges import KINDS, Edge, edges, lies_on
-from tmsopt.design.place import Place, placed
 from tmsopt.design.problem import Problem, checked
-from tmsopt.design.rays import Crossing, between, crossings, most_damped
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.margins.approach import ALIKE, Approach, approach
+from tmsopt.margins.boundaries import KINDS, Edge, edges, lies_on
+from tmsopt.margins.rays import Crossing, between, crossings, most_damped
+from tmsopt.margins.surroundings import Place, placed
 from tmsopt.records import Array, Table
 
 STABILITY = ("weave", "capsize", "infinity")

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.design.rests import quotient, regular, rest, terms
+from tmsopt.margins.cofactor import quotient, regular, rest, terms
 from tmsopt.records import Array, Truth
 from tmsopt.roots import discriminant, hurwitz_minors, is_stable, product, real_roots, roots
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.edges import heavily_damped, losses
+from tmsopt.margins.boundaries import heavily_damped, losses
 from tmsopt.records import Array, Truth
 from tmsopt.roots import discriminant, hurwitz_minors, is_stable, roots
 

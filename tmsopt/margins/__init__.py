@@ -1,0 +1,1 @@
+"""Distance to weave, capsize, infinity, heavy damping: the robustness radius."""
