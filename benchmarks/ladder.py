@@ -15,7 +15,7 @@ from benchmarks.references import references
 from benchmarks.report import origin, table
 from benchmarks.suite import RANGES, random_problem
 from tmsopt.arithmetic.intervals import root_bound
-from tmsopt.design.bound import omega0_bound
+from tmsopt.checks.bound import omega0_bound
 from tmsopt.design.bounds.lines import over
 from tmsopt.design.bounds.program import Question
 from tmsopt.design.bounds.translation import FEASIBILITY, Translated, translate

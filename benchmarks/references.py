@@ -28,8 +28,8 @@ from benchmarks.rivals import differential
 from benchmarks.stages import EXACT, started_at
 from benchmarks.suite import SEED, random_problem
 from benchmarks.trials import Attempt, attempt
+from tmsopt.checks.recheck import FEASIBLE, realised_abscissa
 from tmsopt.design.problem import Problem
-from tmsopt.design.recheck import FEASIBLE, realised_abscissa
 from tmsopt.roots import exact_roots
 
 PATH = Path("benchmarks/references.json")

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from oracles import certified_roots, routh_exact
 
-from tmsopt.design.bound import omega0_bound
-from tmsopt.design.cover import cover
+from tmsopt.checks.bound import omega0_bound
+from tmsopt.checks.coverage import cover
 from tmsopt.design.problem import Problem
 from tmsopt.margins.boundaries import edges, heavily_damped
 from tmsopt.margins.nearest import nearest, robustness

@@ -15,13 +15,13 @@ from mpmath import mp
 
 import tmsopt
 from tmsopt.arithmetic.balls import Number
-from tmsopt.design.bound import omega0_bound
+from tmsopt.checks.bound import omega0_bound
+from tmsopt.checks.relation import relation_bound
 from tmsopt.design.bounds.program import Question
 from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, available, decide, task
 from tmsopt.design.proof import rational
 from tmsopt.design.proof.factors import abscissa_formula
 from tmsopt.design.proof.proof import Proof, prove_design
-from tmsopt.design.relation import relation_bound
 from tmsopt.models import Model, from_coefficients, from_matrices
 from tmsopt.roots import Root, pattern, product, roots
 from tmsopt.roots.patterns.naming import implies, shown_patterns

@@ -26,7 +26,7 @@ from oracles import elementary, polynomial_60, roots_60
 import tmsopt
 from benchmarks.suite import random_problem
 from tmsopt.arithmetic.elementary import exact
-from tmsopt.design.bound import omega0_bound
+from tmsopt.checks.bound import omega0_bound
 from tmsopt.models import tms
 from tmsopt.roots import structure
 from tmsopt.roots.patterns.enclosed import enclosed_roots, nearest, nearest_decimal, nearest_double

@@ -11,7 +11,7 @@ from oracles import abscissa_60, polynomial_60
 
 import tmsopt
 from tmsopt import laws
-from tmsopt.design.bound import omega0_bound
+from tmsopt.checks.bound import omega0_bound
 from tmsopt.design.problem import freedom
 from tmsopt.formulation.formulate import abscissa as abscissa_nlp
 from tmsopt.formulation.formulate import matching

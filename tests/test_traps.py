@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tmsopt
-from tmsopt.design.worst import worst_cases
+from tmsopt.checks.worst_case import worst_cases
 
 TMS = tmsopt.models.tms
 HEIGHTS = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}

@@ -10,11 +10,11 @@ import pytest
 from scipy.optimize import brentq
 
 import tmsopt
-from tmsopt.design import cover as covering
+from tmsopt.checks import coverage as covering
+from tmsopt.checks.coverage import cover
+from tmsopt.checks.recheck import recheck
+from tmsopt.checks.worst_case import worst_cases
 from tmsopt.design.cases import Band
-from tmsopt.design.cover import cover
-from tmsopt.design.recheck import recheck
-from tmsopt.design.worst import worst_cases
 
 TMS = tmsopt.models.tms
 DESIGN = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2, "chi_B": 1.3, "lambda_s": 0.15, "Fr": 1.8}

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from tmsopt.checks.recheck import recheck
 from tmsopt.design.branches import newton, square_system
 from tmsopt.design.problem import Problem, freedom
-from tmsopt.design.recheck import recheck
 from tmsopt.design.search import Runner
 from tmsopt.design.solution import Solution
 from tmsopt.design.solve import solve

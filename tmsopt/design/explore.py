@@ -4,18 +4,18 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from tmsopt.checks.recheck import FEASIBLE, recheck
+from tmsopt.checks.worst_case import worst_cases
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import overclaims
 from tmsopt.design.family import Family
 from tmsopt.design.finding import Finding, Trial, ahead, counted, found, survivor
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
-from tmsopt.design.recheck import FEASIBLE, recheck
 from tmsopt.design.relax import relax
 from tmsopt.design.search import Candidate, Runner, follow, same, search
 from tmsopt.design.sides import Side
 from tmsopt.design.solution import Starts
-from tmsopt.design.worst import worst_cases
 from tmsopt.formulation.formulate import design_of, formulate, middle
 from tmsopt.formulation.nlp import NLP
 from tmsopt.records import Progress, Table

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tmsopt.checks.recheck import Checked, recheck
 from tmsopt.design.branches import other_branches
 from tmsopt.design.cases import Case
 from tmsopt.design.family import Family
 from tmsopt.design.problem import Problem, freedom
-from tmsopt.design.recheck import Checked, recheck
 from tmsopt.design.search import Candidate, claim, same
 from tmsopt.design.solution import Branch, Relaxation, Starts
 from tmsopt.formulation.formulate import design_of

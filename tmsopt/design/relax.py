@@ -8,15 +8,15 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from tmsopt.checks.recheck import FEASIBLE, excesses
+from tmsopt.checks.worst_case import worst_cases
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import overclaims
 from tmsopt.design.finding import Trial, survivor
 from tmsopt.design.problem import Problem
-from tmsopt.design.recheck import FEASIBLE, excesses
 from tmsopt.design.search import Candidate, Runner, same
 from tmsopt.design.sides import sides
 from tmsopt.design.solution import Relaxation
-from tmsopt.design.worst import worst_cases
 from tmsopt.formulation.formulate import formulate
 from tmsopt.formulation.nlp import NLP, Lift
 from tmsopt.formulation.starts import designs

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tmsopt.design.bound import bounded, closed, instant_bound
+from tmsopt.checks.bound import bounded, closed, instant_bound
 from tmsopt.design.family import Family
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.formulation.formulate import abscissa, design_of, middle

@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any
 
+from tmsopt.checks.coverage import Cover
 from tmsopt.design.cases import Case
-from tmsopt.design.cover import Cover
 from tmsopt.design.problem import Freedom, Problem
 from tmsopt.design.proof.proof import DIGITS, Proof, prove_design
 from tmsopt.design.units import Reading

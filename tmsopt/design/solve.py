@@ -5,14 +5,14 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from tmsopt.design.bound import instant_bound
-from tmsopt.design.certified import certified
-from tmsopt.design.cover import cover
+from tmsopt.checks.bound import instant_bound
+from tmsopt.checks.coverage import cover
+from tmsopt.checks.digits import certified
+from tmsopt.checks.recheck import Checked
 from tmsopt.design.explore import Explored, Options, evaluated_cases, explore, without_any
 from tmsopt.design.family import Family
 from tmsopt.design.finding import Finding, better, evaluated
 from tmsopt.design.problem import Problem, freedom, unasked
-from tmsopt.design.recheck import Checked
 from tmsopt.design.search import STARTS
 from tmsopt.design.sides import sides
 from tmsopt.design.solution import Bound, NotSolved, Solution, Starts

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tmsopt.design.recheck import FEASIBLE
+from tmsopt.checks.recheck import FEASIBLE
 from tmsopt.design.solution import Solution
 from tmsopt.design.units import decay_time, frequencies, growth_time, reading
 from tmsopt.models import Values

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tmsopt.design.recheck import recheck
+from tmsopt.checks.recheck import recheck
 from tmsopt.design.solution import Solution
 from tmsopt.formulation.formulate import design_of
 from tmsopt.records import Array, Table

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+from tmsopt.checks.recheck import recheck
 from tmsopt.design.problem import Problem
-from tmsopt.design.recheck import recheck
 from tmsopt.design.search import STARTS
 from tmsopt.design.solution import Solution
 from tmsopt.design.solve import solve

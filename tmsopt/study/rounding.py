@@ -8,11 +8,11 @@ from typing import Any
 import flint
 import numpy as np
 
+from tmsopt.checks.recheck import FEASIBLE, realised_abscissa
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import varies
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
-from tmsopt.design.recheck import FEASIBLE, realised_abscissa
 from tmsopt.design.solution import Solution
 from tmsopt.models import Values
 from tmsopt.records import Table

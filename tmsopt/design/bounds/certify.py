@@ -6,7 +6,8 @@ from dataclasses import replace
 from functools import partial
 
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.design.bound import instant_bound
+from tmsopt.checks.bound import instant_bound
+from tmsopt.checks.recheck import recheck
 from tmsopt.design.bounds.answer import Answer, Clock, Progress, answer, contradicted, doubt
 from tmsopt.design.bounds.lines import over
 from tmsopt.design.bounds.program import Question
@@ -16,7 +17,6 @@ from tmsopt.design.bounds.translation import FEASIBILITY
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem, checked, unasked
 from tmsopt.design.quantities import ROOT_NAMES
-from tmsopt.design.recheck import recheck
 from tmsopt.design.solution import Bound, Solution
 from tmsopt.design.solve import solve
 from tmsopt.errors import Fault, InputError

@@ -13,11 +13,11 @@ from typing import Any
 import flint
 
 from tmsopt.arithmetic.elementary import exact, greater, lesser
+from tmsopt.checks.recheck import Checked
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import varies
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
-from tmsopt.design.recheck import Checked
 from tmsopt.design.units import Reading, readings
 from tmsopt.models import Values
 from tmsopt.records import Table

@@ -14,8 +14,8 @@ import flint
 import numpy as np
 
 from tmsopt.arithmetic.elementary import as_ball, exact, quotient, rational
+from tmsopt.checks.relation import is_rational, relation_bound
 from tmsopt.design.problem import Problem
-from tmsopt.design.relation import is_rational, relation_bound
 from tmsopt.design.solution import Bound
 from tmsopt.formulation.scale import objective_size
 from tmsopt.models import Model
