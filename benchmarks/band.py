@@ -18,13 +18,13 @@ import numpy as np
 from benchmarks.judge import eigenvalues
 from tmsopt.design.cases import Band
 from tmsopt.design.problem import Problem
-from tmsopt.design.search import search
-from tmsopt.design.sides import sides
 from tmsopt.design.solution import Solution
-from tmsopt.design.solve import solve
 from tmsopt.formulation.formulate import formulate
 from tmsopt.models import tms
 from tmsopt.models.tms import copo
+from tmsopt.solver.box import sides
+from tmsopt.solver.multistart import search
+from tmsopt.solver.solve import solve
 
 SPEEDS = Band(1.2, 2.4, 7)
 """Froude numbers that each bicycle must do at; 12 to 24 km/h at a wheelbase of 0.77 m."""

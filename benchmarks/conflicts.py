@@ -12,8 +12,8 @@ from benchmarks.suite import SEED, rounded
 from benchmarks.trials import FEASIBLE
 from tmsopt.design.cases import Band
 from tmsopt.design.problem import Problem
-from tmsopt.design.solve import solve
 from tmsopt.models import tms
+from tmsopt.solver.solve import solve
 
 LESS = 0.99
 """Share of a relaxation that must not be enough."""

@@ -23,7 +23,7 @@ from tqdm import tqdm
 
 from benchmarks.report import keep, kept, origin, table
 from tmsopt.design.files import load
-from tmsopt.design.solve import solve
+from tmsopt.solver.solve import solve
 from tmsopt.study.batch.definition import definition
 from tmsopt.study.batch.monte_carlo import monte_carlo
 from tmsopt.study.batch.plan import Study

@@ -11,7 +11,7 @@ from benchmarks.references import Reference, references
 from benchmarks.report import milliseconds, origin, share, table
 from benchmarks.suite import random_problem
 from tmsopt.design.bounds.certify import certify
-from tmsopt.design.solve import solve
+from tmsopt.solver.solve import solve
 
 RELATIVE, ABSOLUTE = 1e-4, 1e-5
 """Gap that counts as proven."""

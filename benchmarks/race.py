@@ -17,8 +17,8 @@ from benchmarks.rivals import Reduced
 from benchmarks.seekers import Seeker
 from benchmarks.stages import EXACT
 from tmsopt.design.problem import Problem
-from tmsopt.design.solve import solve
 from tmsopt.records import Array
+from tmsopt.solver.solve import solve
 
 TOLERANCES = (1e-3, 1e-6, 1e-8)
 """Excess over the optimum, relative to it."""

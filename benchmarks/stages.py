@@ -14,7 +14,7 @@ from tqdm import tqdm
 from benchmarks.rivals import LOCAL, SCALAR, VECTORISED, Found, differential
 from benchmarks.suite import random_problem
 from tmsopt.design.problem import Problem
-from tmsopt.design.solve import solve
+from tmsopt.solver.solve import solve
 
 REFERENCE_STARTS = 200
 """Starts of the reference, all of them tried."""

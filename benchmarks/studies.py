@@ -13,9 +13,9 @@ import numpy as np
 
 from benchmarks.measure import duration, times
 from benchmarks.report import origin, table
-from tmsopt.design import family as families
 from tmsopt.design.files import load
 from tmsopt.formulation.ipopt import Run
+from tmsopt.solver import workspace as families
 from tmsopt.study.batch.definition import definition
 from tmsopt.study.batch.engines import cluster, in_process, processes
 from tmsopt.study.batch.plan import Study, over_grid

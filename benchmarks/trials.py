@@ -16,7 +16,7 @@ from benchmarks.judge import NOWHERE, Verdict, verdict
 from benchmarks.stages import started_at
 from benchmarks.variety import varied_problem
 from tmsopt.design.problem import Problem
-from tmsopt.design.solve import solve
+from tmsopt.solver.solve import solve
 
 REFERENCE_STARTS = 16
 """Starts of the long run, all of them tried."""

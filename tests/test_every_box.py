@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import tmsopt
-from tmsopt.design.every import _coverage
 from tmsopt.models import from_coefficients
+from tmsopt.solver.all_designs import _coverage
 
 x = ca.SX.sym("x")
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from tmsopt import laws
-from tmsopt.design.family import Family
 from tmsopt.design.files import load
 from tmsopt.design.limit import with_limit
 from tmsopt.design.problem import Problem
-from tmsopt.design.solve import solve
 from tmsopt.formulation.formulate import formulate
 from tmsopt.models import from_coefficients, tms
+from tmsopt.solver.solve import solve
+from tmsopt.solver.workspace import Family
 
 EP4 = Problem(
     model=tms,

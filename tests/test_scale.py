@@ -6,10 +6,10 @@ import casadi as ca
 import pytest
 
 import tmsopt
-from tmsopt.design.search import same
 from tmsopt.formulation.scale import Scale, objective_size, scale_of
 from tmsopt.models import from_coefficients
 from tmsopt.roots import product
+from tmsopt.solver.multistart import same
 
 
 def powers(rate: float, **asked: str) -> tmsopt.Problem:

@@ -9,7 +9,7 @@ import pytest
 
 import tmsopt
 from tmsopt import laws
-from tmsopt.design.sides import sides
+from tmsopt.solver.box import sides
 
 TMS = tmsopt.models.tms
 FIXED = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}

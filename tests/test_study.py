@@ -22,10 +22,10 @@ from tmsopt import laws
 from tmsopt.cli import main
 from tmsopt.design.files import load
 from tmsopt.design.problem import Problem
-from tmsopt.design.solve import solve
 from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.records import Table
+from tmsopt.solver.solve import solve
 from tmsopt.study.batch.definition import definition
 from tmsopt.study.batch.monte_carlo import monte_carlo
 from tmsopt.study.batch.plan import Study, over_grid

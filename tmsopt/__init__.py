@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tmsopt import laws, models, roots
     from tmsopt.design.bounds.certify import certify
-    from tmsopt.design.every import Every, solve_all
     from tmsopt.design.files import load
     from tmsopt.design.problem import Problem
     from tmsopt.design.proof.proof import Proof
     from tmsopt.design.prove import prove
     from tmsopt.design.solution import NotSolved, Solution
-    from tmsopt.design.solve import solve
     from tmsopt.errors import InputError
     from tmsopt.margins.nearest import Nearest, Robustness, nearest, robustness
     from tmsopt.models.bicycle_files import Bicycle, read_bicycle, write_bicycle
+    from tmsopt.solver.all_designs import Every, solve_all
+    from tmsopt.solver.solve import solve
     from tmsopt.study.batch.files import load_study
     from tmsopt.study.batch.monte_carlo import monte_carlo
     from tmsopt.study.batch.plan import Study, over_grid
@@ -138,9 +138,9 @@ _HOMES = {
     "robustness": "tmsopt.margins.nearest",
     "run_study": "tmsopt.study.batch.run",
     "sobol": "tmsopt.study.batch.samples",
-    "solve": "tmsopt.design.solve",
-    "solve_all": "tmsopt.design.every",
-    "Every": "tmsopt.design.every",
+    "solve": "tmsopt.solver.solve",
+    "solve_all": "tmsopt.solver.all_designs",
+    "Every": "tmsopt.solver.all_designs",
     "speeds": "tmsopt.study.speeds",
     "swallowtail": "tmsopt.study.swallowtail",
     "trace": "tmsopt.study.trace",

@@ -76,8 +76,8 @@ def _named(exact: tuple[str, ...]) -> dict[str, str]:
 
 
 def _solved(problem: "Problem", starts: int | None, seed: int) -> "Solution":
-    from tmsopt.design.search import STARTS
-    from tmsopt.design.solve import solve
+    from tmsopt.solver.multistart import STARTS
+    from tmsopt.solver.solve import solve
 
     with progress() as update:
         return solve(problem, starts=starts or STARTS, seed=seed, throw=False, progress=update)

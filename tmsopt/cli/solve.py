@@ -168,9 +168,9 @@ def solve(
             check_installed()
     if every:
         _solve_all(problem, as_json=as_json, starts=starts, seed=seed, linear_solver=linear_solver)
-    from tmsopt.design.search import STARTS
     from tmsopt.design.solution import NotSolved
-    from tmsopt.design.solve import solve as solve_problem
+    from tmsopt.solver.multistart import STARTS
+    from tmsopt.solver.solve import solve as solve_problem
 
     if problem.pareto:
         try:
@@ -203,7 +203,7 @@ def solve(
 
 def _solve_all(problem: "Problem", as_json: bool, starts: int | None, **options: Any) -> NoReturn:
     """Write all designs with a pattern, and end."""
-    from tmsopt.design.every import MOST, solve_all
+    from tmsopt.solver.all_designs import MOST, solve_all
 
     with bad_input(), progress() as update:
         found = solve_all(problem, starts=starts or MOST, progress=update, **options)
@@ -229,8 +229,8 @@ def compare(file: Path, as_json: bool, starts: int | None, seed: int, linear_sol
         problem = nominal_of(load(file))
         if problem.pareto:
             raise InputError(unasked(problem))
-    from tmsopt.design.search import STARTS
     from tmsopt.show.tables import comparison_table
+    from tmsopt.solver.multistart import STARTS
     from tmsopt.study.compare import compare as compare_design
 
     with progress() as update:

@@ -67,7 +67,7 @@ def speeds(file: Path, parameter: str | None, between: tuple[float, float] | Non
 
 def _solved(problem: "Problem") -> "Solution":
     """The design that a problem asks for; without one the command ends."""
-    from tmsopt.design.solve import solve
+    from tmsopt.solver.solve import solve
 
     with progress() as update:
         solution = solve(problem, throw=False, progress=update)

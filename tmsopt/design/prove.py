@@ -6,8 +6,8 @@ from typing import Any
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.proof.proof import DIGITS, Proof
 from tmsopt.design.solution import Solution
-from tmsopt.design.solve import solve
 from tmsopt.errors import Fault, InputError
+from tmsopt.solver.solve import solve
 
 
 def prove(

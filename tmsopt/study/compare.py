@@ -9,12 +9,12 @@ import numpy as np
 
 from tmsopt import laws
 from tmsopt.design.problem import Problem
-from tmsopt.design.search import STARTS
 from tmsopt.design.solution import Solution
-from tmsopt.design.solve import solve
 from tmsopt.models import tms
 from tmsopt.records import Progress
 from tmsopt.roots import PATTERNS, is_stable
+from tmsopt.solver.multistart import STARTS
+from tmsopt.solver.solve import solve
 
 SAME_LAW = 1e-9
 """Relative difference up to which number and law count as agreeing; coefficients are matched to 1e-10."""

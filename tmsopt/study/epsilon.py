@@ -6,9 +6,9 @@ from itertools import pairwise
 
 from tmsopt.checks.recheck import recheck
 from tmsopt.design.problem import Problem
-from tmsopt.design.search import STARTS
 from tmsopt.design.solution import Solution
-from tmsopt.design.solve import solve
+from tmsopt.solver.multistart import STARTS
+from tmsopt.solver.solve import solve
 from tmsopt.study.front import FrontPoint
 
 _RETRY = 16  # starts for a sub-problem that the neighbours' designs and a few starts did not solve

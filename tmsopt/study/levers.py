@@ -9,8 +9,8 @@ from typing import Any
 from tmsopt.design.expression import parse_value
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
-from tmsopt.design.solve import solve
 from tmsopt.errors import InputError
+from tmsopt.solver.solve import solve
 from tmsopt.study.steps import Step, natural_step, reported_unit, step_within, unit_of, with_reported_unit
 
 DIFFERS = 0.2

@@ -18,9 +18,9 @@ from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem, checked, unasked
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.design.solution import Bound, Solution
-from tmsopt.design.solve import solve
 from tmsopt.errors import Fault, InputError
 from tmsopt.formulation.builder import Builder
+from tmsopt.solver.solve import solve
 
 SECONDS = 60.0
 """Time for a proof, by default."""

@@ -10,10 +10,10 @@ from pydantic import Field, StrictBool, StrictInt, StrictStr
 
 from tmsopt.design.files import load, posed
 from tmsopt.design.problem import Problem, unasked
-from tmsopt.design.search import STARTS
 from tmsopt.design.toml import Key, Number, Page, Section, fitted, read_page, within
 from tmsopt.design.units import with_unit
 from tmsopt.errors import Fault, InputError, short, suggest
+from tmsopt.solver.multistart import STARTS
 from tmsopt.study.batch.monte_carlo import DISTRIBUTIONS, Sampling
 from tmsopt.study.batch.plan import Study
 from tmsopt.study.batch.rows_csv import read_csv

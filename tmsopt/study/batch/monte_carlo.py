@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem, checked, unasked
-from tmsopt.design.search import STARTS
 from tmsopt.design.solution import NotSolved, Solution
-from tmsopt.design.solve import solve
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.records import Column, Table
+from tmsopt.solver.multistart import STARTS
+from tmsopt.solver.solve import solve
 from tmsopt.study.batch.plan import Study
 from tmsopt.study.batch.stated import MOST_ROWS, common_faults, count_faults
 

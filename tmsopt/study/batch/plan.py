@@ -7,9 +7,9 @@ import numpy as np
 
 from tmsopt.design.limit import with_limit
 from tmsopt.design.problem import Problem
-from tmsopt.design.search import STARTS
 from tmsopt.errors import Fault, InputError
 from tmsopt.records import Column, Table
+from tmsopt.solver.multistart import STARTS
 from tmsopt.study.batch.samples import grid
 from tmsopt.study.batch.stated import faults
 

@@ -11,13 +11,13 @@ from typing import Any
 from threadpoolctl import ThreadpoolController
 
 from tmsopt.design.expression import parse_value
-from tmsopt.design.family import Family
-from tmsopt.design.search import same
 from tmsopt.design.solution import Solution
-from tmsopt.design.solve import solve
 from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.records import Table
+from tmsopt.solver.multistart import same
+from tmsopt.solver.solve import solve
+from tmsopt.solver.workspace import Family
 from tmsopt.study.batch.neighbours import blocks
 from tmsopt.study.batch.plan import Study
 from tmsopt.study.batch.row import Row

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 
 from tmsopt.checks.recheck import recheck
-from tmsopt.design.branches import newton, square_system
 from tmsopt.design.problem import Problem, freedom
-from tmsopt.design.search import Runner
 from tmsopt.design.solution import Solution
-from tmsopt.design.solve import solve
 from tmsopt.errors import Fault, InputError
 from tmsopt.formulation.formulate import design_of, matching
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import completions, spread
 from tmsopt.records import Array
+from tmsopt.solver.multistart import Runner
+from tmsopt.solver.newton import newton, square_system
+from tmsopt.solver.solve import solve
 
 MOST = 1024
 """Starts at most."""

@@ -11,7 +11,6 @@ from tmsopt.design.cases import Case
 from tmsopt.design.dependence import demands_heavy_damping, tempts
 from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Problem, freedom
-from tmsopt.design.sides import narrowed
 from tmsopt.formulation.builder import LIMIT
 from tmsopt.formulation.formulate import formulate, middle
 from tmsopt.formulation.ipopt import Run, ipopt
@@ -20,6 +19,7 @@ from tmsopt.formulation.polish import Point, polisher
 from tmsopt.formulation.scale import objective_unit, scale_of, units_of
 from tmsopt.margins.nearest import Robustness, robustness
 from tmsopt.models import Quantity, Values
+from tmsopt.solver.box import narrowed
 
 _KEPT = 32
 """NLPs kept, with three solvers each: where cases are added row by row, most are not met again."""

@@ -8,17 +8,17 @@ from tmsopt.checks.recheck import FEASIBLE, recheck
 from tmsopt.checks.worst_case import worst_cases
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import overclaims
-from tmsopt.design.family import Family
-from tmsopt.design.finding import Finding, Trial, ahead, counted, found, survivor
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
-from tmsopt.design.relax import relax
-from tmsopt.design.search import Candidate, Runner, follow, same, search
-from tmsopt.design.sides import Side
 from tmsopt.design.solution import Starts
 from tmsopt.formulation.formulate import design_of, formulate, middle
 from tmsopt.formulation.nlp import NLP
 from tmsopt.records import Progress, Table
+from tmsopt.solver.box import Side
+from tmsopt.solver.multistart import Candidate, Runner, follow, same, search
+from tmsopt.solver.outcome import Finding, Trial, ahead, counted, found, survivor
+from tmsopt.solver.relaxation import relax
+from tmsopt.solver.workspace import Family
 
 _ROUNDS, _FAR_ROUNDS = 12, 40
 """Times that cases are added; each time the worst one between them shrinks to its square, roughly."""

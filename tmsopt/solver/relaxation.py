@@ -12,16 +12,16 @@ from tmsopt.checks.recheck import FEASIBLE, excesses
 from tmsopt.checks.worst_case import worst_cases
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import overclaims
-from tmsopt.design.finding import Trial, survivor
 from tmsopt.design.problem import Problem
-from tmsopt.design.search import Candidate, Runner, same
-from tmsopt.design.sides import sides
 from tmsopt.design.solution import Relaxation
 from tmsopt.formulation.formulate import formulate
 from tmsopt.formulation.nlp import NLP, Lift
 from tmsopt.formulation.starts import designs
 from tmsopt.models import Values
 from tmsopt.records import Table
+from tmsopt.solver.box import sides
+from tmsopt.solver.multistart import Candidate, Runner, same
+from tmsopt.solver.outcome import Trial, survivor
 
 _ROUNDS = 12  # times that cases are added
 _TRIED = 16  # starts of a relaxation at most

@@ -9,15 +9,15 @@ from tmsopt.checks.bound import instant_bound
 from tmsopt.checks.coverage import cover
 from tmsopt.checks.digits import certified
 from tmsopt.checks.recheck import Checked
-from tmsopt.design.explore import Explored, Options, evaluated_cases, explore, without_any
-from tmsopt.design.family import Family
-from tmsopt.design.finding import Finding, better, evaluated
 from tmsopt.design.problem import Problem, freedom, unasked
-from tmsopt.design.search import STARTS
-from tmsopt.design.sides import sides
 from tmsopt.design.solution import Bound, NotSolved, Solution, Starts
 from tmsopt.errors import InputError
 from tmsopt.records import Progress, Table
+from tmsopt.solver.box import sides
+from tmsopt.solver.multistart import STARTS
+from tmsopt.solver.outcome import Finding, better, evaluated
+from tmsopt.solver.search import Explored, Options, evaluated_cases, explore, without_any
+from tmsopt.solver.workspace import Family
 
 
 def solve(

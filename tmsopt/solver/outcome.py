@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from tmsopt.checks.recheck import Checked, recheck
-from tmsopt.design.branches import other_branches
 from tmsopt.design.cases import Case
-from tmsopt.design.family import Family
 from tmsopt.design.problem import Problem, freedom
-from tmsopt.design.search import Candidate, claim, same
 from tmsopt.design.solution import Branch, Relaxation, Starts
 from tmsopt.formulation.formulate import design_of
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.polish import Point
+from tmsopt.solver.multistart import Candidate, claim, same
+from tmsopt.solver.newton import other_branches
+from tmsopt.solver.workspace import Family
 
 _STATIONARY = 1e-6  # gradient of the Lagrangian at which a point counts as converged whatever IPOPT says
 _ALIKE = 3  # candidates of one objective looked at closely

@@ -8,7 +8,6 @@ from itertools import pairwise
 import numpy as np
 
 from tmsopt.checks.bound import bounded, closed, instant_bound
-from tmsopt.design.family import Family
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.formulation.formulate import abscissa, design_of, middle
 from tmsopt.formulation.ipopt import Run, ipopt
@@ -16,6 +15,7 @@ from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import complete, designs, opposite, worth
 from tmsopt.records import Array, Progress
 from tmsopt.roots import roots
+from tmsopt.solver.workspace import Family
 
 STARTS = 64
 """Starts tried at most; most problems settle with a dozen."""

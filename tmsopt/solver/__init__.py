@@ -1,0 +1,1 @@
+"""Solve: parts of the box, multistart, outcome, relaxation, all designs."""
