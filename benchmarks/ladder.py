@@ -15,10 +15,10 @@ from benchmarks.references import references
 from benchmarks.report import origin, table
 from benchmarks.suite import RANGES, random_problem
 from tmsopt.arithmetic.intervals import root_bound
+from tmsopt.certificates.half_planes import over
+from tmsopt.certificates.question import Question
+from tmsopt.certificates.translation import FEASIBILITY, Translated, translate
 from tmsopt.checks.bound import omega0_bound
-from tmsopt.design.bounds.lines import over
-from tmsopt.design.bounds.program import Question
-from tmsopt.design.bounds.translation import FEASIBILITY, Translated, translate
 from tmsopt.design.problem import Problem
 from tmsopt.formulation.builder import Builder
 from tmsopt.models import Model

@@ -10,7 +10,7 @@ from tqdm import tqdm
 from benchmarks.references import Reference, references
 from benchmarks.report import milliseconds, origin, share, table
 from benchmarks.suite import random_problem
-from tmsopt.design.bounds.certify import certify
+from tmsopt.certificates.certify import certify
 from tmsopt.solver.solve import solve
 
 RELATIVE, ABSOLUTE = 1e-4, 1e-5

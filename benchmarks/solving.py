@@ -12,7 +12,7 @@ from benchmarks.report import milliseconds, origin, table
 from benchmarks.seekers import SEEKERS
 from benchmarks.suite import random_problem
 from tmsopt import InputError, Problem, load, models, solve
-from tmsopt.design.bounds.certify import certify
+from tmsopt.certificates.certify import certify
 
 LIMIT = 10.0
 """Seconds that a rival has for one problem."""

@@ -12,8 +12,8 @@ import pytest
 
 from tmsopt.arithmetic.intervals import BALLS, EVERYTHING, ball, interval, ranges, root_bound
 from tmsopt.arithmetic.walk import NotAccepted, walk
-from tmsopt.design.bounds.interlace import interlacing, squares_of, unknowns
-from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, available, decide, task
+from tmsopt.certificates.interlacing import interlacing, squares_of, unknowns
+from tmsopt.certificates.scip import FOUND, INFEASIBLE, available, decide, task
 from tmsopt.design.expression import parse_value
 from tmsopt.formulation.nlp import NLP
 from tmsopt.roots import product

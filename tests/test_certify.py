@@ -17,16 +17,16 @@ from click.testing import CliRunner
 from oracles import polynomial_floats
 from scipy.optimize import brentq  # type: ignore[import-untyped]
 
-import tmsopt.design.bounds.certify as certifying
-import tmsopt.design.bounds.interlace as interlaces
-import tmsopt.design.bounds.race as races
+import tmsopt.certificates.certify as certifying
+import tmsopt.certificates.interlacing as interlaces
+import tmsopt.certificates.processes as races
 from benchmarks.references import PATH, references
 from benchmarks.suite import random_problem
 from tmsopt import InputError, Problem, Solution, certify, models, solve
+from tmsopt.certificates import half_planes as lines
+from tmsopt.certificates.processes import Crew
+from tmsopt.certificates.scip import available
 from tmsopt.cli import main
-from tmsopt.design.bounds import lines
-from tmsopt.design.bounds.race import Crew
-from tmsopt.design.bounds.scip import available
 from tmsopt.design.cases import Band
 from tmsopt.design.solution import Bound
 from tmsopt.records import Array

@@ -15,10 +15,10 @@ from mpmath import mp
 
 import tmsopt
 from tmsopt.arithmetic.balls import Number
+from tmsopt.certificates.question import Question
+from tmsopt.certificates.scip import FOUND, INFEASIBLE, available, decide, task
 from tmsopt.checks.bound import omega0_bound
 from tmsopt.checks.relation import relation_bound
-from tmsopt.design.bounds.program import Question
-from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, available, decide, task
 from tmsopt.design.proof import rational
 from tmsopt.design.proof.factors import abscissa_formula
 from tmsopt.design.proof.proof import Proof, prove_design

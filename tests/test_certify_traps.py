@@ -10,13 +10,13 @@ import pytest
 from tmsopt import Problem, certify, solve
 from tmsopt.arithmetic.intervals import ball, interval, square
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.design.bounds.interlace import interlace, squares_of
-from tmsopt.design.bounds.program import Question
-from tmsopt.design.bounds.race import Crew
-from tmsopt.design.bounds.scip import INFEASIBLE, Decision
+from tmsopt.certificates.interlacing import interlace, squares_of
+from tmsopt.certificates.processes import Crew
+from tmsopt.certificates.question import Question
+from tmsopt.certificates.scip import INFEASIBLE, Decision
 from tmsopt.models import tms
 
-scip = pytest.importorskip("pyscipopt") and pytest.importorskip("tmsopt.design.bounds.scip")
+scip = pytest.importorskip("pyscipopt") and pytest.importorskip("tmsopt.certificates.scip")
 
 FIXED = {"Fr": 2.0, "mu": 0.5, "chi_B": 1.3, "chi_H": 1.0, "zeta_B": -0.6, "zeta_H": -0.3, "lambda_s": 0.5}
 CAPSIZE = {**FIXED, "chi_H": 1.2, "mu": 5.0}  # a4 < 0 for tan λ_s < 5/3: one root s > 0, so ζ = −1

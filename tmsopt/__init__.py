@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tmsopt import laws, models, roots
-    from tmsopt.design.bounds.certify import certify
+    from tmsopt.certificates.certify import certify
     from tmsopt.design.files import load
     from tmsopt.design.problem import Problem
     from tmsopt.design.proof.proof import Proof
@@ -117,7 +117,7 @@ _HOMES = {
     "Study": "tmsopt.study.batch.plan",
     "Swallowtail": "tmsopt.study.swallowtail",
     "Trace": "tmsopt.study.branch",
-    "certify": "tmsopt.design.bounds.certify",
+    "certify": "tmsopt.certificates.certify",
     "chart": "tmsopt.study.chart",
     "chart_to": "tmsopt.study.stored",
     "compare": "tmsopt.study.compare",

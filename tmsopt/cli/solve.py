@@ -163,7 +163,7 @@ def solve(
         problem = load(file)
         check_options(problem, _given(context))
         if certify:
-            from tmsopt.design.bounds.certify import check_installed
+            from tmsopt.certificates.certify import check_installed
 
             check_installed()
     if every:
@@ -246,7 +246,7 @@ def compare(file: Path, as_json: bool, starts: int | None, seed: int, linear_sol
 
 def _certified(solution: "Solution", seconds: float) -> "Solution":
     """The solution with its bound, within seconds."""
-    from tmsopt.design.bounds.certify import certify
+    from tmsopt.certificates.certify import certify
 
     with progress("second") as update:
         return certify(solution, seconds=seconds, progress=lambda done, most: update(round(done), round(most)))

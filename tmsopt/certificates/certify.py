@@ -6,14 +6,14 @@ from dataclasses import replace
 from functools import partial
 
 from tmsopt.arithmetic.walk import NotAccepted
+from tmsopt.certificates.answer import Answer, Clock, Progress, answer, contradicted, doubt
+from tmsopt.certificates.half_planes import over
+from tmsopt.certificates.processes import Crew
+from tmsopt.certificates.question import Question
+from tmsopt.certificates.scip import FOUND, INFEASIBLE, UNDECIDED, available
+from tmsopt.certificates.translation import FEASIBILITY
 from tmsopt.checks.bound import instant_bound
 from tmsopt.checks.recheck import recheck
-from tmsopt.design.bounds.answer import Answer, Clock, Progress, answer, contradicted, doubt
-from tmsopt.design.bounds.lines import over
-from tmsopt.design.bounds.program import Question
-from tmsopt.design.bounds.race import Crew
-from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, UNDECIDED, available
-from tmsopt.design.bounds.translation import FEASIBILITY
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem, checked, unasked
 from tmsopt.design.quantities import ROOT_NAMES

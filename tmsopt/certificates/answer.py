@@ -10,9 +10,9 @@ import numpy as np
 
 from tmsopt.arithmetic.intervals import ranges
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.design.bounds.program import Question
-from tmsopt.design.bounds.race import Crew
-from tmsopt.design.bounds.scip import FOUND, INFEASIBLE, UNDECIDED, Decision, Task, task
+from tmsopt.certificates.processes import Crew
+from tmsopt.certificates.question import Question
+from tmsopt.certificates.scip import FOUND, INFEASIBLE, UNDECIDED, Decision, Task, task
 from tmsopt.design.solution import Solution
 from tmsopt.formulation.formulate import design_of, variables_of
 from tmsopt.formulation.starts import complete

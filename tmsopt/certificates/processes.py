@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.design.bounds.scip import INFEASIBLE, UNDECIDED, Decision, Task
+from tmsopt.certificates.scip import INFEASIBLE, UNDECIDED, Decision, Task
 
 _TICK = 0.02  # seconds between looks
 _GRACE = 5.0  # seconds that SCIP may take longer than it was given, as it does in the midst of a relaxation
@@ -92,7 +92,7 @@ class _Job:
 
 
 def _started() -> Any:
-    command = [sys.executable, "-m", "tmsopt.design.bounds.worker"]
+    command = [sys.executable, "-m", "tmsopt.certificates.worker"]
     return subprocess.Popen(
         command,
         stdin=subprocess.PIPE,

@@ -11,7 +11,7 @@ from functools import partial
 import casadi as ca
 import numpy as np
 
-from tmsopt.design.bounds.lines import Frame, bound_unknowns, compact, half_planes, over, sectors
+from tmsopt.certificates.half_planes import Frame, bound_unknowns, compact, half_planes, over, sectors
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import tempts
 from tmsopt.design.expression import Expression

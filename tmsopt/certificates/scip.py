@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.bounds.translation import FEASIBILITY, translate
+from tmsopt.certificates.translation import FEASIBILITY, translate
 from tmsopt.formulation.nlp import NLP
 
 _LEAST = 0.01  # seconds

@@ -11,7 +11,7 @@ import threading
 from typing import IO, Any
 
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.design.bounds.scip import Decision, Task, decide
+from tmsopt.certificates.scip import Decision, Task, decide
 
 
 def serve() -> None:
