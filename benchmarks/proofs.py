@@ -11,7 +11,7 @@ import click
 
 from benchmarks.report import keep, kept, origin, table
 from tmsopt import Problem, Proof, Solution, models, solve
-from tmsopt.design.proof.proof import prove_design
+from tmsopt.proofs.proof import prove_design
 
 DIGITS = (30, 60)
 _REPEATS = 3

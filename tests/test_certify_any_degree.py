@@ -19,10 +19,10 @@ from tmsopt.certificates.question import Question
 from tmsopt.certificates.scip import FOUND, INFEASIBLE, available, decide, task
 from tmsopt.checks.bound import omega0_bound
 from tmsopt.checks.relation import relation_bound
-from tmsopt.design.proof import rational
-from tmsopt.design.proof.factors import abscissa_formula
-from tmsopt.design.proof.proof import Proof, prove_design
 from tmsopt.models import Model, from_coefficients, from_matrices
+from tmsopt.proofs import rational
+from tmsopt.proofs.factored import abscissa_formula
+from tmsopt.proofs.proof import Proof, prove_design
 from tmsopt.roots import Root, pattern, product, roots
 from tmsopt.roots.patterns.naming import implies, shown_patterns
 

@@ -22,10 +22,10 @@ from tmsopt.arithmetic.balls import Number, number
 from tmsopt.arithmetic.krawczyk import Refused, enclosed, refined
 from tmsopt.cli import main
 from tmsopt.design.cases import Case
-from tmsopt.design.proof import rational
-from tmsopt.design.proof.factors import Factored
-from tmsopt.design.proof.proof import Proof, prove_design
 from tmsopt.models.exact import decimal
+from tmsopt.proofs import rational
+from tmsopt.proofs.factored import Factored
+from tmsopt.proofs.proof import Proof, prove_design
 from tmsopt.roots import exact_roots, product
 from tmsopt.show.proved import proof_text
 

@@ -8,12 +8,12 @@ if TYPE_CHECKING:
     from tmsopt.certificates.certify import certify
     from tmsopt.design.files import load
     from tmsopt.design.problem import Problem
-    from tmsopt.design.proof.proof import Proof
-    from tmsopt.design.prove import prove
     from tmsopt.design.solution import NotSolved, Solution
     from tmsopt.errors import InputError
     from tmsopt.margins.nearest import Nearest, Robustness, nearest, robustness
     from tmsopt.models.bicycle_files import Bicycle, read_bicycle, write_bicycle
+    from tmsopt.proofs.proof import Proof
+    from tmsopt.proofs.prove import prove
     from tmsopt.solver.all_designs import Every, solve_all
     from tmsopt.solver.solve import solve
     from tmsopt.study.batch.files import load_study
@@ -108,7 +108,7 @@ _HOMES = {
     "NotSolved": "tmsopt.design.solution",
     "Optimality": "tmsopt.study.optimality",
     "Problem": "tmsopt.design.problem",
-    "Proof": "tmsopt.design.proof.proof",
+    "Proof": "tmsopt.proofs.proof",
     "Results": "tmsopt.study.batch.run",
     "Robustness": "tmsopt.margins.nearest",
     "Solution": "tmsopt.design.solution",
@@ -133,7 +133,7 @@ _HOMES = {
     "optimality": "tmsopt.study.optimality",
     "over_grid": "tmsopt.study.batch.plan",
     "pareto": "tmsopt.study.pareto",
-    "prove": "tmsopt.design.prove",
+    "prove": "tmsopt.proofs.prove",
     "read_bicycle": "tmsopt.models.bicycle_files",
     "robustness": "tmsopt.margins.nearest",
     "run_study": "tmsopt.study.batch.run",

@@ -9,8 +9,8 @@ from typing import Any
 from tmsopt.checks.coverage import Cover
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Freedom, Problem
-from tmsopt.design.proof.proof import DIGITS, Proof, prove_design
 from tmsopt.design.units import Reading
+from tmsopt.proofs.proof import DIGITS, Proof, prove_design
 from tmsopt.records import Table
 from tmsopt.roots import Root
 

@@ -4,8 +4,8 @@ from fractions import Fraction
 
 from tmsopt.arithmetic.balls import Number, fraction
 from tmsopt.design.problem import Problem
-from tmsopt.design.proof.proof import Proof
-from tmsopt.design.proof.verdict import Verdict
+from tmsopt.proofs.facts import Verdict
+from tmsopt.proofs.proof import Proof
 from tmsopt.show.text import columns
 
 

@@ -9,10 +9,10 @@ import flint
 from tmsopt.arithmetic.balls import GUARD, largest_radius, upper
 from tmsopt.arithmetic.krawczyk import Enclosure, Refused, enclosed, refined
 from tmsopt.design.problem import Problem
-from tmsopt.design.proof import rational
-from tmsopt.design.proof.factors import Factored, of_pattern
-from tmsopt.design.proof.system import ROUNDINGS, Equations, choose, equations
 from tmsopt.models.exact import Written
+from tmsopt.proofs import rational
+from tmsopt.proofs.factored import Factored, of_pattern
+from tmsopt.proofs.system import ROUNDINGS, Equations, choose, equations
 from tmsopt.roots import Pattern
 from tmsopt.roots.patterns.structure import nearest_unknowns
 

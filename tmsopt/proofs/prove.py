@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from tmsopt.design.problem import Problem, checked
-from tmsopt.design.proof.proof import DIGITS, Proof
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError
+from tmsopt.proofs.proof import DIGITS, Proof
 from tmsopt.solver.solve import solve
 
 

@@ -12,12 +12,11 @@ from tmsopt.arithmetic.balls import Number, ProvedRoot, fraction, number
 from tmsopt.arithmetic.krawczyk import Refused
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
-from tmsopt.design.proof import rational
-from tmsopt.design.proof.existence import Existing, beside, exact_coefficients, exactly
-from tmsopt.design.proof.facts import as_stored, heavy_damping, inside, limits, stability
-from tmsopt.design.proof.verdict import NOTHING, Verdict
 from tmsopt.errors import Fault, InputError
 from tmsopt.models.exact import Written, written
+from tmsopt.proofs import rational
+from tmsopt.proofs.existence import Existing, beside, exact_coefficients, exactly
+from tmsopt.proofs.facts import NOTHING, Verdict, as_stored, heavy_damping, inside, limits, stability
 from tmsopt.records import Table
 from tmsopt.roots import PATTERNS, Pattern, Root
 from tmsopt.roots import pattern as pattern_of

@@ -1,5 +1,6 @@
 """What follows for a design whose roots are known in balls: stability, heavy damping, its place in the problem."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import flint
@@ -7,13 +8,30 @@ import flint
 from tmsopt.arithmetic.balls import largest_radius
 from tmsopt.arithmetic.elementary import rational
 from tmsopt.design.problem import Problem
-from tmsopt.design.proof.existence import Existing, exact_coefficients
-from tmsopt.design.proof.factors import Factored
-from tmsopt.design.proof.rational import factored
-from tmsopt.design.proof.verdict import Verdict
 from tmsopt.design.quantities import RADIUS
 from tmsopt.models import Values
 from tmsopt.models.exact import Written, decimal, decimal_fraction
+from tmsopt.proofs.existence import Existing, exact_coefficients
+from tmsopt.proofs.factored import Factored
+from tmsopt.proofs.rational import factored
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether something certainly holds.
+
+    Attributes:
+        holds: None where the balls cannot tell, or nothing was asked.
+        words: what holds, or why not.
+    """
+
+    holds: bool | None = None
+    words: str = "not looked at"
+
+
+NOTHING = Verdict()
+"""Where no answer was looked for."""
+
 
 BINDS = 1e-9
 """Room between the sides of an inequality up to which it binds: what a solver leaves."""

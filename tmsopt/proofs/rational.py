@@ -6,7 +6,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.design.proof.factors import Factored, roots_of
+from tmsopt.proofs.factored import Factored, roots_of
 from tmsopt.roots import composition
 
 

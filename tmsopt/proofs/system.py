@@ -11,10 +11,10 @@ from scipy.linalg import qr
 from tmsopt.arithmetic.krawczyk import Refused, slopes
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
-from tmsopt.design.proof.factors import abscissa_formula
 from tmsopt.design.quantities import RADIUS
 from tmsopt.models import Quantity, Values
 from tmsopt.models.exact import decimal_fraction
+from tmsopt.proofs.factored import abscissa_formula
 from tmsopt.roots import Pattern
 
 ROUNDINGS = 64
