@@ -19,13 +19,13 @@ from oracles import polynomial_60, roots_60
 
 import tmsopt
 from tmsopt.cli import main
+from tmsopt.diagnosis.diagnosis import Diagnosis, diagnosed
+from tmsopt.diagnosis.jordan import is_regular, jordan
+from tmsopt.diagnosis.puiseux import branches
+from tmsopt.diagnosis.splitting import Response
 from tmsopt.models import Model, from_coefficients, from_matrices, tms
 from tmsopt.roots import structure
-from tmsopt.roots.jordan import is_regular, jordan
-from tmsopt.roots.puiseux import branches
 from tmsopt.show.diagnosis import diagnosis_lines
-from tmsopt.study.diagnosis import Diagnosis, diagnosed
-from tmsopt.study.splitting import Response
 
 # Jordan chains
 

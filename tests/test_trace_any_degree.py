@@ -16,13 +16,13 @@ from tmsopt.cli import main
 from tmsopt.design.files import load
 from tmsopt.design.problem import Problem
 from tmsopt.errors import InputError
+from tmsopt.explanation.optimality import optimality
 from tmsopt.models import from_coefficients, from_matrices, whipple
 from tmsopt.roots import pattern, product, shift
 from tmsopt.roots.patterns.descriptions import in_words
 from tmsopt.show.traced import trace_figure, trace_table
 from tmsopt.solver.solve import solve
 from tmsopt.study.domain import domain
-from tmsopt.study.optimality import optimality
 from tmsopt.study.swallowtail import swallowtail
 from tmsopt.study.trace import trace
 

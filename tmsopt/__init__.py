@@ -9,7 +9,10 @@ if TYPE_CHECKING:
     from tmsopt.design.files import load
     from tmsopt.design.problem import Problem
     from tmsopt.design.solution import NotSolved, Solution
+    from tmsopt.diagnosis.diagnosis import Diagnosis, diagnose
     from tmsopt.errors import InputError
+    from tmsopt.explanation.explain import Explanation, explain
+    from tmsopt.explanation.optimality import Optimality, optimality
     from tmsopt.margins.nearest import Nearest, Robustness, nearest, robustness
     from tmsopt.models.bicycle_files import Bicycle, read_bicycle, write_bicycle
     from tmsopt.proofs.proof import Proof
@@ -24,11 +27,8 @@ if TYPE_CHECKING:
     from tmsopt.study.branch import Branch, Trace
     from tmsopt.study.chart import Chart, chart
     from tmsopt.study.compare import Comparison, compare
-    from tmsopt.study.diagnosis import Diagnosis, diagnose
     from tmsopt.study.domain import Domain, domain
-    from tmsopt.study.explain import Explanation, explain
     from tmsopt.study.front import Front
-    from tmsopt.study.optimality import Optimality, optimality
     from tmsopt.study.pareto import pareto
     from tmsopt.study.speeds import Speeds, speeds
     from tmsopt.study.stored import StoredChart, chart_to, open_chart
@@ -99,14 +99,14 @@ _HOMES = {
     "Branch": "tmsopt.study.branch",
     "Chart": "tmsopt.study.chart",
     "Comparison": "tmsopt.study.compare",
-    "Diagnosis": "tmsopt.study.diagnosis",
+    "Diagnosis": "tmsopt.diagnosis.diagnosis",
     "Domain": "tmsopt.study.domain",
-    "Explanation": "tmsopt.study.explain",
+    "Explanation": "tmsopt.explanation.explain",
     "Front": "tmsopt.study.front",
     "InputError": "tmsopt.errors",
     "Nearest": "tmsopt.margins.nearest",
     "NotSolved": "tmsopt.design.solution",
-    "Optimality": "tmsopt.study.optimality",
+    "Optimality": "tmsopt.explanation.optimality",
     "Problem": "tmsopt.design.problem",
     "Proof": "tmsopt.proofs.proof",
     "Results": "tmsopt.study.batch.run",
@@ -121,16 +121,16 @@ _HOMES = {
     "chart": "tmsopt.study.chart",
     "chart_to": "tmsopt.study.stored",
     "compare": "tmsopt.study.compare",
-    "diagnose": "tmsopt.study.diagnosis",
+    "diagnose": "tmsopt.diagnosis.diagnosis",
     "domain": "tmsopt.study.domain",
-    "explain": "tmsopt.study.explain",
+    "explain": "tmsopt.explanation.explain",
     "latin_hypercube": "tmsopt.study.batch.samples",
     "load": "tmsopt.design.files",
     "load_study": "tmsopt.study.batch.files",
     "monte_carlo": "tmsopt.study.batch.monte_carlo",
     "nearest": "tmsopt.margins.nearest",
     "open_chart": "tmsopt.study.stored",
-    "optimality": "tmsopt.study.optimality",
+    "optimality": "tmsopt.explanation.optimality",
     "over_grid": "tmsopt.study.batch.plan",
     "pareto": "tmsopt.study.pareto",
     "prove": "tmsopt.proofs.prove",

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tmsopt.design.solution import Solution
+    from tmsopt.diagnosis.diagnosis import Diagnosis
+    from tmsopt.explanation.explain import Explanation
     from tmsopt.margins.nearest import Robustness
-    from tmsopt.study.diagnosis import Diagnosis
-    from tmsopt.study.explain import Explanation
 
 
 def meaning(solution: "Solution") -> dict[str, Any]:
@@ -40,7 +40,7 @@ def meaning_lines(solution: "Solution", brief: bool, details: bool) -> Iterator[
 
 
 def _explained(solution: "Solution") -> "Explanation":
-    from tmsopt.study.explain import explain
+    from tmsopt.explanation.explain import explain
 
     return explain(solution)
 
@@ -56,6 +56,6 @@ def _robust(solution: "Solution") -> "Robustness | None":
 
 def _diagnosed(solution: "Solution") -> "tuple[Diagnosis, ...]":
     """The multiple roots of a design that was found."""
-    from tmsopt.study.diagnosis import diagnose
+    from tmsopt.diagnosis.diagnosis import diagnose
 
     return diagnose(solution) if solution.status == "optimal" else ()

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
+from tmsopt.diagnosis.diagnosis import Diagnosis
+from tmsopt.diagnosis.splitting import DEVIATION, Law, Response
 from tmsopt.show.text import columns
-from tmsopt.study.diagnosis import Diagnosis
-from tmsopt.study.splitting import DEVIATION, Law, Response
 
 _ROUNDING = 1e-16
 

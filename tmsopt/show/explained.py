@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 
+from tmsopt.explanation.explain import Explanation
+from tmsopt.explanation.optimality import NOT_COVERED, OnLine, Optimality
+from tmsopt.explanation.rounding import ALONE, Rounded
 from tmsopt.show.text import columns, number
-from tmsopt.study.explain import Explanation
-from tmsopt.study.optimality import NOT_COVERED, OnLine, Optimality
-from tmsopt.study.rounding import ALONE, Rounded
 
 
 def explained_lines(explanation: Explanation) -> list[str]:

@@ -1,8 +1,8 @@
 """Why a design is a local optimum, and not only an exceptional point: multipliers of its factors and limits.
 
 Minimise γ subject to p(t + γ; θ) = a0(θ) ∏ (t² + βᵢ t + κᵢ), βᵢ, κᵢ ≥ 0, and to the limits on θ. The factors of the
-roots on the rightmost line stand at their bounds (`tmsopt.study.held` says which coefficients those are, however a
-multiple root is shared out), and the conditions are
+roots on the rightmost line stand at their bounds (`tmsopt.explanation.program` says which those are, however
+a multiple root is shared out), and the conditions are
 
     first order     ∇f = Σ yᵢ ∇hᵢ over all that is held at 0, with yᵢ ≥ 0 where hᵢ may become positive;
     vertex          where the ∇hᵢ of equalities and of positive yᵢ span all variables, nothing else is needed: the
@@ -24,10 +24,10 @@ import numpy as np
 from tmsopt.design.dependence import demands_heavy_damping, overclaims
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
+from tmsopt.explanation.conditions import POSITIVE, STATIONARY, Conditions, conditions, curved
+from tmsopt.explanation.descent import Better, better
+from tmsopt.explanation.program import NotCovered, Program, program
 from tmsopt.records import Table
-from tmsopt.study.descent import Better, better
-from tmsopt.study.held import NotCovered, Program, program
-from tmsopt.study.multipliers import POSITIVE, STATIONARY, Conditions, conditions, curved
 
 STRICT, NOT_MINIMAL, UNDECIDED, NOT_COVERED = "strict minimum", "not minimal", "undecided", "not covered"
 

@@ -9,11 +9,11 @@ import flint
 
 from tmsopt.arithmetic.elementary import exact
 from tmsopt.design.solution import Solution
+from tmsopt.diagnosis.jordan import Jordan, is_regular, jordan
+from tmsopt.diagnosis.splitting import DEVIATION, Ideal, Law, Response, response
 from tmsopt.models import Model, ParameterSet
 from tmsopt.roots import Root, Structure
-from tmsopt.roots.jordan import Jordan, is_regular, jordan
 from tmsopt.roots.patterns.enclosed import nearest
-from tmsopt.study.splitting import DEVIATION, Ideal, Law, Response, response
 
 _BITS = 424  # 127 digits: changes down to 1e-16 are differences of coefficients
 _RANK = 1e-7  # relative singular value that counts as 0; of a nearly semisimple root it is the root of the distance

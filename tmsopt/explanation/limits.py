@@ -10,8 +10,8 @@ from tmsopt.design.expression import parse_value
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.errors import InputError
+from tmsopt.explanation.steps import Step, natural_step, reported_unit, step_within, unit_of, with_reported_unit
 from tmsopt.solver.solve import solve
-from tmsopt.study.steps import Step, natural_step, reported_unit, step_within, unit_of, with_reported_unit
 
 DIFFERS = 0.2
 """Relative difference of the two gains from which the reader is told why."""

@@ -10,9 +10,9 @@ import flint
 import numpy as np
 
 from tmsopt.arithmetic.elementary import exact
+from tmsopt.diagnosis.puiseux import Branches, branches
 from tmsopt.models import Model, ParameterSet
 from tmsopt.roots import Root, product
-from tmsopt.roots.puiseux import Branches, branches
 
 DEVIATION = 0.1
 """Share by which a root may be off the leading term while the law is said to hold."""

@@ -11,10 +11,10 @@ import numpy as np
 
 from tmsopt.checks.recheck import recheck
 from tmsopt.design.solution import Solution
+from tmsopt.explanation.conditions import Conditions, curved
+from tmsopt.explanation.program import Program
 from tmsopt.formulation.formulate import design_of
 from tmsopt.records import Array, Table
-from tmsopt.study.held import Program
-from tmsopt.study.multipliers import Conditions, curved
 
 _FIRST = 0.05  # of the sizes of the variables: the longest step
 _SHORTER = 4.0

@@ -9,9 +9,9 @@ from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ROOT_QUANTITIES
 from tmsopt.design.solution import Solution
+from tmsopt.explanation.limits import is_physical
+from tmsopt.explanation.steps import with_reported_unit
 from tmsopt.roots.patterns.descriptions import in_words
-from tmsopt.study.levers import is_physical
-from tmsopt.study.steps import with_reported_unit
 
 _ROOTS = {q.name for q in ROOT_QUANTITIES}
 _PARTS = (0.0, 0.29, 0.5, 0.83, 1.0)  # of a range: a change along it shows at one of these

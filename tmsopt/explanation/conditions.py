@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.optimize import lsq_linear
 
+from tmsopt.explanation.program import Program
 from tmsopt.records import Array
-from tmsopt.study.held import Program
 
 STATIONARY = 1e-8
 """Part of the gradient that no multipliers explain, up to which a point is stationary: a polished one has 1e-12."""

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from tmsopt.design.solution import Bound, Solution
+from tmsopt.explanation.limits import Lever, levers
+from tmsopt.explanation.optimality import Optimality, optimality
+from tmsopt.explanation.rounding import Rounded, rounded_alone, rounded_together, worst
+from tmsopt.explanation.summary import summary, warnings
 from tmsopt.records import Table
-from tmsopt.study.levers import Lever, levers
-from tmsopt.study.optimality import Optimality, optimality
-from tmsopt.study.remarks import summary, warnings
-from tmsopt.study.rounding import Rounded, rounded_alone, rounded_together, worst
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,10 @@ from tmsopt.design.dependence import varies
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
 from tmsopt.design.solution import Solution
+from tmsopt.explanation.steps import reported_unit
 from tmsopt.models import Values
 from tmsopt.records import Table
 from tmsopt.roots import roots
-from tmsopt.study.steps import reported_unit
 
 ALONE = 3
 """Significant digits to which each parameter is rounded alone."""

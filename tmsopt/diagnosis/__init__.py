@@ -1,0 +1,1 @@
+"""Diagnose: Jordan chains, Puiseux splitting."""

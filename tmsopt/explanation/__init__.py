@@ -1,0 +1,1 @@
+"""Explain: optimality, multipliers of limits, rounding, warnings."""
