@@ -19,9 +19,9 @@ from tmsopt import load
 from tmsopt.design.problem import Problem
 from tmsopt.records import Array
 from tmsopt.roots import quartic_is_stable
-from tmsopt.study.grid import coefficients
 from tmsopt.study.stored import gathered
 from tmsopt.study.tiles import USUAL, Survey, survey
+from tmsopt.tracing.seeds import coefficients
 
 STACKED = "stacked numpy.linalg.eigvals"
 PROBLEM = Path(__file__).parent.parent / "problems" / "chart.toml"

@@ -25,8 +25,8 @@ from tmsopt.roots import CLASSES
 from tmsopt.show.chart import chart_table
 from tmsopt.study.chart import chart, save_arrays
 from tmsopt.study.classes import classify
-from tmsopt.study.domain import domain
-from tmsopt.study.trace import trace
+from tmsopt.tracing.domain import domain
+from tmsopt.tracing.trace import trace
 
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 SQRT2 = math.sqrt(2)

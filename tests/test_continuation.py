@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from tmsopt.study.continuation import (
+from tmsopt.tracing.continuation import (
     End,
     between,
     both_ways,

@@ -16,7 +16,7 @@ import tmsopt
 from tmsopt.design.problem import Problem
 from tmsopt.models import tms
 from tmsopt.models.model import Model, Parameter, ParameterSet
-from tmsopt.study.domain import domain
+from tmsopt.tracing.domain import domain
 
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 SQRT2 = math.sqrt(2)

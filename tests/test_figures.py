@@ -42,7 +42,7 @@ from tmsopt.study.paper.universal import (
     table_1_paths,
     universal_path,
 )
-from tmsopt.study.trace import trace
+from tmsopt.tracing.trace import trace
 
 ROUNDING = 1e-13
 """Relative; a few hundred operations in double precision."""

@@ -12,7 +12,7 @@ from tmsopt.show.planes import planes_figure
 from tmsopt.show.style import new_figure
 from tmsopt.show.swallowtail import draw_swallowtail, quadrilaterals
 from tmsopt.study.paper import planes
-from tmsopt.study.swallowtail import swallowtail
+from tmsopt.tracing.swallowtail import swallowtail
 
 FIXED = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 BOX = {"Fr": (2.0, 3.0), "chi_B": (1.1, 1.8), "lambda_s": (0.02, 0.7)}

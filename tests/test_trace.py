@@ -22,8 +22,8 @@ from tmsopt import laws
 from tmsopt.design.problem import Problem
 from tmsopt.errors import InputError
 from tmsopt.models import tms
-from tmsopt.study.branch import write_csv
-from tmsopt.study.trace import trace
+from tmsopt.tracing.branch import write_csv
+from tmsopt.tracing.trace import trace
 
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 """The chi_H = 1 bicycle of the paper; mu does not matter there."""

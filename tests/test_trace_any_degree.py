@@ -22,9 +22,9 @@ from tmsopt.roots import pattern, product, shift
 from tmsopt.roots.patterns.descriptions import in_words
 from tmsopt.show.traced import trace_figure, trace_table
 from tmsopt.solver.solve import solve
-from tmsopt.study.domain import domain
-from tmsopt.study.swallowtail import swallowtail
-from tmsopt.study.trace import trace
+from tmsopt.tracing.domain import domain
+from tmsopt.tracing.swallowtail import swallowtail
+from tmsopt.tracing.trace import trace
 
 EXACT = 1e-12
 """Points and events: a few roundings of a Newton step whose condition is below 1e3."""

@@ -24,16 +24,16 @@ if TYPE_CHECKING:
     from tmsopt.study.batch.plan import Study, over_grid
     from tmsopt.study.batch.run import Results, run_study
     from tmsopt.study.batch.samples import latin_hypercube, sobol
-    from tmsopt.study.branch import Branch, Trace
     from tmsopt.study.chart import Chart, chart
     from tmsopt.study.compare import Comparison, compare
-    from tmsopt.study.domain import Domain, domain
     from tmsopt.study.front import Front
     from tmsopt.study.pareto import pareto
     from tmsopt.study.speeds import Speeds, speeds
     from tmsopt.study.stored import StoredChart, chart_to, open_chart
-    from tmsopt.study.swallowtail import Swallowtail, swallowtail
-    from tmsopt.study.trace import trace
+    from tmsopt.tracing.branch import Branch, Trace
+    from tmsopt.tracing.domain import Domain, domain
+    from tmsopt.tracing.swallowtail import Swallowtail, swallowtail
+    from tmsopt.tracing.trace import trace
 
 __version__ = "0.1.0"
 
@@ -96,11 +96,11 @@ __all__ = [
 # Imported when first used, so that `tmsopt --help` need not wait for CasADi.
 _HOMES = {
     "Bicycle": "tmsopt.models.bicycle_files",
-    "Branch": "tmsopt.study.branch",
+    "Branch": "tmsopt.tracing.branch",
     "Chart": "tmsopt.study.chart",
     "Comparison": "tmsopt.study.compare",
     "Diagnosis": "tmsopt.diagnosis.diagnosis",
-    "Domain": "tmsopt.study.domain",
+    "Domain": "tmsopt.tracing.domain",
     "Explanation": "tmsopt.explanation.explain",
     "Front": "tmsopt.study.front",
     "InputError": "tmsopt.errors",
@@ -115,14 +115,14 @@ _HOMES = {
     "Speeds": "tmsopt.study.speeds",
     "StoredChart": "tmsopt.study.stored",
     "Study": "tmsopt.study.batch.plan",
-    "Swallowtail": "tmsopt.study.swallowtail",
-    "Trace": "tmsopt.study.branch",
+    "Swallowtail": "tmsopt.tracing.swallowtail",
+    "Trace": "tmsopt.tracing.branch",
     "certify": "tmsopt.certificates.certify",
     "chart": "tmsopt.study.chart",
     "chart_to": "tmsopt.study.stored",
     "compare": "tmsopt.study.compare",
     "diagnose": "tmsopt.diagnosis.diagnosis",
-    "domain": "tmsopt.study.domain",
+    "domain": "tmsopt.tracing.domain",
     "explain": "tmsopt.explanation.explain",
     "latin_hypercube": "tmsopt.study.batch.samples",
     "load": "tmsopt.design.files",
@@ -142,8 +142,8 @@ _HOMES = {
     "solve_all": "tmsopt.solver.all_designs",
     "Every": "tmsopt.solver.all_designs",
     "speeds": "tmsopt.study.speeds",
-    "swallowtail": "tmsopt.study.swallowtail",
-    "trace": "tmsopt.study.trace",
+    "swallowtail": "tmsopt.tracing.swallowtail",
+    "trace": "tmsopt.tracing.trace",
     "write_bicycle": "tmsopt.models.bicycle_files",
 }
 

@@ -176,8 +176,8 @@ def _charted(
     from tmsopt.errors import Fault, InputError
     from tmsopt.study.archive import check_netcdf, save_layers
     from tmsopt.study.chart import CHART_LAYERS, LARGEST, chart_of
-    from tmsopt.study.domain import domain
     from tmsopt.study.stored import gathered, store, summary
+    from tmsopt.tracing.domain import domain
 
     if output is not None and output.suffix.lower() == ".chart":
         try:
@@ -217,8 +217,8 @@ def _draw(
     from tmsopt.show.chart import chart_figure
     from tmsopt.show.style import save
     from tmsopt.study.chart import CHART_LAYERS, chart_of
-    from tmsopt.study.domain import domain
     from tmsopt.study.stored import gathered
+    from tmsopt.tracing.domain import domain
 
     if found is None:
         flat = (work.plane(held) if held else work).thinned(_SHOWN).with_layers(CHART_LAYERS)

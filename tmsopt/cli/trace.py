@@ -55,8 +55,8 @@ def trace(
     with bad_input():
         from tmsopt.design.files import load
         from tmsopt.errors import Fault, InputError
-        from tmsopt.study.branch import write_csv
-        from tmsopt.study.trace import trace as trace_problem
+        from tmsopt.tracing.branch import write_csv
+        from tmsopt.tracing.trace import trace as trace_problem
 
         check_output("--plot", plot, FIGURES)
         check_output("--csv", csv_file, ("csv",))

@@ -21,7 +21,7 @@ from tmsopt.show.labels import Name, label_axes, place_names
 from tmsopt.show.style import CAPSIZE, CRITICAL, LINE, MARK, legend_below, new_figure
 from tmsopt.show.text import columns, number, with_unit
 from tmsopt.study.chart import Chart
-from tmsopt.study.domain import Domain
+from tmsopt.tracing.domain import Domain
 
 CLASS_COLOURS = ("#FFFFFF", "#BBBBBB", "#E6E6E6", "#A6D5F0", "#F2C45A")
 """Fills of the classes, undefined to heavily damped, told apart by lightness too."""

@@ -14,9 +14,9 @@ from tmsopt.records import Array
 from tmsopt.show.labels import place_names
 from tmsopt.show.planes import draw_plane, plane_handles
 from tmsopt.show.style import COMPLEX, HEAVY, LINE, MARK, REAL, STABLE, legend_below, new_figure
-from tmsopt.study.branch import Trace
 from tmsopt.study.paper.planes import Plane
-from tmsopt.study.swallowtail import Swallowtail
+from tmsopt.tracing.branch import Trace
+from tmsopt.tracing.swallowtail import Swallowtail
 
 _LIGHT = np.array([0.3, -0.6, 0.75])
 

@@ -10,7 +10,7 @@ from tmsopt.roots import pattern
 from tmsopt.show.labels import Name, label_axes, place_names
 from tmsopt.show.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, legend_below, new_figure
 from tmsopt.show.text import columns, number, with_unit
-from tmsopt.study.branch import Branch, Trace
+from tmsopt.tracing.branch import Branch, Trace
 
 COLOURS = {
     "EP4": MARK, "EP3": MARK, "2EP2": REAL, "CEP2": COMPLEX, "EP2": LINE, "weave": CRITICAL, "capsize": CAPSIZE,

@@ -13,9 +13,9 @@ from tmsopt.errors import Fault, InputError
 from tmsopt.records import Array
 from tmsopt.roots import CLASSES
 from tmsopt.study.archive import save_layers
-from tmsopt.study.domain import Domain, domain
 from tmsopt.study.stored import gathered
 from tmsopt.study.tiles import USUAL, Grid, Survey, survey
+from tmsopt.tracing.domain import Domain, domain
 
 LARGEST = 20_000_000
 """Designs of a chart, which is held in memory at some 40 bytes each."""

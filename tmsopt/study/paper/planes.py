@@ -9,11 +9,11 @@ from tmsopt import laws
 from tmsopt.design.problem import Problem
 from tmsopt.models import tms
 from tmsopt.records import Array, Table
-from tmsopt.study.branch import Trace
 from tmsopt.study.chart import Chart, chart
 from tmsopt.study.paper.reference import MU, ZETA_B, ZETA_H
-from tmsopt.study.swallowtail import Swallowtail, swallowtail
-from tmsopt.study.trace import trace
+from tmsopt.tracing.branch import Trace
+from tmsopt.tracing.swallowtail import Swallowtail, swallowtail
+from tmsopt.tracing.trace import trace
 
 FR, TILT, CHI_B = (0.01, 5.0), (0.01, 1.5), (1.001, 1.999)
 """Boxes of the planes; between χ_B = 1 and ζ_B/ζ_H = 2 a bicycle with λ_s > 0 can be stable."""

@@ -9,8 +9,8 @@ from scipy.optimize import minimize_scalar
 from tmsopt.design.problem import Problem
 from tmsopt.records import Array
 from tmsopt.roots import Pattern
-from tmsopt.study.continuation import Curve, Walk, between, crossing
-from tmsopt.study.marks import CHANGES, NOTHING, Mark, marks, sign_changes, stability, vanishes
+from tmsopt.tracing.continuation import Curve, Walk, between, crossing
+from tmsopt.tracing.monitors import CHANGES, NOTHING, Mark, marks, sign_changes, stability, vanishes
 
 TOGETHER = 1e-6
 """Distance, in units of the scale, within which events are one: each is located to 1e-12 or better."""

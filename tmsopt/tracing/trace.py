@@ -19,11 +19,11 @@ from tmsopt.records import Array
 from tmsopt.roots import Pattern, roots
 from tmsopt.roots import pattern as pattern_of
 from tmsopt.roots.patterns.composed import pattern_names
-from tmsopt.study.branch import Branch, Event, Trace
-from tmsopt.study.continuation import INFINITE, SINGULAR, Curve, Walk, both_ways, contains, curve, project, same
-from tmsopt.study.events import describe
-from tmsopt.study.grid import unexplained
-from tmsopt.study.sizes import Sizes, sizes
+from tmsopt.tracing.branch import Branch, Event, Trace
+from tmsopt.tracing.continuation import INFINITE, SINGULAR, Curve, Walk, both_ways, contains, curve, project, same
+from tmsopt.tracing.equations import Sizes, sizes
+from tmsopt.tracing.events import describe
+from tmsopt.tracing.seeds import unexplained
 
 Report = Callable[[int, int], None]
 

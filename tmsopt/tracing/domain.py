@@ -15,10 +15,10 @@ from tmsopt.design.problem import Problem, checked
 from tmsopt.records import Array
 from tmsopt.roots import pattern, real_roots
 from tmsopt.roots.meetings import nearest_two
-from tmsopt.study.branch import Branch, Event
-from tmsopt.study.continuation import INFINITE, SINGULAR
-from tmsopt.study.infinity import Infinity, through_infinity
-from tmsopt.study.trace import STARTS, STEP, trace
+from tmsopt.tracing.branch import Branch, Event
+from tmsopt.tracing.continuation import INFINITE, SINGULAR
+from tmsopt.tracing.infinity import Infinity, through_infinity
+from tmsopt.tracing.trace import STARTS, STEP, trace
 
 _CLOSE = 5e-3
 """Widths of the box, a step, between the last point before infinity or a singular end and the corner it belongs to."""

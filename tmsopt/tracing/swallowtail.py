@@ -16,9 +16,9 @@ from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
 from tmsopt.records import Array
 from tmsopt.roots import determinant, is_stable, real_roots
-from tmsopt.study.branch import Trace
-from tmsopt.study.continuation import project
-from tmsopt.study.trace import STARTS, Traced, prepare, trace
+from tmsopt.tracing.branch import Trace
+from tmsopt.tracing.continuation import project
+from tmsopt.tracing.trace import STARTS, Traced, prepare, trace
 
 Cut = tuple[float, str]
 

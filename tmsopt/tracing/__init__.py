@@ -1,0 +1,1 @@
+"""Trace, domain, swallowtail: EP sets as curves with events."""
