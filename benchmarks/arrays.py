@@ -9,7 +9,7 @@ import click
 import numpy as np
 
 from benchmarks.report import keep, kept, origin
-from tmsopt.design.arrays import array_function
+from tmsopt.charts.expressions import array_function
 from tmsopt.design.expression import parse_value
 from tmsopt.design.machine import engine_of
 from tmsopt.design.problem import Problem

@@ -16,11 +16,11 @@ import numpy as np
 from benchmarks.measure import best, duration, times
 from benchmarks.report import origin, table
 from tmsopt import load
+from tmsopt.charts.stored import gathered
+from tmsopt.charts.survey import USUAL, Survey, survey
 from tmsopt.design.problem import Problem
 from tmsopt.records import Array
 from tmsopt.roots import quartic_is_stable
-from tmsopt.study.stored import gathered
-from tmsopt.study.tiles import USUAL, Survey, survey
 from tmsopt.tracing.seeds import coefficients
 
 STACKED = "stacked numpy.linalg.eigvals"
@@ -122,7 +122,7 @@ _LARGE = """
 import json, re, resource, sys, time
 from pathlib import Path
 import tmsopt
-from tmsopt.study.stored import chart_to
+from tmsopt.charts.stored import chart_to
 problem = tmsopt.load(sys.argv[1], asks=False)
 began = time.perf_counter()
 chart_to(problem, sys.argv[2], points=json.loads(sys.argv[3]), layers=("kind", "abscissa"), single=True)

@@ -12,11 +12,11 @@ import click
 import numpy as np
 
 from benchmarks.report import keep, kept, origin
+from tmsopt.charts.motion import classified
+from tmsopt.charts.stored import TILE, store
+from tmsopt.charts.survey import USUAL, Survey, survey
 from tmsopt.design.files import load
 from tmsopt.design.machine import engine_of
-from tmsopt.study.classes import classified
-from tmsopt.study.stored import TILE, store
-from tmsopt.study.tiles import USUAL, Survey, survey
 
 _FILE = "problems/chart.toml"
 _SIZES = {"numpy": (2000, 1000), "numba": (4000, 2000)}
@@ -70,7 +70,7 @@ _LARGE = """
 import sys, tempfile
 from pathlib import Path
 from tmsopt.design.files import load
-from tmsopt.study.stored import chart_to
+from tmsopt.charts.stored import chart_to
 with tempfile.TemporaryDirectory(dir=sys.argv[1]) as folder:
     found = chart_to(load(sys.argv[2], asks=False), Path(folder) / "a.chart", points=(10_000, 10_000))
     peak = next(line for line in open("/proc/self/status") if line.startswith("VmHWM"))

@@ -2,10 +2,10 @@
 
 import math
 
+from tmsopt.charts.stored import chart_to
+from tmsopt.charts.survey import LAYERS
 from tmsopt.design.problem import Problem
 from tmsopt.models import tms
-from tmsopt.study.stored import chart_to
-from tmsopt.study.tiles import LAYERS
 
 FIXED = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 PLANE = Problem(

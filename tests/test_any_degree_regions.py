@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from oracles import certified_roots, routh_exact
 
+from tmsopt.charts.chart import chart
+from tmsopt.charts.motion import classified
 from tmsopt.checks.bound import omega0_bound
 from tmsopt.checks.coverage import cover
 from tmsopt.design.problem import Problem
@@ -31,8 +33,6 @@ from tmsopt.roots import (
 )
 from tmsopt.show.chart import chart_figure, chart_table
 from tmsopt.show.growth import growth_figure
-from tmsopt.study.chart import chart
-from tmsopt.study.classes import classified
 from tmsopt.study.growth import growth
 
 LAYERS = ("kind", "real_roots", "abscissa", "damping_ratio")

@@ -10,8 +10,8 @@ import pytest
 
 from benchmarks.suite import TEMPLATES
 from tmsopt.arithmetic.walk import NotAccepted
+from tmsopt.charts.expressions import array_function
 from tmsopt.design import machine as machines
-from tmsopt.design.arrays import array_function
 from tmsopt.design.expression import parse_comparison, parse_value
 from tmsopt.design.machine import EXACT, engine_of, machine
 from tmsopt.design.problem import Problem

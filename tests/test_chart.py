@@ -16,6 +16,8 @@ import pytest
 from curves import exact_polynomial, sturm
 from oracles import abscissa_60, certified_roots, polynomial_60
 
+from tmsopt.charts.chart import chart, save_arrays
+from tmsopt.charts.motion import classify
 from tmsopt.cli import main
 from tmsopt.design.files import load
 from tmsopt.design.problem import Problem
@@ -23,8 +25,6 @@ from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.roots import CLASSES
 from tmsopt.show.chart import chart_table
-from tmsopt.study.chart import chart, save_arrays
-from tmsopt.study.classes import classify
 from tmsopt.tracing.domain import domain
 from tmsopt.tracing.trace import trace
 

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from charts import EXTRA, PLANE, charted, files
 
+from tmsopt.charts import folder
+from tmsopt.charts.chart import chart
+from tmsopt.charts.stored import chart_to, open_chart
+from tmsopt.charts.survey import LAYERS
 from tmsopt.cli import main
 from tmsopt.design.files import load
 from tmsopt.errors import InputError
-from tmsopt.study import folder
-from tmsopt.study.chart import chart
-from tmsopt.study.stored import chart_to, open_chart
-from tmsopt.study.tiles import LAYERS
 
 
 @pytest.fixture(scope="module")

@@ -15,13 +15,13 @@ from matplotlib.mathtext import MathTextParser
 from scipy.optimize import differential_evolution
 
 import tmsopt
+from tmsopt.charts.files import save_layers
+from tmsopt.charts.survey import Grid
 from tmsopt.cli import main
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.models import Unfit, from_coefficients, from_matrices
 from tmsopt.models.names import CONSTANTS, FUNCTIONS, TAKEN, latex
-from tmsopt.study.archive import save_layers
 from tmsopt.study.batch.definition import definition
-from tmsopt.study.tiles import Grid
 
 PENDULUMS = """
 [model]

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from charts import EXTRA, FIXED, PLANE, POINTS, SPACE, charted, files
 
-from tmsopt.design.arrays import array_function
+from tmsopt.charts.chart import chart
+from tmsopt.charts.expressions import array_function
+from tmsopt.charts.stored import chart_to
+from tmsopt.charts.summary import tally, total
+from tmsopt.charts.survey import LAYERS, Grid, survey
 from tmsopt.design.files import load
 from tmsopt.design.problem import Problem
 from tmsopt.errors import InputError
 from tmsopt.models import Model, Parameter, ParameterSet
 from tmsopt.roots import CLASSES
-from tmsopt.study.chart import chart
-from tmsopt.study.stored import chart_to
-from tmsopt.study.tally import tally, total
-from tmsopt.study.tiles import LAYERS, Grid, survey
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tmsopt import laws, models, roots
     from tmsopt.certificates.certify import certify
+    from tmsopt.charts.chart import Chart, chart
+    from tmsopt.charts.stored import StoredChart, chart_to, open_chart
     from tmsopt.design.files import load
     from tmsopt.design.problem import Problem
     from tmsopt.design.solution import NotSolved, Solution
@@ -24,12 +26,10 @@ if TYPE_CHECKING:
     from tmsopt.study.batch.plan import Study, over_grid
     from tmsopt.study.batch.run import Results, run_study
     from tmsopt.study.batch.samples import latin_hypercube, sobol
-    from tmsopt.study.chart import Chart, chart
     from tmsopt.study.compare import Comparison, compare
     from tmsopt.study.front import Front
     from tmsopt.study.pareto import pareto
     from tmsopt.study.speeds import Speeds, speeds
-    from tmsopt.study.stored import StoredChart, chart_to, open_chart
     from tmsopt.tracing.branch import Branch, Trace
     from tmsopt.tracing.domain import Domain, domain
     from tmsopt.tracing.swallowtail import Swallowtail, swallowtail
@@ -97,7 +97,7 @@ __all__ = [
 _HOMES = {
     "Bicycle": "tmsopt.models.bicycle_files",
     "Branch": "tmsopt.tracing.branch",
-    "Chart": "tmsopt.study.chart",
+    "Chart": "tmsopt.charts.chart",
     "Comparison": "tmsopt.study.compare",
     "Diagnosis": "tmsopt.diagnosis.diagnosis",
     "Domain": "tmsopt.tracing.domain",
@@ -113,13 +113,13 @@ _HOMES = {
     "Robustness": "tmsopt.margins.nearest",
     "Solution": "tmsopt.design.solution",
     "Speeds": "tmsopt.study.speeds",
-    "StoredChart": "tmsopt.study.stored",
+    "StoredChart": "tmsopt.charts.stored",
     "Study": "tmsopt.study.batch.plan",
     "Swallowtail": "tmsopt.tracing.swallowtail",
     "Trace": "tmsopt.tracing.branch",
     "certify": "tmsopt.certificates.certify",
-    "chart": "tmsopt.study.chart",
-    "chart_to": "tmsopt.study.stored",
+    "chart": "tmsopt.charts.chart",
+    "chart_to": "tmsopt.charts.stored",
     "compare": "tmsopt.study.compare",
     "diagnose": "tmsopt.diagnosis.diagnosis",
     "domain": "tmsopt.tracing.domain",
@@ -129,7 +129,7 @@ _HOMES = {
     "load_study": "tmsopt.study.batch.files",
     "monte_carlo": "tmsopt.study.batch.monte_carlo",
     "nearest": "tmsopt.margins.nearest",
-    "open_chart": "tmsopt.study.stored",
+    "open_chart": "tmsopt.charts.stored",
     "optimality": "tmsopt.explanation.optimality",
     "over_grid": "tmsopt.study.batch.plan",
     "pareto": "tmsopt.study.pareto",

@@ -23,9 +23,9 @@ from tmsopt.cli.common import (
 )
 
 if TYPE_CHECKING:
+    from tmsopt.charts.chart import Chart
+    from tmsopt.charts.survey import Survey
     from tmsopt.design.problem import Problem
-    from tmsopt.study.chart import Chart
-    from tmsopt.study.tiles import Survey
 
 _EXAMPLES = """
 \b
@@ -129,8 +129,8 @@ def chart(
 ) -> None:  # fmt: skip
     """Chart stability over the free parameters of FILE: capsize, weave, stable, heavily damped."""
     with bad_input(), _stopped(output):
+        from tmsopt.charts.survey import USUAL, axes_of, survey
         from tmsopt.design.files import load
-        from tmsopt.study.tiles import USUAL, axes_of, survey
 
         check_output("--plot", plot, FIGURES)
         check_output("--output", output, ("npz", "nc", "chart"), folders=("chart",))
@@ -173,10 +173,10 @@ def _charted(
     work: "Survey", output: Path | None, fresh: bool, workers: int, boundaries: bool, update: Any
 ) -> tuple[dict[str, Any], "Chart | None"]:
     """The summary, and a plane in memory as a chart; the arrays are written."""
+    from tmsopt.charts.chart import CHART_LAYERS, LARGEST, chart_of
+    from tmsopt.charts.files import check_netcdf, save_layers
+    from tmsopt.charts.stored import gathered, store, summary
     from tmsopt.errors import Fault, InputError
-    from tmsopt.study.archive import check_netcdf, save_layers
-    from tmsopt.study.chart import CHART_LAYERS, LARGEST, chart_of
-    from tmsopt.study.stored import gathered, store, summary
     from tmsopt.tracing.domain import domain
 
     if output is not None and output.suffix.lower() == ".chart":
@@ -214,10 +214,10 @@ def _draw(
     work: "Survey", found: "Chart | None", held: dict[str, float], boundaries: bool, layer: str, plot: Path
 ) -> None:
     """The figure: the chart itself, some of its points, or a plane of a space."""
+    from tmsopt.charts.chart import CHART_LAYERS, chart_of
+    from tmsopt.charts.stored import gathered
     from tmsopt.show.chart import chart_figure
     from tmsopt.show.style import save
-    from tmsopt.study.chart import CHART_LAYERS, chart_of
-    from tmsopt.study.stored import gathered
     from tmsopt.tracing.domain import domain
 
     if found is None:

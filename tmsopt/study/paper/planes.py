@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tmsopt import laws
+from tmsopt.charts.chart import Chart, chart
 from tmsopt.design.problem import Problem
 from tmsopt.models import tms
 from tmsopt.records import Array, Table
-from tmsopt.study.chart import Chart, chart
 from tmsopt.study.paper.reference import MU, ZETA_B, ZETA_H
 from tmsopt.tracing.branch import Trace
 from tmsopt.tracing.swallowtail import Swallowtail, swallowtail

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.charts.files import save_layers
+from tmsopt.charts.stored import gathered
+from tmsopt.charts.survey import USUAL, Grid, Survey, survey
 from tmsopt.design.problem import Problem, checked
 from tmsopt.errors import Fault, InputError
 from tmsopt.records import Array
 from tmsopt.roots import CLASSES
-from tmsopt.study.archive import save_layers
-from tmsopt.study.stored import gathered
-from tmsopt.study.tiles import USUAL, Grid, Survey, survey
 from tmsopt.tracing.domain import Domain, domain
 
 LARGEST = 20_000_000

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.charts import folder
+from tmsopt.charts.summary import Tally, tally, total
+from tmsopt.charts.survey import USUAL, Grid, Survey, survey
 from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
 from tmsopt.records import Progress
 from tmsopt.roots import CLASSES
-from tmsopt.study import folder
-from tmsopt.study.tally import Tally, tally, total
-from tmsopt.study.tiles import USUAL, Grid, Survey, survey
 
 TILE = 2**18
 """Designs of a tile: some 40 MB while it is computed."""
@@ -105,7 +105,7 @@ def chart_to(
         path: of the folder, e.g. ``big.chart``.
         axes: the free parameters, the one that runs fastest first; by default in the order of the problem.
         points: along each axis, up to 1e9 in all; the ends of the box are grid points.
-        layers: names among `tmsopt.study.tiles.LAYERS`.
+        layers: names among `tmsopt.charts.survey.LAYERS`.
         quantities: name → expression, further layers.
         single: keep numbers in single precision.
         engine: ``auto``, ``numpy`` or ``numba``; the classes do not depend on it.

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.charts.survey import Grid
 from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
 from tmsopt.roots import CLASSES
-from tmsopt.study.tiles import Grid
 
 ENDINGS = ("npz", "nc")
 """Of the files that this writes."""

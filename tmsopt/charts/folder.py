@@ -20,8 +20,8 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.charts.summary import Tally
 from tmsopt.errors import Fault, InputError
-from tmsopt.study.tally import Tally
 
 SCHEMA = 1
 

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from tmsopt.design.arrays import ArrayFunction, array_function, parsed
+from tmsopt.charts.expressions import ArrayFunction, array_function, parsed
+from tmsopt.charts.motion import Classified, classified
 from tmsopt.design.machine import engine_of
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.quantities import RADIUS, ROOT_NAMES
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.records import Array
-from tmsopt.study.classes import Classified, classified
 
 LAYERS: Mapping[str, DTypeLike] = {
     "kind": np.int8,

@@ -1,0 +1,1 @@
+"""Chart: grids of designs in memory or in a folder."""
