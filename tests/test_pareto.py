@@ -16,8 +16,8 @@ from scipy.optimize import brentq, minimize_scalar
 import tmsopt
 from tmsopt import InputError, NotSolved, Problem
 from tmsopt.cli import main
+from tmsopt.fronts import subproblems as epsilon
 from tmsopt.models import tms
-from tmsopt.study import epsilon
 
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 Z_B, Z_H = -0.4, -0.2

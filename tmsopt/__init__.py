@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from tmsopt.errors import InputError
     from tmsopt.explanation.explain import Explanation, explain
     from tmsopt.explanation.optimality import Optimality, optimality
+    from tmsopt.fronts.front import Front
+    from tmsopt.fronts.pareto import pareto
     from tmsopt.margins.nearest import Nearest, Robustness, nearest, robustness
     from tmsopt.models.bicycle_files import Bicycle, read_bicycle, write_bicycle
     from tmsopt.proofs.proof import Proof
@@ -27,8 +29,6 @@ if TYPE_CHECKING:
     from tmsopt.study.batch.run import Results, run_study
     from tmsopt.study.batch.samples import latin_hypercube, sobol
     from tmsopt.study.compare import Comparison, compare
-    from tmsopt.study.front import Front
-    from tmsopt.study.pareto import pareto
     from tmsopt.study.speeds import Speeds, speeds
     from tmsopt.tracing.branch import Branch, Trace
     from tmsopt.tracing.domain import Domain, domain
@@ -102,7 +102,7 @@ _HOMES = {
     "Diagnosis": "tmsopt.diagnosis.diagnosis",
     "Domain": "tmsopt.tracing.domain",
     "Explanation": "tmsopt.explanation.explain",
-    "Front": "tmsopt.study.front",
+    "Front": "tmsopt.fronts.front",
     "InputError": "tmsopt.errors",
     "Nearest": "tmsopt.margins.nearest",
     "NotSolved": "tmsopt.design.solution",
@@ -132,7 +132,7 @@ _HOMES = {
     "open_chart": "tmsopt.charts.stored",
     "optimality": "tmsopt.explanation.optimality",
     "over_grid": "tmsopt.study.batch.plan",
-    "pareto": "tmsopt.study.pareto",
+    "pareto": "tmsopt.fronts.pareto",
     "prove": "tmsopt.proofs.prove",
     "read_bicycle": "tmsopt.models.bicycle_files",
     "robustness": "tmsopt.margins.nearest",

@@ -49,8 +49,8 @@ def write_front(
     Raises:
         NotSolved: when an objective has no optimum.
     """
-    from tmsopt.study.front import write_csv
-    from tmsopt.study.pareto import POINTS, STARTS, pareto
+    from tmsopt.fronts.front import write_csv
+    from tmsopt.fronts.pareto import POINTS, STARTS, pareto
 
     with progress("sub-problem") as update:
         front = pareto(

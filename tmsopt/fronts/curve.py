@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from tmsopt.design.solution import Solution
+from tmsopt.fronts.front import Front, FrontPoint, Gap, Kink, efficient
+from tmsopt.fronts.subproblems import Asker, least, point
 from tmsopt.records import Progress
-from tmsopt.study.dominance import efficient
-from tmsopt.study.epsilon import Asker, least, point
-from tmsopt.study.front import Front, FrontPoint, Gap, Kink
 
 Values = tuple[float, ...]
 

@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -159,3 +159,24 @@ def _point(point: FrontPoint) -> dict[str, Any]:
 
 def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
+
+
+def efficient(points: Sequence[FrontPoint], slack: Sequence[float]) -> list[FrontPoint]:
+    """Points that no other dominates, by their objectives; of those that are the same the first.
+
+    Args:
+        slack: per objective, the difference that rounding explains.
+    """
+    kept: list[FrontPoint] = []
+    for p in points:
+        beaten = any(
+            all(b <= a + t for a, b, t in zip(p.objectives, q.objectives, slack, strict=True))
+            and any(b < a - t for a, b, t in zip(p.objectives, q.objectives, slack, strict=True))
+            for q in points
+        )
+        same = any(
+            all(abs(a - b) <= t for a, b, t in zip(p.objectives, q.objectives, slack, strict=True)) for q in kept
+        )
+        if not beaten and not same:
+            kept.append(p)
+    return sorted(kept, key=lambda p: p.objectives)

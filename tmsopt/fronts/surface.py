@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from tmsopt.design.solution import Solution
+from tmsopt.fronts.front import FrontPoint, Gap, efficient
+from tmsopt.fronts.subproblems import Asker, least, point, solvable
 from tmsopt.records import Progress
-from tmsopt.study.dominance import efficient
-from tmsopt.study.epsilon import Asker, least, point, solvable
-from tmsopt.study.front import FrontPoint, Gap
 
 MOST = 12
 """Limits per objective at most, so 144 sub-problems."""

@@ -7,9 +7,9 @@ from itertools import pairwise
 from tmsopt.checks.recheck import recheck
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
+from tmsopt.fronts.front import FrontPoint
 from tmsopt.solver.multistart import STARTS
 from tmsopt.solver.solve import solve
-from tmsopt.study.front import FrontPoint
 
 _RETRY = 16  # starts for a sub-problem that the neighbours' designs and a few starts did not solve
 _SLACK = 1e-9  # of a best value held while the next is minimised: what the recheck of a constraint forgives

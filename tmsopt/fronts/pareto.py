@@ -7,11 +7,11 @@ from dataclasses import replace
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.solution import NotSolved, Solution
 from tmsopt.errors import Fault, InputError
+from tmsopt.fronts.curve import curve
+from tmsopt.fronts.front import Front, FrontPoint
+from tmsopt.fronts.subproblems import Asker, best_first, point
+from tmsopt.fronts.surface import surface
 from tmsopt.records import Progress
-from tmsopt.study.epsilon import Asker, best_first, point
-from tmsopt.study.front import Front, FrontPoint
-from tmsopt.study.payoff import surface
-from tmsopt.study.sweep import curve
 
 POINTS = 25
 STARTS = 2
