@@ -16,6 +16,7 @@ from tmsopt.charts.chart import chart
 from tmsopt.charts.motion import classified
 from tmsopt.checks.bound import omega0_bound
 from tmsopt.checks.coverage import cover
+from tmsopt.critical_speeds.growth import growth
 from tmsopt.design.problem import Problem
 from tmsopt.margins.boundaries import edges, heavily_damped
 from tmsopt.margins.nearest import nearest, robustness
@@ -33,7 +34,6 @@ from tmsopt.roots import (
 )
 from tmsopt.show.chart import chart_figure, chart_table
 from tmsopt.show.growth import growth_figure
-from tmsopt.study.growth import growth
 
 LAYERS = ("kind", "real_roots", "abscissa", "damping_ratio")
 

@@ -10,9 +10,9 @@ from oracles import abscissa_60, polynomial_60
 
 import tmsopt
 from tmsopt import laws
+from tmsopt.critical_speeds.growth import growth
 from tmsopt.show.growth import draw_frequencies, draw_growth_rates, growth_figure
 from tmsopt.show.style import save
-from tmsopt.study.growth import growth
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,8 @@ import math
 import pytest
 
 import tmsopt
+from tmsopt.critical_speeds.crossings import crossings
 from tmsopt.models import from_matrices
-from tmsopt.roots.crossings import crossings
 from tmsopt.show.speeds import speeds_table
 
 

@@ -16,14 +16,14 @@ from mpmath import mp
 import tmsopt
 from tmsopt import laws
 from tmsopt.cli import main
+from tmsopt.critical_speeds.crossings import crossings
+from tmsopt.critical_speeds.parametric import interpolated
 from tmsopt.models import MODELS, Values, tms, whipple
 from tmsopt.models.bicycle_files import problem_text
 from tmsopt.models.tms import copo, to_si
 from tmsopt.models.whipple import canonical
 from tmsopt.models.whipple_quantities import spin
 from tmsopt.roots import exact_roots, quadratic_pencil
-from tmsopt.roots.crossings import crossings
-from tmsopt.roots.parametric import interpolated
 
 SI = whipple.sets[0]
 NONE = {p.name: 0.0 for p in SI.parameters if p.default == 0}

@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from tmsopt.certificates.certify import certify
     from tmsopt.charts.chart import Chart, chart
     from tmsopt.charts.stored import StoredChart, chart_to, open_chart
+    from tmsopt.critical_speeds.speeds import Speeds, speeds
     from tmsopt.design.files import load
     from tmsopt.design.problem import Problem
     from tmsopt.design.solution import NotSolved, Solution
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from tmsopt.study.batch.run import Results, run_study
     from tmsopt.study.batch.samples import latin_hypercube, sobol
     from tmsopt.study.compare import Comparison, compare
-    from tmsopt.study.speeds import Speeds, speeds
     from tmsopt.tracing.branch import Branch, Trace
     from tmsopt.tracing.domain import Domain, domain
     from tmsopt.tracing.swallowtail import Swallowtail, swallowtail
@@ -112,7 +112,7 @@ _HOMES = {
     "Results": "tmsopt.study.batch.run",
     "Robustness": "tmsopt.margins.nearest",
     "Solution": "tmsopt.design.solution",
-    "Speeds": "tmsopt.study.speeds",
+    "Speeds": "tmsopt.critical_speeds.speeds",
     "StoredChart": "tmsopt.charts.stored",
     "Study": "tmsopt.study.batch.plan",
     "Swallowtail": "tmsopt.tracing.swallowtail",
@@ -141,7 +141,7 @@ _HOMES = {
     "solve": "tmsopt.solver.solve",
     "solve_all": "tmsopt.solver.all_designs",
     "Every": "tmsopt.solver.all_designs",
-    "speeds": "tmsopt.study.speeds",
+    "speeds": "tmsopt.critical_speeds.speeds",
     "swallowtail": "tmsopt.tracing.swallowtail",
     "trace": "tmsopt.tracing.trace",
     "write_bicycle": "tmsopt.models.bicycle_files",

@@ -277,11 +277,11 @@ def _scale(option: str, text: str, unit: str) -> float:
 
 
 def _draw(solution: "Solution", path: Path, w: float, m_B: float) -> None:
+    from tmsopt.critical_speeds.growth import growth
     from tmsopt.models import tms
     from tmsopt.show.growth import growth_figure
     from tmsopt.show.style import save
     from tmsopt.show.tables import si_parameters
-    from tmsopt.study.growth import growth
 
     if not math.isfinite(solution.abscissa):
         click.echo("--plot: nothing to draw, a root is at infinity", err=True)

@@ -44,12 +44,12 @@ def _ends(_context: click.Context, _option: click.Parameter, value: str | None) 
 def speeds(file: Path, parameter: str | None, between: tuple[float, float] | None, as_json: bool) -> None:
     """Find every weave and capsize speed of FILE, and every speed at which roots meet."""
     with bad_input():
+        from tmsopt.critical_speeds.speeds import speed_of
+        from tmsopt.critical_speeds.speeds import speeds as find
         from tmsopt.design.files import load
         from tmsopt.design.problem import unasked
         from tmsopt.errors import InputError
         from tmsopt.show.speeds import speeds_table
-        from tmsopt.study.speeds import speed_of
-        from tmsopt.study.speeds import speeds as find
 
         problem = nominal_of(load(file, asks=False))
         name = parameter or speed_of(problem.parameter_set)

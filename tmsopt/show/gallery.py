@@ -60,12 +60,12 @@ def _bicycle() -> "Figure":
 
 
 def _growth() -> "Figure":
+    from tmsopt.critical_speeds.growth import growth
     from tmsopt.design.problem import Problem
     from tmsopt.models import tms
     from tmsopt.show.growth import draw_growth_rates
     from tmsopt.show.style import REAL, new_figure
     from tmsopt.solver.solve import solve
-    from tmsopt.study.growth import growth
     from tmsopt.study.paper.reference import benchmark, optimised
 
     others = {name: value for name, value in benchmark().parameters.items() if name != "Fr"}

@@ -5,9 +5,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from tmsopt.critical_speeds.growth import SPEEDS, Growth
 from tmsopt.show.labels import axis_label
 from tmsopt.show.style import CRITICAL, HEAVY, LINE, MARK, STABLE, new_figure
-from tmsopt.study.growth import SPEEDS, Growth
 
 
 def draw_growth_rates(ax: Axes, data: Growth) -> None:

@@ -3,10 +3,10 @@
 import math
 from collections.abc import Iterator, Sequence
 
+from tmsopt.critical_speeds.crossings import Crossing
+from tmsopt.critical_speeds.speeds import Speeds
 from tmsopt.design.units import reading
-from tmsopt.roots.crossings import Crossing
 from tmsopt.show.text import columns
-from tmsopt.study.speeds import Speeds
 
 _DIGITS = 15
 

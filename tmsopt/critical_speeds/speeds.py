@@ -8,13 +8,13 @@ from typing import Any
 import flint
 
 from tmsopt.arithmetic.elementary import exact, rational
+from tmsopt.critical_speeds.crossings import Crossing, crossings
+from tmsopt.critical_speeds.parametric import interpolated
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import ParameterSet
 from tmsopt.records import Table
-from tmsopt.roots.crossings import Crossing, crossings
-from tmsopt.roots.parametric import interpolated
 
 _DIGITS = 120  # of what is no fraction, such as the tangent of an angle
 _STRAIGHT = 1e-100  # relative; a number that is linear in the speed is so within the digits carried

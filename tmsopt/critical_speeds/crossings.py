@@ -13,9 +13,17 @@ from typing import Any
 import flint
 
 from tmsopt.arithmetic.elementary import rational
+from tmsopt.critical_speeds.parametric import (
+    DIGITS,
+    Lasting,
+    Polynomial,
+    lasting,
+    of_values,
+    real_places,
+    trimmed,
+    value_at,
+)
 from tmsopt.roots.exact import exact_roots
-from tmsopt.roots.lasting import Lasting, Polynomial, lasting
-from tmsopt.roots.parametric import DIGITS, of_values, real_places, trimmed, value_at
 from tmsopt.roots.polynomial import Root
 from tmsopt.roots.stability import lienard_chipart
 

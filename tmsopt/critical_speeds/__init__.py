@@ -1,0 +1,1 @@
+"""Speeds: every weave, capsize and meeting speed, exactly; growth over speed."""
