@@ -24,12 +24,11 @@ from tqdm import tqdm
 from benchmarks.report import keep, kept, origin, table
 from tmsopt.design.files import load
 from tmsopt.solver.solve import solve
-from tmsopt.study.batch.definition import definition
-from tmsopt.study.batch.monte_carlo import monte_carlo
-from tmsopt.study.batch.plan import Study
-from tmsopt.study.batch.row import Row
-from tmsopt.study.batch.run import fill
-from tmsopt.study.batch.solving import Solver
+from tmsopt.studies.monte_carlo import monte_carlo
+from tmsopt.studies.row import Row
+from tmsopt.studies.run import fill
+from tmsopt.studies.solving import Solver
+from tmsopt.studies.study import Study, definition
 from tmsopt.study.batch.store.store import Store, open_store, read_store
 
 _EP4 = Path(__file__).parent.parent / "problems" / "ep4.toml"

@@ -16,11 +16,10 @@ from benchmarks.report import origin, table
 from tmsopt.design.files import load
 from tmsopt.formulation.ipopt import Run
 from tmsopt.solver import workspace as families
-from tmsopt.study.batch.definition import definition
+from tmsopt.studies.run import fill, run_study
+from tmsopt.studies.solving import Solver
+from tmsopt.studies.study import Study, definition, over_grid
 from tmsopt.study.batch.engines import cluster, in_process, processes
-from tmsopt.study.batch.plan import Study, over_grid
-from tmsopt.study.batch.run import fill, run_study
-from tmsopt.study.batch.solving import Solver
 from tmsopt.study.batch.store.store import open_store
 
 _PROBLEMS = Path(__file__).parent.parent / "problems"

@@ -14,9 +14,9 @@ import pytest
 from works import Fake, Unloadable
 
 from tmsopt.errors import InputError
+from tmsopt.studies.row import Row
 from tmsopt.study.batch.engines import EngineError, cluster, cores, in_process, processes
 from tmsopt.study.batch.engines.ledger import Ledger
-from tmsopt.study.batch.row import Row
 
 Units = Sequence[tuple[int, ...]]
 Engine = Callable[..., Iterator[Row]]

@@ -14,9 +14,8 @@ import pytest
 
 from tmsopt.errors import InputError
 from tmsopt.records import Table
-from tmsopt.study.batch.row import Row
-from tmsopt.study.batch.store.columns import columns
-from tmsopt.study.batch.store.export import ENDINGS, check_export, export
+from tmsopt.studies.export import ENDINGS, check_export, columns, export
+from tmsopt.studies.row import Row
 
 SPECIAL = (
     0.1,

@@ -18,15 +18,14 @@ import tmsopt
 from tmsopt.design.expression import ExpressionError
 from tmsopt.design.limit import limit_of, with_limit
 from tmsopt.records import Column, Table
-from tmsopt.study.batch.definition import definition
-from tmsopt.study.batch.files import load_study
-from tmsopt.study.batch.monte_carlo import Sampling, monte_carlo, planned
-from tmsopt.study.batch.neighbours import blocks
-from tmsopt.study.batch.plan import Study, over_grid
-from tmsopt.study.batch.product import Share, wilson, yield_of
-from tmsopt.study.batch.row import Row
-from tmsopt.study.batch.rows_csv import read_csv
-from tmsopt.study.batch.samples import Span, grid, latin_hypercube, sobol, sobol_note
+from tmsopt.studies.load import load_study
+from tmsopt.studies.monte_carlo import Sampling, monte_carlo, planned
+from tmsopt.studies.neighbours import blocks
+from tmsopt.studies.row import Row
+from tmsopt.studies.samples import Span, grid, latin_hypercube, sobol, sobol_note
+from tmsopt.studies.study import Study, definition, over_grid
+from tmsopt.studies.summary import Share, wilson, yield_of
+from tmsopt.studies.vary import read_csv
 
 PROBLEM = tmsopt.Problem(
     tmsopt.models.tms,

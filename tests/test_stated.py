@@ -21,7 +21,7 @@ from tmsopt.cli import main
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.models import Unfit, from_coefficients, from_matrices
 from tmsopt.models.names import CONSTANTS, FUNCTIONS, TAKEN, latex
-from tmsopt.study.batch.definition import definition
+from tmsopt.studies.study import definition
 
 PENDULUMS = """
 [model]

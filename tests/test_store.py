@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 
 from tmsopt.errors import InputError
 from tmsopt.records import Table
-from tmsopt.study.batch.row import Row
+from tmsopt.studies.row import Row
 from tmsopt.study.batch.store import database, store
 from tmsopt.study.batch.store.journal import _type, journal
 from tmsopt.study.batch.store.lock import lock

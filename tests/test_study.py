@@ -26,14 +26,13 @@ from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.records import Table
 from tmsopt.solver.solve import solve
-from tmsopt.study.batch.definition import definition
-from tmsopt.study.batch.monte_carlo import monte_carlo
-from tmsopt.study.batch.plan import Study, over_grid
-from tmsopt.study.batch.row import Row
-from tmsopt.study.batch.run import run_study
-from tmsopt.study.batch.solving import Solver, alone
+from tmsopt.studies.monte_carlo import monte_carlo
+from tmsopt.studies.row import Row
+from tmsopt.studies.run import run_study
+from tmsopt.studies.solving import Solver, alone
+from tmsopt.studies.study import Study, definition, over_grid
+from tmsopt.studies.summary import summary
 from tmsopt.study.batch.store.store import open_store, read_store
-from tmsopt.study.batch.summary import summary
 from tmsopt.study.compare import law_rows
 
 EP4 = load("problems/ep4.toml")
@@ -160,7 +159,7 @@ def test_a_row_that_breaks_the_program_is_a_row(monkeypatch: pytest.MonkeyPatch)
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("of a bug")
 
-    monkeypatch.setattr("tmsopt.study.batch.solving.solve", broken)
+    monkeypatch.setattr("tmsopt.studies.solving.solve", broken)
     rows = run_study(GRID, workers=1).rows
     assert {row.status for row in rows} == {"failed"}
     assert rows[0].cause == "ZeroDivisionError: of a bug"
@@ -322,7 +321,7 @@ def test_a_row_is_solved_from_its_own_seed_with_the_starts_of_the_study_on_one_t
         seen.append((options["seed"], options["starts"]))
         return solve(problem, **options)
 
-    monkeypatch.setattr("tmsopt.study.batch.solving.solve", spied)
+    monkeypatch.setattr("tmsopt.studies.solving.solve", spied)
     study = over_grid(EP4, HEIGHTS, seed=5, starts=3)
     with threadpool_limits(2):  # more than one, wherever this runs
         run_study(study, workers=1)

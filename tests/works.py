@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tmsopt.records import Table
-from tmsopt.study.batch.row import Row
+from tmsopt.studies.row import Row
 
 
 @dataclass(frozen=True)

@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from tmsopt.proofs.prove import prove
     from tmsopt.solver.all_designs import Every, solve_all
     from tmsopt.solver.solve import solve
-    from tmsopt.study.batch.files import load_study
-    from tmsopt.study.batch.monte_carlo import monte_carlo
-    from tmsopt.study.batch.plan import Study, over_grid
-    from tmsopt.study.batch.run import Results, run_study
-    from tmsopt.study.batch.samples import latin_hypercube, sobol
+    from tmsopt.studies.load import load_study
+    from tmsopt.studies.monte_carlo import monte_carlo
+    from tmsopt.studies.run import Results, run_study
+    from tmsopt.studies.samples import latin_hypercube, sobol
+    from tmsopt.studies.study import Study, over_grid
     from tmsopt.study.compare import Comparison, compare
     from tmsopt.tracing.branch import Branch, Trace
     from tmsopt.tracing.domain import Domain, domain
@@ -109,12 +109,12 @@ _HOMES = {
     "Optimality": "tmsopt.explanation.optimality",
     "Problem": "tmsopt.design.problem",
     "Proof": "tmsopt.proofs.proof",
-    "Results": "tmsopt.study.batch.run",
+    "Results": "tmsopt.studies.run",
     "Robustness": "tmsopt.margins.nearest",
     "Solution": "tmsopt.design.solution",
     "Speeds": "tmsopt.critical_speeds.speeds",
     "StoredChart": "tmsopt.charts.stored",
-    "Study": "tmsopt.study.batch.plan",
+    "Study": "tmsopt.studies.study",
     "Swallowtail": "tmsopt.tracing.swallowtail",
     "Trace": "tmsopt.tracing.branch",
     "certify": "tmsopt.certificates.certify",
@@ -124,20 +124,20 @@ _HOMES = {
     "diagnose": "tmsopt.diagnosis.diagnosis",
     "domain": "tmsopt.tracing.domain",
     "explain": "tmsopt.explanation.explain",
-    "latin_hypercube": "tmsopt.study.batch.samples",
+    "latin_hypercube": "tmsopt.studies.samples",
     "load": "tmsopt.design.files",
-    "load_study": "tmsopt.study.batch.files",
-    "monte_carlo": "tmsopt.study.batch.monte_carlo",
+    "load_study": "tmsopt.studies.load",
+    "monte_carlo": "tmsopt.studies.monte_carlo",
     "nearest": "tmsopt.margins.nearest",
     "open_chart": "tmsopt.charts.stored",
     "optimality": "tmsopt.explanation.optimality",
-    "over_grid": "tmsopt.study.batch.plan",
+    "over_grid": "tmsopt.studies.study",
     "pareto": "tmsopt.fronts.pareto",
     "prove": "tmsopt.proofs.prove",
     "read_bicycle": "tmsopt.models.bicycle_files",
     "robustness": "tmsopt.margins.nearest",
-    "run_study": "tmsopt.study.batch.run",
-    "sobol": "tmsopt.study.batch.samples",
+    "run_study": "tmsopt.studies.run",
+    "sobol": "tmsopt.studies.samples",
     "solve": "tmsopt.solver.solve",
     "solve_all": "tmsopt.solver.all_designs",
     "Every": "tmsopt.solver.all_designs",

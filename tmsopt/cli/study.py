@@ -10,7 +10,7 @@ import click
 from tmsopt.cli.common import BAD_INPUT, INTERRUPTED, bad_input, check_output, saving, write_json
 
 if TYPE_CHECKING:
-    from tmsopt.study.batch.plan import Study
+    from tmsopt.studies.study import Study
     from tmsopt.study.batch.store.store import Store
 
 _EXAMPLES = """
@@ -70,11 +70,11 @@ def study(
 ) -> None:
     """Solve the problem of the study FILE for every row of what varies in it."""
     with bad_input():
-        from tmsopt.study.batch.files import load_study
+        from tmsopt.studies.load import load_study
 
         _check_together(row, scheduler, workers, {"--store": store, "--fresh": fresh, "--export": exports})
         for target in exports:
-            from tmsopt.study.batch.store.export import check_export
+            from tmsopt.studies.export import check_export
 
             check_export(target)
         path = store or Path(f"{file.stem}.sqlite")
@@ -84,7 +84,7 @@ def study(
         if row is not None:
             _show_row(asked, row, as_json)
             return
-        from tmsopt.study.batch.definition import definition
+        from tmsopt.studies.study import definition
         from tmsopt.study.batch.store.store import open_store
 
         with open_store(path, definition(asked), fresh=fresh) as opened:
@@ -93,7 +93,7 @@ def study(
             figures = _filled(asked, opened, workers, scheduler)
             _show(asked, opened, figures, as_json)
             for target in exports:
-                from tmsopt.study.batch.store.export import export
+                from tmsopt.studies.export import export
 
                 with saving("--export", target):
                     export(opened.rows(), target, opened.about())
@@ -118,7 +118,7 @@ def _check_together(row: int | None, scheduler: str | None, workers: int | None,
 def _planned(asked: Any) -> "Study":
     """The study, with the design of a Monte Carlo one solved first."""
     from tmsopt.design.solution import NotSolved
-    from tmsopt.study.batch.monte_carlo import planned
+    from tmsopt.studies.monte_carlo import planned
 
     try:
         return planned(asked)
@@ -131,8 +131,8 @@ def _filled(asked: "Study", opened: "Store", workers: int | None, scheduler: str
     """Solve what is missing, with a progress bar; figures of the run."""
     from tqdm import tqdm
 
+    from tmsopt.studies.run import fill
     from tmsopt.study.batch.engines import EngineError
-    from tmsopt.study.batch.run import fill
 
     present = len(opened.done())
     figures: dict[str, Any] = {"store": str(opened.path), "rows_found": present}
@@ -166,7 +166,7 @@ def _filled(asked: "Study", opened: "Store", workers: int | None, scheduler: str
 
 def _show(asked: "Study", opened: "Store", figures: dict[str, Any], as_json: bool) -> None:
     from tmsopt.show.study import study_table
-    from tmsopt.study.batch.summary import summary
+    from tmsopt.studies.summary import summary
 
     found = summary(asked, opened.rows())
     if as_json:
@@ -184,7 +184,7 @@ def _show(asked: "Study", opened: "Store", figures: dict[str, Any], as_json: boo
 
 def _show_row(asked: "Study", number: int, as_json: bool) -> None:
     """One row, solved alone."""
-    from tmsopt.study.batch.solving import alone
+    from tmsopt.studies.solving import alone
 
     solved = alone(asked, number)
     if as_json:

@@ -6,10 +6,9 @@ from itertools import islice
 
 from tmsopt.models import ParameterSet
 from tmsopt.show.text import columns, number, with_unit
-from tmsopt.study.batch.plan import Study
-from tmsopt.study.batch.product import Share
-from tmsopt.study.batch.row import Row
-from tmsopt.study.batch.summary import Summary
+from tmsopt.studies.row import Row
+from tmsopt.studies.study import Study
+from tmsopt.studies.summary import Share, Summary
 
 LISTED = 40
 """Rows up to which a study is shown whole."""

@@ -5,8 +5,8 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from tmsopt.studies.row import Row
 from tmsopt.study.batch.engines.work import Unit, Work, attempt
-from tmsopt.study.batch.row import Row
 
 TOPIC = "tmsopt-rows"
 """Of the events that carry finished units. One for all studies: schedulers never forget a topic."""

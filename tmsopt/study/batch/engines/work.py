@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from tmsopt.study.batch.row import Row
+from tmsopt.studies.row import Row
 
 Unit = tuple[int, ...]
 """Numbers of rows that are solved together: usually one, a block where neighbours start each other."""

@@ -3,7 +3,7 @@
 import json
 import zlib
 
-from tmsopt.study.batch.row import Row
+from tmsopt.studies.row import Row
 
 Line = tuple[int, str, int, str]
 

@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Any
 
 from tmsopt.errors import InputError
-from tmsopt.study.batch.row import STATUSES, Row
+from tmsopt.studies.row import STATUSES, Row
 from tmsopt.study.batch.store import database
 from tmsopt.study.batch.store.database import ask, explained, refuse
 from tmsopt.study.batch.store.journal import journal

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tmsopt.study.batch.plan import Study
+from tmsopt.studies.study import Study
 
 BLOCK = 32
 """Rows of a block: the first of each starts cold, so that blocks can be solved apart."""

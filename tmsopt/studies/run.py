@@ -12,18 +12,16 @@ from numpy.typing import NDArray
 
 from tmsopt.errors import Fault, InputError, short, suggest
 from tmsopt.records import Progress
-from tmsopt.study.batch.definition import definition
+from tmsopt.studies.export import columns, export
+from tmsopt.studies.monte_carlo import Sampling, planned
+from tmsopt.studies.neighbours import blocks
+from tmsopt.studies.row import Row
+from tmsopt.studies.solving import Solver
+from tmsopt.studies.study import Study, definition
+from tmsopt.studies.summary import Summary, summary
 from tmsopt.study.batch.engines import Note, Unit, cluster, cores, in_process, processes
 from tmsopt.study.batch.engines.work import silent
-from tmsopt.study.batch.monte_carlo import Sampling, planned
-from tmsopt.study.batch.neighbours import blocks
-from tmsopt.study.batch.plan import Study
-from tmsopt.study.batch.row import Row
-from tmsopt.study.batch.solving import Solver
-from tmsopt.study.batch.store.columns import columns
-from tmsopt.study.batch.store.export import export
 from tmsopt.study.batch.store.store import Store, open_store
-from tmsopt.study.batch.summary import Summary, summary
 
 _COMMIT = 0.2
 """s of rows in one transaction: what a kill may cost, and some 20 times what a transaction takes."""

@@ -14,11 +14,10 @@ from tmsopt.design.toml import Key, Number, Page, Section, fitted, read_page, wi
 from tmsopt.design.units import with_unit
 from tmsopt.errors import Fault, InputError, short, suggest
 from tmsopt.solver.multistart import STARTS
-from tmsopt.study.batch.monte_carlo import DISTRIBUTIONS, Sampling
-from tmsopt.study.batch.plan import Study
-from tmsopt.study.batch.rows_csv import read_csv
-from tmsopt.study.batch.stated import METHODS, MOST_ROWS, common_faults, count_faults, name_fault
-from tmsopt.study.batch.vary import Varied, unit_of, varied
+from tmsopt.studies.monte_carlo import DISTRIBUTIONS, Sampling
+from tmsopt.studies.study import Study
+from tmsopt.studies.validate import METHODS, MOST_ROWS, common_faults, count_faults, name_fault
+from tmsopt.studies.vary import Varied, read_csv, unit_of, varied
 
 _NEEDED = {"latin_hypercube": ("rows",), "sobol": ("rows",), "csv": ("csv",), "monte_carlo": ("rows",)}
 _OWN = {"rows": ("latin_hypercube", "sobol", "monte_carlo"), "csv": ("csv",), "distribution": ("monte_carlo",)}

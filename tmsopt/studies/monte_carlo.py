@@ -14,8 +14,8 @@ from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.records import Column, Table
 from tmsopt.solver.multistart import STARTS
 from tmsopt.solver.solve import solve
-from tmsopt.study.batch.plan import Study
-from tmsopt.study.batch.stated import MOST_ROWS, common_faults, count_faults
+from tmsopt.studies.study import Study
+from tmsopt.studies.validate import MOST_ROWS, common_faults, count_faults
 
 DISTRIBUTIONS = ("uniform", "normal")
 """Of an error: uniform within ± tolerance; or normal, its standard deviation a third of the tolerance, cut off at

@@ -10,7 +10,7 @@ import numpy as np
 
 from tmsopt.errors import Fault, InputError
 from tmsopt.records import Array, Column
-from tmsopt.study.batch.stated import MOST_ROWS, count_faults
+from tmsopt.studies.validate import MOST_ROWS, count_faults
 
 _DIGITS = 15  # of a decimal number, all of which a double holds
 

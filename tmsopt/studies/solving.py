@@ -18,9 +18,9 @@ from tmsopt.records import Table
 from tmsopt.solver.multistart import same
 from tmsopt.solver.solve import solve
 from tmsopt.solver.workspace import Family
-from tmsopt.study.batch.neighbours import blocks
-from tmsopt.study.batch.plan import Study
-from tmsopt.study.batch.row import Row
+from tmsopt.studies.neighbours import blocks
+from tmsopt.studies.row import Row
+from tmsopt.studies.study import Study
 from tmsopt.study.compare import LawRow, law_rows
 
 _AFAR = 1
