@@ -16,10 +16,10 @@ from benchmarks.report import origin, table
 from tmsopt.design.files import load
 from tmsopt.formulation.ipopt import Run
 from tmsopt.solver import workspace as families
+from tmsopt.studies.engines import cluster, in_process, processes
 from tmsopt.studies.run import fill, run_study
 from tmsopt.studies.solving import Solver
 from tmsopt.studies.study import Study, definition, over_grid
-from tmsopt.study.batch.engines import cluster, in_process, processes
 from tmsopt.study.batch.store.store import open_store
 
 _PROBLEMS = Path(__file__).parent.parent / "problems"

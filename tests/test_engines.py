@@ -14,9 +14,9 @@ import pytest
 from works import Fake, Unloadable
 
 from tmsopt.errors import InputError
+from tmsopt.studies.engines import EngineError, cluster, cores, in_process, processes
+from tmsopt.studies.engines.dispatch import Ledger
 from tmsopt.studies.row import Row
-from tmsopt.study.batch.engines import EngineError, cluster, cores, in_process, processes
-from tmsopt.study.batch.engines.ledger import Ledger
 
 Units = Sequence[tuple[int, ...]]
 Engine = Callable[..., Iterator[Row]]
@@ -206,7 +206,7 @@ def test_workers_of_two_threads_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("wrong", ["nowhere", "tcp://127.0.0.1:99999", "http://127.0.0.1:1"])
 def test_an_address_without_a_scheduler_is_refused(wrong: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("tmsopt.study.batch.engines.admission.PATIENCE", 0.5)
+    monkeypatch.setattr("tmsopt.studies.engines.dask_workers.PATIENCE", 0.5)
     with pytest.raises(InputError, match=f"no Dask scheduler answers at '{wrong}'"):
         list(cluster(Fake(tmp_path), singles(3), wrong))
 

@@ -67,7 +67,7 @@ class Unloadable(Fake):
 
 def main(folder: str) -> None:
     """A program whose workers would never end by themselves: the ids of two of them, then nothing."""
-    from tmsopt.study.batch.engines import processes
+    from tmsopt.studies.engines import processes
 
     seen: set[str] = set()
     try:

@@ -131,8 +131,8 @@ def _filled(asked: "Study", opened: "Store", workers: int | None, scheduler: str
     """Solve what is missing, with a progress bar; figures of the run."""
     from tqdm import tqdm
 
+    from tmsopt.studies.engines import EngineError
     from tmsopt.studies.run import fill
-    from tmsopt.study.batch.engines import EngineError
 
     present = len(opened.done())
     figures: dict[str, Any] = {"store": str(opened.path), "rows_found": present}

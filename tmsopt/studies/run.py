@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from tmsopt.errors import Fault, InputError, short, suggest
 from tmsopt.records import Progress
+from tmsopt.studies.engines import Note, Unit, cluster, cores, in_process, processes
+from tmsopt.studies.engines.work import silent
 from tmsopt.studies.export import columns, export
 from tmsopt.studies.monte_carlo import Sampling, planned
 from tmsopt.studies.neighbours import blocks
@@ -19,8 +21,6 @@ from tmsopt.studies.row import Row
 from tmsopt.studies.solving import Solver
 from tmsopt.studies.study import Study, definition
 from tmsopt.studies.summary import Summary, summary
-from tmsopt.study.batch.engines import Note, Unit, cluster, cores, in_process, processes
-from tmsopt.study.batch.engines.work import silent
 from tmsopt.study.batch.store.store import Store, open_store
 
 _COMMIT = 0.2

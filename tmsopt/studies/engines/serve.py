@@ -8,7 +8,7 @@ import time
 from multiprocessing.connection import Connection
 from queue import SimpleQueue
 
-from tmsopt.study.batch.engines.work import Unit, attempt
+from tmsopt.studies.engines.work import Unit, attempt
 
 READY = "ready"
 """The first message of a worker that has the work; any other text says why it has not."""

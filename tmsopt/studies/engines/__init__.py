@@ -5,8 +5,8 @@ bits on all of them. They differ in what a crash costs: `in_process` ends with i
 solved, try it again alone, and quarantine a row that ends its worker twice.
 """
 
-from tmsopt.study.batch.engines.local import cores, in_process, processes
-from tmsopt.study.batch.engines.remote import cluster
-from tmsopt.study.batch.engines.work import EngineError, Note, Unit, Work
+from tmsopt.studies.engines.dask import cluster
+from tmsopt.studies.engines.local import cores, in_process, processes
+from tmsopt.studies.engines.work import EngineError, Note, Unit, Work
 
 __all__ = ["EngineError", "Note", "Unit", "Work", "cluster", "cores", "in_process", "processes"]

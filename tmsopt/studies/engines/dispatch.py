@@ -4,8 +4,8 @@ import math
 from collections import deque
 from collections.abc import Sequence
 
+from tmsopt.studies.engines.work import Note, Unit, Work, called
 from tmsopt.studies.row import Row
-from tmsopt.study.batch.engines.work import Note, Unit, Work, called
 
 _BATCH = 0.2  # s of work in one message
 _LOW = 0.1  # s of work left at a worker, below which it is sent more before it asks

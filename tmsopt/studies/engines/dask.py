@@ -12,11 +12,10 @@ from functools import cached_property
 from queue import Empty, SimpleQueue
 from typing import Any
 
+from tmsopt.studies.engines.dask_workers import PATIENCE, TOPIC, admitted, check_threads, connected, solve
+from tmsopt.studies.engines.dispatch import Ledger
+from tmsopt.studies.engines.work import EngineError, Note, Unit, Work, pickled, silent
 from tmsopt.studies.row import Row
-from tmsopt.study.batch.engines.admission import PATIENCE, admitted, check_threads, connected
-from tmsopt.study.batch.engines.ledger import Ledger
-from tmsopt.study.batch.engines.member import TOPIC, solve
-from tmsopt.study.batch.engines.work import EngineError, Note, Unit, Work, pickled, silent
 
 _LOOK = 2.0  # s between looks at who is there; news of it comes sooner as a rule
 _LATE = 2.0  # s that finished units may come after word that their batch is done

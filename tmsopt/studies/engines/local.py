@@ -11,10 +11,10 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from tmsopt.errors import Fault, InputError
+from tmsopt.studies.engines.dispatch import Ledger
+from tmsopt.studies.engines.serve import READY, serve
+from tmsopt.studies.engines.work import EngineError, Note, Unit, Work, attempt, pickled, silent
 from tmsopt.studies.row import Row
-from tmsopt.study.batch.engines.ledger import Ledger
-from tmsopt.study.batch.engines.serve import READY, serve
-from tmsopt.study.batch.engines.work import EngineError, Note, Unit, Work, attempt, pickled, silent
 
 _ONE_THREAD = dict.fromkeys(
     (
