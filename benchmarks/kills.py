@@ -28,8 +28,8 @@ from tmsopt.studies.monte_carlo import monte_carlo
 from tmsopt.studies.row import Row
 from tmsopt.studies.run import fill
 from tmsopt.studies.solving import Solver
+from tmsopt.studies.store.store import Store, open_store, read_store
 from tmsopt.studies.study import Study, definition
-from tmsopt.study.batch.store.store import Store, open_store, read_store
 
 _EP4 = Path(__file__).parent.parent / "problems" / "ep4.toml"
 _PAUSE = (0.3, 3.0)  # s of work between kills

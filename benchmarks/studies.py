@@ -19,8 +19,8 @@ from tmsopt.solver import workspace as families
 from tmsopt.studies.engines import cluster, in_process, processes
 from tmsopt.studies.run import fill, run_study
 from tmsopt.studies.solving import Solver
+from tmsopt.studies.store.store import open_store
 from tmsopt.studies.study import Study, definition, over_grid
-from tmsopt.study.batch.store.store import open_store
 
 _PROBLEMS = Path(__file__).parent.parent / "problems"
 

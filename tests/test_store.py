@@ -24,10 +24,9 @@ from hypothesis import strategies as st
 from tmsopt.errors import InputError
 from tmsopt.records import Table
 from tmsopt.studies.row import Row
-from tmsopt.study.batch.store import database, store
-from tmsopt.study.batch.store.journal import _type, journal
-from tmsopt.study.batch.store.lock import lock
-from tmsopt.study.batch.store.store import Store, open_store, read_store
+from tmsopt.studies.store import database, store
+from tmsopt.studies.store.locking import _type, journal, lock
+from tmsopt.studies.store.store import Store, open_store, read_store
 
 JOURNALS = ("wal", "delete")
 STUDY: dict[str, Any] = {
@@ -555,7 +554,7 @@ def test_a_full_disk_costs_no_row_that_was_acknowledged(path: Path, kind: str, m
 def test_a_write_ahead_log_is_probed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert journal(tmp_path) == "wal"
     assert journal(tmp_path / "absent") == "delete"
-    monkeypatch.setattr("tmsopt.study.batch.store.journal._type", lambda folder: "nfs4")
+    monkeypatch.setattr("tmsopt.studies.store.locking._type", lambda folder: "nfs4")
     assert journal(tmp_path) == "delete"
     assert list(tmp_path.iterdir()) == []
 

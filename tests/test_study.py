@@ -30,9 +30,9 @@ from tmsopt.studies.monte_carlo import monte_carlo
 from tmsopt.studies.row import Row
 from tmsopt.studies.run import run_study
 from tmsopt.studies.solving import Solver, alone
+from tmsopt.studies.store.store import open_store, read_store
 from tmsopt.studies.study import Study, definition, over_grid
 from tmsopt.studies.summary import summary
-from tmsopt.study.batch.store.store import open_store, read_store
 from tmsopt.study.compare import law_rows
 
 EP4 = load("problems/ep4.toml")

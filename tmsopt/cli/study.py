@@ -10,8 +10,8 @@ import click
 from tmsopt.cli.common import BAD_INPUT, INTERRUPTED, bad_input, check_output, saving, write_json
 
 if TYPE_CHECKING:
+    from tmsopt.studies.store.store import Store
     from tmsopt.studies.study import Study
-    from tmsopt.study.batch.store.store import Store
 
 _EXAMPLES = """
 \b
@@ -84,8 +84,8 @@ def study(
         if row is not None:
             _show_row(asked, row, as_json)
             return
+        from tmsopt.studies.store.store import open_store
         from tmsopt.studies.study import definition
-        from tmsopt.study.batch.store.store import open_store
 
         with open_store(path, definition(asked), fresh=fresh) as opened:
             for line in (*opened.warnings, *([f"moved the old store to {opened.moved}"] if opened.moved else [])):

@@ -19,9 +19,9 @@ from tmsopt.studies.monte_carlo import Sampling, planned
 from tmsopt.studies.neighbours import blocks
 from tmsopt.studies.row import Row
 from tmsopt.studies.solving import Solver
+from tmsopt.studies.store.store import Store, open_store
 from tmsopt.studies.study import Study, definition
 from tmsopt.studies.summary import Summary, summary
-from tmsopt.study.batch.store.store import Store, open_store
 
 _COMMIT = 0.2
 """s of rows in one transaction: what a kill may cost, and some 20 times what a transaction takes."""

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from tmsopt.errors import Fault, InputError
-from tmsopt.study.batch.store.provenance import host, now
-from tmsopt.study.batch.store.recorded import Definition, pack, unpack
+from tmsopt.studies.store.definition import Definition, pack, unpack
+from tmsopt.studies.store.provenance import host, now
 
 APPLICATION = 0x746D736F
 """In the header of every store, where `file` and SQLite look for it: "tmso"."""

@@ -13,13 +13,12 @@ from typing import Any
 
 from tmsopt.errors import InputError
 from tmsopt.studies.row import STATUSES, Row
-from tmsopt.study.batch.store import database
-from tmsopt.study.batch.store.database import ask, explained, refuse
-from tmsopt.study.batch.store.journal import journal
-from tmsopt.study.batch.store.lock import Lock, lock
-from tmsopt.study.batch.store.packing import SELECT, packed, unpacked
-from tmsopt.study.batch.store.provenance import changed, host, now, versions
-from tmsopt.study.batch.store.recorded import Definition, differences
+from tmsopt.studies.store import database
+from tmsopt.studies.store.database import ask, explained, refuse
+from tmsopt.studies.store.definition import Definition, differences
+from tmsopt.studies.store.locking import Lock, journal, lock
+from tmsopt.studies.store.packing import SELECT, packed, unpacked
+from tmsopt.studies.store.provenance import changed, host, now, versions
 
 _CHUNK = 500  # rows read at once: a reader that pauses between rows must not hold up the writer
 _MOST = 20  # differences shown
