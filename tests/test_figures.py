@@ -19,20 +19,11 @@ from tmsopt import laws
 from tmsopt.cli import main
 from tmsopt.design.files import load
 from tmsopt.models import Model, Parameter, ParameterSet, tms
-from tmsopt.records import Table
-from tmsopt.show.bicycle import draw_bicycle, draw_distance
-from tmsopt.show.experiment import draw_critical_speeds, draw_law
-from tmsopt.show.gallery import GALLERY, find
-from tmsopt.show.labels import Name, place_names
-from tmsopt.show.locus import draw_row, full_window
-from tmsopt.show.style import new_figure, save
-from tmsopt.show.traced import varying
-from tmsopt.show.universal import draw_box, draw_section
-from tmsopt.study.paper.experiment import experiment
-from tmsopt.study.paper.locus import locus, table_1_loci
-from tmsopt.study.paper.reference import benchmark, experimental, optimised, table_1
-from tmsopt.study.paper.sketch import sketch
-from tmsopt.study.paper.universal import (
+from tmsopt.paper.experiment import experiment
+from tmsopt.paper.locus import locus, table_1_loci
+from tmsopt.paper.reference import benchmark, experimental, optimised, table_1
+from tmsopt.paper.sketch import sketch
+from tmsopt.paper.universal import (
     ep_set,
     heavy_section,
     normalised,
@@ -42,6 +33,15 @@ from tmsopt.study.paper.universal import (
     table_1_paths,
     universal_path,
 )
+from tmsopt.records import Table
+from tmsopt.show.bicycle import draw_bicycle, draw_distance
+from tmsopt.show.experiment import draw_critical_speeds, draw_law
+from tmsopt.show.gallery import GALLERY, find
+from tmsopt.show.labels import Name, place_names
+from tmsopt.show.locus import draw_row, full_window
+from tmsopt.show.style import new_figure, save
+from tmsopt.show.traced import varying
+from tmsopt.show.universal import draw_box, draw_section
 from tmsopt.tracing.trace import trace
 
 ROUNDING = 1e-13

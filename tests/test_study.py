@@ -24,6 +24,7 @@ from tmsopt.design.files import load
 from tmsopt.design.problem import Problem
 from tmsopt.errors import InputError
 from tmsopt.models import tms
+from tmsopt.paper.compare import law_rows
 from tmsopt.records import Table
 from tmsopt.solver.solve import solve
 from tmsopt.studies.monte_carlo import monte_carlo
@@ -33,7 +34,6 @@ from tmsopt.studies.solving import Solver, alone
 from tmsopt.studies.store.store import open_store, read_store
 from tmsopt.studies.study import Study, definition, over_grid
 from tmsopt.studies.summary import summary
-from tmsopt.study.compare import law_rows
 
 EP4 = load("problems/ep4.toml")
 HEIGHTS = {"zeta_B": [-0.4, -0.8], "zeta_H": [-0.2, -0.3, -0.35]}

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tmsopt.fronts.pareto import pareto
     from tmsopt.margins.nearest import Nearest, Robustness, nearest, robustness
     from tmsopt.models.bicycle_files import Bicycle, read_bicycle, write_bicycle
+    from tmsopt.paper.compare import Comparison, compare
     from tmsopt.proofs.proof import Proof
     from tmsopt.proofs.prove import prove
     from tmsopt.solver.all_designs import Every, solve_all
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from tmsopt.studies.run import Results, run_study
     from tmsopt.studies.samples import latin_hypercube, sobol
     from tmsopt.studies.study import Study, over_grid
-    from tmsopt.study.compare import Comparison, compare
     from tmsopt.tracing.branch import Branch, Trace
     from tmsopt.tracing.domain import Domain, domain
     from tmsopt.tracing.swallowtail import Swallowtail, swallowtail
@@ -98,7 +98,7 @@ _HOMES = {
     "Bicycle": "tmsopt.models.bicycle_files",
     "Branch": "tmsopt.tracing.branch",
     "Chart": "tmsopt.charts.chart",
-    "Comparison": "tmsopt.study.compare",
+    "Comparison": "tmsopt.paper.compare",
     "Diagnosis": "tmsopt.diagnosis.diagnosis",
     "Domain": "tmsopt.tracing.domain",
     "Explanation": "tmsopt.explanation.explain",
@@ -120,7 +120,7 @@ _HOMES = {
     "certify": "tmsopt.certificates.certify",
     "chart": "tmsopt.charts.chart",
     "chart_to": "tmsopt.charts.stored",
-    "compare": "tmsopt.study.compare",
+    "compare": "tmsopt.paper.compare",
     "diagnose": "tmsopt.diagnosis.diagnosis",
     "domain": "tmsopt.tracing.domain",
     "explain": "tmsopt.explanation.explain",

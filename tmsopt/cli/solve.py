@@ -229,9 +229,9 @@ def compare(file: Path, as_json: bool, starts: int | None, seed: int, linear_sol
         problem = nominal_of(load(file))
         if problem.pareto:
             raise InputError(unasked(problem))
+    from tmsopt.paper.compare import compare as compare_design
     from tmsopt.show.tables import comparison_table
     from tmsopt.solver.multistart import STARTS
-    from tmsopt.study.compare import compare as compare_design
 
     with progress() as update:
         comparison = compare_design(

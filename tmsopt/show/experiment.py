@@ -4,8 +4,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from tmsopt.paper.experiment import CriticalSpeed, Experiment
 from tmsopt.show.style import COMPLEX, CRITICAL, LINE, MARK, REAL, STABLE, new_figure
-from tmsopt.study.paper.experiment import CriticalSpeed, Experiment
 
 _MARKERS = ("*", "s", "o")
 _COLOURS = (MARK, CRITICAL, REAL)

@@ -52,9 +52,9 @@ def _names() -> Iterator[str]:
 
 
 def _bicycle() -> "Figure":
+    from tmsopt.paper.reference import benchmark
+    from tmsopt.paper.sketch import sketch
     from tmsopt.show.bicycle import bicycle_figure
-    from tmsopt.study.paper.reference import benchmark
-    from tmsopt.study.paper.sketch import sketch
 
     return bicycle_figure(sketch(benchmark().parameters), "The two-mass-skate bicycle: the benchmark, to scale")
 
@@ -63,10 +63,10 @@ def _growth() -> "Figure":
     from tmsopt.critical_speeds.growth import growth
     from tmsopt.design.problem import Problem
     from tmsopt.models import tms
+    from tmsopt.paper.reference import benchmark, optimised
     from tmsopt.show.growth import draw_growth_rates
     from tmsopt.show.style import REAL, new_figure
     from tmsopt.solver.solve import solve
-    from tmsopt.study.paper.reference import benchmark, optimised
 
     others = {name: value for name, value in benchmark().parameters.items() if name != "Fr"}
     fastest = solve(Problem(tms, fixed=others, free={"Fr": (0.1, 4.0)}, minimize="abscissa"))
@@ -93,8 +93,8 @@ def _growth() -> "Figure":
 
 
 def _swallowtail() -> "Figure":
+    from tmsopt.paper.planes import SECTIONS, section, surface
     from tmsopt.show.swallowtail import swallowtail_figure
-    from tmsopt.study.paper.planes import SECTIONS, section, surface
 
     names = (r"\mathrm{Fr}_{\mathrm{EP}_4}" + (f" {offset:+g}" if offset else "") for offset in SECTIONS)
     titles = [rf"({letter}) $\mathrm{{Fr}} = {name}$" for letter, name in zip("bcd", names, strict=True)]
@@ -102,15 +102,15 @@ def _swallowtail() -> "Figure":
 
 
 def _ep_set() -> "Figure":
+    from tmsopt.paper.planes import chi_B_plane, tilt_plane
     from tmsopt.show.planes import planes_figure
-    from tmsopt.study.paper.planes import chi_B_plane, tilt_plane
 
     return planes_figure([tilt_plane(), chi_B_plane()], _ON_LAW)
 
 
 def _off_law() -> "Figure":
+    from tmsopt.paper.planes import OFF_LAW_CHI_B, OFF_LAW_TILT, chi_B_plane, tilt_plane
     from tmsopt.show.planes import planes_figure
-    from tmsopt.study.paper.planes import OFF_LAW_CHI_B, OFF_LAW_TILT, chi_B_plane, tilt_plane
 
     titles = [
         rf"(a) $\chi_B = \sqrt{{2}} {OFF_LAW_CHI_B:+g}$",
@@ -120,8 +120,8 @@ def _off_law() -> "Figure":
 
 
 def _abscissa() -> "Figure":
+    from tmsopt.paper.planes import chi_B_plane, tilt_plane
     from tmsopt.show.planes import abscissa_figure
-    from tmsopt.study.paper.planes import chi_B_plane, tilt_plane
 
     points = (480, 360)
     return abscissa_figure([tilt_plane(0, points, False), chi_B_plane(0, points, False)], _ON_LAW)
@@ -131,22 +131,22 @@ _ON_LAW = (r"(a) $\chi_B = \sqrt{2}$", r"(b) $\lambda_s = \lambda_s^{\mathrm{EP}
 
 
 def _root_locus() -> "Figure":
+    from tmsopt.paper.locus import table_1_loci
     from tmsopt.show.locus import locus_figure
-    from tmsopt.study.paper.locus import table_1_loci
 
     return locus_figure(table_1_loci())
 
 
 def _experiment() -> "Figure":
+    from tmsopt.paper.experiment import experiment
     from tmsopt.show.experiment import experiment_figure
-    from tmsopt.study.paper.experiment import experiment
 
     return experiment_figure(experiment())
 
 
 def _universal() -> "Figure":
+    from tmsopt.paper.universal import spire_faces, table_1_paths
     from tmsopt.show.universal import LIMIT, universal_figure
-    from tmsopt.study.paper.universal import spire_faces, table_1_paths
 
     return universal_figure(table_1_paths(), spire_faces(LIMIT), r"$\mathrm{Fr}$")
 

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from tmsopt.paper.locus import Locus, LocusRow, Mark, Track
 from tmsopt.show.style import COMPLEX, CRITICAL, LINE, MARK, REAL, new_figure
-from tmsopt.study.paper.locus import Locus, LocusRow, Mark, Track
 
 COLOURS = (LINE, CRITICAL, MARK)
 """χ_B of the law, below it, above it."""

@@ -9,11 +9,11 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from tmsopt.paper.planes import Plane
 from tmsopt.show.chart import class_handles, domain_handles, draw_classes, draw_domain
 from tmsopt.show.labels import Name, label_axes, place_names
 from tmsopt.show.style import COMPLEX, CRITICAL, LINE, MARK, REAL, legend_below, new_figure
 from tmsopt.show.traced import draw_branch
-from tmsopt.study.paper.planes import Plane
 
 LAW_STYLE: Mapping[str, tuple[str, str]] = {
     "Frc1": (CRITICAL, "-"),

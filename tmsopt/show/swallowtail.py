@@ -10,11 +10,11 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.axes3d import Axes3D  # type: ignore[import-untyped]
 
+from tmsopt.paper.planes import Plane
 from tmsopt.records import Array
 from tmsopt.show.labels import place_names
 from tmsopt.show.planes import draw_plane, plane_handles
 from tmsopt.show.style import COMPLEX, HEAVY, LINE, MARK, REAL, STABLE, legend_below, new_figure
-from tmsopt.study.paper.planes import Plane
 from tmsopt.tracing.branch import Trace
 from tmsopt.tracing.swallowtail import Swallowtail
 

@@ -5,13 +5,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from tmsopt.design.solution import Solution
 from tmsopt.design.units import reading
 from tmsopt.models.tms import GRAVITY, tms, to_si
+from tmsopt.paper.compare import Comparison
 from tmsopt.roots import Root
 from tmsopt.show import plain
 from tmsopt.show.build import pitching, quantity_rows
 from tmsopt.show.limits import bound_lines, case_lines, relaxation_lines
 from tmsopt.show.text import columns, number
 from tmsopt.solver.all_designs import Every
-from tmsopt.study.compare import Comparison
 
 _SI_OF = {"Fr": "v", "mu": "m_H", "chi_B": "x_B", "chi_H": "x_H", "zeta_B": "z_B", "zeta_H": "z_H"}
 _SI = tms.parameter_set("SI")

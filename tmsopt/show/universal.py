@@ -10,9 +10,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 
+from tmsopt.paper.universal import UniversalPath, ep_set, heavy_section
 from tmsopt.records import Array
 from tmsopt.show.style import COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, new_figure
-from tmsopt.study.paper.universal import UniversalPath, ep_set, heavy_section
 
 COLOURS = (LINE, CRITICAL, MARK, "#999999", "#F0E442", STABLE)
 """Paths, in the order given."""

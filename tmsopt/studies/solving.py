@@ -14,6 +14,7 @@ from tmsopt.design.expression import parse_value
 from tmsopt.design.solution import Solution
 from tmsopt.errors import InputError
 from tmsopt.models import tms
+from tmsopt.paper.compare import LawRow, law_rows
 from tmsopt.records import Table
 from tmsopt.solver.multistart import same
 from tmsopt.solver.solve import solve
@@ -21,7 +22,6 @@ from tmsopt.solver.workspace import Family
 from tmsopt.studies.neighbours import blocks
 from tmsopt.studies.row import Row
 from tmsopt.studies.study import Study
-from tmsopt.study.compare import LawRow, law_rows
 
 _AFAR = 1
 """Starts of a row beside the one near its neighbour: an optimum that neither end of a block knows is met on the way."""

@@ -10,10 +10,10 @@ from scipy.optimize import brentq
 
 from tmsopt.models import Model, ParameterSet
 from tmsopt.models import tms as bicycle_model
+from tmsopt.paper.reference import TILT_OFFSETS, on_ep_set
+from tmsopt.paper.universal import universal_path
 from tmsopt.records import Array, Complex
 from tmsopt.roots import discriminant, roots
-from tmsopt.study.paper.reference import TILT_OFFSETS, on_ep_set
-from tmsopt.study.paper.universal import universal_path
 
 _ORDERS = np.array(list(permutations(range(4))))
 _CERTAIN = 0.25  # of the distance to the nearest other root: a step shorter than this can have only one reading

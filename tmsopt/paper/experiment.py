@@ -7,9 +7,9 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from tmsopt import laws
+from tmsopt.paper.reference import Bicycle, benchmark, experimental, optimised
 from tmsopt.records import Array
 from tmsopt.roots import is_stable
-from tmsopt.study.paper.reference import Bicycle, benchmark, experimental, optimised
 
 TILT = np.deg2rad(20.0)
 """Assumed steer axis tilt in rad: the source gives none for the experimental bicycle."""

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from tmsopt.models import Model, ParameterSet, tms
+from tmsopt.paper.reference import table_1
 from tmsopt.records import Array
-from tmsopt.study.paper.reference import table_1
 
 Chart = Callable[[ArrayLike], tuple[Array, Array]]
 
