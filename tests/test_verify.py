@@ -15,10 +15,10 @@ from click.testing import CliRunner
 from mpmath import mp
 
 from tmsopt.cli import main
+from tmsopt.paper.ledger import VERDICTS, matching, printed, verify
+from tmsopt.paper.ledger.entry import decimal, entry_of, proof, universal
+from tmsopt.paper.ledger.stability import BACKWARD, WITNESS
 from tmsopt.show.ledger import ledger_page, ledger_table
-from tmsopt.study.verify import VERDICTS, matching, printed, verify
-from tmsopt.study.verify.entry import decimal, entry_of, proof, universal
-from tmsopt.study.verify.stability import BACKWARD, WITNESS
 
 EXACT, HOLDS, OFF, CONDITIONAL, FAILS = VERDICTS
 PAGE = Path(__file__).parent.parent / "problems" / "paper.md"

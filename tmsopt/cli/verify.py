@@ -27,8 +27,8 @@ def verify(as_json: bool, markdown: Path | None, only: tuple[str, ...]) -> None:
     """Recompute every number and statement of the source paper, with a verdict on each."""
     with bad_input():
         from tmsopt.errors import Fault, InputError
-        from tmsopt.study.verify import matching
-        from tmsopt.study.verify import verify as compute
+        from tmsopt.paper.ledger import matching
+        from tmsopt.paper.ledger import verify as compute
 
         check_output("--markdown", markdown, ("md",))
         for pattern in only:

@@ -3,7 +3,7 @@
 import textwrap
 from itertools import groupby
 
-from tmsopt.study.verify import Entry, Ledger
+from tmsopt.paper.ledger import Entry, Ledger
 
 _WIDTH = 100
 _INDENT = "    "

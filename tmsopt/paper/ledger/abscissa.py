@@ -1,17 +1,17 @@
 """Section 2.3: the least spectral abscissa and the conditions for an EP4."""
 
 from tmsopt.models.tms import copo, matrices
-from tmsopt.roots.polynomial import product
-from tmsopt.study.verify import printed
-from tmsopt.study.verify.algebra import (
+from tmsopt.paper.ledger import printed
+from tmsopt.paper.ledger.algebra import (
     polynomials,
     positive,
     q,
     ring,
     substitute,
 )
-from tmsopt.study.verify.entry import Claim, Outcome, proof, section, universal
-from tmsopt.study.verify.stability import upright_case, wrongly_admitted
+from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal
+from tmsopt.paper.ledger.stability import upright_case, wrongly_admitted
+from tmsopt.roots.polynomial import product
 
 _claim = section("2.3 Minimizing the spectral abscissa of general TMS bikes")
 

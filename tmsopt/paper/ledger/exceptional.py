@@ -3,11 +3,11 @@
 import flint
 
 from tmsopt.models.tms import copo
+from tmsopt.paper.ledger import printed
+from tmsopt.paper.ledger.algebra import Quotient, polynomials, q, ring, vanishes
+from tmsopt.paper.ledger.entry import Claim, Outcome, decimal, digits, proof, section
+from tmsopt.paper.ledger.lemmas import HEIGHTS, double_pair, ep4, normal, quartic, tilt_of_EP4, weave
 from tmsopt.roots.polynomial import product
-from tmsopt.study.verify import printed
-from tmsopt.study.verify.algebra import Quotient, polynomials, q, ring, vanishes
-from tmsopt.study.verify.entry import Claim, Outcome, decimal, digits, proof, section
-from tmsopt.study.verify.upright import HEIGHTS, double_pair, ep4, normal, quartic, tilt_of_EP4, weave
 
 _claim = section("2.4.2 Exact location of the real exceptional point EP4; Table 1")
 

@@ -7,11 +7,9 @@ from typing import Any
 import flint
 
 from tmsopt.models.tms import copo, matrices
-from tmsopt.roots.polynomial import evaluate as value_at
-from tmsopt.roots.polynomial import quadratic_pencil, shift
-from tmsopt.study.verify import printed
-from tmsopt.study.verify.abscissa import product_bound
-from tmsopt.study.verify.algebra import (
+from tmsopt.paper.ledger import printed
+from tmsopt.paper.ledger.abscissa import product_bound
+from tmsopt.paper.ledger.algebra import (
     Polynomial,
     evaluate,
     match,
@@ -23,7 +21,9 @@ from tmsopt.study.verify.algebra import (
     stable,
     stable_left_of,
 )
-from tmsopt.study.verify.entry import Claim, Outcome, decimal, digits, proof, section, universal
+from tmsopt.paper.ledger.entry import Claim, Outcome, decimal, digits, proof, section, universal
+from tmsopt.roots.polynomial import evaluate as value_at
+from tmsopt.roots.polynomial import quadratic_pencil, shift
 
 _claim = section("2.3 Minimizing the spectral abscissa of general TMS bikes")
 

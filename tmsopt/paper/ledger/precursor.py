@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import flint
 
 from tmsopt.models.tms import copo
-from tmsopt.study.verify import printed
-from tmsopt.study.verify.algebra import (
+from tmsopt.paper.ledger import printed
+from tmsopt.paper.ledger.algebra import (
     Quotient,
     ball_roots,
     heavily_damped,
@@ -16,8 +16,8 @@ from tmsopt.study.verify.algebra import (
     slope,
     stable,
 )
-from tmsopt.study.verify.entry import Claim, Outcome, proof, section, universal
-from tmsopt.study.verify.upright import (
+from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal
+from tmsopt.paper.ledger.lemmas import (
     HEIGHTS,
     double_pair,
     ep4,

@@ -3,9 +3,9 @@
 from typing import Any
 
 from tmsopt.models.tms import copo
-from tmsopt.study.verify import printed
-from tmsopt.study.verify.algebra import polynomials, q, ring
-from tmsopt.study.verify.entry import Claim, Outcome, proof, section, universal
+from tmsopt.paper.ledger import printed
+from tmsopt.paper.ledger.algebra import polynomials, q, ring
+from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal
 
 _claim = section("2.4.1 χ_H = 1: the critical Froude number and its minimum")
 

@@ -5,9 +5,8 @@ from typing import Any
 import flint
 
 from tmsopt.models.tms import copo
-from tmsopt.roots.polynomial import evaluate as value_at
-from tmsopt.study.verify import printed
-from tmsopt.study.verify.algebra import (
+from tmsopt.paper.ledger import printed
+from tmsopt.paper.ledger.algebra import (
     Quotient,
     heavily_damped,
     polynomials,
@@ -18,16 +17,17 @@ from tmsopt.study.verify.algebra import (
     slope,
     stable,
 )
-from tmsopt.study.verify.entry import Claim, Outcome, digits, proof, section, universal
-from tmsopt.study.verify.regimes import standstill_identity
-from tmsopt.study.verify.upright import (
+from tmsopt.paper.ledger.entry import Claim, Outcome, digits, proof, section, universal
+from tmsopt.paper.ledger.lemmas import (
     HEIGHTS,
     ep4,
     normal,
     palindrome,
     quartic,
+    standstill_identity,
     tilt_of_EP4,
 )  # fmt: skip
+from tmsopt.roots.polynomial import evaluate as value_at
 
 _claim = section("2.4.5 Mechanism of self-stability and CEP2 as a precursor to weaving")
 

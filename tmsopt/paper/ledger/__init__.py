@@ -5,11 +5,10 @@ from fnmatch import fnmatchcase
 
 import flint
 
-from tmsopt.study.verify import (
+from tmsopt.paper.ledger import (
     abscissa,
     benchmark,
     critical,
-    edges,
     epset,
     exceptional,
     experiment,
@@ -20,19 +19,17 @@ from tmsopt.study.verify import (
     sets,
     stability,
 )
-from tmsopt.study.verify.algebra import PRECISION
-from tmsopt.study.verify.entry import VERDICTS, Claim, Entry, Ledger, entry_of
+from tmsopt.paper.ledger.algebra import PRECISION
+from tmsopt.paper.ledger.entry import VERDICTS, Claim, Entry, Ledger, entry_of
 
 __all__ = ["CLAIMS", "VERDICTS", "Claim", "Entry", "Ledger", "matching", "verify"]
 
 SOURCE = "O. N. Kirillov, Localizing EP sets in dissipative systems and the self-stability of bicycles (2018)"
 
-_PARTS = (
-    model, stability, abscissa, benchmark, critical, exceptional, sets, epset, edges, optimum, motion, precursor,
-    experiment,
+CLAIMS: tuple[Claim, ...] = (
+    *model.CLAIMS, *stability.CLAIMS, *abscissa.CLAIMS, *benchmark.CLAIMS, *critical.CLAIMS, *exceptional.CLAIMS,
+    *sets.CLAIMS, *epset.CLAIMS, *sets.EDGES, *optimum.CLAIMS, *motion.CLAIMS, *precursor.CLAIMS, *experiment.CLAIMS,
 )  # fmt: skip
-
-CLAIMS: tuple[Claim, ...] = tuple(claim for part in _PARTS for claim in part.CLAIMS)
 """Every claim, in the order of the paper."""
 
 

@@ -7,10 +7,10 @@ from typing import Any
 import flint
 
 from tmsopt.models.tms import copo
-from tmsopt.study.verify import printed
-from tmsopt.study.verify.algebra import match, polynomials, positive, q, ring, solve, stable, unstable
-from tmsopt.study.verify.entry import EXACT, Claim, Outcome, decimal, proof, section, universal
-from tmsopt.study.verify.regimes import (
+from tmsopt.paper.ledger import printed
+from tmsopt.paper.ledger.algebra import match, polynomials, positive, q, ring, solve, stable, unstable
+from tmsopt.paper.ledger.entry import EXACT, Claim, Outcome, decimal, proof, section, universal
+from tmsopt.paper.ledger.lemmas import (
     Design,
     admitted,
     class_identity,

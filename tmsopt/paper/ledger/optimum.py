@@ -5,10 +5,9 @@ from typing import Any
 import flint
 
 from tmsopt.models.tms import copo
-from tmsopt.roots.polynomial import product
-from tmsopt.study.verify import printed
-from tmsopt.study.verify.abscissa import product_bound
-from tmsopt.study.verify.algebra import (
+from tmsopt.paper.ledger import printed
+from tmsopt.paper.ledger.abscissa import product_bound
+from tmsopt.paper.ledger.algebra import (
     heavily_damped,
     polynomials,
     positive_quotient,
@@ -16,17 +15,24 @@ from tmsopt.study.verify.algebra import (
     ring,
     stable,
 )
-from tmsopt.study.verify.edges import ep3_left
-from tmsopt.study.verify.entry import EXACT, Claim, Outcome, proof, section, universal
-from tmsopt.study.verify.steepest import (
+from tmsopt.paper.ledger.entry import EXACT, Claim, Outcome, proof, section, universal
+from tmsopt.paper.ledger.lemmas import (
+    HEIGHTS,
+    double_pair,
+    ep4,
     newton_inequalities,
+    normal,
     one_pair_of_double_roots,
+    palindrome,
+    quartic,
     smooth_parts_have_no_maximum,
     tilt_bound,
+    tilt_of_EP4,
     tilt_of_roots,
     triple_roots_are_slow,
 )
-from tmsopt.study.verify.upright import HEIGHTS, double_pair, ep4, normal, palindrome, quartic, tilt_of_EP4
+from tmsopt.paper.ledger.sets import ep3_left
+from tmsopt.roots.polynomial import product
 
 _claim = section("2.4.4 Localization of the EP set and stability optimization")
 

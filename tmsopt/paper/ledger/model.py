@@ -3,10 +3,10 @@
 import flint
 
 from tmsopt.models.tms import matrices, tms
+from tmsopt.paper.ledger import printed
+from tmsopt.paper.ledger.algebra import polynomials, q, ring
+from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal
 from tmsopt.roots.polynomial import quadratic_pencil
-from tmsopt.study.verify import printed
-from tmsopt.study.verify.algebra import polynomials, q, ring
-from tmsopt.study.verify.entry import Claim, Outcome, proof, section, universal
 
 _claim = section("2.1 The TMS bicycle model; the characteristic polynomial")
 

@@ -5,8 +5,8 @@ from typing import Any
 import flint
 
 from tmsopt.models.tms import copo
-from tmsopt.study.verify import printed
-from tmsopt.study.verify.algebra import (
+from tmsopt.paper.ledger import printed
+from tmsopt.paper.ledger.algebra import (
     Quotient,
     composed,
     evaluate,
@@ -19,19 +19,19 @@ from tmsopt.study.verify.algebra import (
     slope,
     stable,
 )
-from tmsopt.study.verify.entry import Claim, Outcome, digits, proof, section, universal
-from tmsopt.study.verify.sets import lifted
-from tmsopt.study.verify.steepest import tilt_bound
-from tmsopt.study.verify.upright import (
+from tmsopt.paper.ledger.entry import Claim, Outcome, digits, proof, section, universal
+from tmsopt.paper.ledger.lemmas import (
     HEIGHTS,
     double_pair,
     ep4,
     normal,
     palindrome,
     quartic,
+    tilt_bound,
     tilt_of_EP4,
     tilted,
 )  # fmt: skip
+from tmsopt.paper.ledger.sets import lifted
 
 _claim = section("2.4.3 The discriminant surface and the EP set")
 

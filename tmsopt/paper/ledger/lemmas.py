@@ -1,0 +1,253 @@
+"""Bicycles with χ_H = 1 in the coordinates that take the radicals away.
+
+ζ_B = −q² r, ζ_H = −q²/r, so √(ζ_B/ζ_H) = r, ω0 = −1/q, and h = √(ζ_B ζ_H) = q². At χ_B = r the roots over |ω0|,
+σ = q s, obey the palindromic σ⁴ + B1 σ³ + B2 σ² + B1 σ + 1, that is u² + B1 u + B2 − 2 = 0 with u = σ + 1/σ.
+"""
+
+import random
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+import flint
+
+from tmsopt.models.tms import copo
+from tmsopt.paper.ledger import printed
+from tmsopt.paper.ledger.algebra import Quotient, match, polynomials, positive, q, ring, solve, stable, substitute
+
+_NAMES = "Fr mu chi_B chi_H zeta_B zeta_H T"
+Design = tuple[Any, ...]  # Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T as fractions
+
+
+HEIGHTS = q("-0.4"), q("-0.2")
+"""ζ_B and ζ_H of every design of the section."""
+
+
+def quartic(Fr: Any, chi_B: Any, T: Any, r: Any, scale: Any) -> list[Any]:
+    """Coefficients with χ_H = 1, in the coordinates r and q (here `scale`)."""
+    nothing = 0 * T
+    return copo(Fr, nothing, chi_B, 1 + nothing, -(scale**2) * r, -(scale**2) / r, T)
+
+
+def normal(Fr: Any, chi_B: Any, T: Any, r: Any, scale: Any) -> list[Any]:
+    """Coefficients of the monic polynomial in σ = q s."""
+    a = quartic(Fr, chi_B, T, r, scale)
+    return [a[k] / a[0] * scale**k for k in range(5)]
+
+
+def palindrome() -> tuple[Quotient, Quotient, tuple[Quotient, ...]]:
+    """B1, B2 at χ_B = r and the variables Fr, T, r, q they are made of.
+
+    Raises:
+        ArithmeticError: if the polynomial in σ is not palindromic.
+    """
+    Fr, T, r, scale = variables = ring("Fr T r q")
+    b = normal(Fr, r, T, r, scale)
+    if not (b[4] == 1 and b[1] == b[3]):
+        raise ArithmeticError("the polynomial is not palindromic at χ_B = r")
+    return b[1], b[2], variables
+
+
+def tilt_of_EP4(r: Any, h: Any) -> Any:
+    """tan λ_s of the EP4, compact: not the printed form; see the entry tls for its proof."""
+    return (r - 1) * (r**2 + 6 * r + 1) / (16 * h * (r + 1))
+
+
+@cache
+def ep4() -> dict[str, Any]:
+    """Fr, χ_B, T and the 4-fold root s for ζ_B = −0.4, ζ_H = −0.2, all four unknown, proved in balls."""
+    Fr, chi_B, T, s = polynomials("Fr chi_B T s")
+    a = copo(Fr, q(0), chi_B, q(1), *HEIGHTS, T)
+    return solve(match(a, *[[1, -s]] * 4), {"Fr": 2.2, "chi_B": 1.4, "T": 0.43, "s": -1.9}, {})
+
+
+def tilted(offset: str) -> Any:
+    """tan(λ_s of the EP4 + offset), from the solved EP4."""
+    return (ep4()["T"].atan() + flint.arb(q(offset))).tan()
+
+
+@cache
+def double_pair(offset: str) -> dict[str, Any]:
+    """Fr, χ_B, b, c with p = a0 (s² + b s + c)² at that tilt, proved in balls."""
+    Fr, chi_B, b, c, T = polynomials("Fr chi_B b c T")
+    a = copo(Fr, q(0), chi_B, q(1), *HEIGHTS, T)
+    guess = {"-0.05": (2.26, 4.1), "0.80": (4.1, 1.5), "-0.18": (2.9, 8.0)}[offset]
+    tilt = {"T": tilted(offset)}
+    return solve(match(a, [1, b, c], [1, b, c]), {"Fr": guess[0], "chi_B": 1.4, "b": guess[1], "c": 3.5}, tilt)
+
+
+@cache
+def weave(offset: str, chi_B: str = "") -> dict[str, Any]:
+    """Fr, ω² and the other factor at the weave boundary at that tilt; χ_B = √2 plus the given number."""
+    Fr, W, b, c, T, chi = polynomials("Fr W b c T chi")
+    a = copo(Fr, q(0), chi, q(1), *HEIGHTS, T)
+    at = {"T": tilted(offset), "chi": ep4()["chi_B"] + flint.arb(q(chi_B or "0"))}
+    slope = float(at["T"].mid())
+    guess = {"Fr": (5.8 * slope) ** 0.5, "W": 3.5, "b": 2.0 / slope**0.5, "c": 3.5}
+    return solve(match(a, [1, 0, W], [1, b, c]), guess, at)
+
+
+@cache
+def designs() -> tuple[tuple[Design, bool], ...]:
+    """Rational designs in every sign regime, Fr of both signs, and whether each is stable, by its Routh conditions."""
+    return tuple((design, stable(copo(*design))) for design in _designs(4000))
+
+
+def _designs(count: int) -> Iterator[Design]:
+    pick = random.Random(1)
+
+    def tenths(low: int, high: int) -> Any:
+        return q(pick.randint(10 * low, 10 * high)) / 10
+
+    for k in range(count):
+        chi_H = 1 + tenths(-1, 1) / 3 if k % 2 else tenths(-2, 3)
+        zeta_B, zeta_H = -q(pick.randint(1, 40)) / 20, -q(pick.randint(0, 40)) / 20
+        mu, T = q(pick.choice((1, 2, 5, 10, 50, 200))) / 10, q(pick.choice((1, 3, 7, 15, 60))) / 10
+        Fr = tenths(0, 8) + q("1/20")
+        signs = (pick.choice((1, 1, 1, -1)), pick.choice((1, -1)))
+        yield signs[0] * Fr, mu, tenths(-2, 3) + q("1/50"), chi_H, zeta_B, zeta_H, signs[1] * T
+
+
+def first_four(design: Design) -> list[bool]:
+    _, mu, chi_B, chi_H, zeta_B, zeta_H, T = design
+    return [chi_H > 1 + zeta_H * T, chi_H < 1 - zeta_B / mu * T, chi_H < chi_B, zeta_H > zeta_B]
+
+
+def fifth(design: Design) -> bool:
+    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = design
+    if zeta_B * chi_H == zeta_H * chi_B:
+        return False
+    square = printed.flus(mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    return bool(square > 0 and Fr > 0 and Fr * Fr > square)
+
+
+def admitted(design: Design) -> bool:
+    """Whether all five printed conditions hold."""
+    return all(first_four(design)) and fifth(design)
+
+
+def class_identity() -> bool:
+    """a4 + μ a0/ζ_B² = −T (ζ_B + μ ζ_H): with T > 0 not both a0 and a4 are negative, with T < 0 not both positive."""
+    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
+    a = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    return bool(a[4] + mu * a[0] / zeta_B**2 == -T * (zeta_B + mu * zeta_H))
+
+
+def standstill_identity() -> bool:
+    """At Fr = 0, a2 is minus a positive combination of a0 and a4; with y = −ζ > 0."""
+    mu, k, y_B, y_H, T = ring("mu k y_B y_H T")
+    a = copo(0 * T, mu, 2 * k, 1 + k, -y_B, -y_H, T)
+    weight = y_B + mu * y_H
+    return bool(a[2] * weight == -a[4] * (y_B**2 + mu * y_H**2) - a[0] * (1 + mu))
+
+
+def hurwitz_identity() -> bool:
+    """a1 a2 a3 − a0 a3² − a4 a1² is (ζ_B − ζ_H) ζ_B a1 a3 (Fr² − flus), and so affine in Fr² beside Fr²."""
+    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
+    a0, a1, a2, a3, a4 = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    square = printed.flus(mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    return bool(a1 * a2 * a3 - a0 * a3**2 - a4 * a1**2 == (zeta_B - zeta_H) * zeta_B * a1 * a3 * (Fr**2 - square))
+
+
+def necessary(line: int) -> bool:
+    """No stable design of the sample with λ_s > 0 and Fr > 0 breaks a line of the conditions."""
+    for design, is_stable in designs():
+        if is_stable and design[0] > 0 and design[6] > 0:
+            lines = [*first_four(design), fifth(design)]
+            if not lines[line]:
+                return False
+    return True
+
+
+def symmetric(count: int = 4) -> tuple[list[Any], list[Any]]:
+    """Four variables and their elementary symmetric polynomials e1 … e4."""
+    x = list(polynomials("x1 x2 x3 x4"))
+    e = [x[0] * 0 + 1, *[x[0] * 0] * 4]
+    for variable in x:
+        e = [e[0]] + [e[k] + variable * e[k - 1] for k in range(1, 5)]
+    return x, e[1:]
+
+
+def newton_inequalities() -> bool:
+    """For positive x with product 1: 3 e1² − 8 e2 and 3 e3² − 8 e2 e4 are sums of squares, e2 ≥ 6 likewise."""
+    x, (e1, e2, e3, e4) = symmetric()
+    pairs = [(i, j) for i in range(4) for j in range(i)]
+    first = sum(((x[i] - x[j]) ** 2 for i, j in pairs), x[0] * 0)
+    others = {(i, j): [k for k in range(4) if k not in (i, j)] for i, j in pairs}
+    last = sum((((x[i] - x[j]) * x[k] * x[m]) ** 2 for (i, j), (k, m) in others.items()), x[0] * 0)
+    # with x = y²: e2 − 6 √e4 as squares over the three pairings
+    squared = sum((x[i] ** 2 * x[j] ** 2 for i, j in pairs), x[0] * 0)
+    pairings = (((0, 1), (2, 3)), ((0, 2), (1, 3)), ((0, 3), (1, 2)))
+    middle = sum(((x[a] * x[b] - x[c] * x[d]) ** 2 for (a, b), (c, d) in pairings), x[0] * 0)
+    return bool(
+        3 * e1**2 - 8 * e2 == first
+        and 3 * e3**2 - 8 * e2 * e4 == last
+        and squared - 6 * x[0] * x[1] * x[2] * x[3] == middle
+    )
+
+
+def tilt_of_roots() -> bool:
+    """With e1, e2, e3 of the roots −x over |ω0|: h T (r e1 + e3)² = (r² − 1)(r e2 + r² + 1), for any Fr and χ_B."""
+    Fr, chi_B, T, r, scale = ring("Fr chi_B T r q")
+    b = normal(Fr, chi_B, T, r, scale)
+    return bool(b[4] == 1 and scale**2 * T * (r * b[1] + b[3]) ** 2 == (r**2 - 1) * (r * b[2] + r**2 + 1))
+
+
+def tilt_bound() -> bool:
+    """No heavily damped bicycle has a steeper tilt than the EP4, and at that tilt only the EP4 is real-rooted.
+
+    With m = e2/6 ≥ 1, (r e1 + e3)² ≥ 16 m (r + 1)², and (r² + 6 r + 1) m − (6 r m + r² + 1) = (r² + 1)(m − 1) ≥ 0.
+    """
+    r, m, h = ring("r m h")
+    bound = (r**2 - 1) * (6 * r * m + r**2 + 1) / (16 * m * (r + 1) ** 2 * h)
+    excess = tilt_of_EP4(r, h) - bound
+    gap = (r**2 - 1) * (r**2 + 1) * (m - 1) / (16 * m * (r + 1) ** 2 * h)
+    return newton_inequalities() and tilt_of_roots() and excess == gap
+
+
+def triple_roots_are_slow() -> bool:
+    """EP3 bicycles, heavily damped, have Fr ≤ Fr_EP4 for r > 1, with equality at the EP4 only.
+
+    With f = q Fr, roots −a, −a, −a, −a⁻³ and r = 1 + ρ, f(EP4) − f(a) is (a − 1)² times a polynomial over positive
+    terms; the discriminant of the polynomial has no zero for ρ > 0, and at ρ = 1 it has no real zero a.
+    """
+    a, rho = polynomials("a rho")
+    r = 1 + rho
+    speed = 3 * r * (a**5 + a) + (r**2 + 1) * a**3  # (r e2 + r² + 1) a³
+    sums = r * (3 * a**4 + 1) + a**6 + 3 * a**2  # (r e1 + e3) a³
+    excess = (r**2 + 6 * r + 1) * sums - 4 * (r + 1) * speed
+    rest, remainder = divmod(excess, (a - 1) ** 2)
+    factors = [factor for factor, _ in rest.discriminant("a").factor()[1]]
+    at_1 = substitute(rest, {"rho": q(1)}).to_dict()
+    quartic_at_1: Any = flint.fmpq_poly([at_1.get((k, 0), q(0)) for k in range(rest.degrees()[0] + 1)])
+    real: Any = quartic_at_1.complex_roots()
+    return (
+        remainder == 0
+        and all(positive(factor) for factor in factors)
+        and not any(z.imag == 0 for z, _ in real)
+        and at_1[(0, 0)] > 0
+    )
+
+
+def smooth_parts_have_no_maximum() -> bool:
+    """On the part of the boundary with one double root −a, tan λ_s at fixed Fr is stationary only at a² = r.
+
+    There the multiplier 1/(1 − f/√r) is negative for f > √r, so it is a minimum; f(EP4) > √r by (√r − 1)⁴.
+    """
+    root, f = ring("root f")
+    r, a = root**2, root
+    y = 1 / (1 - f / root)  # d(r e1 + e3) = y (a² de1 − a de2 + de3) + z (r de2 − f d(r e1 + e3))
+    z = y * a / r
+    stationary = r * (1 + z * f) == y * a**2 and z * r == y * a and 1 + z * f == y
+    speed = (r**2 + 6 * r + 1) / (4 * (r + 1))
+    return bool(stationary and speed - root == (root - 1) ** 4 / (4 * (r + 1)))
+
+
+def one_pair_of_double_roots() -> bool:
+    """At fixed f the 2EP2 have U = x + 1/x > 2 with r U² − 2 f (r + 1) U + (r + 1)² = 0: one for f > f(EP4)."""
+    f, r, U = ring("f r U")
+    e1, e2 = 2 * U, U**2 + 2
+    relation = r * e2 + r**2 + 1 - f * (r * e1 + e1)
+    at_2 = r * 4 - 4 * f * (r + 1) + (r + 1) ** 2
+    speed = (r**2 + 6 * r + 1) / (4 * (r + 1))
+    return bool(relation == r * U**2 - 2 * f * (r + 1) * U + (r + 1) ** 2 and at_2 == 4 * (r + 1) * (speed - f))
