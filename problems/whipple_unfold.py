@@ -76,7 +76,7 @@ def held_trail():
 
 
 def draw(path):
-    from tmsopt.show.style import new_figure, save
+    from tmsopt.plots.style import new_figure, save
 
     figure = new_figure(10.5, 4.0)
     left, right = figure.subplots(1, 2)

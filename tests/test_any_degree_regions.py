@@ -21,6 +21,8 @@ from tmsopt.design.problem import Problem
 from tmsopt.margins.boundaries import edges, heavily_damped
 from tmsopt.margins.nearest import nearest, robustness
 from tmsopt.models import Model, Parameter, ParameterSet
+from tmsopt.plots.chart import chart_figure, chart_table
+from tmsopt.plots.growth import growth_figure
 from tmsopt.roots import (
     CLASSES,
     hurwitz_minors,
@@ -32,8 +34,6 @@ from tmsopt.roots import (
     real_roots,
     roots,
 )
-from tmsopt.show.chart import chart_figure, chart_table
-from tmsopt.show.growth import growth_figure
 
 LAYERS = ("kind", "real_roots", "abscissa", "damping_ratio")
 

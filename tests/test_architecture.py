@@ -211,7 +211,7 @@ def test_the_public_list_is_reachable(name: str) -> None:
         ("tmsopt.design.a", "import tmsopt.laws"),
         ("tmsopt.design.a", "from importlib import import_module\nimport_module('tmsopt.study.b')"),
         ("tmsopt.design.a", "from tmsopt import solve"),
-        ("tmsopt.study.a", "from tmsopt.show import b"),
+        ("tmsopt.study.a", "from tmsopt.report import b"),
         ("tmsopt.show.a", "import tmsopt.cli"),
         ("tmsopt.laws", "from tmsopt.roots import product"),
     ],

@@ -23,8 +23,8 @@ from tmsopt.design.files import load
 from tmsopt.design.problem import Problem
 from tmsopt.errors import InputError
 from tmsopt.models import tms
+from tmsopt.plots.chart import chart_table
 from tmsopt.roots import CLASSES
-from tmsopt.show.chart import chart_table
 from tmsopt.tracing.domain import domain
 from tmsopt.tracing.trace import trace
 

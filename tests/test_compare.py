@@ -11,8 +11,8 @@ from oracles import abscissa_60, polynomial_60
 import tmsopt
 from tmsopt import laws
 from tmsopt.critical_speeds.growth import growth
-from tmsopt.show.growth import draw_frequencies, draw_growth_rates, growth_figure
-from tmsopt.show.style import save
+from tmsopt.plots.growth import draw_frequencies, draw_growth_rates, growth_figure
+from tmsopt.plots.style import save
 
 
 @pytest.fixture(scope="module")

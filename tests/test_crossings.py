@@ -7,7 +7,7 @@ import pytest
 import tmsopt
 from tmsopt.critical_speeds.crossings import crossings
 from tmsopt.models import from_matrices
-from tmsopt.show.speeds import speeds_table
+from tmsopt.report.speeds import speeds_table
 
 
 def _speeds(free, between, *, A=None, M=None, D=None, K=None):

@@ -24,8 +24,8 @@ from tmsopt.diagnosis.jordan import is_regular, jordan
 from tmsopt.diagnosis.puiseux import branches
 from tmsopt.diagnosis.splitting import Response
 from tmsopt.models import Model, from_coefficients, from_matrices, tms
+from tmsopt.report.explanation import diagnosis_lines
 from tmsopt.roots import structure
-from tmsopt.show.diagnosis import diagnosis_lines
 
 # Jordan chains
 

@@ -17,8 +17,8 @@ from tmsopt.explanation.limits import moved
 from tmsopt.explanation.rounding import rounded
 from tmsopt.explanation.steps import natural_step, step_within
 from tmsopt.models import Range, tms
+from tmsopt.report.explanation import explained_lines
 from tmsopt.roots.patterns.descriptions import STRUCTURES
-from tmsopt.show.explained import explained_lines
 
 ZETA_B, ZETA_H = -0.4, -0.2
 CHI_H_1 = {"chi_H": 1.0, "zeta_B": ZETA_B, "zeta_H": ZETA_H, "mu": 0.1}

@@ -33,15 +33,15 @@ from tmsopt.paper.universal import (
     table_1_paths,
     universal_path,
 )
+from tmsopt.plots.bicycle import draw_bicycle, draw_distance
+from tmsopt.plots.labels import Name, place_names
+from tmsopt.plots.paper.experiment import draw_critical_speeds, draw_law
+from tmsopt.plots.paper.gallery import GALLERY, find
+from tmsopt.plots.paper.locus import draw_row, full_window
+from tmsopt.plots.paper.universal import draw_box, draw_section
+from tmsopt.plots.style import new_figure, save
 from tmsopt.records import Table
-from tmsopt.show.bicycle import draw_bicycle, draw_distance
-from tmsopt.show.experiment import draw_critical_speeds, draw_law
-from tmsopt.show.gallery import GALLERY, find
-from tmsopt.show.labels import Name, place_names
-from tmsopt.show.locus import draw_row, full_window
-from tmsopt.show.style import new_figure, save
-from tmsopt.show.traced import varying
-from tmsopt.show.universal import draw_box, draw_section
+from tmsopt.tracing.branch import varying
 from tmsopt.tracing.trace import trace
 
 ROUNDING = 1e-13
@@ -559,7 +559,7 @@ def test_one_figure_is_written_whole(tmp_path):
 def test_all_figures_go_into_a_new_directory(tmp_path, monkeypatch):
     """With two figures that are quick to draw, in this process."""
     quick = Table({name: GALLERY[name] for name in ("bicycle", "experiment")})
-    monkeypatch.setattr("tmsopt.show.gallery.GALLERY", quick)
+    monkeypatch.setattr("tmsopt.plots.paper.gallery.GALLERY", quick)
     folder = tmp_path / "new" / "figures"
     done = CliRunner().invoke(main, ["figure", "all", "--output", str(folder)])
     assert (done.exit_code, done.stdout) == (0, "")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import tmsopt
-from tmsopt.design.toml import LARGEST
+from tmsopt.disk import LARGEST
 
 STUDIES = set(Path("problems").glob("study_*.toml"))
 

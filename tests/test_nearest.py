@@ -15,8 +15,8 @@ from tmsopt.errors import InputError
 from tmsopt.margins.nearest import nearest, robustness
 from tmsopt.models import tms
 from tmsopt.models.tms import to_si
+from tmsopt.report.explanation import robustness_line, robustness_table
 from tmsopt.roots import real_roots, roots
-from tmsopt.show.robust import robustness_line, robustness_table
 
 NAMES = ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")
 KINDS = ("weave", "capsize", "infinity", "heavy damping")

@@ -14,7 +14,7 @@ import tmsopt
 from tmsopt.cli import main
 from tmsopt.explanation.optimality import NOT_COVERED, NOT_MINIMAL, STRICT, UNDECIDED
 from tmsopt.models import tms
-from tmsopt.show.explained import optimality_lines
+from tmsopt.report.explanation import optimality_lines
 
 NATIVE = ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")
 CHI_H_1 = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}

@@ -26,8 +26,8 @@ from tmsopt.models.exact import decimal
 from tmsopt.proofs import rational
 from tmsopt.proofs.factored import Factored
 from tmsopt.proofs.proof import Proof, prove_design
+from tmsopt.report.proof import proof_text
 from tmsopt.roots import exact_roots, product
-from tmsopt.show.proved import proof_text
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
 HEIGHTS = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}

@@ -13,7 +13,7 @@ from test_build import ROBOT
 import tmsopt
 from tmsopt.design.solution import Solution
 from tmsopt.models import tms
-from tmsopt.show.tables import solution_table
+from tmsopt.report.design import solution_table
 
 BENCHMARK = dict(tmsopt.load("problems/benchmark.toml").fixed)
 CEP2 = {

@@ -9,9 +9,9 @@ import pytest
 from tmsopt import InputError, Problem, laws, models
 from tmsopt.models.tms import copo
 from tmsopt.paper import planes
-from tmsopt.show.planes import planes_figure
-from tmsopt.show.style import new_figure
-from tmsopt.show.swallowtail import draw_swallowtail, quadrilaterals
+from tmsopt.plots.paper.planes import planes_figure
+from tmsopt.plots.paper.swallowtail import draw_swallowtail, quadrilaterals
+from tmsopt.plots.style import new_figure
 from tmsopt.tracing.swallowtail import swallowtail
 
 FIXED = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}

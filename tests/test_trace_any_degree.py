@@ -18,9 +18,9 @@ from tmsopt.design.problem import Problem
 from tmsopt.errors import InputError
 from tmsopt.explanation.optimality import optimality
 from tmsopt.models import from_coefficients, from_matrices, whipple
+from tmsopt.plots.trace import trace_figure, trace_table
 from tmsopt.roots import pattern, product, shift
 from tmsopt.roots.patterns.descriptions import in_words
-from tmsopt.show.traced import trace_figure, trace_table
 from tmsopt.solver.solve import solve
 from tmsopt.tracing.domain import domain
 from tmsopt.tracing.swallowtail import swallowtail

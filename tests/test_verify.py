@@ -18,7 +18,7 @@ from tmsopt.cli import main
 from tmsopt.paper.ledger import VERDICTS, matching, printed, verify
 from tmsopt.paper.ledger.entry import decimal, entry_of, proof, universal
 from tmsopt.paper.ledger.stability import BACKWARD, WITNESS
-from tmsopt.show.ledger import ledger_page, ledger_table
+from tmsopt.report.ledger import ledger_page, ledger_table
 
 EXACT, HOLDS, OFF, CONDITIONAL, FAILS = VERDICTS
 PAGE = Path(__file__).parent.parent / "problems" / "paper.md"

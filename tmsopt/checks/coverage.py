@@ -10,6 +10,7 @@ import flint
 
 from tmsopt.design.cases import Band
 from tmsopt.design.problem import Problem
+from tmsopt.design.solution import Cover
 from tmsopt.roots import lienard_chipart, shift
 
 SLACK = 1e-6
@@ -22,21 +23,6 @@ _FEWEST = 32
 
 _DIGITS = 30
 Interval = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Cover:
-    """What is known of every case together.
-
-    Attributes:
-        limit: no root of any case is right of it, if `proven`.
-        proven: by interval arithmetic over all the boxes; else by a search for the worst case alone.
-        boxes: parts that bands and tolerances were divided into.
-    """
-
-    limit: float
-    proven: bool
-    boxes: int
 
 
 def cover(problem: Problem, parameters: Mapping[str, float], worst: float, boxes: int | None = None) -> Cover:

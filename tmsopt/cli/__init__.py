@@ -9,8 +9,8 @@ import click
 from tmsopt import __version__
 from tmsopt.cli.chart import chart
 from tmsopt.cli.common import BAD_INPUT
-from tmsopt.cli.convert import convert
 from tmsopt.cli.figure import figure
+from tmsopt.cli.import_ import convert
 from tmsopt.cli.prove import prove
 from tmsopt.cli.solve import compare, solve
 from tmsopt.cli.speeds import speeds

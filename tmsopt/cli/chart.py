@@ -147,7 +147,7 @@ def chart(
     if as_json:
         write_json(data)
     else:
-        from tmsopt.show.chart import chart_table, summary_table
+        from tmsopt.plots.chart import chart_table, summary_table
 
         click.echo(chart_table(found) if found is not None else summary_table(work.problem.parameter_set, data))
     if output is not None and output.suffix.lower() == ".chart":
@@ -216,8 +216,8 @@ def _draw(
     """The figure: the chart itself, some of its points, or a plane of a space."""
     from tmsopt.charts.chart import CHART_LAYERS, chart_of
     from tmsopt.charts.stored import gathered
-    from tmsopt.show.chart import chart_figure
-    from tmsopt.show.style import save
+    from tmsopt.plots.chart import chart_figure
+    from tmsopt.plots.style import save
     from tmsopt.tracing.domain import domain
 
     if found is None:

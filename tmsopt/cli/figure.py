@@ -9,7 +9,7 @@ import click
 from tmsopt.cli.common import BAD_INPUT, FIGURES, bad_input, check_output, progress, write_json
 
 if TYPE_CHECKING:
-    from tmsopt.show.gallery import Item
+    from tmsopt.plots.paper.gallery import Item
 
 _EXAMPLES = """
 \b
@@ -46,7 +46,7 @@ def figure(name: str | None, output: Path | None, ending: str | None, as_json: b
 
     NAME is one of those that --list shows, or its label in the paper, such as fig3.
     """
-    from tmsopt.show.gallery import GALLERY
+    from tmsopt.plots.paper.gallery import GALLERY
 
     if as_list:
         _write_list(list(GALLERY.values()), as_json)
@@ -62,7 +62,7 @@ def figure(name: str | None, output: Path | None, ending: str | None, as_json: b
 
 def _wanted(name: str | None) -> "list[Item]":
     from tmsopt.errors import Fault, InputError
-    from tmsopt.show.gallery import GALLERY, find
+    from tmsopt.plots.paper.gallery import GALLERY, find
 
     if name is None:
         raise InputError([Fault(f"missing; accepted: {' '.join(GALLERY)} all", ("NAME",))])
@@ -88,7 +88,7 @@ def _files(wanted: "list[Item]", every: bool, output: Path | None, ending: str |
 
 
 def _draw(wanted: "list[Item]", files: list[Path]) -> None:
-    from tmsopt.show.style import save
+    from tmsopt.plots.style import save
 
     with progress("figure") as update:
         for done, (item, path) in enumerate(zip(wanted, files, strict=True)):

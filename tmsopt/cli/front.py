@@ -64,15 +64,15 @@ def write_front(
     if as_json:
         write_json(front.to_json())
     else:
-        from tmsopt.show.front import front_table
+        from tmsopt.plots.front import front_table
 
         click.echo(front_table(front))
     if csv_file is not None:
         with saving("--csv", csv_file):
             write_csv(front, csv_file)
     if plot is not None:
-        from tmsopt.show.front import front_figure
-        from tmsopt.show.style import save
+        from tmsopt.plots.front import front_figure
+        from tmsopt.plots.style import save
 
         with saving("--plot", plot):
             save(front_figure(front), plot)

@@ -57,7 +57,7 @@ def prove(file: Path, as_json: bool, digits: int, exact: tuple[str, ...], starts
     if as_json:
         write_json({"title": problem.title, "status": solution.status, **proof.to_json()})
     else:
-        from tmsopt.show.proved import proof_text
+        from tmsopt.report.proof import proof_text
 
         click.echo(proof_text(problem, proof))
     sys.exit(DONE if proof.proved else NOT_CONVERGED if solution.status == "optimal" else INFEASIBLE)

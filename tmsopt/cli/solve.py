@@ -20,7 +20,7 @@ from tmsopt.cli.common import (
     saving,
     write_json,
 )
-from tmsopt.cli.meaning import meaning, meaning_lines
+from tmsopt.report.explanation import meaning, meaning_lines
 
 if TYPE_CHECKING:
     from tmsopt.design.problem import Problem
@@ -191,7 +191,7 @@ def solve(
     if as_json:
         write_json(solution.to_json() | ({} if brief else meaning(solution)))
     else:
-        from tmsopt.show.tables import solution_table
+        from tmsopt.report.design import solution_table
 
         click.echo(solution_table(solution, w, m_B))
         for line in meaning_lines(solution, brief, details):
@@ -210,7 +210,7 @@ def _solve_all(problem: "Problem", as_json: bool, starts: int | None, **options:
     if as_json:
         write_json({"schema": 1, "title": problem.title, "model": problem.model.name, **found.to_json()})
     else:
-        from tmsopt.show.tables import every_table
+        from tmsopt.report.design import every_table
 
         click.echo(every_table(found))
     sys.exit(DONE if found.solutions else INFEASIBLE)
@@ -230,7 +230,7 @@ def compare(file: Path, as_json: bool, starts: int | None, seed: int, linear_sol
         if problem.pareto:
             raise InputError(unasked(problem))
     from tmsopt.paper.compare import compare as compare_design
-    from tmsopt.show.tables import comparison_table
+    from tmsopt.report.design import comparison_table
     from tmsopt.solver.multistart import STARTS
 
     with progress() as update:
@@ -279,9 +279,9 @@ def _scale(option: str, text: str, unit: str) -> float:
 def _draw(solution: "Solution", path: Path, w: float, m_B: float) -> None:
     from tmsopt.critical_speeds.growth import growth
     from tmsopt.models import tms
-    from tmsopt.show.growth import growth_figure
-    from tmsopt.show.style import save
-    from tmsopt.show.tables import si_parameters
+    from tmsopt.plots.growth import growth_figure
+    from tmsopt.plots.style import save
+    from tmsopt.report.design import si_parameters
 
     if not math.isfinite(solution.abscissa):
         click.echo("--plot: nothing to draw, a root is at infinity", err=True)

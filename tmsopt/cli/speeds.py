@@ -49,7 +49,7 @@ def speeds(file: Path, parameter: str | None, between: tuple[float, float] | Non
         from tmsopt.design.files import load
         from tmsopt.design.problem import unasked
         from tmsopt.errors import InputError
-        from tmsopt.show.speeds import speeds_table
+        from tmsopt.report.speeds import speeds_table
 
         problem = nominal_of(load(file, asks=False))
         name = parameter or speed_of(problem.parameter_set)

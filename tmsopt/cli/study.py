@@ -165,7 +165,7 @@ def _filled(asked: "Study", opened: "Store", workers: int | None, scheduler: str
 
 
 def _show(asked: "Study", opened: "Store", figures: dict[str, Any], as_json: bool) -> None:
-    from tmsopt.show.study import study_table
+    from tmsopt.report.study import study_table
     from tmsopt.studies.summary import summary
 
     found = summary(asked, opened.rows())
@@ -191,8 +191,8 @@ def _show_row(asked: "Study", number: int, as_json: bool) -> None:
         solution = {} if solved.solution is None else {"solution": solved.solution.to_json()}
         write_json({"schema": 1, **solved.row.to_json(), **solution})
         return
-    from tmsopt.show.study import row_lines
-    from tmsopt.show.tables import solution_table
+    from tmsopt.report.design import solution_table
+    from tmsopt.report.study import row_lines
 
     click.echo(row_lines(solved.row))
     if solved.solution is not None:

@@ -70,7 +70,7 @@ def trace(
     if as_json:
         write_json(found.to_json())
     else:
-        from tmsopt.show.traced import trace_table
+        from tmsopt.plots.trace import trace_table
 
         click.echo(trace_table(found))
     if not found.branches:
@@ -80,8 +80,9 @@ def trace(
         with saving("--csv", csv_file):
             write_csv(found, csv_file)
     if plot is not None:
-        from tmsopt.show.style import save
-        from tmsopt.show.traced import trace_figure, varying
+        from tmsopt.plots.style import save
+        from tmsopt.plots.trace import trace_figure
+        from tmsopt.tracing.branch import varying
 
         with saving("--plot", plot):
             save(trace_figure(found, *plane(problem, axes or ",".join(varying(found)[:2]))), plot)

@@ -36,7 +36,7 @@ def verify(as_json: bool, markdown: Path | None, only: tuple[str, ...]) -> None:
                 raise InputError(
                     [Fault(f"found '{pattern}'; accepted: a key of the ledger, or a pattern", ("--only",))]
                 )
-    from tmsopt.show.ledger import ledger_page, ledger_table
+    from tmsopt.report.ledger import ledger_page, ledger_table
 
     with progress("claim") as update:
         ledger = compute(update, only)

@@ -6,13 +6,28 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any
 
-from tmsopt.checks.coverage import Cover
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Freedom, Problem
 from tmsopt.design.units import Reading
 from tmsopt.proofs.proof import DIGITS, Proof, prove_design
 from tmsopt.records import Table
 from tmsopt.roots import Root
+
+
+@dataclass(frozen=True)
+class Cover:
+    """What is known of every case together.
+
+    Attributes:
+        limit: no root of any case is right of it, if `proven`.
+        proven: by interval arithmetic over all the boxes; else by a search for the worst case alone.
+        boxes: parts that bands and tolerances were divided into.
+    """
+
+    limit: float
+    proven: bool
+    boxes: int
+
 
 SCHEMA = 1
 GAIN_DIGITS = 6

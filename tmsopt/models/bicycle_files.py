@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 
-from tmsopt.design.toml import read_text
+from tmsopt.disk import read_text
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import whipple
 from tmsopt.records import Table

@@ -10,8 +10,8 @@ from typing import Any
 
 from tmsopt.design.expression import written_sides
 from tmsopt.design.problem import Problem
-from tmsopt.design.toml import read_text
 from tmsopt.design.units import with_unit
+from tmsopt.disk import read_text
 from tmsopt.errors import Fault, InputError, short, suggest
 from tmsopt.records import Column
 from tmsopt.studies.samples import Span, check_size, grid, latin_hypercube, sobol, sobol_note, span_faults

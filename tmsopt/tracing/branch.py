@@ -173,3 +173,23 @@ def write_csv(trace: Trace, path: Path) -> None:
 
 def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def varying(trace: Trace) -> list[str]:
+    """The free parameters, those that stay the same on every branch last."""
+
+    def moves(name: str) -> bool:
+        low, high = trace.problem.free[name]
+        return any(np.ptp(b.parameters[name]) > 1e-9 * (high - low) for b in trace.branches)
+
+    return sorted(trace.problem.free, key=lambda name: not moves(name))
+
+
+def _sides(branch: Branch) -> list[str]:
+    """The pattern of each point, a special point counted with the one before it."""
+    special = {e.index for e in branch.events if str(branch.kinds[e.index]) == e.name}
+    kinds = [str(k) for k in branch.kinds]
+    for row in sorted(special):
+        if len(kinds) > 1:
+            kinds[row] = kinds[row - 1] if row else kinds[1]
+    return kinds

@@ -6,11 +6,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from tmsopt.plots.labels import Name, label_axes, place_names
+from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, legend_below, new_figure
+from tmsopt.report.text import columns, number, with_unit
 from tmsopt.roots import pattern
-from tmsopt.show.labels import Name, label_axes, place_names
-from tmsopt.show.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, legend_below, new_figure
-from tmsopt.show.text import columns, number, with_unit
-from tmsopt.tracing.branch import Branch, Trace
+from tmsopt.tracing.branch import Branch, Trace, _sides
 
 COLOURS = {
     "EP4": MARK, "EP3": MARK, "2EP2": REAL, "CEP2": COMPLEX, "EP2": LINE, "weave": CRITICAL, "capsize": CAPSIZE,
@@ -98,16 +98,6 @@ def trace_figure(trace: Trace, horizontal: str, vertical: str) -> Figure:
     return figure
 
 
-def varying(trace: Trace) -> list[str]:
-    """The free parameters, those that stay the same on every branch last."""
-
-    def moves(name: str) -> bool:
-        low, high = trace.problem.free[name]
-        return any(np.ptp(b.parameters[name]) > 1e-9 * (high - low) for b in trace.branches)
-
-    return sorted(trace.problem.free, key=lambda name: not moves(name))
-
-
 def _summary(branch: Branch, trace: Trace) -> str:
     share = f"{100 * float(np.mean(branch.stable)):.0f} % of its points"
     states = (
@@ -121,16 +111,6 @@ def _summary(branch: Branch, trace: Trace) -> str:
     kinds = " and ".join(dict.fromkeys(_sides(branch)))
     met = "met" if branch.residual <= _FITTING else "met only"
     return f"{kinds}, {len(branch)} points, {form}, {states}, coefficients {met} to {branch.residual:.0e}"
-
-
-def _sides(branch: Branch) -> list[str]:
-    """The pattern of each point, a special point counted with the one before it."""
-    special = {e.index for e in branch.events if str(branch.kinds[e.index]) == e.name}
-    kinds = [str(k) for k in branch.kinds]
-    for row in sorted(special):
-        if len(kinds) > 1:
-            kinds[row] = kinds[row - 1] if row else kinds[1]
-    return kinds
 
 
 def _label(ax: Axes, text: str) -> str | None:

@@ -6,11 +6,11 @@ from tmsopt.design.solution import Solution
 from tmsopt.design.units import reading
 from tmsopt.models.tms import GRAVITY, tms, to_si
 from tmsopt.paper.compare import Comparison
+from tmsopt.report import rows as plain
+from tmsopt.report.limits import bound_lines, case_lines, relaxation_lines
+from tmsopt.report.rows import pitching, skate_rows
+from tmsopt.report.text import columns, number
 from tmsopt.roots import Root
-from tmsopt.show import plain
-from tmsopt.show.build import pitching, quantity_rows
-from tmsopt.show.limits import bound_lines, case_lines, relaxation_lines
-from tmsopt.show.text import columns, number
 from tmsopt.solver.all_designs import Every
 
 _SI_OF = {"Fr": "v", "mu": "m_H", "chi_B": "x_B", "chi_H": "x_H", "zeta_B": "z_B", "zeta_H": "z_H"}
@@ -29,7 +29,7 @@ def solution_table(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: floa
     lines = [solution.problem.title or "untitled problem", _headline(solution), ""]
     if solution.problem.model is tms:
         si = si_parameters(solution, w, m_B, g)
-        lines += [*columns(_parameter_rows(solution, si)), "", *columns(quantity_rows(solution, si)), ""]
+        lines += [*columns(_parameter_rows(solution, si)), "", *columns(skate_rows(solution, si)), ""]
         lines.append(pitching(solution, si))
     else:
         lines += [*columns(plain.parameter_rows(solution)), "", *columns(plain.quantity_rows(solution)), ""]

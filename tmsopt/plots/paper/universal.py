@@ -11,8 +11,8 @@ from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 
 from tmsopt.paper.universal import UniversalPath, ep_set, heavy_section
+from tmsopt.plots.style import COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, new_figure
 from tmsopt.records import Array
-from tmsopt.show.style import COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, new_figure
 
 COLOURS = (LINE, CRITICAL, MARK, "#999999", "#F0E442", STABLE)
 """Paths, in the order given."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from tmsopt.critical_speeds.crossings import Crossing
 from tmsopt.critical_speeds.speeds import Speeds
 from tmsopt.design.units import reading
-from tmsopt.show.text import columns
+from tmsopt.report.text import columns
 
 _DIGITS = 15
 

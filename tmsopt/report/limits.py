@@ -7,7 +7,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.design.units import reading
 from tmsopt.models import ParameterSet
-from tmsopt.show.text import number
+from tmsopt.report.text import number
 
 
 def bound_lines(solution: Solution) -> list[str]:

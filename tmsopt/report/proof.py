@@ -6,7 +6,7 @@ from tmsopt.arithmetic.balls import Number, fraction
 from tmsopt.design.problem import Problem
 from tmsopt.proofs.facts import Verdict
 from tmsopt.proofs.proof import Proof
-from tmsopt.show.text import columns
+from tmsopt.report.text import columns
 
 
 def proof_text(problem: Problem, proof: Proof) -> str:

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, Polygon
 
 from tmsopt.paper.sketch import Sketch
+from tmsopt.plots.style import CRITICAL, HEAVY, LINE, MARK, REAL, new_figure
 from tmsopt.records import Array
-from tmsopt.show.style import CRITICAL, HEAVY, LINE, MARK, REAL, new_figure
 
 REAR_FRAME, FRONT_FRAME = CRITICAL, MARK
 """Colours of the rear frame with mass B, and of the front assembly with mass H."""

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from tmsopt.charts.chart import Chart
 from tmsopt.models import ParameterSet
+from tmsopt.plots.labels import Name, label_axes, place_names
+from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, legend_below, new_figure
+from tmsopt.report.text import columns, number, with_unit
 from tmsopt.roots import CLASSES
-from tmsopt.show.labels import Name, label_axes, place_names
-from tmsopt.show.style import CAPSIZE, CRITICAL, LINE, MARK, legend_below, new_figure
-from tmsopt.show.text import columns, number, with_unit
 from tmsopt.tracing.domain import Domain
 
 CLASS_COLOURS = ("#FFFFFF", "#BBBBBB", "#E6E6E6", "#A6D5F0", "#F2C45A")

@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tmsopt.fronts.front import Front, FrontPoint
-from tmsopt.show.labels import Name, place_names
-from tmsopt.show.style import CAPSIZE, COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, legend_below, new_figure
-from tmsopt.show.text import columns, number, with_unit
+from tmsopt.plots.labels import Name, place_names
+from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, legend_below, new_figure
+from tmsopt.report.text import columns, number, with_unit
 
 _STYLES = {
     "EP4": (MARK, "D"), "EP3": (MARK, "^"), "2EP2": (REAL, "s"), "EP2": (REAL, "v"), "CEP2": (COMPLEX, "s"),

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from itertools import islice
 
 from tmsopt.models import ParameterSet
-from tmsopt.show.text import columns, number, with_unit
+from tmsopt.report.text import columns, number, with_unit
 from tmsopt.studies.row import Row
 from tmsopt.studies.study import Study
 from tmsopt.studies.summary import Share, Summary

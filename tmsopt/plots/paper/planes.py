@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from tmsopt.paper.planes import Plane
-from tmsopt.show.chart import class_handles, domain_handles, draw_classes, draw_domain
-from tmsopt.show.labels import Name, label_axes, place_names
-from tmsopt.show.style import COMPLEX, CRITICAL, LINE, MARK, REAL, legend_below, new_figure
-from tmsopt.show.traced import draw_branch
+from tmsopt.plots.chart import class_handles, domain_handles, draw_classes, draw_domain
+from tmsopt.plots.labels import Name, label_axes, place_names
+from tmsopt.plots.style import COMPLEX, CRITICAL, LINE, MARK, REAL, legend_below, new_figure
+from tmsopt.plots.trace import draw_branch
 
 LAW_STYLE: Mapping[str, tuple[str, str]] = {
     "Frc1": (CRITICAL, "-"),

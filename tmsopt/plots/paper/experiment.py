@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tmsopt.paper.experiment import CriticalSpeed, Experiment
-from tmsopt.show.style import COMPLEX, CRITICAL, LINE, MARK, REAL, STABLE, new_figure
+from tmsopt.plots.style import COMPLEX, CRITICAL, LINE, MARK, REAL, STABLE, new_figure
 
 _MARKERS = ("*", "s", "o")
 _COLOURS = (MARK, CRITICAL, REAL)

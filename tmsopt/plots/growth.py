@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from tmsopt.critical_speeds.growth import SPEEDS, Growth
-from tmsopt.show.labels import axis_label
-from tmsopt.show.style import CRITICAL, HEAVY, LINE, MARK, STABLE, new_figure
+from tmsopt.plots.labels import axis_label
+from tmsopt.plots.style import CRITICAL, HEAVY, LINE, MARK, STABLE, new_figure
 
 
 def draw_growth_rates(ax: Axes, data: Growth) -> None:

@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from tmsopt.paper.locus import Locus, LocusRow, Mark, Track
-from tmsopt.show.style import COMPLEX, CRITICAL, LINE, MARK, REAL, new_figure
+from tmsopt.plots.style import COMPLEX, CRITICAL, LINE, MARK, REAL, new_figure
 
 COLOURS = (LINE, CRITICAL, MARK)
 """χ_B of the law, below it, above it."""

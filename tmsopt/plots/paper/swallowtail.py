@@ -11,10 +11,10 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 from mpl_toolkits.mplot3d.axes3d import Axes3D  # type: ignore[import-untyped]
 
 from tmsopt.paper.planes import Plane
+from tmsopt.plots.labels import place_names
+from tmsopt.plots.paper.planes import draw_plane, plane_handles
+from tmsopt.plots.style import COMPLEX, HEAVY, LINE, MARK, REAL, STABLE, legend_below, new_figure
 from tmsopt.records import Array
-from tmsopt.show.labels import place_names
-from tmsopt.show.planes import draw_plane, plane_handles
-from tmsopt.show.style import COMPLEX, HEAVY, LINE, MARK, REAL, STABLE, legend_below, new_figure
 from tmsopt.tracing.branch import Trace
 from tmsopt.tracing.swallowtail import Swallowtail
 

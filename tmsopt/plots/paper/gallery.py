@@ -54,7 +54,7 @@ def _names() -> Iterator[str]:
 def _bicycle() -> "Figure":
     from tmsopt.paper.reference import benchmark
     from tmsopt.paper.sketch import sketch
-    from tmsopt.show.bicycle import bicycle_figure
+    from tmsopt.plots.bicycle import bicycle_figure
 
     return bicycle_figure(sketch(benchmark().parameters), "The two-mass-skate bicycle: the benchmark, to scale")
 
@@ -64,8 +64,8 @@ def _growth() -> "Figure":
     from tmsopt.design.problem import Problem
     from tmsopt.models import tms
     from tmsopt.paper.reference import benchmark, optimised
-    from tmsopt.show.growth import draw_growth_rates
-    from tmsopt.show.style import REAL, new_figure
+    from tmsopt.plots.growth import draw_growth_rates
+    from tmsopt.plots.style import REAL, new_figure
     from tmsopt.solver.solve import solve
 
     others = {name: value for name, value in benchmark().parameters.items() if name != "Fr"}
@@ -94,7 +94,7 @@ def _growth() -> "Figure":
 
 def _swallowtail() -> "Figure":
     from tmsopt.paper.planes import SECTIONS, section, surface
-    from tmsopt.show.swallowtail import swallowtail_figure
+    from tmsopt.plots.paper.swallowtail import swallowtail_figure
 
     names = (r"\mathrm{Fr}_{\mathrm{EP}_4}" + (f" {offset:+g}" if offset else "") for offset in SECTIONS)
     titles = [rf"({letter}) $\mathrm{{Fr}} = {name}$" for letter, name in zip("bcd", names, strict=True)]
@@ -103,14 +103,14 @@ def _swallowtail() -> "Figure":
 
 def _ep_set() -> "Figure":
     from tmsopt.paper.planes import chi_B_plane, tilt_plane
-    from tmsopt.show.planes import planes_figure
+    from tmsopt.plots.paper.planes import planes_figure
 
     return planes_figure([tilt_plane(), chi_B_plane()], _ON_LAW)
 
 
 def _off_law() -> "Figure":
     from tmsopt.paper.planes import OFF_LAW_CHI_B, OFF_LAW_TILT, chi_B_plane, tilt_plane
-    from tmsopt.show.planes import planes_figure
+    from tmsopt.plots.paper.planes import planes_figure
 
     titles = [
         rf"(a) $\chi_B = \sqrt{{2}} {OFF_LAW_CHI_B:+g}$",
@@ -121,7 +121,7 @@ def _off_law() -> "Figure":
 
 def _abscissa() -> "Figure":
     from tmsopt.paper.planes import chi_B_plane, tilt_plane
-    from tmsopt.show.planes import abscissa_figure
+    from tmsopt.plots.paper.planes import abscissa_figure
 
     points = (480, 360)
     return abscissa_figure([tilt_plane(0, points, False), chi_B_plane(0, points, False)], _ON_LAW)
@@ -132,21 +132,21 @@ _ON_LAW = (r"(a) $\chi_B = \sqrt{2}$", r"(b) $\lambda_s = \lambda_s^{\mathrm{EP}
 
 def _root_locus() -> "Figure":
     from tmsopt.paper.locus import table_1_loci
-    from tmsopt.show.locus import locus_figure
+    from tmsopt.plots.paper.locus import locus_figure
 
     return locus_figure(table_1_loci())
 
 
 def _experiment() -> "Figure":
     from tmsopt.paper.experiment import experiment
-    from tmsopt.show.experiment import experiment_figure
+    from tmsopt.plots.paper.experiment import experiment_figure
 
     return experiment_figure(experiment())
 
 
 def _universal() -> "Figure":
     from tmsopt.paper.universal import spire_faces, table_1_paths
-    from tmsopt.show.universal import LIMIT, universal_figure
+    from tmsopt.plots.paper.universal import LIMIT, universal_figure
 
     return universal_figure(table_1_paths(), spire_faces(LIMIT), r"$\mathrm{Fr}$")
 

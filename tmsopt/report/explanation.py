@@ -1,0 +1,248 @@
+"""What an optimum means, as lines for a reader."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from tmsopt.diagnosis.diagnosis import Diagnosis
+from tmsopt.diagnosis.splitting import DEVIATION, Law, Response
+from tmsopt.explanation.explain import Explanation
+from tmsopt.explanation.optimality import NOT_COVERED, OnLine, Optimality
+from tmsopt.explanation.rounding import ALONE, Rounded
+from tmsopt.margins.nearest import Nearest, Robustness
+from tmsopt.report.text import columns, number
+
+if TYPE_CHECKING:
+    from tmsopt.design.solution import Solution
+    from tmsopt.diagnosis.diagnosis import Diagnosis
+    from tmsopt.explanation.explain import Explanation
+    from tmsopt.margins.nearest import Robustness
+
+_MAIN = 0.5
+"""Share of the largest change above which a parameter is named in the headline."""
+_WIDE = 12
+"""Parameters up to which each has a column; of more, each has a row."""
+_WORDS = {
+    "weave": "weave",
+    "capsize": "capsize",
+    "infinity": "a root through infinity (a0 = 0)",
+}
+
+
+_ROUNDING = 1e-16
+
+
+def explained_lines(explanation: Explanation) -> list[str]:
+    """Summary, local optimality, levers, rounding, precision and warnings."""
+    lines = [f"meaning: {explanation.summary}", *optimality_lines(explanation.optimality)]
+    lines += [f"warning: {text}" for text in explanation.warnings]
+    if explanation.levers:
+        lines += ["", "what moving a limit buys, solved again:"]
+        lines += [f"  {lever.sentence}" for lever in explanation.levers]
+    if explanation.precision:
+        lines.append("")
+        lines += columns(_rows(explanation))
+    if explanation.worst:
+        lines.append(f"rounding {explanation.worst} alone to {ALONE} digits costs most")
+    return [line.rstrip() for line in lines]
+
+
+def optimality_lines(optimality: Optimality) -> list[str]:
+    """The verdict, then the multipliers of each root on the rightmost line."""
+    if optimality.verdict == NOT_COVERED:
+        return [f"local optimality: not judged, for {optimality.reason}"]
+    lines = [f"local optimality: {optimality.reason}", *map(_root_line, optimality.roots)]
+    if optimality.roots:
+        lines[-1] += f"; stationary within {optimality.residual:.1g}"
+    return lines
+
+
+def _root_line(root: OnLine) -> str:
+    place = f"{root.re:.5g}" + (f" ± {root.im:.5g}i" if root.im else "")
+    times = f" ({root.multiplicity}-fold)" if root.multiplicity > 1 else ""
+    share = f" bears {100 * root.share:.3g} % of the line," if root.share < 1 - 1e-9 else ""
+    kappa = f", of kappa {root.kappa:.4g}" if root.multiplicity > 1 else ""
+    return f"  {place}{times}{share} multiplier of beta {root.beta:.4g}{kappa}"
+
+
+def _rows(explanation: Explanation) -> list[Sequence[str]]:
+    rows: list[Sequence[str]] = [("rounded", "to", "abscissa", "loses", "damping_ratio", "violates")]
+    for name, row in explanation.rounding.items():
+        rows.append(_row(f"{name} alone", row.written[name], row))
+    for row in explanation.precision:
+        rows.append(_row("all", f"{row.digits} digits", row))
+    return rows
+
+
+def _row(what: str, to: str, row: Rounded) -> tuple[str, ...]:
+    return (what, to, number(row.realised), f"{row.loss:.2g}", f"{row.damping_ratio:.4g}", _violated(row.violations))
+
+
+def _violated(violations: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} by {value:.1g}" for name, value in violations.items())
+
+
+def meaning(solution: "Solution") -> dict[str, Any]:
+    """What the optimum means, for JSON."""
+    robust, found = _robust(solution), _diagnosed(solution)
+    return {
+        "meaning": _explained(solution).to_json(),
+        **({"robustness": robust.to_json()} if robust else {}),
+        **({"diagnosis": [d.to_json() for d in found]} if found else {}),
+    }
+
+
+def meaning_lines(solution: "Solution", brief: bool, details: bool) -> Iterator[str]:
+    """The same as text: nothing if brief, but for the details of multiple roots where these are asked for."""
+    if not brief:
+        from tmsopt.report.explanation import explained_lines
+
+        yield from ["", *explained_lines(_explained(solution))]
+        if robust := _robust(solution):
+            nominal = "of the nominal design, without its scenarios and tolerances:\n" if solution.worst else ""
+            yield "\n" + nominal + robustness_table(robust)
+    if (not brief or details) and (lines := diagnosis_lines(_diagnosed(solution), details)):
+        yield from ["", *lines]
+
+
+def _explained(solution: "Solution") -> "Explanation":
+    from tmsopt.explanation.explain import explain
+
+    return explain(solution)
+
+
+def _robust(solution: "Solution") -> "Robustness | None":
+    """The nearest boundaries; None where a root is at infinity, or nothing feasible was found."""
+    from tmsopt.margins.nearest import robustness
+
+    if not math.isfinite(solution.abscissa) or solution.status == "infeasible":
+        return None
+    return robustness(solution)
+
+
+def _diagnosed(solution: "Solution") -> "tuple[Diagnosis, ...]":
+    """The multiple roots of a design that was found."""
+    from tmsopt.diagnosis.diagnosis import diagnose
+
+    return diagnose(solution) if solution.status == "optimal" else ()
+
+
+def diagnosis_lines(diagnoses: Sequence[Diagnosis], details: bool = False) -> list[str]:
+    """Two sentences for each multiple root: what it is, and how it splits; the laws of every parameter as details."""
+    lines: list[str] = []
+    for found in diagnoses:
+        lines += [_kind(found), *_splitting(found)]
+        if details:
+            lines += ["", *(f"  {line}".rstrip() for line in columns(_diagnosis_rows(found))), ""]
+    return lines[:-1] if details and lines else lines
+
+
+def _kind(found: Diagnosis) -> str:
+    place = f"{found.re:.8g}" + (f" ± {found.im:.8g}i" if found.im else "")
+    vectors = f"{found.geometric} independent eigenvector" + ("s" if found.geometric > 1 else "")
+    if found.jordan is None:
+        why = "there are no matrices to judge by, so one chain, as a companion matrix has"
+    else:
+        zero = f"{found.jordan.zero:.1g}" if found.jordan.zero > _ROUNDING else f"below {_ROUNDING:g}"
+        why = f"{vectors}: relative singular value {zero}"
+        why += f" beside {found.jordan.nonzero:.2g}" if found.jordan.nonzero < float("inf") else ", and no other"
+    chains = f"Jordan chains of length {', '.join(map(str, found.partial))}" if found.partial else "chains not decided"
+    chains = chains.replace("chains", "chain", 1) if len(found.partial) == 1 else chains
+    what = "pair" if found.im else "root"
+    return f"{found.algebraic}-fold {what} {place}: {found.kind}, {chains} ({why})"
+
+
+def _splitting(found: Diagnosis) -> list[str]:
+    moved = [r for r in found.responses if r.laws]
+    if not moved:
+        return ["  no parameter moves it"]
+    first, still = moved[0], [r.parameter for r in found.responses if not r.laws]
+    rest = f"; {', '.join(still)} {'does' if len(still) == 1 else 'do'} not move it" if still else ""
+    change = "relative change" if first.relative else "change"
+    return [f"  a {change} ε of {first.parameter} moves it by {_law(first.laws[0])}, {_range(first.laws[0])}{rest}"]
+
+
+def _law(law: Law) -> str:
+    exponent = str(law.branches.exponent)
+    power = "ε" if exponent == "1" else f"ε^({exponent})" if "/" in exponent else f"ε^{exponent}"
+    return f"{law.branches.size:.3g} {power}"
+
+
+def _range(law: Law) -> str:
+    least = min(law.below, law.above)
+    within = f"within {100 * DEVIATION:.0f} %"
+    if not least:
+        return f"{within} for no change that was sampled"
+    return f"{within} while |ε| <= {least:.2g}, as sampled"
+
+
+def _diagnosis_rows(found: Diagnosis) -> list[Sequence[str]]:
+    rows: list[Sequence[str]] = [("parameter", "change", "roots", "shift", "holds for ε < 0", "holds for ε > 0")]
+    for response in found.responses:
+        rows += [_diagnosis_row(response, law) for law in response.laws]
+        if response.unmoved:
+            rows.append((response.parameter, _change(response), str(response.unmoved), "none", "", ""))
+    return rows
+
+
+def _diagnosis_row(response: Response, law: Law) -> tuple[str, ...]:
+    ends = (f"|ε| <= {x:.2g}" if x else "nowhere sampled" for x in (law.below, law.above))
+    return (response.parameter, _change(response), str(law.branches.roots), _law(law), *ends)
+
+
+def _change(response: Response) -> str:
+    return "relative" if response.relative else "absolute"
+
+
+def robustness_line(found: Robustness) -> str:
+    """One sentence: how far, to what, and mostly by which parameters."""
+    limit = found.limit
+    if not limit.found:
+        return f"robustness: no boundary of stability found; the design is {'' if found.stable else 'not '}stable"
+    where = _WORDS[limit.kind] + _mostly(limit)
+    if not found.stable:
+        return f"robustness: none, the design is not stable; {_size(found)} to stability through {where}"
+    return f"robustness: {_size(found)} to {where}"
+
+
+def robustness_table(found: Robustness) -> str:
+    """The sentence, then the nearest point of every boundary: its distance and the change of each parameter."""
+    names = list(found.weights)
+    kinds = (found.weave, found.capsize, found.infinity, found.heavy_damping)
+    rows: list[tuple[str, ...]] = [("relative changes" if found.relative else "changes in weights", "distance", *names)]
+    for n in kinds:
+        moves = (f"{n.direction[name]:+.2%}" for name in names) if n.found else ["" for _ in names]
+        rows.append((_robust_row(n, found), _percent(n.distance) if n.found else "none found", *moves))
+    rows.append(("weight", "", *(f"{found.weights[name]:.6g}" for name in names)))
+    for n in kinds:
+        if n.found and n.distance > 0:
+            rows.append((f"at {n.kind}", "", *(f"{n.parameters[name]:.8g}" for name in names)))
+    if len(names) > _WIDE:
+        rows = list(zip(*rows, strict=True))
+    return "\n".join(line.rstrip() for line in [robustness_line(found), "", *columns(rows)])
+
+
+def _robust_row(n: Nearest, found: Robustness) -> str:
+    if n.kind != "heavy damping":
+        return f"to {n.kind}"
+    return "out of heavy damping" if found.heavily_damped else "into heavy damping"
+
+
+def _mostly(limit: Nearest) -> str:
+    """The parameters that change most, signed."""
+    changes = sorted(limit.direction.items(), key=lambda item: -abs(item[1]))
+    largest = abs(changes[0][1])
+    named = [f"{n} {_percent(x, '+')}" for n, x in changes if largest > 0 and abs(x) >= _MAIN * largest]
+    return f" (mostly {', '.join(named)})" if named else ""
+
+
+def _size(found: Robustness) -> str:
+    if found.relative:
+        return f"{_percent(found.limit.distance)} relative change"
+    return f"change of {found.limit.distance:.4g} in weights"
+
+
+def _percent(x: float, sign: str = "") -> str:
+    """Two significant digits at least."""
+    digits = 1 if x == 0 else max(1 - math.floor(math.log10(abs(100 * x))), 0)
+    return f"{100 * x:{sign}.{digits}f} %"

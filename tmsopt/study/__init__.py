@@ -1,1 +1,0 @@
-"""Studies over designs: beside the laws, over speeds."""
