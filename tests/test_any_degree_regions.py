@@ -21,8 +21,9 @@ from tmsopt.design.problem import Problem
 from tmsopt.margins.boundaries import edges, heavily_damped
 from tmsopt.margins.nearest import nearest, robustness
 from tmsopt.models import Model, Parameter, ParameterSet
-from tmsopt.plots.chart import chart_figure, chart_table
+from tmsopt.plots.chart import chart_figure
 from tmsopt.plots.growth import growth_figure
+from tmsopt.report.curves import chart_table
 from tmsopt.roots import (
     CLASSES,
     hurwitz_minors,

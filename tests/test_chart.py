@@ -23,7 +23,7 @@ from tmsopt.design.files import load
 from tmsopt.design.problem import Problem
 from tmsopt.errors import InputError
 from tmsopt.models import tms
-from tmsopt.plots.chart import chart_table
+from tmsopt.report.curves import chart_table
 from tmsopt.roots import CLASSES
 from tmsopt.tracing.domain import domain
 from tmsopt.tracing.trace import trace

@@ -19,12 +19,12 @@ from click.testing import CliRunner, Result
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from tmsopt import laws
+from tmsopt.checks.law_rows import law_rows
 from tmsopt.cli import main
 from tmsopt.design.files import load
 from tmsopt.design.problem import Problem
 from tmsopt.errors import InputError
 from tmsopt.models import tms
-from tmsopt.paper.compare import law_rows
 from tmsopt.records import Table
 from tmsopt.solver.solve import solve
 from tmsopt.studies.monte_carlo import monte_carlo

@@ -18,7 +18,8 @@ from tmsopt.design.problem import Problem
 from tmsopt.errors import InputError
 from tmsopt.explanation.optimality import optimality
 from tmsopt.models import from_coefficients, from_matrices, whipple
-from tmsopt.plots.trace import trace_figure, trace_table
+from tmsopt.plots.trace import trace_figure
+from tmsopt.report.curves import trace_table
 from tmsopt.roots import pattern, product, shift
 from tmsopt.roots.patterns.descriptions import in_words
 from tmsopt.solver.solve import solve

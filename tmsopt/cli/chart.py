@@ -147,7 +147,7 @@ def chart(
     if as_json:
         write_json(data)
     else:
-        from tmsopt.plots.chart import chart_table, summary_table
+        from tmsopt.report.curves import chart_table, summary_table
 
         click.echo(chart_table(found) if found is not None else summary_table(work.problem.parameter_set, data))
     if output is not None and output.suffix.lower() == ".chart":

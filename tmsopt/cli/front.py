@@ -64,7 +64,7 @@ def write_front(
     if as_json:
         write_json(front.to_json())
     else:
-        from tmsopt.plots.front import front_table
+        from tmsopt.report.curves import front_table
 
         click.echo(front_table(front))
     if csv_file is not None:

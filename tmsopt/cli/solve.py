@@ -230,7 +230,7 @@ def compare(file: Path, as_json: bool, starts: int | None, seed: int, linear_sol
         if problem.pareto:
             raise InputError(unasked(problem))
     from tmsopt.paper.compare import compare as compare_design
-    from tmsopt.report.design import comparison_table
+    from tmsopt.report.comparison import comparison_table
     from tmsopt.solver.multistart import STARTS
 
     with progress() as update:

@@ -70,7 +70,7 @@ def trace(
     if as_json:
         write_json(found.to_json())
     else:
-        from tmsopt.plots.trace import trace_table
+        from tmsopt.report.curves import trace_table
 
         click.echo(trace_table(found))
     if not found.branches:

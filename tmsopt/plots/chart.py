@@ -1,7 +1,6 @@
 """Stability charts drawn with their exact boundary curves."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -16,10 +15,8 @@ from matplotlib.typing import LineStyleType
 from numpy.typing import NDArray
 
 from tmsopt.charts.chart import Chart
-from tmsopt.models import ParameterSet
 from tmsopt.plots.labels import Name, label_axes, place_names
 from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, legend_below, new_figure
-from tmsopt.report.text import columns, number, with_unit
 from tmsopt.roots import CLASSES
 from tmsopt.tracing.domain import Domain
 
@@ -146,48 +143,3 @@ def chart_figure(chart: Chart, layer: str = "kind") -> Figure:
     legend_below(figure, handles)
     place_names(ax, names)
     return figure
-
-
-def chart_table(chart: Chart) -> str:
-    """Shares of the classes, the best grid point, and the boundaries with their corners."""
-    data: dict[str, Any] = chart.to_json()
-    (first, second), of = chart.axes, chart.problem.parameter_set
-    size = f"{len(chart.grid[0])} × {len(chart.grid[1])}"
-    lines = [chart.problem.title or "untitled problem", f"{size} designs over {first} and {second}", ""]
-    lines += columns([(name, f"{100 * share:.2f} %") for name, share in chart.shares.items() if share])
-    if len(chart.problem.constraints) > len(chart.left_aside):
-        lines.append(f"  the constraints hold on {100 * data['satisfied']:.2f} %")
-    for name in chart.left_aside:
-        lines.append(f"  {name} is an equality, which holds on curves and not on a grid: left aside")
-    if best := data["least_abscissa"]:
-        units = {n: "" if of[n].unit == "1" else f" {of[n].unit}" for n in (first, second)}
-        where = ", ".join(f"{n} = {best[n]:.6g}{unit}" for n, unit in units.items())
-        lines += ["", f"least abscissa on the grid: {best['value']:.6g} at {where}"]
-    if chart.domain is not None:
-        kinds = [f"{arc.kind} ({len(arc.points[first])} points)" for arc in chart.domain.stability]
-        damped = [f"{arc.kind} ({len(arc.points[first])} points)" for arc in chart.domain.heavy_damping]
-        lines += ["", f"stability is bounded by {', '.join(kinds) or 'nothing in the box'}"]
-        lines += [f"heavy damping is bounded by {', '.join(damped) or 'nothing in the box'}"]
-        if chart.domain.corners:
-            rows = [("corner", with_unit(of, first), with_unit(of, second))]
-            rows += [(c.name, number(c.parameters[first]), number(c.parameters[second])) for c in chart.domain.corners]
-            lines += ["", *columns(rows)]
-    return "\n".join(line.rstrip() for line in lines)
-
-
-def summary_table(of: ParameterSet, data: Mapping[str, Any]) -> str:
-    """A chart that is not in memory: shares of the classes, the best grid point, and how fast it was made."""
-    axes = data["axes"]
-    size = " × ".join(str(a["points"]) for a in axes.values())
-    lines = [data["title"] or "untitled problem", f"{size} designs over {', '.join(axes)}", ""]
-    if data["classes"]:
-        lines += columns([(name, f"{100 * share:.2f} %") for name, share in data["classes"].items() if share])
-    if data["satisfied"] is not None and data["satisfied"] < 1:
-        lines.append(f"  the constraints hold on {100 * data['satisfied']:.2f} %")
-    if best := data["least_abscissa"]:
-        units = {n: "" if of[n].unit == "1" else f" {of[n].unit}" for n in axes}
-        where = ", ".join(f"{n} = {best[n]:.6g}{unit}" for n, unit in units.items())
-        lines += ["", f"least abscissa on the grid: {best['value']:.6g} at {where}"]
-    if data.get("designs"):
-        lines += ["", f"{data['per_second']:.3g} designs per second with {data['engine']}"]
-    return "\n".join(line.rstrip() for line in lines)

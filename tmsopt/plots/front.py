@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from tmsopt.fronts.front import Front, FrontPoint
 from tmsopt.plots.labels import Name, place_names
 from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, legend_below, new_figure
-from tmsopt.report.text import columns, number, with_unit
 
 _STYLES = {
     "EP4": (MARK, "D"), "EP3": (MARK, "^"), "2EP2": (REAL, "s"), "EP2": (REAL, "v"), "CEP2": (COMPLEX, "s"),
@@ -23,29 +22,6 @@ def _style(structure: str) -> tuple[str, str]:
     """A root of five or more drawn as EP4 is, and so with pairs."""
     higher = re.fullmatch(r"(C?)EP\d+", structure)
     return _STYLES.get(structure) or (_STYLES["CEP2" if higher[1] else "EP4"] if higher else (LINE, "x"))
-
-
-def front_table(front: Front) -> str:
-    """Points one a row: objectives, free parameters, structure, limits that bind, ends and kinks."""
-    of = front.problem.parameter_set
-    texts = [t.strip() for t in front.objectives]
-    free = [n for n in front.problem.free if n not in texts]
-    count = f"{len(front)} point" + ("s" if len(front) != 1 else "")
-    where = f", designs with {front.problem.locate}" if front.problem.locate else ""
-    lines = [
-        front.problem.title or "untitled problem",
-        f"front of least {', '.join(texts)}{where}: {count}, {_counted(front)}"
-        f"{front.solved} sub-problems; {front.seconds:.2f} s",
-        "",
-    ]
-    headings = [with_unit(of, t) if t in of.names else t for t in texts]
-    rows = [(*headings, *(with_unit(of, n) for n in free), "structure", "limits that bind", "")]
-    for p in front.points:
-        numbers = [number(v) for v in p.objectives] + [f"{p.solution.parameters[n]:.8g}" for n in free]
-        rows.append((*numbers, p.structure, ", ".join(p.limits), p.label))
-    lines += columns(rows)
-    remarks = [f"gap: {gap.reason}" for gap in front.gaps] + [f"note: {note}" for note in front.notes]
-    return "\n".join(line.rstrip() for line in [*lines, *([""] if remarks else []), *remarks])
 
 
 def front_figure(front: Front) -> Figure:
@@ -109,11 +85,3 @@ def _axis(front: Front, text: str) -> str:
         unit = "" if of[name].unit == "1" else f" in {of[name].unit}"
         return f"${sign}{of[name].latex}${unit}"
     return plain
-
-
-def _counted(front: Front) -> str:
-    words = ""
-    for found, word in ((front.kinks, "kink"), (front.gaps, "gap")):
-        if found:
-            words += f"{len(found)} {word}{'s' if len(found) > 1 else ''}, "
-    return words

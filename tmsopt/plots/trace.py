@@ -2,14 +2,11 @@
 
 from itertools import groupby
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tmsopt.plots.labels import Name, label_axes, place_names
 from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, legend_below, new_figure
-from tmsopt.report.text import columns, number, with_unit
-from tmsopt.roots import pattern
 from tmsopt.tracing.branch import Branch, Trace, _sides
 
 COLOURS = {
@@ -19,28 +16,6 @@ COLOURS = {
 """Colour of each pattern; complex ones are dashed besides."""
 
 _UNLABELLED = ("fold", "constraint", "end")
-
-_FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
-
-
-def trace_table(trace: Trace) -> str:
-    """Branches with their events, one a row, in the free parameters."""
-    free, of = list(trace.problem.free), trace.problem.parameter_set
-    per_point = 1e6 * trace.seconds_walking / max(trace.points, 1)
-    count = f"{len(trace.branches)} branch" + ("es" if len(trace.branches) != 1 else "")
-    points = f", {trace.points} points at {per_point:.0f} µs each" if trace.points else ""
-    lines = [
-        trace.problem.title or "untitled problem",
-        f"{trace.pattern}: {count}{points}, looked for from {trace.starts} starts; {trace.seconds:.2f} s",
-    ]
-    for number_, branch in enumerate(trace.branches, start=1):
-        lines += ["", f"branch {number_}: {_summary(branch, trace)}"]
-        rows = [("", *(with_unit(of, n) for n in free), "abscissa", "")]
-        for event in branch.events:
-            values = (number(event.parameters[n]) for n in free)
-            rows.append((event.name, *values, number(float(branch.abscissa[event.index])), event.detail))
-        lines += columns(rows)
-    return "\n".join(line.rstrip() for line in lines)
 
 
 def draw_trace(ax: Axes, trace: Trace, horizontal: str, vertical: str) -> list[Name]:
@@ -96,21 +71,6 @@ def trace_figure(trace: Trace, horizontal: str, vertical: str) -> Figure:
     legend_below(figure, ax.get_legend_handles_labels()[0])
     place_names(ax, names)
     return figure
-
-
-def _summary(branch: Branch, trace: Trace) -> str:
-    share = f"{100 * float(np.mean(branch.stable)):.0f} % of its points"
-    states = (
-        f"bounds stability on {share}"
-        if pattern(branch.pattern, trace.problem.model.degree).rest
-        else f"stable on {share}"
-    )
-    if any(c.comparison != "==" for c in trace.problem.conditions.values()):
-        states += f", constraints hold on {100 * float(np.mean(branch.satisfied)):.0f} %"
-    form = "closed" if branch.closed else "open"
-    kinds = " and ".join(dict.fromkeys(_sides(branch)))
-    met = "met" if branch.residual <= _FITTING else "met only"
-    return f"{kinds}, {len(branch)} points, {form}, {states}, coefficients {met} to {branch.residual:.0e}"
 
 
 def _label(ax: Axes, text: str) -> str | None:

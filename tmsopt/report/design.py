@@ -5,7 +5,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from tmsopt.design.solution import Solution
 from tmsopt.design.units import reading
 from tmsopt.models.tms import GRAVITY, tms, to_si
-from tmsopt.paper.compare import Comparison
 from tmsopt.report import rows as plain
 from tmsopt.report.limits import bound_lines, case_lines, relaxation_lines
 from tmsopt.report.rows import pitching, skate_rows
@@ -63,31 +62,6 @@ def every_table(every: Every) -> str:
         f"{coverage.expected:.2f} solutions to be expected in all; "
         f"the chance that one more start finds another is below {coverage.chance:.2g} (95 % confidence; no proof)"
     ]
-    return "\n".join(line.rstrip() for line in lines).rstrip()
-
-
-def comparison_table(comparison: Comparison) -> str:
-    """Law beside number where laws are known, then the two formulations beside each other."""
-    design = comparison.design
-    lines = [design.problem.title or "untitled problem", _headline(design), ""]
-    rows = [("law", "of", "numeric", "law says", "relative", "")]
-    for row in comparison.laws:
-        verdict = row.reason or ("agrees" if row.agrees else "DIFFERS")
-        relative = f"{row.relative:.1e}" if row.applies else ""
-        law = number(row.law) if row.applies else ""
-        rows.append((row.label, row.subject, number(row.numeric), law, relative, verdict))
-    known = design.problem.model is tms
-    model = design.problem.model
-    named = f"the {model.title}" if model.statement is None else f"'{model.title}'"
-    lines += columns(rows) if known else [f"no laws are known of {named}, only of skates (tms)"]
-    lines.append("")
-    if comparison.other is None:
-        lines.append(f"other formulation: none, {comparison.reason}")
-    else:
-        names = f"{comparison.other.formulation} minus {design.formulation}"
-        rows2 = [("formulations", names)] + [(n, f"{d:.1e}") for n, d in comparison.differences.items()]
-        lines += columns(rows2)
-    lines += [line for line in _facts(design) if line.startswith("also solved")]
     return "\n".join(line.rstrip() for line in lines).rstrip()
 
 

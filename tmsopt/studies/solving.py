@@ -10,11 +10,11 @@ from typing import Any
 
 from threadpoolctl import ThreadpoolController
 
+from tmsopt.checks.law_rows import LawRow, law_rows
 from tmsopt.design.expression import parse_value
 from tmsopt.design.solution import Solution
 from tmsopt.errors import InputError
 from tmsopt.models import tms
-from tmsopt.paper.compare import LawRow, law_rows
 from tmsopt.records import Table
 from tmsopt.solver.multistart import same
 from tmsopt.solver.solve import solve

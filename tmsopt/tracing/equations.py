@@ -1,13 +1,22 @@
 """How large the coefficients of a problem are over its box, so that no unit of time or mass matters."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from itertools import islice
+from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from tmsopt.design.problem import Problem
+from tmsopt.errors import Fault, InputError
+from tmsopt.formulation.formulate import matching, variables_of
+from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import spread
 from tmsopt.records import Array
+from tmsopt.roots import Pattern, roots
+from tmsopt.roots import pattern as pattern_of
+from tmsopt.tracing.continuation import Curve, curve
 
 _SAMPLE = 32  # designs by which sizes are judged
 
@@ -33,3 +42,74 @@ def sizes(problem: Problem) -> Sizes:
     a = np.array([[float(c) for c in problem.values(problem.ordered(d)).coefficients] for d in designs])
     a = np.abs(a[np.all(np.isfinite(a), axis=1)])
     return Sizes(np.median(a, axis=0) if len(a) else np.zeros(problem.model.degree + 1))
+
+
+@dataclass(frozen=True)
+class Traced:
+    """A problem made ready for tracing one pattern.
+
+    Attributes:
+        problem: with the pattern to locate and every constraint.
+        unknowns: where the unknowns of the pattern stand among the variables.
+        size: of the coefficients over the box.
+    """
+
+    problem: Problem
+    pattern: Pattern
+    nlp: NLP
+    on: Curve
+    unknowns: slice
+    size: Sizes
+
+
+def prepare(problem: Problem) -> Traced:
+    """The equations of a pattern problem, compiled for tracing."""
+    pattern = pattern_of(str(problem.locate), problem.model.degree)
+    equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].comparison == "=="}
+    nlp = matching(replace(problem, constraints=equalities))
+    free = len(problem.free)
+    unknowns = slice(free, free + len(pattern.unknowns))
+    unit = np.ones(len(nlp.variables))
+    unit[unknowns] = np.array([nlp.unit**power for power in pattern.powers])  # of the NLP; x has natural units
+    x = ca.SX.sym("x", len(nlp.variables))
+    g = nlp.at(x / ca.DM(unit))[1]
+    rows = [k for k in range(len(nlp.rows)) if nlp.row_lower[k] == nlp.row_upper[k]]
+    if len(rows) != len(nlp.variables) - 1:
+        names = ", ".join(equalities)
+        message = f"an equality of a root quantity cannot be traced along {pattern.name}; leave out {names}"
+        raise InputError([Fault(message, ("constraints",))])
+    lower, upper = np.array(nlp.lower), np.array(nlp.upper)
+    for k, name in enumerate(pattern.unknowns):
+        if name in pattern.ends:
+            lower[free + k] = 0.0
+    scale = unit.copy()
+    scale[:free] = upper[:free] - lower[:free]
+    sample = [_variables(nlp, problem, d, 1) for d, _ in zip(spread(problem, 0), range(_SAMPLE), strict=False)]
+    known = np.array([s[0] for s in sample if s]).reshape(-1, len(nlp.variables))
+    if known.size:
+        scale[free:] = np.clip(np.median(np.abs(known[:, free:]), axis=0), 0.1 * unit[free:], 1e3 * unit[free:])
+    on = curve(x, ca.vertcat(*[g[k] for k in rows]), scale, lower, upper)
+    return Traced(problem, pattern, nlp, on, unknowns, sizes(problem))
+
+
+def design_at(problem: Problem, x: Array) -> dict[str, Any]:
+    """Free parameters for traced variables, floats or columns."""
+    of = problem.parameter_set
+    return {n: np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, x.T, strict=False)}
+
+
+def _variables(nlp: NLP, problem: Problem, design: Mapping[str, float], count: int | None) -> list[Array]:
+    """All variables for a design, for the first guesses of the pattern's unknowns, as many as asked for, or all."""
+    values = problem.values(problem.ordered(design))
+    a = np.array([float(c) for c in values.coefficients])
+    if a[0] == 0 or not np.all(np.isfinite(a)):
+        return []
+    z = roots(a)
+    guesses = [
+        lift.guess([values], [z / nlp.unit if k else z]) for k, lift in enumerate(nlp.lifts)
+    ]  # those in its unit
+    if not all(guesses):
+        return []
+    others = [c for guess in guesses[1:] for c in guess[0]]
+    x = variables_of(problem, design)
+    return [np.array([*x, *first, *others]) for first in guesses[0][:count]]

@@ -18,10 +18,9 @@ from tmsopt.records import Array, Truth
 from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.meetings import meeting
 from tmsopt.tracing.continuation import Curve, Walk, between, both_ways, contains, crossing, curve, project
-from tmsopt.tracing.equations import sizes
+from tmsopt.tracing.equations import design_at, sizes
 from tmsopt.tracing.monitors import margins, sign_changes
 from tmsopt.tracing.seeds import unexplained
-from tmsopt.tracing.trace import design_at
 
 _NOTHING = 1e-12  # of its size over the box: a constant term this small all along the curve vanishes with a0
 

@@ -6,8 +6,17 @@ from typing import Any
 import numpy as np
 
 from tmsopt.design.problem import Problem
+from tmsopt.formulation.starts import spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots.meetings import CLOSED
+from tmsopt.tracing.continuation import INFINITE, Curve, Walk, project
+from tmsopt.tracing.equations import Traced, _variables, design_at
+
+_BACK = 300.0  # size of an unknown from which a curve is looked for on the other side of infinity
+_FAR = 1e5  # unknowns of a seed, in units of their scale: beyond, a0 all but vanishes
+_ROUNDS = 8  # times the starts asked for, at most
+_GUESSES = 4  # starting values of the unknowns tried at each design
+
 
 POINTS = 256
 """Along each axis; an edge of the grid is as long as a step of a trace."""
@@ -105,3 +114,89 @@ def apart(points: Array, line: Array, distance: float) -> Truth:
 
 def _blocks(count: int, size: int = 256) -> Iterator[slice]:
     return (slice(k, k + size) for k in range(0, count, size))
+
+
+def _seeds(
+    ready: Traced,
+    starts: int,
+    seed: int,
+    through: Sequence[Mapping[str, float]],
+    lines: Sequence[Mapping[str, Array]],
+) -> Iterator[tuple[int, Array | None]]:
+    """Points of the pattern's curve in the box, found from many designs, and the number of these; None where one fails.
+
+    Where no grid shows what they missed, the search goes on until as many starts in a row find nothing new: `lines`
+    grows meanwhile.
+    """
+    problem = ready.problem
+    free = len(problem.free)
+    given = [*through, *([problem.start] if set(problem.start) == set(problem.free) else [])]
+    for design in given:
+        for guess in range(_GUESSES):
+            yield 0, _seed(ready, design, guess, None)
+    vain, known = 0, len(lines)
+    for count, design in enumerate(spread(problem, seed)):
+        if vain >= starts or count >= _ROUNDS * starts or (count >= starts and _swept(ready)):
+            return
+        held = [None, *range(free)][count % (free + 1)]
+        for guess in range(_GUESSES):
+            yield count + 1, _seed(ready, design, guess, held)
+        vain, known = (vain + 1 if len(lines) == known else 0), len(lines)
+
+
+def _swept(ready: Traced) -> bool:
+    """Whether a grid over two free parameters shows every branch that is not too short for it."""
+    return ready.pattern.test is not None and len(ready.problem.free) == 2
+
+
+def _missed(ready: Traced, lines: Sequence[Mapping[str, Array]]) -> Iterator[tuple[int, Array | None]]:
+    """Points of the curve where a test function of the pattern changes sign over a grid, off the lines so far."""
+    if ready.pattern.test is not None and _swept(ready):
+        for design in unexplained(ready.problem, ready.pattern.test, lines):
+            yield 0, _seed(ready, design, None, None)
+
+
+def _beyond(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int, Array | None]]:
+    """Points where a curve may come back from infinity: there a root changes sides, and the parameters go on.
+
+    They approach a0 = 0 with the inverse of the unknown that grows, so two points give the limit, and a point beyond
+    it.
+    """
+    free = len(ready.problem.free)
+    done = 0
+    while done < len(walks):
+        walked = walks[done]
+        done += 1
+        for end, y in zip(walked.ends, (walked.y[::-1], walked.y), strict=True):
+            if end.reason != INFINITE:
+                continue
+            size = np.abs(y[:, free:]).max(axis=1)
+            begin = int(np.flatnonzero(size < _BACK)[-1]) if np.any(size < _BACK) else 0
+            if begin < len(y) - 2:
+                (here, far), weight = (y[begin, :free], y[-1, :free]), size[begin] / size[-1]
+                limit = (far - weight * here) / (1 - weight)
+                x = (2 * limit - here) * ready.on.scale[:free]
+                yield 0, _seed(ready, _floats(design_at(ready.problem, x)), None, None)
+
+
+def _floats(design: Mapping[str, Any]) -> dict[str, float]:
+    return {n: float(v) for n, v in design.items()}
+
+
+def _seed(ready: Traced, design: Mapping[str, float], guess: int | None, held: int | None) -> Array | None:
+    """A point of the curve near a design, from a guess of that number, or the best guess."""
+    on, free = ready.on, len(ready.problem.free)
+    tried = _variables(ready.nlp, ready.problem, design, None if guess is None else guess + 1)
+    x = min(tried, key=lambda t: _mismatch(on, t), default=None) if guess is None else next(iter(tried[guess:]), None)
+    if x is None:
+        return None
+    y = project(on.evaluate, x / on.scale, held)
+    if y is None or not np.all((y >= on.lower - 1e-12) & (y <= on.upper + 1e-12)) or np.abs(y[free:]).max() > _FAR:
+        return None
+    y = np.clip(y, on.lower, on.upper)
+    a = ready.problem.values(ready.problem.ordered(design_at(ready.problem, y * on.scale))).coefficients
+    return y if ready.size.leads(np.array([float(c) for c in a])) else None
+
+
+def _mismatch(on: Curve, x: Array) -> float:
+    return float(np.abs(np.array(on.evaluate(x / on.scale)[0])).max())

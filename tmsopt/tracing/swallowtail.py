@@ -18,7 +18,8 @@ from tmsopt.records import Array
 from tmsopt.roots import determinant, is_stable, real_roots
 from tmsopt.tracing.branch import Trace
 from tmsopt.tracing.continuation import project
-from tmsopt.tracing.trace import STARTS, Traced, prepare, trace
+from tmsopt.tracing.equations import Traced, prepare
+from tmsopt.tracing.trace import STARTS, trace
 
 Cut = tuple[float, str]
 

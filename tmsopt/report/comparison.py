@@ -1,0 +1,31 @@
+"""TODO"""
+
+from tmsopt.models.tms import tms
+from tmsopt.paper.compare import Comparison
+from tmsopt.report.design import _facts, _headline
+from tmsopt.report.text import columns, number
+
+
+def comparison_table(comparison: Comparison) -> str:
+    """Law beside number where laws are known, then the two formulations beside each other."""
+    design = comparison.design
+    lines = [design.problem.title or "untitled problem", _headline(design), ""]
+    rows = [("law", "of", "numeric", "law says", "relative", "")]
+    for row in comparison.laws:
+        verdict = row.reason or ("agrees" if row.agrees else "DIFFERS")
+        relative = f"{row.relative:.1e}" if row.applies else ""
+        law = number(row.law) if row.applies else ""
+        rows.append((row.label, row.subject, number(row.numeric), law, relative, verdict))
+    known = design.problem.model is tms
+    model = design.problem.model
+    named = f"the {model.title}" if model.statement is None else f"'{model.title}'"
+    lines += columns(rows) if known else [f"no laws are known of {named}, only of skates (tms)"]
+    lines.append("")
+    if comparison.other is None:
+        lines.append(f"other formulation: none, {comparison.reason}")
+    else:
+        names = f"{comparison.other.formulation} minus {design.formulation}"
+        rows2 = [("formulations", names)] + [(n, f"{d:.1e}") for n, d in comparison.differences.items()]
+        lines += columns(rows2)
+    lines += [line for line in _facts(design) if line.startswith("also solved")]
+    return "\n".join(line.rstrip() for line in lines).rstrip()

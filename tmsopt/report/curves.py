@@ -1,0 +1,126 @@
+"""TODO"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from tmsopt.charts.chart import Chart
+from tmsopt.fronts.front import Front
+from tmsopt.models import ParameterSet
+from tmsopt.report.text import columns, number, with_unit
+from tmsopt.roots import pattern
+from tmsopt.tracing.branch import Branch, Trace, _sides
+
+_FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
+
+
+def chart_table(chart: Chart) -> str:
+    """Shares of the classes, the best grid point, and the boundaries with their corners."""
+    data: dict[str, Any] = chart.to_json()
+    (first, second), of = chart.axes, chart.problem.parameter_set
+    size = f"{len(chart.grid[0])} × {len(chart.grid[1])}"
+    lines = [chart.problem.title or "untitled problem", f"{size} designs over {first} and {second}", ""]
+    lines += columns([(name, f"{100 * share:.2f} %") for name, share in chart.shares.items() if share])
+    if len(chart.problem.constraints) > len(chart.left_aside):
+        lines.append(f"  the constraints hold on {100 * data['satisfied']:.2f} %")
+    for name in chart.left_aside:
+        lines.append(f"  {name} is an equality, which holds on curves and not on a grid: left aside")
+    if best := data["least_abscissa"]:
+        units = {n: "" if of[n].unit == "1" else f" {of[n].unit}" for n in (first, second)}
+        where = ", ".join(f"{n} = {best[n]:.6g}{unit}" for n, unit in units.items())
+        lines += ["", f"least abscissa on the grid: {best['value']:.6g} at {where}"]
+    if chart.domain is not None:
+        kinds = [f"{arc.kind} ({len(arc.points[first])} points)" for arc in chart.domain.stability]
+        damped = [f"{arc.kind} ({len(arc.points[first])} points)" for arc in chart.domain.heavy_damping]
+        lines += ["", f"stability is bounded by {', '.join(kinds) or 'nothing in the box'}"]
+        lines += [f"heavy damping is bounded by {', '.join(damped) or 'nothing in the box'}"]
+        if chart.domain.corners:
+            rows = [("corner", with_unit(of, first), with_unit(of, second))]
+            rows += [(c.name, number(c.parameters[first]), number(c.parameters[second])) for c in chart.domain.corners]
+            lines += ["", *columns(rows)]
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def summary_table(of: ParameterSet, data: Mapping[str, Any]) -> str:
+    """A chart that is not in memory: shares of the classes, the best grid point, and how fast it was made."""
+    axes = data["axes"]
+    size = " × ".join(str(a["points"]) for a in axes.values())
+    lines = [data["title"] or "untitled problem", f"{size} designs over {', '.join(axes)}", ""]
+    if data["classes"]:
+        lines += columns([(name, f"{100 * share:.2f} %") for name, share in data["classes"].items() if share])
+    if data["satisfied"] is not None and data["satisfied"] < 1:
+        lines.append(f"  the constraints hold on {100 * data['satisfied']:.2f} %")
+    if best := data["least_abscissa"]:
+        units = {n: "" if of[n].unit == "1" else f" {of[n].unit}" for n in axes}
+        where = ", ".join(f"{n} = {best[n]:.6g}{unit}" for n, unit in units.items())
+        lines += ["", f"least abscissa on the grid: {best['value']:.6g} at {where}"]
+    if data.get("designs"):
+        lines += ["", f"{data['per_second']:.3g} designs per second with {data['engine']}"]
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def front_table(front: Front) -> str:
+    """Points one a row: objectives, free parameters, structure, limits that bind, ends and kinks."""
+    of = front.problem.parameter_set
+    texts = [t.strip() for t in front.objectives]
+    free = [n for n in front.problem.free if n not in texts]
+    count = f"{len(front)} point" + ("s" if len(front) != 1 else "")
+    where = f", designs with {front.problem.locate}" if front.problem.locate else ""
+    lines = [
+        front.problem.title or "untitled problem",
+        f"front of least {', '.join(texts)}{where}: {count}, {_counted(front)}"
+        f"{front.solved} sub-problems; {front.seconds:.2f} s",
+        "",
+    ]
+    headings = [with_unit(of, t) if t in of.names else t for t in texts]
+    rows = [(*headings, *(with_unit(of, n) for n in free), "structure", "limits that bind", "")]
+    for p in front.points:
+        numbers = [number(v) for v in p.objectives] + [f"{p.solution.parameters[n]:.8g}" for n in free]
+        rows.append((*numbers, p.structure, ", ".join(p.limits), p.label))
+    lines += columns(rows)
+    remarks = [f"gap: {gap.reason}" for gap in front.gaps] + [f"note: {note}" for note in front.notes]
+    return "\n".join(line.rstrip() for line in [*lines, *([""] if remarks else []), *remarks])
+
+
+def _counted(front: Front) -> str:
+    words = ""
+    for found, word in ((front.kinks, "kink"), (front.gaps, "gap")):
+        if found:
+            words += f"{len(found)} {word}{'s' if len(found) > 1 else ''}, "
+    return words
+
+
+def trace_table(trace: Trace) -> str:
+    """Branches with their events, one a row, in the free parameters."""
+    free, of = list(trace.problem.free), trace.problem.parameter_set
+    per_point = 1e6 * trace.seconds_walking / max(trace.points, 1)
+    count = f"{len(trace.branches)} branch" + ("es" if len(trace.branches) != 1 else "")
+    points = f", {trace.points} points at {per_point:.0f} µs each" if trace.points else ""
+    lines = [
+        trace.problem.title or "untitled problem",
+        f"{trace.pattern}: {count}{points}, looked for from {trace.starts} starts; {trace.seconds:.2f} s",
+    ]
+    for number_, branch in enumerate(trace.branches, start=1):
+        lines += ["", f"branch {number_}: {_summary(branch, trace)}"]
+        rows = [("", *(with_unit(of, n) for n in free), "abscissa", "")]
+        for event in branch.events:
+            values = (number(event.parameters[n]) for n in free)
+            rows.append((event.name, *values, number(float(branch.abscissa[event.index])), event.detail))
+        lines += columns(rows)
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _summary(branch: Branch, trace: Trace) -> str:
+    share = f"{100 * float(np.mean(branch.stable)):.0f} % of its points"
+    states = (
+        f"bounds stability on {share}"
+        if pattern(branch.pattern, trace.problem.model.degree).rest
+        else f"stable on {share}"
+    )
+    if any(c.comparison != "==" for c in trace.problem.conditions.values()):
+        states += f", constraints hold on {100 * float(np.mean(branch.satisfied)):.0f} %"
+    form = "closed" if branch.closed else "open"
+    kinds = " and ".join(dict.fromkeys(_sides(branch)))
+    met = "met" if branch.residual <= _FITTING else "met only"
+    return f"{kinds}, {len(branch)} points, {form}, {states}, coefficients {met} to {branch.residual:.0e}"
