@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from tmsopt.plots.labels import Name, label_axes, place_names
 from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, legend_below, new_figure
-from tmsopt.tracing.branch import Branch, Trace, _sides
+from tmsopt.tracing.branch import Branch, Trace, kinds_along
 
 COLOURS = {
     "EP4": MARK, "EP3": MARK, "2EP2": REAL, "CEP2": COMPLEX, "EP2": LINE, "weave": CRITICAL, "capsize": CAPSIZE,
@@ -35,7 +35,7 @@ def draw_trace(ax: Axes, trace: Trace, horizontal: str, vertical: str) -> list[N
 def draw_branch(ax: Axes, branch: Branch, horizontal: str, vertical: str, width: float = 1.4) -> None:
     """One branch as lines, cut where its pattern, its stability or a constraint changes."""
     x, y = branch.parameters[horizontal], branch.parameters[vertical]
-    states = list(zip(_sides(branch), branch.stable.tolist(), branch.satisfied.tolist(), strict=True))
+    states = list(zip(kinds_along(branch), branch.stable.tolist(), branch.satisfied.tolist(), strict=True))
     events = {e.index for e in branch.events}
     start = 0
     for (kind, stable, satisfied), run in groupby(states):

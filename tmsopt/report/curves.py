@@ -10,7 +10,7 @@ from tmsopt.fronts.front import Front
 from tmsopt.models import ParameterSet
 from tmsopt.report.text import columns, number, with_unit
 from tmsopt.roots import pattern
-from tmsopt.tracing.branch import Branch, Trace, _sides
+from tmsopt.tracing.branch import Branch, Trace, kinds_along
 
 _FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
 
@@ -121,6 +121,6 @@ def _summary(branch: Branch, trace: Trace) -> str:
     if any(c.comparison != "==" for c in trace.problem.conditions.values()):
         states += f", constraints hold on {100 * float(np.mean(branch.satisfied)):.0f} %"
     form = "closed" if branch.closed else "open"
-    kinds = " and ".join(dict.fromkeys(_sides(branch)))
+    kinds = " and ".join(dict.fromkeys(kinds_along(branch)))
     met = "met" if branch.residual <= _FITTING else "met only"
     return f"{kinds}, {len(branch)} points, {form}, {states}, coefficients {met} to {branch.residual:.0e}"

@@ -25,7 +25,7 @@ def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float
 
 def solution_table(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> str:
     """A design with its roots, bound, limits and remarks; of skates, dimensionless and in SI side by side."""
-    lines = [solution.problem.title or "untitled problem", _headline(solution), ""]
+    lines = [solution.problem.title or "untitled problem", headline(solution), ""]
     if solution.problem.model is tms:
         si = si_parameters(solution, w, m_B, g)
         lines += [*columns(_parameter_rows(solution, si)), "", *columns(skate_rows(solution, si)), ""]
@@ -34,7 +34,7 @@ def solution_table(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: floa
         lines += [*columns(plain.parameter_rows(solution)), "", *columns(plain.quantity_rows(solution)), ""]
         if "load_rear" in solution.quantities:
             lines.append(pitching(solution, solution.parameters))
-    lines += _facts(solution)
+    lines += facts(solution)
     return "\n".join(line.rstrip() for line in lines).rstrip()
 
 
@@ -65,7 +65,7 @@ def every_table(every: Every) -> str:
     return "\n".join(line.rstrip() for line in lines).rstrip()
 
 
-def _headline(solution: Solution) -> str:
+def headline(solution: Solution) -> str:
     problem = solution.problem
     text = problem.minimize or problem.maximize
     asked = f"{problem.sense} {text} = {number(solution.value)}" if text else ""
@@ -106,7 +106,7 @@ def _freedom(solution: Solution, name: str) -> str:
     return "free" if name in problem.free else "scenario" if name in problem.scenarios else "fixed"
 
 
-def _facts(solution: Solution) -> list[str]:
+def facts(solution: Solution) -> list[str]:
     lines = ["roots: " + (", ".join(_roots(solution.roots)) or "none")]
     lines += bound_lines(solution)
     lines += case_lines(solution)

@@ -185,7 +185,7 @@ def varying(trace: Trace) -> list[str]:
     return sorted(trace.problem.free, key=lambda name: not moves(name))
 
 
-def _sides(branch: Branch) -> list[str]:
+def kinds_along(branch: Branch) -> list[str]:
     """The pattern of each point, a special point counted with the one before it."""
     special = {e.index for e in branch.events if str(branch.kinds[e.index]) == e.name}
     kinds = [str(k) for k in branch.kinds]

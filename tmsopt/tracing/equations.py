@@ -84,7 +84,7 @@ def prepare(problem: Problem) -> Traced:
             lower[free + k] = 0.0
     scale = unit.copy()
     scale[:free] = upper[:free] - lower[:free]
-    sample = [_variables(nlp, problem, d, 1) for d, _ in zip(spread(problem, 0), range(_SAMPLE), strict=False)]
+    sample = [starting_points(nlp, problem, d, 1) for d, _ in zip(spread(problem, 0), range(_SAMPLE), strict=False)]
     known = np.array([s[0] for s in sample if s]).reshape(-1, len(nlp.variables))
     if known.size:
         scale[free:] = np.clip(np.median(np.abs(known[:, free:]), axis=0), 0.1 * unit[free:], 1e3 * unit[free:])
@@ -98,7 +98,7 @@ def design_at(problem: Problem, x: Array) -> dict[str, Any]:
     return {n: np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, x.T, strict=False)}
 
 
-def _variables(nlp: NLP, problem: Problem, design: Mapping[str, float], count: int | None) -> list[Array]:
+def starting_points(nlp: NLP, problem: Problem, design: Mapping[str, float], count: int | None) -> list[Array]:
     """All variables for a design, for the first guesses of the pattern's unknowns, as many as asked for, or all."""
     values = problem.values(problem.ordered(design))
     a = np.array([float(c) for c in values.coefficients])

@@ -10,7 +10,7 @@ from tmsopt.formulation.starts import spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots.meetings import CLOSED
 from tmsopt.tracing.continuation import INFINITE, Curve, Walk, project
-from tmsopt.tracing.equations import Traced, _variables, design_at
+from tmsopt.tracing.equations import Traced, design_at, starting_points
 
 _BACK = 300.0  # size of an unknown from which a curve is looked for on the other side of infinity
 _FAR = 1e5  # unknowns of a seed, in units of their scale: beyond, a0 all but vanishes
@@ -116,7 +116,7 @@ def _blocks(count: int, size: int = 256) -> Iterator[slice]:
     return (slice(k, k + size) for k in range(0, count, size))
 
 
-def _seeds(
+def seeds(
     ready: Traced,
     starts: int,
     seed: int,
@@ -149,14 +149,14 @@ def _swept(ready: Traced) -> bool:
     return ready.pattern.test is not None and len(ready.problem.free) == 2
 
 
-def _missed(ready: Traced, lines: Sequence[Mapping[str, Array]]) -> Iterator[tuple[int, Array | None]]:
+def missed(ready: Traced, lines: Sequence[Mapping[str, Array]]) -> Iterator[tuple[int, Array | None]]:
     """Points of the curve where a test function of the pattern changes sign over a grid, off the lines so far."""
     if ready.pattern.test is not None and _swept(ready):
         for design in unexplained(ready.problem, ready.pattern.test, lines):
             yield 0, _seed(ready, design, None, None)
 
 
-def _beyond(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int, Array | None]]:
+def beyond_infinity(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int, Array | None]]:
     """Points where a curve may come back from infinity: there a root changes sides, and the parameters go on.
 
     They approach a0 = 0 with the inverse of the unknown that grows, so two points give the limit, and a point beyond
@@ -186,7 +186,7 @@ def _floats(design: Mapping[str, Any]) -> dict[str, float]:
 def _seed(ready: Traced, design: Mapping[str, float], guess: int | None, held: int | None) -> Array | None:
     """A point of the curve near a design, from a guess of that number, or the best guess."""
     on, free = ready.on, len(ready.problem.free)
-    tried = _variables(ready.nlp, ready.problem, design, None if guess is None else guess + 1)
+    tried = starting_points(ready.nlp, ready.problem, design, None if guess is None else guess + 1)
     x = min(tried, key=lambda t: _mismatch(on, t), default=None) if guess is None else next(iter(tried[guess:]), None)
     if x is None:
         return None

@@ -17,7 +17,7 @@ from tmsopt.tracing.branch import Branch, Event, Trace
 from tmsopt.tracing.continuation import SINGULAR, Walk, both_ways, contains, same
 from tmsopt.tracing.equations import Traced, design_at, prepare
 from tmsopt.tracing.events import describe
-from tmsopt.tracing.seeds import _beyond, _missed, _seeds
+from tmsopt.tracing.seeds import beyond_infinity, missed, seeds
 
 Report = Callable[[int, int], None]
 
@@ -60,7 +60,7 @@ def trace(
     lines: list[dict[str, Array]] = []
     walking = 0.0
     tried = 0
-    sources = (_seeds(ready, starts, seed, through, lines), _missed(ready, lines), _beyond(ready, walks))
+    sources = (seeds(ready, starts, seed, through, lines), missed(ready, lines), beyond_infinity(ready, walks))
     for count, y in chain.from_iterable(sources):
         tried = max(tried, count)
         if progress:
