@@ -75,7 +75,7 @@ def test_the_two_mass_spring_controller_is_optimal_and_its_6_fold_root_exists() 
     design = two_mass_spring()
     assert (design.structure, design.bound.method, design.bound.proven) == ("EP6", "relation", True)
     assert design.bound.value <= -R6 <= design.bound.value + 4e-16
-    proof = design.proof
+    proof = tmsopt.prove(design)
     assert (proof.proved, proof.pattern, proof.method) == (True, "EP6", "Krawczyk")
     assert (proof.stable.holds, proof.heavily_damped.holds, proof.inside.holds) == (True, True, True)
     assert [z.multiplicity for z in proof.roots] == [6]
@@ -264,7 +264,7 @@ def test_a_double_pair_of_two_coupled_oscillators() -> None:
     """
     c1, c2 = symbols("c1 c2")
     model = from_matrices(M=[[1, 0], [0, 1]], D=[[c1, 0], [0, c2]], K=[[1.5, -0.5], [-0.5, 2.5]])
-    proof = tmsopt.solve(boxed(model, 0.0, 5.0, locate="CEP2")).proof
+    proof = tmsopt.prove(tmsopt.solve(boxed(model, 0.0, 5.0, locate="CEP2")))
     assert (proof.proved, proof.pattern) == (True, "CEP2")
     with mp.workdps(45):
         c = mp.sqrt(mp.mpf(7) / 2)
@@ -277,7 +277,7 @@ def test_the_whole_structure_of_an_optimum_is_proved() -> None:
     """Degree 5 with a₅ = 2a₁ − 1: a double pair and a real root on one line; the roots rebuild the coefficients."""
     a, b, d, e = symbols("a b d e")
     design = tmsopt.solve(boxed(from_coefficients([1, a, b, d, e, 2 * a - 1]), 0.0, 20.0, minimize="abscissa"))
-    proof = design.proved(25)
+    proof = tmsopt.prove(design, 25)
     assert (proof.proved, proof.pattern) == (True, "CEP2+real")
     assert proof.claim.endswith("a 2-fold complex pair and a real root on one vertical line")
     assert sorted(z.multiplicity for z in proof.roots) == [1, 2, 2]
@@ -353,7 +353,7 @@ def test_exact_fractions_are_decided_without_rounding() -> None:
     c = product(*[[Fraction(1), Fraction(1, 2)]] * 3, *[[Fraction(1)] * 3] * 2)
     names = [f"a{k}_" for k in range(1, 8)]
     problem = tmsopt.Problem(free_polynomial(7), fixed=dict(zip(names, map(float, c[1:]), strict=True)))
-    proof = tmsopt.solve(problem).proof
+    proof = tmsopt.prove(tmsopt.solve(problem))
     assert (proof.proved, proof.pattern, proof.method) == (True, "EP3+CEP2", "exact factorisation")
     assert sorted(z.multiplicity for z in proof.roots) == [2, 2, 3]
 

@@ -314,6 +314,6 @@ def test_three_pairs_on_one_line_are_proved() -> None:
     design = tmsopt.solve(tmsopt.Problem(model=model, free=free, minimize="abscissa"))
     assert design.structure == "three pairs"
     assert design.abscissa == pytest.approx(-sum(design.parameters[n] for n in ("c1", "c2")) / 6, rel=1e-14)
-    assert (design.proof.proved, design.proof.pattern) == (True, "three pairs")
-    assert design.proof.abscissa is not None
-    assert float(design.proof.abscissa) == pytest.approx(-0.5, abs=1e-14)
+    assert (tmsopt.prove(design).proved, tmsopt.prove(design).pattern) == (True, "three pairs")
+    assert tmsopt.prove(design).abscissa is not None
+    assert float(tmsopt.prove(design).abscissa) == pytest.approx(-0.5, abs=1e-14)

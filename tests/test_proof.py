@@ -78,7 +78,7 @@ def on_ep_set(lambda_s: float, kind: str) -> tuple[tmsopt.Problem, dict[str, flo
 @pytest.mark.parametrize("digits", [5, 30, 50])
 def test_the_printed_EP4_lies_in_the_balls(digits: int) -> None:
     """Table 1: χ_B = √2, tan λ_s = 15/4 − 75√2/32, Fr = 3√(110√2 − 120)/8, s = −√5/2^(1/4); at 60 digits."""
-    proof = solved("ep4").proved(digits)
+    proof = tmsopt.prove(solved("ep4"), digits)
     with mp.workdps(70):
         root2 = mp.sqrt(2)
         T = mp.mpf(15) / 4 - 75 * root2 / 32
@@ -99,9 +99,8 @@ def test_the_printed_EP4_lies_in_the_balls(digits: int) -> None:
     assert proof.uniqueness > 1e-3 > proof.explained > proof.distance
 
 
-def test_the_cached_proof_is_that_of_30_digits() -> None:
-    proof = solved("ep4").proof
-    assert proof is solved("ep4").proof
+def test_a_proof_has_30_digits_by_default() -> None:
+    proof = tmsopt.prove(solved("ep4"))
     assert proof.digits == 30
     assert proof.radius < 1e-25
 
@@ -142,7 +141,7 @@ def test_the_optimised_benchmark_on_all_its_branches() -> None:
 
 def test_a_triple_root_and_its_derivatives() -> None:
     """The EP3 of heavy damping at the least speed: p, p′, p″ vanish, by mpmath's root finder at 60 digits."""
-    proof = solved("heavily_damped").proof
+    proof = tmsopt.prove(solved("heavily_damped"))
     with mp.workdps(60):
         T = mp.tan(mp.mpf(proof.parameters["lambda_s"].value))
 
@@ -207,7 +206,7 @@ def polished(design: dict[str, float]) -> dict[str, float]:
 def test_the_critical_speed() -> None:
     """Table 1: Fr_c = √(30√2 + 120)/8 at the EP4's tilt and χ_B = √2; held here at doubles, so to 1e-14."""
     held = {"chi_B": SQRT2, "lambda_s": math.atan(15 / 4 - 75 * SQRT2 / 32)}
-    proof = located("weave", held, {"Fr": (0.5, 3)}).proof
+    proof = tmsopt.prove(located("weave", held, {"Fr": (0.5, 3)}))
     assert float(proof.parameters["Fr"]) == pytest.approx(math.sqrt(30 * SQRT2 + 120) / 8, abs=1e-13)
     assert proof.stable.holds is False
     assert "boundary of stability" in proof.stable.words
@@ -217,7 +216,7 @@ def test_the_critical_speed() -> None:
 def test_a_root_at_0() -> None:
     """a4 = −ζ_B T − μ (χ_H − 1) vanishes at tan λ_s = μ (χ_H − 1)/|ζ_B| = 1/20."""
     held = {"chi_H": 1.2, "chi_B": 1.3, "Fr": 1.3}
-    proof = located("capsize", held, {"lambda_s": (0.01, 0.4)}).proof
+    proof = tmsopt.prove(located("capsize", held, {"lambda_s": (0.01, 0.4)}))
     assert proof.proved
     assert proof.tangents["lambda_s"].contains("0.05")
 
@@ -230,7 +229,7 @@ def test_the_same_EP4_in_SI() -> None:
         free={"v": (1, 20), "x_B": (2.1, 5), "lambda_s": (0.1, 1)},
         locate="EP4",
     )
-    proof = tmsopt.solve(problem).proof
+    proof = tmsopt.prove(tmsopt.solve(problem))
     with mp.workdps(50):
         truth = ep4_of_heights(-mp.mpf("0.4"), -mp.mpf("0.2"))
         assert holds(proof.parameters["v"], truth["Fr"] * mp.sqrt(mp.mpf("9.81") * 2))
@@ -243,15 +242,15 @@ def test_the_same_EP4_in_SI() -> None:
 def test_patterns_of_optima(name: str, pattern: str) -> None:
     """Whatever the rightmost roots show; the proved polynomial has the abscissa of the design."""
     design = solved(name)
-    assert (design.structure, design.proof.pattern, design.proof.proved) == (pattern, pattern, True)
-    assert float(design.proof.abscissa or "nan") == pytest.approx(design.abscissa, abs=1e-12)
-    assert design.proof.stable.holds is True
+    assert (design.structure, tmsopt.prove(design).pattern, tmsopt.prove(design).proved) == (pattern, pattern, True)
+    assert float(tmsopt.prove(design).abscissa or "nan") == pytest.approx(design.abscissa, abs=1e-12)
+    assert tmsopt.prove(design).stable.holds is True
 
 
 def test_a_design_without_multiple_roots_is_taken_as_it_is() -> None:
     """Nothing is solved for: its roots are isolated; beside them those of mpmath at 50 digits."""
     design = solved("benchmark")
-    proof = design.proof
+    proof = tmsopt.prove(design)
     assert (proof.proved, proof.pattern, proof.moved, proof.method) == (True, "pair", (), "isolated roots")
     with mp.workdps(60):
         p = {n: mp.mpf(v.value) for n, v in proof.parameters.items()}
@@ -272,8 +271,8 @@ def test_a_design_without_multiple_roots_is_taken_as_it_is() -> None:
 def test_a_double_stands_for_the_decimal_that_prints_it() -> None:
     assert decimal(0.1) == Fraction(1, 10)
     assert decimal(1e-17) == Fraction(1, 10**17)
-    assert solved("ep4").proof.held == {"mu": "1/10", "chi_H": "1", "zeta_B": "-2/5", "zeta_H": "-1/5"}
-    assert solved("ep4").proof.parameters["zeta_B"] == Number("-0.4", "0")
+    assert tmsopt.prove(solved("ep4")).held == {"mu": "1/10", "chi_H": "1", "zeta_B": "-2/5", "zeta_H": "-1/5"}
+    assert tmsopt.prove(solved("ep4")).parameters["zeta_B"] == Number("-0.4", "0")
 
 
 def test_thirds_are_thirds_where_they_are_given_exactly() -> None:
@@ -287,7 +286,7 @@ def test_thirds_are_thirds_where_they_are_given_exactly() -> None:
             assert all(holds(proof.parameters[n], truth[n]) for n in ("Fr", "chi_B"))
             assert proof.held["zeta_B"] == "-1/3"
             assert Fraction(proof.parameters["zeta_B"].radius) > 0
-        beside = design.proof
+        beside = tmsopt.prove(design)
         assert not any(holds(beside.parameters[n], truth[n]) for n in ("Fr", "chi_B"))
         assert float(beside.parameters["Fr"]) == pytest.approx(float(truth["Fr"]), abs=1e-14)
 
@@ -325,7 +324,7 @@ def test_a_pattern_in_fractions_needs_no_free_parameter() -> None:
 def test_nothing_free_and_not_exact_is_refused() -> None:
     """The same bicycle in doubles is no EP4, and one in a fraction a little off is none either."""
     for proof in (
-        fractions().proof,
+        tmsopt.prove(fractions()),
         tmsopt.prove(fractions(chi_B=2.0000000000000004), exact={"Fr": "17/12", "tan(lambda_s)": "17/48"}),
     ):
         assert not proof.proved
@@ -483,7 +482,7 @@ def test_the_wrong_structure_is_refused() -> None:
 
 
 def test_what_is_not_solved_is_not_proved() -> None:
-    proof = replace(solved("ep4"), status="infeasible").proof
+    proof = tmsopt.prove(replace(solved("ep4"), status="infeasible"))
     assert not proof.proved
     assert "not solved (infeasible)" in proof.reason
     with pytest.raises(tmsopt.InputError, match="asks for a front"):
@@ -574,9 +573,9 @@ def test_decimals_hold_their_balls() -> None:
 
 
 def test_a_proof_is_plain_data() -> None:
-    proof = solved("ep4").proof
+    proof = tmsopt.prove(solved("ep4"))
     assert pickle.loads(pickle.dumps(proof)) == proof
-    assert pickle.loads(pickle.dumps(solved("ep4"))).proof == proof
+    assert tmsopt.prove(pickle.loads(pickle.dumps(solved("ep4")))) == proof
     assert b"flint" not in pickle.dumps(proof)
     data = json.loads(json.dumps(proof.to_json(), allow_nan=False))
     assert data["parameters"]["chi_B"]["value"].startswith("1.414213562373095048801688724209698")

@@ -47,13 +47,14 @@ def prove(file: Path, as_json: bool, digits: int, exact: tuple[str, ...], starts
         from tmsopt.design.files import load
         from tmsopt.design.problem import unasked
         from tmsopt.errors import InputError
+        from tmsopt.proofs.prove import prove as prove_design
 
         given = _named(exact)
         problem = load(file)
         if problem.pareto:
             raise InputError(unasked(problem))
         solution = _solved(problem, starts, seed)
-        proof = solution.proved(digits, given)
+        proof = prove_design(solution, digits, exact=given)
     if as_json:
         write_json({"title": problem.title, "status": solution.status, **proof.to_json()})
     else:

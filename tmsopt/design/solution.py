@@ -3,13 +3,11 @@
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from functools import cached_property
 from typing import Any
 
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Freedom, Problem
 from tmsopt.design.units import Reading
-from tmsopt.proofs.proof import DIGITS, Proof, prove_design
 from tmsopt.records import Table
 from tmsopt.roots import Root
 
@@ -161,18 +159,6 @@ class Solution:
     sides: Table[float] = field(default_factory=Table)
     relaxation: Relaxation | None = None
     si: Table[Reading] = field(default_factory=Table)
-
-    @cached_property
-    def proof(self) -> Proof:
-        """That the design exists, proved in ball arithmetic to 30 digits, or why it is not."""
-        return self.proved()
-
-    def proved(self, digits: int = DIGITS, exact: Mapping[str, Any] | None = None) -> Proof:
-        """The proof to other digits, or with exact numbers for parameters; see `prove`."""
-        if self.status != "optimal":
-            reason = f"the problem is not solved ({self.status}): there is no design to prove"
-            return Proof(f"a design of '{self.problem.title or 'the problem'}' exists", False, reason, digits=digits)
-        return prove_design(self.problem, self.parameters, self.structure, digits, exact, self.worst, self.roots)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None.

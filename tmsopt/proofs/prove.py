@@ -6,12 +6,12 @@ from typing import Any
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError
-from tmsopt.proofs.proof import DIGITS, Proof
+from tmsopt.proofs.proof import DIGITS, Proof, prove_design
 from tmsopt.solver.solve import solve
 
 
 def prove(
-    problem: Problem | Solution, digits: int = DIGITS, *, exact: Mapping[str, Any] | None = None, **options: Any
+    design: Problem | Solution, digits: int = DIGITS, *, exact: Mapping[str, Any] | None = None, **options: Any
 ) -> Proof:
     """Prove that the design a problem asks for exists, in ball arithmetic, with what follows for its stability.
 
@@ -20,7 +20,7 @@ def prove(
     in `Proof.reason`, never guessed.
 
     Args:
-        problem: a problem, which is solved first, or its solution.
+        design: a problem, which is solved first, or its solution.
         digits: that every number is given to.
         exact: parameter, or ``tan(lambda_s)`` → the number that it is exactly: an int, a Fraction, a ``flint.fmpq``,
             text such as ``"-2/5"`` or ``"20 deg"``. Other numbers stand for the shortest decimals that print them.
@@ -30,11 +30,12 @@ def prove(
         InputError: for a problem that asks nothing, options beside a solution, digits out of range, or exact numbers
             that are not the design's.
     """
-    if isinstance(problem, Solution):
-        if options:
-            message = (
-                f"found {', '.join(options)}; options are for solving, and this is solved: give the problem instead"
-            )
-            raise InputError([Fault(message, ("options",))])
-        return problem.proved(digits, exact)
-    return solve(checked(problem), throw=False, **options).proved(digits, exact)
+    if isinstance(design, Solution) and options:
+        message = f"found {', '.join(options)}; options are for solving, and this is solved: give the problem instead"
+        raise InputError([Fault(message, ("options",))])
+    found = design if isinstance(design, Solution) else solve(checked(design), throw=False, **options)
+    problem = found.problem
+    if found.status != "optimal":
+        reason = f"the problem is not solved ({found.status}): there is no design to prove"
+        return Proof(f"a design of '{problem.title or 'the problem'}' exists", False, reason, digits=digits)
+    return prove_design(problem, found.parameters, found.structure, digits, exact, found.worst, found.roots)
