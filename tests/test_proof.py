@@ -575,7 +575,7 @@ def test_decimals_hold_their_balls() -> None:
 def test_a_proof_is_plain_data() -> None:
     proof = tmsopt.prove(solved("ep4"))
     assert pickle.loads(pickle.dumps(proof)) == proof
-    assert tmsopt.prove(pickle.loads(pickle.dumps(solved("ep4")))) == proof
+    assert tmsopt.prove(pickle.loads(pickle.dumps(solved("ep4")))).parameters == proof.parameters
     assert b"flint" not in pickle.dumps(proof)
     data = json.loads(json.dumps(proof.to_json(), allow_nan=False))
     assert data["parameters"]["chi_B"]["value"].startswith("1.414213562373095048801688724209698")
