@@ -10,9 +10,9 @@ from fractions import Fraction
 from math import comb
 
 import numpy as np
-import oracles
 import pytest
 import sympy
+from helpers import oracles
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from mpmath import mp

@@ -1,4 +1,8 @@
-"""The tmsopt command: thin commands over the library; heavy imports stand inside them."""
+"""The tmsopt command: one thin room per command, over the public functions of the library.
+
+In: words of a command line. Out: text or JSON on stdout, progress and diagnostics on stderr, an exit status. Heavy
+imports stand inside commands. Open `common` first: what they share.
+"""
 
 import errno
 import sys

@@ -1,1 +1,44 @@
-"""Design problems as data, their formulations, and their solution by IPOPT."""
+"""Problems and solutions as data: expressions, units, problem files, validation.
+
+In: a problem file, or the arguments of `Problem`. Out: a frozen `Problem` in which every number is checked, and the
+record `Solution` that solving it fills. Open `problem` first, then `expression`.
+"""
+
+from tmsopt.design.cases import Band, Case
+from tmsopt.design.expression import Expression, ExpressionError, parse_comparison, parse_value
+from tmsopt.design.files import load
+from tmsopt.design.limit import limit_of, with_limit
+from tmsopt.design.machine import EXACT, engine_of, machine
+from tmsopt.design.problem import Problem, freedom
+from tmsopt.design.quantities import NO_RADIUS, ROOT_NAMES
+from tmsopt.design.solution import Bound, NotSolved, Solution
+from tmsopt.design.tape import tape
+from tmsopt.design.units import decay_time, frequencies, growth_time, reading, with_unit
+
+__all__ = [
+    "EXACT",
+    "NO_RADIUS",
+    "ROOT_NAMES",
+    "Band",
+    "Bound",
+    "Case",
+    "Expression",
+    "ExpressionError",
+    "NotSolved",
+    "Problem",
+    "Solution",
+    "decay_time",
+    "engine_of",
+    "freedom",
+    "frequencies",
+    "growth_time",
+    "limit_of",
+    "load",
+    "machine",
+    "parse_comparison",
+    "parse_value",
+    "reading",
+    "tape",
+    "with_limit",
+    "with_unit",
+]

@@ -1,18 +1,31 @@
-"""Models whose roots can be designed."""
+"""Models whose roots can be designed: tms, whipple, and those a user states.
+
+In: parameters by name. Out: coefficients and quantities in any arithmetic. Open `model` first: what a model is; then
+`tms`.
+"""
 
 import copyreg
 from typing import Any
 
+from tmsopt.models.bicycle_files import Bicycle, problem_text, read_bicycle, write_bicycle
+from tmsopt.models.exact import decimal
 from tmsopt.models.model import Model, Parameter, ParameterSet, Quantity, Range, Values
-from tmsopt.models.tms import tms
+from tmsopt.models.names import CONSTANTS, FUNCTIONS, TAKEN, latex
+from tmsopt.models.tms import GRAVITY, copo, from_si, matrices, tms, to_si
 from tmsopt.models.user_defined import Unfit, from_coefficients, from_matrices
-from tmsopt.models.whipple import whipple
+from tmsopt.models.whipple import canonical, whipple
+from tmsopt.models.whipple_quantities import spin
 
 MODELS = {tms.name: tms, whipple.name: whipple}
 """Models that a problem file can name."""
 
 __all__ = [
+    "CONSTANTS",
+    "FUNCTIONS",
+    "GRAVITY",
     "MODELS",
+    "TAKEN",
+    "Bicycle",
     "Model",
     "Parameter",
     "ParameterSet",
@@ -20,11 +33,22 @@ __all__ = [
     "Range",
     "Unfit",
     "Values",
+    "canonical",
+    "copo",
+    "decimal",
     "from_coefficients",
     "from_matrices",
+    "from_si",
+    "latex",
+    "matrices",
     "named",
+    "problem_text",
+    "read_bicycle",
+    "spin",
     "tms",
+    "to_si",
     "whipple",
+    "write_bicycle",
 ]
 
 

@@ -11,7 +11,7 @@ import flint
 
 from tmsopt.arithmetic.elementary import exact, rational
 from tmsopt.errors import Fault, InputError, suggest
-from tmsopt.models import ParameterSet
+from tmsopt.models.model import ParameterSet
 from tmsopt.records import Table
 
 SAME = 4e-15

@@ -1,4 +1,8 @@
-"""Real polynomials and their roots: factored forms, stability, numeric and exact roots, multiplicity."""
+"""Real polynomials and their roots: factored forms, stability, numeric and exact roots, multiplicity.
+
+In: coefficients, highest power first. Out: roots, verdicts on stability, counts and structures. Open `polynomial`
+first; `patterns` says which roots meet, `quartics` takes millions at once.
+"""
 
 from tmsopt.roots.count import real_roots
 from tmsopt.roots.exact import exact_abscissa, exact_roots

@@ -133,7 +133,7 @@ def solve_all(
             progress(done, starts)
     order = np.argsort([-h for h in hits], kind="stable")
     solutions = [_solution(problem, _named(problem, found[k])) for k in order]
-    return Every(tuple(solutions), _coverage(done, [hits[k] for k in order], singular))
+    return Every(tuple(solutions), coverage_of(done, [hits[k] for k in order], singular))
 
 
 def _check(problem: Problem) -> None:
@@ -176,7 +176,7 @@ def _expected(hits: list[int]) -> float:
     return w * (n - 1) / (n - w - 2) if n > w + 2 else math.inf if w else 0.0
 
 
-def _coverage(done: int, hits: list[int], singular: int = 0) -> Coverage:
+def coverage_of(done: int, hits: list[int], singular: int = 0) -> Coverage:
     once, twice = (sum(h == k for h in hits) for k in (1, 2))
     deviation = math.sqrt(once + 2 * twice)  # of n times the chance, which Turing estimates by `once` (Good 1953)
     chance = min(1.0, (once + _DEVIATIONS * deviation + _NEVER) / max(done, 1))

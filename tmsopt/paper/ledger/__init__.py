@@ -1,4 +1,7 @@
-"""A ledger of every number and every verifiable statement of the source paper, recomputed by independent routes."""
+"""A ledger of every number and every verifiable statement of the source paper, recomputed by independent routes.
+
+In: nothing but the paper's own claims, a room per section. Out: a `Ledger` with a verdict on each. Open `entry` first.
+"""
 
 from collections.abc import Callable, Sequence
 from fnmatch import fnmatchcase
@@ -20,9 +23,23 @@ from tmsopt.paper.ledger import (
     stability,
 )
 from tmsopt.paper.ledger.algebra import PRECISION
-from tmsopt.paper.ledger.entry import VERDICTS, Claim, Entry, Ledger, entry_of
+from tmsopt.paper.ledger.entry import VERDICTS, Claim, Entry, Ledger, decimal, entry_of, proof, universal
+from tmsopt.paper.ledger.stability import BACKWARD, WITNESS
 
-__all__ = ["CLAIMS", "VERDICTS", "Claim", "Entry", "Ledger", "matching", "verify"]
+__all__ = [
+    "BACKWARD",
+    "CLAIMS",
+    "VERDICTS",
+    "WITNESS",
+    "Claim",
+    "Entry",
+    "Ledger",
+    "decimal",
+    "matching",
+    "proof",
+    "universal",
+    "verify",
+]
 
 SOURCE = "O. N. Kirillov, Localizing EP sets in dissipative systems and the self-stability of bicycles (2018)"
 

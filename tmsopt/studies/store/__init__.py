@@ -1,1 +1,15 @@
-"""The store of a study: one SQLite file, and what can be made of it."""
+"""Where the rows of a study are kept: one SQLite file.
+
+In: finished rows. Out: the same rows to the bit, whatever happened in between. Open `store` first.
+"""
+
+from tmsopt.studies.store.locking import journal, lock
+from tmsopt.studies.store.store import Store, open_store, read_store
+
+__all__ = [
+    "Store",
+    "journal",
+    "lock",
+    "open_store",
+    "read_store",
+]

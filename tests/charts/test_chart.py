@@ -1,0 +1,454 @@
+"""Stability charts against exact classes; `tmsopt trace` and `tmsopt chart` by their contract, in processes."""
+
+import csv
+import dataclasses
+import json
+import math
+import subprocess
+import sys
+from fractions import Fraction
+from math import comb
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers import curves
+from helpers.curves import exact_polynomial, sturm
+from helpers.oracles import abscissa_60, certified_roots, polynomial_60
+
+from tmsopt.charts import chart, classify, save_arrays
+from tmsopt.cli import main
+from tmsopt.design import Problem, load
+from tmsopt.errors import InputError
+from tmsopt.models import tms
+from tmsopt.report import chart_table
+from tmsopt.roots import CLASSES
+from tmsopt.tracing import domain, trace
+
+BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
+SQRT2 = math.sqrt(2)
+TAN_EP4 = 15 / 4 - 75 * SQRT2 / 32  # Table 1
+FR_EP4 = 3 * math.sqrt(110 * SQRT2 - 120) / 8  # Table 1
+OMEGA0 = -(12.5**0.25)  # Table 1
+
+PLANES = {
+    "on the law": (BASE | {"chi_B": SQRT2}, {"Fr": (0.01, 5.0), "lambda_s": (0.01, 1.4)}),
+    "both tilts": (BASE | {"Fr": FR_EP4 + 0.5}, {"chi_B": (-1.0, 3.0), "lambda_s": (-1.4, 1.4)}),
+    "chi_H = 1.02": (
+        {"chi_H": 1.02, "mu": 20.8, "Fr": 2.337, "zeta_B": -0.4, "zeta_H": -0.2},
+        {"chi_B": (0.5, 3.0), "lambda_s": (-1.4, 1.4)},
+    ),
+    "masses": (
+        {"chi_B": 1.3, "Fr": 3.0, "lambda_s": 0.4, "zeta_B": -0.4, "zeta_H": -0.2},
+        {"mu": (0.1, 30.0), "chi_H": (0.8, 1.2)},
+    ),
+}
+
+
+def charted(fixed, free, axes=None, constraints=None, **options):
+    problem = Problem(model=tms, fixed=fixed, free=free, constraints=constraints or {})
+    return chart(problem, axes, **{"points": (41, 30), "boundaries": False} | options)
+
+
+def cells(found, count, seed=0):
+    """Random grid points: indices and every parameter."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        i, j = int(rng.integers(found.kind.shape[0])), int(rng.integers(found.kind.shape[1]))
+        free = {found.axes[0]: float(found.grid[0][j]), found.axes[1]: float(found.grid[1][i])}
+        yield (i, j), {**found.problem.fixed, **free}
+
+
+@pytest.mark.parametrize("name", PLANES)
+def test_classes_and_counts_are_exact_at_random_designs(name):
+    found = charted(*PLANES[name])
+    seen = set()
+    for at, design in cells(found, 250):
+        a = exact_polynomial(design)
+        expected = curves.kind(a)
+        assert CLASSES[found.kind[at]] == expected
+        assert found.real_roots[at] == sum(sturm(a))
+        seen.add(expected)
+    assert len(seen) >= 3
+
+
+@pytest.mark.parametrize("name", PLANES)
+def test_abscissa_and_damping_ratio_are_those_of_isolated_roots(name):
+    found = charted(*PLANES[name])
+    for at, design in cells(found, 40, seed=1):
+        roots = [complex(z) for z, _ in certified_roots(exact_polynomial(design))]
+        # a random design is 1e-3 or more from a double root: its roots move by 1e3 units of rounding of their size
+        size = max(map(abs, roots))
+        assert found.abscissa[at] == pytest.approx(max(z.real for z in roots), abs=1e-10 * size)
+        assert found.damping_ratio[at] == pytest.approx(min(-z.real / abs(z) for z in roots), abs=1e-8)
+
+
+def test_one_abscissa_by_iteration_too():
+    found = charted(*PLANES["chi_H = 1.02"])
+    for at, design in cells(found, 4, seed=2):
+        assert found.abscissa[at] == pytest.approx(float(abscissa_60(polynomial_60(**design))), rel=1e-9)
+
+
+def test_shape_axes_and_shares():
+    fixed, free = PLANES["on the law"]
+    found, turned = charted(fixed, free), charted(fixed, free, ("lambda_s", "Fr"), points=(30, 41))
+    assert found.axes == ("Fr", "lambda_s")
+    assert turned.axes == ("lambda_s", "Fr")
+    assert found.kind.shape == (30, 41)
+    for name in ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied"):
+        assert np.array_equal(getattr(found, name), getattr(turned, name).T)
+    for grid, n in zip(found.grid, found.axes, strict=True):
+        assert (grid[0], grid[-1]) == free[n]
+    assert sum(found.shares.values()) == pytest.approx(1.0, abs=1e-14)
+    assert list(found.shares) == list(CLASSES)
+    for code, name in enumerate(CLASSES):
+        assert found.shares[name] == np.count_nonzero(found.kind == code) / found.kind.size
+
+
+def test_a_large_grid_is_the_small_one_in_blocks():
+    """23 961 designs take two blocks; every third of them is the small grid."""
+    fixed, free = PLANES["both tilts"]
+    large, small = charted(fixed, free, points=(163, 147)), charted(fixed, free, points=(55, 49 + 25))
+    assert large.kind.shape == (147, 163)
+    again = large.grid[0][::3]
+    assert again == pytest.approx(small.grid[0], abs=1e-14)
+    rows = [0, 146]
+    assert np.array_equal(large.kind[rows][:, ::3], small.kind[[0, -1]])
+
+
+def test_a_singular_mass_matrix_is_undefined():
+    """chi_H = 1 and lambda_s = 0: nu_H = 0, a0 = a4 = 0."""
+    found = charted(BASE | {"chi_B": 1.3}, {"Fr": (0.1, 5.0), "lambda_s": (-0.5, 0.5)}, points=(7, 21))
+    assert found.grid[1][10] == 0
+    assert np.all(found.kind[10] == 0)
+    assert np.all(np.isnan(found.abscissa[10]))
+    assert np.all(np.isnan(found.damping_ratio[10]))
+    assert np.all(found.real_roots[10] == 0)
+    others = [i for i in range(21) if i != 10]
+    assert np.all(found.kind[others] > 0)
+    assert np.all(np.isfinite(found.abscissa[others]))
+    assert found.shares["undefined"] == pytest.approx(1 / 21)
+    json.dumps(found.to_json(), allow_nan=False)
+
+
+def test_all_undefined_is_a_chart_all_the_same():
+    found = charted(BASE | {"lambda_s": 0.0}, {"Fr": (0.1, 5.0), "chi_B": (1.1, 2.0)}, points=(5, 4))
+    assert found.shares["undefined"] == 1.0
+    assert found.to_json()["least_abscissa"] is None
+    json.dumps(found.to_json(), allow_nan=False)
+
+
+def test_standing_still_is_unstable():
+    """Fr = 0: a1 = a3 = 0, roots in pairs ±s, never asymptotically stable."""
+    found = charted(BASE | {"chi_B": 1.3}, {"Fr": (0.0, 1.0), "lambda_s": (0.1, 1.0)}, points=(3, 20))
+    for i in range(20):
+        a = exact_polynomial({**BASE, "chi_B": 1.3, "Fr": 0.0, "lambda_s": float(found.grid[1][i])})
+        assert CLASSES[found.kind[i, 0]] == curves.kind(a)
+        assert found.kind[i, 0] < CLASSES.index("stable")
+
+
+@pytest.mark.parametrize("distance", [0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3])
+def test_beside_ep4_roots_are_jointly_right_and_classes_exact(distance):
+    """(s − ω0)⁴ with coefficients moved: the roots of the very doubles, isolated exactly.
+
+    A backward error of a few units of rounding moves a 4-fold root by its fourth root, and a root that is δ^(1/4)
+    from the others by that unit over δ^(3/4).
+    """
+    rng = np.random.default_rng(3)
+    c = np.array([comb(4, k) * (-OMEGA0) ** k for k in range(5)]) * np.ones((12, 1))
+    c[:, 1:] *= 1 + distance * rng.uniform(-1, 1, (12, 4))
+    kind, real, alpha, _ = classify(c)
+    unit = 20 * np.finfo(float).eps
+    tolerance = abs(OMEGA0) * min(unit**0.25, 4 * unit / max(distance, 1e-300) ** 0.75)
+    for row, code, count, value in zip(c, kind, real, alpha, strict=True):
+        exact = [Fraction(x) for x in row.tolist()]
+        assert CLASSES[code] == curves.kind(exact)
+        assert count == sum(sturm(exact))
+        assert value == pytest.approx(max(float(z.real) for z, _ in certified_roots(exact)), abs=tolerance)
+
+
+def test_classify_by_hand():
+    rows = {
+        (1, 10, 35, 50, 24): ("heavily damped", 4, -1.0),  # −1 −2 −3 −4
+        (-1, -10, -35, -50, -24): ("heavily damped", 4, -1.0),
+        (1, 4, 8, 8, 3): ("stable", 2, -1.0),  # (s + 1)² is not 2 roots more: (s+1)²(s²+2s+3)
+        (1, 0, 5, 0, 4): ("weave", 0, 0.0),  # ±i ±2i: not asymptotically stable
+        (1, 6, 11, 6, 0): ("capsize", 4, 0.0),  # 0 −1 −2 −3
+        (1, -1, 1, -1, 0): ("capsize", 2, 1.0),  # 0, 1, ±i
+        (1, 0, 0, 0, -1): ("capsize", 2, 1.0),
+        (0, 1, 2, 3, 4): ("undefined", 0, math.nan),
+        (1, -2, 3, -2, 2): ("weave", 0, 1.0),  # ±i, 1 ± i
+    }
+    kind, real, alpha, _ = classify(np.array(list(rows), dtype=float))
+    assert [CLASSES[k] for k in kind] == [v[0] for v in rows.values()]
+    expected_real = [1 if k == (1, 4, 8, 8, 3) else v[1] for k, v in rows.items()]
+    assert real.tolist() == expected_real  # different ones
+    assert alpha == pytest.approx([v[2] for v in rows.values()], abs=1e-7, nan_ok=True)
+    kind, *_ = classify(np.array([[1.0, np.nan, 1, 1, 1], [np.inf, 1, 1, 1, 1]]))
+    assert kind.tolist() == [0, 0]
+
+
+def test_constraints_are_held_where_they_hold():
+    constraints = {"fast": "Fr >= 1.2 * Fr_c", "tilt": "tan(lambda_s) + Fr <= 3", "rate": "abscissa <= -0.3"}
+    fixed, free = PLANES["on the law"]
+    found = charted(fixed, free, constraints=constraints)
+    for at, design in cells(found, 150, seed=4):
+        T = math.tan(design["lambda_s"])
+        critical = math.sqrt(curves.FR_C2_SLOPE * T)
+        alpha = max(float(z.real) for z, _ in certified_roots(exact_polynomial(design)))
+        expected = design["Fr"] >= 1.2 * critical and T + design["Fr"] <= 3 and alpha <= -0.3
+        assert bool(found.satisfied[at]) == expected
+    assert 0 < np.mean(found.satisfied) < 1
+
+
+def test_least_abscissa_is_the_least():
+    found = charted(*PLANES["on the law"])
+    best = found.to_json()["least_abscissa"]
+    design = PLANES["on the law"][0] | {n: best[n] for n in ("Fr", "lambda_s")}
+    roots = [float(z.real) for z, _ in certified_roots(exact_polynomial(design))]
+    assert best["value"] == pytest.approx(max(roots), abs=1e-9)
+    assert best["value"] == found.abscissa.min() >= OMEGA0  # `w0` bounds them all
+
+
+def test_the_archive_reads_back_with_named_axes(tmp_path):
+    found = charted(*PLANES["both tilts"], axes=("lambda_s", "chi_B"), points=(9, 6))
+    path = tmp_path / "chart.npz"
+    save_arrays(found, path)
+    with np.load(path, allow_pickle=False) as data:
+        assert np.array_equal(data["lambda_s"], np.linspace(-1.4, 1.4, 9))
+        assert np.array_equal(data["chi_B"], np.linspace(-1, 3, 6))
+        for name in ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied"):
+            assert data[name].shape == (6, 9)
+            assert np.array_equal(data[name], getattr(found, name), equal_nan=data[name].dtype.kind == "f")
+        about = json.loads(str(data["about"]))
+    assert about["dimensions"] == ["chi_B", "lambda_s"]
+    assert about["classes"] == list(CLASSES)
+    assert about["fixed"]["Fr"] == FR_EP4 + 0.5
+
+
+@pytest.mark.parametrize(
+    ("free", "axes", "words"),
+    [
+        ({"Fr": (0.1, 5.0)}, None, "1 are free"),
+        ({"Fr": (0.1, 5.0), "chi_B": (1.1, 2.0), "lambda_s": (0.1, 1.0)}, None, "fix the others"),
+        ({}, None, "0 are free"),
+        ({"Fr": (0.1, 5.0), "lambda_s": (0.1, 1.0)}, ("Fr", "mu"), "accepted: Fr and lambda_s"),
+    ],
+)
+def test_what_is_no_plane_is_refused(free, axes, words):
+    fixed = {n: v for n, v in {**BASE, "Fr": 2.0, "chi_B": 1.3, "lambda_s": 0.3}.items() if n not in free}
+    with pytest.raises(InputError, match=words):
+        charted(fixed, free, axes)
+
+
+# The command line
+
+
+def run(capsys, *arguments):
+    """In this process, to save starting so many: exit status, stdout, stderr."""
+    with pytest.raises(SystemExit) as stop:
+        main(args=[*map(str, arguments)], prog_name="tmsopt")
+    written = capsys.readouterr()
+    return stop.value.code, written.out, written.err
+
+
+def tmsopt(*arguments, cwd=None):
+    command = [sys.executable, "-c", "from tmsopt.cli import main; main()", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, cwd=cwd, encoding="utf-8")
+
+
+def test_trace_writes_table_csv_and_figure(tmp_path, capsys):
+    table, figure = tmp_path / "branches.csv", tmp_path / "branches.svg"
+    asked = ("trace", "problems/ep_set.toml", "--starts", 8, "--csv", table, "--plot", figure, "--axes", "lambda_s,Fr")
+    status, out, err = run(capsys, *asked)
+    assert status == 0
+    assert err.splitlines() == [f"wrote {table}", f"wrote {figure}"]
+    assert "EP4" in out
+    assert "1.41421356237" in out  # chi_B = √2, Table 1
+    assert "2.23631751" in out  # Fr_EP4, printed in the paper
+    assert figure.read_bytes().startswith(b"<?xml")
+    with table.open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    columns = {
+        "branch", "arclength", "Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s", "d_Fr", "d_chi_B",
+        "d_lambda_s", "b", "c", "abscissa", "kind", "stable", "heavily_damped", "constraints", "event",
+    }  # fmt: skip
+    assert set(rows[0]) == columns
+    (ep4,) = [row for row in rows if row["kind"] == "EP4"]
+    assert float(ep4["Fr"]) == pytest.approx(FR_EP4, abs=1e-12)
+    assert "EP4" in ep4["event"]
+
+
+def test_trace_json_is_finite_and_of_another_pattern_where_asked(capsys):
+    status, out, err = run(capsys, "trace", "problems/off_law.toml", "--pattern", "weave", "--starts", 8, "--json")
+    assert (status, err) == (0, "")
+    data = json.loads(out, parse_constant=pytest.fail)
+    assert data["schema"] == 1
+    assert data["pattern"] == "weave"
+    assert data["free"] == ["Fr", "lambda_s"]
+    (branch,) = data["branches"]
+    assert branch["points"] == len(branch["columns"]["Fr"]) == data["points"]
+    x = SQRT2 - 0.1
+    for Fr, angle in zip(branch["columns"]["Fr"], branch["columns"]["lambda_s"], strict=True):
+        assert Fr**2 == pytest.approx(0.2 / (0.4 - 0.2 * x) * x / (x - 1) * math.tan(angle), rel=1e-12)  # `Frc1`
+
+
+NOTHING = """
+[parameters]
+chi_H = 1.0
+zeta_H = -0.2
+zeta_B = -0.4
+mu = 0.1
+chi_B = 1.3
+Fr = { min = 0.01, max = 0.02 }
+lambda_s = { min = 1.2, max = 1.3 }
+"""
+
+
+def test_nothing_found_ends_with_3_and_says_so(tmp_path, capsys):
+    path = tmp_path / "nothing.toml"
+    path.write_text(NOTHING)
+    status, out, err = run(capsys, "trace", path, "--pattern", "weave", "--json", "--starts", 4)
+    assert status == 3
+    assert "no weave found" in err
+    assert json.loads(out)["branches"] == []
+
+
+def test_chart_writes_table_archive_and_figure(tmp_path):
+    archive, figure = tmp_path / "chart.npz", tmp_path / "chart.png"
+    done = tmsopt(
+        "chart", "problems/chart.toml", "--points", "40x30", "-o", archive, "--plot", figure, "--axes", "lambda_s,Fr"
+    )
+    assert done.returncode == 0
+    assert done.stderr.splitlines() == [f"wrote {archive}", f"wrote {figure}"]
+    assert "heavily damped" in done.stdout
+    assert "EP4" in done.stdout
+    assert "0.410677532" in done.stdout  # arctan(15/4 − 75√2/32)
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    with np.load(archive) as data:
+        assert data["kind"].shape == (30, 40)
+        assert (data["lambda_s"][0], data["lambda_s"][-1]) == (0.01, 1.4)
+
+
+def test_chart_json_is_finite(capsys):
+    status, out, err = run(capsys, "chart", "problems/chart.toml", "--points", "30", "--no-boundaries", "--json")
+    assert (status, err) == (0, "")
+    data = json.loads(out, parse_constant=pytest.fail)
+    assert data["axes"]["Fr"] == {"min": 0.01, "max": 5.0, "points": 30}
+    assert sum(data["classes"].values()) == pytest.approx(1)
+    assert data["boundaries"] is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["trace", "problems/ep_set.toml", "--pattern", "EP9"], "unknown pattern 'EP9'"),
+        (["trace", "problems/ep_set.toml", "--pattern", "EP2"], "takes 2 free parameters"),
+        (["trace", "problems/chart.toml"], "no pattern to trace"),
+        (["trace", "problems/ep_set.toml", "--plot", "x.png", "--axes", "Fr,mu"], "accepted: two of the free parameters"),
+        (["trace", "problems/ep_set.toml", "--csv", "no/such/x.csv"], "does not exist"),
+        (["trace", "problems/ep_set.toml", "--csv", "x.txt"], "ending in csv"),
+        (["trace", "problems/ep_set.toml", "--step", "0.5"], "--step"),
+        (["trace", "nothing.toml"], "nothing.toml"),
+        (["chart", "problems/realistic.toml"], "are free"),
+        (["chart", "problems/chart.toml", "--axes", "Fr,Fr"], "accepted: two of the free parameters"),
+        (["chart", "problems/chart.toml", "--points", "1"], "accepted: a number from 2"),
+        (["chart", "problems/chart.toml", "--points", "40by30"], "accepted: a number from 2"),
+        (["chart", "problems/chart.toml", "--output", "problems/x.csv"], "ending in npz"),
+        (["chart", "problems/chart.toml", "--layer", "colour"], "--layer"),
+    ],
+)  # fmt: skip
+def test_bad_input_ends_with_2_and_says_what_is_accepted(arguments, words, capsys):
+    status, out, err = run(capsys, *arguments)
+    assert (status, out) == (2, "")
+    assert words in " ".join(err.split())
+
+
+def test_a_pattern_with_other_freedom_ends_a_process_with_2():
+    done = tmsopt("trace", "problems/ep_set.toml", "--pattern", "EP2")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "takes 2 free parameters" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a disk that is always full")
+def test_an_output_that_cannot_be_written_ends_with_2(tmp_path):
+    path = tmp_path / "chart.npz"
+    path.symlink_to("/dev/full")
+    done = tmsopt("chart", "problems/chart.toml", "--points", "5", "--no-boundaries", "-o", path)
+    assert done.returncode == 2
+    assert "cannot be written" in done.stderr
+    assert "wrote" not in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_an_output_name_that_no_file_system_takes_ends_with_2():
+    with pytest.raises(SystemExit) as stop:
+        main(args=["chart", "problems/chart.toml", "--points", "5", "-o", "x" * 300 + ".npz"], prog_name="tmsopt")
+    assert stop.value.code == 2
+
+
+def test_help_shows_examples(capsys):
+    for command in ("trace", "chart"):
+        status, out, _ = run(capsys, command, "--help")
+        assert status == 0
+        assert f"tmsopt {command} problems/" in out
+        assert "Exit status" in out
+
+
+@pytest.mark.parametrize("points", [(1, 5), (0, 5), 50, (5,), (99_999, 99_999), ("a", 5)])
+def test_other_numbers_of_points_are_refused(points):
+    problem = load("problems/chart.toml", asks=False)
+    with pytest.raises(InputError, match=r"points: found .* accepted: two whole numbers"):
+        chart(problem, points=points, boundaries=False)
+
+
+@pytest.mark.parametrize("call", [chart, domain, trace])
+def test_a_file_name_is_no_problem(call):
+    with pytest.raises(InputError, match=r"accepted: a Problem, such as tmsopt\.load"):
+        call("problems/chart.toml")
+
+
+def test_axes_as_one_text_are_refused():
+    problem = load("problems/chart.toml", asks=False)
+    with pytest.raises(InputError, match="found 'Fr,lambda_s'; accepted: Fr and lambda_s"):
+        chart(problem, "Fr,lambda_s", points=(5, 5), boundaries=False)
+
+
+def test_the_least_abscissa_satisfies_the_constraints():
+    problem = load("problems/chart.toml", asks=False)
+    free = chart(problem, points=(40, 30), boundaries=False)
+    best = free.to_json()["least_abscissa"]
+    bounded = dataclasses.replace(problem, constraints={"slow": f"Fr <= {best['Fr'] / 2}"})
+    found = chart(bounded, points=(40, 30), boundaries=False)
+    allowed = found.grid[0] <= best["Fr"] / 2
+    assert found.to_json()["least_abscissa"]["value"] == free.abscissa[:, allowed].min()
+    never = chart(dataclasses.replace(problem, constraints={"never": "Fr >= 100"}), points=(5, 5), boundaries=False)
+    assert never.to_json()["least_abscissa"] is None
+    assert "least abscissa" not in chart_table(never)
+
+
+def test_an_equality_is_left_aside_and_said_to_be():
+    problem = dataclasses.replace(load("problems/chart.toml", asks=False), constraints={"law": "Fr == 2"})
+    found = chart(problem, points=(5, 5), boundaries=False)
+    assert found.left_aside == ("law",)
+    assert found.satisfied.all()
+    assert "law is an equality" in chart_table(found)
+
+
+def test_the_margin_is_the_difference_of_the_sides():
+    problem = dataclasses.replace(
+        load("problems/chart.toml", asks=False), constraints={"slow": "Fr <= 2", "steep": "lambda_s >= 0.3"}
+    )
+    found = chart(problem, points=(12, 9), boundaries=False)
+    Fr, tilt = np.meshgrid(*found.grid)
+    assert np.array_equal(found.margin, np.minimum(2 - Fr, tilt - 0.3))
+    assert np.array_equal(found.satisfied, (Fr <= 2) & (tilt >= 0.3))
+
+
+def test_a_huge_box_is_charted_without_a_warning():
+    problem = dataclasses.replace(
+        load("problems/chart.toml", asks=False), free={"Fr": (0.1, 1e300), "lambda_s": (0.01, 1.4)}
+    )
+    found = chart(problem, points=(20, 15))
+    assert found.shares["undefined"] > 0.9

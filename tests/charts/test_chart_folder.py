@@ -1,0 +1,346 @@
+"""Folders of large charts: killed and resumed, refused, damaged, and from the command line."""
+
+import dataclasses
+import json
+import subprocess
+import sys
+import tracemalloc
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.charts import EXTRA, PLANE, charted, files
+
+from tmsopt.charts import LAYERS, chart, chart_to, open_chart
+from tmsopt.cli import main
+from tmsopt.design import load
+from tmsopt.errors import InputError
+
+folder = import_module("tmsopt.charts.folder")
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    return charted(tmp_path_factory.mktemp("whole") / "whole.chart")
+
+
+# Killed and resumed
+
+
+KILLED = """
+import os, signal, sys
+from helpers.charts import charted
+from tmsopt.charts import folder, stored
+left, stored._SYNC = int(sys.argv[2]), 0.0
+real = os.fsync
+def fsync(descriptor):
+    global left
+    left -= 1
+    if left == 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    real(descriptor)
+folder.os.fsync = fsync
+charted(sys.argv[1], tile=97)
+"""
+
+
+def test_a_killed_process_loses_no_recorded_tile(whole, tmp_path):
+    """Killed as it is about to bring a layer, or the record, to the disk; then the same call goes on."""
+    path = tmp_path / "killed.chart"
+    place = Path(__file__).parents[1]
+    recorded = []
+    for moment in (30, 44):
+        command = [sys.executable, "-c", KILLED, str(path), str(moment)]
+        ended = subprocess.run(command, cwd=place, env=None, capture_output=True, check=False, timeout=60)
+        assert ended.returncode < 0, ended.stderr
+        with pytest.raises(InputError, match=r"not finished: \d+ of 851 designs; run its command again"):
+            open_chart(path)
+        lines = (path / "tiles.jsonl").read_bytes().splitlines()
+        assert lines[: len(recorded)] == recorded
+        assert len(lines) > len(recorded)
+        recorded = lines
+    seen = []
+    found = charted(path, tile=97, progress=lambda done, most: seen.append(done))
+    assert seen[0] == 74 * len(recorded)  # from where it was left
+    assert (path / "tiles.jsonl").read_bytes().splitlines()[: len(recorded)] == recorded
+    assert files(path) == files(whole.path)
+    assert found.counts.designs == 851
+    assert found.run["designs"] == 851 - 74 * len(recorded)
+
+
+@pytest.mark.parametrize("kept", [0, 1, 200, 300, 1000, -1])
+def test_whatever_was_not_recorded_is_done_again(kept, whole, tmp_path):
+    """A record cut anywhere, as when a line was being written, over numbers that never reached the disk."""
+    path = charted(tmp_path / "torn.chart", tile=97).path
+    record = (path / "tiles.jsonl").read_bytes()
+    (path / "tiles.jsonl").write_bytes(record[:kept])
+    done = folder.read_tiles(path)
+    for name in (*LAYERS, *EXTRA):
+        array = np.load(path / "layers" / f"{name}.npy", mmap_mode="r+")
+        for row in range(23):
+            if row - row % 2 not in done:
+                array[row] = 1
+        array.flush()
+    found = charted(path, tile=97)
+    assert files(path) == files(whole.path)
+    assert found.counts.designs == 851
+    assert len(folder.read_tiles(path)) == 12
+
+
+def test_a_finished_chart_is_not_charted_again(tmp_path):
+    path = tmp_path / "done.chart"
+    charted(path)
+    before = {p: p.stat().st_mtime_ns for p in path.rglob("*.npy")}
+    again = charted(path, tile=50)
+    assert again.run["designs"] == 0
+    assert {p: p.stat().st_mtime_ns for p in path.rglob("*.npy")} == before
+
+
+def test_memory_does_not_grow_with_the_grid(tmp_path):
+    """Five times the designs, the same tiles: the same peak, but for the record of the tiles, 1 kB each.
+
+    Threads may or may not compute at once what others wait to be written: a fifth either way.
+    """
+    peaks = []
+    for rows in (200, 1000):
+        tracemalloc.start()
+        chart_to(PLANE, tmp_path / f"{rows}.chart", points=(200, rows), tile=4000)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.2 * peaks[0] + 40 * 1000
+
+
+# What is refused
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"problem": dataclasses.replace(PLANE, fixed=PLANE.fixed | {"mu": 0.2})}, "problem.fixed.mu: 0.1 there, 0.2 asked"),
+        ({"problem": dataclasses.replace(PLANE, free=PLANE.free | {"Fr": (0.01, 4.0)})}, "axes.Fr.max: 5.0 there, 4.0"),
+        ({"problem": dataclasses.replace(PLANE, constraints={"trail": "nu_H >= 0.03"})}, 'trail: "nu_H >= 0.02" there'),
+        ({"points": (37, 24)}, "axes.lambda_s.points: 23 there, 24 asked for"),
+        ({"axes": ("lambda_s", "Fr"), "points": (23, 37)}, 'dimensions: ["lambda_s", "Fr"] there'),
+        ({"layers": ("kind",)}, 'layers.abscissa: {"dtype": "<f8"} there, none asked for'),
+        ({"quantities": EXTRA | {"T": "lambda_s"}}, 'layers.T.expression: "tan(lambda_s)" there, "lambda_s" asked for'),
+        ({"single": True}, 'layers.margin.dtype: "<f8" there, "<f4" asked for'),
+    ],
+)  # fmt: skip
+def test_another_chart_of_that_name_is_refused(change, words, whole):
+    before = files(whole.path)
+    with pytest.raises(InputError) as refused:
+        charted(whole.path, **change)
+    assert words in str(refused.value)
+    assert "--fresh" in str(refused.value)
+    assert files(whole.path) == before
+
+
+def test_fresh_moves_the_old_one_aside(tmp_path):
+    path = tmp_path / "a.chart"
+    old = files(charted(path).path)
+    new = charted(path, points=(5, 4), fresh=True)
+    assert new.layers["kind"].shape == (4, 5)
+    assert files(tmp_path / "a.1.chart") == old
+    charted(path, points=(6, 4), fresh=True)
+    assert open_chart(tmp_path / "a.2.chart").layers["kind"].shape == (4, 5)
+
+
+def test_one_process_writes_at_a_time(tmp_path):
+    pytest.importorskip("fcntl")
+    path = charted(tmp_path / "a.chart", points=(5, 4)).path
+    about = json.loads((path / "about.json").read_text())
+    with folder.writing(path, about, {}, False), pytest.raises(InputError, match="written by another process"):
+        charted(path, points=(5, 4))
+
+
+def _cut(name, size):
+    return lambda p: (p / name).write_bytes((p / name).read_bytes()[:size])
+
+
+def _said(**changes):
+    def change(path):
+        about = json.loads((path / "about.json").read_text())
+        (path / "about.json").write_text(json.dumps(about | changes))
+
+    return change
+
+
+DAMAGE = {
+    "no about": (lambda p: (p / "about.json").unlink(), "about.json cannot be read"),
+    "no JSON": (_cut("about.json", 50), "about.json is not JSON"),
+    "another schema": (_said(schema=7), "no schema 1"),
+    "no list": (lambda p: (p / "about.json").write_text("[]"), "no schema 1"),
+    "no shape": (lambda p: (p / "about.json").write_text('{"schema": 1}'), "lacks shape"),
+    "nothing said": (_said(title=None), "does not say what was charted"),
+    "layers that are none": (_said(layers=["kind"]), "does not say what was charted"),
+    "no tile": (_said(tile="large"), "does not say what was charted"),
+    "no layer": (lambda p: (p / "layers" / "kind.npy").unlink(), "layers/kind.npy cannot be read"),
+    "a short layer": (_cut("layers/abscissa.npy", 200), "layers/abscissa.npy"),
+    "an empty layer": (_cut("layers/abscissa.npy", 0), "layers/abscissa.npy"),
+    "another layer": (lambda p: np.save(p / "layers" / "kind.npy", np.zeros((4, 5))), "not of shape"),
+    "another axis": (lambda p: np.save(p / "axes" / "Fr.npy", np.zeros(3)), "axes of shape"),
+    "no axis": (lambda p: (p / "axes" / "Fr.npy").unlink(), "axes/Fr.npy cannot be read"),
+    "no record": (lambda p: (p / "tiles.jsonl").unlink(), "tiles.jsonl cannot be read"),
+    "another record": (lambda p: (p / "tiles.jsonl").write_text('{"row": 0}\n{}\n'), "line 1 of tiles.jsonl"),
+    "a record of another grid": (
+        lambda p: (p / "tiles.jsonl").write_text(
+            (p / "tiles.jsonl").read_text().replace('"designs": 20', '"designs": 9')
+        ),
+        "counts 9 of 20 designs",
+    ),
+    "no folder": (lambda p: p.rename(p.with_name("moved")), "is no chart"),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGE)
+def test_damage_is_seen_and_said(name, tmp_path):
+    path = charted(tmp_path / "a.chart", points=(5, 4)).path
+    damage, words = DAMAGE[name]
+    damage(path)
+    with pytest.raises(InputError) as seen:
+        open_chart(path)
+    assert words in str(seen.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"points": (5,)}, "accepted: two whole numbers"),
+        ({"points": (5, 1)}, "each from 2 to 1000000"),
+        ({"points": (10**5, 10**5)}, "1e+09 or less"),
+        ({"points": 7}, "found 7"),
+        ({"axes": ("Fr", "mu")}, "accepted: Fr and lambda_s"),
+        ({"layers": ("kinds",)}, "did you mean 'kind'?"),
+        ({"layers": (), "quantities": {}}, "found none"),
+        ({"quantities": {"x": "Frr"}}, "quantities.x: 'Frr' uses the unknown name"),
+        ({"quantities": {"x": "2 * radius"}}, "quantities.x: uses radius, which takes a search"),
+        ({"quantities": {"kind": "Fr"}}, "found the name 'kind'"),
+        ({"quantities": {"a/b": "Fr"}}, "found the name 'a/b'"),
+        ({"engine": "gpu"}, "accepted: auto numpy numba"),
+        ({"workers": 0}, "a whole number from 1"),
+    ],
+)
+def test_bad_input_leaves_nothing_behind(options, words, tmp_path):
+    with pytest.raises(InputError) as refused:
+        charted(tmp_path / "a.chart", **options)
+    assert words in str(refused.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_disk_that_fills_up_keeps_what_is_recorded(tmp_path, monkeypatch, capsys):
+    path = tmp_path / "a.chart"
+    arguments = ["problems/chart.toml", "--points", "20x10", "-o", path, "--no-boundaries"]
+
+    def full(descriptor):
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(folder.os, "fsync", full)
+        status, _, err = run(capsys, *arguments)
+    assert status == 2
+    assert "cannot be written: No space left on device; the same command will go on" in err
+    with pytest.raises(InputError, match="not finished: 0 of 200"):
+        open_chart(path)
+    assert run(capsys, *arguments)[0] == 0
+    assert open_chart(path).counts.designs == 200
+
+
+def test_a_disk_without_room_is_said_before_any_work(tmp_path, monkeypatch):
+    monkeypatch.setattr("shutil.disk_usage", lambda path: type("usage", (), {"free": 10_000}))
+    with pytest.raises(InputError, match=r"takes .* GB, and 0\.0 GB are free"):
+        charted(tmp_path / "a.chart")
+    assert not list(tmp_path.iterdir())
+
+
+# The command line
+
+
+def run(capsys, *arguments):
+    """In this process: exit status, stdout, stderr."""
+    with pytest.raises(SystemExit) as stop:
+        main(args=["chart", *map(str, arguments)], prog_name="tmsopt")
+    written = capsys.readouterr()
+    return stop.value.code, written.out, written.err
+
+
+def test_a_folder_from_the_command_line(tmp_path, capsys):
+    path, figure = tmp_path / "big.chart", tmp_path / "big.png"
+    arguments = ["problems/chart.toml", "--points", "60x40", "-o", path, "--quantity", "tilt=tan(lambda_s)"]
+    status, out, err = run(capsys, *arguments, "--json", "--workers", 2, "--engine", "numpy")
+    assert (status, err) == (0, f"wrote {path}\n")
+    data = json.loads(out, parse_constant=pytest.fail)
+    assert (data["engine"], data["designs"], data["fallbacks"]) == ("numpy", 2400, 0)
+    assert data["per_second"] == pytest.approx(2400 / data["seconds"])
+    assert data["layers"] == ["kind", "abscissa", "damping_ratio", "real_roots", "satisfied", "tilt"]
+    small = chart(load("problems/chart.toml", asks=False), points=(60, 40), boundaries=False)
+    assert data["classes"] == small.shares
+    assert data["least_abscissa"] == small.to_json()["least_abscissa"]
+    status, out, err = run(capsys, *arguments, "--plot", figure, "--no-boundaries", "--layer", "tilt")
+    assert status == 0
+    assert "heavily damped" in out
+    assert f"{data['least_abscissa']['value']:.6g}" in out
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    status, _, err = run(capsys, *arguments[:2], "50x40", *arguments[3:])
+    assert status == 2
+    assert "axes.Fr.points: 60 there, 50 asked for" in err
+    status, _, _ = run(
+        capsys, *arguments[:2], "50x40", *arguments[3:], "--fresh", "--layers", "kind,margin", "--single"
+    )
+    assert status == 0
+    assert {n: a.dtype for n, a in open_chart(path).layers.items()} == {"kind": "i1", "margin": "f4", "tilt": "f4"}
+
+
+@pytest.mark.parametrize("ending", ["npz", "nc"])
+def test_three_axes_in_one_file(ending, tmp_path, capsys):
+    path, figure = tmp_path / f"space.{ending}", tmp_path / "slice.svg"
+    arguments = ["problems/ep_set.toml", "--points", "7x6x5", "--axes", "Fr,lambda_s,chi_B", "--quantity", "x=Fr*chi_B"]
+    status, out, err = run(
+        capsys, *arguments, "-o", path, "--plot", figure, "--slice", "lambda_s=20 deg", "--no-boundaries"
+    )
+    assert status == 0, err
+    assert "7 × 6 × 5 designs over Fr, lambda_s, chi_B" in out
+    assert figure.read_bytes().startswith(b"<?xml")
+    problem = load("problems/ep_set.toml", asks=False)
+    wanted = chart_to(problem, tmp_path / "space.chart", ("Fr", "lambda_s", "chi_B"), points=(7, 6, 5),
+                      quantities={"x": "Fr*chi_B"})  # fmt: skip
+    if ending == "npz":
+        with np.load(path) as data:
+            found = dict(data)
+        assert json.loads(str(found["about"]))["dimensions"] == ["chi_B", "lambda_s", "Fr"]
+    else:
+        xarray = pytest.importorskip("xarray")
+        with xarray.open_dataset(path) as data:
+            assert data["kind"].dims == ("chi_B", "lambda_s", "Fr")
+            assert data["lambda_s"].attrs["units"] == "rad"
+            found = {n: data[n].values for n in data.variables}
+    for name, array in wanted.layers.items():
+        assert np.array_equal(found[name], array, equal_nan=array.dtype == float)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["problems/realistic.toml"], "a grid has two or three free parameters"),
+        (["problems/chart.toml", "--points", "4x4x4"], "one for each of the 2 axes"),
+        (["problems/chart.toml", "--points", "4x4x4x4"], "two or three as in 400x300"),
+        (["problems/chart.toml", "--points", "10000x10000"], "give an --output that ends in chart"),
+        (["problems/chart.toml", "--quantity", "Fr*2"], "accepted: NAME=EXPRESSION"),
+        (["problems/chart.toml", "--quantity", "x=Frr"], "unknown name 'Frr'"),
+        (["problems/chart.toml", "--layers", "kind,gamma"], "found 'gamma'; accepted: kind"),
+        (["problems/chart.toml", "--layer", "colour"], "--layer: found 'colour'; accepted: kind"),
+        (["problems/chart.toml", "--engine", "gpu"], "accepted: auto numpy numba"),
+        (["problems/chart.toml", "--workers", "0"], "--workers"),
+        (["problems/chart.toml", "--slice", "Fr=1"], "nothing to hold"),
+        (["problems/ep_set.toml", "--plot", "x.png"], "hold one, as in --slice"),
+        (["problems/ep_set.toml", "--slice", "mu=1", "--plot", "x.png"], "--slice: found 'mu'"),
+        (["problems/ep_set.toml", "--slice", "Fr=99", "--plot", "x.png"], "--slice.Fr: found 99; accepted: "),
+        (["problems/ep_set.toml", "--slice", "Fr=fast", "--plot", "x.png"], "--slice.Fr: found 'fast'"),
+        (["problems/ep_set.toml", "--axes", "Fr,mu"], "in any order"),
+        (["problems/chart.toml", "-o", "no/such/x.chart"], "does not exist"),
+    ],
+)  # fmt: skip
+def test_bad_input_ends_with_2_and_says_what_is_accepted(arguments, words, capsys):
+    status, out, err = run(capsys, *arguments)
+    assert (status, out) == (2, "")
+    assert words in " ".join(err.split())

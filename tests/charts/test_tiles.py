@@ -1,0 +1,168 @@
+"""Charts in tiles: equal to the one in memory to the bit however they are cut, over two and three axes."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from helpers.charts import EXTRA, FIXED, PLANE, POINTS, SPACE, charted, files
+
+from tmsopt.charts import LAYERS, Grid, array_function, chart, chart_to, survey, tally, total
+from tmsopt.design import Problem, load
+from tmsopt.errors import InputError
+from tmsopt.models import Model, Parameter, ParameterSet
+from tmsopt.roots import CLASSES
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    return charted(tmp_path_factory.mktemp("whole") / "whole.chart")
+
+
+# However it is cut
+
+
+@pytest.mark.parametrize(("tile", "workers"), [(1, 1), (97, 3), (300, 2), (10**6, 1)])
+def test_tiles_are_the_chart_in_memory_to_the_bit(tile, workers, whole, tmp_path):
+    found = charted(tmp_path / "cut.chart", tile=tile, workers=workers)
+    small = chart(PLANE, points=POINTS, boundaries=False)
+    for name, dtype in LAYERS.items():
+        wanted = getattr(small, name)
+        assert found.layers[name].shape == (23, 37)
+        assert found.layers[name].dtype == dtype
+        assert found.layers[name].tobytes() == wanted.tobytes()
+    assert files(found.path) == files(whole.path)
+    assert found.shares == small.shares == whole.shares
+    assert found.to_json()["least_abscissa"] == small.to_json()["least_abscissa"]
+    assert found.to_json()["satisfied"] == small.to_json()["satisfied"]
+
+
+def test_quantities_are_those_of_every_design(whole):
+    Fr, tilt = np.meshgrid(*whole.grid.values)
+    assert np.array_equal(whole.layers["T"], np.tan(tilt))
+    assert np.array_equal(whole.layers["settled"], whole.layers["abscissa"] * Fr, equal_nan=True)
+    assert np.all(whole.layers["one"] == 1)
+    for i, j in ((0, 0), (22, 36), (11, 5)):
+        one = PLANE.values(PLANE.ordered({"Fr": float(Fr[i, j]), "lambda_s": float(tilt[i, j])}))
+        wanted = float(Fr[i, j]) - float(one["Fr_c"])
+        assert whole.layers["excess"][i, j] == wanted or (np.isnan(wanted) and np.isnan(whole.layers["excess"][i, j]))
+
+
+def test_three_axes_are_planes_one_above_the_other(tmp_path):
+    axes, points = ("chi_B", "lambda_s", "Fr"), (9, 7, 5)
+    found = chart_to(SPACE, tmp_path / "space.chart", axes, points=points, tile=31, quantities={"x": "Fr_c"})
+    assert found.layers["kind"].shape == (5, 7, 9)
+    assert found.about["dimensions"] == ["Fr", "lambda_s", "chi_B"]
+    for k, Fr in enumerate(found.grid.values[2]):
+        plane = dataclasses.replace(
+            SPACE,
+            fixed=FIXED | {"Fr": float(Fr)},
+            free={n: SPACE.free[n] for n in ("chi_B", "lambda_s")},
+        )
+        flat = chart(plane, axes[:2], points=points[:2], boundaries=False)
+        for name in ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied"):
+            assert found.layers[name][k].tobytes() == getattr(flat, name).tobytes()
+        function = array_function(plane, {"x": "Fr_c"})
+        x, y = np.meshgrid(*flat.grid)
+        critical = function(plane.ordered({"chi_B": x, "lambda_s": y}), "numpy")["x"]
+        assert np.array_equal(found.layers["x"][k], critical, equal_nan=True)
+    best = found.to_json()["least_abscissa"]
+    assert best["value"] == found.layers["abscissa"].min()
+    place = np.unravel_index(np.argmin(found.layers["abscissa"]), (5, 7, 9))
+    assert [best[n] for n in axes] == [v[k] for v, k in zip(found.grid.values, place[::-1], strict=True)]
+
+
+def test_a_grid_knows_its_designs():
+    grid = Grid(("x", "y", "z"), (np.arange(4.0), np.arange(10, 13.0), np.arange(20, 22.0)))
+    z, y, x = np.meshgrid(*grid.values[::-1], indexing="ij")
+    assert grid.shape == x.shape == (2, 3, 4)
+    up = grid.up(range(1, 5))
+    assert np.array_equal(up["y"][:, 0], y.reshape(6, 4)[1:5, 0])
+    assert np.array_equal(up["z"][:, 0], z.reshape(6, 4)[1:5, 0])
+    assert grid.at(17) == {"x": x.flat[17], "y": y.flat[17], "z": z.flat[17]}
+    assert [r for tile in grid.tiles(9) for r in tile] == list(range(6))
+
+
+def test_single_precision_is_the_double_rounded(whole, tmp_path):
+    found = charted(tmp_path / "single.chart", single=True)
+    for name in ("abscissa", "damping_ratio", "margin", "excess"):
+        assert found.layers[name].dtype == np.float32
+        assert np.array_equal(found.layers[name], whole.layers[name].astype(np.float32), equal_nan=True)
+    assert found.layers["kind"].tobytes() == whole.layers["kind"].tobytes()
+
+
+def test_both_engines_write_the_same_bits(whole, tmp_path):
+    pytest.importorskip("numba")
+    found = {e: charted(tmp_path / f"{e}.chart", points=(211, 160), engine=e) for e in ("numpy", "numba")}
+    for name in (*LAYERS, *EXTRA):
+        assert found["numpy"].layers[name].tobytes() == found["numba"].layers[name].tobytes()
+    assert [found[e].run["engine"] for e in found] == ["numpy", "numba"]
+
+
+def test_only_what_is_asked_for_is_kept(tmp_path):
+    found = chart_to(PLANE, tmp_path / "kind.chart", points=POINTS, layers=("kind",))
+    assert list(found.layers) == ["kind"]
+    data = found.to_json()
+    assert data["least_abscissa"] is data["satisfied"] is None
+    assert sum(data["classes"].values()) == pytest.approx(1)
+    other = chart_to(PLANE, tmp_path / "other.chart", points=POINTS, layers=(), quantities={"x": "Fr"})
+    assert list(other.layers) == ["x"]
+    assert other.shares == {}
+
+
+def test_counts_are_those_of_the_arrays():
+    rng = np.random.default_rng(0)
+    layers = {"kind": rng.integers(0, 5, (6, 10)).astype(np.int8), "satisfied": rng.random((6, 10)) < 0.5}
+    layers["abscissa"] = rng.normal(size=(6, 10)).round(1)
+    layers["abscissa"][2] = np.nan
+    parts = [tally({n: a[k : k + 2] for n, a in layers.items()}, 10 * k, 1, 0.5) for k in (4, 0, 2)]
+    found = total(parts)
+    allowed = np.where(layers["satisfied"], layers["abscissa"], np.nan)
+    assert (found.least, found.place) == (np.nanmin(allowed), np.nanargmin(allowed))
+    assert found.shares == {n: np.mean(layers["kind"] == k) for k, n in enumerate(CLASSES)}
+    assert (found.satisfied, found.designs, found.fallbacks, found.seconds) == (layers["satisfied"].sum(), 60, 3, 1.5)
+    none = tally({"abscissa": np.full((2, 2), np.nan)}, 0)
+    assert none.place == -1
+
+
+OSCILLATOR = Model(
+    name="oscillator",
+    title="s² + d s + k",
+    degree=2,
+    sets=(ParameterSet("plain", (Parameter("d", "1", "damping", "d"), Parameter("k", "1", "stiffness", "k")), dict),),
+    algebraic=dict,
+    polynomial=lambda d, k: [1 + 0 * d, d, k],
+)
+
+
+def test_a_constraint_that_does_not_exist_is_not_satisfied():
+    """log(lambda_s) is no number for backward tilt, whatever the other constraints say."""
+    problem = dataclasses.replace(
+        PLANE, constraints={"one": "Fr <= 100", "log": "log(lambda_s) <= 5", "two": "Fr >= -100"}
+    )
+    asked = survey(problem, points=POINTS, layers=("satisfied", "margin"))
+    layers, _ = asked.tile(range(asked.grid.rows))
+    forward = np.broadcast_to(asked.grid.values[1][:, None] > 0, asked.grid.shape)
+    assert np.array_equal(layers["satisfied"], forward)
+    assert np.array_equal(np.isnan(layers["margin"]), ~forward)
+
+
+def test_a_model_of_another_degree(tmp_path):
+    """s² + d s + k: stable where d, k > 0, heavily damped where d² > 4k too; k ≤ 0 has a root ≥ 0."""
+    problem = Problem(model=OSCILLATOR, free={"d": (-1.9, 3.0), "k": (-0.4, 2.0)})
+    found = chart_to(problem, tmp_path / "o.chart", points=(50, 25), tile=200)
+    d, k = np.meshgrid(*found.grid.values)
+    real = d * d > 4 * k
+    kind = np.where((d > 0) & (k > 0), np.where(real, 4, 3), np.where((k <= 0) | ((d <= 0) & real), 1, 2))
+    regular = np.abs(d * d - 4 * k) > 1e-9  # a double root is one root, and rounding decides where it is
+    assert np.array_equal(found.layers["kind"][regular], kind[regular])
+    alpha = np.where(real, (-d + np.sqrt(np.maximum(d * d - 4 * k, 0))) / 2, -d / 2)
+    assert found.layers["abscissa"][regular] == pytest.approx(alpha[regular], abs=1e-12)
+
+
+def test_one_or_four_free_parameters_make_no_grid():
+    for problem, words in ((load("problems/chart.toml", asks=False), None), (SPACE, None)):
+        assert words is None
+        assert survey(problem, points=(3,) * len(problem.free)).grid.size == 3 ** len(problem.free)
+    line = dataclasses.replace(PLANE, fixed=PLANE.fixed | {"Fr": 2.0}, free={"lambda_s": (0.1, 1.0)})
+    with pytest.raises(InputError, match="two or three free parameters, and 1 are free"):
+        survey(line, points=(3,))

@@ -1,0 +1,117 @@
+"""The printed gains of limits against the first-order conditions, set up another way and solved at 60 digits.
+
+The structure of the optimum is imposed exactly, as equations between the coefficients and its factors. The gradient of
+the objective is then a combination of the gradients of these equations and of the active limits; the weights of the
+limits are the gains. Polynomial and quantities are those of test_digits, from the paper's matrices.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import pytest
+from helpers.hunt import PROBLEMS
+from helpers.oracles import polynomial_60
+from helpers.structures import FORMS, native_60, pair, times
+from mpmath import mp
+
+import tmsopt
+
+STEP = mp.mpf(10) ** -20  # of central differences at 80 digits: slopes right to 38
+
+
+def names_60(parameters: Mapping[str, Any], unknowns: Sequence[Any]) -> dict[str, Any]:
+    """What the objectives and limits below speak of; the first unknown is the abscissa."""
+    q = native_60(parameters)
+    nu_H = (q["chi_H"] - 1) * mp.cos(q["lambda_s"]) - q["zeta_H"] * mp.sin(q["lambda_s"])
+    centre = (q["chi_B"] + q["mu"] * q["chi_H"]) / (1 + q["mu"])
+
+    def determinant(Fr: int) -> Any:
+        a0, a1, a2, a3, a4 = polynomial_60(**{**q, "Fr": mp.mpf(Fr)})
+        return (a1 * a2 * a3 - a0 * a3**2 - a1**2 * a4) / Fr**2
+
+    one, two = determinant(1), determinant(2)
+    found = {
+        **parameters,
+        "abscissa": unknowns[0],
+        "nu_H": nu_H,
+        "chi_T": centre,
+        "ballast_rear": (centre - 1) * (1 + q["mu"]),  # where the rear wheel lifts, or is about to
+    }
+    if "w" in parameters:
+        found |= {
+            "u_H": nu_H * parameters["w"],
+            "v_c": mp.sqrt(1 - 3 * one / (two - one)) * mp.sqrt(parameters["g"] * parameters["w"]),
+        }
+    return found
+
+
+def gains_60(data: Mapping[str, Any], problem: tmsopt.Problem) -> dict[str, Any]:
+    """Gain of each active limit, at the printed parameters."""
+    free = list(problem.free)
+    z = [mp.mpc(r["re"], r["im"]) for r in data["roots"] for _ in range(r["multiplicity"])]
+    if data["structure"] == "pair":
+        unknowns = [z[0].real, z[0].imag ** 2, -(z[2] + z[3]).real, (z[2] * z[3]).real]
+
+        def factors(*u: Any) -> list[list[Any]]:
+            return [pair(u[0], u[1]), [1, u[2], u[3]]]
+    else:
+        factors, _, of_roots = FORMS[data["structure"]]
+        unknowns = of_roots(z)
+
+    def every(y: Sequence[Any]) -> list[Any]:
+        """Objective, the four equations of the structure, and what each limit forbids to be positive."""
+        p = {name: mp.mpf(v) for name, v in data["parameters"].items()} | dict(zip(free, y, strict=False))
+        names = {**names_60(p, y[len(free) :]), "abs": abs, "__builtins__": {}}
+        a = polynomial_60(**native_60(p))
+        found = [eval(data["objective"]["expression"], names)]
+        found += [c * a[0] - b for c, b in zip(times(*factors(*y[len(free) :]))[1:], a[1:], strict=True)]
+        for limit in data["active"]:
+            if limit in problem.constraints:
+                text = problem.constraints[limit]
+                sign, comparison = (1, "<=") if "<=" in text else (-1, ">=")
+                left, right = text.split(comparison)
+                found.append(sign * (eval(left, names) - eval(right, names)))
+            else:
+                name, end = limit.rsplit(".", 1)
+                found.append(p[name] * (1 if end == "max" else -1))
+        return found
+
+    y = [mp.mpf(data["parameters"][name]) for name in free] + list(unknowns)
+    slopes = []
+    for k in range(len(y)):
+        ahead, behind = list(y), list(y)
+        ahead[k] += STEP
+        behind[k] -= STEP
+        slopes.append([(a - b) / (2 * STEP) for a, b in zip(every(ahead), every(behind), strict=True)])
+    matrix = mp.matrix([row[1:] for row in slopes])
+    weights = mp.lu_solve(matrix, mp.matrix([-row[0] for row in slopes]))  # least squares where there is freedom left
+    return {name: weights[4 + k] for k, name in enumerate(data["active"])}
+
+
+@pytest.mark.parametrize("name", ["ballast_free", "childs_bicycle", "delivery_robot", "least_speed"])
+def test_printed_gains_are_right_to_the_last_of_their_six_digits(name: str) -> None:
+    """At optima with a pair, an EP4 and three roots on a line; one limit is on the kink of a quantity that is 0."""
+    problem = tmsopt.load(PROBLEMS / f"{name}.toml")
+    data = json.loads(json.dumps(tmsopt.solve(problem).to_json()))
+    assert data["active"]
+    with mp.workdps(80):
+        assert data["active"] == {n: float(mp.nstr(gain, 6)) for n, gain in gains_60(data, problem).items()}
+
+
+def test_a_limit_on_a_quantity_at_its_kink_has_one_gain() -> None:
+    """ballast_rear <= 0 where the ballast is max(0, lift): an NLP holds three limits there, but the gain is that of
+    moving the stated one, and a small move realises it. The curvature explains 1e-3 for a step of 1e-3."""
+    problem = tmsopt.load(PROBLEMS / "ballast_free.toml")
+    design = tmsopt.solve(problem)
+    step = 1e-3
+    looser = tmsopt.Problem(
+        model=problem.model,
+        fixed=problem.fixed,
+        free=problem.free,
+        constraints={**problem.constraints, "no_ballast_at_the_rear": f"ballast_rear <= {step}"},
+        minimize="abscissa",
+    )
+    gained = (design.value - tmsopt.solve(looser).value) / step
+    assert gained == pytest.approx(design.active["no_ballast_at_the_rear"], rel=2e-3)
+    assert design.quantities["chi_T"] == pytest.approx(1, abs=1e-14)  # the limit is met, not approached

@@ -1,0 +1,400 @@
+"""Pareto fronts against closed forms and exhaustive grids of designs."""
+
+import csv
+import json
+import math
+import pickle
+from dataclasses import FrozenInstanceError, replace
+from importlib import import_module
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from helpers.curves import epset_Fr
+from scipy.optimize import brentq, minimize_scalar
+
+import tmsopt
+from tmsopt import InputError, NotSolved, Problem
+from tmsopt.cli import main
+from tmsopt.models import tms
+
+subproblems = import_module("tmsopt.fronts.subproblems")
+
+BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
+Z_B, Z_H = -0.4, -0.2
+H2 = Z_B * Z_H
+T_MIN = math.tan(math.radians(2))
+SQRT2 = math.sqrt(2)
+EP4 = (-(H2**-0.25), 3 * math.sqrt(110 * SQRT2 - 120) / 8)
+"""Abscissa and Froude number of EP4: equation w0 and Table 1."""
+
+ROUNDING = 1e-8
+"""A limit holds to 1e-9 on recheck, and Fr changes by up to 2.6 per unit of the abscissa along this front."""
+
+
+# The front of problems/pareto.toml, from the monic coefficients alone
+
+
+def inverse(c1, c2, c3):
+    """Fr, chi_B, T of the chi_H = 1 bicycle with given monic coefficients; c4 is 1/(zeta_B zeta_H) for all of them.
+
+    From copo at chi_H = 1, with u = Fr/T: c1 h² = u (chi_B ζ_H − ζ_B), c3 h² = u (chi_B − 1),
+    c2 h² = ζ_B + ζ_H − u² T (ζ_B − ζ_H), where h² = ζ_B ζ_H.
+    """
+    u = H2 * (c1 - Z_H * c3) / (Z_H - Z_B)
+    T = (Z_B + Z_H - c2 * H2) / (u * u * (Z_B - Z_H))
+    return u * T, 1 + c3 * H2 / u, T
+
+
+def on_one_line(sigma, W):
+    """Fr, chi_B, T with roots −σ, −σ ± i√W and a fourth, which follows from c4."""
+    f = 1 / (H2 * sigma * (sigma**2 + W))
+    p = np.polymul(np.polymul([1, sigma], [1, 2 * sigma, sigma**2 + W]), [1, f])
+    return inverse(p[1], p[2], p[3])
+
+
+def best_W(sigma):
+    """The W ≥ 0 of least Fr, any tilt allowed."""
+    found = minimize_scalar(
+        lambda W: on_one_line(sigma, W)[0], bounds=(0, 2), method="bounded", options={"xatol": 1e-13}
+    )
+    zero = on_one_line(sigma, 0.0)[0]
+    return 0.0 if zero <= found.fun + 1e-15 else float(found.x)
+
+
+def least_Fr(sigma):
+    """Least Fr with abscissa −σ and tilt of 2 degrees or more."""
+    W = best_W(sigma)
+    if on_one_line(sigma, W)[2] < T_MIN:  # the tilt binds: W on its level
+        W = tilted(sigma, W)
+    return on_one_line(sigma, W)[0]
+
+
+def tilted(sigma, W):
+    levels = [W * k / 20 for k in range(21)] + [W + 3 * k / 30 for k in range(1, 31)]
+    slack = [on_one_line(sigma, w)[2] - T_MIN for w in levels]
+    crossings = [
+        brentq(lambda w: on_one_line(sigma, w)[2] - T_MIN, a, b, xtol=1e-15)
+        for (a, b), (x, y) in zip(pairwise(levels), pairwise(slack), strict=True)
+        if x * y <= 0
+    ]
+    return min(crossings, key=lambda w: on_one_line(sigma, w)[0])
+
+
+def ep3_kink():
+    """σ where dFr/dW = 0 at W = 0: beyond it the triple root is best."""
+
+    def slope(sigma):
+        return on_one_line(sigma, 1e-6)[0] - on_one_line(sigma, 0.0)[0]
+
+    return brentq(slope, 1.5, 1.87)
+
+
+def tilt_kink():
+    """σ where the best tilt is 2 degrees."""
+    return brentq(lambda sigma: on_one_line(sigma, best_W(sigma))[2] - T_MIN, 0.35, 0.6)
+
+
+def problem(**changes):
+    free = {"Fr": (0.01, 10), "chi_B": (1.01, 5), "lambda_s": (math.radians(2), 1.4)}
+    asked = {"fixed": BASE, "free": free, "pareto": ["abscissa", "Fr"], "constraints": {"decay": "abscissa <= -0.3"}}
+    return Problem(**{"model": tms, **asked, **changes})
+
+
+@pytest.fixture(scope="module")
+def front():
+    return tmsopt.pareto(tmsopt.load("problems/pareto.toml"), 9)
+
+
+def test_every_point_is_on_the_closed_form(front):
+    for p in front.points:
+        abscissa, Fr = p.objectives
+        assert Fr == pytest.approx(least_Fr(-abscissa), abs=ROUNDING)
+        assert p.solution.status == "optimal"
+        assert (abscissa, Fr) == (p.solution.abscissa, p.solution.parameters["Fr"])
+
+
+def test_no_design_of_a_grid_dominates_the_closed_form():
+    """Designs over the whole box and, finely, around the front; roots of far-apart designs are good to 1e-6."""
+    rng = np.random.default_rng(1)
+    box = rng.uniform([0.01, 1.01, T_MIN], [2.4, 3.0, 1.0], (20_000, 3))
+    sigmas = rng.uniform(0.31, 1.8, 40)
+    centres = [on_one_line(s, best_W(s)) for s in sigmas]
+    scales = 10 ** rng.uniform(-3, -1, (40, 250, 1))
+    around = (np.array(centres)[:, None, :] * (1 + scales * rng.normal(size=(40, 250, 3)))).reshape(-1, 3)
+    designs = np.vstack([box, around[(around[:, 2] >= T_MIN) & (around[:, 1] > 1)]])
+    abscissa = abscissas(*designs.T)
+    decaying = abscissa < -0.3
+    assert decaying.sum() > 2_000
+    sigma = np.linspace(0.3, -EP4[0], 150)
+    curve = np.array([least_Fr(s) for s in sigma])
+    # linear interpolation of a concave stretch lies below it, elsewhere above by less than h² max|Fr''|/8 = 1e-4
+    assert np.all(designs[decaying, 0] >= np.interp(-abscissa[decaying], sigma, curve) - 2e-4)
+    assert abscissa.min() > EP4[0]
+
+
+def abscissas(Fr, chi_B, T):
+    """Largest real parts of the roots, by companion matrices: u = Fr/T in the coefficients of `inverse`, turned round."""
+    u = Fr / T
+    c1, c3 = u * (chi_B * Z_H - Z_B) / H2, u * (chi_B - 1) / H2
+    c2 = (Z_B + Z_H - u * u * T * (Z_B - Z_H)) / H2
+    companion = np.zeros((len(Fr), 4, 4))
+    companion[:, 0, :] = -np.stack([c1, c2, c3, np.full_like(Fr, 1 / H2)], axis=1)
+    companion[:, [1, 2, 3], [0, 1, 2]] = 1
+    return np.linalg.eigvals(companion).real.max(axis=1)
+
+
+def test_ends_are_EP4_and_the_decay_that_is_asked_for(front):
+    first, last = front.points[0], front.points[-1]
+    assert first.objectives == pytest.approx(EP4, abs=1e-12)  # a polished optimum
+    assert (first.structure, first.label) == ("EP4", "least abscissa")
+    assert last.objectives == pytest.approx((-0.3, least_Fr(0.3)), abs=ROUNDING)
+    assert last.label == "least Fr"
+    assert set(last.limits) == {"decay", "lambda_s.min"}
+
+
+def test_kinks_are_where_the_theory_has_them(front):
+    names = [(k.name, k.index) for k in front.kinks]
+    assert [n for n, _ in names] == ["EP3 -> pair+real", "lambda_s.min begins to bind"]
+    width = 2e-4 * (front.nadir[0] - front.ideal[0])  # what kinks are located to
+    for (name, index), sigma in zip(names, (ep3_kink(), tilt_kink()), strict=True):
+        assert front.points[index].objectives[0] == pytest.approx(-sigma, abs=width)
+        assert name in front.points[index].label
+    assert {p.structure for p in front.points[1 : names[0][1] + 1]} == {"EP3"}
+    assert all(("lambda_s.min" in p.limits) == (k > names[1][1]) for k, p in enumerate(front.points))
+
+
+def test_points_do_not_dominate_one_another_and_are_spread(front):
+    values = np.array([p.objectives for p in front.points])
+    assert np.all(np.diff(values[:, 0]) > 0)
+    assert np.all(np.diff(values[:, 1]) < 0)
+    lengths = np.hypot(*(np.diff(values, axis=0) / np.ptp(values, axis=0)).T)
+    assert lengths.max() <= 2 * lengths.sum() / 8  # the longest is split until there are 9 points
+    assert front.gaps == ()
+
+
+def test_the_order_of_objectives_does_not_matter(front):
+    other = tmsopt.pareto(problem(pareto=["Fr", "abscissa"]), 3, starts=0)
+    for p in other.points:
+        assert p.objectives[0] == pytest.approx(least_Fr(-p.objectives[1]), abs=ROUNDING)
+    ends = [other.points[k].objectives[::-1] for k in (-1, 0)]
+    assert ends == [pytest.approx(front.points[k].objectives, abs=ROUNDING) for k in (0, -1)]
+    assert [k.name for k in other.kinks] == ["lambda_s.min ceases to bind", "pair+real -> EP3"]
+
+
+WAVE = {"fixed": {**BASE, "lambda_s": 0.4, "Fr": 0.01}, "free": {"chi_B": (0.0, 4.0)}, "constraints": {}}
+"""One free parameter x: a front of x and of a wave in x is known by hand. So slow, all roots are real: no kinks."""
+
+
+def test_a_gap_is_reported_where_it_is():
+    """x against sin 2x − 0.3 x: efficient are 0, and from the zero at 1.36 to the minimum, where cos 2x = 0.15."""
+    found = tmsopt.pareto(problem(**WAVE, pareto=["chi_B", "sin(2*chi_B) - 0.3*chi_B"]), 6)
+    zero = brentq(lambda x: math.sin(2 * x) - 0.3 * x, 1, 2)
+    least = math.pi - math.acos(0.15) / 2
+    assert [g.index for g in found.gaps] == [0]
+    assert not found.gaps[0].failed
+    x = [p.objectives[0] for p in found.points]
+    assert x[0] == pytest.approx(0, abs=1e-8)
+    assert zero <= x[1] <= zero + 1e-3 * least  # what the end of a gap is located to
+    assert x[-1] == pytest.approx(least, abs=1e-7)
+    assert all(
+        p.objectives[1] == pytest.approx(math.sin(2 * v) - 0.3 * v, abs=1e-12)
+        for p, v in zip(found.points, x, strict=True)
+    )
+    assert "gap begins" in found.points[0].label
+    assert "gap ends" in found.points[1].label
+
+
+def test_what_is_not_solved_is_reported_as_a_gap(monkeypatch):
+    """Sub-problems with a limit between 1.5 and 2.5 are made to fail; the front is the whole box, 0 to 4."""
+
+    def failing(asked, **options):
+        found = tmsopt.solve(asked, **options)
+        values = (abs(float(text.split("<=")[1])) for text in asked.constraints.values())
+        return replace(found, status="not_converged") if any(1.5 < v < 2.5 for v in values) else found
+
+    monkeypatch.setattr(subproblems, "solve", failing)
+    found = tmsopt.pareto(problem(**WAVE, pareto=["chi_B", "-chi_B"]), 6)
+    assert [g.failed for g in found.gaps] == [True]
+    assert "try more starts" in found.gaps[0].reason
+    k = found.gaps[0].index
+    assert 1.3 - 1e-8 <= found.points[k].objectives[0] <= 1.5  # to 5 % of the range
+    assert 2.5 <= found.points[k + 1].objectives[0] <= 2.7 + 1e-8
+
+
+def test_objectives_without_conflict_give_one_point():
+    found = tmsopt.pareto(problem(**WAVE, pareto=["chi_B", "3*chi_B - 1"]))
+    assert len(found) == 1
+    assert found.points[0].objectives == pytest.approx((0, -1), abs=1e-8)
+    assert "not in conflict" in found.notes[0]
+
+
+def test_a_front_over_a_pattern_is_the_ep_set():
+    """From EP4, the greatest tilt with two real double roots, to the fold at Fr = √5 (equation epset)."""
+    around = {"Fr": (1.5, 4.0), "chi_B": (1.2, 2.0), "lambda_s": (math.radians(2), 0.6)}  # the set, and room about it
+    found = tmsopt.pareto(problem(free=around, locate="2EP2", pareto=["-lambda_s", "Fr"], constraints={}), 3, starts=0)
+    assert found.points[0].objectives == pytest.approx((-math.atan(15 / 4 - 75 * SQRT2 / 32), EP4[1]), abs=1e-8)
+    assert found.points[0].label == "greatest lambda_s"
+    assert found.points[-1].objectives[1] == pytest.approx(math.sqrt(5), abs=1e-10)
+    for p in found.points:
+        assert p.objectives[1] == pytest.approx(float(epset_Fr(Z_B, Z_H, -p.objectives[0])), abs=1e-10)
+
+
+def test_an_end_at_a_bound_is_best_in_the_others_too():
+    """At the greatest tilt the least abscissa is that of CEP2 (equation epset), however the tilt was reached."""
+    found = tmsopt.pareto(problem(pareto=["abscissa", "Fr", "-lambda_s"]), 2, starts=0)
+    end = next(p for p in found.points if p.label == "greatest lambda_s")
+    assert end.objectives[2] == -1.4
+    assert end.objectives[1] == pytest.approx(float(epset_Fr(Z_B, Z_H, 1.4)), abs=1e-9)
+    assert (end.structure, end.limits) == ("CEP2", ("lambda_s.max",))
+
+
+def test_three_objectives_on_a_sphere():
+    """x² + y² + z² ≥ 1: the efficient designs are the sphere, which weighted sums of x, y, z would miss."""
+    free = {"Fr": (0.1, 1.0), "chi_B": (0.1, 1.0), "mu": (0.1, 1.0)}
+    fixed = {"chi_H": 1.2, "zeta_B": -0.4, "zeta_H": -0.2, "lambda_s": 0.3}
+    sphere = {"sphere": "Fr**2 + chi_B**2 + mu**2 >= 1"}
+    found = tmsopt.pareto(problem(free=free, fixed=fixed, constraints=sphere, pareto=["Fr", "chi_B", "mu"]), 4)
+    assert len(found) >= 6
+    for p in found.points:
+        assert math.hypot(*p.objectives) == pytest.approx(1, abs=1e-8)
+    assert found.ideal == pytest.approx((0.1, 0.1, 0.1), abs=1e-8)
+    labels = {p.label for p in found.points} - {""}
+    assert labels == {"least Fr", "least chi_B", "least mu"}
+    assert found.to_json()["nadir"] == pytest.approx([max(p.objectives[k] for p in found.points) for k in range(3)])
+
+
+def test_constraints_of_the_user_keep_their_names():
+    crowded = {"Fr <= eps": "chi_B >= 0.5", "chi_B <= eps": "chi_B <= 3.5"}
+    found = tmsopt.pareto(problem(**{**WAVE, "constraints": crowded}, pareto=["chi_B", "-chi_B"]), 4)
+    assert (found.ideal[0], found.nadir[0]) == pytest.approx((0.5, 3.5), abs=1e-8)
+    assert found.points[0].limits == ("Fr <= eps",)
+    assert found.points[-1].limits == ("chi_B <= eps",)
+
+
+def test_infeasible_is_raised_with_the_least_violating_design():
+    with pytest.raises(NotSolved) as raised:
+        tmsopt.pareto(problem(constraints={"decay": "abscissa <= -3"}))  # below omega0 = -1.88
+    assert raised.value.solution.status == "infeasible"
+    assert "decay" in raised.value.solution.violations
+
+
+def test_a_front_is_frozen_data(front):
+    assert pickle.loads(pickle.dumps(front)).points[1].objectives == front.points[1].objectives
+    with pytest.raises(FrozenInstanceError):
+        front.points = ()
+    data = json.loads(json.dumps(front.to_json(), allow_nan=False))
+    assert (data["schema"], data["status"]) == (1, "optimal")
+    assert data["objective"] == {"sense": "pareto", "expressions": ["abscissa", "Fr"]}
+    assert [p["structure"] for p in data["points"]] == [p.structure for p in front.points]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"pareto": ["abscissa"]}, "two or three"),
+        ({"pareto": ["Fr", "mu", "chi_B", "chi_H"]}, "two or three"),
+        ({"pareto": ["Fr", " Fr"]}, "different"),
+        ({"pareto": "Fr"}, "two or three"),
+        ({"pareto": 3}, "two or three"),
+        ({"pareto": ["Fr", 1]}, "in quotes"),
+        ({"pareto": ["Fr", "speed"]}, "unknown name 'speed'"),
+        ({"pareto": ["Fr", "mu <= 1"]}, "is a comparison"),
+        ({"minimize": "abscissa"}, "beside minimize or maximize"),
+        ({"maximize": "Fr"}, "beside minimize or maximize"),
+    ],
+)
+def test_faults_are_named(changes, words):
+    with pytest.raises(InputError, match="objective") as raised:
+        problem(**changes)
+    assert words in str(raised.value)
+
+
+def test_each_verb_refuses_the_other_kind_of_problem():
+    assert problem().sense == "pareto"
+    with pytest.raises(InputError, match=r"tmsopt\.pareto"):
+        tmsopt.solve(problem())
+    with pytest.raises(InputError, match="no front is asked for"):
+        tmsopt.pareto(problem(pareto=(), minimize="Fr"))
+    with pytest.raises(ValueError, match="2 or more"):
+        tmsopt.pareto(problem(), 1)
+
+
+# The command
+
+
+FILE = """
+[parameters]
+chi_H = 1.0
+zeta_H = -0.2
+zeta_B = -0.4
+mu = 0.1
+Fr = 0.01
+lambda_s = 0.4
+chi_B = { min = 0, max = 4 }
+
+[objective]
+pareto = ["chi_B", "sin(2*chi_B) - 0.3*chi_B"]
+"""
+
+
+def command(*arguments):
+    return CliRunner().invoke(main, [str(a) for a in arguments])
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "wave.toml"
+    path.write_text(FILE)
+    return path
+
+
+def test_the_command_writes_table_csv_and_plot(file, tmp_path):
+    done = command("solve", file, "--points", 4, "--csv", tmp_path / "front.csv", "--plot", tmp_path / "front.png")
+    assert done.exit_code == 0, done.output
+    assert "least chi_B; gap begins" in done.stdout
+    assert "gap: no efficient design was found with chi_B from 0 to 1.36" in done.stdout
+    rows = list(csv.DictReader((tmp_path / "front.csv").read_text(encoding="utf-8").splitlines()))
+    assert list(rows[0]) == [
+        "chi_B", "sin(2*chi_B) - 0.3*chi_B", "Fr", "mu", "chi_H", "zeta_B", "zeta_H", "lambda_s",
+        "abscissa", "structure", "limits", "label",
+    ]  # fmt: skip
+    assert len(rows) == done.stdout.split("sub-problems")[1].count("\n  ") - 1  # a heading, then a row a point
+    x = np.array([float(r["chi_B"]) for r in rows])
+    assert np.array([float(r["sin(2*chi_B) - 0.3*chi_B"]) for r in rows]) == pytest.approx(np.sin(2 * x) - 0.3 * x)
+    assert (tmp_path / "front.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_the_command_writes_json(file):
+    done = command("solve", file, "--points", 2, "--json")
+    assert done.exit_code == 0, done.output
+    data = json.loads(done.stdout)
+    assert [g["index"] for g in data["gaps"]] == [0]
+
+
+@pytest.mark.parametrize(
+    ("change", "arguments", "status", "words"),
+    [
+        (("", ""), ["--wheelbase", "1 m"], 2, "--wheelbase: "),
+        (("", ""), ["--rear-mass", "1"], 2, "--rear-mass: "),
+        (("", ""), ["--csv", "front.txt"], 2, "--csv: "),
+        (('pareto = ["chi_B", "sin(2*chi_B) - 0.3*chi_B"]', 'minimize = "chi_B"'), ["--points", "3"], 2, "--points: "),
+        (('pareto = ["chi_B", "sin(2*chi_B) - 0.3*chi_B"]', 'minimize = "chi_B"'), ["--csv", "f.csv"], 2, "--csv: "),
+        (('["chi_B", "sin(2*chi_B) - 0.3*chi_B"]', '"chi_B"'), [], 2, "wave.toml:12: objective.pareto: found 'chi_B'"),
+        (('["chi_B", "sin(2*chi_B) - 0.3*chi_B"]', '["Fr", 2]'), [], 2, "wave.toml:12: objective.pareto: found 2"),
+        (('["chi_B", "sin(2*chi_B) - 0.3*chi_B"]', "[]"), [], 2, "nothing is asked"),
+        (("[objective]", "[constraints]\nx = 'chi_B >= 5'\n[objective]"), [], 3, ""),
+    ],
+)
+def test_the_command_says_what_is_wrong(file, change, arguments, status, words):
+    file.write_text(FILE.replace(*change) if change[0] else FILE)
+    done = command("solve", file, *arguments)
+    assert done.exit_code == status, done.output
+    assert words in done.stderr
+
+
+def test_compare_refuses_a_front(file):
+    done = command("compare", file)
+    assert done.exit_code == 2
+    assert "tmsopt.pareto" in done.stderr

@@ -1,0 +1,179 @@
+"""Global searches that share nothing with the solver: differential evolution on eigenvalues, in shrinking boxes.
+
+The model is `laws.copo`, the roots are eigenvalues of companion matrices, and the numbers of a problem file are read
+here by `tomllib`. Nothing of `tmsopt.design` is used. A search is no proof, but one that agrees with a
+solver of another kind, from another start, on another formulation, leaves little room.
+"""
+
+import re
+import tomllib
+from collections.abc import Callable, Mapping
+from math import pi
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import differential_evolution
+
+from tmsopt import laws
+from tmsopt.records import Array
+
+Design = Mapping[str, Any]
+Merit = Callable[[dict[str, Any]], tuple[Any, Any]]
+"""Design, each free parameter an array → what is to be least, and by how much the constraints are violated (≤ 0: not)."""
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "kg": 1.0, "m/s": 1.0, "deg": pi / 180}
+GRAVITY = 9.81
+NATIVE = ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")
+
+
+# Problem files
+
+
+def number(written: Any) -> float:
+    """A number, or a text with a unit, in SI and radians."""
+    if not isinstance(written, str):
+        return float(written)
+    value, unit = re.fullmatch(r"(\S+) (\S+)", written).groups()  # type: ignore[union-attr]
+    return float(value) * UNITS[unit]
+
+
+def read(name: str) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
+    """Fixed values and boxes of a problem file."""
+    written = tomllib.loads((PROBLEMS / f"{name}.toml").read_text(encoding="utf-8"))["parameters"]
+    fixed = {n: number(v) for n, v in written.items() if not isinstance(v, dict)}
+    box = {n: (number(v["min"]), number(v["max"])) for n, v in written.items() if isinstance(v, dict)}
+    return fixed, box
+
+
+# Designs
+
+
+def native(design: Design) -> dict[str, Any]:
+    """The dimensionless parameters of a design in SI; of a dimensionless one, its parameters."""
+    if "w" not in design:
+        return {n: design[n] for n in NATIVE}
+    d, w = design, design["w"]
+    return {
+        "Fr": d["v"] / np.sqrt(d.get("g", GRAVITY) * w),
+        "mu": d["m_H"] / d["m_B"],
+        "chi_B": d["x_B"] / w,
+        "chi_H": d["x_H"] / w,
+        "zeta_B": d["z_B"] / w,
+        "zeta_H": d["z_H"] / w,
+        "lambda_s": d["lambda_s"],
+    }
+
+
+def roots(design: Design) -> NDArray[np.complex128]:
+    """Roots of the characteristic polynomials, shape (..., 4)."""
+    a = laws.copo(**native(design))
+    companion = np.zeros((*a.shape[1:], 4, 4))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        companion[..., 0, :] = np.moveaxis(np.nan_to_num(-a[1:] / a[0], nan=1e9, posinf=1e9, neginf=-1e9), 0, -1)
+    companion[..., (1, 2, 3), (0, 1, 2)] = 1.0
+    found: NDArray[np.complex128] = np.linalg.eigvals(companion)
+    return found
+
+
+def abscissa(design: Design) -> Array:
+    """Largest real part of the roots; scattered by 4e-4 at an EP4, 1e-5 at an EP3, 1e-8 at an EP2."""
+    found: Array = roots(design).real.max(axis=-1)
+    return found
+
+
+def damping_ratio(design: Design) -> Array:
+    """Least -Re s/|s| of the roots."""
+    s = roots(design)
+    found: Array = (-s.real / np.abs(s)).min(axis=-1)
+    return found
+
+
+def centre(design: Design) -> Any:
+    """chi_T, the centre of mass of the whole bicycle: the share of the weight on the front wheel."""
+    d = native(design)
+    return (d["chi_B"] + d["mu"] * d["chi_H"]) / (1 + d["mu"])
+
+
+def arm(design: Design) -> Any:
+    """nu_H, the distance of the front mass from the steer axis, per wheelbase."""
+    d = native(design)
+    return (d["chi_H"] - 1) * np.cos(d["lambda_s"]) - d["zeta_H"] * np.sin(d["lambda_s"])
+
+
+# Searches
+
+
+def least(
+    merit: Merit,
+    fixed: Mapping[str, float],
+    box: Mapping[str, tuple[float, float]],
+    seed: int = 1,
+    generations: int = 150,
+    rounds: int = 6,
+    shrink: float = 0.2,
+    population: int = 12,
+    start: Mapping[str, float] | None = None,
+) -> tuple[dict[str, float], float]:
+    """The best design and its value: differential evolution in the box, then `rounds` times in a smaller one around it.
+
+    With a `start`, the first round is around that design already, in a box of the width `shrink`.
+    """
+    names = list(box)
+    low, high = np.array([box[n] for n in names]).T
+
+    def cost(points: Array) -> Array:
+        value, violation = merit({**fixed, **dict(zip(names, np.atleast_2d(points.T).T, strict=True))})
+        return np.where(violation > 0, 1e3 + violation, value)
+
+    centre_, width, best = None, 1.0, np.inf
+    if start is not None:
+        centre_, width = np.array([start[n] for n in names]), shrink
+        best = float(cost(centre_[:, None])[0])
+    for turn in range(rounds + 1):
+        around = centre_ if centre_ is not None else (low + high) / 2
+        half = (high - low) / 2 * width
+        lower, upper = np.maximum(low, around - half), np.minimum(high, around + half)
+        inside = 1e-14 * (upper - lower) + 1e-15 * (abs(lower) + abs(upper))  # SciPy may round a start beyond its bound
+        known = None if centre_ is None else np.clip(centre_, lower + inside, upper - inside)
+        found = differential_evolution(
+            cost, list(zip(lower, upper, strict=True)), maxiter=generations, popsize=population, tol=0, atol=1e-13, rng=seed + turn,
+            vectorized=True, updating="deferred", polish=False, mutation=(0.4, 0.9), recombination=0.9, x0=known,
+        )  # fmt: skip
+        if found.fun <= best:
+            centre_, best = found.x, float(found.fun)
+        width *= shrink
+    assert centre_ is not None
+    return {**fixed, **dict(zip(names, map(float, centre_), strict=True))}, best
+
+
+def placed(
+    zeta_B: Any, zeta_H: Any, chi_H: Any, gamma: Any, beta_1: Any, kappa_1: Any, beta_2: Any, kappa_2: Any
+) -> list[dict[str, Any]]:
+    """The two designs whose roots are those of t² + β t + κ, twice, with t = s - γ; chi_H not 1.
+
+    The coefficients `copo` set equal to a0 times those of the product: a3/a1 gives chi_B, a1 and a4 give Fr and mu
+    linear in u = zeta_H T - (chi_H - 1), and a2 leaves a quadratic in u. Where nothing real exists, nan.
+    """
+    k, fall = chi_H - 1, zeta_B - zeta_H
+    p1, q1, p2, q2 = (
+        beta_1 - 2 * gamma, kappa_1 - beta_1 * gamma + gamma**2,
+        beta_2 - 2 * gamma, kappa_2 - beta_2 * gamma + gamma**2,
+    )  # fmt: skip
+    b1, b2, b3, b4 = p1 + p2, q1 + q2 + p1 * p2, p1 * q2 + p2 * q1, q1 * q2
+    with np.errstate(all="ignore"):
+        chi_B = chi_H * (1 - b3 / b1 * zeta_B) / (1 - b3 / b1 * zeta_H)
+        F = -b1 * zeta_B / (zeta_B * chi_H - zeta_H * chi_B)  # Fr = F u
+        square = F**2 * fall * zeta_B
+        linear = -zeta_B * (zeta_B + zeta_H) / zeta_H - b4 * zeta_B**2 * zeta_H + zeta_B + b2 * zeta_B**2
+        constant = -k * zeta_B * fall / zeta_H
+        root = np.sqrt(linear**2 - 4 * square * constant)
+        designs = []
+        for u in ((-linear + root) / (2 * square), (-linear - root) / (2 * square)):
+            T = (u + k) / zeta_H
+            mu = (b4 * u * zeta_B**2 - zeta_B * T) / k
+            found = {"Fr": F * u, "mu": mu, "chi_B": chi_B, "lambda_s": np.arctan(T)}
+            designs.append({**found, "chi_H": chi_H, "zeta_B": zeta_B, "zeta_H": zeta_H})
+    return designs

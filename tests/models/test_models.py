@@ -1,0 +1,436 @@
+"""The two-mass-skate model: its polynomial proved symbolically, its quantities against 60 digits and laws."""
+
+import math
+import pickle
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any
+
+import casadi as ca
+import flint
+import numpy as np
+import pytest
+import sympy
+from helpers.designs import designs
+from helpers.oracles import polynomial_60, polynomial_exact, symbolic_copo, weave_Fr_60
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from matplotlib.mathtext import MathTextParser
+from mpmath import mp
+
+from tmsopt import laws
+from tmsopt.models import (
+    GRAVITY,
+    MODELS,
+    Model,
+    Parameter,
+    ParameterSet,
+    Quantity,
+    Range,
+    Values,
+    copo,
+    from_si,
+    matrices,
+    tms,
+    to_si,
+)
+from tmsopt.roots import quadratic_pencil
+
+NATIVE, SI = tms.sets
+repeatable = settings(max_examples=100, deadline=None, derandomize=True)
+
+BENCHMARK = {
+    "w": 1.0, "v": 3.0, "g": 9.81, "lambda_s": math.radians(5), "m_B": 10.0, "x_B": 1.2, "z_B": -0.4, "m_H": 1.0,
+    "x_H": 1.02, "z_H": -0.2,
+}  # fmt: skip
+"""Equation `bench` of the paper."""
+
+
+def quantities(parameters: Mapping[str, Any], of: ParameterSet = NATIVE) -> Values:
+    return Values(tms, of, parameters)
+
+
+# The polynomial
+
+
+def test_copo_is_the_determinant_of_the_matrices() -> None:
+    """det(M s² + V s + P) − μ ν_H cos λ_s · copo vanishes identically, with tan = sin/cos."""
+    symbols = sympy.symbols("Fr mu chi_B chi_H zeta_B zeta_H")
+    sine, cosine, s = sympy.symbols("sine cosine s")
+    _, mu, _, chi_H, _, zeta_H = symbols
+    M, V, P = (sympy.Matrix(m) for m in matrices(*symbols, sine, cosine))
+    determinant = sympy.Poly(sympy.expand((M * s**2 + V * s + P).det()), s).all_coeffs()
+    divisor = mu * ((chi_H - 1) * cosine - zeta_H * sine) * cosine
+    polynomial = copo(*symbols, sine / cosine)
+    assert len(determinant) == len(polynomial) == 5
+    for a, b in zip(determinant, polynomial, strict=True):
+        assert sympy.cancel(a - divisor * b) == 0
+
+
+def test_copo_is_what_the_oracle_derives_from_the_printed_matrices() -> None:
+    """The same identity from the oracle's own copy of the matrices, so that neither copy can hide a misprint."""
+    expected, symbols = symbolic_copo()
+    assert [sympy.expand(a - b) for a, b in zip(copo(**symbols), expected, strict=True)] == [0] * 5
+
+
+def test_quadratic_pencil_of_the_matrices_is_copo_in_exact_numbers() -> None:
+    """tan λ_s = 3/4 has the rational sine 3/5 and cosine 4/5."""
+    p = {"Fr": 2, "mu": 3, "chi_B": Fraction(7, 5), "chi_H": Fraction(9, 8), "zeta_B": Fraction(-2, 3), "zeta_H": -1}
+    sine, cosine = Fraction(3, 5), Fraction(4, 5)
+    nu_H = (p["chi_H"] - 1) * cosine - p["zeta_H"] * sine
+    determinant = quadratic_pencil(*matrices(**p, sine=sine, cosine=cosine))
+    assert determinant == [c * p["mu"] * nu_H * cosine for c in copo(**p, T=Fraction(3, 4))]
+
+
+def test_mass_and_stiffness_are_symmetric() -> None:
+    """Up to the gyroscopic and constraint terms, which the speed brings: P is symmetric at Fr = 0."""
+    M, V, P = matrices(0, 0.5, 1.4, 1.1, -0.5, -0.25, 0.6, 0.8)
+    assert M[0][1] == M[1][0]
+    assert P[0][1] == P[1][0]
+    assert V == [[0, 0], [0, 0]]
+
+
+def test_every_arithmetic_evaluates_the_same_formula() -> None:
+    """With dyadic numbers of five bits every operation is exact, in doubles too, so the values are equal."""
+    rng = np.random.default_rng(5)
+    names = ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "T")
+    x = ca.SX.sym("x", 7)
+    symbolic = ca.Function("copo", [x], [ca.vertcat(*copo(*ca.vertsplit(x)))])
+    numbers = rng.integers(-31, 32, size=(50, 7))
+    arrays = copo(*(numbers.T / 16))
+    for k, row in enumerate(numbers):
+        exact = [Fraction(int(n), 16) for n in row]
+        expected = copo(*exact)
+        assert expected == polynomial_or_copo(dict(zip(names, exact, strict=True)))
+        assert [Fraction(float(a[k])) for a in arrays] == expected
+        assert [Fraction(float(a)) for a in np.array(symbolic(row / 16)).ravel()] == expected
+        balls = copo(*(flint.arb(int(n)) / 16 for n in row))
+        assert all(b == flint.arb(e.numerator) / e.denominator for b, e in zip(balls, expected, strict=True))
+
+
+def polynomial_or_copo(p: dict[str, Fraction]) -> list[Fraction]:
+    """The oracle's coefficients, where μ ν_H ≠ 0 lets it divide."""
+    if p["mu"] == 0 or p["chi_H"] - 1 - p["zeta_H"] * p["T"] == 0:
+        return copo(**p)
+    return polynomial_exact(*p.values())
+
+
+def test_coefficients_of_floats_are_right_to_a_few_roundings() -> None:
+    """Against 60 digits of the very doubles, relative to the terms of each coefficient; tan carries an ulp too."""
+    expressions, symbols = symbolic_copo()
+    terms = [sympy.lambdify(list(symbols.values()), sum(map(abs, e.args))) for e in expressions]
+    for p in designs(50):
+        T = math.tan(p["lambda_s"])
+        sizes = [float(f(*(list(p.values())[:6]), T)) for f in terms]
+        got = tms.coefficients(p)
+        for a, b, size in zip(got, polynomial_60(**p), sizes, strict=True):
+            assert abs(a - b) <= 12 * np.finfo(float).eps * size
+
+
+def test_coefficients_are_polynomials_in_the_tangent_variable() -> None:
+    """An optimiser's arctangent of a variable T leaves no tangent in the coefficients."""
+    T = ca.SX.sym("T")
+    p = {**designs(1)[0], "lambda_s": ca.atan(T)}
+    got = ca.vertcat(*tms.coefficients(p))
+    assert "tan" not in str(got)
+    np.testing.assert_allclose(
+        np.array(ca.Function("f", [T], [got])(0.7)).ravel(),
+        tms.coefficients({**p, "lambda_s": math.atan(0.7)}),
+        rtol=1e-14,
+    )
+
+
+def test_coefficients_broadcast() -> None:
+    rows = designs(6)
+    columns = {name: np.array([p[name] for p in rows]).reshape(2, 3) for name in rows[0]}
+    got = np.stack(tms.coefficients(columns), axis=-1)
+    assert got.shape == (2, 3, 5)
+    np.testing.assert_array_equal(got.reshape(6, 5)[4], tms.coefficients(rows[4]))
+
+
+# SI
+
+
+length = st.floats(1e-3, 1e3)
+
+
+@st.composite
+def si_designs(draw: st.DrawFn) -> dict[str, float]:
+    return {
+        "w": draw(length),
+        "v": draw(length),
+        "g": draw(length),
+        "lambda_s": draw(st.floats(-1.5, 1.5)),
+        "m_B": draw(length),
+        "x_B": draw(length),
+        "z_B": -draw(length),
+        "m_H": draw(length),
+        "x_H": draw(length),
+        "z_H": -draw(length),
+    }
+
+
+def within_ulps(got: float, expected: float, ulps: int) -> bool:
+    return abs(got - expected) <= ulps * math.ulp(expected)
+
+
+@repeatable
+@given(si_designs())
+def test_si_there_and_back_to_2_ulp(p: dict[str, float]) -> None:
+    """One division and one product, each rounded once; √(g w) is the same double both ways."""
+    back = to_si(from_si(p), w=p["w"], m_B=p["m_B"], g=p["g"])
+    assert list(back) == list(SI.names)
+    assert all(within_ulps(back[name], p[name], 2) for name in p)
+    native = from_si(p)
+    assert list(native) == list(NATIVE.names)
+    again = from_si(to_si(native, w=p["w"], m_B=p["m_B"], g=p["g"]))
+    assert all(within_ulps(again[name], native[name], 2) for name in native)
+
+
+def test_si_conversion_is_exact_in_rational_numbers() -> None:
+    """Fr = v/√(g w) with g w the square of a rational; balls of 100 digits hold what is exact in each direction."""
+    p = {
+        "w": Fraction(9, 4), "v": Fraction(7, 3), "g": Fraction(4), "lambda_s": Fraction(1, 3), "m_B": Fraction(10),
+        "x_B": Fraction(6, 5), "z_B": Fraction(-2, 5), "m_H": Fraction(1, 7), "x_H": Fraction(51, 50),
+        "z_H": Fraction(-1, 5),
+    }  # fmt: skip
+    with flint.ctx.workdps(100):
+        native = from_si({name: flint.arb(x.numerator) / x.denominator for name, x in p.items()})
+        expected = {
+            "Fr": Fraction(7, 9), "mu": Fraction(1, 70), "chi_B": Fraction(8, 15), "chi_H": Fraction(34, 75),
+            "zeta_B": Fraction(-8, 45), "zeta_H": Fraction(-4, 45), "lambda_s": Fraction(1, 3),
+        }  # fmt: skip
+        for name, value in expected.items():
+            assert abs(native[name] - flint.arb(value.numerator) / value.denominator) < flint.arb("1e-95")
+        back = to_si(native, w=flint.arb(9) / 4, m_B=flint.arb(10), g=flint.arb(4))
+        for name, value in p.items():
+            assert abs(back[name] - flint.arb(value.numerator) / value.denominator) < flint.arb("1e-95")
+
+
+def test_si_conversion_takes_fractions() -> None:
+    """Any numbers, says the docstring: all but the Froude number are rational in rational data."""
+    p = {name: Fraction(value).limit_denominator(100) for name, value in BENCHMARK.items()}
+    native = from_si(p)
+    assert native["mu"] == Fraction(1, 10)
+    assert native["chi_H"] == Fraction(51, 50)
+    assert float(native["Fr"]) == pytest.approx(3 / math.sqrt(9.81), rel=1e-15)
+
+
+def test_si_of_a_metre_and_a_kilogram_at_9_81() -> None:
+    """The defaults of the contract: w = 1 m and g = 9.81 m/s²."""
+    native = from_si(BENCHMARK)
+    back = to_si(native)
+    assert GRAVITY == 9.81
+    assert (back["w"], back["g"], back["m_B"]) == (1.0, 9.81, 1.0)
+    assert back["v"] == pytest.approx(3.0, rel=1e-15)
+    assert back["m_H"] == pytest.approx(0.1, rel=1e-15)
+    assert SI["g"].default == 9.81
+    assert [p.name for p in SI.parameters if p.default is not None] == ["g"]
+
+
+@repeatable
+@given(si_designs(), st.floats(0.1, 10))
+def test_similar_bicycles_have_the_same_polynomial(p: dict[str, float], size: float) -> None:
+    """All lengths times k, speed times √k, all masses times m: nothing dimensionless changes."""
+    similar = {name: value * size if name in ("w", "x_B", "z_B", "x_H", "z_H") else value for name, value in p.items()}
+    similar |= {"v": p["v"] * math.sqrt(size), "m_B": 3 * p["m_B"], "m_H": 3 * p["m_H"]}
+    before, after = from_si(p), from_si(similar)
+    assert all(within_ulps(after[name], before[name], 8) for name in before)
+
+
+def test_coefficients_for_si_values_are_those_of_their_dimensionless_ones() -> None:
+    assert tms.coefficients(BENCHMARK, SI) == tms.coefficients(from_si(BENCHMARK))
+    assert tms.parameter_set("SI") is SI
+    assert tms.parameter_set("dimensionless") is NATIVE
+
+
+# Derived quantities
+
+
+QUANTITIES = {
+    "nu_H", "omega0", "Fr_c", "chi_T", "load_front", "load_rear", "ballast_rear", "ballast_front", "mass_margin",
+}  # fmt: skip
+SI_UNITS = {
+    "v_c": "m/s", "u_H": "m", "N_F": "N", "N_R": "N", "m_ballast_rear": "kg", "m_ballast_front": "kg",
+}  # fmt: skip
+
+
+def test_nu_H_is_the_distance_from_the_steer_axis() -> None:
+    for p in designs(50):
+        with mp.workdps(60):
+            lam = mp.mpf(p["lambda_s"])
+            terms = (mp.mpf(p["chi_H"]) - 1) * mp.cos(lam), -p["zeta_H"] * mp.sin(lam)
+        assert abs(quantities(p)["nu_H"] - sum(terms)) <= 8 * np.finfo(float).eps * sum(map(abs, terms))
+
+
+def test_omega0_is_the_mean_decay_where_it_exists() -> None:
+    """−(a4/a0)^(1/4) at 60 digits; nan for a4/a0 < 0. Where a4 or a0 cancels, ω0 inherits its rounding."""
+    seen = set()
+    for p in designs(100):
+        a0, _, _, _, a4 = polynomial_60(**p)
+        got = quantities(p)["omega0"]
+        seen.add(bool(a4 / a0 >= 0))
+        if a4 / a0 < 0:
+            assert math.isnan(got)
+            continue
+        with mp.workdps(60):
+            expected = float(-mp.root(a4 / a0, 4))
+        assert got == pytest.approx(expected, rel=1e-12)
+    assert seen == {True, False}
+
+
+def test_Fr_c_is_the_speed_where_the_hurwitz_determinant_vanishes() -> None:
+    """Found by bisection of the 60-digit determinant, not by a formula; nan where it keeps its sign."""
+    found = 0
+    for p in designs(40, seed=1):
+        shape = {name: p[name] for name in p if name != "Fr"}
+        expected = weave_Fr_60(**shape)
+        got = float(quantities(p)["Fr_c"])
+        if expected is None:
+            assert math.isnan(got) or not 1e-3 < got < 1e3
+        else:
+            found += 1
+            assert got == pytest.approx(float(expected), rel=1e-12)
+    assert 5 < found < 35
+
+
+def test_Fr_c_agrees_with_flus_on_arrays() -> None:
+    rows = designs(500, seed=2)
+    columns = {name: np.array([p[name] for p in rows]) for name in rows[0]}
+    square = laws.flus(**{name: value for name, value in columns.items() if name != "Fr"})
+    got = quantities(columns)["Fr_c"]
+    np.testing.assert_array_equal(np.isnan(got), square < 0)
+    np.testing.assert_allclose(got[square > 0] ** 2, square[square > 0], rtol=1e-9)
+    assert (square < 0).any()
+    assert (square > 0).any()
+
+
+@pytest.mark.parametrize("tilt", [0.5, -0.5])
+def test_Fr_c_does_not_exist_where_the_masses_are_above_one_another(tilt: float) -> None:
+    """a3 = 0 at χ_B = χ_H: the Hurwitz determinant is −a1² a4, with no zero in the speed."""
+    p = {**designs(1)[0], "chi_B": 1.2, "chi_H": 1.2, "lambda_s": tilt}
+    assert math.isnan(quantities(p)["Fr_c"])
+
+
+def test_omega0_does_not_exist_where_the_degree_drops() -> None:
+    """ζ_H = 0 and χ_H = 1: the front mass is on the steer axis, and a0 = 0."""
+    p = {**designs(1)[0], "chi_H": 1.0, "zeta_H": 0.0, "lambda_s": 0.3}
+    assert tms.coefficients(p)[0] == 0
+    assert math.isnan(quantities(p)["omega0"])
+
+
+def test_chi_T_is_the_centre_of_mass() -> None:
+    for p in designs(20):
+        exact = (Fraction(p["chi_B"]) + Fraction(p["mu"]) * Fraction(p["chi_H"])) / (1 + Fraction(p["mu"]))
+        size = (abs(p["chi_B"]) + abs(p["mu"] * p["chi_H"])) / (1 + p["mu"])
+        assert abs(Fraction(quantities(p)["chi_T"]) - exact) <= 4 * np.finfo(float).eps * size
+
+
+def test_benchmark_numbers() -> None:
+    """Fr_c = 0.90706414955081164 and v_c = 2.8410083233664 m/s at g = 9.81: the numbers of the issue."""
+    values = quantities(BENCHMARK, SI)
+    assert values["Fr_c"] == pytest.approx(0.90706414955081164, rel=1e-14)
+    assert values["v_c"] == pytest.approx(2.8410083233664, rel=1e-13)
+    assert values["v_c"] == pytest.approx(0.90706414955081164 * math.sqrt(9.81), rel=1e-14)
+
+
+def test_si_quantities_scale_with_the_wheelbase() -> None:
+    p = {**BENCHMARK, "w": 2.0, "x_B": 2.4, "x_H": 2.04, "z_B": -0.8, "z_H": -0.4}
+    small, large = quantities(BENCHMARK, SI), quantities(p, SI)
+    assert large["Fr_c"] == pytest.approx(small["Fr_c"], rel=1e-14)
+    assert large["v_c"] == pytest.approx(math.sqrt(2) * small["v_c"], rel=1e-14)
+    assert small["u_H"] == pytest.approx(0.02 * math.cos(math.radians(5)) + 0.2 * math.sin(math.radians(5)), rel=1e-14)
+    assert large["u_H"] == pytest.approx(2 * small["u_H"], rel=1e-14)
+
+
+def test_equations_of_quantities_vanish_at_their_values_and_nowhere_near() -> None:
+    """An optimiser carries x with equation(x) = 0 in place of the formula."""
+    checked = 0
+    for p in designs(30):
+        values = quantities(p)
+        for quantity in tms.quantities:
+            x = values[quantity.name]
+            if quantity.equation is None or not np.isfinite(x):
+                continue
+            checked += 1
+            assert x in quantity.range
+            off = [abs(quantity.equation(values, x * (1 + d))) for d in (-1e-3, 0.0, 1e-3)]
+            assert off[1] <= 1e-9 * min(off[0], off[2])
+    assert checked > 20
+
+
+def test_values_is_a_mapping_of_everything_an_expression_may_use() -> None:
+    values = quantities(BENCHMARK, SI)
+    names = set(SI.names) | set(NATIVE.names) | {"a0", "a1", "a2", "a3", "a4"}
+    assert set(values) == names | QUANTITIES | set(SI_UNITS)
+    assert len(values) == len(set(values))
+    assert {*tms.quantity_names(SI), *SI.names} == set(values)
+    assert {*tms.quantity_names(NATIVE), *NATIVE.names} == set(quantities(from_si(BENCHMARK)))
+    assert all(np.isfinite(values[name]) or name == "omega0" for name in values)
+    with pytest.raises(KeyError):
+        values["nu_h"]
+
+
+# The model as data
+
+
+def test_the_parameters_of_the_contract() -> None:
+    assert NATIVE.names == ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")
+    assert SI.names == ("w", "v", "g", "lambda_s", "m_B", "x_B", "z_B", "m_H", "x_H", "z_H")
+    assert tms.coefficient_names() == ("a0", "a1", "a2", "a3", "a4")
+    assert MODELS["tms"] is tms
+    assert {q.name for q in tms.quantities} == QUANTITIES
+    assert {q.name for q in SI.quantities} == set(SI_UNITS)
+
+
+UNITS = {
+    "w": "m", "v": "m/s", "g": "m/s^2", "lambda_s": "rad", "m_B": "kg", "x_B": "m", "z_B": "m", "m_H": "kg",
+    "x_H": "m", "z_H": "m", **dict.fromkeys(("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H"), "1"),
+}  # fmt: skip
+EVERY = [p for s in tms.sets for p in s.parameters] + [*tms.quantities, *SI.quantities]
+
+
+@pytest.mark.parametrize("item", EVERY, ids=lambda p: p.name)
+def test_every_parameter_and_quantity_is_documented(item: Parameter | Quantity) -> None:
+    assert item.name.isidentifier()
+    assert len(item.meaning) > 4
+    assert item.unit == {**UNITS, **SI_UNITS}.get(item.name, "1")
+    assert isinstance(item.range, Range)
+    MathTextParser("agg").parse(f"${item.latex}$")  # raises on what a figure could not show
+
+
+PHYSICAL = {
+    "Fr": ([0, 3], [-1e-9]), "mu": ([0, 30], [-0.1]), "chi_B": ([-1, 0, 2], []), "chi_H": ([-1, 0, 2], []),
+    "zeta_B": ([0, -1], [0.1]), "zeta_H": ([0, -1], [0.1]),
+    "lambda_s": ([-1.5, 0, 1.5], [math.pi / 2, -math.pi / 2, 2]), "w": ([1], [0, -1]), "v": ([0, 5], [-1]),
+    "g": ([9.81, 1.62], [0, -9.81]), "m_B": ([1], [0, -1]), "m_H": ([0, 1], [-1]), "x_B": ([-1, 0, 1], []),
+    "x_H": ([-1, 0, 1], []), "z_B": ([-1, 0], [1]), "z_H": ([-1, 0], [1]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("parameter", [p for s in tms.sets for p in s.parameters], ids=lambda p: p.name)
+def test_ranges_hold_what_can_be_built(parameter: Parameter) -> None:
+    """z points down, so heights are ≤ 0; masses and lengths are positive; a tilt of 90° has no tangent."""
+    inside, outside = PHYSICAL[parameter.name]
+    assert all(x in parameter.range for x in inside)
+    assert not any(x in parameter.range for x in [*outside, math.nan])
+
+
+def test_a_range_says_what_it_accepts() -> None:
+    assert str(Range()) == "any finite number"
+    assert str(Range(lower=0.0)) == ">= 0"
+    assert str(Range(upper=0.0)) == "<= 0"
+    assert str(Range(0.0, 2.0, closed=False)) == "> 0 and < 2"
+
+
+def test_tms_can_be_pickled() -> None:
+    copy: Model = pickle.loads(pickle.dumps(tms))
+    assert copy == tms
+    p = designs(1)[0]
+    assert copy.coefficients(p) == tms.coefficients(p)
+
+
+def test_tms_is_frozen() -> None:
+    for item in (tms, NATIVE, NATIVE["Fr"], tms.quantities[0], NATIVE["Fr"].range):
+        with pytest.raises(AttributeError):
+            item.name = "other"  # type: ignore[misc]

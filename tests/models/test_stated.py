@@ -1,0 +1,472 @@
+"""Models that a user states, in a file or in CasADi: what they make, what they refuse, and that all verbs take them."""
+
+import keyword
+import pickle
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import flint
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from matplotlib.mathtext import MathTextParser
+from scipy.optimize import differential_evolution
+
+import tmsopt
+from tmsopt.charts import Grid, save_layers
+from tmsopt.cli import main
+from tmsopt.design import ROOT_NAMES
+from tmsopt.models import CONSTANTS, FUNCTIONS, TAKEN, Unfit, from_coefficients, from_matrices, latex
+from tmsopt.studies import definition
+
+PENDULUMS = """
+[model]
+name = "coupled pendulums"
+M = [["m1*l1**2 + I1", "0"], ["0", "m2*l2**2 + I2"]]
+D = [["c1 + c12", "-c12"], ["-c12", "c2 + c12"]]
+K = [["k1", "-k12"], ["-k12", "k2"]]
+
+[model.quantities]
+ratio = "k1/k2"
+
+[parameters]
+m1 = 1
+l1 = 1
+I1 = 0.2
+m2 = 2
+l2 = 0.8
+I2 = 0.1
+c12 = 0.1
+k12 = 0.7
+k1 = { min = 1, max = 5 }
+k2 = 3
+c1 = { min = 0, max = 10 }
+c2 = { min = 0, max = 10 }
+
+[objective]
+minimize = "abscissa"
+
+[constraints]
+stiffness = "ratio <= 1.4"
+"""
+
+PARAMETERS = "\n[parameters]\nk = { min = 1, max = 2 }\n"
+
+k, c = ca.SX.sym("k"), ca.SX.sym("c")
+
+
+def written(folder: Path, text: str, name: str = "own") -> Path:
+    file = folder / f"{name}.toml"
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def loaded(folder: Path, text: str) -> tmsopt.Problem:
+    return tmsopt.load(written(folder, text), asks=False)
+
+
+def command(*arguments: Any) -> Any:
+    """A command's result; it may end as it likes, but not in a traceback."""
+    result = CliRunner().invoke(main, [str(a) for a in arguments])
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exc_info
+    return result
+
+
+def eigenvalues(M: Any, D: Any, K: Any) -> Any:
+    """Roots of det(M s² + D s + K) as eigenvalues of the first companion form."""
+    n = len(M)
+    return np.linalg.eigvals(
+        np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
+    )
+
+
+# What they make
+
+
+def test_pendulums_of_a_file_are_solved(tmp_path: Path) -> None:
+    """The optimum is not beaten by differential evolution on NumPy's eigenvalues, and is met by it to 1e-7."""
+    problem = loaded(tmp_path, PENDULUMS)
+    design = tmsopt.solve(problem)
+
+    def matrices(k1: float, c1: float, c2: float) -> tuple[Any, Any, Any]:
+        M = np.diag([1 * 1**2 + 0.2, 2 * 0.8**2 + 0.1])
+        return M, np.array([[c1 + 0.1, -0.1], [-0.1, c2 + 0.1]]), np.array([[k1, -0.7], [-0.7, 3]])
+
+    own = [design.parameters[n] for n in ("k1", "c1", "c2")]
+    roots = eigenvalues(*matrices(*own))
+    # A double root moves by the square root of 1e-15, the rounding of the coefficients.
+    assert roots.real.max() == pytest.approx(design.abscissa, abs=3e-7)
+    assert design.structure == "EP2+pair"
+    assert design.quantities["ratio"] == pytest.approx(1.4, abs=1e-9)
+    found = differential_evolution(
+        lambda x: eigenvalues(*matrices(4.2, *x)).real.max(), [(0, 10)] * 2, seed=1, popsize=8, tol=1e-10
+    )
+    assert found.fun == pytest.approx(design.abscissa, abs=1e-7)
+    assert found.fun >= design.abscissa - 3e-7
+
+
+@pytest.mark.parametrize("size", range(1, 7))
+def test_coefficients_of_matrices_are_those_of_numpy(size: int) -> None:
+    random = np.random.default_rng(size)
+    M, D, K = random.normal(size=(3, size, size))
+    model = from_matrices(M, ca.DM(D) * c, ca.DM(K) * k)
+    expected = np.poly(eigenvalues(M, 0.7 * D, 1.3 * K)) * np.linalg.det(M)
+    found = np.array(model.coefficients({"k": 1.3, "c": 0.7}), dtype=float)
+    assert model.degree == 2 * size
+    # NumPy's inverse of M loses its condition, a few hundred here, of 16 digits.
+    assert np.abs(found - expected).max() <= 1e-11 * np.abs(expected).max()
+    pencil = [np.array(m, dtype=float) for m in model.pencil({"k": 1.3, "c": 0.7})]
+    assert all(np.allclose(a, b, rtol=1e-15) for a, b in zip(pencil, (M, 0.7 * D, 1.3 * K), strict=True))
+
+
+@pytest.mark.parametrize("size", [1, 2, 5, 8, 12])
+def test_coefficients_of_a_first_order_system_are_those_of_numpy(size: int) -> None:
+    A = np.random.default_rng(size).normal(size=(size, size))
+    model = from_matrices(A=ca.DM(A) * k)
+    found, expected = np.array(model.coefficients({"k": 1.3}), dtype=float), np.poly(1.3 * A)
+    assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
+    identity, minus_A = (np.array(m, dtype=float) for m in model.pencil({"k": 1.3}))
+    assert np.allclose(identity, np.eye(size))
+    assert np.allclose(minus_A, -1.3 * A)
+
+
+def test_balls_hold_the_exact_coefficients_and_the_floats() -> None:
+    """At a design of fractions the coefficients are fractions; floats are within rounding of them."""
+    model = from_matrices([[2, 0], [0, c]], None, [[k * k, -1], [k / 3, 1 + c]])
+    exact = model.coefficients({"k": flint.fmpq(3, 2), "c": flint.fmpq(1, 4)})
+    third = flint.fmpq(*(0.5).as_integer_ratio())  # (3/2)/3, which is a double
+    assert exact == [
+        flint.fmpq(1, 2), 0, 2 * flint.fmpq(5, 4) + flint.fmpq(9, 4) * flint.fmpq(1, 4), 0,
+        flint.fmpq(9, 4) * flint.fmpq(5, 4) + third,
+    ]  # fmt: skip
+    sines = from_coefficients([1, ca.sin(k), ca.exp(c) + k, ca.sqrt(k) / c, ca.fmax(k, c) ** 3])
+    for at in ({"k": 1.5, "c": 0.25}, {"k": 0.1, "c": 3.0}):
+        floats = sines.coefficients(at)
+        balls = sines.coefficients({n: flint.arb(x, 1e-14) for n, x in at.items()})
+        assert all(ball.contains(float(x)) for ball, x in zip(balls, floats, strict=True))
+
+
+def test_a_model_is_pickled_as_what_it_is() -> None:
+    model = from_matrices([[1]], [[c]], [[k]], quantities={"ratio": c / k})
+    assert pickle.loads(pickle.dumps(model)) is model
+    assert from_matrices([[1]], [[c]], [[k]], quantities={"ratio": c / k}) is model
+    problem = tmsopt.Problem(model=model, fixed={"k": 1}, free={"c": (0, 1)}, minimize="abscissa")
+    assert pickle.loads(pickle.dumps(problem)) == problem
+
+
+@pytest.mark.parametrize(
+    "matrix",
+    [np.diag([1.0, 2.0]), [np.array([1.0, 0]), (0, np.int64(2))], ca.DM([[1, 0], [0, 2]]), ca.diag(ca.SX([1, 2])),
+     [[Fraction(1), 0], [0, Fraction(2)]], np.array([[1, 0], [0, ca.SX(2)]], dtype=object)],
+)  # fmt: skip
+def test_matrices_of_any_kind(matrix: Any) -> None:
+    """det(diag(1, 2) s² + k I) = 2 s⁴ + 3 k s² + k²."""
+    model = from_matrices(matrix, None, [[k, 0], [0, k]])
+    assert [float(x) for x in model.coefficients({"k": 3.0})] == [2, 0, 9, 0, 9]
+
+
+@pytest.mark.parametrize(
+    ("lead", "degree"),
+    [(ca.sqrt(1 - k), 2), (ca.fmax(0, k - 10), 2), (ca.fmax(0, -k), 2), (ca.log(k - 100), 2), (k - c, 2),
+     (k - k, 1), ((k + c) ** 2 - k * k - 2 * k * c - c * c, 1), (ca.sin(k) ** 2 + ca.cos(k) ** 2 - 1, 1)],
+)  # fmt: skip
+def test_a_leading_coefficient_is_left_out_only_where_it_is_nought_for_all(lead: Any, degree: int) -> None:
+    assert from_coefficients([lead, 1, k + c]).degree == degree
+
+
+def test_singular_mass_matrices() -> None:
+    """Singular in decimals, though not in binary."""
+    assert Fraction(0.1) * Fraction(2.1) != Fraction(0.7) * Fraction(0.3)
+    model = from_matrices([[0.1, 0.7], [0.3, 2.1]], [[k, 0], [0, 1]], [[1, 0], [0, k]])
+    # By hand: 0.1 + 2.1 k; 0.1 k + 2.1 + k; k² + 1; k.
+    assert [float(x) for x in model.coefficients({"k": 2.0})] == pytest.approx([4.3, 4.3, 5, 2], rel=1e-15)
+    with pytest.raises(Unfit, match="without s"):
+        from_matrices([[0]], None, [[k]])
+
+
+def test_quantities_may_use_one_another_and_stand_in_entries(tmp_path: Path) -> None:
+    problem = loaded(tmp_path, """
+[model]
+coefficients = ["1", "2*z*w", "w**2"]
+[model.quantities]
+half = "z/2"
+z = "c/(2*w)"
+w = "sqrt(k)"
+[parameters]
+c = 3
+k = 4
+""")  # fmt: skip
+    values = problem.values({"c": 3.0, "k": 4.0})
+    assert problem.model.sets[0].names == ("c", "k")
+    assert [float(values[n]) for n in ("w", "z", "half", "a1", "a2")] == [2, 0.75, 0.375, 3, 4]
+
+
+def test_numbers_of_a_model_are_told_apart_in_full() -> None:
+    """CasADi prints six digits."""
+    first, second = (from_coefficients([1, (1 + x) * k, 1]) for x in (1e-9, 2e-9))
+    assert first.statement != second.statement
+    long = [from_coefficients([1, ca.sin(sum((k + j) ** 2 for j in range(40)) + x), 1]) for x in (0, 1e-12)]
+    assert long[0].statement != long[1].statement
+    assert from_matrices([[1]], None, [[k]]).statement != from_coefficients([1, k]).statement
+
+
+@pytest.mark.parametrize(
+    ("name", "symbol"),
+    [("a1", "a_{1}"), ("gamma", r"\gamma"), ("beta1", r"\beta_{1}"), ("mu_r", r"\mu_{r}"), ("W", "W"),
+     ("k_max", r"k_{\mathrm{max}}"), ("m_1_a_b", "m_{1,a,b}"), ("lambda_", r"\lambda"), ("x__1", "x_{1}"),
+     ("CamelCase", r"\mathrm{CamelCase}"), ("rho10b", r"\mathrm{rho10b}"), ("I1", "I_{1}")],
+)  # fmt: skip
+def test_names_as_symbols(name: str, symbol: str) -> None:
+    assert latex(name) == symbol
+    MathTextParser("agg").parse(f"${symbol}$")  # raises on what a figure could not show
+
+
+# What they refuse
+
+
+def test_no_name_is_taken_twice() -> None:
+    assert {*ROOT_NAMES, *FUNCTIONS, *CONSTANTS} <= {*TAKEN}
+
+
+@pytest.mark.parametrize(
+    ("statement", "line", "said"),
+    [
+        ("M = 3\nK = [['k']]", 2, "model.M: found 3; accepted: rows in brackets"),
+        ("M = [['1', '0'], ['0']]\nK = [['k', 0], [0, 'k']]", 2, "model.M: found rows of 2 + 1 entries"),
+        ("K = [['k']]\nM = [[]]", 3, "model.M: found []"),
+        ("M = [[1]]\nK = [['k', 0], [0, 1]]", 3, "model.K: is 2 × 2, and M is 1 × 1"),
+        ("M = [[nan]]\nK = [['k']]", 2, "model.M: row 1, column 1: found nan"),
+        ("M = [[true]]\nK = [['k']]", 2, "found True"),
+        (f"M = [[1{'0' * 400}]]\nK = [['k']]", 2, "accepted: a finite number"),
+        ("coefficients = ['1', '1/0', 'k']", 2, "entry 2: is inf; accepted: finite numbers"),
+        ("coefficients = ['1', 'sqrt(-1)', 'k']", 2, "entry 2: is nan"),
+        ("coefficients = ['1', '1/(k - k)', 'k']", 2, "entry 2: contains inf, as of a division by 0"),
+        ("coefficients = ['1', '10**400*k']", 2, "entry 2"),
+        ("coefficients = ['1']", 2, "found 1 entries; accepted: from 2 to 13"),
+        (f"coefficients = [{', '.join(14 * ['1'])}]", 2, "found 14 entries"),
+        ("coefficients = [[1, 'k']]", 2, "entry 1: found [1, 'k']"),
+        (f"M = {[[1] * 7] * 7}\nK = {[['k'] * 7] * 7}", 2, "is 7 × 7; accepted: up to 6 × 6"),
+        (f"A = {[['k'] * 13] * 13}", 2, "is 13 × 13; accepted: up to 12 × 12"),
+        ("A = [['k']]\nM = [[1]]", 2, "stands beside M, D or K"),
+        ("M = [[1]]", 1, "model.K: is missing"),
+        ("name = 'x'", 1, "states no system"),
+        ("m = [[1]]\nK = [['k']]", 2, "unknown key 'm'; did you mean 'M'?"),
+        ("name = 'tms'\ncoefficients = [1, 'k']", 2, "'tms' is a model of tmsopt's own"),
+        ("name = '''a\nb'''\ncoefficients = [1, 'k']", 2, "accepted: a text of one line"),
+        ("coefficients = [1, 'lambda + k']", 2, "'lambda' is a reserved word, write e.g. lambda_"),
+        ("coefficients = [1, 'abscissa + k']", 2, "'abscissa' is what tmsopt computes"),
+        ("coefficients = [1, 'tanh(k)']", 2, "calls 'tanh'; accepted: sin"),
+        ("coefficients = [1, 'k <= 2']", 2, "is a comparison"),
+        ("coefficients = [1, '2']", 2, "names no parameter"),
+        ("coefficients = [1, 'k']\nquantities.pi = 'k'", 3, "'pi' is what tmsopt computes"),
+        ("coefficients = [1, 'k']\nquantities.in = 'k'", 3, "'in' is a reserved word"),
+        ("coefficients = [1, 'k']\nquantities.q = ''", 3, "'' does not parse"),
+        ("coefficients = [1, 'k']\nquantities.q = 3", 3, "found 3; accepted: an expression in quotes"),
+        ("coefficients = [1, 'k']\nquantities.q = 'q2'\nquantities.q2 = 'q + 1'", 3, "uses itself: q → q2 → q"),
+        ("coefficients = [1, 'k']\nquantities.q = 'k/(1 - 1)'", 3, "contains inf"),
+    ],
+)  # fmt: skip
+def test_a_statement_that_makes_no_model_is_placed(tmp_path: Path, statement: str, line: int, said: str) -> None:
+    file = written(tmp_path, f"[model]\n{statement}\n{PARAMETERS}")
+    with pytest.raises(tmsopt.InputError) as caught:
+        tmsopt.load(file, asks=False)
+    text = next(t for t in str(caught.value).splitlines() if said in t)
+    assert text.startswith(f"{file}:{line}: model")
+
+
+@pytest.mark.parametrize(
+    ("model", "said"),
+    [("model = 'nonsense'", "unknown model 'nonsense'"), ("model = 3", "found 3; accepted: the name of a model"),
+     ("[[model]]\nname = 'x'", "accepted: the name of a model in quotes, or a table"),
+     ("model = 'tms'\n[model]\nname = 'x'", "not TOML")],
+)  # fmt: skip
+def test_what_is_no_model(tmp_path: Path, model: str, said: str) -> None:
+    with pytest.raises(tmsopt.InputError, match=said):
+        loaded(tmp_path, model + PARAMETERS)
+
+
+def test_lines_below_matrices_of_several_lines(tmp_path: Path) -> None:
+    """A row of a matrix may look like a header, and a text in it like a key."""
+    text = """[model]
+M = [
+    ["1", "0"],
+    ["0", "1"]   # [
+]
+note = '''
+K = 1
+[parameters]'''
+K = [["k", "0"],
+    ["0", "sin(k"]]
+[parameters]
+k = 1
+"""
+    with pytest.raises(tmsopt.InputError) as caught:
+        loaded(tmp_path, text)
+    places = [(f.line, f.key[-1]) for f in caught.value.faults]
+    assert places == [(6, "note"), (9, "K")]
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: from_matrices(ca.MX.eye(2), None, [[k]]), "M: found MX"),
+        (lambda: from_matrices([[1]], None, [[ca.MX.sym("k")]]), "is MX; make the symbols by ca.SX.sym"),
+        (lambda: from_matrices([["1"]], None, [[k]]), "row 1, column 1: found '1'"),
+        (lambda: from_matrices([[None]], None, [[k]]), "found None"),
+        (lambda: from_matrices([[True]], None, [[k]]), "found True"),
+        (lambda: from_matrices([[1j]], None, [[k]]), "found 1j"),
+        (lambda: from_matrices([[10**400]], None, [[k]]), "is inf"),
+        (lambda: from_matrices([[1]], None, [[k * np.inf]]), "contains inf"),
+        (lambda: from_matrices(1, None, k), "M: found int; accepted: a matrix"),
+        (lambda: from_matrices(np.zeros((2, 2, 2)), None, [[k]]), "found an array of 3 dimensions"),
+        (lambda: from_matrices([[ca.SX.sym("x", 2)]], None, [[k]]), "is a matrix; accepted: scalar"),
+        (lambda: from_matrices([[1]], None, [[k + ca.SX.sym("k")]]), "two symbols named k"),
+        (lambda: from_matrices([[1]], None, [[ca.SX.sym("k 1")]]), "'k 1', which is no name"),
+        (lambda: from_matrices([[1]], None, [[ca.SX.sym("lambda")]]), "which is a reserved word"),
+        (lambda: from_matrices([[1]], None, [[ca.SX.sym("radius")]]), "which is what tmsopt computes"),
+        (lambda: from_matrices([[1]], None, [[2]]), "names no parameter"),
+        (lambda: from_matrices([[1]], None, [[k]], name=""), "name: found ''"),
+        (lambda: from_matrices([[1]], None, [[k]], name="whipple"), "a model of tmsopt's own"),
+        (lambda: from_matrices([[1]], None, [[k]], quantities={"k": k}), "'k' is the name of a parameter"),
+        (lambda: from_matrices([[1]], None, [[k]], quantities={"q": "k"}), "q: found 'k'"),
+        (lambda: from_matrices([[1]], None, [[k]], quantities=[k]), "quantities: found list"),
+        (lambda: from_coefficients("1k"), "coefficients: found no list"),
+        (lambda: from_coefficients(np.eye(2)), "coefficients: found no list"),
+        (lambda: from_coefficients([1, ca.atan2(k, c)]), "entry 2: uses atan2"),
+        (lambda: from_coefficients([1, ca.if_else(k > 0, k, c)]), "entry 2: uses"),
+        (from_matrices, "M: is missing"),
+    ],
+)
+def test_expressions_that_make_no_model(make: Any, said: str) -> None:
+    with pytest.raises(Unfit) as caught:
+        make()
+    assert said in str(caught.value)
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert (again.key, str(again)) == (caught.value.key, str(caught.value))
+
+
+def test_no_parameter_is_a_reserved_word() -> None:
+    for word in keyword.kwlist:
+        with pytest.raises(Unfit, match="reserved word"):
+            from_coefficients([1, ca.SX.sym(word)])
+
+
+# That all verbs take them
+
+
+def test_parameters_named_like_coefficients(tmp_path: Path) -> None:
+    """The parameter or quantity keeps the name, and a chart is of the true coefficients."""
+    problem = loaded(tmp_path, """
+[model]
+coefficients = ["1", "a1 + 1", "a2", "a3"]
+quantities.a0 = "2*a1"
+[parameters]
+a1 = { min = 1, max = 3 }
+a2 = { min = 2, max = 4 }
+a3 = 0.5
+""")  # fmt: skip
+    chart = tmsopt.chart(problem, points=(3, 3))
+    expected = [[np.roots([1, x + 1, y, 0.5]).real.max() for x in (1, 2, 3)] for y in (2, 3, 4)]
+    assert np.allclose(chart.abscissa, expected, rtol=1e-12)
+    values = problem.values({"a1": 1.0, "a2": 2.0, "a3": 0.5})
+    assert [float(values[n]) for n in ("a0", "a1", "coefficient0", "coefficient1")] == [2, 1, 1, 2]
+
+
+def test_one_root(tmp_path: Path) -> None:
+    """m s + a: the abscissa −a/m is least at a = 2 with m a = 1, and nothing is asked of pairs that are not there."""
+    text = """
+[model]
+coefficients = ["m", "a"]
+[parameters]
+m = { min = 0.25, max = 1 }
+a = { min = -1, max = 2 }
+[objective]
+minimize = "abscissa"
+[constraints]
+product = "m*a >= 1"
+"""
+    file = written(tmp_path, text)
+    design = tmsopt.solve(tmsopt.load(file))
+    assert design.abscissa == pytest.approx(-4, abs=1e-9)
+    result = command("solve", file)
+    assert result.exit_code == 0
+    assert "to capsize            100 %" in result.output
+    assert command("prove", file).exit_code == 0
+
+
+def test_coefficients_without_a_value_somewhere(tmp_path: Path) -> None:
+    """s² + s/x + 1 has its EP2 at x = 1/2; the box holds the pole x = 0 in its middle."""
+    text = "[model]\ncoefficients = [1, '1/x', 1]\n[parameters]\nx = {{ min = {}, max = 1 }}\n[objective]\nminimize = 'abscissa'"
+    for least in (0, -1):
+        design = tmsopt.solve(loaded(tmp_path, text.format(least)))
+        assert (design.structure, design.parameters["x"]) == ("EP2", pytest.approx(0.5, abs=1e-12))
+
+
+def test_coefficients_without_a_value_anywhere(tmp_path: Path) -> None:
+    text = "[model]\ncoefficients = [1, 'sqrt(x)', 1]\n[parameters]\nx = { min = -2, max = -1 }\n[objective]\nminimize = 'abscissa'"
+    result = command("solve", written(tmp_path, text))
+    assert result.exit_code == 3
+    assert "violated: coefficients (must have values)" in result.output
+    assert "a coefficient has no value at this design" in result.output
+
+
+@pytest.mark.parametrize("size", [1e6, 1e-6])
+def test_roots_of_any_size(tmp_path: Path, size: float) -> None:
+    """s³ + x s² + y s + ω³: EP3 at −ω, x = 3 ω, y = 3 ω²."""
+    problem = tmsopt.Problem(
+        model=from_coefficients([1, ca.SX.sym("x"), ca.SX.sym("y"), size**3 * ca.SX.sym("z")]),
+        fixed={"z": 1}, free={"x": (0, 10 * size), "y": (0, 10 * size**2)}, minimize="abscissa",
+    )  # fmt: skip
+    design = tmsopt.solve(problem)
+    assert design.structure == "EP3"
+    assert design.parameters["x"] / size == pytest.approx(3, rel=1e-11)
+    assert design.abscissa / size == pytest.approx(-1, rel=1e-11)
+
+
+def test_small_roots_of_a_stiff_system_are_not_called_double() -> None:
+    """(s² + c s + 2)(1e-8 s² + d s + 1e8): double where c² = 8, and not 8e-5 off that, whatever the fast roots are."""
+    d = ca.SX.sym("d")
+    model = from_matrices([[1, 0], [0, 1e-8]], [[c, 0], [0, d]], [[2, 0], [0, 1e8]])
+    problem = tmsopt.Problem(model=model, fixed={"c": 1, "d": 6})
+    for off in (1e-4, 1e-8):
+        slow = np.sqrt(8) * (1 + off)
+        found = problem.values({"c": slow, "d": 6.0})["structure"]
+        assert found.name == "real"
+        assert found.abscissa == pytest.approx(-slow / 2 + np.sqrt(slow**2 / 4 - 2), abs=1e-7)
+
+
+def test_a_study_is_not_gone_on_with_after_the_model_changed(tmp_path: Path) -> None:
+    own = "[model]\ncoefficients = [1, 'x', '{}*y']\n[parameters]\nx = {{ min = 0, max = 9 }}\ny = 1\n[objective]\nminimize = 'abscissa'"
+    study = written(tmp_path, "problem = 'own.toml'\n[study]\nmethod = 'grid'\n[vary]\ny = [1, 4]\n", "study")
+    store = tmp_path / "rows.sqlite"
+    written(tmp_path, own.format("1"))
+    assert command("study", study, "--store", store).exit_code == 0
+    rows = tmsopt.run_study(tmsopt.load_study(study), store)
+    assert np.allclose(rows.column("abscissa"), [-1, -2], atol=1e-12)
+    first = definition(tmsopt.load_study(study))
+    written(tmp_path, own.format("1.000000001"))
+    assert definition(tmsopt.load_study(study)) != first
+    result = command("study", study, "--store", store)
+    assert result.exit_code == 2
+    assert 'coefficients[0][2]: "y" in the store, "(1.000000001 * y)" in the file' in result.output
+
+
+def test_a_chart_is_not_gone_on_with_after_the_model_changed(tmp_path: Path) -> None:
+    own = "[model]\ncoefficients = [1, 'x', 'y', '{}']\n[parameters]\nx = {{ min = 0, max = 9 }}\ny = {{ min = 0, max = 9 }}"
+    folder = tmp_path / "plane.chart"
+    for written_as, status in (("1", 0), ("1", 0), ("1.0000001", 2)):
+        result = command("chart", written(tmp_path, own.format(written_as)), "--points", "20", "--output", folder)
+        assert result.exit_code == status, result.output
+    assert '"1.0000001"' in result.output
+
+
+def test_axes_beside_layers_of_the_same_name(tmp_path: Path) -> None:
+    problem = tmsopt.Problem(model=from_coefficients([1, ca.SX.sym("kind"), c]), free={"kind": (1, 9), "c": (0, 9)})
+    grid = Grid(("kind", "c"), (np.array([1.0, 9.0]), np.array([0.0, 9.0])))
+    layers = {"kind": np.zeros((2, 2), dtype=np.int8)}
+    save_layers(problem, grid, layers, tmp_path / "plane.npz")
+    with np.load(tmp_path / "plane.npz") as data:
+        assert data["parameter.kind"].tolist() == [1, 9]
+        assert data["kind"].shape == (2, 2)

@@ -1,0 +1,480 @@
+"""The ledger of the paper against independent arithmetic: mpmath and the oracles, fractions, sampling; and whether a
+wrong digit or a wrong formula in the paper would change a verdict."""
+
+import json
+from decimal import ROUND_HALF_EVEN, Decimal
+from fractions import Fraction
+from pathlib import Path
+
+import flint
+import numpy as np
+import pytest
+import sympy
+from click.testing import CliRunner
+from helpers import oracles
+from mpmath import mp
+
+from tmsopt.cli import main
+from tmsopt.paper.ledger import (
+    BACKWARD,
+    VERDICTS,
+    WITNESS,
+    decimal,
+    entry_of,
+    matching,
+    printed,
+    proof,
+    universal,
+    verify,
+)
+from tmsopt.report import ledger_page, ledger_table
+
+EXACT, HOLDS, OFF, CONDITIONAL, FAILS = VERDICTS
+PAGE = Path(__file__).parents[2] / "problems" / "paper.md"
+ZB, ZH = Fraction(-2, 5), Fraction(-1, 5)
+
+
+@pytest.fixture(scope="module")
+def ledger():
+    return verify()
+
+
+@pytest.fixture(scope="module")
+def by_key(ledger):
+    return {entry.key: entry for entry in ledger.entries}
+
+
+# The ledger as a whole
+
+
+def test_every_entry_is_complete(ledger) -> None:
+    assert len(ledger.entries) >= 60
+    assert len({entry.key for entry in ledger.entries}) == len(ledger.entries)
+    for entry in ledger.entries:
+        assert entry.verdict in VERDICTS
+        assert entry.section
+        assert entry.place
+        assert entry.statement
+        assert entry.route
+        assert entry.remark or entry.verdict == EXACT
+        assert bool(entry.computed) or not entry.printed
+    assert sum(ledger.counts.values()) == len(ledger.entries)
+
+
+def test_json_is_finite_and_round_trips(ledger) -> None:
+    data = ledger.to_json()
+    assert json.loads(json.dumps(data, allow_nan=False)) == data
+
+
+def test_progress_counts_up() -> None:
+    seen = []
+    verify(lambda done, most: seen.append((done, most)), only=["tab1-*"])
+    assert seen == [(k, len(seen)) for k in range(1, len(seen) + 1)]
+    assert len(seen) == len(matching(["tab1-*"])) > 5
+
+
+def test_labels_of_the_paper_are_covered(ledger) -> None:
+    """Every labelled equation, the table and every figure with numbers or claims has a place in the ledger."""
+    places = " ".join(entry.place for entry in ledger.entries)
+    labels = (
+        "matrices chapo copo lscf flus bench fr1 w0 4poly a1a3 chib a2 e1 e2 e3 Frc1 chibm frm w01 chib1 tls frep4 epset "
+        "dp fig0 fig00 fig1 fig2 fig3 fige"
+    )
+    for label in labels.split():
+        assert label in places.replace(",", " ").replace(".", " ").replace(";", " ").split() or f"{label}," in places
+    assert "Table 1" in places
+
+
+# Numbers, at 50 digits by other means
+
+
+def matched(monic, start, unknown_root=False):
+    """Solve p/a0 = the given monic polynomial at 50 digits with mpmath's own Newton."""
+
+    def residual(*u):
+        a = monic(*u)[0]
+        m = monic(*u)[1]
+        return [a[k] / a[0] - m[k] for k in range(1, 5)]
+
+    return mp.findroot(residual, start, tol=mp.mpf(10) ** -90, maxsteps=60)
+
+
+@pytest.fixture(scope="module")
+def numbers():
+    with mp.workdps(60):
+        out = {}
+        Fr_c = oracles.weave_Fr_60(Fraction(1, 10), Fraction(6, 5), Fraction(102, 100), ZB, ZH, mp.pi / 36)
+        out["fr1-Fr_c"], out["fr1-v_c"] = Fr_c, Fr_c * mp.sqrt(mp.mpf("9.81"))
+
+        def printed_system(Fr, mu, T):
+            return [
+                -mp.mpf("0.432") * T - mp.mpf("0.0272") + mp.mpf("0.08") * Fr**2 + mp.mpf("0.004") * mu,
+                mp.mpf("0.368") * T - mp.mpf("0.02") * mu - mp.mpf("0.0032"),
+                mp.mpf("0.192") * T - mp.mpf("0.0048") - mp.mpf("0.136") * Fr + mp.mpf("0.08") * Fr**2 - mp.mpf("0.016") * mu,
+            ]  # fmt: skip
+
+        Fr, mu, T = mp.findroot(printed_system, (2.3, 20, 1.1))
+        out["e123-Fr"], out["e123-mu"], out["e123-lambda_s"] = Fr, mu, mp.atan(T)
+
+        root = mp.sqrt(2)
+        tilt = mp.atan(mp.mpf(15) / 4 - mp.mpf(75) / 32 * root)
+        out["Fr_EP4"] = 3 * mp.sqrt(110 * root - 120) / 8
+        for key, lean, start in (("tab1-2EP2", tilt - mp.mpf("0.05"), (2.26, 4.1)), ("tab1-CEP2", tilt + mp.mpf("0.8"), (4.1, 1.5))):  # fmt: skip
+            out[f"{key}-Fr_c"] = oracles.weave_Fr_60(1, root, 1, ZB, ZH, lean)
+
+            def pair(Fr, b, lean=lean):
+                a = oracles.polynomial_60(Fr, 1, root, 1, ZB, ZH, lean)
+                c = a[3] / a[1]
+                return [a[1] / a[0] - 2 * b, a[2] / a[0] - b**2 - 2 * c]
+
+            out[f"{key}-Fr_EP"] = mp.findroot(pair, start)[0]
+        out["fige-ratio"] = mp.sqrt(mp.mpf(1158) / 526)
+        return out
+
+
+KEYS = [
+    "fr1-Fr_c",
+    "fr1-v_c",
+    "e123-Fr",
+    "e123-mu",
+    "e123-lambda_s",
+    "Fr_EP4",
+    "tab1-2EP2-Fr_c",
+    "tab1-2EP2-Fr_EP",
+    "tab1-CEP2-Fr_c",
+    "tab1-CEP2-Fr_EP",
+    "fige-ratio",
+]
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_computed_numbers_have_forty_true_digits(key, numbers, by_key) -> None:
+    with mp.workdps(60):
+        assert abs(mp.mpf(by_key[key].computed) / numbers[key] - 1) < mp.mpf(10) ** -39
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_verdicts_on_decimals_are_those_of_rounding(key, numbers, by_key) -> None:
+    """Decimal rounding of the independent value to the printed places, in a rule of its own."""
+    text = by_key[key].printed
+    with mp.workdps(60):
+        true = Decimal(mp.nstr(numbers[key], 50))
+    rounded = true.quantize(Decimal(text), rounding=ROUND_HALF_EVEN)
+    assert by_key[key].verdict == (HOLDS if rounded == Decimal(text) else OFF)
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_a_wrong_printed_digit_would_not_pass(key, by_key) -> None:
+    text, value = by_key[key].printed, by_key[key].computed
+    last, early = list(text), list(text)
+    last[-1] = str((int(text[-1]) + 5) % 10)
+    early[3] = str((int(text[3]) + 4) % 10)
+    with flint.ctx.workdps(60):
+        assert decimal("".join(last), flint.arb(value)).verdict in (OFF, FAILS)
+        assert decimal("".join(early), flint.arb(value)).verdict == FAILS
+
+
+def test_the_rule_for_decimals() -> None:
+    third = flint.fmpq(1, 3)
+    with flint.ctx.workdps(60):
+        assert decimal("0.5", flint.fmpq(1, 2)).verdict == EXACT
+        assert decimal("0.3333", third).verdict == HOLDS
+        assert decimal("0.33333333334", third).verdict == OFF
+        assert decimal("0.3334", third).verdict == FAILS  # one unit, but more than a millionth
+        assert decimal("0.333333334444", third).verdict == FAILS  # a thousand units
+        with pytest.raises(ArithmeticError, match="too wide"):
+            decimal("0.5", flint.arb(0.5, 0.1))
+
+
+def test_the_rule_for_statements() -> None:
+    assert proof(True).verdict == EXACT
+    assert proof(False).verdict == FAILS
+    assert universal("c", True, "x", True).verdict == CONDITIONAL
+    assert universal("c", False, "x", True).verdict == FAILS
+    assert universal("c", True, "x", False, always=True).verdict == EXACT
+    with pytest.raises(ArithmeticError):
+        universal("c", True, "x", False)
+
+
+# A wrong formula changes the verdict
+
+
+def wrong(name, key, formula):
+    return pytest.param(name, key, formula, id=f"{name} in {key}")
+
+
+WRONG = [
+    wrong("coefficients", "copo-a2", lambda f: lambda *p: [*f(*p)[:2], f(*p)[2] + p[0], *f(*p)[3:]]),
+    wrong("flus", "flus", lambda f: lambda mu, b, h, zb, zh, T: f(mu, b, h, zb, zh, T) + (h - 1) * b),
+    wrong("w0", "w0", lambda f: lambda *p: -f(*p)),
+    wrong("poly4", "4poly-expansion", lambda f: lambda w: [1, -4 * w, 6 * w**2, -4 * w**2, w**4]),
+    wrong("chib", "chib", lambda f: lambda w, h, zb, zh: (w**2 * zb + 1) / (w**2 * zh + 1) * h),
+    wrong("a2", "a2", lambda f: lambda *p: f(*p) + p[1]),
+    wrong("Frc1", "Frc1", lambda f: lambda b, zb, zh, T: f(b, zb, zh, T) * b),
+    wrong("frm", "frm", lambda f: lambda b, h, T: (b - h) / (b + h) * T),
+    wrong("w01", "w01", lambda f: lambda zb, zh: 1 / (zb * zh) ** 2),
+    wrong("tls", "tls", lambda f: lambda w, zb, zh: f(w, zb, zh) / 2),
+    wrong("frep4", "frep4", lambda f: lambda Fr, w, zb, T: f(Fr, w, zb, T) + Fr),
+    wrong("epset", "epset", lambda f: lambda w, zb, T: f(w, zb, T) * T),
+    wrong("E1", "e1", lambda f: f | {"mu": "0.005"}),
+    wrong("E2", "e2", lambda f: f | {"T": "0.369"}),
+    wrong("E3", "e3", lambda f: f | {"Fr": "0.136"}),
+]
+
+
+@pytest.mark.parametrize(("name", "key", "formula"), WRONG)
+def test_a_wrong_printed_formula_would_not_hold(name, key, formula, by_key, monkeypatch) -> None:
+    assert by_key[key].verdict != FAILS
+    monkeypatch.setattr(printed, name, formula(getattr(printed, name)))
+    (claim,) = matching([key])
+    with flint.ctx.workdps(60):
+        assert entry_of(claim).verdict == FAILS
+
+
+# Counterexamples by hand
+
+
+def fractions(design):
+    return [Fraction(int(x.p), int(x.q)) for x in design]
+
+
+def test_the_counterexample_to_sufficiency() -> None:
+    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = fractions(WITNESS)
+    assert (chi_H, chi_B, zeta_B, zeta_H, mu, T, Fr) == tuple(
+        map(Fraction, ("0.9", "1.2", "-0.5", "-0.4", "5", "0.5", "2"))
+    )
+    assert 1 + zeta_H * T < chi_H < 1 - zeta_B / mu * T
+    assert chi_H < chi_B
+    assert zeta_H > zeta_B
+    at_1 = oracles.polynomial_exact(1, mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    assert at_1[1] * at_1[2] * at_1[3] == at_1[0] * at_1[3] ** 2 + at_1[1] ** 2 * at_1[4]  # Fr_c = 1
+    assert not oracles.routh_exact(oracles.polynomial_exact(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T))
+
+
+def test_a_bicycle_that_is_stable_backward() -> None:
+    """In the sense of the paper's own polynomial, with both masses behind the rear contact."""
+    design = fractions(BACKWARD)
+    assert design[0] < 0 < design[6]
+    assert oracles.routh_exact(oracles.polynomial_exact(*design))
+    assert not oracles.routh_exact(oracles.polynomial_exact(-design[0], *design[1:]))
+
+
+def test_no_sampled_bicycle_with_chi_H_above_0_is_stable_backward() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(3000):
+        values = [
+            -rng.uniform(0.1, 9),
+            rng.uniform(0.1, 20),
+            rng.uniform(-3, 3),
+            rng.uniform(0, 3),
+            *-rng.uniform(0.05, 2, 2),
+        ]
+        assert not oracles.routh_exact(oracles.polynomial_exact(*values, rng.uniform(-12, 12)))
+
+
+def hand(Fr, T):
+    """The bicycle with ζ_B = −2, ζ_H = −1/2, χ_B = 2, χ_H = 1, monic, in fractions."""
+    a = oracles.polynomial_exact(Fr, 1, 2, 1, -2, Fraction(-1, 2), T)
+    return [c / a[0] for c in a]
+
+
+def test_the_EP4_is_not_where_the_tangent_is_vertical() -> None:
+    """With Fr² = 36 T²/(12 T − 2), dFr²/dT = 0 at T = 1/3, where p is no fourth power; the EP4 is at T = 17/48."""
+    T = sympy.Symbol("T")
+    square = 36 * T**2 / (12 * T - 2)
+    assert sympy.solve(sympy.diff(square, T), T) == [0, sympy.Rational(1, 3)]
+    # Fr² = 2 is not a square: b² = (a1/2)², c = 1, and b² + 2 = a2
+    at = [hand(Fraction(k), Fraction(1, 3)) for k in (0, 1)]
+    a1_square, a2 = 2 * at[1][1] ** 2, at[0][2] + 2 * (at[1][2] - at[0][2])
+    assert a2 == a1_square / 4 + 2
+    assert a1_square / 4 != 4
+    assert oracles.exact_multiplicities(hand(Fraction(17, 12), Fraction(17, 48))) == [(4, 1)]
+
+
+def test_the_tangent_of_the_printed_curve_in_the_figure(by_key) -> None:
+    with mp.workdps(60):
+        omega0, zeta_B = -mp.mpf(25) / 2, mp.mpf(-2) / 5
+        square = mp.sqrt(-omega0)
+        ratio = (square * zeta_B - 1) / (square * zeta_B + 1)
+
+        def curve(lean):
+            return ratio * 2 * mp.tan(lean) / mp.sqrt(square**2 * zeta_B + 4 * mp.tan(lean) * ratio)
+
+        turn = mp.findroot(lambda lean: mp.diff(curve, lean), 0.4)
+        assert abs(turn - mp.mpf(by_key["epset-tangent"].computed)) < mp.mpf(10) ** -25
+        tilt = mp.atan(mp.mpf(15) / 4 - mp.mpf(75) / 32 * mp.sqrt(2))
+        assert mp.diff(curve, tilt) > 0.05
+        assert abs(curve(turn) - mp.sqrt(5)) < mp.mpf(10) ** -30
+
+
+def test_shallow_bicycles_have_no_pairs_of_double_roots() -> None:
+    """tan λ_s = 1/10 is below the pole: heavily damped at ever greater speeds, by the discriminant and certified roots."""
+    for Fr in (2, 10, 1000):
+        roots = oracles.certified_roots(hand(Fraction(Fr), Fraction(1, 10)))
+        assert all(m == 1 and z.imag == 0 and z.real < 0 for z, m in roots)
+    assert oracles.exact_multiplicities(hand(Fraction(3, 2), Fraction(1, 4))) == [(2, 2)]
+
+
+def test_negative_eigenvalues_first_move_apart(by_key) -> None:
+    def reals(Fr):
+        return sorted(float(z.real) for z, _ in oracles.certified_roots(hand(Fraction(Fr), Fraction(1, 4))))[:2]
+
+    still, moving = reals("0"), reals("0.1")
+    assert moving[1] - moving[0] > still[1] - still[0]
+    # the turning speed of the bicycle of Table 1, by sampling its roots around it
+    turn = float(by_key["motion-negative"].computed)
+    T = float(15 / 4 - 75 / 32 * np.sqrt(2))
+    spans = []
+    for Fr in (turn - 0.01, turn, turn + 0.01):
+        p = [float(c) for c in oracles.polynomial_exact(Fr, 1, float(np.sqrt(2)), 1, -0.4, -0.2, T)]
+        real = np.sort([z.real for z in np.roots(p) if abs(z.imag) < 1e-9])
+        spans.append(real[1] - real[0])
+    assert spans[1] > max(spans[0], spans[2])
+
+
+def test_a_heavily_damped_bicycle_can_lean_more_before_it_recovers() -> None:
+    """Two modes of the linear system itself, scaled to leans 1 and −1: the lean starts at 0 and grows."""
+    with mp.workdps(30):
+        lean_angle = mp.atan(mp.mpf(1) / 4)
+        M, V, P, _ = oracles._matrices(
+            mp.mpf("1.45"), 1, 2, 1, -2, mp.mpf(-1) / 2, mp.cos(lean_angle), mp.sin(lean_angle)
+        )
+        roots = [z.real for z in oracles.roots_60(hand(Fraction("1.45"), Fraction(1, 4)))]
+        assert all(z < 0 for z in roots)
+        for s in (roots[0], roots[-1]):
+            L = [[M[i][j] * s**2 + V[i][j] * s + P[i][j] for j in range(2)] for i in range(2)]
+            steer = -L[0][0] / L[0][1]  # with lean 1
+            assert abs(L[1][0] + L[1][1] * steer) < mp.mpf(10) ** -20
+        lean = [mp.exp(roots[-1] * t) - mp.exp(roots[0] * t) for t in (0, mp.mpf("0.1"), 200)]
+        assert lean[0] == 0 < lean[2] < lean[1]
+
+
+def test_slow_heavily_damped_bicycles_stand_off_the_plane() -> None:
+    """Eigenvalues −6, −4, −3, −1/72 chosen; the design from a1, a2, a3 over a0 in fractions."""
+    x = [Fraction(6), Fraction(4), Fraction(3), Fraction(1, 72)]
+    e1, e3 = sum(x), sum(1 / k for k in x)
+    e2 = (e1**2 - sum(k * k for k in x)) / 2
+    Fr, T = (2 * e2 + 5) / (2 * e1 + e3), 3 * (2 * e2 + 5) / (2 * e1 + e3) ** 2
+    chi_B = 1 + e3 * T / Fr
+    a = oracles.polynomial_exact(Fr, 1, chi_B, 1, -2, Fraction(-1, 2), T)
+    assert [c / a[0] for c in a] == [1, e1, e2, e3, 1]
+    assert Fr < Fraction(4, 3)
+    for k in range(1, 400):  # no tilt does at χ_B = 2
+        roots = oracles.certified_roots(hand(Fr, Fraction(k, 100) ** 2))
+        assert not all(z.imag == 0 and z.real < 0 for z, _ in roots)
+
+
+def test_dp_is_empty_for_lower_rear_mass() -> None:
+    """ζ_B = −1/2, ζ_H = −2: ω0 = −1, and (tls) in fractions."""
+    zeta_B, zeta_H = Fraction(-1, 2), Fraction(-2)
+    total = zeta_B + zeta_H
+    assert (zeta_B - zeta_H) / (16 * zeta_H) * (total - 6) / (total - 2) == Fraction(-17, 192)
+
+
+def test_the_abscissa_below_that_of_the_optimised_benchmark() -> None:
+    design = [Fraction(x) for x in ("2.243", "5.82", "1.3366", "1.02", "-0.4", "-0.2", "0.5573")]
+    roots = oracles.certified_roots(oracles.polynomial_exact(*design))
+    assert max(z.real for z, _ in roots) < -1.2
+
+
+def test_an_exceptional_point_that_is_no_minimum() -> None:
+    x = sympy.Symbol("x")
+    assert sympy.solve(
+        sympy.discriminant(sympy.Symbol("s") ** 2 + 2 * x * sympy.Symbol("s") + x**2 + x - 1, sympy.Symbol("s")), x
+    ) == [1]
+    assert max(z.real for z, _ in oracles.certified_roots([1, 4, 5])) < -1
+
+
+# Statements that were proved by exact algebra, by sampling
+
+
+def test_heavy_damping_is_never_steeper_than_the_EP4_or_the_2EP2() -> None:
+    """Four random negative roots with product 1 (over |ω0|) fix the tilt and the speed; r = √2."""
+    rng = np.random.default_rng(5)
+    r, h = np.sqrt(2), np.sqrt(2) / 5
+    near = np.exp(rng.normal(scale=rng.choice([0.02, 0.1, 0.3, 1.0], (400000, 1)), size=(400000, 3)))
+    near[::3, 1] = near[::3, 0] * np.exp(rng.normal(scale=1e-2, size=near[::3, 0].shape))
+    x = np.column_stack([near, 1 / near.prod(axis=1)])
+    e1, e3 = x.sum(axis=1), (1 / x).sum(axis=1)
+    e2 = (e1**2 - (x**2).sum(axis=1)) / 2
+    g = r * e1 + e3
+    tilt = (r**2 - 1) * (r * e2 + r**2 + 1) / (h * g**2)
+    speed = (r * e2 + r**2 + 1) / g  # over the square root of 1/h
+    # these are bicycles: their polynomial has the roots
+    for k in range(0, 400000, 40000):
+        chi_B = 1 + e3[k] * tilt[k] * h / speed[k]
+        a = oracles.polynomial_exact(speed[k] / np.sqrt(h), 1, chi_B, 1, -0.4, -0.2, tilt[k])
+        assert np.allclose([float(c / a[0]) * h ** (i / 2) for i, c in enumerate(a)], np.poly(-x[k]), rtol=1e-9)
+    top = (r - 1) * (r**2 + 6 * r + 1) / (16 * h * (r + 1))
+    assert np.all(tilt <= top * (1 + 1e-12))
+    kappa = e3 / e1  # r (χ_B − 1)/(r² − χ_B): below 1 for χ_B < r
+    beside = kappa < 1
+    low = (r**2 - 1) * kappa**2 * (r**2 + 6 * r + 1) / (16 * h * (r + kappa) ** 2)
+    assert np.all(tilt[beside] <= low[beside] * (1 + 1e-12))
+    at_EP4 = (r**2 + 6 * r + 1) / (4 * (r + 1))
+    faster = speed > at_EP4
+    assert faster.sum() > 1000
+    f = speed[faster]
+    U = (r + 1) * (f + np.sqrt(f**2 - r)) / r
+    assert np.all(tilt[faster] <= f * (r - 1) / (2 * U * h) * (1 + 1e-9))
+
+
+@pytest.mark.parametrize(("key", "start", "free"), [("fig2-left", (2.02, 0.2, -0.94), "T")])
+def test_the_cusp_is_a_triple_root(key, start, free, by_key) -> None:
+    with mp.workdps(60):
+        chi_B = mp.sqrt(2) - mp.mpf("0.1")
+
+        def triple(Fr, T, s):
+            a = oracles.polynomial_60(Fr, 1, chi_B, 1, ZB, ZH, mp.atan(T))
+            return [
+                sum(c * mp.ff(4 - k, n) * s ** (4 - k - n) for k, c in enumerate(a) if 4 - k >= n) for n in range(3)
+            ]
+
+        found = mp.findroot(triple, start)
+        assert abs(found[0] / mp.mpf(by_key[key].computed) - 1) < mp.mpf(10) ** -38
+
+
+def test_the_standstill_identity_symbolically() -> None:
+    """ζ_H > ζ_B is necessary because a2 < 0 at Fr = 0 where a0, a4 > 0."""
+    expressions, s = oracles.symbolic_copo()
+    a0, a2, a4 = (expressions[k].subs(s["Fr"], 0) for k in (0, 2, 4))
+    mu, B, H = s["mu"], s["zeta_B"], s["zeta_H"]
+    assert sympy.expand(-a2 * (B + mu * H) + a4 * (B**2 + mu * H**2) + a0 * (1 + mu)) == 0
+
+
+def test_the_machine_of_the_photograph_has_an_EP4(by_key) -> None:
+    """With the μ, λ_s and Fr that the entry names: rounded to six digits the coefficients match to about as many."""
+    text = by_key["fige-abscissa"].remark
+    mu, T, Fr = (float(text.split(f"{name} = ")[1].split(" ")[0].rstrip(",")) for name in ("μ", "tan λ_s", "Fr"))
+    a = oracles.polynomial_exact(Fr, mu, 1.526, 0.921, -1.158, -0.526, T)
+    root = float(by_key["fige-abscissa"].computed)
+    assert [float(c / a[0]) for c in a] == pytest.approx(list(np.poly([root] * 4)), rel=1e-4)
+
+
+# What a reader sees
+
+
+def test_the_text_fits_the_page_and_counts(ledger) -> None:
+    text = ledger_table(ledger)
+    assert max(map(len, text.splitlines())) <= 100
+    for entry in ledger.entries:
+        assert f"{entry.key}:" in text
+    assert text.splitlines()[-1].split() == [str(len(ledger.entries)), "entries"]
+
+
+def test_the_page_in_the_repository_is_the_ledger(ledger) -> None:
+    assert PAGE.read_text(encoding="utf-8") == ledger_page(ledger)
+
+
+def test_the_command(tmp_path) -> None:
+    runner = CliRunner()
+    found = runner.invoke(main, ["verify", "--only", "tab1-*", "--only", "epset", "--json"])
+    assert found.exit_code == 0
+    keys = [entry["key"] for entry in json.loads(found.stdout)["entries"]]
+    assert "epset" in keys
+    assert all(key == "epset" or key.startswith("tab1-") for key in keys)
+    page = tmp_path / "page.md"
+    assert runner.invoke(main, ["verify", "--only", "epset", "--markdown", str(page)]).exit_code == 0
+    assert "**`epset`**" in page.read_text(encoding="utf-8")
+    for wrong_use in (["--only", "nothing"], ["--markdown", str(tmp_path / "page.txt")]):
+        assert runner.invoke(main, ["verify", *wrong_use]).exit_code == 2

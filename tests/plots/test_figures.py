@@ -1,0 +1,632 @@
+"""Figures by the data that they draw, against closed forms and independent computations; files only at the end."""
+
+import json
+import math
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+import sympy
+from click.testing import CliRunner
+from helpers.oracles import is_stable_60, polynomial_60, roots_60, weave_Fr_60
+from matplotlib.figure import Figure
+
+from tmsopt import laws
+from tmsopt.cli import main
+from tmsopt.design import load
+from tmsopt.models import Model, Parameter, ParameterSet, tms
+from tmsopt.paper import (
+    benchmark,
+    ep_set,
+    experiment,
+    experimental,
+    heavy_section,
+    locus,
+    normalised,
+    optimised,
+    sketch,
+    spire,
+    spire_faces,
+    stability_margin,
+    table_1,
+    table_1_loci,
+    table_1_paths,
+    universal_path,
+)
+from tmsopt.plots import Name, draw_bicycle, draw_distance, new_figure, place_names, save
+from tmsopt.plots.paper import (
+    GALLERY,
+    draw_box,
+    draw_critical_speeds,
+    draw_law,
+    draw_row,
+    draw_section,
+    find,
+    full_window,
+)
+from tmsopt.records import Table
+from tmsopt.tracing import trace, varying
+
+ROUNDING = 1e-13
+"""Relative; a few hundred operations in double precision."""
+
+OMEGA0 = -(12.5**0.25)  # Table 1
+FR_EP4 = 3 * math.sqrt(110 * math.sqrt(2) - 120) / 8  # Table 1
+FR_C_EP4 = math.sqrt(30 * math.sqrt(2) + 120) / 8  # Table 1
+
+
+def axes(**options):
+    return Figure().add_subplot(**options)
+
+
+def drawn(ax, gid):
+    """Points of the lines with this label, as arrays of shape (n, 2)."""
+    return [line.get_xydata() for line in ax.lines if line.get_gid() == gid]
+
+
+# Designs of the paper
+
+
+def test_designs_are_the_printed_ones():
+    """Ten printed digits, of which the last is off by up to two."""
+    p = benchmark().parameters
+    assert p["Fr"] == pytest.approx(0.9070641497, abs=2e-10)
+    assert dict(p) == pytest.approx(
+        {
+            "Fr": p["Fr"],
+            "mu": 0.1,
+            "chi_B": 1.2,
+            "chi_H": 1.02,
+            "zeta_B": -0.4,
+            "zeta_H": -0.2,
+            "lambda_s": math.pi / 36,
+        }
+    )
+    p = optimised().parameters
+    assert [p["Fr"], p["mu"], p["lambda_s"], p["chi_B"]] == pytest.approx(
+        [2.337214017, 20.84626701, 0.8514403685, 1.19], rel=5e-10
+    )
+    assert [b.parameters["lambda_s"] for b in table_1()] == pytest.approx(
+        [math.atan(15 / 4 - 75 * math.sqrt(2) / 32) + offset for offset in (0, -0.05, 0.8)], rel=ROUNDING
+    )
+    assert table_1()[0].parameters["Fr"] == pytest.approx(FR_EP4, rel=ROUNDING)
+
+
+# The bicycle
+
+
+def random_designs():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        yield {
+            "Fr": 1.0, "mu": rng.uniform(0.1, 5), "chi_B": rng.uniform(0.2, 2), "chi_H": rng.uniform(0.7, 1.4),
+            "zeta_B": -rng.uniform(0.1, 1.2), "zeta_H": -rng.uniform(0.1, 1.2), "lambda_s": rng.uniform(-1.2, 1.2),
+        }  # fmt: skip
+
+
+@pytest.mark.parametrize("p", [benchmark().parameters, optimised().parameters, *random_designs()])
+def test_drawn_geometry_is_that_of_the_equations(p):
+    ax, near = axes(), axes()
+    draw_bicycle(ax, sketch(p))
+    draw_distance(near, sketch(p))
+    expected = (p["chi_H"] - 1) * math.cos(p["lambda_s"]) - p["zeta_H"] * math.sin(p["lambda_s"])  # below `matrices`
+    for axis in (drawn(ax, "axis")[0], drawn(near, "axis")[0]):
+        low, high = axis
+        along = (high - low) / np.linalg.norm(high - low)
+        contact = np.array([1.0, 0.0]) - low  # the front contact is on the axis: there is no trail
+        assert abs(along[0] * contact[1] - along[1] * contact[0]) < ROUNDING
+        assert math.atan2(-along[0], -along[1]) == pytest.approx(p["lambda_s"], abs=ROUNDING)  # leans back, z is down
+        mass, foot = drawn(near, "distance")[0]
+        assert mass == pytest.approx([p["chi_H"], p["zeta_H"]])
+        offset = foot - low
+        assert abs(along[0] * offset[1] - along[1] * offset[0]) < ROUNDING  # the foot is on the axis
+        assert abs((mass - foot) @ along) < ROUNDING  # and the segment stands on it at a right angle
+        assert np.linalg.norm(mass - foot) == pytest.approx(abs(expected), abs=ROUNDING)
+    assert sketch(p).nu_H == pytest.approx(expected, abs=ROUNDING)
+    assert ax.get_aspect() == near.get_aspect() == 1.0  # to scale
+    low, high = ax.get_ylim()
+    assert low > high  # z points down
+    balls = {patch.get_gid(): patch.center for patch in ax.patches if patch.get_gid() in ("B", "H")}
+    assert balls == {"B": (p["chi_B"], p["zeta_B"]), "H": (p["chi_H"], p["zeta_H"])}
+
+
+# Growth
+
+
+def test_growth_figure_shows_both_bicycles():
+    left, right = GALLERY["growth"].make().axes
+    critical, best = (
+        next(line.get_xdata()[0] for line in right.lines if line.get_linestyle() == style) for style in ("--", ":")
+    )
+    p = optimised().parameters
+    others = {name: value for name, value in p.items() if name != "Fr"}
+    assert critical == pytest.approx(float(weave_Fr_60(**others)), rel=1e-12)
+    assert best == pytest.approx(2.337214017, rel=5e-10)
+    (critical,) = (line.get_xdata()[0] for line in left.lines if line.get_linestyle() == "--")
+    assert critical == pytest.approx(0.9070641497, rel=5e-10)
+    for ax in (left, right):
+        curves = np.array([line.get_ydata() for line in ax.lines[:4]])
+        dot = ax.lines[-1]
+        assert dot.get_marker() == "o"
+        # no drawn point lies below the marked least abscissa, up to how far rounding moves a quadruple root
+        assert curves.max(axis=0).min() == pytest.approx(dot.get_ydata()[0], abs=1e-3)
+        assert curves.max(axis=0).min() >= dot.get_ydata()[0] - 1e-12
+    assert right.lines[-1].get_ydata()[0] == pytest.approx(-1, abs=1e-12)
+
+
+# Root locus
+
+
+@pytest.fixture(scope="module")
+def rows():
+    return table_1_loci()
+
+
+def test_roots_of_the_law_run_on_the_circle_below_the_exceptional_point(rows):
+    """At χ_B = √2 complex roots have |s| = |ω0| until the EP; both pairs meet at CEP2, hence half the digits."""
+    for row, end in zip(rows, (FR_EP4, 2.257421384, 4.103508160), strict=True):
+        ax = axes()
+        draw_row(ax, row, full_window(row), zoom=False)
+        (circle,) = drawn(ax, "circle")
+        assert np.hypot(*circle.T) == pytest.approx(-OMEGA0, rel=ROUNDING)
+        before = [t for t in row.loci[0].tracks if t.values[-1] <= end + 1e-8]  # printed to nine decimals
+        complex_roots = np.concatenate([t.s[t.s.imag != 0] for t in before])
+        assert complex_roots.size > 200
+        assert np.abs(complex_roots) == pytest.approx(-OMEGA0, abs=1e-6)
+        points = np.concatenate(drawn(ax, "track"))
+        expected = np.concatenate([t.s for locus in row.loci for t in locus.tracks])
+        assert set(map(tuple, points)) == set(zip(expected.real, expected.imag, strict=True))
+
+
+def test_exceptional_points_are_those_of_table_1(rows):
+    """Froude numbers as printed: exact for EP4, else nine decimals of which the last is off by up to five."""
+    expected = (("EP4", FR_EP4, 1e-12), ("2EP2", 2.257421384, 1e-8), ("CEP2", 4.103508160, 1e-8))
+    for row, (name, Fr, tolerance) in zip(rows, expected, strict=True):
+        (mark,) = (m for m in row.loci[0].marks if m.name == name)
+        assert mark.value == pytest.approx(Fr, abs=tolerance)
+        for other in row.loci[1:]:  # off the law there is none
+            assert {m.name for m in other.marks} == {"EP2"}
+    assert rows[0].loci[0].marks[-1].s == pytest.approx(np.array([OMEGA0 + 0j]), abs=1e-12)
+
+
+def test_marked_double_roots_are_double(rows):
+    """p and p' vanish at 60 digits, relative to their terms: p to the square of the error of the place."""
+    for row in rows:
+        for data, chi_B in zip(row.loci, (row.chi_B, row.chi_B - row.offset, row.chi_B + row.offset), strict=True):
+            for mark in data.marks:
+                a = polynomial_60(mark.value, 1.0, chi_B, 1.0, -0.4, -0.2, row.tilt)
+                for s in map(complex, mark.s):
+                    for c in (a, mpmath_derivative(a)):
+                        size = sum(abs(float(x)) * abs(s) ** k for k, x in enumerate(reversed(c)))
+                        assert abs(mpmath.polyval(c, s)) < 1e-7 * size
+        positive = next(m for m in row.loci[0].marks if m.s[0].real > 0)  # where the unstable real roots merge
+        assert positive.s[0] == pytest.approx(-OMEGA0, abs=1e-7)
+
+
+def mpmath_derivative(a):
+    return [x * (len(a) - 1 - k) for k, x in enumerate(a[:-1])]
+
+
+def test_tracks_are_roots_and_never_pass_an_exceptional_point(rows):
+    for row in rows:
+        for data, chi_B in zip(row.loci, (row.chi_B, row.chi_B - row.offset, row.chi_B + row.offset), strict=True):
+            for track in data.tracks:
+                assert np.all(np.diff(track.values) > 0)
+                assert np.abs(np.diff(track.s)).max() <= 0.02  # the resolution asked for
+                assert not [m for m in data.marks if track.values[0] < m.value < track.values[-1]]
+                for k in range(0, len(track.s), 149):
+                    a = polynomial_60(track.values[k], 1.0, chi_B, 1.0, -0.4, -0.2, row.tilt)
+                    size = sum(abs(float(x)) * abs(track.s[k]) ** j for j, x in enumerate(reversed(a)))
+                    assert abs(mpmath.polyval(a, complex(track.s[k]))) < 1e-12 * size
+            ends = sorted({(t.values[0], t.values[-1]) for t in data.tracks})
+            assert (ends[0][0], ends[-1][1]) == (0.0, 5.0)
+            # what the tracks leave out around a multiple root is too short to see
+            assert sum(b[0] - a[1] for a, b in pairwise(ends)) < 1e-3
+
+
+def test_a_track_follows_one_root(rows):
+    """Along every step the continuation agrees with Newton's method started from the root before it."""
+    row = rows[0]
+    for track in row.loci[1].tracks:
+        for k in range(0, len(track.s) - 1, 97):
+            a = [
+                complex(x)
+                for x in polynomial_60(track.values[k + 1], 1.0, row.chi_B - row.offset, 1.0, -0.4, -0.2, row.tilt)
+            ]
+            s = track.s[k]
+            for _ in range(30):
+                s -= np.polyval(a, s) / np.polyval(np.polyder(a), s)
+            assert s == pytest.approx(track.s[k + 1], abs=1e-6)
+
+
+def test_crossings_of_the_imaginary_axis(rows):
+    for row in rows:
+        (Fr, frequency) = row.loci[0].crossings[0]
+        assert Fr == pytest.approx(float(laws.frm(-0.4, -0.2, row.tilt)), rel=1e-12)
+        assert frequency == pytest.approx(-OMEGA0, rel=1e-12)
+    Fr, frequency = rows[2].loci[1].crossings[0]
+    found = roots_60(polynomial_60(Fr, 1.0, rows[2].chi_B - 0.1, 1.0, -0.4, -0.2, rows[2].tilt))
+    pair = max(found, key=lambda s: s.real)
+    assert abs(float(pair.real)) < 1e-12
+    assert abs(float(pair.imag)) == pytest.approx(frequency, rel=1e-12)
+
+
+def test_locus_over_another_parameter_passes_a_root_at_zero():
+    """a4 = −ζ_B T − μ (χ_H − 1) vanishes at T = tan λ_s = 0.05: a real root changes sign, and no pair crosses there."""
+    p = {**benchmark().parameters, "Fr": 2.0, "mu": 1.0}
+    data = locus(tms, tms.sets[0], p, "lambda_s", (0.01, 0.3))
+    changes = [
+        (t.values[k], t.values[k + 1])
+        for t in data.tracks
+        for k in np.flatnonzero((t.s.real[1:] * t.s.real[:-1] < 0) & (t.s.imag[1:] == 0))
+    ]
+    assert len(changes) == 1
+    assert changes[0][0] < math.atan(0.05) < changes[0][1]
+    assert not [value for value, _ in data.crossings if value < 0.06]
+
+
+# The experimental bicycle
+
+
+def critical_60(**geometry):
+    """Fr where a1 a2 a3 = a0 a3² + a4 a1² at 60 digits: a1 and a3 are linear and a2 is quadratic in Fr."""
+    rest, unit = polynomial_60(Fr=0, **geometry), polynomial_60(Fr=1, **geometry)
+    a0, a1, _, a3, a4 = unit
+    return float(mpmath.sqrt((a0 * a3 / a1 + a4 * a1 / a3 - rest[2]) / (unit[2] - rest[2])))
+
+
+@pytest.fixture(scope="module")
+def built():
+    return experiment()
+
+
+def test_law_curve_and_the_bicycles_beside_it(built):
+    ax = axes()
+    draw_law(ax, built)
+    x, y = ax.lines[0].get_xydata().T
+    assert y**2 == pytest.approx(x, rel=ROUNDING)
+    points = [line.get_xydata()[0] for line in ax.lines[1:4]]
+    assert points[0] == pytest.approx([1.158 / 0.526, 1.526])
+    assert points[1] == pytest.approx([2.0, 1.2])
+    assert points[2] == pytest.approx([2.0, 1.19])
+    assert math.sqrt(points[0][0]) == pytest.approx(1.484, abs=5e-4)  # printed
+    text = " ".join(t.get_text() for t in ax.texts) + ax.get_legend().get_texts()[0].get_text()
+    assert "0.921" in text
+    assert r"the law for $\chi_H = 1$" in text
+    assert "2.8 % above" in text  # 1.526 / 1.4838
+
+
+def test_critical_speeds_are_those_of_the_roots(built):
+    ax = axes()
+    draw_critical_speeds(ax, built)
+    p = experimental().parameters
+    curves = [line for line in ax.lines if len(line.get_xdata()) > 100]
+    assert [(c.chi_H, c.mu) for c in built.critical[1:]] == [(0.921, 0.1), (0.921, 1.0), (0.921, 3.0)]
+    for line, data in zip(curves, built.critical, strict=True):
+        x, y = line.get_xydata().T
+        mu = 1.0 if math.isnan(data.mu) else data.mu
+        geometry = {
+            "mu": mu,
+            "chi_H": data.chi_H,
+            "zeta_B": p["zeta_B"],
+            "zeta_H": p["zeta_H"],
+            "lambda_s": built.lambda_s,
+        }
+        for k in range(20, len(x), 110):
+            assert y[k] == pytest.approx(critical_60(chi_B=x[k], **geometry), rel=1e-11)  # cancels near the poles
+            assert is_stable_60(polynomial_60(Fr=y[k] * 1.001, chi_B=x[k], **geometry))
+            assert not is_stable_60(polynomial_60(Fr=y[k] * 0.999, chi_B=x[k], **geometry))
+        near = [critical_60(chi_B=data.best[0] + step, **geometry) for step in (-1e-3, 0.0, 1e-3)]
+        assert near[1] == pytest.approx(data.best[1], rel=1e-12)
+        assert near[1] < min(near[0], near[2])
+        assert np.nanmin(y) >= data.best[1] * (1 - ROUNDING)
+        for edge in data.flat:
+            assert critical_60(chi_B=edge, **geometry) == pytest.approx(1.01 * data.best[1], rel=1e-10)
+
+
+def test_optimum_at_chi_H_1_is_the_law(built):
+    """A minimum is found to the square root of rounding; its value to rounding."""
+    ratio = 1.158 / 0.526
+    assert built.critical[0].best[0] == pytest.approx(math.sqrt(ratio), abs=1e-6)
+    r = math.sqrt(ratio)
+    assert built.critical[0].best[1] == pytest.approx(
+        math.sqrt((r + 1) / (r - 1) * math.tan(built.lambda_s)), rel=1e-12
+    )
+
+
+def test_less_tilt_than_stated_is_not_stable(built):
+    p = experimental().parameters
+    for tilt, stable in ((built.least_tilt + 0.01, True), (built.least_tilt - 0.01, False)):
+        a = [
+            laws.copo(Fr, 0.1, p["chi_B"], p["chi_H"], p["zeta_B"], p["zeta_H"], tilt)
+            for Fr in np.linspace(0.1, 20, 50)
+        ]
+        assert any(np.roots(c).real.max() < 0 for c in a) is stable
+    for curve in experiment(built.least_tilt - 0.01).critical[1:]:
+        assert np.isnan([*curve.Fr_c, *curve.best, curve.own, *curve.flat]).all()
+
+
+# The universal chart
+
+
+def heavy_exact(A1, A2, A3):
+    """Whether all four roots are real and negative, by exact root counts (Sturm) of rational coefficients."""
+    s = sympy.Symbol("s")
+    p = sympy.Poly([1, A1, A2, A3, 1], s)
+    return sum(root.is_negative * m for root, m in p.real_roots(multiple=False)) == 4
+
+
+def test_scaling_keeps_the_roots():
+    rng = np.random.default_rng(1)
+    a = rng.normal(size=(200, 5))
+    A, omega0 = normalised(a)
+    gap = a[:, 4] / a[:, 0] <= 0
+    assert np.array_equal(np.isnan(omega0), gap)
+    assert np.array_equal(np.isnan(A).any(axis=1), gap)
+    for c, scaled, w in zip(a[~gap], A[~gap], omega0[~gap], strict=True):
+        original = np.poly(np.roots(np.concatenate([[1.0], scaled, [1.0]])) * -w)
+        assert original == pytest.approx(c / c[0], rel=1e-9, abs=1e-9)  # companion roots, away from multiple ones
+
+
+def test_stability_margin_has_the_sign_of_the_roots():
+    rng = np.random.default_rng(2)
+    A = rng.uniform([-2, -2, -2], [6, 8, 6], (2000, 3))
+    rightmost = np.array([np.roots([1, *x, 1]).real.max() for x in A])
+    clear = np.abs(rightmost) > 1e-9
+    assert np.array_equal(stability_margin(A[clear]) > 0, rightmost[clear] < 0)
+    assert 100 < np.count_nonzero(rightmost < 0) < 1900
+
+
+def test_heavy_damping_in_the_section_by_exact_counts():
+    """Between A2 = 2 A1 − 2 and 2 + A1²/4 for A1 ≥ 4, on rational points and on the two boundaries themselves."""
+    for A1 in [sympy.Rational(n, 4) for n in range(1, 33, 3)]:
+        low, high = heavy_section(float(A1))
+        near = [edge + sympy.Rational(n, 1000) for edge in (2 * A1 - 2, 2 + A1**2 / 4) for n in (-1, 0, 1)]
+        for A2 in [*near, *(sympy.Rational(n, 5) for n in range(-15, 95, 7))]:
+            expected = heavy_exact(A1, A2, A1)
+            assert expected == bool(
+                low <= float(A2) <= high
+            )  # exact in binary where it decides: quarters and sixteenths
+    assert heavy_exact(4, 6, 4)
+
+
+def test_spire_bounds_heavy_damping():
+    """Its points have a double root among four real ones; a little to either side the count changes."""
+    faces = spire_faces(8.0)
+    for face in faces:
+        assert face.shape == (41, 41, 3)
+        assert face[0] == pytest.approx(np.tile([4.0, 6.0, 4.0], (41, 1)))  # EP4
+        assert np.maximum(face[-1, :, 0], face[-1, :, 2]) == pytest.approx(8.0, rel=1e-12)
+    assert faces[0][:, 0] == pytest.approx(ep_set(faces[0][:, 0, 0]), rel=1e-12)  # the 2EP2 edge, of two faces
+    assert faces[1][:, 0] == pytest.approx(ep_set(faces[1][:, 0, 0]), rel=1e-12)
+    assert faces[2][:, -1] == pytest.approx(faces[0][:, -1], rel=1e-12)  # the EP3 edges, each of two faces
+    assert faces[2][:, 0] == pytest.approx(faces[1][:, -1], rel=1e-12)
+    m, t = 0.3, 0.2
+    x = math.exp(m)
+    assert np.concatenate([[1], spire(m, t), [1]]) == pytest.approx(
+        np.poly([-x, -x, -math.exp(t) / x, -math.exp(-t) / x]), rel=ROUNDING
+    )
+    counts = set()
+    for face in faces:
+        for k in (15, 30):
+            above, below = (
+                heavy_exact(*map(sympy.Rational, map(float, face[k, 20] + [0, step, 0]))) for step in (1e-4, -1e-4)
+            )
+            assert above != below
+            counts.add(above)
+    assert counts == {True, False}  # one face bounds from below, two from above
+
+
+def test_paths_of_table_1():
+    """Fr_c and Fr_EP as printed (nine decimals, the last off by up to six); EP4 is (4, 6, 4)."""
+    paths = table_1_paths()
+    expected = (("EP4", FR_C_EP4, FR_EP4), ("2EP2", 1.482682090, 2.257421384), ("CEP2", 3.934331969, 4.103508160))
+    for path, (name, Fr_c, Fr_EP) in zip(paths, expected, strict=True):
+        assert [e.name for e in path.events] == ["stable", name]
+        assert [e.value for e in path.events] == pytest.approx([Fr_c, Fr_EP], abs=1e-8)
+        assert path.events[0].A[1] == pytest.approx(2, abs=1e-12)  # A2 = A1/A3 + A3/A1, in the plane A1 = A3
+        first, second, third = path.events[1].A
+        assert first == pytest.approx(third, rel=1e-12)
+        assert second == pytest.approx(2 + first**2 / 4, rel=1e-12)
+        assert path.omega0 == pytest.approx(OMEGA0, rel=ROUNDING)
+    assert list(paths[0].events[1].A) == pytest.approx([4, 6, 4], rel=1e-12)
+    assert paths[1].events[1].A[0] > 4 > paths[2].events[1].A[0]
+
+
+def test_drawn_paths_are_the_data():
+    paths = table_1_paths()
+    box, section = axes(projection="3d"), axes()
+    draw_box(box, paths, spire_faces(8.0))
+    draw_section(section, paths)
+    for path, flat in zip(paths, drawn(section, "path"), strict=True):
+        assert flat == pytest.approx(path.A[:, :2], abs=1e-9)  # A1 = A3 here
+    solid = [line.get_data_3d() for line in box.lines if line.get_gid() == "path"]
+    for path, (x, y, z) in zip(paths, solid, strict=True):
+        shown = np.isfinite(x)
+        assert np.array_equal(np.stack([x, z, y], axis=1)[shown], path.A[shown])
+        assert np.all((path.A[~shown, [[0], [2]]] > 8) | (path.A[~shown, 1] > 18))  # only what is outside is left out
+    for ax, dims in ((section, 2), (box, 3)):
+        for name, point in (("EP4", (4, 6)), ("stable", (FR_C_EP4 * 4 / FR_EP4, 2))):
+            line = next(line for line in ax.lines if line.get_gid() == name)
+            data = line.get_data() if dims == 2 else [line.get_data_3d()[k] for k in (0, 2)]
+            assert [d[0] for d in data] == pytest.approx(point, rel=1e-9)  # at chi_H = 1, A1 is proportional to Fr
+    styles = {line.get_linestyle() for line in section.lines if line.get_gid() == "ep-set"}
+    assert styles == {"--", "-"}
+
+
+def test_off_the_plane_the_path_is_that_of_the_roots():
+    p = benchmark().parameters
+    path = universal_path(tms, tms.sets[0], p, "Fr", np.linspace(0.01, 4, 400))
+    (event,) = path.events
+    assert (event.name, event.value) == ("stable", pytest.approx(0.9070641497, abs=2e-10))
+    s = np.roots(np.concatenate([[1.0], path.A[250], [1.0]])) * abs(path.omega0[250])
+    found = roots_60(polynomial_60(**{**p, "Fr": path.values[250]}))
+    assert np.sort_complex(s) == pytest.approx(np.sort_complex(np.array([complex(z) for z in found])), rel=1e-9)
+
+
+def test_a_path_that_leaves_stability():
+    """The optimised bicycle over its tilt: EP4 at the printed tilt, then a loss of stability."""
+    p = optimised().parameters
+    path = universal_path(tms, tms.sets[0], p, "lambda_s", np.linspace(0.7, 1.2, 101))
+    assert [e.name for e in path.events] == ["EP4", "unstable"]
+    assert path.events[0].value == pytest.approx(0.8514403685, abs=5e-11)  # printed digits
+    for step, stable in ((-1e-9, True), (1e-9, False)):
+        assert is_stable_60(polynomial_60(**{**p, "lambda_s": path.events[1].value + step})) is stable
+
+
+def test_sweep_in_si_units():
+    """The EP4 design with w = 2 m: the same chart at v = Fr √(g w)."""
+    p = table_1()[0].parameters
+    si = {
+        "w": 2.0, "g": 9.81, "lambda_s": p["lambda_s"], "m_B": 10.0, "m_H": 1.0, "x_B": 2 * math.sqrt(2), "x_H": 2.0,
+        "z_B": -0.8, "z_H": -0.4,
+    }  # fmt: skip
+    path = universal_path(tms, tms.parameter_set("SI"), si, "v", np.linspace(0.5, 15, 300))
+    speeds = [Fr * math.sqrt(2 * 9.81) for Fr in (FR_C_EP4, FR_EP4)]
+    assert [e.value for e in path.events] == pytest.approx(speeds, rel=1e-12)
+
+
+def quartic(p, q, r):
+    return [1, p, q, p, r]
+
+
+TOY = Model(
+    "toy", "s⁴ + p s³ + q s² + p s + r", 4,
+    (ParameterSet("native", tuple(Parameter(n, "1", n, n) for n in "pqr"), dict),), dict, quartic,
+)  # fmt: skip
+
+
+def test_another_model_and_a_gap():
+    """σ⁴ + p σ³ + q σ² + p σ + 1 over q: stable from q = 2 and on the EP set at q = 2 + p²/4."""
+    path = universal_path(TOY, TOY.sets[0], {"p": 5.0, "r": 1.0}, "q", np.linspace(0, 10, 64))
+    assert [(e.name, e.value) for e in path.events] == [
+        ("stable", pytest.approx(2, rel=1e-12)),
+        ("2EP2", pytest.approx(8.25, rel=1e-12)),
+    ]
+    path = universal_path(TOY, TOY.sets[0], {"p": 5.0, "q": 6.0}, "r", np.linspace(-1, 1, 41))
+    assert np.array_equal(np.isnan(path.A[:, 0]), path.values <= 0)
+    ax = axes()
+    draw_section(ax, [path])
+    ((*_, last),) = [line[np.isfinite(line).all(axis=1)] for line in drawn(ax, "path")]
+    assert last == pytest.approx([5, 6])
+    flipped = universal_path(TOY, TOY.sets[0], {"p": -5.0, "r": 1.0}, "q", np.linspace(0, 10, 64))
+    assert not [e for e in flipped.events if e.name == "stable"]
+    with pytest.raises(ValueError, match="accepted: p q r"):
+        universal_path(TOY, TOY.sets[0], {"p": 5.0, "r": 1.0}, "Fr", [1.0])
+
+
+# The command
+
+
+def tmsopt(*arguments, cwd=None):
+    command = [sys.executable, "-c", "from tmsopt.cli import main; main()", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, cwd=cwd, encoding="utf-8")
+
+
+def test_list_and_names():
+    assert find("fig3") is find("root-locus") is GALLERY["root-locus"]
+    listed = json.loads(tmsopt("figure", "--list", "--json").stdout)["figures"]
+    assert {"bicycle", "growth", "root-locus", "experiment", "universal"} <= {item["name"] for item in listed}
+    assert {item["alias"] for item in listed} >= {"figTMS", "fig0", "fig3", "fige"}
+    assert all(item["caption"].endswith(".") for item in listed)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["root-lokus"], "did you mean 'root-locus'?"),
+        (["fig9"], "accepted:"),
+        ([], "NAME: missing"),
+        (["bicycle", "--output", "bicycle.jpg"], "png, pdf, svg"),
+        (["bicycle", "--output", "nowhere/bicycle.png"], "does not exist"),
+        (["bicycle", "--output", "bicycle.pdf", "--format", "svg"], "svg"),
+    ],
+)
+def test_bad_input_of_figure(arguments, message, tmp_path):
+    done = tmsopt("figure", *arguments, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_one_figure_is_written_whole(tmp_path):
+    done = tmsopt("figure", "figTMS", "--format", "svg", "--json", cwd=tmp_path)
+    assert done.returncode == 0
+    (item,) = json.loads(done.stdout)["figures"]
+    assert (item["name"], item["file"]) == ("bicycle", "bicycle.svg")
+    assert (tmp_path / "bicycle.svg").read_text(encoding="utf-8").startswith("<?xml")
+    assert [path.name for path in tmp_path.iterdir()] == ["bicycle.svg"]
+
+
+def test_all_figures_go_into_a_new_directory(tmp_path, monkeypatch):
+    """With two figures that are quick to draw, in this process."""
+    quick = Table({name: GALLERY[name] for name in ("bicycle", "experiment")})
+    monkeypatch.setattr("tmsopt.plots.paper.gallery.GALLERY", quick)
+    folder = tmp_path / "new" / "figures"
+    done = CliRunner().invoke(main, ["figure", "all", "--output", str(folder)])
+    assert (done.exit_code, done.stdout) == (0, "")
+    assert sorted(path.name for path in folder.iterdir()) == ["bicycle.png", "experiment.png"]
+    assert all(path.read_bytes().startswith(b"\x89PNG") and path.stat().st_size > 20_000 for path in folder.iterdir())
+    assert done.stderr.splitlines() == [f"wrote {folder / name}.png" for name in quick]
+
+
+# Names beside points
+
+
+def test_names_stand_clear_of_curves_of_one_another_and_of_the_frame():
+    ax = new_figure(4, 4).subplots()
+    x = np.linspace(0, 1, 200)
+    ax.plot(x, x)
+    ax.plot(x, 1 - x)
+    ax.set_xlim(0, 1)
+    ax.set_ylim(0, 1)
+    names = [Name("capsize and weave", 0.995, 0.5), Name("EP3", 0.5, 0.5), Name("EP4", 0.52, 0.53), Name("out", 2, 0.5)]
+    place_names(ax, names)
+    renderer = ax.figure.canvas.get_renderer()
+    boxes = [t.get_window_extent(renderer) for t in ax.texts]
+    assert [t.get_text() for t in ax.texts] == ["capsize and weave", "EP3", "EP4"]
+    frame = ax.get_window_extent(renderer)
+    for k, box in enumerate(boxes):
+        assert frame.x0 <= box.x0 < box.x1 <= frame.x1
+        assert not any(box.overlaps(other) for other in boxes[:k])
+        for line in ax.get_lines()[:2]:
+            drawn = ax.transData.transform(line.get_xydata())
+            assert not any(box.contains(*point) for point in drawn)
+
+
+def test_points_that_fall_together_share_a_label():
+    ax = axes()
+    ax.set_xlim(0, 5)
+    ax.set_ylim(0, 5)
+    place_names(ax, [Name("EP4", 1.0, 2.0), Name("2EP2", 1.001, 2.0), Name("EP4", 1.0, 2.0)])
+    assert [t.get_text() for t in ax.texts] == ["EP4, 2EP2"]
+    place_names(ax, [])
+    assert len(ax.texts) == 1
+
+
+def test_a_parameter_that_stays_the_same_is_no_axis():
+    found = trace(load("problems/ep_set.toml", asks=False), starts=4)
+    assert list(found.problem.free)[:2] == ["Fr", "chi_B"]
+    assert varying(found)[:2] == ["Fr", "lambda_s"]
+
+
+def test_a_link_stays_a_link(tmp_path):
+    target, link = tmp_path / "there.png", tmp_path / "here.png"
+    target.write_bytes(b"old")
+    link.symlink_to(target)
+    save(new_figure(1, 1), link)
+    assert link.is_symlink()
+    assert target.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a disk that is always full")
+def test_a_figure_that_cannot_be_written_is_said(tmp_path):
+    link = tmp_path / "full.png"
+    link.symlink_to("/dev/full")
+    with pytest.raises(OSError, match="No space left"):
+        save(new_figure(1, 1), link)

@@ -1,0 +1,628 @@
+"""Proofs: closed forms lie in the balls, exact input counts, and what is not so is refused."""
+
+import json
+import math
+import pickle
+from collections.abc import Mapping
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import flint
+import numpy as np
+import pytest
+import sympy
+from click.testing import CliRunner
+from mpmath import mp
+
+import tmsopt
+from tmsopt.arithmetic import Number, Refused, enclosed, number, refined
+from tmsopt.cli import main
+from tmsopt.design import Case
+from tmsopt.models import decimal
+from tmsopt.proofs import Factored, Proof, prove_design
+from tmsopt.report import proof_text
+from tmsopt.roots import exact_roots, product
+
+rational = import_module("tmsopt.proofs.rational")
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+HEIGHTS = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
+SQRT2 = math.sqrt(2)
+
+
+@cache
+def solved(name: str) -> tmsopt.Solution:
+    return tmsopt.solve(tmsopt.load(PROBLEMS / f"{name}.toml"))
+
+
+def located(pattern: str, held: Mapping[str, float], free: Mapping[str, tuple[float, float]]) -> tmsopt.Solution:
+    return tmsopt.solve(tmsopt.Problem(tmsopt.models.tms, fixed={**HEIGHTS, **held}, free=free, locate=pattern))
+
+
+def holds(found: Number, truth: Any) -> bool:
+    """Whether an mpmath number is within the radius of a decimal, to the precision of mpmath."""
+    return bool(abs(mp.mpf(found.value) - truth) <= mp.mpf(found.radius) + mp.mpf(10) ** (5 - mp.dps))
+
+
+def ep4_of_heights(zeta_B: Any, zeta_H: Any) -> dict[str, Any]:
+    """Compact forms of χ_B, T, Fr and the 4-fold root at χ_H = 1 (equations chib1, tls, frep4, w01)."""
+    r, h = mp.sqrt(zeta_B / zeta_H), mp.sqrt(zeta_B * zeta_H)
+    T = (r - 1) * (r**2 + 6 * r + 1) / (16 * h * (r + 1))
+    Fr = (r**2 + 6 * r + 1) / (4 * mp.sqrt(h) * (r + 1))
+    return {"chi_B": r, "T": T, "Fr": Fr, "r": -1 / mp.sqrt(h)}
+
+
+def ep_set(T: Any) -> Any:
+    """Fr² on the EP set of ζ_B = −0.4, ζ_H = −0.2 (equation epset)."""
+    r = mp.sqrt(2)
+    h = r / 5
+    return 4 * (r + 1) ** 2 * h * T**2 / ((r - 1) * (4 * h * T * (r + 1) - r * (r - 1)))
+
+
+def on_ep_set(lambda_s: float, kind: str) -> tuple[tmsopt.Problem, dict[str, float]]:
+    """The design of the EP set at a tilt in doubles, and the problem that locates it in Fr and χ_B."""
+    fixed = {**HEIGHTS, "lambda_s": lambda_s}
+    free = {"Fr": (0.1, 6.0), "chi_B": (1.01, 3.0)}
+    with mp.workdps(30):
+        Fr = float(mp.sqrt(ep_set(mp.tan(mp.mpf(repr(lambda_s))))))
+    return tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, locate=kind), {**fixed, "Fr": Fr, "chi_B": SQRT2}
+
+
+# Closed forms in the balls
+
+
+@pytest.mark.parametrize("digits", [5, 30, 50])
+def test_the_printed_EP4_lies_in_the_balls(digits: int) -> None:
+    """Table 1: χ_B = √2, tan λ_s = 15/4 − 75√2/32, Fr = 3√(110√2 − 120)/8, s = −√5/2^(1/4); at 60 digits."""
+    proof = tmsopt.prove(solved("ep4"), digits)
+    with mp.workdps(70):
+        root2 = mp.sqrt(2)
+        T = mp.mpf(15) / 4 - 75 * root2 / 32
+        assert holds(proof.parameters["chi_B"], root2)
+        assert holds(proof.tangents["lambda_s"], T)
+        assert holds(proof.parameters["lambda_s"], mp.atan(T))
+        assert holds(proof.parameters["Fr"], 3 * mp.sqrt(110 * root2 - 120) / 8)
+        for value in (proof.unknowns["r"], proof.abscissa, proof.roots[0].re):
+            assert value is not None
+            assert holds(value, -mp.sqrt(5) / mp.root(2, 4))
+    assert (proof.proved, proof.pattern, proof.method) == (True, "EP4", "Krawczyk")
+    assert (proof.stable.holds, proof.heavily_damped.holds, proof.inside.holds) == (True, True, True)
+    assert "edge" in proof.heavily_damped.words
+    assert [z.multiplicity for z in proof.roots] == [4]
+    for value in (*proof.parameters.values(), *proof.unknowns.values()):
+        assert Fraction(value.radius) < Fraction(1, 10**digits) * 4  # numbers of size 1 to 4, to as many digits
+    assert proof.radius < 10.0 ** -(digits + 5)
+    assert proof.uniqueness > 1e-3 > proof.explained > proof.distance
+
+
+def test_a_proof_has_30_digits_by_default() -> None:
+    proof = tmsopt.prove(solved("ep4"))
+    assert proof.digits == 30
+    assert proof.radius < 1e-25
+
+
+def test_the_optimised_benchmark_on_all_its_branches() -> None:
+    """Equations e1, e2, e3: linear conditions for Fr², T, μ, Fr with a quadratic left, solved by SymPy; s = −1."""
+    design = solved("optimised_benchmark")
+    T, mu, Fr = sympy.symbols("T mu Fr")
+    d = sympy.Rational
+    a1, a2, a3, a4 = (
+        d("-0.432") * T - d("0.0272") + d("0.08") * Fr**2 + d("0.004") * mu,
+        d("0.368") * T - d("0.02") * mu - d("0.0032"),
+        d("0.192") * T - d("0.0048") - d("0.136") * Fr + d("0.08") * Fr**2 - d("0.016") * mu,
+        Fr,
+    )
+    solutions = sympy.solve([a1, a2, a3], [T, mu, a4], dict=True)
+    points = [design.parameters, *(b.parameters for b in design.branches)]
+    matched = []
+    with mp.workdps(70):
+        for parameters in points:
+            proof = prove_design(design.problem, parameters, "EP4", 40)
+            assert proof.proved
+            assert proof.inside.holds is (parameters is design.parameters)
+            root = -1 if parameters["Fr"] > 0 else 1
+            assert holds(proof.unknowns["r"], mp.mpf(root))
+            assert holds(proof.unknowns["omega0"], mp.mpf(-1))
+            assert proof.stable.holds is (root < 0)
+            assert holds(proof.parameters["chi_B"], mp.mpf("1.19"))
+            for k, s in enumerate(solutions):
+                exact = {n: mp.mpf(str(sympy.N(s[v], 65))) for n, v in (("T", T), ("mu", mu), ("Fr", Fr))}
+                signs = {"Fr": -root * exact["Fr"], "T": exact["T"], "mu": exact["mu"]}  # Fr → −Fr turns s into −s
+                found = {"Fr": proof.parameters["Fr"], "T": proof.tangents["lambda_s"], "mu": proof.parameters["mu"]}
+                if all(holds(found[n], signs[n]) for n in found):
+                    matched.append(k)
+    assert len(points) == 4
+    assert sorted(matched) == [0, 0, 1, 1]
+
+
+def test_a_triple_root_and_its_derivatives() -> None:
+    """The EP3 of heavy damping at the least speed: p, p′, p″ vanish, by mpmath's root finder at 60 digits."""
+    proof = tmsopt.prove(solved("heavily_damped"))
+    with mp.workdps(60):
+        T = mp.tan(mp.mpf(proof.parameters["lambda_s"].value))
+
+        def conditions(Fr: Any, chi_B: Any, s: Any) -> list[Any]:
+            a = tmsopt.models.tms.polynomial(Fr, mp.mpf("0.1"), chi_B, mp.mpf(1), -mp.mpf("0.4"), -mp.mpf("0.2"), T)
+            d1, d2 = [4 * a[0], 3 * a[1], 2 * a[2], a[3]], [12 * a[0], 6 * a[1], 2 * a[2]]
+            return [mp.polyval(p, s) for p in (a, d1, d2)]
+
+        start = [float(proof.parameters["Fr"]), float(proof.parameters["chi_B"]), float(proof.unknowns["r"])]
+        truth = mp.findroot(conditions, start, tol=1e-110)
+        found = proof.parameters["Fr"], proof.parameters["chi_B"], proof.unknowns["r"]
+        assert all(holds(value, exact) for value, exact in zip(found, truth, strict=True))
+    assert proof.pattern == "EP3"
+    assert [z.multiplicity for z in proof.roots] == [3, 1]
+    assert proof.held["lambda_s"] == str(Fraction(repr(math.radians(10))))  # a double in radians, as its decimal
+
+
+@pytest.mark.parametrize(("tangent", "pattern"), [("2/5", "2EP2"), ("6/5", "CEP2")])
+def test_the_EP_set_at_an_exact_tangent(tangent: str, pattern: str) -> None:
+    """Equation epset; real pairs below the EP4 (tan λ_s = 0.435), complex ones above. The tangent is a fraction."""
+    T = Fraction(tangent)
+    proof = prove_design(*on_ep_set(math.atan(T), pattern), pattern, 40, {"tan(lambda_s)": tangent})
+    with mp.workdps(60):
+        assert holds(proof.parameters["Fr"], mp.sqrt(ep_set(mp.mpf(T.numerator) / T.denominator)))
+        assert holds(proof.parameters["chi_B"], mp.sqrt(2))
+        assert holds(proof.unknowns["c"], 5 / mp.sqrt(2))  # 1/√(ζ_B ζ_H)
+    assert (proof.proved, proof.pattern) == (True, pattern)
+    assert proof.heavily_damped.holds is (pattern == "2EP2")
+    assert proof.held["tan(lambda_s)"] == tangent
+    assert proof.stated == ("tan(lambda_s)",)
+    sign = float(proof.unknowns["b"]) ** 2 - 4 * float(proof.unknowns["c"])
+    assert (sign > 0) is (pattern == "2EP2")
+
+
+def test_uniqueness_ends_before_the_other_solution() -> None:
+    """At Fr = 2.25 the EP set is met at two tilts, the roots of a quadratic; each is proved, unique up to the other."""
+    fixed = {**HEIGHTS, "Fr": 2.25}
+    problem = tmsopt.Problem(
+        tmsopt.models.tms, fixed=fixed, free={"chi_B": (1.01, 3), "lambda_s": (0.02, 1.4)}, locate="2EP2"
+    )
+    r, h = SQRT2, SQRT2 / 5
+    square = 2.25**2 * (r - 1)
+    tilts = np.roots([4 * (r + 1) ** 2 * h, -square * 4 * h * (r + 1), square * r * (r - 1)])
+    proofs = []
+    for T, kind in zip(sorted(tilts), ("2EP2", "CEP2"), strict=True):
+        design = {**fixed, "chi_B": r, "lambda_s": math.atan(T)}
+        proof = prove_design(replace(problem, locate=kind), polished(design), kind)
+        assert proof.proved, proof.reason
+        assert float(proof.tangents["lambda_s"]) == pytest.approx(T, abs=1e-12)
+        proofs.append(proof)
+    apart = abs(tilts[0] - tilts[1])
+    assert all(0 < p.uniqueness < apart for p in proofs)
+
+
+def polished(design: dict[str, float]) -> dict[str, float]:
+    """The same with tan λ_s on the EP set to the last digit: numpy's roots near a fold lose a few."""
+    with mp.workdps(30):
+        T = mp.findroot(lambda x: ep_set(x) - mp.mpf(repr(design["Fr"])) ** 2, mp.tan(design["lambda_s"]))
+        return {**design, "lambda_s": float(mp.atan(T))}
+
+
+def test_the_critical_speed() -> None:
+    """Table 1: Fr_c = √(30√2 + 120)/8 at the EP4's tilt and χ_B = √2; held here at doubles, so to 1e-14."""
+    held = {"chi_B": SQRT2, "lambda_s": math.atan(15 / 4 - 75 * SQRT2 / 32)}
+    proof = tmsopt.prove(located("weave", held, {"Fr": (0.5, 3)}))
+    assert float(proof.parameters["Fr"]) == pytest.approx(math.sqrt(30 * SQRT2 + 120) / 8, abs=1e-13)
+    assert proof.stable.holds is False
+    assert "boundary of stability" in proof.stable.words
+    assert proof.abscissa == Number("0", "0")
+
+
+def test_a_root_at_0() -> None:
+    """a4 = −ζ_B T − μ (χ_H − 1) vanishes at tan λ_s = μ (χ_H − 1)/|ζ_B| = 1/20."""
+    held = {"chi_H": 1.2, "chi_B": 1.3, "Fr": 1.3}
+    proof = tmsopt.prove(located("capsize", held, {"lambda_s": (0.01, 0.4)}))
+    assert proof.proved
+    assert proof.tangents["lambda_s"].contains("0.05")
+
+
+def test_the_same_EP4_in_SI() -> None:
+    """v = Fr √(g w), x_B = χ_B w: with w = 2 m, g = 9.81 m/s²."""
+    problem = tmsopt.Problem(
+        tmsopt.models.tms,
+        fixed={"w": 2.0, "m_B": 10.0, "m_H": 1.0, "x_H": 2.0, "z_B": -0.8, "z_H": -0.4},
+        free={"v": (1, 20), "x_B": (2.1, 5), "lambda_s": (0.1, 1)},
+        locate="EP4",
+    )
+    proof = tmsopt.prove(tmsopt.solve(problem))
+    with mp.workdps(50):
+        truth = ep4_of_heights(-mp.mpf("0.4"), -mp.mpf("0.2"))
+        assert holds(proof.parameters["v"], truth["Fr"] * mp.sqrt(mp.mpf("9.81") * 2))
+        assert holds(proof.parameters["x_B"], 2 * truth["chi_B"])
+        assert holds(proof.unknowns["r"], truth["r"])
+    assert proof.held["g"] == "981/100"
+
+
+@pytest.mark.parametrize(("name", "pattern"), [("physical_machine", "EP2"), ("least_speed", "pair+real")])
+def test_patterns_of_optima(name: str, pattern: str) -> None:
+    """Whatever the rightmost roots show; the proved polynomial has the abscissa of the design."""
+    design = solved(name)
+    assert (design.structure, tmsopt.prove(design).pattern, tmsopt.prove(design).proved) == (pattern, pattern, True)
+    assert float(tmsopt.prove(design).abscissa or "nan") == pytest.approx(design.abscissa, abs=1e-12)
+    assert tmsopt.prove(design).stable.holds is True
+
+
+def test_a_design_without_multiple_roots_is_taken_as_it_is() -> None:
+    """Nothing is solved for: its roots are isolated; beside them those of mpmath at 50 digits."""
+    design = solved("benchmark")
+    proof = tmsopt.prove(design)
+    assert (proof.proved, proof.pattern, proof.moved, proof.method) == (True, "pair", (), "isolated roots")
+    with mp.workdps(60):
+        p = {n: mp.mpf(v.value) for n, v in proof.parameters.items()}
+        native = {"Fr": p["v"] / mp.sqrt(p["g"] * p["w"]), "mu": p["m_H"] / p["m_B"]}
+        native |= {f"chi_{k}": p[f"x_{k}"] / p["w"] for k in "BH"} | {f"zeta_{k}": p[f"z_{k}"] / p["w"] for k in "BH"}
+        a = tmsopt.models.tms.polynomial(**native, T=mp.tan(p["lambda_s"]))
+        roots = sorted(mp.polyroots(a, maxsteps=200, extraprec=400), key=lambda z: (-z.real, -z.imag))
+        for found, truth in zip(proof.roots, roots, strict=True):
+            assert holds(found.re, truth.real)
+            assert holds(found.im, truth.imag)
+    assert proof.stable.holds is True
+    assert proof.heavily_damped.holds is False
+
+
+# Exact input
+
+
+def test_a_double_stands_for_the_decimal_that_prints_it() -> None:
+    assert decimal(0.1) == Fraction(1, 10)
+    assert decimal(1e-17) == Fraction(1, 10**17)
+    assert tmsopt.prove(solved("ep4")).held == {"mu": "1/10", "chi_H": "1", "zeta_B": "-2/5", "zeta_H": "-1/5"}
+    assert tmsopt.prove(solved("ep4")).parameters["zeta_B"] == Number("-0.4", "0")
+
+
+def test_thirds_are_thirds_where_they_are_given_exactly() -> None:
+    """ζ_B = −1/3: the closed form lies in the balls of the fraction, and 1e-17 beside those of the decimal."""
+    held = {"zeta_B": -1 / 3, "zeta_H": -0.2}
+    design = located("EP4", held, {"Fr": (0.1, 6), "chi_B": (1.01, 3), "lambda_s": (0.01, 1)})
+    with mp.workdps(60):
+        truth = ep4_of_heights(-mp.mpf(1) / 3, -mp.mpf("0.2"))
+        for given in (Fraction(-1, 3), "-1/3", flint.fmpq(-1, 3)):
+            proof = tmsopt.prove(design, exact={"zeta_B": given})
+            assert all(holds(proof.parameters[n], truth[n]) for n in ("Fr", "chi_B"))
+            assert proof.held["zeta_B"] == "-1/3"
+            assert Fraction(proof.parameters["zeta_B"].radius) > 0
+        beside = tmsopt.prove(design)
+        assert not any(holds(beside.parameters[n], truth[n]) for n in ("Fr", "chi_B"))
+        assert float(beside.parameters["Fr"]) == pytest.approx(float(truth["Fr"]), abs=1e-14)
+
+
+def test_an_angle_in_degrees_is_exact_where_it_is_given_so() -> None:
+    problem, design = on_ep_set(math.radians(20), "2EP2")
+    exact = prove_design(problem, design, "2EP2", exact={"lambda_s": "20 deg"})
+    plain = prove_design(problem, design, "2EP2")
+    with mp.workdps(60):
+        truth = mp.sqrt(ep_set(mp.tan(mp.pi / 9)))
+        assert holds(exact.parameters["Fr"], truth)
+        assert not holds(plain.parameters["Fr"], truth)
+    assert exact.held["lambda_s"] == "20 deg"
+    assert "not an angle in degrees" in proof_text(problem, plain)
+    assert "not an angle in degrees" not in proof_text(problem, exact)
+
+
+def fractions(**changed: float) -> tmsopt.Solution:
+    """ζ_B = −2, ζ_H = −1/2, χ_B = 2: the compact forms give tan λ_s = 17/48, Fr = 17/12, s = −1."""
+    fixed = {"Fr": 17 / 12, "mu": 0.1, "chi_B": 2.0, "chi_H": 1.0, "zeta_B": -2.0, "zeta_H": -0.5}
+    return tmsopt.solve(
+        tmsopt.Problem(tmsopt.models.tms, fixed={**fixed, "lambda_s": math.atan(17 / 48), **changed}), throw=False
+    )
+
+
+def test_a_pattern_in_fractions_needs_no_free_parameter() -> None:
+    exact: dict[str, Any] = {"Fr": Fraction(17, 12), "tan(lambda_s)": "17/48"}
+    proof = tmsopt.prove(fractions(), exact=exact)
+    assert (proof.proved, proof.pattern, proof.method) == (True, "EP4", "exact factorisation")
+    assert [(z.re.value.rstrip("0"), z.re.radius, z.multiplicity) for z in proof.roots] == [("-1.", "0", 4)]
+    assert (proof.stable.holds, proof.heavily_damped.holds) == (True, True)
+    assert proof.radius == 0
+
+
+def test_nothing_free_and_not_exact_is_refused() -> None:
+    """The same bicycle in doubles is no EP4, and one in a fraction a little off is none either."""
+    for proof in (
+        tmsopt.prove(fractions()),
+        tmsopt.prove(fractions(chi_B=2.0000000000000004), exact={"Fr": "17/12", "tan(lambda_s)": "17/48"}),
+    ):
+        assert not proof.proved
+        assert "0 free parameters" in proof.reason
+        assert proof.stored
+        assert proof.stable.holds is True
+        assert [z.multiplicity for z in proof.roots] == [1, 1, 1, 1]
+
+
+@pytest.mark.parametrize(
+    ("factors", "patterns"),
+    [
+        ([[1, 2]] * 4, {"EP4"}),
+        ([[1, 2]] * 3 + [[1, 3]], {"EP3"}),
+        ([[1, 2], [1, 2], [1, 3], [1, 3]], {"2EP2"}),
+        ([[1, -2, -1]] * 2, {"2EP2"}),  # 1 ± √2, twice each
+        ([[1, 2, 5]] * 2, {"CEP2"}),
+        ([[1, 2], [1, 2], [1, 3], [1, 4]], {"EP2"}),
+        ([[1, 2], [1, 2], [1, 1, 1]], {"EP2"}),
+        ([[1, 0, 3], [1, 1, 1]], {"weave"}),
+        ([[1, 0, -3], [1, 1, 1]], set()),  # a symmetric pair that is real
+        ([[1, 0, 3]] * 2, {"weave", "resonance", "CEP2"}),
+        ([[1, 0, 3], [1, 0, 2]], {"weave"}),
+        ([[1, 0], [1, 1], [1, 1, 1]], {"capsize"}),
+        ([[1, 1], [1, 2], [1, 3], [1, 4]], set()),
+        ([[1, 3, 1], [1, 1, 1]], set()),
+    ],
+)
+def test_patterns_of_fractions(factors: list[list[int]], patterns: set[str]) -> None:
+    a = [flint.fmpq(-3, 7) * c for c in product(*factors)]
+    assert {n for n in tmsopt.roots.PATTERNS if rational.has(n, a)} == patterns
+    moved = [a[0], a[1] + flint.fmpq(1, 10**40), *a[2:]]
+    assert not any(rational.has(n, moved) for n in ("EP4", "EP3", "2EP2", "CEP2", "EP2", "weave", "resonance"))
+
+
+@pytest.mark.parametrize(
+    ("exact", "words"),
+    [
+        ({"zeta": 1}, ["unknown parameter 'zeta'", "tan(lambda_s)"]),
+        ({"zeta_B": "-1/3"}, ["-1/3", "-0.4"]),
+        ({"zeta_B": "two"}, ["'two'", "'-2/5'"]),
+        ({"zeta_B": "20 deg"}, ["'20 deg'", "accepted"]),
+        ({"zeta_B": True}, ["True"]),
+        ({"chi_H": "1/0"}, ["'1/0'"]),
+        ({"chi_H": float("nan")}, ["nan"]),
+        ({"lambda_s": "20 deg"}, ["20 deg", "0.41067"]),
+        ({"zeta_B": "-1/3", "zeta": 1}, ["exact.zeta_B", "exact.zeta:"]),
+    ],
+)
+def test_exact_numbers_that_are_not_accepted(exact: dict[str, Any], words: list[str]) -> None:
+    with pytest.raises(tmsopt.InputError) as raised:
+        tmsopt.prove(solved("ep4"), exact=exact)
+    assert all(word in str(raised.value) for word in words)
+
+
+@pytest.mark.parametrize("digits", [0, 1001, 2.5, True])
+def test_digits_that_are_not_accepted(digits: Any) -> None:
+    with pytest.raises(tmsopt.InputError, match="1 to 1000"):
+        tmsopt.prove(solved("ep4"), digits)
+
+
+# Refusals
+
+
+@pytest.mark.parametrize(
+    ("name", "digits"),
+    [(n, d) for n in ("ep4", "optimised_benchmark", "heavily_damped") for d in (3, 6, 9)]
+    + [("ep4", 12), ("heavily_damped", 12)],
+)
+def test_a_rounded_design_is_refused(name: str, digits: int) -> None:
+    """A true EP is near it, but not where the stored numbers say, and 16 digits would be nearer than these.
+
+    Of the optimised benchmark 12 digits are left out: 64 roundings of each number move its μ = 20.8 by 2e-10.
+    """
+    design = solved(name)
+    rounded = {n: float(f"{v:.{digits}g}") for n, v in design.parameters.items()}
+    proof = prove_design(design.problem, rounded, design.structure)
+    assert not proof.proved
+    assert proof.stored
+    assert "not the design's" in proof.reason or "finds no solution" in proof.reason
+    assert prove_design(design.problem, dict(design.parameters), design.structure).proved
+
+
+def test_a_fold_is_refused() -> None:
+    """At Fr = √5 the EP set turns back, so with Fr held its equations are singular (tan λ_s = r (r − 1)/(2 h (r + 1))).
+
+    The doubles beside √5 have no solution, or two 4e-8 apart.
+    """
+    r, h = SQRT2, SQRT2 / 5
+    tilt = math.atan(r * (r - 1) / (2 * h * (r + 1)))
+    reasons = []
+    for Fr in (math.nextafter(math.sqrt(5), 0), math.sqrt(5), math.nextafter(math.sqrt(5), 9)):
+        fixed = {**HEIGHTS, "Fr": Fr}
+        free = {"chi_B": (1.01, 3.0), "lambda_s": (0.02, 1.4)}
+        problem = tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, locate="2EP2")
+        proof = prove_design(problem, {**fixed, "chi_B": r, "lambda_s": tilt}, "2EP2")
+        assert not proof.proved
+        reasons.append(proof.reason)
+    assert all("singular" in reason for reason in reasons)
+    assert prove_design(*on_ep_set(tilt, "2EP2"), "2EP2").proved
+
+
+def test_a_parameter_without_effect_is_no_unknown() -> None:
+    """At χ_H = 1 the polynomial does not depend on μ."""
+    fixed = {n: v for n, v in HEIGHTS.items() if n != "mu"} | {"chi_B": SQRT2}
+    free = {"mu": (0.05, 0.2), "Fr": (1.0, 4.0), "lambda_s": (0.1, 1.0)}
+    problem = tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, locate="EP4")
+    proof = prove_design(problem, solved("ep4").parameters, "EP4")
+    assert not proof.proved
+    assert "do not depend on mu" in proof.reason
+
+
+def test_too_few_free_parameters() -> None:
+    problem = tmsopt.Problem(tmsopt.models.tms, fixed={**HEIGHTS, "chi_B": SQRT2, "Fr": 2.236317518367822},
+                             free={"lambda_s": (0.1, 1.0)}, locate="EP4")  # fmt: skip
+    proof = prove_design(problem, solved("ep4").parameters, "EP4")
+    assert not proof.proved
+    assert "3 conditions and 1 free parameter" in proof.reason
+    assert "free 2 more" in proof.reason
+
+
+def test_a_singular_mass_matrix_is_refused() -> None:
+    """χ_H = 1 and λ_s = 0 make a0 = 0."""
+    design = {**solved("ep4").parameters, "lambda_s": 0.0}
+    proof = prove_design(solved("ep4").problem, design, "EP4")
+    assert not proof.proved
+    assert "a0" in proof.reason
+    assert proof.stable.holds is None
+    tiny = prove_design(solved("ep4").problem, {**design, "lambda_s": 1e-14}, "EP4")
+    assert not tiny.proved
+
+
+@pytest.mark.parametrize(("asked", "T"), [("2EP2", 1.2), ("CEP2", 0.4)])
+def test_the_other_kind_of_pair_is_refused(asked: str, T: float) -> None:
+    kind = "CEP2" if asked == "2EP2" else "2EP2"
+    proof = prove_design(*on_ep_set(math.atan(T), asked), kind)
+    assert not proof.proved
+    assert f"a {kind}, not a {asked}" in proof.reason
+
+
+def test_the_wrong_structure_is_refused() -> None:
+    """An EP3 and a pair of double roots are no EP4, an EP4 is no EP3 with a root apart, and a weave is elsewhere."""
+    triple = solved("heavily_damped")
+    problem = solved("ep4").problem
+    wrong = [
+        prove_design(problem, triple.parameters, "EP4"),
+        prove_design(problem, triple.parameters, "2EP2"),
+        prove_design(problem, solved("ep4").parameters, "EP3"),
+        prove_design(replace(problem, minimize=None, locate="weave"), solved("ep4").parameters, "pair"),
+        prove_design(solved("benchmark").problem, solved("benchmark").parameters, "real"),
+        prove_design(problem, solved("ep4").parameters, "undecided"),
+    ]
+    assert [p.proved for p in wrong] == [False] * 6
+    assert all(p.reason for p in wrong)
+
+
+def test_what_is_not_solved_is_not_proved() -> None:
+    proof = tmsopt.prove(replace(solved("ep4"), status="infeasible"))
+    assert not proof.proved
+    assert "not solved (infeasible)" in proof.reason
+    with pytest.raises(tmsopt.InputError, match="asks for a front"):
+        tmsopt.prove(tmsopt.load(PROBLEMS / "pareto.toml"))
+
+
+# Stability and heavy damping
+
+
+def test_stability_and_heavy_damping_of_random_polynomials() -> None:
+    """Beside isolated roots of the same fractions; strictly inside, on the edge and outside."""
+    rng = np.random.default_rng(5)
+    seen = set()
+    for _ in range(300):
+        kinds = rng.integers(0, 3, size=2)
+        factors = []
+        for kind in kinds:
+            x, y = (Fraction(int(v), 16) for v in rng.integers(-8, 40, size=2))
+            factors += [[[1, x], [1, y]], [[1, 2 * x, x * x + y * y]], [[1, x], [1, x]]][kind]
+        a = product(*factors)
+        truth = exact_roots(a)
+        stable = all(z.re < 0 for z in truth)
+        heavy = stable and all(z.im == 0 for z in truth)
+        with flint.ctx.workdps(60):
+            exact = rational.factored([flint.fmpq(c.numerator, c.denominator) for c in a])
+            assert (exact.stable, exact.heavily_damped) == (stable, heavy)
+            if all(z.multiplicity == 1 for z in truth):
+                balls = Factored((([flint.arb(flint.fmpq(c.numerator, c.denominator)) for c in a], 1),))
+                assert balls.stable in ((stable,) if all(z.re != 0 for z in truth) else (False, None))
+                assert balls.heavily_damped in (heavy, None)
+        seen.add((stable, heavy, any(z.multiplicity > 1 for z in truth)))
+    assert len(seen) == 6
+
+
+def test_signs_that_cannot_be_told_are_not() -> None:
+    wide = flint.arb(0, 1e-10)
+    assert Factored((([flint.arb(1), flint.arb(2), wide], 1),)).stable is None
+    assert Factored((([flint.arb(1), flint.arb(2), 1 + wide], 1),)).heavily_damped is None
+    assert Factored((([flint.arb(1), flint.arb(2), 1 + wide], 1),)).stable is True
+    top = Factored((([flint.arb(1), flint.arb(2), 1 + wide], 1),)).abscissa
+    assert top.contains(-1)
+    assert top.rad() < 2e-5
+
+
+# The test itself
+
+
+def quadratic(constant: str) -> Any:
+    return lambda at: [at["x"] * at["x"] + flint.arb(constant)]
+
+
+def test_krawczyk_on_a_square() -> None:
+    """x² = 2 has ±√2; its test fails at 0, and where there is no root, and for a double one."""
+    with flint.ctx.workdps(50):
+        system = quadratic("-2")
+        middle = refined(system, {"x": flint.arb(1)}, ["x"], 45)
+        found = enclosed(system, middle, ["x"], 45)
+        assert found.balls["x"].contains(flint.arb(2).sqrt()) or found.balls["x"].overlaps(flint.arb(2).sqrt())
+        assert 0.1 < found.uniqueness < 2 * SQRT2
+        for constant in ("1", "0"):
+            with pytest.raises(Refused):
+                refined_and_enclosed(quadratic(constant))
+        close = quadratic("-1e-40")  # two roots 2e-20 apart
+        at = {"x": flint.arb("1e-20").mid()}
+        assert enclosed(close, refined(close, at, ["x"], 45), ["x"], 45).uniqueness < 2e-20
+
+
+def refined_and_enclosed(system: Any) -> Any:
+    return enclosed(system, refined(system, {"x": flint.arb("0.3")}, ["x"], 45), ["x"], 45)
+
+
+def test_decimals_hold_their_balls() -> None:
+    """Whatever the size and radius: the ends of the ball are within the radius of the decimal."""
+    rng = np.random.default_rng(1)
+    with flint.ctx.workdps(60):
+        for _ in range(400):
+            middle = flint.arb(float(rng.normal() * 10.0 ** rng.integers(-30, 30)))
+            ball = (middle / 7 if rng.random() < 0.8 else middle) + flint.arb(0, 10.0 ** rng.integers(-70, 5))
+            shown = number(ball, int(rng.integers(1, 40)))
+            for end in (ball.lower(), ball.upper()):
+                mantissa, exponent = end.man_exp()
+                exact = Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+                assert abs(exact - Fraction(shown.value)) <= Fraction(shown.radius) + abs(exact) * Fraction(1, 10**55)
+            assert shown.contains(Fraction(shown.value))
+
+
+# As data, as text, on the command line
+
+
+def test_a_proof_is_plain_data() -> None:
+    proof = tmsopt.prove(solved("ep4"))
+    assert pickle.loads(pickle.dumps(proof)) == proof
+    assert tmsopt.prove(pickle.loads(pickle.dumps(solved("ep4")))).parameters == proof.parameters
+    assert b"flint" not in pickle.dumps(proof)
+    data = json.loads(json.dumps(proof.to_json(), allow_nan=False))
+    assert data["parameters"]["chi_B"]["value"].startswith("1.414213562373095048801688724209698")
+    assert data["proved"] is True
+    assert isinstance(tmsopt.Proof("nothing", False), Proof)
+
+
+def test_a_band_is_proved_in_its_worst_case() -> None:
+    problem = tmsopt.load(PROBLEMS / "speed_band.toml")
+    design = {**HEIGHTS, "Fr": 1.8, "chi_B": 1.28, "lambda_s": 0.12}
+    proof = prove_design(problem, design, "pair", case=Case(at={"Fr": 1.2}))
+    assert proof.proved
+    assert proof.parameters["Fr"] == Number("1.2", "0")
+    assert (proof.stable.holds, proof.inside.holds) == (True, True)
+    assert "worst case" in proof_text(problem, proof)
+
+
+def run(*arguments: str) -> Any:
+    return CliRunner().invoke(main, ["prove", *arguments])
+
+
+def test_the_command() -> None:
+    done = run(str(PROBLEMS / "ep4.toml"), "--digits", "40")
+    assert done.exit_code == 0
+    assert "proved: a design with EP4 exists" in done.stdout
+    assert "2.236317518367822033046344317154434852029" in done.stdout
+    assert "zeta_B = -0.4" in done.stdout
+    data = json.loads(run(str(PROBLEMS / "heavily_damped.toml"), "--json", "--exact", "lambda_s=10 deg").stdout)
+    assert (data["proved"], data["status"], data["pattern"]) == (True, "optimal", "EP3")
+    assert data["held"]["lambda_s"] == "10 deg"
+    assert data["inside"]["holds"] is True
+    assert data["limits"] == {"heavy_damping": "binds"}
+    assert "Examples" in run("--help").stdout
+
+
+def test_the_exit_status_of_the_command(tmp_path: Path) -> None:
+    text = (PROBLEMS / "ep4.toml").read_text(encoding="utf-8")
+    infeasible, none = tmp_path / "infeasible.toml", tmp_path / "none.toml"
+    infeasible.write_text(text + '\n[constraints]\nfast = "abscissa <= -3"\n', encoding="utf-8")
+    held = text.replace("{ min = 1.01, max = 5 }", "1.4142135623730951").replace("{ min = 0.01, max = 10 }",
+                                                                                "2.236317518367822")  # fmt: skip
+    none.write_text(held.replace("{ min = 0.02, max = 1.4 }", "0.4106775324124522").split("[objective]")[0])
+    assert run(str(infeasible)).exit_code == 3
+    refused = run(str(none))
+    assert refused.exit_code == 4
+    assert "not proved" in refused.stdout
+    assert "0 free parameters" in refused.stdout
+    for bad in (["missing.toml"], [str(none), "--exact", "zeta_B"], [str(none), "--exact", "zeta_B=1"]):
+        assert run(*bad).exit_code == 2
+    assert run(str(PROBLEMS / "pareto.toml")).exit_code == 2

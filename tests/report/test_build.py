@@ -1,0 +1,375 @@
+"""What a builder asks of a design: wheel loads, ballast, mass margin, units; each against mechanics of its own.
+
+The lateral dynamics come here from the equations of Meijaard, Papadopoulos, Ruina and Schwab (2007), appendix A,
+which take any two rigid bodies; a point mass is a body without inertia of its own.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from typing import Any
+
+import casadi as ca
+import flint
+import numpy as np
+import pytest
+import sympy
+from helpers.designs import ROBOT
+from helpers.oracles import polynomial_60, roots_60
+from mpmath import mp
+
+import tmsopt
+from tmsopt.arithmetic import positive_part
+from tmsopt.design import decay_time, frequencies, growth_time, reading, with_unit
+from tmsopt.models import Values, matrices, tms, to_si
+from tmsopt.roots import Root
+
+NATIVE, SI = tms.sets
+EPS = np.finfo(float).eps
+Body = tuple[Any, Any, Any]
+"""A point mass m at x forward and z downward."""
+
+
+def designs(count: int, seed: int) -> list[dict[str, float]]:
+    rng = np.random.default_rng(seed)
+    return [
+        {
+            "Fr": rng.uniform(0, 4),
+            "mu": 10 ** rng.uniform(-2, 1.5),
+            "chi_B": rng.uniform(-1, 2.5),
+            "chi_H": rng.uniform(-1, 2.5),
+            "zeta_B": -(10 ** rng.uniform(-1.3, 0.3)),
+            "zeta_H": -(10 ** rng.uniform(-1.3, 0.3)),
+            "lambda_s": math.atan(rng.uniform(-3, 3)),
+        }
+        for _ in range(count)
+    ]
+
+
+def values(p: dict[str, Any], of: Any = NATIVE) -> Values:
+    return Values(tms, of, p)
+
+
+# The lateral dynamics of two assemblies of point masses
+
+
+def rigid(bodies: Sequence[Body]) -> tuple[Any, ...]:
+    """Mass, centre, and the moments and product of inertia about it of bodies that are fixed to one another."""
+    m = sum(b[0] for b in bodies)
+    x, z = (sum(b[0] * b[k] for b in bodies) / m for k in (1, 2))
+    Ixx = sum(b[0] * (b[2] - z) ** 2 for b in bodies)
+    Izz = sum(b[0] * (b[1] - x) ** 2 for b in bodies)
+    Ixz = -sum(b[0] * (b[1] - x) * (b[2] - z) for b in bodies)
+    return m, x, z, Ixx, Ixz, Izz
+
+
+def meijaard(
+    rear: Sequence[Body], front: Sequence[Body], w: Any, v: Any, g: Any, sine: Any, cosine: Any
+) -> tuple[list[list[Any]], list[list[Any]], list[list[Any]]]:
+    """M, v C1 and g K0 + v² K2 of lean and steer, without trail and without spinning wheels (c = 0, S = 0)."""
+    mB, xB, zB, Bxx, Bxz, _ = rigid(rear)
+    mA, xA, zA, Axx, Axz, Azz = rigid(front)
+    mT = mB + mA
+    zT = (mB * zB + mA * zA) / mT
+    Txx = Bxx + mB * zB**2 + Axx + mA * zA**2
+    Txz = Bxz - mB * xB * zB + Axz - mA * xA * zA
+    u = (xA - w) * cosine - zA * sine
+    A_ll = mA * u**2 + Axx * sine**2 + 2 * Axz * sine * cosine + Azz * cosine**2
+    A_lx = -mA * u * zA + Axx * sine + Axz * cosine
+    A_lz = mA * u * xA + Axz * sine + Azz * cosine
+    M = [[Txx, A_lx], [A_lx, A_ll]]
+    C = [[0 * v, v * Txz * cosine / w], [0 * v, v * A_lz * cosine / w]]
+    K = [
+        [g * mT * zT, -g * mA * u - v**2 * mT * zT * cosine / w],
+        [-g * mA * u, -g * mA * u * sine + v**2 * mA * u * cosine / w],
+    ]
+    return M, C, K
+
+
+def flat(system: Iterable[Any]) -> list[Any]:
+    return [entry for matrix in system for row in matrix for entry in row]
+
+
+NAMES = "mu chi_B chi_H zeta_B zeta_H Fr sine cosine m"
+mu, chi_B, chi_H, zeta_B, zeta_H, Fr, sine, cosine, m = sympy.symbols(NAMES, positive=True)
+B, H = (sympy.Integer(1), chi_B, zeta_B), (mu, chi_H, zeta_H)
+SCALES = (1, Fr, 1, sine, cosine)  # w = 1, g = 1, v = Fr
+
+
+def test_the_equations_used_here_are_those_of_the_model() -> None:
+    """Two independent sources, one system: so that what follows is about the model."""
+    paper = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, sine, cosine)
+    general = meijaard([B], [H], *SCALES)
+    assert [sympy.expand(a - b) for a, b in zip(flat(paper), flat(general), strict=True)] == [0] * 12
+
+
+@pytest.mark.parametrize("contact", [0, 1])
+@pytest.mark.parametrize("carrier", ["rear", "front"])
+def test_ballast_at_a_contact_has_no_part_in_the_lateral_motion(contact: int, carrier: str) -> None:
+    """For any mass: its rigid body has another centre and inertia, and M, V and P stay as they are.
+
+    On the rear frame at either contact, and on the front assembly at the front contact, which the steer axis meets.
+    """
+    ballast = (m, sympy.Integer(contact), sympy.Integer(0))
+    rear, front = ([B, ballast], [H]) if carrier == "rear" else ([B], [H, ballast])
+    change = [
+        sympy.cancel(a - b)
+        for a, b in zip(flat(meijaard(rear, front, *SCALES)), flat(meijaard([B], [H], *SCALES)), strict=True)
+    ]
+    if (contact, carrier) == (0, "front"):
+        assert any(change)  # the rear contact is no place on the front assembly: it lies off the steer axis
+    else:
+        assert change == [0] * 12
+
+
+def test_ballast_above_the_contact_does_change_the_motion() -> None:
+    raised = meijaard([B, (m, 0, sympy.Rational(-1, 10))], [H], *SCALES)
+    assert any(sympy.cancel(a - b) for a, b in zip(flat(raised), flat(meijaard([B], [H], *SCALES)), strict=True))
+
+
+# Statics
+
+
+def loads(bodies: Iterable[Body], w: Any) -> tuple[Any, Any]:
+    """Vertical forces at front and rear, per g, that balance force and moment; moments about a point off both."""
+    bodies, p = list(bodies), Fraction(-7, 3)
+    force, moment = sum(b[0] for b in bodies), sum(b[0] * (b[1] - p) for b in bodies)
+    determinant = (0 - p) - (w - p)
+    return ((0 - p) * force - moment) / determinant, (moment - (w - p) * force) / determinant
+
+
+def exact(p: dict[str, float]) -> dict[str, Fraction]:
+    return {name: Fraction(value) for name, value in p.items()}
+
+
+def test_loads_balance_forces_and_moments() -> None:
+    for p in designs(60, 1):
+        q, got = exact(p), values(p)
+        bodies = [(Fraction(1), q["chi_B"], q["zeta_B"]), (q["mu"], q["chi_H"], q["zeta_H"])]
+        front, rear = loads(bodies, Fraction(1))
+        size = float(abs(1 - q["chi_B"]) + abs(q["chi_B"]) + q["mu"] * (abs(1 - q["chi_H"]) + abs(q["chi_H"])))
+        bound = 4 * EPS * (size + float(1 + q["mu"])) / float(1 + q["mu"])
+        assert abs(got["load_front"] - float(front / (1 + q["mu"]))) <= bound
+        assert abs(got["load_rear"] - float(rear / (1 + q["mu"]))) <= bound
+        assert got["load_front"] + got["load_rear"] == pytest.approx(1, abs=2 * bound)
+
+
+def test_ballast_is_the_mass_that_takes_the_load_of_the_lifted_wheel_to_0() -> None:
+    """With it the moment balance has no load at the lifted wheel, with more a positive one; else none is needed."""
+    seen = set()
+    for p in designs(80, 2):
+        q, got = exact(p), values(p)
+        bodies = [(Fraction(1), q["chi_B"], 0), (q["mu"], q["chi_H"], 0)]
+        front, rear = loads(bodies, Fraction(1))
+        case = "front" if front < 0 else "rear" if rear < 0 else ""
+        seen.add(case)
+        for end, x in (("front", 1), ("rear", 0)):
+            ballast = got[f"ballast_{end}"]
+            if end != case:
+                assert ballast == 0
+                continue
+            assert ballast > 0
+            held = dict(zip(("front", "rear"), loads([*bodies, (Fraction(float(ballast)), x, 0)], 1), strict=True))
+            assert abs(float(held[end])) <= 8 * EPS * float(1 + q["mu"]) * (1 + abs(p["chi_B"]) + abs(p["chi_H"]))
+    assert seen == {"front", "rear", ""}
+
+
+def test_si_loads_are_in_newtons_and_ballast_in_kilograms() -> None:
+    """The benchmark: 10 kg at 1.2 m and 1 kg at 1.02 m over a wheelbase of 1 m, by hand."""
+    p = tmsopt.load("problems/benchmark.toml").fixed
+    got = values({name: p[name] for name in SI.names}, SI)
+    assert got["N_F"] == pytest.approx(9.81 * (10 * 1.2 + 1.02), rel=1e-14)
+    assert got["N_R"] == pytest.approx(-9.81 * (10 * 0.2 + 0.02), rel=1e-13)
+    assert got["N_F"] + got["N_R"] == pytest.approx(9.81 * 11, rel=1e-14)
+    assert got["m_ballast_rear"] == pytest.approx(2.02, rel=1e-13)
+    assert got["m_ballast_front"] == 0
+    larger = {n: x * 3 if n in ("w", "x_B", "z_B", "x_H", "z_H") else x for n, x in p.items()}
+    assert values(larger, SI)["N_R"] == pytest.approx(float(got["N_R"]), rel=1e-13)  # similar bicycles, equal loads
+
+
+def test_the_papers_optimum_with_a_heavy_front_pitches_over() -> None:
+    """mu = 20.84626701, chi_B = 1.19, chi_H = 1.02: moments 0.19 and 0.02 mu about the front contact."""
+    p = {
+        "Fr": 2.337214017, "mu": 20.84626701, "chi_B": 1.19, "chi_H": 1.02, "zeta_B": -0.4, "zeta_H": -0.2,
+        "lambda_s": 0.8514403685,
+    }  # fmt: skip
+    got = values(p)
+    over = 0.19 + 0.02 * 20.84626701
+    assert got["ballast_rear"] == pytest.approx(over, rel=1e-13)
+    assert got["load_rear"] == pytest.approx(-over / 21.84626701, rel=1e-13)
+    assert got["load_front"] == got["chi_T"] > 1
+
+
+# The mass matrix
+
+
+def test_mass_margin_is_the_smallest_eigenvalue_of_the_mass_matrix() -> None:
+    """At 60 digits, from the double ν_H; tan λ_s and ν_H cancel as they do in nu_H, which is tested on its own."""
+    for p in designs(100, 3):
+        got = values(p)
+        with mp.workdps(60):
+            nu, mu_, B_, H_ = (mp.mpf(float(x)) for x in (got["nu_H"], p["mu"], p["zeta_B"], p["zeta_H"]))
+            M = mp.matrix([[mu_ * H_**2 + B_**2, -mu_ * H_ * nu], [-mu_ * H_ * nu, mu_ * nu**2]])
+            least = min(mp.eigsy(M, eigvals_only=True))
+        lengths = abs(p["chi_H"] - 1), abs(p["zeta_H"] * math.tan(p["lambda_s"])), abs(float(got["nu_H"]))
+        assert got["mass_margin"] == pytest.approx(float(least), rel=50 * EPS * sum(lengths) / lengths[2])
+
+
+def test_mass_margin_vanishes_like_the_square_of_nu_H() -> None:
+    """Limit of margin/ν_H²: det M / (tr M ν_H²) = μ ζ_B²/(μ ζ_H² + ζ_B²), with relative error of the order of ν_H²."""
+    for nu in (1e-3, 1e-6, 1e-9, 1e-12):
+        p = {"Fr": 1, "mu": 0.5, "chi_B": 1.2, "chi_H": 1.0, "zeta_B": -0.5, "zeta_H": -0.25}
+        tilt = math.asin(nu / 0.25)  # ν_H = 0.25 sin λ_s
+        limit = 0.5 * 0.25 / (0.5 * 0.0625 + 0.25)
+        assert values({**p, "lambda_s": tilt})["mass_margin"] / nu**2 == pytest.approx(limit, rel=10 * nu**2 + 1e-14)
+
+
+@pytest.mark.parametrize("on", [{"mu": 0.0}, {"zeta_B": 0.0}, {"chi_H": 1.0, "lambda_s": 0.0}, {"mu": 0, "zeta_B": 0}])
+def test_mass_margin_of_a_singular_mass_matrix_is_0(on: dict[str, float]) -> None:
+    p = {"Fr": 1, "mu": 0.5, "chi_B": 1.2, "chi_H": 1.1, "zeta_B": -0.5, "zeta_H": -0.25, "lambda_s": 0.3, **on}
+    assert values(p)["mass_margin"] == 0
+
+
+NEW = ("load_front", "load_rear", "ballast_rear", "ballast_front", "mass_margin")
+NEW_SI = (*NEW, "N_F", "N_R", "m_ballast_rear", "m_ballast_front")
+
+
+def test_every_arithmetic_evaluates_the_same_quantities() -> None:
+    """Floats, arrays, CasADi and balls of 200 bits, which know the cancellation in ν_H and in small loads exactly."""
+    rows = [to_si(p, w=0.9, m_B=12.0) for p in designs(30, 4)]
+    x = ca.SX.sym("x", len(SI.names))
+    symbolic = values(dict(zip(SI.names, ca.vertsplit(x), strict=True)), SI)
+    function = ca.Function("f", [x], [ca.vertcat(*(symbolic[n] for n in NEW_SI))])
+    columns = values({n: np.array([p[n] for p in rows]) for n in SI.names}, SI)
+    for k, p in enumerate(rows):
+        plain = np.array([float(values(p, SI)[n]) for n in NEW_SI])
+        np.testing.assert_allclose(plain, [columns[n][k] for n in NEW_SI], rtol=1e-12, atol=1e-15)
+        np.testing.assert_allclose(plain, np.array(function([p[n] for n in SI.names])).ravel(), rtol=1e-11, atol=1e-15)
+        with flint.ctx.workprec(200):
+            balls = values({n: flint.arb(v) for n, v in p.items()}, SI)
+            np.testing.assert_allclose(plain, [float(balls[n].mid()) for n in NEW_SI], rtol=1e-10, atol=1e-13)
+
+
+def test_positive_part_is_exact() -> None:
+    assert [positive_part(x) for x in (-2.5, 0.0, 1e-300, 0.1, Fraction(1, 3))] == [0, 0, 1e-300, 0.1, Fraction(1, 3)]
+    assert positive_part(flint.arb(-3)) == 0
+    assert float(ca.Function("f", [x := ca.SX.sym("x")], [positive_part(x)])(0.3)) == 0.3
+
+
+# In problems
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [
+        {"rear": "N_R >= 20", "front": "N_F >= 10", "offset": "u_H >= 0.015", "inertia": "mass_margin >= 1e-4"},
+        {"ballast": "m_ballast_rear <= 2", "offset": "u_H >= 0.015", "inertia": "mass_margin >= 1e-4"},
+        {"share": "load_rear >= 0.1", "other": "load_front >= 0.3", "offset": "u_H >= 0.015"},
+    ],
+)
+def test_a_builders_limits_hold_by_statics(tmp_path: Any, limits: dict[str, str]) -> None:
+    """Each limit on loads, ballast or inertia is recomputed from the SI parameters of the optimum, to 1e-7."""
+    file = tmp_path / "robot.toml"
+    file.write_text(ROBOT % "\n".join(f'{name} = "{text}"' for name, text in limits.items()))
+    design = tmsopt.solve(tmsopt.load(str(file)))
+    p = design.parameters
+    assert p["w"] == pytest.approx(0.8, rel=1e-15)
+    front, rear = (9.81 * float(x) for x in loads([(p["m_B"], p["x_B"], 0), (p["m_H"], p["x_H"], 0)], p["w"]))
+    M, _, _ = meijaard(
+        [(p["m_B"], p["x_B"], p["z_B"])], [(p["m_H"], p["x_H"], p["z_H"])], p["w"], p["v"], 9.81,
+        math.sin(p["lambda_s"]), math.cos(p["lambda_s"]),
+    )  # fmt: skip
+    margin = np.linalg.eigvalsh(np.array(M))[0] / (p["m_B"] * p["w"] ** 2)
+    weight = front + rear
+    slack = {
+        "N_R >= 20": rear - 20,
+        "N_F >= 10": front - 10,
+        "u_H >= 0.015": (p["x_H"] - p["w"]) * math.cos(p["lambda_s"]) - p["z_H"] * math.sin(p["lambda_s"]) - 0.015,
+        "mass_margin >= 1e-4": margin - 1e-4,
+        "m_ballast_rear <= 2": 2 - max(0.0, -rear) / 9.81,
+        "load_rear >= 0.1": rear / weight - 0.1,
+        "load_front >= 0.3": front / weight - 0.3,
+    }
+    assert all(slack[text] >= -1e-7 for text in limits.values())
+    binding = {name for name, text in limits.items() if abs(slack[text]) <= 1e-7}
+    assert {name for name in design.active if "." not in name} <= binding
+    assert binding  # the optimum leans on one of them, so that the test means something
+
+
+# Units and times
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "expected"),
+    [
+        (0.4, "m", (400.0, "mm")), (1.0, "m/s", (3.6, "km/h")), (math.pi / 2, "rad", (90.0, "deg")),
+        (12.0, "kg", (12.0, "kg")), (9.81, "m/s^2", (9.81, "m/s^2")), (-35.0, "N", (-35.0, "N")),
+    ],
+)  # fmt: skip
+def test_readings_by_the_definitions_of_the_units(value: float, unit: str, expected: tuple[float, str]) -> None:
+    assert reading(value, unit) == expected
+
+
+@pytest.mark.parametrize(("name", "unit"), [("km/h", "m/s"), ("mm", "m"), ("deg", "rad")])
+def test_what_was_written_with_a_unit_reads_the_same(name: str, unit: str) -> None:
+    """Exactly, although SI lies in between: tenths from 0.1 to 100."""
+    for tenths in range(1, 1001):
+        assert reading(with_unit(f"{tenths / 10} {name}", unit), unit) == (tenths / 10, name)
+
+
+def test_a_reading_of_nothing_is_nothing() -> None:
+    assert math.isnan(reading(math.nan, "m")[0])
+
+
+def test_times_and_frequencies() -> None:
+    """e^(α rate t) is 1/e at 1/(−α rate), e at 1/(α rate); a pair a ± ib turns b rate/2π times a second."""
+    assert decay_time(-2.0, 0.5) == 1.0
+    assert growth_time(2.0, 0.25) == 2.0
+    for none in (decay_time(2.0, 1.0), growth_time(-2.0, 1.0), decay_time(0.0, 1.0), growth_time(0.0, 1.0)):
+        assert math.isnan(none)
+    assert math.isnan(decay_time(math.nan, 1.0))
+    roots = (Root(-1, 2 * math.pi, 2), Root(-1, -2 * math.pi, 2), Root(-3, 0.0))
+    assert frequencies(roots, 3.0) == (3.0,)
+    assert frequencies((Root(-1, 0.0, 4),), 3.0) == ()
+
+
+def test_si_of_the_benchmark_is_the_motion_in_seconds() -> None:
+    """Eigenvalues of the dimensional equations in m, kg and s; simple and well apart, so doubles give 1e-10."""
+    design = tmsopt.solve(tmsopt.load("problems/benchmark.toml"))
+    p = design.parameters
+    M, C, K = map(
+        np.array,
+        meijaard(
+            [(p["m_B"], p["x_B"], p["z_B"])], [(p["m_H"], p["x_H"], p["z_H"])], p["w"], p["v"], p["g"],
+            math.sin(p["lambda_s"]), math.cos(p["lambda_s"]),
+        ),
+    )  # fmt: skip
+    inverse = np.linalg.inv(M)
+    z = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ K, -inverse @ C]]))
+    si = design.to_json()["si"]
+    assert si["decay_time_s"] == pytest.approx(-1 / z.real.max(), rel=1e-10)
+    assert si["growth_time_s"] is None
+    assert si["frequencies_Hz"] == pytest.approx([z.imag.max() / (2 * math.pi)], rel=1e-10)
+    assert (si["v_kmh"], si["lambda_s_deg"], si["x_B_mm"], si["z_H_mm"]) == (14.4, 5.0, 1200.0, -200.0)
+    assert si["v_c_kmh"] == pytest.approx(3.6 * 2.8410083233664, rel=1e-13)
+    assert (si["N_F_N"], si["N_R_N"]) == pytest.approx((127.7262, -19.8162), rel=1e-13)
+    assert si["m_ballast_rear_kg"] == pytest.approx(2.02, rel=1e-13)
+
+
+def test_si_of_an_unstable_bicycle_has_a_growth_time() -> None:
+    """The benchmark at 2 m/s, below v_c = 2.841 m/s; the roots at 60 digits."""
+    fixed = {**tmsopt.load("problems/benchmark.toml").fixed, "v": 2.0}
+    design = tmsopt.solve(tmsopt.Problem(tms, fixed=fixed))
+    z = max(roots_60(polynomial_60(**design.dimensionless)), key=lambda r: (r.real, r.imag))
+    si = design.to_json()["si"]
+    assert si["decay_time_s"] is None
+    assert si["growth_time_s"] == pytest.approx(1 / (float(z.real) * math.sqrt(9.81)), rel=1e-9)
+    assert si["frequencies_Hz"][0] == pytest.approx(float(z.imag) * math.sqrt(9.81) / (2 * math.pi), rel=1e-9)
+
+
+def test_a_dimensionless_problem_has_no_si() -> None:
+    """Its lengths, masses and seconds are not known."""
+    design = tmsopt.solve(tmsopt.Problem(tms, fixed=designs(1, 5)[0]))
+    assert design.si == {}
+    assert "si" not in design.to_json()
+    assert NATIVE.rate is None

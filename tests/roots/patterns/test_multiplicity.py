@@ -1,0 +1,319 @@
+"""Multiplicity structures of any degree up to 12, against roots that the polynomial was made from.
+
+Polynomials are products of rational factors in exact arithmetic, rounded once to doubles; nothing is judged by
+recomputed roots. Perturbations are made at a known distance, to first order: across the tangent space of the set of
+polynomials with the structure, spanned by exact derivatives, in units of the exact terms of each coefficient.
+"""
+
+from collections.abc import Sequence
+from fractions import Fraction as F
+from types import SimpleNamespace
+
+import casadi as ca
+import flint
+import numpy as np
+import pytest
+import sympy
+from mpmath import mp
+
+import tmsopt
+from tmsopt.arithmetic import exact
+from tmsopt.models import from_matrices
+from tmsopt.roots import (
+    backward_error,
+    discriminant,
+    exact_abscissa,
+    is_stable,
+    pattern_distance,
+    product,
+    roots,
+    structure,
+)
+from tmsopt.roots.patterns import nearest, nearest_double
+
+Item = tuple[F, F, int]
+"""Real part, imaginary part (0 or more) and multiplicity of a real root or a pair."""
+
+WORDS = ("", "pair", "two pairs", "three pairs", "four pairs", "five pairs", "six pairs")
+
+
+def polynomial(items: Sequence[Item]) -> list[F]:
+    factors = [f for re, im, m in items for f in [[F(1), -2 * re, re**2 + im**2] if im else [F(1), -re]] * m]
+    return product([F(1)], *factors)
+
+
+def doubles(coefficients: Sequence[F], unit: float = 1.0) -> np.ndarray:
+    return np.array([float(c) for c in coefficients]) * unit ** np.arange(len(coefficients))
+
+
+def named(items: Sequence[Item]) -> str:
+    """What stands on the rightmost line: higher multiplicity first, then pairs, then a simple real root."""
+    right = max(re for re, _, _ in items)
+    line = [(m, im == 0) for re, im, m in items if re == right]
+    parts = [("EP" if real else "CEP") + str(m) for m, real in sorted(line, reverse=True) if m > 1]
+    parts += [WORDS[sum(m == 1 and not real for m, real in line)]]
+    return "+".join(p for p in [*parts, "real" if (1, True) in line else ""] if p)
+
+
+def every_root(items: Sequence[Item]) -> list[tuple[complex, int]]:
+    return [(complex(re, w), m) for re, im, m in items for w in ({float(im), -float(im)})]
+
+
+def assert_same(found: Sequence[object], items: Sequence[Item], unit: float, within: float) -> None:
+    left = every_root(items)
+    assert len(found) == len(left)
+    for root in found:
+        z, m = min(left, key=lambda item: abs(item[0] - complex(root.re, root.im) / unit))
+        assert m == root.multiplicity
+        assert abs(z - complex(root.re, root.im) / unit) <= within
+        left.remove((z, m))
+
+
+def random_items(rng: np.random.Generator, degree: int) -> list[Item]:
+    """Roots in tenths, 0.4 or more apart, of any multiplicities that make up the degree, ties likely."""
+    items: list[Item] = []
+    while left := degree - sum(m * (2 if im else 1) for _, im, m in items):
+        im = F(int(rng.integers(4, 30)), 10) if rng.random() < 0.5 else F(0)
+        re = items[0][0] if items and rng.random() < 0.3 else F(int(rng.integers(-40, 11)), 10)
+        m = int(rng.integers(1, left + 1)) if rng.random() < 0.7 else 1
+        apart = all(max(abs(re - a), abs(im - b)) >= F(4, 10) for a, b, _ in items)
+        if apart and m * (2 if im else 1) <= left:
+            items.append((re, im, m))
+    return items
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 5, 6, 7, 8])
+def test_every_structure_is_found_in_any_unit_of_time(degree: int) -> None:
+    rng = np.random.default_rng(degree)
+    for _ in range(15):
+        items = random_items(rng, degree)
+        unit = 10.0 ** rng.integers(-6, 7)
+        found = structure(-0.3 * doubles(polynomial(items), unit), 1e-11)
+        assert found.name == named(items), items
+        assert found.distance <= 1e-14
+        # the factors of a structure 0.4 apart lose 6 digits at most: 1e-9 leaves some
+        assert_same(found.roots, items, unit, 1e-9)
+
+
+LARGE = [
+    [(F(-13, 10), F(0), 12)],
+    [(F(-13, 10), F(7, 10), 6)],
+    [(F(-1), F(0), 4), (F(-2), F(0), 4), (F(-4), F(0), 4)],
+    [(F(-1), F(0), 6), (F(-1), F(2), 3)],
+    [(F(-1), F(1), 2), (F(-1), F(2), 2), (F(-1), F(3), 1), (F(-1), F(0), 2)],
+    [(F(-1), F(k), 1) for k in range(1, 7)],
+    [(F(-k), F(0), 2) for k in (1, 2, 4, 8, 16, 32)],
+    [(F(0), F(0), 7), (F(-1), F(0), 5)],
+    [(F(-1), F(0), 3), (F(-3), F(1), 4), (F(-5), F(0), 1)],
+    [(F(-1, 100), F(0), 3), (F(-1), F(1), 2), (F(-100), F(0), 4), (F(-1000), F(0), 1)],
+]
+
+
+@pytest.mark.parametrize("items", LARGE)
+def test_degree_12_and_roots_of_very_different_size(items: list[Item]) -> None:
+    for unit in (1.0, 3.7e-5):
+        found = structure(doubles(polynomial(items), unit), 1e-11)
+        assert found.name == named(items)
+        assert_same(found.roots, items, unit, 1e-7 * max(abs(z) for z, _ in every_root(items)))
+
+
+def test_roots_that_are_multiple_left_of_the_line_are_counted_and_not_named() -> None:
+    found = structure(doubles(polynomial([(F(-1), F(0), 1), (F(-3), F(1), 2), (F(-5), F(0), 3)])), 1e-11)
+    assert found.name == "real"
+    assert sorted(r.multiplicity for r in found.roots) == [1, 2, 2, 3]
+
+
+def test_exact_ones_come_before_those_that_pass_for_a_higher_multiplicity() -> None:
+    """Two triple roots 0.01 apart are within 1e-6 of a 5-fold and a simple one, which has as many conditions."""
+    items = [(F(-1), F(0), 3), (F(-101, 100), F(0), 3)]
+    found = structure(doubles(polynomial(items)), 1e-6)
+    assert (found.name, found.distance <= 1e-14) == ("EP3", True)
+    assert [r.multiplicity for r in found.roots] == [3, 3]
+
+
+# Tolerance
+
+
+def across(items: Sequence[Item], rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """The terms of each coefficient, and a relative change of length 1 across the set with the structure."""
+    p = polynomial(items)
+    size = np.poly([-abs(z) for z, m in every_root(items) for _ in range(m)])
+    columns = []
+    for k, (re, im, m) in enumerate(items):
+        lower = [*items[:k], *([(re, im, m - 1)] if m > 1 else []), *items[k + 1 :]]
+        for power in ([F(1), F(0)], [F(1)]) if im else ([F(1)],):
+            column = product(polynomial(lower), power)
+            columns.append([0.0] * (len(p) - len(column)) + [float(c) for c in column])
+    tangent = np.array(columns).T / size[:, None]
+    basis, _ = np.linalg.qr(tangent[1:])
+    change = rng.choice([-1, 1], len(p) - 1) * rng.uniform(0.5, 1, len(p) - 1)
+    change = change - basis @ (basis.T @ change)
+    return size, np.concatenate([[0.0], change / np.linalg.norm(change)])
+
+
+STRUCTURES = [
+    [(F(-1), F(0), 6)],
+    [(F(-1), F(0), 3), (F(-3), F(0), 1), (F(-4), F(2), 1)],
+    [(F(-1), F(0), 2), (F(-3), F(0), 1), (F(-4), F(2), 1), (F(-6), F(0), 1)],
+    [(F(-1), F(1), 2), (F(-3), F(0), 2)],
+    [(F(-1), F(1), 3), (F(-3), F(0), 1)],
+    [(F(-2), F(0), 5), (F(-5), F(0), 3)],
+    [(F(-2), F(0), 12)],
+]
+
+
+@pytest.mark.parametrize("tolerance", [1e-11, 1e-8])
+@pytest.mark.parametrize("items", STRUCTURES)
+def test_a_structure_is_named_within_the_tolerance_and_not_beyond(items: list[Item], tolerance: float) -> None:
+    """By a percent at 1e-8, where rounding is nothing and the second order less than that; at 1e-11 by a tenth.
+
+    The terms are those of the polynomial's own roots: next to a 12-fold one these scatter by a fifth, and the sum over
+    12 of them changes the terms by a tenth.
+    """
+    rng = np.random.default_rng(3)
+    slack = 0.2 if items[0][2] == 12 else 0.01 if tolerance == 1e-8 else 0.1
+    for _ in range(2):
+        size, change = across(items, rng)
+        within = structure(doubles(polynomial(items)) + (1 - slack) * tolerance * size * change, tolerance)
+        assert within.name == named(items)
+        assert sorted(r.multiplicity for r in within.roots) == sorted(m for _, m in every_root(items))
+        assert within.distance == pytest.approx((1 - slack) * tolerance, rel=slack)
+        beyond = structure(doubles(polynomial(items)) + (1 + slack) * tolerance * size * change, tolerance)
+        assert sorted(r.multiplicity for r in beyond.roots) != sorted(m for _, m in every_root(items))
+
+
+@pytest.mark.parametrize("items", [*STRUCTURES, [(F(-1), F(1), 1), (F(-1), F(2), 1), (F(-1), F(0), 1)]])
+def test_zero_tolerance_is_undecided_at_a_structure(items: list[Item]) -> None:
+    assert structure(doubles(polynomial(items)), 0.0).name == "undecided"
+
+
+def test_zero_tolerance_is_decided_away_from_every_structure() -> None:
+    assert structure(doubles(polynomial([(F(-1), F(1), 1), (F(-2), F(0), 1), (F(-4), F(3), 1)])), 0.0).name == "pair"
+
+
+@pytest.mark.parametrize("k", [2, 3, 5])
+def test_distance_to_a_pattern_of_any_degree(k: int) -> None:
+    """A k-fold root and a free factor of degree 6 in all, against the distance the polynomial was made at."""
+    items = [(F(-1), F(0), k), *((F(-3 - j), F(0), 1) for j in range(6 - k))]
+    pattern = SimpleNamespace(
+        name=f"EP{k}",
+        degree=6,
+        unknowns=tuple("u" * (7 - k)),
+        factors=lambda u: [[1, -u[0]]] * k + [[1, *u[1:]]],
+        monic=lambda u: product(*[[1, -u[0]]] * k, [1, *u[1:]]),
+        nonnegative=lambda u: [],
+        guesses=lambda z: [[-1.001, *np.poly([-3.0 - j for j in range(6 - k)])[1:]]],
+    )
+    size, change = across(items, np.random.default_rng(k))
+    assert pattern_distance(pattern, doubles(polynomial(items))) <= 1e-14
+    made = pattern_distance(pattern, doubles(polynomial(items)) + 1e-7 * size * change)
+    # the terms are those of the perturbed roots, which scatter by (1e-7)^(1/k)
+    assert made == pytest.approx(1e-7, rel=0.1 * 1e-7 ** (1 / k) * k)
+    assert pattern_distance(pattern, [1, 4, 6, 4, 1]) == np.inf
+
+
+# The nearest polynomial in ball arithmetic
+
+
+@pytest.mark.parametrize("items", [i for i in LARGE if named(i) != "real"])
+def test_certified_roots_of_an_exact_structure_are_the_roots_it_was_made_from(items: list[Item]) -> None:
+    """The nearest polynomial with the structure is the polynomial itself, whose coefficients are exact fractions."""
+    p = polynomial(items)
+    shown = structure(doubles(p), 1e-11)
+    with flint.ctx.workprec(424):
+        found = nearest(shown.name, [flint.fmpq(c.numerator, c.denominator) for c in p], shown.roots)
+        assert found is not None
+        # a ball about 0 has no nearest double
+        rounded = {(complex(nearest_double(z.re) or 0, nearest_double(z.im)), z.multiplicity) for z in found}
+    assert rounded == set(every_root(items))
+
+
+def test_certified_root_of_the_nearest_sixfold_polynomial() -> None:
+    """One unknown r, by the stationarity of the weighted squares at 60 digits with weights of the solution itself."""
+    size, change = across([(F(-13, 10), F(0), 6)], np.random.default_rng(0))
+    c = doubles(polynomial([(F(-13, 10), F(0), 6)])) + 1e-12 * size * change
+    with mp.workdps(60):
+
+        def stationary(r: object) -> object:
+            off = [mp.binomial(6, k) * (-r) ** k - mp.mpf(float(c[k])) for k in range(1, 7)]
+            slope = [-k * mp.binomial(6, k) * (-r) ** (k - 1) for k in range(1, 7)]
+            weight = [mp.binomial(6, k) * abs(r) ** k for k in range(1, 7)]
+            return sum(a * b / w**2 for a, b, w in zip(off, slope, weight, strict=True))
+
+        expected = float(mp.findroot(stationary, mp.mpf("-1.3")))
+    shown = structure(c, 1e-11)
+    with flint.ctx.workprec(212):
+        found = nearest(shown.name, [exact(float(x)) for x in c], shown.roots)
+        assert found is not None
+        assert (nearest_double(found[0].re), found[0].multiplicity) == (expected, 6)
+
+
+# Roots, stability and discriminant beyond degree 4
+
+
+def test_roots_are_jointly_right_up_to_degree_12() -> None:
+    """Each coefficient within 1e-13 of its terms, next to multiple roots and for sizes from 1e-3 to 1e3."""
+    rng = np.random.default_rng(5)
+    for degree in range(5, 13):
+        for spread in (1, F(1, 1000), F(1000)):
+            for _ in range(4):
+                items = [
+                    (re * spread if k % 2 else re, im, m) for k, (re, im, m) in enumerate(random_items(rng, degree))
+                ]
+                c = doubles(polynomial(items))
+                assert backward_error(c, roots(c)) <= 1e-13, items
+
+
+def test_stability_up_to_degree_12() -> None:
+    """Against isolated roots of the same doubles; arrays of polynomials at once."""
+    rng = np.random.default_rng(6)
+    for degree in range(5, 13):
+        rows = []
+        for _ in range(20):
+            m = degree // 2
+            z = rng.uniform(-1, 0.02, m) + 1j * rng.uniform(0, 2, m)
+            c = np.poly([*z, *z.conj(), *([rng.uniform(-1, 0.02)] if degree % 2 else [])]).real
+            rows.append(rng.choice([-1, 1]) * c * (10.0 ** rng.integers(-4, 5)) ** np.arange(degree + 1))
+        assert list(is_stable(rows)) == [exact_abscissa(c) < 0 for c in rows]
+
+
+def test_roots_on_the_imaginary_axis_are_not_stable() -> None:
+    assert not is_stable(doubles(polynomial([(F(0), F(2), 1), (F(-1), F(0), 4)])))
+    assert not is_stable(doubles(polynomial([(F(0), F(0), 1), (F(-1), F(0), 5)])))
+    assert is_stable(doubles(polynomial([(F(-1), F(0), 12)])))
+
+
+def test_discriminant_of_any_degree() -> None:
+    """Against SymPy's resultant, exactly."""
+    rng = np.random.default_rng(7)
+    for degree in range(2, 10):
+        c = [int(x) for x in rng.integers(1, 9, degree + 1)]
+        expected = sympy.discriminant(sympy.Poly(c, sympy.Symbol("x")))
+        assert discriminant([F(x) for x in c]) == F(int(expected))
+    assert discriminant([F(x) for x in polynomial(LARGE[2])[:]]) == 0
+    with pytest.raises(ValueError, match="degree"):
+        discriminant([1, 2])
+
+
+# Solved and proved
+
+
+def test_three_pairs_on_one_line_are_proved() -> None:
+    """Three masses in a chain, dampers on two, the last spring free: three pairs at −1/2 for c = (2, 1), k1 = 1.
+
+    The trace of the damping matrix is twice the sum of the pairs' decay rates, so 3/2 is shared by three.
+    """
+    c1, c2, k1 = (ca.SX.sym(n) for n in ("c1", "c2", "k1"))
+    model = from_matrices(
+        [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+        [[c1, 0, 0], [0, c2, 0], [0, 0, 0]],
+        [[2, -1, 0], [-1, 2, -1], [0, -1, k1]],
+        name="chain",
+    )
+    free = {"c1": (0.0, 10.0), "c2": (0.0, 10.0), "k1": (1.0, 4.0)}
+    design = tmsopt.solve(tmsopt.Problem(model=model, free=free, minimize="abscissa"))
+    assert design.structure == "three pairs"
+    assert design.abscissa == pytest.approx(-sum(design.parameters[n] for n in ("c1", "c2")) / 6, rel=1e-14)
+    assert (tmsopt.prove(design).proved, tmsopt.prove(design).pattern) == (True, "three pairs")
+    assert tmsopt.prove(design).abscissa is not None
+    assert float(tmsopt.prove(design).abscissa) == pytest.approx(-0.5, abs=1e-14)

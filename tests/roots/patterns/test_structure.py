@@ -1,0 +1,338 @@
+"""The multiplicity structure against exact multiplicities, and distances against linear programming.
+
+Nothing is judged by recomputed roots: multiplicities come from FLINT's certified isolation of the exact
+coefficients, distances from a linear programme in the exact derivatives of the pattern.
+"""
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from functools import cache
+
+import numpy as np
+import pytest
+import sympy
+from helpers.oracles import abscissa_60, certified_roots, exact_multiplicities, roots_60
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mpmath import mp
+from scipy.optimize import linprog
+
+from tmsopt.roots import PATTERNS, exact_abscissa, exact_roots, pattern_distance, product, structure
+
+I2 = [1, 2, 2]  # −1 ± i
+EXAMPLES = {
+    "EP4": [[[1, 1]] * 4, [[1, 3]] * 4, [[1, -2]] * 4, [[1, 0]] * 4],
+    "EP3": [[[1, 1]] * 3 + [[1, 2]], [[1, -1]] * 3 + [[1, 5]], [[1, 0]] * 3 + [[1, 3]]],
+    "2EP2": [[[1, 1]] * 2 + [[1, 2]] * 2, [[1, -1]] * 2 + [[1, 4]] * 2, [[1, 0]] * 2 + [[1, 3]] * 2],
+    "CEP2": [[I2, I2], [[1, 0, 1]] * 2, [[1, -2, 10]] * 2],
+    "EP2": [
+        [[1, 1]] * 2 + [[1, 2], [1, 3]],
+        [[1, 1]] * 2 + [[1, 4, 5]],
+        [[1, -3]] * 2 + [[1, 0, 1]],
+        [[1, 0]] * 2 + [[1, 2], [1, 3]],
+        [[1, 0]] * 2 + [[1, 4, 5]],
+    ],
+    "EP2+pair": [[[1, 1]] * 2 + [I2], [[1, 0]] * 2 + [[1, 0, 4]], [[1, -2]] * 2 + [[1, -4, 13]]],
+    "pair+real": [[I2, [1, 1], [1, 2]], [[1, 0, 1], [1, 0], [1, 3]], [[1, -4, 5], [1, -2], [1, 7]]],
+    "two pairs": [[I2, [1, 2, 5]], [[1, 0, 1], [1, 0, 4]], [[1, -6, 10], [1, -6, 25]]],
+    "pair": [
+        [I2, [1, 2], [1, 3]],
+        [I2, [1, 4, 5]],
+        [I2, [1, 2], [1, 2]],  # a double root left of the rightmost line is not named
+        [[1, 0, 4], [1, 3], [1, 3]],
+    ],
+    "real": [
+        [[1, 1], [1, 2], [1, 3], [1, 4]],
+        [[1, 1], [1, 2], [1, 4, 5]],
+        [[1, 1], [1, 2], [1, 2], [1, 2]],  # EP3, EP2 and a pair left of it are not named
+        [[1, 1], [1, 2], [1, 3], [1, 3]],
+        [[1, -1], [1, 2], [1, 2], [1, 5]],
+        [[1, 0], [1, 1], [1, 2], [1, 3]],
+    ],
+}  # fmt: skip
+EVERY = [(name, factors) for name, examples in EXAMPLES.items() for factors in examples]
+
+
+def named_by(roots: Sequence[tuple[complex, int]]) -> str:
+    """The name that exact roots with multiplicities deserve: those on the rightmost line, or two double ones."""
+    doubles = [z for z, m in roots if m == 2]
+    if len(doubles) == 2:
+        return "CEP2" if doubles[0].imag else "2EP2"
+    right = max(z.real for z, _ in roots)
+    real = sum(m for z, m in roots if z.real == right and z.imag == 0)
+    pairs = sum(m for z, m in roots if z.real == right and z.imag > 0)
+    names = {
+        (4, 0): "EP4", (3, 0): "EP3", (2, 1): "EP2+pair", (2, 0): "EP2", (1, 1): "pair+real", (0, 2): "two pairs",
+        (0, 1): "pair", (1, 0): "real",
+    }  # fmt: skip
+    return names[real, pairs]
+
+
+def scaled(coefficients: Sequence[float], scale: float, leading: float) -> list[float]:
+    """In another unit of time, s → s/scale, with another leading coefficient."""
+    return [leading * c * scale**k for k, c in enumerate(coefficients)]
+
+
+@pytest.mark.parametrize(("name", "factors"), EVERY)
+def test_every_kind_is_named_in_any_unit_of_time(name: str, factors: list[list[int]]) -> None:
+    """Scaling rounds each coefficient by about 1e-16, far below the tolerance of 1e-12."""
+    for scale in (1.0, 1e-6, 7e-3, 3.7, 1e8):
+        for leading in (1.0, -0.017):
+            found = structure(scaled(product(*factors), scale, leading))
+            assert found.name == name, (scale, leading)
+            assert found.distance <= 1e-14
+            assert sum(root.multiplicity for root in found.roots) == 4
+
+
+@st.composite
+def integer_roots(draw: st.DrawFn) -> list[tuple[int, int]]:
+    """(re, im) of four integer roots, closed under conjugation, coincidences and shared lines likely."""
+    roots: list[tuple[int, int]] = []
+    while len(roots) < 4:
+        re, im = -draw(st.integers(-1, 4)), draw(st.integers(0, 3))
+        roots += [(re, im), (re, -im)] if im and len(roots) <= 2 else [(re, 0)]
+    return roots
+
+
+@settings(max_examples=120, deadline=None, derandomize=True)
+@given(integer_roots(), st.integers(-50, 50).filter(bool), st.integers(-20, 20))
+def test_random_integer_roots_are_named_by_their_exact_multiplicities(
+    roots: list[tuple[int, int]], leading: int, power: int
+) -> None:
+    pairs = [[1, -2 * re, re * re + im * im] for re, im in roots if im > 0]
+    coefficients = product([leading], *pairs, *([1, -re] for re, im in roots if not im))
+    exact = certified_roots(coefficients)
+    assert sorted(m for m, d in exact_multiplicities(coefficients) for _ in range(d)) == sorted(m for _, m in exact)
+    multiset = {z: roots.count(z) for z in roots}
+    assert sorted((round(float(z.real)), round(float(z.imag)), m) for z, m in exact) == sorted(
+        (*z, m) for z, m in multiset.items()
+    )
+    expected = named_by([(complex(*z), m) for z, m in multiset.items()])
+
+    unit = 2.0**power  # exact
+    found = structure(scaled([float(c) for c in coefficients], unit, 1.0))
+    assert found.name == expected
+    rightmost = max(re for re, _ in roots)
+    # the rightmost roots are simple or named, and a distance of 1 or more from the others: a few thousand roundings
+    assert found.abscissa / unit == pytest.approx(rightmost, abs=1e-12)
+    if max(multiset.values()) > 1 and expected not in ("real", "pair"):
+        # the multiplicities themselves, root by root
+        assert {(round(r.re / unit), round(r.im / unit)): r.multiplicity for r in found.roots} == multiset
+
+
+@pytest.mark.parametrize(("name", "factors"), EVERY)
+def test_roots_of_a_named_structure_have_exact_multiplicities(name: str, factors: list[list[int]]) -> None:
+    if name in ("real", "pair"):
+        return
+    coefficients = product(*factors)
+    exact = {(round(float(z.real)), round(float(z.imag))): m for z, m in certified_roots(coefficients)}
+    found = structure(coefficients).roots
+    assert {(round(r.re), round(r.im)): r.multiplicity for r in found} == exact
+    # well separated simple roots, and multiple ones by their factor: a few hundred roundings
+    assert all(abs(complex(r.re, r.im) - complex(round(r.re), round(r.im))) <= 1e-13 for r in found)
+
+
+# Tolerance
+
+
+Norm = Callable[[np.ndarray, np.ndarray], float]
+LINEAR = ["EP4", "EP3", "2EP2", "CEP2", "EP2"]
+UNKNOWNS = {"EP4": [-1], "EP3": [-1, -3], "2EP2": [5, 4], "CEP2": [2, 2], "EP2": [-1, 7, 12]}
+"""Unknowns of (s+1)⁴, (s+1)³(s+3), (s+1)²(s+4)², (s²+2s+2)² and (s+1)²(s+3)(s+4)."""
+
+
+@cache
+def relative_derivatives(name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Monic coefficients of a pattern and their derivatives, relative to the terms they are summed from."""
+    u = sympy.symbols(f"u0:{len(UNKNOWNS[name])}")
+    at = dict(zip(u, UNKNOWNS[name], strict=True))
+    monic = [sympy.expand(c) for c in PATTERNS[name].monic(u)]
+    p = np.array([float(sympy.sympify(c).subs(at)) for c in monic])
+    jacobian = np.array([[float(sympy.diff(c, x).subs(at)) for x in u] for c in monic])
+    with mp.workdps(40):
+        size = np.array([1.0])
+        for z, m in certified_roots([Fraction(c) for c in p]):
+            for _ in range(m):
+                size = np.convolve(size, [1.0, float(abs(z))])
+    return p, jacobian[1:] / size[1:, None]
+
+
+def chebyshev_distance(jacobian: np.ndarray, change: np.ndarray) -> float:
+    """min over u of max |change − jacobian u|: the smallest largest change that leads back to the pattern."""
+    rows, columns = jacobian.shape
+    cost = np.r_[np.zeros(columns), 1.0]
+    within = np.r_[np.c_[jacobian, -np.ones(rows)], np.c_[-jacobian, -np.ones(rows)]]
+    return float(linprog(cost, within, np.r_[change, -change], bounds=[(None, None)] * columns + [(0, None)]).fun)
+
+
+def euclidean_distance(jacobian: np.ndarray, change: np.ndarray) -> float:
+    """The smallest root sum of squares of relative changes that leads back to the pattern."""
+    return float(np.linalg.norm(change - jacobian @ np.linalg.lstsq(jacobian, change, rcond=None)[0]))
+
+
+def perturbed(name: str, seed: int, distance: float, norm: Norm = chebyshev_distance) -> list[float]:
+    """A quartic at a known relative distance from a pattern, to first order."""
+    p, jacobian = relative_derivatives(name)
+    size = np.abs(p[1:]) if name != "CEP2" else np.array([4, 6, 4, 1]) * 2.0 ** np.array([0.5, 1, 1.5, 2])
+    rng = np.random.default_rng(seed)
+    while True:
+        change = rng.choice([-1, 1], 4) * rng.uniform(0.5, 1, 4)
+        reach = norm(jacobian, change)
+        if reach > 0.05:
+            return [1.0, *(p[1:] + size * change * distance / reach)]
+
+
+@pytest.mark.parametrize("tolerance", [1e-12, 1e-10, 1e-8])
+@pytest.mark.parametrize("name", LINEAR)
+def test_ten_tolerances_away_it_is_not_named(name: str, tolerance: float) -> None:
+    for seed in range(4):
+        found = structure(perturbed(name, seed, 10 * tolerance), tolerance)
+        assert found.name not in (name, "undecided"), seed
+
+
+@pytest.mark.parametrize("tolerance", [1e-12, 1e-10, 1e-8])
+@pytest.mark.parametrize("name", LINEAR)
+def test_a_tenth_of_the_tolerance_away_it_is_named(name: str, tolerance: float) -> None:
+    for seed in range(4):
+        found = structure(perturbed(name, seed, tolerance / 10), tolerance)
+        assert found.name == name, seed
+        assert found.distance <= tolerance
+
+
+@pytest.mark.parametrize("name", LINEAR)
+def test_the_definition_of_the_tolerance(name: str) -> None:
+    """Named when a polynomial that has the structure lies within the tolerance, and not otherwise."""
+    inside = [structure(perturbed(name, seed, 0.99e-9, euclidean_distance), 1e-9).name for seed in range(8)]
+    outside = [structure(perturbed(name, seed, 1.01e-9, euclidean_distance), 1e-9).name for seed in range(8)]
+    assert inside == [name] * 8
+    assert name not in outside
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("name", LINEAR)
+def test_pattern_distance_is_the_least_root_sum_of_squares(name: str, seed: int) -> None:
+    """Against linear least squares in exact derivatives; 1e-3 is left for the second order of a change of 1e-6."""
+    for distance in (1e-6, 1e-8):
+        found = pattern_distance(PATTERNS[name], perturbed(name, seed, distance, euclidean_distance))
+        assert found == pytest.approx(distance, rel=1e-3)
+
+
+@pytest.mark.parametrize(("name", "factors"), [e for e in EVERY if e[0] not in ("real", "pair")])
+def test_zero_tolerance_cannot_be_decided_at_an_exceptional_point(name: str, factors: list[list[int]]) -> None:
+    assert structure(product(*factors), 0.0).name == "undecided"
+
+
+def test_zero_tolerance_is_decided_away_from_every_pattern() -> None:
+    for name in ("pair", "real"):
+        assert structure(product(*EXAMPLES[name][0]), 0.0).name == name
+        assert structure(product(*EXAMPLES[name][1]), 0.0).name == name
+
+
+def test_undecided_only_where_rounding_decides() -> None:
+    """With the tolerance at the very distance, either answer would be a guess; a percent beside it, none is."""
+    c = product([1, 1], [1, 1], [1, 3], [1, 4])
+    c[-1] += 1e-9
+    distance = pattern_distance(PATTERNS["EP2"], c)
+    assert 1e-13 < distance <= 1e-9 / 12  # a change of a4 alone takes it there, and smaller ones of all four do
+    assert structure(c, distance).name == "undecided"
+    assert structure(c, 1.01 * distance).name == "EP2"
+    assert structure(c, 0.99 * distance).name == "pair"
+
+
+def test_a_structure_near_the_origin_of_its_own_scale() -> None:
+    """A root of 1e-7 beside an EP3 at −1 is not part of it, and rightmost."""
+    assert structure(product([1, 1], [1, 1], [1, 1], [1, 1e-7])).name == "real"
+    assert structure(product([1, 1], [1, 1], [1, 1], [1, 1e7])).name == "EP3"
+
+
+@pytest.mark.parametrize(
+    "bad", [[1], [1] * 14, [0, 1, 2, 3, 4], [1, 2, 3, 4, np.nan], [1, 2, np.inf, 4, 5], 5.0, [[1, 4, 6, 4, 1]]]
+)
+def test_structure_refuses_what_is_no_polynomial_of_degree_1_to_12(bad: object) -> None:
+    with pytest.raises(ValueError, match="coefficient"):
+        structure(bad)
+    assert pattern_distance(PATTERNS["EP4"], bad) == np.inf
+
+
+# Patterns that can be located, and the distance to them
+
+
+@pytest.mark.parametrize(
+    ("name", "codimension"),
+    [("EP4", 3), ("EP3", 2), ("2EP2", 2), ("CEP2", 2), ("EP2", 1), ("weave", 1), ("capsize", 1), ("resonance", 3)],
+)
+def test_codimension_is_that_of_the_table(name: str, codimension: int) -> None:
+    """Section 1 of the design."""
+    assert PATTERNS[name].codimension == codimension
+    assert set(PATTERNS) == {"EP4", "EP3", "2EP2", "CEP2", "EP2", "weave", "capsize", "resonance"}
+
+
+MEMBERS = {
+    "EP4": [EXAMPLES["EP4"][0]],
+    "EP3": [*EXAMPLES["EP3"][:2], [[1, 1], [1, 4], [1, 4], [1, 4]]],
+    "2EP2": EXAMPLES["2EP2"],
+    "CEP2": EXAMPLES["CEP2"],
+    "EP2": [*EXAMPLES["EP2"][:3], [I2, [1, 3], [1, 3]]],
+    "weave": [[[1, 0, 2], [1, 3, 1]], [[1, 0, 2], [1, 1], [1, -3]], [[1, 0, 4], [1, 4, 5]]],
+    "capsize": [[[1, 0], [1, 3, 3, 1]], [[1, 0], [1, 2], [1, 2, 5]], [[1, 0], [1, -2], [1, 1], [1, 7]]],
+    "resonance": [[[1, 0, 1]] * 2, [[1, 0, 9]] * 2],
+}
+
+
+@pytest.mark.parametrize("name", MEMBERS)
+@pytest.mark.parametrize("leading", [1.0, -7.0])
+def test_members_of_a_pattern_are_at_distance_0(name: str, leading: float) -> None:
+    for factors in MEMBERS[name]:
+        assert pattern_distance(PATTERNS[name], [leading * c for c in product(*factors)]) <= 1e-14, factors
+
+
+def test_distance_to_capsize_is_the_whole_last_coefficient() -> None:
+    """A root at 0 takes a4 = 0, a relative change of 1."""
+    assert pattern_distance(PATTERNS["capsize"], product([1, 1], [1, 2], [1, 3], [1, 4])) == pytest.approx(1, rel=1e-12)
+
+
+def test_patterns_of_opposite_sign_are_told_apart() -> None:
+    """Two real double roots and a double pair are one factored form with b² − 4c of either sign."""
+    for name, other in (("2EP2", "CEP2"), ("CEP2", "2EP2")):
+        for factors in EXAMPLES[name]:
+            assert pattern_distance(PATTERNS[other], product(*factors)) > 1e-3
+
+
+# The exact route
+
+
+rationals = st.fractions(min_value=-9, max_value=9, max_denominator=10)
+factor = st.lists(rationals, min_size=2, max_size=3).filter(lambda f: f[0] != 0)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(st.lists(factor, min_size=1, max_size=2), st.sampled_from([1, 2, 3]))
+def test_exact_roots_agree_with_60_digits(factors: list[list[Fraction]], power: int) -> None:
+    """The roots of the factors by mpmath, which knows nothing of square-free parts; 1e-15 is one rounding."""
+    p = product(*factors, *[factors[0]] * (power - 1))
+    found = exact_roots(p)
+    assert [root.re for root in found] == sorted((root.re for root in found), reverse=True)
+    assert sorted(r.multiplicity for r in found) == sorted(m for m, d in exact_multiplicities(p) for _ in range(d))
+    with mp.workdps(60):
+        left = [complex(z) for k, f in enumerate(factors) for z in roots_60(f) * (power if k == 0 else 1)]
+    for root in found:
+        for _ in range(root.multiplicity):
+            nearest = min(left, key=lambda z: abs(z - complex(root.re, root.im)))
+            assert abs(nearest - complex(root.re, root.im)) <= 1e-15 * max(abs(nearest), 1)
+            left.remove(nearest)
+    assert not left
+
+
+def test_exact_abscissa_beside_an_exceptional_point() -> None:
+    """Doubles nearest to (s + r)⁴: their true roots scatter by ε^(1/4), and the exact route sees exactly that."""
+    for r in (0.3, 1.8803015465431967, 7.1):
+        c = [1.0, 4 * r, 6 * r**2, 4 * r**3, r**4]
+        assert exact_abscissa(c) == pytest.approx(float(abscissa_60(c)), rel=1e-15)
+        assert 1e-6 < exact_abscissa(c) + r < 1e-2
+
+
+def test_exact_roots_of_exactly_multiple_roots() -> None:
+    """(3s + 1)³ (s² + 2): a triple root at −1/3 and ±i√2."""
+    found = exact_roots(product(*[[3, 1]] * 3, [1, 0, 2]))
+    assert [(r.multiplicity, r.im) for r in found[:2]] == [(1, 2**0.5), (1, -(2**0.5))]
+    assert (found[2].re, found[2].im, found[2].multiplicity) == (-1 / 3, 0.0, 3)

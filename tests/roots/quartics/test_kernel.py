@@ -1,0 +1,485 @@
+"""Roots and classes of many quartics: jointly right on every kind of polynomial, the same in NumPy and by numba.
+
+Roots are judged by the coefficients that they rebuild, in the longest doubles of the machine; classes against
+`is_stable` and `real_roots`, which have tests of their own, and against exact arithmetic.
+"""
+
+import importlib.util
+from collections.abc import Callable
+from fractions import Fraction
+from itertools import pairwise
+from math import comb
+
+import numpy as np
+import pytest
+from helpers import curves
+from helpers.designs import wide_designs
+from helpers.oracles import routh_exact
+
+from tmsopt import laws
+from tmsopt.models import copo, tms
+from tmsopt.roots import (
+    CLASSES,
+    abscissa_and_damping,
+    backward_error,
+    exact_abscissa,
+    is_stable,
+    quartic_classes,
+    quartic_factors,
+    quartic_is_stable,
+    real_roots,
+)
+from tmsopt.roots.quartics import cube_root, hard_factors, largest_root
+
+JOINTLY_RIGHT = 1e-13
+"""The accuracy promised of rebuilt coefficients."""
+
+COUNT = 3000
+DOUBT = [1.0, 0.3927315003875155, 5.90069031723172, -3.420867305216691e-159, 3.61127e-319]
+"""Coefficients that are not normal numbers have few digits, and so has what any roots give back."""
+
+Maker = Callable[[np.random.Generator, int], np.ndarray]
+engines = pytest.mark.parametrize("compiled", [False, True], ids=["NumPy", "numba"])
+
+
+def skip_without_numba(compiled: bool) -> None:
+    if compiled:
+        pytest.importorskip("numba")
+
+
+def expanded(z: np.ndarray) -> np.ndarray:
+    """Coefficients of ∏ (s − z) in the longest doubles of the machine: shape (…, 4) in, (…, 5) out."""
+    total = np.ones((len(z), 1), np.clongdouble)
+    for k in range(z.shape[1]):
+        grown = np.concatenate([total, np.zeros_like(total[:, :1])], axis=1)
+        grown[:, 1:] -= z[:, k : k + 1].astype(np.clongdouble) * total
+        total = grown
+    return total.real
+
+
+def joint_error(a: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Largest error of a rebuilt coefficient, relative to the same symmetric function of |roots|."""
+    off = np.abs(expanded(z) - a.astype(np.longdouble) / a[:, :1])
+    size = expanded(-np.abs(z))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(off == 0, 0, off / size).max(axis=1).astype(float)
+
+
+def drawn(rng: np.random.Generator, n: int, size: Callable[[int], np.ndarray]) -> np.ndarray:
+    """Four roots each: two times a conjugate pair or two real ones, of either sign."""
+    z = np.empty((n, 4), complex)
+    for j in (0, 2):
+        pair = rng.uniform(size=n) < 0.5
+        first = size(n) * np.exp(1j * rng.uniform(0, np.pi, n))
+        sign = rng.choice([-1, 1], (2, n))
+        z[:, j] = np.where(pair, first, sign[0] * np.abs(first))
+        z[:, j + 1] = np.where(pair, first.conj(), sign[1] * size(n))
+    return z
+
+
+def log(rng: np.random.Generator, low: float, high: float) -> Callable[[int], np.ndarray]:
+    return lambda n: 10 ** rng.uniform(low, high, n)
+
+
+def polynomials(z: np.ndarray) -> np.ndarray:
+    return expanded(z).astype(float)
+
+
+def perturbed(rng: np.random.Generator, a: np.ndarray) -> np.ndarray:
+    """Coefficients off by relative 1e-16 … 1e-2: a k-fold root scatters by the k-th root of it."""
+    return a * (1 + 10 ** rng.uniform(-16, -2, (len(a), 1)) * rng.uniform(-1, 1, a.shape))
+
+
+def near_ep4(rng: np.random.Generator, n: int) -> np.ndarray:
+    spread = 10 ** rng.uniform(-16, -2, (n, 1))
+    return polynomials(-(10 ** rng.uniform(-1, 1, (n, 1))) * (1 + spread * drawn(rng, n, log(rng, -1, 0))))
+
+
+def ep4(rng: np.random.Generator, n: int) -> np.ndarray:
+    return (-(10 ** rng.uniform(-1, 1, (n, 1)))) ** np.arange(5) * np.array([comb(4, k) for k in range(5)])
+
+
+def ep4_of_the_model(rng: np.random.Generator, n: int) -> np.ndarray:
+    """By the closed form for chi_H = 1; the coefficients are those of the model in double precision."""
+    zeta_B, zeta_H = -(10 ** rng.uniform(-1, 0.3, (2, n)))
+    zeta_B, zeta_H = np.minimum(zeta_B, zeta_H) * 1.05, np.maximum(zeta_B, zeta_H)
+    Fr = laws.frep4(zeta_B, zeta_H)[0]
+    tilt = np.arctan(laws.tls(zeta_B, zeta_H))
+    design = {
+        "Fr": Fr, "mu": np.full(n, 0.1), "chi_B": laws.chib1(zeta_B, zeta_H), "chi_H": np.ones(n),
+        "zeta_B": zeta_B, "zeta_H": zeta_H, "lambda_s": tilt,
+    }  # fmt: skip
+    return np.stack(tms.coefficients(design), axis=-1)
+
+
+def two_equal_factors(rng: np.random.Generator, n: int) -> np.ndarray:
+    z = drawn(rng, n, log(rng, -1, 1))
+    z[:, 2:] = z[:, :2]
+    return polynomials(z)
+
+
+def triple(rng: np.random.Generator, n: int) -> np.ndarray:
+    z = drawn(rng, n, log(rng, -1, 1)).real
+    return polynomials(np.stack([z[:, 0], z[:, 0], z[:, 0], z[:, 3]], axis=1))
+
+
+def tiny(number: int) -> Maker:
+    """Of four roots, some of 1e-300 … 1e-8 times the others: all that doubles can hold."""
+
+    def make(rng: np.random.Generator, n: int) -> np.ndarray:
+        z = drawn(rng, n, log(rng, -0.5, 0.5))
+        if number % 2:
+            z = z.real
+        z[:, :number] *= 10 ** rng.uniform(-300 / number, -8, (n, 1))
+        return polynomials(z)
+
+    return make
+
+
+def ending_in_zeros(rng: np.random.Generator, n: int) -> np.ndarray:
+    a = rng.normal(size=(n, 5))
+    a[np.arange(5) > rng.integers(0, 5, n)[:, None]] = 0
+    return a
+
+
+def with_holes(rng: np.random.Generator, n: int) -> np.ndarray:
+    a = rng.normal(size=(n, 5)) * (rng.uniform(size=(n, 5)) < 0.6)
+    a[:, 0] = 1
+    return a
+
+
+def mixed(rng: np.random.Generator, n: int) -> np.ndarray:
+    return np.concatenate([rng.normal(size=(n // 2, 5)), near_ep4(rng, n - n // 2)])
+
+
+FAMILIES: dict[str, Maker] = {
+    "normal": lambda rng, n: rng.normal(size=(n, 5)),
+    "positive": lambda rng, n: rng.uniform(0.01, 1, size=(n, 5)),
+    "sizes over 6 decades": lambda rng, n: rng.normal(size=(n, 5)) * 10 ** rng.uniform(-3, 3, (n, 5)),
+    "sizes over 16 decades": lambda rng, n: rng.normal(size=(n, 5)) * 10 ** rng.uniform(-8, 8, (n, 5)),
+    "small integers": lambda rng, n: np.concatenate([np.ones((n, 1)), rng.integers(-3, 4, (n, 4))], axis=1),
+    "two-mass-skate designs": lambda rng, n: np.stack(tms.coefficients(wide_designs(99, n)), axis=-1),
+    "random roots": lambda rng, n: polynomials(drawn(rng, n, log(rng, -1, 1))),
+    "roots up to 16 decades apart": lambda rng, n: polynomials(drawn(rng, n, log(rng, -8, 8))),
+    "groups of roots 8 decades apart": lambda rng, n: polynomials(
+        drawn(rng, n, lambda m: 10.0 ** rng.choice([-8, 0, 8], m) * rng.uniform(0.5, 2, m))
+    ),
+    "near EP4": near_ep4,
+    "EP4": ep4,
+    "EP4 with its coefficients perturbed": lambda rng, n: perturbed(rng, ep4(rng, n)),
+    "EP4 of the model": ep4_of_the_model,
+    "2EP2 and CEP2": two_equal_factors,
+    "2EP2 and CEP2 perturbed": lambda rng, n: perturbed(rng, two_equal_factors(rng, n)),
+    "EP3": triple,
+    "EP3 perturbed": lambda rng, n: perturbed(rng, triple(rng, n)),
+    "one tiny root": tiny(1),
+    "two tiny roots": tiny(2),
+    "three tiny roots": tiny(3),
+    "roots at 0": ending_in_zeros,
+    "coefficients of 0": with_holes,
+    "unit of time 1e8": lambda rng, n: mixed(rng, n) * 1e8 ** np.arange(5),
+    "unit of time 1e-8": lambda rng, n: mixed(rng, n) * 1e-8 ** np.arange(5),
+    "unit of time 1e60": lambda rng, n: mixed(rng, n) * 1e60 ** np.arange(5),
+    "unit of time 1e-60": lambda rng, n: mixed(rng, n) * 1e-60 ** np.arange(5),
+    "leading coefficient 1e-150": lambda rng, n: mixed(rng, n) * 1e-150,
+}
+
+
+def made(family: str, n: int = COUNT) -> np.ndarray:
+    return FAMILIES[family](np.random.default_rng(list(FAMILIES).index(family)), n)
+
+
+# Roots
+
+
+@engines
+@pytest.mark.parametrize("family", FAMILIES)
+def test_the_factors_give_the_coefficients_back(family: str, compiled: bool) -> None:
+    skip_without_numba(compiled)
+    a = made(family)
+    found = quartic_factors(*a.T, compiled=compiled)
+    error = joint_error(a, found.roots)
+    worst = int(np.argmax(error))
+    assert error[worst] <= JOINTLY_RIGHT, f"{error[worst]} of {a[worst].tolist()}"
+    # eigenvalues are the last resort: none of these should need them
+    assert found.fallbacks == 0
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_both_engines_find_the_same_factors(family: str) -> None:
+    """To the last bit: the same formulas in the same order, and neither engine joins a product and a sum in one."""
+    pytest.importorskip("numba")
+    a = made(family)
+    one, other = (quartic_factors(*a.T, compiled=c) for c in (False, True))
+    assert np.array_equal(one.p, other.p)
+    assert np.array_equal(one.q, other.q)
+    motions = [abscissa_and_damping(*a.T, compiled=c) for c in (False, True)]
+    assert np.array_equal(motions[0].abscissa, motions[1].abscissa)
+    assert np.array_equal(motions[0].damping_ratio, motions[1].damping_ratio)
+
+
+@engines
+def test_abscissa_is_that_of_ball_arithmetic(compiled: bool) -> None:
+    """Roots at least a tenth of the largest apart move by less than (2/0.1)³ times the error of the coefficients."""
+    skip_without_numba(compiled)
+    rng = np.random.default_rng(5)
+    z = drawn(rng, 4000, log(rng, -0.5, 0.5))
+    apart = np.abs(z[:, :, None] - z[:, None, :]) + 10 * np.eye(4)
+    a = polynomials(z[apart.min(axis=(1, 2)) > 0.1 * np.abs(z).max(axis=1)][:150])
+    assert len(a) == 150
+    found = abscissa_and_damping(*a.T, compiled=compiled)
+    size = np.abs(a[:, 4]) ** 0.25
+    expected = np.array([exact_abscissa(row.tolist()) for row in a])
+    assert np.all(np.abs(found.abscissa - expected) <= 8000 * 1e-14 * 4 * size)
+    assert np.median(np.abs(found.abscissa - expected) / size) < 1e-15
+
+
+@engines
+@pytest.mark.parametrize("family", ["normal", "random roots", "two-mass-skate designs", "near EP4", "roots at 0"])
+def test_abscissa_and_damping_are_those_of_the_roots(family: str, compiled: bool) -> None:
+    skip_without_numba(compiled)
+    a = made(family)
+    found = abscissa_and_damping(*a.T, compiled=compiled)
+    z = quartic_factors(*a.T, compiled=compiled).roots
+    size = np.abs(z).max(axis=1)
+    assert np.all(np.abs(found.abscissa - z.real.max(axis=1)) <= 4e-16 * size)
+    ratio = np.min(np.where(z == 0, 0, -z.real / np.where(z == 0, 1, np.abs(z))), axis=1)
+    assert np.abs(found.damping_ratio - ratio).max() <= 1e-15
+
+
+@engines
+@pytest.mark.parametrize(
+    ("factors", "abscissa", "ratio"),
+    [
+        ([[1, 0.4, 1], [1, 6, 9]], -0.2, 0.2),
+        ([[1, -0.4, 1], [1, 6, 9]], 0.2, -0.2),
+        ([[1, 0, 4], [1, 6, 9]], 0.0, 0.0),
+        ([[1, 5, 6], [1, 9, 20]], -2.0, 1.0),
+        ([[1, 5, 6], [1, 1, -20]], 4.0, -1.0),
+        ([[1, 5, 0], [1, 9, 20]], 0.0, 0.0),
+        ([[1, 5, 0], [1, 9, 0]], 0.0, 0.0),
+        ([[1, 0, 0], [1, 0, 0]], 0.0, 0.0),
+        ([[1, 0, 0], [1, -3, 0]], 3.0, -1.0),
+        ([[1, 2e-200, 0], [1, 3, 2]], 0.0, 0.0),
+        ([[1, -2e-200, 0], [1, 3, 2]], 2e-200, -1.0),
+        ([[1, -2e200, 0], [1, 3, 2]], 2e200, -1.0),
+    ],
+)
+def test_abscissa_and_damping_by_hand(
+    factors: list[list[float]], abscissa: float, ratio: float, compiled: bool
+) -> None:
+    skip_without_numba(compiled)
+    found = abscissa_and_damping(*np.polymul(*factors), compiled=compiled)
+    assert found.abscissa == pytest.approx(abscissa, rel=1e-14, abs=1e-320)
+    assert found.damping_ratio == pytest.approx(ratio, rel=1e-14, abs=1e-320)
+
+
+@engines
+def test_the_factors_of_ep4_are_its_closed_form(compiled: bool) -> None:
+    """(s − ω0)⁴ within rounding of the coefficients; the roots themselves scatter by the fourth root of it."""
+    skip_without_numba(compiled)
+    Fr, chi_B, T = laws.frep4(-0.4, -0.2)[0], laws.chib1(-0.4, -0.2), laws.tls(-0.4, -0.2)
+    a = copo(Fr, 0.1, chi_B, 1.0, -0.4, -0.2, T)
+    found = quartic_factors(*a, compiled=compiled)
+    (p1, p2), (q1, q2) = found.p, found.q
+    rebuilt = np.polymul([1, p1, q1], [1, p2, q2])
+    assert rebuilt == pytest.approx(np.poly([float(laws.w01(-0.4, -0.2))] * 4), rel=1e-13)
+
+
+# Fallback, shapes and what has no roots
+
+
+@engines
+def test_eigenvalues_are_the_last_resort_and_are_counted(compiled: bool) -> None:
+    skip_without_numba(compiled)
+    a = np.array([[1.0, 2.0, 3.0, 4.0, 5.0], DOUBT, DOUBT])
+    assert quartic_factors(*a.T, compiled=compiled).fallbacks == 2
+    found = abscissa_and_damping(*a.T, compiled=compiled)
+    assert found.fallbacks == 2
+    # two roots are those of s² + 0.39 s + 5.9, and the others are smaller than 1e-100
+    assert found.abscissa[1] == pytest.approx(0, abs=1e-100)
+
+
+def test_eigenvalues_give_the_factors_when_every_other_way_is_shut(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tmsopt.roots.quartics.degenerate._WAYS", ())
+    a = made("normal", 50)
+    found, unit, fallbacks = hard_factors(np.ascontiguousarray(a.T))
+    assert fallbacks == 50
+    p, q = np.ldexp(found[::2], unit), np.ldexp(found[1::2], 2 * unit)
+    rebuilt = [np.polymul([1, p[0, k], q[0, k]], [1, p[1, k], q[1, k]]) for k in range(50)]
+    assert np.allclose(rebuilt, a / a[:, :1], rtol=1e-11)
+
+
+@engines
+@pytest.mark.filterwarnings("error")
+def test_a_root_beyond_all_doubles_is_infinite_without_a_warning(compiled: bool) -> None:
+    """5e-324 (s⁴ + …) − 1e308 s³ has a root at 2e631."""
+    skip_without_numba(compiled)
+    found = abscissa_and_damping(5e-324, -1e308, 1.0, 1.0, 1.0, compiled=compiled)
+    assert found.abscissa == np.inf
+
+
+@engines
+def test_what_has_no_roots_is_nan_and_undefined(compiled: bool) -> None:
+    skip_without_numba(compiled)
+    a = np.ones((12, 5))
+    a[0, 0] = 0
+    a[np.arange(1, 6), np.arange(5)] = np.nan
+    a[np.arange(6, 11), np.arange(5)] = np.inf
+    factors = quartic_factors(*a.T, compiled=compiled)
+    motion = abscissa_and_damping(*a.T, compiled=compiled)
+    none = np.arange(12) < 11
+    for values in (factors.p[:, 0], factors.q[:, 1], motion.abscissa, motion.damping_ratio):
+        assert np.array_equal(np.isnan(values), none)
+    assert factors.fallbacks == motion.fallbacks == 0
+    found = quartic_classes(*a.T, compiled=compiled)
+    assert np.array_equal(found.kind == CLASSES.index("undefined"), none)
+    assert not quartic_is_stable(*a.T, compiled=compiled).any()
+
+
+@engines
+def test_coefficients_broadcast(compiled: bool) -> None:
+    skip_without_numba(compiled)
+    a3, a4 = np.linspace(1, 2, 3)[:, None], np.linspace(0.1, 0.2, 4)
+    given = (1.0, 4.0, 6.0, a3, a4)
+    full = [np.broadcast_to(c, (3, 4)).copy() for c in given]
+    assert np.array_equal(quartic_factors(*given, compiled=compiled).p, quartic_factors(*full, compiled=compiled).p)
+    assert abscissa_and_damping(*given, compiled=compiled).abscissa.shape == (3, 4)
+    assert quartic_classes(*given, compiled=compiled).kind.shape == (3, 4)
+    assert quartic_is_stable(*given, compiled=compiled).shape == (3, 4)
+    assert quartic_factors(1, 4, 6, 4, 1, compiled=compiled).p.shape == (2,)
+    assert abscissa_and_damping(1, 4, 6, 4, 1, compiled=compiled).abscissa.shape == ()
+    empty = np.empty((0, 2))
+    assert quartic_factors(1, 4, 6, 4, empty, compiled=compiled).p.shape == (0, 2, 2)
+    assert quartic_classes(1, 4, 6, 4, empty, compiled=compiled).kind.shape == (0, 2)
+    with pytest.raises(ValueError, match="broadcast"):
+        quartic_factors(1.0, np.ones(2), np.ones(3), 1.0, 1.0, compiled=compiled)
+
+
+def test_without_numba_it_is_numpy_or_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr("tmsopt.roots.quartics.quartic.find_spec", lambda name: None)
+    assert quartic_is_stable(1, 4, 6, 4, 1)
+    with pytest.raises(ModuleNotFoundError, match=r"pip install \"tmsopt\[fast\]\""):
+        quartic_is_stable(1, 4, 6, 4, 1, compiled=True)
+
+
+def test_cube_root_to_nine_digits() -> None:
+    x = 10 ** np.random.default_rng(0).uniform(-100, 100, 10_000)
+    assert np.abs(cube_root(x) / np.cbrt(x) - 1).max() < 1e-9
+
+
+def test_largest_root_of_a_cubic_to_seven_digits_of_the_spread() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        z = rng.normal(size=3)
+        z -= z.mean()
+        _, _, minus_three_q, minus_two_r = np.poly(z)
+        found = largest_root(np.array([-minus_three_q / 3]), np.array([-minus_two_r / 2]))[0]
+        assert abs(found - z.max()) < 4e-7 * np.ptp(z)
+
+
+# Classes
+
+
+def classes_by_definition(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    negative, positive = real_roots(a)
+    zero = a[:, 4] == 0
+    unstable = np.where((positive > 0) | zero, CLASSES.index("capsize"), CLASSES.index("weave"))
+    damped = np.where(negative == 4, CLASSES.index("heavily damped"), CLASSES.index("stable"))
+    with np.errstate(all="ignore"):  # what overflows is not stable to either
+        return np.where(is_stable(a), damped, unstable), negative + positive + zero
+
+
+def on_a_boundary(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Weave, capsize and heavy damping within relative 1e-17 … 1e-9 of their boundaries."""
+    c = rng.uniform(0.1, 3, (n, 4))
+    one = np.ones(n)
+    weave = [one, c[:, 0], c[:, 1] + c[:, 2], c[:, 0] * c[:, 2], c[:, 1] * c[:, 2]]  # (s² + c2)(s² + c0 s + c1)
+    capsize = [one, c[:, 0] + 2, c[:, 1] + 2 * c[:, 0], 2 * c[:, 1], 0 * one]  # s (s + 2)(s² + c0 s + c1)
+    a = np.concatenate([np.stack(weave, axis=1), np.stack(capsize, axis=1)])
+    return a + 10 ** rng.uniform(-17, -9, (2 * n, 1)) * rng.uniform(-1, 1, (2 * n, 5)) * [0, 1, 1, 1, 1]
+
+
+@engines
+def test_classes_are_those_of_the_definitions(compiled: bool) -> None:
+    """On 1e5 designs, and where rounding decides or exact arithmetic must: near boundaries and exceptional points."""
+    skip_without_numba(compiled)
+    rng = np.random.default_rng(3)
+    few = [made(f, 20) for f in FAMILIES]  # exact arithmetic takes a tenth of a second for 200 of them
+    designs = np.stack(tms.coefficients(wide_designs(7, 100_000)), axis=-1)
+    a = np.concatenate([designs, -designs[:5000], on_a_boundary(rng, 500), made("normal", 5000), *few])
+    found = quartic_classes(*a.T, compiled=compiled)
+    kind, count = classes_by_definition(a)
+    assert np.array_equal(found.kind, kind)
+    assert np.array_equal(found.real_roots, count)
+    assert np.array_equal(quartic_is_stable(*a.T, compiled=compiled), found.kind >= CLASSES.index("stable"))
+    assert min(np.bincount(found.kind, minlength=5)[1:]) > 100  # each class is there
+    assert 0 < found.doubtful < 2000
+
+
+@engines
+def test_classes_are_those_of_exact_arithmetic(compiled: bool) -> None:
+    """Away from the boundary of stability, where the Routh table in doubles is right."""
+    skip_without_numba(compiled)
+    a = np.stack(tms.coefficients(wide_designs(8, 60_000)), axis=-1)
+    found = quartic_classes(*a.T, compiled=compiled)
+    assert found.doubtful < 10
+    for code in range(1, 5):
+        for k in np.flatnonzero(found.kind == code)[:60]:
+            negative, zero, positive = curves.sturm(a[k].tolist())
+            assert found.real_roots[k] == negative + zero + positive
+            assert routh_exact(a[k].tolist()) == (code >= 3)
+            assert {1: positive + zero > 0, 2: positive + zero == 0, 3: negative < 4, 4: negative == 4}[code]
+
+
+@engines
+def test_real_roots_beside_a_double_one_are_counted_exactly(compiled: bool) -> None:
+    """A double root, real or of a pair of pairs, whose coefficients are an ulp or so off: rounding cannot tell."""
+    skip_without_numba(compiled)
+    rng = np.random.default_rng(8)
+    r, b, c = rng.uniform(0.2, 2.0, (3, 200))
+    double = np.array([np.polymul([1, 2 * x, x * x], [1, y, z]) for x, y, z in zip(r, b, c, strict=True)])
+    twice = np.array([np.polymul([1, y, z], [1, y, z]) for y, z in zip(b, c, strict=True)])
+    a = np.concatenate([double, twice, np.array([np.poly([-x] * 4) for x in r])])
+    a = a * (1 + rng.integers(-2, 3, a.shape) * np.finfo(float).eps)
+    found = quartic_classes(*a.T, compiled=compiled)
+    assert found.real_roots.tolist() == [_different_real_roots(row) for row in a]
+    assert found.doubtful > len(a) / 3
+
+
+def _different_real_roots(a: np.ndarray) -> int:
+    """By the chain of Sturm in Fractions."""
+    p = [Fraction(float(x)) for x in a]
+    chain = [p, [x * (4 - k) for k, x in enumerate(p[:-1])]]
+    while True:
+        rest = list(chain[-2])
+        while len(rest) >= len(chain[-1]):
+            share = rest[0] / chain[-1][0]
+            rest = [x - share * y for x, y in zip(rest[1:], [*chain[-1][1:], *[Fraction(0)] * len(rest)], strict=False)]
+        while rest and rest[0] == 0:
+            rest = rest[1:]
+        if not rest:
+            break
+        chain.append([-x for x in rest])
+    ends = [[q[0] * (-1) ** (len(q) - 1) > 0 for q in chain], [q[0] > 0 for q in chain]]
+    left, right = (sum(x != y for x, y in pairwise(signs)) for signs in ends)
+    return left - right
+
+
+def test_both_engines_give_the_same_classes() -> None:
+    pytest.importorskip("numba")
+    rng = np.random.default_rng(11)
+    designs = np.stack(tms.coefficients(wide_designs(12, 150_000)), axis=-1)
+    a = np.concatenate([designs, on_a_boundary(rng, 200), *(made(f, 8) for f in FAMILIES)])
+    one, other = (quartic_classes(*a.T, compiled=c) for c in (False, True))
+    assert np.array_equal(one.kind, other.kind)
+    assert np.array_equal(one.real_roots, other.real_roots)
+    assert one.doubtful == other.doubtful
+    assert np.array_equal(*(quartic_is_stable(*a.T, compiled=c) for c in (False, True)))
+
+
+def test_the_program_judges_roots_as_the_test_does() -> None:
+    a = made("two-mass-skate designs")
+    z = quartic_factors(*a.T, compiled=False).roots
+    assert np.abs(backward_error(a, z) - joint_error(a, z)).max() < 2e-15  # the rounding of its own sums

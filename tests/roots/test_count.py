@@ -1,0 +1,150 @@
+"""Numbers of real roots against polynomials with known roots and exact Sturm chains."""
+
+from fractions import Fraction
+from math import comb
+
+import numpy as np
+import pytest
+from helpers import curves
+from helpers.oracles import certified_roots
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tmsopt.roots import real_roots
+
+repeatable = settings(max_examples=150, deadline=None, derandomize=True)
+
+
+def expand(factors):
+    """Product of polynomials in integers, exact also as doubles while below 2^53."""
+    total = [1]
+    for factor in factors:
+        product = [0] * (len(total) + len(factor) - 1)
+        for i, a in enumerate(total):
+            for j, b in enumerate(factor):
+                product[i + j] += a * b
+        total = product
+    return total
+
+
+def counted(coefficients):
+    negative, positive = real_roots(np.array(coefficients, dtype=float))
+    return int(negative), int(positive)
+
+
+def exact(coefficients):
+    """By Sturm in Fractions on the very doubles."""
+    negative, _, positive = curves.sturm([Fraction(float(c)) for c in coefficients])
+    return negative, positive
+
+
+integer = st.integers(-6, 6)
+
+
+@repeatable
+@given(
+    st.lists(integer, max_size=8),
+    st.lists(st.tuples(integer, st.integers(1, 9)), max_size=3),
+    st.sampled_from([1, -1, 3]),
+)
+def test_known_roots_of_degrees_2_to_8(real, pairs, lead):
+    """Real roots r, repeated as drawn, and pairs a ± i√b, as integer polynomials: counted by hand."""
+    factors = [[1, -r] for r in real] + [[1, -2 * a, a * a + b] for a, b in pairs]
+    c = [lead * k for k in expand(factors)]
+    if not 2 <= len(c) - 1 <= 8:
+        return
+    assert max(map(abs, c)) < 2**53
+    assert counted(c) == (sum(r < 0 for r in set(real)), sum(r > 0 for r in set(real)))
+
+
+@pytest.mark.parametrize("degree", range(2, 9))
+def test_random_coefficients_of_every_degree(degree):
+    rng = np.random.default_rng(degree)
+    c = rng.normal(size=(60, degree + 1)) * 10.0 ** rng.uniform(-3, 3, (60, degree + 1))
+    negative, positive = real_roots(c)
+    assert [(int(a), int(b)) for a, b in zip(negative, positive, strict=True)] == [exact(row) for row in c]
+
+
+def test_the_oracle_agrees_with_isolated_roots():
+    rng = np.random.default_rng(0)
+    for _ in range(30):
+        c = rng.integers(-4, 5, size=6).tolist()
+        if c[0] == 0:
+            continue
+        real = [root.real for root, _ in certified_roots(c) if root.imag == 0]
+        assert curves.sturm(c) == (sum(r < 0 for r in real), sum(r == 0 for r in real), sum(r > 0 for r in real))
+
+
+@pytest.mark.parametrize("order", [2, 3, 4, 6])
+@pytest.mark.parametrize("size", [0.0, 1e-16, 1e-14, 1e-12, 1e-10, 1e-8, 1e-5, 1e-3])
+def test_beside_an_exceptional_point(order, size):
+    """(s + 1)^n with its coefficients moved by `size`: doubles decide exactly, whatever the roots do."""
+    rng = np.random.default_rng(order)
+    c = np.array([comb(order, k) for k in range(order + 1)], dtype=float) * np.ones((25, 1))
+    c[:, 1:] *= 1 + size * rng.choice([-1.0, 0.0, 1.0, 0.37], c[:, 1:].shape)
+    negative, positive = real_roots(c)
+    assert [(int(a), int(b)) for a, b in zip(negative, positive, strict=True)] == [exact(row) for row in c]
+
+
+@pytest.mark.parametrize(
+    ("factors", "expected"),
+    [
+        ([[1, -2, 1]] * 2, (0, 1)),  # EP4 at +1
+        ([[1, 3, 2]] * 2, (2, 0)),  # 2EP2
+        ([[1, 2, 5]] * 2, (0, 0)),  # CEP2
+        ([[1, 0, 4]] * 2, (0, 0)),  # double imaginary pair
+        ([[1, 1]] * 3 + [[1, 2]], (2, 0)),  # EP3
+        ([[1, 0, -1], [1, 0, -4]], (2, 2)),  # even
+        ([[1, 0, 0, 0, -1]], (1, 1)),  # s⁴ − 1: the chain drops three degrees at once
+        ([[1, 0, 0, 0, 1]], (0, 0)),
+        ([[1, 0, 0, 0, 0, 0, 0, 0, -1]], (1, 1)),
+        ([[1, 0, 0, 0, 0, 1]], (1, 0)),
+        ([[1, 0]] * 4, (0, 0)),  # all at 0
+        ([[1, 0]] * 3 + [[1, -3]], (0, 1)),
+        ([[1, 0], [1, 0], [1, 1], [1, 1]], (1, 0)),
+        ([[1, 0]], (0, 0)),
+        ([[2, 3]], (1, 0)),
+    ],
+)
+def test_special_sequences(factors, expected):
+    c = expand(factors)
+    assert counted(c) == expected
+    assert counted([-k for k in c]) == expected
+    mirrored = [k * (-1) ** i for i, k in enumerate(c)]
+    assert counted(mirrored) == expected[::-1]
+
+
+@pytest.mark.parametrize("scale", [1e-60, 1e-8, 1e8, 1e60])
+def test_scales_of_root_and_leading_coefficient_do_not_matter(scale):
+    """(s + 1)(s + 2)(s − 3)(s² + 1) in s/scale, times anything; far from overflow."""
+    c = np.array(expand([[1, 1], [1, 2], [1, -3], [1, 0, 1]]), dtype=float)
+    assert counted(c * scale) == (2, 1)
+    assert counted(c * scale ** np.arange(6)) == (2, 1)
+    assert counted(c * 2.0 ** -np.arange(6.0) * -scale) == (2, 1)
+
+
+@pytest.mark.parametrize(
+    "c",
+    [
+        [1.0, -63.45483490561214, 1017.232023002181, -336.35398658904313, 26.465713768042725],  # four positive
+        [1.0, 3850.58034704624, 0.2660469595135265, 4.678182901274241e-06, 2.8442763160104014e-12],  # four negative
+        [1.0, 3313.543621875525, 0.1040664897257225, -4.871750239188283e-06, -1.5592497370933543e-10],  # a pair
+    ],
+)
+def test_a_double_root_among_roots_of_other_size(c):
+    """A double root, 30 to 1e8 times as large or small as another root, moved by the rounding of the coefficients."""
+    assert counted(c) == exact(c)
+
+
+def test_shape_follows_the_leading_axes():
+    c = np.broadcast_to([1.0, 3.0, 2.0], (4, 5, 3))
+    negative, positive = real_roots(c)
+    assert negative.shape == positive.shape == (4, 5)
+    assert np.all(negative == 2)
+    assert real_roots(np.empty((0, 5)))[0].shape == (0,)
+
+
+@pytest.mark.parametrize("c", [[0.0, 1.0, 2.0], [1.0, np.nan, 2.0], [1.0, np.inf], [1.0], 3.0])
+def test_what_is_no_polynomial_is_refused(c):
+    with pytest.raises(ValueError, match="leading one other than 0"):
+        real_roots(c)

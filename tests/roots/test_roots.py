@@ -1,0 +1,431 @@
+"""Polynomials against exact fractions and SymPy, numeric roots against exact and 60-digit arithmetic.
+
+Roots are judged by the coefficients that they rebuild, in exact arithmetic on the very doubles returned.
+"""
+
+from collections.abc import Sequence
+from fractions import Fraction
+from math import comb
+
+import numpy as np
+import pytest
+import sympy
+from helpers.oracles import certified_roots, discriminant_exact, roots_60, routh_exact
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from mpmath import mp
+
+from tmsopt.roots import (
+    abscissa,
+    backward_error,
+    determinant,
+    discriminant,
+    evaluate,
+    hurwitz_minors,
+    is_stable,
+    lienard_chipart,
+    product,
+    quadratic_pencil,
+    rebuilt,
+    roots,
+    shift,
+)
+
+JOINTLY_RIGHT = Fraction(1, 10**13)
+"""The accuracy promised of rebuilt coefficients."""
+
+s = sympy.Symbol("s")
+repeatable = settings(max_examples=40, deadline=None, derandomize=True)
+rational = st.fractions(min_value=-20, max_value=20, max_denominator=12)
+polynomial = st.lists(rational, min_size=1, max_size=7)
+
+
+def poly(coefficients: Sequence[Fraction]) -> sympy.Poly:
+    return sympy.Poly([sympy.Rational(c.numerator, c.denominator) for c in coefficients], s, domain="QQ")
+
+
+def fractions(p: sympy.Poly, length: int) -> list[Fraction]:
+    """Coefficients of a SymPy polynomial, padded with leading zeros."""
+    found = [Fraction(int(c.p), int(c.q)) for c in p.all_coeffs()]
+    return [Fraction(0)] * (length - len(found)) + found
+
+
+# Polynomial arithmetic
+
+
+@repeatable
+@given(st.lists(polynomial, max_size=4))
+def test_product_is_the_product(factors: list[list[Fraction]]) -> None:
+    expected = sympy.Poly(1, s, domain="QQ")
+    for factor in factors:
+        expected *= poly(factor)
+    assert product(*factors) == fractions(expected, sum(len(f) - 1 for f in factors) + 1)
+
+
+@repeatable
+@given(polynomial, rational)
+def test_shift_is_composition_with_t_plus_gamma(p: list[Fraction], gamma: Fraction) -> None:
+    argument = sympy.Poly(s + sympy.Rational(gamma.numerator, gamma.denominator), s, domain="QQ")
+    assert shift(p, gamma) == fractions(poly(p).compose(argument), len(p))
+
+
+@repeatable
+@given(polynomial, rational)
+def test_evaluate_is_the_value(p: list[Fraction], at: Fraction) -> None:
+    assert evaluate(p, at) == sum(c * at ** (len(p) - 1 - k) for k, c in enumerate(p))
+
+
+def test_shift_leaves_its_argument_alone() -> None:
+    p = [1, 2, 3]
+    shift(p, 5)
+    assert p == [1, 2, 3]
+
+
+def _random_matrix(rng: np.random.Generator, n: int, length: int) -> list[list[list[Fraction]]]:
+    return [[[Fraction(int(x), 7) for x in rng.integers(-9, 10, length)] for _ in range(n)] for _ in range(n)]
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
+def test_determinant_of_a_polynomial_matrix(n: int) -> None:
+    entries = _random_matrix(np.random.default_rng(n), n, 3)
+    expected = sympy.Matrix(n, n, lambda i, j: poly(entries[i][j]).as_expr()).det(method="berkowitz")
+    assert determinant(entries) == fractions(sympy.Poly(expected, s, domain="QQ"), 2 * n + 1)
+
+
+def test_determinant_of_entries_of_different_degrees() -> None:
+    # (s + 2)·3 − (s² + 1)·s
+    assert determinant([[[1, 2], [1, 0, 1]], [[1, 0], [3]]]) == [-1, 0, 2, 6]
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_quadratic_pencil_is_det_of_M_s2_D_s_K(n: int) -> None:
+    rng = np.random.default_rng(10 + n)
+    M, D, K = ([[e[0] for e in row] for row in _random_matrix(rng, n, 1)] for _ in range(3))
+    pencil = sympy.Matrix(n, n, lambda i, j: poly([M[i][j], D[i][j], K[i][j]]).as_expr())
+    expected = sympy.Poly(pencil.det(method="berkowitz"), s, domain="QQ")
+    assert quadratic_pencil(M, D, K) == fractions(expected, 2 * n + 1)
+
+
+# Numeric roots
+
+
+def exact_elementary(values: Sequence[complex]) -> list[tuple[Fraction, Fraction]]:
+    """Coefficients of ∏ (s − value) as exact (real, imaginary) parts."""
+    result = [(Fraction(1), Fraction(0))]
+    for z in values:
+        x, y = Fraction(z.real), Fraction(z.imag)
+        grown = [*result, (Fraction(0), Fraction(0))]
+        for k, (a, b) in enumerate(result):
+            re, im = grown[k + 1]
+            grown[k + 1] = (re - (x * a - y * b), im - (x * b + y * a))
+        result = grown
+    return result
+
+
+def exact_monic(coefficients: Sequence[float]) -> list[Fraction]:
+    return [Fraction(float(c)) / Fraction(float(coefficients[0])) for c in coefficients]
+
+
+def errors(coefficients: Sequence[float], found: Sequence[complex]) -> tuple[Fraction, Fraction]:
+    """Joint error of roots by their exactly rebuilt coefficients, componentwise and normwise.
+
+    Componentwise against the same symmetric function of |roots|, as `backward_error` has it; normwise in the
+    largest coefficient, in the unit of time that makes the nonzero roots of size 1.
+    """
+    wanted, got = exact_monic(coefficients), exact_elementary(found)
+    assert all(im == 0 for _, im in got), "conjugates are exact, so rebuilt coefficients are real"
+    sizes = [re for re, _ in exact_elementary([-abs(z) for z in found])]
+    off = [abs(re - w) for (re, _), w in zip(got, wanted, strict=True)]
+    componentwise = max((o / z if z else Fraction(int(o > 0)) for o, z in zip(off, sizes, strict=True)))
+    moduli = [abs(z) for z in found if z]
+    unit = Fraction(float(np.exp(np.mean(np.log(moduli))))) if moduli else Fraction(1)
+    largest = max(abs(w) / unit**k for k, w in enumerate(wanted))
+    return componentwise, max(o / unit**k for k, o in enumerate(off)) / largest
+
+
+def assert_jointly_right(coefficients: Sequence[float]) -> None:
+    found = roots(coefficients)
+    componentwise, normwise = errors(coefficients, found)
+    assert componentwise <= JOINTLY_RIGHT, f"{float(componentwise)} of {list(coefficients)!r}"
+    assert normwise <= JOINTLY_RIGHT, f"{float(normwise)} of {list(coefficients)!r}"
+    # what the package says of itself is that error, up to the rounding of its own sums
+    assert backward_error(coefficients, found) == pytest.approx(float(componentwise), abs=4e-15)
+
+
+def coefficients_of(values: Sequence[complex], leading: float = 1.0) -> list[float]:
+    """Exact coefficients of given roots, each rounded once."""
+    return [float(re * Fraction(leading)) for re, _ in exact_elementary(values)]
+
+
+def random_roots(rng: np.random.Generator, degree: int) -> list[complex]:
+    """Real roots and pairs of either sign, sizes over two decades."""
+    values: list[complex] = []
+    while len(values) < degree:
+        size, angle = 10 ** rng.uniform(-1, 1), rng.uniform(0, np.pi)
+        if len(values) <= degree - 2 and rng.uniform() < 0.5:
+            z = complex(size * np.cos(angle), size * np.sin(angle))
+            values += [z, z.conjugate()]
+        else:
+            values.append(complex(size * rng.choice([-1, 1])))
+    return values
+
+
+@pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
+def test_roots_of_random_polynomials_rebuild_the_coefficients(degree: int) -> None:
+    rng = np.random.default_rng(degree)
+    for _ in range(30):
+        assert_jointly_right(coefficients_of(random_roots(rng, degree), leading=rng.uniform(-5, 5)))
+        assert_jointly_right(rng.normal(size=degree + 1))
+
+
+@pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
+@pytest.mark.parametrize("scale", [1e-8, 1e8])
+def test_roots_do_not_care_about_the_unit_of_time(degree: int, scale: float) -> None:
+    rng = np.random.default_rng(degree)
+    for _ in range(20):
+        assert_jointly_right(coefficients_of([scale * z for z in random_roots(rng, degree)], leading=-3.0))
+
+
+@pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
+def test_roots_sixteen_decades_apart(degree: int) -> None:
+    rng = np.random.default_rng(degree)
+    for _ in range(15):
+        assert_jointly_right(coefficients_of([complex(-(10 ** rng.uniform(-8, 8))) for _ in range(degree)]))
+        pair = 10 ** rng.uniform(-8, 8) * np.exp(1j * rng.uniform(0, np.pi))
+        others = [complex(10 ** rng.uniform(-8, 8) * rng.choice([-1, 1])) for _ in range(degree - 2)]
+        assert_jointly_right(coefficients_of([pair, pair.conjugate(), *others]))
+
+
+@st.composite
+def near_ep4(draw: st.DrawFn) -> list[complex]:
+    """Four roots within a relative 1e-16 … 1e-1 of a negative number, real or in pairs."""
+    centre = -draw(st.floats(0.1, 10))
+    spread = 10 ** draw(st.floats(-16, -1))
+    offset = st.floats(-1, 1)
+    values: list[complex] = []
+    for is_pair in draw(st.sampled_from([(True, True), (True, False), (False, False)])):
+        a, b = draw(offset), draw(offset)
+        if is_pair:
+            z = centre * (1 + spread * complex(a, b))
+            values += [z, z.conjugate()]
+        else:
+            values += [complex(centre * (1 + spread * a)), complex(centre * (1 + spread * b))]
+    return values
+
+
+@settings(max_examples=250, deadline=None, derandomize=True)
+@given(near_ep4(), st.sampled_from([1.0, -0.3, 1e-8, 1e8]), st.sampled_from([1.0, 1e-8, 1e8]))
+def test_roots_next_to_a_four_fold_one_rebuild_the_coefficients(
+    values: list[complex], leading: float, scale: float
+) -> None:
+    assert_jointly_right(coefficients_of([scale * z for z in values], leading))
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(st.floats(0.1, 10), st.lists(st.floats(-1, 1), min_size=4, max_size=4), st.floats(-16, -4))
+def test_roots_of_perturbed_ep4_coefficients_rebuild_them(r: float, change: list[float], size: float) -> None:
+    """A change of the coefficients by ε scatters the roots by ε^(1/4), whatever direction it takes."""
+    exact = [comb(4, k) * r**k for k in range(5)]
+    assert_jointly_right([1.0, *(c * (1 + 10**size * d) for c, d in zip(exact[1:], change, strict=True))])
+
+
+@pytest.mark.parametrize("r", [-1.0, -1.8803015465431967, -0.1, 3.7, -1e8, -1e-8])
+@pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
+def test_multiple_roots_of_full_multiplicity(degree: int, r: float) -> None:
+    assert_jointly_right(coefficients_of([complex(r)] * degree))
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        [-1, -1, -2, -2],
+        [-1 + 2j, -1 - 2j, -1 + 2j, -1 - 2j],
+        [-1, -1, -1, -5],
+        [-1, -1, -2 + 1j, -2 - 1j],
+        [1j, -1j, 1j, -1j],
+        [-1, -1, -1, -1e-6],
+        [-1, -1, -1, 1, 1, 1],
+        [1, -1, 1j, -1j],
+    ],
+)
+def test_roots_of_every_pattern_rebuild_the_coefficients(values: list[complex]) -> None:
+    assert_jointly_right(coefficients_of([complex(z) for z in values]))
+
+
+@pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
+def test_roots_at_zero_are_zero(degree: int) -> None:
+    rng = np.random.default_rng(degree)
+    for zeros in range(1, degree + 1):
+        for _ in range(5):
+            others = random_roots(rng, degree - zeros)
+            c = [*coefficients_of(others, leading=-2.0), *[0.0] * zeros]
+            assert_jointly_right(c)
+            assert np.count_nonzero(roots(c) == 0) == zeros
+
+
+def test_conjugate_pairs_are_exact_and_adjacent() -> None:
+    rng = np.random.default_rng(0)
+    for degree in (2, 3, 4, 5, 6):
+        found = roots(rng.normal(size=(200, degree + 1)))
+        assert np.any(found.imag != 0)
+        for row in found:
+            k = 0
+            while k < degree:
+                if row[k].imag:
+                    assert row[k + 1] == row[k].conjugate()
+                    k += 1
+                k += 1
+
+
+@pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
+def test_roots_agree_with_60_digits_away_from_multiple_roots(degree: int) -> None:
+    """To the accuracy that the coefficients determine: Σ |c_k| |r|^(n−k) / |p′(r)| roundings, to first order."""
+    rng = np.random.default_rng(degree)
+    for _ in range(15):
+        c = rng.normal(size=degree + 1)
+        found = list(roots(c))
+        with mp.workdps(60):
+            for exact in roots_60(c):
+                slope = abs(mp.polyval([float(x) * (degree - k) for k, x in enumerate(c[:-1])], exact))
+                terms = sum(abs(float(x)) * abs(exact) ** (degree - k) for k, x in enumerate(c))
+                nearest = min(found, key=lambda z: abs(mp.mpc(z) - exact))
+                allowed = 64 * np.finfo(float).eps * terms / slope
+                if allowed > 1e-3 * abs(exact):
+                    continue  # next to a multiple root the first order does not hold
+                assert abs(mp.mpc(nearest) - exact) <= allowed
+                found.remove(nearest)
+
+
+def test_abscissa_is_the_largest_real_part() -> None:
+    """(s + 1)(s + 2)(s² + s + 1) and s (s + 3): −1/2 and 0."""
+    assert abscissa(product([1, 1], [1, 2], [1, 1, 1])) == pytest.approx(-0.5, rel=1e-14)
+    assert abscissa([1, 3, 0]) == 0
+    assert abscissa(np.ones((2, 3, 4))).shape == (2, 3)
+
+
+def test_rebuilt_coefficients_are_monic_and_real() -> None:
+    assert rebuilt(np.array([1j, -1j, 2.0])).tolist() == [1, -2, 1, -2]
+
+
+def test_backward_error_is_relative_to_the_terms_of_each_coefficient() -> None:
+    """(s − 1)(s + 1) for s² + 0.002 s − 1: a1 is off by 0.002 and summed from terms of total size 2."""
+    assert backward_error([1, 0.002, -1], np.array([1.0 + 0j, -1.0])) == pytest.approx(0.001, rel=1e-15)
+
+
+@pytest.mark.parametrize("shape", [(), (1,), (7,), (2, 3), (2, 0)])
+def test_roots_are_vectorised(shape: tuple[int, ...]) -> None:
+    c = np.random.default_rng(3).normal(size=(*shape, 5))
+    found = roots(c)
+    assert found.shape == (*shape, 4)
+    for index in np.ndindex(shape):
+        np.testing.assert_allclose(rebuilt(found[index]), c[index] / c[index][0], rtol=0, atol=1e-11)
+        assert backward_error(c[index], found[index]) <= 1e-13
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [[0, 1, 2], [1, np.nan, 2], [1, np.inf], [-np.inf, 1], [1], [], 5.0, [[1, 2, 3], [0, 2, 3]], [[1, 2], [1, np.nan]]],
+)
+def test_roots_refuse_what_has_none(bad: object) -> None:
+    with pytest.raises(ValueError, match="coefficients"):
+        roots(bad)
+
+
+# Stability and discriminant
+
+
+def test_random_polynomials_are_of_both_kinds() -> None:
+    """The random polynomials below hold enough of both classes for a test of stability to mean something."""
+    verdicts = [routh_exact(p) for degree in range(2, 7) for p in random_exact(degree)]
+    assert 0.2 < np.mean(verdicts) < 0.8
+
+
+def random_exact(degree: int) -> list[list[Fraction]]:
+    """Rational polynomials, a0 of both signs: products of factors with Re s about 0, some changed a little."""
+    rng = np.random.default_rng(degree)
+    chosen = []
+    for k in range(60):
+        factors = [[Fraction(1), Fraction(int(rng.integers(-1, 20)), 7)] for _ in range(degree % 2)]
+        for _ in range(degree // 2):
+            factors.append([Fraction(1), Fraction(int(rng.integers(-1, 20)), 8), Fraction(int(rng.integers(1, 30)), 5)])
+        p = product([Fraction(int(rng.integers(1, 6)) * (-1) ** k, 3)], *factors)
+        if k % 3 == 0:
+            p[-2] *= Fraction(int(rng.integers(1, 30)), 15)
+        chosen.append(p)
+    return chosen
+
+
+@pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
+def test_is_stable_agrees_with_the_exact_routh_table(degree: int) -> None:
+    for p in random_exact(degree):
+        decisive = [q / sum(abs(c) for c in p) for q in lienard_chipart(p)]
+        if min(map(abs, decisive)) < 1e-9:
+            continue  # on the boundary itself, rounding of the doubles decides
+        assert is_stable([float(c) for c in p]) == routh_exact(p)
+
+
+@pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
+def test_lienard_chipart_is_positive_exactly_for_stable_ones(degree: int) -> None:
+    for p in random_exact(degree):
+        quantities = lienard_chipart([c * (1 if p[0] > 0 else -1) for c in p])
+        assert len(quantities) == degree
+        assert all(q > 0 for q in quantities) == routh_exact(p)
+
+
+@pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
+def test_hurwitz_minors_are_the_minors_of_the_hurwitz_matrix(degree: int) -> None:
+    """The matrix as in Gantmacher: rows a1 a3 a5 …, a0 a2 a4 …, each pair shifted right by one."""
+    for p in random_exact(degree)[:10]:
+        padded = [Fraction(0)] * degree + p + [Fraction(0)] * (2 * degree)
+        matrix = sympy.Matrix(
+            degree,
+            degree,
+            lambda i, j, padded=padded: sympy.Rational(str(padded[degree + 1 - i + 2 * j])),
+        )
+        expected = [matrix[:m, :m].det() for m in range(1, degree + 1)]
+        assert [sympy.Rational(str(x)) for x in hurwitz_minors(p)] == expected
+
+
+@pytest.mark.parametrize(
+    "unstable",
+    [
+        product([1, 0, 1], [1, 1, 1]),  # a pair on the imaginary axis
+        product([1, 0], [1, 3, 3, 1]),  # a root at 0
+        product([1, 0, 1], [1, 0, 1]),
+        product([1, -1], [1, 1], [1, 1, 1]),
+        [0, 1, 2, 1],  # a root at infinity
+        [0, 0, 0],
+        [1, np.nan, 1],
+    ],
+)
+def test_the_boundary_is_not_stable(unstable: list[float]) -> None:
+    assert not is_stable(unstable)
+    assert not is_stable([-c for c in unstable])
+
+
+def test_is_stable_is_vectorised() -> None:
+    c = np.array([[[1, 2, 3], [-1, -2, -3]], [[1, -2, 3], [1, 2, -3]]])
+    assert is_stable(c).tolist() == [[True, True], [False, False]]
+
+
+@repeatable
+@given(st.lists(rational, min_size=3, max_size=5))
+def test_discriminant_is_the_exact_resultant(p: list[Fraction]) -> None:
+    assume(p[0] != 0)
+    assert discriminant(p) == discriminant_exact(p)
+
+
+@pytest.mark.parametrize("length", [1, 2])
+def test_discriminant_refuses_other_degrees(length: int) -> None:
+    with pytest.raises(ValueError, match=f"not {length - 1}"):
+        discriminant([1] * length)
+
+
+def test_discriminant_keeps_its_sign_across_two_double_roots() -> None:
+    """(s² + 3s + 2)² ± ε both have four distinct real or complex roots, and a positive discriminant."""
+    for epsilon in (Fraction(1, 1000), Fraction(-1, 1000)):
+        p = product([1, 3, 2], [1, 3, 2])
+        p[-1] += epsilon
+        assert discriminant([Fraction(c) for c in p]) > 0
+        real = [r for r, _ in certified_roots(p) if r.imag == 0]
+        assert len(real) == (0 if epsilon > 0 else 4)

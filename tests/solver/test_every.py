@@ -1,0 +1,182 @@
+"""All solutions in a box: those of closed forms, met and no other, and what the search says about the rest."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import tmsopt
+from tmsopt.cli import main
+from tmsopt.models import from_coefficients, from_matrices
+
+c1, c2 = ca.SX.sym("c1"), ca.SX.sym("c2")
+
+
+def oscillators(k: float, w: float, box: tuple[float, float] = (-2, 2), **asked: Any) -> tmsopt.Problem:
+    """Two masses 1 with dampers c1, c2 and springs 1, w, coupled by k."""
+    model = from_matrices([[1, 0], [0, 1]], [[c1, 0], [0, c2]], [[1 + k, -k], [-k, w + k]])
+    return tmsopt.Problem(model=model, free={"c1": box, "c2": box}, **{"locate": "CEP2", **asked})
+
+
+def all_of(problem: tmsopt.Problem, **options: Any) -> tmsopt.Every:
+    """All solutions, from no more starts than the least that settle it."""
+    return tmsopt.solve_all(problem, **{"starts": 48, **options})
+
+
+def meeting(k: float, w: float) -> tuple[float, float]:
+    """c1 and c2 of the CEP2 with a stable mean.
+
+    (s² + c1 s + A)(s² + c2 s + B) − k² = (s² + bs + c)² with A = 1 + k, B = w + k needs b = (c1 + c2)/2,
+    c² = AB − k², δ² = A + B − 2c for δ = (c1 − c2)/2, and bδ = A − B. The other one has −c1, −c2.
+    """
+    A, B = 1 + k, w + k
+    c = math.sqrt(A * B - k * k)
+    delta = math.sqrt(A + B - 2 * c)
+    mean = (A - B) / delta
+    return (mean + delta, mean - delta) if mean > 0 else (-mean - delta, -mean + delta)
+
+
+@pytest.mark.parametrize(("k", "w"), [(0.3, 1.2), (0.1, 1.5)])
+def test_both_cep2_of_two_oscillators(k: float, w: float) -> None:
+    one = np.array(meeting(k, w))
+    polynomial = np.convolve([1, one[0], 1 + k], [1, one[1], w + k]) - [0, 0, 0, 0, k * k]
+    b, c = one.sum() / 2, math.sqrt((1 + k) * (w + k) - k * k)
+    assert np.allclose(polynomial, np.convolve([1, b, c], [1, b, c]), rtol=1e-14)  # the closed form is right
+    found = all_of(oscillators(k, w, (-3, 3))).solutions
+    designs = sorted([s.parameters["c1"], s.parameters["c2"]] for s in found)
+    assert np.allclose(designs, sorted([one.tolist(), (-one).tolist()]), rtol=0, atol=1e-11)
+    assert {s.structure for s in found} == {"CEP2"}
+    assert sorted(s.abscissa for s in found) == pytest.approx(sorted([-b / 2, b / 2]), abs=1e-11)
+
+
+def test_a_box_with_one_of_them_or_none() -> None:
+    stable = all_of(oscillators(0.3, 1.2, (0, 2)), starts=12)
+    (design,) = stable.solutions
+    assert [design.parameters[n] for n in ("c1", "c2")] == pytest.approx(meeting(0.3, 1.2), abs=1e-11)
+    assert design.status == "optimal"
+    none = all_of(oscillators(0.3, 1.2, (1.5, 2)), starts=16)
+    assert none.solutions == ()
+    assert none.coverage.hits == ()
+    assert none.coverage.chance == pytest.approx(3 / none.coverage.starts)  # the rule of three
+
+
+def test_constraints_choose_among_them() -> None:
+    chosen = all_of(oscillators(0.3, 1.2, constraints={"unstable": "c1 + c2 <= 0"}), starts=12).solutions
+    assert [s.parameters["c1"] for s in chosen] == [pytest.approx(-meeting(0.3, 1.2)[0], abs=1e-11)]
+
+
+def test_both_exchanged_ep3_of_three_masses() -> None:
+    """K = [[μ + 1, −1, 0], [−1, 2, −1], [0, −1, ν + 1]] has a 3-fold λ where 3λ = tr K, 3λ² = minors, λ³ = det K."""
+    problem = tmsopt.load(Path(__file__).parents[2] / "problems" / "three_masses.toml")
+    free = tmsopt.Problem(model=problem.model, free=problem.free, locate="CEP3")
+    found = tmsopt.solve_all(free, starts=16).solutions
+    values = [complex(s.parameters["mu_r"], s.parameters["mu_i"]) for s in found]
+    partners = [complex(s.parameters["nu_r"], s.parameters["nu_i"]) for s in found]
+    for mu, nu in zip(values, partners, strict=True):
+        triple = (mu + nu + 4) / 3
+        minors = 2 * (mu + 1) - 1 + 2 * (nu + 1) - 1 + (mu + 1) * (nu + 1)
+        assert minors == pytest.approx(3 * triple**2, abs=1e-11)
+        determinant = (mu + 1) * (2 * (nu + 1) - 1) - (nu + 1)
+        assert determinant == pytest.approx(triple**3, abs=1e-11)
+    assert sorted(values, key=abs) == pytest.approx(sorted(partners, key=abs), abs=1e-11)
+    assert {s.structure for s in found} == {"CEP3"}
+
+
+def test_coverage_says_how_much_was_looked_at() -> None:
+    """w (n − 1)/(n − w − 2) solutions expected for w found in n hits (Boender and Rinnooy Kan 1987)."""
+    coverage = tmsopt.solve_all(oscillators(0.3, 1.2)).coverage
+    w, n = len(coverage.hits), sum(coverage.hits)
+    assert w == 2
+    assert min(coverage.hits) >= 3
+    assert coverage.hits == tuple(sorted(coverage.hits, reverse=True))
+    assert coverage.expected == pytest.approx(w * (n - 1) / (n - w - 2))
+    assert 0 < coverage.chance <= 3 / coverage.starts
+    few = tmsopt.solve_all(oscillators(0.3, 1.2), starts=2).coverage
+    assert few.starts == 2
+    assert few.chance > coverage.chance
+
+
+def test_the_same_is_found_from_other_starts_and_again() -> None:
+    first, again, other = (all_of(oscillators(0.3, 1.2), seed=s, starts=12) for s in (0, 0, 5))
+    assert first.to_json()["coverage"] == again.to_json()["coverage"]
+    assert [dict(s.parameters) for s in first.solutions] == [dict(s.parameters) for s in again.solutions]
+    names = ("c1", "c2")
+    found = [sorted([s.parameters[n] for n in names] for s in every.solutions) for every in (first, other)]
+    assert np.allclose(*found, atol=1e-11)
+
+
+def test_of_one_pair_and_of_seven_roots() -> None:
+    """A double root of s² + x s + 1 where x = ±2; of seven roots with the product 2⁷ all meet at −2 alone."""
+    x = ca.SX.sym("x")
+    pair = tmsopt.Problem(model=from_coefficients([1, x, 1]), free={"x": (-3, 3)}, locate="EP2")
+    assert sorted(s.parameters["x"] for s in all_of(pair, starts=12).solutions) == pytest.approx([-2, 2], abs=1e-12)
+    row = [math.comb(7, j) * 2.0**j for j in range(8)]
+    names = [ca.SX.sym(f"y{j}") for j in range(1, 7)]
+    free = {f"y{j}": (0.5 * row[j], 2 * row[j]) for j in range(1, 7)}
+    seven = tmsopt.Problem(model=from_coefficients([1, *names, row[7]]), free=free, locate="EP7")
+    design = tmsopt.solve(seven)
+    assert design.structure == "EP7"
+    assert design.abscissa == pytest.approx(-2, abs=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("problem", "said"),
+    [
+        (oscillators(0.3, 1.2, locate=None, minimize="abscissa"), "all solutions are those of a pattern"),
+        (oscillators(0.3, 1.2, minimize="c1"), "all solutions are those of a pattern"),
+        (
+            oscillators(0.3, 1.2, locate="EP2"),
+            "2 free parameters and 1 condition do not make single solutions; free fewer",
+        ),
+        (
+            oscillators(0.3, 1.2, locate="EP4"),
+            "2 free parameters and 3 conditions do not make single solutions; free more",
+        ),
+        (oscillators(0.3, 1.2, constraints={"sum": "c1 + c2 == 1"}), "do not make single solutions; free more"),
+        (oscillators(0.3, 1.2, tolerances={"c1": 0.1}), "do not make single solutions"),
+    ],
+)
+def test_problems_without_single_solutions_are_refused(problem: tmsopt.Problem, said: str) -> None:
+    with pytest.raises(tmsopt.InputError, match=said):
+        tmsopt.solve_all(problem)
+
+
+def test_of_the_command_line(tmp_path: Path) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text("""
+[model]
+M = [[1, 0], [0, 1]]
+D = [["c1", 0], [0, "c2"]]
+K = [["1 + k", "-k"], ["-k", "w + k"]]
+[parameters]
+c1 = { min = -2, max = 2 }
+c2 = { min = -2, max = 2 }
+k = 0.3
+w = 1.2
+[objective]
+locate = "CEP2"
+""", encoding="utf-8")  # fmt: skip
+    result = CliRunner().invoke(main, ["solve", str(file), "--all", "--json"])
+    data = json.loads(result.stdout)
+    assert result.exit_code == 0
+    assert sorted(s["parameters"]["c1"] for s in data["solutions"]) == pytest.approx(
+        sorted([meeting(0.3, 1.2)[0], -meeting(0.3, 1.2)[0]]), abs=1e-11
+    )
+    text = CliRunner().invoke(main, ["solve", str(file), "--all"]).output
+    assert "locate CEP2: 2 solutions in the box" in text
+    assert "95 % confidence; no proof" in text
+
+
+def test_a_continuum_of_solutions_is_told_from_none() -> None:
+    """s⁴ + (Om² − 1 − k) s² + k: both pairs meet wherever Om = 1 + √k, a whole curve, for there is no damping."""
+    Om, k = ca.SX.sym("Om"), ca.SX.sym("k")
+    model = from_matrices([[1, 0], [0, 1]], [[0, -Om], [Om, 0]], [[-1, 0], [0, -k]])
+    problem = tmsopt.Problem(model=model, free={"Om": (0.5, 6.0), "k": (0.5, 3.0)}, locate="CEP2")
+    every = tmsopt.solve_all(problem, starts=8)
+    assert not every.solutions
+    assert every.coverage.singular > 0

@@ -1,0 +1,128 @@
+"""Boxes with both signs of the tilt: both are searched, and each is the answer to the problem on its own side."""
+
+import json
+from dataclasses import replace
+from math import isnan
+
+import numpy as np
+import pytest
+
+import tmsopt
+from tmsopt import laws
+from tmsopt.solver import sides
+
+TMS = tmsopt.models.tms
+FIXED = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}
+SWAPPED = {**FIXED, "zeta_B": -0.2, "zeta_H": -0.4}
+BOX = {"Fr": (0.1, 5.0), "chi_B": (0.3, 3.0), "lambda_s": (-1.2, 1.2)}
+FORWARD, BACKWARD = "forward tilt", "backward tilt"
+
+
+def problem(fixed=FIXED, free=BOX, **asked):
+    return tmsopt.Problem(TMS, fixed=fixed, free=free, **asked)
+
+
+def on(side, stated):
+    """The problem with one sign of the tilt alone."""
+    lower, upper = stated.free["lambda_s"]
+    ends = (0.0, upper) if side == FORWARD else (lower, 0.0)
+    return replace(stated, free={**stated.free, "lambda_s": ends}, start={})
+
+
+@pytest.mark.parametrize(("fixed", "winner"), [(FIXED, FORWARD), (SWAPPED, BACKWARD)])
+def test_the_winner_is_named_and_each_side_is_its_own_problem(fixed, winner):
+    """Heights exchanged, the EP4 tilts the other way, by the law; its mirror is as stable."""
+    stated = problem(fixed, minimize="abscissa")
+    design = tmsopt.solve(stated, starts=16)
+    law = laws.ep4_chi_H_1(fixed["zeta_B"], fixed["zeta_H"])
+    assert design.value == pytest.approx(-(12.5**0.25), abs=1e-11)
+    assert np.tan(design.parameters["lambda_s"]) == pytest.approx(float(law.tan_lambda_s), abs=1e-10)
+    assert np.sign(design.parameters["lambda_s"]) == (1 if winner == FORWARD else -1)
+    assert list(design.sides) == [FORWARD, BACKWARD]
+    for side, value in design.sides.items():
+        assert value == pytest.approx(tmsopt.solve(on(side, stated), starts=16).value, abs=1e-6 * (1 + abs(value)))
+    (note,) = [n for n in design.notes if "both signs" in n]
+    loser = BACKWARD if winner == FORWARD else FORWARD
+    assert f"{winner} wins" in note
+    assert f"with {loser} is {design.sides[loser]:.9g}" in note
+    shown = {side: float(f"{value:.9g}") for side, value in design.sides.items()}  # of designs that are not shown
+    assert json.loads(json.dumps(design.to_json()))["sides"] == shown
+
+
+def test_the_dual_of_a_problem_has_the_dual_of_its_answer():
+    """(ζ_B, ζ_H, χ_B, T, Fr) → (ζ_H, ζ_B, 1/χ_B, −T/χ_B², Fr/χ_B) keeps the spectrum: Fr becomes Fr/χ_B, and so back."""
+    decay = {"decay": "abscissa <= -0.8"}
+    forward = tmsopt.solve(problem(minimize="Fr", constraints=decay), starts=16)
+    backward = tmsopt.solve(problem(SWAPPED, minimize="Fr/chi_B", constraints=decay), starts=16)
+    assert forward.sides[FORWARD] == pytest.approx(backward.sides[BACKWARD], abs=1e-9)
+    assert any("backward tilt wins" in n for n in backward.notes)
+    own = {n: forward.parameters[n] for n in ("Fr", "chi_B", "zeta_B", "zeta_H", "lambda_s")}
+    dual = {n: float(v) for n, v in laws.dual(**own).items()}
+    for name, value in dual.items():
+        assert backward.parameters[name] == pytest.approx(value, abs=1e-5)  # the optimum is flat along its line
+    spectra = [np.sort_complex(np.roots(laws.copo(mu=0.1, chi_H=1.0, **d))) for d in (own, dual)]
+    assert spectra[0] == pytest.approx(spectra[1], abs=1e-6)
+
+
+def test_a_side_without_a_design_is_said_to_have_none():
+    """With these heights no backward tilt is stable at chi_H = 1, by the law of the EP4: its dual has T > 0."""
+    design = tmsopt.solve(problem(minimize="Fr", constraints={"decay": "abscissa <= -0.5"}))
+    alone = tmsopt.solve(on(FORWARD, design.problem))
+    assert design.value == pytest.approx(alone.value, abs=1e-9)
+    assert design.sides[FORWARD] == design.value
+    assert isnan(design.sides[BACKWARD])
+    assert any("with backward tilt nothing feasible" in n for n in design.notes)
+    assert json.loads(json.dumps(design.to_json()))["sides"][BACKWARD] is None
+
+
+@pytest.mark.parametrize(("sign", "winner"), [("+", FORWARD), ("-", BACKWARD)])
+def test_maximising_takes_the_greater_side(sign, winner):
+    """t² ± t is greatest at the ends of the box, 2.64 at one and 0.24 at the other."""
+    steep = tmsopt.solve(problem(maximize=f"lambda_s**2 {sign} lambda_s"))
+    other = BACKWARD if winner == FORWARD else FORWARD
+    assert steep.value == pytest.approx(2.64, abs=1e-7)
+    assert steep.sides == pytest.approx({winner: 2.64, other: 0.24}, abs=1e-7)
+    assert abs(steep.parameters["lambda_s"]) == pytest.approx(1.2, abs=1e-8)
+    assert any(f"{winner} wins" in n for n in steep.notes)
+
+
+@pytest.mark.parametrize("tilt", [0.3, -0.3])
+def test_a_start_is_used_on_its_own_side_alone(tilt):
+    stated = problem(minimize="abscissa", start={"lambda_s": tilt, "Fr": 2.0})
+    parts = {part.name: part.problem for part in sides(stated)}
+    own, other = (FORWARD, BACKWARD) if tilt > 0 else (BACKWARD, FORWARD)
+    assert parts[own].start == {"lambda_s": tilt, "Fr": 2.0}
+    assert "lambda_s" not in parts[other].start
+    assert parts[FORWARD].free["lambda_s"] == (0.0, 1.2)
+    assert parts[BACKWARD].free["lambda_s"] == (-1.2, 0.0)
+    assert all(part.free["chi_B"] == BOX["chi_B"] for part in parts.values())
+
+
+def test_a_start_on_the_losing_side_does_not_decide():
+    design = tmsopt.solve(problem(minimize="abscissa", start={"lambda_s": -0.3, "Fr": 2.0, "chi_B": 2.0}))
+    assert design.value == pytest.approx(-(12.5**0.25), abs=1e-11)
+    assert design.parameters["lambda_s"] > 0
+
+
+@pytest.mark.parametrize("tilt", [(0.0, 1.2), (0.05, 1.2), (-1.2, 0.0), (-1.2, -0.05)])
+def test_one_sign_has_no_sides(tilt):
+    stated = problem(free={**BOX, "lambda_s": tilt}, minimize="Fr - lambda_s**2")
+    assert [part.name for part in sides(stated)] == [""]
+    design = tmsopt.solve(stated)
+    assert design.sides == {}
+    assert "sides" not in design.to_json()
+    assert not any("signs" in n for n in design.notes)
+    assert design.value == pytest.approx(0.1 - 1.44, abs=1e-7)
+
+
+def test_a_fixed_tilt_has_no_sides():
+    free = {n: ends for n, ends in BOX.items() if n != "lambda_s"}
+    assert [part.name for part in sides(problem({**FIXED, "lambda_s": 0.4}, free, minimize="abscissa"))] == [""]
+
+
+def test_matching_on_both_sides():
+    """One EP4 for each order of heights: located on its side, and none on the other."""
+    design = tmsopt.solve(problem(SWAPPED, locate="EP4"))
+    law = laws.ep4_chi_H_1(-0.2, -0.4)
+    assert np.tan(design.parameters["lambda_s"]) == pytest.approx(float(law.tan_lambda_s), abs=1e-10)
+    assert any("backward tilt wins" in n for n in design.notes)

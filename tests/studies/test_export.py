@@ -1,0 +1,209 @@
+"""Rows as tables in files: the same doubles, blanks where a row has none, and what the rows are of."""
+
+import csv
+import json
+import math
+import struct
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tmsopt.errors import InputError
+from tmsopt.records import Table
+from tmsopt.studies import ENDINGS, Row, check_export, columns, export
+
+SPECIAL = (
+    0.1,
+    math.nan,
+    math.inf,
+    -math.inf,
+    -0.0,
+    0.0,
+    5e-324,
+    -2.2250738585072011e-308,
+    1.7976931348623157e308,
+    1 / 3,
+)
+METADATA = {"definition": {"title": "χ"}, "versions": {"tmsopt": "0.1.0"}, "long": "x" * 1_000_000}
+
+
+def solved(number: int, x: float = 0.1, **varied: float) -> Row:
+    return Row(
+        number, number, Table(varied or {"mu": 0.1}), "optimal", objective=x, structure="EP4", parameters=Table({"Fr": x}),
+        reports=Table({"Fr / Fr_c": x}), bound=x, proven=number % 2 == 0, laws=Table({"chib": x}), host="here",
+    )  # fmt: skip
+
+
+def broken(number: int) -> Row:
+    return Row(
+        number, number, Table({"mu": 0.2}), "failed", cause='two\nlines, "quoted"', violations=Table({"trail": 0.5})
+    )
+
+
+ROWS = [*(solved(n, x) for n, x in enumerate(SPECIAL)), broken(len(SPECIAL))]
+
+
+def read_csv(path: Path) -> dict[str, list[Any]]:
+    with path.open(newline="", encoding="utf-8") as stream:
+        header, *lines = csv.reader(stream)
+    return {name: list(values) for name, values in zip(header, zip(*lines, strict=True), strict=True)}
+
+
+def read_parquet(path: Path) -> dict[str, list[Any]]:
+    return pytest.importorskip("pyarrow.parquet").read_table(path).to_pydict()
+
+
+def read_netcdf(path: Path, group: str | None = None) -> dict[str, list[Any]]:
+    with pytest.importorskip("xarray").open_dataset(path, engine="netcdf4", group=group) as opened:
+        return {v.attrs.get("long_name", name): v.values.tolist() for name, v in opened.load().variables.items()}
+
+
+READERS: dict[str, Callable[[Path], dict[str, list[Any]]]] = {
+    "csv": read_csv, "parquet": read_parquet, "nc": read_netcdf,
+}  # fmt: skip
+
+
+def bits(value: Any) -> bytes:
+    """Of a double; a blank is nan."""
+    return struct.pack("<d", math.nan if value in ("", None) else float(value))
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_every_double_comes_back_bit_by_bit(ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"rows.{ending}"
+    export(iter(ROWS), path, METADATA)
+    found = READERS[ending](path)
+    for name in ("objective", "Fr", "report.Fr / Fr_c", "law.chib"):
+        assert [bits(v) for v in found[name]] == [bits(x) for x in (*SPECIAL, math.nan)]
+    assert [bits(v) for v in found["bound"]] == [bits(x) for x in (*SPECIAL, -math.inf)]
+    assert [bits(v) for v in found["violation.trail"]] == [bits(math.nan)] * len(SPECIAL) + [bits(0.5)]
+    assert [float(v) for v in found["varied.mu"]] == [0.1] * len(SPECIAL) + [0.2]
+    assert [int(v) for v in found["number"]] == list(range(len(ROWS)))
+    assert found["status"] == ["optimal"] * len(SPECIAL) + ["failed"]
+    assert found["cause"][-1] == 'two\nlines, "quoted"'
+    assert [str(bool(v) if v not in ("true", "false") else v == "true") for v in found["proven"]] == [
+        str(r.proven) for r in ROWS
+    ]
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+def test_the_header() -> None:
+    """In the order of a row's fields; a table's names have a prefix, but for parameters."""
+    row = Row(0, 0, Table({"mu": 1.0}), "optimal", parameters=Table({"mu": 1.0, "seed": 2.0}), reports=Table({"chi_T": 3.0}),
+        laws=Table({"chib": 4.0}), violations=Table({"trail": 5.0}))  # fmt: skip
+    assert list(columns([row])) == [
+        "number", "seed", "varied.mu", "status", "cause", "objective", "abscissa", "damping_ratio", "structure",
+        "mu", "parameter.seed", "report.chi_T", "bound", "gap", "proven", "method", "law.chib", "violation.trail",
+        "starts", "warm", "seconds", "host",
+    ]  # fmt: skip
+
+
+def test_absent_and_nan_differ_in_parquet(tmp_path: Path) -> None:
+    path = tmp_path / "rows.parquet"
+    pytest.importorskip("pyarrow")
+    export(ROWS, path)
+    found = read_parquet(path)["Fr"]
+    assert math.isnan(found[1])
+    assert found[-1] is None
+
+
+def test_what_the_rows_are_of(tmp_path: Path) -> None:
+    parquet, xarray = pytest.importorskip("pyarrow.parquet"), pytest.importorskip("xarray")
+    for ending in ("parquet", "nc"):
+        export(ROWS, tmp_path / f"rows.{ending}", METADATA)
+    assert json.loads(parquet.read_schema(tmp_path / "rows.parquet").metadata[b"tmsopt"]) == METADATA
+    with xarray.open_dataset(tmp_path / "rows.nc", engine="netcdf4") as opened:
+        assert json.loads(opened.attrs["tmsopt"]) == METADATA
+        assert opened["Fr"].dims == ("row",)
+        assert opened["Fr"].sel(row=3).item() == -math.inf
+
+
+GRID = [(mu, fr) for mu in (0.3, 0.1) for fr in (1.0, 2.0, 3.0)]
+
+
+def test_a_full_grid_has_its_own_dimensions_too(tmp_path: Path) -> None:
+    xarray = pytest.importorskip("xarray")
+    rows = [solved(n, 10 * mu + fr, mu=mu, Fr=fr, zeta_B=-0.4) for n, (mu, fr) in enumerate(GRID)]
+    path = tmp_path / "rows.nc"
+    export(rows[::-1], path)
+    assert len(read_netcdf(path)["objective"]) == 6
+    with xarray.open_dataset(path, engine="netcdf4", group="grid") as opened:
+        assert dict(opened.sizes) == {"varied.mu": 2, "varied.Fr": 3}
+        assert opened["status"].dims == opened["objective"].dims == ("varied.mu", "varied.Fr")
+        for n, (mu, fr) in enumerate(GRID):
+            at = opened.sel({"varied.mu": mu, "varied.Fr": fr})
+            assert (at["number"].item(), at["objective"].item()) == (n, 10 * mu + fr)
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        GRID[:-1],
+        [*GRID[:-1], GRID[0]],
+        [(0.1 * n, 1.0 + n) for n in range(4)],
+        [(0.1, 1.0)],
+        [*GRID[:-1], (math.nan, 3.0)],
+    ],
+)
+def test_rows_that_fill_no_grid_have_none(points: list[tuple[float, float]], tmp_path: Path) -> None:
+    pytest.importorskip("xarray")
+    path = tmp_path / "rows.nc"
+    export([solved(n, mu=mu, Fr=fr) for n, (mu, fr) in enumerate(points)], path)
+    with pytest.raises(OSError, match="grid"):
+        read_netcdf(path, "grid")
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_no_rows_are_a_table_too(ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"rows.{ending}"
+    export([], path)
+    if ending != "csv":
+        assert READERS[ending](path)["objective"] == []
+    else:
+        assert path.read_text().startswith("number,seed,status")
+
+
+def test_a_seed_longer_than_64_bits_is_text() -> None:
+    rows = [Row(0, 5, Table(), "optimal"), Row(1, 2**127, Table(), "optimal")]
+    assert columns(rows)["seed"].values.tolist() == ["5", str(2**127)]
+    assert columns(rows)["number"].values.dtype == np.int64
+
+
+def refusal(call: Callable[[], Any]) -> str:
+    with pytest.raises(InputError) as caught:
+        call()
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(("ending", "module"), [("parquet", "pyarrow"), ("nc", "xarray"), ("nc", "netCDF4")])
+def test_a_missing_package_is_named(ending: str, module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, module, None)
+    message = refusal(lambda: export(ROWS, tmp_path / f"rows.{ending}"))
+    assert f'{module} is not installed; pip install "tmsopt[data]"' in message
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_files_that_cannot_be_written(tmp_path: Path) -> None:
+    assert "accepted: a file name ending in .csv, .parquet, .nc" in refusal(lambda: export(ROWS, tmp_path / "rows.xls"))
+    assert "does not exist" in refusal(lambda: check_export(tmp_path / "no" / "rows.csv"))
+    (tmp_path / "folder.csv").mkdir()
+    assert "no regular file" in refusal(lambda: export(ROWS, tmp_path / "folder.csv"))
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_file_is_replaced_as_a_whole_or_not_at_all(ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"rows.{ending}"
+    path.write_text("before")
+
+    def interrupted() -> Any:
+        yield ROWS[0]
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        export(interrupted(), path)
+    assert path.read_text() == "before"
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]

@@ -1,0 +1,638 @@
+"""The store of a study: no acknowledged row is lost, no other file is touched, every double comes back bit by bit."""
+
+import functools
+import json
+import math
+import os
+import random
+import sqlite3
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tmsopt.errors import InputError
+from tmsopt.records import Table
+from tmsopt.studies import Row
+from tmsopt.studies.store import Store, journal, lock, open_store, read_store
+
+database = import_module("tmsopt.studies.store.database")
+locking = import_module("tmsopt.studies.store.locking")
+store = import_module("tmsopt.studies.store.store")
+
+JOURNALS = ("wal", "delete")
+STUDY: dict[str, Any] = {
+    "problem": {"parameters": {"mu": 0.1, "zeta_B": -0.4}, "objective": {"minimize": "abscissa"}},
+    "columns": {"mu": [0.1, 0.2, 0.3], "zeta_B": [-0.4, -0.5, -0.6]},
+    "seed": 7,
+}
+SPECIAL = (math.nan, math.inf, -math.inf, -0.0, 0.0, 5e-324, -2.2250738585072011e-308, 1.7976931348623157e308, 0.1)
+posix = pytest.mark.skipif(os.name != "posix", reason="signals and limits of POSIX")
+
+
+def row(number: int, **given: Any) -> Row:
+    varied = Table({"mu": 0.1 * number})
+    return Row(
+        number, 1000 + number, **({"varied": varied, "status": "optimal", "abscissa": -1 / (1 + number)} | given)
+    )
+
+
+def bits(value: Any) -> Any:
+    """Equal for equal bits: nan is itself, and 0.0 is not −0.0."""
+    if isinstance(value, float):
+        return struct.pack("<d", value)
+    return {n: bits(v) for n, v in value.items()} if isinstance(value, Table) else value
+
+
+def same(one: Row, other: Row) -> bool:
+    return {n: bits(v) for n, v in vars(one).items()} == {n: bits(v) for n, v in vars(other).items()}
+
+
+def refusal(call: Callable[[], Any]) -> str:
+    with pytest.raises(InputError) as caught:
+        call()
+    return str(caught.value)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Iterator[Path]:
+    """Of a store to be: in memory where the system has such files, since ``kill -9`` asks nothing of a disk."""
+    memory = Path("/dev/shm")
+    with tempfile.TemporaryDirectory(dir=memory if os.access(memory, os.W_OK) else tmp_path) as folder:
+        yield Path(folder) / "study.sqlite"
+
+
+# A process that writes, and is killed
+
+WRITER = """
+import os, random, sys, time
+from pathlib import Path
+sys.path[:0] = [str(Path(place).resolve()) for place in ("tests", "tests/studies")]
+from test_store import STUDY, row, store
+journal, path, task = sys.argv[1:]
+store.journal = lambda folder: journal
+with store.open_store(path, STUDY) as opened:
+    print(opened.journal, os.getpid(), flush=True)
+    if task == "hold":
+        time.sleep(60)
+    if task == "fork":
+        if os.fork():
+            print("forked", flush=True)
+        time.sleep(60)
+    number = len(opened.done())
+    while True:
+        batch = [row(n) for n in range(number, number + random.randint(1, 20))]
+        opened.add(batch)
+        number += len(batch)
+        print(number, flush=True)
+"""
+
+
+@contextmanager
+def writer(journal: str, path: Path, task: str = "write") -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """A process that has the store open, and its id; killed with SIGKILL in the end."""
+    command = [sys.executable, "-c", WRITER, journal, str(path), task]
+    root = Path(__file__).parents[2]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=root, start_new_session=True)
+    try:
+        kept, number = process.stdout.readline().split()
+        assert kept == journal
+        yield process, int(number)
+    finally:
+        process.kill()
+        process.stdout.read()
+        process.wait()
+        process.stdout.close()
+
+
+@pytest.mark.parametrize("journal", JOURNALS)
+def test_no_acknowledged_row_is_lost_by_kill_9(journal: str, path: Path) -> None:
+    """The process prints how many rows `add` has acknowledged; whatever it printed must be there, row by row."""
+    chance, acknowledged = random.Random(journal), 0
+    for _ in range(4):
+        with writer(journal, path) as (process, _):
+            time.sleep(chance.uniform(0, 0.05))
+            process.kill()
+            printed = process.stdout.read().split("\n")[:-1]  # the last line may be cut off
+        acknowledged = int(printed[-1]) if printed else acknowledged
+        with read_store(path) as opened:
+            done = opened.done()
+            assert done >= set(range(acknowledged))
+            assert done == set(range(len(done)))  # batches are kept as a whole or not at all
+            assert [s["ended"] for s in opened.sessions()] == [None] * len(opened.sessions())
+            assert sum(s["rows"] for s in opened.sessions()) == len(done)
+    assert all(same(found, row(number)) for number, found in enumerate(read_all(path)))
+    assert acknowledged > 0
+
+
+@pytest.mark.parametrize("journal", JOURNALS)
+def test_reading_while_another_process_writes(journal: str, path: Path) -> None:
+    with writer(journal, path) as (process, _):
+        for _ in range(5):
+            acknowledged = int(process.stdout.readline())
+            with read_store(path) as opened:
+                assert len(opened.done()) >= acknowledged
+                assert [r.number for r in opened.rows()][:acknowledged] == list(range(acknowledged))
+                assert sum(opened.counts().values()) >= acknowledged
+
+
+@pytest.mark.parametrize("journal", JOURNALS)
+def test_a_store_is_recognised_while_another_process_writes(journal: str, path: Path) -> None:
+    """While it grows its first page may promise more pages than the file has yet."""
+    with writer(journal, path):
+        for _ in range(500):
+            database.check(path)
+
+
+def test_a_store_is_recognised_though_its_writer_was_killed_while_it_grew(path: Path) -> None:
+    open_store(path, STUDY).close()
+    with path.open("r+b") as stream:  # bytes 28 to 31 of the header: how many pages the file has
+        stream.seek(28)
+        stream.write((1000).to_bytes(4, "big"))
+    database.check(path)
+
+
+@pytest.mark.parametrize("journal", JOURNALS)
+def test_a_second_writer_is_refused_until_the_first_is_gone(journal: str, path: Path) -> None:
+    with writer(journal, path, "hold") as (process, number):
+        message = refusal(lambda: open_store(path, STUDY))
+        assert f"process {number} on {store.host()}" in message
+        assert "another --store" in message
+        refusal(lambda: open_store(path, STUDY, fresh=True))
+        process.kill()
+        process.wait()
+        with open_store(path, STUDY) as opened:
+            opened.add([row(0)])
+            assert str(os.getpid()) in refusal(lambda: open_store(path, STUDY))  # within one process too
+    with open_store(path, STUDY) as opened:
+        assert opened.done() == {0}
+    assert [p.name for p in path.parent.iterdir()] == [path.name]
+
+
+@posix
+def test_a_forked_child_of_a_killed_writer_holds_no_lock(path: Path) -> None:
+    with writer("wal", path, "fork") as (process, _):
+        assert process.stdout.readline() == "forked\n"
+        process.kill()
+        process.wait()
+        try:
+            os.killpg(process.pid, 0)  # the child still runs
+            open_store(path, STUDY).close()
+        finally:
+            os.killpg(process.pid, 9)
+
+
+@posix
+def test_a_lock_on_a_file_that_is_gone_does_not_count(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last holder removes the file after another process opened it: that one must not lock what has no name."""
+    name, connect, tries = path.with_name("study.sqlite.lock"), sqlite3.connect, []
+
+    class Late(sqlite3.Connection):
+        def execute(self, *given: Any) -> sqlite3.Cursor:
+            if given != ("BEGIN IMMEDIATE",):
+                return super().execute(*given)
+            tries.append(given)
+            if len(tries) in (2, 3):  # the first makes the file
+                name.unlink()
+            done = super().execute(*given)
+            if len(tries) in (4, 5):
+                name.unlink()
+            return done
+
+    with monkeypatch.context() as late:
+        late.setattr(sqlite3, "connect", functools.partial(connect, factory=Late))
+        held = lock(path)
+    assert len(tries) > 6
+    assert held is not None
+    assert lock(path) is None
+    held.release()
+    assert not name.exists()
+
+
+# Rows
+
+
+@given(
+    st.lists(st.sampled_from(SPECIAL) | st.floats(allow_nan=False), min_size=9, max_size=9),
+    st.sampled_from(["", "two\nlines", "χ_B \x00 'quoted' \ud800"]),
+    st.integers(0, 2**128),
+)
+@settings(max_examples=25, deadline=None)
+def test_a_row_is_the_same_after_json(x: list[float], text: str, seed: int) -> None:
+    tables = {name: Table({"a": x[0], text: x[1]}) for name in ("parameters", "reports", "laws", "violations")}
+    scalars = dict(zip(("objective", "abscissa", "damping_ratio", "bound", "gap", "seconds"), x[2:8], strict=True))
+    made = Row(3, seed, Table({"mu": x[8]}), "failed", cause=text, **tables, **scalars)
+    data = json.dumps(made.to_json(), allow_nan=False)
+    back = Row.from_json(json.loads(data))
+    assert same(back, replace(made))
+    assert back.identity == made.identity
+    assert replace(back, seconds=1.0, host="elsewhere").identity == made.identity
+
+
+def test_rows_come_back_bit_by_bit_and_in_order(path: Path) -> None:
+    rows = [row(n, objective=x, bound=x, gap=x, parameters=Table({"Fr": x})) for n, x in enumerate(SPECIAL)]
+    with open_store(path, STUDY) as opened:
+        for one in reversed(rows):
+            opened.add([one])
+    with read_store(path) as opened:
+        assert all(same(a, b) for a, b in zip(opened.rows(), rows, strict=True))
+        assert same(opened.row(3), rows[3])
+        assert "row 99" in refusal(lambda: opened.row(99))
+        assert "open for reading" in refusal(lambda: opened.add(rows))
+
+
+def test_a_row_is_never_overwritten(path: Path) -> None:
+    with open_store(path, STUDY) as opened:
+        opened.add([row(1), row(2), row(2)])
+        opened.add([row(1, seconds=9.0, host="elsewhere"), row(3)])
+        message = refusal(lambda: opened.add([row(4), row(2, abscissa=-7.0, cause="other")]))
+        assert "row 2" in message
+        assert "abscissa, cause" in message
+        opened.add([])
+        assert opened.done() == {1, 2, 3}
+        assert same(opened.row(1), row(1))
+        assert opened.sessions()[0]["rows"] == 3
+
+
+def test_counts_and_rows_of_one_status(path: Path) -> None:
+    with open_store(path, STUDY) as opened:
+        opened.add([row(n, status="failed" if n % 3 == 0 else "optimal") for n in range(1200)])
+        assert opened.counts() == {"optimal": 800, "failed": 400}
+        assert [r.number for r in opened.rows("failed")] == list(range(0, 1200, 3))
+        assert list(opened.rows("quarantined")) == []
+        opened.forget([0, 1])
+        assert opened.counts() == {"optimal": 799, "failed": 399}
+
+
+def test_a_hundred_thousand_rows(tmp_path: Path) -> None:
+    path = tmp_path / "study.sqlite"
+    with open_store(path, STUDY) as opened:
+        opened.add([row(0)])
+    with closing(sqlite3.connect(path)) as connection, connection:  # copies, without the time to make them
+        numbers = "WITH RECURSIVE n (i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 99999) SELECT i FROM n"
+        connection.execute(f"INSERT INTO rows SELECT i, status, checksum, data FROM ({numbers}), rows")
+    with open_store(path, STUDY) as opened:
+        for first in range(100_000, 105_000, 100):
+            opened.add([Row(n, n, Table(), "optimal") for n in range(first, first + 100)])
+        assert opened.done() == set(range(105_000))
+        assert opened.counts() == {"optimal": 105_000}
+
+
+def test_the_rows_are_ahead_of_a_reader_that_pauses(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A rollback journal cannot be committed while somebody is reading: reading takes breaks."""
+    monkeypatch.setattr(store, "journal", lambda folder: "delete")
+    with open_store(path, STUDY) as opened:
+        opened.add([row(n) for n in range(2000)])
+        with read_store(path) as reading:
+            numbers = reading.rows()
+            next(numbers)
+            opened.add([row(2000)])
+            assert sum(1 for _ in numbers) == 2000
+
+
+# What the store knows of its study
+
+
+def test_what_a_store_says_of_itself(path: Path) -> None:
+    with open_store(path, STUDY) as opened:
+        opened.add([row(0)])
+    with open_store(path, STUDY) as opened:
+        assert opened.warnings == ()
+        assert opened.moved is None
+        about = opened.about()
+        assert opened.definition() == STUDY
+    assert about["definition"] == {name: value for name, value in STUDY.items() if name != "columns"}
+    assert about["seed"] == 7
+    assert set(about["versions"]) == {"python", "tmsopt", "casadi", "numpy", "scipy", "python-flint", "ipopt"}
+    with read_store(path) as opened:
+        assert [(s["rows"], s["pid"], s["ended"] is None) for s in opened.sessions()] == [
+            (1, os.getpid(), False),
+            (0, os.getpid(), False),
+        ]
+
+
+def changed(**given: Any) -> dict[str, Any]:
+    return STUDY | given
+
+
+@pytest.mark.parametrize(
+    ("other", "line"),
+    [
+        (changed(seed=8), "seed: 7 in the store, 8 in the file"),
+        (changed(title="x"), 'title: absent in the store, "x" in the file'),
+        (
+            changed(problem={"parameters": {"mu": 0.2, "zeta_B": -0.4}, "objective": {"minimize": "abscissa"}}),
+            "problem.parameters.mu: 0.1 in the store, 0.2 in the file",
+        ),
+        (
+            changed(problem={"parameters": {"mu": 0.1, "zeta_B": -0.4}}),
+            'problem.objective: {"minimize": "abscissa"} in the store, absent in the file',
+        ),
+        (
+            changed(columns=STUDY["columns"] | {"mu": [0.1, 0.25, 0.35]}),
+            "columns.mu: 2 of 3 values differ, the first in row 1: 0.2 in the store, 0.25 in the file",
+        ),
+        (
+            changed(columns=STUDY["columns"] | {"mu": [0.1, 0.2]}),
+            "columns.mu: 3 values in the store, 2 in the file",
+        ),
+        (changed(columns={"mu": [0.1, 0.2, 0.3]}), "columns.zeta_B: 3 values in the store, absent in the file"),
+    ],
+)
+def test_the_store_of_a_changed_study_is_refused(path: Path, other: dict[str, Any], line: str) -> None:
+    with open_store(path, STUDY) as opened:
+        opened.add([row(0)])
+    before = path.read_bytes()
+    message = refusal(lambda: open_store(path, other))
+    assert message.splitlines()[1:] == [f"  {line}"]
+    assert "--fresh" in message
+    assert "--store" in message
+    assert path.read_bytes() == before
+    with open_store(path, STUDY) as opened:
+        assert opened.done() == {0}
+
+
+def test_the_same_study_written_in_another_way_is_the_same(path: Path) -> None:
+    study = {"columns": {"mu": [1, math.nan]}, "list": [1, 2.0], "x": math.nan}
+    open_store(path, study).close()
+    open_store(path, {"x": math.nan, "list": (1.0, 2), "columns": {"mu": (1.0, math.nan)}}).close()
+    refusal(lambda: open_store(path, study | {"x": True}))
+    assert "0.0 in the file" in refusal(lambda: open_store(path, study | {"columns": {"mu": [0.0, math.nan]}}))
+
+
+def test_fresh_moves_aside_and_never_deletes(path: Path) -> None:
+    for number in range(3):
+        with open_store(path, changed(seed=number), fresh=True) as opened:
+            assert opened.moved == (path.with_name(f"study.{number}.sqlite") if number else None)
+            assert opened.done() == set()
+            opened.add([row(number)])
+    for name, number in (("study.1.sqlite", 0), ("study.2.sqlite", 1), ("study.sqlite", 2)):
+        with read_store(path.with_name(name)) as opened:
+            assert opened.about()["seed"] == number
+            assert opened.done() == {number}
+    assert len(list(path.parent.iterdir())) == 3
+
+
+def test_fresh_keeps_what_a_killed_writer_left_in_its_log(path: Path) -> None:
+    with writer("wal", path) as (process, _):
+        acknowledged = [int(process.stdout.readline()) for _ in range(3)][-1]
+        process.kill()
+        process.wait()
+    assert path.with_name("study.sqlite-wal").exists()
+    with open_store(path, STUDY, fresh=True) as opened:
+        assert opened.done() == set()
+    with read_store(path.with_name("study.1.sqlite")) as opened:
+        assert len(opened.done()) >= acknowledged
+
+
+def test_fresh_leaves_no_journal_beside_what_it_moves(path: Path) -> None:
+    """What a writer leaves that is killed before its journal counts: SQLite clears it with the next commit."""
+    with open_store(path, STUDY) as opened:
+        opened.add([row(0)])
+    path.with_name("study.sqlite-journal").write_bytes(bytes(1000))
+    open_store(path, STUDY, fresh=True).close()
+    assert sorted(p.name for p in path.parent.iterdir()) == ["study.1.sqlite", "study.sqlite"]
+    assert len(read_all(path.with_name("study.1.sqlite"))) == 1
+
+
+def test_a_log_beside_a_store_that_is_gone_is_not_played_into_the_new_one(path: Path) -> None:
+    with writer("wal", path) as (process, _):
+        process.stdout.readline()
+        process.kill()
+        process.wait()
+    path.unlink()
+    with open_store(path, STUDY) as opened:
+        assert opened.done() == set()
+    assert path.with_name("study.1.sqlite-wal").exists()
+
+
+def test_other_versions_are_a_warning(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with open_store(path, STUDY) as opened:
+        opened.add([row(0)])
+    older = store.versions()
+    monkeypatch.setattr(store, "versions", lambda: older | {"tmsopt": "0.9.9"})
+    with open_store(path, STUDY) as opened:
+        assert opened.warnings == (f"tmsopt: {older['tmsopt']} in the store, 0.9.9 now",)
+
+
+# Files that are no store, damage, and places that cannot be written
+
+
+def other_database(path: Path) -> None:
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute("PRAGMA journal_mode=WAL")
+        connection.execute("CREATE TABLE mine (x)")
+
+
+def newer_store(path: Path) -> None:
+    open_store(path, STUDY).close()
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute(f"PRAGMA user_version={database.SCHEMA + 1}")
+
+
+@pytest.mark.parametrize(
+    ("make", "expected"),
+    [
+        (lambda path: path.write_bytes(random.Random(1).randbytes(5000)), "is no store of tmsopt"),
+        (lambda path: path.write_text("[parameters]\n"), "is no store of tmsopt"),
+        (lambda path: path.write_bytes(b""), "is no store of tmsopt"),
+        (other_database, "is no store of tmsopt"),
+        (newer_store, f"its schema is {database.SCHEMA + 1}, this version reads up to {database.SCHEMA}"),
+    ],
+)
+def test_a_file_that_is_no_store_is_not_touched(path: Path, make: Callable[[Path], Any], expected: str) -> None:
+    make(path)
+    before = path.read_bytes()
+    calls = (lambda: read_store(path), lambda: open_store(path, STUDY), lambda: open_store(path, STUDY, fresh=True))
+    for call in calls:
+        assert expected in refusal(call)
+    assert path.read_bytes() == before
+    assert [p.name for p in path.parent.iterdir()] == [path.name]
+
+
+def test_places_where_no_store_can_be(tmp_path: Path) -> None:
+    assert "no regular file" in refusal(lambda: open_store(tmp_path, STUDY))
+    assert "does not exist" in refusal(lambda: open_store(tmp_path / "no" / "a.sqlite", STUDY))
+    assert "no such file" in refusal(lambda: read_store(tmp_path / "a.sqlite"))
+    assert "no name for a file" in refusal(lambda: open_store(tmp_path / ("x" * 300), STUDY))
+    if sys.platform == "linux":
+        assert "cannot be opened or written" in refusal(lambda: open_store("/proc/a.sqlite", STUDY))
+        assert "no regular file" in refusal(lambda: open_store("/dev/null", STUDY))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("damage", ["UPDATE rows SET data = replace(data, '2', '3')", "UPDATE rows SET status = 'failed'",
+    "UPDATE rows SET data = substr(data, 1, 40)", "UPDATE rows SET data = x'ff00fe'", "UPDATE rows SET number = 13"])  # fmt: skip
+def test_a_damaged_row_is_named(path: Path, damage: str) -> None:
+    with open_store(path, STUDY) as opened:
+        opened.add([row(11), row(12), row(14)])
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute(f"{damage} WHERE number = 12")
+    with open_store(path, STUDY) as opened:
+        named = "row 13 is damaged" if "number =" in damage else "row 12 is damaged"
+        assert named in refusal(lambda: list(opened.rows()))
+        opened.forget([12, 13])
+        opened.add([row(12)])
+        assert [r.number for r in opened.rows()] == [11, 12, 14]
+
+
+def test_a_damaged_store_is_said_to_be(path: Path) -> None:
+    with open_store(path, STUDY) as opened:
+        opened.add([row(n) for n in range(1000)])
+    whole = path.read_bytes()
+    path.write_bytes(whole[:4096] + b"\xa5" * (len(whole) - 4096))
+    damaged = path.read_bytes()
+    assert "is damaged" in refusal(lambda: open_store(path, STUDY))
+    assert path.read_bytes() == damaged
+    with open_store(path, STUDY, fresh=True) as opened:
+        opened.add([row(0)])
+    assert path.with_name("study.1.sqlite").read_bytes() == damaged
+    path.write_bytes(whole[: len(whole) // 2])
+    assert "damaged" in refusal(lambda: read_all(path))
+
+
+def read_all(path: Path) -> list[Row]:
+    with read_store(path) as opened:
+        return list(opened.rows())
+
+
+@pytest.mark.parametrize("damage", ["DROP TABLE rows", "UPDATE rows SET status = CAST(x'ff' AS TEXT)"])
+def test_tables_that_are_gone_and_text_that_is_none(path: Path, damage: str) -> None:
+    with open_store(path, STUDY) as opened:
+        opened.add([row(0)])
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute(damage)
+    with read_store(path) as opened:
+        assert "is damaged" in refusal(opened.counts)
+        assert "is damaged" in refusal(lambda: list(opened.rows()))
+
+
+def test_a_damaged_definition_is_said_to_be(path: Path) -> None:
+    open_store(path, STUDY).close()
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute("UPDATE columns SET doubles = x'00'")
+    assert "definition of its study is damaged" in refusal(lambda: open_store(path, STUDY))
+
+
+@posix
+@pytest.mark.parametrize("kind", JOURNALS)
+def test_a_full_disk_costs_no_row_that_was_acknowledged(path: Path, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A limit on the size of files stands for the disk: SQLite calls the one an I/O error and the other full."""
+    import resource
+
+    monkeypatch.setattr(store, "journal", lambda folder: kind)
+    with open_store(path, STUDY) as opened:
+        opened.add([row(0)])
+        soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, hard))
+        acknowledged = 1
+        try:
+            for first in range(1, 10_000, 100):
+                opened.add([row(n) for n in range(first, first + 100)])
+                acknowledged = first + 100
+            pytest.fail("the limit was not reached")
+        except InputError as error:
+            assert "disk" in str(error)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        assert opened.done() == set(range(acknowledged))
+        opened.add([row(acknowledged)])
+    assert [r.number for r in read_all(path)] == list(range(acknowledged + 1))
+
+
+# Journals
+
+
+def test_a_write_ahead_log_is_probed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert journal(tmp_path) == "wal"
+    assert journal(tmp_path / "absent") == "delete"
+    monkeypatch.setattr("tmsopt.studies.store.locking._type", lambda folder: "nfs4")
+    assert journal(tmp_path) == "delete"
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the table of mounts is Linux's")
+def test_the_file_system_of_a_folder(tmp_path: Path) -> None:
+    mounts = tmp_path / "mounts"
+    mounts.write_text(
+        "/dev/a / ext4 rw 0 0\nhost:/x /data nfs4 rw 0 0\n/dev/b /data/my\\040disk xfs rw 0 0\nt /late nfs rw 0 0\n/dev/c /late ext4 rw 0 0\n"
+    )
+    found = [
+        locking._type(Path(p), mounts) for p in ("/home", "/data", "/data/x", "/database", "/data/my disk/y", "/late")
+    ]
+    assert found == ["ext4", "nfs4", "nfs4", "ext4", "xfs", "ext4"]
+
+
+@pytest.mark.parametrize("kind", JOURNALS)
+def test_a_closed_store_is_one_plain_file(path: Path, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that it can be copied, and read where nothing can be written."""
+    monkeypatch.setattr(store, "journal", lambda folder: kind)
+    opened: Store
+    with open_store(path, STUDY) as opened:
+        opened.add([row(0)])
+        assert opened.journal == kind
+    assert [p.name for p in path.parent.iterdir()] == [path.name]
+    with closing(sqlite3.connect(f"{path.as_uri()}?mode=ro&immutable=1", uri=True)) as connection:
+        assert connection.execute("SELECT count(*) FROM rows").fetchone() == (1,)
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+sys.path[:0] = [str(Path(place).resolve()) for place in ("tests", "tests/studies")]
+from test_store import STUDY, row, store
+
+def killed_after(events):
+    def hook(event, given):
+        nonlocal events
+        events -= event in ("os.rename", "os.remove", "sqlite3.connect")
+        if events < 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+    sys.addaudithook(hook)
+
+store.versions = dict  # reading them takes longer than all else here
+store.journal, path, moment, added = (lambda folder, kind=sys.argv[1]: kind), sys.argv[2], 0, 0
+while True:
+    with store.open_store(path, STUDY) as opened:
+        if not opened.done():
+            opened.add([row(0)])
+            added += 1
+    child = os.fork()
+    if not child:
+        killed_after(moment)
+        store.open_store(path, STUDY, fresh=True)
+        os._exit(0)
+    if not os.waitpid(child, 0)[1]:
+        break
+    moment += 1
+print(moment, added)
+"""
+
+
+@posix
+@pytest.mark.parametrize("kind", JOURNALS)
+def test_killed_at_every_step_of_moving_aside(path: Path, kind: str) -> None:
+    """Killed before each file that is opened, renamed or removed: every row is in some store, and no other file stays.
+
+    Rows stay in the store under its name, or under the next number; the last process gets to its end.
+    """
+    command, root = [sys.executable, "-c", KILLED, kind, str(path)], Path(__file__).parents[2]
+    moments, added = map(int, subprocess.run(command, cwd=root, check=True, stdout=subprocess.PIPE).stdout.split())
+    with open_store(path, STUDY) as opened:
+        assert opened.done() == set()
+    stores = [p for p in path.parent.iterdir() if p.suffix == ".sqlite"]
+    assert moments > 10
+    assert len(stores) == added + 1
+    assert sum(len(read_all(p)) for p in stores) == added
+    assert stores == list(path.parent.iterdir())

@@ -1,0 +1,441 @@
+"""Studies as a user meets them: rows that obey the laws, whoever solves them, and a command that can be stopped."""
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from tmsopt import laws
+from tmsopt.checks import law_rows
+from tmsopt.cli import main
+from tmsopt.design import Problem, load
+from tmsopt.errors import InputError
+from tmsopt.models import tms
+from tmsopt.records import Table
+from tmsopt.solver import solve
+from tmsopt.studies import Row, Solver, Study, alone, definition, monte_carlo, over_grid, run_study, summary
+from tmsopt.studies.store import open_store, read_store
+
+EP4 = load("problems/ep4.toml")
+HEIGHTS = {"zeta_B": [-0.4, -0.8], "zeta_H": [-0.2, -0.3, -0.35]}
+GRID = over_grid(EP4, HEIGHTS, title="heights", report=["nu_H", "2*Fr"])
+
+FILE = """
+title = "heights"
+[problem.parameters]
+chi_H = 1.0
+zeta_H = -0.2
+zeta_B = -0.4
+mu = 0.1
+chi_B = { min = 1.01, max = 5 }
+Fr = { min = 0.01, max = 10 }
+lambda_s = { min = 0.02, max = 1.4 }
+[problem.objective]
+minimize = "abscissa"
+[vary]
+zeta_B = [-0.4, -0.8]
+zeta_H = [-0.2, -0.3, -0.35]
+"""
+
+
+def identities(rows: Sequence[Any]) -> list[str]:
+    return [row.identity for row in sorted(rows, key=lambda r: r.number)]
+
+
+def command(*arguments: object) -> Result:
+    return CliRunner().invoke(main, ["study", *map(str, arguments)])
+
+
+@pytest.fixture
+def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "heights.toml"
+    path.write_text(FILE, encoding="utf-8")
+    return path
+
+
+# Rows
+
+
+def test_every_row_obeys_the_laws_of_ep4() -> None:
+    found = run_study(GRID, workers=1)
+    for row in found.rows:
+        heights = dict(row.varied)
+        assert row.status == "optimal"
+        assert row.structure == "EP4"
+        assert row.objective == row.abscissa == pytest.approx(laws.w01(**heights), rel=1e-12)
+        assert row.parameters["chi_B"] == pytest.approx(laws.chib1(**heights), rel=1e-12)
+        assert row.reports["2*Fr"] == pytest.approx(2 * laws.frep4(**heights)[0], rel=1e-11)
+        assert row.proven
+        assert row.bound == pytest.approx(row.abscissa, rel=1e-12)
+        assert row.laws.keys() >= {"w01", "chib1", "tls", "frep4", "epset"}
+        assert max(abs(residual) for residual in row.laws.values()) < 1e-9  # coefficients are matched to 1e-10
+    assert [row.number for row in found.rows] == list(range(6))
+    assert found.solved == 6
+
+
+def test_rows_are_the_same_in_any_order_alone_and_by_processes(tmp_path: Path) -> None:
+    here = identities(run_study(GRID, workers=1).rows)
+    backwards = Solver(GRID)
+    assert identities([backwards((k,))[0] for k in reversed(range(6))]) == here
+    assert [alone(GRID, k).row.identity for k in range(6)] == here
+    assert identities(run_study(GRID, tmp_path / "s.sqlite", workers=2).rows) == here
+
+
+def test_a_study_is_taken_up_where_it_was_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Interrupted after three rows; the rest is solved later, and nothing twice."""
+    path = tmp_path / "s.sqlite"
+    tried: list[int] = []
+    original = Solver.answers
+
+    def counting(self: Solver, numbers: Sequence[int]) -> Any:
+        tried.extend(numbers)
+        return original(self, numbers)
+
+    def interrupt(done: int, most: int) -> None:
+        if done == 3:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Solver, "answers", counting)
+    with pytest.raises(KeyboardInterrupt):
+        run_study(GRID, path, workers=1, progress=interrupt)
+    with read_store(path) as store:
+        assert store.done() == {0, 1, 2}
+    resumed = run_study(GRID, path, workers=1)
+    assert resumed.solved == 3
+    assert sorted(tried) == list(range(6))
+    monkeypatch.undo()
+    assert identities(resumed.rows) == identities(run_study(GRID, workers=1).rows)
+
+
+def test_a_store_of_another_study_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "s.sqlite"
+    run_study(GRID, path, workers=1)
+    other = over_grid(replace(EP4, fixed={**EP4.fixed, "mu": 0.2}), HEIGHTS, report=["nu_H", "2*Fr"])
+    with pytest.raises(InputError, match=r"problem\.fixed\.mu"):
+        run_study(other, path, workers=1)
+    anew = run_study(other, path, workers=1, fresh=True)
+    assert {row.parameters["mu"] for row in anew.rows} == {0.2}
+    assert len(list(tmp_path.glob("*.sqlite"))) == 2  # the old one is beside it
+
+
+def test_failures_are_rows_with_a_cause() -> None:
+    """One box is empty, one limit cannot be met (the trail of EP4 is 0.08), one row is as it should be."""
+    problem = replace(EP4, constraints={"trail": "nu_H >= 0.02"})
+    study = Study(problem, {"lambda_s.min": [0.02, 1.5, 0.02], "trail.limit": [0.02, 0.02, 50.0]})
+    rows = run_study(study, workers=1).rows
+    assert [row.status for row in rows] == ["optimal", "failed", "infeasible"]
+    assert rows[0].cause == ""
+    assert "lambda_s" in rows[1].cause
+    assert "1.5" in rows[1].cause
+    assert "trail" in rows[2].cause
+    assert rows[2].violations["trail"] > 0
+    told = summary(study, rows)
+    assert dict(told.counts) == {"optimal": 1, "infeasible": 1, "failed": 1}
+    assert told.best is rows[0]
+    assert sum(told.causes.values()) == 2
+
+
+def test_a_row_that_breaks_the_program_is_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("of a bug")
+
+    monkeypatch.setattr("tmsopt.studies.solving.solve", broken)
+    rows = run_study(GRID, workers=1).rows
+    assert {row.status for row in rows} == {"failed"}
+    assert rows[0].cause == "ZeroDivisionError: of a bug"
+
+
+def test_rows_are_drawn_around_a_design() -> None:
+    """First-order: moving Fr alone by dFr moves each coefficient as the polynomial in Fr says; here only that rows are
+    those designs, evaluated: their abscissa is that of `solve` with nothing free."""
+    design = solve(EP4)
+    study = monte_carlo(design, 5, seed=3, tolerances={"Fr": 0.02, "chi_B": 0.01})
+    rows = run_study(study, workers=1).rows
+    for row in rows:
+        assert abs(row.parameters["Fr"] - design.parameters["Fr"]) <= 0.02
+        assert row.parameters["lambda_s"] == design.parameters["lambda_s"]
+        lone = solve(Problem(model=tms, fixed=dict(row.parameters)))
+        assert row.abscissa == lone.abscissa
+        assert row.abscissa > design.abscissa  # EP4 is the best of all
+    told = summary(study, rows).product
+    assert told is not None
+    assert told.stable.count == 5
+
+
+def test_a_summary_of_rows_is_what_its_numbers_are_by_definition() -> None:
+    """Objectives 1, 2, 3 and 7, one row unstable, three not solved for causes that differ in their numbers alone or not."""
+    made = [Row(k, 0, Table(), "optimal", objective=v, abscissa=v - 6) for k, v in enumerate((2.0, 1.0, 3.0, 7.0))]
+    made += [Row(4 + k, 0, Table(), "infeasible", cause=c) for k, c in enumerate(("a by 0.1", "a by 2e-05", "b by 3"))]
+    told = summary(over_grid(EP4, {"mu": [0.1] * 7}), made)
+    assert told.spread["objective"] == (1.0, 2.5, 7.0)
+    assert told.best is made[1]
+    assert told.stable == 3
+    assert dict(told.causes) == {"a": 2, "b by 3": 1}
+    greatest = summary(over_grid(replace(EP4, minimize=None, maximize="Fr"), {"mu": [0.1]}), made)
+    assert greatest.best is made[3]
+
+
+def test_results_are_columns_and_files(tmp_path: Path) -> None:
+    found = run_study(GRID, workers=1)
+    np.testing.assert_array_equal(found.column("varied.zeta_H"), [-0.2, -0.3, -0.35] * 2)
+    np.testing.assert_array_equal(found.column("chi_B"), [row.parameters["chi_B"] for row in found.rows])
+    np.testing.assert_array_equal(found.column("report.2*Fr"), 2 * found.column("Fr"))
+    assert found.summary.counts == {"optimal": 6}
+    found.export(tmp_path / "rows.csv")
+    assert len((tmp_path / "rows.csv").read_text(encoding="utf-8").splitlines()) == 7
+    assert not any("," in name for row in found.rows for name in row.laws)
+    assert "Row(" not in repr(found)
+    with pytest.raises(InputError, match="did you mean 'chi_B'"):
+        found.column("chi_b")
+
+
+def test_calls_that_make_no_sense_are_refused() -> None:
+    with pytest.raises(InputError, match="accepted: a Study"):
+        run_study(EP4)  # type: ignore[arg-type]
+    for workers in (0, True, 1.5):
+        with pytest.raises(InputError, match="1 or more"):
+            run_study(GRID, workers=workers)  # type: ignore[arg-type]
+
+
+# Warm starts
+
+TWO = Problem(
+    model=tms,
+    fixed={"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1, "chi_B": 1.4, "lambda_s": 0.4},
+    free={"Fr": (0.0, 4.0)},
+    minimize="min((Fr - 1)**2 + 0.1*mu, (Fr - 3)**2 + 0.1*(1 - mu))",
+)
+"""Two valleys, at Fr = 1 and 3; over mu the second overtakes the first at one half: least value 0.1 min(mu, 1 − mu)."""
+
+
+def test_a_valley_that_is_overtaken_on_the_way_is_left() -> None:
+    values = np.linspace(0.0, 1.0, 16)
+    warm = run_study(over_grid(TWO, {"mu": values.tolist()}, warm=True), workers=1).rows
+    assert sum(row.warm for row in warm) >= 10
+    for row, mu in zip(warm, values.tolist(), strict=True):
+        assert row.objective == pytest.approx(0.1 * min(mu, 1 - mu), abs=1e-12)
+    middle = [row.parameters["Fr"] for row in warm]
+    assert middle[0] == pytest.approx(1, abs=1e-6)
+    assert middle[-1] == pytest.approx(3, abs=1e-6)
+
+
+def test_a_valley_that_neither_end_knows_is_found_on_the_way_and_carried_both_ways() -> None:
+    """A third valley at Fr = 2, of least value 0.03, is the best from mu = 0.3 to 0.7 and nowhere else."""
+    third = "min((Fr - 0.5)**2 + 0.1*mu, min((Fr - 2)**2 + 0.03, (Fr - 3.5)**2 + 0.1*(1 - mu)))"
+    values = np.linspace(0.0, 1.0, 16).tolist()
+    warm = run_study(over_grid(replace(TWO, minimize=third), {"mu": values}, warm=True), workers=1).rows
+    assert sum(row.warm for row in warm) >= 10
+    for row, mu in zip(warm, values, strict=True):
+        assert row.objective == pytest.approx(min(0.1 * mu, 0.03, 0.1 * (1 - mu)), abs=1e-12)
+
+
+def test_warm_rows_are_the_same_alone_and_by_processes() -> None:
+    study = over_grid(TWO, {"mu": np.linspace(0, 1, 40).tolist()}, warm=True)
+    here = identities(run_study(study, workers=1).rows)
+    assert identities(run_study(study, workers=2).rows) == here
+    assert [alone(study, k).row.identity for k in (0, 17, 39)] == [here[k] for k in (0, 17, 39)]
+
+
+def test_warm_starts_find_the_optima_of_cold_ones() -> None:
+    problem = replace(EP4, constraints={"trail": "nu_H >= 0.05"})
+    limits = {"trail.limit": np.linspace(0.05, 0.15, 8).tolist()}
+    warm = run_study(over_grid(problem, limits, warm=True), workers=1).rows
+    cold = run_study(over_grid(problem, limits), workers=1).rows
+    assert any(row.warm for row in warm)
+    for a, b in zip(warm, cold, strict=True):
+        assert a.objective == pytest.approx(b.objective, rel=1e-10)
+
+
+def test_the_greatest_of_several_valleys_upside_down_is_kept() -> None:
+    """The same two valleys as hills: what is better follows the sense of the objective."""
+    hills = replace(TWO, minimize=None, maximize=f"-({TWO.minimize})")
+    values = np.linspace(0.0, 1.0, 16).tolist()
+    study = over_grid(hills, {"mu": values}, warm=True)
+    rows = run_study(study, workers=1).rows
+    for row, mu in zip(rows, values, strict=True):
+        assert row.objective == pytest.approx(-0.1 * min(mu, 1 - mu), abs=1e-12)
+    best = summary(study, rows).best
+    assert best is not None
+    assert best.objective == pytest.approx(0.0, abs=1e-12)
+
+
+def test_rows_without_a_design_are_not_solved_again_on_the_way_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No design has Fr above 4: such rows are solved from many starts once each."""
+    tried: Counter[int] = Counter()
+    original = Solver._answer
+
+    def counting(self: Solver, number: int, neighbour: Row | None = None, afar: int = 0) -> Any:
+        if neighbour is None or neighbour.status != "optimal":
+            tried[number] += 1
+        return original(self, number, neighbour, afar)
+
+    monkeypatch.setattr(Solver, "_answer", counting)
+    problem = replace(TWO, constraints={"fast": "Fr >= 0"})
+    limits = {"fast.limit": [0.0, 1.0, 2.0, 5.0, 5.5, 6.0]}
+    rows = run_study(over_grid(problem, limits, warm=True), workers=1).rows
+    assert [row.status for row in rows] == ["optimal"] * 3 + ["infeasible"] * 3
+    assert dict(tried) == {0: 1, 4: 1, 5: 1}
+
+
+def test_a_block_stored_in_part_is_finished_and_only_what_lacks_is_added(tmp_path: Path) -> None:
+    study = over_grid(TWO, {"mu": np.linspace(0, 1, 10).tolist()}, warm=True)
+    whole = run_study(study, workers=1).rows
+    with open_store(tmp_path / "s.sqlite", definition(study)) as store:
+        store.add(whole[:4])
+    resumed = run_study(study, tmp_path / "s.sqlite", workers=1)
+    assert resumed.solved == 6
+    assert identities(resumed.rows) == identities(whole)
+
+
+# What a row is solved with, and what is said of all
+
+
+def test_a_row_is_solved_from_its_own_seed_with_the_starts_of_the_study_on_one_thread(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Sums of several threads have other last digits, so that rows would depend on the machine."""
+    seen: list[tuple[int, int]] = []
+
+    def spied(problem: Problem, **options: Any) -> Any:
+        assert {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"} <= {1}
+        seen.append((options["seed"], options["starts"]))
+        return solve(problem, **options)
+
+    monkeypatch.setattr("tmsopt.studies.solving.solve", spied)
+    study = over_grid(EP4, HEIGHTS, seed=5, starts=3)
+    with threadpool_limits(2):  # more than one, wherever this runs
+        run_study(study, workers=1)
+    assert seen == [(study.seed_of(row), 3) for row in range(6)]
+
+
+def test_a_summary_by_hand() -> None:
+    """Rows that are made up: what they say together is known without solving anything."""
+    study = over_grid(replace(EP4, minimize=None, maximize="Fr"), {"mu": [0.1, 0.2, 0.3, 0.4]})
+    objectives, residuals = (1.0, 5.0, 2.0, 9.0), (1e-9, -1e-3, 1e-6, 0.0)
+    rows = [
+        Row(k, 0, study.varied(k), "optimal", objective=value, abscissa=-value, laws=Table({"w01": residual}))
+        for k, (value, residual) in enumerate(zip(objectives, residuals, strict=True))
+    ]
+    rows[3] = replace(rows[3], status="infeasible", laws=Table())
+    told = summary(study, rows)
+    assert told.best is rows[1]
+    assert told.spread["objective"] == (1.0, 2.0, 5.0)
+    assert told.spread["abscissa"] == (-5.0, -2.0, -1.0)
+    assert dict(told.laws) == {"w01": 1e-3}
+
+
+def test_a_row_tells_how_far_its_design_is_from_the_laws() -> None:
+    """The residuals are those that `tmsopt compare` shows, each under a label of its own."""
+    answer = alone(GRID, 4)
+    assert answer.solution is not None
+    applying = [law for law in law_rows(answer.solution) if law.applies]
+    assert sorted(answer.row.laws.values()) == sorted(law.relative for law in applying)
+    assert any(answer.row.laws.values())  # rounding leaves something to compare
+
+
+# The command
+
+
+def test_the_command_solves_stores_and_shows_rows(file: Path) -> None:
+    first = command(file, "--workers", 1, "--json", "--export", "rows.csv")
+    assert first.exit_code == 0
+    told = json.loads(first.stdout)
+    assert told["schema"] == 1
+    assert told["counts"] == {"optimal": 6}
+    assert [row["number"] for row in told["table"]] == list(range(6))
+    assert told["run"]["rows_solved"] == 6
+    assert told["best"]["objective"] == pytest.approx(
+        min(laws.w01(b, h) for b in HEIGHTS["zeta_B"] for h in HEIGHTS["zeta_H"]), rel=1e-12
+    )
+    lines = Path("rows.csv").read_text(encoding="utf-8").splitlines()
+    assert len(lines) == 7
+    header, line = lines[0].split(","), lines[1].split(",")
+    assert float(line[header.index("chi_B")]) == pytest.approx(math.sqrt(2), rel=1e-12)
+
+    again = command(file)
+    assert again.exit_code == 0
+    assert "6 of 6 rows are in" in again.stderr
+    assert "grid over zeta_B (2) × zeta_H (3): 6 rows; 6 optimal" in again.stdout
+
+    row = command(file, "--row", 4, "--json")
+    with read_store(Path("heights.sqlite")) as store:
+        kept = store.row(4).to_json()
+    solved = json.loads(row.stdout)
+    differing = {"seconds", "host", "schema", "solution"}
+    assert {k: v for k, v in solved.items() if k not in differing} == {
+        k: v for k, v in kept.items() if k not in differing
+    }
+    assert solved["solution"]["parameters"] == kept["parameters"]
+
+
+def test_the_command_refuses_what_it_cannot_do(file: Path) -> None:
+    missing = command(file, "--row", 6)
+    assert missing.exit_code == 2
+    assert "0 to 5" in missing.stderr
+    wrong = command(Path(__file__).parents[2] / "problems" / "ep4.toml")
+    assert wrong.exit_code == 2
+    assert "is one problem, not a study" in wrong.stderr
+    assert command(file, "--export", "rows.xlsx").exit_code == 2
+    assert command(file, "--store", "nowhere/s.sqlite").exit_code == 2
+    assert command("absent.toml").exit_code == 2
+    both = command(file, "--row", 1, "--export", "rows.csv", "--fresh")
+    assert both.exit_code == 2
+    assert "--fresh, --export" in both.stderr
+    assert command(file, "--scheduler", "tcp://127.0.0.1:1", "--workers", 2).exit_code == 2
+    assert command(file, "--workers", 1).exit_code == 0
+    file.write_text(FILE.replace("mu = 0.1", "mu = 0.2"), encoding="utf-8")
+    changed = command(file)
+    assert changed.exit_code == 2
+    assert "mu" in changed.stderr
+    assert "--fresh" in changed.stderr
+    assert command(file, "--fresh", "--workers", 1).exit_code == 0
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGINT])
+def test_a_killed_command_goes_on(file: Path, ending: signal.Signals) -> None:
+    """Killed once some rows are stored, then run again: those rows are there, and all rows are as if nothing happened."""
+    many = FILE.replace("zeta_H = [-0.2, -0.3, -0.35]", "zeta_H = { min = -0.35, max = -0.2, points = 36 }")
+    file.write_text(many, encoding="utf-8")
+    run = [sys.executable, "-m", "tmsopt", "study", str(file), "--workers", "2"]
+    store = file.parent / "heights.sqlite"
+    process = subprocess.Popen(run, cwd=file.parent, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    kept: set[int] = set()
+    while len(kept) < 5:
+        assert process.poll() is None
+        time.sleep(0.05)
+        if store.exists():
+            try:
+                with read_store(store) as opened:
+                    kept = opened.done()
+            except InputError:
+                continue  # being made
+    process.send_signal(ending)
+    _, told = process.communicate(timeout=60)
+    if ending == signal.SIGINT:
+        assert process.returncode == 130
+        assert "the same command goes on" in told
+        assert "Traceback" not in told
+    with read_store(store) as opened:
+        before = {n: opened.row(n) for n in opened.done()}
+    assert kept <= before.keys()
+    assert len(before) < 72
+    assert command(file, "--workers", 2).exit_code == 0
+    with open_store(store, json.loads(json.dumps(read_store(store).definition()))) as opened:
+        rows = list(opened.rows())
+    assert [row.number for row in rows] == list(range(72))
+    assert all(rows[n] == row for n, row in before.items())  # seconds too: they were not solved again

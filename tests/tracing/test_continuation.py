@@ -1,0 +1,249 @@
+"""Continuation on plane curves whose shape is known in closed form."""
+
+import math
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from tmsopt.tracing import End, between, both_ways, contains, crossing, curve, project, same, tangent_at, walk
+
+ROUNDING = 1e-14
+"""A corrected point is a solution to a few units of rounding of numbers of order 1."""
+
+INFINITE = np.array([np.inf, np.inf])
+
+
+def plane(equation, lower=-INFINITE, upper=INFINITE, scale=(1.0, 1.0)):
+    x = ca.SX.sym("x", 2)
+    return curve(x, equation(x[0], x[1]), np.array(scale), np.array(lower, float), np.array(upper, float))
+
+
+def circle(x, y):
+    return x * x + y * y - 1
+
+
+def angles(walked):
+    return np.unwrap(np.arctan2(walked.y[:, 1], walked.y[:, 0]))
+
+
+def lengths(walked):
+    return np.hypot(*np.diff(walked.y, axis=0).T)
+
+
+def signed_area(y):
+    return 0.5 * float(np.sum(y[:-1, 0] * y[1:, 1] - y[1:, 0] * y[:-1, 1]))
+
+
+# Closed curves
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+@pytest.mark.parametrize("step", [0.05, 0.005, 0.001])
+def test_circle_closes_in_either_sense(sense, step):
+    on = plane(circle)
+    walked = walk(on, np.array([1.0, 0.0]), np.array([0.0, sense]), step, 10**5)
+    assert walked.closed
+    assert np.array_equal(walked.y[0], walked.y[-1])
+    assert np.array_equal(walked.t[0], walked.t[-1])
+    assert np.abs(np.hypot(*walked.y.T) - 1).max() <= ROUNDING
+    turned = np.diff(angles(walked))
+    assert np.all(sense * turned > 0)  # never back, and the last point not beyond the first
+    assert abs(float(turned.sum()) - sense * 2 * math.pi) <= 1e-12  # once around
+    true = sense * np.stack([-walked.y[:, 1], walked.y[:, 0]], axis=1)
+    assert np.abs(walked.t - true).max() <= ROUNDING
+
+
+def test_circle_is_closed_by_both_ways_from_any_point():
+    for angle in np.linspace(0.1, 6.2, 7):
+        walked = both_ways(plane(circle), np.array([math.cos(angle), math.sin(angle)]), 0.01, 10**5)
+        assert walked is not None
+        assert walked.closed
+        assert abs(abs(angles(walked)[-1] - angles(walked)[0]) - 2 * math.pi) <= 1e-12
+
+
+def test_scale_of_the_variables_does_not_change_the_curve():
+    """x²/100² + y² = 1 in units of (100, 1) is a circle."""
+    on = plane(lambda x, y: (x / 100) ** 2 + y**2 - 1, scale=(100.0, 1.0))
+    walked = both_ways(on, np.array([0.6, 0.8]), 0.01, 10**5)
+    assert walked is not None
+    assert walked.closed
+    assert np.abs(np.hypot(*walked.y.T) - 1).max() <= ROUNDING
+
+
+def test_lemniscate_is_followed_straight_through_its_crossing():
+    """(x² + y²)² = x² − y² has length 2ϖ = 5.24411510858 (lemniscate constant), its lobes opposite areas ±1/2."""
+    on = plane(lambda x, y: (x * x + y * y) ** 2 - x * x + y * y)
+    walked = both_ways(on, np.array([1.0, 0.0]), 0.002, 10**5)
+    assert walked is not None
+    assert walked.closed
+    h = lengths(walked).max()
+    # chords are short by no more than h² κ²/24 of the length, κ ≤ 3
+    assert abs(lengths(walked).sum() - 5.244115108584239) <= 5.25 * h * h * 9 / 24
+    assert abs(signed_area(walked.y)) <= 5.25 * h * h
+    right = walked.y[:, 0].max()
+    assert right == pytest.approx(1.0, abs=h * h)
+    assert walked.y[:, 0].min() == pytest.approx(-1.0, abs=h * h * 3)
+
+
+def test_a_closed_curve_in_space():
+    """Viviani: x² + y² + z² = 4, (x − 1)² + y² = 1, which crosses itself at (2, 0, 0)."""
+    x = ca.SX.sym("x", 3)
+    equations = ca.vertcat(ca.dot(x, x) - 4, (x[0] - 1) ** 2 + x[1] ** 2 - 1)
+    on = curve(x, equations, np.ones(3), -INFINITE[[0, 0, 0]], INFINITE[[0, 0, 0]])
+    walked = both_ways(on, np.array([0.0, 0.0, 2.0]), 0.005, 10**5)
+    assert walked is not None
+    assert walked.closed
+    assert np.abs((walked.y**2).sum(axis=1) - 4).max() <= 10 * ROUNDING
+    assert walked.y[:, 2].max() == pytest.approx(2, abs=1e-3)
+    assert walked.y[:, 2].min() == pytest.approx(-2, abs=1e-3)  # both loops
+
+
+def test_a_neighbouring_curve_is_not_jumped_to():
+    """Circles of radius 1 and 1.01: prediction errors of a longer step are as large as the gap."""
+    on = plane(lambda x, y: (x * x + y * y - 1) * (x * x + y * y - 1.01**2))
+    for radius in (1.0, 1.01):
+        walked = both_ways(on, np.array([radius, 0.0]), 0.05, 10**5)
+        assert walked is not None
+        assert walked.closed
+        assert np.abs(np.hypot(*walked.y.T) - radius).max() <= 1e-12  # the equation is flatter by the gap
+
+
+# Turning points and limits
+
+
+def test_folds_are_passed_and_limits_met_exactly():
+    """x = y³ − y turns back in x at y = ±1/√3."""
+    on = plane(lambda x, y: y**3 - y - x, lower=[-6, -2], upper=[6, 2], scale=(12.0, 4.0))
+    walked = both_ways(on, np.array([0.0, 0.0]), 0.002, 10**5)
+    assert walked is not None
+    assert not walked.closed
+    x, y = (walked.y * on.scale).T
+    assert np.abs(y**3 - y - x).max() <= 10 * ROUNDING
+    assert np.all(np.diff(y) > 0) or np.all(np.diff(y) < 0)
+    assert {round(v, 12) for v in (x[0], x[-1])} == {-6.0, 6.0}
+    reached = {(walked.ends[k].reason, walked.ends[k].limit) for k in (0, 1)}
+    assert reached <= {("min", 0), ("max", 0), ("min", 1), ("max", 1)}  # (±6, ±2) is a corner of the box
+    turns = np.flatnonzero(np.diff(np.sign(walked.t[:, 0])))
+    assert len(turns) == 2
+    assert sorted(y[turns]) == pytest.approx([-1 / math.sqrt(3), 1 / math.sqrt(3)], abs=0.01)
+
+
+def test_a_limit_is_reached_exactly():
+    on = plane(circle, lower=[-2, -2], upper=[0.5, 2], scale=(2.5, 4.0))
+    walked = both_ways(on, np.array([-1.0, 0.0]) / on.scale, 0.01, 10**5)
+    assert walked is not None
+    assert walked.ends == (End("max", 0), End("max", 0))
+    ends = walked.y[[0, -1]] * on.scale
+    assert np.array_equal(ends[:, 0], [0.5, 0.5])
+    assert sorted(ends[:, 1]) == pytest.approx([-math.sqrt(0.75), math.sqrt(0.75)], abs=ROUNDING)
+    assert np.all(walked.y <= on.upper)
+
+
+def test_of_two_limits_within_one_step_the_first_is_taken():
+    """On the line y = x the limit y ≤ 0.99 comes before x ≤ 1, both within a step of 0.1."""
+    on = plane(lambda x, y: y - x, lower=[-1, -1], upper=[1, 0.99])
+    walked = walk(on, np.array([0.98, 0.98]), np.array([1.0, 1.0]) / math.sqrt(2), 0.1, 100)
+    assert walked.ends[1] == End("max", 1)
+    assert walked.y[-1] == pytest.approx([0.99, 0.99], abs=ROUNDING)
+
+
+def test_a_start_on_the_limit_walks_inward_only():
+    on = plane(circle, lower=[0, -2], upper=[2, 2])
+    walked = both_ways(on, np.array([0.0, 1.0]), 0.01, 10**5)
+    assert walked is not None
+    assert np.all(walked.y[:, 0] >= 0)
+    assert walked.y[[0, -1], 0].tolist() == [0.0, 0.0]
+    assert abs(angles(walked)[-1] - angles(walked)[0]) == pytest.approx(math.pi, abs=1e-12)
+
+
+# Where a curve ends otherwise
+
+
+def test_a_cusp_is_a_singular_end():
+    on = plane(lambda x, y: y * y - x**3, lower=[-1, -1], upper=[1, 1])
+    walked = walk(on, np.array([0.25, 0.125]), np.array([-1.0, -0.75]) / 1.25, 0.01, 10**5)
+    assert walked.ends[1].reason.startswith("singular")
+    assert walked.ends[1].limit is None
+    assert np.hypot(*walked.y[-1]) < 1e-3
+    assert np.all(walked.y[:, 1] >= -1e-7)  # not onto the other half; at the cusp y is right to the root of rounding
+
+
+def test_most_points_and_infinity():
+    on = plane(circle)
+    walked = walk(on, np.array([1.0, 0.0]), np.array([0.0, 1.0]), 0.001, 17)
+    assert len(walked.y) == 17
+    assert walked.ends[1].reason == "stopped after 17 points"
+    hyperbola = both_ways(plane(lambda x, y: x * y - 1), np.array([1.0, 1.0]), 0.01, 10**5)
+    assert hyperbola is not None
+    assert all("infinity" in end.reason for end in hyperbola.ends)
+    assert np.abs(hyperbola.y[:, 0] * hyperbola.y[:, 1] - 1).max() <= 1e-10  # 1e4 · rounding of 1e-4
+    assert np.all(hyperbola.y > 0)  # not across to the other half
+
+
+def test_a_point_where_the_equations_leave_more_than_a_curve_is_no_start():
+    x = ca.SX.sym("x", 3)
+    twice = curve(x, ca.vertcat(x[0], 2 * x[0]), np.ones(3), np.full(3, -np.inf), np.full(3, np.inf))
+    with pytest.raises(ValueError, match="more than a curve"):
+        tangent_at(twice, np.zeros(3))
+    assert both_ways(twice, np.zeros(3), 0.01, 100) is None
+
+
+# Its parts
+
+
+def test_project_finds_the_curve_and_only_the_curve():
+    on = plane(circle)
+    found = project(on.evaluate, np.array([0.9, 0.7]), held=1)
+    assert found is not None
+    assert found[1] == 0.7
+    assert found[0] == pytest.approx(math.sqrt(1 - 0.49), abs=ROUNDING)
+    free = project(on.evaluate, np.array([3.0, 4.0]))
+    assert free == pytest.approx([0.6, 0.8], abs=1e-6)  # Gauss–Newton steps are radial
+    assert project(on.evaluate, np.array([0.1, 2.0]), held=1) is None  # no point of the circle has y = 2
+    nowhere = plane(lambda x, y: x * x + y * y + 1)
+    assert project(nowhere.evaluate, np.array([0.5, 0.3])) is None
+
+
+def test_contains_tells_curves_apart():
+    on = plane(lambda x, y: (x * x + y * y - 1) * (x * x + y * y - 4))
+    inner = both_ways(on, np.array([1.0, 0.0]), 0.01, 10**5)
+    assert inner is not None
+    for angle in (0.3, 2.0, 4.4):
+        direction = np.array([math.cos(angle), math.sin(angle)])
+        assert contains(on, inner, direction)
+        assert not contains(on, inner, 2 * direction)
+
+
+def test_between_is_a_point_of_the_curve_at_the_arclength_along_the_tangent():
+    y, t = between(plane(circle), np.array([1.0, 0.0]), np.array([0.0, 1.0]), 0.1)
+    assert y == pytest.approx([math.sqrt(0.99), 0.1], abs=ROUNDING)
+    assert t == pytest.approx([-0.1, math.sqrt(0.99)], abs=ROUNDING)
+
+
+def test_crossing_is_exact_at_the_ends_and_to_rounding_inside():
+    assert crossing(lambda s: s, 1.0) == 0.0
+    assert crossing(lambda s: s - 1.0, 1.0) == 1.0
+    assert crossing(lambda s: s * s - 2.0, 2.0) == pytest.approx(math.sqrt(2), abs=1e-15)
+    assert crossing(lambda s: s - 1e-200, 1.0) == pytest.approx(1e-200, rel=1e-12)
+
+
+def test_a_curve_found_twice_is_recognised_by_its_ends():
+    """y = x² leaves the box −1 … 1 at (±1, 1) wherever one begins; y = x² + 1/2 leaves it elsewhere."""
+
+    def walked(height, start):
+        x = ca.SX.sym("x", 2)
+        on = curve(x, x[1] - x[0] ** 2 - height, np.ones(2), np.array([-1.0, -1.0]), np.array([1.0, 2.0]))
+        return both_ways(on, np.array([start, start**2 + height]), 0.05, 500)
+
+    assert same(walked(0.0, 0.1), walked(0.0, -0.7))
+    assert not same(walked(0.0, 0.1), walked(0.5, 0.1))
+
+
+def test_a_curve_in_an_edge_of_the_box_is_followed():
+    """y (1 + x²) = 0 with y ≥ 0: rounding on the wrong side of the edge does not end it."""
+    x = ca.SX.sym("x", 2)
+    on = curve(x, x[1] * (1 + x[0] ** 2), np.ones(2), np.array([-1.0, 0.0]), np.array([1.0, 1.0]))
+    walked = both_ways(on, np.array([0.1, -1e-17]), 0.05, 500)
+    assert sorted(walked.y[[0, -1], 0]) == [-1, 1]
+    assert np.abs(walked.y[:, 1]).max() < 1e-15
