@@ -1,4 +1,4 @@
-"""Expressions over a grid: the tape by NumPy and by numba, beside one design at a time and CasADi's own evaluation."""
+"""Expressions over a grid by NumPy, beside one design at a time and CasADi's own evaluation."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -11,7 +11,6 @@ import numpy as np
 from benchmarks.report import keep, kept, origin
 from tmsopt.charts.expressions import array_function
 from tmsopt.design.expression import parse_value
-from tmsopt.design.machine import engine_of
 from tmsopt.design.problem import Problem
 from tmsopt.models import Values, tms
 
@@ -56,10 +55,8 @@ def rates(text: str) -> dict[str, float]:
         "one at a time": (alone, _ALONE),
         "F(matrix)": (lambda: casadi(matrix), matrix.shape[1]),
         "F.map": (lambda: mapped(matrix), matrix.shape[1]),
-        "numpy": (lambda: settled({"lambda_s": tilt[:, None]}, "numpy"), matrix.shape[1]),
+        "numpy": (lambda: settled({"lambda_s": tilt[:, None]}), matrix.shape[1]),
     }
-    if engine_of("auto") == "numba":
-        ways["numba"] = (lambda: settled({"lambda_s": tilt[:, None]}, "numba"), matrix.shape[1])
     best = dict.fromkeys(ways, np.inf)
     for _ in range(_ROUNDS):
         for name, (way, count) in ways.items():
@@ -73,15 +70,14 @@ def section(command: str = "python -m benchmarks.arrays", quick: bool = False) -
     """Designs per second and ratios in Markdown."""
     texts = dict(list(EXPRESSIONS.items())[:2]) if quick else EXPRESSIONS
     found = {name: rates(text) for name, text in texts.items()}
-    engines = [e for e in ("numpy", "numba") if e in next(iter(found.values()))]
     others = ["one at a time", "F(matrix)", "F.map"]
-    head = ["expression", *(f"{e}, designs/s" for e in engines), *(f"{e} : {o}" for e in engines for o in others)]
+    head = ["expression", "designs/s", *(f"numpy : {o}" for o in others)]
     lines = [" | ".join(head), " | ".join("---" for _ in head)]
     for name, best in found.items():
-        cells = [f"{1 / best[e]:.2g}" for e in engines] + [f"{best[o] / best[e]:.0f}" for e in engines for o in others]
-        lines.append(" | ".join([name, *cells]))
+        ratios = (f"{best[o] / best['numpy']:.0f}" for o in others)
+        lines.append(" | ".join([name, f"{1 / best['numpy']:.2g}", *ratios]))
     said = (
-        f"A grid of {_COLUMNS} by {_ROWS} designs. Ratios are times divided: how many times faster the tape is than "
+        f"A grid of {_COLUMNS} by {_ROWS} designs. Ratios are times divided: how many times faster NumPy is than "
         "the formula on one design at a time, than CasADi's function on a matrix, and than its map. All are best of "
         f"{_ROUNDS} interleaved rounds on one core."
     )

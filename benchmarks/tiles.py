@@ -12,11 +12,10 @@ import click
 import numpy as np
 
 from benchmarks.report import keep, kept, origin
-from tmsopt.charts.motion import classified
+from tmsopt.charts.motion import classified, engine_of
 from tmsopt.charts.stored import TILE, store
 from tmsopt.charts.survey import USUAL, Survey, survey
 from tmsopt.design.files import load
-from tmsopt.design.machine import engine_of
 
 _FILE = "problems/chart.toml"
 _SIZES = {"numpy": (2000, 1000), "numba": (4000, 2000)}
@@ -35,7 +34,7 @@ def parts(engine: str) -> dict[str, float]:
     a = list(room)
 
     def coefficients() -> None:
-        values = bare.before(bare.grid.up(rows), engine)
+        values = bare.before(bare.grid.up(rows))
         for array, name in zip(a, names, strict=True):
             array[...] = values[name]
 

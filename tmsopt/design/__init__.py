@@ -8,15 +8,12 @@ from tmsopt.design.cases import Band, Case
 from tmsopt.design.expression import Expression, ExpressionError, parse_comparison, parse_value
 from tmsopt.design.files import load
 from tmsopt.design.limit import limit_of, with_limit
-from tmsopt.design.machine import EXACT, engine_of, machine
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.quantities import NO_RADIUS, ROOT_NAMES
 from tmsopt.design.solution import Bound, NotSolved, Solution
-from tmsopt.design.tape import tape
 from tmsopt.design.units import decay_time, frequencies, growth_time, reading, with_unit
 
 __all__ = [
-    "EXACT",
     "NO_RADIUS",
     "ROOT_NAMES",
     "Band",
@@ -28,17 +25,14 @@ __all__ = [
     "Problem",
     "Solution",
     "decay_time",
-    "engine_of",
     "freedom",
     "frequencies",
     "growth_time",
     "limit_of",
     "load",
-    "machine",
     "parse_comparison",
     "parse_value",
     "reading",
-    "tape",
     "with_limit",
     "with_unit",
 ]
