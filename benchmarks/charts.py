@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks.measure import best, duration, times
 from benchmarks.report import origin, table
 from tmsopt import load
-from tmsopt.charts.stored import gathered
+from tmsopt.charts.chart import charted
 from tmsopt.charts.survey import USUAL, Survey, survey
 from tmsopt.design.problem import Problem
 from tmsopt.records import Array
@@ -61,7 +61,7 @@ def methods(problem: Problem, points: int) -> Iterator[Method]:
         )  # fmt: skip
         for gives, layers in _LAYERS.items():
             work = survey(problem, points=(across, across), layers=layers, engine=engine)
-            yield Method(f"chart, {engine}", gives, work.grid.size, partial(gathered, work), width(work))
+            yield Method(f"chart, {engine}", gives, work.grid.size, partial(charted, work), width(work))
 
 
 def engines() -> list[str]:
@@ -122,10 +122,10 @@ _LARGE = """
 import json, re, resource, sys, time
 from pathlib import Path
 import tmsopt
-from tmsopt.charts.stored import chart_to
 problem = tmsopt.load(sys.argv[1], asks=False)
 began = time.perf_counter()
-chart_to(problem, sys.argv[2], points=json.loads(sys.argv[3]), layers=("kind", "abscissa"), single=True)
+asked = {"points": json.loads(sys.argv[3]), "layers": ("kind", "abscissa"), "single": True, "boundaries": False}
+tmsopt.chart(problem, folder=sys.argv[2], **asked)
 seconds = time.perf_counter() - began
 status = Path("/proc/self/status")  # ru_maxrss counts the parent too, from before exec
 peak = status.exists() and re.search(r"VmHWM:\\s*(\\d+)", status.read_text())

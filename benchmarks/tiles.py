@@ -12,9 +12,10 @@ import click
 import numpy as np
 
 from benchmarks.report import keep, kept, origin
+from tmsopt.charts.chart import charted
 from tmsopt.charts.motion import classified, engine_of
-from tmsopt.charts.stored import TILE, store
 from tmsopt.charts.survey import USUAL, Survey, survey
+from tmsopt.charts.tiles import TILE
 from tmsopt.design.files import load
 
 _FILE = "problems/chart.toml"
@@ -61,17 +62,17 @@ def stored(engine: str, layers: tuple[str, ...], workers: int) -> float:
     best = np.inf
     for _ in range(2):
         with tempfile.TemporaryDirectory() as folder:
-            best = min(best, 1 / store(work, Path(folder) / "a.chart", workers=workers).run["per_second"])
+            best = min(best, 1 / charted(work, Path(folder) / "a.chart", workers).run["per_second"])
     return float(best)
 
 
 _LARGE = """
 import sys, tempfile
 from pathlib import Path
-from tmsopt.design.files import load
-from tmsopt.charts.stored import chart_to
+import tmsopt
 with tempfile.TemporaryDirectory(dir=sys.argv[1]) as folder:
-    found = chart_to(load(sys.argv[2], asks=False), Path(folder) / "a.chart", points=(10_000, 10_000))
+    asked = {"folder": Path(folder) / "a.chart", "points": (10_000, 10_000), "boundaries": False}
+    found = tmsopt.chart(tmsopt.load(sys.argv[2], asks=False), **asked)
     peak = next(line for line in open("/proc/self/status") if line.startswith("VmHWM"))
     print(found.run["engine"], found.run["seconds"], peak.split()[1], found.counts.fallbacks)
 """

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tmsopt import laws, models, roots
     from tmsopt.certificates.certify import certify
-    from tmsopt.charts.chart import Chart, chart
-    from tmsopt.charts.stored import StoredChart, chart_to, open_chart
+    from tmsopt.charts.chart import Chart, chart, open_chart
     from tmsopt.critical_speeds.speeds import Speeds, speeds
     from tmsopt.design.files import load
     from tmsopt.design.problem import Problem
@@ -57,13 +56,11 @@ __all__ = [
     "Robustness",
     "Solution",
     "Speeds",
-    "StoredChart",
     "Study",
     "Swallowtail",
     "Trace",
     "certify",
     "chart",
-    "chart_to",
     "compare",
     "diagnose",
     "domain",
@@ -113,13 +110,11 @@ _HOMES = {
     "Robustness": "tmsopt.margins.nearest",
     "Solution": "tmsopt.design.solution",
     "Speeds": "tmsopt.critical_speeds.speeds",
-    "StoredChart": "tmsopt.charts.stored",
     "Study": "tmsopt.studies.study",
     "Swallowtail": "tmsopt.tracing.swallowtail",
     "Trace": "tmsopt.tracing.branch",
     "certify": "tmsopt.certificates.certify",
     "chart": "tmsopt.charts.chart",
-    "chart_to": "tmsopt.charts.stored",
     "compare": "tmsopt.paper.compare",
     "diagnose": "tmsopt.diagnosis.diagnosis",
     "domain": "tmsopt.tracing.domain",
@@ -129,7 +124,7 @@ _HOMES = {
     "load_study": "tmsopt.studies.load",
     "monte_carlo": "tmsopt.studies.monte_carlo",
     "nearest": "tmsopt.margins.nearest",
-    "open_chart": "tmsopt.charts.stored",
+    "open_chart": "tmsopt.charts.chart",
     "optimality": "tmsopt.explanation.optimality",
     "over_grid": "tmsopt.studies.study",
     "pareto": "tmsopt.fronts.pareto",
