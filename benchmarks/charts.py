@@ -123,7 +123,7 @@ import json, re, resource, sys, time
 from pathlib import Path
 import tmsopt
 from tmsopt.charts.stored import chart_to
-problem = tmsopt.load(sys.argv[1], asks=False)
+problem = tmsopt.load(sys.argv[1])
 began = time.perf_counter()
 chart_to(problem, sys.argv[2], points=json.loads(sys.argv[3]), layers=("kind", "abscissa"), single=True)
 seconds = time.perf_counter() - began
@@ -146,7 +146,7 @@ def large(across: int, up: int) -> Large:
 
 def section(command: str, quick: bool = False) -> str:
     """The report in Markdown."""
-    problem = load(PROBLEM, asks=False)
+    problem = load(PROBLEM)
     every = list(methods(problem, 40_000 if quick else 1_000_000))
     seconds = best({m.name + m.gives: m.work for m in every}, 2 if quick else 5)
     copied = copy_rate()

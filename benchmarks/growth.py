@@ -77,7 +77,7 @@ def _speeds(count: int) -> tuple[float, ...]:
 
 def by_points(quick: bool) -> list[tuple[int, float, float]]:
     """Designs of a chart, its seconds, and those of stacked eigenvalues; nan where they are not waited for."""
-    problem = load(PROBLEM, asks=False)
+    problem = load(PROBLEM)
     rows = []
     for points in _POINTS[:2] if quick else _POINTS:
         across = math.isqrt(points)

@@ -26,7 +26,7 @@ _LAYERS = {"class alone": ("kind",), "usual layers": USUAL}
 
 def parts(engine: str) -> dict[str, float]:
     """Seconds per design of the parts of a tile, the best of several interleaved rounds."""
-    work = survey(load(_FILE, asks=False), points=_SIZES[engine], engine=engine)
+    work = survey(load(_FILE), points=_SIZES[engine], engine=engine)
     tiles = work.grid.tiles(TILE)
     rows = tiles[len(tiles) // 2]
     names = work.problem.model.coefficient_names()
@@ -58,7 +58,7 @@ def parts(engine: str) -> dict[str, float]:
 
 def stored(engine: str, layers: tuple[str, ...], workers: int) -> float:
     """Seconds per design of a whole chart, written to a folder that is deleted again, the best of two."""
-    work: Survey = survey(load(_FILE, asks=False), points=_SIZES[engine], engine=engine, layers=layers)
+    work: Survey = survey(load(_FILE), points=_SIZES[engine], engine=engine, layers=layers)
     best = np.inf
     for _ in range(2):
         with tempfile.TemporaryDirectory() as folder:
@@ -72,7 +72,7 @@ from pathlib import Path
 from tmsopt.design.files import load
 from tmsopt.charts.stored import chart_to
 with tempfile.TemporaryDirectory(dir=sys.argv[1]) as folder:
-    found = chart_to(load(sys.argv[2], asks=False), Path(folder) / "a.chart", points=(10_000, 10_000))
+    found = chart_to(load(sys.argv[2]), Path(folder) / "a.chart", points=(10_000, 10_000))
     peak = next(line for line in open("/proc/self/status") if line.startswith("VmHWM"))
     print(found.run["engine"], found.run["seconds"], peak.split()[1], found.counts.fallbacks)
 """

@@ -1,10 +1,13 @@
 """Files that are written as a whole or not at all."""
 
+import csv
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from tmsopt.errors import Fault, InputError, suggest
 
@@ -66,3 +69,15 @@ def read_text(file: str, kind: str, largest: int = LARGEST) -> str:
     except UnicodeDecodeError as error:
         line = raw[: error.start].count(b"\n") + 1
         raise InputError([Fault(f"not {form}: byte {raw[error.start]:#x} is not UTF-8").at(file, line)]) from None
+
+
+def write_csv(path: str | PathLike[str], rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write rows with the same names as one table.
+
+    Raises:
+        OSError: when the file cannot be written.
+    """
+    with open(path, "w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, fieldnames=list(rows[0]) if rows else [])
+        writer.writeheader()
+        writer.writerows(rows)

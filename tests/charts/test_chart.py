@@ -398,25 +398,25 @@ def test_help_shows_examples(capsys):
 
 @pytest.mark.parametrize("points", [(1, 5), (0, 5), 50, (5,), (99_999, 99_999), ("a", 5)])
 def test_other_numbers_of_points_are_refused(points):
-    problem = load("problems/chart.toml", asks=False)
+    problem = load("problems/chart.toml")
     with pytest.raises(InputError, match=r"points: found .* accepted: two whole numbers"):
         chart(problem, points=points, boundaries=False)
 
 
 @pytest.mark.parametrize("call", [chart, domain, trace])
 def test_a_file_name_is_no_problem(call):
-    with pytest.raises(InputError, match=r"accepted: a Problem, such as tmsopt\.load"):
+    with pytest.raises(InputError, match="accepted: a Problem, the path of a problem file"):
         call("problems/chart.toml")
 
 
 def test_axes_as_one_text_are_refused():
-    problem = load("problems/chart.toml", asks=False)
+    problem = load("problems/chart.toml")
     with pytest.raises(InputError, match="found 'Fr,lambda_s'; accepted: Fr and lambda_s"):
         chart(problem, "Fr,lambda_s", points=(5, 5), boundaries=False)
 
 
 def test_the_least_abscissa_satisfies_the_constraints():
-    problem = load("problems/chart.toml", asks=False)
+    problem = load("problems/chart.toml")
     free = chart(problem, points=(40, 30), boundaries=False)
     best = free.to_json()["least_abscissa"]
     bounded = dataclasses.replace(problem, constraints={"slow": f"Fr <= {best['Fr'] / 2}"})
@@ -429,7 +429,7 @@ def test_the_least_abscissa_satisfies_the_constraints():
 
 
 def test_an_equality_is_left_aside_and_said_to_be():
-    problem = dataclasses.replace(load("problems/chart.toml", asks=False), constraints={"law": "Fr == 2"})
+    problem = dataclasses.replace(load("problems/chart.toml"), constraints={"law": "Fr == 2"})
     found = chart(problem, points=(5, 5), boundaries=False)
     assert found.left_aside == ("law",)
     assert found.satisfied.all()
@@ -438,7 +438,7 @@ def test_an_equality_is_left_aside_and_said_to_be():
 
 def test_the_margin_is_the_difference_of_the_sides():
     problem = dataclasses.replace(
-        load("problems/chart.toml", asks=False), constraints={"slow": "Fr <= 2", "steep": "lambda_s >= 0.3"}
+        load("problems/chart.toml"), constraints={"slow": "Fr <= 2", "steep": "lambda_s >= 0.3"}
     )
     found = chart(problem, points=(12, 9), boundaries=False)
     Fr, tilt = np.meshgrid(*found.grid)
@@ -447,8 +447,6 @@ def test_the_margin_is_the_difference_of_the_sides():
 
 
 def test_a_huge_box_is_charted_without_a_warning():
-    problem = dataclasses.replace(
-        load("problems/chart.toml", asks=False), free={"Fr": (0.1, 1e300), "lambda_s": (0.01, 1.4)}
-    )
+    problem = dataclasses.replace(load("problems/chart.toml"), free={"Fr": (0.1, 1e300), "lambda_s": (0.01, 1.4)})
     found = chart(problem, points=(20, 15))
     assert found.shares["undefined"] > 0.9

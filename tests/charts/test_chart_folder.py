@@ -273,7 +273,7 @@ def test_a_folder_from_the_command_line(tmp_path, capsys):
     assert (data["engine"], data["designs"], data["fallbacks"]) == ("numpy", 2400, 0)
     assert data["per_second"] == pytest.approx(2400 / data["seconds"])
     assert data["layers"] == ["kind", "abscissa", "damping_ratio", "real_roots", "satisfied", "tilt"]
-    small = chart(load("problems/chart.toml", asks=False), points=(60, 40), boundaries=False)
+    small = chart(load("problems/chart.toml"), points=(60, 40), boundaries=False)
     assert data["classes"] == small.shares
     assert data["least_abscissa"] == small.to_json()["least_abscissa"]
     status, out, err = run(capsys, *arguments, "--plot", figure, "--no-boundaries", "--layer", "tilt")
@@ -301,7 +301,7 @@ def test_three_axes_in_one_file(ending, tmp_path, capsys):
     assert status == 0, err
     assert "7 × 6 × 5 designs over Fr, lambda_s, chi_B" in out
     assert figure.read_bytes().startswith(b"<?xml")
-    problem = load("problems/ep_set.toml", asks=False)
+    problem = load("problems/ep_set.toml")
     wanted = chart_to(problem, tmp_path / "space.chart", ("Fr", "lambda_s", "chi_B"), points=(7, 6, 5),
                       quantities={"x": "Fr*chi_B"})  # fmt: skip
     if ending == "npz":

@@ -160,7 +160,7 @@ def test_a_model_of_another_degree(tmp_path):
 
 
 def test_one_or_four_free_parameters_make_no_grid():
-    for problem, words in ((load("problems/chart.toml", asks=False), None), (SPACE, None)):
+    for problem, words in ((load("problems/chart.toml"), None), (SPACE, None)):
         assert words is None
         assert survey(problem, points=(3,) * len(problem.free)).grid.size == 3 ** len(problem.free)
     line = dataclasses.replace(PLANE, fixed=PLANE.fixed | {"Fr": 2.0}, free={"lambda_s": (0.1, 1.0)})

@@ -22,7 +22,7 @@ from tmsopt import laws
 from tmsopt.design import Problem
 from tmsopt.errors import InputError
 from tmsopt.models import tms
-from tmsopt.tracing import trace, write_csv
+from tmsopt.tracing import trace
 
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 """The chi_H = 1 bicycle of the paper; mu does not matter there."""
@@ -726,7 +726,7 @@ def test_a_limit_that_its_tangent_does_not_return_is_met_exactly():
 def test_rows_json_and_csv_hold_the_same_numbers(planes, tmp_path):
     found = planes["fig2 left"]
     path = tmp_path / "branches.csv"
-    write_csv(found, path)
+    found.write_csv(path)
     rows = list(csv.DictReader(io.StringIO(path.read_text())))
     assert len(rows) == found.points == found.to_json()["points"]
     k = 0

@@ -4,7 +4,7 @@ In: a solution. Out: the solution with a proved bound. Open `certify` first; `qu
 `translation` writes it in SCIP's terms, `processes` runs it apart.
 """
 
-from tmsopt.certificates.certify import certify
+from tmsopt.certificates.certify import certify, check_installed
 from tmsopt.certificates.interlacing import interlace, interlacing, squares_of, unknowns
 from tmsopt.certificates.processes import Crew
 from tmsopt.certificates.question import Question
@@ -18,6 +18,7 @@ __all__ = [
     "Question",
     "available",
     "certify",
+    "check_installed",
     "decide",
     "interlace",
     "interlacing",

@@ -10,14 +10,16 @@ from tmsopt.charts.files import save_layers
 from tmsopt.charts.motion import classified, classify
 from tmsopt.charts.stored import StoredChart, chart_to, open_chart
 from tmsopt.charts.summary import tally, total
-from tmsopt.charts.survey import LAYERS, Grid, survey
+from tmsopt.charts.survey import LAYERS, USUAL, Grid, axes_of, survey
 
 __all__ = [
     "LAYERS",
+    "USUAL",
     "Chart",
     "Grid",
     "StoredChart",
     "array_function",
+    "axes_of",
     "chart",
     "chart_to",
     "classified",

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from tmsopt.charts.files import save_layers
 from tmsopt.charts.stored import gathered
 from tmsopt.charts.survey import USUAL, Grid, Survey, survey
-from tmsopt.design.problem import Problem, checked
+from tmsopt.design.files import problem_of
+from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
 from tmsopt.records import Array
 from tmsopt.roots import CLASSES
@@ -111,7 +112,7 @@ def chart(
     Raises:
         InputError: unless exactly two parameters are free and the axes name them, or for other numbers of points.
     """
-    names = plane_of(checked(problem), axes)
+    names = plane_of(problem_of(problem), axes)
     _check(points)
     work = survey(problem, names, points, CHART_LAYERS)
     return chart_of(work, gathered(work, progress)[0], domain(problem) if boundaries else None)

@@ -10,8 +10,9 @@ from numpy.typing import DTypeLike, NDArray
 
 from tmsopt.charts.expressions import ArrayFunction, array_function, parsed
 from tmsopt.charts.motion import Classified, classified
+from tmsopt.design.files import problem_of
 from tmsopt.design.machine import engine_of
-from tmsopt.design.problem import Problem, checked
+from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS, ROOT_NAMES
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.records import Array
@@ -216,7 +217,7 @@ def survey(
         InputError: unless two or three parameters are free and the axes name them; for other numbers of points,
             unknown layers, bad expressions, unknown engines.
     """
-    names = axes_of(checked(problem), axes)
+    names = axes_of(problem_of(problem), axes)
     sizes = _sizes(points, len(names))
     faults = [Fault(f"found {n!r}; {suggest(str(n), LAYERS)}", ("layers",)) for n in layers if n not in LAYERS]
     extra = dict(quantities or {})

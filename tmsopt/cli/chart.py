@@ -134,7 +134,7 @@ def chart(
 
         check_output("--plot", plot, FIGURES)
         check_output("--output", output, ("npz", "nc", "chart"), folders=("chart",))
-        problem = nominal_of(load(file, asks=False))
+        problem = nominal_of(load(file))
         free = axes_of(problem)
         names = plane(problem, axes) if len(free) == 2 else _space(free, axes)
         sizes = _sizes(points, len(free))

@@ -53,36 +53,28 @@ def trace(
 ) -> None:
     """Trace a root pattern of FILE through parameter space, every branch in the box, with its events."""
     with bad_input():
-        from tmsopt.design.files import load
-        from tmsopt.errors import Fault, InputError
-        from tmsopt.tracing.branch import write_csv
-        from tmsopt.tracing.trace import trace as trace_problem
+        import tmsopt
 
         check_output("--plot", plot, FIGURES)
         check_output("--csv", csv_file, ("csv",))
-        problem = nominal_of(load(file, asks=False))
+        problem = nominal_of(tmsopt.load(file))
         if plot is None and axes is not None:
-            raise InputError([Fault("says what --plot draws; add --plot FILE", ("--axes",))])
+            raise tmsopt.InputError([tmsopt.Fault("says what --plot draws; add --plot FILE", ("--axes",))])
         if axes is not None:
             plane(problem, axes)
         with progress() as update:
-            found = trace_problem(problem, pattern, step=step, starts=starts, seed=seed, progress=update)
+            found = tmsopt.trace(problem, pattern, step=step, starts=starts, seed=seed, progress=update)
     if as_json:
         write_json(found.to_json())
     else:
-        from tmsopt.report.curves import trace_table
-
-        click.echo(trace_table(found))
+        click.echo(tmsopt.report.trace_table(found))
     if not found.branches:
         click.echo(f"no {found.pattern} found in the box; widen it, or try more --starts", err=True)
         raise SystemExit(3)
     if csv_file is not None:
         with saving("--csv", csv_file):
-            write_csv(found, csv_file)
+            found.write_csv(csv_file)
     if plot is not None:
-        from tmsopt.plots.style import save
-        from tmsopt.plots.trace import trace_figure
-        from tmsopt.tracing.branch import varying
-
         with saving("--plot", plot):
-            save(trace_figure(found, *plane(problem, axes or ",".join(varying(found)[:2]))), plot)
+            drawn = plane(problem, axes or ",".join(found.varying[:2]))
+            tmsopt.plots.save(tmsopt.plots.trace_figure(found, *drawn), plot)

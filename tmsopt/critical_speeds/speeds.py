@@ -10,11 +10,13 @@ import flint
 from tmsopt.arithmetic.elementary import exact, rational
 from tmsopt.critical_speeds.crossings import Crossing, crossings
 from tmsopt.critical_speeds.parametric import interpolated
-from tmsopt.design.problem import Problem, checked
+from tmsopt.design.files import Given, problem_of
+from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import ParameterSet
-from tmsopt.records import Table
+from tmsopt.records import Progress, Table
+from tmsopt.solver.solve import solve
 
 _DIGITS = 120  # of what is no fraction, such as the tangent of an angle
 _STRAIGHT = 1e-100  # relative; a number that is linear in the speed is so within the digits carried
@@ -97,25 +99,29 @@ class Speeds:
 
 
 def speeds(
-    design: Problem | Solution | Mapping[str, float],
+    design: Given | Mapping[str, float],
     parameter: str | None = None,
     *,
     between: tuple[float, float] | None = None,
     problem: Problem | None = None,
+    progress: Progress | None = None,
 ) -> Speeds:
     """Every weave and capsize speed of a design and every speed at which roots meet, by exact root isolation.
 
     The coefficients are polynomials in the speed, so these speeds are the roots of polynomials too, and none is missed.
 
     Args:
-        design: a problem in which nothing else is free, a solution, or the parameters of a design of `problem`.
+        design: a solution, a problem or its file, or the parameters of a design of `problem`. A problem that frees
+            more than this parameter is solved first.
         parameter: what varies, by default the speed; any parameter that the coefficients are polynomials in.
+        progress: called with the starts done and in all, where the problem is solved first.
         between: the range to look through; by default the parameter's box, or all of its physical range.
 
     Raises:
-        InputError: where other parameters are free, or the parameter does not enter as a polynomial.
+        NotSolved: where there is no design to look at.
+        InputError: where the parameter does not enter as a polynomial.
     """
-    asked, own = _design(design, problem)
+    asked = (problem_of(design) if problem is None or isinstance(design, Given) else problem).nominal
     of = asked.parameter_set
     name = parameter if parameter is not None else speed_of(of)
     if name is None:
@@ -125,9 +131,7 @@ def speeds(
         raise InputError([Fault(message, ("parameter",))])
     if name not in of.names:
         raise InputError([Fault(f"unknown parameter '{name}'; {suggest(name, of.names)}", ("parameter",))])
-    if others := [n for n in asked.free if n != name and n not in own]:
-        message = f"also free: {', '.join(others)}; fix them, or give the solution of the problem"
-        raise InputError([Fault(message, ("parameters",))])
+    own = _parameters(design, asked, name, progress)
     allowed = of[name].range
     lower, upper = between or asked.free.get(name) or (allowed.lower, allowed.upper)
     if not math.isfinite(lower) or not lower < upper:
@@ -158,13 +162,13 @@ def speed_of(of: ParameterSet) -> str | None:
     return next((p.name for p in of.parameters if p.unit == "m/s" or p.name == "Fr"), None)
 
 
-def _design(design: Any, problem: Problem | None) -> tuple[Problem, dict[str, float]]:
+def _parameters(design: Any, asked: Problem, name: str, progress: Progress | None) -> dict[str, float]:
+    """The parameters of the design; that of a problem which frees more than the one that varies is found first."""
     if isinstance(design, Solution):
-        return design.problem.nominal, dict(design.parameters)
-    if isinstance(design, Problem) or problem is None:
-        asked = checked(design).nominal
-        return asked, dict(asked.fixed)
-    return problem.nominal, {**problem.fixed, **design}
+        return dict(design.parameters)
+    if not isinstance(design, Given):
+        return {**asked.fixed, **design}
+    return dict(asked.fixed if set(asked.free) <= {name} else solve(asked, progress=progress).parameters)
 
 
 def _linear(problem: Problem, own: Mapping[str, float], name: str) -> dict[str, tuple[Any, Any]]:

@@ -6,12 +6,12 @@ record `Solution` that solving it fills. Open `problem` first, then `expression`
 
 from tmsopt.design.cases import Band, Case
 from tmsopt.design.expression import Expression, ExpressionError, parse_comparison, parse_value
-from tmsopt.design.files import load
+from tmsopt.design.files import Given, load, problem_of, question_of
 from tmsopt.design.limit import limit_of, with_limit
 from tmsopt.design.machine import EXACT, engine_of, machine
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.quantities import NO_RADIUS, ROOT_NAMES
-from tmsopt.design.solution import Bound, NotSolved, Solution
+from tmsopt.design.solution import Bound, NotSolved, Solution, Starts
 from tmsopt.design.tape import tape
 from tmsopt.design.units import decay_time, frequencies, growth_time, reading, with_unit
 
@@ -24,9 +24,11 @@ __all__ = [
     "Case",
     "Expression",
     "ExpressionError",
+    "Given",
     "NotSolved",
     "Problem",
     "Solution",
+    "Starts",
     "decay_time",
     "engine_of",
     "freedom",
@@ -37,6 +39,8 @@ __all__ = [
     "machine",
     "parse_comparison",
     "parse_value",
+    "problem_of",
+    "question_of",
     "reading",
     "tape",
     "with_limit",

@@ -161,18 +161,6 @@ def weighted(of: ParameterSet, weights: Mapping[str, float], fixed: Mapping[str,
     return tuple(p.name for p in of.parameters if p.may_change(fixed.get(p.name, math.inf)))
 
 
-def checked(problem: object) -> Problem:
-    """A problem as it is.
-
-    Raises:
-        InputError: for anything else, such as the name of a file.
-    """
-    if isinstance(problem, Problem):
-        return problem
-    message = f"found {problem!r}; accepted: a Problem, such as tmsopt.load('problems/chart.toml', asks=False)"
-    raise InputError([Fault(message, ("problem",))])
-
-
 def unasked(problem: Problem) -> list[Fault]:
     """What is wrong with solving a problem that has not one question; a chart needs none."""
     if problem.pareto:
@@ -184,7 +172,7 @@ def unasked(problem: Problem) -> list[Fault]:
         return []
     message = (
         "parameters are free, but nothing is asked of them; write minimize, maximize or locate, "
-        "or pareto for a front (chart and trace need none: in Python, load(file, asks=False))"
+        "or pareto for a front (chart and trace need none)"
     )
     return [Fault(message, ("objective",))]
 

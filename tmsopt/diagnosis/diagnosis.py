@@ -8,12 +8,13 @@ from typing import Any
 import flint
 
 from tmsopt.arithmetic.elementary import exact
-from tmsopt.design.solution import Solution
+from tmsopt.design.files import Given
 from tmsopt.diagnosis.jordan import Jordan, is_regular, jordan
 from tmsopt.diagnosis.splitting import DEVIATION, Ideal, Law, Response, response
 from tmsopt.models import Model, ParameterSet
 from tmsopt.roots import Root, Structure
 from tmsopt.roots.patterns.enclosed import nearest
+from tmsopt.solver.solve import solved
 
 _BITS = 424  # 127 digits: changes down to 1e-16 are differences of coefficients
 _RANK = 1e-7  # relative singular value that counts as 0; of a nearly semisimple root it is the root of the distance
@@ -70,7 +71,7 @@ class Diagnosis:
         }
 
 
-def diagnose(solution: Solution) -> tuple[Diagnosis, ...]:
+def diagnose(design: Given) -> tuple[Diagnosis, ...]:
     """Diagnosis of every multiple root of a design, rightmost first; none if all roots are simple.
 
     The algebraic multiplicity is that of the solution's structure. The geometric and partial multiplicities are ranks
@@ -78,11 +79,12 @@ def diagnose(solution: Solution) -> tuple[Diagnosis, ...]:
     that polynomial with the exact changes of the coefficients that a parameter makes: c = −k! ∂p/∂θ / p⁽ᵏ⁾ of
     s = s0 + (c ε)^(1/k), or Newton's polygon where that vanishes; the law is then set beside the roots themselves.
     """
+    solution = solved(design)
     problem = solution.problem
-    design = solution.worst.applied(solution.parameters) if solution.worst else dict(solution.parameters)
-    found = problem.values(design)["structure"]
+    parameters = solution.worst.applied(solution.parameters) if solution.worst else dict(solution.parameters)
+    found = problem.values(parameters)["structure"]
     assert isinstance(found, Structure)
-    return diagnosed(problem.model, problem.parameter_set, design, found)
+    return diagnosed(problem.model, problem.parameter_set, parameters, found)
 
 
 def diagnosed(

@@ -3,12 +3,14 @@
 from dataclasses import dataclass
 from typing import Any
 
-from tmsopt.design.solution import Bound, Solution
+from tmsopt.design.files import Given
+from tmsopt.design.solution import Bound
 from tmsopt.explanation.limits import Lever, levers
 from tmsopt.explanation.optimality import Optimality, optimality
 from tmsopt.explanation.rounding import Rounded, rounded_alone, rounded_together, worst
 from tmsopt.explanation.summary import summary, warnings
 from tmsopt.records import Table
+from tmsopt.solver.solve import solved
 
 
 @dataclass(frozen=True)
@@ -50,12 +52,13 @@ class Explanation:
         }
 
 
-def explain(solution: Solution, *, resolve: bool = True) -> Explanation:
+def explain(design: Given, *, resolve: bool = True) -> Explanation:
     """Say what a solution means; of one that is not optimal, what can be said.
 
     Args:
         resolve: check each multiplier by solving again with its limit moved, from the optimum; 30 ms or so each.
     """
+    solution = solved(design)
     feasible = not solution.violations
     alone = rounded_alone(solution) if feasible else Table[Rounded]()
     return Explanation(

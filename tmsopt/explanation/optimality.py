@@ -22,12 +22,14 @@ from typing import Any
 import numpy as np
 
 from tmsopt.design.dependence import demands_heavy_damping, overclaims
+from tmsopt.design.files import Given
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.explanation.conditions import POSITIVE, STATIONARY, Conditions, conditions, curved
 from tmsopt.explanation.descent import Better, better
 from tmsopt.explanation.program import NotCovered, Program, program
 from tmsopt.records import Table
+from tmsopt.solver.solve import solved
 
 STRICT, NOT_MINIMAL, UNDECIDED, NOT_COVERED = "strict minimum", "not minimal", "undecided", "not covered"
 
@@ -118,11 +120,12 @@ class Optimality:
         }
 
 
-def optimality(solution: Solution) -> Optimality:
+def optimality(design: Given) -> Optimality:
     """Judge a design by the first- and, where needed, second-order conditions on its factors.
 
     Of a pattern that was located without an objective the abscissa is judged, within the box and the constraints.
     """
+    solution = solved(design)
     try:
         problem = _judged(solution)
         around = program(problem, solution)

@@ -1,14 +1,14 @@
 """A Pareto front as data: efficient designs, where the way they are limited changes, and what is missing."""
 
-import csv
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from os import PathLike
 from typing import Any
 
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
+from tmsopt.disk import write_csv
 
 SCHEMA = 1
 
@@ -113,6 +113,14 @@ class Front:
                 "label": point.label,
             }
 
+    def write_csv(self, path: str | PathLike[str]) -> None:
+        """The points in one table.
+
+        Raises:
+            OSError: when the file cannot be written.
+        """
+        write_csv(path, list(self.rows()))
+
     def to_json(self) -> dict[str, Any]:
         """The JSON of `tmsopt solve` for a front; numbers that do not exist are None."""
         return {
@@ -130,19 +138,6 @@ class Front:
             "solved": self.solved,
             "seconds": round(self.seconds, 4),
         }
-
-
-def write_csv(front: Front, path: Path) -> None:
-    """The points in one table.
-
-    Raises:
-        OSError: when the file cannot be written.
-    """
-    rows = list(front.rows())
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.DictWriter(stream, fieldnames=list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
 
 
 def _point(point: FrontPoint) -> dict[str, Any]:

@@ -4,7 +4,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
-from tmsopt.design.problem import Problem, checked
+from tmsopt.design.files import Given, problem_of
 from tmsopt.design.solution import NotSolved, Solution
 from tmsopt.errors import Fault, InputError
 from tmsopt.fronts.curve import curve
@@ -21,7 +21,7 @@ _ALIKE = 1e-7  # relative difference of ends that counts as no conflict, that of
 
 
 def pareto(
-    problem: Problem,
+    problem: Given,
     points: int = POINTS,
     *,
     starts: int = STARTS,
@@ -48,7 +48,8 @@ def pareto(
         InputError: for a problem without ``pareto``.
         ValueError: for fewer than 2 points or 0 starts.
     """
-    if not checked(problem).pareto:
+    problem = problem_of(problem)
+    if not problem.pareto:
         message = 'no front is asked for; write e.g. pareto = ["abscissa", "Fr"], or use tmsopt.solve'
         raise InputError([Fault(message, ("objective",))])
     if points < 2 or starts < 0:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.design.problem import Problem, checked
+from tmsopt.design.files import Given, problem_of
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.margins.approach import ALIKE, Approach, approach
@@ -122,7 +122,7 @@ def _number(value: float) -> float | None:
 
 
 def nearest(
-    design: Solution | Problem,
+    design: Given,
     pattern: str,
     *,
     parameters: Mapping[str, float] | None = None,
@@ -135,7 +135,7 @@ def nearest(
     the edge of heavy damping is the way out of it, for another the way into it.
 
     Args:
-        design: a solution, or a problem with `parameters`.
+        design: a solution; or a problem or its file, with `parameters`.
         parameters: a value per parameter (rad, SI units); by default those of the solution, or all fixed ones.
         weights: parameter → change that counts as 1; by default those of the problem, or else |x0| for every
             parameter, fixed ones too, except those with a default value (g), so that distances are relative. Where
@@ -151,7 +151,7 @@ def nearest(
 
 
 def robustness(
-    design: Solution | Problem,
+    design: Given,
     *,
     parameters: Mapping[str, float] | None = None,
     weights: Mapping[str, float] | None = None,
@@ -177,10 +177,8 @@ def robustness(
     )
 
 
-def _place(
-    design: Solution | Problem, parameters: Mapping[str, float] | None, weights: Mapping[str, float] | None
-) -> Place:
-    problem = design.problem if isinstance(design, Solution) else checked(design)
+def _place(design: Given, parameters: Mapping[str, float] | None, weights: Mapping[str, float] | None) -> Place:
+    problem = problem_of(design)
     if weights is None and problem.weights:
         weights = problem.weights
     if isinstance(design, Solution):

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from tmsopt.checks.law_rows import LawRow, law_rows
+from tmsopt.design.files import Given, question_of
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.models import tms
@@ -72,7 +73,7 @@ class Comparison:
 
 
 def compare(
-    design: Solution | Problem,
+    design: Given,
     *,
     starts: int = STARTS,
     seed: int = 0,
@@ -84,20 +85,18 @@ def compare(
     The laws are of one design at one speed: scenarios and tolerances are left aside, and the problem is solved again.
 
     Args:
-        design: a solution, or a problem to solve first.
+        design: a solution; or a problem or its file, solved first.
         starts, seed, linear_solver, progress: as for `solve`, for the solves that this takes.
     """
 
     def solved(problem: Problem) -> Solution:
         return solve(problem, starts=starts, seed=seed, linear_solver=linear_solver, throw=False, progress=progress)
 
-    problem = design if isinstance(design, Problem) else design.problem
-    if problem.scenarios or problem.tolerances:
-        design = problem.nominal
-    if isinstance(design, Problem):
-        design = solved(design)
-    other, reason = _other_formulation(design, solved)
-    return Comparison(design, tuple(law_rows(design)) if design.problem.model is tms else (), other, reason)
+    problem = question_of(design)
+    one = isinstance(design, Solution) and not (problem.scenarios or problem.tolerances)
+    found = design if isinstance(design, Solution) and one else solved(problem.nominal)
+    other, reason = _other_formulation(found, solved)
+    return Comparison(found, tuple(law_rows(found)) if found.problem.model is tms else (), other, reason)
 
 
 def _other_formulation(design: Solution, solved: Callable[[Problem], Solution]) -> tuple[Solution | None, str]:

@@ -6,6 +6,7 @@ source.
 
 from tmsopt.plots.bicycle import draw_bicycle, draw_distance
 from tmsopt.plots.chart import chart_figure
+from tmsopt.plots.front import front_figure
 from tmsopt.plots.growth import draw_frequencies, draw_growth_rates, growth_figure
 from tmsopt.plots.labels import Name, place_names
 from tmsopt.plots.style import new_figure, save
@@ -18,6 +19,7 @@ __all__ = [
     "draw_distance",
     "draw_frequencies",
     "draw_growth_rates",
+    "front_figure",
     "growth_figure",
     "new_figure",
     "place_names",

@@ -7,7 +7,7 @@ In: a `Problem`. Out: a `Solution` that was rechecked, or the least that would h
 from tmsopt.solver.all_designs import Every, coverage_of, solve_all
 from tmsopt.solver.box import sides
 from tmsopt.solver.multistart import same
-from tmsopt.solver.solve import solve
+from tmsopt.solver.solve import solve, solved
 from tmsopt.solver.workspace import Family
 
 __all__ = [
@@ -18,4 +18,5 @@ __all__ = [
     "sides",
     "solve",
     "solve_all",
+    "solved",
 ]

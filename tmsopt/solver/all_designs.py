@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.checks.recheck import recheck
+from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError
@@ -76,7 +77,7 @@ class Every:
 
 
 def solve_all(
-    problem: Problem,
+    problem: Given,
     *,
     starts: int = MOST,
     seed: int = 0,
@@ -92,6 +93,7 @@ def solve_all(
     Raises:
         InputError: for a problem that locates no pattern, or leaves freedom.
     """
+    problem = problem_of(problem)
     _check(problem)
     nlp = matching(problem)
     system = square_system(nlp)

@@ -4,14 +4,15 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from tmsopt.checks.bound import instant_bound
 from tmsopt.checks.coverage import cover
 from tmsopt.checks.digits import certified
 from tmsopt.checks.recheck import Checked
-from tmsopt.design.problem import Problem, freedom, unasked
+from tmsopt.design.files import Given, question_of
+from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.solution import Bound, NotSolved, Solution, Starts
-from tmsopt.errors import InputError
 from tmsopt.records import Progress, Table
 from tmsopt.solver.box import sides
 from tmsopt.solver.multistart import STARTS
@@ -21,7 +22,7 @@ from tmsopt.solver.workspace import Family
 
 
 def solve(
-    problem: Problem,
+    problem: Given,
     *,
     starts: int = STARTS,
     seed: int = 0,
@@ -36,6 +37,7 @@ def solve(
     """Find the best design, from several starts, and check it independently of the solver.
 
     Args:
+        problem: or the path of its file.
         starts: starts tried at most; the search ends early when several agree or optimality is proven.
         seed: of the quasi-random starting designs.
         exhaustive: try all the starts, even when several agree.
@@ -52,8 +54,7 @@ def solve(
         InputError: when parameters are free and nothing is asked of them.
         ValueError: for another linear solver or fewer than one start.
     """
-    if faults := unasked(problem):
-        raise InputError(faults)
+    problem = question_of(problem)
     if starts < 1:
         raise ValueError(f"starts = {starts}; accepted: 1 or more")
     began = time.perf_counter()
@@ -73,6 +74,11 @@ def solve(
     if throw and solution.status != "optimal":
         raise NotSolved(solution)
     return solution
+
+
+def solved(design: Given, **options: Any) -> Solution:
+    """A solution as it is; of a problem, or of a file, what `solve` ends with under these options."""
+    return design if isinstance(design, Solution) else solve(design, throw=False, **options)
 
 
 def _winner(problem: Problem, explored: Sequence[Explored]) -> Finding | None:

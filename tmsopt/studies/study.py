@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.design.cases import Band
+from tmsopt.design.files import Given, problem_of
 from tmsopt.design.limit import with_limit
 from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
@@ -103,7 +104,7 @@ class Study:
 
 
 def over_grid(
-    problem: Problem,
+    problem: Given,
     axes: Mapping[str, Sequence[float]],
     *,
     title: str = "",
@@ -118,7 +119,7 @@ def over_grid(
         InputError: listing everything that is wrong with it.
     """
     return Study(
-        problem=problem,
+        problem=problem_of(problem),
         columns=grid(axes),
         title=title,
         seed=seed,

@@ -4,7 +4,7 @@ In: a problem whose pattern leaves one freedom. Out: `Trace` with `Branch`es, `D
 first; `continuation` follows one curve, `seeds` finds where to begin, `events` names what happens on it.
 """
 
-from tmsopt.tracing.branch import Branch, Trace, varying, write_csv
+from tmsopt.tracing.branch import Branch, Event, Trace
 from tmsopt.tracing.continuation import (
     End,
     between,
@@ -25,6 +25,7 @@ __all__ = [
     "Branch",
     "Domain",
     "End",
+    "Event",
     "Swallowtail",
     "Trace",
     "between",
@@ -38,7 +39,5 @@ __all__ = [
     "swallowtail",
     "tangent_at",
     "trace",
-    "varying",
     "walk",
-    "write_csv",
 ]

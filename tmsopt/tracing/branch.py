@@ -1,16 +1,16 @@
 """A traced curve of a root pattern as data: points, tangents, labels, events."""
 
-import csv
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from os import PathLike
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
+from tmsopt.disk import write_csv
 from tmsopt.records import Array, Table
 
 SCHEMA = 1
@@ -142,6 +142,24 @@ class Trace:
         """Events of all branches."""
         return tuple(e for b in self.branches for e in b.events)
 
+    @property
+    def varying(self) -> list[str]:
+        """The free parameters, those that stay the same on every branch last."""
+
+        def moves(name: str) -> bool:
+            low, high = self.problem.free[name]
+            return any(np.ptp(b.parameters[name]) > 1e-9 * (high - low) for b in self.branches)
+
+        return sorted(self.problem.free, key=lambda name: not moves(name))
+
+    def write_csv(self, path: str | PathLike[str]) -> None:
+        """All branches in one table, a column `branch` before the others.
+
+        Raises:
+            OSError: when the file cannot be written.
+        """
+        write_csv(path, [{"branch": k, **row} for k, branch in enumerate(self.branches) for row in branch.rows()])
+
     def to_json(self) -> dict[str, Any]:
         """The JSON of `tmsopt trace`."""
         return {
@@ -158,31 +176,8 @@ class Trace:
         }
 
 
-def write_csv(trace: Trace, path: Path) -> None:
-    """All branches in one table, a column `branch` before the others.
-
-    Raises:
-        OSError: when the file cannot be written.
-    """
-    rows = [{"branch": k, **row} for k, branch in enumerate(trace.branches) for row in branch.rows()]
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.DictWriter(stream, fieldnames=list(rows[0]) if rows else ["branch"])
-        writer.writeheader()
-        writer.writerows(rows)
-
-
 def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def varying(trace: Trace) -> list[str]:
-    """The free parameters, those that stay the same on every branch last."""
-
-    def moves(name: str) -> bool:
-        low, high = trace.problem.free[name]
-        return any(np.ptp(b.parameters[name]) > 1e-9 * (high - low) for b in trace.branches)
-
-    return sorted(trace.problem.free, key=lambda name: not moves(name))
 
 
 def kinds_along(branch: Branch) -> list[str]:

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.problem import Problem, checked
+from tmsopt.design.files import Given, problem_of
+from tmsopt.design.problem import Problem
 from tmsopt.records import Array
 from tmsopt.roots import pattern, real_roots
 from tmsopt.roots.meetings import nearest_two
@@ -82,12 +83,12 @@ class Domain:
         } | {"corners": [{"name": c.name, "detail": c.detail, **c.parameters} for c in self.corners]}
 
 
-def domain(problem: Problem, *, step: float = STEP, starts: int = STARTS, seed: int = 0) -> Domain:
+def domain(problem: Given, *, step: float = STEP, starts: int = STARTS, seed: int = 0) -> Domain:
     """Boundaries of stability and of heavy damping in the plane of the two free parameters.
 
     Constraints of the problem are left aside. `step`, `starts` and `seed` are those of `trace`.
     """
-    plane = replace(checked(problem), constraints={}, minimize=None, maximize=None, locate=None)
+    plane = replace(problem_of(problem), constraints={}, minimize=None, maximize=None, locate=None)
     found = {
         name: [b for b in trace(plane, name, step=step, starts=starts, seed=seed).branches if not _in_edge(b, plane)]
         for name in ("weave", "capsize", "EP2")
