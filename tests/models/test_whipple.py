@@ -374,9 +374,6 @@ def test_crossings_left_of_another_root_change_no_stability():
 
 
 def test_what_speeds_refuses():
-    problem = tmsopt.load("problems/whipple_trail.toml")
-    with pytest.raises(tmsopt.InputError, match="also free: c, lambda_s"):
-        tmsopt.speeds(problem)
     fixed = tmsopt.Problem(whipple, fixed=BENCHMARK)
     with pytest.raises(tmsopt.InputError, match="not linear in lambda_s"):
         tmsopt.speeds(fixed, "lambda_s", between=(0.1, 0.5))

@@ -121,7 +121,7 @@ def speeds(
         NotSolved: where there is no design to look at.
         InputError: where the parameter does not enter as a polynomial.
     """
-    asked = (problem_of(design) if problem is None or isinstance(design, Given) else problem).nominal
+    asked = (problem if problem is not None and isinstance(design, Mapping) else problem_of(design)).nominal
     of = asked.parameter_set
     name = parameter if parameter is not None else speed_of(of)
     if name is None:
@@ -166,7 +166,7 @@ def _parameters(design: Any, asked: Problem, name: str, progress: Progress | Non
     """The parameters of the design; that of a problem which frees more than the one that varies is found first."""
     if isinstance(design, Solution):
         return dict(design.parameters)
-    if not isinstance(design, Given):
+    if isinstance(design, Mapping):
         return {**asked.fixed, **design}
     return dict(asked.fixed if set(asked.free) <= {name} else solve(asked, progress=progress).parameters)
 
