@@ -4,8 +4,7 @@ from pathlib import Path
 
 import click
 
-from benchmarks.ladder import ladder as climb_ladder
-from benchmarks.ladder import ladder_section
+from benchmarks.ladder import ladder as climb_ladder, ladder_section
 from benchmarks.proving import prove_suite, proved_section
 from benchmarks.report import keep, kept
 from benchmarks.suite import SEED

@@ -13,8 +13,7 @@ import pytest
 import sympy
 from helpers.designs import designs
 from helpers.oracles import polynomial_60, polynomial_exact, symbolic_copo, weave_Fr_60
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from matplotlib.mathtext import MathTextParser
 from mpmath import mp
 

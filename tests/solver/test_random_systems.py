@@ -13,8 +13,7 @@ from benchmarks.sections import SECTIONS
 from benchmarks.spectrum import confirmed, evolve, exact_polynomial, ideals, values_of, violation, worth
 from benchmarks.stages import started_at
 from tmsopt import Problem, models, solve
-from tmsopt.formulation import opposite
-from tmsopt.formulation import worth as start_worth
+from tmsopt.formulation import opposite, worth as start_worth
 
 SUITE = list(random_systems())
 KNOWN = known()

@@ -13,8 +13,7 @@ import tmsopt
 from tmsopt import laws
 from tmsopt.checks import omega0_bound
 from tmsopt.design import freedom
-from tmsopt.formulation import abscissa as abscissa_nlp
-from tmsopt.formulation import matching
+from tmsopt.formulation import abscissa as abscissa_nlp, matching
 from tmsopt.roots import PATTERNS, backward_error, pattern_distance, roots
 
 TMS = tmsopt.models.tms

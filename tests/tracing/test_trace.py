@@ -14,8 +14,7 @@ import sympy
 from helpers import curves
 from helpers.curves import certified, distance, epset_Fr, equations, exact_polynomial
 from helpers.oracles import certified_roots, polynomial_60, roots_60, routh_exact
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from mpmath import mp
 
 from tmsopt import laws

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from tmsopt.models import Model, ParameterSet
-from tmsopt.models import tms as bicycle_model
+from tmsopt.models import Model, ParameterSet, tms as bicycle_model
 from tmsopt.paper.reference import TILT_OFFSETS, on_ep_set
 from tmsopt.paper.universal import universal_path
 from tmsopt.records import Array, Complex

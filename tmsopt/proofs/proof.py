@@ -18,8 +18,7 @@ from tmsopt.proofs import rational
 from tmsopt.proofs.existence import Existing, beside, exact_coefficients, exactly
 from tmsopt.proofs.facts import NOTHING, Verdict, as_stored, heavy_damping, inside, limits, stability
 from tmsopt.records import Table
-from tmsopt.roots import PATTERNS, Pattern, Root
-from tmsopt.roots import pattern as pattern_of
+from tmsopt.roots import PATTERNS, Pattern, Root, pattern as pattern_of
 from tmsopt.roots.patterns.naming import implies, shown_patterns
 from tmsopt.roots.patterns.pattern import LINES
 

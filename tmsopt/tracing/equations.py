@@ -14,8 +14,7 @@ from tmsopt.formulation.formulate import matching, variables_of
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import spread
 from tmsopt.records import Array
-from tmsopt.roots import Pattern, roots
-from tmsopt.roots import pattern as pattern_of
+from tmsopt.roots import Pattern, pattern as pattern_of, roots
 from tmsopt.tracing.continuation import Curve, curve
 
 _SAMPLE = 32  # designs by which sizes are judged

@@ -22,8 +22,7 @@ from tmsopt.paper.ledger.algebra import (
     stable_left_of,
 )
 from tmsopt.paper.ledger.entry import Claim, Outcome, decimal, digits, proof, section, universal
-from tmsopt.roots.polynomial import evaluate as value_at
-from tmsopt.roots.polynomial import quadratic_pencil, shift
+from tmsopt.roots.polynomial import evaluate as value_at, quadratic_pencil, shift
 
 _claim = section("2.3 Minimizing the spectral abscissa of general TMS bikes")
 

@@ -16,8 +16,7 @@ from tmsopt.roots.meetings import meeting, weave_test
 from tmsopt.roots.numeric import rebuilt
 from tmsopt.roots.patterns.parts import AXIS, Part, parts_of
 from tmsopt.roots.patterns.pattern import PATTERNS, Pattern, Roots
-from tmsopt.roots.polynomial import evaluate
-from tmsopt.roots.polynomial import product as multiplied
+from tmsopt.roots.polynomial import evaluate, product as multiplied
 
 _GUESSES = 24  # unknowns to start from, the nearest of all ways to choose the roots
 _LOOKED_AT = 512  # ways to choose the roots at most

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tmsopt.records import Array
-from tmsopt.roots.numeric import rebuilt, roots
-from tmsopt.roots.numeric import roots as numeric_roots
+from tmsopt.roots.numeric import rebuilt, roots, roots as numeric_roots
 from tmsopt.roots.patterns.fitting import gauss_newton, relative_distance, sizes
 from tmsopt.roots.patterns.shape import Group, Shape
 from tmsopt.roots.polynomial import Root
