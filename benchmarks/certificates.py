@@ -4,11 +4,11 @@ from pathlib import Path
 
 import click
 
-from benchmarks.ladder import ladder as climb_ladder
-from benchmarks.ladder import ladder_section
-from benchmarks.proving import prove_suite, proved_section
-from benchmarks.report import keep, kept
-from benchmarks.suite import SEED
+from benchmarks.reports.designs.certificates import prove_suite, proved_section
+from benchmarks.reports.designs.ladder import ladder as climb_ladder
+from benchmarks.reports.designs.ladder import ladder_section
+from benchmarks.reports.tables import keep, kept
+from benchmarks.suites.random_designs import SEED
 
 
 @click.group()

@@ -8,12 +8,12 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
-from benchmarks.band import band_problems, ride
-from benchmarks.conflicts import check, conflicts
-from benchmarks.report import keep
-from benchmarks.suite import SEED
-from benchmarks.trials import trials
-from benchmarks.verdicts import band_section, conflict_section, variety_section
+from benchmarks.judges.bands import band_problems, ride
+from benchmarks.reports.designs.varied_designs import trials
+from benchmarks.reports.designs.verdicts import band_section, conflict_section, variety_section
+from benchmarks.reports.tables import keep
+from benchmarks.suites.conflicts import check, conflicts
+from benchmarks.suites.random_designs import SEED
 
 _CONFLICTS = 50
 

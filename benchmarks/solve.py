@@ -5,9 +5,9 @@ from pathlib import Path
 
 import click
 
-from benchmarks.report import keep, section
-from benchmarks.stages import measure
-from benchmarks.suite import SEED
+from benchmarks.reports.designs.random_designs import measure
+from benchmarks.reports.tables import keep, section
+from benchmarks.suites.random_designs import SEED
 
 
 @click.command()

@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-import benchmarks.measure
-from benchmarks import sections
-from benchmarks.measure import best, exponent
-from benchmarks.race import OWN, Heat, Moment, Run, median_ratio, own, run
-from benchmarks.rivals import Reduced, Watch
-from benchmarks.sections import SECTIONS, Section, chosen
-from benchmarks.seekers import Seeker, slopes
-from benchmarks.solving import details, overview
-from benchmarks.suite import random_problem
+import benchmarks.timing
+from benchmarks import command as sections
+from benchmarks.command import SECTIONS, Section, chosen
+from benchmarks.reports.designs.solving import details, overview
+from benchmarks.rivals.race import OWN, Heat, Moment, Run, median_ratio, own, run
+from benchmarks.rivals.reduced import Reduced, Watch
+from benchmarks.rivals.seekers import Seeker, slopes
+from benchmarks.suites.random_designs import random_problem
+from benchmarks.timing import best, exponent
 from tmsopt import Problem, models
 
 HEIGHTS = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
@@ -93,7 +93,7 @@ def test_methods_take_turns_and_the_least_time_counts(monkeypatch: pytest.Monkey
 
         return one
 
-    monkeypatch.setattr(benchmarks.measure.time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(benchmarks.timing.time, "perf_counter", lambda: clock[0])
     assert best({"a": work("a", [5, 2, 3]), "b": work("b", [4, 8, 6])}, 3) == {"a": 2, "b": 4}
     assert turns == ["a", "b"] * 3
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.band import abscissa_below, highest_abscissa
-from benchmarks.conflicts import conflict, conflicts, moved
-from benchmarks.judge import Judge, verdict, worst_roots
-from benchmarks.variety import varied_problem
+from benchmarks.judges.bands import abscissa_below, highest_abscissa
+from benchmarks.judges.grid import Judge, verdict, worst_roots
+from benchmarks.suites.conflicts import conflict, conflicts, moved
+from benchmarks.suites.varied_designs import varied_problem
 from tmsopt import Problem, models
 
 HEIGHTS = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}

@@ -11,9 +11,9 @@ import pytest
 from helpers.oracles import DIGITS, abscissa_60, polynomial_60, roots_60
 from mpmath import mp
 
-from benchmarks.references import PATH, Settings, best_of, confirmed, references, run
-from benchmarks.suite import random_problem
-from benchmarks.trials import Attempt
+from benchmarks.reports.designs.references import PATH, Settings, best_of, confirmed, references, run
+from benchmarks.reports.designs.varied_designs import Attempt
+from benchmarks.suites.random_designs import random_problem
 from tmsopt import Problem, models
 
 KEPT = references(Path(__file__).parents[2] / PATH)

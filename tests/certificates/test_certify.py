@@ -18,8 +18,8 @@ from click.testing import CliRunner
 from helpers.oracles import polynomial_floats
 from scipy.optimize import brentq  # type: ignore[import-untyped]
 
-from benchmarks.references import PATH, references
-from benchmarks.suite import random_problem
+from benchmarks.reports.designs.references import PATH, references
+from benchmarks.suites.random_designs import random_problem
 from tmsopt import InputError, Problem, Solution, certify, models, solve
 from tmsopt.certificates import Crew, available
 from tmsopt.cli import main

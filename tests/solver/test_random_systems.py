@@ -7,11 +7,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from benchmarks.known import known
-from benchmarks.oscillators import System, random_system, random_systems
-from benchmarks.sections import SECTIONS
-from benchmarks.spectrum import confirmed, evolve, exact_polynomial, ideals, values_of, violation, worth
-from benchmarks.stages import started_at
+from benchmarks.command import SECTIONS
+from benchmarks.judges.exact import confirmed, evolve, exact_polynomial, ideals, values_of, violation, worth
+from benchmarks.reports.designs.random_designs import started_at
+from benchmarks.reports.systems.known import known
+from benchmarks.suites.random_systems import System, random_system, random_systems
 from tmsopt import Problem, models, solve
 from tmsopt.formulation import opposite
 from tmsopt.formulation import worth as start_worth
