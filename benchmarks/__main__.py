@@ -1,4 +1,4 @@
-"""All benchmarks that compare: ``python -m benchmarks``."""
+"""All benchmarks: ``python -m benchmarks``."""
 
 import sys
 

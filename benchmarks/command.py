@@ -1,6 +1,6 @@
 """The sections of ``python -m benchmarks``: which there are, and how a failure costs only its section.
 
-A section is a module with ``section(command, quick) -> str``, the report in Markdown.
+A section is a module with ``report(asked) -> str``, in Markdown.
 """
 
 import os
@@ -10,80 +10,54 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import click
 
-from benchmarks.reports.tables import keep
-
-Report = Callable[[str, bool], str]
+from benchmarks.reports import RESULTS, Asked, keep
 
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the benchmark: a letter and a name to call it by, and where it is."""
+    """A part of the benchmark: a letter and a name to call it by, and where it is.
+
+    Attributes:
+        long: run only when it is named.
+    """
 
     letter: str
     name: str
     module: str
     about: str
+    long: bool = False
 
-    def report(self) -> Report:
-        """Its report: (command, quick) → Markdown."""
-        return cast(Report, import_module(self.module).section)
+    def report(self) -> Callable[[Asked], str]:
+        """What makes its report."""
+        return cast(Callable[[Asked], str], import_module(self.module).report)
 
+
+_DESIGNS, _SYSTEMS, _SPEED = (f"benchmarks.reports.{room}" for room in ("designs", "systems", "speed"))
 
 SECTIONS = (
-    Section(
-        "a",
-        "solving",
-        "benchmarks.reports.designs.solving",
-        "solving at equal accuracy, beside SciPy, CMA-ES and PyGRANSO",
-    ),
-    Section(
-        "b",
-        "charts",
-        "benchmarks.reports.speed.charts",
-        "charts, beside stacked eigvals, numpy.roots and copying memory",
-    ),
-    Section(
-        "b", "kernels", "benchmarks.reports.speed.kernels", "roots and classes of many quartics, beside stacked eigvals"
-    ),
-    Section(
-        "c",
-        "studies",
-        "benchmarks.reports.speed.studies",
-        "studies, beside bare solves in a loop, over cores and Dask workers",
-    ),
-    Section("d", "trace", "benchmarks.reports.speed.tracing", "tracing, beside scipy.optimize.root and a contour"),
-    Section(
-        "e", "startup", "benchmarks.reports.speed.startup", "start-up and import times, beside Python, NumPy and CasADi"
-    ),
-    Section("f", "growth", "benchmarks.reports.speed.growth", "growth with free parameters, scenarios and grid points"),
-    Section(
-        "g",
-        "arrays",
-        "benchmarks.reports.speed.arrays",
-        "expressions over grids, beside one design at a time and CasADi's map",
-    ),
-    Section(
-        "h",
-        "tiles",
-        "benchmarks.reports.speed.folders",
-        "charts to a folder and their parts; 1e8 designs in bounded memory",
-    ),
-    Section(
-        "i",
-        "systems",
-        "benchmarks.reports.systems.sixfold",
-        "a 6-fold root from random starts, beside HANSO and PyGRANSO",
-    ),
-    Section(
-        "j",
-        "random",
-        "benchmarks.reports.systems.random_systems",
-        "random systems of degree 3 to 12, beside differential evolution",
-    ),
+    Section("a", "solving", f"{_DESIGNS}.solving", "solving at equal accuracy, beside SciPy, CMA-ES and PyGRANSO"),
+    Section("b", "charts", f"{_SPEED}.charts", "charts, beside stacked eigvals, numpy.roots and copying memory"),
+    Section("b", "kernels", f"{_SPEED}.kernels", "roots and classes of many quartics, beside stacked eigvals"),
+    Section("c", "studies", f"{_SPEED}.studies", "studies, beside bare solves in a loop, over cores and Dask workers"),
+    Section("d", "trace", f"{_SPEED}.tracing", "tracing, beside scipy.optimize.root and a contour"),
+    Section("e", "startup", f"{_SPEED}.startup", "start-up and import times, beside Python, NumPy and CasADi"),
+    Section("f", "growth", f"{_SPEED}.growth", "growth with free parameters, scenarios and grid points"),
+    Section("h", "tiles", f"{_SPEED}.folders", "charts to a folder; 1e8 designs in bounded memory"),
+    Section("i", "systems", f"{_SYSTEMS}.sixfold", "a 6-fold root from random starts, beside HANSO and PyGRANSO"),
+    Section("j", "random", f"{_SYSTEMS}.random_systems", "random systems of degree 3 to 12, beside evolution"),
+    Section("k", "solve", f"{_DESIGNS}.random_designs", "200 random designs, beside SciPy", long=True),
+    Section("l", "variety", f"{_DESIGNS}.varied_designs", "varied problems, judged by eigenvalues", long=True),
+    Section("m", "band", f"{_DESIGNS}.bands", "bands of speeds, proved between the scenarios", long=True),
+    Section("n", "conflicts", f"{_DESIGNS}.conflicts", "relaxations of infeasible problems", long=True),
+    Section("o", "certificates", f"{_DESIGNS}.certificates", "random designs proved globally best", long=True),
+    Section("p", "proofs", "benchmarks.reports.proofs", "exceptional points of the paper, proved", long=True),
+    Section("q", "kills", f"{_SPEED}.kills", "a study killed again and again: what is lost", long=True),
+    Section("r", "references", f"{_DESIGNS}.references", "the best values of the random designs, kept", long=True),
+    Section("s", "known", f"{_SYSTEMS}.known", "the best values of the random systems, kept", long=True),
 )
 """In the order in which they are run."""
 
@@ -97,11 +71,11 @@ class Outcome:
     failed: bool
 
 
-def run(section: Section, command: str, quick: bool) -> Outcome:
+def run(section: Section, asked: Asked) -> Outcome:
     """One section; whatever it raises becomes its report."""
     load, began = _load(), time.perf_counter()
     try:
-        text, failed = section.report()(command, quick), False
+        text, failed = section.report()(asked), False
     except ModuleNotFoundError as error:
         text, failed = _refused(section, f"not installed: {error.name}"), True
     except Exception as error:
@@ -120,7 +94,7 @@ def _load() -> str:
 
 
 def chosen(only: str, sections: Sequence[Section]) -> list[Section]:
-    """Sections by letters or names, separated by commas; all of them for an empty text.
+    """Sections by letters or names, separated by commas; for an empty text all that are not long.
 
     Raises:
         click.BadParameter: for a word that is neither.
@@ -130,23 +104,17 @@ def chosen(only: str, sections: Sequence[Section]) -> list[Section]:
         if not any(word in (s.letter, s.name) for s in sections):
             known = ", ".join(f"{s.letter} or {s.name}" for s in sections)
             raise click.BadParameter(f"found {word!r}; accepted: {known}", param_hint="--only")
-    return [s for s in sections if not words or s.letter in words or s.name in words]
+    return [s for s in sections if (not words and not s.long) or s.letter in words or s.name in words]
 
 
 @click.command(
     epilog="""\b
 Examples:
-  python -m benchmarks                     all sections, about 25 minutes
+  python -m benchmarks                     all sections but the long ones, about 25 minutes
   python -m benchmarks --quick             small sizes, a few minutes, kept nowhere
   python -m benchmarks --only a,growth     two of them
+  python -m benchmarks --only solve        a long one: 200 random designs beside SciPy
   python -m benchmarks --output mine.md    kept in another file
-
-\b
-Longer ones have commands of their own:
-  python -m benchmarks.solve               200 random designs beside SciPy
-  python -m benchmarks.design              bands of speeds, varied problems, conflicts
-  python -m benchmarks.certificates        designs proved globally best
-  python -m benchmarks.proofs              exceptional points of the paper, proved
 
 Every ratio compares times of the same run. Other load on the machine spoils them: each section says how much there was.
 """
@@ -154,26 +122,30 @@ Every ratio compares times of the same run. Other load on the machine spoils the
 @click.option("--only", default="", metavar="LIST", help="letters or names of sections, separated by commas")
 @click.option("--quick", is_flag=True, help="small sizes, to see that everything runs")
 @click.option("--list", "listed", is_flag=True, help="name the sections and stop")
+@click.option("--count", type=click.IntRange(1), default=None, help="problems, systems or rows of a section")
+@click.option("--seconds", type=float, default=None, help="limit for each problem: solving, certificates")
+@click.option("--seed", default=Asked.seed, show_default=True, help="of random problems")
+@click.option("--workers", default=Asked.workers, show_default=True, help="processes for what is not timed")
 @click.option(
     "--output",
     type=click.Path(dir_okay=False, path_type=Path),
-    help="file that keeps the tables; by default benchmarks/results.md, and with --quick none",
+    help=f"file that keeps the tables; by default {RESULTS}, and with --quick none",
 )
-def main(only: str, quick: bool, listed: bool, output: Path | None) -> None:
+def main(only: str, listed: bool, output: Path | None, **sizes: Any) -> None:
     """Measure tmsopt beside what one would use without it, print the tables and keep them.
 
     Sections that fail say so and the others go on; the exit status is then 1.
     """
     sections = chosen(only, SECTIONS)
     if listed:
-        click.echo("\n".join(f"{s.letter}  {s.name:8}  {s.about}" for s in sections))
+        shown = sections if only else SECTIONS
+        click.echo("\n".join(f"{s.letter}  {s.name:12}  {s.about}{', when named' * s.long}" for s in shown))
         return
-    path = output or (None if quick else Path("benchmarks/results.md"))
+    path = output or (None if sizes["quick"] else RESULTS)
     failed = []
     for section in sections:
         click.echo(f"{section.letter}  {section.name}: {section.about}", err=True)
-        command = f"python -m benchmarks --only {section.name}{' --quick' if quick else ''}"
-        outcome = run(section, command, quick)
+        outcome = run(section, Asked(section.name, **{n: v for n, v in sizes.items() if v is not None}))
         click.echo(outcome.text)
         if path:
             keep(path, section.name, outcome.text)

@@ -1,10 +1,15 @@
-"""Times taken side by side, and how they grow."""
+"""Times taken side by side, how they grow, and the runs of IPOPT in them."""
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
+from unittest.mock import patch
 
+import casadi as ca
 import numpy as np
 
 
@@ -33,15 +38,46 @@ def exponent(sizes: Sequence[float], seconds: Sequence[float]) -> float:
     return float(np.polyfit(n, s, 1)[0])
 
 
-def duration(seconds: float) -> str:
-    """With its unit, to two or three digits."""
-    if not math.isfinite(seconds):
-        return "–"
-    scale, unit = next(((f, u) for f, u in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs")) if seconds >= f), (1e-9, "ns"))
-    number = seconds / scale
-    return f"{number:.0f} {unit}" if number >= 100 else f"{number:.3g} {unit}"
+def quantile(numbers: Iterable[float], q: float = 0.5) -> float:
+    """By default the median; nan of none."""
+    found = list(numbers)
+    return float(np.quantile(found, q)) if found else math.nan
 
 
-def times(ratio: float) -> str:
-    """A ratio, to two digits."""
-    return "–" if not math.isfinite(ratio) else f"{ratio:.0f}" if ratio >= 10 else f"{ratio:.2g}"
+@dataclass(frozen=True)
+class IpoptRun:
+    """A run of IPOPT that was made.
+
+    Attributes:
+        evaluations: of the objective.
+        again: makes the same run once more, and nothing else.
+    """
+
+    seconds: float
+    evaluations: int
+    again: Callable[[], Any]
+
+
+@contextmanager
+def ipopt_runs() -> Iterator[list[IpoptRun]]:
+    """Note every run of IPOPT by a solver that is built meanwhile."""
+    runs: list[IpoptRun] = []
+    made_by: Any = ca.nlpsol
+
+    class Noted:
+        def __init__(self, *given: Any) -> None:
+            self._solver = made_by(*given)
+
+        def __call__(self, **given: Any) -> Any:
+            began = time.perf_counter()
+            answer = self._solver(**given)
+            seconds = time.perf_counter() - began
+            evaluations = int(self._solver.stats().get("n_call_nlp_f", 0))
+            runs.append(IpoptRun(seconds, evaluations, partial(self._solver, **given)))
+            return answer
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self._solver, name)
+
+    with patch.object(ca, "nlpsol", Noted):
+        yield runs

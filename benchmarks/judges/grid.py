@@ -8,30 +8,18 @@ what rounding of the coefficients does to them is measured, and granted to whoev
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from types import CodeType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tmsopt.design.cases import Band
-from tmsopt.design.problem import Problem
+from benchmarks.judges.eigenvalues import worst_roots
+from benchmarks.judges.text import NOWHERE, evaluated, excess, sides
+from tmsopt import Problem
+from tmsopt.design import Band
 from tmsopt.models import Values
-from tmsopt.models.names import FUNCTIONS
 from tmsopt.records import Array
 
-NOWHERE = 1e3
-"""Abscissa, and violation, of a design where it does not exist."""
-
-_NUMPY: Mapping[str, Any] = {name: getattr(np, name) for name in FUNCTIONS if hasattr(np, name)} | {
-    "asin": np.arcsin,
-    "acos": np.arccos,
-    "atan": np.arctan,
-    "min": np.minimum,
-    "max": np.maximum,
-    "pi": np.pi,
-}
 _ROUNDING = 2e-15  # relative, of a coefficient: a dozen roundings of doubles
 _TRIALS = 12
 _GRANTED = 3.0  # times the scatter seen in the trials
@@ -106,8 +94,8 @@ class Judge:
         self.names = list(problem.free)
         self.lower, self.upper = np.array([problem.free[n] for n in self.names]).reshape(-1, 2).T
         self.cases = cases_of(problem, points, inside)
-        self._rows = [(_code(c.text), c.comparison) for c in problem.conditions.values()]
-        self._objective = _code(problem.objective.text)[0] if problem.objective else None
+        self._rows = [_compiled(c.text) for c in problem.conditions.values()]
+        self._objective = compile(problem.objective.text, "objective", "eval") if problem.objective else None
         self._sign = -1.0 if problem.sense == "maximize" else 1.0
 
     def worth(self, x: Array) -> Array:
@@ -130,9 +118,9 @@ class Judge:
                 values.define("abscissa", abscissa[:, None])
                 values.define("damping_ratio", damping[:, None])
             violation = np.zeros(x.shape[1])
-            for (left, right), comparison in self._rows:
+            for left, comparison, right in self._rows:
                 values = one if comparison == "==" else each
-                found = _excess(_value(left, values), _value(right, values), comparison)
+                found = np.atleast_2d(excess(evaluated(left, values), comparison, evaluated(right, values)))
                 violation = np.maximum(violation, np.broadcast_to(found, (x.shape[1], found.shape[-1])).max(axis=1))
             value = np.full(x.shape[1], np.nan) if self._objective is None else self._worst(each, size)
         violation = np.where(np.isfinite(abscissa) & (abscissa < NOWHERE), violation, NOWHERE)
@@ -144,7 +132,7 @@ class Judge:
 
     def _worst(self, each: Values, size: tuple[int, int]) -> Array:
         assert self._objective is not None
-        found = np.broadcast_to(_value(self._objective, each), size)
+        found = np.broadcast_to(evaluated(self._objective, each), size)
         return np.asarray(self._sign * np.where(np.isfinite(found), self._sign * found, NOWHERE).max(axis=1))
 
     def _values(self, x: Array) -> tuple[Values, Values]:
@@ -158,11 +146,6 @@ class Judge:
     def of(self, parameters: Mapping[str, float], shift: float = 0.0) -> Judged:
         """One design."""
         return self(np.array([[parameters[n]] for n in self.names]).reshape(-1, 1), shift)
-
-    @cached_property
-    def constrained(self) -> bool:
-        """Whether there are constraints."""
-        return bool(self._rows)
 
 
 @dataclass(frozen=True)
@@ -191,44 +174,11 @@ def verdict(problem: Problem, parameters: Mapping[str, float], points: int = 102
     return Verdict(violation, float(plain.value[0]), abs(float(granted.value[0] - plain.value[0])))
 
 
-def worst_roots(a: Array) -> tuple[Array, Array]:
-    """Largest abscissa and least damping ratio, over the last but one axis of coefficients (designs, cases, n + 1)."""
-    z = eigenvalues(a)
-    abscissa = z.real.max(axis=-1)
-    size = np.abs(z)
-    damping = np.where(size > 0, -z.real / np.where(size > 0, size, 1.0), 0.0).min(axis=-1)
-    return abscissa.max(axis=-1), np.where(abscissa < NOWHERE, damping, -1.0).min(axis=-1)
-
-
-def eigenvalues(a: Array) -> NDArray[np.complex128]:
-    """Roots by stacked companion matrices as in `numpy.roots`; `NOWHERE` where the mass matrix is singular."""
-    n = a.shape[-1] - 1
-    regular = np.all(np.isfinite(a), axis=-1) & (a[..., 0] != 0)
-    companion = np.zeros((*a.shape[:-1], n, n))
-    companion[..., 0, :] = -np.where(regular[..., None], a[..., 1:], 0.0) / np.where(regular, a[..., 0], 1.0)[..., None]
-    companion[..., np.arange(1, n), np.arange(n - 1)] = 1
-    return np.where(regular[..., None], np.linalg.eigvals(companion), NOWHERE + 0j)
-
-
 def _rounded(size: int) -> list[Array]:
     rng = np.random.default_rng(0)
     return [1 + _ROUNDING * rng.choice([-1.0, 1.0], size) for _ in range(_TRIALS)]
 
 
-def _excess(left: Any, right: Any, comparison: str) -> Array:
-    difference = np.atleast_2d(np.asarray(left - right, dtype=float))
-    excess = {"<=": difference, ">=": -difference, "==": np.abs(difference)}[comparison]
-    size = np.maximum(1.0, np.maximum(np.abs(left), np.abs(right)))
-    return np.where(np.isfinite(difference), np.maximum(excess, 0.0) / size, NOWHERE)
-
-
-def _value(code: CodeType, values: Values) -> Any:
-    return eval(code, dict(_NUMPY), values)
-
-
-def _code(text: str) -> tuple[CodeType, ...]:
-    """Both sides of a comparison, or a value."""
-    for comparison in ("<=", ">=", "=="):
-        if comparison in text:
-            return tuple(compile(side.strip(), text, "eval") for side in text.split(comparison))
-    return (compile(text, text, "eval"),)
+def _compiled(text: str) -> tuple[CodeType, str, CodeType]:
+    left, comparison, right = sides(text)
+    return compile(left, text, "eval"), comparison, compile(right, text, "eval")

@@ -1,4 +1,33 @@
 """Reports: what is measured, a section of results.md each.
 
-In: a command and whether it is to be quick. Out: Markdown.
+In: what is asked for, `Asked`. Out: a page of Markdown. Open `tables` first; `designs`, `systems` and `speed` hold
+the sections, listed in `benchmarks.command`.
 """
+
+from benchmarks.reports.tables import (
+    RESULTS,
+    Asked,
+    duration,
+    facts,
+    keep,
+    median,
+    origin,
+    page,
+    share,
+    table,
+    times,
+)
+
+__all__ = [
+    "RESULTS",
+    "Asked",
+    "duration",
+    "facts",
+    "keep",
+    "median",
+    "origin",
+    "page",
+    "share",
+    "table",
+    "times",
+]

@@ -5,20 +5,18 @@ known to stop there or not, and the time that the watching takes is not its own.
 """
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
-from unittest.mock import patch
 
-import casadi as ca
 import numpy as np
 
-from benchmarks.reports.designs.random_designs import EXACT
+from benchmarks.judges import EXACT
 from benchmarks.rivals.reduced import Reduced
 from benchmarks.rivals.seekers import Seeker
-from tmsopt.design.problem import Problem
+from benchmarks.timing import ipopt_runs
+from tmsopt import Problem, solve
 from tmsopt.records import Array
-from tmsopt.solver.solve import solve
 
 TOLERANCES = (1e-3, 1e-6, 1e-8)
 """Excess over the optimum, relative to it."""
@@ -166,33 +164,13 @@ def own(problem: Problem, method: str = OWN) -> Run:
         began = time.perf_counter()
         solution = solve(problem, throw=False, **OWN_WAYS[method])
         seconds.append(time.perf_counter() - began)
-    evaluations = _evaluations(lambda: solve(problem, throw=False, **OWN_WAYS[method]))
+    with ipopt_runs() as runs:
+        solve(problem, throw=False, **OWN_WAYS[method])
+    evaluations = sum(run.evaluations for run in runs)
     if solution.status != "optimal":
         return Run(method, (), min(seconds), evaluations, f"failed: {solution.status}")
     moment = Moment(solution.value, min(seconds), evaluations, dict(solution.parameters))
     return Run(method, (moment,), min(seconds), evaluations)
-
-
-def _evaluations(work: Callable[[], Any]) -> int:
-    """How often IPOPT evaluates an objective while some work is done."""
-    made: list[int] = []
-    made_by: Any = ca.nlpsol
-
-    class Counted:
-        def __init__(self, *given: Any) -> None:
-            self._solver = made_by(*given)
-
-        def __call__(self, **given: Any) -> Any:
-            answer = self._solver(**given)
-            made.append(int(self._solver.stats().get("n_call_nlp_f", 0)))
-            return answer
-
-        def __getattr__(self, name: str) -> Any:
-            return getattr(self._solver, name)
-
-    with patch.object(ca, "nlpsol", Counted):
-        work()
-    return sum(made)
 
 
 def heat(

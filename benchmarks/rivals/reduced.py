@@ -1,24 +1,15 @@
-"""SciPy's optimisers on the eigenvalues, given the same problems: what one would try without factors.
+"""A problem as its rivals see it: eigenvalues, a box, constraints, and no equality, which is solved for a parameter."""
 
-Every rival minimises the largest real part of `numpy.roots` of the coefficients in the box, with the constraints in
-the form that suits it best. An equality is solved for a parameter that enters it linearly, so that no rival has to
-follow one.
-"""
-
-import time
-import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution, minimize
 
-from tmsopt.design.expression import parse_value
-from tmsopt.design.problem import Problem
-from tmsopt.formulation.starts import designs
-from tmsopt.models.names import FUNCTIONS
-from tmsopt.models.tms import copo, tms
+from benchmarks.judges import NOWHERE, difference, eigenvalues, evaluated
+from tmsopt import Problem
+from tmsopt.design import parse_value
+from tmsopt.models import copo, tms
 from tmsopt.records import Array
 
 Watch = Callable[[Array, Array], None]
@@ -27,22 +18,7 @@ Watch = Callable[[Array, Array], None]
 FEASIBLE = 1e-6
 """Violation, relative to the size of the two sides, up to which a rival's design counts as feasible."""
 
-STARTS = 5
-"""Designs that the local rivals start from: the first ones of `tmsopt.solve`."""
-
-SCALAR, VECTORISED = "DE", "DE, vectorised"
-"""The two ways in which differential evolution is run: design by design, and a whole generation at once."""
-
-_NOWHERE = 1e3  # abscissa, and violation, of a design where it does not exist
 _PENALTY = 1e3
-_NUMPY = {name: getattr(np, name) for name in FUNCTIONS if hasattr(np, name)} | {
-    "asin": np.arcsin,
-    "acos": np.arccos,
-    "atan": np.arctan,
-    "min": np.minimum,
-    "max": np.maximum,
-    "pi": np.pi,
-}
 _QUANTITIES = {q.name: q.value for q in tms.quantities}
 
 
@@ -65,7 +41,7 @@ class Found:
     @property
     def feasible(self) -> bool:
         """Whether the design counts."""
-        return self.violation <= FEASIBLE and self.value < _NOWHERE
+        return self.violation <= FEASIBLE and self.value < NOWHERE
 
 
 class Reduced:
@@ -77,9 +53,9 @@ class Reduced:
         conditions = list(problem.conditions.values())
         equalities = [c.text for c in conditions if c.comparison == "=="]
         self._solved = _solvable(problem, equalities[0]) if equalities else ""
-        self._equation = compile(_difference(equalities[0]), "equality", "eval") if equalities else None
+        self._equation = compile(difference(equalities[0]), "equality", "eval") if equalities else None
         self._rows = [
-            (compile(_difference(c.text), c.text, "eval"), -1.0 if c.comparison == "<=" else 1.0)
+            (compile(difference(c.text), c.text, "eval"), -1.0 if c.comparison == "<=" else 1.0)
             for c in conditions
             if c.comparison != "=="
         ]
@@ -107,19 +83,14 @@ class Reduced:
         """Largest real part of the eigenvalues of one design."""
         coefficients = self.coefficients(x)
         regular = bool(np.all(np.isfinite(coefficients)))
-        value = float(np.roots(coefficients).real.max(initial=-_NOWHERE)) if regular else _NOWHERE
+        value = float(np.roots(coefficients).real.max(initial=-NOWHERE)) if regular else NOWHERE
         if self._watch:
             self._watch(x[:, None], np.array([value]))
         return value
 
     def abscissae(self, x: Array) -> Array:
         """The same for designs of shape (n, m), by stacked companion matrices as in `numpy.roots`."""
-        a = self.coefficients(x)
-        regular = np.all(np.isfinite(a), axis=-1) & (a[:, 0] != 0)
-        companion = np.zeros((len(a), 4, 4))
-        companion[:, 0, :] = -np.where(regular[:, None], a[:, 1:], 0.0) / np.where(regular, a[:, 0], 1.0)[:, None]
-        companion[:, np.arange(1, 4), np.arange(3)] = 1
-        values = np.where(regular, np.linalg.eigvals(companion).real.max(axis=-1), _NOWHERE)
+        values: Array = eigenvalues(self.coefficients(x)).real.max(axis=-1)
         if self._watch:
             self._watch(x, values)
         return values
@@ -136,14 +107,14 @@ class Reduced:
         if self._used:
             values |= {f"a{k}": np.asarray(a)[()] for k, a in enumerate(_coefficients(values))}
             values |= {name: _QUANTITIES[name](values) for name in self._used}
-        g = [sign * eval(code, _NUMPY, values) for code, sign in self._rows]
+        g = [sign * evaluated(code, values) for code, sign in self._rows]
         for value in solved:
             lower, upper = self.problem.free[self._solved]
             g += [value - lower, upper - value]
         found = np.array([np.broadcast_to(row, np.shape(x)[1:]) for row in g], dtype=float).reshape(
             len(g), *x.shape[1:]
         )
-        return np.where(np.isfinite(found), found, -_NOWHERE)
+        return np.where(np.isfinite(found), found, -NOWHERE)
 
     def found(self, method: str, x: Array, seconds: float) -> Found:
         """A rival's end point, judged."""
@@ -153,85 +124,8 @@ class Reduced:
 
     def _eliminated(self, values: dict[str, Any]) -> Any:
         assert self._equation is not None
-        first, second = (eval(self._equation, _NUMPY, values | {self._solved: v}) for v in (0.25, 0.75))
+        first, second = (evaluated(self._equation, values | {self._solved: v}) for v in (0.25, 0.75))
         return 0.25 - 0.5 * first / (second - first)
-
-
-def differential(problem: Problem, seed: int = 0, vectorized: bool = False, watch: Watch | None = None) -> Found:
-    """Differential evolution with the constraints as such (Lampinen's rule), polished by SciPy's own choice."""
-    reduced = Reduced(problem, watch)
-    bounds = Bounds(reduced.lower, reduced.upper)
-    constraints: Any = NonlinearConstraint(reduced.rows, 0.0, np.inf) if reduced.constrained else ()
-    objective: Callable[[Array], Any] = reduced.abscissae if vectorized else reduced.abscissa
-    began = time.perf_counter()
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")
-        answer = differential_evolution(
-            objective,
-            bounds,
-            constraints=constraints,
-            tol=1e-8,
-            rng=seed,
-            vectorized=vectorized,
-            updating="deferred" if vectorized else "immediate",
-            polish=not vectorized,
-        )
-        return reduced.found(VECTORISED if vectorized else SCALAR, answer.x, time.perf_counter() - began)
-
-
-def slsqp(problem: Problem, starts: int = STARTS, watch: Watch | None = None) -> Found:
-    """SLSQP from the first starts."""
-
-    def run(reduced: Reduced, x: Array) -> Array:
-        options = {"ftol": 1e-14, "maxiter": 300}
-        return _minimized(reduced, reduced.abscissa, x, method="SLSQP", constraints=_rows(reduced), options=options)
-
-    return _multistart("SLSQP", Reduced(problem, watch), starts, run)
-
-
-def cobyla(problem: Problem, starts: int = STARTS, watch: Watch | None = None) -> Found:
-    """COBYLA from the first starts."""
-
-    def run(reduced: Reduced, x: Array) -> Array:
-        options = {"maxiter": 5000, "tol": 1e-12, "rhobeg": 0.1 * float((reduced.upper - reduced.lower).min())}
-        return _minimized(reduced, reduced.abscissa, x, method="COBYLA", constraints=_rows(reduced), options=options)
-
-    return _multistart("COBYLA", Reduced(problem, watch), starts, run)
-
-
-def nelder_mead(problem: Problem, starts: int = STARTS, watch: Watch | None = None) -> Found:
-    """Nelder–Mead from the first starts, violations as an exact penalty."""
-
-    def run(reduced: Reduced, x: Array) -> Array:
-        options = {"xatol": 1e-12, "fatol": 1e-12, "maxiter": 1000 * len(x), "maxfev": 1000 * len(x)}
-        return _minimized(reduced, reduced.penalised, x, method="Nelder-Mead", options=options)
-
-    return _multistart("Nelder–Mead", Reduced(problem, watch), starts, run)
-
-
-def _rows(reduced: Reduced) -> list[dict[str, Any]]:
-    return [{"type": "ineq", "fun": reduced.rows}] if reduced.constrained else []
-
-
-def _minimized(reduced: Reduced, function: Callable[[Array], float], x: Array, **options: Any) -> Array:
-    answer: Any = minimize(function, x, bounds=Bounds(reduced.lower, reduced.upper), **options)
-    return np.asarray(answer.x)
-
-
-LOCAL: Mapping[str, Callable[..., Found]] = {"SLSQP": slsqp, "Nelder–Mead": nelder_mead, "COBYLA": cobyla}
-"""The local rivals by name."""
-
-
-def _multistart(method: str, reduced: Reduced, starts: int, run: Callable[[Reduced, Array], Array]) -> Found:
-    began = time.perf_counter()
-    ends: list[Found] = []
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")
-        for design in designs(reduced.problem, 0, starts):
-            x = run(reduced, np.array([design[n] for n in reduced.names]))
-            ends.append(reduced.found(method, x, 0.0))
-    best = min(ends, key=lambda f: (not f.feasible, f.value if f.feasible else f.violation))
-    return Found(method, best.value, best.violation, best.parameters, time.perf_counter() - began)
 
 
 def _coefficients(p: Mapping[str, Any]) -> list[Any]:
@@ -248,17 +142,9 @@ def _violation(problem: Problem, parameters: Mapping[str, float]) -> float:
     return largest if np.isfinite(largest) else np.inf
 
 
-def _difference(text: str) -> str:
-    for comparison in ("<=", ">=", "=="):
-        left, found, right = text.partition(comparison)
-        if found:
-            return f"({left}) - ({right})"
-    raise ValueError(f"{text!r} compares nothing")
-
-
 def _solvable(problem: Problem, equality: str) -> str:
     """A free parameter in which the equality is linear, so that it can be solved for it."""
-    expression = parse_value(_difference(equality), problem.vocabulary)
+    expression = parse_value(difference(equality), problem.vocabulary)
     rng = np.random.default_rng(0)
     designs = [{n: rng.uniform(*ends) for n, ends in problem.free.items()} for _ in range(3)]
 

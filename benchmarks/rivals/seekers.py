@@ -4,9 +4,6 @@ Each is given the problem, the box and the constraints in the form that suits it
 watches the evaluations decides when it is over.
 """
 
-import contextlib
-import io
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import import_module
@@ -19,9 +16,11 @@ from unittest.mock import patch
 import numpy as np
 from scipy.optimize import dual_annealing
 
-from benchmarks.rivals.reduced import Reduced, Watch, cobyla, differential, nelder_mead, slsqp
-from tmsopt.design.problem import Problem
-from tmsopt.formulation.starts import designs
+from benchmarks.rivals.nonsmooth import pygranso, rightmost
+from benchmarks.rivals.reduced import Reduced, Watch
+from benchmarks.rivals.searches import LOCAL, differential, local, quiet
+from tmsopt import Problem
+from tmsopt.formulation import designs
 from tmsopt.records import Array
 
 _MANY = 1_000_000
@@ -36,7 +35,7 @@ class Seeker:
         search: (problem, watch) → only when it gives up; watch is told of every evaluation and may end it.
     """
 
-    search: Callable[[Problem, Watch], None]
+    search: Callable[[Problem, Watch], object]
     packages: tuple[str, ...] = ()
 
     @property
@@ -46,7 +45,7 @@ class Seeker:
         if absent:
             return f"not installed: {', '.join(absent)}"
         try:
-            with _quiet():
+            with quiet():
                 numeric = import_module("numpy.core.numeric")
                 with patch.object(numeric, "Inf", np.inf, create=True):  # PyGRANSO 1.2 wants it, NumPy 2 dropped it
                     for name in self.packages:
@@ -61,8 +60,8 @@ class Seeker:
         return ", ".join(f"{n} {version(n)}" for n in self.packages if "." not in n)
 
 
-def _local(rival: Callable[..., Any]) -> Seeker:
-    return Seeker(lambda problem, watch: rival(problem, starts=_MANY, watch=watch))
+def _local(method: str) -> Seeker:
+    return Seeker(lambda problem, watch: local(method, problem, starts=_MANY, watch=watch))
 
 
 def _evolution(problem: Problem, watch: Watch) -> None:
@@ -74,7 +73,7 @@ def _annealing(problem: Problem, watch: Watch) -> None:
     """SciPy's generalised simulated annealing with its local searches, violations as an exact penalty."""
     reduced = Reduced(problem, watch)
     for seed in count():
-        with _quiet():
+        with quiet():
             dual_annealing(reduced.penalised, list(zip(reduced.lower, reduced.upper, strict=True)), rng=seed)
 
 
@@ -89,52 +88,29 @@ def _cma_es(problem: Problem, watch: Watch) -> None:
 
     for seed, start in enumerate(_starts(reduced), start=1):
         options = {"bounds": [0, 1], "seed": seed, "verbose": -9, "tolfun": 1e-13, "tolx": 1e-13, "tolflatfitness": 20}
-        with _quiet():
+        with quiet():
             first = np.clip((start - reduced.lower) / width, 0.05, 0.95)
             cma.fmin2(None, first, 0.3, options, restarts=9, bipop=True, parallel_objective=generation)
 
 
 def _pygranso(problem: Problem, watch: Watch) -> None:
-    """BFGS-SQP for constrained nonsmooth functions, with exact gradients and the box as constraints."""
-    torch = import_module("torch")
-    torch.set_num_threads(1)  # a dozen numbers are not worth a second thread
-    granso = import_module("pygranso.pygranso").pygranso
-    struct = import_module("pygranso.pygransoStruct").pygransoStruct
+    """PyGRANSO in the unit box, with exact gradients and the box as constraints."""
     reduced = Reduced(problem, watch)
     width = reduced.upper - reduced.lower
 
-    def tensor(a: Any) -> Any:
-        return torch.tensor(np.asarray(a, dtype=float))
-
-    def combined(variables: Any) -> list[Any]:
-        x = reduced.lower + width * variables.x.detach().numpy().ravel()
+    def combined(share: Array) -> tuple[float, Array, Array, Array]:
+        x, unit = reduced.lower + width * share, np.eye(len(share))
         slope, row_slopes = slopes(reduced, x)
-        share, unit = (x - reduced.lower) / width, np.eye(len(x))
         limits = np.concatenate([-reduced.rows(x), -share, share - 1])
         inward = np.concatenate([-row_slopes * width, -unit, unit]).T
-        return [
-            reduced.abscissa(x),
-            tensor(slope * width)[:, None],
-            tensor(limits)[:, None],
-            tensor(inward),
-            None,
-            None,
-        ]
+        return reduced.abscissa(x), slope * width, limits, inward
 
     for start in _starts(reduced):
-        options = struct()
-        options.x0 = tensor((start - reduced.lower) / width)[:, None]
-        options.globalAD, options.print_level, options.quadprog_info_msg = False, 0, False
-        options.opt_tol, options.viol_ineq_tol, options.maxit = 1e-10, 1e-9, 1000
-        # it ends the interpreter where a function is not finite: that is the end of one start
-        with _quiet(), contextlib.suppress(SystemExit):
-            granso(var_spec={"x": [len(start), 1]}, combined_fn=combined, user_opts=options)
+        pygranso(combined, (start - reduced.lower) / width, viol_ineq_tol=1e-9)
 
 
 SEEKERS: Mapping[str, Seeker] = {
-    "SLSQP": _local(slsqp),
-    "Nelder–Mead": _local(nelder_mead),
-    "COBYLA": _local(cobyla),
+    **{method: _local(method) for method in LOCAL},
     "differential evolution": Seeker(_evolution),
     "dual annealing": Seeker(_annealing),
     "CMA-ES": Seeker(_cma_es, ("cma",)),
@@ -146,30 +122,18 @@ SEEKERS: Mapping[str, Seeker] = {
 def slopes(reduced: Reduced, x: Array) -> tuple[Array, Array]:
     """Gradient of the abscissa (n,) and of the rows (rows, n) at one design.
 
-    The rightmost root z moves by dz = −Σ da_k z^(4−k) / p'(z); the coefficients and rows are smooth, so central
-    differences serve for them.
+    The coefficients and rows are smooth, so central differences serve for them.
     """
     step = np.diag(_STEP * (reduced.upper - reduced.lower))
     around = np.concatenate([x[:, None] + step, x[:, None] - step], axis=1)
-    forward, backward = np.split(reduced.coefficients(around), 2)
     with np.errstate(all="ignore"):
-        a, twice = reduced.coefficients(x), 2 * np.diag(step)
-        found = np.roots(a)
-        z = found[int(np.argmax(found.real))]
-        da = (forward - backward) / twice[:, None]
-        slope = -(np.polyval(da.T, z) / np.polyval(np.polyder(a), z)).real
+        forward, backward = np.split(reduced.coefficients(around), 2)
         above, below = np.split(reduced.rows(around), 2, axis=-1)
-    return np.nan_to_num(slope, posinf=0.0, neginf=0.0), np.nan_to_num((above - below) / twice)
+        twice = 2 * np.diag(step)
+        _, slope = rightmost(reduced.coefficients(x), ((forward - backward) / twice[:, None]).T)
+    return slope, np.nan_to_num((above - below) / twice)
 
 
 def _starts(reduced: Reduced) -> Iterator[Array]:
     for design in designs(reduced.problem, 0, _MANY):
         yield np.array([design[n] for n in reduced.names])
-
-
-@contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """Nothing printed and no warnings: a search that fails says so by its best value."""
-    with warnings.catch_warnings(), np.errstate(all="ignore"), contextlib.redirect_stdout(io.StringIO()):
-        warnings.simplefilter("ignore")
-        yield

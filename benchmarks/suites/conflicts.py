@@ -1,4 +1,4 @@
-"""Infeasible problems, each with the closed form that excludes it, and the test of a reported relaxation."""
+"""Infeasible problems, each with the closed form that excludes it."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -6,22 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.judges.grid import verdict
-from benchmarks.reports.designs.varied_designs import FEASIBLE
-from benchmarks.rivals.evolution import Evolved, evolve
-from benchmarks.suites.random_designs import SEED, rounded
-from tmsopt.design.cases import Band
-from tmsopt.design.problem import Problem
+from benchmarks.suites.random_designs import SEED, Box, rounded
+from tmsopt import Problem
+from tmsopt.design import Band
 from tmsopt.models import tms
-from tmsopt.solver.solve import solve
 
-LESS = 0.99
-"""Share of a relaxation that must not be enough."""
-
-_VIOLATED = 1e-9
-"""Violation beyond which a design of the evolution is not feasible: what the recheck of a solution allows."""
-
-_BOX: Mapping[str, tuple[float, float]] = {
+_BOX: Mapping[str, Box] = {
     "Fr": (0.8, 4.0),
     "mu": (0.05, 3.0),
     "chi_B": (1.05, 2.0),
@@ -47,50 +37,6 @@ class Conflict:
     short: float
 
 
-@dataclass(frozen=True)
-class Relaxed:
-    """How a reported relaxation did.
-
-    Attributes:
-        amounts: as reported; empty where nothing is.
-        enough: whether the reported design satisfies all moved limits.
-        violation: of the reported design.
-        less: status of a solve with 1 % less.
-        evolved: the evolution's least violation with 1 % less, relative to the sides.
-    """
-
-    conflict: Conflict
-    status: str
-    amounts: Mapping[str, float]
-    violation: float
-    less: str
-    evolved: float
-    seconds: float
-
-    @property
-    def enough(self) -> bool:
-        """Whether the moved limits can be met."""
-        return bool(self.amounts) and self.violation <= FEASIBLE
-
-    @property
-    def needed(self) -> bool:
-        """Whether 1 % less is not enough, by the package and by the evolution."""
-        return bool(self.amounts) and self.less == "infeasible" and self.evolved > _VIOLATED
-
-    @property
-    def cause(self) -> str:
-        """What is wrong; empty where nothing is."""
-        if self.status != "infeasible":
-            return f"claimed {self.status}"
-        if not self.amounts:
-            return "no relaxation reported"
-        if not self.enough:
-            return f"the relaxed design violates by {self.violation:.0e}"
-        if self.evolved <= _VIOLATED:
-            return "1 % less is enough for the evolution"
-        return "" if self.needed else f"1 % less ends {self.less}"
-
-
 def conflicts(count: int = 50, seed: int = SEED) -> list[Conflict]:
     """Every kind in turn."""
     return [conflict(index, seed) for index in range(count)]
@@ -100,34 +46,6 @@ def conflict(index: int, seed: int = SEED) -> Conflict:
     """One conflict, the same whatever the others are."""
     rng = np.random.default_rng([seed, index, 2])
     return list(_KINDS.values())[index % len(_KINDS)](rng)
-
-
-def check(conflict: Conflict) -> Relaxed:
-    """Solve a conflict, and try the relaxation that the solution reports; a crash is a failure like another."""
-    problem = conflict.problem
-    try:
-        solution = solve(problem, throw=False)
-    except Exception as error:
-        return Relaxed(conflict, f"crash: {error!r}", {}, math.inf, "", math.nan, math.nan)
-    relaxation = solution.relaxation
-    if relaxation is None or not relaxation.amounts:
-        return Relaxed(conflict, solution.status, {}, math.inf, "", math.nan, solution.seconds)
-    amounts, design = dict(relaxation.amounts), relaxation.parameters
-    less = moved(problem, amounts, LESS)
-    return Relaxed(
-        conflict=conflict,
-        status=solution.status,
-        amounts=amounts,
-        violation=verdict(moved(problem, amounts), design).violation,
-        less=solve(less, throw=False).status,
-        evolved=least_violation(less).violation,
-        seconds=solution.seconds,
-    )
-
-
-def least_violation(problem: Problem) -> Evolved:
-    """The less violating of two evolutions."""
-    return min((evolve(problem, seed) for seed in (0, 1)), key=lambda e: e.violation)
 
 
 def moved(problem: Problem, amounts: Mapping[str, float], share: float = 1.0) -> Problem:
@@ -272,7 +190,7 @@ def _conflict(
     why: str,
     short: float,
     fixed: Mapping[str, float] | None = None,
-    box: Mapping[str, tuple[float, float]] = _BOX,
+    box: Mapping[str, Box] = _BOX,
     scenarios: Mapping[str, Band] | None = None,
     tolerances: Mapping[str, float] | None = None,
 ) -> Conflict:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tmsopt.design.expression import parse_value
-from tmsopt.design.problem import Problem
+from tmsopt import Problem
+from tmsopt.design import parse_value
 from tmsopt.models import tms
 
 SEED = 2018
@@ -74,13 +74,11 @@ _EQUALITIES = (
 _SPREAD = 64  # designs of the box that tell which values an expression takes
 
 
-def random_problems(count: int = 200, seed: int = SEED) -> list[Problem]:
-    """Problems with 1 to 7 free parameters in turn and 1 to 4 constraints; some are infeasible or never stable."""
-    return [random_problem(index, seed) for index in range(count)]
-
-
 def random_problem(index: int, seed: int = SEED) -> Problem:
-    """One problem of the suite, the same whatever the others are."""
+    """One problem of the suite, the same whatever the others are.
+
+    1 to 7 free parameters in turn and 1 to 4 constraints; some are infeasible or never stable.
+    """
     rng = np.random.default_rng([seed, index])
     draw = _draw(rng, 1 + index % len(RANGES))
     constraints = _constraints(rng, draw)

@@ -1,28 +1,17 @@
-"""Random small systems of degree 3 to 12: oscillators, state matrices and polynomials, and what is asked of them.
-
-A system is kept as text, as in a problem file, so that judges and rivals evaluate it without the package.
-"""
+"""Random small systems of degree 3 to 12: oscillators, state matrices and polynomials, and what is asked of them."""
 
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Any
+from dataclasses import dataclass, replace
 
-import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from benchmarks.judges import Entries, Roots, System, evaluated
 from benchmarks.suites.random_designs import Box, rounded
-from tmsopt.design.problem import Problem
-from tmsopt.models import Model, from_coefficients, from_matrices
-from tmsopt.records import Array
 
 SEED = 2018
 COUNT = 100
-
-Entries = list[list[str]]
 
 _BOXES: Mapping[str, Box] = {"m": (0.4, 4.0), "d": (0.0, 4.0), "k": (0.3, 8.0), "g": (-1.5, 1.5), "n": (-0.5, 0.5)}
 """Masses, dampers, springs, gyroscopic and circulatory (follower) terms."""
@@ -31,88 +20,6 @@ _GIVEN: Mapping[str, Box] = {"m": (0.5, 3.0), "d": (0.02, 0.5), "k": (0.5, 5.0),
 _GAINS: Box = (-2.0, 2.0)
 _LOCATED = ("EP3", "CEP2", "EP4", "CEP2", "EP2+EP2")
 _SPREAD = 400  # designs of the box, one of the best few of which every limit admits
-
-
-@dataclass(frozen=True)
-class System:
-    """A system and a question, as text.
-
-    Attributes:
-        index: in the suite.
-        kind: how it was made.
-        matrices: ``M``, ``D`` and ``K``; or ``A``; or ``coefficients``, in one row.
-        goal: ``minimize``, ``maximize`` or ``locate`` and what.
-        known: a design that has the pattern to locate.
-    """
-
-    index: int
-    kind: str
-    matrices: Mapping[str, Entries]
-    fixed: Mapping[str, float]
-    free: Mapping[str, Box]
-    goal: Mapping[str, str]
-    constraints: Mapping[str, str] = field(default_factory=dict)
-    known: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def degree(self) -> int:
-        """Of the characteristic polynomial."""
-        size = len(next(iter(self.matrices.values()))[0])
-        return 2 * size if "M" in self.matrices else size if "A" in self.matrices else size - 1
-
-    @property
-    def sign(self) -> float:
-        """−1 where the objective is maximised."""
-        return -1.0 if "maximize" in self.goal else 1.0
-
-    @property
-    def objective(self) -> str:
-        """What is optimised."""
-        return self.goal.get("minimize") or self.goal["maximize"]
-
-    @cached_property
-    def model(self) -> Model:
-        """As a user would make it."""
-        symbols = {n: ca.SX.sym(n) for n in (*self.fixed, *self.free)}
-        made: dict[str, Any] = {
-            n: [[eval(text, {}, symbols) for text in row] for row in rows] for n, rows in self.matrices.items()
-        }
-        if "coefficients" in made:
-            return from_coefficients(made["coefficients"][0], name="random")
-        return from_matrices(name="random", **made)
-
-    @property
-    def problem(self) -> Problem:
-        """As `solve` takes it."""
-        return Problem(
-            model=self.model,
-            fixed=self.fixed,
-            free=self.free,
-            constraints=self.constraints,
-            title=f"random system {self.index}: {self.kind}",
-            minimize=self.goal.get("minimize"),
-            maximize=self.goal.get("maximize"),
-            locate=self.goal.get("locate"),
-        )
-
-    def evaluated(self, values: Mapping[str, Any]) -> dict[str, list[list[Any]]]:
-        """The matrices for numbers of any kind, arrays included."""
-        every = {**self.fixed, **values}
-        return {n: [[eval(text, {}, every) for text in row] for row in rows] for n, rows in self.matrices.items()}
-
-    def state(self, values: Mapping[str, Any]) -> Array:
-        """The state matrix, shape (designs, n, n), for arrays of shape (designs,)."""
-        found = self.evaluated(values)
-        count = len(next(iter(values.values())))
-        stacked = {n: _stacked(rows, count) for n, rows in found.items()}
-        if "A" in stacked:
-            return stacked["A"]
-        if "coefficients" in stacked:
-            return _companion(stacked["coefficients"][:, 0])
-        size = stacked["M"].shape[-1]
-        lower = -np.linalg.solve(stacked["M"], np.concatenate([stacked["K"], stacked["D"]], axis=-1))
-        upper = np.broadcast_to(np.eye(size, 2 * size, size), lower.shape)
-        return np.concatenate([upper, lower], axis=1)
 
 
 def random_systems(count: int = COUNT, seed: int = SEED) -> Iterator[System]:
@@ -139,20 +46,6 @@ def random_system(index: int, seed: int = SEED) -> System:
         goal=goal,
     )
     return _constrained(rng, system)
-
-
-def _stacked(rows: list[list[Any]], count: int) -> Array:
-    return np.stack(
-        [np.stack([np.broadcast_to(np.asarray(x, float), count) for x in row], axis=-1) for row in rows], axis=1
-    )
-
-
-def _companion(a: Array) -> Array:
-    n = a.shape[-1] - 1
-    found = np.zeros((len(a), n, n))
-    found[:, 0] = -a[:, 1:] / a[:, :1]
-    found[:, np.arange(1, n), np.arange(n - 1)] = 1
-    return found
 
 
 @dataclass(frozen=True)
@@ -245,7 +138,7 @@ def _polynomials(rng: np.random.Generator, size: int, odd: bool) -> _Parts:
     return _Parts({"coefficients": [text]}, given)
 
 
-def _roots(rng: np.random.Generator, n: int) -> NDArray[np.complex128]:
+def _roots(rng: np.random.Generator, n: int) -> Roots:
     pairs = [complex(-rng.uniform(0.1, 1.5), rng.uniform(0.3, 2.5)) for _ in range(n // 2)]
     alone = [complex(-rng.uniform(0.2, 2.0))] * (n % 2)
     return np.array([*(w for z in pairs for w in (z, z.conjugate())), *alone])
@@ -308,14 +201,13 @@ def _constrained(rng: np.random.Generator, system: System) -> System:
     names = list(system.free)
     lower, upper = np.array(list(system.free.values())).T
     designs = dict(zip(names, rng.uniform(lower, upper, (_SPREAD, len(names))).T, strict=True))
-    z = np.linalg.eigvals(system.state(designs))
-    worth = {"abscissa": z.real.max(axis=-1), "damping_ratio": np.min(-z.real / np.abs(z), axis=-1)}
+    worth, _ = system.judged(designs)
     anchor = int(rng.choice(np.argsort(system.sign * worth[system.objective])[:10]))
     limits = {}
     for number in range(int(rng.choice([0, 1, 2], p=[0.4, 0.35, 0.25]))):
         template, comparison = _TEMPLATES[int(rng.integers(len(_TEMPLATES)))]
         text = template.format(*(str(n) for n in rng.choice(names, 3, replace=False)))
-        values = np.asarray(eval(text, {"sqrt": np.sqrt}, designs), dtype=float)
+        values = np.asarray(evaluated(text, designs), dtype=float)
         slack = float(rng.uniform(0, 0.2)) * float(np.ptp(values))
         limit = _outwards(float(values[anchor]), slack, comparison)
         limits[f"c{number + 1}"] = f"{text} {comparison} {limit}"

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.judges.grid import Judge
+from benchmarks.judges import Judge
 from benchmarks.suites.random_designs import SEED, Box, drawn_box, drawn_value, rounded
-from tmsopt.design.cases import Band
-from tmsopt.design.problem import Problem
+from tmsopt import Problem
+from tmsopt.design import Band
 from tmsopt.models import tms
 
 RANGES: Mapping[str, Box] = {
@@ -21,15 +21,7 @@ RANGES: Mapping[str, Box] = {
     "zeta_H": (-1.0, -0.1),
     "lambda_s": (0.03, 1.25),
 }
-SI_NAMES = {
-    "Fr": "v",
-    "mu": "m_H",
-    "chi_B": "x_B",
-    "chi_H": "x_H",
-    "zeta_B": "z_B",
-    "zeta_H": "z_H",
-    "lambda_s": "lambda_s",
-}
+SI_NAMES = dict(zip(RANGES, ("v", "m_H", "x_B", "x_H", "z_B", "z_H", "lambda_s"), strict=True))
 _SPREAD = 1000  # designs of the box that tell what can be had in it
 _CHOICE = 4  # boxes of which the most stable is taken, in most problems: few of them have any stable design
 _COARSE = 3  # points of a band for them
@@ -87,13 +79,8 @@ _OBJECTIVES: tuple[tuple[str, str, float], ...] = (
 )
 
 
-def varied_problems(count: int = 200, seed: int = SEED) -> list[Problem]:
-    """Problems with 1 to 7 free parameters in turn; a few are infeasible."""
-    return [varied_problem(index, seed) for index in range(count)]
-
-
 def varied_problem(index: int, seed: int = SEED) -> Problem:
-    """One problem, the same whatever the others are."""
+    """One problem, the same whatever the others are; 1 to 7 free parameters in turn, a few are infeasible."""
     rng = np.random.default_rng([seed, index, 1])
     boxes = [
         _Box(_frame(rng, 1 + index % len(RANGES)), rng) for _ in range(int(rng.choice([1, _CHOICE], p=[0.3, 0.7])))

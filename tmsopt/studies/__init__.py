@@ -9,7 +9,7 @@ from tmsopt.studies.load import load_study
 from tmsopt.studies.monte_carlo import Sampling, monte_carlo, planned
 from tmsopt.studies.neighbours import blocks
 from tmsopt.studies.row import Row
-from tmsopt.studies.run import Results, run_study
+from tmsopt.studies.run import Results, fill, run_study
 from tmsopt.studies.samples import Span, grid, latin_hypercube, sobol, sobol_note
 from tmsopt.studies.solving import Solver, alone
 from tmsopt.studies.study import Study, definition, over_grid
@@ -31,6 +31,7 @@ __all__ = [
     "columns",
     "definition",
     "export",
+    "fill",
     "grid",
     "latin_hypercube",
     "load_study",

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 
 from tqdm import tqdm
 
-from benchmarks.reports.designs.references import Reference, references
-from benchmarks.reports.tables import milliseconds, origin, share, table
-from benchmarks.suites.random_designs import random_problem
-from tmsopt.certificates.certify import certify
-from tmsopt.solver.solve import solve
+from benchmarks.reports import Asked, facts, median, page, share, table
+from benchmarks.suites import Reference, random_problem, references
+from tmsopt import certify, solve
 
 RELATIVE, ABSOLUTE = 1e-4, 1e-5
 """Gap that counts as proven."""
@@ -68,62 +66,67 @@ class Proof:
         return self.bound > self.best + _ROUNDING * max(1e-3, abs(self.best))
 
 
-def prove_suite(count: int, seed: int, seconds: float) -> list[Proof]:
+def proofs(count: int, seed: int, seconds: float) -> list[Proof]:
     """Default solves, then certificates, one after the other."""
     known = references()
-    proofs = []
+    found = []
     for index in tqdm(range(count), unit="problem"):
         design = solve(random_problem(index, seed), throw=False)
         began = time.perf_counter()
         proved = certify(design, seconds=seconds)
         took = time.perf_counter() - began
         bound = proved.bound
-        proofs.append(
+        found.append(
             Proof(
                 index, len(design.problem.free), proved.status, design.value, proved.value, bound.value, bound.gap,
                 bound.method, bound.nodes, took, known[index],
             )
         )  # fmt: skip
-    return proofs
+    return found
 
 
-def proved_section(proofs: Sequence[Proof], command: str) -> str:
+def report(asked: Asked) -> str:
     """The report in Markdown."""
-    solvable, others = [p for p in proofs if p.solvable], [p for p in proofs if not p.solvable]
+    every = proofs(asked.of(200, 4), asked.seed, asked.within(60, 5))
+    solvable, others = [p for p in every if p.solvable], [p for p in every if not p.solvable]
     closed = [p for p in solvable if p.closed]
-    finer = sum(p.gap <= 1e-6 * max(abs(p.value), 0.1) * (1 + 1e-9) for p in closed)
     rows = [
         ("feasible problems", len(solvable)),
-        ("**gap below 1e-4 (relative) or 1e-5 (absolute)**", f"**{share(len(closed), len(solvable))}**"),
+        ("**gap below 1e-4 (relative) or 1e-5 (absolute)**", f"**{share(p.closed for p in solvable)}**"),
         ("of these, by the product of the roots alone", sum(p.method == "omega0" for p in closed)),
-        ("of these, gap below 1e-6, or 1e-7 absolute", finer),
+        (
+            "of these, gap below 1e-6, or 1e-7 absolute",
+            sum(p.gap <= 1e-6 * max(abs(p.value), 0.1) * (1 + 1e-9) for p in closed),
+        ),
         ("problems without a feasible design known", len(others)),
-        ("**proved infeasible**", f"**{share(sum(p.excluded for p in others), len(others))}**"),
-        ("designs replaced by a better one", sum(_replaced(p) for p in proofs)),
-        ("**bounds above a value that some method reaches**", f"**{sum(p.wrong for p in proofs)}**"),
-        ("median time of a proof", milliseconds(p.seconds for p in closed)),
-        ("90 % of these times below", milliseconds((p.seconds for p in closed), 0.9)),
+        ("**proved infeasible**", f"**{share(p.excluded for p in others)}**"),
+        ("designs replaced by a better one", sum(_replaced(p) for p in every)),
+        ("**bounds above a value that some method reaches**", f"**{sum(p.wrong for p in every)}**"),
+        ("median time of a proof", median(p.seconds for p in closed)),
+        ("90 % of these times below", median((p.seconds for p in closed), 0.9)),
         ("median nodes", sorted(p.nodes for p in closed)[len(closed) // 2] if closed else "–"),
     ]
     left = [
         (p.index, p.free, p.status, f"{p.value:.9g}", f"{p.bound:.9g}", f"{p.gap:.1e}", p.nodes, f"{p.seconds:.0f} s")
-        for p in proofs
+        for p in every
         if not (p.closed or p.excluded)
     ]
-    better = [(p.index, p.free, f"{p.before:.9g}", f"{p.value:.9g}", f"{p.best:.9g}") for p in proofs if _replaced(p)]
-    note = (
+    better = [(p.index, p.free, f"{p.before:.9g}", f"{p.value:.9g}", f"{p.best:.9g}") for p in every if _replaced(p)]
+    return page(
+        "Proved designs",
+        asked,
+        facts(rows),
         "The random designs of the solve benchmark. A bound is wrong if it lies above the least abscissa that the "
         "default solve, 500 starts or differential evolution reach at a design judged feasible "
-        "(`benchmarks/references.json`), or "
-        f"the certified design itself, by more than {_ROUNDING:.0e} of it. Times include the start of SCIP's processes."
+        "(`benchmarks/suites/references.json`), or the certified design itself, by more than "
+        f"{_ROUNDING:.0e} of it. Times include the start of SCIP's processes.",
+        "### By number of free parameters",
+        _by_freedom(solvable),
+        "### Replaced",
+        table(("problem", "free", "before", "after", "best known"), better, "None."),
+        "### Not proved",
+        table(("problem", "free", "status", "value", "bound", "gap", "nodes", "time"), left, "None."),
     )
-    parts = ["## Proved designs", origin(command), table(("", ""), rows), note, "### By number of free parameters"]
-    parts.append(_by_freedom(solvable))
-    if better:
-        parts += ["### Replaced", table(("problem", "free", "before", "after", "best known"), better)]
-    header = ("problem", "free", "status", "value", "bound", "gap", "nodes", "time")
-    parts += ["### Not proved", table(header, left) if left else "None."]
-    return "\n\n".join(parts) + "\n"
 
 
 def _replaced(proof: Proof) -> bool:
@@ -135,13 +138,6 @@ def _by_freedom(solvable: Sequence[Proof]) -> str:
     for free in sorted({p.free for p in solvable}):
         group = [p for p in solvable if p.free == free]
         closed = [p for p in group if p.closed]
-        rows.append(
-            (
-                free,
-                len(group),
-                len(closed),
-                milliseconds(p.seconds for p in closed),
-                max((p.nodes for p in closed), default=0),
-            )
-        )
+        nodes = max((p.nodes for p in closed), default=0)
+        rows.append((free, len(group), len(closed), median(p.seconds for p in closed), nodes))
     return table(("free", "feasible", "proved", "median time", "most nodes"), rows)

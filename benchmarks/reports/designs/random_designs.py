@@ -1,51 +1,24 @@
-"""The stages of the solve benchmark: what is timed, one problem after another, and what only has to be known."""
+"""How often, how well and how fast random constrained designs are solved, beside SciPy."""
 
 import math
-import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import repeat
-from typing import Any, TypeVar
 
 import numpy as np
 from tqdm import tqdm
 
-from benchmarks.rivals.reduced import LOCAL, SCALAR, VECTORISED, Found, differential
-from benchmarks.suites.random_designs import random_problem
-from tmsopt.design.problem import Problem
-from tmsopt.solver.solve import solve
+from benchmarks.judges import EXACT, FLOOR, SAME, Attempt, attempt
+from benchmarks.reports import Asked, facts, median, page, share, table, times
+from benchmarks.reports.designs.references import Settings, reference
+from benchmarks.rivals import FEASIBLE, LOCAL, SCALAR, STARTS, VECTORISED, Found, differential, local
+from benchmarks.suites import SEED, Reference, random_problem, references
+from benchmarks.timing import quantile
+from tmsopt import Problem
 
-REFERENCE_STARTS = 200
-"""Starts of the reference, all of them tried."""
-
-EXACT = 1e-12
-"""Violation up to which a rival's own value may serve as the best known; otherwise it is only a start to solve from."""
-
-_FLOOR = 1e-3  # of |best|, in relative errors: an abscissa near 0 has no scale of its own
-
-Item = TypeVar("Item")
-
-
-@dataclass(frozen=True)
-class Own:
-    """What `solve` did with a problem."""
-
-    status: str
-    value: float
-    parameters: Mapping[str, float]
-    tried: int
-    seconds: float
-
-    @property
-    def per_start(self) -> float:
-        """Seconds per start tried, everything included."""
-        return self.seconds / max(self.tried, 1)
-
-    @property
-    def optimal(self) -> bool:
-        """Whether a feasible optimum is claimed."""
-        return self.status == "optimal"
+_SCALAR, _LOCAL = 10, 20  # problems for scalar differential evolution, and for the local rivals
+_TOLERANCES = (1e-3, 1e-6, SAME)
 
 
 @dataclass(frozen=True)
@@ -54,111 +27,201 @@ class Record:
 
     Attributes:
         default: at default settings, timed.
-        reference: the best of many starts and of solves that start where a rival ended.
+        reference: the best that is known of it.
         rivals: by name; those that were run.
     """
 
     index: int
     problem: Problem
-    default: Own
-    reference: Own
+    default: Attempt
+    reference: Reference
     rivals: Mapping[str, Found]
 
     @property
     def best(self) -> float:
         """The least abscissa that any method reached at a feasible design; nan where there is none."""
-        known = [own.value for own in (self.default, self.reference) if own.optimal]
+        known = [self.default.value] if self.default.optimal else []
+        known += [self.reference.value] if self.reference.solvable else []
         known += [f.value for f in self.rivals.values() if f.feasible and (f.violation <= EXACT or not known)]
-        return min(known, default=float("nan"))
+        return min(known, default=math.nan)
 
     @property
     def solvable(self) -> bool:
         """Whether any method found a feasible design."""
-        return bool(np.isfinite(self.best))
+        return math.isfinite(self.best)
 
     @property
     def error(self) -> float:
         """Relative error of the default solve; inf where it claims no optimum."""
-        return self.relative(self.default.value) if self.default.optimal else float("inf")
+        return self.relative(self.default.value) if self.default.optimal else math.inf
 
     @property
     def solved(self) -> bool:
         """Whether the default solve reached the best value known."""
-        return self.error <= 1e-8
+        return self.error <= SAME
 
     @property
     def contradicted(self) -> bool:
         """Whether a design is feasible although `solve` says that none is."""
-        return self.solvable and "infeasible" in (self.default.status, self.reference.status)
+        return self.solvable and self.default.status == "infeasible"
+
+    @property
+    def unsettled(self) -> bool:
+        """Whether no design is feasible and none is excluded."""
+        return not self.solvable and self.default.status != "infeasible"
+
+    @property
+    def by(self) -> Iterator[str]:
+        """Who has the best value, or any feasible design where none is claimed."""
+        if self.reference.solvable and self.relative(self.reference.value) <= SAME:
+            yield "reference"
+        for name, found in self.rivals.items():
+            if found.feasible and self.relative(found.value) <= 1e-6:
+                yield f"{name} (violation {found.violation:.0e})"
 
     def relative(self, value: float) -> float:
         """Excess of a value over the best one."""
-        return (value - self.best) / max(_FLOOR, abs(self.best))
+        return (value - self.best) / max(FLOOR, abs(self.best))
 
 
-def measure(count: int, seed: int, evolved: int, local: int, workers: int) -> list[Record]:
-    """Run all stages: `evolved` problems for the scalar differential evolution, `local` for the local optimisers.
-
-    Default solves and both evolutions run one after another in this process; the rest is spread over the workers.
-    """
-    indices = range(count)
-    _own(random_problem(1, seed))  # imports and first allocations are nobody's time
-    defaults = [_own(random_problem(i, seed)) for i in _progress(indices, "default solves")]
-    rivals: list[dict[str, Found]] = [{} for _ in indices]
-    for i in _progress(_evolved(defaults, evolved), "differential evolution"):
-        rivals[i][SCALAR] = differential(random_problem(i, seed))
-    for i in _progress(indices, "vectorised evolution"):
-        rivals[i][VECTORISED] = differential(random_problem(i, seed), vectorized=True)
+def measured(count: int, seed: int, workers: int, quick: bool) -> list[Record]:
+    """Default solves and both evolutions one after another in this process; the rest is spread over the workers."""
+    problems = [random_problem(i, seed) for i in range(count)]
+    attempt("warm-up", random_problem(1, seed))  # imports and first allocations are nobody's time
+    defaults = [attempt("default", p) for p in tqdm(problems, "default solves")]
+    rivals: list[dict[str, Found]] = [{} for _ in problems]
+    for i in tqdm(_some(defaults, 1 if quick else _SCALAR), "differential evolution"):
+        rivals[i][SCALAR] = differential(problems[i])
+    for i in tqdm(range(count), "vectorised evolution"):
+        rivals[i][VECTORISED] = differential(problems[i], vectorized=True)
+    kept = references() if seed == SEED else {}
+    missing = [i for i in range(count) if i not in kept]
     with ProcessPoolExecutor(workers) as pool:
-        few = _evolved(defaults, local)
-        for i, found in zip(few, _progress(pool.map(_local, few, repeat(seed)), "local rivals", len(few)), strict=True):
+        few = _some(defaults, 2 if quick else _LOCAL)
+        for i, found in zip(few, tqdm(pool.map(_local, few, repeat(seed)), "local rivals", len(few)), strict=True):
             rivals[i].update(found)
-        ends = [[f.parameters for f in found.values() if f.feasible] for found in rivals]
-        claimed = [own.status == "infeasible" for own in defaults]
-        every = pool.map(_reference, indices, repeat(seed), ends, claimed)
-        references = list(_progress(every, "references", count))
-    return [Record(i, random_problem(i, seed), defaults[i], references[i], rivals[i]) for i in indices]
+        every = pool.map(reference, missing, repeat(Settings(seed)))
+        kept |= dict(zip(missing, tqdm(every, "references", len(missing)), strict=True))
+    return [Record(i, p, defaults[i], kept[i], rivals[i]) for i, p in enumerate(problems)]
 
 
-def _evolved(defaults: Sequence[Own], wanted: int) -> list[int]:
+def _some(defaults: Sequence[Attempt], wanted: int) -> list[int]:
     """A fixed random choice of the problems that are not claimed infeasible: speed means nothing on the others."""
     eligible = [i for i, own in enumerate(defaults) if own.status != "infeasible"]
     return sorted(np.random.default_rng(0).permutation(eligible)[:wanted].tolist())
 
 
 def _local(index: int, seed: int) -> dict[str, Found]:
-    problem = random_problem(index, seed)
-    return {name: rival(problem) for name, rival in LOCAL.items()}
+    return {method: local(method, random_problem(index, seed)) for method in LOCAL}
 
 
-def _reference(index: int, seed: int, ends: Sequence[Mapping[str, float]], claimed_infeasible: bool) -> Own:
-    """Many starts of another seed, and one solve from each rival's end.
-
-    Where the default solve found nothing feasible, the search may give up early: the evolutions check that claim.
-    """
-    problem = random_problem(index, seed)
-    found = [_own(problem, starts=REFERENCE_STARTS, seed=1, exhaustive=not claimed_infeasible)]
-    for end in ends:
-        found.append(_own(started_at(problem, end), starts=1))
-    return min(found, key=lambda own: own.value if own.optimal else math.inf)
-
-
-def started_at(problem: Problem, design: Mapping[str, float]) -> Problem:
-    """The problem with a design, or the one nearest to it in the box, as its first start."""
-    start = {n: min(max(design[n], lower), upper) for n, (lower, upper) in problem.free.items()}
-    return replace(problem, start=start)
-
-
-def _own(problem: Problem, **options: Any) -> Own:
-    """One solve; a crash is a failure like another."""
-    began = time.perf_counter()
-    try:
-        solution = solve(problem, throw=False, **options)
-    except Exception as error:
-        return Own(f"crash: {error!r}", math.nan, {}, 0, time.perf_counter() - began)
-    tried = solution.starts.tried
-    return Own(solution.status, solution.value, dict(solution.parameters), tried, solution.seconds)
+def report(asked: Asked) -> str:
+    """The report in Markdown."""
+    records = measured(asked.of(200, 6), asked.seed, asked.workers, asked.quick)
+    return page(
+        "Random constrained designs",
+        asked,
+        _counts(records),
+        "The best known is that of `benchmarks/suites/references.json`: 500 starts with another seed, evolutions and "
+        "solves from their ends; or that of a rival or of the default solve itself. Errors are relative to it, or to "
+        "1e-3 where it is smaller. A time per start is the time of the whole solve over the starts that it tried.",
+        "### Default settings, by number of free parameters",
+        _by_freedom(records),
+        "### Beside SciPy on the eigenvalues",
+        _rivals(records),
+        "A rival minimises the largest real part of the eigenvalues; its design counts if it violates nothing by "
+        f"more than {FEASIBLE:.0e}. An equality is solved for a parameter, so that no rival has to follow it. "
+        "Differential evolution has the constraints as such (`NonlinearConstraint`), `tol` = 1e-8 and otherwise "
+        "SciPy's defaults, polishing included; vectorised, it evaluates a generation at once and is not polished. "
+        f"The others start from the first {STARTS} designs of `solve` and their best end counts; Nelder–Mead has a "
+        "penalty for violations. Times of these three are taken with all cores busy.",
+        _ratios(records),
+        "### Failures",
+        _failures(records),
+    )
 
 
-def _progress(items: Iterable[Item], stage: str, total: int | None = None) -> Iterator[Item]:
-    return iter(tqdm(items, desc=stage, total=total, unit="problem"))
+def _counts(records: Sequence[Record]) -> str:
+    solvable = [r for r in records if r.solvable]
+    claimed = [r for r in records if r.default.status == "infeasible"]
+    return facts(
+        [
+            ("problems", len(records)),
+            ("solvable: some method found a feasible design", len(solvable)),
+            ("of these, no stable design known", sum(r.best >= 0 for r in solvable)),
+            (
+                "**solved at default settings, within 1e-8 of the best known**",
+                f"**{share(r.solved for r in solvable)}**",
+            ),
+            ("claimed infeasible, and no method found a feasible design", sum(not r.solvable for r in claimed)),
+            ("claimed infeasible, but a method found a feasible design", sum(r.contradicted for r in records)),
+            ("neither: no feasible design found, none excluded", sum(r.unsettled for r in records)),
+            ("median time per start", median(r.default.per_start for r in solvable)),
+            ("90 % of times per start below", median((r.default.per_start for r in solvable), 0.9)),
+            ("median time of a solve", median(r.default.seconds for r in solvable)),
+            ("median time of a solve that ends infeasible", median(r.default.seconds for r in claimed)),
+        ]
+    )
+
+
+def _by_freedom(records: Sequence[Record]) -> str:
+    rows = []
+    for free in sorted({len(r.problem.free) for r in records}):
+        group = [r for r in records if len(r.problem.free) == free]
+        own = [r.default for r in group if r.solvable]
+        solved = sum(r.solved for r in group if r.solvable)
+        each, whole = median(a.per_start for a in own), median(a.seconds for a in own)
+        rows.append((free, len(group), len(own), solved, each, whole, times(quantile(a.starts for a in own))))
+    return table(("free", "problems", "solvable", "solved", "time per start", "time", "starts"), rows)
+
+
+def _rivals(records: Sequence[Record]) -> str:
+    solvable = [r for r in records if r.solvable]
+    own = [(r.error, r.default.seconds) for r in solvable]
+    rows = [_row("default solve", own)]
+    for name in (SCALAR, VECTORISED, *LOCAL):
+        run = [(r, r.rivals[name]) for r in solvable if name in r.rivals]
+        rows.append(_row(name, [(r.relative(f.value) if f.feasible else math.inf, f.seconds) for r, f in run]))
+    within = (f"within {t:.0e}" for t in _TOLERANCES)
+    return table(("method", "solvable problems", "feasible", *within, "median time"), rows)
+
+
+def _row(name: str, ends: Sequence[tuple[float, float]]) -> tuple[object, ...]:
+    shares = (share(error <= t for error, _ in ends) for t in (1e300, *_TOLERANCES))
+    return (name, len(ends), *shares, median(seconds for _, seconds in ends))
+
+
+def _ratios(records: Sequence[Record]) -> str:
+    rows = []
+    for name in (SCALAR, VECTORISED):
+        pairs = [(r, r.rivals[name]) for r in records if r.solvable and r.default.optimal and name in r.rivals]
+        fair = [(r, f) for r, f in pairs if not f.feasible or r.error <= r.relative(f.value) + SAME]
+        rows += [
+            (f"{name}, all problems", len(pairs), *_speedups(pairs)),
+            (f"{name}, where the default solve is equal or better", len(fair), *_speedups(fair)),
+        ]
+    header = ("time of differential evolution over that of", "problems", "a default solve", "10 % below", "one start")
+    return table(header, rows)
+
+
+def _speedups(pairs: Sequence[tuple[Record, Found]]) -> tuple[str, ...]:
+    solves = [f.seconds / r.default.seconds for r, f in pairs]
+    starts = [f.seconds / r.default.per_start for r, f in pairs]
+    return times(quantile(solves)), times(quantile(solves, 0.1)), times(quantile(starts))
+
+
+def _failures(records: Sequence[Record]) -> str:
+    rows = [
+        (
+            r.index,
+            len(r.problem.free),
+            r.default.status,
+            f"{r.default.value:.10g}",
+            f"{r.best:.10g}",
+            f"{r.error:.1e}",
+            ", ".join(r.by),
+        )
+        for r in records
+        if (r.solvable and not r.solved) or r.contradicted or r.unsettled
+    ]
+    return table(("problem", "free", "status", "value", "best known", "error", "reached by"), rows, "None.")

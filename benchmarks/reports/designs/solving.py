@@ -1,18 +1,14 @@
-"""Section (a): solving at equal accuracy, beside optimisers on the eigenvalues."""
+"""Solving at equal accuracy, beside optimisers on the eigenvalues."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 
-from benchmarks.reports.tables import milliseconds, origin, table
-from benchmarks.rivals.race import OWN, TOLERANCES, Heat, Run, heat, median_ratio
-from benchmarks.rivals.seekers import SEEKERS
-from benchmarks.suites.random_designs import random_problem
-from benchmarks.timing import times
-from tmsopt import InputError, Problem, load, models, solve
-from tmsopt.certificates.certify import certify
+from benchmarks.reports import Asked, duration, page, table, times
+from benchmarks.rivals import OWN, SEEKERS, TOLERANCES, Heat, Run, heat, median_ratio
+from benchmarks.suites import PROBLEMS, random_problem
+from tmsopt import InputError, Problem, certify, load, models, solve
 
 LIMIT = 10.0
 """Seconds that a rival has for one problem."""
@@ -22,12 +18,10 @@ _STARTS = 32  # of the search for the reference, all tried
 _SUITE = (29, 3, 39, 6)
 """The first problems of the suite with 2, 4, 5 and 7 free parameters whose best design is stable and proved optimal."""
 
-_PROBLEMS = Path(__file__).parents[3] / "problems"
-
 
 def problems(quick: bool = False) -> Iterator[tuple[str, Problem, float]]:
     """Title, problem, and its optimum in closed form; nan where there is none."""
-    yield "EP4 of the paper", load(_PROBLEMS / "ep4.toml"), -((0.4 * 0.2) ** -0.25)
+    yield "EP4 of the paper", load(PROBLEMS / "ep4.toml"), -((0.4 * 0.2) ** -0.25)
     five = Problem(
         model=models.tms,
         fixed={"chi_H": 1.0, "mu": 0.1},
@@ -41,7 +35,7 @@ def problems(quick: bool = False) -> Iterator[tuple[str, Problem, float]]:
     if quick:
         return
     yield "EP4, heights free too", five, -((0.3 * 0.1) ** -0.25)  # ω0 is lowest where both masses are
-    yield "what a builder would accept", load(_PROBLEMS / "realistic.toml"), math.nan
+    yield "what a builder would accept", load(PROBLEMS / "realistic.toml"), math.nan
     for index in _SUITE:
         yield f"random design {index}", random_problem(index), math.nan
 
@@ -60,25 +54,21 @@ def optimum(problem: Problem, closed: float) -> tuple[float, str, Mapping[str, f
     return found.value, f"branch and bound, within {max(found.bound.gap, 0.0):.0e}", found.parameters
 
 
-def section(command: str, quick: bool = False) -> str:
+def report(asked: Asked) -> str:
     """The report in Markdown."""
-    limit = _QUICK if quick else LIMIT
-    heats = [heat(title, p, optimum(p, closed), SEEKERS, limit) for title, p, closed in problems(quick)]
-    parts = [
-        "## Solving at equal accuracy",
-        " ".join([origin(command), *_versions()]),
+    limit = asked.within(LIMIT, _QUICK)
+    heats = [heat(title, p, optimum(p, closed), SEEKERS, limit) for title, p, closed in problems(asked.quick)]
+    return page(
+        "Solving at equal accuracy",
+        asked,
+        " ".join(f"{name}: {s.versions}." for name, s in SEEKERS.items() if s.packages and not s.obstacle),
         overview(heats),
         "On how many problems a method comes within a relative error of the optimum, and its time until then over that "
-        f"of `tmsopt.solve`: the median of all problems, where one that is never there counts with its {limit:.0f} s.",
+        f"of `tmsopt.solve`: the median of all problems, where one that is never there counts with its {limit:g} s.",
         _problems(heats),
         details(heats),
         _note(limit),
-    ]
-    return "\n\n".join(parts) + "\n"
-
-
-def _versions() -> list[str]:
-    return [f"{name}: {s.versions}." for name, s in SEEKERS.items() if s.packages and not s.obstacle]
+    )
 
 
 def overview(heats: Sequence[Heat]) -> str:
@@ -109,7 +99,7 @@ def _problems(heats: Sequence[Heat]) -> str:
             len(h.problem.conditions),
             f"{h.optimum:.12g}",
             h.proof,
-            milliseconds([h.runs[0].seconds]),
+            duration(h.runs[0].seconds),
         )
         for h in heats
     ]
@@ -135,7 +125,7 @@ def _cell(of: Heat, run: Run, tolerance: float) -> str:
     if moment is None:
         return f"never: best error {of.error(run):.0e}" if run.moments else "never: nothing feasible"
     ratio = "" if run.method == OWN else f"× {times(of.ratio(run, tolerance))}: "
-    return f"{ratio}{milliseconds([moment.seconds])}, {moment.evaluations}"
+    return f"{ratio}{duration(moment.seconds)}, {moment.evaluations}"
 
 
 def _off(distance: float) -> str:
@@ -147,7 +137,7 @@ def _note(limit: float) -> str:
         "A cell has the ratio, the time and the designs evaluated until then; of `tmsopt.solve` the best of several "
         "whole solves, rechecks and all starts included, and IPOPT's evaluations of the factored problem. Rivals "
         "minimise the largest real part of the eigenvalues from the same starts, or from one seed after another, for "
-        f"{limit:.0f} s, and are stopped when they see the optimum, which they could not know. A rival's value is "
+        f"{limit:g} s, and are stopped when they see the optimum, which they could not know. A rival's value is "
         "the least that its own eigenvalues ever had at a design that violates nothing by more than 1e-6; an equality "
         "is solved for a parameter. Differential evolution and CMA-ES (BIPOP restarts) evaluate a generation at once; "
         "Nelder–Mead, annealing and CMA-ES have a penalty for violations, PyGRANSO exact gradients and the box as "

@@ -1,82 +1,26 @@
-"""The stages of the variety benchmark: a default solve of each problem, and everything that might do better."""
+"""Varied problems: scenarios, tolerances, damping, objectives of many kinds, and the failures by cause."""
 
 import math
-import time
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import repeat
-from typing import Any
 
 from tqdm import tqdm
 
-from benchmarks.judges.grid import NOWHERE, Verdict, verdict
-from benchmarks.reports.designs.random_designs import started_at
-from benchmarks.rivals.evolution import Evolved, evolve
-from benchmarks.suites.varied_designs import varied_problem
-from tmsopt.design.problem import Problem
-from tmsopt.solver.solve import solve
+from benchmarks.judges import EXACT, FEASIBLE, NOWHERE, SCALE, SOLVED, Attempt, Verdict, attempt, started_at, verdict
+from benchmarks.reports import Asked, facts, median, page, share, table
+from benchmarks.rivals import POINTS, Evolved, evolve
+from benchmarks.suites import varied_problem
+from tmsopt import Problem
 
 REFERENCE_STARTS = 16
 """Starts of the long run, all of them tried."""
 
-SOLVED = 1e-6
-"""Relative excess over the best known value up to which a problem counts as solved.
-
-Two solves of one optimum agree to 1e-9, the tolerance of the recheck times a multiplier; the evolution's value, which
-stops a little inside the limits, is good to 1e-6.
-"""
-
-FEASIBLE = 1e-6
-"""Violation, relative to the size of the two sides, that the judge lets pass: limits are met to 1e-9 at the worst case
-that a search with golden sections and 4e-9 steps found, and constraints on roots amplify that."""
-
-EXACT = 1e-12
-"""Violation up to which the evolution's own value may serve as the best known; otherwise it is only a start."""
-
 SLOW = 10.0
 """Seconds beyond which a default solve counts as slow."""
-
-_FLOOR = 0.01  # of |best| in relative errors: a value near 0 has no scale of its own
-
-
-@dataclass(frozen=True)
-class Attempt:
-    """One solve, and what the judge says of its design.
-
-    Attributes:
-        value: as claimed.
-        judged: by eigenvalues on a dense grid.
-        granted: difference of the two that the scatter of multiple roots explains.
-        abscissa: as claimed.
-    """
-
-    source: str
-    status: str
-    value: float
-    parameters: Mapping[str, float]
-    seconds: float
-    starts: int
-    violation: float = math.inf
-    judged: float = math.nan
-    granted: float = 0.0
-    abscissa: float = math.nan
-
-    @property
-    def feasible(self) -> bool:
-        """Whether the design satisfies everything, whatever is claimed."""
-        return self.violation <= FEASIBLE
-
-    @property
-    def honest(self) -> bool:
-        """Whether the claimed value is the design's."""
-        return abs(self.value - self.judged) <= self.granted + SOLVED * max(_FLOOR, abs(self.judged))
-
-    @property
-    def counts(self) -> bool:
-        """Whether its value can be the best known."""
-        return self.status == "optimal" and self.feasible and self.honest
 
 
 @dataclass(frozen=True)
@@ -121,7 +65,7 @@ class Trial:
     @property
     def error(self) -> float:
         """Excess of the default solve's value over the best one."""
-        return self.sign * (self.default.value - self.best) / max(_FLOOR, abs(self.best))
+        return self.sign * (self.default.value - self.best) / max(SCALE, abs(self.best))
 
     @property
     def cause(self) -> str:  # noqa: PLR0911 - one return per cause
@@ -143,6 +87,11 @@ class Trial:
                 return crash
 
     @property
+    def stable(self) -> bool:
+        """Whether the design of the default solve is."""
+        return self.default.optimal and self.default.abscissa < 0
+
+    @property
     def slow(self) -> bool:
         """Whether the default solve took too long."""
         return self.default.seconds > SLOW
@@ -150,7 +99,7 @@ class Trial:
     @property
     def by(self) -> list[str]:
         """Who reached the best value."""
-        near = SOLVED * max(_FLOOR, abs(self.best))
+        near = SOLVED * max(SCALE, abs(self.best))
         return [n for n, v in self.known.items() if abs(v - self.best) <= near]
 
 
@@ -179,19 +128,68 @@ def _others(problem: Problem, evolved: Evolved, starts: int, exhaustive: bool) -
         yield attempt(f"{starts} starts", problem, starts=starts, seed=1, exhaustive=exhaustive)
 
 
-def attempt(source: str, problem: Problem, **options: Any) -> Attempt:
-    """One solve, judged; a crash is a failure like another."""
-    began = time.perf_counter()
-    try:
-        solution = solve(problem, throw=False, **options)
-    except Exception as error:
-        return Attempt(source, f"crash: {error!r}", math.nan, {}, time.perf_counter() - began, 0)
-    seconds = time.perf_counter() - began
-    parameters = dict(solution.parameters)
-    own = Attempt(
-        source, solution.status, solution.value, parameters, seconds, solution.starts.tried, abscissa=solution.abscissa
+def report(asked: Asked) -> str:
+    """The report in Markdown."""
+    every = trials(asked.of(200, 4), asked.seed, asked.workers)
+    good = [t for t in every if not t.cause]
+    return page(
+        "Varied design problems",
+        asked,
+        facts(
+            [
+                ("problems", len(every)),
+                ("with scenarios", sum(bool(t.problem.scenarios) for t in every)),
+                ("with tolerances", sum(bool(t.problem.tolerances) for t in every)),
+                ("in SI", sum(t.problem.parameter_set.name == "SI" for t in every)),
+                ("somebody found a feasible design", sum(t.solvable for t in every)),
+                ("of these, stable at the best known", sum(t.solvable and t.stable for t in every)),
+                ("**solved at default settings**", f"**{share(not t.cause for t in every)}**"),
+                ("of these, infeasible and nobody found otherwise", sum(not t.solvable for t in good)),
+                ("median time of a solve", median(t.default.seconds for t in every)),
+                ("90 % of times below", median((t.default.seconds for t in every), 0.9)),
+                (f"longer than {SLOW:.0f} s", ", ".join(str(t.index) for t in every if t.slow) or "none"),
+            ]
+        ),
+        "A problem is solved when the default solve ends `optimal`, an independent judge (eigenvalues, up to 1025 "
+        "points per band, corners and inside of the tolerance box) finds its design feasible within "
+        f"{FEASIBLE:.0e} and its value as claimed, and the best known value is within {SOLVED:.0e}; or when it ends "
+        "`infeasible` and nobody found a feasible design. The others: differential evolution on eigenvalues "
+        f"({POINTS} points per band), a solve from its end, and {REFERENCE_STARTS} starts of another seed, all tried. "
+        "Where eigenvalues scatter beside a multiple root, what 2e-15 of the coefficients does to them is granted.",
+        "### Objectives",
+        _objectives(every),
+        "### Failures by cause",
+        _failures(every),
     )
-    if not all(map(math.isfinite, parameters.values())):
-        return own
-    judged = verdict(problem, parameters)
-    return replace(own, violation=judged.violation, judged=judged.value, granted=judged.granted)
+
+
+def _objectives(trials: Sequence[Trial]) -> str:
+    asked = Counter(_asked(t) for t in trials)
+    failed = Counter(_asked(t) for t in trials if t.cause)
+    return table(("objective", "problems", "failed"), ((n, k, failed[n]) for n, k in sorted(asked.items())))
+
+
+def _asked(trial: Trial) -> str:
+    assert trial.problem.objective is not None
+    return f"{trial.problem.sense} {trial.problem.objective.text}".replace("**", "^")
+
+
+def _failures(trials: Sequence[Trial]) -> str:
+    rows = [
+        (
+            t.index,
+            len(t.problem.free),
+            ", ".join(
+                n for n, given in (("scenarios", t.problem.scenarios), ("tolerances", t.problem.tolerances)) if given
+            ),
+            _asked(t),
+            t.cause,
+            f"{t.default.value:.9g}",
+            f"{t.best:.9g}",
+            ", ".join(t.by),
+        )
+        for t in trials
+        if t.cause
+    ]
+    header = ("problem", "free", "with", "objective", "cause", "value", "best known", "reached by")
+    return table(header, sorted(rows, key=lambda row: str(row[4])), "None.")

@@ -1,21 +1,20 @@
-"""Section (f): how the time grows with free parameters, scenarios and grid points."""
+"""How the time grows with free parameters, scenarios and grid points."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import islice
 from typing import Any
 
 import numpy as np
 
-from benchmarks.judges.bands import band_problems
-from benchmarks.reports.speed.charts import PROBLEM, by_blocks, grid_coefficients, stacked
-from benchmarks.reports.tables import origin, table
-from benchmarks.suites.random_designs import random_problem
-from benchmarks.timing import best, duration, exponent, times
-from tmsopt import chart, load, solve
-from tmsopt.design.problem import Problem
+from benchmarks.judges import Attempt, attempt
+from benchmarks.reports import Asked, duration, page, table, times
+from benchmarks.reports.speed.charts import grid_coefficients, stacked
+from benchmarks.suites import PLANE, band_problems, random_problem
+from benchmarks.timing import best, exponent, quantile
+from tmsopt import Problem, chart, solve
 
 _FREE = (2, 3, 4, 5, 6, 7)
 _EACH = 5  # random problems with each number of free parameters
@@ -25,29 +24,13 @@ _POINTS = (10**4, 10**5, 10**6, 10**7)
 _STACKED = 10**6  # designs beyond which stacked eigenvalues need not be waited for
 
 
-@dataclass(frozen=True)
-class Solved:
-    """A solve: how long, and from how many starts.
-
-    Attributes:
-        optimal: whether it ended so; others end at other times for other reasons.
-    """
-
-    seconds: float
-    starts: int
-    optimal: bool
-
-
-def timed(problems: Sequence[Problem], rounds: int) -> list[Solved]:
+def timed(problems: Sequence[Problem], rounds: int) -> list[Attempt]:
     """The fastest solve of each over some rounds, in which all take turns."""
-    found = [[solve(problem, throw=False) for problem in problems] for _ in range(rounds)]
-    return [
-        Solved(min(one.seconds for one in turns), turns[0].starts.tried, turns[0].status == "optimal")
-        for turns in zip(*found, strict=True)
-    ]
+    found = [[attempt("default", problem) for problem in problems] for _ in range(rounds)]
+    return [min(turns, key=lambda own: own.seconds) for turns in zip(*found, strict=True)]
 
 
-def by_freedom(quick: bool) -> list[tuple[int, list[Solved]]]:
+def by_freedom(quick: bool) -> list[tuple[int, list[Attempt]]]:
     """The first random designs with each number of free parameters that have an optimum."""
     wanted = 2 if quick else _EACH
     groups = {free: list(islice(_with_optimum(free), wanted)) for free in (_FREE[:3] if quick else _FREE)}
@@ -59,12 +42,12 @@ def _with_optimum(free: int) -> Iterator[Problem]:
     return (p for p in every if solve(p, throw=False).status == "optimal")
 
 
-def _grouped(groups: Mapping[int, Sequence[Problem]], rounds: int) -> list[tuple[int, list[Solved]]]:
+def _grouped(groups: Mapping[int, Sequence[Problem]], rounds: int) -> list[tuple[int, list[Attempt]]]:
     found = iter(timed([p for problems in groups.values() for p in problems], rounds))
     return [(size, list(islice(found, len(problems)))) for size, problems in groups.items()]
 
 
-def by_scenarios(quick: bool) -> list[tuple[int, list[Solved]]]:
+def by_scenarios(quick: bool) -> list[tuple[int, list[Attempt]]]:
     """The band designs of six free parameters at 1, 2, 4 … speeds of the band, and nothing asked between them."""
     boxes = list(band_problems().values())[: 1 if quick else _BOXES]
     groups = {n: [replace(p, scenarios={"Fr": _speeds(n)}) for p in boxes] for n in (_SPEEDS[:3] if quick else _SPEEDS)}
@@ -77,41 +60,39 @@ def _speeds(count: int) -> tuple[float, ...]:
 
 def by_points(quick: bool) -> list[tuple[int, float, float]]:
     """Designs of a chart, its seconds, and those of stacked eigenvalues; nan where they are not waited for."""
-    problem = load(PROBLEM, asks=False)
     rows = []
     for points in _POINTS[:2] if quick else _POINTS:
         across = math.isqrt(points)
         size = (across, points // across)
-        works: dict[str, Callable[[], Any]] = {"chart": partial(chart, problem, points=size, boundaries=False)}
+        works: dict[str, Callable[[], Any]] = {"chart": partial(chart, PLANE, points=size, boundaries=False)}
         if points <= _STACKED:
-            works["stacked"] = partial(by_blocks, stacked, grid_coefficients(problem, points))
+            works["stacked"] = partial(stacked, grid_coefficients(points))
         seconds = best(works, 1 if points > _STACKED else 3)
         rows.append((size[0] * size[1], seconds["chart"], seconds.get("stacked", math.nan)))
     return rows
 
 
-def section(command: str, quick: bool = False) -> str:
+def report(asked: Asked) -> str:
     """The report in Markdown."""
-    parts = [
-        "## Growth",
-        origin(command),
+    return page(
+        "Growth",
+        asked,
         "### With free parameters",
-        _solves("free", by_freedom(quick)),
+        _solves("free", by_freedom(asked.quick)),
         "The first random designs of the suite with each number that have an optimum: medians.",
         "### With scenarios",
-        _solves("speeds", by_scenarios(quick)),
-        "Band designs of `benchmarks.judges.bands`, six free parameters, the worst abscissa over separate speeds: "
-        "medians. A speed adds its own factors and equations to the problem.",
+        _solves("speeds", by_scenarios(asked.quick)),
+        "Band designs of six free parameters, the worst abscissa over separate speeds: medians. A speed adds its own "
+        "factors and equations to the problem.",
         "### With grid points",
-        _charts(by_points(quick)),
-    ]
-    return "\n\n".join(parts) + "\n"
+        _charts(by_points(asked.quick)),
+    )
 
 
-def _solves(what: str, rows: Sequence[tuple[int, Sequence[Solved]]]) -> str:
+def _solves(what: str, rows: Sequence[tuple[int, Sequence[Attempt]]]) -> str:
     sizes = [size for size, _ in rows]
-    whole = [_median([s.seconds for s in solved]) for _, solved in rows]
-    each = [_median([s.seconds / s.starts for s in solved]) for _, solved in rows]
+    whole = [quantile(s.seconds for s in solved) for _, solved in rows]
+    each = [quantile(s.per_start for s in solved) for _, solved in rows]
     lines = [
         (
             size,
@@ -138,7 +119,3 @@ def _charts(rows: Sequence[tuple[int, float, float]]) -> str:
         f"{found}\n\nTime of a chart ~ designs^{exponent(sizes, own):.2f}, "
         f"of stacked eigenvalues ~ designs^{exponent(sizes, rival):.2f}."
     )
-
-
-def _median(numbers: Sequence[float]) -> float:
-    return float(np.median(numbers)) if numbers else math.nan

@@ -1,13 +1,11 @@
-"""How fast roots and classes of many quartics come, beside stacked eigenvalues: ``python -m benchmarks.kernels``."""
+"""How fast roots and classes of many quartics come, beside stacked eigenvalues."""
 
 from collections.abc import Callable
-from pathlib import Path
 
-import click
 import numpy as np
-from numpy.typing import NDArray
 
-from benchmarks.reports.tables import keep, kept, origin, table
+from benchmarks.judges import Roots, companion
+from benchmarks.reports import Asked, page, table
 from benchmarks.timing import best
 from tmsopt.models import tms
 from tmsopt.records import Array
@@ -50,12 +48,9 @@ def random(count: int, seed: int = 0) -> Array:
     return np.random.default_rng(seed).normal(size=(5, count))
 
 
-def eigenvalues(a: Array) -> NDArray[np.complex128]:
-    """Roots as eigenvalues of companion matrices, built from the coefficients."""
-    companion = np.zeros((a.shape[1], 4, 4))
-    companion[:, 0, :] = -(a[1:] / a[0]).T
-    companion[:, [1, 2, 3], [0, 1, 2]] = 1
-    return np.asarray(np.linalg.eigvals(companion), dtype=complex)
+def eigenvalues(a: Array) -> Roots:
+    """Roots as eigenvalues of companion matrices, built from the coefficients (5, count)."""
+    return np.asarray(np.linalg.eigvals(companion(a.T)), dtype=complex)
 
 
 def works(a: Array) -> dict[str, Work]:
@@ -98,9 +93,9 @@ def _rows(inputs: dict[str, Array], repeats: int) -> list[tuple[str, ...]]:
     return rows
 
 
-def section(command: str, quick: bool = False) -> str:
+def report(asked: Asked) -> str:
     """The report in Markdown."""
-    points, repeats = (_POINTS // 10, 2) if quick else (_POINTS, _REPEATS)
+    points, repeats = asked.of(_POINTS, _POINTS // 10), 2 if asked.quick else _REPEATS
     inputs = {"two-mass-skate designs": designs(points), "normal coefficients": random(points)}
     header = ["work", *(cell for name in inputs for cell in (f"{name}, ns a point", "times the eigenvalues' rate"))]
     errors = []
@@ -108,30 +103,12 @@ def section(command: str, quick: bool = False) -> str:
         found = quartic_factors(*a)
         error = float(np.max(backward_error(a.T, found.roots)))
         errors.append(f"{name} {error:.1e} ({found.fallbacks} by eigenvalues)")
-    lines = [
-        "## Roots and classes of many quartics",
-        "",
-        origin(command),
-        "",
+    return page(
+        "Roots and classes of many quartics",
+        asked,
         f"{points} quartics from coefficients in memory, one thread, interleaved, the best of {repeats} rounds:",
-        "",
         table(header, _rows(inputs, repeats)),
-        "",
         f"Copying five coefficients and an answer takes {1e9 * _copying(points) / points:.1f} ns a point. The rate of "
-        f"the eigenvalues includes building the companion matrices. Largest backward error of the factors: "
+        "the eigenvalues includes building the companion matrices. Largest backward error of the factors: "
         f"{', '.join(errors)}.",
-    ]
-    return "\n".join(lines) + "\n"
-
-
-@click.command()
-@kept
-def main(output: Path) -> None:
-    """Time roots and classes in NumPy and numba beside eigenvalues, print the table and keep it."""
-    text = section("python -m benchmarks.kernels")
-    click.echo(text)
-    keep(output, "kernels", text)
-
-
-if __name__ == "__main__":
-    main()
+    )

@@ -1,4 +1,4 @@
-"""Ten thousand rows through twenty kills: ``python -m benchmarks.kills``.
+"""Ten thousand rows through twenty kills.
 
 The study runs in a process of its own that notes every row when it is solved and again when the store has acknowledged
 it. Sometimes that process is killed and started again, sometimes one of its workers; of a Dask cluster, workers.
@@ -18,27 +18,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import click
 from tqdm import tqdm
 
-from benchmarks.reports.tables import keep, kept, origin, table
-from tmsopt.design.files import load
-from tmsopt.solver.solve import solve
-from tmsopt.studies.monte_carlo import monte_carlo
-from tmsopt.studies.row import Row
-from tmsopt.studies.run import fill
-from tmsopt.studies.solving import Solver
-from tmsopt.studies.store.store import Store, open_store, read_store
-from tmsopt.studies.study import Study, definition
+from benchmarks.reports import Asked, page, table
+from benchmarks.suites import PROBLEMS
+from tmsopt import Study, load, monte_carlo, solve
+from tmsopt.studies import Row, Solver, definition, fill
+from tmsopt.studies.store import Store, open_store, read_store
 
-_EP4 = Path(__file__).parents[3] / "problems" / "ep4.toml"
 _PAUSE = (0.3, 3.0)  # s of work between kills
 _SAMPLE = 100  # rows solved again here, and compared
 
 
 def drawn(rows: int) -> Study:
     """The EP4 as a workshop builds it: rows of a hundredth of a second."""
-    return monte_carlo(solve(load(_EP4)), rows, tolerances={"chi_B": 0.005, "lambda_s": 0.01, "Fr": 0.02})
+    return monte_carlo(
+        solve(load(PROBLEMS / "ep4.toml")), rows, tolerances={"chi_B": 0.005, "lambda_s": 0.01, "Fr": 0.02}
+    )
 
 
 class Watched:
@@ -183,20 +179,16 @@ def _judged(path: Path, log: Path, rows: int, kills: tuple[int, int], seconds: f
     return Told(kills, len(there), lost, twice, again, quarantined, different, seconds)
 
 
-def section(command: str, rows: int = 10_000, kills: int = 20, seed: int = 0) -> str:
+def report(asked: Asked) -> str:
     """The report in Markdown."""
-    found = {"2 processes": survived(rows, kills, seed, False), "2 Dask workers": survived(rows, kills, seed, True)}
+    rows, kills = asked.of(10_000, 400), 2 if asked.quick else 20
+    ways = {"2 processes": False, "2 Dask workers": True}
+    found = {name: survived(rows, kills, asked.seed, scheduler) for name, scheduler in ways.items()}
     head = (
-        "engine",
-        "kills of the study, of workers",
-        "rows in the end",
-        "acknowledged and lost",
-        "acknowledged and solved again",
-        "in flight when killed",
-        "quarantined",
-        f"of {_SAMPLE} solved once more, with other bits",
-        "s",
-    )
+        "engine", "kills of the study, of workers", "rows in the end", "acknowledged and lost",
+        "acknowledged and solved again", "in flight when killed", "quarantined",
+        f"of {_SAMPLE} solved once more, with other bits", "s",
+    )  # fmt: skip
     lines = [
         (
             name, f"{told.kills[0]}, {told.kills[1]}", f"{told.rows} of {rows}", told.lost, told.twice, told.again,
@@ -204,25 +196,11 @@ def section(command: str, rows: int = 10_000, kills: int = 20, seed: int = 0) ->
         )
         for name, told in found.items()
     ]  # fmt: skip
-    note = (
+    return page(
+        "Kills",
+        asked,
+        table(head, lines),
         "Monte Carlo rows of the EP4; kill -9 at random moments while rows come in. A row is acknowledged when the "
         "store has it; one in flight was solved and not yet acknowledged when its process was killed, and is solved "
-        "again."
+        "again.",
     )
-    return f"## Kills\n\n{origin(command)}\n\n{table(head, lines)}\n\n{note}\n"
-
-
-@click.command()
-@click.option("--rows", default=10_000, show_default=True)
-@click.option("--kills", default=20, show_default=True)
-@click.option("--seed", default=0, show_default=True, help="of the moments")
-@kept
-def main(rows: int, kills: int, seed: int, output: Path) -> None:
-    """Kill a study and its workers again and again; count what is lost, and what is solved twice."""
-    text = section(f"python -m benchmarks.kills --rows {rows} --kills {kills}", rows, kills, seed)
-    click.echo(text)
-    keep(output, "kills", text)
-
-
-if __name__ == "__main__":
-    main()

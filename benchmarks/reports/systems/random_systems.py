@@ -1,18 +1,18 @@
-"""Section (j): a suite of random systems of degree 3 to 12: how many are solved, how fast, and beside evolution."""
+"""A suite of random systems of degree 3 to 12: how many are solved, how fast, and beside evolution."""
 
 import math
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from tqdm import tqdm
 
-from benchmarks.judges.exact import FLOOR, SAME, Evolved, evolve, relative
-from benchmarks.reports.systems.known import Known, claimed, known
-from benchmarks.reports.tables import origin, share, table
-from benchmarks.suites.random_systems import COUNT, SEED, System, random_system
-from benchmarks.timing import duration, exponent, times
+from benchmarks.judges import FLOOR, SAME, System
+from benchmarks.reports import Asked, duration, facts, median, page, share, table, times
+from benchmarks.reports.systems.known import claimed
+from benchmarks.rivals import Followed, evolve_system
+from benchmarks.suites import COUNT, SEED, Known, known, random_system
+from benchmarks.timing import exponent, quantile
 from tmsopt import solve
 
 _QUICK = 3
@@ -48,7 +48,7 @@ class Solved:
         if math.isnan(self.value):
             return math.inf
         best = of[self.system.index].value if self.system.index in of else math.nan
-        return relative(self.system, self.value, self.value if math.isnan(best) else best)
+        return self.system.excess(self.value, self.value if math.isnan(best) else best)
 
 
 def solved(system: System) -> Solved:
@@ -66,30 +66,29 @@ def solved(system: System) -> Solved:
     return Solved(system, value, said, solution.structure, solution.starts.tried, seconds)
 
 
-def section(command: str, quick: bool = False) -> str:
+def report(asked: Asked) -> str:
     """The report in Markdown."""
-    systems = [random_system(k) for k in range(_QUICK if quick else COUNT)]
+    systems = [random_system(k) for k in range(asked.of(COUNT, _QUICK))]
     solved(systems[0])  # imports and first allocations are nobody's time
     own = [solved(s) for s in tqdm(systems, "random systems", unit="system")]
-    some = [one for one in own[:: 4 if quick else _EVERY] if "locate" not in one.system.goal]
-    evolved = [(one, evolve(one.system, generations=5 if quick else 1000)) for one in tqdm(some, "evolution")]
+    some = [one for one in own[:: 4 if asked.quick else _EVERY] if "locate" not in one.system.goal]
+    generations = 5 if asked.quick else 1000
+    evolved = [(one, evolve_system(one.system, generations=generations)) for one in tqdm(some, "evolution")]
     of = known()
-    return "\n\n".join(
-        [
-            "## Random systems",
-            origin(command),
-            _overview(own, of),
-            _NOTE,
-            "### By degree",
-            _by_degree(own, of),
-            "### By kind",
-            _by_kind(own, of),
-            "### Beside differential evolution on the eigenvalues",
-            _agreement(own, of),
-            _race(evolved),
-            "### Failures",
-            _failures(own, of),
-        ]
+    return page(
+        "Random systems",
+        asked,
+        _overview(own, of),
+        _NOTE,
+        "### By degree",
+        _by_degree(own, of),
+        "### By kind",
+        _by_kind(own, of),
+        "### Beside differential evolution on the eigenvalues",
+        _agreement(own, of),
+        _race(evolved),
+        "### Failures",
+        _failures(own, of),
     )
 
 
@@ -97,7 +96,7 @@ _NOTE = (
     f"`benchmarks.suites.random_systems`, seed {SEED}: systems of 2 to 6 degrees of freedom, given by M, D, K (masses, "
     "dampers, springs, gyroscopic and circulatory terms, negative damping), by a state matrix with output feedback, or "
     "by a polynomial, with 3 to 8 free parameters and up to three limits. The best known is the best of 32 starts of "
-    "another seed, all tried, of a differential evolution, of a solve from its end (`python -m benchmarks.known`), "
+    "another seed, all tried, of an evolution, of a solve from its end (`python -m benchmarks --only known`), "
     "and of the default solve. Errors are relative to it, or to 1e-3 where it is smaller. A system is solved when the "
     f"status is `optimal`, the value is within {SAME:.0e} of the best known, as in the suite of random designs, and "
     "judges that share nothing with the package confirm the claim: limits at the design, and its value by the "
@@ -108,20 +107,20 @@ _NOTE = (
 
 
 def _overview(own: Sequence[Solved], of: Mapping[int, Known]) -> str:
-    whole = len(own)
     errors = [one.error(of) for one in own]
-    rows = [
-        ("systems", whole),
-        (f"**solved, within {SAME:.0e} of the best known**", f"**{share(sum(e <= SAME for e in errors), whole)}**"),
-        ("within 1e-06", share(sum(e <= _WITHIN for e in errors), whole)),
-        ("better than the best known by more than 1e-08", sum(e < -SAME for e in errors)),
-        ("optimal, but not confirmed", sum("not confirmed" in one.said for one in own)),
-        ("multiple root on the rightmost line", sum("EP" in one.structure for one in own)),
-        ("median time per start", duration(_median(one.per_start for one in own))),
-        ("90 % of times per start below", duration(_quantile((one.per_start for one in own), 0.9))),
-        ("median time of a solve", duration(_median(one.seconds for one in own))),
-    ]
-    return table(("", ""), rows)
+    return facts(
+        [
+            ("systems", len(own)),
+            (f"**solved, within {SAME:.0e} of the best known**", f"**{share(e <= SAME for e in errors)}**"),
+            ("within 1e-06", share(e <= _WITHIN for e in errors)),
+            ("better than the best known by more than 1e-08", sum(e < -SAME for e in errors)),
+            ("optimal, but not confirmed", sum("not confirmed" in one.said for one in own)),
+            ("multiple root on the rightmost line", sum("EP" in one.structure for one in own)),
+            ("median time per start", median(one.per_start for one in own)),
+            ("90 % of times per start below", median((one.per_start for one in own), 0.9)),
+            ("median time of a solve", median(one.seconds for one in own)),
+        ]
+    )
 
 
 def _by_degree(own: Sequence[Solved], of: Mapping[int, Known]) -> str:
@@ -129,11 +128,11 @@ def _by_degree(own: Sequence[Solved], of: Mapping[int, Known]) -> str:
     rows = [
         (
             n,
-            share(sum(one.error(of) <= SAME for one in group), len(group)),
-            duration(_median(one.per_start for one in group)),
+            share(one.error(of) <= SAME for one in group),
+            median(one.per_start for one in group),
             duration(max(one.per_start for one in group)),
-            duration(_median(one.seconds for one in group)),
-            f"{_median(one.starts for one in group):.0f}",
+            median(one.seconds for one in group),
+            f"{quantile(one.starts for one in group):.0f}",
         )
         for n, group in groups.items()
     ]
@@ -147,11 +146,10 @@ def _by_degree(own: Sequence[Solved], of: Mapping[int, Known]) -> str:
 
 
 def _by_kind(own: Sequence[Solved], of: Mapping[int, Known]) -> str:
-    groups = {(one.system.kind, _asked(one.system)) for one in own}
-    rows = []
-    for kind, asked in sorted(groups):
-        group = [one for one in own if (one.system.kind, _asked(one.system)) == (kind, asked)]
-        rows.append((kind, asked, share(sum(one.error(of) <= SAME for one in group), len(group))))
+    groups = sorted({(one.system.kind, _asked(one.system)) for one in own})
+    rows = [
+        (*g, share(one.error(of) <= SAME for one in own if (one.system.kind, _asked(one.system)) == g)) for g in groups
+    ]
     return table(("kind", "asked", "solved"), rows)
 
 
@@ -160,26 +158,24 @@ def _asked(system: System) -> str:
 
 
 def _agreement(own: Sequence[Solved], of: Mapping[int, Known]) -> str:
-    both = [(one, of[k].known["evolution"]) for one in own if "evolution" in of.get(k := one.system.index, _NONE).known]
+    both = [(one, of[one.system.index]) for one in own if one.system.index in of]
+    both = [(one, kept) for one, kept in both if "evolution" in kept.known]
     if not both:
         return "No evolution is kept."
-    gaps = [relative(one.system, other, one.value) if math.isfinite(one.value) else -math.inf for one, other in both]
-    rows = [
-        (f"evolution ends within {w:.0e} of the default solve", share(sum(abs(g) <= w for g in gaps), len(gaps)))
-        for w in _CLOSE
+    gaps = [
+        one.system.excess(kept.known["evolution"], one.value) if math.isfinite(one.value) else -math.inf
+        for one, kept in both
     ]
+    rows = [(f"evolution ends within {w:.0e} of the default solve", share(abs(g) <= w for g in gaps)) for w in _CLOSE]
     rows += [
-        (f"evolution is worse by more than {_WITHIN:.0e}", share(sum(g > _WITHIN for g in gaps), len(gaps))),
-        (f"evolution is better by more than {_WITHIN:.0e}", share(sum(g < -_WITHIN for g in gaps), len(gaps))),
-        ("median evaluations of the evolution", f"{_median(of[one.system.index].evaluations for one, _ in both):.0f}"),
+        (f"evolution is worse by more than {_WITHIN:.0e}", share(g > _WITHIN for g in gaps)),
+        (f"evolution is better by more than {_WITHIN:.0e}", share(g < -_WITHIN for g in gaps)),
+        ("median evaluations of the evolution", f"{quantile(kept.evaluations for _, kept in both):.0f}"),
     ]
-    return table(("", ""), rows)
+    return facts(rows)
 
 
-_NONE = Known(-1, math.nan, {}, {}, 0)
-
-
-def _race(evolved: Sequence[tuple[Solved, Evolved]]) -> str:
+def _race(evolved: Sequence[tuple[Solved, Followed]]) -> str:
     """How long each took to values as good as ours, and to the evolution's own."""
     good = [(one, e) for one, e in evolved if math.isfinite(one.value)]
     if not good:
@@ -188,8 +184,8 @@ def _race(evolved: Sequence[tuple[Solved, Evolved]]) -> str:
     for within in (1e-2, 1e-3, 1e-4, 1e-6):
         reached = [(one, e.reached(_merit(one, within))) for one, e in good]
         met = [(one, t) for one, t in reached if math.isfinite(t)]
-        solves, starts = _median(t / one.seconds for one, t in met), _median(t / one.per_start for one, t in met)
-        rows.append((f"{within:.0e}", share(len(met), len(good)), times(solves), times(starts)))
+        solves, starts = quantile(t / one.seconds for one, t in met), quantile(t / one.per_start for one, t in met)
+        rows.append((f"{within:.0e}", share(math.isfinite(t) for _, t in reached), times(solves), times(starts)))
     note = (
         f"{len(good)} systems, both in this run. SciPy's evolution, vectorised, 15 members for each parameter, "
         "stacked eigenvalues of the state matrix, limits by rank, until it converges to 1e-8: its time to a value "
@@ -197,7 +193,7 @@ def _race(evolved: Sequence[tuple[Solved, Evolved]]) -> str:
         "medians where it got there."
     )
     header = ("within", "reached by the evolution", "its time over a default solve", "over one start")
-    ends = _median(e.seconds / one.seconds for one, e in good)
+    ends = quantile(e.seconds / one.seconds for one, e in good)
     return f"{table(header, rows)}\n\n{note} To its own end it takes {times(ends)} times a default solve."
 
 
@@ -222,13 +218,4 @@ def _failures(own: Sequence[Solved], of: Mapping[int, Known]) -> str:
         if not one.error(of) <= SAME
     ]
     header = ("system", "kind", "degree", "free", "asked", "status", "value", "best known", "error")
-    return table(header, rows) if rows else "None."
-
-
-def _median(numbers: Iterable[float]) -> float:
-    return _quantile(numbers, 0.5)
-
-
-def _quantile(numbers: Iterable[float], q: float) -> float:
-    found = list(numbers)
-    return float(np.quantile(found, q)) if found else math.nan
+    return table(header, rows, "None.")
