@@ -14,7 +14,7 @@ from typing import Any, cast
 
 import click
 
-from benchmarks.reports import RESULTS, Asked, keep
+from benchmarks.reports.tables import RESULTS, Asked, keep
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ SECTIONS = (
     Section("c", "studies", f"{_SPEED}.studies", "studies, beside bare solves in a loop, over cores and Dask workers"),
     Section("d", "trace", f"{_SPEED}.tracing", "tracing, beside scipy.optimize.root and a contour"),
     Section("e", "startup", f"{_SPEED}.startup", "start-up and import times, beside Python, NumPy and CasADi"),
-    Section("f", "growth", f"{_SPEED}.growth", "growth with free parameters, scenarios and grid points"),
+    Section("f", "growth", f"{_SPEED}.growth", "growth with free parameters and scenarios"),
     Section("h", "tiles", f"{_SPEED}.folders", "charts to a folder; 1e8 designs in bounded memory"),
     Section("i", "systems", f"{_SYSTEMS}.sixfold", "a 6-fold root from random starts, beside HANSO and PyGRANSO"),
     Section("j", "random", f"{_SYSTEMS}.random_systems", "random systems of degree 3 to 12, beside evolution"),
@@ -55,24 +55,14 @@ SECTIONS = (
     Section("n", "conflicts", f"{_DESIGNS}.conflicts", "relaxations of infeasible problems", long=True),
     Section("o", "certificates", f"{_DESIGNS}.certificates", "random designs proved globally best", long=True),
     Section("p", "proofs", "benchmarks.reports.proofs", "exceptional points of the paper, proved", long=True),
-    Section("q", "kills", f"{_SPEED}.kills", "a study killed again and again: what is lost", long=True),
-    Section("r", "references", f"{_DESIGNS}.references", "the best values of the random designs, kept", long=True),
-    Section("s", "known", f"{_SYSTEMS}.known", "the best values of the random systems, kept", long=True),
+    Section("q", "references", f"{_DESIGNS}.references", "the best values of the random designs, kept", long=True),
+    Section("r", "known", f"{_SYSTEMS}.known", "the best values of the random systems, kept", long=True),
 )
 """In the order in which they are run."""
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What a section ended with: its report, or a report that says why there is none."""
-
-    section: Section
-    text: str
-    failed: bool
-
-
-def run(section: Section, asked: Asked) -> Outcome:
-    """One section; whatever it raises becomes its report."""
+def run(section: Section, asked: Asked) -> tuple[str, bool]:
+    """The report of a section, and whether it failed; whatever it raises becomes its report."""
     load, began = _load(), time.perf_counter()
     try:
         text, failed = section.report()(asked), False
@@ -82,7 +72,7 @@ def run(section: Section, asked: Asked) -> Outcome:
         traceback.print_exc()
         text, failed = _refused(section, f"failed: {type(error).__name__}: {error}"), True
     took = f"Took {time.perf_counter() - began:.0f} s; load average before {load}, after {_load()}."
-    return Outcome(section, f"{text.rstrip()}\n\n{took}\n", failed)
+    return f"{text.rstrip()}\n\n{took}\n", failed
 
 
 def _refused(section: Section, why: str) -> str:
@@ -145,10 +135,10 @@ def main(only: str, listed: bool, output: Path | None, **sizes: Any) -> None:
     failed = []
     for section in sections:
         click.echo(f"{section.letter}  {section.name}: {section.about}", err=True)
-        outcome = run(section, Asked(section.name, **{n: v for n, v in sizes.items() if v is not None}))
-        click.echo(outcome.text)
+        text, bad = run(section, Asked(section.name, **{n: v for n, v in sizes.items() if v is not None}))
+        click.echo(text)
         if path:
-            keep(path, section.name, outcome.text)
-        failed += [section.name] if outcome.failed else []
+            keep(path, section.name, text)
+        failed += [section.name] if bad else []
     if failed:
         raise SystemExit(f"not measured: {', '.join(failed)}")

@@ -18,15 +18,10 @@ def best(works: Mapping[str, Callable[[], Any]], repeats: int) -> dict[str, floa
     seconds = dict.fromkeys(works, math.inf)
     for _ in range(repeats):
         for name, work in works.items():
-            seconds[name] = min(seconds[name], clocked(work))
+            began = time.perf_counter()
+            work()
+            seconds[name] = min(seconds[name], time.perf_counter() - began)
     return seconds
-
-
-def clocked(work: Callable[[], Any]) -> float:
-    """Seconds of one run."""
-    began = time.perf_counter()
-    work()
-    return time.perf_counter() - began
 
 
 def exponent(sizes: Sequence[float], seconds: Sequence[float]) -> float:

@@ -7,16 +7,7 @@ first: eigenvalues over scenarios; `exact` decides at multiple roots, `bands` pr
 from benchmarks.judges.attempts import EXACT, FEASIBLE, SCALE, SOLVED, Attempt, attempt, started_at
 from benchmarks.judges.bands import abscissa_below, highest_abscissa
 from benchmarks.judges.eigenvalues import Roots, companion, eigenvalues, root_values, worst_roots
-from benchmarks.judges.exact import (
-    MET,
-    SAME,
-    confirmed,
-    confirmed_system,
-    exact_polynomial,
-    ideals,
-    same,
-    values_of,
-)
+from benchmarks.judges.exact import MET, SAME, confirmed, confirmed_system, exact_polynomial, ideals, same, values_of
 from benchmarks.judges.grid import Judge, Verdict, verdict
 from benchmarks.judges.system import FLOOR, Entries, System
 from benchmarks.judges.text import NOWHERE, difference, evaluated

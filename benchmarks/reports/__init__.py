@@ -4,30 +4,6 @@ In: what is asked for, `Asked`. Out: a page of Markdown. Open `tables` first; `d
 the sections, listed in `benchmarks.command`.
 """
 
-from benchmarks.reports.tables import (
-    RESULTS,
-    Asked,
-    duration,
-    facts,
-    keep,
-    median,
-    origin,
-    page,
-    share,
-    table,
-    times,
-)
+from benchmarks.reports.tables import Asked
 
-__all__ = [
-    "RESULTS",
-    "Asked",
-    "duration",
-    "facts",
-    "keep",
-    "median",
-    "origin",
-    "page",
-    "share",
-    "table",
-    "times",
-]
+__all__ = ["Asked"]

@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
+from typing import NamedTuple
 
 from benchmarks.reports.tables import Asked, duration, page, table
 from benchmarks.suites import POINTS
@@ -16,8 +16,7 @@ DIGITS = (30, 60)
 _REPEATS = 3
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """A proof, and the best of some times."""
 
     place: str

@@ -8,20 +8,19 @@ from benchmarks.rivals.evolution import POINTS, Evolved, Followed, evolve, evolv
 from benchmarks.rivals.nonsmooth import NONSMOOTH, Poles, poles
 from benchmarks.rivals.race import OWN, TOLERANCES, Heat, Moment, Run, heat, median_ratio, own, run
 from benchmarks.rivals.reduced import FEASIBLE, Found, Reduced, Watch
-from benchmarks.rivals.searches import LOCAL, SCALAR, STARTS, VECTORISED, differential, local
+from benchmarks.rivals.searches import EVOLUTION, LOCAL, STARTS, differential, local
 from benchmarks.rivals.seekers import SEEKERS, Seeker, slopes
 
 __all__ = [
+    "EVOLUTION",
     "FEASIBLE",
     "LOCAL",
     "NONSMOOTH",
     "OWN",
     "POINTS",
-    "SCALAR",
     "SEEKERS",
     "STARTS",
     "TOLERANCES",
-    "VECTORISED",
     "Evolved",
     "Followed",
     "Found",

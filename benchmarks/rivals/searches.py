@@ -8,7 +8,7 @@ import contextlib
 import io
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -18,13 +18,12 @@ from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution, 
 from benchmarks.rivals.reduced import Found, Reduced, Watch
 from tmsopt import Problem
 from tmsopt.formulation import designs
-from tmsopt.records import Array
 
 STARTS = 5
 """Designs that the local rivals start from: the first ones of `tmsopt.solve`."""
 
-SCALAR, VECTORISED = "DE", "DE, vectorised"
-"""The two ways in which differential evolution is run: design by design, and a whole generation at once."""
+EVOLUTION = "DE, vectorised"
+"""Differential evolution, a whole generation at once."""
 
 LOCAL = ("SLSQP", "Nelder–Mead", "COBYLA")
 """The local rivals."""
@@ -38,25 +37,17 @@ def quiet() -> Iterator[None]:
         yield
 
 
-def differential(problem: Problem, seed: int = 0, vectorized: bool = False, watch: Watch | None = None) -> Found:
-    """Differential evolution with the constraints as such (Lampinen's rule), polished by SciPy's own choice."""
+def differential(problem: Problem, seed: int = 0, watch: Watch | None = None) -> Found:
+    """Differential evolution with the constraints as such (Lampinen's rule)."""
     reduced = Reduced(problem, watch)
     bounds = Bounds(reduced.lower, reduced.upper)
     constraints: Any = NonlinearConstraint(reduced.rows, 0.0, np.inf) if reduced.constrained else ()
-    objective: Callable[[Array], Any] = reduced.abscissae if vectorized else reduced.abscissa
+    objective: Any = reduced.abscissae
+    way: dict[str, Any] = {"tol": 1e-8, "rng": seed, "vectorized": True, "updating": "deferred", "polish": False}
     began = time.perf_counter()
     with quiet():
-        answer = differential_evolution(
-            objective,
-            bounds,
-            constraints=constraints,
-            tol=1e-8,
-            rng=seed,
-            vectorized=vectorized,
-            updating="deferred" if vectorized else "immediate",
-            polish=not vectorized,
-        )
-        return reduced.found(VECTORISED if vectorized else SCALAR, answer.x, time.perf_counter() - began)
+        answer = differential_evolution(objective, bounds, constraints=constraints, **way)
+        return reduced.found(EVOLUTION, answer.x, time.perf_counter() - began)
 
 
 def local(method: str, problem: Problem, starts: int = STARTS, watch: Watch | None = None) -> Found:

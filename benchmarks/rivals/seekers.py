@@ -66,7 +66,7 @@ def _local(method: str) -> Seeker:
 
 def _evolution(problem: Problem, watch: Watch) -> None:
     for seed in count():
-        differential(problem, seed, vectorized=True, watch=watch)
+        differential(problem, seed, watch)
 
 
 def _annealing(problem: Problem, watch: Watch) -> None:

@@ -5,19 +5,10 @@ JSON files beside the suites hold the values.
 """
 
 from benchmarks.suites.bands import SPEEDS, band_problems
-from benchmarks.suites.best_known import (
-    OSCILLATORS,
-    REFERENCES,
-    Known,
-    Reference,
-    known,
-    read,
-    references,
-    write,
-)
+from benchmarks.suites.best_known import OSCILLATORS, REFERENCES, Known, Reference, known, read, references, write
 from benchmarks.suites.conflicts import Conflict, conflict, conflicts, moved
 from benchmarks.suites.paper import EP_SET, HEIGHTS, PLANE, POINTS, PROBLEMS, Point
-from benchmarks.suites.random_designs import RANGES, SEED, TEMPLATES, random_problem
+from benchmarks.suites.random_designs import SEED, TEMPLATES, random_problem
 from benchmarks.suites.random_systems import COUNT, random_system, random_systems
 from benchmarks.suites.varied_designs import varied_problem
 
@@ -29,7 +20,6 @@ __all__ = [
     "PLANE",
     "POINTS",
     "PROBLEMS",
-    "RANGES",
     "REFERENCES",
     "SEED",
     "SPEEDS",

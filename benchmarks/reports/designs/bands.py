@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from tqdm import tqdm
 
 from benchmarks.judges import abscissa_below, highest_abscissa
-from benchmarks.reports import Asked, duration, page, share, table
+from benchmarks.reports.tables import Asked, duration, page, share, table
 from benchmarks.suites import SPEEDS, band_problems
 from benchmarks.timing import ipopt_runs, quantile
 from tmsopt import Problem, Solution, solve
@@ -27,8 +27,8 @@ class Ride:
     Attributes:
         per_start: seconds of a solve that tries all starts, over their number.
         single: median seconds of a run of IPOPT.
-        highest: largest abscissa over `CHECKED` speeds, by eigenvalues.
-        excess: of `highest` over the claim; next to multiple roots eigenvalues scatter to the right by up to 4e-4.
+        excess: of the largest abscissa over `CHECKED` speeds over the claim; next to multiple roots eigenvalues scatter
+            to the right by up to 4e-4.
         proved: whether the abscissa is at most the claim + `MARGIN` at every speed of the band.
         stable: whether it is below 0 at every speed.
         pieces: of the band in the proof.
@@ -39,16 +39,11 @@ class Ride:
     solution: Solution
     per_start: float
     single: float
-    highest: float
+    excess: float
     proved: bool
     stable: bool
     pieces: int
     own: str
-
-    @property
-    def excess(self) -> float:
-        """Of the highest abscissa over the claim."""
-        return self.highest - self.solution.abscissa
 
 
 def ride(name: str, problem: Problem, starts: int = STARTS) -> Ride:
@@ -59,24 +54,19 @@ def ride(name: str, problem: Problem, starts: int = STARTS) -> Ride:
         solution = solve(problem, starts=starts, exhaustive=True, throw=False)
         seconds = time.perf_counter() - began
     speeds = (solution.parameters, SPEEDS.min, SPEEDS.max)
+    cover = solution.cover
     proved, pieces = abscissa_below(*speeds, solution.abscissa + MARGIN)
     return Ride(
         name=name,
         solution=solution,
         per_start=seconds / solution.starts.tried,
         single=quantile(run.seconds for run in runs),
-        highest=highest_abscissa(*speeds, CHECKED),
+        excess=highest_abscissa(*speeds, CHECKED) - solution.abscissa,
         proved=proved,
         stable=abscissa_below(*speeds, 0.0)[0],
         pieces=pieces,
-        own=own_proof(solution),
+        own="–" if cover is None else f"{'yes' if cover.proven else 'no'}, {cover.boxes} boxes",
     )
-
-
-def own_proof(solution: Solution) -> str:
-    """The solution's own proof between the scenarios; empty where it offers none."""
-    cover = solution.cover
-    return "" if cover is None else f"{'yes' if cover.proven else 'no'}, {cover.boxes} boxes"
 
 
 def report(asked: Asked) -> str:
@@ -95,7 +85,7 @@ def report(asked: Asked) -> str:
             f"{r.excess:.0e}",
             f"{'yes' if r.proved else 'no'}, {r.pieces} pieces",
             ("yes" if r.stable else "no"),
-            r.own or "–",
+            r.own,
         )
         for r in rides
     ]

@@ -2,14 +2,14 @@
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from tqdm import tqdm
 
-from benchmarks.reports import Asked, facts, median, page, share, table
+from benchmarks.reports.tables import Asked, facts, median, page, share, table
 from benchmarks.suites import Reference, random_problem, references
-from tmsopt import certify, solve
+from tmsopt import Solution, certify, solve
 
 RELATIVE, ABSOLUTE = 1e-4, 1e-5
 """Gap that counts as proven."""
@@ -22,96 +22,92 @@ class Proof:
     """What became of one problem.
 
     Attributes:
-        value: of the design, certified or its replacement.
-        before: of the design that the default solve found.
-        best: the least value that any method is known to reach, this one included.
+        before, after: the default solve, and what was certified: the same design or its replacement.
     """
 
     index: int
-    free: int
-    status: str
-    before: float
-    value: float
-    bound: float
-    gap: float
-    method: str
-    nodes: int
+    before: Solution
+    after: Solution
     seconds: float
     reference: Reference
 
     @property
+    def free(self) -> int:
+        """Free parameters."""
+        return len(self.after.problem.free)
+
+    @property
     def solvable(self) -> bool:
         """Whether any method found a feasible design."""
-        return self.reference.solvable or self.status == "optimal"
+        return self.reference.solvable or self.after.status == "optimal"
 
     @property
     def best(self) -> float:
-        """The least abscissa known."""
+        """The least abscissa that any method is known to reach, this one included."""
         known = [self.reference.value] if self.reference.solvable else []
-        return min([*known, *([self.value] if self.status == "optimal" else [])], default=math.inf)
+        return min([*known, *([self.after.value] if self.after.status == "optimal" else [])], default=math.inf)
 
     @property
     def closed(self) -> bool:
         """Whether the gap is small enough to call the design proven."""
-        return self.status == "optimal" and self.gap < max(RELATIVE * abs(self.value), ABSOLUTE) * (1 + 1e-9)
+        enough = max(RELATIVE * abs(self.after.value), ABSOLUTE) * (1 + 1e-9)
+        return self.after.status == "optimal" and self.after.bound.gap < enough
 
     @property
     def excluded(self) -> bool:
         """Whether it is proved that no design is feasible."""
-        return self.status == "infeasible" and self.bound == math.inf
+        return self.after.status == "infeasible" and self.after.bound.value == math.inf
 
     @property
     def wrong(self) -> bool:
         """Whether a design is known that the bound excludes."""
-        return self.bound > self.best + _ROUNDING * max(1e-3, abs(self.best))
+        return self.after.bound.value > self.best + _ROUNDING * max(1e-3, abs(self.best))
+
+    @property
+    def replaced(self) -> bool:
+        """Whether a better design took the place of the default solve's."""
+        before, after = self.before.value, self.after.value
+        return self.after.status == "optimal" and not abs(before - after) <= 1e-12 * (1 + abs(after))
 
 
-def proofs(count: int, seed: int, seconds: float) -> list[Proof]:
+def proofs(count: int, seed: int, seconds: float) -> Iterator[Proof]:
     """Default solves, then certificates, one after the other."""
     known = references()
-    found = []
     for index in tqdm(range(count), unit="problem"):
         design = solve(random_problem(index, seed), throw=False)
         began = time.perf_counter()
         proved = certify(design, seconds=seconds)
-        took = time.perf_counter() - began
-        bound = proved.bound
-        found.append(
-            Proof(
-                index, len(design.problem.free), proved.status, design.value, proved.value, bound.value, bound.gap,
-                bound.method, bound.nodes, took, known[index],
-            )
-        )  # fmt: skip
-    return found
+        yield Proof(index, design, proved, time.perf_counter() - began, known[index])
 
 
 def report(asked: Asked) -> str:
     """The report in Markdown."""
-    every = proofs(asked.of(200, 4), asked.seed, asked.within(60, 5))
+    every = list(proofs(asked.of(200, 4), asked.seed, asked.within(60, 5)))
     solvable, others = [p for p in every if p.solvable], [p for p in every if not p.solvable]
     closed = [p for p in solvable if p.closed]
     rows = [
         ("feasible problems", len(solvable)),
         ("**gap below 1e-4 (relative) or 1e-5 (absolute)**", f"**{share(p.closed for p in solvable)}**"),
-        ("of these, by the product of the roots alone", sum(p.method == "omega0" for p in closed)),
+        ("of these, by the product of the roots alone", sum(p.after.bound.method == "omega0" for p in closed)),
         (
             "of these, gap below 1e-6, or 1e-7 absolute",
-            sum(p.gap <= 1e-6 * max(abs(p.value), 0.1) * (1 + 1e-9) for p in closed),
+            sum(p.after.bound.gap <= 1e-6 * max(abs(p.after.value), 0.1) * (1 + 1e-9) for p in closed),
         ),
         ("problems without a feasible design known", len(others)),
         ("**proved infeasible**", f"**{share(p.excluded for p in others)}**"),
-        ("designs replaced by a better one", sum(_replaced(p) for p in every)),
+        ("designs replaced by a better one", sum(p.replaced for p in every)),
         ("**bounds above a value that some method reaches**", f"**{sum(p.wrong for p in every)}**"),
         ("median time of a proof", median(p.seconds for p in closed)),
         ("90 % of these times below", median((p.seconds for p in closed), 0.9)),
-        ("median nodes", sorted(p.nodes for p in closed)[len(closed) // 2] if closed else "–"),
+        ("median nodes", sorted(p.after.bound.nodes for p in closed)[len(closed) // 2] if closed else "–"),
     ]
-    left = [
-        (p.index, p.free, p.status, f"{p.value:.9g}", f"{p.bound:.9g}", f"{p.gap:.1e}", p.nodes, f"{p.seconds:.0f} s")
-        for p in every
-        if not (p.closed or p.excluded)
-    ]
-    better = [(p.index, p.free, f"{p.before:.9g}", f"{p.value:.9g}", f"{p.best:.9g}") for p in every if _replaced(p)]
+    left = []
+    for p in (p for p in every if not (p.closed or p.excluded)):
+        found, bound = p.after, p.after.bound
+        numbers = (f"{found.value:.9g}", f"{bound.value:.9g}", f"{bound.gap:.1e}", bound.nodes, f"{p.seconds:.0f} s")
+        left.append((p.index, p.free, found.status, *numbers))
+    replaced = (p for p in every if p.replaced)
+    better = [(p.index, p.free, *(f"{v:.9g}" for v in (p.before.value, p.after.value, p.best))) for p in replaced]
     return page(
         "Proved designs",
         asked,
@@ -129,15 +125,11 @@ def report(asked: Asked) -> str:
     )
 
 
-def _replaced(proof: Proof) -> bool:
-    return proof.status == "optimal" and not abs(proof.before - proof.value) <= 1e-12 * (1 + abs(proof.value))
-
-
 def _by_freedom(solvable: Sequence[Proof]) -> str:
     rows = []
     for free in sorted({p.free for p in solvable}):
         group = [p for p in solvable if p.free == free]
         closed = [p for p in group if p.closed]
-        nodes = max((p.nodes for p in closed), default=0)
+        nodes = max((p.after.bound.nodes for p in closed), default=0)
         rows.append((free, len(group), len(closed), median(p.seconds for p in closed), nodes))
     return table(("free", "feasible", "proved", "median time", "most nodes"), rows)

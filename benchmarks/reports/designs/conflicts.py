@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from tqdm import tqdm
 
 from benchmarks.judges import FEASIBLE, MET, verdict
-from benchmarks.reports import Asked, median, page, share, table
+from benchmarks.reports.tables import Asked, median, page, share, table
 from benchmarks.rivals import least_violation
 from benchmarks.suites import Conflict, conflicts, moved
 from tmsopt import solve

@@ -10,14 +10,14 @@ import numpy as np
 from tqdm import tqdm
 
 from benchmarks.judges import EXACT, FLOOR, SAME, Attempt, attempt
-from benchmarks.reports import Asked, facts, median, page, share, table, times
 from benchmarks.reports.designs.references import Settings, reference
-from benchmarks.rivals import FEASIBLE, LOCAL, SCALAR, STARTS, VECTORISED, Found, differential, local
+from benchmarks.reports.tables import Asked, facts, median, page, share, table, times
+from benchmarks.rivals import EVOLUTION, FEASIBLE, LOCAL, STARTS, Found, differential, local
 from benchmarks.suites import SEED, Reference, random_problem, references
 from benchmarks.timing import quantile
 from tmsopt import Problem
 
-_SCALAR, _LOCAL = 10, 20  # problems for scalar differential evolution, and for the local rivals
+_LOCAL = 20  # problems for the local rivals
 _TOLERANCES = (1e-3, 1e-6, SAME)
 
 
@@ -85,15 +85,13 @@ class Record:
 
 
 def measured(count: int, seed: int, workers: int, quick: bool) -> list[Record]:
-    """Default solves and both evolutions one after another in this process; the rest is spread over the workers."""
+    """Default solves and the evolution one after another in this process; the rest is spread over the workers."""
     problems = [random_problem(i, seed) for i in range(count)]
     attempt("warm-up", random_problem(1, seed))  # imports and first allocations are nobody's time
     defaults = [attempt("default", p) for p in tqdm(problems, "default solves")]
     rivals: list[dict[str, Found]] = [{} for _ in problems]
-    for i in tqdm(_some(defaults, 1 if quick else _SCALAR), "differential evolution"):
-        rivals[i][SCALAR] = differential(problems[i])
     for i in tqdm(range(count), "vectorised evolution"):
-        rivals[i][VECTORISED] = differential(problems[i], vectorized=True)
+        rivals[i][EVOLUTION] = differential(problems[i])
     kept = references() if seed == SEED else {}
     missing = [i for i in range(count) if i not in kept]
     with ProcessPoolExecutor(workers) as pool:
@@ -131,11 +129,10 @@ def report(asked: Asked) -> str:
         _rivals(records),
         "A rival minimises the largest real part of the eigenvalues; its design counts if it violates nothing by "
         f"more than {FEASIBLE:.0e}. An equality is solved for a parameter, so that no rival has to follow it. "
-        "Differential evolution has the constraints as such (`NonlinearConstraint`), `tol` = 1e-8 and otherwise "
-        "SciPy's defaults, polishing included; vectorised, it evaluates a generation at once and is not polished. "
+        "Differential evolution has the constraints as such (`NonlinearConstraint`), `tol` = 1e-8, evaluates a "
+        "generation at once, and is otherwise SciPy's. "
         f"The others start from the first {STARTS} designs of `solve` and their best end counts; Nelder–Mead has a "
         "penalty for violations. Times of these three are taken with all cores busy.",
-        _ratios(records),
         "### Failures",
         _failures(records),
     )
@@ -179,7 +176,7 @@ def _rivals(records: Sequence[Record]) -> str:
     solvable = [r for r in records if r.solvable]
     own = [(r.error, r.default.seconds) for r in solvable]
     rows = [_row("default solve", own)]
-    for name in (SCALAR, VECTORISED, *LOCAL):
+    for name in (EVOLUTION, *LOCAL):
         run = [(r, r.rivals[name]) for r in solvable if name in r.rivals]
         rows.append(_row(name, [(r.relative(f.value) if f.feasible else math.inf, f.seconds) for r, f in run]))
     within = (f"within {t:.0e}" for t in _TOLERANCES)
@@ -189,25 +186,6 @@ def _rivals(records: Sequence[Record]) -> str:
 def _row(name: str, ends: Sequence[tuple[float, float]]) -> tuple[object, ...]:
     shares = (share(error <= t for error, _ in ends) for t in (1e300, *_TOLERANCES))
     return (name, len(ends), *shares, median(seconds for _, seconds in ends))
-
-
-def _ratios(records: Sequence[Record]) -> str:
-    rows = []
-    for name in (SCALAR, VECTORISED):
-        pairs = [(r, r.rivals[name]) for r in records if r.solvable and r.default.optimal and name in r.rivals]
-        fair = [(r, f) for r, f in pairs if not f.feasible or r.error <= r.relative(f.value) + SAME]
-        rows += [
-            (f"{name}, all problems", len(pairs), *_speedups(pairs)),
-            (f"{name}, where the default solve is equal or better", len(fair), *_speedups(fair)),
-        ]
-    header = ("time of differential evolution over that of", "problems", "a default solve", "10 % below", "one start")
-    return table(header, rows)
-
-
-def _speedups(pairs: Sequence[tuple[Record, Found]]) -> tuple[str, ...]:
-    solves = [f.seconds / r.default.seconds for r, f in pairs]
-    starts = [f.seconds / r.default.per_start for r, f in pairs]
-    return times(quantile(solves)), times(quantile(solves, 0.1)), times(quantile(starts))
 
 
 def _failures(records: Sequence[Record]) -> str:

@@ -18,7 +18,7 @@ import click
 from tqdm import tqdm
 
 from benchmarks.judges import EXACT, MET, Attempt, attempt, confirmed, same, started_at, verdict
-from benchmarks.reports import Asked, facts, origin, page
+from benchmarks.reports.tables import Asked, facts, origin, page
 from benchmarks.rivals import differential, least_violation
 from benchmarks.suites import REFERENCES, SEED, Reference, random_problem, read, references, write
 from tmsopt import Problem
@@ -49,7 +49,7 @@ def reference(index: int, settings: Settings) -> Reference:
     default = attempt("default", problem)
     claimed = default.status == "infeasible"
     starts = min(FEW, settings.starts) if claimed else settings.starts
-    ends = [differential(problem, seed, vectorized=True).parameters for seed in range(settings.evolutions)]
+    ends = [differential(problem, seed).parameters for seed in range(settings.evolutions)]
     if claimed:
         ends.append(least_violation(problem).parameters)
     attempts = [default, attempt("starts", problem, starts=starts, seed=1, exhaustive=not claimed)]

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from benchmarks.reports import Asked, duration, page, table, times
+from benchmarks.reports.tables import Asked, duration, page, table, times
 from benchmarks.rivals import OWN, SEEKERS, TOLERANCES, Heat, Run, heat, median_ratio
 from benchmarks.suites import PROBLEMS, random_problem
 from tmsopt import InputError, Problem, certify, load, models, solve

@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,8 +11,8 @@ from itertools import repeat
 from tqdm import tqdm
 
 from benchmarks.judges import EXACT, FEASIBLE, NOWHERE, SCALE, SOLVED, Attempt, Verdict, attempt, started_at, verdict
-from benchmarks.reports import Asked, facts, median, page, share, table
-from benchmarks.rivals import POINTS, Evolved, evolve
+from benchmarks.reports.tables import Asked, facts, median, page, share, table
+from benchmarks.rivals import POINTS, evolve
 from benchmarks.suites import varied_problem
 from tmsopt import Problem
 
@@ -87,16 +87,6 @@ class Trial:
                 return crash
 
     @property
-    def stable(self) -> bool:
-        """Whether the design of the default solve is."""
-        return self.default.optimal and self.default.abscissa < 0
-
-    @property
-    def slow(self) -> bool:
-        """Whether the default solve took too long."""
-        return self.default.seconds > SLOW
-
-    @property
     def by(self) -> list[str]:
         """Who reached the best value."""
         near = SOLVED * max(SCALE, abs(self.best))
@@ -112,26 +102,26 @@ def trials(count: int, seed: int, workers: int) -> list[Trial]:
         return list(tqdm(every, desc="references", total=count))
 
 
-def _trial(index: int, seed: int, default: Attempt, starts: int = REFERENCE_STARTS) -> Trial:
+def _trial(index: int, seed: int, default: Attempt) -> Trial:
+    """Where the default solve found nothing feasible, the search may give up early: the evolutions check that claim."""
     problem = varied_problem(index, seed)
     evolved = evolve(problem)
-    if evolved.violation > FEASIBLE and default.status != "optimal":
+    if evolved.violation > FEASIBLE and not default.optimal:
         evolved = min(evolved, evolve(problem, seed=1), key=lambda e: e.violation)
-    others = list(_others(problem, evolved, starts, exhaustive=default.status != "infeasible"))
-    return Trial(index, problem, default, tuple(others), verdict(problem, evolved.parameters))
-
-
-def _others(problem: Problem, evolved: Evolved, starts: int, exhaustive: bool) -> Iterator[Attempt]:
-    """Where the default solve found nothing feasible, the search may give up early: the evolutions check that claim."""
-    yield attempt("from the evolution", started_at(problem, evolved.parameters), starts=1)
-    if starts:
-        yield attempt(f"{starts} starts", problem, starts=starts, seed=1, exhaustive=exhaustive)
+    n, exhaustive = REFERENCE_STARTS, default.status != "infeasible"
+    others = (
+        attempt("from the evolution", started_at(problem, evolved.parameters), starts=1),
+        attempt(f"{n} starts", problem, starts=n, seed=1, exhaustive=exhaustive),
+    )
+    return Trial(index, problem, default, others, verdict(problem, evolved.parameters))
 
 
 def report(asked: Asked) -> str:
     """The report in Markdown."""
     every = trials(asked.of(200, 4), asked.seed, asked.workers)
     good = [t for t in every if not t.cause]
+    stable = sum(t.solvable and t.default.optimal and t.default.abscissa < 0 for t in every)
+    slow = ", ".join(str(t.index) for t in every if t.default.seconds > SLOW)
     return page(
         "Varied design problems",
         asked,
@@ -142,12 +132,15 @@ def report(asked: Asked) -> str:
                 ("with tolerances", sum(bool(t.problem.tolerances) for t in every)),
                 ("in SI", sum(t.problem.parameter_set.name == "SI" for t in every)),
                 ("somebody found a feasible design", sum(t.solvable for t in every)),
-                ("of these, stable at the best known", sum(t.solvable and t.stable for t in every)),
+                (
+                    "of these, stable at the best known",
+                    stable,
+                ),
                 ("**solved at default settings**", f"**{share(not t.cause for t in every)}**"),
                 ("of these, infeasible and nobody found otherwise", sum(not t.solvable for t in good)),
                 ("median time of a solve", median(t.default.seconds for t in every)),
                 ("90 % of times below", median((t.default.seconds for t in every), 0.9)),
-                (f"longer than {SLOW:.0f} s", ", ".join(str(t.index) for t in every if t.slow) or "none"),
+                (f"longer than {SLOW:.0f} s", slow or "none"),
             ]
         ),
         "A problem is solved when the default solve ends `optimal`, an independent judge (eigenvalues, up to 1025 "
@@ -179,9 +172,7 @@ def _failures(trials: Sequence[Trial]) -> str:
         (
             t.index,
             len(t.problem.free),
-            ", ".join(
-                n for n, given in (("scenarios", t.problem.scenarios), ("tolerances", t.problem.tolerances)) if given
-            ),
+            ", ".join(n for n in ("scenarios", "tolerances") if getattr(t.problem, n)),
             _asked(t),
             t.cause,
             f"{t.default.value:.9g}",

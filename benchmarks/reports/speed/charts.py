@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks.judges import companion
-from benchmarks.reports import Asked, duration, page, table, times
+from benchmarks.reports.tables import Asked, duration, page, table, times
 from benchmarks.suites import PLANE
 from benchmarks.timing import best
 from tmsopt.charts import gathered, survey
 from tmsopt.models import tms
 from tmsopt.records import Array
-from tmsopt.roots import quartic_is_stable
 
 STACKED = "stacked numpy.linalg.eigvals"
 
@@ -47,12 +46,7 @@ def methods(points: int) -> Iterator[Method]:
     yield Method("loop of numpy.roots", "abscissa", _LOOP, lambda: [np.roots(a).real.max() for a in ready[:_LOOP]])
     yield Method(STACKED, "abscissa", len(ready), lambda: stacked(ready))
     across = int(np.sqrt(points))
-    many = np.ascontiguousarray(grid_coefficients(points).T)
     for engine in engines():
-        yield Method(
-            f"tmsopt.roots.quartic_is_stable, {engine}", "stable or not", points,
-            partial(quartic_is_stable, *many, compiled=engine == "numba"),
-        )  # fmt: skip
         for gives, layers in _LAYERS.items():
             work = partial(charted, across, layers, engine)
             width = sum(layer.itemsize for layer in charted(2, layers, engine).values())

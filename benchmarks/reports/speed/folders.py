@@ -5,8 +5,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from benchmarks.reports import Asked, page, table
 from benchmarks.reports.speed.charts import engines
+from benchmarks.reports.tables import Asked, page, table
 from benchmarks.suites import PLANE
 from tmsopt import StoredChart, chart_to
 

@@ -1,27 +1,21 @@
-"""How the time grows with free parameters, scenarios and grid points."""
+"""How the time grows with free parameters and scenarios."""
 
-import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import islice
-from typing import Any
 
 import numpy as np
 
 from benchmarks.judges import Attempt, attempt
-from benchmarks.reports import Asked, duration, page, table, times
-from benchmarks.reports.speed.charts import grid_coefficients, stacked
-from benchmarks.suites import PLANE, band_problems, random_problem
-from benchmarks.timing import best, exponent, quantile
-from tmsopt import Problem, chart, solve
+from benchmarks.reports.tables import Asked, duration, page, table, times
+from benchmarks.suites import band_problems, random_problem
+from benchmarks.timing import exponent, quantile
+from tmsopt import Problem, solve
 
 _FREE = (2, 3, 4, 5, 6, 7)
 _EACH = 5  # random problems with each number of free parameters
 _SPEEDS = (1, 2, 4, 8, 16)
 _BOXES = 3
-_POINTS = (10**4, 10**5, 10**6, 10**7)
-_STACKED = 10**6  # designs beyond which stacked eigenvalues need not be waited for
 
 
 def timed(problems: Sequence[Problem], rounds: int) -> list[Attempt]:
@@ -58,20 +52,6 @@ def _speeds(count: int) -> tuple[float, ...]:
     return tuple(np.linspace(1.2, 2.4, count).tolist()) if count > 1 else (1.8,)
 
 
-def by_points(quick: bool) -> list[tuple[int, float, float]]:
-    """Designs of a chart, its seconds, and those of stacked eigenvalues; nan where they are not waited for."""
-    rows = []
-    for points in _POINTS[:2] if quick else _POINTS:
-        across = math.isqrt(points)
-        size = (across, points // across)
-        works: dict[str, Callable[[], Any]] = {"chart": partial(chart, PLANE, points=size, boundaries=False)}
-        if points <= _STACKED:
-            works["stacked"] = partial(stacked, grid_coefficients(points))
-        seconds = best(works, 1 if points > _STACKED else 3)
-        rows.append((size[0] * size[1], seconds["chart"], seconds.get("stacked", math.nan)))
-    return rows
-
-
 def report(asked: Asked) -> str:
     """The report in Markdown."""
     return page(
@@ -84,8 +64,6 @@ def report(asked: Asked) -> str:
         _solves("speeds", by_scenarios(asked.quick)),
         "Band designs of six free parameters, the worst abscissa over separate speeds: medians. A speed adds its own "
         "factors and equations to the problem.",
-        "### With grid points",
-        _charts(by_points(asked.quick)),
     )
 
 
@@ -107,15 +85,3 @@ def _solves(what: str, rows: Sequence[tuple[int, Sequence[Attempt]]]) -> str:
     found = table((what, "optimal", "solve", "ratio", "a start", "ratio"), lines)
     laws = f"{what}^{exponent(sizes, whole):.2f}, of a start ~ {what}^{exponent(sizes, each):.2f}"
     return f"{found}\n\nTime of a solve ~ {laws}."
-
-
-def _charts(rows: Sequence[tuple[int, float, float]]) -> str:
-    lines = [
-        (f"{n:.0e}", duration(own), duration(own / n), duration(rival), times(rival / own)) for n, own, rival in rows
-    ]
-    sizes, own, rival = zip(*rows, strict=True)
-    found = table(("designs", "chart", "a design", "stacked eigvals", "over the chart"), lines)
-    return (
-        f"{found}\n\nTime of a chart ~ designs^{exponent(sizes, own):.2f}, "
-        f"of stacked eigenvalues ~ designs^{exponent(sizes, rival):.2f}."
-    )

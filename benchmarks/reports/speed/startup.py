@@ -5,7 +5,7 @@ import sys
 from collections.abc import Mapping
 from functools import partial
 
-from benchmarks.reports import Asked, duration, page, table, times
+from benchmarks.reports.tables import Asked, duration, page, table, times
 from benchmarks.suites import PROBLEMS
 from benchmarks.timing import best
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.reports import Asked, page, table, times
+from benchmarks.reports.tables import Asked, page, table, times
 from benchmarks.suites import PROBLEMS
 from benchmarks.timing import best, ipopt_runs
 from tmsopt import Study, load, over_grid, run_study
@@ -76,16 +76,6 @@ def _rate(rows: Iterable[Any], workers: int) -> float:
     arrived = [time.perf_counter() for _ in rows]
     skip = 4 * workers
     return (len(arrived) - skip) / (arrived[-1] - arrived[skip - 1])
-
-
-def warm_and_cold(rows: int) -> tuple[float, float, float, int]:
-    """Seconds warm and cold, the largest relative difference of the optima, and rows started from a neighbour."""
-    warm = run_study(long_rows(rows, warm=True), workers=1)
-    cold = run_study(long_rows(rows), workers=1)
-    pairs = list(zip(warm.rows, cold.rows, strict=True))
-    assert all(a.status == b.status for a, b in pairs)
-    worst = max(abs(a.objective - b.objective) / abs(b.objective) for a, b in pairs)
-    return warm.seconds, cold.seconds, worst, sum(row.warm for row in warm.rows)
 
 
 def report(asked: Asked) -> str:
@@ -157,8 +147,15 @@ def _scalings(study: Study, rounds: int) -> str:
 
 
 def _warm(n: int) -> str:
-    warm, cold, worst, started = warm_and_cold(n)
-    rows = [("cold starts", f"{n / cold:.3g}", ""), ("warm starts", f"{n / warm:.3g}", f"{times(cold / warm)} times")]
+    warm, cold = (run_study(long_rows(n, warm), workers=1) for warm in (True, False))
+    pairs = list(zip(warm.rows, cold.rows, strict=True))
+    assert all(a.status == b.status for a, b in pairs)
+    worst = max(abs(a.objective - b.objective) / abs(b.objective) for a, b in pairs)
+    started = sum(row.warm for row in warm.rows)
+    rows = [
+        ("cold starts", f"{n / cold.seconds:.3g}", ""),
+        ("warm starts", f"{n / warm.seconds:.3g}", f"{times(cold.seconds / warm.seconds)} times"),
+    ]
     note = (
         f"{n} rows of {long_rows(2).title}; {started} of them started from a neighbour's optimum, and checked against "
         f"cold ends of the block. Objectives differ by {worst:.0e} at most, relative."

@@ -1,21 +1,17 @@
 """How exactly and how fast root patterns are traced, beside SciPy and a contour."""
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import TypeVar
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import root
 
-from benchmarks.reports import Asked, page, table
+from benchmarks.reports.tables import Asked, page, table
 from benchmarks.suites import EP_SET, HEIGHTS, PLANE
-from tmsopt import Problem, chart, domain, laws, models, trace
+from tmsopt import laws, trace
 from tmsopt.models import copo
 from tmsopt.records import Array
 from tmsopt.roots import discriminant, pattern
-
-T = TypeVar("T")
 
 ZETA_B, ZETA_H = HEIGHTS["zeta_B"], HEIGHTS["zeta_H"]
 
@@ -91,32 +87,6 @@ def _by_contour() -> Result:
     return Result("contour of the discriminant, 800 × 600", int(near.sum()), error, seconds)
 
 
-def others() -> list[tuple[str, int, float]]:
-    """Name, points and seconds of other sets: EP4 over chi_H, the discriminant curve, a domain, a chart."""
-    ep4 = Problem(
-        models.tms,
-        fixed={n: value for n, value in HEIGHTS.items() if n != "chi_H"},
-        free={**EP_SET.free, "Fr": (0.01, 10.0), "chi_H": (0.8, 1.2)},
-        locate="EP4",
-    )
-    off_law = replace(PLANE, fixed={**PLANE.fixed, "chi_B": np.sqrt(2) - 0.1})
-    rows = []
-    for name, found in (("EP4 over chi_H", trace(ep4)), ("EP2 beside the law", trace(off_law, "EP2"))):
-        rows.append((f"{name}, {len(found.branches)} branches", found.points, found.seconds))
-    arcs, seconds = _timed(lambda: domain(off_law))
-    count = sum(len(a.points["Fr"]) for a in (*arcs.stability, *arcs.heavy_damping))
-    rows.append(("boundaries of stability and heavy damping in a plane", count, seconds))
-    _, seconds = _timed(lambda: chart(off_law, points=(400, 300), boundaries=False))
-    rows.append(("chart of 400 × 300 designs", 120_000, seconds))
-    return rows
-
-
-def _timed(work: Callable[[], T]) -> tuple[T, float]:
-    began = time.perf_counter()
-    done = work()
-    return done, time.perf_counter() - began
-
-
 def report(asked: Asked) -> str:
     """The report in Markdown."""
     repeats = 1 if asked.quick else 5
@@ -139,8 +109,4 @@ def report(asked: Asked) -> str:
         table(("method", "points", "largest error in Fr", "µs a point", "points a second"), rows),
         f"The least of {repeats} runs each: SciPy takes {ratio:.0f} times as long a point. The error is against the "
         "closed form `epset`; points of the contour count when they lie within 0.01 of it.",
-        table(
-            ("other work", "points", "seconds, search for branches included", "points a second"),
-            [(name, points, f"{s:.2f}", f"{points / s:.0f}") for name, points, s in others()],
-        ),
     )

@@ -1,23 +1,20 @@
 """The best value that anybody reached on each random system, looked for in every way there is."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import numpy as np
 from tqdm import tqdm
 
 from benchmarks.judges import SAME, System, confirmed_system, ideals, started_at, values_of
-from benchmarks.reports import Asked, facts, origin, page, share
+from benchmarks.reports.tables import Asked, facts, origin, page, share
 from benchmarks.rivals import Followed, evolve_system
 from benchmarks.suites import COUNT, OSCILLATORS, Known, known, random_system, write
 from tmsopt import Solution, solve
 
 STARTS = 32
 """Of the long run, all of them tried, with seed 1."""
-
-_EVOLUTIONS = 1
 
 
 def claimed(system: System, solution: Solution) -> tuple[float, dict[str, float]] | None:
@@ -27,23 +24,25 @@ def claimed(system: System, solution: Solution) -> tuple[float, dict[str, float]
     return (solution.value, design) if good else None
 
 
-def looked_for(index: int, starts: int = STARTS, evolutions: int = _EVOLUTIONS) -> Known:
-    """Everything that might do well on one system, judged."""
+Found = tuple[str, float, Mapping[str, float]]
+"""Source, value and design."""
+
+
+def looked_for(index: int, starts: int = STARTS, before: Known | None = None) -> Known:
+    """Everything that might do well on one system, judged, beside what was known before."""
     system = random_system(index)
-    ends = [] if "locate" in system.goal else [evolve_system(system, seed) for seed in range(evolutions)]
+    ends = [] if "locate" in system.goal else [evolve_system(system)]
     solved = [("starts", solve(system.problem, starts=starts, seed=1, exhaustive=True, throw=False))]
     solved += [("from evolution", solve(started_at(system.problem, e.parameters), starts=1, throw=False)) for e in ends]
-    found = [(source, *good) for source, s in solved if (good := claimed(system, s)) is not None]
+    found: list[Found] = [(source, *good) for source, s in solved if (good := claimed(system, s)) is not None]
     found += [("evolution", *end) for e in ends if (end := _ended(system, e)) is not None]
-    return _best(system, found, ends)
-
-
-def _best(system: System, found: Sequence[tuple[str, float, dict[str, float]]], ends: Sequence[Followed]) -> Known:
+    if before:
+        found += [(source, value, before.parameters) for source, value in before.known.items()]
     least: dict[str, float] = {}
     for source, value, _ in found:
         least[source] = min((least.get(source, value), value), key=lambda v: system.sign * v)
-    top = min(found, key=lambda f: system.sign * f[1], default=("", math.nan, {}))
-    return Known(system.index, top[1], top[2], least, ends[0].evaluations if ends else 0)
+    _, value, design = min(found, key=lambda f: system.sign * f[1], default=("", math.nan, {}))
+    return Known(index, value, design, least, ends[0].evaluations if ends else 0)
 
 
 def _ended(system: System, end: Followed) -> tuple[float, dict[str, float]] | None:
@@ -54,16 +53,6 @@ def _ended(system: System, end: Followed) -> tuple[float, dict[str, float]] | No
     return (float(system.worth(values)), design) if float(system.violation(values)) <= 0 else None
 
 
-def better(system: System, one: Known, other: Known | None) -> Known:
-    """Two looks at a system in one."""
-    if other is None:
-        return one
-    found = [(s, v, dict(k.parameters)) for k in (one, other) for s, v in k.known.items() if np.isfinite(v)]
-    best = min((one, other), key=lambda k: system.sign * k.value if math.isfinite(k.value) else math.inf)
-    least = {s: min((v for t, v, _ in found if t == s), key=lambda v: system.sign * v) for s, _, _ in found}
-    return Known(one.index, best.value, best.parameters, least, one.evaluations)
-
-
 def report(asked: Asked) -> str:
     """What is missing in the file, or all that are asked for by their count, looked at; who reached the values."""
     with TemporaryDirectory() as folder:
@@ -71,16 +60,11 @@ def report(asked: Asked) -> str:
         rows = known(path)
         for index in tqdm(range(asked.of(COUNT, 2)), "known", unit="system"):
             if asked.count or index not in rows:
-                found = looked_for(index, 2 if asked.quick else STARTS)
-                rows[index] = better(random_system(index), found, rows.get(index))
+                rows[index] = looked_for(index, 2 if asked.quick else STARTS, rows.get(index))
                 write(path, {"origin": origin(asked.command)}, "systems", rows.values())
+    of = {k: random_system(k) for k in rows}
     reached = [
-        (
-            source,
-            share(
-                random_system(k).excess(r.known[source], r.value) <= SAME for k, r in rows.items() if source in r.known
-            ),
-        )
-        for source in ("starts", "from evolution", "evolution")
+        (s, share(of[k].excess(r.known[s], r.value) <= SAME for k, r in rows.items() if s in r.known))
+        for s in ("starts", "from evolution", "evolution")
     ]
     return page("Best values of the random systems", asked, facts(reached), f"Kept in `{OSCILLATORS}`.")

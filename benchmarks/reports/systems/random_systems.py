@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from tqdm import tqdm
 
 from benchmarks.judges import FLOOR, SAME, System
-from benchmarks.reports import Asked, duration, facts, median, page, share, table, times
 from benchmarks.reports.systems.known import claimed
+from benchmarks.reports.tables import Asked, duration, facts, median, page, share, table, times
 from benchmarks.rivals import Followed, evolve_system
 from benchmarks.suites import COUNT, SEED, Known, known, random_system
 from benchmarks.timing import exponent, quantile
@@ -182,7 +182,9 @@ def _race(evolved: Sequence[tuple[Solved, Followed]]) -> str:
         return "Nobody to race with."
     rows = []
     for within in (1e-2, 1e-3, 1e-4, 1e-6):
-        reached = [(one, e.reached(_merit(one, within))) for one, e in good]
+        reached = [
+            (one, e.reached(one.system.sign * one.value + within * max(FLOOR, abs(one.value)))) for one, e in good
+        ]
         met = [(one, t) for one, t in reached if math.isfinite(t)]
         solves, starts = quantile(t / one.seconds for one, t in met), quantile(t / one.per_start for one, t in met)
         rows.append((f"{within:.0e}", share(math.isfinite(t) for _, t in reached), times(solves), times(starts)))
@@ -195,10 +197,6 @@ def _race(evolved: Sequence[tuple[Solved, Followed]]) -> str:
     header = ("within", "reached by the evolution", "its time over a default solve", "over one start")
     ends = quantile(e.seconds / one.seconds for one, e in good)
     return f"{table(header, rows)}\n\n{note} To its own end it takes {times(ends)} times a default solve."
-
-
-def _merit(one: Solved, within: float) -> float:
-    return one.system.sign * one.value + within * max(FLOOR, abs(one.value))
 
 
 def _failures(own: Sequence[Solved], of: Mapping[int, Known]) -> str:

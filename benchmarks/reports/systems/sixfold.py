@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.reports import Asked, duration, page, share, table
+from benchmarks.reports.tables import Asked, duration, page, share, table
 from benchmarks.rivals import NONSMOOTH, SEEKERS, Poles, poles
 from benchmarks.suites import PROBLEMS
 from tmsopt import Problem, load, solve
