@@ -1,5 +1,6 @@
 """The benchmark command: what is measured, that a failure costs one section, and that nobody is credited unduly."""
 
+import ast
 import inspect
 import math
 import sys
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import tmsopt
 from benchmarks import command, timing
 from benchmarks.command import SECTIONS, Section, chosen
 from benchmarks.reports import Asked
@@ -40,6 +42,28 @@ def test_sections_have_letters_names_and_a_report() -> None:
     assert len({s.name for s in SECTIONS}) == len(SECTIONS)
     for section in SECTIONS:
         assert list(inspect.signature(section.report()).parameters) == ["asked"]
+
+
+def test_rooms_are_small_and_have_faces() -> None:
+    """As in the package: at most 12 modules, 350 lines a module, a face that says what it is for; 5,500 lines in all."""
+    room = Path(command.__file__).parent
+    lines = {path: path.read_text(encoding="utf-8").splitlines() for path in room.rglob("*.py")}
+    assert sum(map(len, lines.values())) <= 5500
+    assert max(map(len, lines.values())) <= 350
+    for folder in {path.parent for path in lines}:
+        assert len(list(folder.glob("*.py"))) <= 13  # the face is one
+        face = ast.get_docstring(ast.parse("\n".join(lines[folder / "__init__.py"]))) or ""
+        assert 2 <= len([line for line in face.splitlines() if line]) <= 5
+
+
+def test_benchmarks_open_packages_by_their_faces() -> None:
+    """Rooms of the package may be rebuilt and benchmarks stay."""
+    package = Path(tmsopt.__file__).parent
+    for path in Path(command.__file__).parent.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("tmsopt."):
+                place = package.joinpath(*str(node.module).split(".")[1:])
+                assert place.is_dir() or place.parent == package, f"{path.name} line {node.lineno}: {node.module}"
 
 
 def test_sections_are_chosen_by_letter_or_name() -> None:
