@@ -18,8 +18,7 @@ from click.testing import CliRunner
 from helpers.oracles import polynomial_floats
 from scipy.optimize import brentq  # type: ignore[import-untyped]
 
-from benchmarks.references import PATH, references
-from benchmarks.suite import random_problem
+from benchmarks.suites import REFERENCES, random_problem, references
 from tmsopt import InputError, Problem, Solution, certify, models, solve
 from tmsopt.certificates import Crew, available
 from tmsopt.cli import main
@@ -37,7 +36,7 @@ HEIGHTS = {"mu": 0.1, "chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2}
 OMEGA0 = -((0.4 * 0.2) ** -0.25)  # where chi_H = 1
 TILTED = {**HEIGHTS, "lambda_s": 0.2}
 PLANE = {"Fr": (0.5, 3.0), "chi_B": (1.01, 3.0)}
-KEPT = references(Path(__file__).parents[2] / PATH)
+KEPT = references(Path(__file__).parents[2] / REFERENCES)
 CLOSED = 1e-4  # a gap that counts as closed, relative to the objective
 SECONDS = 8.0  # five times what any of these needs
 

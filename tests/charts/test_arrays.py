@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from benchmarks.suite import TEMPLATES
+from benchmarks.suites import TEMPLATES
 from tmsopt.arithmetic import NotAccepted
 from tmsopt.charts import array_function
 from tmsopt.design import EXACT, NO_RADIUS, Problem, engine_of, machine, parse_comparison, parse_value, tape

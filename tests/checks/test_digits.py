@@ -25,7 +25,7 @@ from helpers.structures import FORMS, NATIVE, native_60, times
 from mpmath import mp
 
 import tmsopt
-from benchmarks.suite import random_problem
+from benchmarks.suites import random_problem
 from tmsopt.arithmetic import exact
 from tmsopt.checks import omega0_bound
 from tmsopt.models import tms
