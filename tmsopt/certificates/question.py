@@ -106,7 +106,7 @@ class Question:
 
 def _threshold(condition: Expression, name: str, worse: float) -> float | None:
     """The value that a comparison allows a quantity at worst, where it is linear in that and nothing else."""
-    if condition.names != (name,) or condition.comparison == "==":
+    if condition.names != (name,) or condition.equality:
         return None
     symbol = ca.SX.sym(name)
     difference = ca.SX(condition.symbolic({name: symbol}))
@@ -114,5 +114,4 @@ def _threshold(condition: Expression, name: str, worse: float) -> float | None:
         return None
     at = [float(condition({name: value})) for value in (0.0, 1.0)]
     slope = at[1] - at[0]
-    falls = -1.0 if condition.comparison == ">=" else 1.0
-    return -at[0] / slope if slope * falls * worse > 0 else None
+    return -at[0] / slope if slope * condition.sign * worse > 0 else None

@@ -98,11 +98,10 @@ def excesses(problem: Problem, parameters: Mapping[str, float], cases: Sequence[
     found = {}
     for name, condition in problem.conditions.items():
         differences = [left - right for left, right in (condition.sides(v) for v in looked.at(problem, condition))]
-        if condition.comparison == "==":
+        if condition.equality:
             found[name] = differences[0]
         else:
-            sign = -1.0 if condition.comparison == ">=" else 1.0
-            found[name] = max(0.0, *(_or_infinite(sign * d) for d in differences))
+            found[name] = max(0.0, *(_or_infinite(condition.sign * d) for d in differences))
     return found
 
 

@@ -51,7 +51,7 @@ def subjects(problem: Problem, cases: Sequence[Case]) -> dict[str, tuple[float, 
         found["objective"] = (-1.0 if problem.sense == "maximize" else 1.0, problem.objective)
     for name, condition in problem.conditions.items():
         if varies(problem, condition, cases):
-            found[f"constraint {name}"] = (-1.0 if condition.comparison == ">=" else 1.0, condition)
+            found[f"constraint {name}"] = (condition.sign, condition)
     return found
 
 

@@ -214,5 +214,5 @@ class Freedom:
 
 def freedom(problem: Problem) -> Freedom:
     """Degrees of freedom of a problem: free parameters against pattern conditions and equality constraints."""
-    equalities = sum(c.comparison == "==" for c in problem.conditions.values())
+    equalities = sum(c.equality for c in problem.conditions.values())
     return Freedom(len(problem.free), (problem.pattern.codimension if problem.pattern else 0) + equalities)

@@ -139,14 +139,13 @@ class Builder:
 
     def constraints(self, without: Collection[str] = ()) -> None:
         """A row for each constraint in each case that it differs in."""
-        ends = {"<=": (-np.inf, 0.0), ">=": (0.0, np.inf), "==": (0.0, 0.0)}
         for name, condition in self.problem.conditions.items():
             if name in without:
                 continue
             if len(condition.names) == 1 and condition.names[0] in self.taken:
                 continue
             for value in self.in_each_case(condition, self.settings.get(name + LIMIT)):
-                self.row(name, value, *ends[condition.comparison])
+                self.row(name, value, *condition.allowed)
 
     def optimise(self) -> None:
         """The objective: where it differs between cases, the worst of them."""

@@ -179,14 +179,7 @@ def _values(problem: Problem, parameters: Mapping[str, Any], shape: tuple[int, .
 
 def _excess(condition: Expression, values: Values, shape: tuple[int, ...]) -> Array:
     """By how much a comparison is violated."""
-    difference = np.broadcast_to(np.asarray(condition(values), dtype=float), shape)
-    match condition.comparison:
-        case "<=":
-            return np.asarray(np.maximum(difference, 0))
-        case ">=":
-            return np.asarray(np.maximum(-difference, 0))
-        case _:
-            return np.asarray(np.abs(difference))
+    return np.asarray(condition.excess(np.broadcast_to(np.asarray(condition(values), dtype=float), shape)))
 
 
 def _in_spreads(column: Array) -> Array:

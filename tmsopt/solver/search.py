@@ -207,7 +207,8 @@ def _uncovered(problem: Problem, trial: Trial) -> list[Case]:
             case "objective":
                 excess = abs(worst.value - known.objective)
             case _:
-                excess = abs(worst.value) if _violated(problem, name, worst.value) else 0.0
+                beyond = problem.conditions[name.removeprefix("constraint ")].excess(worst.value)
+                excess = float(beyond) if beyond > 0 else 0.0  # what does not exist is no excess
         if not excess <= FEASIBLE * (1 + abs(worst.value)) and worst.case not in more:
             more.append(worst.case)
     return more
@@ -227,11 +228,6 @@ def _nearer(problem: Problem, nlp: NLP, trial: Trial) -> list[Case]:
     if any(all(abs(step[n] - k.get(n, 0.0)) < _NEARER for n in step) for k in known):  # stable again further out
         step = {n: u * around.radius / claimed * (1 + _NEARER) for n, u in step.items()}
     return [Case(direction=Table(step))]
-
-
-def _violated(problem: Problem, name: str, difference: float) -> bool:
-    condition = problem.conditions[name.removeprefix("constraint ")]
-    return difference > 0 if condition.comparison == "<=" else difference < 0
 
 
 def _leaders(problem: Problem, candidates: Sequence[Candidate]) -> list[dict[str, float]]:

@@ -131,7 +131,7 @@ def monte_carlo(
 def _as_built(design: Solution) -> tuple[Problem, tuple[str, ...]]:
     """The design's problem with everything fixed and nothing asked that no product can meet; what was left out."""
     problem = design.problem
-    equal = [name for name, condition in problem.conditions.items() if condition.comparison == "=="]
+    equal = [name for name, condition in problem.conditions.items() if condition.equality]
     left_out = equal + ([f"the pattern {problem.locate}"] if problem.locate else [])
     notes = (f"left out, for no drawn design meets it exactly: {', '.join(left_out)}",) if left_out else ()
     fixed = replace(
