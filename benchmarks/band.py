@@ -19,12 +19,12 @@ from benchmarks.judge import eigenvalues
 from tmsopt.design.cases import Band
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
-from tmsopt.formulation.formulate import formulate
+from tmsopt.formulation.options import Options
 from tmsopt.models import tms
 from tmsopt.models.tms import copo
-from tmsopt.solver.box import sides
 from tmsopt.solver.multistart import search
 from tmsopt.solver.solve import solve
+from tmsopt.solver.workspace import workspace
 
 SPEEDS = Band(1.2, 2.4, 7)
 """Froude numbers that each bicycle must do at; 12 to 24 km/h at a wheelbase of 0.77 m."""
@@ -158,13 +158,12 @@ def own_proof(solution: Solution) -> str:
 
 def _single(problem: Problem) -> Iterable[float]:
     """Seconds of each start."""
-    for side in sides(problem):
-        nlp = side.narrowed(formulate(problem, problem.cases))
-        times = [time.perf_counter()]
-        search(
-            side.problem, nlp, starts=STARTS, seed=0, exhaustive=True, linear_solver="mumps",
-            progress=lambda done, most, times=times: times.append(time.perf_counter()),  # type: ignore[misc]
-        )  # fmt: skip
+    times: list[float] = []
+    options = Options(STARTS, progress=lambda done, most: times.append(time.perf_counter()), exhaustive=True)
+    for part in workspace(problem, options).parts():
+        nlp = part.formulate(problem.cases)
+        times[:] = [time.perf_counter()]
+        search(part, nlp)
         yield from np.diff(times).tolist()
 
 

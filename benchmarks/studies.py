@@ -57,7 +57,7 @@ def _recorded(calls: list[Callable[[], Any]]) -> Iterator[None]:
     original = families.ipopt  # type: ignore[attr-defined]
 
     def recording(*arguments: Any, **options: Any) -> Callable[..., Run]:
-        solver = original(*arguments, **options)
+        solver: Callable[..., Run] = original(*arguments, **options)
 
         def run(*start: Any) -> Run:
             calls.append(lambda: solver(*start))

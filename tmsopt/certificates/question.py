@@ -85,7 +85,7 @@ class Question:
         build.constraints()
         if self.limit is not None:
             build.optimise()
-            sense = -1.0 if problem.sense == "maximize" else 1.0
+            sense = problem.sign
             build.row("limit", build.objective, -np.inf, sense * self.limit)
         build.objective = ca.SX(0)
         return build.finish("bound")

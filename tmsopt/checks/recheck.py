@@ -164,7 +164,7 @@ def _objective(problem: Problem, nominal: Values, each: Sequence[Values], cases:
         return math.nan
     if not varies(problem, problem.objective, cases):
         return float(problem.objective(nominal))
-    sign = -1.0 if problem.sense == "maximize" else 1.0
+    sign = problem.sign
     return sign * max((sign * float(problem.objective(values)) for values in each), key=_or_infinite)
 
 

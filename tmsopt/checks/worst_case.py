@@ -48,7 +48,7 @@ def subjects(problem: Problem, cases: Sequence[Case]) -> dict[str, tuple[float, 
     if any("damping_ratio" in e.names for e in asked):
         found["damping_ratio"] = (-1.0, "damping_ratio")
     if problem.objective and varies(problem, problem.objective, cases):
-        found["objective"] = (-1.0 if problem.sense == "maximize" else 1.0, problem.objective)
+        found["objective"] = (problem.sign, problem.objective)
     for name, condition in problem.conditions.items():
         if varies(problem, condition, cases):
             found[f"constraint {name}"] = (condition.sign, condition)

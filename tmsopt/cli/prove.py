@@ -77,7 +77,7 @@ def _named(exact: tuple[str, ...]) -> dict[str, str]:
 
 
 def _solved(problem: "Problem", starts: int | None, seed: int) -> "Solution":
-    from tmsopt.solver.multistart import STARTS
+    from tmsopt.formulation.options import STARTS
     from tmsopt.solver.solve import solve
 
     with progress() as update:

@@ -169,7 +169,7 @@ def solve(
     if every:
         _solve_all(problem, as_json=as_json, starts=starts, seed=seed, linear_solver=linear_solver)
     from tmsopt.design.solution import NotSolved
-    from tmsopt.solver.multistart import STARTS
+    from tmsopt.formulation.options import STARTS
     from tmsopt.solver.solve import solve as solve_problem
 
     if problem.pareto:
@@ -229,9 +229,9 @@ def compare(file: Path, as_json: bool, starts: int | None, seed: int, linear_sol
         problem = nominal_of(load(file))
         if problem.pareto:
             raise InputError(unasked(problem))
+    from tmsopt.formulation.options import STARTS
     from tmsopt.paper.compare import compare as compare_design
     from tmsopt.report.comparison import comparison_table
-    from tmsopt.solver.multistart import STARTS
 
     with progress() as update:
         comparison = compare_design(

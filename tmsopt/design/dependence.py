@@ -41,8 +41,7 @@ def overclaims(problem: Problem) -> bool:
 
 def tempts(problem: Problem, name: str, worse: float = 1.0) -> bool:
     """Whether objective or constraints get better, at some design, as a quantity moves up (or down: `worse` −1)."""
-    sense = -1.0 if problem.sense == "maximize" else 1.0
-    asked = [(sense, problem.objective)]
+    asked = [(problem.sign, problem.objective)]
     for condition in problem.conditions.values():
         asked.append((condition.sign, condition))
     return any(e is not None and _falls(problem, sign, e, name, worse) for sign, e in asked)

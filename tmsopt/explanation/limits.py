@@ -172,8 +172,7 @@ def _signed(step: Step, sign: float) -> str:
 def _better_side(solution: Solution, name: str) -> float:
     """The direction in which moving the right-hand side of an equality improves the objective."""
     change = solution.active[name]
-    better = change if solution.problem.sense == "maximize" else -change
-    return math.copysign(1.0, better)
+    return math.copysign(1.0, -solution.problem.sign * change)
 
 
 def _size(solution: Solution, text: str) -> float:
@@ -205,11 +204,10 @@ def _resolved(solution: Solution, lever: Lever) -> Lever:
         asked = replace(moved(problem, lever.name, lever.step), start=start)
     except InputError:
         return replace(lever, reason="the moved problem cannot be written down")
-    sign = 1.0 if problem.sense == "maximize" else -1.0
     gain, found = math.nan, None
     for starts in (1, _RETRY):
         again = solve(asked, starts=starts, throw=False)
-        better = sign * (again.value - solution.value)
+        better = -problem.sign * (again.value - solution.value)
         if again.status == "optimal" and not better <= gain:
             gain, found = better, again
         if found and gain >= -_NOISE * (1 + abs(solution.value)):

@@ -152,7 +152,7 @@ class Builder:
         expression = self.problem.objective
         if expression is None:
             return
-        sign = -1 if self.problem.sense == "maximize" else 1
+        sign = self.problem.sign
         values = [sign * value for value in self.in_each_case(expression)]
         self.objective = values[0]
         if len(values) > 1:
@@ -244,7 +244,7 @@ _LIFTED: Mapping[str, Lifting] = {"abscissa": lift_abscissa, "damping_ratio": li
 
 
 def _worst_guess(
-    sign: int, expression: Expression, covered: Sequence[int], values: Sequence[Values], z: Sequence[Any]
+    sign: float, expression: Expression, covered: Sequence[int], values: Sequence[Values], z: Sequence[Any]
 ) -> list[list[float]]:
     found = [sign * float(expression(values[k])) for k in covered]
     return [[max((v for v in found if np.isfinite(v)), default=0.0)]]

@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.formulation.nlp import NLP
+from tmsopt.formulation.options import DEFAULTS, Options
 from tmsopt.records import Array
 
 LINEAR_SOLVERS = ("mumps", "spral")
@@ -50,7 +51,7 @@ class Run:
     iterations: int
 
 
-def ipopt(nlp: NLP, linear_solver: str = "mumps", max_iterations: int = 150, start: str = "far") -> Callable[..., Run]:
+def ipopt(nlp: NLP, options: Options = DEFAULTS, start: str = "far", max_iterations: int = 150) -> Callable[..., Run]:
     """A solver of one NLP: start, and other limits if wanted → run.
 
     `start` says what to expect of starts: ``far`` from a solution, ``exact`` in the equations, or ``near`` a solution.
@@ -60,14 +61,14 @@ def ipopt(nlp: NLP, linear_solver: str = "mumps", max_iterations: int = 150, sta
     Raises:
         ValueError: for a linear solver other than mumps and spral.
     """
-    if linear_solver not in LINEAR_SOLVERS:
-        raise ValueError(f"linear solver {linear_solver!r}; accepted: {' '.join(LINEAR_SOLVERS)}")
-    options: dict[str, Any] = {
+    if options.linear_solver not in LINEAR_SOLVERS:
+        raise ValueError(f"linear solver {options.linear_solver!r}; accepted: {' '.join(LINEAR_SOLVERS)}")
+    settings: dict[str, Any] = {
         "print_time": False,
         "show_eval_warnings": False,
         "ipopt.print_level": 0,
         "ipopt.sb": "yes",
-        "ipopt.linear_solver": linear_solver,
+        "ipopt.linear_solver": options.linear_solver,
         "ipopt.tol": 1e-12,
         "ipopt.bound_relax_factor": 0.0,
         "ipopt.max_iter": max_iterations,
@@ -77,7 +78,7 @@ def ipopt(nlp: NLP, linear_solver: str = "mumps", max_iterations: int = 150, sta
     unit = np.array([*nlp.units, *[1.0] * (len(nlp.variables) - len(nlp.units))])
     x, p = ca.SX.sym("x", len(nlp.variables)), ca.SX.sym("p", len(nlp.settings))
     f, g = nlp.at(x if np.all(unit == 1) else x * unit, p)
-    solver = ca.nlpsol("solver", "ipopt", {"x": x, "p": p, "f": f, "g": g}, options)
+    solver = ca.nlpsol("solver", "ipopt", {"x": x, "p": p, "f": f, "g": g}, settings)
 
     def run(x0: Array, limits: NLP = nlp) -> Run:
         lower, upper = np.array(limits.lower), np.array(limits.upper)

@@ -164,8 +164,7 @@ def _judged(problem: Problem, columns: Mapping[str, Array]) -> tuple[Array | Non
                 values.define(name, found)
     objective = None
     if problem.objective is not None:
-        sign = -1.0 if problem.sense == "maximize" else 1.0
-        every = [sign * np.broadcast_to(problem.objective(values), shape) for values in each]
+        every = [problem.sign * np.broadcast_to(problem.objective(values), shape) for values in each]
         objective = reduce(np.maximum, every)
     conditions = problem.conditions.values()
     excesses = [reduce(np.maximum, [_excess(c, values, shape) for values in each]) for c in conditions]

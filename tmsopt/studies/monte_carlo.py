@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from tmsopt.design.problem import Problem, checked, unasked
 from tmsopt.design.solution import NotSolved, Solution
 from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.formulation.options import STARTS
 from tmsopt.records import Column, Table
-from tmsopt.solver.multistart import STARTS
 from tmsopt.solver.solve import solve
 from tmsopt.studies.study import Study
 from tmsopt.studies.validate import MOST_ROWS, common_faults, count_faults
