@@ -20,7 +20,7 @@ from tmsopt.certificates.question import Question
 from tmsopt.certificates.translation import FEASIBILITY, Translated, translate
 from tmsopt.checks.bound import omega0_bound
 from tmsopt.design.problem import Problem
-from tmsopt.formulation.builder import Builder
+from tmsopt.formulation.formulate import Builder
 from tmsopt.models import Model
 from tmsopt.roots import product, shift
 

@@ -19,7 +19,7 @@ from tmsopt.design.problem import Problem, checked, unasked
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.design.solution import Bound, Solution
 from tmsopt.errors import Fault, InputError
-from tmsopt.formulation.builder import Builder
+from tmsopt.formulation.formulate import Builder
 from tmsopt.solver.solve import solve
 
 SECONDS = 60.0

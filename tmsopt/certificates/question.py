@@ -17,7 +17,7 @@ from tmsopt.design.dependence import tempts
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ROOT_NAMES
-from tmsopt.formulation.builder import Builder, Lifting
+from tmsopt.formulation.formulate import Builder, Lifting
 from tmsopt.formulation.nlp import NLP
 
 _DEEP = 99  # levels to which expressions are compared
@@ -81,7 +81,7 @@ class Question:
             value = self._known(name)
             if value is not None and name not in build.shared:
                 build.take(name, value)
-                build.lifts.append(lift(build, build.covered, build.values, value).lift)
+                build.lifts.append(lift(build, value).lift)
         build.constraints()
         if self.limit is not None:
             build.optimise()

@@ -9,6 +9,7 @@ import threading
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -233,6 +234,7 @@ _ONE_AT_A_TIME = threading.Lock()
 """Neither ast.parse (python/cpython#106905) nor warnings.catch_warnings may run in two threads at once."""
 
 
+@lru_cache(maxsize=4096)
 def _parse(text: str) -> ast.expr:
     if len(text) > _LONGEST:
         raise ExpressionError(f"expression of {len(text)} characters; accepted: up to {_LONGEST}")

@@ -5,9 +5,8 @@ by Newton. Open `formulate` first: the three forms; `builder` puts them together
 """
 
 from tmsopt.formulation.formulate import abscissa, formulate, matching
-from tmsopt.formulation.nlp import NLP, Factor
+from tmsopt.formulation.nlp import NLP, Factor, Scale, objective_size, scale_of
 from tmsopt.formulation.options import DEFAULTS, STARTS, Asked, AskedOfSolve, Options, options_of
-from tmsopt.formulation.scale import Scale, objective_size, scale_of
 from tmsopt.formulation.starts import complete, designs, opposite, worth
 
 __all__ = [

@@ -11,8 +11,8 @@ from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Branch, Relaxation, Starts
 from tmsopt.formulation.formulate import design_of
+from tmsopt.formulation.ipopt import Point
 from tmsopt.formulation.nlp import NLP
-from tmsopt.formulation.polish import Point
 from tmsopt.solver.multistart import Candidate, claim, same
 from tmsopt.solver.newton import other_branches
 from tmsopt.solver.workspace import Workspace

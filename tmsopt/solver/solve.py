@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Unpack
 
 from tmsopt.checks.bound import instant_bound
-from tmsopt.checks.coverage import cover
 from tmsopt.checks.digits import certified
 from tmsopt.checks.recheck import Checked
+from tmsopt.checks.worst_case import cover
 from tmsopt.design.problem import Problem, freedom, unasked
 from tmsopt.design.solution import Bound, NotSolved, Solution, Starts
 from tmsopt.errors import InputError

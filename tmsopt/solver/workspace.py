@@ -14,13 +14,10 @@ from tmsopt.design.cases import Case
 from tmsopt.design.dependence import demands_heavy_damping, overclaims, tempts
 from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Freedom, Problem, freedom
-from tmsopt.formulation.builder import LIMIT
-from tmsopt.formulation.formulate import design_of, formulate, middle
-from tmsopt.formulation.ipopt import Run, ipopt
-from tmsopt.formulation.nlp import NLP
+from tmsopt.formulation.formulate import LIMIT, design_of, formulate, middle
+from tmsopt.formulation.ipopt import Point, Run, ipopt, polisher
+from tmsopt.formulation.nlp import NLP, objective_unit, scale_of, units_of
 from tmsopt.formulation.options import DEFAULTS, Options
-from tmsopt.formulation.polish import Point, polisher
-from tmsopt.formulation.scale import objective_unit, scale_of, units_of
 from tmsopt.margins.nearest import Robustness, robustness
 from tmsopt.models import Quantity, Values
 from tmsopt.records import Array
