@@ -9,7 +9,7 @@ import pytest
 
 import tmsopt
 from tmsopt import laws
-from tmsopt.solver import sides
+from tmsopt.solver import workspace
 
 TMS = tmsopt.models.tms
 FIXED = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}
@@ -89,7 +89,7 @@ def test_maximising_takes_the_greater_side(sign, winner):
 @pytest.mark.parametrize("tilt", [0.3, -0.3])
 def test_a_start_is_used_on_its_own_side_alone(tilt):
     stated = problem(minimize="abscissa", start={"lambda_s": tilt, "Fr": 2.0})
-    parts = {part.name: part.problem for part in sides(stated)}
+    parts = {part.name: part.part for part in workspace(stated).parts()}
     own, other = (FORWARD, BACKWARD) if tilt > 0 else (BACKWARD, FORWARD)
     assert parts[own].start == {"lambda_s": tilt, "Fr": 2.0}
     assert "lambda_s" not in parts[other].start
@@ -107,7 +107,7 @@ def test_a_start_on_the_losing_side_does_not_decide():
 @pytest.mark.parametrize("tilt", [(0.0, 1.2), (0.05, 1.2), (-1.2, 0.0), (-1.2, -0.05)])
 def test_one_sign_has_no_sides(tilt):
     stated = problem(free={**BOX, "lambda_s": tilt}, minimize="Fr - lambda_s**2")
-    assert [part.name for part in sides(stated)] == [""]
+    assert [part.name for part in workspace(stated).parts()] == [""]
     design = tmsopt.solve(stated)
     assert design.sides == {}
     assert "sides" not in design.to_json()
@@ -117,7 +117,8 @@ def test_one_sign_has_no_sides(tilt):
 
 def test_a_fixed_tilt_has_no_sides():
     free = {n: ends for n, ends in BOX.items() if n != "lambda_s"}
-    assert [part.name for part in sides(problem({**FIXED, "lambda_s": 0.4}, free, minimize="abscissa"))] == [""]
+    stated = problem({**FIXED, "lambda_s": 0.4}, free, minimize="abscissa")
+    assert [part.name for part in workspace(stated).parts()] == [""]
 
 
 def test_matching_on_both_sides():

@@ -20,7 +20,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.design.solution import Bound, Solution
 from tmsopt.errors import Fault, InputError
-from tmsopt.formulation.builder import Builder
+from tmsopt.formulation.formulate import Builder
 from tmsopt.solver.solve import solve, solved
 
 SECONDS = 60.0
@@ -157,21 +157,21 @@ def _over_the_box(design: Solution) -> Bound:
     build = Builder(problem, _cases(design))
     build.optimise()
     lower, upper = over(build, [build.objective])[0]  # of the negative, where it is maximised
-    sense = _sense(problem)
+    sense = problem.sign
     gap = max(sense * design.value - lower, 0.0)
     return Bound(sense * lower, gap, gap == 0, "interval") if math.isfinite(lower) and upper >= lower else Bound()
 
 
 def _question(design: Solution, level: float) -> Question:
     """Whether any design is better by a gap of some level."""
-    limit = design.value - _sense(design.problem) * _gap(design.value, level)
+    limit = design.value - design.problem.sign * _gap(design.value, level)
     return Question(design.problem, _cases(design), limit, _unit(design))
 
 
 def _bound(design: Solution, level: float, clock: Clock) -> Bound:
     """What has been proved."""
     gap = _gap(design.value, level) if math.isfinite(level) else math.inf
-    value = design.value - _sense(design.problem) * gap if math.isfinite(gap) else -_sense(design.problem) * math.inf
+    value = design.value - design.problem.sign * gap if math.isfinite(gap) else -design.problem.sign * math.inf
     return Bound(value, gap, level <= PROVEN, "scip", clock.used, clock.nodes, FEASIBILITY)
 
 
@@ -215,11 +215,7 @@ def _gain(problem: Problem, known: float | None, value: float) -> float:
         return math.inf
     if not math.isfinite(value):
         return -math.inf
-    return _sense(problem) * (known - value) / max(_FLOOR, abs(known))
-
-
-def _sense(problem: Problem) -> float:
-    return -1.0 if problem.sense == "maximize" else 1.0
+    return problem.sign * (known - value) / max(_FLOOR, abs(known))
 
 
 def _gap(value: float, level: float) -> float:

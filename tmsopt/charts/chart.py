@@ -63,7 +63,7 @@ class Chart:
     @property
     def left_aside(self) -> tuple[str, ...]:
         """Names of the equality constraints: they hold on curves, which `trace` follows, and nowhere on a grid."""
-        return tuple(n for n, c in self.problem.conditions.items() if c.comparison == "==")
+        return tuple(n for n, c in self.problem.conditions.items() if c.equality)
 
     def to_json(self) -> dict[str, Any]:
         """Summary, boundaries and corners; the arrays themselves go to a file."""

@@ -232,7 +232,7 @@ def _about(work: Survey, tile: int) -> dict[str, Any]:
             "model": problem.model.name,
             **({} if problem.model.statement is None else {"statement": dict(problem.model.statement)}),
             "fixed": dict(problem.fixed),
-            "constraints": {n: t for n, t in problem.constraints.items() if problem.conditions[n].comparison != "=="},
+            "constraints": {n: t for n, t in problem.constraints.items() if not problem.conditions[n].equality},
         },
         "axes": {
             n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v), "unit": of[n].unit}

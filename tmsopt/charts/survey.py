@@ -184,9 +184,8 @@ class Survey:
         """Least difference by which the inequalities hold; nan where one does not exist."""
         least: Any = np.inf
         for name, condition in self.problem.conditions.items():
-            if condition.comparison != "==":
-                sign = -1.0 if condition.comparison == "<=" else 1.0
-                least = np.minimum(least, sign * values[_CONDITION + name])
+            if not condition.equality:
+                least = np.minimum(least, -condition.sign * values[_CONDITION + name])
         return least
 
 
@@ -245,7 +244,7 @@ def _over(
         message = f"uses {RADIUS}, which takes a search for every design; a chart has what is computed at once"
         raise InputError([Fault(message, ("quantities", n)) for n in searched])
     if {"satisfied", "margin"} & set(layers):
-        wanted |= {_CONDITION + n: c for n, c in problem.conditions.items() if c.comparison != "=="}
+        wanted |= {_CONDITION + n: c for n, c in problem.conditions.items() if not c.equality}
     of_roots = {n: e for n, e in wanted.items() if set(ROOT_NAMES) & set(e.names)}
     others = {n: e for n, e in wanted.items() if n not in of_roots}
     others |= parsed(problem, {n: n for n in problem.model.coefficient_names()})

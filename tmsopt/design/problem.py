@@ -116,6 +116,11 @@ class Problem:
             return "pareto"
         return "locate" if self.locate else "evaluate"
 
+    @property
+    def sign(self) -> float:
+        """1, or −1 where the objective is maximised: times this, the less of it the better."""
+        return 1.0 if self.maximize is None else -1.0
+
     @cached_property
     def objective(self) -> Expression | None:
         """The expression to optimise, if there is one."""
@@ -202,5 +207,5 @@ class Freedom:
 
 def freedom(problem: Problem) -> Freedom:
     """Degrees of freedom of a problem: free parameters against pattern conditions and equality constraints."""
-    equalities = sum(c.comparison == "==" for c in problem.conditions.values())
+    equalities = sum(c.equality for c in problem.conditions.values())
     return Freedom(len(problem.free), (problem.pattern.codimension if problem.pattern else 0) + equalities)

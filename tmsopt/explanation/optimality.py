@@ -272,7 +272,7 @@ def _limits(solution: Solution, around: Program, found: Conditions) -> Mapping[s
     """Gain of the objective per unit that a limit is relaxed; of an equality, change per unit added on the right."""
     problem = around.problem
     limits: dict[str, float] = {}
-    sign = -1.0 if problem.sense == "maximize" else 1.0
+    sign = problem.sign
     for h, y, firm in zip(around.held, found.multipliers, found.firm, strict=True):
         if h.name in problem.constraints:
             limits[h.name] = float(y if h.signed else sign * y)

@@ -150,7 +150,7 @@ class _Search:
             self.probes.append(_Probe(s.axis, eps, known))
 
     def probe(self, axis: int, eps: float, near: Sequence[Solution], few: bool = False) -> FrontPoint | None:
-        ask = replace(self.ask, seed=self.ask.seed + len(self.probes))
+        ask = self.ask.later(len(self.probes))
         solution = least(ask, 1 - axis, {axis: eps}, near, few)
         found = None if solution is None else point(ask, solution)
         if found is not None or not few:

@@ -1,19 +1,16 @@
 """A numeric optimum beside the closed-form laws, law by law, and beside the other formulation."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Unpack
 
 from tmsopt.checks.law_rows import LawRow, law_rows
 from tmsopt.design.files import Given, question_of
-from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
+from tmsopt.formulation.options import Asked, Options, options_of
 from tmsopt.models import tms
-from tmsopt.records import Progress
 from tmsopt.roots import PATTERNS
-from tmsopt.solver.multistart import STARTS
-from tmsopt.solver.solve import solve
+from tmsopt.solver.solve import solved
 
 
 @dataclass(frozen=True)
@@ -72,34 +69,24 @@ class Comparison:
         }
 
 
-def compare(
-    design: Given,
-    *,
-    starts: int = STARTS,
-    seed: int = 0,
-    linear_solver: str = "mumps",
-    progress: Progress | None = None,
-) -> Comparison:
+def compare(design: Given, **options: Unpack[Asked]) -> Comparison:
     """Set a design beside the laws of the paper, which are of skates alone, and solve it by the other formulation.
 
     The laws are of one design at one speed: scenarios and tolerances are left aside, and the problem is solved again.
 
     Args:
         design: a solution; or a problem or its file, solved first.
-        starts, seed, linear_solver, progress: as for `solve`, for the solves that this takes.
+        options: for the solves that this takes; see `solve`.
     """
-
-    def solved(problem: Problem) -> Solution:
-        return solve(problem, starts=starts, seed=seed, linear_solver=linear_solver, throw=False, progress=progress)
-
+    how = options_of(options)
     problem = question_of(design)
     one = isinstance(design, Solution) and not (problem.scenarios or problem.tolerances)
-    found = design if isinstance(design, Solution) and one else solved(problem.nominal)
-    other, reason = _other_formulation(found, solved)
+    found = solved(design if one else problem.nominal, how)
+    other, reason = _other_formulation(found, how)
     return Comparison(found, tuple(law_rows(found)) if found.problem.model is tms else (), other, reason)
 
 
-def _other_formulation(design: Solution, solved: Callable[[Problem], Solution]) -> tuple[Solution | None, str]:
+def _other_formulation(design: Solution, options: Options) -> tuple[Solution | None, str]:
     problem = design.problem
     if design.status != "optimal":
         return None, f"the design is {design.status}"
@@ -114,7 +101,7 @@ def _other_formulation(design: Solution, solved: Callable[[Problem], Solution]) 
         restated = replace(problem, locate=design.structure, start={})
         if square:  # there may be several such designs: the one near this
             restated = replace(restated, minimize=None, maximize=None, start=_near(design))
-    other = solved(restated)
+    other = solved(restated, options)
     if other.status != "optimal":
         return None, f"the {other.formulation} formulation ended {other.status}"
     return other, ""

@@ -52,8 +52,7 @@ def exactly(problem: Problem, pattern: Pattern, design: Written) -> Existing | N
     a = exact_coefficients(problem, design)
     if a is None or not rational.has(pattern.name, a):
         return None
-    equalities = [c for c in problem.conditions.values() if c.comparison == "=="]
-    if equalities:
+    if any(c.equality for c in problem.conditions.values()):
         return None
     balls = design.balls()
     tangents = {n: balls[n].tan() for n in balls if problem.parameter_set[n].tangent}

@@ -6,6 +6,7 @@ from typing import Any
 from tmsopt.design.files import Given
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError
+from tmsopt.formulation.options import AskedOfSolve, options_of
 from tmsopt.proofs.proof import DIGITS, Proof, prove_design
 from tmsopt.solver.solve import solved
 
@@ -31,7 +32,7 @@ def prove(design: Given, digits: int = DIGITS, *, exact: Mapping[str, Any] | Non
     if isinstance(design, Solution) and options:
         message = f"found {', '.join(options)}; options are for solving, and this is solved: give the problem instead"
         raise InputError([Fault(message, ("options",))])
-    found = solved(design, **options)
+    found = solved(design, options_of(options, AskedOfSolve))
     problem = found.problem
     if found.status != "optimal":
         reason = f"the problem is not solved ({found.status}): there is no design to prove"

@@ -82,7 +82,7 @@ def equations(problem: Problem, pattern: Pattern, parameters: Mapping[str, float
     Raises:
         Refused: for an equality that cannot be evaluated in balls.
     """
-    equalities = tuple(c for c in problem.conditions.values() if c.comparison == "==")
+    equalities = tuple(c for c in problem.conditions.values() if c.equality)
     beyond = [n for n in (RADIUS, "damping_ratio") if any(n in c.names for c in equalities)]
     if beyond:
         raise Refused(f"an == constraint uses {beyond[0]}, which has no equation in balls; drop it to prove the rest")

@@ -13,7 +13,7 @@ from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.toml import Key, Number, Page, Section, fitted, read_page, within
 from tmsopt.design.units import with_unit
 from tmsopt.errors import Fault, InputError, short, suggest
-from tmsopt.solver.multistart import STARTS
+from tmsopt.formulation.options import STARTS
 from tmsopt.studies.monte_carlo import DISTRIBUTIONS, Sampling
 from tmsopt.studies.study import Study
 from tmsopt.studies.validate import METHODS, MOST_ROWS, common_faults, count_faults, name_fault

@@ -12,8 +12,8 @@ from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.solution import NotSolved, Solution
 from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.formulation.options import STARTS
 from tmsopt.records import Column, Table
-from tmsopt.solver.multistart import STARTS
 from tmsopt.solver.solve import solve, solved
 from tmsopt.studies.study import Study
 from tmsopt.studies.validate import MOST_ROWS, common_faults, count_faults
@@ -135,7 +135,7 @@ def monte_carlo(
 def _as_built(design: Solution) -> tuple[Problem, tuple[str, ...]]:
     """The design's problem with everything fixed and nothing asked that no product can meet; what was left out."""
     problem = design.problem
-    equal = [name for name, condition in problem.conditions.items() if condition.comparison == "=="]
+    equal = [name for name, condition in problem.conditions.items() if condition.equality]
     left_out = equal + ([f"the pattern {problem.locate}"] if problem.locate else [])
     notes = (f"left out, for no drawn design meets it exactly: {', '.join(left_out)}",) if left_out else ()
     fixed = replace(

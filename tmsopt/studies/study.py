@@ -11,8 +11,8 @@ from tmsopt.design.files import Given, problem_of
 from tmsopt.design.limit import with_limit
 from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
+from tmsopt.formulation.options import STARTS
 from tmsopt.records import Column, Table
-from tmsopt.solver.multistart import STARTS
 from tmsopt.studies.samples import grid
 from tmsopt.studies.validate import faults
 

@@ -128,7 +128,7 @@ def summary(study: Study, rows: Iterable[Row]) -> Summary:
     known = list(rows)
     optimal = [row for row in known if row.status == "optimal"]
     counts = Counter(row.status for row in known)
-    sign = -1.0 if study.problem.sense == "maximize" else 1.0
+    sign = study.problem.sign
     ranked = [row for row in optimal if math.isfinite(row.objective)]
     laws: dict[str, float] = {}
     for row in known:

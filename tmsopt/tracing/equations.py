@@ -64,7 +64,7 @@ class Traced:
 def prepare(problem: Problem) -> Traced:
     """The equations of a pattern problem, compiled for tracing."""
     pattern = pattern_of(str(problem.locate), problem.model.degree)
-    equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].comparison == "=="}
+    equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].equality}
     nlp = matching(replace(problem, constraints=equalities))
     free = len(problem.free)
     unknowns = slice(free, free + len(pattern.unknowns))
