@@ -208,7 +208,7 @@ def _solve_all(problem: "Problem", as_json: bool, starts: int | None, **options:
     with bad_input(), progress() as update:
         found = solve_all(problem, starts=starts or MOST, progress=update, **options)
     if as_json:
-        write_json({"schema": 1, "title": problem.title, "model": problem.model.name, **found.to_json()})
+        write_json(problem.heading | found.to_json())
     else:
         from tmsopt.report.design import every_table
 

@@ -14,7 +14,7 @@ from tmsopt.design.problem import Problem, checked
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import ParameterSet
-from tmsopt.records import Table
+from tmsopt.records import Table, plain
 
 _DIGITS = 120  # of what is no fraction, such as the tangent of an angle
 _STRAIGHT = 1e-100  # relative; a number that is linear in the speed is so within the digits carried
@@ -69,30 +69,23 @@ class Speeds:
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; an end at infinity is null."""
         return {
-            "schema": 1,
-            "title": self.problem.title,
-            "model": self.problem.model.name,
+            **self.problem.heading,
             "parameter": self.parameter,
             "unit": self.problem.parameter_set[self.parameter].unit,
-            "range": [_finite(self.lower), _finite(self.upper)],
+            "range": list(plain(self, "lower upper").values()),
             "found": [
                 {
                     self.parameter: c.at,
                     "kind": c.kind,
-                    "re": _finite(c.root.re),
-                    "im": _finite(c.root.im),
-                    "multiplicity": c.root.multiplicity,
+                    **plain(c.root),
                     "rightmost": c.rightmost,
                     "stability_changes": c.changes,
                 }
                 for c in self.found
             ],
-            "stable": [[_finite(e) for e in band] for band in self.stable],
-            "heavily_damped": [[_finite(e) for e in band] for band in self.heavily_damped],
-            "marginally_stable": [[_finite(e) for e in band] for band in self.marginal],
-            "always": list(self.always),
-            "zeros": self.zeros,
-            "parameters": dict(self.parameters),
+            **plain(self, "stable heavily_damped"),
+            "marginally_stable": plain(self, "marginal")["marginal"],
+            **plain(self, "always zeros parameters"),
         }
 
 
@@ -192,7 +185,3 @@ def _linear(problem: Problem, own: Mapping[str, float], name: str) -> dict[str, 
 
 def _exact(own: Mapping[str, float], of: ParameterSet, name: str, value: int) -> dict[str, Any]:
     return {n: flint.fmpq(value) if n == name else exact(float(own[n])) for n in of.names}
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

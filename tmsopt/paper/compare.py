@@ -1,6 +1,5 @@
 """A numeric optimum beside the closed-form laws, law by law, and beside the other formulation."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,7 +8,7 @@ from tmsopt.checks.law_rows import LawRow, law_rows
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.models import tms
-from tmsopt.records import Progress
+from tmsopt.records import SCHEMA, Progress, plain
 from tmsopt.roots import PATTERNS
 from tmsopt.solver.multistart import STARTS
 from tmsopt.solver.solve import solve
@@ -41,34 +40,8 @@ class Comparison:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
-
-        def number(x: float) -> float | None:
-            return float(x) if math.isfinite(x) else None
-
-        return {
-            "schema": 1,
-            "design": self.design.to_json(),
-            "laws": [
-                {
-                    "label": row.label,
-                    "subject": row.subject,
-                    "numeric": number(row.numeric),
-                    "law": number(row.law),
-                    "residual": number(row.residual) if row.applies else None,
-                    "relative": number(row.relative) if row.applies else None,
-                    "applies": row.applies,
-                    "agrees": row.agrees,
-                    "reason": row.reason,
-                }
-                for row in self.laws
-            ],
-            "formulations": {
-                "formulation": self.design.formulation,
-                "other": None if self.other is None else self.other.to_json(),
-                "differences": {name: number(x) for name, x in self.differences.items()},
-                "reason": self.reason,
-            },
-        }
+        formulations = {"formulation": self.design.formulation} | plain(self, "other differences reason")
+        return {"schema": SCHEMA} | plain(self, "design laws") | {"formulations": formulations}
 
 
 def compare(
