@@ -1,25 +1,23 @@
 """The speeds at which a bicycle changes its kind of motion: weave, capsize, and roots that meet, all of them."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import flint
 
 from tmsopt.arithmetic.elementary import exact, rational
-from tmsopt.critical_speeds.crossings import Crossing, crossings
-from tmsopt.critical_speeds.parametric import interpolated
+from tmsopt.critical_speeds.crossings import Crossing, Span, crossings
+from tmsopt.critical_speeds.parametric import Polynomial, interpolated
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
-from tmsopt.models import ParameterSet
+from tmsopt.models import Model, ParameterSet
 from tmsopt.records import Table, plain
 
 _DIGITS = 120  # of what is no fraction, such as the tangent of an angle
 _STRAIGHT = 1e-100  # relative; a number that is linear in the speed is so within the digits carried
-
-Band = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -45,10 +43,10 @@ class Speeds:
     lower: float
     upper: float
     found: tuple[Crossing, ...]
-    stable: tuple[Band, ...]
-    heavily_damped: tuple[Band, ...]
+    stable: tuple[Span, ...]
+    heavily_damped: tuple[Span, ...]
     always: tuple[str, ...]
-    marginal: tuple[Band, ...] = ()
+    marginal: tuple[Span, ...] = ()
     zeros: int = 0
 
     @property
@@ -93,7 +91,7 @@ def speeds(
     design: Problem | Solution | Mapping[str, float],
     parameter: str | None = None,
     *,
-    between: tuple[float, float] | None = None,
+    between: Span | None = None,
     problem: Problem | None = None,
 ) -> Speeds:
     """Every weave and capsize speed of a design and every speed at which roots meet, by exact root isolation.
@@ -126,10 +124,7 @@ def speeds(
     if not math.isfinite(lower) or not lower < upper:
         message = f"found {lower:.6g} … {upper:.6g}; accepted: a least and a greater value"
         raise InputError([Fault(message, ("between",))])
-    at = _linear(asked, own, name)
-    a = interpolated(lambda x: asked.model.polynomial(**{n: p if q == 0 else p + q * x for n, (p, q) in at.items()}))
-    if a is None or not any(any(c != 0 for c in p) for p in a):
-        raise InputError([Fault(f"the coefficients are no polynomials in {name}, or all 0", ("parameter",))])
+    a = polynomials(asked.model, of, own, name)
     met = crossings(a, exact(float(lower)), exact(float(upper)) if math.isfinite(upper) else None)
     return Speeds(
         problem=asked,
@@ -151,6 +146,19 @@ def speed_of(of: ParameterSet) -> str | None:
     return next((p.name for p in of.parameters if p.unit == "m/s" or p.name == "Fr"), None)
 
 
+def polynomials(model: Model, of: ParameterSet, own: Mapping[str, float], name: str) -> Sequence[Polynomial]:
+    """The coefficients of a design as polynomials in one of its parameters.
+
+    Raises:
+        InputError: where they are none.
+    """
+    at = _linear(model, of, own, name)
+    a = interpolated(lambda x: model.polynomial(**{n: p if q == 0 else p + q * x for n, (p, q) in at.items()}))
+    if a is None or not any(any(c != 0 for c in p) for p in a):
+        raise InputError([Fault(f"the coefficients are no polynomials in {name}, or all 0", ("parameter",))])
+    return a
+
+
 def _design(design: Any, problem: Problem | None) -> tuple[Problem, dict[str, float]]:
     if isinstance(design, Solution):
         return design.problem.nominal, dict(design.parameters)
@@ -160,13 +168,12 @@ def _design(design: Any, problem: Problem | None) -> tuple[Problem, dict[str, fl
     return problem.nominal, {**problem.fixed, **design}
 
 
-def _linear(problem: Problem, own: Mapping[str, float], name: str) -> dict[str, tuple[Any, Any]]:
+def _linear(model: Model, of: ParameterSet, own: Mapping[str, float], name: str) -> dict[str, tuple[Any, Any]]:
     """The algebraic parameters as α + β x.
 
     Raises:
         InputError: where one is no such function.
     """
-    of, model = problem.parameter_set, problem.model
     with flint.ctx.workdps(_DIGITS):
         first, second, third = (
             {n: flint.arb(v) for n, v in model.algebraic(of.native(_exact(own, of, name, k))).items()}
