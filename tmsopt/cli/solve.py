@@ -20,11 +20,13 @@ from tmsopt.cli.common import (
     saving,
     write_json,
 )
-from tmsopt.report.explanation import meaning, meaning_lines
 
 if TYPE_CHECKING:
     from tmsopt.design.problem import Problem
     from tmsopt.design.solution import Solution
+    from tmsopt.diagnosis.diagnosis import Diagnosis
+    from tmsopt.explanation.explain import Explanation
+    from tmsopt.margins.nearest import Robustness
 
 _EXIT = {"optimal": DONE, "infeasible": INFEASIBLE, "not_converged": NOT_CONVERGED}
 
@@ -189,16 +191,38 @@ def solve(
         if certify:
             solution = _certified(solution, certify)
     if as_json:
-        write_json(solution.to_json() | ({} if brief else meaning(solution)))
+        explanation, near, multiple = _meaning(solution, brief, details=False)
+        meaning = {
+            "meaning": explanation and explanation.to_json(),
+            "robustness": near and near.to_json(),
+            "diagnosis": [root.to_json() for root in multiple],
+        }
+        write_json(solution.to_json() | {name: found for name, found in meaning.items() if found})
     else:
         from tmsopt.report.design import solution_table
+        from tmsopt.report.explanation import meaning_lines
 
         click.echo(solution_table(solution, w, m_B))
-        for line in meaning_lines(solution, brief, details):
+        for line in meaning_lines(solution, *_meaning(solution, brief, details), details):
             click.echo(line)
     if plot is not None:
         _draw(solution, plot, w, m_B)
     sys.exit(_EXIT[solution.status])
+
+
+def _meaning(
+    solution: "Solution", brief: bool, details: bool
+) -> "tuple[Explanation | None, Robustness | None, tuple[Diagnosis, ...]]":
+    """What an optimum leans on, how far its boundaries are, and how its multiple roots split, as far as asked for."""
+    from tmsopt import diagnose, explain, robustness
+
+    near = not brief and math.isfinite(solution.abscissa) and solution.status != "infeasible"
+    split = (details or not brief) and solution.status == "optimal"
+    return (
+        None if brief else explain(solution),
+        robustness(solution) if near else None,
+        diagnose(solution) if split else (),
+    )
 
 
 def _solve_all(problem: "Problem", as_json: bool, starts: int | None, **options: Any) -> NoReturn:

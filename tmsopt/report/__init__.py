@@ -8,6 +8,7 @@ from tmsopt.report.design import solution_table
 from tmsopt.report.explanation import (
     diagnosis_lines,
     explained_lines,
+    meaning_lines,
     optimality_lines,
     robustness_line,
     robustness_table,
@@ -22,6 +23,7 @@ __all__ = [
     "explained_lines",
     "ledger_page",
     "ledger_table",
+    "meaning_lines",
     "optimality_lines",
     "proof_text",
     "robustness_line",
