@@ -23,7 +23,7 @@ from tmsopt.cli.common import (
 )
 
 if TYPE_CHECKING:
-    from tmsopt import Problem, Solution
+    from tmsopt import Diagnosis, Explanation, Problem, Robustness, Solution
 
 _EXIT = {"optimal": DONE, "infeasible": INFEASIBLE, "not_converged": NOT_CONVERGED}
 
@@ -181,14 +181,35 @@ def solve(
         if certify:
             solution = _certified(solution, certify)
     if as_json:
-        write_json(solution.to_json() | ({} if brief else tmsopt.report.meaning(solution)))
+        explanation, near, multiple = _meaning(solution, brief, details=False)
+        meaning = {
+            "meaning": explanation and explanation.to_json(),
+            "robustness": near and near.to_json(),
+            "diagnosis": [root.to_json() for root in multiple],
+        }
+        write_json(solution.to_json() | {name: found for name, found in meaning.items() if found})
     else:
         click.echo(tmsopt.report.solution_table(solution, w, m_B))
-        for line in tmsopt.report.meaning_lines(solution, brief, details):
+        for line in tmsopt.report.meaning_lines(solution, *_meaning(solution, brief, details), details):
             click.echo(line)
     if plot is not None:
         _draw(solution, plot, w, m_B)
     sys.exit(_EXIT[solution.status])
+
+
+def _meaning(
+    solution: "Solution", brief: bool, details: bool
+) -> "tuple[Explanation | None, Robustness | None, tuple[Diagnosis, ...]]":
+    """What an optimum leans on, how far its boundaries are, and how its multiple roots split, as far as asked for."""
+    import tmsopt
+
+    near = not brief and math.isfinite(solution.abscissa) and solution.status != "infeasible"
+    split = (details or not brief) and solution.status == "optimal"
+    return (
+        None if brief else tmsopt.explain(solution),
+        tmsopt.robustness(solution) if near else None,
+        tmsopt.diagnose(solution) if split else (),
+    )
 
 
 def _solve_all(problem: "Problem", as_json: bool, asked: dict[str, Any]) -> NoReturn:
@@ -198,7 +219,7 @@ def _solve_all(problem: "Problem", as_json: bool, asked: dict[str, Any]) -> NoRe
     with bad_input(), progress() as update:
         found = tmsopt.solve_all(problem, progress=update, **asked)
     if as_json:
-        write_json({"schema": 1, "title": problem.title, "model": problem.model.name, **found.to_json()})
+        write_json(problem.heading | found.to_json())
     else:
         click.echo(tmsopt.report.every_table(found))
     sys.exit(DONE if found.solutions else INFEASIBLE)

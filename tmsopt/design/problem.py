@@ -12,6 +12,7 @@ from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTIT
 from tmsopt.design.validate import faults, guess_parameter_set
 from tmsopt.errors import Fault, InputError
 from tmsopt.models import Model, ParameterSet, Values
+from tmsopt.records import SCHEMA
 from tmsopt.roots import Pattern, pattern
 
 _POINT = 1e-12
@@ -89,6 +90,11 @@ class Problem:
     def nominal(self) -> "Problem":
         """The same question about one design at its nominal values: no scenarios, no tolerances."""
         return replace(self, scenarios={}, tolerances={}) if self.scenarios or self.tolerances else self
+
+    @property
+    def heading(self) -> dict[str, Any]:
+        """What the JSON of every result begins with."""
+        return {"schema": SCHEMA, "title": self.title, "model": self.model.name}
 
     @property
     def asks_radius(self) -> bool:

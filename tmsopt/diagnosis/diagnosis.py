@@ -12,6 +12,7 @@ from tmsopt.design.files import Given
 from tmsopt.diagnosis.jordan import Jordan, is_regular, jordan
 from tmsopt.diagnosis.splitting import DEVIATION, Ideal, Law, Response, response
 from tmsopt.models import Model, ParameterSet
+from tmsopt.records import plain
 from tmsopt.roots import Root, Structure
 from tmsopt.roots.patterns.enclosed import nearest
 from tmsopt.solver.solve import solved
@@ -48,17 +49,11 @@ class Diagnosis:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that only describe have 6 digits."""
-        ranks = self.jordan
         return {
-            "re": self.re,
-            "im": self.im,
-            "algebraic": self.algebraic,
-            "geometric": self.geometric,
-            "partial": list(self.partial),
-            "kind": self.kind,
-            "matrices": ranks is not None,
-            **({"singular_values": _singular(ranks)} if ranks else {}),
-            "distance": _short(self.distance),
+            **plain(self, "re im algebraic geometric partial kind"),
+            "matrices": self.jordan is not None,
+            **({"singular_values": plain(self.jordan, "zero nonzero threshold", digits=6)} if self.jordan else {}),
+            **plain(self, "distance", digits=6),
             "responses": [
                 {
                     "parameter": r.parameter,
@@ -159,21 +154,6 @@ def _law(law: Law) -> dict[str, Any]:
     return {
         "roots": b.roots,
         "exponent": str(b.exponent),
-        "numerator": b.numerator,
-        "denominator": b.denominator,
-        "constants": [{"re": _short(c.real), "im": _short(c.imag)} for c in b.constants],
-        "size": _short(b.size),
-        "holds": {"below": _short(law.below), "above": _short(law.above), "deviation": DEVIATION},
+        **plain(b, "numerator denominator constants size", digits=6),
+        "holds": plain(law, "below above", digits=6) | {"deviation": DEVIATION},
     }
-
-
-def _singular(ranks: Jordan) -> dict[str, float | None]:
-    return {
-        "zero": _short(ranks.zero),
-        "nonzero": _short(ranks.nonzero) if math.isfinite(ranks.nonzero) else None,
-        "threshold": _short(ranks.threshold),
-    }
-
-
-def _short(x: float) -> float:
-    return float(f"{x:.6g}")

@@ -9,7 +9,7 @@ from tmsopt.explanation.limits import Lever, levers
 from tmsopt.explanation.optimality import Optimality, optimality
 from tmsopt.explanation.rounding import Rounded, rounded_alone, rounded_together, worst
 from tmsopt.explanation.summary import summary, warnings
-from tmsopt.records import Table
+from tmsopt.records import Table, plain
 from tmsopt.solver.solve import solved
 
 
@@ -41,15 +41,8 @@ class Explanation:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
-        return {
-            "summary": self.summary,
-            "optimality": self.optimality.to_json(),
-            "levers": [lever.to_json() for lever in self.levers],
-            "rounding": {name: row.to_json() for name, row in self.rounding.items()},
-            "worst": self.worst or None,
-            "precision": [row.to_json() for row in self.precision],
-            "warnings": list(self.warnings),
-        }
+        found = plain(self, "summary optimality levers rounding worst precision warnings")
+        return found | {"worst": self.worst or None}
 
 
 def explain(design: Given, *, resolve: bool = True) -> Explanation:

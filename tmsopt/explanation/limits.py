@@ -10,6 +10,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.errors import InputError
 from tmsopt.explanation.steps import Step, natural_step, reported_unit, step_within, unit_of, with_reported_unit
+from tmsopt.records import plain
 from tmsopt.solver.solve import solve
 
 DIFFERS = 0.2
@@ -75,18 +76,13 @@ class Lever:
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
         return {
-            "name": self.name,
-            "kind": self.kind,
-            "limit": self.limit,
-            "physical": self.physical,
-            "step": self.step,
+            **plain(self, "name kind limit physical step"),
             "gain_per_unit": self.per_unit,
             "gain_first_order": self.predicted,
             "gain_resolved": self.resolved if math.isfinite(self.resolved) else None,
             "relative_difference": self.relative if math.isfinite(self.relative) else None,
             "structure": self.structure or None,
-            "reason": self.reason,
-            "sentence": self.sentence,
+            **plain(self, "reason sentence"),
         }
 
     def _gain(self, value: float) -> str:

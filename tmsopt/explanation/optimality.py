@@ -28,7 +28,7 @@ from tmsopt.design.solution import Solution
 from tmsopt.explanation.conditions import POSITIVE, STATIONARY, Conditions, conditions, curved
 from tmsopt.explanation.descent import Better, better
 from tmsopt.explanation.program import NotCovered, Program, program
-from tmsopt.records import Table
+from tmsopt.records import Table, plain
 from tmsopt.solver.solve import solved
 
 STRICT, NOT_MINIMAL, UNDECIDED, NOT_COVERED = "strict minimum", "not minimal", "undecided", "not covered"
@@ -59,11 +59,7 @@ class OnLine:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
-        kappa = self.kappa if math.isfinite(self.kappa) else None
-        return {
-            "re": self.re, "im": self.im, "multiplicity": self.multiplicity, "share": self.share,
-            "beta": self.beta, "kappa": kappa, "ties": list(self.ties),
-        }  # fmt: skip
+        return plain(self)
 
 
 @dataclass(frozen=True)
@@ -103,21 +99,10 @@ class Optimality:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
-        found: dict[str, Any] = {"verdict": self.verdict, "reason": self.reason}
         if self.verdict == NOT_COVERED:
-            return found
-        return found | {
-            "order": self.order,
-            "goal": self.goal,
-            "roots": [root.to_json() for root in self.roots],
-            "limits": dict(self.limits),
-            "unknowns": self.unknowns,
-            "conditions": self.conditions,
-            "residual": self.residual,
-            "curvature": self.curvature if math.isfinite(self.curvature) else None,
-            "idle": list(self.idle),
-            **({"better": dict(self.better), "better_value": self.better_value} if self.better else {}),
-        }
+            return plain(self, "verdict reason")
+        found = plain(self)
+        return found if self.better else {n: x for n, x in found.items() if n not in ("better", "better_value")}
 
 
 def optimality(design: Given) -> Optimality:

@@ -16,7 +16,7 @@ from tmsopt.formulation.nlp import NLP
 from tmsopt.margins.boundaries import KINDS, Edge, edges, lies_on
 from tmsopt.margins.rays import Crossing, between, crossings, most_damped
 from tmsopt.margins.surroundings import Place, placed
-from tmsopt.records import Array, Table
+from tmsopt.records import Array, Table, plain
 
 STABILITY = ("weave", "capsize", "infinity")
 """The boundaries of stability: a pair on the imaginary axis, a root 0, a root through infinity."""
@@ -57,15 +57,7 @@ class Nearest:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
-        return {
-            "kind": self.kind,
-            "found": self.found,
-            "distance": self.distance if self.found else None,
-            "parameters": dict(self.parameters),
-            "direction": dict(self.direction),
-            "refined": self.refined,
-            "direct": self.direct,
-        }
+        return plain(self, "kind found distance parameters direction refined direct")
 
 
 @dataclass(frozen=True)
@@ -114,13 +106,9 @@ class Robustness:
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
         return {
-            "stable": self.stable,
-            "heavily_damped": self.heavily_damped,
-            "radius": _number(self.radius),
-            "to_stability": _number(self.to_stability),
+            **plain(self, "stable heavily_damped radius to_stability"),
             "limit": self.limit.kind if self.limit.found else None,
-            "parameters": dict(self.parameters),
-            "weights": dict(self.weights),
+            **plain(self, "parameters weights"),
             "nearest": {n.kind: n.to_json() for n in (self.weave, self.capsize, self.infinity, self.heavy_damping)},
         }
 
@@ -141,10 +129,6 @@ class _Approach:
     def distance(self) -> float:
         """√Σ u²."""
         return float(np.linalg.norm(self.u))
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def nearest(

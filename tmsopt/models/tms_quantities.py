@@ -116,38 +116,74 @@ def _m_ballast_front(v: Mapping[str, Any]) -> Any:
     return v["ballast_front"] * v["m_B"]
 
 
+SI_QUANTITIES = (
+    Quantity("v_c", "m/s", "speed at the weave boundary", "v_c", _v_c),
+    Quantity("u_H", "m", "distance of the front centre of mass from the steer axis", "u_H", _u_H),
+    Quantity("N_F", "N", "load on the front wheel at rest, negative where it lifts", "N_F", _N_F),
+    Quantity("N_R", "N", "load on the rear wheel at rest, negative where it lifts", "N_R", _N_R),
+    Quantity(
+        "m_ballast_rear", "kg", "mass at the rear contact that keeps the rear wheel down", "m_R",
+        _m_ballast_rear,
+        range=_NOT_NEGATIVE,
+        aside=True,
+    ),
+    Quantity(
+        "m_ballast_front", "kg", "mass at the front contact that keeps the front wheel down", "m_F",
+        _m_ballast_front,
+        range=_NOT_NEGATIVE,
+        aside=True,
+    ),
+)  # fmt: skip
+"""Quantities that need lengths, masses and gravity."""
+
+_SI = {q.name: q for q in SI_QUANTITIES}
+
 NATIVE_QUANTITIES = (
-    Quantity("nu_H", "1", "distance of the front centre of mass from the steer axis", r"\nu_H", _nu_H),
+    Quantity(
+        "nu_H", "1", "distance of the front centre of mass from the steer axis", r"\nu_H", _nu_H,
+        counterpart=_SI["u_H"],
+    ),
     Quantity(
         "omega0", "1", "−(a4/a0)^(1/4), the mean decay of the roots (equation w0)", r"\omega_0", omega0,
         equation=omega0_equation,
         range=_NOT_POSITIVE,
+        aside=True,
     ),
     Quantity(
         "Fr_c", "1", "Froude number at the weave boundary (equation flus)", r"\mathrm{Fr}_c", _Fr_c,
         equation=_Fr_c_equation,
         range=_NOT_NEGATIVE,
+        counterpart=_SI["v_c"],
     ),
-    Quantity("chi_T", "1", "centre of mass of the whole bicycle, forward of the rear contact", r"\chi_T", _chi_T),
+    Quantity(
+        "chi_T", "1", "centre of mass of the whole bicycle, forward of the rear contact", r"\chi_T", _chi_T,
+        counterpart=Quantity("x_T", "m", "centre of mass of the whole bicycle", "x_T", lambda v: v["chi_T"] * v["w"]),
+    ),
     Quantity(
         "load_front", "1", "share of the weight on the front wheel, negative where it lifts", r"N_F/(N_F + N_R)",
         _chi_T,
+        counterpart=_SI["N_F"],
     ),
     Quantity(
         "load_rear", "1", "share of the weight on the rear wheel, negative where it lifts", r"N_R/(N_F + N_R)",
         _load_rear,
+        counterpart=_SI["N_R"],
     ),
     Quantity(
         "ballast_rear", "1", "mass at the rear contact that keeps the rear wheel down, per mass of the rear frame",
         r"m_R/m_B", _ballast_rear,
         range=_NOT_NEGATIVE,
         pieces=(nothing, _rear_lift),
+        counterpart=_SI["m_ballast_rear"],
+        aside=True,
     ),
     Quantity(
         "ballast_front", "1", "mass at the front contact that keeps the front wheel down, per mass of the rear frame",
         r"m_F/m_B", _ballast_front,
         range=_NOT_NEGATIVE,
         pieces=(nothing, _front_lift),
+        counterpart=_SI["m_ballast_front"],
+        aside=True,
     ),
     Quantity(
         "mass_margin", "1", "smallest eigenvalue of the mass matrix, 0 where it is singular (equation matrices)",
@@ -156,27 +192,3 @@ NATIVE_QUANTITIES = (
     ),
 )  # fmt: skip
 """Quantities of a dimensionless design. A mass at a wheel contact has no part in the lateral motion."""
-
-SI_QUANTITIES = (
-    Quantity("v_c", "m/s", "speed at the weave boundary", "v_c", _v_c),
-    Quantity("u_H", "m", "distance of the front centre of mass from the steer axis", "u_H", _u_H),
-    Quantity(
-        "N_F", "N", "load on the front wheel at rest, negative where it lifts", "N_F",
-        _N_F,
-    ),
-    Quantity(
-        "N_R", "N", "load on the rear wheel at rest, negative where it lifts", "N_R",
-        _N_R,
-    ),
-    Quantity(
-        "m_ballast_rear", "kg", "mass at the rear contact that keeps the rear wheel down", "m_R",
-        _m_ballast_rear,
-        range=_NOT_NEGATIVE,
-    ),
-    Quantity(
-        "m_ballast_front", "kg", "mass at the front contact that keeps the front wheel down", "m_F",
-        _m_ballast_front,
-        range=_NOT_NEGATIVE,
-    ),
-)  # fmt: skip
-"""Quantities that need lengths, masses and gravity."""

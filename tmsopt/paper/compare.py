@@ -1,6 +1,5 @@
 """A numeric optimum beside the closed-form laws, law by law, and beside the other formulation."""
 
-import math
 from dataclasses import dataclass, replace
 from typing import Any, Unpack
 
@@ -9,6 +8,7 @@ from tmsopt.design.files import Given, question_of
 from tmsopt.design.solution import Solution
 from tmsopt.formulation.options import Asked, Options, options_of
 from tmsopt.models import tms
+from tmsopt.records import SCHEMA, plain
 from tmsopt.roots import PATTERNS
 from tmsopt.solver.solve import solved
 
@@ -39,34 +39,8 @@ class Comparison:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
-
-        def number(x: float) -> float | None:
-            return float(x) if math.isfinite(x) else None
-
-        return {
-            "schema": 1,
-            "design": self.design.to_json(),
-            "laws": [
-                {
-                    "label": row.label,
-                    "subject": row.subject,
-                    "numeric": number(row.numeric),
-                    "law": number(row.law),
-                    "residual": number(row.residual) if row.applies else None,
-                    "relative": number(row.relative) if row.applies else None,
-                    "applies": row.applies,
-                    "agrees": row.agrees,
-                    "reason": row.reason,
-                }
-                for row in self.laws
-            ],
-            "formulations": {
-                "formulation": self.design.formulation,
-                "other": None if self.other is None else self.other.to_json(),
-                "differences": {name: number(x) for name, x in self.differences.items()},
-                "reason": self.reason,
-            },
-        }
+        formulations = {"formulation": self.design.formulation} | plain(self, "other differences reason")
+        return {"schema": SCHEMA} | plain(self, "design laws") | {"formulations": formulations}
 
 
 def compare(design: Given, **options: Unpack[Asked]) -> Comparison:

@@ -1,7 +1,7 @@
 """The existence of what a problem asks for, proved: solve first, then prove."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Unpack
 
 from tmsopt.design.files import Given
 from tmsopt.design.solution import Solution
@@ -11,7 +11,9 @@ from tmsopt.proofs.proof import DIGITS, Proof, prove_design
 from tmsopt.solver.solve import solved
 
 
-def prove(design: Given, digits: int = DIGITS, *, exact: Mapping[str, Any] | None = None, **options: Any) -> Proof:
+def prove(
+    design: Given, digits: int = DIGITS, *, exact: Mapping[str, Any] | None = None, **options: Unpack[AskedOfSolve]
+) -> Proof:
     """Prove that the design a problem asks for exists, in ball arithmetic, with what follows for its stability.
 
     An interval Newton test (Krawczyk) on a_k = a0 c_k with the problem's equalities proves that exactly one solution

@@ -9,7 +9,6 @@ from tmsopt.report.design import every_table, si_parameters, solution_table
 from tmsopt.report.explanation import (
     diagnosis_lines,
     explained_lines,
-    meaning,
     meaning_lines,
     optimality_lines,
     robustness_line,
@@ -29,7 +28,6 @@ __all__ = [
     "front_table",
     "ledger_page",
     "ledger_table",
-    "meaning",
     "meaning_lines",
     "optimality_lines",
     "proof_text",

@@ -1,4 +1,4 @@
-"""TODO"""
+"""Traces, charts and fronts as text: what is on them, and where their events are."""
 
 from collections.abc import Mapping
 from typing import Any

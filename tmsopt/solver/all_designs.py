@@ -16,7 +16,7 @@ from tmsopt.formulation.formulate import design_of, matching
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.options import Asked, Options, options_of
 from tmsopt.formulation.starts import completions, spread
-from tmsopt.records import Array
+from tmsopt.records import Array, plain
 from tmsopt.solver.multistart import Runner
 from tmsopt.solver.newton import newton, square_system
 from tmsopt.solver.solve import solved
@@ -57,14 +57,9 @@ class Coverage:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
+        found = plain(self)
         expected = round(self.expected, 4) if math.isfinite(self.expected) else None
-        return {
-            "starts": self.starts,
-            "hits": list(self.hits),
-            "expected": expected,
-            "chance": round(self.chance, 6),
-            "singular": self.singular,
-        }
+        return found | {"expected": expected, "chance": round(self.chance, 6)}
 
 
 @dataclass(frozen=True)
@@ -76,7 +71,7 @@ class Every:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
-        return {"solutions": [s.to_json() for s in self.solutions], "coverage": self.coverage.to_json()}
+        return plain(self)
 
 
 def solve_all(problem: Given, **options: Unpack[Asked]) -> Every:

@@ -1,6 +1,5 @@
 """A traced curve of a root pattern as data: points, tangents, labels, events."""
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from os import PathLike
@@ -11,9 +10,7 @@ from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
 from tmsopt.disk import write_csv
-from tmsopt.records import Array, Table
-
-SCHEMA = 1
+from tmsopt.records import Array, Table, plain
 
 
 @dataclass(frozen=True)
@@ -90,10 +87,6 @@ class Branch:
             }
 
     def _told_apart(self, unknown: str) -> str:
-        """The name of an unknown, with the pattern's before it where a parameter has it too."""
-        return f"{self.pattern}.{unknown}" if unknown in self.parameters else unknown
-
-    def _column(self, unknown: str) -> str:
         """The name of an unknown's column, told from a parameter of the same name, such as a damping c."""
         return f"{self.pattern}.{unknown}" if unknown in self.parameters else unknown
 
@@ -102,18 +95,11 @@ class Branch:
         columns: dict[str, list[Any]] = {}
         for row in self.rows():
             for name, value in row.items():
-                columns.setdefault(name, []).append(_finite(value))
-        return {
-            "pattern": self.pattern,
-            "closed": self.closed,
-            "points": len(self),
-            "residual": self.residual,
-            "events": [
-                {"name": e.name, "detail": e.detail, "index": e.index, "parameters": dict(e.parameters)}
-                for e in self.events
-            ],
-            "columns": columns,
-        }
+                columns.setdefault(name, []).append(value)
+        found = plain(self, "pattern closed")
+        found |= {"points": len(self), "residual": self.residual}
+        events = [plain(event, "name detail index parameters") for event in self.events]
+        return found | {"events": events, "columns": plain(columns)}
 
 
 @dataclass(frozen=True)
@@ -163,21 +149,12 @@ class Trace:
     def to_json(self) -> dict[str, Any]:
         """The JSON of `tmsopt trace`."""
         return {
-            "schema": SCHEMA,
-            "title": self.problem.title,
-            "model": self.problem.model.name,
+            **self.problem.heading,
             "pattern": self.pattern,
             "free": list(self.problem.free),
-            "branches": [b.to_json() for b in self.branches],
-            "starts": self.starts,
-            "points": self.points,
-            "seconds": self.seconds,
+            **plain(self, "branches starts points seconds"),
             "seconds_per_point": self.seconds_walking / max(self.points, 1),
         }
-
-
-def _finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def kinds_along(branch: Branch) -> list[str]:

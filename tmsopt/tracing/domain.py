@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
-from tmsopt.records import Array
+from tmsopt.records import Array, plain
 from tmsopt.roots import pattern, real_roots
 from tmsopt.roots.meetings import nearest_two
 from tmsopt.tracing.branch import Branch, Event
@@ -73,14 +73,8 @@ class Domain:
 
     def to_json(self) -> dict[str, Any]:
         """Arcs as columns of their parameters."""
-        return {
-            name: [{"kind": arc.kind, "points": {n: c.tolist() for n, c in arc.points.items()}} for arc in arcs]
-            for name, arcs in (
-                ("stability", self.stability),
-                ("heavy_damping", self.heavy_damping),
-                ("parting", self.parting),
-            )
-        } | {"corners": [{"name": c.name, "detail": c.detail, **c.parameters} for c in self.corners]}
+        corners = [{"name": c.name, "detail": c.detail, **c.parameters} for c in self.corners]
+        return plain(self, "stability heavy_damping parting") | {"corners": corners}
 
 
 def domain(problem: Given, *, step: float = STEP, starts: int = STARTS, seed: int = 0) -> Domain:
