@@ -68,6 +68,10 @@ class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap h
     def __pow__(self, n: int) -> "Quotient":
         return Quotient(self.over**n, self.under**n) if n >= 0 else Quotient(self.under**-n, self.over**-n)
 
+    def sqrt(self) -> "Quotient":
+        """The square root of a square, with positive leading coefficients."""
+        return Quotient(self.over.sqrt(), self.under.sqrt())
+
     __radd__ = __add__
     __rmul__ = __mul__
 

@@ -5,7 +5,6 @@ from typing import Any
 import flint
 
 from tmsopt.models.tms import copo
-from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.algebra import (
     Quotient,
     heavily_damped,
@@ -27,6 +26,7 @@ from tmsopt.paper.ledger.lemmas import (
     standstill_identity,
     tilt_of_EP4,
 )  # fmt: skip
+from tmsopt.paper.ledger.printed import Tilt, laws
 from tmsopt.roots.polynomial import evaluate as value_at
 
 _claim = section("2.4.5 Mechanism of self-stability and CEP2 as a precursor to weaving")
@@ -202,7 +202,7 @@ def _circle() -> Outcome:
 )
 def _crossing() -> Outcome:
     _, B2, (Fr, T, r, scale) = palindrome()
-    law = printed.Frc1(r, -(scale**2) * r, -(scale**2) / r, T)
+    law = laws.Frc1(r, -(scale**2) * r, -(scale**2) / r, Tilt(T))
     below, above = stable(_hand("1.7", "1")), stable(_hand("1.75", "1"))
     return proof((Fr**2 - law) * (r**2 - 1) / (r * T) == B2 - 2 and above and not below)
 

@@ -26,6 +26,7 @@ from tmsopt.paper.ledger.lemmas import (
     tilted,
     weave,
 )  # fmt: skip
+from tmsopt.paper.ledger.printed import Tilt, laws
 
 _claim = section("2.4.5 Mechanism of self-stability and CEP2 as a precursor to weaving")
 
@@ -80,7 +81,7 @@ def _frequency() -> Outcome:
 def _precursor() -> Outcome:
     T, r, scale, eps = ring("T r q eps")
     square = printed.epset(-1 / scale, -(scale**2) * r, T)
-    critical = printed.Frc1(r + eps, -(scale**2) * r, -(scale**2) / r, T)
+    critical = laws.Frc1(r + eps, -(scale**2) * r, -(scale**2) / r, Tilt(T))
     base = T * (r + 1) / (r - 1)
     excess = critical - base == base * eps**2 / ((r**2 - r - eps) * (r + eps - 1))
     remains = slope((square - base) * (4 * scale**2 * T * (r + 1) - r * (r - 1)) / T, "T") == 0
