@@ -8,14 +8,16 @@ do.
 from tmsopt.arithmetic.balls import Number, number
 from tmsopt.arithmetic.elementary import exact, greater, lesser, magnitude, positive_part, power, quotient, sqrt, tan
 from tmsopt.arithmetic.formulas import formulas
-from tmsopt.arithmetic.intervals import EVERYTHING, ball, interval, ranges, root_bound, square
+from tmsopt.arithmetic.intervals import EVERYTHING, INTERVALS, ball, interval, ranges, root_bound, square
 from tmsopt.arithmetic.krawczyk import Refused, enclosed, refined
-from tmsopt.arithmetic.operations import ARRAYS
+from tmsopt.arithmetic.operations import ARRAYS, BALLS
 from tmsopt.arithmetic.walk import NotAccepted, operation_name, steps, walk
 
 __all__ = [
     "ARRAYS",
+    "BALLS",
     "EVERYTHING",
+    "INTERVALS",
     "NotAccepted",
     "Number",
     "Refused",

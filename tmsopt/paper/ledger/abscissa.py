@@ -10,6 +10,8 @@ from tmsopt.paper.ledger.algebra import (
     substitute,
 )
 from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal
+from tmsopt.paper.ledger.lemmas import critical_square
+from tmsopt.paper.ledger.printed import Tilt, laws
 from tmsopt.paper.ledger.stability import upright_case, wrongly_admitted
 from tmsopt.roots.polynomial import product
 
@@ -36,7 +38,7 @@ def product_bound() -> bool:
 )
 def _guarantee() -> Outcome:
     design = tuple(q(x) for x in ("10", "1", "2", "0.5", "-1", "-0.9", "1"))
-    square, a1 = printed.flus(*design[1:]), copo(*design)[1]
+    square, a1 = critical_square(design), copo(*design)[1]
     return universal(
         "χ_H ≥ 1, or a1 > 0",
         upright_case(),
@@ -118,8 +120,8 @@ def _jordan() -> Outcome:
 
 @_claim("4poly-expansion", "Eq. 4poly", "expansion of (s − ω0)⁴", "product of four factors, as polynomials")
 def _expansion() -> Outcome:
-    (omega0,) = polynomials("omega0")
-    return proof(product(*[[1, -omega0]] * 4) == printed.poly4(omega0), otherwise="A coefficient differs.")
+    (omega0,) = ring("omega0")
+    return proof(product(*[[1, -omega0]] * 4) == list(laws.poly4(omega0)), otherwise="A coefficient differs.")
 
 
 @_claim(
@@ -162,7 +164,7 @@ def _chib() -> Outcome:
     constant = none[3] - omega0**2 * none[1]
     slope = (a[3] - omega0**2 * a[1] - constant) / chi_B
     return proof(
-        -constant / slope == printed.chib(omega0, chi_H, zeta_B, zeta_H),
+        -constant / slope == laws.chib(omega0, chi_H, zeta_B, zeta_H),
         "The only solution, as ω0² ζ_H − 1 < 0 for ζ_H ≤ 0.",
         "The linear equation has another solution.",
     )
@@ -172,7 +174,7 @@ def _chib() -> Outcome:
 def _a2() -> Outcome:
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T, omega0 = ring(f"{_NAMES} omega0")
     a = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
-    law = printed.a2(Fr, mu, chi_H, zeta_B, zeta_H, T, omega0)
+    law = laws.a2(Fr, mu, chi_H, zeta_B, zeta_H, Tilt(T), omega0)
     return proof(zeta_B * law == a[2] - 6 * omega0**2 * a[0], otherwise="The difference is not 0.")
 
 

@@ -6,6 +6,7 @@ from tmsopt.models.tms import copo
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.algebra import polynomials, q, ring
 from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal
+from tmsopt.paper.ledger.printed import Tilt, laws
 
 _claim = section("2.4.1 χ_H = 1: the critical Froude number and its minimum")
 
@@ -36,7 +37,7 @@ def _frc1() -> Outcome:
     slope = (a[2] - still) / Fr**2
     square = ((a[0] * W**2 + a[4]) / W - still) / slope
     return proof(
-        square == printed.Frc1(chi_B, zeta_B, zeta_H, T), otherwise="The eliminated condition has another root."
+        square == laws.Frc1(chi_B, zeta_B, zeta_H, Tilt(T)), otherwise="The eliminated condition has another root."
     )
 
 
@@ -122,7 +123,7 @@ def _chibm() -> Outcome:
 
     excess = square(chi_B) - square(r)
     under = (r**2 - chi_B) * (chi_B - 1)
-    outside = printed.Frc1(q("-0.1"), q(-4), q(-1), q(1))
+    outside = laws.Frc1(q("-0.1"), q(-4), q(-1), Tilt(q(1)))
     return proof(
         excess == T * (r + 1) * (chi_B - r) ** 2 / ((r - 1) * under) and outside > 0,
         "The only minimum on 1 < χ_B < ζ_B/ζ_H, the interval that lscf allow: the excess is "

@@ -7,6 +7,7 @@ from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.algebra import Quotient, polynomials, q, ring, vanishes
 from tmsopt.paper.ledger.entry import Claim, Outcome, decimal, digits, proof, section
 from tmsopt.paper.ledger.lemmas import HEIGHTS, double_pair, ep4, normal, quartic, tilt_of_EP4, weave
+from tmsopt.paper.ledger.printed import laws
 from tmsopt.roots.polynomial import product
 
 _claim = section("2.4.2 Exact location of the real exceptional point EP4; Table 1")
@@ -14,10 +15,10 @@ _claim = section("2.4.2 Exact location of the real exceptional point EP4; Table 
 
 @_claim("w01", "Eq. w01", "ω0 at χ_H = 1", "a4/a0 of the polynomial at χ_H = 1, as a rational function")
 def _w01() -> Outcome:
-    Fr, chi_B, zeta_B, zeta_H, T = ring("Fr chi_B zeta_B zeta_H T")
-    a = copo(Fr, 0 * T, chi_B, 1 + 0 * T, zeta_B, zeta_H, T)
+    Fr, chi_B, T, r, scale = ring("Fr chi_B T r q")
+    a = quartic(Fr, chi_B, T, r, scale)
     return proof(
-        a[4] / a[0] == printed.w01(zeta_B, zeta_H),
+        a[4] / a[0] == laws.w01(-(scale**2) * r, -(scale**2) / r) ** 4,
         "Independent of λ_s too: with χ_H = 1 it bounds the abscissa of every design with these heights.",
         "a4/a0 is another function.",
     )
@@ -65,7 +66,7 @@ def _eliminated() -> tuple[Quotient, Quotient, tuple[Quotient, ...]]:
 @_claim("tls", "Eq. tls", "tan λ_s at EP4", "p(ω0) = 0 and a2 = 6 ω0² a0 with Fr eliminated, solved for tan λ_s")
 def _tls() -> Outcome:
     _, rest, (T, r, scale) = _eliminated()
-    law = printed.tls(-1 / scale, -(scale**2) * r, -(scale**2) / r)
+    law = laws.tls(-(scale**2) * r, -(scale**2) / r)
     ratio = rest / (T - law)
     free = ratio.over.derivative("T") * ratio.under == ratio.over * ratio.under.derivative("T")
     return proof(

@@ -11,6 +11,7 @@ from tmsopt.paper.ledger.abscissa import product_bound
 from tmsopt.paper.ledger.algebra import match, polynomials, positive_quotient, q, ring, solve, stable_left_of
 from tmsopt.paper.ledger.entry import Claim, Outcome, decimal, digits, proof, section, universal
 from tmsopt.paper.ledger.lemmas import normal, tilt_bound, tilt_of_EP4
+from tmsopt.paper.ledger.printed import Tilt, laws
 
 _machine = section("2.4.6 How the scaling laws match the experimental TMS bike")
 _frame = section("Abstract, introduction and conclusions")
@@ -217,11 +218,11 @@ def _by_hand() -> bool:
 def _criteria() -> Outcome:
     T, r = ring("T r")
     least = T * (r + 1) / (r - 1)
-    quarter = printed.Frc1(r, -r, -1 / r, T / 4)
+    quarter = laws.Frc1(r, -r, -1 / r, Tilt(T / 4))
     return universal(
         "in χ_B: one value minimises Fr_c for every λ_s, carries the EP4 and the steepest heavy damping. In λ_s (tls) "
         "serves the abscissa and the steepest tilt",
-        product_bound() and tilt_bound() and printed.Frc1(r, -r, -1 / r, T) == least,
+        product_bound() and tilt_bound() and laws.Frc1(r, -r, -1 / r, Tilt(T)) == least,
         "a quarter of tan λ_s halves Fr_c, so (tls) does not minimise Fr_c",
         quarter * 4 == least,
     )
@@ -236,12 +237,12 @@ def _criteria() -> Outcome:
 def _follow() -> Outcome:
     r, scale = ring("r q")
     omega0, zeta_B, zeta_H = -1 / scale, -(scale**2) * r, -(scale**2) / r
-    law = printed.tls(omega0, zeta_B, zeta_H)
+    law = laws.tls(zeta_B, zeta_H)
     return proof(
         tilt_bound()
         and product_bound()
         and law == tilt_of_EP4(r, scale**2)
-        and printed.chib(omega0, 1 + 0 * r, zeta_B, zeta_H) == r,
+        and laws.chib(omega0, 1 + 0 * r, zeta_B, zeta_H) == r,
         "(chib1) from all three problems, (tls) from two.",
     )
 

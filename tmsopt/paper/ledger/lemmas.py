@@ -12,8 +12,8 @@ from typing import Any
 import flint
 
 from tmsopt.models.tms import copo
-from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.algebra import Quotient, match, polynomials, positive, q, ring, solve, stable, substitute
+from tmsopt.paper.ledger.printed import Tilt, laws
 
 _NAMES = "Fr mu chi_B chi_H zeta_B zeta_H T"
 Design = tuple[Any, ...]  # Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T as fractions
@@ -113,11 +113,16 @@ def first_four(design: Design) -> list[bool]:
     return [chi_H > 1 + zeta_H * T, chi_H < 1 - zeta_B / mu * T, chi_H < chi_B, zeta_H > zeta_B]
 
 
+def critical_square(design: Design) -> Any:
+    """Fr_c² (flus)."""
+    return laws.flus(*design[1:6], Tilt(design[6]))
+
+
 def fifth(design: Design) -> bool:
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = design
+    Fr, _, chi_B, chi_H, zeta_B, zeta_H, _ = design
     if zeta_B * chi_H == zeta_H * chi_B:
         return False
-    square = printed.flus(mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    square = critical_square(design)
     return bool(square > 0 and Fr > 0 and Fr * Fr > square)
 
 
@@ -145,7 +150,7 @@ def hurwitz_identity() -> bool:
     """a1 a2 a3 − a0 a3² − a4 a1² is (ζ_B − ζ_H) ζ_B a1 a3 (Fr² − flus), and so affine in Fr² beside Fr²."""
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
     a0, a1, a2, a3, a4 = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
-    square = printed.flus(mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    square = laws.flus(mu, chi_B, chi_H, zeta_B, zeta_H, Tilt(T))
     return bool(a1 * a2 * a3 - a0 * a3**2 - a4 * a1**2 == (zeta_B - zeta_H) * zeta_B * a1 * a3 * (Fr**2 - square))
 
 

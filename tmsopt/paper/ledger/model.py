@@ -6,6 +6,7 @@ from tmsopt.models.tms import matrices, tms
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.algebra import polynomials, q, ring
 from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal
+from tmsopt.paper.ledger.printed import Tilt, laws
 from tmsopt.roots.polynomial import quadratic_pencil
 
 _claim = section("2.1 The TMS bicycle model; the characteristic polynomial")
@@ -29,7 +30,7 @@ def _nine() -> Outcome:
     names = [name for name in tms.sets[1].names if name != "g"]
     w, v, g, T, m_B, x_B, z_B, m_H, x_H, z_H = variables = ring("w v g T m_B x_B z_B m_H x_H z_H")
     # Fr stands squared or beside a1 and a3; Fr² in place of Fr shows the same dependence without a root
-    a = printed.coefficients(v**2 / (g * w), m_H / m_B, x_B / w, x_H / w, z_B / w, z_H / w, T)
+    a = laws.copo(v**2 / (g * w), m_H / m_B, x_B / w, x_H / w, z_B / w, z_H / w, Tilt(T))
     matters = [
         any(
             c.over.derivative(str(x.over)) * c.under != c.over * c.under.derivative(str(x.over))
@@ -111,10 +112,10 @@ def _coefficient(order: int) -> Claim:
         "μ ν_H cos λ_s times the printed coefficient",
     )
     def check() -> Outcome:
-        Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T, cosine = polynomials(f"{_NAMES} cosine")
+        Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T, cosine = ring(f"{_NAMES} cosine")
         M, V, P = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T * cosine, cosine)
         factor = mu * cosine * printed.nu_H(chi_H, zeta_H, T * cosine, cosine)
-        claimed = printed.coefficients(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)[order]
+        claimed = laws.copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, Tilt(T))[order]
         return proof(
             quadratic_pencil(M, V, P)[order] == factor * claimed,
             otherwise="The coefficient of the determinant is another.",
@@ -133,14 +134,14 @@ a0, a1, a2, a3, a4 = (_coefficient(order) for order in range(5))
     "the quotient of the determinant and p, and the determinant of a bicycle with ν_H = 0",
 )
 def _scale() -> Outcome:
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = polynomials(_NAMES)
+    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
     M, V, P = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T, T * 0 + 1)
     nu = printed.nu_H(chi_H, zeta_H, T, T * 0 + 1)
-    a = printed.coefficients(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    a = laws.copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, Tilt(T))
     under = all(d == mu * nu * c for d, c in zip(quadratic_pencil(M, V, P), a, strict=True))
     design = (q(1), q(1), q(2), q(1), q(-2), q(-1))  # Fr, mu, chi_B, chi_H, zeta_B, zeta_H
     upright = quadratic_pencil(*matrices(*design, q(0), q(1)))
-    cubic = printed.coefficients(*design, q(0))
+    cubic = list(laws.copo(*design, Tilt(q(0))))
     return universal(
         "up to the factor μ ν_H cos λ_s, which must not be 0",
         under,

@@ -5,7 +5,6 @@ from typing import Any
 import flint
 
 from tmsopt.models.tms import copo
-from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.algebra import (
     Quotient,
     heavily_damped,
@@ -13,7 +12,6 @@ from tmsopt.paper.ledger.algebra import (
     positive_quotient,
     q,
     ring,
-    roots,
     slope,
     stable,
 )
@@ -27,6 +25,8 @@ from tmsopt.paper.ledger.lemmas import (
     standstill_identity,
     tilt_of_EP4,
 )  # fmt: skip
+from tmsopt.paper.ledger.printed import Tilt, laws
+from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.polynomial import evaluate as value_at
 
 _claim = section("2.4.5 Mechanism of self-stability and CEP2 as a precursor to weaving")
@@ -202,7 +202,7 @@ def _circle() -> Outcome:
 )
 def _crossing() -> Outcome:
     _, B2, (Fr, T, r, scale) = palindrome()
-    law = printed.Frc1(r, -(scale**2) * r, -(scale**2) / r, T)
+    law = laws.Frc1(r, -(scale**2) * r, -(scale**2) / r, Tilt(T))
     below, above = stable(_hand("1.7", "1")), stable(_hand("1.75", "1"))
     return proof((Fr**2 - law) * (r**2 - 1) / (r * T) == B2 - 2 and above and not below)
 
@@ -259,7 +259,7 @@ def _after() -> Outcome:
 )
 def _middle() -> Outcome:
     before, heavy, after = (_hand(Fr, "1/4") for Fr in ("1.38", "1.45", "1.55"))
-    real = [sum(m for z, m in roots(p) if z.imag == 0) for p in (before, heavy, after)]
+    real = [sum(m for z, m in isolated_roots(p) if z.imag == 0) for p in (before, heavy, after)]
     return proof(
         _third() and _order() and real == [2, 4, 0] and heavily_damped(heavy),
         "With ζ_B = −2, ζ_H = −1/2, tan λ_s = 1/4 the numbers of real roots at Fr = 1.38, 1.45, 1.55 are 2, 4, 0.",
@@ -301,9 +301,9 @@ def _simultaneous() -> Outcome:
 )
 def _lower() -> Outcome:
     before, on, after = (_hand(Fr, "1") for Fr in ("1.5", "1.85", "2"))
-    counts = [sum(m for z, m in roots(p) if z.imag == 0) for p in (before, on, after)]
-    round_ = all(abs(z) - 1 < flint.arb("1e-10") and 1 - abs(z) < flint.arb("1e-10") for z, _ in roots(on))
-    off = all(not (abs(z) - 1).contains(0) for z, _ in roots(after))
+    counts = [sum(m for z, m in isolated_roots(p) if z.imag == 0) for p in (before, on, after)]
+    round_ = all(abs(z) - 1 < flint.arb("1e-10") and 1 - abs(z) < flint.arb("1e-10") for z, _ in isolated_roots(on))
+    off = all(not (abs(z) - 1).contains(0) for z, _ in isolated_roots(after))
     return proof(
         _third() and _order() and counts == [2, 0, 0] and round_ and off and stable(after),
         "With ζ_B = −2, ζ_H = −1/2, tan λ_s = 1: two real roots at Fr = 3/2, two pairs of modulus 1 at 1.85, four "

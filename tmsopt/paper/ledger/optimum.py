@@ -5,7 +5,6 @@ from typing import Any
 import flint
 
 from tmsopt.models.tms import copo
-from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.abscissa import product_bound
 from tmsopt.paper.ledger.algebra import (
     heavily_damped,
@@ -31,6 +30,7 @@ from tmsopt.paper.ledger.lemmas import (
     tilt_of_roots,
     triple_roots_are_slow,
 )
+from tmsopt.paper.ledger.printed import laws
 from tmsopt.paper.ledger.sets import ep3_left
 from tmsopt.roots.polynomial import product
 
@@ -209,14 +209,14 @@ def _abscissa() -> Outcome:
 )
 def _dp() -> Outcome:
     T, r, scale = palindrome()[2][1:]
-    law = printed.tls(-1 / scale, -(scale**2) * r, -(scale**2) / r)
+    law = laws.tls(-(scale**2) * r, -(scale**2) / r)
     # on B2 + 2 = 2 B1 at B1 = 4 the sign of the tilt less that of the EP4 decides
     at_4 = 4 * scale * T / (r - 1)
     b = normal(at_4, r, T, r, scale)
     decides = b[1] == 4 and b[2] - 6 == 16 * scale**2 * (r + 1) * (T - law) / ((r - 1) * r)
     low = heavily_damped(quartic(q("1.45"), q(2), q("1/4"), q(2), q(1)))
     shallow = heavily_damped(quartic(q(2), q(2), q("1/10"), q(2), q(1)))
-    other = printed.tls(q(-1), q("-0.5"), q(-2))
+    other = tilt_of_EP4(q("1/2"), q(1))
     return universal(
         "|ζ_B| > |ζ_H|, as lscf demand for λ_s > 0; then the bound is necessary for any χ_B, and sufficient",
         tilt_bound() and decides and low and shallow and law == tilt_of_EP4(r, scale**2),
@@ -235,7 +235,7 @@ def _dp() -> Outcome:
 def _dp_omega0() -> Outcome:
     design = ep4()
     a = copo(design["Fr"], q(0), design["chi_B"], q(1), *HEIGHTS, design["T"])
-    return proof(bool(abs(a[4] / a[0] - printed.w01(*HEIGHTS)) < flint.arb("1e-40")))
+    return proof(bool(abs(a[4] / a[0] - 1 / (HEIGHTS[0] * HEIGHTS[1])) < flint.arb("1e-40")))
 
 
 @_claim(

@@ -7,13 +7,13 @@ from typing import Any
 import flint
 
 from tmsopt.models.tms import copo
-from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.algebra import match, polynomials, positive, q, ring, solve, stable, unstable
 from tmsopt.paper.ledger.entry import EXACT, Claim, Outcome, decimal, proof, section, universal
 from tmsopt.paper.ledger.lemmas import (
     Design,
     admitted,
     class_identity,
+    critical_square,
     designs,
     fifth,
     first_four,
@@ -21,6 +21,7 @@ from tmsopt.paper.ledger.lemmas import (
     necessary,
     standstill_identity,
 )
+from tmsopt.paper.ledger.printed import Tilt, laws
 
 _claim = section("2.2 Asymptotic stability and the critical Froude number")
 
@@ -85,7 +86,7 @@ def upright_case() -> bool:
     mu, k, d, x, y, T, w = ring("mu k d x y T w")
     chi_H, chi_B, zeta_B, zeta_H = 1 + k, 1 + k + d, -(x + y), -y
     skew = zeta_B * chi_H - zeta_H * chi_B  # a1/(Fr ζ_B); it is w > 0 where a1 < 0
-    square = printed.flus(mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    square = laws.flus(mu, chi_B, chi_H, zeta_B, zeta_H, Tilt(T))
     rest = x * (x + y) * chi_B * chi_H * T + k * chi_B * (x + y) * d
     identity = -square * (d * skew * (x + y)) == rest + k * chi_H * mu * skew
     return identity and positive((rest + k * chi_H * mu * w).over)
@@ -107,7 +108,7 @@ def _sufficient() -> Outcome:
     )  # fmt: skip
     wrong = sum(admitted(d) and not is_stable for d, is_stable in designs() if d[6] > 0 and d[3] < 1)
     all_below = sum(admitted(d) for d, _ in designs() if d[6] > 0 and d[3] < 1)
-    a1, square = copo(*WITNESS)[1], printed.flus(*WITNESS[1:])
+    a1, square = copo(*WITNESS)[1], critical_square(WITNESS)
     return universal(
         "χ_H ≥ 1; for χ_H < 1 the condition a1 > 0, that is ζ_B χ_H < ζ_H χ_B, must be added",
         upright_case() and upright and amended and hurwitz_identity(),
@@ -191,7 +192,7 @@ def _flus() -> Outcome:
     W = a3 / a1  # ω² from the imaginary part
     real = a0 * W**2 - a2 * W + a4
     lead = -(zeta_B - zeta_H) * zeta_B * W  # of Fr² in the real part
-    square = printed.flus(mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    square = laws.flus(mu, chi_B, chi_H, zeta_B, zeta_H, Tilt(T))
     return proof(
         real == lead * (Fr**2 - square),
         "For every χ_H and either sign of λ_s it is the speed at which the Hurwitz determinant vanishes. It bounds "
@@ -216,7 +217,7 @@ def _sides_of_critical() -> Outcome:
     still = copo(0 * T, mu, chi_B, chi_H, zeta_B, zeta_H, T)
     even = still[1] == 0 and still[3] == 0
     regular = all(
-        is_stable == (d[0] ** 2 > printed.flus(*d[1:]))
+        is_stable == (d[0] ** 2 > critical_square(d))
         for d, is_stable in designs()
         if d[0] > 0 and d[6] > 0 and all(first_four(d)) and d[4] * d[3] < d[5] * d[2]
     )
@@ -224,7 +225,7 @@ def _sides_of_critical() -> Outcome:
         "a0, a1, a3, a4 have one sign, which lscf gives for χ_H ≥ 1",
         even and regular and hurwitz_identity() and standstill_identity(),
         "the design of lscf-sufficient, Fr_c = 1, is unstable at Fr = 2 and at Fr = 10",
-        not _sides("2") and not _sides("10") and printed.flus(*WITNESS[1:]) == 1,
+        not _sides("2") and not _sides("10") and critical_square(WITNESS) == 1,
     )
 
 
