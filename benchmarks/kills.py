@@ -142,7 +142,7 @@ def _count(path: Path) -> int:
 
 def _children(pid: int) -> list[int]:
     found = subprocess.run(["ps", "-o", "pid=,args=", "--ppid", str(pid)], capture_output=True, text=True, check=False)
-    return [int(line.split()[0]) for line in found.stdout.splitlines() if "LokyProcess" in line]
+    return [int(line.split()[0]) for line in found.stdout.splitlines() if "tmsopt.processes" in line]
 
 
 @contextmanager
