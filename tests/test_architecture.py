@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PACKAGE = "tmsopt"
 FLOORS = (
-    ("errors", "records", "disk", "laws"),
+    ("errors", "records", "disk", "processes", "laws"),
     ("arithmetic",),
     ("roots",),
     ("models",),

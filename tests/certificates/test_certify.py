@@ -27,7 +27,7 @@ from tmsopt.records import Array
 
 certifying = import_module("tmsopt.certificates.certify")
 interlaces = import_module("tmsopt.certificates.interlacing")
-races = import_module("tmsopt.certificates.processes")
+started = import_module("tmsopt.processes")
 lines = import_module("tmsopt.certificates.half_planes")
 
 pytestmark = pytest.mark.skipif(not available(), reason="SCIP is not installed")
@@ -414,13 +414,13 @@ def test_a_better_design_than_many_starts_find() -> None:
 def children(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
     """The processes that are started, none of which is left at the end."""
     seen: list[Any] = []
-    start = races._started
+    start = started.start
 
-    def noted() -> Any:
-        seen.append(start())
+    def noted(*given: Any) -> Any:
+        seen.append(start(*given))
         return seen[-1]
 
-    monkeypatch.setattr(races, "_started", noted)
+    monkeypatch.setattr(started, "start", noted)
     yield seen
     assert seen
     assert all(child.poll() is not None for child in seen)
@@ -444,12 +444,12 @@ def test_a_process_that_crashes_costs_no_result(slow_plane: Solution, monkeypatc
     """At once, every time: nothing is decided, in the time that was given and that of one process more."""
     crashed: list[Any] = []
 
-    def crash() -> Any:
+    def crash(*_: Any) -> Any:
         command = [sys.executable, "-S", "-c", "import os; os._exit(1)"]
         crashed.append(subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE))
         return crashed[-1]
 
-    monkeypatch.setattr(races, "_started", crash)
+    monkeypatch.setattr(started, "start", crash)
     before = len(os.listdir("/proc/self/fd")) if os.path.isdir("/proc/self/fd") else 0
     began = time.perf_counter()
     design = certify(slow_plane, seconds=1.0)
@@ -465,15 +465,15 @@ def test_a_process_that_crashes_costs_no_result(slow_plane: Solution, monkeypatc
 
 def test_one_crash_of_two(slow_plane: Solution, monkeypatch: pytest.MonkeyPatch, children: list[Any]) -> None:
     """The other one answers."""
-    start = races._started
+    start = started.start
 
-    def every_other() -> Any:
-        child = start()
+    def every_other(*given: Any) -> Any:
+        child = start(*given)
         if len(children) % 2:
             child.kill()
         return child
 
-    monkeypatch.setattr(races, "_started", every_other)
+    monkeypatch.setattr(started, "start", every_other)
     assert is_closed(certify(slow_plane, seconds=SECONDS))
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from tmsopt.arithmetic.intervals import ranges
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.certificates.processes import Crew
 from tmsopt.certificates.question import Question
+from tmsopt.certificates.race import Crew
 from tmsopt.certificates.scip import FOUND, INFEASIBLE, UNDECIDED, Decision, Task, task
 from tmsopt.design.solution import Solution
 from tmsopt.formulation.formulate import design_of, variables_of

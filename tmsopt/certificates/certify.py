@@ -8,8 +8,8 @@ from functools import partial
 from tmsopt.arithmetic.walk import NotAccepted
 from tmsopt.certificates.answer import Answer, Clock, Progress, answer, contradicted, doubt
 from tmsopt.certificates.half_planes import over
-from tmsopt.certificates.processes import Crew
 from tmsopt.certificates.question import Question
+from tmsopt.certificates.race import Crew
 from tmsopt.certificates.scip import FOUND, INFEASIBLE, UNDECIDED, available
 from tmsopt.certificates.translation import FEASIBILITY
 from tmsopt.checks.bound import instant_bound

@@ -32,8 +32,8 @@ FILE names a problem and what varies: title, problem = "ep4.toml" (or a table [p
             "trail.limit" = [0.02, 0.05]: fixed parameters, ends of free ones, numbers of constraints
   [tolerances]  of monte_carlo, by default those of the problem
 
-Every row goes to the store, an SQLite file, as soon as it is solved. The same command goes on where it was stopped, and
-shows the rows that are there already. A row solved again, by --row or by any engine, has the same bits.
+Rows go to the store, an SQLite file, as they are solved, once a second. The same command goes on where it was stopped,
+and shows the rows that are there already. A row solved again, by --row or by any engine, has the same bits.
 
 A Dask cluster needs the same tmsopt on every worker, and one thread each: dask worker HOST:8786 --nthreads 1.
 

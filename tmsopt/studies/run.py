@@ -23,8 +23,8 @@ from tmsopt.studies.store.store import Store, open_store
 from tmsopt.studies.study import Study, definition
 from tmsopt.studies.summary import Summary, summary
 
-_COMMIT = 0.2
-"""s of rows in one transaction: what a kill may cost, and some 20 times what a transaction takes."""
+_COMMIT = 1.0
+"""s of rows in one transaction: what a kill may cost, and some 30 times what a transaction takes."""
 
 _FEW = 32  # rows for which no workers are started unless asked for: they take seconds to come up
 
@@ -84,8 +84,8 @@ def run_study(
     The rows are the same, bit by bit, whoever solves them and in whatever order.
 
     Args:
-        store: path of an SQLite file that keeps each row as soon as it is solved; the same call goes on after an
-            interruption. Rows are held in memory only, without it.
+        store: path of an SQLite file that keeps the rows as they are solved, once a second; the same call goes on after
+            an interruption. Rows are held in memory only, without it.
         workers: processes of this machine; 1 solves in this one. By default as many as cores, or 1 for few rows.
         scheduler: address of a Dask scheduler, such as ``tcp://host:8786``, in place of workers.
         fresh: move a store that is there aside, and start anew.
