@@ -1,6 +1,6 @@
 """Where, within its scenarios and tolerances, a design does worst."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -35,10 +35,6 @@ class Worst:
 
     case: Case
     value: float
-
-
-Badness = Callable[[Mapping[str, Any]], Any]
-"""A function of the values of designs that is greatest where a design does worst."""
 
 
 def subjects(problem: Problem, cases: Sequence[Case]) -> dict[str, tuple[float, Expression | str]]:

@@ -8,7 +8,7 @@ from typing import Any
 import flint
 
 from tmsopt.arithmetic.elementary import exact, rational
-from tmsopt.critical_speeds.crossings import Crossing, Span, crossings
+from tmsopt.critical_speeds.crossings import Crossing, Stretch, crossings
 from tmsopt.critical_speeds.parametric import Polynomial, interpolated
 from tmsopt.design.problem import Problem, checked
 from tmsopt.design.solution import Solution
@@ -43,10 +43,10 @@ class Speeds:
     lower: float
     upper: float
     found: tuple[Crossing, ...]
-    stable: tuple[Span, ...]
-    heavily_damped: tuple[Span, ...]
+    stable: tuple[Stretch, ...]
+    heavily_damped: tuple[Stretch, ...]
     always: tuple[str, ...]
-    marginal: tuple[Span, ...] = ()
+    marginal: tuple[Stretch, ...] = ()
     zeros: int = 0
 
     @property
@@ -91,7 +91,7 @@ def speeds(
     design: Problem | Solution | Mapping[str, float],
     parameter: str | None = None,
     *,
-    between: Span | None = None,
+    between: Stretch | None = None,
     problem: Problem | None = None,
 ) -> Speeds:
     """Every weave and capsize speed of a design and every speed at which roots meet, by exact root isolation.

@@ -12,7 +12,7 @@ from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.margins.approach import ALIKE, Approach, approach
 from tmsopt.margins.boundaries import KINDS, Edge, edges, lies_on
-from tmsopt.margins.rays import Crossing, between, crossings, most_damped
+from tmsopt.margins.rays import RayCrossing, between, crossings, most_damped
 from tmsopt.margins.surroundings import Place, placed
 from tmsopt.records import Array, Table, plain
 
@@ -175,7 +175,7 @@ def _place(
     return placed(problem, problem.ordered(parameters or {}), weights)
 
 
-def _nearest(place: Place, seen: list[Crossing], kind: str) -> Nearest:
+def _nearest(place: Place, seen: list[RayCrossing], kind: str) -> Nearest:
     """The least distance over the pieces of one boundary."""
     if kind == "heavy damping" and place.on_edge:
         zero = dict.fromkeys(place.weights, 0.0)
@@ -204,7 +204,7 @@ def _length(found: Approach) -> float:
     return found.distance if found.u.size else math.inf
 
 
-def _pieces(place: Place, seen: list[Crossing], kind: str) -> Iterator[tuple[str, float, list[Array]]]:
+def _pieces(place: Place, seen: list[RayCrossing], kind: str) -> Iterator[tuple[str, float, list[Array]]]:
     """Each edge that rays crossed, the sign of a0, and starts; the way into heavy damping is sought without a ray."""
     starts: dict[tuple[str, float], list[Array]] = {}
     for crossing in seen:
