@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tmsopt.arithmetic.elementary import exact
 from tmsopt.critical_speeds.crossings import Stretch, crossings
-from tmsopt.critical_speeds.speeds import polynomials
+from tmsopt.critical_speeds.speeds import coefficients_over
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import Parameter, ParameterSet, Values
@@ -76,7 +76,7 @@ def growth(design: Solution, end: float | None = None, over: str | None = None) 
     values, a = values[shown], a[shown]
     found = roots(a)
     try:
-        bands = crossings(polynomials(model, of, parameters, name), exact(low), exact(high), bands_alone=True)
+        bands = crossings(coefficients_over(model, of, parameters, name), exact(low), exact(high), bands_alone=True)
         stable, heavily_damped = bands.stable, bands.heavily_damped
     except InputError:  # no polynomials in it
         inside = is_stable(a)

@@ -124,7 +124,7 @@ def speeds(
     if not math.isfinite(lower) or not lower < upper:
         message = f"found {lower:.6g} … {upper:.6g}; accepted: a least and a greater value"
         raise InputError([Fault(message, ("between",))])
-    a = polynomials(asked.model, of, own, name)
+    a = coefficients_over(asked.model, of, own, name)
     met = crossings(a, exact(float(lower)), exact(float(upper)) if math.isfinite(upper) else None)
     return Speeds(
         problem=asked,
@@ -146,7 +146,7 @@ def speed_of(of: ParameterSet) -> str | None:
     return next((p.name for p in of.parameters if p.unit == "m/s" or p.name == "Fr"), None)
 
 
-def polynomials(model: Model, of: ParameterSet, own: Mapping[str, float], name: str) -> Sequence[Polynomial]:
+def coefficients_over(model: Model, of: ParameterSet, own: Mapping[str, float], name: str) -> Sequence[Polynomial]:
     """The coefficients of a design as polynomials in one of its parameters.
 
     Raises:

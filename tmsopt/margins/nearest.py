@@ -12,7 +12,7 @@ from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.margins.approach import ALIKE, Approach, approach
 from tmsopt.margins.boundaries import KINDS, Edge, edges, lies_on
-from tmsopt.margins.rays import RayCrossing, between, crossings, most_damped
+from tmsopt.margins.rays import RayCrossing, between, most_damped, ray_crossings
 from tmsopt.margins.surroundings import Place, placed
 from tmsopt.records import Array, Table, plain
 
@@ -131,7 +131,7 @@ def nearest(
     if pattern not in KINDS:
         raise InputError([Fault(f"unknown boundary {pattern!r}; {suggest(str(pattern), KINDS)}", ("pattern",))])
     place = _place(design, parameters, weights)
-    return _nearest(place, crossings(place.space), pattern)
+    return _nearest(place, ray_crossings(place.space), pattern)
 
 
 def robustness(
@@ -145,7 +145,7 @@ def robustness(
     Arguments, distances and exceptions are those of `nearest`.
     """
     place = _place(design, parameters, weights)
-    seen = crossings(place.space)
+    seen = ray_crossings(place.space)
     found = [_nearest(place, seen, kind) for kind in KINDS]
     limit = min((n for n in found if n.kind in STABILITY), key=lambda n: n.distance)
     if limit.found and not limit.direct:  # another boundary is nearer, and no ray met it

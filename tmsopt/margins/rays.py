@@ -53,7 +53,7 @@ class RayCrossing:
     distance: float
 
 
-def crossings(space: Space, seed: int = 0) -> list[RayCrossing]:
+def ray_crossings(space: Space, seed: int = 0) -> list[RayCrossing]:
     """The nearest few crossings of each edge in different directions, nearest first."""
     rays = directions(space, seed)
     return along(space, rays, np.broadcast_to(_RADII, (len(rays), len(_RADII))))
