@@ -112,6 +112,6 @@ def _plain(value: Any, digits: int | None) -> Any:
             return {"re": _plain(value.real, digits), "im": _plain(value.imag, digits)}
         case np.ndarray() | np.generic():
             return _plain(value.tolist(), digits)
-        case tuple() | list():
+        case Sequence():
             return [_plain(item, digits) for item in value]
     return value.to_json() if hasattr(value, "to_json") else plain(value, digits=digits)

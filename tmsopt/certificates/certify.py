@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.certificates.answer import Answer, Clock, Progress, answer, contradicted, doubt
+from tmsopt.certificates.answer import Answer, Clock, SecondsPassed, answer, contradicted, doubt
 from tmsopt.certificates.half_planes import over
 from tmsopt.certificates.question import Question
 from tmsopt.certificates.race import Crew
@@ -41,7 +41,7 @@ _STARTS = 4  # from SCIP's design, and others
 _NEARLY = 1e-3  # violation and loss beyond which a design that SCIP found is none
 
 
-def certify(design: Given, *, seconds: float = SECONDS, progress: Progress | None = None) -> Solution:
+def certify(design: Given, *, seconds: float = SECONDS, progress: SecondsPassed | None = None) -> Solution:
     """The same design with a bound that no design of the box can beat; or a better design, where one is found.
 
     SCIP is asked whether any design does better than this one by a gap; the answer no is the bound. It is a proof in

@@ -1,7 +1,7 @@
 """Where, within its scenarios and tolerances, a design does worst, and the proof that it does no worse anywhere."""
 
 import heapq
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count, product
 from typing import Any
@@ -49,10 +49,6 @@ class Worst:
 
     case: Case
     value: float
-
-
-Badness = Callable[[Mapping[str, Any]], Any]
-"""A function of the values of designs that is greatest where a design does worst."""
 
 
 def subjects(problem: Problem, cases: Sequence[Case]) -> dict[str, tuple[float, Expression | str]]:

@@ -31,7 +31,7 @@ _SAME = 1e-12  # relative to the largest root: difference of two that are one; a
 _NOTHING = flint.fmpq(1, 10**90)  # of the largest coefficient: one that is 0 but for the digits of y
 
 
-Span = tuple[float, float]
+Stretch = tuple[float, float]
 """Two ends of a band."""
 
 
@@ -72,10 +72,10 @@ class Crossings:
     """
 
     found: tuple[Crossing, ...]
-    stable: tuple[Span, ...]
-    heavily_damped: tuple[Span, ...]
+    stable: tuple[Stretch, ...]
+    heavily_damped: tuple[Stretch, ...]
     always: tuple[str, ...] = ()
-    marginal: tuple[Span, ...] = ()
+    marginal: tuple[Stretch, ...] = ()
     zeros: int = 0
 
 
@@ -227,9 +227,9 @@ def _cells(marks: Sequence[Any], lower: Any, upper: Any | None) -> Iterator[tupl
             yield float(low), float(high), (low + high) / 2
 
 
-def _bands(cells: Sequence[tuple[float, float, Any]], inside: Sequence[bool]) -> tuple[Span, ...]:
+def _bands(cells: Sequence[tuple[float, float, Any]], inside: Sequence[bool]) -> tuple[Stretch, ...]:
     """Neighbouring gaps in which something holds, as one. It may fail at a mark between them, in one point."""
-    bands: list[Span] = []
+    bands: list[Stretch] = []
     for (low, high, _), holds in zip(cells, inside, strict=True):
         if holds and bands and bands[-1][1] == low:
             bands[-1] = (bands[-1][0], high)

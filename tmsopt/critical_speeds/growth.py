@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.arithmetic.elementary import exact
-from tmsopt.critical_speeds.crossings import Span, crossings
-from tmsopt.critical_speeds.speeds import polynomials
+from tmsopt.critical_speeds.crossings import Stretch, crossings
+from tmsopt.critical_speeds.speeds import coefficients_over
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import Parameter, ParameterSet, Values
@@ -44,8 +44,8 @@ class Growth:
     critical: float
     design: float
     structure: str
-    stable: tuple[Span, ...]
-    heavily_damped: tuple[Span, ...]
+    stable: tuple[Stretch, ...]
+    heavily_damped: tuple[Stretch, ...]
 
 
 def growth(design: Solution, end: float | None = None, over: str | None = None) -> Growth:
@@ -76,7 +76,7 @@ def growth(design: Solution, end: float | None = None, over: str | None = None) 
     values, a = values[shown], a[shown]
     found = roots(a)
     try:
-        bands = crossings(polynomials(model, of, parameters, name), exact(low), exact(high), bands_alone=True)
+        bands = crossings(coefficients_over(model, of, parameters, name), exact(low), exact(high), bands_alone=True)
         stable, heavily_damped = bands.stable, bands.heavily_damped
     except InputError:  # no polynomials in it
         inside = is_stable(a)
@@ -114,7 +114,7 @@ def _critical(design: Solution, of: ParameterSet, parameters: Mapping[str, float
     return float(Values(model, of, parameters)[f"{name}_c"]) if known else math.nan
 
 
-def _ends(design: Solution, name: str, end: float | None, at: float, critical: float) -> Span:
+def _ends(design: Solution, name: str, end: float | None, at: float, critical: float) -> Stretch:
     if end is not None:
         return min(end, 0.0), max(end, 0.0)
     if name in SPEEDS:
@@ -123,7 +123,7 @@ def _ends(design: Solution, name: str, end: float | None, at: float, critical: f
     return (low, high) if low < high else (low - 1.0, high + 1.0)
 
 
-def _runs(values: Array, inside: Truth) -> tuple[Span, ...]:
+def _runs(values: Array, inside: Truth) -> tuple[Stretch, ...]:
     """First and last value of each run of points in which something holds."""
     changes = np.flatnonzero(np.diff(inside.astype(int), prepend=0, append=0))
     return tuple((float(values[k]), float(values[m - 1])) for k, m in changes.reshape(-1, 2))

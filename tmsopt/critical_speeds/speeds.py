@@ -8,7 +8,7 @@ from typing import Any
 import flint
 
 from tmsopt.arithmetic.elementary import exact, rational
-from tmsopt.critical_speeds.crossings import Crossing, Span, crossings
+from tmsopt.critical_speeds.crossings import Crossing, Stretch, crossings
 from tmsopt.critical_speeds.parametric import Polynomial, interpolated
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
@@ -45,10 +45,10 @@ class Speeds:
     lower: float
     upper: float
     found: tuple[Crossing, ...]
-    stable: tuple[Span, ...]
-    heavily_damped: tuple[Span, ...]
+    stable: tuple[Stretch, ...]
+    heavily_damped: tuple[Stretch, ...]
     always: tuple[str, ...]
-    marginal: tuple[Span, ...] = ()
+    marginal: tuple[Stretch, ...] = ()
     zeros: int = 0
 
     @property
@@ -93,7 +93,7 @@ def speeds(
     design: Given | Mapping[str, float],
     parameter: str | None = None,
     *,
-    between: Span | None = None,
+    between: Stretch | None = None,
     problem: Problem | None = None,
     progress: Progress | None = None,
 ) -> Speeds:
@@ -128,7 +128,7 @@ def speeds(
     if not math.isfinite(lower) or not lower < upper:
         message = f"found {lower:.6g} … {upper:.6g}; accepted: a least and a greater value"
         raise InputError([Fault(message, ("between",))])
-    a = polynomials(asked.model, of, own, name)
+    a = coefficients_over(asked.model, of, own, name)
     met = crossings(a, exact(float(lower)), exact(float(upper)) if math.isfinite(upper) else None)
     return Speeds(
         problem=asked,
@@ -150,7 +150,7 @@ def speed_of(of: ParameterSet) -> str | None:
     return next((p.name for p in of.parameters if p.unit == "m/s" or p.name == "Fr"), None)
 
 
-def polynomials(model: Model, of: ParameterSet, own: Mapping[str, float], name: str) -> Sequence[Polynomial]:
+def coefficients_over(model: Model, of: ParameterSet, own: Mapping[str, float], name: str) -> Sequence[Polynomial]:
     """The coefficients of a design as polynomials in one of its parameters.
 
     Raises:

@@ -9,7 +9,7 @@ from tmsopt.design.expression import parse_value, written_sides
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.errors import InputError
-from tmsopt.explanation.steps import Step, natural_step, reported_unit, step_within, unit_of, with_reported_unit
+from tmsopt.explanation.steps import LimitStep, natural_step, reported_unit, step_within, unit_of, with_reported_unit
 from tmsopt.records import plain
 from tmsopt.solver.solve import solve
 
@@ -161,7 +161,7 @@ def _gained(problem: Problem) -> tuple[str, float]:
     return reported_unit(of[text].unit) if text in of.names else ("1", 1.0)
 
 
-def _signed(step: Step, sign: float) -> str:
+def _signed(step: LimitStep, sign: float) -> str:
     return step.text if sign > 0 else f"-{step.text}"
 
 

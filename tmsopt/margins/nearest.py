@@ -14,7 +14,7 @@ from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.formulation.ipopt import ipopt, polisher
 from tmsopt.formulation.nlp import NLP
 from tmsopt.margins.boundaries import KINDS, Edge, edges, lies_on
-from tmsopt.margins.rays import Crossing, between, crossings, most_damped
+from tmsopt.margins.rays import RayCrossing, between, most_damped, ray_crossings
 from tmsopt.margins.surroundings import Place, placed
 from tmsopt.records import Array, Table, plain
 
@@ -157,7 +157,7 @@ def nearest(
     if pattern not in KINDS:
         raise InputError([Fault(f"unknown boundary {pattern!r}; {suggest(str(pattern), KINDS)}", ("pattern",))])
     place = _place(design, parameters, weights)
-    return _nearest(place, crossings(place.space), pattern)
+    return _nearest(place, ray_crossings(place.space), pattern)
 
 
 def robustness(
@@ -171,7 +171,7 @@ def robustness(
     Arguments, distances and exceptions are those of `nearest`.
     """
     place = _place(design, parameters, weights)
-    seen = crossings(place.space)
+    seen = ray_crossings(place.space)
     found = [_nearest(place, seen, kind) for kind in KINDS]
     limit = min((n for n in found if n.kind in STABILITY), key=lambda n: n.distance)
     if limit.found and not limit.direct:  # another boundary is nearer, and no ray met it
@@ -199,7 +199,7 @@ def _place(design: Given, parameters: Mapping[str, float] | None, weights: Mappi
     return placed(problem, problem.ordered(parameters or {}), weights)
 
 
-def _nearest(place: Place, seen: list[Crossing], kind: str) -> Nearest:
+def _nearest(place: Place, seen: list[RayCrossing], kind: str) -> Nearest:
     """The least distance over the pieces of one boundary."""
     if kind == "heavy damping" and place.on_edge:
         zero = dict.fromkeys(place.weights, 0.0)
@@ -228,7 +228,7 @@ def _length(found: _Approach) -> float:
     return found.distance if found.u.size else math.inf
 
 
-def _pieces(place: Place, seen: list[Crossing], kind: str) -> Iterator[tuple[str, float, list[Array]]]:
+def _pieces(place: Place, seen: list[RayCrossing], kind: str) -> Iterator[tuple[str, float, list[Array]]]:
     """Each edge that rays crossed, the sign of a0, and starts; the way into heavy damping is sought without a ray."""
     starts: dict[tuple[str, float], list[Array]] = {}
     for crossing in seen:

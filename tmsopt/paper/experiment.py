@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from tmsopt import laws
-from tmsopt.paper.reference import Bicycle, benchmark, experimental, optimised
+from tmsopt.paper.reference import ReferenceBicycle, benchmark, experimental, optimised
 from tmsopt.records import Array
 from tmsopt.roots import is_stable
 
@@ -22,7 +22,7 @@ _JUST_ABOVE = 1 + 1e-6  # of Fr_c: where a bicycle that gains stability at Fr_c 
 
 
 @dataclass(frozen=True)
-class Point:
+class ExperimentPoint:
     """A bicycle in the plane of the law: χ_B over ζ_B/ζ_H; ω0 where it fulfils the law for any χ_H (equation chib)."""
 
     name: str
@@ -61,7 +61,7 @@ class Experiment:
 
     ratio: Array
     law: Array
-    points: tuple[Point, ...]
+    points: tuple[ExperimentPoint, ...]
     chi_B: float
     lambda_s: float
     least_tilt: float
@@ -89,9 +89,9 @@ def experiment(lambda_s: float = TILT, mass_ratios: tuple[float, ...] = MASS_RAT
     )
 
 
-def _point(bicycle: Bicycle) -> Point:
+def _point(bicycle: ReferenceBicycle) -> ExperimentPoint:
     p = bicycle.parameters
-    return Point(bicycle.name, p["zeta_B"] / p["zeta_H"], p["chi_B"], p["chi_H"], bicycle.omega0)
+    return ExperimentPoint(bicycle.name, p["zeta_B"] / p["zeta_H"], p["chi_B"], p["chi_H"], bicycle.omega0)
 
 
 def _critical(chi_H: float, mu: float, lambda_s: float, slack: float = 0.01) -> CriticalSpeed:

@@ -30,7 +30,7 @@ class Track:
 
 
 @dataclass(frozen=True)
-class Mark:
+class DoubleRoots:
     """A multiple root: ``EP4``, ``2EP2``, ``CEP2``, or ``EP2`` for one real double root; `s` lists it, once each."""
 
     name: str
@@ -55,7 +55,7 @@ class Locus:
     values: Array
     roots: Complex
     tracks: tuple[Track, ...]
-    marks: tuple[Mark, ...]
+    marks: tuple[DoubleRoots, ...]
     crossings: tuple[tuple[float, float], ...]
 
 
@@ -95,7 +95,7 @@ def locus(
         found = np.insert(found, coarse + 1, roots(coefficients(middle)), axis=0)
         values = np.insert(values, coarse + 1, middle)
     path = universal_path(model, of, parameters, sweep, values)
-    pairs = [Mark(e.name, e.value, _double_roots(e.name, e.A, e.omega0)) for e in path.events if "EP" in e.name]
+    pairs = [DoubleRoots(e.name, e.value, _double_roots(e.name, e.A, e.omega0)) for e in path.events if "EP" in e.name]
     marks = [*pairs, *_real_double_roots(coefficients, values, [m.value for m in pairs])]
     crossings = [
         (e.value, abs(e.omega0) * float(np.sqrt(e.A[2] / e.A[0])))
@@ -183,7 +183,9 @@ def _double_roots(name: str, A: Array, omega0: float) -> Complex:
     return roots(np.array([1.0, float(A[0]) / 2, 1.0])) * abs(omega0)
 
 
-def _real_double_roots(coefficients: Callable[[ArrayLike], Array], values: Array, known: list[float]) -> list[Mark]:
+def _real_double_roots(
+    coefficients: Callable[[ArrayLike], Array], values: Array, known: list[float]
+) -> list[DoubleRoots]:
     """Where the discriminant changes sign: two real roots meet. It keeps its sign at 2EP2 and CEP2."""
 
     def quartic(at: ArrayLike) -> list[Array]:
@@ -201,7 +203,7 @@ def _real_double_roots(coefficients: Callable[[ArrayLike], Array], values: Array
         if found[low] * found[high] > 0 or any(values[low] <= v <= values[high] for v in known):
             continue
         at = float(brentq(value, values[low], values[high], xtol=1e-15, rtol=1e-15))
-        marks.append(Mark("EP2", at, np.array([_closest_pair(roots(coefficients(at)))])))
+        marks.append(DoubleRoots("EP2", at, np.array([_closest_pair(roots(coefficients(at)))])))
     return marks
 
 

@@ -14,7 +14,7 @@ from tmsopt.design.units import decay_time, frequencies, growth_time, reading
 from tmsopt.models import Model, Parameter, Quantity, Values
 from tmsopt.report.text import number
 
-Row = Sequence[str]
+TableRow = Sequence[str]
 Cells = tuple[str, str, str]
 """Symbol, number and unit."""
 
@@ -25,7 +25,7 @@ _DIGITS = {"m/s": 8, "N": 6}
 """Of a quantity beside a dimensionless one, where these are fewer than all."""
 
 
-def parameter_rows(solution: Solution, si: Mapping[str, float]) -> list[Row]:
+def parameter_rows(solution: Solution, si: Mapping[str, float]) -> list[TableRow]:
     """Names, numbers, units, and which are free; those that are 0 as by default are left out.
 
     Args:
@@ -40,7 +40,7 @@ def parameter_rows(solution: Solution, si: Mapping[str, float]) -> list[Row]:
     counterpart = {p.counterpart or p.name: p for p in scaled.parameters}
     own = of is scaled
     scale = "SI" if own else f"SI for w = {si['w']:g} m, m_B = {si['m_B']:g} kg"
-    rows: list[Row] = [("", "dimensionless", "", scale, "", "")]
+    rows: list[TableRow] = [("", "dimensionless", "", scale, "", "")]
     for p in native.parameters:
         other = counterpart[p.name]
         how = _freedom(solution, other.name if own else p.name)
@@ -50,7 +50,7 @@ def parameter_rows(solution: Solution, si: Mapping[str, float]) -> list[Row]:
     return rows + [("", "", *_read(p, si[p.name]), _freedom(solution, p.name)) for p in rest]
 
 
-def quantity_rows(solution: Solution, si: Mapping[str, float]) -> list[Row]:
+def quantity_rows(solution: Solution, si: Mapping[str, float]) -> list[TableRow]:
     """What the roots and the quantities of a model are; without a dimensionless form, only those that exist."""
     model, found = solution.problem.model, solution.quantities
     paired = _paired(model)
@@ -79,7 +79,7 @@ def _freedom(solution: Solution, name: str) -> str:
     return "free" if name in problem.free else "scenario" if name in problem.scenarios else "fixed"
 
 
-def _motion(solution: Solution, rate: float | None, paired: bool) -> Iterator[Row]:
+def _motion(solution: Solution, rate: float | None, paired: bool) -> Iterator[TableRow]:
     """Abscissae with the times that they stand for, damping ratio and frequencies; beside each other if paired."""
     hertz = [] if rate is None else frequencies(solution.roots, rate)
     waves = [("frequency", f"{f:.6g}", "Hz") for f in hertz]
@@ -104,7 +104,7 @@ def _times(abscissa: float, rate: float | None) -> list[Cells]:
     return [(name, f"{time:.4g}", "s") for name, time in times if math.isfinite(time)]
 
 
-def _beside(left: tuple[str, str], cells: Sequence[Cells]) -> list[Row]:
+def _beside(left: tuple[str, str], cells: Sequence[Cells]) -> list[TableRow]:
     """A dimensionless number, and what is beside it: the first in its row, others below."""
     return [(*(left if k == 0 else ("", "")), *cell) for k, cell in enumerate(cells or [("", "", "")])]
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from tmsopt.paper.locus import Locus, LocusRow, Mark, Track
+from tmsopt.paper.locus import DoubleRoots, Locus, LocusRow, Track
 from tmsopt.plots.style import COMPLEX, CRITICAL, LINE, MARK, REAL, new_figure
 
 COLOURS = (LINE, CRITICAL, MARK)
@@ -157,7 +157,7 @@ def _key(row: LocusRow) -> list[Line2D]:
     ]  # fmt: skip
 
 
-def _name(ax: Axes, mark: Mark, omega0: float) -> None:
+def _name(ax: Axes, mark: DoubleRoots, omega0: float) -> None:
     """The name of a multiple root at each of its places inside the axes, with a leader where it stands off."""
     (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
     for k, s in enumerate(sorted(mark.s, key=lambda z: (z.real, z.imag))):
