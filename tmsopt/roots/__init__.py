@@ -7,9 +7,9 @@ first; `patterns` says which roots meet, `quartics` takes millions at once.
 from tmsopt.roots.count import real_roots
 from tmsopt.roots.exact import exact_abscissa, exact_roots
 from tmsopt.roots.numeric import abscissa, backward_error, rebuilt, roots
-from tmsopt.roots.patterns.composed import composition, pattern
+from tmsopt.roots.patterns.composed import PATTERNS, composition, pattern
 from tmsopt.roots.patterns.multiplicity import multiple_real_roots
-from tmsopt.roots.patterns.pattern import PATTERNS, Pattern
+from tmsopt.roots.patterns.pattern import Pattern
 from tmsopt.roots.patterns.structure import Structure, pattern_distance, structure
 from tmsopt.roots.polynomial import Root, determinant, evaluate, product, quadratic_pencil, shift
 from tmsopt.roots.quartics.classes import CLASSES, Classes, quartic_classes, quartic_is_stable

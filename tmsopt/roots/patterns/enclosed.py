@@ -14,9 +14,10 @@ import flint
 import numpy as np
 
 from tmsopt.arithmetic.elementary import as_ball, rational
+from tmsopt.roots.patterns.composed import PATTERNS
 from tmsopt.roots.patterns.fitting import Form
 from tmsopt.roots.patterns.naming import shown
-from tmsopt.roots.patterns.pattern import LINES, PATTERNS, Pattern
+from tmsopt.roots.patterns.pattern import LINES, Pattern
 from tmsopt.roots.patterns.shape import Shape
 from tmsopt.roots.polynomial import Root, evaluate, product
 
