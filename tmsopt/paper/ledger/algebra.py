@@ -9,6 +9,7 @@ import flint
 
 from tmsopt.arithmetic.elementary import rational
 from tmsopt.arithmetic.krawczyk import enclosed, refined
+from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.polynomial import determinant, product, shift
 from tmsopt.roots.stability import lienard_chipart
 
@@ -156,17 +157,7 @@ def stable_left_of(coefficients: Sequence[Any], gamma: Any) -> bool:
 
 def unstable(coefficients: Sequence[Any]) -> bool:
     """Whether some root lies in Re s > 0, by isolating balls around the roots."""
-    return any(bool(z.real > 0) for z, _ in roots(coefficients))
-
-
-def roots(coefficients: Sequence[Any]) -> list[tuple[Any, int]]:
-    """Certified isolating balls of the roots of a polynomial with fractions, with multiplicities."""
-    common = flint.fmpz(1)
-    for c in coefficients:
-        common = common.lcm(c.q)
-    whole: Any = flint.fmpz_poly([int(c.p * (common // c.q)) for c in reversed(coefficients)])
-    found: list[tuple[Any, int]] = whole.complex_roots()
-    return found
+    return any(bool(z.real > 0) for z, _ in isolated_roots(coefficients))
 
 
 def ball_roots(coefficients: Sequence[Ball]) -> list[Any]:
@@ -178,7 +169,7 @@ def ball_roots(coefficients: Sequence[Ball]) -> list[Any]:
 
 def heavily_damped(coefficients: Sequence[Any]) -> bool:
     """Whether all roots of a polynomial with fractions are simple, real and negative."""
-    found = roots(coefficients)
+    found = isolated_roots(coefficients)
     return all(m == 1 and z.imag == 0 and bool(z.real < 0) for z, m in found)
 
 

@@ -12,7 +12,6 @@ from tmsopt.paper.ledger.algebra import (
     positive_quotient,
     q,
     ring,
-    roots,
     slope,
     stable,
 )
@@ -27,6 +26,7 @@ from tmsopt.paper.ledger.lemmas import (
     tilt_of_EP4,
 )  # fmt: skip
 from tmsopt.paper.ledger.printed import Tilt, laws
+from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.polynomial import evaluate as value_at
 
 _claim = section("2.4.5 Mechanism of self-stability and CEP2 as a precursor to weaving")
@@ -259,7 +259,7 @@ def _after() -> Outcome:
 )
 def _middle() -> Outcome:
     before, heavy, after = (_hand(Fr, "1/4") for Fr in ("1.38", "1.45", "1.55"))
-    real = [sum(m for z, m in roots(p) if z.imag == 0) for p in (before, heavy, after)]
+    real = [sum(m for z, m in isolated_roots(p) if z.imag == 0) for p in (before, heavy, after)]
     return proof(
         _third() and _order() and real == [2, 4, 0] and heavily_damped(heavy),
         "With ζ_B = −2, ζ_H = −1/2, tan λ_s = 1/4 the numbers of real roots at Fr = 1.38, 1.45, 1.55 are 2, 4, 0.",
@@ -301,9 +301,9 @@ def _simultaneous() -> Outcome:
 )
 def _lower() -> Outcome:
     before, on, after = (_hand(Fr, "1") for Fr in ("1.5", "1.85", "2"))
-    counts = [sum(m for z, m in roots(p) if z.imag == 0) for p in (before, on, after)]
-    round_ = all(abs(z) - 1 < flint.arb("1e-10") and 1 - abs(z) < flint.arb("1e-10") for z, _ in roots(on))
-    off = all(not (abs(z) - 1).contains(0) for z, _ in roots(after))
+    counts = [sum(m for z, m in isolated_roots(p) if z.imag == 0) for p in (before, on, after)]
+    round_ = all(abs(z) - 1 < flint.arb("1e-10") and 1 - abs(z) < flint.arb("1e-10") for z, _ in isolated_roots(on))
+    off = all(not (abs(z) - 1).contains(0) for z, _ in isolated_roots(after))
     return proof(
         _third() and _order() and counts == [2, 0, 0] and round_ and off and stable(after),
         "With ζ_B = −2, ζ_H = −1/2, tan λ_s = 1: two real roots at Fr = 3/2, two pairs of modulus 1 at 1.85, four "

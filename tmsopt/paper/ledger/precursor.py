@@ -12,7 +12,6 @@ from tmsopt.paper.ledger.algebra import (
     heavily_damped,
     q,
     ring,
-    roots,
     slope,
     stable,
 )
@@ -27,6 +26,7 @@ from tmsopt.paper.ledger.lemmas import (
     weave,
 )  # fmt: skip
 from tmsopt.paper.ledger.printed import Tilt, laws
+from tmsopt.roots.exact import isolated_roots
 
 _claim = section("2.4.5 Mechanism of self-stability and CEP2 as a precursor to weaving")
 
@@ -214,7 +214,7 @@ def _monotonic() -> Outcome:
     # ζ_B = −2, ζ_H = −1/2, χ_B = 2, χ_H = 1, tan λ_s = 1/4, Fr = 29/20; over μ ν_H cos λ_s, with ν_H/cos λ_s = 1/8
     Fr, T = q("1.45"), q("0.25")
     p = quartic(Fr, q(2), T, q(2), q(1))
-    modes = [z.real for z, _ in roots(p)]
+    modes = [z.real for z, _ in isolated_roots(p)]
     leans = [s * s / 8 + Fr * s + Fr**2 - T for s in modes]
     slow, fast = modes[-1], modes[0]
     visible = all(not lean.contains(0) for lean in leans)
@@ -250,7 +250,7 @@ def _similar() -> Outcome:
 
 def _real_roots(chi_B: str, speeds: Sequence[str]) -> list[int]:
     designs = [copo(q(Fr), q(0), q(chi_B), q(1), *HEIGHTS, q("0.377177")) for Fr in speeds]
-    return [sum(m for z, m in roots(p) if z.imag == 0) for p in designs]
+    return [sum(m for z, m in isolated_roots(p) if z.imag == 0) for p in designs]
 
 
 CLAIMS: tuple[Claim, ...] = (

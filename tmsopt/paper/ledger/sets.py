@@ -17,7 +17,6 @@ from tmsopt.paper.ledger.algebra import (
     positive,
     q,
     ring,
-    roots,
     slope,
     solve,
 )
@@ -31,6 +30,7 @@ from tmsopt.paper.ledger.lemmas import (
     tilt_of_EP4,
     tilted,
 )  # fmt: skip
+from tmsopt.roots.exact import isolated_roots
 
 _NONE = flint.arb("1e-40")
 _MATCHED = (
@@ -281,7 +281,7 @@ def _spire() -> Outcome:
     inner = copo(q(f"{middle[0]:.6f}"), q(0), q(f"{middle[1]:.6f}"), q(1), *HEIGHTS, q(f"{T:.6f}"))
     outer = copo(q("2.4"), q(0), q("1.42"), q(1), *HEIGHTS, q(f"{T:.6f}"))
     return proof(
-        signs and heavily_damped(inner) and not heavily_damped(outer) and len(roots(inner)) == 4,
+        signs and heavily_damped(inner) and not heavily_damped(outer) and len(isolated_roots(inner)) == 4,
         "The number of real roots changes only on the discriminant surface, so one inner point decides for all.",
     )
 

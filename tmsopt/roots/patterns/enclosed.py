@@ -14,6 +14,7 @@ import flint
 import numpy as np
 
 from tmsopt.arithmetic.elementary import as_ball, rational
+from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.patterns.composed import PATTERNS
 from tmsopt.roots.patterns.fitting import Form
 from tmsopt.roots.patterns.naming import shown
@@ -66,7 +67,7 @@ def enclosed_roots(coefficients: Sequence[Any]) -> tuple[Enclosed, ...] | None:
     degree = len(terms) - 1
     if degree > 0:
         slope = [(degree - k) * c for k, c in enumerate(terms[:-1])]
-        for z, multiplicity in _isolated([rational(t) for t in terms]):
+        for z, multiplicity in isolated_roots(terms):
             if multiplicity > 1:
                 if not all(t.is_exact() for t in terms):
                     return None
@@ -171,16 +172,6 @@ def _double(x: Fraction) -> float:
         return x.numerator / x.denominator  # rounded correctly, whatever the length of the two
     except OverflowError:
         return float("inf") if x > 0 else float("-inf")
-
-
-def _isolated(terms: Sequence[flint.fmpq]) -> list[tuple[Any, int]]:
-    """Distinct roots of a polynomial with rational coefficients, each as a ball with its multiplicity."""
-    common = flint.fmpz(1)
-    for term in terms:
-        common = common.lcm(term.q)
-    polynomial = flint.fmpz_poly([int(t.p * (common // t.q)) for t in reversed(terms)])
-    isolated: Any = polynomial.complex_roots()
-    return [(z, int(m)) for z, m in isolated]
 
 
 def _overlap(found: Sequence[Enclosed]) -> bool:
