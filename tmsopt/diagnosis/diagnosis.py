@@ -14,7 +14,7 @@ from tmsopt.diagnosis.splitting import DEVIATION, Ideal, Law, Response, response
 from tmsopt.models import Model, ParameterSet
 from tmsopt.records import plain
 from tmsopt.roots import Root, Structure
-from tmsopt.roots.patterns.enclosed import nearest
+from tmsopt.roots.patterns.enclosed import nearest_roots
 from tmsopt.solver.solve import solved
 
 _BITS = 424  # 127 digits: changes down to 1e-16 are differences of coefficients
@@ -99,7 +99,7 @@ def diagnosed(
 
 def _ideal(model: Model, of: ParameterSet, design: Mapping[str, float], structure: Structure) -> Ideal:
     coefficients = model.coefficients({n: exact(x) for n, x in design.items()}, of)
-    balls = nearest(structure.name, coefficients, structure.roots)
+    balls = nearest_roots(structure.name, coefficients, structure.roots)
     if balls is None:
         return [(r, flint.acb(r.re, r.im)) for r in structure.roots]
     middles = [flint.acb(z.re.mid(), z.im.mid()) for z in balls]

@@ -1,5 +1,6 @@
 """Section 2.3: the least spectral abscissa and the conditions for an EP4."""
 
+from tmsopt.models.exact import Tilt
 from tmsopt.models.tms import copo, matrices
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.algebra import (
@@ -11,7 +12,7 @@ from tmsopt.paper.ledger.algebra import (
 )
 from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal
 from tmsopt.paper.ledger.lemmas import critical_square
-from tmsopt.paper.ledger.printed import Tilt, laws
+from tmsopt.paper.ledger.printed import laws
 from tmsopt.paper.ledger.stability import upright_case, wrongly_admitted
 from tmsopt.roots.polynomial import product
 

@@ -2,11 +2,12 @@
 
 from typing import Any
 
+from tmsopt.models.exact import Tilt
 from tmsopt.models.tms import copo
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.algebra import polynomials, q, ring
 from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal
-from tmsopt.paper.ledger.printed import Tilt, laws
+from tmsopt.paper.ledger.printed import laws
 
 _claim = section("2.4.1 χ_H = 1: the critical Froude number and its minimum")
 

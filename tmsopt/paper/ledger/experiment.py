@@ -5,13 +5,14 @@ from typing import Any
 
 import flint
 
+from tmsopt.models.exact import Tilt
 from tmsopt.models.tms import copo
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.abscissa import product_bound
 from tmsopt.paper.ledger.algebra import match, polynomials, positive_quotient, q, ring, solve, stable_left_of
 from tmsopt.paper.ledger.entry import Claim, Outcome, decimal, digits, proof, section, universal
 from tmsopt.paper.ledger.lemmas import normal, tilt_bound, tilt_of_EP4
-from tmsopt.paper.ledger.printed import Tilt, laws
+from tmsopt.paper.ledger.printed import laws
 
 _machine = section("2.4.6 How the scaling laws match the experimental TMS bike")
 _frame = section("Abstract, introduction and conclusions")

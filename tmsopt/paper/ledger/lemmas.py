@@ -11,9 +11,10 @@ from typing import Any
 
 import flint
 
+from tmsopt.models.exact import Tilt
 from tmsopt.models.tms import copo
 from tmsopt.paper.ledger.algebra import Quotient, match, polynomials, positive, q, ring, solve, stable, substitute
-from tmsopt.paper.ledger.printed import Tilt, laws
+from tmsopt.paper.ledger.printed import laws
 
 _NAMES = "Fr mu chi_B chi_H zeta_B zeta_H T"
 Design = tuple[Any, ...]  # Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T as fractions

@@ -2,11 +2,12 @@
 
 import flint
 
+from tmsopt.models.exact import Tilt
 from tmsopt.models.tms import matrices, tms
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.algebra import polynomials, q, ring
 from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal
-from tmsopt.paper.ledger.printed import Tilt, laws
+from tmsopt.paper.ledger.printed import laws
 from tmsopt.roots.polynomial import quadratic_pencil
 
 _claim = section("2.1 The TMS bicycle model; the characteristic polynomial")

@@ -4,6 +4,7 @@ from typing import Any
 
 import flint
 
+from tmsopt.models.exact import Tilt
 from tmsopt.models.tms import copo
 from tmsopt.paper.ledger.algebra import (
     Quotient,
@@ -25,7 +26,7 @@ from tmsopt.paper.ledger.lemmas import (
     standstill_identity,
     tilt_of_EP4,
 )  # fmt: skip
-from tmsopt.paper.ledger.printed import Tilt, laws
+from tmsopt.paper.ledger.printed import laws
 from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.polynomial import evaluate as value_at
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import flint
 
+from tmsopt.models.exact import Tilt
 from tmsopt.models.tms import copo
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.algebra import (
@@ -25,7 +26,7 @@ from tmsopt.paper.ledger.lemmas import (
     tilted,
     weave,
 )  # fmt: skip
-from tmsopt.paper.ledger.printed import Tilt, laws
+from tmsopt.paper.ledger.printed import laws
 from tmsopt.roots.exact import isolated_roots
 
 _claim = section("2.4.5 Mechanism of self-stability and CEP2 as a precursor to weaving")

@@ -4,24 +4,12 @@ Most formulas are those of `laws`. Those that have no exact value stand here wit
 ω0⁴, one for Fr gives Fr², and √|ζ| is an argument.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 from tmsopt import laws as _laws
 
 laws: Any = _laws
-"""The laws of the paper, which take exact numbers and `Tilt`, too."""
-
-
-@dataclass(frozen=True)
-class Tilt:
-    """A steer axis tilt of which the tangent is known exactly."""
-
-    T: Any
-
-    def tan(self) -> Any:
-        """T."""
-        return self.T
+"""The laws of the paper, which take exact numbers too, and for λ_s a `Tilt`."""
 
 
 def nu_H(chi_H: Any, zeta_H: Any, sine: Any, cosine: Any) -> Any:

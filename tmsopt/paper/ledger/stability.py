@@ -6,6 +6,7 @@ from typing import Any
 
 import flint
 
+from tmsopt.models.exact import Tilt
 from tmsopt.models.tms import copo
 from tmsopt.paper.ledger.algebra import match, polynomials, positive, q, ring, solve, stable, unstable
 from tmsopt.paper.ledger.entry import EXACT, Claim, Outcome, decimal, proof, section, universal
@@ -21,7 +22,7 @@ from tmsopt.paper.ledger.lemmas import (
     necessary,
     standstill_identity,
 )
-from tmsopt.paper.ledger.printed import Tilt, laws
+from tmsopt.paper.ledger.printed import laws
 
 _claim = section("2.2 Asymptotic stability and the critical Froude number")
 

@@ -82,7 +82,7 @@ def enclosed_roots(coefficients: Sequence[Any]) -> tuple[Enclosed, ...] | None:
     return _sorted(found)
 
 
-def nearest(name: str, coefficients: Sequence[Any], roots: Sequence[Root]) -> tuple[Enclosed, ...] | None:
+def nearest_roots(name: str, coefficients: Sequence[Any], roots: Sequence[Root]) -> tuple[Enclosed, ...] | None:
     """Roots of the polynomial nearest to a given one among those of a structure; None where the fit does not converge.
 
     Nearest is: least in the sum over k = 1 … n of (Δₖ/wₖ)², where Δₖ is the change of the k-th coefficient of the
