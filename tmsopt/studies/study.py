@@ -12,7 +12,7 @@ from tmsopt.design.limit import with_limit
 from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
 from tmsopt.formulation.options import STARTS
-from tmsopt.records import Column, Table
+from tmsopt.records import Array, Column, Table
 from tmsopt.studies.samples import grid
 from tmsopt.studies.validate import faults
 
@@ -65,6 +65,15 @@ class Study:
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
+
+    @property
+    def axes(self) -> dict[str, Array]:
+        """Of a full grid, axis → its values in their order."""
+        found, stride = {}, len(self)
+        for name, size in (self.grid_shape or {}).items():
+            stride //= size
+            found[name] = np.asarray(self.columns[name])[: size * stride : stride]
+        return found
 
     def varied(self, row: int) -> Table[float]:
         """What the study gives a row, counted from 0.
@@ -150,12 +159,7 @@ def definition(study: Study) -> dict[str, Any]:
 def _columns(study: Study) -> dict[str, Any]:
     if study.grid_shape is None:
         return {"columns": {name: list(column) for name, column in study.columns.items()}}
-    sizes = tuple(study.grid_shape.values())
-    axes = {}
-    for axis, (name, column) in enumerate(study.columns.items()):
-        values = np.moveaxis(np.asarray(column).reshape(sizes), axis, 0)
-        axes[name] = values.reshape(sizes[axis], -1)[:, 0].tolist()
-    return {"grid": axes, "axes": list(axes)}
+    return {"grid": {name: values.tolist() for name, values in study.axes.items()}, "axes": list(study.axes)}
 
 
 def _problem(problem: Problem) -> dict[str, Any]:
