@@ -1,4 +1,4 @@
-"""Expressions over arrays: against mpmath, against one design at a time, NumPy against numba to the bit."""
+"""Expressions over arrays: against mpmath, against one design at a time, in blocks and whole to the bit."""
 
 import dataclasses
 import math
@@ -10,22 +10,15 @@ import numpy as np
 import pytest
 
 from benchmarks.suites import TEMPLATES
-from tmsopt.arithmetic import NotAccepted
-from tmsopt.charts import array_function
-from tmsopt.design import EXACT, NO_RADIUS, Problem, engine_of, machine, parse_comparison, parse_value, tape
+from tmsopt.arithmetic import NotAccepted, program
+from tmsopt.charts import array_function, engine_of
+from tmsopt.design import NO_RADIUS, Problem, parse_comparison
 from tmsopt.errors import InputError
 from tmsopt.models import Quantity, Values, tms
 from tmsopt.roots import roots
 
-machines = import_module("tmsopt.design.machine")
-
-try:
-    import numba  # noqa: F401
-except ImportError:
-    MISSING = True
-else:
-    MISSING = False
-compiled = pytest.mark.skipif(MISSING, reason="numba is not installed")
+arrays = import_module("tmsopt.arithmetic.arrays")
+motion = import_module("tmsopt.charts.motion")
 
 NATIVE = Problem(
     model=tms,
@@ -96,7 +89,7 @@ def test_every_operation_of_the_language_is_right():
     found = array_function(NATIVE, dict(zip(EXACT_VALUES, EXACT_VALUES, strict=True)))
     assert found.others == {}
     columns = grid(NATIVE)
-    values = found(columns, "numpy")
+    values = found(columns)
     with mpmath.workdps(50):
         for text, exact in EXACT_VALUES.items():
             array = np.broadcast_to(values[text], (7, 11))
@@ -113,7 +106,7 @@ def test_every_quantity_is_that_of_one_design_at_a_time(problem):
     found = array_function(problem, dict(zip(names, names, strict=True)))
     assert found.others == {}  # quotients and choices too are written down
     columns = grid(problem)
-    values = found(columns, "numpy")
+    values = found(columns)
     for i, j in np.ndindex(7, 11):
         one = Values(tms, problem.parameter_set, single(problem, columns, i, j), extra=(NO_RADIUS,))
         for name in names:
@@ -125,7 +118,7 @@ def test_constraints_are_those_of_one_design_at_a_time():
     texts = {f"{text} {sign} 0.7": sign for text, sign in TEMPLATES}
     conditions = {t: parse_comparison(t, NATIVE.vocabulary) for t in texts}
     columns = grid(NATIVE)
-    values = array_function(NATIVE, conditions)(columns, "numpy")
+    values = array_function(NATIVE, conditions)(columns)
     for i, j in np.ndindex(7, 11):
         one = NATIVE.values(single(NATIVE, columns, i, j))
         for text, condition in conditions.items():
@@ -146,17 +139,16 @@ def test_constraints_are_those_of_one_design_at_a_time():
         ("max(asin(2 * lambda_s), 5)", lambda s: abs(s) <= 0.5),
     ],
 )
-@pytest.mark.parametrize("engine", ["numpy", pytest.param("numba", marks=compiled)])
-def test_nan_where_a_value_does_not_exist(text, exists, engine):
+def test_nan_where_a_value_does_not_exist(text, exists):
     tilts = np.array([-1.1, -0.5, -0.25, 0.25, 0.5, 1.2])[:, None]
     columns = grid(NATIVE) | {"lambda_s": tilts}
-    found = np.broadcast_to(array_function(NATIVE, {"x": text})(columns, engine)["x"], (6, 11))
+    found = np.broadcast_to(array_function(NATIVE, {"x": text})(columns)["x"], (6, 11))
     assert np.array_equal(np.isfinite(found[:, 0]), [exists(s) for s in tilts.ravel()])
 
 
 def test_a_difference_keeps_its_roundings():
     """(x + y) − y is not x; CasADi would write x."""
-    found = array_function(NATIVE, {"x": "(lambda_s + 1e16) - 1e16"})(grid(NATIVE) | {"lambda_s": 1.5}, "numpy")
+    found = array_function(NATIVE, {"x": "(lambda_s + 1e16) - 1e16"})(grid(NATIVE) | {"lambda_s": 1.5})
     assert found["x"] == 2.0
     assert ca.GlobalOptions.getSimplificationOnTheFly()  # as it was
 
@@ -165,7 +157,7 @@ def test_a_difference_keeps_its_roundings():
 
 
 def test_what_depends_on_one_axis_stays_on_it():
-    found = array_function(NATIVE, {"a3": "a3", "a4": "a4", "a2": "a2", "mass": "mu * zeta_H"})(grid(NATIVE), "auto")
+    found = array_function(NATIVE, {"a3": "a3", "a4": "a4", "a2": "a2", "mass": "mu * zeta_H"})(grid(NATIVE))
     assert {n: np.shape(v) for n, v in found.items()} == {"a3": (1, 11), "a4": (7, 1), "a2": (7, 11), "mass": ()}
 
 
@@ -173,17 +165,17 @@ def test_settled_parameters_change_no_bit():
     texts = {"x": "Fr_c * Fr + sin(lambda_s)", "y": "a2", "z": "chi_T"}
     found, columns = array_function(NATIVE, texts), grid(NATIVE)
     settled = found.settled({n: v for n, v in columns.items() if n != "lambda_s"})
-    assert len(settled.tape.nodes) < len(found.tape.nodes)
-    whole, part = found(columns, "numpy"), settled({"lambda_s": columns["lambda_s"]}, "numpy")
+    assert len(settled.program.steps) < len(found.program.steps)
+    whole, part = found(columns), settled({"lambda_s": columns["lambda_s"]})
     assert all(np.array_equal(whole[n], part[n], equal_nan=True) for n in texts)
 
 
 def test_root_quantities_are_given_or_computed():
     found, columns = array_function(NATIVE, {"x": "2 * abscissa", "y": "Fr"}), grid(NATIVE)
     alpha = np.random.default_rng(0).normal(size=(7, 11))
-    assert np.array_equal(found(columns | {"abscissa": alpha}, "numpy")["x"], 2 * alpha)
+    assert np.array_equal(found(columns | {"abscissa": alpha})["x"], 2 * alpha)
     z = roots(np.stack(np.broadcast_arrays(*tms.coefficients(columns)), axis=-1))
-    assert np.array_equal(found(columns, "numpy")["x"], 2 * z.real.max(axis=-1))
+    assert np.array_equal(found(columns)["x"], 2 * z.real.max(axis=-1))
 
 
 def test_a_formula_that_takes_no_symbols_is_evaluated_all_the_same():
@@ -198,7 +190,7 @@ def test_a_formula_that_takes_no_symbols_is_evaluated_all_the_same():
     assert np.array_equal(values["y"], columns["Fr"] * columns["lambda_s"])
 
 
-# The machine
+# Programs
 
 
 BINARY = (
@@ -225,46 +217,61 @@ def random_function(rng, size=40):
                 made.append(ca.if_else(a < b, b, c))
             case _:
                 made.append(BINARY[rng.integers(len(BINARY))](a, b))
-    return ca.Function("f", [x], [made[-1], made[-2], made[size // 2]])
+    return ca.Function("f", [x], [ca.vertcat(made[-1], made[-2], made[size // 2])])
 
 
-@compiled
 @pytest.mark.parametrize("shape", [(5, 1200), (600, 3), (1, 700), (40, 1), (700,), (), (2, 3, 4), (0, 5)])
-def test_numpy_and_the_machine_give_the_same_bits(shape):
-    """Rounded alike, so equal whatever the program: 1200 columns are three blocks."""
+def test_blocks_change_no_bit(shape, monkeypatch):
+    """Whatever the program: blocks are parts of a row, whole rows, or the grid."""
     rng = np.random.default_rng(5)
     for _ in range(12):
-        program = tape(random_function(rng), "pqrs", "uvw")
+        found = program(random_function(rng))
         column, row = (1,) * (len(shape) - 1) + shape[-1:], (*shape[:-1], 1) if shape else ()
-        given = {n: rng.normal(size=s) * 3 for n, s in zip("pqrs", (shape, column, row, ()), strict=True)}
-        numpy, numba_ = program(given), program(given, machine())
-        for name in "uvw":
-            assert np.shape(numpy[name]) == np.shape(numba_[name])
-            assert np.array_equal(numpy[name], numba_[name], equal_nan=True)
+        given = {k: rng.normal(size=s) * 3 for k, s in enumerate((shape, column, row, ()))}
+        whole = found(given)
+        for size in (97, 512):
+            with monkeypatch.context() as patch:
+                patch.setattr(arrays, "BLOCK", size)
+                parts = found(given)
+            for one, other in zip(whole, parts, strict=True):
+                assert np.shape(one) == np.shape(other)
+                assert np.array_equal(one, other, equal_nan=True)
 
 
-def test_a_tape_is_the_casadi_function():
+def test_results_go_into_arrays_of_the_grid():
+    """Two results that are one value do not share an array; what depends on one axis is not spread."""
+    x = ca.SX.sym("x", 2)
+    found = program(ca.Function("f", [x], [ca.vertcat(x[0] * x[1], 2 * x[0], x[0] * x[1], x[0] + x[1])], {"cse": True}))
+    room = np.zeros((4, 3, 5))
+    first, second, third, fourth = found({0: np.arange(5.0)[None, :], 1: np.ones((3, 1))}, dict(enumerate(room)))
+    assert np.array_equal(first, third)
+    assert not np.shares_memory(first, room)
+    assert not np.shares_memory(third, room)
+    assert second.shape == (1, 5)
+    assert fourth is not None
+    assert np.array_equal(room[3], np.arange(1.0, 6.0) * np.ones((3, 1)))
+
+
+def test_a_program_is_the_casadi_function():
     """Point by point, for every operation alone: exactly rounded ones alike, CasADi's functions within 2 ulp."""
     rng = np.random.default_rng(6)
     x = ca.SX.sym("x", 2)
     operations = [f(x[0]) for f in UNARY] + [f(x[0], x[1]) for f in BINARY] + [ca.if_else(x[0] < x[1], 2 * x[0], x[1])]
-    function = ca.Function("f", [x], operations)
-    program = tape(function, ["p", "q"], range(len(operations)))
+    function = ca.Function("f", [x], [ca.vertcat(*operations)])
     points = np.concatenate([rng.normal(size=(60, 2)), [[0.0, 1.0], [1.0, 1.0], [-1.0, 0.5]]])
-    found = program({"p": points[:, 0], "q": points[:, 1]})
+    found = program(function)({0: points[:, 0], 1: points[:, 1]})
     for k, point in enumerate(points):
-        for n, wanted in enumerate(function(point)):
+        for n, wanted in enumerate(function(point).full().ravel()):
             assert ulps(float(np.broadcast_to(found[n], len(points))[k]), float(wanted)) <= 2, operations[n]
 
 
-@compiled
 def test_inputs_are_left_as_they_are_and_may_be_read_only():
     problem, columns = NATIVE, grid(NATIVE)
     for array in (columns["Fr"], columns["lambda_s"]):
         array.flags.writeable = False
     alpha = np.broadcast_to(np.linspace(-1, 1, 11), (7, 11))
     found = array_function(problem, {"x": "abscissa * Fr - lambda_s", "y": "abscissa"})
-    values = found(columns | {"abscissa": alpha}, "numba")
+    values = found(columns | {"abscissa": alpha})
     assert np.array_equal(values["x"], alpha * columns["Fr"] - columns["lambda_s"])
     assert np.array_equal(values["y"], alpha)
 
@@ -272,30 +279,23 @@ def test_inputs_are_left_as_they_are_and_may_be_read_only():
 def test_an_operation_that_arrays_lack_is_refused():
     x = ca.SX.sym("x")
     with pytest.raises(NotAccepted, match="erf"):
-        tape(ca.Function("f", [x], [ca.erf(x)]), ["x"], ["y"])
+        program(ca.Function("f", [x], [ca.erf(x)]))
 
 
 def test_an_empty_output_is_zero():
     x = ca.SX.sym("x")
-    assert tape(ca.Function("f", [x], [x, ca.SX(1, 1)]), ["x"], ["y", "z"])({"x": 3.0}) == {"y": 3.0, "z": 0.0}
+    assert program(ca.Function("f", [x], [ca.densify(ca.vertcat(x, ca.SX(1, 1)))]))({0: 3.0}) == [3.0, 0.0]
 
 
 def test_unknown_names_and_engines_are_refused():
     with pytest.raises(InputError, match=r"quantities\.x: .*unknown name 'Froude'"):
         array_function(NATIVE, {"x": "Froude"})
     with pytest.raises(InputError, match="engine: found 'gpu'; accepted: auto numpy numba"):
-        array_function(NATIVE, {"x": "Fr"})(grid(NATIVE), "gpu")
+        engine_of("gpu")
 
 
 def test_without_numba_numpy_serves_and_numba_is_asked_for(monkeypatch):
-    monkeypatch.setattr(machines, "find_spec", lambda name: None)
+    monkeypatch.setattr(motion, "find_spec", lambda name: None)
     assert engine_of("auto") == "numpy"
     with pytest.raises(InputError, match=r'pip install "tmsopt\[fast\]"'):
         engine_of("numba")
-
-
-def test_exact_operations_are_nothing_else():
-    """IEEE 754 leaves no choice in these; a function such as sin does not belong to the machine."""
-    names = {"ADD", "SUB", "MUL", "DIV", "NEG", "SQRT", "FABS", "FMIN", "FMAX", "LT", "LE", "EQ", "NOT", "AND", "OR"}
-    assert set(EXACT) == {getattr(ca, f"OP_{n}") for n in names} | {ca.OP_IF_ELSE_ZERO}
-    assert parse_value("Fr", NATIVE.vocabulary)({"Fr": 2.0}) == 2.0

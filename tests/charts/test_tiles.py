@@ -44,6 +44,7 @@ def test_quantities_are_those_of_every_design(whole):
     for i, j in ((0, 0), (22, 36), (11, 5)):
         one = PLANE.values(PLANE.ordered({"Fr": float(Fr[i, j]), "lambda_s": float(tilt[i, j])}))
         wanted = float(Fr[i, j]) - float(one["Fr_c"])
+        assert whole.layers["second"][i, j] == one["a2"]
         assert whole.layers["excess"][i, j] == wanted or (np.isnan(wanted) and np.isnan(whole.layers["excess"][i, j]))
 
 
@@ -63,7 +64,7 @@ def test_three_axes_are_planes_one_above_the_other(tmp_path):
             assert found.layers[name][k].tobytes() == getattr(flat, name).tobytes()
         function = array_function(plane, {"x": "Fr_c"})
         x, y = np.meshgrid(*flat.grid)
-        critical = function(plane.ordered({"chi_B": x, "lambda_s": y}), "numpy")["x"]
+        critical = function(plane.ordered({"chi_B": x, "lambda_s": y}))["x"]
         assert np.array_equal(found.layers["x"][k], critical, equal_nan=True)
     best = found.to_json()["least_abscissa"]
     assert best["value"] == found.layers["abscissa"].min()

@@ -18,7 +18,7 @@ SPACE = Problem(
     model=tms, fixed=FIXED, free={"Fr": (0.1, 5.0), "chi_B": (1.0, 2.0), "lambda_s": (0.1, 1.2)}, title="a space"
 )
 POINTS = (37, 23)
-EXTRA = {"excess": "Fr - Fr_c", "settled": "abscissa * Fr", "T": "tan(lambda_s)", "one": "1"}
+EXTRA = {"excess": "Fr - Fr_c", "settled": "abscissa * Fr", "T": "tan(lambda_s)", "one": "1", "second": "a2"}
 
 
 def charted(path, problem=PLANE, **options):

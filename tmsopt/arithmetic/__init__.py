@@ -5,6 +5,7 @@ enclosures, and solutions proved by interval Newton. Open `operations` first: th
 do.
 """
 
+from tmsopt.arithmetic.arrays import Program, program
 from tmsopt.arithmetic.balls import Number, number
 from tmsopt.arithmetic.elementary import exact, greater, lesser, magnitude, positive_part, power, quotient, sqrt, tan
 from tmsopt.arithmetic.formulas import formulas
@@ -20,6 +21,7 @@ __all__ = [
     "INTERVALS",
     "NotAccepted",
     "Number",
+    "Program",
     "Refused",
     "ball",
     "enclosed",
@@ -33,6 +35,7 @@ __all__ = [
     "operation_name",
     "positive_part",
     "power",
+    "program",
     "quotient",
     "ranges",
     "refined",

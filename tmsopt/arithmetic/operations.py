@@ -14,7 +14,9 @@ def _truth(relation: Callable[..., Any]) -> Callable[..., Any]:
     return lambda *operands: np.where(relation(*operands), 1.0, 0.0)[()]
 
 
-NUMPY: Arithmetic = {
+ARRAYS: Arithmetic = {
+    ca.OP_CONST: np.float64,
+    ca.OP_ASSIGN: lambda x: x,
     ca.OP_ADD: np.add,
     ca.OP_SUB: np.subtract,
     ca.OP_MUL: np.multiply,
@@ -55,12 +57,6 @@ NUMPY: Arithmetic = {
     ca.OP_FMOD: np.fmod,
     ca.OP_HYPOT: np.hypot,
     ca.OP_COPYSIGN: np.copysign,
-}
-"""What each operation does to arrays; those that are others in the same numbers are left out."""
-
-ARRAYS: Arithmetic = {
-    **NUMPY,
-    ca.OP_CONST: np.float64,
     ca.OP_SQ: lambda x: x * x,
     ca.OP_TWICE: lambda x: x + x,
     ca.OP_INV: lambda x: np.divide(1.0, x),

@@ -30,7 +30,7 @@ def walk(
         NotAccepted: for an operation that the arithmetic does not have.
     """
     taken = list(steps(function))
-    uses = Counter(k for step in taken for k in step.operands)
+    left = Counter(k for step in taken for k in step.operands)
     values: list[Any] = []
     outputs: list[list[Any]] = [[arithmetic[ca.OP_CONST](0.0)] * function.nnz_out(k) for k in range(function.n_out())]
     for step in taken:
@@ -44,10 +44,14 @@ def walk(
                 value = arithmetic[ca.OP_CONST](step.constant)
             case operation if operation in arithmetic:
                 value = arithmetic[operation](*(values[k] for k in step.operands))
-                value = shared(value) if uses[len(values)] > 1 else value
+                value = shared(value) if left[len(values)] > 1 else value
             case operation:
                 raise NotAccepted(operation_name(operation))
         values.append(value)
+        for k in step.operands:
+            left[k] -= 1
+            if not left[k]:
+                values[k] = None  # so that few arrays are alive, and these in the cache
     return outputs
 
 
@@ -59,12 +63,13 @@ class Instruction:
         operation: as CasADi numbers them, ``ca.OP_ADD`` and so on.
         operands: numbers of the steps whose results it takes.
         place: of an input or output, which one and which entry.
+        constant: a number.
     """
 
     operation: int
     operands: tuple[int, ...] = ()
     place: tuple[int, int] = (0, 0)
-    constant: float = 0.0
+    constant: Any = 0.0
 
 
 def steps(function: ca.Function) -> Iterator[Instruction]:

@@ -7,7 +7,7 @@ In: a problem with two or three free parameters. Out: a `Chart` of layers: class
 from tmsopt.charts.chart import Chart, chart, save_arrays
 from tmsopt.charts.expressions import array_function
 from tmsopt.charts.files import save_layers
-from tmsopt.charts.motion import classified, classify
+from tmsopt.charts.motion import classified, classify, engine_of
 from tmsopt.charts.stored import StoredChart, chart_to, gathered, open_chart
 from tmsopt.charts.summary import tally, total
 from tmsopt.charts.survey import LAYERS, USUAL, Grid, axes_of, survey
@@ -24,6 +24,7 @@ __all__ = [
     "chart_to",
     "classified",
     "classify",
+    "engine_of",
     "gathered",
     "open_chart",
     "save_arrays",

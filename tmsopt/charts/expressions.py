@@ -1,6 +1,5 @@
 """Expressions of a problem over arrays of designs, all at once: quantities of charts and studies."""
 
-import math
 import threading
 import warnings
 from collections.abc import Iterator, Mapping
@@ -11,17 +10,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from tmsopt.arithmetic.arrays import Program, program
 from tmsopt.arithmetic.walk import NotAccepted
 from tmsopt.design.expression import Expression, ExpressionError, parse_value
-from tmsopt.design.machine import engine_of, machine
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES, NO_RADIUS, ROOT_QUANTITIES
-from tmsopt.design.tape import Tape, tape
 from tmsopt.errors import Fault, InputError
 from tmsopt.models import Model, ParameterSet, Values
-
-_LARGE = 500_000
-"""Size of arrays for which numba is loaded unless an engine is named: loading it takes as long as some millions."""
+from tmsopt.records import Array
 
 _ROOT = tuple(q.name for q in ROOT_QUANTITIES)
 
@@ -31,53 +27,59 @@ class ArrayFunction:
     """Expressions as a function of arrays of parameters.
 
     Attributes:
-        tape: the expressions that CasADi can write down.
+        program: computes those that CasADi can write down of the parameters and the root quantities.
+        written: names of these.
         others: those that it cannot, evaluated by the formulas of the model on whole arrays.
         known: parameters that were given for good, see `settled`.
     """
 
     model: Model = field(repr=False)
     of: ParameterSet = field(repr=False)
-    tape: Tape = field(repr=False)
+    program: Program = field(repr=False)
+    written: tuple[str, ...]
     others: Mapping[str, Expression]
     known: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
-    def __call__(self, columns: Mapping[str, Any], engine: str = "auto") -> dict[str, Any]:
+    def __call__(self, columns: Mapping[str, Any], into: Mapping[str, Array] | None = None) -> dict[str, Any]:
         """Values of the expressions, of a comparison left minus right; nan where one does not exist.
 
         Args:
             columns: every parameter that is not settled, and root quantities where they are known already, as numbers
                 or arrays whose shapes broadcast. Axes of a grid are best given in shapes (1, n) and (m, 1).
-            engine: ``numpy``, ``numba``, or ``auto``: numba where it is installed and the arrays are large. The numbers
-                are the same to the bit.
+            into: name → array for the values, used if they have the shape of the grid.
 
         Returns:
             Name → value, of the shape that the expression depends on, which broadcasts to that of the grid.
-
-        Raises:
-            InputError: for an unknown engine, or numba where it is not installed.
         """
         columns = {**self.known, **columns}
-        small = engine == "auto" and math.prod(np.broadcast_shapes(*map(np.shape, columns.values()))) < _LARGE
-        compiled = machine() if engine_of("numpy" if small else engine) == "numba" else None
-        if unknown := [n for n in _ROOT if n not in columns and n in self.tape.inputs]:
+        if unknown := [n for n in _ROOT if n not in columns and n in self.inputs]:
             values = self._values(columns)
             with np.errstate(all="ignore"):
                 columns |= {n: values[n] for n in unknown}
-        found = self.tape(columns, compiled)
+        places = {k: into[n] for k, n in enumerate(self.written) if n in into} if into else {}
+        found = dict(zip(self.written, self.program(self._arguments(columns), places), strict=True))
         if self.others:
             values = self._values(columns)
             found |= {n: np.asarray(e(values), dtype=float)[()] for n, e in self.others.items()}
         return found
 
     @property
+    def inputs(self) -> set[str]:
+        """Names of the parameters and root quantities that are not settled."""
+        return {(*self.of.names, *_ROOT)[k] for k in self.program.arguments}
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Of the expressions."""
-        return (*self.tape.outputs, *self.others)
+        return (*self.written, *self.others)
 
     def settled(self, columns: Mapping[str, Any]) -> "ArrayFunction":
         """The same with some parameters given for good: what depends on them alone is computed once, now."""
-        return replace(self, tape=self.tape.settled(columns), known={**self.known, **columns})
+        rest = self.program.settled(self._arguments(columns))
+        return replace(self, program=rest, known={**self.known, **columns})
+
+    def _arguments(self, columns: Mapping[str, Any]) -> dict[int, Any]:
+        return {k: columns[n] for k, n in enumerate((*self.of.names, *_ROOT)) if n in columns}
 
     def _values(self, columns: Mapping[str, Any]) -> Values:
         """The formulas of the model themselves, on arrays."""
@@ -127,12 +129,14 @@ def _array_function(model: Model, of: ParameterSet, expressions: Mapping[str, Ex
         for name in _ROOT:
             values.define(name, symbols[name])
         written = {n: s for n, e in expressions.items() if (s := _symbolic(e, values)) is not None}
-        function = ca.Function("f", [ca.vertcat(*symbols.values())], list(written.values()))
+        column = ca.densify(ca.vertcat(*written.values())) if written else ca.SX(0, 1)
+        function = ca.Function("f", [ca.vertcat(*symbols.values())], [column], {"cse": True})
     try:
-        found = tape(function, symbols, written)
+        found = program(function)
     except NotAccepted:  # an operation that only CasADi has: every expression by the formulas
-        written, found = {}, Tape((), {})
-    return ArrayFunction(model, of, found, {n: e for n, e in expressions.items() if n not in written})
+        written, found = {}, Program(())
+    others = {n: e for n, e in expressions.items() if n not in written}
+    return ArrayFunction(model, of, found, tuple(written), others)
 
 
 def _symbolic(expression: Expression, values: Values) -> Any:

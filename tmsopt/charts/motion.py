@@ -2,12 +2,32 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.errors import Fault, InputError
 from tmsopt.records import Array
 from tmsopt.roots import CLASSES, abscissa_and_damping, is_stable, quartic_classes, real_roots, roots
+
+ENGINES = ("auto", "numpy", "numba")
+"""What computes roots and classes: numba where it is installed, or the one or the other."""
+
+
+def engine_of(name: str) -> str:
+    """``numpy`` or ``numba`` for one of `ENGINES`.
+
+    Raises:
+        InputError: for another name, or numba where it is not installed.
+    """
+    if name not in ENGINES:
+        raise InputError([Fault(f"found {name!r}; accepted: {' '.join(ENGINES)}", ("engine",))])
+    installed = find_spec("numba") is not None
+    if name == "numba" and not installed:
+        message = 'numba is not installed; run pip install "tmsopt[fast]", or take the engine numpy'
+        raise InputError([Fault(message, ("engine",))])
+    return "numba" if installed and name != "numpy" else "numpy"
 
 
 @dataclass(frozen=True)

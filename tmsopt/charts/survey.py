@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from tmsopt.charts.expressions import ArrayFunction, array_function, parsed
-from tmsopt.charts.motion import Classified, classified
+from tmsopt.charts.motion import Classified, classified, engine_of
 from tmsopt.design.files import problem_of
-from tmsopt.design.machine import engine_of
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS, ROOT_NAMES
 from tmsopt.errors import Fault, InputError, suggest
@@ -131,13 +130,15 @@ class Survey:
         """
         shape, up = (len(rows), self.grid.shape[-1]), self.grid.up(rows)
         with np.errstate(all="ignore"):  # a box of any size: what overflows is undefined
-            values = self.before(up, self.engine)
             a = (self.room(len(rows)) if room is None else room)[:, : len(rows)]
-            for whole, name in zip(a, self.problem.model.coefficient_names(), strict=True):
-                whole[...] = values[name]
+            places = dict(zip(self.problem.model.coefficient_names(), a, strict=True))
+            values = self.before(up, places)
+            for name, whole in places.items():
+                if values[name] is not whole:
+                    whole[...] = values[name]
             found = classified(list(a), self._needs, self.engine)
             known = {n: v for n in ("abscissa", "damping_ratio") if (v := getattr(found, n)) is not None}
-            values |= self.after(up | known, self.engine) if self.after.names else {}
+            values |= self.after(up | known) if self.after.names else {}
             layers = {n: self._layer(n, found, values, shape) for n in self.names}
         return layers, found.fallbacks
 
@@ -166,7 +167,7 @@ class Survey:
     @property
     def _needs(self) -> frozenset[str]:
         """Layers that come from the coefficients."""
-        return frozenset(self.layers) | {n for n in self.after.tape.inputs if n in LAYERS} | (
+        return frozenset(self.layers) | {n for n in self.after.inputs if n in LAYERS} | (
             {"abscissa", "damping_ratio"} if self.after.others else set()
         )  # fmt: skip
 

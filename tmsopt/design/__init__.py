@@ -8,15 +8,12 @@ from tmsopt.design.cases import Band, Case
 from tmsopt.design.expression import Expression, ExpressionError, parse_comparison, parse_value
 from tmsopt.design.files import Given, load, problem_of, question_of
 from tmsopt.design.limit import limit_of, with_limit
-from tmsopt.design.machine import EXACT, engine_of, machine
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.quantities import NO_RADIUS, ROOT_NAMES
 from tmsopt.design.solution import Bound, NotSolved, Solution, Starts
-from tmsopt.design.tape import tape
 from tmsopt.design.units import decay_time, frequencies, growth_time, reading, with_unit
 
 __all__ = [
-    "EXACT",
     "NO_RADIUS",
     "ROOT_NAMES",
     "Band",
@@ -30,19 +27,16 @@ __all__ = [
     "Solution",
     "Starts",
     "decay_time",
-    "engine_of",
     "freedom",
     "frequencies",
     "growth_time",
     "limit_of",
     "load",
-    "machine",
     "parse_comparison",
     "parse_value",
     "problem_of",
     "question_of",
     "reading",
-    "tape",
     "with_limit",
     "with_unit",
 ]
