@@ -66,7 +66,8 @@ POINTS = [(0.7, 1.3), (2.6, 1.3), (1.3, 1.3), (3.1, 0.4)]
 
 
 def test_no_operation_is_left_out() -> None:
-    assert {*OPERATIONS} == {*ARRAYS} > {*BALLS}
+    """But handing a value on, which no expression can be made of."""
+    assert {*OPERATIONS, ca.OP_ASSIGN} == {*ARRAYS} > {*BALLS}
 
 
 @pytest.mark.parametrize("operation", OPERATIONS, ids=operation_name)

@@ -23,7 +23,6 @@ from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.report import chart_table
 from tmsopt.roots import CLASSES
-from tmsopt.tracing import domain, trace
 
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 SQRT2 = math.sqrt(2)
@@ -401,12 +400,6 @@ def test_other_numbers_of_points_are_refused(points):
     problem = load("problems/chart.toml")
     with pytest.raises(InputError, match=r"points: found .* accepted: two whole numbers"):
         chart(problem, points=points, boundaries=False)
-
-
-@pytest.mark.parametrize("call", [chart, domain, trace])
-def test_a_file_name_is_no_problem(call):
-    with pytest.raises(InputError, match="accepted: a Problem, the path of a problem file"):
-        call("problems/chart.toml")
 
 
 def test_axes_as_one_text_are_refused():
