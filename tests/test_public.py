@@ -87,3 +87,10 @@ def test_names_are_functions_whatever_was_imported_before() -> None:
         "import tmsopt.solver.solve, tmsopt.charts.chart; import tmsopt; assert callable(tmsopt.solve); tmsopt.chart"
     )
     subprocess.run([sys.executable, "-c", script], check=True, cwd=PROBLEMS.parent)
+
+
+def test_a_study_may_be_given_by_its_file() -> None:
+    named = tmsopt.run_study(PROBLEMS / "study_sway.toml", workers=1)
+    assert [row.status for row in named.rows] == ["optimal"] * len(named.study)
+    with pytest.raises(tmsopt.InputError, match="accepted: a Study"):
+        tmsopt.run_study(3)  # type: ignore[arg-type]

@@ -41,17 +41,6 @@ Exit status: 0 done, failed rows included; 2 bad input; 130 stopped by Ctrl-C.
 """
 
 
-class _Exports(click.Option):
-    """Asked for its help, it asks which formats there are."""
-
-    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
-        """The option and its help."""
-        from tmsopt.studies import formats
-
-        self.help = f"Write all rows ({formats()}). May be given again."
-        return super().get_help_record(ctx)
-
-
 @click.command(epilog=_EXAMPLES)
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
@@ -64,7 +53,10 @@ class _Exports(click.Option):
     help="Processes of this machine. [default: as many as cores; 1 for few rows]",
 )  # fmt: skip
 @click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, in place of workers.")
-@click.option("--export", "exports", cls=_Exports, type=click.Path(path_type=Path), multiple=True)
+@click.option(
+    "--export", "exports", type=click.Path(path_type=Path), multiple=True,
+    help="Write all rows; the ending says how, as in rows.csv, rows.parquet, rows.nc. May be given again.",
+)  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
 def study(
     file: Path,

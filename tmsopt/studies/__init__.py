@@ -4,7 +4,7 @@ In: a study file, or `Study`. Out: `Results`, kept row by row in a store that su
 then `run`; `engines` carries rows out, `store` keeps them.
 """
 
-from tmsopt.studies.export import FORMATS, check_export, columns, export, formats
+from tmsopt.studies.export import FORMATS, check_export, columns, export
 from tmsopt.studies.load import load_study
 from tmsopt.studies.monte_carlo import Sampling, monte_carlo, planned
 from tmsopt.studies.neighbours import blocks
@@ -32,7 +32,6 @@ __all__ = [
     "definition",
     "export",
     "fill",
-    "formats",
     "grid",
     "latin_hypercube",
     "load_study",

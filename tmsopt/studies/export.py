@@ -102,12 +102,6 @@ def check_export(path: Path) -> None:
         _needed(module)
 
 
-def formats() -> str:
-    """The endings, and those that need a package, as a phrase for help."""
-    plain, more = ([e for e, f in FORMATS.items() if bool(f.needs) is extra] for extra in (False, True))
-    return f"{', '.join(plain)}; {' and '.join(more)} with the extra data"
-
-
 def _ending(path: Path) -> str:
     return path.suffix.lstrip(".").lower()
 
