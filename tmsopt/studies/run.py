@@ -121,7 +121,7 @@ def run_study(
 def _faults(study: object, workers: object) -> Iterator[Fault]:
     """What is wrong with the call."""
     if not isinstance(study, Study | Sampling):
-        message = f"found {short(study)}; accepted: a Study, such as tmsopt.over_grid(problem, …), or the path of a study file"
+        message = f"found {short(study)}; accepted: a Study, as of tmsopt.over_grid, or the path of a study file"
         yield Fault(message, ("study",))
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
         yield Fault(f"found {workers!r}; accepted: a whole number, 1 or more", ("workers",))
