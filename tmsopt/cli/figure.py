@@ -28,17 +28,13 @@ Exit status: 0 drawn, 2 bad input.
 @click.command(epilog=_EXAMPLES)
 @click.argument("name", required=False)
 @click.option(
-    "--output",
-    type=click.Path(path_type=Path),
+    "--output", type=click.Path(path_type=Path),
     help="File to write, or with 'all' a directory. [default: NAME.png in the current directory]",
-)
+)  # fmt: skip
 @click.option(
-    "--format",
-    "ending",
-    type=click.Choice(FIGURES),
-    default=None,
+    "--format", "ending", type=click.Choice(FIGURES), default=None,
     help="Kind of file. [default: the ending of --output, else png]",
-)
+)  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Write names, captions and files as JSON to stdout.")
 @click.option("--list", "as_list", is_flag=True, help="List the figures and draw nothing.")
 def figure(name: str | None, output: Path | None, ending: str | None, as_json: bool, as_list: bool) -> None:

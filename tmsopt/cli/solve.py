@@ -94,63 +94,39 @@ class _Seconds(click.ParamType[float]):
 @click.argument("file", type=click.Path(path_type=Path))
 @_common
 @click.option(
-    "--plot",
-    type=click.Path(path_type=Path),
+    "--plot", type=click.Path(path_type=Path),
     help="Draw growth rates and frequencies over Fr, or the front (png, pdf, svg).",
-)
+)  # fmt: skip
 @click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write the points of a front.")
 @click.option("--points", type=click.IntRange(min=2), default=None, help="Points of a front. [default: 25]")
 @click.option(
-    "--wheelbase",
-    default="1",
-    show_default=True,
+    "--wheelbase", default="1", show_default=True,
     help="For SI numbers of a dimensionless problem, in m or with a unit.",
-)
+)  # fmt: skip
 @click.option(
-    "--rear-mass",
-    default="1",
-    show_default=True,
+    "--rear-mass", default="1", show_default=True,
     help="Likewise, the mass m_B of the rear frame, in kg or with a unit.",
-)
+)  # fmt: skip
 @click.option(
     "--brief", is_flag=True, help="Leave out what the optimum means: gains of limits moved, rounding, robustness."
 )
 @click.option(
-    "--diagnose",
-    "details",
-    is_flag=True,
+    "--diagnose", "details", is_flag=True,
     help="Of multiple roots, show how they split when each parameter changes. JSON has this always, but for --brief.",
-)
+)  # fmt: skip
 @click.option(
-    "--certify",
-    type=_Seconds(),
-    is_flag=False,
-    flag_value=60.0,
-    default=None,
-    metavar="[SECONDS]",
+    "--certify", type=_Seconds(), is_flag=False, flag_value=60.0, default=None, metavar="[SECONDS]",
     help="Prove within SECONDS that nothing better exists, or find it (SCIP). Write it after FILE. [60 if left out]",
-)
+)  # fmt: skip
 @click.option(
     "--all", "every", is_flag=True, help="Of a pattern that leaves no freedom: all designs in the box that have it."
 )
 @click.pass_context
 def solve(
-    context: click.Context,
-    file: Path,
-    as_json: bool,
-    starts: int | None,
-    seed: int,
-    linear_solver: str,
-    plot: Path | None,
-    csv_file: Path | None,
-    points: int | None,
-    wheelbase: str,
-    rear_mass: str,
-    brief: bool,
-    details: bool,
-    certify: float | None,
-    every: bool,
-) -> None:
+    context: click.Context, file: Path, as_json: bool, starts: int | None, seed: int, linear_solver: str,
+    plot: Path | None, csv_file: Path | None, points: int | None, wheelbase: str, rear_mass: str, brief: bool,
+    details: bool, certify: float | None, every: bool,
+) -> None:  # fmt: skip
     """Find the best design that the problem FILE asks for, or the front of the best ones."""
     with bad_input():
         import tmsopt
@@ -206,10 +182,9 @@ def _meaning(
     near = not brief and math.isfinite(solution.abscissa) and solution.status != "infeasible"
     split = (details or not brief) and solution.status == "optimal"
     return (
-        None if brief else tmsopt.explain(solution),
-        tmsopt.robustness(solution) if near else None,
+        None if brief else tmsopt.explain(solution), tmsopt.robustness(solution) if near else None,
         tmsopt.diagnose(solution) if split else (),
-    )
+    )  # fmt: skip
 
 
 def _solve_all(problem: "Problem", as_json: bool, asked: dict[str, Any]) -> NoReturn:

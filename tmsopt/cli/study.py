@@ -59,15 +59,9 @@ Exit status: 0 done, failed rows included; 2 bad input; 130 stopped by Ctrl-C.
 )  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
 def study(
-    file: Path,
-    store: Path | None,
-    fresh: bool,
-    row: int | None,
-    workers: int | None,
-    scheduler: str | None,
-    exports: tuple[Path, ...],
-    as_json: bool,
-) -> None:
+    file: Path, store: Path | None, fresh: bool, row: int | None, workers: int | None, scheduler: str | None,
+    exports: tuple[Path, ...], as_json: bool,
+) -> None:  # fmt: skip
     """Solve the problem of the study FILE for every row of what varies in it."""
     with bad_input():
         from tmsopt.studies import load_study

@@ -30,27 +30,17 @@ Exit status: 0 traced, 2 bad input, 3 nothing of the pattern found in the box.
 @click.option("--plot", type=click.Path(path_type=Path), help="Draw the branches (png, pdf, svg).")
 @click.option("--axes", help="Two parameters to draw over, e.g. Fr,chi_B. [default: two that vary]")
 @click.option(
-    "--step",
-    type=click.FloatRange(min=1e-6, max=0.1),
-    default=0.005,
-    show_default=True,
+    "--step", type=click.FloatRange(min=1e-6, max=0.1), default=0.005, show_default=True,
     help="Longest step, in widths of the box.",
-)
+)  # fmt: skip
 @click.option(
     "--starts", type=click.IntRange(min=1), default=48, show_default=True, help="Fruitless in a row, to stop."
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts.")
 def trace(
-    file: Path,
-    pattern: str | None,
-    as_json: bool,
-    csv_file: Path | None,
-    plot: Path | None,
-    axes: str | None,
-    step: float,
-    starts: int,
-    seed: int,
-) -> None:
+    file: Path, pattern: str | None, as_json: bool, csv_file: Path | None, plot: Path | None, axes: str | None,
+    step: float, starts: int, seed: int,
+) -> None:  # fmt: skip
     """Trace a root pattern of FILE through parameter space, every branch in the box, with its events."""
     with bad_input():
         import tmsopt

@@ -117,24 +117,16 @@ def table_1_loci(Fr_max: float = 5.0) -> tuple[LocusRow, LocusRow, LocusRow]:
 def _row(name: str, Fr_max: float) -> LocusRow:
     bicycle = on_ep_set(name, TILT_OFFSETS[name])
     offset = 0.1 if name == "CEP2" else 0.01
+    chi_B = bicycle.parameters["chi_B"]
+    shifts = {r"\sqrt{2}": 0.0, rf"\sqrt{{2}} - {offset:g}": -offset, rf"\sqrt{{2}} + {offset:g}": offset}
     law, below, above = (
         locus(
-            bicycle_model,
-            bicycle_model.sets[0],
-            {**bicycle.parameters, "chi_B": bicycle.parameters["chi_B"] + shift},
-            "Fr",
-            (0.0, Fr_max),
+            bicycle_model, bicycle_model.sets[0], {**bicycle.parameters, "chi_B": chi_B + shift}, "Fr", (0.0, Fr_max),
             title=text,
         )
-        for shift, text in (
-            (0.0, r"\sqrt{2}"),
-            (-offset, rf"\sqrt{{2}} - {offset:g}"),
-            (offset, rf"\sqrt{{2}} + {offset:g}"),
-        )
-    )
-    return LocusRow(
-        name, bicycle.parameters["lambda_s"], bicycle.omega0, bicycle.parameters["chi_B"], offset, (law, below, above)
-    )
+        for text, shift in shifts.items()
+    )  # fmt: skip
+    return LocusRow(name, bicycle.parameters["lambda_s"], bicycle.omega0, chi_B, offset, (law, below, above))
 
 
 def _fine(found: Complex, resolution: float) -> NDArray[np.bool_]:

@@ -163,10 +163,9 @@ def spire_faces(limit: float, points: int = 41) -> tuple[Array, Array, Array]:
         return spire(v * low * m(u), v * low * t(u))
 
     return (
-        face(np.ones_like, lambda a: 2 * a),
-        face(lambda a: -np.ones_like(a), lambda a: 2 * a),
+        face(np.ones_like, lambda a: 2 * a), face(lambda a: -np.ones_like(a), lambda a: 2 * a),
         face(lambda a: 2 * a - 1, lambda a: 2 * np.ones_like(a)),
-    )
+    )  # fmt: skip
 
 
 def _events(chart: Sweep, grid: Array, A: Array) -> list[PathEvent]:

@@ -29,19 +29,9 @@ from tmsopt.paper.ledger.stability import BACKWARD, WITNESS
 from tmsopt.records import Progress
 
 __all__ = [
-    "BACKWARD",
-    "CLAIMS",
-    "VERDICTS",
-    "WITNESS",
-    "Claim",
-    "Entry",
-    "Ledger",
-    "decimal",
-    "matching",
-    "proof",
-    "universal",
-    "verify",
-]
+    "BACKWARD", "CLAIMS", "VERDICTS", "WITNESS", "Claim", "Entry", "Ledger", "decimal", "matching", "proof",
+    "universal", "verify",
+]  # fmt: skip
 
 SOURCE = "O. N. Kirillov, Localizing EP sets in dissipative systems and the self-stability of bicycles (2018)"
 

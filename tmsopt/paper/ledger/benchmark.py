@@ -60,11 +60,9 @@ def _printed_equation(terms: Mapping[str, str], true: Polynomial) -> Outcome:
 
 
 @_claim(
-    "e1",
-    "Eq. e1",
-    "a2 = 6 ω0² a0 for the benchmark geometry",
+    "e1", "Eq. e1", "a2 = 6 ω0² a0 for the benchmark geometry",
     "the polynomial in fractions, coefficient by coefficient",
-)
+)  # fmt: skip
 def _e1() -> Outcome:
     a = _special()
     return _printed_equation(printed.E1, a[2] - 6 * a[0])
@@ -84,11 +82,9 @@ def _e3() -> Outcome:
 
 
 @_claim(
-    "e123-unique",
-    "text after Eq. e3",
-    "(e1)–(e3) have a unique solution with μ > 0",
+    "e123-unique", "text after Eq. e3", "(e1)–(e3) have a unique solution with μ > 0",
     "resultants: Fr and T eliminated, signs of the coefficients of the quadratic in μ",
-)
+)  # fmt: skip
 def _unique() -> Outcome:
     e1, e2, e3 = (_equation(terms) for terms in (printed.E1, printed.E2, printed.E3))
     in_T = e1.resultant(e2, "T"), (e1 - e3).resultant(e2, "T")
@@ -129,11 +125,9 @@ def _optimised_tilt() -> Outcome:
 
 
 @_claim(
-    "fig0-abscissa",
-    "caption of Fig. fig0",
-    "the optimised bicycle attains the least abscissa a_min = −1 at Fr_EP",
+    "fig0-abscissa", "caption of Fig. fig0", "the optimised bicycle attains the least abscissa a_min = −1 at Fr_EP",
     "the 4-fold root −1 proved by interval Newton; the product bound, which does not depend on Fr",
-)
+)  # fmt: skip
 def _fig0() -> Outcome:
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
     a = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
@@ -143,19 +137,16 @@ def _fig0() -> Outcome:
     b = copo(design["Fr"], design["mu"], design["chi_B"], *_GEOMETRY, design["T"])
     return proof(
         free and product_bound() and (b[4] / b[0]).contains(1),
-        "Least over all Fr, and over all χ_B as well, since a4/a0 depends on neither.",
-        printed="-1",
+        "Least over all Fr, and over all χ_B as well, since a4/a0 depends on neither.", printed="-1",
         computed=digits(flint.arb(-1)),
-    )
+    )  # fmt: skip
 
 
 @_claim(
-    "e123-minimum",
-    "text after Eq. e3",
-    "the optimised bicycle attains the minimum of the spectral abscissa",
+    "e123-minimum", "text after Eq. e3", "the optimised bicycle attains the minimum of the spectral abscissa",
     "product bound with ω0 held; shifted Hurwitz conditions of a bicycle with the same χ_H, ζ_B, ζ_H and another "
     "λ_s, μ",
-)
+)  # fmt: skip
 def _whole_minimum() -> Outcome:
     better = tuple(q(x) for x in ("2.243", "5.82", "1.3366", "1.02", "-0.4", "-0.2", "0.5573"))
     slopes = _covector()
@@ -192,11 +183,10 @@ def _covector() -> list[Any]:
 
 
 @_claim(
-    "EP4-swallowtail",
-    "text, of KO2013",
+    "EP4-swallowtail", "text, of KO2013",
     "the EP4 is a swallowtail singularity inside the domain of asymptotic stability",
     "versality: the changes of p with Fr, μ, χ_B, tan λ_s and the root span all changes of a quartic, in balls; Routh",
-)
+)  # fmt: skip
 def _swallowtail() -> Outcome:
     design = optimised()
     relation = _covector()
@@ -210,11 +200,9 @@ def _swallowtail() -> Outcome:
 
 
 @_claim(
-    "e123-Jordan",
-    "text after Eq. e3",
-    "all four eigenvalues merge into s = −1 with the Jordan block",
+    "e123-Jordan", "text after Eq. e3", "all four eigenvalues merge into s = −1 with the Jordan block",
     "determinant and rank of M s² + V s + P at s = −1 in balls, from the solved design",
-)
+)  # fmt: skip
 def _block() -> Outcome:
     design = optimised()
     cosine = 1 / (1 + design["T"] ** 2).sqrt()
@@ -228,11 +216,9 @@ def _block() -> Outcome:
 
 
 @_claim(
-    "fig0-benchmark",
-    "caption of Fig. fig0; text",
-    "the benchmark is generic: its growth rates meet no EP4",
+    "fig0-benchmark", "caption of Fig. fig0; text", "the benchmark is generic: its growth rates meet no EP4",
     "the EP4 condition (a3/a1)² = a4/a0 of the benchmark, in balls",
-)
+)  # fmt: skip
 def _generic() -> Outcome:
     T = (flint.arb.pi() / 36).tan()
     a = copo(flint.arb(1), q("0.1"), q("1.2"), q("1.02"), q("-0.4"), q("-0.2"), T)
@@ -245,21 +231,17 @@ def _generic() -> Outcome:
 
 
 @_claim(
-    "4poly-form",
-    "Eq. 4poly",
-    "the polynomial (chapo) takes the form (s − ω0)⁴",
+    "4poly-form", "Eq. 4poly", "the polynomial (chapo) takes the form (s − ω0)⁴",
     "leading coefficient at the EP4 of the optimised benchmark, in balls",
-)
+)  # fmt: skip
 def _form() -> Outcome:
     design = optimised()
     a = copo(design["Fr"], design["mu"], design["chi_B"], *_GEOMETRY, design["T"])
     monic = all(abs(c / a[0] - m) < flint.arb(10) ** -40 for c, m in zip(a, (1, 4, 6, 4, 1), strict=True))
     return universal(
-        "for p(s)/a0, as (chapo) with (copo) is not monic",
-        monic,
-        f"a0 = {a[0].str(10, radius=False)} at the EP4 of the optimised benchmark",
-        bool(a[0] < 1),
-    )
+        "for p(s)/a0, as (chapo) with (copo) is not monic", monic,
+        f"a0 = {a[0].str(10, radius=False)} at the EP4 of the optimised benchmark", bool(a[0] < 1),
+    )  # fmt: skip
 
 
 CLAIMS: tuple[Claim, ...] = (

@@ -13,11 +13,9 @@ _claim = section("2.4.1 χ_H = 1: the critical Froude number and its minimum")
 
 
 @_claim(
-    "chi_H-near-1",
-    "text",
-    "the benchmark and the realization have χ_H ≈ 1",
+    "chi_H-near-1", "text", "the benchmark and the realization have χ_H ≈ 1",
     "relative difference of the two printed values from 1, in fractions",
-)
+)  # fmt: skip
 def _near_1() -> Outcome:
     gaps = [abs(q(x) - 1) for x in ("1.02", "0.921")]
     return universal(
@@ -43,11 +41,9 @@ def _frc1() -> Outcome:
 
 
 @_claim(
-    "chi_H-1-mu",
-    "text after Eq. Frc1",
-    "χ_H = 1 makes Fr_c and the conditions lscf independent of μ",
+    "chi_H-1-mu", "text after Eq. Frc1", "χ_H = 1 makes Fr_c and the conditions lscf independent of μ",
     "derivative of every coefficient with respect to μ at χ_H = 1; line 2 of lscf at χ_H = 1",
-)
+)  # fmt: skip
 def _no_mu() -> Outcome:
     Fr, mu, chi_B, zeta_B, zeta_H, T = polynomials("Fr mu chi_B zeta_B zeta_H T")
     a = copo(Fr, mu, chi_B, T * 0 + 1, zeta_B, zeta_H, T)
@@ -59,11 +55,9 @@ def _no_mu() -> Outcome:
 
 
 @_claim(
-    "chi_H-1-implies",
-    "text after Eq. Frc1",
-    "lscf imply χ_B > 1 and |ζ_B| > |ζ_H|",
+    "chi_H-1-implies", "text after Eq. Frc1", "lscf imply χ_B > 1 and |ζ_B| > |ζ_H|",
     "signs of a3 and of the slope of the Hurwitz determinant at χ_H = 1",
-)
+)  # fmt: skip
 def _implied() -> Outcome:
     Fr, mu, chi_B, zeta_B, zeta_H, T = ring("Fr mu chi_B zeta_B zeta_H T")
     a = copo(Fr, mu, chi_B, 1 + 0 * T, zeta_B, zeta_H, T)
@@ -82,11 +76,9 @@ def _contains(quotient: Any, name: str) -> bool:
 
 
 @_claim(
-    "dimension-5",
-    "text after Eq. Frc1",
-    "χ_H = 1 reduces the parameters from 7 to 5: Fr, χ_B, ζ_H, ζ_B, λ_s",
+    "dimension-5", "text after Eq. Frc1", "χ_H = 1 reduces the parameters from 7 to 5: Fr, χ_B, ζ_H, ζ_B, λ_s",
     "derivatives of the monic polynomial with respect to every parameter at χ_H = 1",
-)
+)  # fmt: skip
 def _five() -> Outcome:
     names = "Fr mu chi_B zeta_B zeta_H T"
     Fr, mu, chi_B, zeta_B, zeta_H, T = ring(names)
@@ -107,11 +99,9 @@ def _five() -> Outcome:
 
 
 @_claim(
-    "chibm",
-    "Eq. chibm",
-    "Fr_c is least over χ_B at χ_B = √(ζ_B/ζ_H)",
+    "chibm", "Eq. chibm", "Fr_c is least over χ_B at χ_B = √(ζ_B/ζ_H)",
     "identity: Fr_c² less its value there is a square over the two distances from the poles",
-)
+)  # fmt: skip
 def _chibm() -> Outcome:
     r, chi_B, T, h = ring("r chi_B T h")
     zeta_B, zeta_H = -h * r, -h / r
@@ -134,11 +124,9 @@ def _chibm() -> Outcome:
 
 
 @_claim(
-    "frm",
-    "Eq. frm",
-    "the least critical Froude number",
+    "frm", "Eq. frm", "the least critical Froude number",
     "Fr² from p(iω) = 0 at χ_B = √(ζ_B/ζ_H), with √|ζ_B| and √|ζ_H| as variables",
-)
+)  # fmt: skip
 def _frm() -> Outcome:
     root_B, root_H, T, Fr = ring("root_B root_H T Fr")
     a = copo(Fr, 0 * T, root_B / root_H, 1 + 0 * T, -(root_B**2), -(root_H**2), T)

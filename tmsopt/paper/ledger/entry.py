@@ -163,15 +163,9 @@ def proof(holds: bool, remark: str = "", otherwise: str = "", printed: str = "",
 
 
 def universal(
-    condition: str,
-    under: bool,
-    against: str,
-    counterexample: bool,
-    always: bool = False,
-    printed: str = "",
-    computed: str = "",
-    remark: str = "",
-) -> Outcome:
+    condition: str, under: bool, against: str, counterexample: bool, always: bool = False, printed: str = "",
+    computed: str = "", remark: str = "",
+) -> Outcome:  # fmt: skip
     """Judge a general statement: proved always, proved under a condition and refuted outside it, or refuted.
 
     Args:

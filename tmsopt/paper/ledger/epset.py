@@ -48,11 +48,9 @@ def _set_of_pairs() -> tuple[Quotient, tuple[Quotient, ...]]:
 
 
 @_claim(
-    "epset",
-    "Eq. epset",
-    "Fr on the EP set",
+    "epset", "Eq. epset", "Fr on the EP set",
     "the squared factor of the discriminant solved for Fr², in r and q; a bicycle below the pole in fractions",
-)
+)  # fmt: skip
 def _epset() -> Outcome:
     square, (T, r, scale) = _set_of_pairs()
     omega0, zeta_B = -1 / scale, -(scale**2) * r
@@ -82,11 +80,10 @@ def _pair_factor() -> tuple[Any, Any]:
 
 
 @_claim(
-    "epset-tangent",
-    "text after Eq. epset",
+    "epset-tangent", "text after Eq. epset",
     "a point where the curve has a vertical tangent in the (Fr, λ_s)-plane is the EP4",
     "dFr²/dT on the squared factor of the discriminant, its zero beside the tilt of the EP4, in r and q",
-)
+)  # fmt: skip
 def _tangent() -> Outcome:
     square, (T, r, scale) = _set_of_pairs()
     turn = r * (r - 1) / (2 * scale**2 * (r + 1))
@@ -128,11 +125,10 @@ def _by_hand() -> bool:
 
 
 @_claim(
-    "epset-2EP2",
-    "text after Eq. epset",
+    "epset-2EP2", "text after Eq. epset",
     "below the EP4 the curve is a pair of different negative double real eigenvalues (2EP2)",
     "b² − 4 c on the squared factor of the discriminant, in r and q; the solved bicycle of Table 1",
-)
+)  # fmt: skip
 def _below() -> Outcome:
     real = double_pair("-0.05")
     return proof(
@@ -151,11 +147,10 @@ def _kind_identity() -> bool:
 
 
 @_claim(
-    "epset-CEP2",
-    "text after Eq. epset; caption of Fig. fig1",
+    "epset-CEP2", "text after Eq. epset; caption of Fig. fig1",
     "above the EP4 the curve is a conjugate pair of double complex eigenvalues (CEP2)",
     "b² − 4 c on the squared factor of the discriminant, in r and q; the solved bicycle of Table 1",
-)
+)  # fmt: skip
 def _above() -> Outcome:
     pair = double_pair("0.80")
     return proof(
@@ -165,11 +160,9 @@ def _above() -> Outcome:
 
 
 @_claim(
-    "epset-codimension",
-    "text after Eq. epset",
-    "the codimension of the EP set is 2",
+    "epset-codimension", "text after Eq. epset", "the codimension of the EP set is 2",
     "rank of the derivatives of the lifted equations at the EP4, the 2EP2 and the CEP2 of Table 1, in balls",
-)
+)  # fmt: skip
 def _codimension() -> Outcome:
     p, (b, c) = lifted("b", "c")
     design = ep4()
@@ -189,12 +182,10 @@ def _codimension() -> Outcome:
 
 
 @_claim(
-    "fig1-left",
-    "caption of Fig. fig1",
-    "at χ_B = √2 the domain of heavy damping has a cuspidal point at EP4",
+    "fig1-left", "caption of Fig. fig1", "at χ_B = √2 the domain of heavy damping has a cuspidal point at EP4",
     "its two boundaries, B1² = 4 B2 − 8 and B2 + 2 = 2 B1, touch at the EP4: gradients, and the map from (Fr, "
     "T), exactly",
-)
+)  # fmt: skip
 def _cusp() -> Outcome:
     B1, B2, (_, _, r, scale) = palindrome()
     at = {"Fr": (r**2 + 6 * r + 1) / (4 * scale * (r + 1)), "T": tilt_of_EP4(r, scale**2), "r": r, "q": scale}
@@ -208,11 +199,10 @@ def _cusp() -> Outcome:
 
 
 @_claim(
-    "fig1-right",
-    "caption of Fig. fig1",
+    "fig1-right", "caption of Fig. fig1",
     "at the tilt of the EP4 the domain of heavy damping in the (Fr, χ_B)-plane degenerates into the one point",
     "tan λ_s as a function of four positive roots with product 1, bounded by sums of squares",
-)
+)  # fmt: skip
 def _degenerate() -> Outcome:
     return proof(
         tilt_bound(),
@@ -223,11 +213,10 @@ def _degenerate() -> Outcome:
 
 
 @_claim(
-    "EP-Jordan-2",
-    "text after Eq. epset; caption of Fig. fig1",
+    "EP-Jordan-2", "text after Eq. epset; caption of Fig. fig1",
     "the double eigenvalues of 2EP2 and CEP2 have a Jordan block of order two",
     "second row of M s² + V s + P at the double eigenvalues of Table 1, in complex balls: it must not vanish",
-)
+)  # fmt: skip
 def _order_two() -> Outcome:
     ranks = []
     for offset in ("-0.05", "0.80"):
@@ -239,11 +228,9 @@ def _order_two() -> Outcome:
 
 
 @_claim(
-    "EP-kinds",
-    "text after Eq. epset",
-    "the curve is the location of three types of exceptional points",
+    "EP-kinds", "text after Eq. epset", "the curve is the location of three types of exceptional points",
     "stability, b² − 4 c and the EP4 of the three solved bicycles, in balls",
-)
+)  # fmt: skip
 def _kinds() -> Outcome:
     design = ep4()
     r = design["chi_B"]

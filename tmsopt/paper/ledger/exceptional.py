@@ -25,11 +25,9 @@ def _w01() -> Outcome:
 
 
 @_claim(
-    "chib1",
-    "Eq. chib1",
-    "χ_B = √(ζ_B/ζ_H) at EP4",
+    "chib1", "Eq. chib1", "χ_B = √(ζ_B/ζ_H) at EP4",
     "a3 = ω0² a1 at χ_H = 1 with the radicals taken away by ζ_B = −q² r, ζ_H = −q²/r",
-)
+)  # fmt: skip
 def _chib1() -> Outcome:
     Fr, chi_B, T, r, scale = ring("Fr chi_B T r q")
     b = normal(Fr, chi_B, T, r, scale)
@@ -37,19 +35,16 @@ def _chib1() -> Outcome:
 
 
 @_claim(
-    "chib1-chibm",
-    "text after Eq. chib1",
-    "it is the minimizer of the critical Froude number",
+    "chib1-chibm", "text after Eq. chib1", "it is the minimizer of the critical Froude number",
     "the zero of a3 − ω0² a1 beside the zero of the derivative of Fr_c², taken from the Hurwitz determinant",
-)
+)  # fmt: skip
 def _same() -> Outcome:
     chi_B, T, r = polynomials("chi_B T r")
     # Fr_c² = T (r² − 1) χ_B/((r² − χ_B)(χ_B − 1)), proved under Frc1
     over, under = T * (r**2 - 1) * chi_B, (r**2 - chi_B) * (chi_B - 1)
     slope = over.derivative("chi_B") * under - over * under.derivative("chi_B")
     return proof(
-        slope == T * (r**2 - 1) * (chi_B - r) * (chi_B + r),
-        "The derivative has the zeros ±r, r = √(ζ_B/ζ_H).",
+        slope == T * (r**2 - 1) * (chi_B - r) * (chi_B + r), "The derivative has the zeros ±r, r = √(ζ_B/ζ_H)."
     )
 
 
@@ -78,11 +73,9 @@ def _tls() -> Outcome:
 
 
 @_claim(
-    "frep4",
-    "Eq. frep4",
-    "Fr_EP4 is a root of this quadratic",
+    "frep4", "Eq. frep4", "Fr_EP4 is a root of this quadratic",
     "the Fr that solves the four coefficient conditions, put into the quadratic; its other root by division",
-)
+)  # fmt: skip
 def _frep4() -> Outcome:
     Fr, _, (T, r, scale) = _eliminated()
     law = tilt_of_EP4(r, scale**2)
@@ -147,11 +140,9 @@ def _table_omega0() -> Outcome:
 
 
 @_claim(
-    "tab1-EP4-tilt",
-    "Table 1; text; captions of Figs. fig1, fig2, fig3",
-    "tan λ_s = 15/4 − (75/32)√2",
+    "tab1-EP4-tilt", "Table 1; text; captions of Figs. fig1, fig2, fig3", "tan λ_s = 15/4 − (75/32)√2",
     f"{_FIELD}{_BALLS}",
-)
+)  # fmt: skip
 def _table_tilt() -> Outcome:
     r, h, t = _heights()
     # a1 = −4 ω0 a0 gives Fr² = 16 h T²/(r − 1)²; then a2 = 6 ω0² a0 is linear in T
@@ -161,11 +152,9 @@ def _table_tilt() -> Outcome:
 
 
 @_claim(
-    "tab1-EP4-Fr_c",
-    "Table 1",
-    "Fr_c = √(30√2 + 120)/8 at the tilt of the EP4",
+    "tab1-EP4-Fr_c", "Table 1", "Fr_c = √(30√2 + 120)/8 at the tilt of the EP4",
     "p(iω) = 0 in the field of √2 and p = a0 (s² + ω²)(s² + b s + c) by interval Newton",
-)
+)  # fmt: skip
 def _table_Fr_c() -> Outcome:
     r, h, t = _heights()
     T = q("15/4") - q("75/32") * t
@@ -177,12 +166,7 @@ def _table_Fr_c() -> Outcome:
     return _radical("√(30√2 + 120)/8", (30 * t + 120) / 64, 2, square, weave("0")["Fr"], claimed)
 
 
-@_claim(
-    "tab1-EP4-Fr_EP",
-    "Table 1; text; caption of Fig. fig00",
-    "Fr_EP4 = 3√(110√2 − 120)/8",
-    f"{_FIELD}{_BALLS}",
-)
+@_claim("tab1-EP4-Fr_EP", "Table 1; text; caption of Fig. fig00", "Fr_EP4 = 3√(110√2 − 120)/8", f"{_FIELD}{_BALLS}")
 def _table_Fr_EP() -> Outcome:
     r, h, t = _heights()
     T = q("15/4") - q("75/32") * t
@@ -224,11 +208,10 @@ def _table_cep2() -> Outcome:
 
 
 @_claim(
-    "tab1-kinds",
-    "Table 1",
+    "tab1-kinds", "Table 1",
     "rows 2 and 3 have two real double eigenvalues, and a complex double pair, at χ_B = √2 and with the same ω0",
     "b² − 4 c and c of the solved factors, with χ_B an unknown",
-)
+)  # fmt: skip
 def _table_kinds() -> Outcome:
     real, pair = double_pair("-0.05"), double_pair("0.80")
     signs = bool(real["b"] ** 2 > 4 * real["c"]) and bool(pair["b"] ** 2 < 4 * pair["c"])
@@ -241,11 +224,10 @@ def _table_kinds() -> Outcome:
 
 
 @_claim(
-    "compact",
-    "text of Section 2.4.2",
+    "compact", "text of Section 2.4.2",
     "critical parameters of the χ_H = 1 bicycle are elementary in ζ_H, ζ_B (and λ_s)",
     "the matching conditions with the compact forms of tan λ_s and Fr, in r and q",
-)
+)  # fmt: skip
 def _compact() -> Outcome:
     r, scale = ring("r q")
     T = tilt_of_EP4(r, scale**2)
@@ -259,11 +241,9 @@ def _compact() -> Outcome:
 
 
 @_claim(
-    "EP4-heights",
-    "text of Section 2.4.2",
-    "the EP4 exists for the heights of the benchmark",
+    "EP4-heights", "text of Section 2.4.2", "the EP4 exists for the heights of the benchmark",
     "the compact form for r < 1, where tan λ_s changes sign, at ζ_B = −1/2, ζ_H = −2 in fractions",
-)
+)  # fmt: skip
 def _other_heights() -> Outcome:
     r, h = q("0.5"), q(1)
     T = tilt_of_EP4(r, h)

@@ -22,11 +22,9 @@ _DIMENSIONS = {
 
 
 @_claim(
-    "parameters-9",
-    "text",
-    "the model depends on 9 dimensional parameters",
+    "parameters-9", "text", "the model depends on 9 dimensional parameters",
     "derivatives of the characteristic polynomial in SI with respect to every parameter of the model",
-)
+)  # fmt: skip
 def _nine() -> Outcome:
     names = [name for name in tms.sets[1].names if name != "g"]
     w, v, g, T, m_B, x_B, z_B, m_H, x_H, z_H = variables = ring("w v g T m_B x_B z_B m_H x_H z_H")
@@ -43,18 +41,14 @@ def _nine() -> Outcome:
     return proof(
         count == 9 == len(names),
         "The polynomial depends on all of them, and on the acceleration g of gravity as a tenth.",
-        "The polynomial depends on another number of parameters.",
-        "9",
-        str(count),
-    )
+        "The polynomial depends on another number of parameters.", "9", str(count),
+    )  # fmt: skip
 
 
 @_claim(
-    "parameters-7",
-    "text",
-    "7 dimensionless parameters",
+    "parameters-7", "text", "7 dimensionless parameters",
     "exact rank of the matrix of dimensions (mass, length, time) of the 9 parameters and g",
-)
+)  # fmt: skip
 def _seven() -> Outcome:
     matrix = flint.fmpz_mat([list(powers) for powers in _DIMENSIONS.values()])
     groups = matrix.nrows() - matrix.rank()
@@ -69,12 +63,11 @@ def _seven() -> Outcome:
 
 
 @_claim(
-    "nu_H",
-    "text after Eq. matrices",
+    "nu_H", "text after Eq. matrices",
     "ν_H = (χ_H − 1) cos λ_s − ζ_H sin λ_s is the distance u_H of mass H from the steer axis, over w",
     "squared distance of the point (χ_H, ζ_H) from the line through (1, 0) along (sin λ_s, cos λ_s), as a polynomial "
     "identity modulo sin² + cos² = 1",
-)
+)  # fmt: skip
 def _distance() -> Outcome:
     chi_H, zeta_H, sine, cosine = polynomials("chi_H zeta_H sine cosine")
     across, down = chi_H - 1, zeta_H
@@ -84,11 +77,9 @@ def _distance() -> Outcome:
 
 
 @_claim(
-    "forces",
-    "text",
-    "the model has dissipative, gyroscopic, potential and circulatory forces",
+    "forces", "text", "the model has dissipative, gyroscopic, potential and circulatory forces",
     "symmetric and antisymmetric parts of V and P, exactly",
-)
+)  # fmt: skip
 def _forces() -> Outcome:
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T, cosine = polynomials(f"{_NAMES} cosine")
     _, V, P = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T * cosine, cosine)
@@ -106,12 +97,10 @@ def _forces() -> Outcome:
 
 def _coefficient(order: int) -> Claim:
     @_claim(
-        f"copo-a{order}",
-        "Eq. copo",
-        f"a{order} of the characteristic polynomial",
+        f"copo-a{order}", "Eq. copo", f"a{order} of the characteristic polynomial",
         "determinant of M s² + V s + P from the printed matrices, as an identity of polynomials: it must be "
         "μ ν_H cos λ_s times the printed coefficient",
-    )
+    )  # fmt: skip
     def check() -> Outcome:
         Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T, cosine = ring(f"{_NAMES} cosine")
         M, V, P = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T * cosine, cosine)
@@ -129,11 +118,9 @@ a0, a1, a2, a3, a4 = (_coefficient(order) for order in range(5))
 
 
 @_claim(
-    "copo-scale",
-    "Eq. chapo",
-    "p(s) with these coefficients is the characteristic polynomial",
+    "copo-scale", "Eq. chapo", "p(s) with these coefficients is the characteristic polynomial",
     "the quotient of the determinant and p, and the determinant of a bicycle with ν_H = 0",
-)
+)  # fmt: skip
 def _scale() -> Outcome:
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
     M, V, P = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T, T * 0 + 1)

@@ -6,16 +6,7 @@ import flint
 
 from tmsopt.models.exact import Tilt
 from tmsopt.models.tms import copo
-from tmsopt.paper.ledger.algebra import (
-    Quotient,
-    heavily_damped,
-    polynomials,
-    positive_quotient,
-    q,
-    ring,
-    slope,
-    stable,
-)
+from tmsopt.paper.ledger.algebra import Quotient, heavily_damped, polynomials, positive_quotient, q, ring, slope, stable
 from tmsopt.paper.ledger.entry import Claim, Outcome, digits, proof, section, universal
 from tmsopt.paper.ledger.lemmas import (
     HEIGHTS,
@@ -49,11 +40,9 @@ def _grown() -> tuple[Quotient, Quotient, tuple[Quotient, ...]]:
 
 
 @_claim(
-    "motion-standstill",
-    "text",
-    "at Fr = 0 there are two real negative and two real positive eigenvalues",
+    "motion-standstill", "text", "at Fr = 0 there are two real negative and two real positive eigenvalues",
     "factorisation of the even polynomial at Fr = 0, in r and q; for any χ_H the symmetric matrices M and P",
-)
+)  # fmt: skip
 def _standstill() -> Outcome:
     T, r, scale = ring("T r q")
     b = normal(0 * T, r, T, r, scale)
@@ -76,11 +65,9 @@ def real_squares() -> bool:
 
 
 @_claim(
-    "motion-positive",
-    "text",
-    "as Fr grows the positive eigenvalues move towards each other",
+    "motion-positive", "text", "as Fr grows the positive eigenvalues move towards each other",
     "derivative of p with respect to Fr at s > 0, where a1, a3 and ζ_B (ζ_B − ζ_H) are positive, for any χ_H",
-)
+)  # fmt: skip
 def _approach() -> Outcome:
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring("Fr mu chi_B chi_H zeta_B zeta_H T")
     a = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
@@ -110,11 +97,9 @@ def _turn() -> tuple[bool, Any]:
 
 
 @_claim(
-    "motion-negative",
-    "text",
-    "the same happens, at a slower rate, with the negative eigenvalues",
+    "motion-negative", "text", "the same happens, at a slower rate, with the negative eigenvalues",
     f"{_U}the speed at which du/dFr = 0 for the negative pair; sign of p at a point in fractions",
-)
+)  # fmt: skip
 def _slower() -> Outcome:
     holds, value = _turn()
     before, after = (value_at(_hand(Fr, "1/4"), q("-1.5")) for Fr in ("0", "0.1"))
@@ -140,11 +125,9 @@ def _merging() -> Any:
 
 
 @_claim(
-    "motion-double",
-    "text",
-    "the positive eigenvalues merge into a double real eigenvalue s = −ω0 > 0",
+    "motion-double", "text", "the positive eigenvalues merge into a double real eigenvalue s = −ω0 > 0",
     f"{_U}p' − 2 p at σ = 1 for any χ_B; certified roots in fractions",
-)
+)  # fmt: skip
 def _double() -> Outcome:
     Fr, chi_B, T, r, scale = ring("Fr chi_B T r q")
     b = normal(Fr, chi_B, T, r, scale)
@@ -164,11 +147,9 @@ def _double() -> Outcome:
 
 
 @_claim(
-    "motion-split",
-    "text",
-    "at χ_B = √(ζ_B/ζ_H) it splits into a complex pair with positive real parts (weaving)",
+    "motion-split", "text", "at χ_B = √(ζ_B/ζ_H) it splits into a complex pair with positive real parts (weaving)",
     f"{_U}sign of du/dFr where u > 0, with r = 1 + ρ",
-)
+)  # fmt: skip
 def _split() -> Outcome:
     B1, B2, _ = _grown()
     return proof(
@@ -179,11 +160,9 @@ def _split() -> Outcome:
 
 
 @_claim(
-    "motion-circle",
-    "text; Fig. fig3",
-    "the pair evolves along the circle |s| = |ω0|",
+    "motion-circle", "text; Fig. fig3", "the pair evolves along the circle |s| = |ω0|",
     "p over |ω0| as the product of σ² − u σ + 1 for the two roots u, as polynomials",
-)
+)  # fmt: skip
 def _circle() -> Outcome:
     u, v = polynomials("u v")
     product = [1, -(u + v), u * v + 2, -(u + v), 1]
@@ -196,11 +175,9 @@ def _circle() -> Outcome:
 
 
 @_claim(
-    "motion-Fr_c",
-    "text",
-    "it crosses the imaginary axis exactly at Fr_c of (Frc1), which yields asymptotic stability",
+    "motion-Fr_c", "text", "it crosses the imaginary axis exactly at Fr_c of (Frc1), which yields asymptotic stability",
     f"{_U}u = 0 beside the printed Fr_c², as rational functions; the Hurwitz determinant changes sign there",
-)
+)  # fmt: skip
 def _crossing() -> Outcome:
     _, B2, (Fr, T, r, scale) = palindrome()
     law = laws.Frc1(r, -(scale**2) * r, -(scale**2) / r, Tilt(T))
@@ -216,11 +193,10 @@ def _third() -> bool:
 
 
 @_claim(
-    "motion-EP4",
-    "text; Fig. fig3, upper row",
+    "motion-EP4", "text; Fig. fig3, upper row",
     "at the tilt (tls) the pair meets the two negative real eigenvalues exactly at Fr_EP4, in s = ω0",
     f"{_U}u1 and u2 stay on different sides of −2 until Fr_EP4, where both are −2",
-)
+)  # fmt: skip
 def _meeting() -> Outcome:
     r, scale = ring("r q")
     law = tilt_of_EP4(r, scale**2)
@@ -233,11 +209,10 @@ def _meeting() -> Outcome:
 
 
 @_claim(
-    "motion-EP4-after",
-    "text; Fig. fig3, upper row",
+    "motion-EP4-after", "text; Fig. fig3, upper row",
     "beyond Fr_EP4 the multiple eigenvalue splits into a quadruplet of complex eigenvalues with negative real parts",
     f"{_U}its discriminant at the tilt of the EP4 as a multiple of Fr_EP4² − Fr²; Routh in balls beyond",
-)
+)  # fmt: skip
 def _after() -> Outcome:
     Fr, rho, scale = ring("Fr rho q")
     r = 1 + rho
@@ -253,11 +228,10 @@ def _after() -> Outcome:
 
 
 @_claim(
-    "motion-2EP2",
-    "text; Fig. fig3, middle row",
+    "motion-2EP2", "text; Fig. fig3, middle row",
     "for smaller tilt the pair reaches the real axis first, at ω0, and splits: four simple negative real eigenvalues",
     f"{_U}B1 less 4 where (u1 + 2)(u2 + 2) = 0, in r and q; certified roots in fractions",
-)
+)  # fmt: skip
 def _middle() -> Outcome:
     before, heavy, after = (_hand(Fr, "1/4") for Fr in ("1.38", "1.45", "1.55"))
     real = [sum(m for z, m in isolated_roots(p) if z.imag == 0) for p in (before, heavy, after)]
@@ -277,11 +251,10 @@ def _order() -> bool:
 
 
 @_claim(
-    "motion-2EP2-both",
-    "text; Fig. fig3, middle row",
+    "motion-2EP2-both", "text; Fig. fig3, middle row",
     "at Fr_EP of (epset) two real negative double eigenvalues originate simultaneously, and then become two pairs",
     f"{_U}its discriminant in Fr²; certified roots of a bicycle below the pole of (epset), in fractions",
-)
+)  # fmt: skip
 def _simultaneous() -> Outcome:
     edge = _hand("1.5", "1/4")
     shallow = all(heavily_damped(_hand(Fr, "1/10")) for Fr in ("2", "10", "1000"))
@@ -295,11 +268,10 @@ def _simultaneous() -> Outcome:
 
 
 @_claim(
-    "motion-CEP2",
-    "text; Fig. fig3, lower row",
+    "motion-CEP2", "text; Fig. fig3, lower row",
     "for larger tilt the negative real eigenvalues meet first, at ω0, and the pairs meet on the circle at Fr_EP",
     f"{_U}B1 less 4 where (u1 + 2)(u2 + 2) = 0, in r and q; certified roots in fractions",
-)
+)  # fmt: skip
 def _lower() -> Outcome:
     before, on, after = (_hand(Fr, "1") for Fr in ("1.5", "1.85", "2"))
     counts = [sum(m for z, m in isolated_roots(p) if z.imag == 0) for p in (before, on, after)]

@@ -6,14 +6,7 @@ import flint
 
 from tmsopt.models.tms import copo
 from tmsopt.paper.ledger.abscissa import product_bound
-from tmsopt.paper.ledger.algebra import (
-    heavily_damped,
-    polynomials,
-    positive_quotient,
-    q,
-    ring,
-    stable,
-)
+from tmsopt.paper.ledger.algebra import heavily_damped, polynomials, positive_quotient, q, ring, stable
 from tmsopt.paper.ledger.entry import EXACT, Claim, Outcome, proof, section, universal
 from tmsopt.paper.ledger.lemmas import (
     HEIGHTS,
@@ -38,11 +31,9 @@ _claim = section("2.4.4 Localization of the EP set and stability optimization")
 
 
 @_claim(
-    "epset-stable",
-    "text",
-    "the EP set lies entirely in the domain of asymptotic stability",
+    "epset-stable", "text", "the EP set lies entirely in the domain of asymptotic stability",
     "b and c of (s² + b s + c)² on it, with r = 1 + ρ: quotients of polynomials with positive coefficients",
-)
+)  # fmt: skip
 def _inside() -> Outcome:
     Fr, T, rho, scale = ring("Fr T rho q")
     r = 1 + rho
@@ -55,11 +46,10 @@ def _inside() -> Outcome:
 
 
 @_claim(
-    "epset-bounds",
-    "text",
+    "epset-bounds", "text",
     "the 2EP2 part of the EP set bounds the domain of heavy damping in the plane χ_B = √(ζ_B/ζ_H)",
     "u² + B1 u + B2 − 2 for u = σ + 1/σ: heavy damping is u1, u2 < −2; rational bicycles on both sides of the curve",
-)
+)  # fmt: skip
 def _bounds() -> Outcome:
     palindrome()
     u, v = polynomials("u v")
@@ -80,11 +70,9 @@ def _bounds() -> Outcome:
 
 
 @_claim(
-    "fig00-onset",
-    "text; Fig. fig00",
-    "χ_B = √(ζ_B/ζ_H) maximises λ_s at the onset of weaving, for given Fr",
+    "fig00-onset", "text; Fig. fig00", "χ_B = √(ζ_B/ζ_H) maximises λ_s at the onset of weaving, for given Fr",
     "tan λ_s from p(iω) = 0 as a function of χ_B; its maximum less it is a square over positive factors",
-)
+)  # fmt: skip
 def _onset() -> Outcome:
     Fr, chi_B, r, h = ring("Fr chi_B r h")
 
@@ -99,17 +87,15 @@ def _onset() -> Outcome:
         return -at_0 / (at_1 - at_0)
 
     return proof(
-        tilt(r) - tilt(chi_B) == Fr**2 * (chi_B - r) ** 2 / ((r**2 - 1) * chi_B),
-        "The only maximum for χ_B > 0.",
+        tilt(r) - tilt(chi_B) == Fr**2 * (chi_B - r) ** 2 / ((r**2 - 1) * chi_B), "The only maximum for χ_B > 0."
     )
 
 
 @_claim(
-    "fig00-heavy",
-    "text; Fig. fig00",
+    "fig00-heavy", "text; Fig. fig00",
     "χ_B = √(ζ_B/ζ_H) maximises λ_s on the boundary of heavy damping: at EP4 for Fr = Fr_EP4, at 2EP2 for Fr > Fr_EP4",
     "every candidate for a maximum at given Fr: interior, one double root, EP3, 2EP2; by exact polynomial inequalities",
-)
+)  # fmt: skip
 def _steepest() -> Outcome:
     solved = double_pair("0.80")
     return proof(
@@ -149,11 +135,9 @@ def _none_in_the_plane() -> bool:
 
 
 @_claim(
-    "fig00-always",
-    "text; Fig. fig00, lower left",
-    "that maximum is always attained at a singular point of the EP set",
+    "fig00-always", "text; Fig. fig00, lower left", "that maximum is always attained at a singular point of the EP set",
     "the equation for u1, u2 in the plane at small Fr, as polynomials; a bicycle with chosen rational eigenvalues",
-)
+)  # fmt: skip
 def _always() -> Outcome:
     Fr, chi_B, T = slow_bicycle()
     p = copo(Fr, q(0), chi_B, q(1), q(-2), q("-0.5"), T)
@@ -173,22 +157,18 @@ def _always() -> Outcome:
 
 
 @_claim(
-    "EP4-steepest",
-    "text",
-    "the absolute maximum of λ_s with heavy damping is attained exactly at EP4",
+    "EP4-steepest", "text", "the absolute maximum of λ_s with heavy damping is attained exactly at EP4",
     "tan λ_s as a function of four positive roots with product 1, bounded by sums of squares, for every Fr and χ_B",
-)
+)  # fmt: skip
 def _absolute() -> Outcome:
     return proof(tilt_bound(), "For every pair of heights with |ζ_B| > |ζ_H|.")
 
 
 @_claim(
-    "EP4-abscissa",
-    "text",
-    "the EP4 also minimizes the spectral abscissa",
+    "EP4-abscissa", "text", "the EP4 also minimizes the spectral abscissa",
     "product bound with a4/a0 = 1/(ζ_B ζ_H), which no other parameter of the χ_H = 1 bicycle enters; the EP4 "
     "attains it",
-)
+)  # fmt: skip
 def _abscissa() -> Outcome:
     Fr, chi_B, T, r, scale = ring("Fr chi_B T r q")
     law = tilt_of_EP4(r, scale**2)
@@ -201,12 +181,10 @@ def _abscissa() -> Outcome:
 
 
 @_claim(
-    "dp",
-    "Eq. dp",
-    "0 < tan λ_s ≤ (tls) with χ_B = √(ζ_B/ζ_H) gives heavy damping at some speed",
+    "dp", "Eq. dp", "0 < tan λ_s ≤ (tls) with χ_B = √(ζ_B/ζ_H) gives heavy damping at some speed",
     "necessity by the bound for every χ_B; existence by u1, u2 < −2 at the end of the speeds; fractions for the "
     "counterexample",
-)
+)  # fmt: skip
 def _dp() -> Outcome:
     T, r, scale = palindrome()[2][1:]
     law = laws.tls(-(scale**2) * r, -(scale**2) / r)
@@ -227,11 +205,9 @@ def _dp() -> Outcome:
 
 
 @_claim(
-    "dp-omega0",
-    "Eq. dp",
-    "ω0 = −(1/(ζ_B ζ_H))^(1/4) in the design principle",
+    "dp-omega0", "Eq. dp", "ω0 = −(1/(ζ_B ζ_H))^(1/4) in the design principle",
     "a4/a0 of the bicycle with χ_H = 1 in balls at the solved EP4",
-)
+)  # fmt: skip
 def _dp_omega0() -> Outcome:
     design = ep4()
     a = copo(design["Fr"], q(0), design["chi_B"], q(1), *HEIGHTS, design["T"])
@@ -239,11 +215,10 @@ def _dp_omega0() -> Outcome:
 
 
 @_claim(
-    "dp-robust",
-    "text after Eq. dp; Fig. fig2",
+    "dp-robust", "text after Eq. dp; Fig. fig2",
     "with χ_B only approximately √(ζ_B/ζ_H) the domain of heavy damping is large enough",
     "certified real roots of rational bicycles 0.1 from χ_B = √2 on either side, and the EP3 that ends their domain",
-)
+)  # fmt: skip
 def _robust() -> Outcome:
     below = heavily_damped(copo(q("2.06"), q(0), q("1.3142"), q(1), *HEIGHTS, q("0.18")))
     above = heavily_damped(copo(q("2.22"), q(0), q("1.5142"), q(1), *HEIGHTS, q("0.22")))

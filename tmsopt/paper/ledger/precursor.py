@@ -7,15 +7,7 @@ import flint
 from tmsopt.models.exact import Tilt
 from tmsopt.models.tms import copo
 from tmsopt.paper.ledger import printed
-from tmsopt.paper.ledger.algebra import (
-    Quotient,
-    ball_roots,
-    heavily_damped,
-    q,
-    ring,
-    slope,
-    stable,
-)
+from tmsopt.paper.ledger.algebra import Quotient, ball_roots, heavily_damped, q, ring, slope, stable
 from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal
 from tmsopt.paper.ledger.lemmas import (
     HEIGHTS,
@@ -33,11 +25,9 @@ _claim = section("2.4.5 Mechanism of self-stability and CEP2 as a precursor to w
 
 
 @_claim(
-    "motion-limit",
-    "text",
-    "the complex EP set tends to the boundary of asymptotic stability as λ_s → π/2",
+    "motion-limit", "text", "the complex EP set tends to the boundary of asymptotic stability as λ_s → π/2",
     "Fr_EP² − Fr_c² and the real part of the double pair as rational functions of tan λ_s: degrees and limits",
-)
+)  # fmt: skip
 def _limit() -> Outcome:
     T, r, scale = ring("T r q")
     omega0, zeta_B = -1 / scale, -(scale**2) * r
@@ -59,11 +49,10 @@ def _limit() -> Outcome:
 
 
 @_claim(
-    "motion-frequency",
-    "text; Fig. fig3, lower row",
+    "motion-frequency", "text; Fig. fig3, lower row",
     "χ_B above or below √(ζ_B/ζ_H) affects the mode of higher or lower frequency",
     "ω² = a3/a1 of the critical pair against ω0², as rational functions; the solved weave boundaries of Fig. fig3",
-)
+)  # fmt: skip
 def _frequency() -> Outcome:
     Fr, chi_B, T, r, scale = ring("Fr chi_B T r q")
     b = normal(Fr, chi_B, T, r, scale)
@@ -74,11 +63,9 @@ def _frequency() -> Outcome:
 
 
 @_claim(
-    "motion-precursor",
-    "text",
-    "near the CEP2 even a small change of χ_B can destabilize at large λ_s",
+    "motion-precursor", "text", "near the CEP2 even a small change of χ_B can destabilize at large λ_s",
     "Fr_c² at χ_B = r + ε less Fr_EP², as a rational function of tan λ_s: sign for large tan λ_s",
-)
+)  # fmt: skip
 def _precursor() -> Outcome:
     T, r, scale, eps = ring("T r q eps")
     square = printed.epset(-1 / scale, -(scale**2) * r, T)
@@ -96,11 +83,9 @@ def _precursor() -> Outcome:
 
 
 @_claim(
-    "motion-symmetry",
-    "text",
-    "as λ_s → π/2 the system comes close to one with a Hamiltonian symmetry of the spectrum",
+    "motion-symmetry", "text", "as λ_s → π/2 the system comes close to one with a Hamiltonian symmetry of the spectrum",
     "odd coefficients over |ω0| as rational functions of tan λ_s and Fr²/tan λ_s",
-)
+)  # fmt: skip
 def _symmetry() -> Outcome:
     Fr, chi_B, T, r, scale = ring("Fr chi_B T r q")
     b = normal(Fr, chi_B, T, r, scale)
@@ -113,23 +98,19 @@ def _symmetry() -> Outcome:
 
 
 @_claim(
-    "motion-near-circle",
-    "text; Fig. fig3",
-    "for χ_B ≠ √(ζ_B/ζ_H) the eigenvalues evolve close to the circle",
+    "motion-near-circle", "text; Fig. fig3", "for χ_B ≠ √(ζ_B/ζ_H) the eigenvalues evolve close to the circle",
     "certified moduli of the complex roots over |ω0| at Fr = 0.2, 0.4, … up to Fr_EP, for the six bicycles of "
     "Fig. fig3",
-)
+)  # fmt: skip
 def _near() -> Outcome:
     worst = [_departure(offset, shift) for offset, shift in (
         ("0", "0.01"), ("0", "-0.01"), ("-0.05", "0.01"), ("-0.05", "-0.01"), ("0.80", "0.1"), ("0.80", "-0.1"),
     )]  # fmt: skip
     return universal(
-        "'close' read as within a quarter of |ω0|, up to Fr_EP",
-        max(worst) < 0.25,
-        f"at χ_B = √2 + 0.1 in the lower row a modulus departs from |ω0| by {worst[4]:.2%}",
-        worst[4] > 0.1,
+        "'close' read as within a quarter of |ω0|, up to Fr_EP", max(worst) < 0.25,
+        f"at χ_B = √2 + 0.1 in the lower row a modulus departs from |ω0| by {worst[4]:.2%}", worst[4] > 0.1,
         remark=f"The largest departure of the six is {max(worst):.2%}; for ± 0.01 it is {max(worst[:4]):.2%}.",
-    )
+    )  # fmt: skip
 
 
 def _departure(offset: str, shift: str) -> float:
@@ -146,11 +127,10 @@ def _departure(offset: str, shift: str) -> float:
 
 
 @_claim(
-    "fig3-EPs",
-    "caption of Fig. fig3",
+    "fig3-EPs", "caption of Fig. fig3",
     "at χ_B = √2 there is an EP4, a couple of real EP2, a couple of complex EP2 as Fr grows from 0 to 5",
     "the three solved bicycles, their Fr and b² − 4 c, in balls",
-)
+)  # fmt: skip
 def _three() -> Outcome:
     real, pair = double_pair("-0.05"), double_pair("0.80")
     kinds = bool(real["b"] ** 2 > 4 * real["c"]) and bool(pair["b"] ** 2 < 4 * pair["c"])
@@ -159,11 +139,10 @@ def _three() -> Outcome:
 
 
 @_claim(
-    "fig3-stabilized",
-    "caption of Fig. fig3",
+    "fig3-stabilized", "caption of Fig. fig3",
     "the TMS bike is stabilized as Fr grows from 0 to 5, for each of the nine designs",
     "Fr_c of the nine by interval Newton, Routh at Fr = 5",
-)
+)  # fmt: skip
 def _stabilized() -> Outcome:
     designs = [
         (o, s) for o in ("0", "-0.05", "0.80") for s in (("", "0.1", "-0.1") if o == "0.80" else ("", "0.01", "-0.01"))
@@ -179,11 +158,9 @@ def _stabilized() -> Outcome:
 
 
 @_claim(
-    "fig3-repelling",
-    "caption of Fig. fig3; text",
-    "eigenvalue curves repel near the CEP2 when χ_B ≠ √2",
+    "fig3-repelling", "caption of Fig. fig3; text", "eigenvalue curves repel near the CEP2 when χ_B ≠ √2",
     "p = a0 (s² + b s + c)² is impossible off the plane, in r and q; certified distance of the pairs at Fr_EP",
-)
+)  # fmt: skip
 def _repelling() -> Outcome:
     Fr, chi_B, T, r, scale = ring("Fr chi_B T r q")
     b = normal(Fr, chi_B, T, r, scale)
@@ -205,12 +182,11 @@ def _gap(shift: str) -> float:
 
 
 @_claim(
-    "motion-monotonic",
-    "text; Fig. fig3, middle row",
+    "motion-monotonic", "text; Fig. fig3, middle row",
     "with heavy damping the time evolution of all perturbations is monotonic exponential decay",
     "certified roots of a heavily damped bicycle and the lean component of their modes, from the second row of "
     "the matrices",
-)
+)  # fmt: skip
 def _monotonic() -> Outcome:
     # ζ_B = −2, ζ_H = −1/2, χ_B = 2, χ_H = 1, tan λ_s = 1/4, Fr = 29/20; over μ ν_H cos λ_s, with ν_H/cos λ_s = 1/8
     Fr, T = q("1.45"), q("0.25")
@@ -231,11 +207,10 @@ def _monotonic() -> Outcome:
 
 
 @_claim(
-    "motion-similar",
-    "text; Fig. fig3, middle row",
+    "motion-similar", "text; Fig. fig3, middle row",
     "for smaller tilt and χ_B ≠ √(ζ_B/ζ_H) the evolution remains qualitatively the same",
     "number of certified real roots as Fr grows, tan λ_s = 0.377177 (the middle row), χ_B = √2 ± 0.01 rounded",
-)
+)  # fmt: skip
 def _similar() -> Outcome:
     below = _real_roots("1.404214", ("0.01", "2", "2.221", "2.25", "2.4"))
     above = _real_roots("1.424214", ("0.01", "2", "2.239", "2.27", "2.4"))

@@ -47,18 +47,16 @@ _claim = section("2.4.3 The discriminant surface and the EP set")
 def _omega0() -> Outcome:
     claimed = -flint.arb(q("25/2")).root(4)
     return proof(
-        1 / (HEIGHTS[0] * HEIGHTS[1]) == q("25/2") and claimed.overlaps(ep4()["s"]),
-        printed="−(25/2)^(1/4)",
+        1 / (HEIGHTS[0] * HEIGHTS[1]) == q("25/2") and claimed.overlaps(ep4()["s"]), printed="−(25/2)^(1/4)",
         computed=digits(ep4()["s"]),
-    )
+    )  # fmt: skip
 
 
 @_claim(
-    "fig00-swallowtail",
-    "caption of Fig. fig00; text, of KO2013",
+    "fig00-swallowtail", "caption of Fig. fig00; text, of KO2013",
     "the discriminant surface in (Fr, χ_B, λ_s) has its swallowtail singularity at EP4",
     "versality for all heights: 3×3 determinant of the changes of the coefficients of t², t, 1 at the EP4, in r and q",
-)
+)  # fmt: skip
 def _swallowtail() -> Outcome:
     Fr, chi_B, T, r, scale = ring("Fr chi_B T r q")
     b = normal(Fr, chi_B, T, r, scale)
@@ -106,12 +104,10 @@ def _line_at_EP4() -> Any:
 
 
 @_claim(
-    "fig00-edges",
-    "text after Fig. fig00",
-    "two cuspidal edges and the line of self-intersection branch from the EP4",
+    "fig00-edges", "text after Fig. fig00", "two cuspidal edges and the line of self-intersection branch from the EP4",
     "the sets (s − a)³(s − t) and (s² + b s + c)² lifted to their unknowns are regular curves through the EP4, "
     "in balls",
-)
+)  # fmt: skip
 def _edges() -> Outcome:
     return proof(
         not _edge_at_EP4().contains(0) and not _line_at_EP4().contains(0),
@@ -122,11 +118,9 @@ def _edges() -> Outcome:
 
 
 @_claim(
-    "plane",
-    "text before Eq. epset",
-    "the line of self-intersection lies in the plane χ_B = √(ζ_B/ζ_H)",
+    "plane", "text before Eq. epset", "the line of self-intersection lies in the plane χ_B = √(ζ_B/ζ_H)",
     "p = a0 (s² + b s + c)² with b eliminated: c² = a4/a0 and c = a3/a1, in r and q",
-)
+)  # fmt: skip
 def _plane() -> Outcome:
     Fr, chi_B, T, r, scale = ring("Fr chi_B T r q")
     b = normal(Fr, chi_B, T, r, scale)
@@ -140,11 +134,10 @@ def _plane() -> Outcome:
 
 
 @_claim(
-    "discriminant",
-    "text before Eq. epset",
+    "discriminant", "text before Eq. epset",
     "the discriminant simplifies in the plane χ_B = √(ζ_B/ζ_H) and provides the curve",
     "discriminant of σ⁴ + B1 σ³ + B2 σ² + B1 σ + 1 by a resultant, factored exactly",
-)
+)  # fmt: skip
 def _discriminant() -> Outcome:
     B1, _, variables = palindrome()
     x, y, s = polynomials("x y s")
@@ -199,11 +192,9 @@ def is_cusp(point: Mapping[str, Any], plane: tuple[str, str]) -> bool:
 
 
 @_claim(
-    "fig2-left",
-    "caption of Fig. fig2",
-    "at χ_B = √2 − 0.1 the domain of heavy damping has a cusp at an EP3, in the (Fr, λ_s)-plane",
-    _MATCHED,
-)
+    "fig2-left", "caption of Fig. fig2",
+    "at χ_B = √2 − 0.1 the domain of heavy damping has a cusp at an EP3, in the (Fr, λ_s)-plane", _MATCHED,
+)  # fmt: skip
 def _left() -> Outcome:
     point = ep3_left()
     return proof(
@@ -216,11 +207,9 @@ def _left() -> Outcome:
 
 
 @_claim(
-    "fig2-edge",
-    "caption of Fig. fig2",
-    "the EP3 belongs to the cuspidal edge of the swallowtail surface",
+    "fig2-edge", "caption of Fig. fig2", "the EP3 belongs to the cuspidal edge of the swallowtail surface",
     "the set (s − a)³(s − t) in (Fr, χ_B, λ_s) is a regular curve there, in balls, crossing the plane",
-)
+)  # fmt: skip
 def _edge() -> Outcome:
     Fr, chi_B, T, a, t = polynomials("Fr chi_B T a t")
     p = copo(Fr, q(0), chi_B, q(1), *HEIGHTS, T)
@@ -229,11 +218,9 @@ def _edge() -> Outcome:
 
 
 @_claim(
-    "fig2-right",
-    "caption of Fig. fig2",
-    "at the tilt of the EP4 less 0.18 the domain of heavy damping has two EP3 cusps, in the (Fr, χ_B)-plane",
-    _MATCHED,
-)
+    "fig2-right", "caption of Fig. fig2",
+    "at the tilt of the EP4 less 0.18 the domain of heavy damping has two EP3 cusps, in the (Fr, χ_B)-plane", _MATCHED,
+)  # fmt: skip
 def _right() -> Outcome:
     points = [ep3_right(upper) for upper in (True, False)]
     real = all(bool(x["a"] < 0) and bool(x["t"] < 0) for x in points)
@@ -242,12 +229,10 @@ def _right() -> Outcome:
 
 
 @_claim(
-    "fig2-crossing",
-    "caption of Fig. fig2",
-    "and a self-intersection at the 2EP2 point on its boundary",
+    "fig2-crossing", "caption of Fig. fig2", "and a self-intersection at the 2EP2 point on its boundary",
     "p(s) = a0 (s² + b s + c)² by interval Newton; the two sheets p(x) = 0 at its double roots x have different "
     "tangents",
-)
+)  # fmt: skip
 def _crossing() -> Outcome:
     point = double_pair("-0.18")
     b, c = point["b"], point["c"]
@@ -260,19 +245,17 @@ def _crossing() -> Outcome:
     ]
     cross = rows[0][0] * rows[1][1] - rows[0][1] * rows[1][0]
     return proof(
-        bool(b > 0) and bool(c > 0) and not cross.contains(0),
-        f"At Fr = {point['Fr'].str(8, radius=False)}, χ_B = √2.",
+        bool(b > 0) and bool(c > 0) and not cross.contains(0), f"At Fr = {point['Fr'].str(8, radius=False)}, χ_B = √2.",
         computed=digits(point["Fr"]),
-    )
+    )  # fmt: skip
 
 
 @_claim(
-    "spire",
-    "text after Fig. fig00",
+    "spire", "text after Fig. fig00",
     "the edges and the line bound a trihedral spire inside which all eigenvalues are real and negative",
     "its three corners in the slice 0.05 below the EP4, by interval Newton, and certified roots of a bicycle "
     "between them",
-)
+)  # fmt: skip
 def _spire() -> Outcome:
     corners = [ep3_right(True, "-0.05"), ep3_right(False, "-0.05"), double_pair("-0.05")]
     signs = all(bool(x["a"] < 0) and bool(x["t"] < 0) for x in corners[:2])

@@ -94,12 +94,10 @@ def upright_case() -> bool:
 
 
 @_claim(
-    "lscf-sufficient",
-    "Eq. lscf",
-    "for tan λ_s > 0 the five conditions are sufficient",
+    "lscf-sufficient", "Eq. lscf", "for tan λ_s > 0 the five conditions are sufficient",
     "an identity for Fr_c² with a1 < 0, the Routh conditions of 4000 rational designs, and certified roots of the "
     "counterexample",
-)
+)  # fmt: skip
 def _sufficient() -> Outcome:
     upright = all(is_stable for d, is_stable in designs() if d[6] > 0 and d[3] >= 1 and admitted(d))
     amended = all(
@@ -121,11 +119,9 @@ def _sufficient() -> Outcome:
 
 
 @_claim(
-    "lscf-classes",
-    "text after Eq. flus, of GAS2018",
-    "the self-stable designs form two classes, by the sign of λ_s",
+    "lscf-classes", "text after Eq. flus, of GAS2018", "the self-stable designs form two classes, by the sign of λ_s",
     "the identity a4 + μ a0/ζ_B² = −tan λ_s (ζ_B + μ ζ_H), and an example of each class by its Routh conditions",
-)
+)  # fmt: skip
 def _classes() -> Outcome:
     forward = copo(*(q(x) for x in ("4", "1", "2", "1", "-2", "-0.5", "1")))
     other = copo(*(q(x) for x in ("2", "1", "0.5", "1", "-0.5", "-2", "-0.25")))
@@ -161,12 +157,10 @@ def _backward_slopes() -> bool:
 
 
 @_claim(
-    "lscf-backward",
-    "text after Eq. flus, of GAS2018",
-    "backward stability is excluded",
+    "lscf-backward", "text after Eq. flus, of GAS2018", "backward stability is excluded",
     "signs of a1 and a3 at Fr < 0 for ζ_H > ζ_B, which the Hurwitz determinant demands, the Routh conditions of the "
     "rational designs with Fr < 0, and of the counterexample",
-)
+)  # fmt: skip
 def _backward() -> Outcome:
     sample = not any(is_stable for d, is_stable in designs() if d[0] < 0 and d[3] >= 0)
     return universal(
@@ -182,11 +176,9 @@ def _backward() -> Outcome:
 
 
 @_claim(
-    "flus",
-    "Eq. flus",
-    "the critical Froude number",
+    "flus", "Eq. flus", "the critical Froude number",
     "p(iω) = 0 with ω² eliminated: the Hurwitz determinant as an identity of rational functions",
-)
+)  # fmt: skip
 def _flus() -> Outcome:
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
     a0, a1, a2, a3, a4 = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
@@ -208,11 +200,9 @@ def _sides(Fr: str) -> bool:
 
 
 @_claim(
-    "Fr_c-sides",
-    "text after Eq. flus",
-    "unstable at 0 ≤ Fr < Fr_c, asymptotically stable at Fr > Fr_c",
+    "Fr_c-sides", "text after Eq. flus", "unstable at 0 ≤ Fr < Fr_c, asymptotically stable at Fr > Fr_c",
     "sign of the Hurwitz determinant on either side, exactly; Fr = 0 by the evenness of p; the counterexample by Routh",
-)
+)  # fmt: skip
 def _sides_of_critical() -> Outcome:
     _, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
     still = copo(0 * T, mu, chi_B, chi_H, zeta_B, zeta_H, T)
@@ -231,11 +221,9 @@ def _sides_of_critical() -> Outcome:
 
 
 @_claim(
-    "Fr_c-weaving",
-    "text after Eq. flus",
-    "Fr_c lies on the boundary of stability and dynamic instability (weaving)",
+    "Fr_c-weaving", "text after Eq. flus", "Fr_c lies on the boundary of stability and dynamic instability (weaving)",
     "division of p by s² + a3/a1, the remainder proportional to the Hurwitz determinant",
-)
+)  # fmt: skip
 def _weaving() -> Outcome:
     a0, a1, a2, a3, a4 = ring("a0 a1 a2 a3 a4")
     W = a3 / a1

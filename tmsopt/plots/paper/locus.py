@@ -14,20 +14,10 @@ from tmsopt.plots.style import COMPLEX, CRITICAL, LINE, MARK, REAL, new_figure
 COLOURS = (LINE, CRITICAL, MARK)
 """χ_B of the law, below it, above it."""
 
-NAMES = {
-    "EP4": r"$\mathrm{EP}_4$",
-    "2EP2": r"$2\mathrm{EP}_2$",
-    "CEP2": r"$\mathrm{CEP}_2$",
-    "EP2": r"$\mathrm{EP}_2$",
-}
+NAMES = {"EP4": r"$\mathrm{EP}_4$", "2EP2": r"$2\mathrm{EP}_2$", "CEP2": r"$\mathrm{CEP}_2$", "EP2": r"$\mathrm{EP}_2$"}
 """Multiple roots in the symbols of the paper."""
 
-_PLACES = {
-    "EP4": ((-34, 9),),
-    "2EP2": ((22, 26), (1, 33)),
-    "CEP2": ((10, -17), (10, 12)),
-    "EP2": ((6, -13),),
-}
+_PLACES = {"EP4": ((-34, 9),), "2EP2": ((22, 26), (1, 33)), "CEP2": ((10, -17), (10, 12)), "EP2": ((6, -13),)}
 """Where the names stand beside the roots, in points, by ascending real and imaginary part."""
 
 Window = tuple[float, float, float, float]
