@@ -161,10 +161,7 @@ def nearest(
 
 
 def robustness(
-    design: Given,
-    *,
-    parameters: Mapping[str, float] | None = None,
-    weights: Mapping[str, float] | None = None,
+    design: Given, *, parameters: Mapping[str, float] | None = None, weights: Mapping[str, float] | None = None
 ) -> Robustness:
     """The nearest points of all boundaries, and the radius within which a design stays stable.
 
@@ -178,13 +175,7 @@ def robustness(
         u = np.array([limit.direction[n] for n in place.weights])
         seen = sorted([*seen, *between(place.space, u)], key=lambda c: c.distance)
         found = [_nearest(place, seen, kind) for kind in KINDS]
-    return Robustness(
-        place.stable,
-        place.heavily_damped,
-        Table(place.parameters),
-        Table(place.weights),
-        *found,
-    )
+    return Robustness(place.stable, place.heavily_damped, Table(place.parameters), Table(place.weights), *found)
 
 
 def _place(design: Given, parameters: Mapping[str, float] | None, weights: Mapping[str, float] | None) -> Place:

@@ -22,22 +22,6 @@ from tmsopt.tracing.swallowtail import Swallowtail, swallowtail
 from tmsopt.tracing.trace import trace
 
 __all__ = [
-    "Branch",
-    "Domain",
-    "End",
-    "Event",
-    "Swallowtail",
-    "Trace",
-    "between",
-    "both_ways",
-    "contains",
-    "crossing",
-    "curve",
-    "domain",
-    "project",
-    "same",
-    "swallowtail",
-    "tangent_at",
-    "trace",
-    "walk",
-]
+    "Branch", "Domain", "End", "Event", "Swallowtail", "Trace", "between", "both_ways", "contains", "crossing",
+    "curve", "domain", "project", "same", "swallowtail", "tangent_at", "trace", "walk",
+]  # fmt: skip

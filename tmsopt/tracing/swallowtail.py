@@ -155,10 +155,7 @@ class _Affine:
 
 def _on_surface(parts: tuple[Array, Array, Array], r: Array) -> tuple[Array, Array]:
     """x and y for which r is a double root: p(r) = p′(r) = 0 by Cramer's rule."""
-    (A, B, C), (dA, dB, dC) = (
-        [np.polyval(p, r) for p in parts],
-        [np.polyval(np.polyder(p), r) for p in parts],
-    )
+    (A, B, C), (dA, dB, dC) = ([np.polyval(p, r) for p in parts], [np.polyval(np.polyder(p), r) for p in parts])
     with np.errstate(all="ignore"):
         size = B * dC - C * dB
         return (C * dA - A * dC) / size, (A * dB - B * dA) / size
