@@ -11,18 +11,6 @@ from tmsopt.certificates.race import Crew
 from tmsopt.certificates.scip import FOUND, INFEASIBLE, Decision, available, decide, task
 
 __all__ = [
-    "FOUND",
-    "INFEASIBLE",
-    "Crew",
-    "Decision",
-    "Question",
-    "available",
-    "certify",
-    "check_installed",
-    "decide",
-    "interlace",
-    "interlacing",
-    "squares_of",
-    "task",
-    "unknowns",
-]
+    "FOUND", "INFEASIBLE", "Crew", "Decision", "Question", "available", "certify", "check_installed", "decide",
+    "interlace", "interlacing", "squares_of", "task", "unknowns",
+]  # fmt: skip

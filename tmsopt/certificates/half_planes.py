@@ -165,12 +165,7 @@ def _half_plane_guess(
 
 
 def _sector_guess(
-    frame: Frame,
-    covered: Sequence[int],
-    ratio: float | None,
-    unit: float,
-    values: Sequence[Values],
-    z: Sequence[Roots],
+    frame: Frame, covered: Sequence[int], ratio: float | None, unit: float, values: Sequence[Values], z: Sequence[Roots]
 ) -> list[list[float]]:
     """Damping ratio, if it is not known, and factors; the roots are given in the unit of the NLP."""
     factors = []

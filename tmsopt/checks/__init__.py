@@ -9,12 +9,4 @@ from tmsopt.checks.law_rows import law_rows
 from tmsopt.checks.recheck import realised_abscissa, recheck
 from tmsopt.checks.worst_case import cover, worst_cases
 
-__all__ = [
-    "cover",
-    "law_rows",
-    "omega0_bound",
-    "realised_abscissa",
-    "recheck",
-    "relation_bound",
-    "worst_cases",
-]
+__all__ = ["cover", "law_rows", "omega0_bound", "realised_abscissa", "recheck", "relation_bound", "worst_cases"]

@@ -82,11 +82,7 @@ def worst_cases(problem: Problem, parameters: Mapping[str, float]) -> dict[str, 
 
 
 def _measured(
-    problem: Problem,
-    parameters: Mapping[str, float],
-    case: Case,
-    what: Expression | str,
-    shared: Mapping[str, float],
+    problem: Problem, parameters: Mapping[str, float], case: Case, what: Expression | str, shared: Mapping[str, float]
 ) -> float:
     """The value of a root quantity in one case, or of an expression with the given worst root quantities."""
     values = problem.values(case.applied(parameters))
@@ -107,8 +103,7 @@ class _Space:
         """The case at a point of the cube."""
         at, offset = self._columns(u)
         return Case(
-            Table({**self.at, **{n: float(v) for n, v in at.items()}}),
-            Table({n: float(v) for n, v in offset.items()}),
+            Table({**self.at, **{n: float(v) for n, v in at.items()}}), Table({n: float(v) for n, v in offset.items()})
         )
 
     def peaks(

@@ -10,22 +10,6 @@ from tmsopt.formulation.options import DEFAULTS, STARTS, Asked, AskedOfSolve, Op
 from tmsopt.formulation.starts import complete, designs, opposite, worth
 
 __all__ = [
-    "DEFAULTS",
-    "NLP",
-    "STARTS",
-    "Asked",
-    "AskedOfSolve",
-    "Factor",
-    "Options",
-    "Scale",
-    "abscissa",
-    "complete",
-    "designs",
-    "formulate",
-    "matching",
-    "objective_size",
-    "opposite",
-    "options_of",
-    "scale_of",
-    "worth",
-]
+    "DEFAULTS", "NLP", "STARTS", "Asked", "AskedOfSolve", "Factor", "Options", "Scale", "abscissa", "complete",
+    "designs", "formulate", "matching", "objective_size", "opposite", "options_of", "scale_of", "worth",
+]  # fmt: skip

@@ -204,11 +204,7 @@ class Values(Mapping[str, Any]):
         native = of.native(parameters)
         self.coefficients = model.polynomial(**model.algebraic(native))
         self._at = (model, of, dict(parameters), dict(ranges or {}))
-        self._known = {
-            **native,
-            **dict(zip(model.coefficient_names(), self.coefficients, strict=True)),
-            **parameters,
-        }
+        self._known = {**native, **dict(zip(model.coefficient_names(), self.coefficients, strict=True)), **parameters}
         self._formulas = {q.name: q for q in (*model.quantities, *of.quantities, *extra)}
         self._lift = lift
 

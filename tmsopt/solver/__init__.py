@@ -9,14 +9,4 @@ from tmsopt.solver.multistart import same
 from tmsopt.solver.solve import solve, solved
 from tmsopt.solver.workspace import Family, Workspace, workspace
 
-__all__ = [
-    "Every",
-    "Family",
-    "Workspace",
-    "coverage_of",
-    "same",
-    "solve",
-    "solve_all",
-    "solved",
-    "workspace",
-]
+__all__ = ["Every", "Family", "Workspace", "coverage_of", "same", "solve", "solve_all", "solved", "workspace"]

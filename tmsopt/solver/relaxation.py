@@ -146,11 +146,7 @@ def _ahead(one: Trial, other: Trial) -> bool:
 
 
 def _least(
-    work: Workspace,
-    limits: Sequence[Limit],
-    cases: Sequence[Case],
-    before: Trial | None = None,
-    few: bool = False,
+    work: Workspace, limits: Sequence[Limit], cases: Sequence[Case], before: Trial | None = None, few: bool = False
 ) -> tuple[Trial | None, NLP]:
     """The design with the least weighted sum of amounts that a few starts reach, or the one `before` leads to."""
     nlp = _elastic(work.problem, cases, limits)

@@ -21,11 +21,7 @@ from tmsopt.solver.workspace import Family, workspace
 
 
 def solve(
-    problem: Given,
-    *,
-    throw: bool = True,
-    family: Family | None = None,
-    **options: Unpack[AskedOfSolve],
+    problem: Given, *, throw: bool = True, family: Family | None = None, **options: Unpack[AskedOfSolve]
 ) -> Solution:
     """Find the best design, from several starts, and check it independently of the solver.
 
