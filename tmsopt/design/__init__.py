@@ -14,8 +14,7 @@ from tmsopt.design.solution import Bound, NotSolved, Solution, Starts
 from tmsopt.design.units import decay_time, frequencies, growth_time, reading, with_unit
 
 __all__ = [
-    "NO_RADIUS", "ROOT_NAMES", "Band", "Bound", "Case", "Expression", "ExpressionError", "Given", "NotSolved", "Problem",
-    "Solution", "Starts", "decay_time", "freedom", "frequencies", "growth_time", "limit_of", "load", "parse_comparison",
-    "parse_value", "problem_of", "question_of", "reading", "with_limit",
-    "with_unit",
+    "NO_RADIUS", "ROOT_NAMES", "Band", "Bound", "Case", "Expression", "ExpressionError", "Given", "NotSolved",
+    "Problem", "Solution", "Starts", "decay_time", "freedom", "frequencies", "growth_time", "limit_of", "load",
+    "parse_comparison", "parse_value", "problem_of", "question_of", "reading", "with_limit", "with_unit",
 ]  # fmt: skip

@@ -23,7 +23,7 @@ from tmsopt.paper.universal import (
 )
 
 __all__ = [
-    "Comparison", "Ledger", "benchmark", "compare", "ep_set", "experiment", "experimental", "heavy_section", "locus",
-    "normalised", "optimised", "sketch", "spire", "spire_faces", "stability_margin", "table_1", "table_1_loci",
-    "table_1_paths", "universal_path", "verify",
+    "Comparison", "Ledger", "benchmark", "compare", "ep_set", "experiment", "experimental", "heavy_section",
+    "locus", "normalised", "optimised", "sketch", "spire", "spire_faces", "stability_margin", "table_1",
+    "table_1_loci", "table_1_paths", "universal_path", "verify",
 ]  # fmt: skip

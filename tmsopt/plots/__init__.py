@@ -13,6 +13,6 @@ from tmsopt.plots.style import new_figure, save
 from tmsopt.plots.trace import trace_figure
 
 __all__ = [
-    "Name", "chart_figure", "draw_bicycle", "draw_distance", "draw_frequencies", "draw_growth_rates", "front_figure",
-    "growth_figure", "new_figure", "place_names", "save", "trace_figure",
+    "Name", "chart_figure", "draw_bicycle", "draw_distance", "draw_frequencies", "draw_growth_rates",
+    "front_figure", "growth_figure", "new_figure", "place_names", "save", "trace_figure",
 ]  # fmt: skip

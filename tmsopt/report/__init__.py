@@ -20,24 +20,8 @@ from tmsopt.report.speeds import speeds_table
 from tmsopt.report.study import row_lines, study_table
 
 __all__ = [
-    "chart_table",
-    "comparison_table",
-    "diagnosis_lines",
-    "every_table",
-    "explained_lines",
-    "front_table",
-    "ledger_page",
-    "ledger_table",
-    "meaning_lines",
-    "optimality_lines",
-    "proof_text",
-    "robustness_line",
-    "robustness_table",
-    "row_lines",
-    "si_parameters",
-    "solution_table",
-    "speeds_table",
-    "study_table",
-    "summary_table",
-    "trace_table",
-]
+    "chart_table", "comparison_table", "diagnosis_lines", "every_table", "explained_lines", "front_table",
+    "ledger_page", "ledger_table", "meaning_lines", "optimality_lines", "proof_text", "robustness_line",
+    "robustness_table", "row_lines", "si_parameters", "solution_table", "speeds_table", "study_table",
+    "summary_table", "trace_table",
+]  # fmt: skip

@@ -11,6 +11,6 @@ from tmsopt.plots.paper.swallowtail import draw_swallowtail, quadrilaterals
 from tmsopt.plots.paper.universal import draw_box, draw_section
 
 __all__ = [
-    "GALLERY", "Item", "draw_box", "draw_critical_speeds", "draw_law", "draw_row", "draw_section", "draw_swallowtail",
-    "find", "full_window", "planes_figure", "quadrilaterals",
+    "GALLERY", "Item", "draw_box", "draw_critical_speeds", "draw_law", "draw_row", "draw_section",
+    "draw_swallowtail", "find", "full_window", "planes_figure", "quadrilaterals",
 ]  # fmt: skip

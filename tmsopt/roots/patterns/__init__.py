@@ -9,12 +9,6 @@ from tmsopt.roots.patterns.enclosed import enclosed_roots, nearest_decimal, near
 from tmsopt.roots.patterns.naming import implies, shown_patterns
 
 __all__ = [
-    "STRUCTURES",
-    "enclosed_roots",
-    "implies",
-    "in_words",
-    "nearest_decimal",
-    "nearest_double",
-    "nearest_roots",
+    "STRUCTURES", "enclosed_roots", "implies", "in_words", "nearest_decimal", "nearest_double", "nearest_roots",
     "shown_patterns",
-]
+]  # fmt: skip

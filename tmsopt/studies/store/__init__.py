@@ -5,8 +5,4 @@ In: finished rows. Out: the same rows to the bit, whatever happened in between. 
 
 from tmsopt.studies.store.store import Store, open_store, read_store
 
-__all__ = [
-    "Store",
-    "open_store",
-    "read_store",
-]
+__all__ = ["Store", "open_store", "read_store"]
