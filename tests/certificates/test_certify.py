@@ -399,6 +399,7 @@ def test_a_better_design_takes_the_place_of_a_worse_one() -> None:
     assert any("found a better design" in note and f"{part.value:.9g} before" in note for note in design.notes)
 
 
+@pytest.mark.slow
 def test_a_better_design_than_many_starts_find() -> None:
     """The default solve of this problem stops at +0.0138; the value that is kept was found by differential evolution."""
     design = certify(random_problem(32), seconds=5.0)
