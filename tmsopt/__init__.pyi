@@ -2,9 +2,7 @@ from . import laws as laws, models as models, plots as plots, report as report, 
 from .certificates import certify as certify
 from .charts import (
     Chart as Chart,
-    StoredChart as StoredChart,
     chart as chart,
-    chart_to as chart_to,
     open_chart as open_chart,
 )
 from .critical_speeds import Speeds as Speeds, growth as growth, speeds as speeds

@@ -16,7 +16,7 @@ from helpers import curves
 from helpers.curves import exact_polynomial, sturm
 from helpers.oracles import abscissa_60, certified_roots, polynomial_60
 
-from tmsopt.charts import chart, classify, save_arrays
+from tmsopt.charts import chart, classify
 from tmsopt.cli import main
 from tmsopt.design import Problem, load
 from tmsopt.errors import InputError
@@ -212,7 +212,7 @@ def test_least_abscissa_is_the_least():
 def test_the_archive_reads_back_with_named_axes(tmp_path):
     found = charted(*PLANES["both tilts"], axes=("lambda_s", "chi_B"), points=(9, 6))
     path = tmp_path / "chart.npz"
-    save_arrays(found, path)
+    found.save(path)
     with np.load(path, allow_pickle=False) as data:
         assert np.array_equal(data["lambda_s"], np.linspace(-1.4, 1.4, 9))
         assert np.array_equal(data["chi_B"], np.linspace(-1, 3, 6))
@@ -229,7 +229,8 @@ def test_the_archive_reads_back_with_named_axes(tmp_path):
     ("free", "axes", "words"),
     [
         ({"Fr": (0.1, 5.0)}, None, "1 are free"),
-        ({"Fr": (0.1, 5.0), "chi_B": (1.1, 2.0), "lambda_s": (0.1, 1.0)}, None, "fix the others"),
+        ({"Fr": (0.1, 5.0), "chi_B": (1.1, 2.0), "lambda_s": (0.1, 1.0)}, None, "accepted: three whole numbers"),
+        ({"Fr": (0.1, 5.0), "chi_B": (1.1, 2.0), "lambda_s": (0.1, 1.0), "mu": (1.0, 9.0)}, None, "fix the others"),
         ({}, None, "0 are free"),
         ({"Fr": (0.1, 5.0), "lambda_s": (0.1, 1.0)}, ("Fr", "mu"), "accepted: Fr and lambda_s"),
     ],
@@ -400,6 +401,11 @@ def test_other_numbers_of_points_are_refused(points):
     problem = load("problems/chart.toml")
     with pytest.raises(InputError, match=r"points: found .* accepted: two whole numbers"):
         chart(problem, points=points, boundaries=False)
+
+
+def test_what_memory_has_no_room_for_is_refused():
+    with pytest.raises(InputError, match=r"points: 1e\+08 designs do not fit into memory; give a folder"):
+        chart(load("problems/chart.toml"), points=(10_000, 10_000), boundaries=False)
 
 
 def test_axes_as_one_text_are_refused():

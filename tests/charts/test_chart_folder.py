@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from helpers.charts import EXTRA, PLANE, charted, files
 
-from tmsopt.charts import LAYERS, chart, chart_to, open_chart
+from tmsopt.charts import LAYERS, chart, open_chart
 from tmsopt.cli import main
 from tmsopt.design import load
 from tmsopt.errors import InputError
+from tmsopt.plots import chart_figure
 
 folder = import_module("tmsopt.charts.folder")
 
@@ -31,8 +32,8 @@ def whole(tmp_path_factory):
 KILLED = """
 import os, signal, sys
 from helpers.charts import charted
-from tmsopt.charts import folder, stored
-left, stored._SYNC = int(sys.argv[2]), 0.0
+from tmsopt.charts import folder
+left, folder._SYNC = int(sys.argv[2]), 0.0
 real = os.fsync
 def fsync(descriptor):
     global left
@@ -105,10 +106,25 @@ def test_memory_does_not_grow_with_the_grid(tmp_path):
     peaks = []
     for rows in (200, 1000):
         tracemalloc.start()
-        chart_to(PLANE, tmp_path / f"{rows}.chart", points=(200, rows), tile=4000)
+        charted(tmp_path / f"{rows}.chart", points=(200, rows), tile=4000)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < 1.2 * peaks[0] + 40 * 1000
+
+
+def test_an_opened_chart_is_the_one_that_was_charted(whole, tmp_path):
+    """Its problem too, but for the equality constraint, which no grid has; so that it is drawn and saved alike."""
+    again = open_chart(whole.path)
+    assert again.problem == dataclasses.replace(PLANE, constraints=again.problem.constraints)
+    assert again.problem.constraints.keys() == PLANE.constraints.keys() - {"law"}
+    assert (again.axes, again.counts, again.shares) == (whole.axes, whole.counts, whole.shares)
+    assert again.quantities.keys() == EXTRA.keys()
+    assert isinstance(again.abscissa, np.memmap)
+    chart_figure(again, "excess")
+    again.save(tmp_path / "again.npz", ("kind", "T"))
+    with np.load(tmp_path / "again.npz") as data:
+        assert set(data) == {"Fr", "lambda_s", "kind", "T", "about"}
+        assert np.array_equal(data["T"], again.layers["T"])
 
 
 # What is refused
@@ -303,8 +319,8 @@ def test_three_axes_in_one_file(ending, tmp_path, capsys):
     assert "7 × 6 × 5 designs over Fr, lambda_s, chi_B" in out
     assert figure.read_bytes().startswith(b"<?xml")
     problem = load("problems/ep_set.toml")
-    wanted = chart_to(problem, tmp_path / "space.chart", ("Fr", "lambda_s", "chi_B"), points=(7, 6, 5),
-                      quantities={"x": "Fr*chi_B"})  # fmt: skip
+    asked = {"points": (7, 6, 5), "quantities": {"x": "Fr*chi_B"}}
+    wanted = chart(problem, ("Fr", "lambda_s", "chi_B"), folder=tmp_path / "space.chart", **asked)
     if ending == "npz":
         with np.load(path) as data:
             found = dict(data)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers.charts import EXTRA, FIXED, PLANE, POINTS, SPACE, charted, files
 
-from tmsopt.charts import LAYERS, Grid, array_function, chart, chart_to, survey, tally, total
+from tmsopt.charts import LAYERS, Grid, array_function, chart, open_chart, survey, tally, total
 from tmsopt.design import Problem, load
 from tmsopt.errors import InputError
 from tmsopt.models import Model, Parameter, ParameterSet
@@ -24,20 +24,20 @@ def whole(tmp_path_factory):
 @pytest.mark.parametrize(("tile", "workers"), [(1, 1), (97, 3), (300, 2), (10**6, 1)])
 def test_tiles_are_the_chart_in_memory_to_the_bit(tile, workers, whole, tmp_path):
     found = charted(tmp_path / "cut.chart", tile=tile, workers=workers)
-    small = chart(PLANE, points=POINTS, boundaries=False)
-    for name, dtype in LAYERS.items():
-        wanted = getattr(small, name)
+    small = chart(PLANE, points=POINTS, quantities=EXTRA, boundaries=False)
+    assert list(found.layers) == list(small.layers)
+    for name, wanted in small.layers.items():
         assert found.layers[name].shape == (23, 37)
-        assert found.layers[name].dtype == dtype
+        assert found.layers[name].dtype == LAYERS.get(name, float)
         assert found.layers[name].tobytes() == wanted.tobytes()
     assert files(found.path) == files(whole.path)
     assert found.shares == small.shares == whole.shares
-    assert found.to_json()["least_abscissa"] == small.to_json()["least_abscissa"]
-    assert found.to_json()["satisfied"] == small.to_json()["satisfied"]
+    data, wanted = found.to_json(), small.to_json()
+    assert all(data[n] == wanted[n] for n in ("axes", "classes", "least_abscissa", "satisfied", "fallbacks"))
 
 
 def test_quantities_are_those_of_every_design(whole):
-    Fr, tilt = np.meshgrid(*whole.grid.values)
+    Fr, tilt = np.meshgrid(*whole.grid)
     assert np.array_equal(whole.layers["T"], np.tan(tilt))
     assert np.array_equal(whole.layers["settled"], whole.layers["abscissa"] * Fr, equal_nan=True)
     assert np.all(whole.layers["one"] == 1)
@@ -50,10 +50,10 @@ def test_quantities_are_those_of_every_design(whole):
 
 def test_three_axes_are_planes_one_above_the_other(tmp_path):
     axes, points = ("chi_B", "lambda_s", "Fr"), (9, 7, 5)
-    found = chart_to(SPACE, tmp_path / "space.chart", axes, points=points, tile=31, quantities={"x": "Fr_c"})
+    found = chart(SPACE, axes, folder=tmp_path / "space.chart", points=points, tile=31, quantities={"x": "Fr_c"})
     assert found.layers["kind"].shape == (5, 7, 9)
     assert found.about["dimensions"] == ["Fr", "lambda_s", "chi_B"]
-    for k, Fr in enumerate(found.grid.values[2]):
+    for k, Fr in enumerate(found.grid[2]):
         plane = dataclasses.replace(
             SPACE,
             fixed=FIXED | {"Fr": float(Fr)},
@@ -69,7 +69,7 @@ def test_three_axes_are_planes_one_above_the_other(tmp_path):
     best = found.to_json()["least_abscissa"]
     assert best["value"] == found.layers["abscissa"].min()
     place = np.unravel_index(np.argmin(found.layers["abscissa"]), (5, 7, 9))
-    assert [best[n] for n in axes] == [v[k] for v, k in zip(found.grid.values, place[::-1], strict=True)]
+    assert [best[n] for n in axes] == [v[k] for v, k in zip(found.grid, place[::-1], strict=True)]
 
 
 def test_a_grid_knows_its_designs():
@@ -101,12 +101,12 @@ def test_both_engines_write_the_same_bits(whole, tmp_path):
 
 
 def test_only_what_is_asked_for_is_kept(tmp_path):
-    found = chart_to(PLANE, tmp_path / "kind.chart", points=POINTS, layers=("kind",))
+    found = charted(tmp_path / "kind.chart", layers=("kind",), quantities={})
     assert list(found.layers) == ["kind"]
     data = found.to_json()
     assert data["least_abscissa"] is data["satisfied"] is None
     assert sum(data["classes"].values()) == pytest.approx(1)
-    other = chart_to(PLANE, tmp_path / "other.chart", points=POINTS, layers=(), quantities={"x": "Fr"})
+    other = charted(tmp_path / "other.chart", layers=(), quantities={"x": "Fr"})
     assert list(other.layers) == ["x"]
     assert other.shares == {}
 
@@ -151,14 +151,18 @@ def test_a_constraint_that_does_not_exist_is_not_satisfied():
 def test_a_model_of_another_degree(tmp_path):
     """s² + d s + k: stable where d, k > 0, heavily damped where d² > 4k too; k ≤ 0 has a root ≥ 0."""
     problem = Problem(model=OSCILLATOR, free={"d": (-1.9, 3.0), "k": (-0.4, 2.0)})
-    found = chart_to(problem, tmp_path / "o.chart", points=(50, 25), tile=200)
-    d, k = np.meshgrid(*found.grid.values)
+    found = charted(tmp_path / "o.chart", problem, points=(50, 25), tile=200, quantities={})
+    d, k = np.meshgrid(*found.grid)
     real = d * d > 4 * k
     kind = np.where((d > 0) & (k > 0), np.where(real, 4, 3), np.where((k <= 0) | ((d <= 0) & real), 1, 2))
     regular = np.abs(d * d - 4 * k) > 1e-9  # a double root is one root, and rounding decides where it is
     assert np.array_equal(found.layers["kind"][regular], kind[regular])
     alpha = np.where(real, (-d + np.sqrt(np.maximum(d * d - 4 * k, 0))) / 2, -d / 2)
     assert found.layers["abscissa"][regular] == pytest.approx(alpha[regular], abs=1e-12)
+    again = open_chart(found.path)
+    assert again.to_json() | found.run == found.to_json()
+    with pytest.raises(InputError, match="does not hold its model 'oscillator'"):
+        assert again.problem
 
 
 def test_one_or_four_free_parameters_make_no_grid():

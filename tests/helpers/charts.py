@@ -2,7 +2,7 @@
 
 import math
 
-from tmsopt.charts import LAYERS, chart_to
+from tmsopt.charts import LAYERS, chart
 from tmsopt.design import Problem
 from tmsopt.models import tms
 
@@ -22,7 +22,8 @@ EXTRA = {"excess": "Fr - Fr_c", "settled": "abscissa * Fr", "T": "tan(lambda_s)"
 
 
 def charted(path, problem=PLANE, **options):
-    return chart_to(problem, path, **{"points": POINTS, "layers": tuple(LAYERS), "quantities": EXTRA} | options)
+    usual = {"points": POINTS, "layers": tuple(LAYERS), "quantities": EXTRA, "boundaries": False}
+    return chart(problem, folder=path, **usual | options)
 
 
 def files(path):

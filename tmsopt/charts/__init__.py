@@ -4,32 +4,15 @@ In: a problem with two or three free parameters. Out: a `Chart` of layers: class
 `chart` first; `survey` computes it tile by tile, `folder` keeps it on disk.
 """
 
-from tmsopt.charts.chart import Chart, chart, save_arrays
+from tmsopt.charts.chart import LARGEST, Chart, chart, charted, open_chart
 from tmsopt.charts.expressions import array_function
-from tmsopt.charts.files import save_layers
+from tmsopt.charts.files import check_netcdf, save_layers
 from tmsopt.charts.motion import classified, classify, engine_of
-from tmsopt.charts.stored import StoredChart, chart_to, gathered, open_chart
 from tmsopt.charts.summary import tally, total
-from tmsopt.charts.survey import LAYERS, USUAL, Grid, axes_of, survey
+from tmsopt.charts.survey import LAYERS, USUAL, USUAL_POINTS, Grid, axes_of, survey
 
 __all__ = [
-    "LAYERS",
-    "USUAL",
-    "Chart",
-    "Grid",
-    "StoredChart",
-    "array_function",
-    "axes_of",
-    "chart",
-    "chart_to",
-    "classified",
-    "classify",
-    "engine_of",
-    "gathered",
-    "open_chart",
-    "save_arrays",
-    "save_layers",
-    "survey",
-    "tally",
-    "total",
-]
+    "LARGEST", "LAYERS", "USUAL", "USUAL_POINTS", "Chart", "Grid", "array_function", "axes_of", "chart", "charted",
+    "check_netcdf", "classified", "classify", "engine_of", "open_chart", "save_layers", "survey",
+    "tally", "total",
+]  # fmt: skip

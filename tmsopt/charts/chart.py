@@ -1,7 +1,10 @@
-"""Stability charts: what kind of motion each design of a two-parameter grid has."""
+"""Charts: what kind of motion each design of a grid over two or three parameters has."""
 
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -9,160 +12,305 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.charts.files import save_layers
-from tmsopt.charts.stored import gathered
-from tmsopt.charts.survey import USUAL, Grid, Survey, survey
-from tmsopt.design.files import problem_of
+from tmsopt.charts.folder import (
+    ABOUT,
+    SCHEMA,
+    TILES,
+    Folder,
+    complete,
+    damaged,
+    read_about,
+    read_array,
+    read_tiles,
+    writing,
+)
+from tmsopt.charts.summary import Tally, total
+from tmsopt.charts.survey import LAYERS, USUAL, Grid, Survey, survey
+from tmsopt.charts.tiles import TILE, Memory, computed
+from tmsopt.design.files import Given
 from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
-from tmsopt.records import Array
+from tmsopt.models import MODELS
+from tmsopt.records import Array, Progress
 from tmsopt.roots import CLASSES
 from tmsopt.tracing.domain import Domain, domain
 
 LARGEST = 20_000_000
-"""Designs of a chart, which is held in memory at some 40 bytes each."""
+"""Designs of a chart in memory, some 40 bytes each."""
 
-CHART_LAYERS = ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied", "margin")
-"""Layers that a chart in memory has."""
+
+def _layer(name: str, meaning: str) -> Any:
+    return property(lambda self: self.layers[name], doc=meaning)
 
 
 @dataclass(frozen=True)
 class Chart:
-    """Classes and roots over a grid of two parameters.
+    """Classes, roots and quantities over a grid of two or three parameters.
 
     Attributes:
-        axes: names of the two parameters; arrays have shape (len(second), len(first)), as an image has.
+        about: what was charted, as plain data.
         grid: the values along each axis.
-        kind: class codes, decided by coefficients: unstable with a real root ≥ 0 (capsize), unstable without one
-            (weave), stable, stable with all roots real (heavily damped).
-        abscissa, damping_ratio: from roots that are jointly right next to an exceptional point; nan if undefined.
-        real_roots: number of different real roots, from coefficients.
-        satisfied: where every inequality constraint of the problem holds.
-        margin: least difference of the sides of an inequality, negative where one is violated, nan where one does not
-            exist.
-        domain: the exact boundaries, if asked for.
-        quantities: name → values of an expression of the user's.
+        layers: name → array of shape (len(second), len(first)), as an image has, a third axis before them. Those in a
+            folder are memory maps, read when they are looked at.
+        counts: over all designs.
+        domain: the exact boundaries over a plane, if asked for.
+        path: of its folder; None in memory.
+        run: of the process that computed it: ``engine``, ``seconds``, ``per_second``, of a folder also how many
+            ``designs`` were left to it; empty where the chart was only opened.
     """
 
-    problem: Problem
-    axes: tuple[str, str]
-    grid: tuple[Array, Array]
-    kind: NDArray[np.int8]
-    abscissa: Array
-    damping_ratio: Array
-    real_roots: NDArray[np.int8]
-    satisfied: NDArray[np.bool_]
-    margin: Array
-    domain: Domain | None
-    quantities: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    about: Mapping[str, Any] = field(repr=False)
+    grid: tuple[Array, ...] = field(repr=False)
+    layers: Mapping[str, NDArray[Any]] = field(repr=False)
+    counts: Tally
+    domain: Domain | None = field(default=None, repr=False)
+    path: Path | None = None
+    run: Mapping[str, Any] = field(default_factory=dict)
+    asked: Problem | None = field(default=None, repr=False)
+
+    kind = _layer("kind", "Class codes, decided by coefficients, places in `tmsopt.roots.CLASSES`.")
+    abscissa = _layer("abscissa", "Jointly right next to an exceptional point; nan if undefined.")
+    damping_ratio = _layer("damping_ratio", "Jointly right next to an exceptional point; nan if undefined.")
+    real_roots = _layer("real_roots", "Number of different real roots, from coefficients.")
+    satisfied = _layer("satisfied", "Where every inequality constraint of the problem holds.")
+    margin = _layer("margin", "Least difference of the sides of an inequality, negative where one is violated, or nan.")
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the parameters, the horizontal one first."""
+        return tuple(self.about["axes"])
+
+    @property
+    def problem(self) -> Problem:
+        """What was charted.
+
+        Raises:
+            InputError: for an opened folder of a model of the user's own, which it does not hold.
+        """
+        if self.asked is None:
+            name = self.about["problem"]["model"]
+            raise InputError([Fault(f"'{self.path}' does not hold its model {name!r}, only numbers; chart it again")])
+        return self.asked
+
+    @property
+    def quantities(self) -> dict[str, NDArray[Any]]:
+        """Name → values of an expression of the user's."""
+        return {n: layer for n, layer in self.layers.items() if n not in LAYERS}
 
     @property
     def shares(self) -> dict[str, float]:
-        """Share of the grid in each class."""
-        return {name: float(np.mean(self.kind == code)) for code, name in enumerate(CLASSES)}
+        """Share of the grid in each class; empty where the kind was not asked for."""
+        return self.counts.shares
 
     @property
     def left_aside(self) -> tuple[str, ...]:
         """Names of the equality constraints: they hold on curves, which `trace` follows, and nowhere on a grid."""
         return tuple(n for n, c in self.problem.conditions.items() if c.equality)
 
+    def save(self, path: str | Path, layers: Iterable[str] | None = None) -> None:
+        """Write axes and layers, all of them unless named, as a NumPy archive or, to a name ending in nc, as netCDF.
+
+        Raises:
+            InputError: for netCDF where xarray or a library for it is not installed.
+            OSError: when the file cannot be written.
+        """
+        kept = {n: self.layers[n] for n in (self.layers if layers is None else layers)}
+        save_layers(self.problem, Grid(self.axes, self.grid), kept, Path(path))
+
     def to_json(self) -> dict[str, Any]:
         """Summary, boundaries and corners; the arrays themselves go to a file."""
-        allowed = np.where(self.satisfied, self.abscissa, np.nan)
-        best = int(np.nanargmin(allowed)) if np.any(np.isfinite(allowed)) else None
-        row, column = divmod(best, len(self.grid[0])) if best is not None else (0, 0)
+        grid, counts, plane = Grid(self.axes, self.grid), self.counts, self.path is None and len(self.grid) == 2
         return {
             "schema": 1,
-            "title": self.problem.title,
-            "model": self.problem.model.name,
-            "axes": {n: {"min": float(g[0]), "max": float(g[-1]), "points": len(g)} for n, g in self._named()},
-            "classes": self.shares,
-            "satisfied": float(np.mean(self.satisfied)),
-            "least_abscissa": None
-            if best is None
-            else {
-                "value": float(self.abscissa.flat[best]),
-                self.axes[0]: float(self.grid[0][column]),
-                self.axes[1]: float(self.grid[1][row]),
+            "title": self.about["title"],
+            "model": self.about["problem"]["model"],
+            "axes": {
+                n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v)}
+                for n, v in zip(self.axes, self.grid, strict=True)
             },
-            "boundaries": None if self.domain is None else self.domain.to_json(),
+            **({} if plane else {"layers": list(self.layers)}),
+            "classes": counts.shares,
+            "satisfied": None if counts.satisfied is None else counts.satisfied / counts.designs,
+            "least_abscissa": {"value": counts.least, **grid.at(counts.place)} if counts.place >= 0 else None,
+            **({"boundaries": self.domain and self.domain.to_json()} if plane or self.domain else {}),
+            "fallbacks": counts.fallbacks,
+            **({} if self.path is None else {"path": str(self.path)}),
+            **self.run,
         }
-
-    def _named(self) -> list[tuple[str, Array]]:
-        return list(zip(self.axes, self.grid, strict=True))
 
 
 def chart(
-    problem: Problem,
-    axes: tuple[str, str] | None = None,
+    problem: Given,
+    axes: Sequence[str] | None = None,
     *,
-    points: tuple[int, int] = (400, 300),
+    folder: str | Path | None = None,
+    points: Sequence[int] | None = None,
+    layers: Sequence[str] | None = None,
+    quantities: Mapping[str, str] | None = None,
+    single: bool = False,
+    engine: str = "auto",
+    workers: int = 1,
+    fresh: bool = False,
+    tile: int = TILE,
     boundaries: bool = True,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Chart:
-    """Classify every design of a grid over the two free parameters; the others must be fixed.
+    """Classify every design of a grid over the two or three free parameters; the others must be fixed.
 
-    Equality constraints are left aside.
+    Equality constraints are left aside. A chart in a folder goes on where the same call was ended before.
 
     Args:
-        axes: horizontal and vertical parameter; by default in the order of the problem.
-        points: along each axis; the ends of the box are grid points.
-        boundaries: also trace the exact boundary curves.
+        problem: or its file, or a solution of it.
+        axes: the free parameters, the horizontal one first, which runs fastest; by default in the problem's order.
+        folder: where to keep the arrays, e.g. ``big.chart``, up to 1e9 designs; by default in memory, up to 2e7.
+        points: along each axis, by default 400x300 or 120x100x80; the ends of the box are grid points.
+        layers: names among `tmsopt.charts.LAYERS`; by default all, in a folder all but the margin.
+        quantities: name → expression, further layers.
+        single: keep numbers in single precision.
+        engine: ``auto``, ``numpy`` or ``numba``; the numbers do not depend on it.
+        workers: threads.
+        fresh: move a folder of that name aside.
+        tile: designs computed at a time by a worker.
+        boundaries: also trace the exact boundary curves over a plane.
         progress: called with the number of designs done and in all.
 
     Raises:
-        InputError: unless exactly two parameters are free and the axes name them, or for other numbers of points.
+        InputError: for bad input; for a folder that holds another chart, with the differences, or is damaged.
+        OSError: where the disk is full; what is recorded stays right.
     """
-    names = plane_of(problem_of(problem), axes)
-    _check(points)
-    work = survey(problem, names, points, CHART_LAYERS)
-    return chart_of(work, gathered(work, progress)[0], domain(problem) if boundaries else None)
+    if not isinstance(workers, int) or not 1 <= workers <= _MOST_WORKERS:
+        message = f"found {workers!r}; accepted: a whole number from 1 to {_MOST_WORKERS}"
+        raise InputError([Fault(message, ("workers",))])
+    wanted = layers if layers is not None else tuple(LAYERS) if folder is None else USUAL
+    work = survey(problem, axes, points, wanted, quantities, engine, single)
+    return charted(work, folder, workers, fresh, tile, boundaries, progress)
 
 
-def chart_of(work: Survey, layers: Mapping[str, NDArray[Any]], boundaries: Domain | None) -> Chart:
-    """A chart of what was computed over a plane, `CHART_LAYERS` and quantities."""
-    across, up = work.grid.axes
-    return Chart(
-        problem=work.problem,
-        axes=(across, up),
-        grid=(work.grid.values[0], work.grid.values[1]),
-        domain=boundaries,
-        quantities={n: layers[n] for n in work.quantities},
-        **{n: layers[n] for n in CHART_LAYERS},
-    )
+def charted(
+    work: Survey,
+    folder: str | Path | None = None,
+    workers: int = 1,
+    fresh: bool = False,
+    tile: int = TILE,
+    boundaries: bool = False,
+    progress: Progress | None = None,
+) -> Chart:
+    """A survey carried out; see `chart`.
 
-
-def _check(points: Any) -> None:
-    try:
-        across, up = (int(p) for p in points)
-    except (TypeError, ValueError):
-        across = up = 0
-    if min(across, up) < 2 or across * up > LARGEST:
-        message = f"found {points!r}; accepted: two whole numbers, each 2 or more, their product {LARGEST:.0e} or less"
+    Raises:
+        InputError: for more designs than memory has room for; for a folder that holds another chart, or is damaged.
+    """
+    path, grid = None if folder is None else Path(folder), work.grid
+    if path is None and grid.size > LARGEST:
+        message = f"{grid.size:.3g} designs do not fit into memory; give a folder, or {LARGEST:.0e} or less"
         raise InputError([Fault(message, ("points",))])
+    about = _about(work, (None if path is None else _kept_tile(path, fresh)) or tile)
+    where: AbstractContextManager[Memory | Folder] = (
+        nullcontext(Memory(grid, {n: work.dtype(n) for n in work.names}))
+        if path is None
+        else writing(path, about, dict(zip(grid.axes, grid.values, strict=True)), fresh)
+    )
+    began = time.perf_counter()
+    with where as target:
+        left = complete(target.done, grid.tiles(about["tile"]))
+        before = done = sum(t.designs for t in target.done.values())
+        if progress:
+            progress(done, grid.size)
+        for rows, layers, counts in computed(work, left, workers):
+            target.write(rows, layers, counts)
+            done += counts.designs
+            if progress:
+                progress(done, grid.size)
+    seconds = time.perf_counter() - began
+    run: dict[str, Any] = {"engine": work.engine} | ({} if path is None else {"designs": done - before})
+    run |= {"seconds": seconds, "per_second": (done - before) / seconds}
+    edges = domain(work.problem) if boundaries and len(grid.axes) == 2 else None
+    if isinstance(target, Folder):
+        return _opened(target.path, run, edges, work.problem)
+    return Chart(about, grid.values, target.layers, total(target.done.values()), edges, None, run, work.problem)
 
 
-def plane_of(problem: Problem, axes: tuple[str, str] | None = None) -> tuple[str, str]:
-    """The two free parameters of a problem, in the order asked for.
+def open_chart(path: str | Path) -> Chart:
+    """A finished chart in a folder.
 
     Raises:
-        InputError: unless there are exactly two, and the axes name them.
+        InputError: where that is none, or is not finished, or damaged.
     """
-    free = list(problem.free)
-    if len(free) != 2:
-        message = f"a plane has two free parameters, and {len(free)} are free ({', '.join(free) or 'none'})"
-        advice = "; fix the others" if len(free) > 2 else "; write e.g. Fr = { min = 0.1, max = 5 }"
-        raise InputError([Fault(message + advice, ("parameters",))])
-    if axes is not None and (isinstance(axes, str) or sorted(axes) != sorted(free)):
-        raise InputError([Fault(f"found {axes!r}; accepted: {' and '.join(free)}", ("axes",))])
-    return axes or (free[0], free[1])
+    return _opened(Path(path))
 
 
-def save_arrays(found: Chart, path: Path) -> None:
-    """Write a chart as a NumPy archive: the axes by name, `kind`, `abscissa`, `damping_ratio`, `real_roots`,
-    `satisfied`, `about`.
+_MOST_WORKERS = 256
 
-    Raises:
-        OSError: when the file cannot be written.
-    """
-    grid = Grid(found.axes, found.grid)
-    save_layers(found.problem, grid, {n: getattr(found, n) for n in USUAL} | dict(found.quantities), path)
+
+def _about(work: Survey, tile: int) -> dict[str, Any]:
+    """All that makes a chart another one, as plain data."""
+    problem, grid = work.problem, work.grid
+    of = problem.parameter_set
+    return {
+        "schema": SCHEMA,
+        "title": problem.title,
+        "problem": {
+            "model": problem.model.name,
+            **({} if problem.model.statement is None else {"statement": dict(problem.model.statement)}),
+            "fixed": dict(problem.fixed),
+            "constraints": {n: t for n, t in problem.constraints.items() if problem.conditions[n].comparison != "=="},
+        },
+        "axes": {
+            n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v), "unit": of[n].unit}
+            for n, v in zip(grid.axes, grid.values, strict=True)
+        },
+        "dimensions": list(grid.axes[::-1]),
+        "shape": list(grid.shape),
+        "layers": {
+            n: {"dtype": np.lib.format.dtype_to_descr(work.dtype(n))}
+            | ({"expression": work.quantities[n]} if n in work.quantities else {})
+            for n in work.names
+        },
+        "classes": list(CLASSES),
+        "versions": {"tmsopt": version("tmsopt")},
+        "tile": tile,
+    }
+
+
+def _kept_tile(path: Path, fresh: bool) -> int | None:
+    """The size of tiles of a chart that was begun; another one would change nothing but the record."""
+    return None if fresh or not path.exists() else int(read_about(path)["tile"])
+
+
+def _opened(
+    path: Path, run: Mapping[str, Any] | None = None, edges: Domain | None = None, asked: Problem | None = None
+) -> Chart:
+    about = read_about(path)
+    try:
+        shape, names, tile = tuple(map(int, about["shape"])), tuple(map(str, about["axes"])), int(about["tile"])
+        dtypes = {str(n): np.dtype(layer["dtype"]) for n, layer in about["layers"].items()}
+        known = isinstance(about["title"], str) and isinstance(about["problem"]["model"], str)
+        asked = asked or _posed(about)
+    except (KeyError, TypeError, ValueError, AttributeError):
+        known = False
+    if not known:
+        raise damaged(path, f"{ABOUT} does not say what was charted")
+    grid = Grid(names, tuple(np.asarray(read_array(path, "axes", n)) for n in names))
+    if grid.shape != shape:
+        raise damaged(path, f"axes of shape {grid.shape} for arrays of shape {shape}")
+    done = read_tiles(path)
+    counts = total(done.values())
+    if left := complete(done, grid.tiles(tile)):
+        message = f"'{path}' is not finished: {counts.designs} of {grid.size} designs; run its command again to go on"
+        raise InputError([Fault(message + f" from row {left[0].start}")])
+    if counts.designs != grid.size:
+        raise damaged(path, f"{TILES} counts {counts.designs} of {grid.size} designs")
+    layers = {n: read_array(path, "layers", n) for n in dtypes}
+    for name, array in layers.items():
+        if array.shape != shape or array.dtype != dtypes[name]:
+            raise damaged(path, f"layers/{name}.npy is not of shape {shape} and type {dtypes[name]}")
+    return Chart(about, grid.values, layers, counts, edges, path, run or {}, asked)
+
+
+def _posed(about: Mapping[str, Any]) -> Problem | None:
+    """The problem of a folder, but for equality constraints; None for a model of the user's own."""
+    said = about["problem"]
+    if "statement" in said or said["model"] not in MODELS:
+        return None
+    free = {n: (axis["min"], axis["max"]) for n, axis in about["axes"].items()}
+    return Problem(MODELS[said["model"]], said["fixed"], free, said["constraints"], title=about["title"])

@@ -12,6 +12,7 @@ import json
 import os
 import shutil
 import sqlite3
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field, fields
@@ -29,6 +30,8 @@ SCHEMA = 1
 
 ABOUT, TILES = "about.json", "tiles.jsonl"
 
+_SYNC = 1.0  # seconds between two records of finished tiles
+
 
 @dataclass
 class Folder:
@@ -44,9 +47,10 @@ class Folder:
     _layers: Mapping[str, tuple[IO[bytes], int]] = field(repr=False)
     _record: IO[bytes] = field(repr=False)
     _waiting: list[bytes] = field(default_factory=list, repr=False)
+    _synced: float = field(default_factory=time.monotonic, repr=False)
 
     def write(self, rows: range, layers: Mapping[str, NDArray[Any]], counts: Tally) -> None:
-        """Write the layers of a tile; it is recorded by the next `sync`."""
+        """Write the layers of a tile; it is recorded by the next `sync`, which comes once a second."""
         for name, array in layers.items():
             stream, offset = self._layers[name]
             stream.seek(offset + rows.start * self.row * array.itemsize)
@@ -54,6 +58,8 @@ class Folder:
         self.done[rows.start] = counts
         line = {"row": rows.start, "rows": len(rows), **asdict(counts)}
         self._waiting.append(json.dumps(_plain(line)).encode() + b"\n")
+        if time.monotonic() - self._synced > _SYNC:
+            self.sync()
 
     def sync(self) -> None:
         """Bring everything written to the disk, then record it."""
@@ -66,6 +72,7 @@ class Folder:
         self._record.flush()
         os.fsync(self._record.fileno())
         self._waiting.clear()
+        self._synced = time.monotonic()
 
 
 @contextmanager

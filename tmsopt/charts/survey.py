@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from tmsopt.charts.expressions import ArrayFunction, array_function, parsed
 from tmsopt.charts.motion import Classified, classified, engine_of
-from tmsopt.design.files import problem_of
+from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS, ROOT_NAMES
 from tmsopt.errors import Fault, InputError, suggest
@@ -28,6 +28,9 @@ LAYERS: Mapping[str, DTypeLike] = {
 
 USUAL = ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied")
 """Layers of a chart unless others are asked for."""
+
+USUAL_POINTS: Mapping[int, tuple[int, ...]] = {2: (400, 300), 3: (120, 100, 80)}
+"""Points along two or three axes unless others are asked for."""
 
 MOST = 10**9
 """Designs of a grid."""
@@ -142,28 +145,6 @@ class Survey:
             layers = {n: self._layer(n, found, values, shape) for n in self.names}
         return layers, found.fallbacks
 
-    def thinned(self, most: Sequence[int]) -> "Survey":
-        """The same over some of the grid's own points, evenly spread, so many at most along each axis."""
-        kept = tuple(
-            v[np.unique(np.linspace(0, len(v) - 1, min(m, len(v))).round().astype(int))]
-            for v, m in zip(self.grid.values, most, strict=True)
-        )
-        grid = Grid(self.grid.axes, kept)
-        return _over(self.problem, grid, self.layers, self.quantities, self.engine, self.single)
-
-    def plane(self, held: Mapping[str, float]) -> "Survey":
-        """The same with some of the free parameters held."""
-        free = {n: ends for n, ends in self.problem.free.items() if n not in held}
-        title = ", ".join([self.problem.title, *(f"{n} = {v:.6g}" for n, v in held.items())]).removeprefix(", ")
-        problem = replace(self.problem, fixed={**self.problem.fixed, **held}, free=free, start={}, title=title)
-        kept = {n: v for n, v in zip(self.grid.axes, self.grid.values, strict=True) if n not in held}
-        grid = Grid(tuple(kept), tuple(kept.values()))
-        return _over(problem, grid, self.layers, self.quantities, self.engine, self.single)
-
-    def with_layers(self, layers: tuple[str, ...]) -> "Survey":
-        """The same with other layers."""
-        return _over(self.problem, self.grid, layers, self.quantities, self.engine, self.single)
-
     @property
     def _needs(self) -> frozenset[str]:
         """Layers that come from the coefficients."""
@@ -195,9 +176,9 @@ _QUANTITY, _CONDITION = "quantity ", "condition "
 
 
 def survey(
-    problem: Problem,
+    problem: Given,
     axes: Sequence[str] | None = None,
-    points: Sequence[int] = (400, 300),
+    points: Sequence[int] | None = None,
     layers: Sequence[str] = USUAL,
     quantities: Mapping[str, str] | None = None,
     engine: str = "auto",
@@ -207,7 +188,7 @@ def survey(
 
     Args:
         axes: the free parameters, the one that runs fastest first; by default in the order of the problem.
-        points: along each axis; the ends of the box are grid points.
+        points: along each axis, by default those of `USUAL_POINTS`; the ends of the box are grid points.
         layers: names among `LAYERS`.
         quantities: name → expression, further layers.
         engine: ``numpy``, ``numba``, or ``auto``: numba where it is installed and the grid is worth compiling for.
@@ -217,8 +198,9 @@ def survey(
         InputError: unless two or three parameters are free and the axes name them; for other numbers of points,
             unknown layers, bad expressions, unknown engines.
     """
-    names = axes_of(problem_of(problem), axes)
-    sizes = _sizes(points, len(names))
+    problem = problem_of(problem)
+    names = axes_of(problem, axes)
+    sizes = _sizes(USUAL_POINTS[len(names)] if points is None else points, len(names))
     faults = [Fault(f"found {n!r}; {suggest(str(n), LAYERS)}", ("layers",)) for n in layers if n not in LAYERS]
     extra = dict(quantities or {})
     reserved = {*LAYERS, *names, "about"}

@@ -1,10 +1,11 @@
 """The command that charts stability over a plane or a space of parameters."""
 
+import math
 import re
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,9 +24,8 @@ from tmsopt.cli.common import (
 )
 
 if TYPE_CHECKING:
-    from tmsopt.charts.chart import Chart
-    from tmsopt.charts.survey import Survey
-    from tmsopt.design.problem import Problem
+    from tmsopt.charts import Chart
+    from tmsopt.design import Problem
 
 _EXAMPLES = """
 \b
@@ -46,7 +46,6 @@ Exit status: 0 done, 2 bad input, 130 stopped by Ctrl-C.
 """
 
 _LAYERS = ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied", "margin")
-_DEFAULT_POINTS = {2: (400, 300), 3: (120, 100, 80)}
 _SHOWN = (800, 600)
 """Points of a large chart that a figure shows."""
 
@@ -105,32 +104,47 @@ def chart(
 ) -> None:  # fmt: skip
     """Chart stability over the free parameters of FILE: capsize, weave, stable, heavily damped."""
     with bad_input(), _stopped(output):
-        from tmsopt.charts.survey import USUAL, axes_of, survey
-        from tmsopt.design.files import load
+        import tmsopt
+        from tmsopt.charts import USUAL, axes_of
 
         check_output("--plot", plot, FIGURES)
         check_output("--output", output, ("npz", "nc", "chart"), folders=("chart",))
-        problem = nominal_of(load(file))
+        problem = nominal_of(tmsopt.load(file))
         free = axes_of(problem)
         names = plane(problem, axes) if len(free) == 2 else _space(free, axes)
-        sizes = _sizes(points, len(free))
         kept = tuple(n.strip() for n in layers.split(",")) if layers is not None else USUAL
+        folder = output if output is not None and output.suffix.lower() == ".chart" else None
+        whole = folder is None and len(free) == 2  # in memory, and shown with all its layers and boundaries
         _check_plot(plot, layer, (*_LAYERS[:4], *quantities), len(free), cut)
         held = _held(problem, cut)
-        work = survey(problem, names, sizes, kept, quantities, engine, single)
-        with progress("design", scaled=True) as update:
-            data, found = _charted(work, output, fresh, workers, boundaries, update)
+        how: dict[str, Any] = {"quantities": quantities, "single": single, "engine": engine}
+        sizes = _sizes(points, len(free))
+        if folder is None:
+            _check_memory(sizes, output)
+        with progress("design", scaled=True) as update, _moved_aside(folder):
+            found = tmsopt.chart(
+                problem, names, folder=folder, points=sizes, layers=(*_LAYERS, *kept) if whole else kept, **how,
+                workers=workers, fresh=fresh, boundaries=boundaries and whole, progress=update,
+            )  # fmt: skip
+        if output is not None and folder is None:
+            with saving("--output", output):
+                found.save(output, (*dict.fromkeys(kept), *quantities))
     if as_json:
-        write_json(data)
+        write_json(found.to_json())
     else:
-        from tmsopt.report.curves import chart_table, summary_table
+        from tmsopt.report.curves import chart_table
 
-        click.echo(chart_table(found) if found is not None else summary_table(work.problem.parameter_set, data))
-    if output is not None and output.suffix.lower() == ".chart":
-        click.echo(f"wrote {output}", err=True)
+        click.echo(chart_table(found))
+    if folder is not None:
+        click.echo(f"wrote {folder}", err=True)
     if plot is not None:
+        from tmsopt.plots.chart import chart_figure
+        from tmsopt.plots.style import save
+
         with bad_input():
-            _draw(work, found, held, boundaries, layer, plot)
+            shown = found if whole else tmsopt.chart(**_shown(found, held), **how, boundaries=boundaries)
+            with saving("--plot", plot):
+                save(chart_figure(shown, layer), plot)
 
 
 @contextmanager
@@ -145,62 +159,35 @@ def _stopped(output: Path | None) -> Iterator[None]:
         sys.exit(INTERRUPTED)
 
 
-def _charted(
-    work: "Survey", output: Path | None, fresh: bool, workers: int, boundaries: bool, update: Any
-) -> tuple[dict[str, Any], "Chart | None"]:
-    """The summary, and a plane in memory as a chart; the arrays are written."""
-    from tmsopt.charts.chart import CHART_LAYERS, LARGEST, chart_of
-    from tmsopt.charts.files import check_netcdf, save_layers
-    from tmsopt.charts.stored import gathered, store, summary
+@contextmanager
+def _moved_aside(folder: Path | None) -> Iterator[None]:
+    """Say where an old folder of that name went, or why the new one cannot be written."""
     from tmsopt.errors import Fault, InputError
-    from tmsopt.tracing.domain import domain
 
-    if output is not None and output.suffix.lower() == ".chart":
-        try:
-            there = set(output.parent.glob("*.chart"))
-            done = store(work, output, workers=workers, fresh=fresh, progress=update).to_json()
-            for aside in sorted(set(output.parent.glob("*.chart")) - there - {output}):
-                click.echo(f"moved the old folder to {aside}", err=True)
-            return done, None
-        except OSError as error:
-            message = f"'{output}' cannot be written: {error.strerror}; the same command will go on where it was"
-            raise InputError([Fault(message, ("--output",))]) from None
-    if work.grid.size > LARGEST:
-        message = f"{work.grid.size:.3g} designs do not fit into memory; give an --output that ends in chart, or fewer"
-        raise InputError([Fault(message, ("--points",))])
-    if output is not None and output.suffix.lower() == ".nc":
-        check_netcdf()
-    kept, flat = work.names, len(work.grid.axes) == 2
-    if flat:
-        work = work.with_layers(tuple(dict.fromkeys((*CHART_LAYERS, *work.layers))))
-    began = time.perf_counter()
-    arrays, counts = gathered(work, update, workers)
-    seconds = time.perf_counter() - began
-    found = chart_of(work, arrays, domain(work.problem) if boundaries else None) if flat else None
-    data = found.to_json() if found else summary(work, counts)
-    data |= {"fallbacks": counts.fallbacks, "engine": work.engine, "seconds": seconds}
-    data |= {"per_second": counts.designs / seconds}
-    if output is not None:
-        with saving("--output", output):
-            save_layers(work.problem, work.grid, {n: arrays[n] for n in kept}, output)
-    return data, found
+    there = set(folder.parent.glob("*.chart")) if folder is not None else set()
+    try:
+        yield
+    except OSError as error:
+        if folder is None:
+            raise
+        message = f"'{folder}' cannot be written: {error.strerror}; the same command will go on where it was"
+        raise InputError([Fault(message, ("--output",))]) from None
+    if folder is not None:
+        for aside in sorted(set(folder.parent.glob("*.chart")) - there - {folder}):
+            click.echo(f"moved the old folder to {aside}", err=True)
 
 
-def _draw(
-    work: "Survey", found: "Chart | None", held: dict[str, float], boundaries: bool, layer: str, plot: Path
-) -> None:
-    """The figure: the chart itself, some of its points, or a plane of a space."""
-    from tmsopt.charts.chart import CHART_LAYERS, chart_of
-    from tmsopt.charts.stored import gathered
-    from tmsopt.plots.chart import chart_figure
-    from tmsopt.plots.style import save
-    from tmsopt.tracing.domain import domain
-
-    if found is None:
-        flat = (work.plane(held) if held else work).thinned(_SHOWN).with_layers(CHART_LAYERS)
-        found = chart_of(flat, gathered(flat)[0], domain(flat.problem) if boundaries else None)
-    with saving("--plot", plot):
-        save(chart_figure(found, layer), plot)
+def _shown(found: "Chart", held: dict[str, float]) -> dict[str, Any]:
+    """The plane that a figure shows of a space or a folder: what is held is fixed, and points are fewer."""
+    problem, sizes = found.problem, dict(zip(found.axes, map(len, found.grid), strict=True))
+    title = ", ".join([problem.title, *(f"{n} = {v:.6g}" for n, v in held.items())]).removeprefix(", ")
+    free = {n: ends for n, ends in problem.free.items() if n not in held}
+    axes = [n for n in found.axes if n not in held]
+    return {
+        "problem": replace(problem, fixed={**problem.fixed, **held}, free=free, start={}, title=title),
+        "axes": axes,
+        "points": [min(sizes[n], most) for n, most in zip(axes, _SHOWN, strict=True)],
+    }
 
 
 def _space(free: tuple[str, ...], axes: str | None) -> tuple[str, ...]:
@@ -213,15 +200,28 @@ def _space(free: tuple[str, ...], axes: str | None) -> tuple[str, ...]:
 
 
 def _sizes(points: tuple[int, ...] | None, axes: int) -> tuple[int, ...]:
+    from tmsopt.charts import USUAL_POINTS
     from tmsopt.errors import Fault, InputError
 
     if points is None:
-        return _DEFAULT_POINTS[axes]
+        return USUAL_POINTS[axes]
     sizes = points * axes if len(points) == 1 else points
     if len(sizes) != axes:
         message = f"found {'x'.join(map(str, points))}; accepted: one number, or one for each of the {axes} axes"
         raise InputError([Fault(message, ("--points",))])
     return sizes
+
+
+def _check_memory(sizes: tuple[int, ...], output: Path | None) -> None:
+    """Refuse what could not be held or written, before any work is done."""
+    from tmsopt.charts import LARGEST, check_netcdf
+    from tmsopt.errors import Fault, InputError
+
+    if (designs := math.prod(sizes)) > LARGEST:
+        message = f"{designs:.3g} designs do not fit into memory; give an --output that ends in chart, or fewer"
+        raise InputError([Fault(message, ("--points",))])
+    if output is not None and output.suffix.lower() == ".nc":
+        check_netcdf()
 
 
 def _check_plot(plot: Path | None, layer: str, accepted: tuple[str, ...], axes: int, cut: dict[str, str]) -> None:
@@ -238,7 +238,7 @@ def _check_plot(plot: Path | None, layer: str, accepted: tuple[str, ...], axes: 
 
 def _held(problem: "Problem", cut: dict[str, str]) -> dict[str, float]:
     """The parameter that a figure holds, as a number in its box."""
-    from tmsopt.design.units import with_unit
+    from tmsopt.design import with_unit
     from tmsopt.errors import Fault, InputError, suggest
 
     held = {}

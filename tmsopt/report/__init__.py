@@ -4,7 +4,7 @@ In: results of any verb. Out: lines of text. Open `design` first: the report of 
 """
 
 from tmsopt.report.comparison import comparison_table
-from tmsopt.report.curves import chart_table, front_table, summary_table, trace_table
+from tmsopt.report.curves import chart_table, front_table, trace_table
 from tmsopt.report.design import every_table, si_parameters, solution_table
 from tmsopt.report.explanation import (
     diagnosis_lines,
@@ -23,5 +23,5 @@ __all__ = [
     "chart_table", "comparison_table", "diagnosis_lines", "every_table", "explained_lines", "front_table",
     "ledger_page", "ledger_table", "meaning_lines", "optimality_lines", "proof_text", "robustness_line",
     "robustness_table", "row_lines", "si_parameters", "solution_table", "speeds_table", "study_table",
-    "summary_table", "trace_table",
+    "trace_table",
 ]  # fmt: skip

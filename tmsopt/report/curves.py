@@ -16,9 +16,12 @@ _FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belon
 
 
 def chart_table(chart: Chart) -> str:
-    """Shares of the classes, the best grid point, and the boundaries with their corners."""
+    """Shares of the classes, the best grid point, and the boundaries with their corners of a plane in memory."""
     data: dict[str, Any] = chart.to_json()
-    (first, second), of = chart.axes, chart.problem.parameter_set
+    of = chart.problem.parameter_set
+    if chart.path is not None or len(chart.axes) != 2:
+        return _summary_table(of, data)
+    first, second = chart.axes
     size = f"{len(chart.grid[0])} × {len(chart.grid[1])}"
     lines = [chart.problem.title or "untitled problem", f"{size} designs over {first} and {second}", ""]
     lines += columns([(name, f"{100 * share:.2f} %") for name, share in chart.shares.items() if share])
@@ -42,8 +45,8 @@ def chart_table(chart: Chart) -> str:
     return "\n".join(line.rstrip() for line in lines)
 
 
-def summary_table(of: ParameterSet, data: Mapping[str, Any]) -> str:
-    """A chart that is not in memory: shares of the classes, the best grid point, and how fast it was made."""
+def _summary_table(of: ParameterSet, data: Mapping[str, Any]) -> str:
+    """A space, or a chart in a folder: shares of the classes, the best grid point, and how fast it was made."""
     axes = data["axes"]
     size = " × ".join(str(a["points"]) for a in axes.values())
     lines = [data["title"] or "untitled problem", f"{size} designs over {', '.join(axes)}", ""]

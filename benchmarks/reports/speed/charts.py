@@ -12,7 +12,7 @@ from benchmarks.judges import companion
 from benchmarks.reports.tables import Asked, duration, page, table, times
 from benchmarks.suites import PLANE
 from benchmarks.timing import best
-from tmsopt.charts import gathered, survey
+from tmsopt import chart
 from tmsopt.models import tms
 from tmsopt.records import Array
 
@@ -55,7 +55,8 @@ def methods(points: int) -> Iterator[Method]:
 
 def charted(across: int, layers: tuple[str, ...], engine: str) -> dict[str, Any]:
     """Layers of a square chart of the plane."""
-    return gathered(survey(PLANE, points=(across, across), layers=layers, engine=engine))[0]
+    found = chart(PLANE, points=(across, across), layers=layers, engine=engine, boundaries=False)
+    return dict(found.layers)
 
 
 def engines() -> list[str]:

@@ -8,16 +8,16 @@ from pathlib import Path
 from benchmarks.reports.speed.charts import engines
 from benchmarks.reports.tables import Asked, page, table
 from benchmarks.suites import PLANE
-from tmsopt import StoredChart, chart_to
+from tmsopt import Chart, chart
 
 _SIZES = {"numpy": (2000, 1000), "numba": (4000, 2000)}
 _LAYERS: dict[str, dict[str, object]] = {"class alone": {"layers": ("kind",)}, "usual layers": {}}
 _LARGE = (10_000, 10_000)
 
 
-def charted(folder: str, points: tuple[int, int], engine: str = "auto", **options: object) -> StoredChart:
+def charted(folder: str, points: tuple[int, int], engine: str = "auto", **options: object) -> Chart:
     """A chart of the plane in a folder that is not there yet."""
-    return chart_to(PLANE, Path(folder) / "a.chart", points=points, engine=engine, **options)  # type: ignore[arg-type]
+    return chart(PLANE, folder=Path(folder) / "a.chart", points=points, engine=engine, **options)  # type: ignore[arg-type]
 
 
 def rate(engine: str, points: tuple[int, int], **options: object) -> float:

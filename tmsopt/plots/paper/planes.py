@@ -38,7 +38,7 @@ def draw_plane(ax: Axes, plane: Plane) -> list[Name]:
     names = draw_domain(ax, chart.domain, *chart.axes) if chart.domain is not None else []
     if plane.ep_set is not None:
         for branch in plane.ep_set.branches:
-            draw_branch(ax, branch, *chart.axes, width=2.0)
+            draw_branch(ax, branch, chart.axes[0], chart.axes[1], width=2.0)
     names += _draw_marked(ax, plane)
     _frame(ax, plane)
     return names
