@@ -150,6 +150,11 @@ def stable(coefficients: Sequence[Any]) -> bool:
     return all(bool(quantity > 0) for quantity in lienard_chipart(signed))
 
 
+def real_roots(coefficients: Sequence[Any]) -> int:
+    """How many of its roots are real, with multiplicity, certainly."""
+    return sum(m for z, m in isolated_roots(coefficients) if z.imag == 0)
+
+
 def stable_left_of(coefficients: Sequence[Any], gamma: Any) -> bool:
     """Whether every root lies in Re s < gamma, certainly."""
     return stable(shift(coefficients, gamma))
@@ -210,6 +215,11 @@ def slope(quotient: Quotient, name: str) -> Quotient:
     """Derivative of a quotient with respect to a variable."""
     over, under = quotient.over, quotient.under
     return Quotient(over.derivative(name) * under - over * under.derivative(name), under**2)
+
+
+def depends(quotient: Quotient, name: str) -> bool:
+    """Whether a quotient depends on a variable."""
+    return bool(slope(quotient, name) != 0)
 
 
 def kernel(matrix: Sequence[Sequence[Ball]]) -> list[Ball]:
