@@ -10,7 +10,7 @@ from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.abscissa import product_bound
 from tmsopt.paper.ledger.algebra import match, polynomials, positive_quotient, q, ring, solve, stable_left_of
 from tmsopt.paper.ledger.entry import Claim, Outcome, decimal, digits, proof, section, universal
-from tmsopt.paper.ledger.lemmas import normal, tilt_bound, tilt_of_EP4
+from tmsopt.paper.ledger.lemmas import grown, normal, tilt_bound, tilt_of_EP4
 from tmsopt.paper.ledger.printed import Tilt, laws
 
 _machine = section("2.4.6 How the scaling laws match the experimental TMS bike")
@@ -169,8 +169,7 @@ def _machines() -> Outcome:
     "b of the double pair, with r = 1 + ρ; a double imaginary pair needs a1 = a3 = 0",
 )  # fmt: skip
 def _connects() -> Outcome:
-    Fr, T, rho, scale = ring("Fr T rho q")
-    b = normal(Fr, 1 + rho, T, 1 + rho, scale)
+    b, (_, T, rho, scale) = grown()
     never = positive_quotient(b[1])
     square = printed.epset(-1 / scale, -(scale**2) * (1 + rho), T)
     pair = square * rho**2 / (scale**2 * T**2)

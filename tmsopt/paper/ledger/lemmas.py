@@ -60,6 +60,12 @@ def monic() -> tuple[list[Any], tuple[Quotient, ...]]:
     return normal(*variables), variables
 
 
+def grown() -> tuple[list[Any], tuple[Quotient, ...]]:
+    """Those at χ_B = r = 1 + ρ and the variables Fr, T, ρ, q: all signs show."""
+    Fr, T, rho, scale = variables = ring("Fr T rho q")
+    return normal(Fr, 1 + rho, T, 1 + rho, scale), variables
+
+
 def by_hand(Fr: str, T: str) -> list[Any]:
     """The bicycle with ζ_B = −2, ζ_H = −1/2, χ_B = 2 (r = 2, h = 1), monic, in fractions."""
     return normal(q(Fr), q(2), q(T), q(2), q(1))

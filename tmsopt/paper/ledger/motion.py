@@ -6,7 +6,6 @@ import flint
 
 from tmsopt.paper.ledger import lemmas
 from tmsopt.paper.ledger.algebra import (
-    Quotient,
     heavily_damped,
     polynomials,
     positive_quotient,
@@ -24,13 +23,6 @@ from tmsopt.roots.polynomial import evaluate as value_at
 _claim = section("2.4.5 Mechanism of self-stability and CEP2 as a precursor to weaving")
 
 _U = "p over |ω0| as u² + B1 u + B2 − 2 with u = σ + 1/σ, exactly; "
-
-
-def _grown() -> tuple[Quotient, Quotient, tuple[Quotient, ...]]:
-    """B1 and B2 with r = 1 + ρ, and the variables Fr, T, ρ, q: all signs show."""
-    Fr, T, rho, scale = variables = ring("Fr T rho q")
-    b = lemmas.normal(Fr, 1 + rho, T, 1 + rho, scale)
-    return b[1], b[2], variables
 
 
 @_claim(
@@ -126,8 +118,8 @@ def _double() -> Outcome:
     p = b[0] + b[1] + b[2] + b[3] + b[4]
     derivative = 4 * b[0] + 3 * b[1] + 2 * b[2] + b[3]
     only = derivative - 2 * p == b[1] - b[3]
-    B1, B2, (_, tilt, rho, scale_) = _grown()
-    met = (B2 + 2 + 2 * B1) * (1 + rho) * tilt * scale_ + scale_ * rho**2 * tilt  # the constant term added back
+    (_, B1, B2, *_), (_, tilt, rho, scale) = lemmas.grown()
+    met = (B2 + 2 + 2 * B1) * (1 + rho) * tilt * scale + scale * rho**2 * tilt  # the constant term added back
     other = lemmas.quartic(q(1), q(3), q(1), q(2), q(1))
     return universal(
         "χ_B = √(ζ_B/ζ_H); the text divides the cases only in its next sentence",
@@ -144,7 +136,7 @@ def _double() -> Outcome:
     f"{_U}sign of du/dFr where u > 0, with r = 1 + ρ",
 )  # fmt: skip
 def _split() -> Outcome:
-    B1, B2, _ = _grown()
+    (_, B1, B2, *_), _ = lemmas.grown()
     return proof(
         positive_quotient(slope(B1, "Fr")) and positive_quotient(slope(B2, "Fr")),
         "du/dFr = −(B1' u + B2')/(2 u + B1) < 0 for u > 0: u falls through 2, and for 0 < u < 2 the real part of "

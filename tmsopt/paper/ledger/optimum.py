@@ -21,12 +21,9 @@ _claim = section("2.4.4 Localization of the EP set and stability optimization")
     "b and c of (s² + b s + c)² on it, with r = 1 + ρ: quotients of polynomials with positive coefficients",
 )  # fmt: skip
 def _inside() -> Outcome:
-    Fr, T, rho, scale = ring("Fr T rho q")
-    r = 1 + rho
-    b = lemmas.normal(Fr, r, T, r, scale)
-    half = b[1] / 2
+    b, _ = lemmas.grown()
     return proof(
-        positive_quotient(half) and b[3] == b[1] and b[4] == 1,
+        positive_quotient(b[1]) and b[3] == b[1] and b[4] == 1,
         "For |ζ_B| > |ζ_H| and λ_s > 0: b > 0 and c = 1/h > 0, whatever the kind.",
     )
 
