@@ -9,17 +9,7 @@ import flint
 from tmsopt.models.tms import copo, matrices
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.abscissa import product_bound
-from tmsopt.paper.ledger.algebra import (
-    Polynomial,
-    evaluate,
-    kernel,
-    match,
-    polynomials,
-    q,
-    solve,
-    stable,
-    stable_left_of,
-)
+from tmsopt.paper.ledger.algebra import Polynomial, evaluate, kernel, matched, polynomials, q, stable, stable_left_of
 from tmsopt.paper.ledger.entry import Claim, Outcome, decimal, digits, proof, section, universal
 from tmsopt.paper.ledger.lemmas import general
 from tmsopt.roots.polynomial import evaluate as value_at, quadratic_pencil, shift
@@ -106,7 +96,7 @@ def _family() -> list[Polynomial]:
 @cache
 def optimised() -> dict[str, Any]:
     """Fr, μ, χ_B and T with the 4-fold root −1."""
-    return solve(match(_family(), *[[1, 1]] * 4), {"Fr": 2.3, "mu": 20.0, "chi_B": 1.2, "T": 1.1}, {})
+    return matched(_family(), [[1, 1]] * 4, {"Fr": 2.3, "mu": 20.0, "chi_B": 1.2, "T": 1.1}, {})
 
 
 _MATCHED = "p(s) = a0 (s + 1)⁴ solved for Fr, μ, χ_B, tan λ_s by interval Newton, 80 digits"

@@ -5,19 +5,7 @@ from typing import Any
 import flint
 
 from tmsopt.paper.ledger import lemmas, printed
-from tmsopt.paper.ledger.algebra import (
-    Quotient,
-    composed,
-    evaluate,
-    jacobian,
-    kernel,
-    match,
-    polynomials,
-    q,
-    ring,
-    slope,
-    stable,
-)
+from tmsopt.paper.ledger.algebra import Quotient, composed, evaluate, polynomials, q, ring, slope, stable, tangent
 from tmsopt.paper.ledger.entry import Claim, Outcome, digits, proof, section, universal
 
 _claim = section("2.4.3 The discriminant surface and the EP set")
@@ -155,9 +143,7 @@ def _codimension() -> Outcome:
     points = [{**design, "b": -2 * design["s"], "c": design["s"] ** 2}]
     points += [{**lemmas.double_pair(offset), "T": lemmas.tilted(offset)} for offset in ("-0.05", "0.80")]
     free = ("Fr", "chi_B", "T", "b", "c")
-    full = [
-        any(not x.contains(0) for x in kernel(jacobian(match(p, [1, b, c], [1, b, c]), free, at))[:3]) for at in points
-    ]
+    full = [any(not x.contains(0) for x in tangent(p, [[1, b, c], [1, b, c]], free, at)[:3]) for at in points]
     return proof(
         all(full),
         "Four independent conditions with two unknowns b, c: a curve in the space of Fr, χ_B, λ_s; it passes smoothly "

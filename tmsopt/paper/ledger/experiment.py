@@ -8,7 +8,7 @@ import flint
 from tmsopt.models.tms import copo
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.abscissa import product_bound
-from tmsopt.paper.ledger.algebra import match, polynomials, positive_quotient, q, ring, solve, stable_left_of
+from tmsopt.paper.ledger.algebra import matched, polynomials, positive_quotient, q, ring, stable_left_of
 from tmsopt.paper.ledger.entry import Claim, Outcome, decimal, digits, proof, section, universal
 from tmsopt.paper.ledger.lemmas import grown, normal, tilt_bound, tilt_of_EP4
 from tmsopt.paper.ledger.printed import Tilt, laws
@@ -30,7 +30,7 @@ def _ep4(chi_H: Any, held: str, value: Any, guess: dict[str, float]) -> dict[str
     names = "Fr mu chi_B T s"
     gens = dict(zip(names.split(), polynomials(names), strict=True))
     a = copo(gens["Fr"], gens["mu"], gens["chi_B"], chi_H, ZETA_B, ZETA_H, gens["T"])
-    return solve(match(a, *[[1, -gens["s"]]] * 4), guess, {held: flint.arb(value)})
+    return matched(a, [[1, -gens["s"]]] * 4, guess, {held: flint.arb(value)})
 
 
 @_machine("fige-ratio", "caption of Fig. fige; text", "√(ζ_B/ζ_H)", "square root of 1.158/0.526 in balls")
@@ -116,7 +116,7 @@ def _optimal_damping() -> Outcome:
     r = _ratio()
     top = tilt_of_EP4(r, flint.arb(ZETA_B * ZETA_H).sqrt())
     guess = {"Fr": 1.31, "T": 0.17, "a": -1.7, "t": -0.34}
-    edge = solve(match(p, *[[1, -a]] * 3, [1, -t]), guess, {})
+    edge = matched(p, [*[[1, -a]] * 3, [1, -t]], guess, {})
     share = edge["T"] / top
     return universal(
         f"χ_H = 1 in place of 0.921, and in part: the cusp of the domain at χ_B = 1.526 lies at "

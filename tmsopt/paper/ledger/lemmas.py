@@ -12,7 +12,7 @@ from typing import Any
 import flint
 
 from tmsopt.models.tms import copo
-from tmsopt.paper.ledger.algebra import Quotient, match, polynomials, positive, q, ring, solve, stable, substitute
+from tmsopt.paper.ledger.algebra import Quotient, matched, polynomials, positive, q, ring, stable, substitute
 from tmsopt.paper.ledger.printed import Tilt, laws
 
 _NAMES = "Fr mu chi_B chi_H zeta_B zeta_H T"
@@ -131,7 +131,7 @@ def are_complex(pair: dict[str, Any]) -> bool:
 def ep4() -> dict[str, Any]:
     """Fr, χ_B, T and the 4-fold root s for ζ_B = −0.4, ζ_H = −0.2, all four unknown, proved in balls."""
     a, (s,) = lifted("s")
-    return solve(match(a, *[[1, -s]] * 4), {"Fr": 2.2, "chi_B": 1.4, "T": 0.43, "s": -1.9}, {})
+    return matched(a, [[1, -s]] * 4, {"Fr": 2.2, "chi_B": 1.4, "T": 0.43, "s": -1.9}, {})
 
 
 def tilted(offset: str) -> Any:
@@ -145,7 +145,7 @@ def double_pair(offset: str) -> dict[str, Any]:
     a, (b, c) = lifted("b c")
     guess = {"-0.05": (2.26, 4.1), "0.80": (4.1, 1.5), "-0.18": (2.9, 8.0)}[offset]
     tilt = {"T": tilted(offset)}
-    return solve(match(a, [1, b, c], [1, b, c]), {"Fr": guess[0], "chi_B": 1.4, "b": guess[1], "c": 3.5}, tilt)
+    return matched(a, [[1, b, c], [1, b, c]], {"Fr": guess[0], "chi_B": 1.4, "b": guess[1], "c": 3.5}, tilt)
 
 
 @cache
@@ -155,7 +155,7 @@ def weave(offset: str, chi_B: str = "") -> dict[str, Any]:
     at = {"T": tilted(offset), "chi_B": ep4()["chi_B"] + flint.arb(q(chi_B or "0"))}
     slope = float(at["T"].mid())
     guess = {"Fr": (5.8 * slope) ** 0.5, "W": 3.5, "b": 2.0 / slope**0.5, "c": 3.5}
-    return solve(match(a, [1, 0, W], [1, b, c]), guess, at)
+    return matched(a, [[1, 0, W], [1, b, c]], guess, at)
 
 
 @cache

@@ -11,13 +11,12 @@ from tmsopt.paper.ledger.algebra import (
     composed,
     heavily_damped,
     jacobian,
-    kernel,
-    match,
+    matched,
     polynomials,
     positive,
     q,
     slope,
-    solve,
+    tangent,
 )
 from tmsopt.paper.ledger.entry import Claim, Outcome, digits, proof, section
 from tmsopt.roots.exact import isolated_roots
@@ -57,9 +56,8 @@ def _swallowtail() -> Outcome:
     (a11, a12, a13), (a21, a22, a23), (a31, a32, a33) = rows
     determinant = a11 * (a22 * a33 - a23 * a32) - a12 * (a21 * a33 - a23 * a31) + a13 * (a21 * a32 - a22 * a31)
     factors = [f for f, _ in determinant.over.factor()[1]]
-    same = polynomials("Fr chi_B T r q")[3]
     return proof(
-        determinant.over != 0 and all(positive(f) or positive(-f) or f == same - 1 for f in factors),
+        determinant.over != 0 and all(positive(f) or positive(-f) or f == (r - 1).over for f in factors),
         "The determinant vanishes only at r = √(ζ_B/ζ_H) = 1, where there is no EP4; for every other pair of heights "
         "the family is a versal unfolding of t⁴.",
     )
@@ -71,7 +69,7 @@ def _edge_at_EP4() -> Any:
     design = lemmas.ep4()
     at = {**design, "a": design["s"], "t": design["s"]}
     free = ("Fr", "chi_B", "T", "a", "t")
-    direction = kernel(jacobian(match(p, *[[1, -a]] * 3, [1, -t]), free, at))
+    direction = tangent(p, [*[[1, -a]] * 3, [1, -t]], free, at)
     return direction[4] - direction[3]
 
 
@@ -80,7 +78,7 @@ def _line_at_EP4() -> Any:
     p, (b, c) = lemmas.lifted("b c")
     design = lemmas.ep4()
     at = {**design, "b": -2 * design["s"], "c": design["s"] ** 2}
-    direction = kernel(jacobian(match(p, [1, b, c], [1, b, c]), ("Fr", "chi_B", "T", "b", "c"), at))
+    direction = tangent(p, [[1, b, c], [1, b, c]], ("Fr", "chi_B", "T", "b", "c"), at)
     return 2 * at["b"] * direction[3] - 4 * direction[4]
 
 
@@ -138,7 +136,7 @@ def ep3_left() -> dict[str, Any]:
     p, (a, t) = lemmas.lifted("a t")
     guess = {"Fr": 2.02, "T": 0.2, "a": -0.94, "t": -14.9}
     off = {"chi_B": flint.arb(2).sqrt() - flint.arb(q("0.1"))}
-    return {**solve(match(p, *[[1, -a]] * 3, [1, -t]), guess, off), **off}
+    return {**matched(p, [*[[1, -a]] * 3, [1, -t]], guess, off), **off}
 
 
 @cache
@@ -151,7 +149,7 @@ def ep3_right(upper: bool, offset: str = "-0.18") -> dict[str, Any]:
     }  # fmt: skip
     guess = dict(zip(("Fr", "chi_B", "a", "t"), guesses[offset, upper], strict=True))
     off = {"T": lemmas.tilted(offset)}
-    return {**solve(match(p, *[[1, -a]] * 3, [1, -t]), guess, off), **off}
+    return {**matched(p, [*[[1, -a]] * 3, [1, -t]], guess, off), **off}
 
 
 def is_cusp(point: Mapping[str, Any], plane: tuple[str, str]) -> bool:
@@ -159,7 +157,7 @@ def is_cusp(point: Mapping[str, Any], plane: tuple[str, str]) -> bool:
     p, (a, b, c) = lemmas.lifted("a b c")
     at = {**point, "b": -(point["a"] + point["t"]), "c": point["a"] * point["t"]}
     names = (*plane, "a", "b", "c")
-    direction = kernel(jacobian(match(p, [1, -a], [1, -a], [1, b, c]), names, at))
+    direction = tangent(p, [[1, -a], [1, -a], [1, b, c]], names, at)
     stops = all(x.contains(0) and abs(x) < _NONE for x in direction[:2])
     return stops and not direction[2].contains(0)
 
@@ -185,7 +183,7 @@ def _left() -> Outcome:
 )  # fmt: skip
 def _edge() -> Outcome:
     p, (a, t) = lemmas.lifted("a t")
-    direction = kernel(jacobian(match(p, *[[1, -a]] * 3, [1, -t]), ("Fr", "chi_B", "T", "a", "t"), ep3_left()))
+    direction = tangent(p, [*[[1, -a]] * 3, [1, -t]], ("Fr", "chi_B", "T", "a", "t"), ep3_left())
     return proof(not direction[1].contains(0), "The edge crosses χ_B = √2 − 0.1, as its χ_B changes along it.")
 
 

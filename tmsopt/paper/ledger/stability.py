@@ -8,7 +8,7 @@ import flint
 
 from tmsopt.models.tms import copo
 from tmsopt.paper.ledger import lemmas
-from tmsopt.paper.ledger.algebra import match, polynomials, positive, q, ring, solve, stable, unstable
+from tmsopt.paper.ledger.algebra import matched, polynomials, positive, q, ring, stable, unstable
 from tmsopt.paper.ledger.entry import EXACT, Claim, Outcome, decimal, proof, section, universal
 from tmsopt.paper.ledger.printed import Tilt, laws
 
@@ -234,7 +234,7 @@ def benchmark() -> dict[str, Any]:
     Fr, W, b, c, T = polynomials("Fr W b c T")
     a = copo(Fr, q("1/10"), q("1.2"), q("1.02"), q("-0.4"), q("-0.2"), T)
     tilt = {"T": (flint.arb.pi() / 36).tan()}
-    return solve(match(a, [1, 0, W], [1, b, c]), {"Fr": 0.9, "W": 1.07, "b": 2.0, "c": 5.0}, tilt)
+    return matched(a, [[1, 0, W], [1, b, c]], {"Fr": 0.9, "W": 1.07, "b": 2.0, "c": 5.0}, tilt)
 
 
 _MATCHED = "p(s) = a0 (s² + ω²)(s² + b s + c) solved for Fr, ω², b, c by interval Newton, 80 digits"
