@@ -149,6 +149,28 @@ def double_pair(offset: str) -> dict[str, Any]:
 
 
 @cache
+def ep3_left() -> dict[str, Any]:
+    """Fr, T, the triple root a and the simple root t at χ_B = √2 − 0.1, proved in balls."""
+    p, (a, t) = lifted("a t")
+    guess = {"Fr": 2.02, "T": 0.2, "a": -0.94, "t": -14.9}
+    off = {"chi_B": flint.arb(2).sqrt() - flint.arb(q("0.1"))}
+    return {**matched(p, [*[[1, -a]] * 3, [1, -t]], guess, off), **off}
+
+
+@cache
+def ep3_right(upper: bool, offset: str = "-0.18") -> dict[str, Any]:
+    """Fr, χ_B, a, t at a tilt beside the EP4's: χ_B above √2, or below."""
+    p, (a, t) = lifted("a t")
+    guesses = {
+        ("-0.18", True): (2.185, 1.515, -3.68, -0.25), ("-0.18", False): (2.086, 1.339, -1.025, -11.6),
+        ("-0.05", True): (2.2352, 1.4283, -2.581, -0.727), ("-0.05", False): (2.2171, 1.4025, -1.396, -4.59),
+    }  # fmt: skip
+    guess = dict(zip(("Fr", "chi_B", "a", "t"), guesses[offset, upper], strict=True))
+    off = {"T": tilted(offset)}
+    return {**matched(p, [*[[1, -a]] * 3, [1, -t]], guess, off), **off}
+
+
+@cache
 def weave(offset: str, chi_B: str = "") -> dict[str, Any]:
     """Fr, ω² and the other factor at the weave boundary at that tilt; χ_B = √2 plus the given number."""
     a, (W, b, c) = lifted("W b c")

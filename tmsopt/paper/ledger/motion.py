@@ -5,16 +5,7 @@ from typing import Any
 import flint
 
 from tmsopt.paper.ledger import lemmas
-from tmsopt.paper.ledger.algebra import (
-    heavily_damped,
-    polynomials,
-    positive_quotient,
-    q,
-    real_roots,
-    ring,
-    slope,
-    stable,
-)
+from tmsopt.paper.ledger.algebra import heavily_damped, positive_quotient, q, real_roots, ring, slope, stable
 from tmsopt.paper.ledger.entry import Claim, Outcome, digits, proof, section, universal
 from tmsopt.paper.ledger.printed import Tilt, laws
 from tmsopt.roots.exact import isolated_roots
@@ -149,7 +140,7 @@ def _split() -> Outcome:
     "p over |ω0| as the product of σ² − u σ + 1 for the two roots u, as polynomials",
 )  # fmt: skip
 def _circle() -> Outcome:
-    u, v = polynomials("u v")
+    u, v = ring("u v")
     product = [1, -(u + v), u * v + 2, -(u + v), 1]
     B1, B2 = product[1], product[2]
     same = product[3] == B1 and u * u + B1 * u + B2 - 2 == 0 and v * v + B1 * v + B2 - 2 == 0

@@ -10,7 +10,6 @@ from tmsopt.paper.ledger.abscissa import product_bound
 from tmsopt.paper.ledger.algebra import heavily_damped, polynomials, positive_quotient, q, ring, stable
 from tmsopt.paper.ledger.entry import EXACT, Claim, Outcome, proof, section, universal
 from tmsopt.paper.ledger.printed import laws
-from tmsopt.paper.ledger.sets import ep3_left
 from tmsopt.roots.polynomial import product
 
 _claim = section("2.4.4 Localization of the EP set and stability optimization")
@@ -202,7 +201,7 @@ def _robust() -> Outcome:
     chi_B = r - flint.arb(q("0.1"))
     kappa = r * (chi_B - 1) / (r**2 - chi_B)
     bound = (r**2 - 1) * kappa**2 * (r**2 + 6 * r + 1) / (16 * r / 5 * (r + kappa) ** 2)
-    share = ep3_left()["T"].atan() / lemmas.ep4()["T"].atan()
+    share = lemmas.ep3_left()["T"].atan() / lemmas.ep4()["T"].atan()
     return universal(
         "'large enough' read as not empty: rational bicycles at χ_B = √2 ± 0.1 are heavily damped; but at √2 − 0.1 the "
         f"cusp of the domain lies at {float(share.mid()):.0%} of the tilt of the EP4",

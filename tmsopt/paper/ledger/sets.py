@@ -1,25 +1,13 @@
 """Section 2.4.3: the discriminant surface, its edges and its line of self-intersection."""
 
 from collections.abc import Mapping
-from functools import cache
 from typing import Any
 
 import flint
 
 from tmsopt.paper.ledger import lemmas
-from tmsopt.paper.ledger.algebra import (
-    composed,
-    heavily_damped,
-    jacobian,
-    matched,
-    polynomials,
-    positive,
-    q,
-    slope,
-    tangent,
-)
+from tmsopt.paper.ledger.algebra import composed, heavily_damped, jacobian, polynomials, positive, q, slope, tangent
 from tmsopt.paper.ledger.entry import Claim, Outcome, digits, proof, section
-from tmsopt.roots.exact import isolated_roots
 
 _NONE = flint.arb("1e-40")
 _MATCHED = (
@@ -130,28 +118,6 @@ def _discriminant() -> Outcome:
 CLAIMS: tuple[Claim, ...] = (_omega0, _swallowtail, _edges, _plane, _discriminant)
 
 
-@cache
-def ep3_left() -> dict[str, Any]:
-    """Fr, T, the triple root a and the simple root t at χ_B = √2 − 0.1, proved in balls."""
-    p, (a, t) = lemmas.lifted("a t")
-    guess = {"Fr": 2.02, "T": 0.2, "a": -0.94, "t": -14.9}
-    off = {"chi_B": flint.arb(2).sqrt() - flint.arb(q("0.1"))}
-    return {**matched(p, [*[[1, -a]] * 3, [1, -t]], guess, off), **off}
-
-
-@cache
-def ep3_right(upper: bool, offset: str = "-0.18") -> dict[str, Any]:
-    """Fr, χ_B, a, t at a tilt beside the EP4's: χ_B above √2, or below."""
-    p, (a, t) = lemmas.lifted("a t")
-    guesses = {
-        ("-0.18", True): (2.185, 1.515, -3.68, -0.25), ("-0.18", False): (2.086, 1.339, -1.025, -11.6),
-        ("-0.05", True): (2.2352, 1.4283, -2.581, -0.727), ("-0.05", False): (2.2171, 1.4025, -1.396, -4.59),
-    }  # fmt: skip
-    guess = dict(zip(("Fr", "chi_B", "a", "t"), guesses[offset, upper], strict=True))
-    off = {"T": lemmas.tilted(offset)}
-    return {**matched(p, [*[[1, -a]] * 3, [1, -t]], guess, off), **off}
-
-
 def is_cusp(point: Mapping[str, Any], plane: tuple[str, str]) -> bool:
     """Whether the curve (s − a)²(s² + b s + c) through an EP3 is regular in its unknowns and stops in the plane."""
     p, (a, b, c) = lemmas.lifted("a b c")
@@ -167,7 +133,7 @@ def is_cusp(point: Mapping[str, Any], plane: tuple[str, str]) -> bool:
     "at χ_B = √2 − 0.1 the domain of heavy damping has a cusp at an EP3, in the (Fr, λ_s)-plane", _MATCHED,
 )  # fmt: skip
 def _left() -> Outcome:
-    point = ep3_left()
+    point = lemmas.ep3_left()
     return proof(
         is_cusp(point, ("Fr", "T")) and bool(point["a"] < 0) and bool(point["t"] < 0),
         f"At Fr = {point['Fr'].str(10, radius=False)}, λ_s = {point['T'].atan().str(10, radius=False)}: triple root "
@@ -183,7 +149,7 @@ def _left() -> Outcome:
 )  # fmt: skip
 def _edge() -> Outcome:
     p, (a, t) = lemmas.lifted("a t")
-    direction = tangent(p, [*[[1, -a]] * 3, [1, -t]], ("Fr", "chi_B", "T", "a", "t"), ep3_left())
+    direction = tangent(p, [*[[1, -a]] * 3, [1, -t]], ("Fr", "chi_B", "T", "a", "t"), lemmas.ep3_left())
     return proof(not direction[1].contains(0), "The edge crosses χ_B = √2 − 0.1, as its χ_B changes along it.")
 
 
@@ -192,7 +158,7 @@ def _edge() -> Outcome:
     "at the tilt of the EP4 less 0.18 the domain of heavy damping has two EP3 cusps, in the (Fr, χ_B)-plane", _MATCHED,
 )  # fmt: skip
 def _right() -> Outcome:
-    points = [ep3_right(upper) for upper in (True, False)]
+    points = [lemmas.ep3_right(upper) for upper in (True, False)]
     real = all(bool(x["a"] < 0) and bool(x["t"] < 0) for x in points)
     where = "; ".join(f"Fr = {x['Fr'].str(8, radius=False)}, χ_B = {x['chi_B'].str(8, radius=False)}" for x in points)
     return proof(real and all(is_cusp(x, ("Fr", "chi_B")) for x in points), f"They are {where}.")
@@ -227,14 +193,14 @@ def _crossing() -> Outcome:
     "between them",
 )  # fmt: skip
 def _spire() -> Outcome:
-    corners = [ep3_right(True, "-0.05"), ep3_right(False, "-0.05"), lemmas.double_pair("-0.05")]
+    corners = [lemmas.ep3_right(True, "-0.05"), lemmas.ep3_right(False, "-0.05"), lemmas.double_pair("-0.05")]
     signs = all(bool(x["a"] < 0) and bool(x["t"] < 0) for x in corners[:2])
     middle = [float(sum(x[name] for x in corners).mid()) / 3 for name in ("Fr", "chi_B")]
     T = float(lemmas.tilted("-0.05").mid())
     inner = lemmas.at_heights(q(f"{middle[0]:.6f}"), q(f"{middle[1]:.6f}"), q(f"{T:.6f}"))
     outer = lemmas.at_heights(q("2.4"), q("1.42"), q(f"{T:.6f}"))
     return proof(
-        signs and heavily_damped(inner) and not heavily_damped(outer) and len(isolated_roots(inner)) == 4,
+        signs and heavily_damped(inner) and not heavily_damped(outer),
         "The number of real roots changes only on the discriminant surface, so one inner point decides for all.",
     )
 
