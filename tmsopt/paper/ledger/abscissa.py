@@ -5,7 +5,7 @@ from tmsopt.models.tms import copo, matrices
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.algebra import polynomials, positive, q, ring, substitute
 from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal
-from tmsopt.paper.ledger.lemmas import critical_square
+from tmsopt.paper.ledger.lemmas import critical_square, general
 from tmsopt.paper.ledger.printed import laws
 from tmsopt.paper.ledger.stability import upright_case, wrongly_admitted
 from tmsopt.roots.polynomial import product
@@ -122,8 +122,7 @@ def _a1a3() -> Outcome:
     "a1/a3 from the determinant, set to the ratio of the coefficients of (s − ω0)⁴",
 )  # fmt: skip
 def _ratio() -> Outcome:
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
-    a = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    a, (_, _, chi_B, chi_H, zeta_B, zeta_H, _) = general()
     return proof(
         a[1] / a[3] == -(zeta_B * chi_H - zeta_H * chi_B) / (chi_B - chi_H),
         "As a1/a3 = 1/ω0² at the EP4. There Fr ≠ 0 and χ_B ≠ χ_H, since a0 ω0 ≠ 0.",

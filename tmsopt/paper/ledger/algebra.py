@@ -150,6 +150,11 @@ def stable(coefficients: Sequence[Any]) -> bool:
     return all(bool(quantity > 0) for quantity in lienard_chipart(signed))
 
 
+def real_roots(coefficients: Sequence[Any]) -> int:
+    """How many of its roots are real, with multiplicity, certainly."""
+    return sum(m for z, m in isolated_roots(coefficients) if z.imag == 0)
+
+
 def stable_left_of(coefficients: Sequence[Any], gamma: Any) -> bool:
     """Whether every root lies in Re s < gamma, certainly."""
     return stable(shift(coefficients, gamma))
@@ -176,15 +181,18 @@ def heavily_damped(coefficients: Sequence[Any]) -> bool:
 # Systems of equations in balls
 
 
-def solve(equations: Sequence[Polynomial], guess: Mapping[str, float], known: Mapping[str, Any]) -> dict[str, Ball]:
-    """The solution of as many polynomial equations as unknowns near a guess, proved by interval Newton.
+def matched(
+    coefficients: Sequence[Polynomial], factors: Sequence[Sequence[Any]], guess: Mapping[str, float],
+    known: Mapping[str, Any],
+) -> dict[str, Ball]:  # fmt: skip
+    """The unknowns near a guess with which a polynomial is its leading coefficient times monic factors, proved.
 
     Raises:
         ArithmeticError: where no unique solution is proved.
     """
     names = list(guess)
     with flint.ctx.workdps(PRECISION):
-        sides = [_evaluation(equation) for equation in equations]
+        sides = [_evaluation(equation) for equation in _differences(coefficients, factors)]
 
         def system(at: Mapping[str, Any]) -> list[Any]:
             return [side({**known, **at}) for side in sides]
@@ -201,7 +209,7 @@ def minors(matrix: Sequence[Sequence[Any]]) -> list[Any]:
     ]
 
 
-def match(coefficients: Sequence[Any], *factors: Sequence[Any]) -> list[Any]:
+def _differences(coefficients: Sequence[Any], factors: Sequence[Sequence[Any]]) -> list[Any]:
     """What must vanish for a polynomial to be its leading coefficient times the product of monic factors."""
     return [a - coefficients[0] * m for a, m in zip(coefficients[1:], product(*factors)[1:], strict=True)]
 
@@ -212,6 +220,11 @@ def slope(quotient: Quotient, name: str) -> Quotient:
     return Quotient(over.derivative(name) * under - over * under.derivative(name), under**2)
 
 
+def depends(quotient: Quotient, name: str) -> bool:
+    """Whether a quotient depends on a variable."""
+    return bool(slope(quotient, name) != 0)
+
+
 def kernel(matrix: Sequence[Sequence[Ball]]) -> list[Ball]:
     """The vector, up to a factor, that a matrix with one more column than rows maps to 0."""
     return [m if k % 2 == 0 else -m for k, m in enumerate(minors(matrix))]
@@ -220,6 +233,13 @@ def kernel(matrix: Sequence[Sequence[Ball]]) -> list[Ball]:
 def jacobian(equations: Sequence[Polynomial], names: Sequence[str], at: Mapping[str, Any]) -> list[list[Ball]]:
     """Derivatives of polynomials at balls, a row per polynomial."""
     return [[evaluate(e.derivative(name), at) for name in names] for e in equations]
+
+
+def tangent(
+    coefficients: Sequence[Polynomial], factors: Sequence[Sequence[Any]], names: Sequence[str], at: Mapping[str, Any]
+) -> list[Ball]:
+    """The direction of the curve of one unknown more on which a polynomial has monic factors, at a point of it."""
+    return kernel(jacobian(_differences(coefficients, factors), names, at))
 
 
 def composed(quotient: Quotient, at: Mapping[str, Quotient]) -> Quotient:

@@ -9,24 +9,13 @@ import flint
 from tmsopt.models.tms import copo, matrices
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.abscissa import product_bound
-from tmsopt.paper.ledger.algebra import (
-    Polynomial,
-    evaluate,
-    match,
-    minors,
-    polynomials,
-    q,
-    ring,
-    solve,
-    stable,
-    stable_left_of,
-)
+from tmsopt.paper.ledger.algebra import Polynomial, evaluate, kernel, matched, polynomials, q, stable, stable_left_of
 from tmsopt.paper.ledger.entry import Claim, Outcome, decimal, digits, proof, section, universal
+from tmsopt.paper.ledger.lemmas import general
 from tmsopt.roots.polynomial import evaluate as value_at, quadratic_pencil, shift
 
 _claim = section("2.3 Minimizing the spectral abscissa of general TMS bikes")
 
-_NAMES = "Fr mu chi_B chi_H zeta_B zeta_H T"
 _GEOMETRY = q("1.02"), q("-0.4"), q("-0.2")
 """χ_H, ζ_B and ζ_H of the benchmark."""
 
@@ -98,12 +87,16 @@ def _unique() -> Outcome:
     )
 
 
+def _family() -> list[Polynomial]:
+    """p of the benchmark's χ_H, ζ_B and ζ_H in Fr, μ, χ_B and T."""
+    Fr, mu, chi_B, T = polynomials("Fr mu chi_B T")
+    return copo(Fr, mu, chi_B, *_GEOMETRY, T)
+
+
 @cache
 def optimised() -> dict[str, Any]:
-    """Fr, μ, χ_B and T with the 4-fold root −1 for the benchmark's χ_H, ζ_B and ζ_H."""
-    Fr, mu, chi_B, T = polynomials("Fr mu chi_B T")
-    a = copo(Fr, mu, chi_B, *_GEOMETRY, T)
-    return solve(match(a, *[[1, 1]] * 4), {"Fr": 2.3, "mu": 20.0, "chi_B": 1.2, "T": 1.1}, {})
+    """Fr, μ, χ_B and T with the 4-fold root −1."""
+    return matched(_family(), [[1, 1]] * 4, {"Fr": 2.3, "mu": 20.0, "chi_B": 1.2, "T": 1.1}, {})
 
 
 _MATCHED = "p(s) = a0 (s + 1)⁴ solved for Fr, μ, χ_B, tan λ_s by interval Newton, 80 digits"
@@ -129,8 +122,7 @@ def _optimised_tilt() -> Outcome:
     "the 4-fold root −1 proved by interval Newton; the product bound, which does not depend on Fr",
 )  # fmt: skip
 def _fig0() -> Outcome:
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
-    a = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    a, (_, mu, _, chi_H, zeta_B, zeta_H, T) = general()
     bound = a[4] / a[0]
     free = printed.w0(mu, chi_H, zeta_B, zeta_H, T) == bound
     design = optimised()
@@ -170,16 +162,13 @@ def _covector() -> list[Any]:
 
     With equal signs of the first two, c1 and c2 cannot both grow, and the abscissa cannot fall.
     """
-    Fr, mu, chi_B, T = polynomials("Fr mu chi_B T")
-    a = copo(Fr, mu, chi_B, *_GEOMETRY, T)
-    design = optimised()
+    a, design = _family(), optimised()
     rows = []
     for name in ("Fr", "chi_B", "T"):
         slopes = [evaluate(c.derivative(name), design) for c in a]
         monic = [s - slopes[0] * m for s, m in zip(slopes, (1, 4, 6, 4, 1), strict=True)]
         rows.append(shift(monic, flint.arb(-1))[1:])
-    m = minors(rows)
-    return [m[0], -m[1], m[2], -m[3]]
+    return kernel(rows)
 
 
 @_claim(

@@ -9,9 +9,9 @@ from tmsopt.models.exact import Tilt
 from tmsopt.models.tms import copo
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.abscissa import product_bound
-from tmsopt.paper.ledger.algebra import match, polynomials, positive_quotient, q, ring, solve, stable_left_of
+from tmsopt.paper.ledger.algebra import matched, polynomials, positive_quotient, q, ring, stable_left_of
 from tmsopt.paper.ledger.entry import Claim, Outcome, decimal, digits, proof, section, universal
-from tmsopt.paper.ledger.lemmas import normal, tilt_bound, tilt_of_EP4
+from tmsopt.paper.ledger.lemmas import grown, normal, tilt_bound, tilt_of_EP4
 from tmsopt.paper.ledger.printed import laws
 
 _machine = section("2.4.6 How the scaling laws match the experimental TMS bike")
@@ -31,7 +31,7 @@ def _ep4(chi_H: Any, held: str, value: Any, guess: dict[str, float]) -> dict[str
     names = "Fr mu chi_B T s"
     gens = dict(zip(names.split(), polynomials(names), strict=True))
     a = copo(gens["Fr"], gens["mu"], gens["chi_B"], chi_H, ZETA_B, ZETA_H, gens["T"])
-    return solve(match(a, *[[1, -gens["s"]]] * 4), guess, {held: flint.arb(value)})
+    return matched(a, [[1, -gens["s"]]] * 4, guess, {held: flint.arb(value)})
 
 
 @_machine("fige-ratio", "caption of Fig. fige; text", "√(ζ_B/ζ_H)", "square root of 1.158/0.526 in balls")
@@ -117,7 +117,7 @@ def _optimal_damping() -> Outcome:
     r = _ratio()
     top = tilt_of_EP4(r, flint.arb(ZETA_B * ZETA_H).sqrt())
     guess = {"Fr": 1.31, "T": 0.17, "a": -1.7, "t": -0.34}
-    edge = solve(match(p, *[[1, -a]] * 3, [1, -t]), guess, {})
+    edge = matched(p, [*[[1, -a]] * 3, [1, -t]], guess, {})
     share = edge["T"] / top
     return universal(
         f"χ_H = 1 in place of 0.921, and in part: the cusp of the domain at χ_B = 1.526 lies at "
@@ -170,8 +170,7 @@ def _machines() -> Outcome:
     "b of the double pair, with r = 1 + ρ; a double imaginary pair needs a1 = a3 = 0",
 )  # fmt: skip
 def _connects() -> Outcome:
-    Fr, T, rho, scale = ring("Fr T rho q")
-    b = normal(Fr, 1 + rho, T, 1 + rho, scale)
+    b, (_, T, rho, scale) = grown()
     never = positive_quotient(b[1])
     square = printed.epset(-1 / scale, -(scale**2) * (1 + rho), T)
     pair = square * rho**2 / (scale**2 * T**2)

@@ -5,7 +5,7 @@ import flint
 from tmsopt.models.exact import Tilt
 from tmsopt.models.tms import matrices, tms
 from tmsopt.paper.ledger import printed
-from tmsopt.paper.ledger.algebra import polynomials, q, ring
+from tmsopt.paper.ledger.algebra import depends, polynomials, q, ring
 from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal
 from tmsopt.paper.ledger.printed import laws
 from tmsopt.roots.polynomial import quadratic_pencil
@@ -30,13 +30,7 @@ def _nine() -> Outcome:
     w, v, g, T, m_B, x_B, z_B, m_H, x_H, z_H = variables = ring("w v g T m_B x_B z_B m_H x_H z_H")
     # Fr stands squared or beside a1 and a3; Fr² in place of Fr shows the same dependence without a root
     a = laws.copo(v**2 / (g * w), m_H / m_B, x_B / w, x_H / w, z_B / w, z_H / w, Tilt(T))
-    matters = [
-        any(
-            c.over.derivative(str(x.over)) * c.under != c.over * c.under.derivative(str(x.over))
-            for c in a
-        )
-        for x in variables
-    ]  # fmt: skip
+    matters = [any(depends(c, str(x.over)) for c in a) for x in variables]
     count = sum(matters) - 1  # without g
     return proof(
         count == 9 == len(names),

@@ -126,13 +126,8 @@ def _legend(row: LocusRow) -> list[Line2D]:
 
 def _key(row: LocusRow) -> list[Line2D]:
     first, last = row.loci[0].values[[0, -1]]
-    dot: dict[str, Any] = {
-        "linestyle": "none",
-        "marker": "o",
-        "markeredgecolor": "black",
-        "markeredgewidth": 0.6,
-        "markersize": 6,
-    }
+    dot: dict[str, Any] = {"linestyle": "none", "marker": "o", "markeredgecolor": "black", "markeredgewidth": 0.6}
+    dot["markersize"] = 6
     return [
         Line2D([], [], color="0.55", alpha=0.45, linewidth=3.5, label=rf"$|s| = |\omega_0| = {abs(row.omega0):.4f}$"),
         Line2D([], [], color=REAL, label=r"real multiple root, $\chi_B = \sqrt{2}$", **dot),
