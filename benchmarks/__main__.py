@@ -1,8 +1,8 @@
-"""All benchmarks that compare: ``python -m benchmarks``."""
+"""All benchmarks: ``python -m benchmarks``."""
 
 import sys
 
-from benchmarks.sections import main
+from benchmarks.command import main
 
 if __name__ == "__main__":
     sys.exit(main())

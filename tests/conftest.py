@@ -1,7 +1,9 @@
-"""What makes the whole suite cheaper and changes no test."""
+"""What makes the whole suite cheaper and the same wherever it is run, and changes no test."""
 
 import gc
 import os
+import signal
+from collections.abc import Iterator
 
 import pytest
 
@@ -28,3 +30,11 @@ def pytest_collection_finish() -> None:
     """Collected tests and loaded modules stay until the end: no collection of garbage need look at them again."""
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """Ctrl-C ends a process that is started now. A suite in the background of a script ignores it, and so would that."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)

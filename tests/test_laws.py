@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 import sympy
 from helpers import oracles
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from mpmath import mp
 
 from tmsopt import laws

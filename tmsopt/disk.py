@@ -1,35 +1,188 @@
-"""Files that are written as a whole or not at all."""
+"""Files and folders: read, written as a whole or not at all, by one process at a time, compared and moved aside."""
 
+import csv
+import json
 import os
+import shutil
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from math import isnan
+from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from tmsopt.errors import Fault, InputError, suggest
+
+if TYPE_CHECKING:
+    import sqlite3
 
 LARGEST = 1_000_000
 """Bytes; a longer file is not a problem file."""
 
+_WIDTH = 80  # of a value in a message
+_TRIES = 20
+
 
 @contextmanager
-def whole(path: Path) -> Iterator[Path]:
-    """The name of a temporary file beside `path`, which takes its place if all went well; a link stays one.
+def whole(path: Path, *, locked: bool = False) -> Iterator[Path]:
+    """The name of a temporary file or folder beside `path`, which takes its place if all went well; a link stays one.
+
+    Args:
+        locked: nobody else writes here (see `lock`): the name is always the same, free, and what a killed process left
+            under it is gone.
 
     Raises:
-        OSError: when the file cannot be written.
+        OSError: when it cannot be written.
     """
     path = path.resolve()
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".tmsopt-", suffix=path.suffix)
-    os.close(handle)
+    if locked:
+        temporary = path.with_name(f".{path.name}.unfinished")
+        _remove(temporary)
+    else:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".tmsopt-", suffix=path.suffix)
+        os.close(handle)
+        temporary = Path(name)
     try:
-        yield Path(temporary)
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)
+        yield temporary
+        if not locked:  # a temporary file is for its owner alone
+            umask = os.umask(0)
+            os.umask(umask)
+            os.chmod(temporary, 0o666 & ~umask)
         os.replace(temporary, path)
     finally:
-        Path(temporary).unlink(missing_ok=True)
+        _remove(temporary)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
+
+
+class Lock:
+    """The right to write one file or folder; held until `release` or the end of the process, however that ends."""
+
+    def __init__(self, path: Path, connection: "sqlite3.Connection") -> None:
+        self._path, self._connection = path, connection
+
+    def release(self) -> None:
+        """Give the right back. The file goes while it is still locked; `lock` holds for files that go meanwhile."""
+        with suppress(OSError):
+            self._path.unlink()  # Windows does not remove an open file; an empty one stays, and blocks nobody
+        self._connection.close()
+
+
+def lock(path: Path) -> Lock | None:
+    """The lock of a file or folder, or None where another process or thread holds it; never waits.
+
+    An empty SQLite database beside it, with a transaction that is begun and writes nothing: SQLite knows how to lock on
+    every system, forked children do not inherit such a lock, and a file that stayed behind locks nothing.
+
+    Raises:
+        sqlite3.OperationalError: where no file can be written or the file system has no locks.
+    """
+    import sqlite3  # not for those who read a problem
+
+    path = path.with_name(f"{path.name}.lock")
+    for _ in range(_TRIES):
+        before = _identity(path)
+        connection = sqlite3.connect(path, isolation_level=None, timeout=0, check_same_thread=False)
+        try:
+            connection.execute("PRAGMA journal_mode=MEMORY")  # none in a file, since nothing is written
+            connection.execute("BEGIN IMMEDIATE")
+        except sqlite3.OperationalError as error:
+            connection.close()
+            if error.sqlite_errorcode & 0xFF == sqlite3.SQLITE_BUSY:
+                return None
+            if (now := _identity(path)) is not None and before in (None, now):
+                raise
+            continue  # its last holder removed the file just now, and SQLite noticed
+        if before is not None and _identity(path) == before:
+            return Lock(path, connection)
+        connection.close()  # made just now, or removed by its last holder: what is locked may have no name any more
+    return None
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    try:
+        status = os.stat(path)
+    except FileNotFoundError:
+        return None
+    return status.st_dev, status.st_ino
+
+
+def aside(path: Path, companions: tuple[str, ...] = ()) -> Path:
+    """Move a file or folder to ``name.1.ending``, or the first number that is free; its new place.
+
+    Args:
+        companions: what the names of files beside it end in, after its own; they go with it where they are.
+
+    Raises:
+        OSError: when it cannot be moved, e.g. while somebody reads it on Windows.
+    """
+    parts, number = ("", *companions), 1
+    while any(os.path.lexists(f"{_numbered(path, number)}{part}") for part in parts):
+        number += 1
+    moved = _numbered(path, number)
+    for part in parts:
+        if os.path.lexists(f"{path}{part}"):
+            os.rename(f"{path}{part}", f"{moved}{part}")
+    return moved
+
+
+def _numbered(path: Path, number: int) -> Path:
+    return path.with_name(f"{path.stem}.{number}{path.suffix}")
+
+
+def differences(
+    known: Any, asked: Any, sides: tuple[str, str] = ("there", "asked for"), key: str = ""
+) -> Iterator[str]:
+    """Where two pieces of plain data differ, one phrase each; numbers differ where any bit of their doubles does.
+
+    Args:
+        known, asked: what JSON knows, and columns as ``array("d")``.
+        sides: what follows a value of the one and of the other.
+    """
+    match known, asked:
+        case Mapping(), Mapping():
+            for name in dict.fromkeys((*known, *asked)):
+                inner = f"{key}.{name}" if key else str(name)
+                if name in known and name in asked:
+                    yield from differences(known[name], asked[name], sides, inner)
+                else:
+                    one, other = (_shown(side[name]) if name in side else "none" for side in (known, asked))
+                    yield f"{inner}: {one} {sides[0]}, {other} {sides[1]}"
+        case array(), array():
+            if len(known) != len(asked):
+                yield f"{key}: {len(known)} values {sides[0]}, {len(asked)} {sides[1]}"
+            if known.tobytes() == asked.tobytes():
+                return
+            if differ := [row for row, pair in enumerate(zip(known, asked, strict=False)) if not _same(*pair)]:
+                most, first = min(len(known), len(asked)), differ[0]
+                values = f"{known[first]!r} {sides[0]}, {asked[first]!r} {sides[1]}"
+                yield f"{key}: {len(differ)} of {most} values differ, the first in row {first}: {values}"
+        case list(), list() if len(known) == len(asked):
+            for index, (one, other) in enumerate(zip(known, asked, strict=True)):
+                yield from differences(one, other, sides, f"{key}[{index}]")
+        case _ if not _same(known, asked):
+            yield f"{key}: {_shown(known)} {sides[0]}, {_shown(asked)} {sides[1]}"
+
+
+def _same(a: Any, b: Any) -> bool:
+    """Equal to the bit: 1 is 1.0, but 0.0 is not −0.0, true is not 1, and nan is nan."""
+    if isinstance(a, bool) or isinstance(b, bool) or not (isinstance(a, int | float) and isinstance(b, int | float)):
+        return type(a) is type(b) and bool(a == b)
+    return repr(float(a)) == repr(float(b)) and (a == b or isnan(a))
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, array):
+        return f"{len(value)} values"
+    text = json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= _WIDTH else f"{text[: _WIDTH - 1]}…"
 
 
 def read_text(file: str, kind: str, largest: int = LARGEST) -> str:
@@ -66,3 +219,15 @@ def read_text(file: str, kind: str, largest: int = LARGEST) -> str:
     except UnicodeDecodeError as error:
         line = raw[: error.start].count(b"\n") + 1
         raise InputError([Fault(f"not {form}: byte {raw[error.start]:#x} is not UTF-8").at(file, line)]) from None
+
+
+def write_csv(path: str | PathLike[str], rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write rows with the same names as one table.
+
+    Raises:
+        OSError: when the file cannot be written.
+    """
+    with open(path, "w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, fieldnames=list(rows[0]) if rows else [])
+        writer.writeheader()
+        writer.writerows(rows)

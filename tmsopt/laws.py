@@ -10,7 +10,8 @@ of the two masses (z points down, so zeta < 0), `lambda_s` steer axis tilt in ra
 
 Every function takes floats or arrays, broadcasts them, and returns float64 of the broadcast shape, with a
 leading axis where it says so. None raises on values: a pole gives inf or nan, and the root of a negative
-number nan, without a warning. "chi_H = 1" in a docstring is a condition, not an argument.
+number nan, without a warning. "chi_H = 1" in a docstring is a condition, not an argument. Exact numbers that are no
+floats give exact results, if they have `sqrt` and what stands for lambda_s has `tan`.
 """
 
 from collections.abc import Callable
@@ -64,8 +65,11 @@ def _law(formula: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(formula)
     def evaluate(*args: P.args, **kwargs: P.kwargs) -> R:
-        positional = [np.asarray(value, float)[()] for value in args]
-        named = {name: np.asarray(value, float)[()] for name, value in kwargs.items()}
+        try:
+            positional = [np.asarray(value, float)[()] for value in args]
+            named = {name: np.asarray(value, float)[()] for name, value in kwargs.items()}
+        except TypeError:  # numbers that no float stands for
+            return formula(*args, **kwargs)
         with np.errstate(all="ignore"):
             return cast(Callable[..., R], formula)(*positional, **named)
 

@@ -1,12 +1,17 @@
-"""A mapping that cannot be changed, and can be pickled."""
+"""What records are made of, and records as plain data."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import fields
 from typing import Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 V = TypeVar("V")
+
+SCHEMA = 1
+"""Version of the JSON of every command."""
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -79,3 +84,34 @@ class Column(Sequence[float]):
     def __repr__(self) -> str:
         shown = ", ".join(f"{value:.6g}" for value in self._values[:4].tolist())
         return f"Column({shown}{', …' if len(self) > 4 else ''}; {len(self)})"
+
+
+def plain(record: Any, names: str = "", digits: int | None = None) -> dict[str, Any]:
+    """A record or a table as data for ``json.dumps``: numbers that do not exist are None, a complex one has re and im.
+
+    Records inside are written as their own `to_json` says, where they have one.
+
+    Args:
+        names: which attributes, in this order; by default every field.
+        digits: significant digits of the numbers; by default all.
+    """
+    if isinstance(record, Mapping):
+        return {str(name): _plain(value, digits) for name, value in record.items()}
+    chosen = names.split() or [f.name for f in fields(record)]
+    return {name: _plain(getattr(record, name), digits) for name in chosen}
+
+
+def _plain(value: Any, digits: int | None) -> Any:
+    match value:
+        case None | bool() | int() | str():
+            return value
+        case float():
+            rounded = float(value) if digits is None else float(f"{value:.{digits}g}")
+            return rounded if math.isfinite(rounded) else None
+        case complex():
+            return {"re": _plain(value.real, digits), "im": _plain(value.imag, digits)}
+        case np.ndarray() | np.generic():
+            return _plain(value.tolist(), digits)
+        case Sequence():
+            return [_plain(item, digits) for item in value]
+    return value.to_json() if hasattr(value, "to_json") else plain(value, digits=digits)

@@ -8,8 +8,7 @@ import flint
 import numpy as np
 import pytest
 
-from tmsopt.arithmetic import ARRAYS, formulas, operation_name, steps
-from tmsopt.arithmetic.operations import BALLS
+from tmsopt.arithmetic import ARRAYS, BALLS, formulas, operation_name, steps
 
 x, y = ca.SX.sym("x"), ca.SX.sym("y")
 

@@ -1,5 +1,6 @@
 """The benchmark command: what is measured, that a failure costs one section, and that nobody is credited unduly."""
 
+import ast
 import inspect
 import math
 import sys
@@ -13,15 +14,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-import benchmarks.measure
-from benchmarks import sections
-from benchmarks.measure import best, exponent
-from benchmarks.race import OWN, Heat, Moment, Run, median_ratio, own, run
-from benchmarks.rivals import Reduced, Watch
-from benchmarks.sections import SECTIONS, Section, chosen
-from benchmarks.seekers import Seeker, slopes
-from benchmarks.solving import details, overview
-from benchmarks.suite import random_problem
+import tmsopt
+from benchmarks import command, timing
+from benchmarks.command import SECTIONS, Section, chosen
+from benchmarks.reports import Asked
+from benchmarks.reports.designs import details, overview
+from benchmarks.rivals import OWN, Heat, Moment, Reduced, Run, Seeker, Watch, median_ratio, own, run, slopes
+from benchmarks.suites import random_problem
+from benchmarks.timing import best, exponent
 from tmsopt import Problem, models
 
 HEIGHTS = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
@@ -39,31 +39,53 @@ GOAL = OPTIMUM * (1 - 1e-3)  # double roots of a rounded EP4 scatter by 4e-4
 
 def test_sections_have_letters_names_and_a_report() -> None:
     assert [s.letter for s in SECTIONS] == sorted(s.letter for s in SECTIONS)
-    assert {s.letter for s in SECTIONS} == set("abcdefghij")
     assert len({s.name for s in SECTIONS}) == len(SECTIONS)
     for section in SECTIONS:
-        assert list(inspect.signature(section.report()).parameters) == ["command", "quick"]
+        assert list(inspect.signature(section.report()).parameters) == ["asked"]
+
+
+def test_rooms_are_small_and_have_faces() -> None:
+    """As in the package: at most 12 modules, 350 lines a module, a face that says what it is for; 5,500 lines in all."""
+    room = Path(command.__file__).parent
+    lines = {path: path.read_text(encoding="utf-8").splitlines() for path in room.rglob("*.py")}
+    assert sum(map(len, lines.values())) <= 5500
+    assert max(map(len, lines.values())) <= 350
+    for folder in {path.parent for path in lines}:
+        assert len(list(folder.glob("*.py"))) <= 13  # the face is one
+        face = ast.get_docstring(ast.parse("\n".join(lines[folder / "__init__.py"]))) or ""
+        assert 2 <= len([line for line in face.splitlines() if line]) <= 5
+
+
+def test_benchmarks_open_packages_by_their_faces() -> None:
+    """Rooms of the package may be rebuilt and benchmarks stay."""
+    package = Path(tmsopt.__file__).parent
+    for path in Path(command.__file__).parent.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("tmsopt."):
+                place = package.joinpath(*str(node.module).split(".")[1:])
+                assert place.is_dir() or place.parent == package, f"{path.name} line {node.lineno}: {node.module}"
 
 
 def test_sections_are_chosen_by_letter_or_name() -> None:
-    assert [s.letter for s in chosen("", SECTIONS)] == [s.letter for s in SECTIONS]
+    assert [s.name for s in chosen("", SECTIONS)] == [s.name for s in SECTIONS if not s.long]
+    assert [s.name for s in chosen("solve, b", SECTIONS)] == ["charts", "kernels", "solve"]
     assert [s.name for s in chosen("growth, a", SECTIONS)] == ["solving", "growth"]
     with pytest.raises(click.BadParameter, match="found 'x'; accepted: a or solving"):
         chosen("x", SECTIONS)
 
 
 def test_a_section_that_fails_says_so_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    def fails(command: str, quick: bool) -> str:
+    def fails(asked: Asked) -> str:
         raise RuntimeError("out of luck")
 
-    fakes: dict[str, Callable[[str, bool], str]] = {"fails": fails, "works": lambda c, q: f"## Works\n\n`{c}`\n"}
-    for name, section in fakes.items():
-        monkeypatch.setitem(sys.modules, f"fake_{name}", SimpleNamespace(section=section))
+    fakes: dict[str, Callable[[Asked], str]] = {"fails": fails, "works": lambda a: f"## Works\n\n`{a.command}`\n"}
+    for name, report in fakes.items():
+        monkeypatch.setitem(sys.modules, f"fake_{name}", SimpleNamespace(report=report))
     names = ("fails", "absent", "works")
     made = tuple(Section(letter, n, f"fake_{n}", "about") for letter, n in zip("abc", names, strict=True))
-    monkeypatch.setattr(sections, "SECTIONS", made)
+    monkeypatch.setattr(command, "SECTIONS", made)
     path = tmp_path / "kept.md"
-    answer = CliRunner().invoke(sections.main, ["--quick", "--output", str(path)])
+    answer = CliRunner().invoke(command.main, ["--quick", "--output", str(path)])
     assert answer.exit_code == 1
     kept = path.read_text(encoding="utf-8")
     assert "failed: RuntimeError: out of luck" in kept
@@ -73,10 +95,10 @@ def test_a_section_that_fails_says_so_and_the_others_go_on(monkeypatch: pytest.M
 
 
 def test_quick_numbers_are_kept_nowhere_by_default(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setitem(sys.modules, "fake_works", SimpleNamespace(section=lambda command, quick: "## Works\n"))
-    monkeypatch.setattr(sections, "SECTIONS", (Section("a", "works", "fake_works", "about"),))
+    monkeypatch.setitem(sys.modules, "fake_works", SimpleNamespace(report=lambda asked: "## Works\n"))
+    monkeypatch.setattr(command, "SECTIONS", (Section("a", "works", "fake_works", "about"),))
     monkeypatch.chdir(tmp_path)
-    answer = CliRunner().invoke(sections.main, ["--quick"])
+    answer = CliRunner().invoke(command.main, ["--quick"])
     assert answer.exit_code == 0
     assert "## Works" in answer.output
     assert not list(tmp_path.iterdir())
@@ -93,7 +115,7 @@ def test_methods_take_turns_and_the_least_time_counts(monkeypatch: pytest.Monkey
 
         return one
 
-    monkeypatch.setattr(benchmarks.measure.time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(timing.time, "perf_counter", lambda: clock[0])
     assert best({"a": work("a", [5, 2, 3]), "b": work("b", [4, 8, 6])}, 3) == {"a": 2, "b": 4}
     assert turns == ["a", "b"] * 3
 

@@ -6,10 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.band import abscissa_below, highest_abscissa
-from benchmarks.conflicts import conflict, conflicts, moved
-from benchmarks.judge import Judge, verdict, worst_roots
-from benchmarks.variety import varied_problem
+from benchmarks.judges import Judge, abscissa_below, highest_abscissa, verdict, worst_roots
+from benchmarks.suites import conflict, conflicts, moved, varied_problem
 from tmsopt import Problem, models
 
 HEIGHTS = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
@@ -63,7 +61,7 @@ def test_proof_ends_at_the_weave_boundary() -> None:
     critical = math.sqrt(1.3 * math.tan(0.2) * -0.2 / (0.3 * (-0.4 + 0.2 * 1.3)))
     assert abscissa_below(design, critical * (1 + 1e-9), 3.0, 0.0)[0]
     assert not abscissa_below(design, critical * (1 - 1e-9), 3.0, 0.0)[0]
-    highest = highest_abscissa({**design, "Fr": 1.8}, 2001)
+    highest = highest_abscissa(design, 1.2, 2.4, 2001)
     proved, pieces = abscissa_below(design, 1.2, 2.4, highest + 1e-4)
     assert proved
     assert pieces >= 6  # one for each polynomial

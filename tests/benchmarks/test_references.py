@@ -11,12 +11,12 @@ import pytest
 from helpers.oracles import DIGITS, abscissa_60, polynomial_60, roots_60
 from mpmath import mp
 
-from benchmarks.references import PATH, Settings, best_of, confirmed, references, run
-from benchmarks.suite import random_problem
-from benchmarks.trials import Attempt
+from benchmarks.judges import Attempt, confirmed
+from benchmarks.reports.designs import Settings, best_of, run
+from benchmarks.suites import REFERENCES, random_problem, references
 from tmsopt import Problem, models
 
-KEPT = references(Path(__file__).parents[2] / PATH)
+KEPT = references(Path(__file__).parents[2] / REFERENCES)
 SOLVABLE = [i for i, one in KEPT.items() if one.solvable]
 SOME = SOLVABLE[::9]
 HEIGHTS = {"mu": 0.1, "chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "lambda_s": 0.2, "chi_B": 1.3}
@@ -126,8 +126,7 @@ def test_the_rounded_point_of_the_paper_confirms_its_value_and_no_other() -> Non
     claimed = -((0.4 * 0.2) ** -0.25)
 
     def says(value: float, Fr: float = design["Fr"]) -> bool:
-        own = Attempt("default", "optimal", value, {**fixed, **design, "Fr": Fr}, 0.1, 1)
-        return confirmed(problem, own)
+        return confirmed(problem, {**fixed, **design, "Fr": Fr}, value)
 
     assert says(claimed)
     assert not says(claimed - 1e-6)
@@ -193,5 +192,5 @@ def test_what_is_kept_is_not_computed_again(tmp_path: Path) -> None:
     path.write_text(json.dumps({"settings": {"seed": 2018, "starts": 1, "evolutions": 1}, "problems": [row]}))
     assert run(1, settings, 1, path, "test")[0].value == -77
     assert references(path)[0].by == ("default",)
-    with pytest.raises(click.UsageError, match="another file by --output"):
+    with pytest.raises(click.UsageError, match="move it aside"):
         run(1, Settings(starts=2, evolutions=1), 1, path, "test")

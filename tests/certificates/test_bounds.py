@@ -10,8 +10,7 @@ import flint
 import numpy as np
 import pytest
 
-from tmsopt.arithmetic import EVERYTHING, NotAccepted, ball, interval, ranges, root_bound, walk
-from tmsopt.arithmetic.intervals import BALLS
+from tmsopt.arithmetic import EVERYTHING, INTERVALS, NotAccepted, ball, interval, ranges, root_bound, walk
 from tmsopt.certificates import FOUND, INFEASIBLE, available, decide, interlacing, squares_of, task, unknowns
 from tmsopt.design import parse_value
 from tmsopt.formulation import NLP
@@ -258,7 +257,7 @@ def test_walking_is_evaluating() -> None:
     f = ca.Function("f", [x], [ca.vertcat(value, x[0] * value), x[2]])
     expected = [np.array(part).ravel().tolist() for part in f(at)]
     walked = walk(f, at, FLOATS)
-    balls = walk(f, [flint.arb(v) for v in at], BALLS)
+    balls = walk(f, [flint.arb(v) for v in at], INTERVALS)
     for row, floats, enclosed in zip(expected, walked, balls, strict=True):
         assert floats == pytest.approx(row, rel=1e-14)
         assert [float(b) for b in enclosed] == pytest.approx(row, rel=1e-14)

@@ -18,8 +18,7 @@ from click.testing import CliRunner
 from helpers.oracles import polynomial_floats
 from scipy.optimize import brentq  # type: ignore[import-untyped]
 
-from benchmarks.references import PATH, references
-from benchmarks.suite import random_problem
+from benchmarks.suites import REFERENCES, random_problem, references
 from tmsopt import InputError, Problem, Solution, certify, models, solve
 from tmsopt.certificates import Crew, available
 from tmsopt.cli import main
@@ -28,7 +27,7 @@ from tmsopt.records import Array
 
 certifying = import_module("tmsopt.certificates.certify")
 interlaces = import_module("tmsopt.certificates.interlacing")
-races = import_module("tmsopt.certificates.processes")
+started = import_module("tmsopt.processes")
 lines = import_module("tmsopt.certificates.half_planes")
 
 pytestmark = pytest.mark.skipif(not available(), reason="SCIP is not installed")
@@ -37,7 +36,7 @@ HEIGHTS = {"mu": 0.1, "chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2}
 OMEGA0 = -((0.4 * 0.2) ** -0.25)  # where chi_H = 1
 TILTED = {**HEIGHTS, "lambda_s": 0.2}
 PLANE = {"Fr": (0.5, 3.0), "chi_B": (1.01, 3.0)}
-KEPT = references(Path(__file__).parents[2] / PATH)
+KEPT = references(Path(__file__).parents[2] / REFERENCES)
 CLOSED = 1e-4  # a gap that counts as closed, relative to the objective
 SECONDS = 8.0  # five times what any of these needs
 
@@ -400,6 +399,7 @@ def test_a_better_design_takes_the_place_of_a_worse_one() -> None:
     assert any("found a better design" in note and f"{part.value:.9g} before" in note for note in design.notes)
 
 
+@pytest.mark.slow
 def test_a_better_design_than_many_starts_find() -> None:
     """The default solve of this problem stops at +0.0138; the value that is kept was found by differential evolution."""
     design = certify(random_problem(32), seconds=5.0)
@@ -415,13 +415,13 @@ def test_a_better_design_than_many_starts_find() -> None:
 def children(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
     """The processes that are started, none of which is left at the end."""
     seen: list[Any] = []
-    start = races._started
+    start = started.start
 
-    def noted() -> Any:
-        seen.append(start())
+    def noted(*given: Any) -> Any:
+        seen.append(start(*given))
         return seen[-1]
 
-    monkeypatch.setattr(races, "_started", noted)
+    monkeypatch.setattr(started, "start", noted)
     yield seen
     assert seen
     assert all(child.poll() is not None for child in seen)
@@ -445,12 +445,12 @@ def test_a_process_that_crashes_costs_no_result(slow_plane: Solution, monkeypatc
     """At once, every time: nothing is decided, in the time that was given and that of one process more."""
     crashed: list[Any] = []
 
-    def crash() -> Any:
+    def crash(*_: Any) -> Any:
         command = [sys.executable, "-S", "-c", "import os; os._exit(1)"]
         crashed.append(subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE))
         return crashed[-1]
 
-    monkeypatch.setattr(races, "_started", crash)
+    monkeypatch.setattr(started, "start", crash)
     before = len(os.listdir("/proc/self/fd")) if os.path.isdir("/proc/self/fd") else 0
     began = time.perf_counter()
     design = certify(slow_plane, seconds=1.0)
@@ -466,15 +466,15 @@ def test_a_process_that_crashes_costs_no_result(slow_plane: Solution, monkeypatc
 
 def test_one_crash_of_two(slow_plane: Solution, monkeypatch: pytest.MonkeyPatch, children: list[Any]) -> None:
     """The other one answers."""
-    start = races._started
+    start = started.start
 
-    def every_other() -> Any:
-        child = start()
+    def every_other(*given: Any) -> Any:
+        child = start(*given)
         if len(children) % 2:
             child.kill()
         return child
 
-    monkeypatch.setattr(races, "_started", every_other)
+    monkeypatch.setattr(started, "start", every_other)
     assert is_closed(certify(slow_plane, seconds=SECONDS))
 
 

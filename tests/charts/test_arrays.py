@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from benchmarks.suite import TEMPLATES
+from benchmarks.suites import TEMPLATES
 from tmsopt.arithmetic import NotAccepted, program
 from tmsopt.charts import array_function, engine_of
 from tmsopt.design import NO_RADIUS, Problem, parse_comparison

@@ -23,7 +23,6 @@ from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.report import chart_table
 from tmsopt.roots import CLASSES
-from tmsopt.tracing import domain, trace
 
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 SQRT2 = math.sqrt(2)
@@ -399,30 +398,24 @@ def test_help_shows_examples(capsys):
 
 @pytest.mark.parametrize("points", [(1, 5), (0, 5), 50, (5,), (99_999, 99_999), ("a", 5)])
 def test_other_numbers_of_points_are_refused(points):
-    problem = load("problems/chart.toml", asks=False)
+    problem = load("problems/chart.toml")
     with pytest.raises(InputError, match=r"points: found .* accepted: two whole numbers"):
         chart(problem, points=points, boundaries=False)
 
 
 def test_what_memory_has_no_room_for_is_refused():
     with pytest.raises(InputError, match=r"points: 1e\+08 designs do not fit into memory; give a folder"):
-        chart(load("problems/chart.toml", asks=False), points=(10_000, 10_000), boundaries=False)
-
-
-@pytest.mark.parametrize("call", [chart, domain, trace])
-def test_a_file_name_is_no_problem(call):
-    with pytest.raises(InputError, match=r"accepted: a Problem, such as tmsopt\.load"):
-        call("problems/chart.toml")
+        chart(load("problems/chart.toml"), points=(10_000, 10_000), boundaries=False)
 
 
 def test_axes_as_one_text_are_refused():
-    problem = load("problems/chart.toml", asks=False)
+    problem = load("problems/chart.toml")
     with pytest.raises(InputError, match="found 'Fr,lambda_s'; accepted: Fr and lambda_s"):
         chart(problem, "Fr,lambda_s", points=(5, 5), boundaries=False)
 
 
 def test_the_least_abscissa_satisfies_the_constraints():
-    problem = load("problems/chart.toml", asks=False)
+    problem = load("problems/chart.toml")
     free = chart(problem, points=(40, 30), boundaries=False)
     best = free.to_json()["least_abscissa"]
     bounded = dataclasses.replace(problem, constraints={"slow": f"Fr <= {best['Fr'] / 2}"})
@@ -435,7 +428,7 @@ def test_the_least_abscissa_satisfies_the_constraints():
 
 
 def test_an_equality_is_left_aside_and_said_to_be():
-    problem = dataclasses.replace(load("problems/chart.toml", asks=False), constraints={"law": "Fr == 2"})
+    problem = dataclasses.replace(load("problems/chart.toml"), constraints={"law": "Fr == 2"})
     found = chart(problem, points=(5, 5), boundaries=False)
     assert found.left_aside == ("law",)
     assert found.satisfied.all()
@@ -444,7 +437,7 @@ def test_an_equality_is_left_aside_and_said_to_be():
 
 def test_the_margin_is_the_difference_of_the_sides():
     problem = dataclasses.replace(
-        load("problems/chart.toml", asks=False), constraints={"slow": "Fr <= 2", "steep": "lambda_s >= 0.3"}
+        load("problems/chart.toml"), constraints={"slow": "Fr <= 2", "steep": "lambda_s >= 0.3"}
     )
     found = chart(problem, points=(12, 9), boundaries=False)
     Fr, tilt = np.meshgrid(*found.grid)
@@ -453,8 +446,6 @@ def test_the_margin_is_the_difference_of_the_sides():
 
 
 def test_a_huge_box_is_charted_without_a_warning():
-    problem = dataclasses.replace(
-        load("problems/chart.toml", asks=False), free={"Fr": (0.1, 1e300), "lambda_s": (0.01, 1.4)}
-    )
+    problem = dataclasses.replace(load("problems/chart.toml"), free={"Fr": (0.1, 1e300), "lambda_s": (0.01, 1.4)})
     found = chart(problem, points=(20, 15))
     assert found.shares["undefined"] > 0.9

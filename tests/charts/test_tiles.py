@@ -91,6 +91,7 @@ def test_single_precision_is_the_double_rounded(whole, tmp_path):
     assert found.layers["kind"].tobytes() == whole.layers["kind"].tobytes()
 
 
+@pytest.mark.slow
 def test_both_engines_write_the_same_bits(whole, tmp_path):
     pytest.importorskip("numba")
     found = {e: charted(tmp_path / f"{e}.chart", points=(211, 160), engine=e) for e in ("numpy", "numba")}
@@ -165,7 +166,7 @@ def test_a_model_of_another_degree(tmp_path):
 
 
 def test_one_or_four_free_parameters_make_no_grid():
-    for problem, words in ((load("problems/chart.toml", asks=False), None), (SPACE, None)):
+    for problem, words in ((load("problems/chart.toml"), None), (SPACE, None)):
         assert words is None
         assert survey(problem, points=(3,) * len(problem.free)).grid.size == 3 ** len(problem.free)
     line = dataclasses.replace(PLANE, fixed=PLANE.fixed | {"Fr": 2.0}, free={"lambda_s": (0.1, 1.0)})

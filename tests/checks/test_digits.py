@@ -25,12 +25,12 @@ from helpers.structures import FORMS, NATIVE, native_60, times
 from mpmath import mp
 
 import tmsopt
-from benchmarks.suite import random_problem
+from benchmarks.suites import random_problem
 from tmsopt.arithmetic import exact
 from tmsopt.checks import omega0_bound
 from tmsopt.models import tms
 from tmsopt.roots import structure
-from tmsopt.roots.patterns import enclosed_roots, nearest, nearest_decimal, nearest_double
+from tmsopt.roots.patterns import enclosed_roots, nearest_decimal, nearest_double, nearest_roots
 
 DIGITS = 60
 PROBLEMS = Path(__file__).parents[2] / "problems"
@@ -358,7 +358,7 @@ def test_the_nearest_polynomial_of_every_structure(name: str) -> None:
         found = structure(a, 1e-11)
         assert found.name == name
         with flint.ctx.workprec(212):
-            balls = nearest(name, [exact(c) for c in a], found.roots)
+            balls = nearest_roots(name, [exact(c) for c in a], found.roots)
             assert balls is not None
             got = sorted((nearest_double(b.re), nearest_double(b.im)) for b in balls for _ in range(b.multiplicity))
         with mp.workdps(DIGITS + 20):

@@ -14,7 +14,7 @@ import tmsopt
 from tmsopt.checks import cover, recheck, worst_cases
 from tmsopt.design import Band
 
-covering = import_module("tmsopt.checks.coverage")
+covering = import_module("tmsopt.checks.worst_case")
 
 TMS = tmsopt.models.tms
 DESIGN = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2, "chi_B": 1.3, "lambda_s": 0.15, "Fr": 1.8}

@@ -187,7 +187,7 @@ def test_minimum_equal_to_maximum_fixes(write):
 
 @pytest.mark.parametrize("path", sorted(set(Path("problems").glob("*.toml")) - STUDIES), ids=lambda p: p.stem)
 def test_every_problem_in_the_repository_loads(path):
-    assert tmsopt.load(path, asks=False).title
+    assert tmsopt.load(path).title
 
 
 def test_a_study_is_told_from_a_problem():

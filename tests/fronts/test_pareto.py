@@ -18,6 +18,7 @@ import tmsopt
 from tmsopt import InputError, NotSolved, Problem
 from tmsopt.cli import main
 from tmsopt.models import tms
+from tmsopt.solver import solved
 
 subproblems = import_module("tmsopt.fronts.subproblems")
 
@@ -209,12 +210,12 @@ def test_a_gap_is_reported_where_it_is():
 def test_what_is_not_solved_is_reported_as_a_gap(monkeypatch):
     """Sub-problems with a limit between 1.5 and 2.5 are made to fail; the front is the whole box, 0 to 4."""
 
-    def failing(asked, **options):
-        found = tmsopt.solve(asked, **options)
+    def failing(asked, options):
+        found = solved(asked, options)
         values = (abs(float(text.split("<=")[1])) for text in asked.constraints.values())
         return replace(found, status="not_converged") if any(1.5 < v < 2.5 for v in values) else found
 
-    monkeypatch.setattr(subproblems, "solve", failing)
+    monkeypatch.setattr(subproblems, "solved", failing)
     found = tmsopt.pareto(problem(**WAVE, pareto=["chi_B", "-chi_B"]), 6)
     assert [g.failed for g in found.gaps] == [True]
     assert "try more starts" in found.gaps[0].reason

@@ -99,6 +99,7 @@ def test_search_finds_none_more_tolerant():
     assert -found == pytest.approx(BEST, abs=1e-7)  # around it
 
 
+@pytest.mark.slow
 def test_solver_finds_the_most_tolerant_design():
     design = tmsopt.solve(tmsopt.load("problems/tolerant.toml"), starts=6)
     assert design.status == "optimal"

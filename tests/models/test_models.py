@@ -13,8 +13,7 @@ import pytest
 import sympy
 from helpers.designs import designs
 from helpers.oracles import polynomial_60, polynomial_exact, symbolic_copo, weave_Fr_60
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from matplotlib.mathtext import MathTextParser
 from mpmath import mp
 
@@ -434,3 +433,19 @@ def test_tms_is_frozen() -> None:
     for item in (tms, NATIVE, NATIVE["Fr"], tms.quantities[0], NATIVE["Fr"].range):
         with pytest.raises(AttributeError):
             item.name = "other"  # type: ignore[misc]
+
+
+def test_what_stands_beside_a_dimensionless_number_is_that_number_in_si() -> None:
+    """Lengths are multiples of w, masses of m_B, speeds of √(g w), loads of the weight."""
+    native, scaled = tms.sets
+    design = {"Fr": 1.7, "mu": 0.3, "chi_B": 1.2, "chi_H": 0.9, "zeta_B": -0.6, "zeta_H": -0.3, "lambda_s": 0.4}
+    si = to_si(design, w=0.7, m_B=12.0)
+    values = Values(tms, scaled, si)
+    scales = {"m": si["w"], "kg": si["m_B"], "m/s": math.sqrt(si["g"] * si["w"]), "N": si["g"] * (12.0 + si["m_H"])}
+    pairs = {p.counterpart: (si[p.name], p.unit) for p in scaled.parameters if p.counterpart}
+    assert {*pairs, "lambda_s"} == set(native.names)
+    derived = {q.name: q.counterpart for q in tms.quantities if q.counterpart}
+    assert set(scaled.quantities) <= set(derived.values())
+    pairs |= {name: (q.value(values), q.unit) for name, q in derived.items()}
+    for name, (value, unit) in pairs.items():
+        assert value == pytest.approx(values[name] * scales[unit], rel=1e-14), name

@@ -64,7 +64,7 @@ def written(folder: Path, text: str, name: str = "own") -> Path:
 
 
 def loaded(folder: Path, text: str) -> tmsopt.Problem:
-    return tmsopt.load(written(folder, text), asks=False)
+    return tmsopt.load(written(folder, text))
 
 
 def command(*arguments: Any) -> Any:
@@ -271,7 +271,7 @@ def test_no_name_is_taken_twice() -> None:
 def test_a_statement_that_makes_no_model_is_placed(tmp_path: Path, statement: str, line: int, said: str) -> None:
     file = written(tmp_path, f"[model]\n{statement}\n{PARAMETERS}")
     with pytest.raises(tmsopt.InputError) as caught:
-        tmsopt.load(file, asks=False)
+        tmsopt.load(file)
     text = next(t for t in str(caught.value).splitlines() if said in t)
     assert text.startswith(f"{file}:{line}: model")
 

@@ -99,8 +99,7 @@ def test_heavily_damped_band_ends_on_the_ep_set():
     problem = tmsopt.Problem(tmsopt.models.tms, fixed={**fixed, "chi_B": math.sqrt(2), "lambda_s": tilt})
     data = growth(tmsopt.solve(problem))
     assert len(data.heavily_damped) == 1
-    # double roots are resolved to the square root of rounding, 1e-8 of the roots, and Fr alike
-    assert data.heavily_damped[0][1] == pytest.approx(float(laws.epset(-0.4, -0.2, tilt)), abs=1e-6)
+    assert data.heavily_damped[0][1] == pytest.approx(float(laws.epset(-0.4, -0.2, tilt)), rel=1e-12)
     assert data.stable[0][0] == pytest.approx(float(laws.Fr_c(1.0, math.sqrt(2), 1.0, -0.4, -0.2, tilt)), rel=1e-12)
 
 

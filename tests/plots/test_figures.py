@@ -49,7 +49,7 @@ from tmsopt.plots.paper import (
     full_window,
 )
 from tmsopt.records import Table
-from tmsopt.tracing import trace, varying
+from tmsopt.tracing import trace
 
 ROUNDING = 1e-13
 """Relative; a few hundred operations in double precision."""
@@ -610,9 +610,9 @@ def test_points_that_fall_together_share_a_label():
 
 
 def test_a_parameter_that_stays_the_same_is_no_axis():
-    found = trace(load("problems/ep_set.toml", asks=False), starts=4)
+    found = trace(load("problems/ep_set.toml"), starts=4)
     assert list(found.problem.free)[:2] == ["Fr", "chi_B"]
-    assert varying(found)[:2] == ["Fr", "lambda_s"]
+    assert found.varying[:2] == ["Fr", "lambda_s"]
 
 
 def test_a_link_stays_a_link(tmp_path):

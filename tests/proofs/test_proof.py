@@ -481,6 +481,24 @@ def test_the_wrong_structure_is_refused() -> None:
     assert all(p.reason for p in wrong)
 
 
+def test_an_EP3_that_a_last_bit_chooses_is_not_the_designs() -> None:
+    """Along the EP3s the tilt leaves that of the EP4 as (r − t)²: rounded to their side, it has one with roots 1e-8 apart.
+
+    At 1e-4 of a radian from there rounding has no say any more.
+    """
+    problem, design = solved("ep4").problem, dict(solved("ep4").parameters)
+    tilt = design["lambda_s"]
+    for bits in range(-4, 5):
+        near = {**design, "lambda_s": tilt + bits * math.ulp(tilt)}
+        assert prove_design(problem, near, "EP4").proved
+        refused = prove_design(problem, near, "EP3")
+        assert not refused.proved
+        assert "singular" in refused.reason
+    away = located("EP3", {"lambda_s": tilt - 1e-4}, {"Fr": (1.0, 3.0), "chi_B": (1.01, 3.0)})
+    proof = tmsopt.prove(away)
+    assert (proof.proved, proof.pattern) == (True, "EP3")
+
+
 def test_what_is_not_solved_is_not_proved() -> None:
     proof = tmsopt.prove(replace(solved("ep4"), status="infeasible"))
     assert not proof.proved

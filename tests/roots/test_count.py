@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from helpers import curves
 from helpers.oracles import certified_roots
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from tmsopt.roots import real_roots
 

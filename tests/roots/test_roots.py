@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 import sympy
 from helpers.oracles import certified_roots, discriminant_exact, roots_60, routh_exact
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from mpmath import mp
 
 from tmsopt.roots import (

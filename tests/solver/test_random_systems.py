@@ -7,14 +7,13 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from benchmarks.known import known
-from benchmarks.oscillators import System, random_system, random_systems
-from benchmarks.sections import SECTIONS
-from benchmarks.spectrum import confirmed, evolve, exact_polynomial, ideals, values_of, violation, worth
-from benchmarks.stages import started_at
+from benchmarks.command import SECTIONS
+from benchmarks.judges import System, confirmed_system, exact_polynomial, ideals, started_at, values_of
+from benchmarks.reports import Asked
+from benchmarks.rivals import evolve_system
+from benchmarks.suites import known, random_system, random_systems
 from tmsopt import Problem, models, solve
-from tmsopt.formulation import opposite
-from tmsopt.formulation import worth as start_worth
+from tmsopt.formulation import opposite, worth as start_worth
 
 SUITE = list(random_systems())
 KNOWN = known()
@@ -62,7 +61,7 @@ def test_judges_and_model_agree_on_the_polynomial(index: int) -> None:
     assert np.abs(coefficients / coefficients[0] - [int(c.p) / int(c.q) for c in exact]) == pytest.approx(
         0, abs=1e-11 * size.max()
     )
-    found, _ = worth(system, {n: np.array([x]) for n, x in design.items()})
+    found, _ = system.judged({n: np.array([x]) for n, x in design.items()})
     assert found["abscissa"][0] == pytest.approx(values_of(next(ideals(system, design)))["abscissa"], abs=1e-9)
 
 
@@ -70,23 +69,23 @@ def test_judges_and_model_agree_on_the_polynomial(index: int) -> None:
 def test_an_unfolding_has_its_exceptional_point_where_it_was_put(index: int) -> None:
     system = SUITE[index]
     cost = eval(system.goal["minimize"], {}, dict(system.known))
-    assert confirmed(system, system.known, cost)
+    assert confirmed_system(system, system.known, cost)
     assert KNOWN[index].value <= cost  # the cheapest one costs no more than the one that is known
     moved = {**system.known, "x1": system.known["x1"] + 0.01}
-    assert not confirmed(system, moved, eval(system.goal["minimize"], {}, moved))
+    assert not confirmed_system(system, moved, eval(system.goal["minimize"], {}, moved))
 
 
-def test_only_the_value_of_the_multiple_root_is_confirmed() -> None:
+def test_only_the_value_of_the_multiple_root_is_confirmed_system() -> None:
     d = 2 * math.sqrt(2)
-    assert confirmed(DAMPED, {"d": d}, -math.sqrt(2))
-    assert not confirmed(DAMPED, {"d": d}, -math.sqrt(2) - 1e-6)
-    assert not confirmed(DAMPED, {"d": d * (1 + 1e-6)}, -math.sqrt(2))
-    assert confirmed(DAMPED, {"d": 2.0}, -1.0)
+    assert confirmed_system(DAMPED, {"d": d}, -math.sqrt(2))
+    assert not confirmed_system(DAMPED, {"d": d}, -math.sqrt(2) - 1e-6)
+    assert not confirmed_system(DAMPED, {"d": d * (1 + 1e-6)}, -math.sqrt(2))
+    assert confirmed_system(DAMPED, {"d": 2.0}, -1.0)
 
 
 def test_evolution_finds_the_critical_damping() -> None:
     """To the square root of the rounding unit, as eigenvalues of a double root do."""
-    found = evolve(DAMPED)
+    found = evolve_system(DAMPED)
     assert found.parameters["d"] == pytest.approx(2 * math.sqrt(2), rel=1e-6)
     assert found.reached(-math.sqrt(2) * (1 - 1e-3)) <= found.seconds
     assert found.reached(-2.0) == math.inf
@@ -95,7 +94,7 @@ def test_evolution_finds_the_critical_damping() -> None:
 @pytest.mark.parametrize("index", SOME)
 def test_a_kept_value_is_that_of_its_design(index: int) -> None:
     system, one = SUITE[index], KNOWN[index]
-    assert confirmed(system, one.parameters, one.value)
+    assert confirmed_system(system, one.parameters, one.value)
     assert all(lo <= one.parameters[n] <= hi for n, (lo, hi) in system.free.items())
 
 
@@ -105,7 +104,7 @@ def test_every_system_has_a_kept_value() -> None:
 
 
 def test_the_section_runs() -> None:
-    report = next(s for s in SECTIONS if s.name == "random").report()("python", True)
+    report = next(s for s in SECTIONS if s.name == "random").report()(Asked("random", quick=True))
     assert "| systems | 3 |" in report
     assert "### By degree" in report
     assert "of 3 (100.0 %)" in report
@@ -191,4 +190,4 @@ def test_limits_of_the_suite_are_met_by_some_design() -> None:
         plain = {n: np.array([x]) for n, x in one.parameters.items()}
         roots = {"abscissa": np.array([-math.inf]), "damping_ratio": np.array([1.0])}  # those are judged elsewhere
         if "roots" not in system.constraints:
-            assert violation(system, {**plain, **roots})[0] <= 1e-9
+            assert system.violation({**plain, **roots})[0] <= 1e-9

@@ -3,7 +3,7 @@
 import math
 import pickle
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import FrozenInstanceError, fields, replace
 
 import numpy as np
 import pytest
@@ -13,8 +13,7 @@ import tmsopt
 from tmsopt import laws
 from tmsopt.checks import omega0_bound
 from tmsopt.design import freedom
-from tmsopt.formulation import abscissa as abscissa_nlp
-from tmsopt.formulation import matching
+from tmsopt.formulation import AskedOfSolve, Options, abscissa as abscissa_nlp, matching
 from tmsopt.roots import PATTERNS, backward_error, pattern_distance, roots
 
 TMS = tmsopt.models.tms
@@ -292,6 +291,14 @@ def test_silence(capfd, linear_solver):
 def test_other_linear_solvers_are_refused():
     with pytest.raises(ValueError, match="mumps spral"):
         tmsopt.solve(ep4_problem(), linear_solver="ma27")
+
+
+def test_a_misspelt_option_is_refused_with_the_nearest_name():
+    with pytest.raises(TypeError, match="did you mean 'starts'"):
+        tmsopt.solve(ep4_problem(), start=3)
+    with pytest.raises(TypeError, match="unknown option 'near'; accepted: starts seed linear_solver progress"):
+        tmsopt.compare(ep4_problem(), near={})
+    assert list(AskedOfSolve.__annotations__) == [field.name for field in fields(Options)]
 
 
 def test_seeded_runs_are_identical_and_threads_do_not_share_solvers():

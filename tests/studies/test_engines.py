@@ -158,6 +158,7 @@ def test_nothing_is_left_when_nobody_listens(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 @pytest.mark.skipif(sys.platform == "win32", reason="signals to process groups")
+@pytest.mark.usefixtures("interruptible")
 def test_workers_end_with_the_program(how: signal.Signals, tmp_path: Path) -> None:
     """Ctrl-C reaches all processes of a terminal at once, kill -9 only the program; neither leaves anything."""
     from helpers import works
@@ -173,7 +174,11 @@ def test_workers_end_with_the_program(how: signal.Signals, tmp_path: Path) -> No
     assert program.stdout is not None
     workers = [int(program.stdout.readline()) for _ in range(2)]
     (os.killpg if how is signal.SIGINT else os.kill)(program.pid, how)
-    out, err = program.communicate(timeout=30)
+    try:
+        out, err = program.communicate(timeout=30)
+    except subprocess.TimeoutExpired:
+        os.killpg(program.pid, signal.SIGKILL)  # or it would work on beside all other tests
+        raise
     assert (out, err) == ("interrupted\n" if how is signal.SIGINT else "", "")
     until = time.monotonic() + 20
     while any(_running(pid) for pid in workers) and time.monotonic() < until:

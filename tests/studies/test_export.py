@@ -14,7 +14,7 @@ import pytest
 
 from tmsopt.errors import InputError
 from tmsopt.records import Table
-from tmsopt.studies import ENDINGS, Row, check_export, columns, export
+from tmsopt.studies import FORMATS, Row, check_export, columns, export
 
 SPECIAL = (
     0.1,
@@ -72,7 +72,7 @@ def bits(value: Any) -> bytes:
     return struct.pack("<d", math.nan if value in ("", None) else float(value))
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("ending", FORMATS)
 def test_every_double_comes_back_bit_by_bit(ending: str, tmp_path: Path) -> None:
     path = tmp_path / f"rows.{ending}"
     export(iter(ROWS), path, METADATA)
@@ -157,7 +157,7 @@ def test_rows_that_fill_no_grid_have_none(points: list[tuple[float, float]], tmp
         read_netcdf(path, "grid")
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("ending", FORMATS)
 def test_no_rows_are_a_table_too(ending: str, tmp_path: Path) -> None:
     path = tmp_path / f"rows.{ending}"
     export([], path)
@@ -194,7 +194,7 @@ def test_files_that_cannot_be_written(tmp_path: Path) -> None:
     assert "no regular file" in refusal(lambda: export(ROWS, tmp_path / "folder.csv"))
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("ending", FORMATS)
 def test_a_file_is_replaced_as_a_whole_or_not_at_all(ending: str, tmp_path: Path) -> None:
     path = tmp_path / f"rows.{ending}"
     path.write_text("before")

@@ -15,23 +15,24 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from importlib import import_module
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
+from tmsopt.disk import lock
 from tmsopt.errors import InputError
 from tmsopt.records import Table
 from tmsopt.studies import Row
-from tmsopt.studies.store import Store, journal, lock, open_store, read_store
+from tmsopt.studies.store import open_store, read_store
 
 database = import_module("tmsopt.studies.store.database")
-locking = import_module("tmsopt.studies.store.locking")
 store = import_module("tmsopt.studies.store.store")
 
-JOURNALS = ("wal", "delete")
+TASKS = ("write", "log")
+"""Of a process: write, and write with the write-ahead log that earlier versions had."""
 STUDY: dict[str, Any] = {
     "problem": {"parameters": {"mu": 0.1, "zeta_B": -0.4}, "objective": {"minimize": "abscissa"}},
     "columns": {"mu": [0.1, 0.2, 0.3], "zeta_B": [-0.4, -0.5, -0.6]},
@@ -80,10 +81,11 @@ import os, random, sys, time
 from pathlib import Path
 sys.path[:0] = [str(Path(place).resolve()) for place in ("tests", "tests/studies")]
 from test_store import STUDY, row, store
-journal, path, task = sys.argv[1:]
-store.journal = lambda folder: journal
+path, task = sys.argv[1:]
 with store.open_store(path, STUDY) as opened:
-    print(opened.journal, os.getpid(), flush=True)
+    print(os.getpid(), flush=True)
+    if task == "log":  # as earlier versions wrote
+        opened._connection.execute("PRAGMA journal_mode=WAL")
     if task == "hold":
         time.sleep(60)
     if task == "fork":
@@ -100,15 +102,13 @@ with store.open_store(path, STUDY) as opened:
 
 
 @contextmanager
-def writer(journal: str, path: Path, task: str = "write") -> Iterator[tuple[subprocess.Popen[str], int]]:
+def writer(path: Path, task: str = "write") -> Iterator[tuple[subprocess.Popen[str], int]]:
     """A process that has the store open, and its id; killed with SIGKILL in the end."""
-    command = [sys.executable, "-c", WRITER, journal, str(path), task]
+    command = [sys.executable, "-c", WRITER, str(path), task]
     root = Path(__file__).parents[2]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=root, start_new_session=True)
     try:
-        kept, number = process.stdout.readline().split()
-        assert kept == journal
-        yield process, int(number)
+        yield process, int(process.stdout.readline())
     finally:
         process.kill()
         process.stdout.read()
@@ -116,12 +116,12 @@ def writer(journal: str, path: Path, task: str = "write") -> Iterator[tuple[subp
         process.stdout.close()
 
 
-@pytest.mark.parametrize("journal", JOURNALS)
-def test_no_acknowledged_row_is_lost_by_kill_9(journal: str, path: Path) -> None:
+@pytest.mark.parametrize("task", TASKS)
+def test_no_acknowledged_row_is_lost_by_kill_9(task: str, path: Path) -> None:
     """The process prints how many rows `add` has acknowledged; whatever it printed must be there, row by row."""
-    chance, acknowledged = random.Random(journal), 0
+    chance, acknowledged = random.Random(task), 0
     for _ in range(4):
-        with writer(journal, path) as (process, _):
+        with writer(path, task) as (process, _):
             time.sleep(chance.uniform(0, 0.05))
             process.kill()
             printed = process.stdout.read().split("\n")[:-1]  # the last line may be cut off
@@ -136,21 +136,22 @@ def test_no_acknowledged_row_is_lost_by_kill_9(journal: str, path: Path) -> None
     assert acknowledged > 0
 
 
-@pytest.mark.parametrize("journal", JOURNALS)
-def test_reading_while_another_process_writes(journal: str, path: Path) -> None:
-    with writer(journal, path) as (process, _):
+@pytest.mark.parametrize("task", TASKS)
+def test_reading_while_another_process_writes(task: str, path: Path) -> None:
+    with writer(path, task) as (process, _):
         for _ in range(5):
             acknowledged = int(process.stdout.readline())
             with read_store(path) as opened:
-                assert len(opened.done()) >= acknowledged
-                assert [r.number for r in opened.rows()][:acknowledged] == list(range(acknowledged))
+                there = len(opened.done())
+                assert there >= acknowledged
+                assert [r.number for r in islice(opened.rows(), there)] == list(range(there))  # more are being written
                 assert sum(opened.counts().values()) >= acknowledged
 
 
-@pytest.mark.parametrize("journal", JOURNALS)
-def test_a_store_is_recognised_while_another_process_writes(journal: str, path: Path) -> None:
+@pytest.mark.parametrize("task", TASKS)
+def test_a_store_is_recognised_while_another_process_writes(task: str, path: Path) -> None:
     """While it grows its first page may promise more pages than the file has yet."""
-    with writer(journal, path):
+    with writer(path, task):
         for _ in range(500):
             database.check(path)
 
@@ -163,9 +164,8 @@ def test_a_store_is_recognised_though_its_writer_was_killed_while_it_grew(path: 
     database.check(path)
 
 
-@pytest.mark.parametrize("journal", JOURNALS)
-def test_a_second_writer_is_refused_until_the_first_is_gone(journal: str, path: Path) -> None:
-    with writer(journal, path, "hold") as (process, number):
+def test_a_second_writer_is_refused_until_the_first_is_gone(path: Path) -> None:
+    with writer(path, "hold") as (process, number):
         message = refusal(lambda: open_store(path, STUDY))
         assert f"process {number} on {store.host()}" in message
         assert "another --store" in message
@@ -182,7 +182,7 @@ def test_a_second_writer_is_refused_until_the_first_is_gone(journal: str, path: 
 
 @posix
 def test_a_forked_child_of_a_killed_writer_holds_no_lock(path: Path) -> None:
-    with writer("wal", path, "fork") as (process, _):
+    with writer(path, "fork") as (process, _):
         assert process.stdout.readline() == "forked\n"
         process.kill()
         process.wait()
@@ -289,9 +289,8 @@ def test_a_hundred_thousand_rows(tmp_path: Path) -> None:
         assert opened.counts() == {"optimal": 105_000}
 
 
-def test_the_rows_are_ahead_of_a_reader_that_pauses(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_rows_are_ahead_of_a_reader_that_pauses(path: Path) -> None:
     """A rollback journal cannot be committed while somebody is reading: reading takes breaks."""
-    monkeypatch.setattr(store, "journal", lambda folder: "delete")
     with open_store(path, STUDY) as opened:
         opened.add([row(n) for n in range(2000)])
         with read_store(path) as reading:
@@ -330,14 +329,14 @@ def changed(**given: Any) -> dict[str, Any]:
     ("other", "line"),
     [
         (changed(seed=8), "seed: 7 in the store, 8 in the file"),
-        (changed(title="x"), 'title: absent in the store, "x" in the file'),
+        (changed(title="x"), 'title: none in the store, "x" in the file'),
         (
             changed(problem={"parameters": {"mu": 0.2, "zeta_B": -0.4}, "objective": {"minimize": "abscissa"}}),
             "problem.parameters.mu: 0.1 in the store, 0.2 in the file",
         ),
         (
             changed(problem={"parameters": {"mu": 0.1, "zeta_B": -0.4}}),
-            'problem.objective: {"minimize": "abscissa"} in the store, absent in the file',
+            'problem.objective: {"minimize": "abscissa"} in the store, none in the file',
         ),
         (
             changed(columns=STUDY["columns"] | {"mu": [0.1, 0.25, 0.35]}),
@@ -347,7 +346,7 @@ def changed(**given: Any) -> dict[str, Any]:
             changed(columns=STUDY["columns"] | {"mu": [0.1, 0.2]}),
             "columns.mu: 3 values in the store, 2 in the file",
         ),
-        (changed(columns={"mu": [0.1, 0.2, 0.3]}), "columns.zeta_B: 3 values in the store, absent in the file"),
+        (changed(columns={"mu": [0.1, 0.2, 0.3]}), "columns.zeta_B: 3 values in the store, none in the file"),
     ],
 )
 def test_the_store_of_a_changed_study_is_refused(path: Path, other: dict[str, Any], line: str) -> None:
@@ -385,7 +384,7 @@ def test_fresh_moves_aside_and_never_deletes(path: Path) -> None:
 
 
 def test_fresh_keeps_what_a_killed_writer_left_in_its_log(path: Path) -> None:
-    with writer("wal", path) as (process, _):
+    with writer(path, "log") as (process, _):
         acknowledged = [int(process.stdout.readline()) for _ in range(3)][-1]
         process.kill()
         process.wait()
@@ -407,7 +406,7 @@ def test_fresh_leaves_no_journal_beside_what_it_moves(path: Path) -> None:
 
 
 def test_a_log_beside_a_store_that_is_gone_is_not_played_into_the_new_one(path: Path) -> None:
-    with writer("wal", path) as (process, _):
+    with writer(path, "log") as (process, _):
         process.stdout.readline()
         process.kill()
         process.wait()
@@ -526,12 +525,10 @@ def test_a_damaged_definition_is_said_to_be(path: Path) -> None:
 
 
 @posix
-@pytest.mark.parametrize("kind", JOURNALS)
-def test_a_full_disk_costs_no_row_that_was_acknowledged(path: Path, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_costs_no_row_that_was_acknowledged(path: Path) -> None:
     """A limit on the size of files stands for the disk: SQLite calls the one an I/O error and the other full."""
     import resource
 
-    monkeypatch.setattr(store, "journal", lambda folder: kind)
     with open_store(path, STUDY) as opened:
         opened.add([row(0)])
         soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -554,37 +551,27 @@ def test_a_full_disk_costs_no_row_that_was_acknowledged(path: Path, kind: str, m
 # Journals
 
 
-def test_a_write_ahead_log_is_probed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert journal(tmp_path) == "wal"
-    assert journal(tmp_path / "absent") == "delete"
-    monkeypatch.setattr("tmsopt.studies.store.locking._type", lambda folder: "nfs4")
-    assert journal(tmp_path) == "delete"
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="the table of mounts is Linux's")
-def test_the_file_system_of_a_folder(tmp_path: Path) -> None:
-    mounts = tmp_path / "mounts"
-    mounts.write_text(
-        "/dev/a / ext4 rw 0 0\nhost:/x /data nfs4 rw 0 0\n/dev/b /data/my\\040disk xfs rw 0 0\nt /late nfs rw 0 0\n/dev/c /late ext4 rw 0 0\n"
-    )
-    found = [
-        locking._type(Path(p), mounts) for p in ("/home", "/data", "/data/x", "/database", "/data/my disk/y", "/late")
-    ]
-    assert found == ["ext4", "nfs4", "nfs4", "ext4", "xfs", "ext4"]
-
-
-@pytest.mark.parametrize("kind", JOURNALS)
-def test_a_closed_store_is_one_plain_file(path: Path, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_closed_store_is_one_plain_file(path: Path) -> None:
     """So that it can be copied, and read where nothing can be written."""
-    monkeypatch.setattr(store, "journal", lambda folder: kind)
-    opened: Store
     with open_store(path, STUDY) as opened:
         opened.add([row(0)])
-        assert opened.journal == kind
     assert [p.name for p in path.parent.iterdir()] == [path.name]
     with closing(sqlite3.connect(f"{path.as_uri()}?mode=ro&immutable=1", uri=True)) as connection:
         assert connection.execute("SELECT count(*) FROM rows").fetchone() == (1,)
+
+
+def test_a_store_of_an_earlier_version_is_written_also_while_somebody_reads_it(path: Path) -> None:
+    """Those had a write-ahead log. It goes with the first writer whom no reader hinders, and no row with it."""
+    with writer(path, "log") as (process, _):
+        acknowledged = int(process.stdout.readline())
+    with read_store(path) as reading:
+        with open_store(path, STUDY) as opened:
+            before = opened.done()
+            opened.add([row(len(before))])
+        assert reading.done() == before | {len(before)} >= set(range(acknowledged))
+    with open_store(path, STUDY) as opened:
+        assert opened.done() == before | {len(before)}
+    assert [p.name for p in path.parent.iterdir()] == [path.name]
 
 
 KILLED = """
@@ -602,12 +589,14 @@ def killed_after(events):
     sys.addaudithook(hook)
 
 store.versions = dict  # reading them takes longer than all else here
-store.journal, path, moment, added = (lambda folder, kind=sys.argv[1]: kind), sys.argv[2], 0, 0
+path, log, moment, added = sys.argv[1], sys.argv[2] == "log", 0, 0
 while True:
     with store.open_store(path, STUDY) as opened:
         if not opened.done():
             opened.add([row(0)])
             added += 1
+        if log:
+            opened._connection.execute("PRAGMA journal_mode=WAL")
     child = os.fork()
     if not child:
         killed_after(moment)
@@ -621,13 +610,13 @@ print(moment, added)
 
 
 @posix
-@pytest.mark.parametrize("kind", JOURNALS)
-def test_killed_at_every_step_of_moving_aside(path: Path, kind: str) -> None:
+@pytest.mark.parametrize("task", TASKS)
+def test_killed_at_every_step_of_moving_aside(path: Path, task: str) -> None:
     """Killed before each file that is opened, renamed or removed: every row is in some store, and no other file stays.
 
     Rows stay in the store under its name, or under the next number; the last process gets to its end.
     """
-    command, root = [sys.executable, "-c", KILLED, kind, str(path)], Path(__file__).parents[2]
+    command, root = [sys.executable, "-c", KILLED, str(path), task], Path(__file__).parents[2]
     moments, added = map(int, subprocess.run(command, cwd=root, check=True, stdout=subprocess.PIPE).stdout.split())
     with open_store(path, STUDY) as opened:
         assert opened.done() == set()

@@ -407,6 +407,8 @@ def test_the_command_refuses_what_it_cannot_do(file: Path) -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 @pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGINT])
+@pytest.mark.slow
+@pytest.mark.usefixtures("interruptible")
 def test_a_killed_command_goes_on(file: Path, ending: signal.Signals) -> None:
     """Killed once some rows are stored, then run again: those rows are there, and all rows are as if nothing happened."""
     many = FILE.replace("zeta_H = [-0.2, -0.3, -0.35]", "zeta_H = { min = -0.35, max = -0.2, points = 36 }")

@@ -405,7 +405,7 @@ def test_columns_of_unknowns_are_told_from_parameters_of_the_same_name():
 )
 def test_curves_of_the_benchmark_bicycle_start_at_its_published_speeds(name, speed, root):
     """Meijaard et al. (2007), with the trail c = 0.08 m of the benchmark as the end of the box."""
-    fixed = load("problems/whipple_benchmark.toml", asks=False).fixed
+    fixed = load("problems/whipple_benchmark.toml").fixed
     rest = {n: value for n, value in fixed.items() if n not in ("v", "c")}
     branch = only(traced(whipple, name, {"v": (0.1, 10.0), "c": (0.08, 0.15)}, rest))
     (end,) = (e for e in branch.events if e.detail == "c.min")

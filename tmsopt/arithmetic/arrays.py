@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.arithmetic.operations import ARRAYS
-from tmsopt.arithmetic.walk import Arithmetic, NotAccepted, Step, operation_name, steps
+from tmsopt.arithmetic.walk import Arithmetic, Instruction, NotAccepted, operation_name, steps
 from tmsopt.records import Array
 
 BLOCK = 2**14
@@ -43,7 +43,7 @@ _OPERATIONS: Arithmetic = {**ARRAYS, ca.OP_POW: _power, ca.OP_CONSTPOW: _power}
 class Program:
     """Steps of a function of one vector to one vector, in an order in which they can be computed."""
 
-    steps: tuple[Step, ...]
+    steps: tuple[Instruction, ...]
 
     @property
     def arguments(self) -> set[int]:
@@ -69,7 +69,7 @@ class Program:
                     known[k] = _leaf(step, given)
                 elif step.operation not in (ca.OP_INPUT, ca.OP_OUTPUT) and all(o in known for o in step.operands):
                     known[k] = _OPERATIONS[step.operation](*[known[o] for o in step.operands])
-        constants = {k: Step(ca.OP_CONST, constant=value) for k, value in known.items()}
+        constants = {k: Instruction(ca.OP_CONST, constant=value) for k, value in known.items()}
         return _pruned([constants.get(k, step) for k, step in enumerate(self.steps)])
 
     def _results(self, given: Mapping[int, Any], into: Mapping[int, Array]) -> list[Any]:
@@ -131,7 +131,7 @@ def program(function: ca.Function) -> Program:
     return _pruned(taken)
 
 
-def _pruned(taken: Sequence[Step]) -> Program:
+def _pruned(taken: Sequence[Instruction]) -> Program:
     """Without the steps that no result needs."""
     needed: set[int] = set()
     for k in range(len(taken) - 1, -1, -1):
@@ -141,7 +141,7 @@ def _pruned(taken: Sequence[Step]) -> Program:
     return Program(tuple(replace(taken[k], operands=tuple(place[o] for o in taken[k].operands)) for k in place))
 
 
-def _leaf(step: Step, given: Mapping[int, Any]) -> Any:
+def _leaf(step: Instruction, given: Mapping[int, Any]) -> Any:
     return np.asarray(given[step.place[1]], dtype=float)[()] if step.operation == ca.OP_INPUT else step.constant
 
 

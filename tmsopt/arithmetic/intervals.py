@@ -7,6 +7,7 @@ from typing import Any
 import casadi as ca
 import flint
 
+from tmsopt.arithmetic.operations import BALLS
 from tmsopt.arithmetic.walk import Arithmetic, walk
 
 Interval = tuple[float, float]
@@ -35,7 +36,7 @@ def ranges(function: ca.Function, box: Sequence[Interval]) -> list[list[Interval
     Raises:
         NotAccepted: for an operation that has no interval arithmetic here.
     """
-    return [[interval(x) for x in row] for row in walk(function, [ball(ends) for ends in box], BALLS)]
+    return [[interval(x) for x in row] for row in walk(function, [ball(ends) for ends in box], INTERVALS)]
 
 
 def root_bound(coefficients: Sequence[Interval]) -> float:
@@ -59,41 +60,23 @@ def square(x: Any) -> Any:
     return (x.abs_lower() ** 2).union(x.abs_upper() ** 2) if x.is_finite() else flint.arb(0, math.inf)
 
 
-def power(x: Any, y: Any) -> Any:
+def _power(x: Any, y: Any) -> Any:
     """x to the power y; whole powers of any x."""
     if y.is_integer():
         exponent = int(float(y))
         if exponent < 0:
-            return 1 / power(x, flint.arb(-exponent))
+            return 1 / _power(x, flint.arb(-exponent))
         if exponent % 2 == 0:
             return square(x ** (exponent // 2))
         return x**exponent
     return x**y
 
 
-BALLS: Arithmetic = {
+INTERVALS: Arithmetic = {
+    **BALLS,
     ca.OP_CONST: flint.arb,
-    ca.OP_ADD: lambda a, b: a + b,
-    ca.OP_SUB: lambda a, b: a - b,
-    ca.OP_MUL: lambda a, b: a * b,
-    ca.OP_DIV: lambda a, b: a / b,
-    ca.OP_NEG: lambda a: -a,
     ca.OP_SQ: square,
-    ca.OP_TWICE: lambda a: 2 * a,
-    ca.OP_INV: lambda a: 1 / a,
-    ca.OP_POW: power,
-    ca.OP_CONSTPOW: power,
-    ca.OP_SQRT: lambda a: a.sqrt(),
-    ca.OP_EXP: lambda a: a.exp(),
-    ca.OP_LOG: lambda a: a.log(),
-    ca.OP_SIN: lambda a: a.sin(),
-    ca.OP_COS: lambda a: a.cos(),
-    ca.OP_TAN: lambda a: a.tan(),
-    ca.OP_ASIN: lambda a: a.asin(),
-    ca.OP_ACOS: lambda a: a.acos(),
-    ca.OP_ATAN: lambda a: a.atan(),
-    ca.OP_FABS: abs,
-    ca.OP_FMAX: lambda a, b: a.max(b),
-    ca.OP_FMIN: lambda a, b: a.min(b),
+    ca.OP_POW: _power,
+    ca.OP_CONSTPOW: _power,
 }
-"""Operations on balls."""
+"""Operations on balls as wide as a box, where an even power must not reach below 0."""

@@ -56,7 +56,7 @@ def walk(
 
 
 @dataclass(frozen=True)
-class Step:
+class Instruction:
     """One instruction of a function.
 
     Attributes:
@@ -72,7 +72,7 @@ class Step:
     constant: Any = 0.0
 
 
-def steps(function: ca.Function) -> Iterator[Step]:
+def steps(function: ca.Function) -> Iterator[Instruction]:
     """The instructions, with the numbers of steps in place of registers, which CasADi uses again."""
     held: dict[int, int] = {}
     for k in range(function.n_instructions()):
@@ -80,14 +80,14 @@ def steps(function: ca.Function) -> Iterator[Step]:
         inputs, outputs = function.instruction_input(k), function.instruction_output(k)
         match operation:
             case ca.OP_INPUT:
-                yield Step(operation, place=(inputs[0], inputs[1]))
+                yield Instruction(operation, place=(inputs[0], inputs[1]))
             case ca.OP_OUTPUT:
-                yield Step(operation, (held[inputs[0]],), place=(outputs[0], outputs[1]))
+                yield Instruction(operation, (held[inputs[0]],), place=(outputs[0], outputs[1]))
                 continue
             case ca.OP_CONST:
-                yield Step(operation, constant=function.instruction_constant(k))
+                yield Instruction(operation, constant=function.instruction_constant(k))
             case _:
-                yield Step(operation, tuple(held[r] for r in inputs))
+                yield Instruction(operation, tuple(held[r] for r in inputs))
         held[outputs[0]] = k
 
 

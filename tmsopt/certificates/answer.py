@@ -10,8 +10,8 @@ import numpy as np
 
 from tmsopt.arithmetic.intervals import ranges
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.certificates.processes import Crew
 from tmsopt.certificates.question import Question
+from tmsopt.certificates.race import Crew
 from tmsopt.certificates.scip import FOUND, INFEASIBLE, UNDECIDED, Decision, Task, task
 from tmsopt.design.solution import Solution
 from tmsopt.formulation.formulate import design_of, variables_of
@@ -26,13 +26,13 @@ _FIRST = 2.0  # seconds for the first turn, twice as many for each that follows
 _WAYS = (((1.0, False), (1.0, True)), ((4.0, False), (0.25, False)), ((16.0, False), (4.0, True)))
 """Turns: units, as multiples of the usual one, and whether compact."""
 
-Progress = Callable[[float, float], None]
+SecondsPassed = Callable[[float, float], None]
 
 
 class Clock:
     """Time and nodes that a proof has used."""
 
-    def __init__(self, seconds: float, crew: Crew, progress: Progress | None = None) -> None:
+    def __init__(self, seconds: float, crew: Crew, progress: SecondsPassed | None = None) -> None:
         self.seconds, self.crew, self.progress = seconds, crew, progress
         self.began = time.perf_counter()
         self.nodes = 0

@@ -6,21 +6,22 @@ from dataclasses import replace
 from functools import partial
 
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.certificates.answer import Answer, Clock, Progress, answer, contradicted, doubt
+from tmsopt.certificates.answer import Answer, Clock, SecondsPassed, answer, contradicted, doubt
 from tmsopt.certificates.half_planes import over
-from tmsopt.certificates.processes import Crew
 from tmsopt.certificates.question import Question
+from tmsopt.certificates.race import Crew
 from tmsopt.certificates.scip import FOUND, INFEASIBLE, UNDECIDED, available
 from tmsopt.certificates.translation import FEASIBILITY
 from tmsopt.checks.bound import instant_bound
 from tmsopt.checks.recheck import recheck
 from tmsopt.design.cases import Case
-from tmsopt.design.problem import Problem, checked, unasked
+from tmsopt.design.files import Given, question_of
+from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.design.solution import Bound, Solution
 from tmsopt.errors import Fault, InputError
-from tmsopt.formulation.builder import Builder
-from tmsopt.solver.solve import solve
+from tmsopt.formulation.formulate import Builder
+from tmsopt.solver.solve import solve, solved
 
 SECONDS = 60.0
 """Time for a proof, by default."""
@@ -40,14 +41,14 @@ _STARTS = 4  # from SCIP's design, and others
 _NEARLY = 1e-3  # violation and loss beyond which a design that SCIP found is none
 
 
-def certify(design: Solution | Problem, *, seconds: float = SECONDS, progress: Progress | None = None) -> Solution:
+def certify(design: Given, *, seconds: float = SECONDS, progress: SecondsPassed | None = None) -> Solution:
     """The same design with a bound that no design of the box can beat; or a better design, where one is found.
 
     SCIP is asked whether any design does better than this one by a gap; the answer no is the bound. It is a proof in
     floating-point arithmetic, to SCIP's feasibility tolerance. Of an infeasible problem, it is a proof that it is.
 
     Args:
-        design: what `solve` found, with throw=False where that is no optimum; or a problem, which is solved first.
+        design: what `solve` found, with throw=False where that is no optimum; or a problem or its file, solved first.
         seconds: for the whole proof.
         progress: called with the seconds that passed and those there are.
 
@@ -57,25 +58,22 @@ def certify(design: Solution | Problem, *, seconds: float = SECONDS, progress: P
     check_installed()
     if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0 < seconds < math.inf:
         raise InputError([Fault(f"found {seconds!r}; accepted: a positive number of seconds", ("seconds",))])
-    if not isinstance(design, Solution):
-        design = solve(checked(design), throw=False)
-    problem = design.problem
-    if faults := unasked(problem):
-        raise InputError(faults)
+    found = solved(design)
+    problem = question_of(found)
     if not problem.free:
-        return _noted(design, "nothing is free, so there is nothing to bound")
-    if problem.objective is None and design.status == "optimal":
-        return _noted(design, "nothing is minimised or maximised, so there is nothing to bound")
+        return _noted(found, "nothing is free, so there is nothing to bound")
+    if problem.objective is None and found.status == "optimal":
+        return _noted(found, "nothing is minimised or maximised, so there is nothing to bound")
     with Crew() as crew:
         clock = Clock(seconds, crew, progress)
         try:
             for _ in range(_REPLACED):
-                design, replaced = (_bounded if design.status == "optimal" else _excluded)(design, clock)
+                found, replaced = (_bounded if found.status == "optimal" else _excluded)(found, clock)
                 if not replaced:
                     break
         except NotAccepted as error:
-            return _noted(design, f"branch and bound cannot take {error}, so there is no bound")
-        return _noted(design, "the proof was interrupted") if clock.interrupted else design
+            return _noted(found, f"branch and bound cannot take {error}, so there is no bound")
+        return _noted(found, "the proof was interrupted") if clock.interrupted else found
 
 
 def check_installed() -> None:
@@ -159,21 +157,21 @@ def _over_the_box(design: Solution) -> Bound:
     build = Builder(problem, _cases(design))
     build.optimise()
     lower, upper = over(build, [build.objective])[0]  # of the negative, where it is maximised
-    sense = _sense(problem)
+    sense = problem.sign
     gap = max(sense * design.value - lower, 0.0)
     return Bound(sense * lower, gap, gap == 0, "interval") if math.isfinite(lower) and upper >= lower else Bound()
 
 
 def _question(design: Solution, level: float) -> Question:
     """Whether any design is better by a gap of some level."""
-    limit = design.value - _sense(design.problem) * _gap(design.value, level)
+    limit = design.value - design.problem.sign * _gap(design.value, level)
     return Question(design.problem, _cases(design), limit, _unit(design))
 
 
 def _bound(design: Solution, level: float, clock: Clock) -> Bound:
     """What has been proved."""
     gap = _gap(design.value, level) if math.isfinite(level) else math.inf
-    value = design.value - _sense(design.problem) * gap if math.isfinite(gap) else -_sense(design.problem) * math.inf
+    value = design.value - design.problem.sign * gap if math.isfinite(gap) else -design.problem.sign * math.inf
     return Bound(value, gap, level <= PROVEN, "scip", clock.used, clock.nodes, FEASIBILITY)
 
 
@@ -217,11 +215,7 @@ def _gain(problem: Problem, known: float | None, value: float) -> float:
         return math.inf
     if not math.isfinite(value):
         return -math.inf
-    return _sense(problem) * (known - value) / max(_FLOOR, abs(known))
-
-
-def _sense(problem: Problem) -> float:
-    return -1.0 if problem.sense == "maximize" else 1.0
+    return problem.sign * (known - value) / max(_FLOOR, abs(known))
 
 
 def _gap(value: float, level: float) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 
 from tmsopt.arithmetic.intervals import Interval, ranges, root_bound
 from tmsopt.certificates.interlacing import interlace, squares_of, unknowns
-from tmsopt.formulation.builder import Builder
+from tmsopt.formulation.formulate import Builder
 from tmsopt.formulation.lifts import Lifted, quadratic_pairs
 from tmsopt.formulation.nlp import Lift
 from tmsopt.models import Model, Values
@@ -75,12 +75,11 @@ def over(build: Builder, expressions: Sequence[Any]) -> list[Interval]:
     return ranges(function, build.bounds)[0]
 
 
-def half_planes(
-    frame: Frame, build: Builder, covered: Sequence[int], values: Sequence[Values], line: float | None = None
-) -> Lifted:
+def half_planes(frame: Frame, build: Builder, line: float | None = None) -> Lifted:
     """Every root of every case at or left of a line: a known one, or a variable."""
+    covered, values = build.covered, build.values
     looked = [case for case in covered if case in frame.signs]
-    at = build.variable("abscissa", *_reach(frame, build, looked, values)) if line is None else line
+    at = build.variable("abscissa", *_reach(frame, build, looked)) if line is None else line
     for case in looked:
         c = frame.about(values, case, at)
         edges = interlace(build, case, c, frame.largest(over(build, c), case == covered[0]), frame.compact)
@@ -90,23 +89,23 @@ def half_planes(
     return Lifted(ca.SX(at), Lift("abscissa", size, partial(_half_plane_guess, frame, looked, line)), (), ())
 
 
-def _reach(frame: Frame, build: Builder, looked: Sequence[int], values: Sequence[Values]) -> tuple[float, float]:
+def _reach(frame: Frame, build: Builder, looked: Sequence[int]) -> tuple[float, float]:
     """Range of the abscissa: it is no larger than the largest root, unless that is one of a case not looked at."""
     most = max(
-        frame.unit * frame.largest(over(build, frame.coefficients(values, case)), case == looked[0]) for case in looked
+        frame.unit * frame.largest(over(build, frame.coefficients(build.values, case)), case == looked[0])
+        for case in looked
     )
-    return -most, most if len(values) == 1 or not frame.touching else math.inf
+    return -most, most if len(build.values) == 1 or not frame.touching else math.inf
 
 
-def sectors(
-    frame: Frame, build: Builder, covered: Sequence[int], values: Sequence[Values], ratio: float | None = None
-) -> Lifted:
+def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lifted:
     """Every root of every case with at least a damping ratio: p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ.
 
     A root s > 0 has ζ = −1, and with another s < 0 no such factor. Where ζ may be −1, the factors are s² + pᵢ s + qᵢ,
     with qᵢ = wᵢ² asked only of other ζ: (1 + ζ)(wᵢ² − qᵢ) = 0; where it is known to be, nothing is asked. An odd degree
     has one factor s + d more, d ≥ 0 asked only of other ζ: (1 + ζ)(e − d) = 0, e ≥ 0, e ≥ d.
     """
+    covered, values = build.covered, build.values
     zeta = build.variable("damping_ratio", -1.0, 1.0) if ratio is None else ratio
     looked = [case for case in covered if case in frame.signs and (ratio is None or ratio > -1)]
     size = int(ratio is None)
@@ -166,12 +165,7 @@ def _half_plane_guess(
 
 
 def _sector_guess(
-    frame: Frame,
-    covered: Sequence[int],
-    ratio: float | None,
-    unit: float,
-    values: Sequence[Values],
-    z: Sequence[Roots],
+    frame: Frame, covered: Sequence[int], ratio: float | None, unit: float, values: Sequence[Values], z: Sequence[Roots]
 ) -> list[list[float]]:
     """Damping ratio, if it is not known, and factors; the roots are given in the unit of the NLP."""
     factors = []

@@ -17,7 +17,7 @@ from tmsopt.design.dependence import tempts
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ROOT_NAMES
-from tmsopt.formulation.builder import Builder, Lifting
+from tmsopt.formulation.formulate import Builder, Lifting
 from tmsopt.formulation.nlp import NLP
 
 _DEEP = 99  # levels to which expressions are compared
@@ -81,11 +81,11 @@ class Question:
             value = self._known(name)
             if value is not None and name not in build.shared:
                 build.take(name, value)
-                build.lifts.append(lift(build, build.covered, build.values, value).lift)
+                build.lifts.append(lift(build, value).lift)
         build.constraints()
         if self.limit is not None:
             build.optimise()
-            sense = -1.0 if problem.sense == "maximize" else 1.0
+            sense = problem.sign
             build.row("limit", build.objective, -np.inf, sense * self.limit)
         build.objective = ca.SX(0)
         return build.finish("bound")
@@ -106,7 +106,7 @@ class Question:
 
 def _threshold(condition: Expression, name: str, worse: float) -> float | None:
     """The value that a comparison allows a quantity at worst, where it is linear in that and nothing else."""
-    if condition.names != (name,) or condition.comparison == "==":
+    if condition.names != (name,) or condition.equality:
         return None
     symbol = ca.SX.sym(name)
     difference = ca.SX(condition.symbolic({name: symbol}))
@@ -114,5 +114,4 @@ def _threshold(condition: Expression, name: str, worse: float) -> float | None:
         return None
     at = [float(condition({name: value})) for value in (0.0, 1.0)]
     slope = at[1] - at[0]
-    falls = -1.0 if condition.comparison == ">=" else 1.0
-    return -at[0] / slope if slope * falls * worse > 0 else None
+    return -at[0] / slope if slope * condition.sign * worse > 0 else None

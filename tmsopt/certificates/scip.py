@@ -53,6 +53,11 @@ def available() -> bool:
     return importlib.util.find_spec("pyscipopt") is not None
 
 
+def prepare() -> None:
+    """Load SCIP before the first task."""
+    import pyscipopt  # noqa: F401
+
+
 def task(nlp: NLP, seconds: float, *, least: bool = False, within: tuple[tuple[float, float], ...] = ()) -> Task:
     """An NLP for SCIP: whether it has any feasible point, or a bound on its objective."""
     bare = replace(nlp, lifts=(), touches={}, products=(), cases=())  # what SCIP does not need cannot always be pickled

@@ -11,7 +11,7 @@ from typing import Any
 import casadi as ca
 import flint
 
-from tmsopt.arithmetic.intervals import BALLS, ball, interval
+from tmsopt.arithmetic.intervals import INTERVALS, ball, interval
 from tmsopt.arithmetic.walk import NotAccepted, walk
 from tmsopt.certificates.terms import CANCELLED, Term, constant, refuse_huge, scale_of
 from tmsopt.formulation.nlp import NLP
@@ -139,7 +139,7 @@ class _Translation:
         }
 
     def sum(self, a: Term, b: Term, sign: float) -> Term:
-        over = BALLS[ca.OP_ADD](a.ball, sign * b.ball)
+        over = INTERVALS[ca.OP_ADD](a.ball, sign * b.ball)
         return Term(a.expression + sign * b.expression, max(a.degree, b.degree), over, max(a.size, b.size))
 
     def times(self, a: Term, factor: float) -> Term:
@@ -158,7 +158,7 @@ class _Translation:
         if a.degree == 0:
             return constant(a.expression**2)
         a = self.variable(a)
-        return Term(a.expression * a.expression, 2, BALLS[ca.OP_SQ](a.ball), a.size * a.size)
+        return Term(a.expression * a.expression, 2, INTERVALS[ca.OP_SQ](a.ball), a.size * a.size)
 
     def quotient(self, a: Term, b: Term) -> Term:
         """q with q b = a; where b may vanish, of any size."""
@@ -190,7 +190,7 @@ class _Translation:
         if abs(exponent) > _WHOLE:
             raise NotAccepted(f"a power with an exponent beyond {_WHOLE}")
         if a.degree > 0 and a.ball.is_finite():
-            refuse_huge(BALLS[ca.OP_POW](a.ball, b.ball), "a power")
+            refuse_huge(INTERVALS[ca.OP_POW](a.ball, b.ball), "a power")
         if exponent < 0:
             return self.quotient(constant(1.0), self.power(a, constant(-exponent)))
         if exponent != int(exponent):
@@ -220,12 +220,12 @@ class _Translation:
         if a.degree == 0:
             return constant(getattr(math, name)(a.expression))
         if name == "exp":
-            refuse_huge(BALLS[operation](a.ball), "exp")
+            refuse_huge(INTERVALS[operation](a.ball), "exp")
         if a.tangent is not None and name in ("sin", "cos"):
             cosine, sine = self.on_circle(a.tangent)
             return sine if name == "sin" else cosine
         a = self.variable(a)
-        v = self.defined(BALLS[operation](a.ball))
+        v = self.defined(INTERVALS[operation](a.ball))
         if name == "log":  # SCIP keeps the argument of its own away from 0
             self.scip.addCons(a.expression / a.scale == self.functions.exp(v.expression) / a.scale)
         else:
@@ -271,9 +271,9 @@ class _Translation:
     def inverse(self, a: Term, name: str, operation: int) -> Term:
         """An angle whose sine or cosine is given."""
         if a.degree == 0:
-            return constant(float(BALLS[operation](flint.arb(a.expression))))
+            return constant(float(INTERVALS[operation](flint.arb(a.expression))))
         ends = (-math.pi / 2, math.pi / 2) if name == "sin" else (0.0, math.pi)
-        over = BALLS[operation](a.ball)
+        over = INTERVALS[operation](a.ball)
         angle = self.defined(over) if over.is_finite() else self.free(*ends)
         self.scip.addCons(self.variable(a).expression == getattr(self.functions, name)(angle.expression))
         return angle

@@ -27,6 +27,7 @@ from tmsopt.charts.folder import (
 from tmsopt.charts.summary import Tally, total
 from tmsopt.charts.survey import LAYERS, USUAL, Grid, Survey, survey
 from tmsopt.charts.tiles import TILE, Memory, computed
+from tmsopt.design.files import Given
 from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
 from tmsopt.models import MODELS
@@ -104,7 +105,7 @@ class Chart:
     @property
     def left_aside(self) -> tuple[str, ...]:
         """Names of the equality constraints: they hold on curves, which `trace` follows, and nowhere on a grid."""
-        return tuple(n for n, c in self.problem.conditions.items() if c.comparison == "==")
+        return tuple(n for n, c in self.problem.conditions.items() if c.equality)
 
     def save(self, path: str | Path, layers: Iterable[str] | None = None) -> None:
         """Write axes and layers, all of them unless named, as a NumPy archive or, to a name ending in nc, as netCDF.
@@ -139,7 +140,7 @@ class Chart:
 
 
 def chart(
-    problem: Problem,
+    problem: Given,
     axes: Sequence[str] | None = None,
     *,
     folder: str | Path | None = None,
@@ -159,6 +160,7 @@ def chart(
     Equality constraints are left aside. A chart in a folder goes on where the same call was ended before.
 
     Args:
+        problem: or its file, or a solution of it.
         axes: the free parameters, the horizontal one first, which runs fastest; by default in the problem's order.
         folder: where to keep the arrays, e.g. ``big.chart``, up to 1e9 designs; by default in memory, up to 2e7.
         points: along each axis, by default 400x300 or 120x100x80; the ends of the box are grid points.

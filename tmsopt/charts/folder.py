@@ -11,6 +11,7 @@ A tile is recorded once its numbers are on the disk, so that whenever a process 
 import json
 import os
 import shutil
+import sqlite3
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -22,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.charts.summary import Tally
+from tmsopt.disk import Lock, aside, differences, lock, whole
 from tmsopt.errors import Fault, InputError
 
 SCHEMA = 1
@@ -86,19 +88,18 @@ def writing(path: Path, about: Mapping[str, Any], axes: Mapping[str, NDArray[Any
         InputError: for a folder of another chart, or a damaged one, or one that another process is writing; where the
             disk has no room.
     """
-    if fresh and path.exists():
-        path.rename(_aside(path))
-    if not path.exists():
-        _create(path, about, axes)
-    known = read_about(path)
-    if changed := list(differences(known, about)):
-        said = "; ".join(changed)
-        message = f"holds another chart ({said}); give another name, or --fresh to move this one aside"
-        raise InputError([Fault(message, (str(path),))])
-    read_tiles(path)  # so that a file that is missing is said to be
     with ExitStack() as stack:
+        stack.callback(_locked(path).release)
+        if fresh and path.exists():
+            aside(path)
+        if not path.exists():
+            _create(path, about, axes)
+        if changed := list(differences(read_about(path), about)):
+            said = "; ".join(changed)
+            message = f"holds another chart ({said}); give another name, or --fresh to move this one aside"
+            raise InputError([Fault(message, (str(path),))])
+        read_tiles(path)  # so that a file that is missing is said to be
         record = stack.enter_context((path / TILES).open("r+b"))
-        _alone(record, path)
         done, end = _read_record(path)
         record.truncate(end)
         record.seek(end)
@@ -160,43 +161,46 @@ def damaged(path: Path, what: str) -> InputError:
     return InputError([Fault(f"'{path}' is damaged: {what}; give --fresh to chart anew and move this one aside")])
 
 
-def differences(known: Any, asked: Any, key: str = "") -> Iterator[str]:
-    """Where two pieces of plain data differ, one phrase each."""
-    if isinstance(known, Mapping) and isinstance(asked, Mapping):
-        for name in dict.fromkeys((*known, *asked)):
-            inner = f"{key}.{name}" if key else str(name)
-            if name not in known or name not in asked:
-                there, here = (json.dumps(d[name]) if name in d else "none" for d in (known, asked))
-                yield f"{inner}: {there} there, {here} asked for"
-            else:
-                yield from differences(known[name], asked[name], inner)
-    elif known != asked:
-        yield f"{key}: {json.dumps(known)} there, {json.dumps(asked)} asked for"
+def _locked(path: Path) -> Lock:
+    """The right to write a chart.
+
+    Raises:
+        InputError: where another process has it, or nothing can be written.
+    """
+    try:
+        held = lock(path.resolve())
+    except (OSError, sqlite3.Error) as error:
+        raise _unwritten(path, error) from None
+    if held is None:
+        message = f"'{path}' is being written by another process; wait for it, or give another name"
+        raise InputError([Fault(message, ("--output",))])
+    return held
+
+
+def _unwritten(path: Path, error: Exception) -> InputError:
+    reason = getattr(error, "strerror", None) or error
+    return InputError([Fault(f"'{path}' cannot be written: {reason}", ("--output",))])
 
 
 def _create(path: Path, about: Mapping[str, Any], axes: Mapping[str, NDArray[Any]]) -> None:
-    """Make the folder under another name first, so that one of this name is complete."""
-    new = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         _check_room(path.parent, about)
-        for part in ("axes", "layers"):
-            (new / part).mkdir(parents=True)
-        for name, values in axes.items():
-            np.save(new / "axes" / f"{name}.npy", values)
-        shape = tuple(about["shape"])
-        for name, layer in about["layers"].items():
-            dtype = np.dtype(layer["dtype"])
-            with _layer(new, name).open("wb") as stream:
-                header = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
-                np.lib.format.write_array_header_1_0(stream, header)
-                stream.truncate(stream.tell() + int(np.prod(shape)) * dtype.itemsize)
-        (new / TILES).touch()
-        (new / ABOUT).write_text(json.dumps(about, indent=2, ensure_ascii=False), encoding="utf-8")
-        new.rename(path)
+        with whole(path, locked=True) as new:
+            for part in ("axes", "layers"):
+                (new / part).mkdir(parents=True)
+            for name, values in axes.items():
+                np.save(new / "axes" / f"{name}.npy", values)
+            shape = tuple(about["shape"])
+            for name, layer in about["layers"].items():
+                dtype = np.dtype(layer["dtype"])
+                with _layer(new, name).open("wb") as stream:
+                    header = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
+                    np.lib.format.write_array_header_1_0(stream, header)
+                    stream.truncate(stream.tell() + int(np.prod(shape)) * dtype.itemsize)
+            (new / TILES).touch()
+            (new / ABOUT).write_text(json.dumps(about, indent=2, ensure_ascii=False), encoding="utf-8")
     except OSError as error:
-        shutil.rmtree(new, ignore_errors=True)
-        message = f"'{path}' cannot be written: {error.strerror}"
-        raise InputError([Fault(message, ("--output",))]) from None
+        raise _unwritten(path, error) from None
 
 
 def _check_room(parent: Path, about: Mapping[str, Any]) -> None:
@@ -205,11 +209,6 @@ def _check_room(parent: Path, about: Mapping[str, Any]) -> None:
     if needed > free:
         message = f"takes {needed / 1e9:.1f} GB, and {free / 1e9:.1f} GB are free; ask for fewer layers or points"
         raise InputError([Fault(message, ("--output",))])
-
-
-def _aside(path: Path) -> Path:
-    numbered = (path.with_name(f"{path.stem}.{k}{path.suffix}") for k in range(1, 10**6))
-    return next(p for p in numbered if not p.exists())
 
 
 def _layer(path: Path, name: str) -> Path:
@@ -252,19 +251,6 @@ def _read_record(path: Path) -> tuple[dict[int, Tally], int]:
         except (ValueError, KeyError, TypeError):
             raise damaged(path, f"line {number} of {TILES} is not a tile's") from None
     return done, sum(len(line) + 1 for line in lines[:-1])
-
-
-def _alone(record: IO[bytes], path: Path) -> None:
-    """Refuse to write where another process does."""
-    try:
-        import fcntl
-    except ImportError:  # a system without it
-        return
-    try:
-        fcntl.flock(record, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        message = f"'{path}' is being written by another process; wait for it, or give another name"
-        raise InputError([Fault(message, ("--output",))]) from None
 
 
 def _plain(data: Mapping[str, Any]) -> dict[str, Any]:

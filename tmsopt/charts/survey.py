@@ -10,7 +10,8 @@ from numpy.typing import DTypeLike, NDArray
 
 from tmsopt.charts.expressions import ArrayFunction, array_function, parsed
 from tmsopt.charts.motion import Classified, classified, engine_of
-from tmsopt.design.problem import Problem, checked
+from tmsopt.design.files import Given, problem_of
+from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS, ROOT_NAMES
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.records import Array
@@ -165,9 +166,8 @@ class Survey:
         """Least difference by which the inequalities hold; nan where one does not exist."""
         least: Any = np.inf
         for name, condition in self.problem.conditions.items():
-            if condition.comparison != "==":
-                sign = -1.0 if condition.comparison == "<=" else 1.0
-                least = np.minimum(least, sign * values[_CONDITION + name])
+            if not condition.equality:
+                least = np.minimum(least, -condition.sign * values[_CONDITION + name])
         return least
 
 
@@ -176,7 +176,7 @@ _QUANTITY, _CONDITION = "quantity ", "condition "
 
 
 def survey(
-    problem: Problem,
+    problem: Given,
     axes: Sequence[str] | None = None,
     points: Sequence[int] | None = None,
     layers: Sequence[str] = USUAL,
@@ -198,7 +198,8 @@ def survey(
         InputError: unless two or three parameters are free and the axes name them; for other numbers of points,
             unknown layers, bad expressions, unknown engines.
     """
-    names = axes_of(checked(problem), axes)
+    problem = problem_of(problem)
+    names = axes_of(problem, axes)
     sizes = _sizes(USUAL_POINTS[len(names)] if points is None else points, len(names))
     faults = [Fault(f"found {n!r}; {suggest(str(n), LAYERS)}", ("layers",)) for n in layers if n not in LAYERS]
     extra = dict(quantities or {})
@@ -226,7 +227,7 @@ def _over(
         message = f"uses {RADIUS}, which takes a search for every design; a chart has what is computed at once"
         raise InputError([Fault(message, ("quantities", n)) for n in searched])
     if {"satisfied", "margin"} & set(layers):
-        wanted |= {_CONDITION + n: c for n, c in problem.conditions.items() if c.comparison != "=="}
+        wanted |= {_CONDITION + n: c for n, c in problem.conditions.items() if not c.equality}
     of_roots = {n: e for n, e in wanted.items() if set(ROOT_NAMES) & set(e.names)}
     others = {n: e for n, e in wanted.items() if n not in of_roots}
     others |= parsed(problem, {n: n for n in problem.model.coefficient_names()})

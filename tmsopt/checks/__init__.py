@@ -4,18 +4,9 @@ In: a problem and a design. Out: its objective and violations, its worst case, b
 bands, certified digits, the laws it obeys. Open `recheck` first.
 """
 
-from tmsopt.checks.bound import omega0_bound
-from tmsopt.checks.coverage import cover
+from tmsopt.checks.bound import omega0_bound, relation_bound
 from tmsopt.checks.law_rows import law_rows
-from tmsopt.checks.recheck import recheck
-from tmsopt.checks.relation import relation_bound
-from tmsopt.checks.worst_case import worst_cases
+from tmsopt.checks.recheck import realised_abscissa, recheck
+from tmsopt.checks.worst_case import cover, worst_cases
 
-__all__ = [
-    "cover",
-    "law_rows",
-    "omega0_bound",
-    "recheck",
-    "relation_bound",
-    "worst_cases",
-]
+__all__ = ["cover", "law_rows", "omega0_bound", "realised_abscissa", "recheck", "relation_bound", "worst_cases"]

@@ -22,7 +22,7 @@ from tmsopt.design.units import Reading, readings
 from tmsopt.models import Values
 from tmsopt.records import Table
 from tmsopt.roots import Root, Structure
-from tmsopt.roots.patterns.enclosed import Enclosed, enclosed_roots, nearest, nearest_decimal, nearest_double
+from tmsopt.roots.patterns.enclosed import Enclosed, enclosed_roots, nearest_decimal, nearest_double, nearest_roots
 
 _PRECISIONS = (212, 424, 848, 1696)
 """Bits carried, one after the other until they suffice; the first are 60 digits, half of which a fit may lose."""
@@ -178,7 +178,7 @@ class _Design:
         coefficients = self.values(case).coefficients
         if found.name in _SIMPLE and all(root.multiplicity == 1 for root in found.roots):
             return stored or enclosed_roots(coefficients)
-        return nearest(found.name, coefficients, found.roots)
+        return nearest_roots(found.name, coefficients, found.roots)
 
     def values(self, case: Case) -> Values:
         """Everything derived from the exact parameters in a case, root quantities excluded."""

@@ -1,4 +1,4 @@
-"""TODO"""
+"""The closed-form laws of the paper beside a design, one row each."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -9,6 +9,7 @@ import numpy as np
 
 from tmsopt import laws
 from tmsopt.design.solution import Solution
+from tmsopt.records import plain
 from tmsopt.roots import is_stable
 
 SAME_LAW = 1e-9
@@ -52,6 +53,11 @@ class LawRow:
     def agrees(self) -> bool | None:
         """Whether number and law agree; None where the law does not apply."""
         return abs(self.relative) <= SAME_LAW if self.applies else None
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``; numbers that do not exist are None."""
+        found = plain(self, "label subject numeric law residual relative applies agrees reason")
+        return found if self.applies else found | {"residual": None, "relative": None}
 
 
 def law_rows(design: Solution) -> Iterator[LawRow]:

@@ -98,11 +98,10 @@ def excesses(problem: Problem, parameters: Mapping[str, float], cases: Sequence[
     found = {}
     for name, condition in problem.conditions.items():
         differences = [left - right for left, right in (condition.sides(v) for v in looked.at(problem, condition))]
-        if condition.comparison == "==":
+        if condition.equality:
             found[name] = differences[0]
         else:
-            sign = -1.0 if condition.comparison == ">=" else 1.0
-            found[name] = max(0.0, *(_or_infinite(sign * d) for d in differences))
+            found[name] = max(0.0, *(_or_infinite(condition.sign * d) for d in differences))
     return found
 
 
@@ -165,7 +164,7 @@ def _objective(problem: Problem, nominal: Values, each: Sequence[Values], cases:
         return math.nan
     if not varies(problem, problem.objective, cases):
         return float(problem.objective(nominal))
-    sign = -1.0 if problem.sense == "maximize" else 1.0
+    sign = problem.sign
     return sign * max((sign * float(problem.objective(values)) for values in each), key=_or_infinite)
 
 

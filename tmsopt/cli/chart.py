@@ -77,54 +77,30 @@ def _named(_context: click.Context, _option: click.Parameter, values: tuple[str,
 @click.option("--output", "-o", type=click.Path(path_type=Path), help="Write the arrays (npz, nc, chart).")
 @click.option("--layers", help=f"Arrays of --output, among {','.join(_LAYERS)}. [default: all but margin]")
 @click.option(
-    "--quantity",
-    "quantities",
-    multiple=True,
-    callback=_named,
-    metavar="NAME=EXPRESSION",
+    "--quantity", "quantities", multiple=True, callback=_named, metavar="NAME=EXPRESSION",
     help="Also compute an expression; may be given several times.",
-)
+)  # fmt: skip
 @click.option("--single", is_flag=True, help="Write numbers in single precision.")
 @click.option("--fresh", is_flag=True, help="Move a folder of --output aside instead of going on with it.")
 @click.option("--engine", default="auto", show_default=True, help="numba, numpy, or numba where installed (auto).")
 @click.option(
-    "--workers",
-    type=click.IntRange(1, 256),
-    default=1,
-    show_default=True,
+    "--workers", type=click.IntRange(1, 256), default=1, show_default=True,
     help="Threads; NumPy alone gains nothing by them.",
-)
+)  # fmt: skip
 @click.option("--plot", type=click.Path(path_type=Path), help="Draw the chart (png, pdf, svg).")
 @click.option(
-    "--layer",
-    default="kind",
-    show_default=True,
+    "--layer", default="kind", show_default=True,
     help="What --plot shows: kind, abscissa, damping_ratio, real_roots or a quantity.",
-)
+)  # fmt: skip
 @click.option(
-    "--slice",
-    "cut",
-    callback=lambda c, o, v: _named(c, o, (v,)) if v else {},
-    metavar="NAME=VALUE",
+    "--slice", "cut", callback=lambda c, o, v: _named(c, o, (v,)) if v else {}, metavar="NAME=VALUE",
     help="Of three parameters, the one that --plot holds, e.g. lambda_s=0.4.",
-)
+)  # fmt: skip
 @click.option("--boundaries/--no-boundaries", default=True, show_default=True, help="Trace the exact boundary curves.")
 def chart(
-    file: Path,
-    points: tuple[int, ...] | None,
-    axes: str | None,
-    as_json: bool,
-    output: Path | None,
-    layers: str | None,
-    quantities: dict[str, str],
-    single: bool,
-    fresh: bool,
-    engine: str,
-    workers: int,
-    plot: Path | None,
-    layer: str,
-    cut: dict[str, str],
-    boundaries: bool,
+    file: Path, points: tuple[int, ...] | None, axes: str | None, as_json: bool, output: Path | None,
+    layers: str | None, quantities: dict[str, str], single: bool, fresh: bool, engine: str, workers: int,
+    plot: Path | None, layer: str, cut: dict[str, str], boundaries: bool,
 ) -> None:  # fmt: skip
     """Chart stability over the free parameters of FILE: capsize, weave, stable, heavily damped."""
     with bad_input(), _stopped(output):
@@ -133,7 +109,7 @@ def chart(
 
         check_output("--plot", plot, FIGURES)
         check_output("--output", output, ("npz", "nc", "chart"), folders=("chart",))
-        problem = nominal_of(tmsopt.load(file, asks=False))
+        problem = nominal_of(tmsopt.load(file))
         free = axes_of(problem)
         names = plane(problem, axes) if len(free) == 2 else _space(free, axes)
         kept = tuple(n.strip() for n in layers.split(",")) if layers is not None else USUAL

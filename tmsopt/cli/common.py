@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from tmsopt.design.problem import Problem
+    from tmsopt import Problem
 
 DONE, BAD_INPUT, INFEASIBLE, NOT_CONVERGED = 0, 2, 3, 4
 """Exit status."""
@@ -25,7 +25,7 @@ FIGURES = ("png", "pdf", "svg")
 @contextmanager
 def bad_input() -> Iterator[None]:
     """Turn bad input into its messages on stderr and exit status 2."""
-    from tmsopt.errors import InputError
+    from tmsopt import InputError
 
     try:
         yield
@@ -59,7 +59,7 @@ def check_output(option: str, path: Path | None, endings: Sequence[str], folders
     """Refuse a file that could not be written, before any work is done; what ends in one of `folders` is a folder."""
     if path is None:
         return
-    from tmsopt.errors import Fault, InputError
+    from tmsopt import Fault, InputError
 
     ending = path.suffix.lstrip(".").lower()
     if ending not in endings:
@@ -90,7 +90,7 @@ def plane(problem: "Problem", axes: str | None) -> tuple[str, str]:
     Raises:
         InputError: unless there are two, both free.
     """
-    from tmsopt.errors import Fault, InputError
+    from tmsopt import Fault, InputError
 
     free = list(problem.free)
     names = [n.strip() for n in axes.split(",")] if axes is not None else free[:2]
@@ -100,6 +100,11 @@ def plane(problem: "Problem", axes: str | None) -> tuple[str, str]:
         )
         raise InputError([Fault(message, ("--axes",))])
     return names[0], names[1]
+
+
+def options(**given: Any) -> dict[str, Any]:
+    """The options that were given, for a function with defaults of its own."""
+    return {name: value for name, value in given.items() if value is not None}
 
 
 def nominal_of(problem: "Problem") -> "Problem":

@@ -9,7 +9,7 @@ import click
 from tmsopt.cli.common import BAD_INPUT, FIGURES, bad_input, check_output, progress, write_json
 
 if TYPE_CHECKING:
-    from tmsopt.plots.paper.gallery import Item
+    from tmsopt.plots.paper import Item
 
 _EXAMPLES = """
 \b
@@ -28,17 +28,13 @@ Exit status: 0 drawn, 2 bad input.
 @click.command(epilog=_EXAMPLES)
 @click.argument("name", required=False)
 @click.option(
-    "--output",
-    type=click.Path(path_type=Path),
+    "--output", type=click.Path(path_type=Path),
     help="File to write, or with 'all' a directory. [default: NAME.png in the current directory]",
-)
+)  # fmt: skip
 @click.option(
-    "--format",
-    "ending",
-    type=click.Choice(FIGURES),
-    default=None,
+    "--format", "ending", type=click.Choice(FIGURES), default=None,
     help="Kind of file. [default: the ending of --output, else png]",
-)
+)  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Write names, captions and files as JSON to stdout.")
 @click.option("--list", "as_list", is_flag=True, help="List the figures and draw nothing.")
 def figure(name: str | None, output: Path | None, ending: str | None, as_json: bool, as_list: bool) -> None:
@@ -46,7 +42,7 @@ def figure(name: str | None, output: Path | None, ending: str | None, as_json: b
 
     NAME is one of those that --list shows, or its label in the paper, such as fig3.
     """
-    from tmsopt.plots.paper.gallery import GALLERY
+    from tmsopt.plots.paper import GALLERY
 
     if as_list:
         _write_list(list(GALLERY.values()), as_json)
@@ -61,8 +57,8 @@ def figure(name: str | None, output: Path | None, ending: str | None, as_json: b
 
 
 def _wanted(name: str | None) -> "list[Item]":
-    from tmsopt.errors import Fault, InputError
-    from tmsopt.plots.paper.gallery import GALLERY, find
+    from tmsopt import Fault, InputError
+    from tmsopt.plots.paper import GALLERY, find
 
     if name is None:
         raise InputError([Fault(f"missing; accepted: {' '.join(GALLERY)} all", ("NAME",))])
@@ -71,7 +67,7 @@ def _wanted(name: str | None) -> "list[Item]":
 
 def _files(wanted: "list[Item]", every: bool, output: Path | None, ending: str | None) -> list[Path]:
     """The files to write, refused before anything is drawn if one could not be."""
-    from tmsopt.errors import Fault, InputError
+    from tmsopt import Fault, InputError
 
     if every:
         folder = output or Path()
@@ -88,7 +84,7 @@ def _files(wanted: "list[Item]", every: bool, output: Path | None, ending: str |
 
 
 def _draw(wanted: "list[Item]", files: list[Path]) -> None:
-    from tmsopt.plots.style import save
+    from tmsopt.plots import save
 
     with progress("figure") as update:
         for done, (item, path) in enumerate(zip(wanted, files, strict=True)):

@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from tmsopt.cli.common import progress, saving, write_json
 
 if TYPE_CHECKING:
-    from tmsopt.design.problem import Problem
+    from tmsopt import Problem
 
 
 def check_options(problem: "Problem", given: Sequence[str]) -> None:
@@ -18,7 +18,7 @@ def check_options(problem: "Problem", given: Sequence[str]) -> None:
     Raises:
         InputError: naming each of them.
     """
-    from tmsopt.errors import Fault, InputError
+    from tmsopt import Fault, InputError
 
     if problem.pareto:
         if alone := [o for o in given if o in ("--certify", "--diagnose")]:
@@ -34,45 +34,24 @@ def check_options(problem: "Problem", given: Sequence[str]) -> None:
 
 
 def write_front(
-    problem: "Problem",
-    *,
-    points: int | None,
-    as_json: bool,
-    starts: int | None,
-    seed: int,
-    linear_solver: str,
-    plot: Path | None,
-    csv_file: Path | None,
+    problem: "Problem", asked: dict[str, Any], as_json: bool, plot: Path | None, csv_file: Path | None
 ) -> None:
     """Find the front and write it where it is asked for.
 
     Raises:
         NotSolved: when an objective has no optimum.
     """
-    from tmsopt.fronts.front import write_csv
-    from tmsopt.fronts.pareto import POINTS, STARTS, pareto
+    import tmsopt
 
     with progress("sub-problem") as update:
-        front = pareto(
-            problem,
-            points or POINTS,
-            starts=STARTS if starts is None else starts,
-            seed=seed,
-            linear_solver=linear_solver,
-            progress=update,
-        )
+        front = tmsopt.pareto(problem, progress=update, **asked)
     if as_json:
         write_json(front.to_json())
     else:
-        from tmsopt.report.curves import front_table
-
-        click.echo(front_table(front))
+        click.echo(tmsopt.report.front_table(front))
     if csv_file is not None:
         with saving("--csv", csv_file):
-            write_csv(front, csv_file)
+            front.write_csv(csv_file)
     if plot is not None:
-        from tmsopt.plots.front import front_figure
-        from tmsopt.plots.style import save
-
         with saving("--plot", plot):
-            save(front_figure(front), plot)
+            tmsopt.plots.save(tmsopt.plots.front_figure(front), plot)

@@ -28,7 +28,7 @@ Exit status: 0 done, 2 bad input.
 def convert(file: Path, output: Path | None, speed: float | None) -> None:
     """Make a problem file of a bicycle that BicycleParameters has measured."""
     with bad_input():
-        from tmsopt.models.bicycle_files import problem_text, read_bicycle
+        from tmsopt.models import problem_text, read_bicycle
 
         check_output("--output", output, ("toml",))
         text = problem_text(read_bicycle(file), speed)

@@ -2,15 +2,10 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from tmsopt.cli.common import DONE, INFEASIBLE, NOT_CONVERGED, bad_input, progress, write_json
-
-if TYPE_CHECKING:
-    from tmsopt.design.problem import Problem
-    from tmsopt.design.solution import Solution
+from tmsopt.cli.common import DONE, INFEASIBLE, NOT_CONVERGED, bad_input, options, progress, write_json
 
 _EXAMPLES = """
 \b
@@ -44,29 +39,24 @@ Exit status: 0 proved, 2 bad input, 3 no design found, 4 not proved.
 def prove(file: Path, as_json: bool, digits: int, exact: tuple[str, ...], starts: int | None, seed: int) -> None:
     """Prove that the design which FILE asks for exists, and whether it is stable and heavily damped."""
     with bad_input():
-        from tmsopt.design.files import load
-        from tmsopt.design.problem import unasked
-        from tmsopt.errors import InputError
-        from tmsopt.proofs.prove import prove as prove_design
+        import tmsopt
+        from tmsopt.design import question_of
 
         given = _named(exact)
-        problem = load(file)
-        if problem.pareto:
-            raise InputError(unasked(problem))
-        solution = _solved(problem, starts, seed)
-        proof = prove_design(solution, digits, exact=given)
+        problem = question_of(file)
+        with progress() as update:
+            solution = tmsopt.solve(problem, throw=False, progress=update, **options(starts=starts, seed=seed))
+        proof = tmsopt.prove(solution, digits, exact=given)
     if as_json:
         write_json({"title": problem.title, "status": solution.status, **proof.to_json()})
     else:
-        from tmsopt.report.proof import proof_text
-
-        click.echo(proof_text(problem, proof))
+        click.echo(tmsopt.report.proof_text(problem, proof))
     sys.exit(DONE if proof.proved else NOT_CONVERGED if solution.status == "optimal" else INFEASIBLE)
 
 
 def _named(exact: tuple[str, ...]) -> dict[str, str]:
     """Numbers of the command line by name."""
-    from tmsopt.errors import Fault, InputError
+    from tmsopt import Fault, InputError
 
     pairs = [text.partition("=") for text in exact]
     if faults := [
@@ -74,11 +64,3 @@ def _named(exact: tuple[str, ...]) -> dict[str, str]:
     ]:
         raise InputError(faults)
     return {name.strip(): value.strip() for name, _, value in pairs}
-
-
-def _solved(problem: "Problem", starts: int | None, seed: int) -> "Solution":
-    from tmsopt.solver.multistart import STARTS
-    from tmsopt.solver.solve import solve
-
-    with progress() as update:
-        return solve(problem, starts=starts or STARTS, seed=seed, throw=False, progress=update)

@@ -16,15 +16,14 @@ from tmsopt.cli.common import (
     bad_input,
     check_output,
     nominal_of,
+    options,
     progress,
     saving,
     write_json,
 )
-from tmsopt.report.explanation import meaning, meaning_lines
 
 if TYPE_CHECKING:
-    from tmsopt.design.problem import Problem
-    from tmsopt.design.solution import Solution
+    from tmsopt import Diagnosis, Explanation, Problem, Robustness, Solution
 
 _EXIT = {"optimal": DONE, "infeasible": INFEASIBLE, "not_converged": NOT_CONVERGED}
 
@@ -95,124 +94,109 @@ class _Seconds(click.ParamType[float]):
 @click.argument("file", type=click.Path(path_type=Path))
 @_common
 @click.option(
-    "--plot",
-    type=click.Path(path_type=Path),
+    "--plot", type=click.Path(path_type=Path),
     help="Draw growth rates and frequencies over Fr, or the front (png, pdf, svg).",
-)
+)  # fmt: skip
 @click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write the points of a front.")
 @click.option("--points", type=click.IntRange(min=2), default=None, help="Points of a front. [default: 25]")
 @click.option(
-    "--wheelbase",
-    default="1",
-    show_default=True,
+    "--wheelbase", default="1", show_default=True,
     help="For SI numbers of a dimensionless problem, in m or with a unit.",
-)
+)  # fmt: skip
 @click.option(
-    "--rear-mass",
-    default="1",
-    show_default=True,
+    "--rear-mass", default="1", show_default=True,
     help="Likewise, the mass m_B of the rear frame, in kg or with a unit.",
-)
+)  # fmt: skip
 @click.option(
     "--brief", is_flag=True, help="Leave out what the optimum means: gains of limits moved, rounding, robustness."
 )
 @click.option(
-    "--diagnose",
-    "details",
-    is_flag=True,
+    "--diagnose", "details", is_flag=True,
     help="Of multiple roots, show how they split when each parameter changes. JSON has this always, but for --brief.",
-)
+)  # fmt: skip
 @click.option(
-    "--certify",
-    type=_Seconds(),
-    is_flag=False,
-    flag_value=60.0,
-    default=None,
-    metavar="[SECONDS]",
+    "--certify", type=_Seconds(), is_flag=False, flag_value=60.0, default=None, metavar="[SECONDS]",
     help="Prove within SECONDS that nothing better exists, or find it (SCIP). Write it after FILE. [60 if left out]",
-)
+)  # fmt: skip
 @click.option(
     "--all", "every", is_flag=True, help="Of a pattern that leaves no freedom: all designs in the box that have it."
 )
 @click.pass_context
 def solve(
-    context: click.Context,
-    file: Path,
-    as_json: bool,
-    starts: int | None,
-    seed: int,
-    linear_solver: str,
-    plot: Path | None,
-    csv_file: Path | None,
-    points: int | None,
-    wheelbase: str,
-    rear_mass: str,
-    brief: bool,
-    details: bool,
-    certify: float | None,
-    every: bool,
-) -> None:
+    context: click.Context, file: Path, as_json: bool, starts: int | None, seed: int, linear_solver: str,
+    plot: Path | None, csv_file: Path | None, points: int | None, wheelbase: str, rear_mass: str, brief: bool,
+    details: bool, certify: float | None, every: bool,
+) -> None:  # fmt: skip
     """Find the best design that the problem FILE asks for, or the front of the best ones."""
     with bad_input():
+        import tmsopt
         from tmsopt.cli.front import check_options, write_front
-        from tmsopt.design.files import load
+        from tmsopt.design import question_of
 
         w, m_B = _scale("--wheelbase", wheelbase, "m"), _scale("--rear-mass", rear_mass, "kg")
         check_output("--plot", plot, FIGURES)
         check_output("--csv", csv_file, ("csv",))
-        problem = load(file)
+        problem = question_of(file, front=True)
         check_options(problem, _given(context))
         if certify:
-            from tmsopt.certificates.certify import check_installed
+            from tmsopt.certificates import check_installed
 
             check_installed()
+    asked = options(starts=starts, seed=seed, linear_solver=linear_solver)
     if every:
-        _solve_all(problem, as_json=as_json, starts=starts, seed=seed, linear_solver=linear_solver)
-    from tmsopt.design.solution import NotSolved
-    from tmsopt.solver.multistart import STARTS
-    from tmsopt.solver.solve import solve as solve_problem
-
+        _solve_all(problem, as_json, asked)
     if problem.pareto:
         try:
-            write_front(
-                problem, points=points, as_json=as_json, starts=starts, seed=seed, linear_solver=linear_solver,
-                plot=plot, csv_file=csv_file,
-            )  # fmt: skip
+            write_front(problem, asked | options(points=points), as_json, plot, csv_file)
             return
-        except NotSolved as error:
+        except tmsopt.NotSolved as error:
             solution, plot = error.solution, None
     else:
         with progress() as update:
-            solution = solve_problem(
-                problem, starts=starts or STARTS, seed=seed, linear_solver=linear_solver, throw=False, progress=update
-            )
+            solution = tmsopt.solve(problem, throw=False, progress=update, **asked)
         if certify:
             solution = _certified(solution, certify)
     if as_json:
-        write_json(solution.to_json() | ({} if brief else meaning(solution)))
+        explanation, near, multiple = _meaning(solution, brief, details=False)
+        meaning = {
+            "meaning": explanation and explanation.to_json(),
+            "robustness": near and near.to_json(),
+            "diagnosis": [root.to_json() for root in multiple],
+        }
+        write_json(solution.to_json() | {name: found for name, found in meaning.items() if found})
     else:
-        from tmsopt.report.design import solution_table
-
-        click.echo(solution_table(solution, w, m_B))
-        for line in meaning_lines(solution, brief, details):
+        click.echo(tmsopt.report.solution_table(solution, w, m_B))
+        for line in tmsopt.report.meaning_lines(solution, *_meaning(solution, brief, details), details):
             click.echo(line)
     if plot is not None:
         _draw(solution, plot, w, m_B)
     sys.exit(_EXIT[solution.status])
 
 
-def _solve_all(problem: "Problem", as_json: bool, starts: int | None, **options: Any) -> NoReturn:
+def _meaning(
+    solution: "Solution", brief: bool, details: bool
+) -> "tuple[Explanation | None, Robustness | None, tuple[Diagnosis, ...]]":
+    """What an optimum leans on, how far its boundaries are, and how its multiple roots split, as far as asked for."""
+    import tmsopt
+
+    near = not brief and math.isfinite(solution.abscissa) and solution.status != "infeasible"
+    split = (details or not brief) and solution.status == "optimal"
+    return (
+        None if brief else tmsopt.explain(solution), tmsopt.robustness(solution) if near else None,
+        tmsopt.diagnose(solution) if split else (),
+    )  # fmt: skip
+
+
+def _solve_all(problem: "Problem", as_json: bool, asked: dict[str, Any]) -> NoReturn:
     """Write all designs with a pattern, and end."""
-    from tmsopt.solver.all_designs import MOST, solve_all
+    import tmsopt
 
     with bad_input(), progress() as update:
-        found = solve_all(problem, starts=starts or MOST, progress=update, **options)
+        found = tmsopt.solve_all(problem, progress=update, **asked)
     if as_json:
-        write_json({"schema": 1, "title": problem.title, "model": problem.model.name, **found.to_json()})
+        write_json(problem.heading | found.to_json())
     else:
-        from tmsopt.report.design import every_table
-
-        click.echo(every_table(found))
+        click.echo(tmsopt.report.every_table(found))
     sys.exit(DONE if found.solutions else INFEASIBLE)
 
 
@@ -222,34 +206,26 @@ def _solve_all(problem: "Problem", as_json: bool, starts: int | None, **options:
 def compare(file: Path, as_json: bool, starts: int | None, seed: int, linear_solver: str) -> None:
     """Set the optimum of FILE beside the closed-form laws, and one formulation beside the other."""
     with bad_input():
-        from tmsopt.design.files import load
-        from tmsopt.design.problem import unasked
-        from tmsopt.errors import InputError
+        import tmsopt
+        from tmsopt.design import question_of
 
-        problem = nominal_of(load(file))
-        if problem.pareto:
-            raise InputError(unasked(problem))
-    from tmsopt.paper.compare import compare as compare_design
-    from tmsopt.report.comparison import comparison_table
-    from tmsopt.solver.multistart import STARTS
-
+        problem = nominal_of(question_of(file))
     with progress() as update:
-        comparison = compare_design(
-            problem, starts=starts or STARTS, seed=seed, linear_solver=linear_solver, progress=update
-        )
+        asked = options(starts=starts, seed=seed, linear_solver=linear_solver)
+        comparison = tmsopt.compare(problem, progress=update, **asked)
     if as_json:
         write_json(comparison.to_json())
     else:
-        click.echo(comparison_table(comparison))
+        click.echo(tmsopt.report.comparison_table(comparison))
     sys.exit(_EXIT[comparison.design.status])
 
 
 def _certified(solution: "Solution", seconds: float) -> "Solution":
     """The solution with its bound, within seconds."""
-    from tmsopt.certificates.certify import certify
+    import tmsopt
 
     with progress("second") as update:
-        return certify(solution, seconds=seconds, progress=lambda done, most: update(round(done), round(most)))
+        return tmsopt.certify(solution, seconds=seconds, progress=lambda done, most: update(round(done), round(most)))
 
 
 def _given(context: click.Context) -> list[str]:
@@ -261,8 +237,8 @@ def _given(context: click.Context) -> list[str]:
 
 def _scale(option: str, text: str, unit: str) -> float:
     """A positive length or mass of the command line."""
-    from tmsopt.design.units import with_unit
-    from tmsopt.errors import Fault, InputError
+    from tmsopt import Fault, InputError
+    from tmsopt.design import with_unit
 
     try:
         try:
@@ -277,18 +253,14 @@ def _scale(option: str, text: str, unit: str) -> float:
 
 
 def _draw(solution: "Solution", path: Path, w: float, m_B: float) -> None:
-    from tmsopt.critical_speeds.growth import growth
-    from tmsopt.models import tms
-    from tmsopt.plots.growth import growth_figure
-    from tmsopt.plots.style import save
-    from tmsopt.report.design import si_parameters
+    import tmsopt
 
     if not math.isfinite(solution.abscissa):
         click.echo("--plot: nothing to draw, a root is at infinity", err=True)
         return
     unit = None
-    if solution.problem.model is tms:
-        si = si_parameters(solution, w, m_B)
+    if solution.problem.model is tmsopt.models.tms:
+        si = tmsopt.report.si_parameters(solution, w, m_B)
         unit = (si["g"] * si["w"]) ** 0.5
     with saving("--plot", path):
-        save(growth_figure(growth(solution), solution.problem.title, unit), path)
+        tmsopt.plots.save(tmsopt.plots.growth_figure(tmsopt.growth(solution), solution.problem.title, unit), path)

@@ -1,15 +1,10 @@
 """The command that finds every speed at which the motion of a design changes."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from tmsopt.cli.common import INFEASIBLE, NOT_CONVERGED, bad_input, nominal_of, progress, write_json
-
-if TYPE_CHECKING:
-    from tmsopt.design.problem import Problem
-    from tmsopt.design.solution import Solution
 
 _EXAMPLES = """
 \b
@@ -44,34 +39,17 @@ def _ends(_context: click.Context, _option: click.Parameter, value: str | None) 
 def speeds(file: Path, parameter: str | None, between: tuple[float, float] | None, as_json: bool) -> None:
     """Find every weave and capsize speed of FILE, and every speed at which roots meet."""
     with bad_input():
-        from tmsopt.critical_speeds.speeds import speed_of
-        from tmsopt.critical_speeds.speeds import speeds as find
-        from tmsopt.design.files import load
-        from tmsopt.design.problem import unasked
-        from tmsopt.errors import InputError
-        from tmsopt.report.speeds import speeds_table
+        import tmsopt
 
-        problem = nominal_of(load(file, asks=False))
-        name = parameter or speed_of(problem.parameter_set)
-        if set(problem.free) <= {name}:
-            found = find(problem, parameter, between=between)
-        else:
-            if faults := unasked(problem):
-                raise InputError(faults)
-            found = find(_solved(problem), parameter, between=between)
+        problem = nominal_of(tmsopt.load(file))
+        try:
+            with progress() as update:
+                found = tmsopt.speeds(problem, parameter, between=between, progress=update)
+        except tmsopt.NotSolved as error:
+            status = error.solution.status
+            click.echo(f"{problem.title}: {status.replace('_', ' ')}; there is no design to look at", err=True)
+            raise SystemExit(INFEASIBLE if status == "infeasible" else NOT_CONVERGED) from None
     if as_json:
         write_json(found.to_json())
     else:
-        click.echo(speeds_table(found))
-
-
-def _solved(problem: "Problem") -> "Solution":
-    """The design that a problem asks for; without one the command ends."""
-    from tmsopt.solver.solve import solve
-
-    with progress() as update:
-        solution = solve(problem, throw=False, progress=update)
-    if solution.status != "optimal":
-        click.echo(f"{problem.title}: {solution.status.replace('_', ' ')}; there is no design to look at", err=True)
-        raise SystemExit(INFEASIBLE if solution.status == "infeasible" else NOT_CONVERGED)
-    return solution
+        click.echo(tmsopt.report.speeds_table(found))

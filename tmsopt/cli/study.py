@@ -10,8 +10,8 @@ import click
 from tmsopt.cli.common import BAD_INPUT, INTERRUPTED, bad_input, check_output, saving, write_json
 
 if TYPE_CHECKING:
-    from tmsopt.studies.store.store import Store
-    from tmsopt.studies.study import Study
+    from tmsopt.studies import Study
+    from tmsopt.studies.store import Store
 
 _EXAMPLES = """
 \b
@@ -32,8 +32,8 @@ FILE names a problem and what varies: title, problem = "ep4.toml" (or a table [p
             "trail.limit" = [0.02, 0.05]: fixed parameters, ends of free ones, numbers of constraints
   [tolerances]  of monte_carlo, by default those of the problem
 
-Every row goes to the store, an SQLite file, as soon as it is solved. The same command goes on where it was stopped, and
-shows the rows that are there already. A row solved again, by --row or by any engine, has the same bits.
+Rows go to the store, an SQLite file, as they are solved, once a second. The same command goes on where it was stopped,
+and shows the rows that are there already. A row solved again, by --row or by any engine, has the same bits.
 
 A Dask cluster needs the same tmsopt on every worker, and one thread each: dask worker HOST:8786 --nthreads 1.
 
@@ -55,26 +55,20 @@ Exit status: 0 done, failed rows included; 2 bad input; 130 stopped by Ctrl-C.
 @click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, in place of workers.")
 @click.option(
     "--export", "exports", type=click.Path(path_type=Path), multiple=True,
-    help="Write all rows (csv; parquet and nc with the extra data). May be given again.",
+    help="Write all rows; the ending says how, as in rows.csv, rows.parquet, rows.nc. May be given again.",
 )  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
 def study(
-    file: Path,
-    store: Path | None,
-    fresh: bool,
-    row: int | None,
-    workers: int | None,
-    scheduler: str | None,
-    exports: tuple[Path, ...],
-    as_json: bool,
-) -> None:
+    file: Path, store: Path | None, fresh: bool, row: int | None, workers: int | None, scheduler: str | None,
+    exports: tuple[Path, ...], as_json: bool,
+) -> None:  # fmt: skip
     """Solve the problem of the study FILE for every row of what varies in it."""
     with bad_input():
-        from tmsopt.studies.load import load_study
+        from tmsopt.studies import load_study
 
         _check_together(row, scheduler, workers, {"--store": store, "--fresh": fresh, "--export": exports})
         for target in exports:
-            from tmsopt.studies.export import check_export
+            from tmsopt.studies import check_export
 
             check_export(target)
         path = store or Path(f"{file.stem}.sqlite")
@@ -84,8 +78,8 @@ def study(
         if row is not None:
             _show_row(asked, row, as_json)
             return
-        from tmsopt.studies.store.store import open_store
-        from tmsopt.studies.study import definition
+        from tmsopt.studies import definition
+        from tmsopt.studies.store import open_store
 
         with open_store(path, definition(asked), fresh=fresh) as opened:
             for line in (*opened.warnings, *([f"moved the old store to {opened.moved}"] if opened.moved else [])):
@@ -93,7 +87,7 @@ def study(
             figures = _filled(asked, opened, workers, scheduler)
             _show(asked, opened, figures, as_json)
             for target in exports:
-                from tmsopt.studies.export import export
+                from tmsopt.studies import export
 
                 with saving("--export", target):
                     export(opened.rows(), target, opened.about())
@@ -104,7 +98,7 @@ def study(
 
 def _check_together(row: int | None, scheduler: str | None, workers: int | None, kept: Mapping[str, object]) -> None:
     """Refuse options that would have no effect."""
-    from tmsopt.errors import Fault, InputError
+    from tmsopt import Fault, InputError
 
     given = [*(name for name, value in kept.items() if value)]
     given += [name for name, value in (("--scheduler", scheduler), ("--workers", workers)) if value is not None]
@@ -117,8 +111,8 @@ def _check_together(row: int | None, scheduler: str | None, workers: int | None,
 
 def _planned(asked: Any) -> "Study":
     """The study, with the design of a Monte Carlo one solved first."""
-    from tmsopt.design.solution import NotSolved
-    from tmsopt.studies.monte_carlo import planned
+    from tmsopt import NotSolved
+    from tmsopt.studies import planned
 
     try:
         return planned(asked)
@@ -131,8 +125,8 @@ def _filled(asked: "Study", opened: "Store", workers: int | None, scheduler: str
     """Solve what is missing, with a progress bar; figures of the run."""
     from tqdm import tqdm
 
+    from tmsopt.studies import fill
     from tmsopt.studies.engines import EngineError
-    from tmsopt.studies.run import fill
 
     present = len(opened.done())
     figures: dict[str, Any] = {"store": str(opened.path), "rows_found": present}
@@ -165,8 +159,8 @@ def _filled(asked: "Study", opened: "Store", workers: int | None, scheduler: str
 
 
 def _show(asked: "Study", opened: "Store", figures: dict[str, Any], as_json: bool) -> None:
-    from tmsopt.report.study import study_table
-    from tmsopt.studies.summary import summary
+    from tmsopt.report import study_table
+    from tmsopt.studies import summary
 
     found = summary(asked, opened.rows())
     if as_json:
@@ -184,15 +178,14 @@ def _show(asked: "Study", opened: "Store", figures: dict[str, Any], as_json: boo
 
 def _show_row(asked: "Study", number: int, as_json: bool) -> None:
     """One row, solved alone."""
-    from tmsopt.studies.solving import alone
+    from tmsopt.studies import alone
 
     solved = alone(asked, number)
     if as_json:
         solution = {} if solved.solution is None else {"solution": solved.solution.to_json()}
         write_json({"schema": 1, **solved.row.to_json(), **solution})
         return
-    from tmsopt.report.design import solution_table
-    from tmsopt.report.study import row_lines
+    from tmsopt.report import row_lines, solution_table
 
     click.echo(row_lines(solved.row))
     if solved.solution is not None:

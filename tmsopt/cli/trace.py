@@ -30,59 +30,41 @@ Exit status: 0 traced, 2 bad input, 3 nothing of the pattern found in the box.
 @click.option("--plot", type=click.Path(path_type=Path), help="Draw the branches (png, pdf, svg).")
 @click.option("--axes", help="Two parameters to draw over, e.g. Fr,chi_B. [default: two that vary]")
 @click.option(
-    "--step",
-    type=click.FloatRange(min=1e-6, max=0.1),
-    default=0.005,
-    show_default=True,
+    "--step", type=click.FloatRange(min=1e-6, max=0.1), default=0.005, show_default=True,
     help="Longest step, in widths of the box.",
-)
+)  # fmt: skip
 @click.option(
     "--starts", type=click.IntRange(min=1), default=48, show_default=True, help="Fruitless in a row, to stop."
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts.")
 def trace(
-    file: Path,
-    pattern: str | None,
-    as_json: bool,
-    csv_file: Path | None,
-    plot: Path | None,
-    axes: str | None,
-    step: float,
-    starts: int,
-    seed: int,
-) -> None:
+    file: Path, pattern: str | None, as_json: bool, csv_file: Path | None, plot: Path | None, axes: str | None,
+    step: float, starts: int, seed: int,
+) -> None:  # fmt: skip
     """Trace a root pattern of FILE through parameter space, every branch in the box, with its events."""
     with bad_input():
-        from tmsopt.design.files import load
-        from tmsopt.errors import Fault, InputError
-        from tmsopt.tracing.branch import write_csv
-        from tmsopt.tracing.trace import trace as trace_problem
+        import tmsopt
 
         check_output("--plot", plot, FIGURES)
         check_output("--csv", csv_file, ("csv",))
-        problem = nominal_of(load(file, asks=False))
+        problem = nominal_of(tmsopt.load(file))
         if plot is None and axes is not None:
-            raise InputError([Fault("says what --plot draws; add --plot FILE", ("--axes",))])
+            raise tmsopt.InputError([tmsopt.Fault("says what --plot draws; add --plot FILE", ("--axes",))])
         if axes is not None:
             plane(problem, axes)
         with progress() as update:
-            found = trace_problem(problem, pattern, step=step, starts=starts, seed=seed, progress=update)
+            found = tmsopt.trace(problem, pattern, step=step, starts=starts, seed=seed, progress=update)
     if as_json:
         write_json(found.to_json())
     else:
-        from tmsopt.report.curves import trace_table
-
-        click.echo(trace_table(found))
+        click.echo(tmsopt.report.trace_table(found))
     if not found.branches:
         click.echo(f"no {found.pattern} found in the box; widen it, or try more --starts", err=True)
         raise SystemExit(3)
     if csv_file is not None:
         with saving("--csv", csv_file):
-            write_csv(found, csv_file)
+            found.write_csv(csv_file)
     if plot is not None:
-        from tmsopt.plots.style import save
-        from tmsopt.plots.trace import trace_figure
-        from tmsopt.tracing.branch import varying
-
         with saving("--plot", plot):
-            save(trace_figure(found, *plane(problem, axes or ",".join(varying(found)[:2]))), plot)
+            drawn = plane(problem, axes or ",".join(found.varying[:2]))
+            tmsopt.plots.save(tmsopt.plots.trace_figure(found, *drawn), plot)

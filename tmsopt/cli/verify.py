@@ -26,25 +26,16 @@ Exit status: 0 when the ledger was computed, whatever the verdicts; 2 bad input.
 def verify(as_json: bool, markdown: Path | None, only: tuple[str, ...]) -> None:
     """Recompute every number and statement of the source paper, with a verdict on each."""
     with bad_input():
-        from tmsopt.errors import Fault, InputError
-        from tmsopt.paper.ledger import matching
-        from tmsopt.paper.ledger import verify as compute
+        import tmsopt
 
         check_output("--markdown", markdown, ("md",))
-        for pattern in only:
-            if not matching([pattern]):
-                raise InputError(
-                    [Fault(f"found '{pattern}'; accepted: a key of the ledger, or a pattern", ("--only",))]
-                )
-    from tmsopt.report.ledger import ledger_page, ledger_table
-
-    with progress("claim") as update:
-        ledger = compute(update, only)
+        with progress("claim") as update:
+            ledger = tmsopt.verify(update, only)
     if as_json:
         write_json(ledger.to_json())
     else:
-        click.echo(ledger_table(ledger))
+        click.echo(tmsopt.report.ledger_table(ledger))
     if markdown is not None:
         with saving("--markdown", markdown):
-            markdown.write_text(ledger_page(ledger), encoding="utf-8")
+            markdown.write_text(tmsopt.report.ledger_page(ledger), encoding="utf-8")
     sys.exit(DONE)

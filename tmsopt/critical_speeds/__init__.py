@@ -9,10 +9,4 @@ from tmsopt.critical_speeds.growth import growth
 from tmsopt.critical_speeds.parametric import interpolated
 from tmsopt.critical_speeds.speeds import Speeds, speeds
 
-__all__ = [
-    "Speeds",
-    "crossings",
-    "growth",
-    "interpolated",
-    "speeds",
-]
+__all__ = ["Speeds", "crossings", "growth", "interpolated", "speeds"]

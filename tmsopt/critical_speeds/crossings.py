@@ -31,6 +31,10 @@ _SAME = 1e-12  # relative to the largest root: difference of two that are one; a
 _NOTHING = flint.fmpq(1, 10**90)  # of the largest coefficient: one that is 0 but for the digits of y
 
 
+Stretch = tuple[float, float]
+"""Two ends of a band."""
+
+
 @dataclass(frozen=True)
 class Crossing:
     """A place where roots meet, or meet the imaginary axis.
@@ -68,25 +72,29 @@ class Crossings:
     """
 
     found: tuple[Crossing, ...]
-    stable: tuple[tuple[float, float], ...]
-    heavily_damped: tuple[tuple[float, float], ...]
+    stable: tuple[Stretch, ...]
+    heavily_damped: tuple[Stretch, ...]
     always: tuple[str, ...] = ()
-    marginal: tuple[tuple[float, float], ...] = ()
+    marginal: tuple[Stretch, ...] = ()
     zeros: int = 0
 
 
-def crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any | None) -> Crossings:
+def crossings(
+    coefficients: Sequence[Polynomial], lower: Any, upper: Any | None, bands_alone: bool = False
+) -> Crossings:
     """All crossings with lower < y < upper, in exact numbers; without an upper end where that is None.
 
     Args:
         coefficients: of the polynomial in s, descending, each a polynomial in y.
+        bands_alone: what roots do where bands end, which takes most of the time, is not looked at.
     """
     lower, upper = rational(lower), None if upper is None else rational(upper)
     every = [trimmed(c) for c in coefficients]
     a = every[next(k for k, c in enumerate(every) if c) :]
     kinds, split = _conditions(a)
     places = {kind: real_places(polynomial, lower, upper) for kind, polynomial in kinds.items() if polynomial}
-    found = [(y, *rest) for kind, ys in places.items() for y in ys for rest in _named(a, split, kind, y)]
+    named = {} if bands_alone else places
+    found = [(y, *rest) for kind, ys in named.items() for y in ys for rest in _named(a, split, kind, y)]
     found.sort(key=lambda place: place[0])
     marks = sorted({y for ys in places.values() for y in ys})
     cells = list(_cells(marks, lower, upper))
@@ -219,9 +227,9 @@ def _cells(marks: Sequence[Any], lower: Any, upper: Any | None) -> Iterator[tupl
             yield float(low), float(high), (low + high) / 2
 
 
-def _bands(cells: Sequence[tuple[float, float, Any]], inside: Sequence[bool]) -> tuple[tuple[float, float], ...]:
+def _bands(cells: Sequence[tuple[float, float, Any]], inside: Sequence[bool]) -> tuple[Stretch, ...]:
     """Neighbouring gaps in which something holds, as one. It may fail at a mark between them, in one point."""
-    bands: list[tuple[float, float]] = []
+    bands: list[Stretch] = []
     for (low, high, _), holds in zip(cells, inside, strict=True):
         if holds and bands and bands[-1][1] == low:
             bands[-1] = (bands[-1][0], high)

@@ -1,26 +1,26 @@
 """Roots of a design over its speed, or another parameter, with the stable and heavily damped values of it."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.arithmetic.elementary import exact
+from tmsopt.critical_speeds.crossings import Stretch, crossings
+from tmsopt.critical_speeds.speeds import coefficients_over
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import Parameter, ParameterSet, Values
-from tmsopt.records import Array
+from tmsopt.records import Array, Truth
 from tmsopt.roots import is_stable, roots
-
-Band = tuple[float, float]
 
 SPEEDS = ("Fr", "v")
 """Native parameters that roots are shown over unless another is named; of a model without a speed, the first free."""
 
 _POINTS = 801
-_BISECTIONS = 60
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,8 @@ class Growth:
         critical: critical value that the model knows, such as Fr_c, nan if there is none.
         design: value of the design.
         structure: structure of its rightmost roots.
-        stable, heavily_damped: bands of values with all Re s < 0; with all s real and negative.
+        stable, heavily_damped: bands of values with all Re s < 0; with all s real and negative. Exact where the
+            coefficients are polynomials in the parameter, else from point to point.
     """
 
     over: Parameter
@@ -43,8 +44,8 @@ class Growth:
     critical: float
     design: float
     structure: str
-    stable: tuple[Band, ...]
-    heavily_damped: tuple[Band, ...]
+    stable: tuple[Stretch, ...]
+    heavily_damped: tuple[Stretch, ...]
 
 
 def growth(design: Solution, end: float | None = None, over: str | None = None) -> Growth:
@@ -69,27 +70,27 @@ def growth(design: Solution, end: float | None = None, over: str | None = None) 
     grid = np.unique(np.concatenate([np.linspace(first, high, _POINTS), at + crowd]))
     values = grid[(grid > low) & (grid <= high)] if name in SPEEDS else grid[(grid >= low) & (grid <= high)]
 
-    def coefficients(along: Array) -> Array:
-        columns: Mapping[str, Any] = {**parameters, name: along}
-        return np.stack(np.broadcast_arrays(*model.coefficients(columns, of), along)[:-1], axis=-1).astype(float)
-
-    def heavily_damped(along: Array) -> NDArray[np.bool_]:
-        a = coefficients(along)
-        return np.asarray(is_stable(a) & np.all(roots(a).imag == 0, axis=-1))
-
-    def stable(along: Array) -> NDArray[np.bool_]:
-        return is_stable(coefficients(along))
-
-    values = values[coefficients(values)[:, 0] != 0]  # a root at infinity cannot be shown
+    columns: Mapping[str, Any] = {**parameters, name: values}
+    a = np.stack(np.broadcast_arrays(*model.coefficients(columns, of), values)[:-1], axis=-1).astype(float)
+    shown = a[:, 0] != 0  # a root at infinity cannot be shown
+    values, a = values[shown], a[shown]
+    found = roots(a)
+    try:
+        bands = crossings(coefficients_over(model, of, parameters, name), exact(low), exact(high), bands_alone=True)
+        stable, heavily_damped = bands.stable, bands.heavily_damped
+    except InputError:  # no polynomials in it
+        inside = is_stable(a)
+        stable = _runs(values, inside)
+        heavily_damped = _runs(values, inside & np.all(found.imag == 0, axis=-1))
     return Growth(
         over=of[name],
         values=values,
-        roots=roots(coefficients(values)),
+        roots=found,
         critical=critical,
         design=at,
         structure=design.structure,
-        stable=_bands(values, stable),
-        heavily_damped=_bands(values, heavily_damped),
+        stable=stable,
+        heavily_damped=heavily_damped,
     )
 
 
@@ -113,7 +114,7 @@ def _critical(design: Solution, of: ParameterSet, parameters: Mapping[str, float
     return float(Values(model, of, parameters)[f"{name}_c"]) if known else math.nan
 
 
-def _ends(design: Solution, name: str, end: float | None, at: float, critical: float) -> Band:
+def _ends(design: Solution, name: str, end: float | None, at: float, critical: float) -> Stretch:
     if end is not None:
         return min(end, 0.0), max(end, 0.0)
     if name in SPEEDS:
@@ -122,14 +123,7 @@ def _ends(design: Solution, name: str, end: float | None, at: float, critical: f
     return (low, high) if low < high else (low - 1.0, high + 1.0)
 
 
-def _bands(grid: Array, holds: Callable[[Array], NDArray[np.bool_]]) -> tuple[Band, ...]:
-    """Intervals where a property holds, their ends bisected between grid points."""
-    inside = holds(grid)
-    edges = np.flatnonzero(inside[1:] != inside[:-1])
-    low, high, left = grid[edges], grid[edges + 1], inside[edges]
-    for _ in range(_BISECTIONS if edges.size else 0):
-        middle = (low + high) / 2
-        same = holds(middle) == left
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
-    ends = [*([float(grid[0])] if inside[0] else []), *high.tolist(), *([float(grid[-1])] if inside[-1] else [])]
-    return tuple(zip(ends[0::2], ends[1::2], strict=True))
+def _runs(values: Array, inside: Truth) -> tuple[Stretch, ...]:
+    """First and last value of each run of points in which something holds."""
+    changes = np.flatnonzero(np.diff(inside.astype(int), prepend=0, append=0))
+    return tuple((float(values[k]), float(values[m - 1])) for k, m in changes.reshape(-1, 2))

@@ -11,7 +11,7 @@ from tmsopt.arithmetic.elementary import rational
 
 Polynomial = Sequence[Any]
 """Coefficients in y, exact fractions, ascending."""
-Rows = list[list[Any]]
+Bivariate = list[list[Any]]
 """A polynomial in s, descending, each coefficient a polynomial in y."""
 
 
@@ -112,9 +112,9 @@ class Lasting:
     """
 
     zeros: int
-    mirrored: Rows
-    rest: Rows
-    once: Rows
+    mirrored: Bivariate
+    rest: Bivariate
+    once: Bivariate
     repeated: bool
     repeats_mirrored: bool
 
@@ -149,7 +149,7 @@ def lasting(coefficients: Sequence[Polynomial]) -> Lasting:
     )
 
 
-def _rows(p: Any) -> Rows:
+def _rows(p: Any) -> Bivariate:
     """Coefficients of a polynomial in s and y, descending in s."""
     degree, width = p.degrees()
     rows = [[flint.fmpq(0)] * (width + 1) for _ in range(degree + 1)]

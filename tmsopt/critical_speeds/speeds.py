@@ -1,25 +1,25 @@
 """The speeds at which a bicycle changes its kind of motion: weave, capsize, and roots that meet, all of them."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import flint
 
 from tmsopt.arithmetic.elementary import exact, rational
-from tmsopt.critical_speeds.crossings import Crossing, crossings
-from tmsopt.critical_speeds.parametric import interpolated
-from tmsopt.design.problem import Problem, checked
+from tmsopt.critical_speeds.crossings import Crossing, Stretch, crossings
+from tmsopt.critical_speeds.parametric import Polynomial, interpolated
+from tmsopt.design.files import Given, problem_of
+from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
-from tmsopt.models import ParameterSet
-from tmsopt.records import Table
+from tmsopt.models import Model, ParameterSet
+from tmsopt.records import Progress, Table, plain
+from tmsopt.solver.solve import solve
 
 _DIGITS = 120  # of what is no fraction, such as the tangent of an angle
 _STRAIGHT = 1e-100  # relative; a number that is linear in the speed is so within the digits carried
-
-Band = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -45,10 +45,10 @@ class Speeds:
     lower: float
     upper: float
     found: tuple[Crossing, ...]
-    stable: tuple[Band, ...]
-    heavily_damped: tuple[Band, ...]
+    stable: tuple[Stretch, ...]
+    heavily_damped: tuple[Stretch, ...]
     always: tuple[str, ...]
-    marginal: tuple[Band, ...] = ()
+    marginal: tuple[Stretch, ...] = ()
     zeros: int = 0
 
     @property
@@ -69,53 +69,50 @@ class Speeds:
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; an end at infinity is null."""
         return {
-            "schema": 1,
-            "title": self.problem.title,
-            "model": self.problem.model.name,
+            **self.problem.heading,
             "parameter": self.parameter,
             "unit": self.problem.parameter_set[self.parameter].unit,
-            "range": [_finite(self.lower), _finite(self.upper)],
+            "range": list(plain(self, "lower upper").values()),
             "found": [
                 {
                     self.parameter: c.at,
                     "kind": c.kind,
-                    "re": _finite(c.root.re),
-                    "im": _finite(c.root.im),
-                    "multiplicity": c.root.multiplicity,
+                    **plain(c.root),
                     "rightmost": c.rightmost,
                     "stability_changes": c.changes,
                 }
                 for c in self.found
             ],
-            "stable": [[_finite(e) for e in band] for band in self.stable],
-            "heavily_damped": [[_finite(e) for e in band] for band in self.heavily_damped],
-            "marginally_stable": [[_finite(e) for e in band] for band in self.marginal],
-            "always": list(self.always),
-            "zeros": self.zeros,
-            "parameters": dict(self.parameters),
+            **plain(self, "stable heavily_damped"),
+            "marginally_stable": plain(self, "marginal")["marginal"],
+            **plain(self, "always zeros parameters"),
         }
 
 
 def speeds(
-    design: Problem | Solution | Mapping[str, float],
+    design: Given | Mapping[str, float],
     parameter: str | None = None,
     *,
-    between: tuple[float, float] | None = None,
+    between: Stretch | None = None,
     problem: Problem | None = None,
+    progress: Progress | None = None,
 ) -> Speeds:
     """Every weave and capsize speed of a design and every speed at which roots meet, by exact root isolation.
 
     The coefficients are polynomials in the speed, so these speeds are the roots of polynomials too, and none is missed.
 
     Args:
-        design: a problem in which nothing else is free, a solution, or the parameters of a design of `problem`.
+        design: a solution, a problem or its file, or the parameters of a design of `problem`. A problem that frees
+            more than this parameter is solved first.
         parameter: what varies, by default the speed; any parameter that the coefficients are polynomials in.
+        progress: called with the starts done and in all, where the problem is solved first.
         between: the range to look through; by default the parameter's box, or all of its physical range.
 
     Raises:
-        InputError: where other parameters are free, or the parameter does not enter as a polynomial.
+        NotSolved: where there is no design to look at.
+        InputError: where the parameter does not enter as a polynomial.
     """
-    asked, own = _design(design, problem)
+    asked = (problem if problem is not None and isinstance(design, Mapping) else problem_of(design)).nominal
     of = asked.parameter_set
     name = parameter if parameter is not None else speed_of(of)
     if name is None:
@@ -125,18 +122,13 @@ def speeds(
         raise InputError([Fault(message, ("parameter",))])
     if name not in of.names:
         raise InputError([Fault(f"unknown parameter '{name}'; {suggest(name, of.names)}", ("parameter",))])
-    if others := [n for n in asked.free if n != name and n not in own]:
-        message = f"also free: {', '.join(others)}; fix them, or give the solution of the problem"
-        raise InputError([Fault(message, ("parameters",))])
+    own = _parameters(design, asked, name, progress)
     allowed = of[name].range
     lower, upper = between or asked.free.get(name) or (allowed.lower, allowed.upper)
     if not math.isfinite(lower) or not lower < upper:
         message = f"found {lower:.6g} … {upper:.6g}; accepted: a least and a greater value"
         raise InputError([Fault(message, ("between",))])
-    at = _linear(asked, own, name)
-    a = interpolated(lambda x: asked.model.polynomial(**{n: p if q == 0 else p + q * x for n, (p, q) in at.items()}))
-    if a is None or not any(any(c != 0 for c in p) for p in a):
-        raise InputError([Fault(f"the coefficients are no polynomials in {name}, or all 0", ("parameter",))])
+    a = coefficients_over(asked.model, of, own, name)
     met = crossings(a, exact(float(lower)), exact(float(upper)) if math.isfinite(upper) else None)
     return Speeds(
         problem=asked,
@@ -158,22 +150,34 @@ def speed_of(of: ParameterSet) -> str | None:
     return next((p.name for p in of.parameters if p.unit == "m/s" or p.name == "Fr"), None)
 
 
-def _design(design: Any, problem: Problem | None) -> tuple[Problem, dict[str, float]]:
+def coefficients_over(model: Model, of: ParameterSet, own: Mapping[str, float], name: str) -> Sequence[Polynomial]:
+    """The coefficients of a design as polynomials in one of its parameters.
+
+    Raises:
+        InputError: where they are none.
+    """
+    at = _linear(model, of, own, name)
+    a = interpolated(lambda x: model.polynomial(**{n: p if q == 0 else p + q * x for n, (p, q) in at.items()}))
+    if a is None or not any(any(c != 0 for c in p) for p in a):
+        raise InputError([Fault(f"the coefficients are no polynomials in {name}, or all 0", ("parameter",))])
+    return a
+
+
+def _parameters(design: Any, asked: Problem, name: str, progress: Progress | None) -> dict[str, float]:
+    """The parameters of the design; that of a problem which frees more than the one that varies is found first."""
     if isinstance(design, Solution):
-        return design.problem.nominal, dict(design.parameters)
-    if isinstance(design, Problem) or problem is None:
-        asked = checked(design).nominal
-        return asked, dict(asked.fixed)
-    return problem.nominal, {**problem.fixed, **design}
+        return dict(design.parameters)
+    if isinstance(design, Mapping):
+        return {**asked.fixed, **design}
+    return dict(asked.fixed if set(asked.free) <= {name} else solve(asked, progress=progress).parameters)
 
 
-def _linear(problem: Problem, own: Mapping[str, float], name: str) -> dict[str, tuple[Any, Any]]:
+def _linear(model: Model, of: ParameterSet, own: Mapping[str, float], name: str) -> dict[str, tuple[Any, Any]]:
     """The algebraic parameters as α + β x.
 
     Raises:
         InputError: where one is no such function.
     """
-    of, model = problem.parameter_set, problem.model
     with flint.ctx.workdps(_DIGITS):
         first, second, third = (
             {n: flint.arb(v) for n, v in model.algebraic(of.native(_exact(own, of, name, k))).items()}
@@ -192,7 +196,3 @@ def _linear(problem: Problem, own: Mapping[str, float], name: str) -> dict[str, 
 
 def _exact(own: Mapping[str, float], of: ParameterSet, name: str, value: int) -> dict[str, Any]:
     return {n: flint.fmpq(value) if n == name else exact(float(own[n])) for n in of.names}
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

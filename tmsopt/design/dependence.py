@@ -25,7 +25,7 @@ def varies(problem: Problem, expression: Expression, cases: Sequence[Case]) -> b
     at two corners of a box.
     """
     varied = {name for case in cases for table in (case.at, case.offset) for name in table}
-    if not varied or expression.comparison == "==":
+    if not varied or expression.equality:
         return False
     return bool(varied & _dependencies(problem.model, problem.parameter_set.name, expression))
 
@@ -41,10 +41,9 @@ def overclaims(problem: Problem) -> bool:
 
 def tempts(problem: Problem, name: str, worse: float = 1.0) -> bool:
     """Whether objective or constraints get better, at some design, as a quantity moves up (or down: `worse` −1)."""
-    sense = -1.0 if problem.sense == "maximize" else 1.0
-    asked = [(sense, problem.objective)]
+    asked = [(problem.sign, problem.objective)]
     for condition in problem.conditions.values():
-        asked.append((-1.0 if condition.comparison == ">=" else 1.0, condition))
+        asked.append((condition.sign, condition))
     return any(e is not None and _falls(problem, sign, e, name, worse) for sign, e in asked)
 
 
@@ -53,9 +52,7 @@ def demands_heavy_damping(problem: Problem) -> bool:
     for condition in problem.conditions.values():
         if condition.names == ("damping_ratio",):
             below, at = (float(condition({"damping_ratio": ratio})) for ratio in (1 - 1e-9, 1.0))
-            sign = -1.0 if condition.comparison == ">=" else 1.0
-            equal = condition.comparison == "=="
-            if (at == 0 != below) if equal else (sign * at <= 0 < sign * below):
+            if condition.holds(at) and condition.excess(below) > 0:
                 return True
     return False
 
@@ -78,7 +75,7 @@ def _falls(problem: Problem, sign: float, expression: Expression, name: str, wor
             for value in (found[name], found[name] + worse * _STEP)
         )
         change = sign * (after - before)
-        if change < 0 or (expression.comparison == "==" and change != 0):
+        if change < 0 or (expression.equality and change != 0):
             return True
     return False
 

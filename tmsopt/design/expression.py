@@ -9,6 +9,7 @@ import threading
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -20,6 +21,8 @@ from tmsopt.errors import suggest
 from tmsopt.models.names import CONSTANTS, FUNCTIONS
 
 COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
+
+_ALLOWED = {"<=": (-math.inf, 0.0), ">=": (0.0, math.inf), "==": (0.0, 0.0), "": (-math.inf, math.inf)}
 
 _LONGEST = 2000  # characters; longer texts could exhaust the parser's stack
 _DEEPEST = 200
@@ -128,8 +131,31 @@ class Expression:
         """By how much a numeric design violates a comparison, relative to the size of its sides; nan if undefined."""
         left, right = self.sides(values)
         difference = left - right
-        excess = {"<=": max(difference, 0.0), ">=": max(-difference, 0.0), "==": abs(difference)}[self.comparison]
+        excess = float(self.excess(difference))
         return excess / max(1.0, abs(left), abs(right)) if math.isfinite(difference) else math.nan
+
+    @property
+    def equality(self) -> bool:
+        """Whether a comparison allows one value alone, so that it takes away a degree of freedom."""
+        return self.allowed[0] == self.allowed[1]
+
+    @property
+    def allowed(self) -> tuple[float, float]:
+        """Least and greatest left minus right that a comparison allows."""
+        return _ALLOWED[self.comparison]
+
+    @property
+    def sign(self) -> float:
+        """−1 where left minus right is better the greater it is; else 1, for values and equalities too."""
+        return -1.0 if self.allowed == (0.0, math.inf) else 1.0
+
+    def excess(self, difference: Any) -> Any:
+        """By how much left minus right, a number or an array of them, is beyond what a comparison allows."""
+        return np.abs(difference) if self.equality else np.maximum(self.sign * difference, 0)
+
+    def holds(self, difference: Any) -> Any:
+        """Whether a comparison allows left minus right; not where that does not exist."""
+        return self.excess(difference) <= 0
 
     def sides(self, values: Mapping[str, Any]) -> tuple[float, float]:
         """Both sides of a comparison for a numeric design."""
@@ -208,6 +234,7 @@ _ONE_AT_A_TIME = threading.Lock()
 """Neither ast.parse (python/cpython#106905) nor warnings.catch_warnings may run in two threads at once."""
 
 
+@lru_cache(maxsize=4096)
 def _parse(text: str) -> ast.expr:
     if len(text) > _LONGEST:
         raise ExpressionError(f"expression of {len(text)} characters; accepted: up to {_LONGEST}")

@@ -1,7 +1,7 @@
 """Problem files: TOML to a Problem, with every fault placed at its line."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -12,6 +12,7 @@ from pydantic import Field, StrictFloat, StrictInt, StrictStr
 from tmsopt.design.cases import POINTS, Band
 from tmsopt.design.model_table import stated_model
 from tmsopt.design.problem import Problem, unasked
+from tmsopt.design.solution import Solution
 from tmsopt.design.toml import Number, Section, fitted, read_page
 from tmsopt.design.units import with_unit
 from tmsopt.design.validate import VARIATIONS, guess_parameter_set
@@ -53,19 +54,59 @@ class _File(Section):
     weights: dict[str, Number] = Field(default_factory=dict)
 
 
-def load(path: str | PathLike[str], asks: bool = True) -> Problem:
-    """Read a problem file; one that `asks` must say what to do with its free parameters.
+Given = Problem | Solution | str | PathLike[str]
+"""What every verb takes: a problem, the path of its file, or a solution, which has its problem."""
+
+
+def load(path: str | PathLike[str]) -> Problem:
+    """Read a problem file, whether it asks something or not: what must be asked is the verb's business.
 
     Raises:
         InputError: listing every fault with file, line, key, what was found and what is accepted.
     """
+    return _read(path, lambda problem: [])
+
+
+def problem_of(given: object) -> Problem:
+    """What a verb is given: a problem as it is, the one in a file, or the one that a solution is of.
+
+    Raises:
+        InputError: for a file with faults, and for anything else.
+    """
+    return _given(given, lambda problem: [])
+
+
+def question_of(given: object, front: bool = False) -> Problem:
+    """The same, which must ask for one design, or may ask for a `front` as well.
+
+    Raises:
+        InputError: also where parameters are free and nothing is asked of them; of a file, at its line.
+    """
+    return _given(given, lambda problem: [] if front and problem.pareto else unasked(problem))
+
+
+def _given(given: object, faults_of: Callable[[Problem], list[Fault]]) -> Problem:
+    if isinstance(given, str | PathLike):
+        return _read(given, faults_of)
+    if not isinstance(given, Problem | Solution):
+        message = f"found {short(given)}; accepted: a Problem, the path of a problem file, or a Solution"
+        raise InputError([Fault(message, ("problem",))])
+    problem = given if isinstance(given, Problem) else given.problem
+    if faults := faults_of(problem):
+        raise InputError(faults)
+    return problem
+
+
+def _read(path: str | PathLike[str], faults_of: Callable[[Problem], list[Fault]]) -> Problem:
     page = read_page(path, "problem")
     if "parameters" not in page.data and {"problem", "study", "vary"} & set(page.data):
         written = page.data.get("problem")
         own = f"its problem, {written}" if isinstance(written, str) else "a file with its [problem] alone"
         message = f"is a study of many designs, not one problem; run tmsopt study {page.file}, or give {own}"
         raise InputError([Fault(message, file=page.file)])
-    faults, problem = posed(_with_bicycle(page.data, Path(page.file).parent), Path(page.file).stem, asks)
+    faults, problem = posed(_with_bicycle(page.data, Path(page.file).parent), Path(page.file).stem)
+    if problem is not None:
+        faults = [*faults, *faults_of(problem)]
     if problem is None or faults:
         raise page.error(faults)
     return problem
@@ -81,7 +122,7 @@ def _with_bicycle(data: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
     return {"model": "whipple", **data, "parameters": {**measured, **given}}
 
 
-def posed(data: Mapping[str, Any], title: str, asks: bool = True) -> tuple[list[Fault], Problem | None]:
+def posed(data: Mapping[str, Any], title: str) -> tuple[list[Fault], Problem | None]:
     """The problem of a problem file's tables, and what is wrong with them.
 
     Args:
@@ -120,8 +161,6 @@ def posed(data: Mapping[str, Any], title: str, asks: bool = True) -> tuple[list[
                 | {f.key[:1] for f in faults if f.key[:1] == ("objective",)}
             )
             faults = faults + [f for f in error.faults if f.key[:2] not in reported]
-    if problem is not None and asks and not problem.pareto:
-        faults = [*faults, *unasked(problem)]
     return faults, problem
 
 

@@ -12,6 +12,7 @@ from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTIT
 from tmsopt.design.validate import faults, guess_parameter_set
 from tmsopt.errors import Fault, InputError
 from tmsopt.models import Model, ParameterSet, Values
+from tmsopt.records import SCHEMA
 from tmsopt.roots import Pattern, pattern
 
 _POINT = 1e-12
@@ -91,6 +92,11 @@ class Problem:
         return replace(self, scenarios={}, tolerances={}) if self.scenarios or self.tolerances else self
 
     @property
+    def heading(self) -> dict[str, Any]:
+        """What the JSON of every result begins with."""
+        return {"schema": SCHEMA, "title": self.title, "model": self.model.name}
+
+    @property
     def asks_radius(self) -> bool:
         """Whether the objective or a constraint names the robustness radius."""
         return any(RADIUS in e.names for e in (self.objective, *self.objectives, *self.conditions.values()) if e)
@@ -115,6 +121,11 @@ class Problem:
         if self.pareto:
             return "pareto"
         return "locate" if self.locate else "evaluate"
+
+    @property
+    def sign(self) -> float:
+        """1, or −1 where the objective is maximised: times this, the less of it the better."""
+        return 1.0 if self.maximize is None else -1.0
 
     @cached_property
     def objective(self) -> Expression | None:
@@ -161,18 +172,6 @@ def weighted(of: ParameterSet, weights: Mapping[str, float], fixed: Mapping[str,
     return tuple(p.name for p in of.parameters if p.may_change(fixed.get(p.name, math.inf)))
 
 
-def checked(problem: object) -> Problem:
-    """A problem as it is.
-
-    Raises:
-        InputError: for anything else, such as the name of a file.
-    """
-    if isinstance(problem, Problem):
-        return problem
-    message = f"found {problem!r}; accepted: a Problem, such as tmsopt.load('problems/chart.toml', asks=False)"
-    raise InputError([Fault(message, ("problem",))])
-
-
 def unasked(problem: Problem) -> list[Fault]:
     """What is wrong with solving a problem that has not one question; a chart needs none."""
     if problem.pareto:
@@ -184,7 +183,7 @@ def unasked(problem: Problem) -> list[Fault]:
         return []
     message = (
         "parameters are free, but nothing is asked of them; write minimize, maximize or locate, "
-        "or pareto for a front (chart and trace need none: in Python, load(file, asks=False))"
+        "or pareto for a front (chart and trace need none)"
     )
     return [Fault(message, ("objective",))]
 
@@ -214,5 +213,5 @@ class Freedom:
 
 def freedom(problem: Problem) -> Freedom:
     """Degrees of freedom of a problem: free parameters against pattern conditions and equality constraints."""
-    equalities = sum(c.comparison == "==" for c in problem.conditions.values())
+    equalities = sum(c.equality for c in problem.conditions.values())
     return Freedom(len(problem.free), (problem.pattern.codimension if problem.pattern else 0) + equalities)

@@ -21,7 +21,10 @@ def _structure(values: Mapping[str, Any]) -> Structure:
     a = [float(c) for c in values.coefficients]
     if a[0] == 0 or not all(map(math.isfinite, a)):
         return Structure("undecided", (), math.inf)  # a singular mass matrix: a root is at infinity
-    return structure(a, STRUCTURE_TOLERANCE, values.roundings())
+    off = values.roundings()
+    if abs(a[0]) <= off[0] < math.inf:
+        return Structure("undecided", (), math.inf)  # rounding alone keeps it from 0; where all are such, all fits
+    return structure(a, STRUCTURE_TOLERANCE, off)
 
 
 def _abscissa(values: Mapping[str, Any]) -> float:

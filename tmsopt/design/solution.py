@@ -1,14 +1,13 @@
 """The solution of a design problem as data."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Freedom, Problem
 from tmsopt.design.units import Reading
-from tmsopt.records import Table
+from tmsopt.records import Table, plain
 from tmsopt.roots import Root
 
 
@@ -27,7 +26,6 @@ class Cover:
     boxes: int
 
 
-SCHEMA = 1
 GAIN_DIGITS = 6
 SIDE_DIGITS = 9
 
@@ -57,9 +55,8 @@ class Bound:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
-        known = {"value": _number(self.value), "gap": _number(self.gap), "proven": self.proven, "method": self.method}
         search = {"seconds": round(self.seconds, 4), "nodes": self.nodes, "feasibility_tolerance": self.tolerance}
-        return known | (search if self.tolerance else {})
+        return plain(self, "value gap proven method") | (search if self.tolerance else {})
 
 
 @dataclass(frozen=True)
@@ -97,12 +94,7 @@ class Relaxation:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
-        return {
-            "amounts": dict(self.amounts),
-            "conflict": list(self.conflict),
-            "alone": dict(self.alone),
-            "parameters": dict(self.parameters),
-        }
+        return plain(self, "amounts conflict alone parameters")
 
 
 @dataclass(frozen=True)
@@ -171,49 +163,31 @@ class Solution:
         """
         problem = self.problem
         text = problem.minimize or problem.maximize or problem.locate or "abscissa"
-        objective: dict[str, Any] = {"sense": problem.sense, "expression": text, "value": _number(self.value)}
-        if problem.locate:
-            objective["locate"] = problem.locate
-        si = {name: list(x) if isinstance(x, tuple) else _number(x) for name, x in self.si.items()}
+        cases = {"worst_case": self.worst, "least_damped_case": self.least_damped}
+        optional = {
+            **{name: case and plain(case, "at offset") for name, case in cases.items()},
+            **plain(self, "cover"),
+            "sides": plain(self.sides, digits=SIDE_DIGITS),
+            **plain(self, "relaxation si"),
+        }
         return {
-            "schema": SCHEMA,
-            "title": problem.title,
-            "model": problem.model.name,
+            **problem.heading,
             "status": self.status,
-            "objective": objective,
-            "parameters": _numbers(self.parameters),
-            "abscissa": _number(self.abscissa),
-            "abscissa_realised": _number(self.abscissa_realised),
-            "roots": [{"re": r.re, "im": r.im, "multiplicity": r.multiplicity} for r in self.roots],
-            "structure": self.structure,
-            "active": _digits(self.active, GAIN_DIGITS),
-            "violations": _digits(self.violations, GAIN_DIGITS),
-            "bound": self.bound.to_json(),
-            "starts": {
-                "tried": self.starts.tried,
-                "converged": self.starts.converged,
-                "at_best": self.starts.at_best,
+            "objective": {
+                "sense": problem.sense,
+                "expression": text,
+                **plain(self, "value"),
+                **({"locate": problem.locate} if problem.locate else {}),
             },
+            **plain(self, "parameters abscissa abscissa_realised roots structure"),
+            "active": plain(self.active, digits=GAIN_DIGITS),
+            "violations": plain(self.violations, digits=GAIN_DIGITS),
+            **plain(self, "bound starts"),
             "seconds": round(self.seconds, 4),
-            "quantities": _numbers(self.quantities),
-            "dimensionless": _numbers(self.dimensionless),
-            "formulation": self.formulation,
-            "freedom": {
-                "free": self.freedom.free,
-                "conditions": self.freedom.conditions,
-                "count": self.freedom.count,
-                "kind": self.freedom.kind,
-            },
-            "branches": [
-                {"parameters": _numbers(b.parameters), "excluded_by": list(b.excluded_by)} for b in self.branches
-            ],
-            "notes": list(self.notes),
-            **({"worst_case": _case(self.worst)} if self.worst else {}),
-            **({"least_damped_case": _case(self.least_damped)} if self.least_damped else {}),
-            **({"cover": asdict(self.cover)} if self.cover else {}),
-            **({"sides": _digits(self.sides, SIDE_DIGITS)} if self.sides else {}),
-            **({"relaxation": self.relaxation.to_json()} if self.relaxation else {}),
-            **({"si": si} if si else {}),
+            **plain(self, "quantities dimensionless formulation"),
+            "freedom": plain(self.freedom, "free conditions count kind"),
+            **plain(self, "branches notes"),
+            **{name: value for name, value in optional.items() if value},
         }
 
 
@@ -231,20 +205,3 @@ class NotSolved(RuntimeError):
 
     def __reduce__(self) -> tuple[type["NotSolved"], tuple[Solution]]:
         return NotSolved, (self.solution,)
-
-
-def _case(case: Case) -> dict[str, dict[str, float]]:
-    return {"at": dict(case.at), "offset": dict(case.offset)}
-
-
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
-def _numbers(table: Mapping[str, float]) -> dict[str, float | None]:
-    return {name: _number(value) for name, value in table.items()}
-
-
-def _digits(table: Mapping[str, float], digits: int) -> dict[str, float | None]:
-    """Numbers to so many significant digits."""
-    return {name: _number(float(f"{value:.{digits}g}")) for name, value in table.items()}

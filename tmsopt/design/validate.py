@@ -98,8 +98,7 @@ def _value_faults(problem: Stated, of: ParameterSet, name: str) -> Iterator[Faul
         yield Fault(f"min = {lower:.6g} is greater than max = {upper:.6g}; swap them", key)
     elif name in problem.start and not lower <= problem.start[name] <= upper:
         yield Fault(
-            f"start = {problem.start[name]:.6g} lies outside the bounds {lower:.6g} … {upper:.6g}",
-            (*key, "start"),
+            f"start = {problem.start[name]:.6g} lies outside the bounds {lower:.6g} … {upper:.6g}", (*key, "start")
         )
 
 
@@ -189,10 +188,7 @@ def _number_faults(of: ParameterSet, name: str, value: Any, key: tuple[str, ...]
     if not math.isfinite(number):
         yield Fault(f"found {value!r}; accepted: a finite number{unit and ' in' + unit}", key)
     elif number not in parameter.range:
-        yield Fault(
-            f"{name} = {number:.6g}{unit} is not physical; {parameter.meaning} is {parameter.range}{unit}",
-            key,
-        )
+        yield Fault(f"{name} = {number:.6g}{unit} is not physical; {parameter.meaning} is {parameter.range}{unit}", key)
 
 
 def _objective_faults(problem: Stated) -> Iterator[Fault]:

@@ -8,12 +8,4 @@ from tmsopt.diagnosis.jordan import is_regular, jordan
 from tmsopt.diagnosis.puiseux import branches
 from tmsopt.diagnosis.splitting import Response
 
-__all__ = [
-    "Diagnosis",
-    "Response",
-    "branches",
-    "diagnose",
-    "diagnosed",
-    "is_regular",
-    "jordan",
-]
+__all__ = ["Diagnosis", "Response", "branches", "diagnose", "diagnosed", "is_regular", "jordan"]

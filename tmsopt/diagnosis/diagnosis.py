@@ -8,12 +8,14 @@ from typing import Any
 import flint
 
 from tmsopt.arithmetic.elementary import exact
-from tmsopt.design.solution import Solution
+from tmsopt.design.files import Given
 from tmsopt.diagnosis.jordan import Jordan, is_regular, jordan
 from tmsopt.diagnosis.splitting import DEVIATION, Ideal, Law, Response, response
 from tmsopt.models import Model, ParameterSet
+from tmsopt.records import plain
 from tmsopt.roots import Root, Structure
-from tmsopt.roots.patterns.enclosed import nearest
+from tmsopt.roots.patterns.enclosed import nearest_roots
+from tmsopt.solver.solve import solved
 
 _BITS = 424  # 127 digits: changes down to 1e-16 are differences of coefficients
 _RANK = 1e-7  # relative singular value that counts as 0; of a nearly semisimple root it is the root of the distance
@@ -47,17 +49,11 @@ class Diagnosis:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that only describe have 6 digits."""
-        ranks = self.jordan
         return {
-            "re": self.re,
-            "im": self.im,
-            "algebraic": self.algebraic,
-            "geometric": self.geometric,
-            "partial": list(self.partial),
-            "kind": self.kind,
-            "matrices": ranks is not None,
-            **({"singular_values": _singular(ranks)} if ranks else {}),
-            "distance": _short(self.distance),
+            **plain(self, "re im algebraic geometric partial kind"),
+            "matrices": self.jordan is not None,
+            **({"singular_values": plain(self.jordan, "zero nonzero threshold", digits=6)} if self.jordan else {}),
+            **plain(self, "distance", digits=6),
             "responses": [
                 {
                     "parameter": r.parameter,
@@ -70,7 +66,7 @@ class Diagnosis:
         }
 
 
-def diagnose(solution: Solution) -> tuple[Diagnosis, ...]:
+def diagnose(design: Given) -> tuple[Diagnosis, ...]:
     """Diagnosis of every multiple root of a design, rightmost first; none if all roots are simple.
 
     The algebraic multiplicity is that of the solution's structure. The geometric and partial multiplicities are ranks
@@ -78,11 +74,12 @@ def diagnose(solution: Solution) -> tuple[Diagnosis, ...]:
     that polynomial with the exact changes of the coefficients that a parameter makes: c = −k! ∂p/∂θ / p⁽ᵏ⁾ of
     s = s0 + (c ε)^(1/k), or Newton's polygon where that vanishes; the law is then set beside the roots themselves.
     """
+    solution = solved(design)
     problem = solution.problem
-    design = solution.worst.applied(solution.parameters) if solution.worst else dict(solution.parameters)
-    found = problem.values(design)["structure"]
+    parameters = solution.worst.applied(solution.parameters) if solution.worst else dict(solution.parameters)
+    found = problem.values(parameters)["structure"]
     assert isinstance(found, Structure)
-    return diagnosed(problem.model, problem.parameter_set, design, found)
+    return diagnosed(problem.model, problem.parameter_set, parameters, found)
 
 
 def diagnosed(
@@ -102,7 +99,7 @@ def diagnosed(
 
 def _ideal(model: Model, of: ParameterSet, design: Mapping[str, float], structure: Structure) -> Ideal:
     coefficients = model.coefficients({n: exact(x) for n, x in design.items()}, of)
-    balls = nearest(structure.name, coefficients, structure.roots)
+    balls = nearest_roots(structure.name, coefficients, structure.roots)
     if balls is None:
         return [(r, flint.acb(r.re, r.im)) for r in structure.roots]
     middles = [flint.acb(z.re.mid(), z.im.mid()) for z in balls]
@@ -157,21 +154,6 @@ def _law(law: Law) -> dict[str, Any]:
     return {
         "roots": b.roots,
         "exponent": str(b.exponent),
-        "numerator": b.numerator,
-        "denominator": b.denominator,
-        "constants": [{"re": _short(c.real), "im": _short(c.imag)} for c in b.constants],
-        "size": _short(b.size),
-        "holds": {"below": _short(law.below), "above": _short(law.above), "deviation": DEVIATION},
+        **plain(b, "numerator denominator constants size", digits=6),
+        "holds": plain(law, "below above", digits=6) | {"deviation": DEVIATION},
     }
-
-
-def _singular(ranks: Jordan) -> dict[str, float | None]:
-    return {
-        "zero": _short(ranks.zero),
-        "nonzero": _short(ranks.nonzero) if math.isfinite(ranks.nonzero) else None,
-        "threshold": _short(ranks.threshold),
-    }
-
-
-def _short(x: float) -> float:
-    return float(f"{x:.6g}")

@@ -10,16 +10,6 @@ from tmsopt.explanation.rounding import rounded
 from tmsopt.explanation.steps import natural_step, step_within
 
 __all__ = [
-    "NOT_COVERED",
-    "NOT_MINIMAL",
-    "STRICT",
-    "UNDECIDED",
-    "Explanation",
-    "Optimality",
-    "explain",
-    "moved",
-    "natural_step",
-    "optimality",
-    "rounded",
-    "step_within",
-]
+    "NOT_COVERED", "NOT_MINIMAL", "STRICT", "UNDECIDED", "Explanation", "Optimality", "explain", "moved",
+    "natural_step", "optimality", "rounded", "step_within",
+]  # fmt: skip

@@ -40,7 +40,7 @@ def better(program: Program, found: Conditions, solution: Solution) -> Better | 
     """The design after the longest step downhill that improves; None where none does."""
     problem = program.problem
     judged = solution.abscissa if (problem.minimize or "").strip() == "abscissa" else solution.value
-    sign = -1.0 if problem.sense == "maximize" else 1.0
+    sign = problem.sign
     order = 2 if curved(found.curvature) < 0 else 1
     for x in _along(program, found, both=order == 2):
         names = list(problem.free)

@@ -3,12 +3,14 @@
 from dataclasses import dataclass
 from typing import Any
 
-from tmsopt.design.solution import Bound, Solution
+from tmsopt.design.files import Given
+from tmsopt.design.solution import Bound
 from tmsopt.explanation.limits import Lever, levers
 from tmsopt.explanation.optimality import Optimality, optimality
 from tmsopt.explanation.rounding import Rounded, rounded_alone, rounded_together, worst
 from tmsopt.explanation.summary import summary, warnings
-from tmsopt.records import Table
+from tmsopt.records import Table, plain
+from tmsopt.solver.solve import solved
 
 
 @dataclass(frozen=True)
@@ -39,23 +41,17 @@ class Explanation:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
-        return {
-            "summary": self.summary,
-            "optimality": self.optimality.to_json(),
-            "levers": [lever.to_json() for lever in self.levers],
-            "rounding": {name: row.to_json() for name, row in self.rounding.items()},
-            "worst": self.worst or None,
-            "precision": [row.to_json() for row in self.precision],
-            "warnings": list(self.warnings),
-        }
+        found = plain(self, "summary optimality levers rounding worst precision warnings")
+        return found | {"worst": self.worst or None}
 
 
-def explain(solution: Solution, *, resolve: bool = True) -> Explanation:
+def explain(design: Given, *, resolve: bool = True) -> Explanation:
     """Say what a solution means; of one that is not optimal, what can be said.
 
     Args:
         resolve: check each multiplier by solving again with its limit moved, from the optimum; 30 ms or so each.
     """
+    solution = solved(design)
     feasible = not solution.violations
     alone = rounded_alone(solution) if feasible else Table[Rounded]()
     return Explanation(

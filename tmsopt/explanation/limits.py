@@ -1,16 +1,16 @@
 """What each limit that binds is worth: its multiplier, checked by solving again with the limit moved."""
 
 import math
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from tmsopt.design.expression import parse_value
+from tmsopt.design.expression import parse_value, written_sides
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.errors import InputError
-from tmsopt.explanation.steps import Step, natural_step, reported_unit, step_within, unit_of, with_reported_unit
+from tmsopt.explanation.steps import LimitStep, natural_step, reported_unit, step_within, unit_of, with_reported_unit
+from tmsopt.records import plain
 from tmsopt.solver.solve import solve
 
 DIFFERS = 0.2
@@ -18,7 +18,6 @@ DIFFERS = 0.2
 
 _RETRY = 8  # starts when the optimum as the only start did not lead to one at least as good
 _NOISE = 1e-8  # of the objective: differences below it are no loss
-_COMPARISON = re.compile(r"<=|>=|==")
 
 
 @dataclass(frozen=True)
@@ -77,18 +76,13 @@ class Lever:
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
         return {
-            "name": self.name,
-            "kind": self.kind,
-            "limit": self.limit,
-            "physical": self.physical,
-            "step": self.step,
+            **plain(self, "name kind limit physical step"),
             "gain_per_unit": self.per_unit,
             "gain_first_order": self.predicted,
             "gain_resolved": self.resolved if math.isfinite(self.resolved) else None,
             "relative_difference": self.relative if math.isfinite(self.relative) else None,
             "structure": self.structure or None,
-            "reason": self.reason,
-            "sentence": self.sentence,
+            **plain(self, "reason sentence"),
         }
 
     def _gain(self, value: float) -> str:
@@ -141,9 +135,9 @@ def _of_bound(solution: Solution, bound: str) -> Lever:
 def _of_row(solution: Solution, name: str) -> Lever:
     problem = solution.problem
     condition, text = problem.conditions[name], problem.constraints[name]
-    sign = {"<=": 1.0, ">=": -1.0, "==": _better_side(solution, name)}[condition.comparison]
+    sign = _better_side(solution, name) if condition.equality else condition.sign
     step = natural_step(unit_of(problem, condition), _size(solution, text))
-    verb = "moving" if condition.comparison == "==" else "relaxing"
+    verb = "moving" if condition.equality else "relaxing"
     return _lever(
         solution,
         name=name,
@@ -167,36 +161,29 @@ def _gained(problem: Problem) -> tuple[str, float]:
     return reported_unit(of[text].unit) if text in of.names else ("1", 1.0)
 
 
-def _signed(step: Step, sign: float) -> str:
+def _signed(step: LimitStep, sign: float) -> str:
     return step.text if sign > 0 else f"-{step.text}"
 
 
 def _better_side(solution: Solution, name: str) -> float:
     """The direction in which moving the right-hand side of an equality improves the objective."""
     change = solution.active[name]
-    better = change if solution.problem.sense == "maximize" else -change
-    return math.copysign(1.0, better)
+    return math.copysign(1.0, -solution.problem.sign * change)
 
 
 def _size(solution: Solution, text: str) -> float:
     """Size of the sides of a constraint at the optimum, where they are equal but for rounding."""
     problem = solution.problem
-    left, _, right = _split(text)
+    left, _, right = written_sides(text)
     values = problem.values(solution.parameters)
     sides = (abs(float(parse_value(side, problem.vocabulary)(values))) for side in (left, right))
     return max((size for size in sides if math.isfinite(size)), default=1.0)
 
 
-def _split(text: str) -> tuple[str, str, str]:
-    """Left side, comparison sign and right side of a constraint."""
-    sign = next(iter(_COMPARISON.finditer(text)))
-    return text[: sign.start()].strip(), sign[0], text[sign.end() :].strip()
-
-
 def moved(problem: Problem, name: str, step: float) -> Problem:
     """The problem with one limit changed by a step: a bound, or the right-hand side of a constraint."""
     if name in problem.constraints:
-        left, sign, right = _split(problem.constraints[name])
+        left, sign, right = written_sides(problem.constraints[name])
         text = f"({left}) {sign} ({right}) {'+' if step > 0 else '-'} {abs(step)!r}"
         return replace(problem, constraints={**problem.constraints, name: text})
     parameter, end = name.rsplit(".", 1)
@@ -213,11 +200,10 @@ def _resolved(solution: Solution, lever: Lever) -> Lever:
         asked = replace(moved(problem, lever.name, lever.step), start=start)
     except InputError:
         return replace(lever, reason="the moved problem cannot be written down")
-    sign = 1.0 if problem.sense == "maximize" else -1.0
     gain, found = math.nan, None
     for starts in (1, _RETRY):
         again = solve(asked, starts=starts, throw=False)
-        better = sign * (again.value - solution.value)
+        better = -problem.sign * (again.value - solution.value)
         if again.status == "optimal" and not better <= gain:
             gain, found = better, again
         if found and gain >= -_NOISE * (1 + abs(solution.value)):

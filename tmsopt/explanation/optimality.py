@@ -22,12 +22,14 @@ from typing import Any
 import numpy as np
 
 from tmsopt.design.dependence import demands_heavy_damping, overclaims
+from tmsopt.design.files import Given
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.explanation.conditions import POSITIVE, STATIONARY, Conditions, conditions, curved
 from tmsopt.explanation.descent import Better, better
 from tmsopt.explanation.program import NotCovered, Program, program
-from tmsopt.records import Table
+from tmsopt.records import Table, plain
+from tmsopt.solver.solve import solved
 
 STRICT, NOT_MINIMAL, UNDECIDED, NOT_COVERED = "strict minimum", "not minimal", "undecided", "not covered"
 
@@ -57,11 +59,7 @@ class OnLine:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
-        kappa = self.kappa if math.isfinite(self.kappa) else None
-        return {
-            "re": self.re, "im": self.im, "multiplicity": self.multiplicity, "share": self.share,
-            "beta": self.beta, "kappa": kappa, "ties": list(self.ties),
-        }  # fmt: skip
+        return plain(self)
 
 
 @dataclass(frozen=True)
@@ -101,28 +99,18 @@ class Optimality:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
-        found: dict[str, Any] = {"verdict": self.verdict, "reason": self.reason}
         if self.verdict == NOT_COVERED:
-            return found
-        return found | {
-            "order": self.order,
-            "goal": self.goal,
-            "roots": [root.to_json() for root in self.roots],
-            "limits": dict(self.limits),
-            "unknowns": self.unknowns,
-            "conditions": self.conditions,
-            "residual": self.residual,
-            "curvature": self.curvature if math.isfinite(self.curvature) else None,
-            "idle": list(self.idle),
-            **({"better": dict(self.better), "better_value": self.better_value} if self.better else {}),
-        }
+            return plain(self, "verdict reason")
+        found = plain(self)
+        return found if self.better else {n: x for n, x in found.items() if n not in ("better", "better_value")}
 
 
-def optimality(solution: Solution) -> Optimality:
+def optimality(design: Given) -> Optimality:
     """Judge a design by the first- and, where needed, second-order conditions on its factors.
 
     Of a pattern that was located without an objective the abscissa is judged, within the box and the constraints.
     """
+    solution = solved(design)
     try:
         problem = _judged(solution)
         around = program(problem, solution)
@@ -269,7 +257,7 @@ def _limits(solution: Solution, around: Program, found: Conditions) -> Mapping[s
     """Gain of the objective per unit that a limit is relaxed; of an equality, change per unit added on the right."""
     problem = around.problem
     limits: dict[str, float] = {}
-    sign = -1.0 if problem.sense == "maximize" else 1.0
+    sign = problem.sign
     for h, y, firm in zip(around.held, found.multipliers, found.firm, strict=True):
         if h.name in problem.constraints:
             limits[h.name] = float(y if h.signed else sign * y)

@@ -16,7 +16,7 @@ from tmsopt.design.quantities import RADIUS
 from tmsopt.design.solution import Solution
 from tmsopt.explanation.steps import reported_unit
 from tmsopt.models import Values
-from tmsopt.records import Table
+from tmsopt.records import Table, plain
 from tmsopt.roots import roots
 
 ALONE = 3
@@ -54,15 +54,8 @@ class Rounded:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
-        return {
-            "digits": self.digits,
-            "written": dict(self.written),
-            "abscissa_realised": _number(self.realised),
-            "loss": _number(self.loss),
-            "damping_ratio": _number(self.damping_ratio),
-            "objective": _number(self.objective),
-            "violations": {name: _number(v) for name, v in self.violations.items()},
-        }
+        found = plain(self)
+        return {"abscissa_realised" if name == "realised" else name: value for name, value in found.items()}
 
 
 def rounded_alone(solution: Solution, digits: int = ALONE) -> Table[Rounded]:
@@ -160,7 +153,3 @@ def _exact(text: str, unit: str) -> flint.arb:
 def _with_unit(text: str, unit: str) -> str:
     name = reported_unit(unit)[0]
     return text if name == "1" else f"{text} {name}"
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -23,7 +23,7 @@ _REPORTED = {"rad": ("deg", math.pi / 180)}
 
 
 @dataclass(frozen=True)
-class Step:
+class LimitStep:
     """A change of a limit.
 
     Attributes:
@@ -35,12 +35,12 @@ class Step:
     text: str
 
 
-def natural_step(unit: str, size: float) -> Step:
+def natural_step(unit: str, size: float) -> LimitStep:
     """The natural step for something of a unit and a size, e.g. the limit or the width of its box."""
     return next(_steps(unit, size))
 
 
-def step_within(unit: str, size: float, limit: float, direction: float, allowed: Range) -> Step | None:
+def step_within(unit: str, size: float, limit: float, direction: float, allowed: Range) -> LimitStep | None:
     """The largest natural step that keeps a moved limit physically possible; None at a physical end."""
     for step in _steps(unit, size):
         if limit + direction * step.size in allowed:
@@ -69,7 +69,7 @@ def unit_of(problem: Problem, expression: Expression) -> str:
     return found.pop() if len(found) == 1 and not product else "1"
 
 
-def _steps(unit: str, size: float) -> Iterator[Step]:
+def _steps(unit: str, size: float) -> Iterator[LimitStep]:
     """Ever smaller steps, from the natural one down."""
     size = abs(size) if abs(size) > _TINY else 1.0
     name, one, first = _NATURAL.get(unit, (unit, 1.0, 0.0))
@@ -81,7 +81,7 @@ def _steps(unit: str, size: float) -> Iterator[Step]:
         largest = _one_two_five(_PART * size)
     step = largest
     while step >= _SMALLEST * largest:
-        yield Step(step * one, f"{step:.4g}" if name == "1" else f"{step:.4g} {name}")
+        yield LimitStep(step * one, f"{step:.4g}" if name == "1" else f"{step:.4g} {name}")
         step = _one_two_five(step / 2.2)
 
 

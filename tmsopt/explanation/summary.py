@@ -123,7 +123,7 @@ def _idle(solution: Solution, name: str) -> str:
         return ""
     affected = [n for n, m in zip(conditions, moves[len(asked) - len(conditions) :], strict=True) if m]
     what = " and ".join(part for part in (goal, (problem.minimize or problem.maximize or "").strip()) if part)
-    if any(n in solution.active or conditions[n].comparison == "==" for n in affected):
+    if any(n in solution.active or conditions[n].equality for n in affected):
         return ""  # it moves the optimum through a constraint that binds
     ends = " … ".join(_limit(problem, f"{name}.{end}") for end in ("min", "max"))
     kept = f" that keeps {', '.join(affected)}" if affected else ""

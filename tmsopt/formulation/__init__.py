@@ -5,21 +5,11 @@ by Newton. Open `formulate` first: the three forms; `builder` puts them together
 """
 
 from tmsopt.formulation.formulate import abscissa, formulate, matching
-from tmsopt.formulation.nlp import NLP, Factor
-from tmsopt.formulation.scale import Scale, objective_size, scale_of
+from tmsopt.formulation.nlp import NLP, Factor, Scale, objective_size, scale_of
+from tmsopt.formulation.options import DEFAULTS, STARTS, Asked, AskedOfSolve, Options, options_of
 from tmsopt.formulation.starts import complete, designs, opposite, worth
 
 __all__ = [
-    "NLP",
-    "Factor",
-    "Scale",
-    "abscissa",
-    "complete",
-    "designs",
-    "formulate",
-    "matching",
-    "objective_size",
-    "opposite",
-    "scale_of",
-    "worth",
-]
+    "DEFAULTS", "NLP", "STARTS", "Asked", "AskedOfSolve", "Factor", "Options", "Scale", "abscissa", "complete",
+    "designs", "formulate", "matching", "objective_size", "opposite", "options_of", "scale_of", "worth",
+]  # fmt: skip

@@ -5,17 +5,37 @@ pattern. Both share how parameters, quantities and constraints become variables 
 must stand up to has factors of its own, and shares the design and the root quantities with the others.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from tmsopt.design.cases import Case
-from tmsopt.design.dependence import demands_heavy_damping
+from tmsopt.design.dependence import demands_heavy_damping, tempts, varies
+from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem, freedom
-from tmsopt.formulation.builder import Builder
-from tmsopt.formulation.nlp import NLP
+from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_QUANTITIES
+from tmsopt.formulation.lifts import (
+    Lifted,
+    lift_abscissa,
+    lift_damping_ratio,
+    lift_quantity,
+    lift_radius,
+    lift_real_roots,
+)
+from tmsopt.formulation.nlp import NLP, Factor, Lift, Touch, objective_size, objective_unit, scale_of, units_of
+from tmsopt.models import Quantity, Values
 from tmsopt.roots import Pattern
+
+Lifting = Callable[["Builder"], Lifted]
+"""Variables and rows for a root quantity in the covered ones of all cases."""
+
+LIMIT = ".limit"
+"""Ending of the name of the number that a constraint compares with."""
+
+_LEEWAY = 1e-9  # below a constant that a quantity is never less than
 
 
 def formulate(
@@ -97,3 +117,219 @@ def design_of(problem: Problem, x: Sequence[float]) -> dict[str, float]:
 def middle(problem: Problem) -> dict[str, float]:
     """The start of each free parameter, or the middle of its range."""
     return {n: problem.start.get(n, (lo + hi) / 2) for n, (lo, hi) in problem.free.items()}
+
+
+class Builder:
+    """Collects variables and rows; discarded once the NLP is finished.
+
+    Args:
+        lifts: root quantity → how it is carried by variables; by default by factors.
+        settings: symbols that stand for numbers of the problem.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        cases: Sequence[Case],
+        lifts: Mapping[str, Lifting] | None = None,
+        settings: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.problem = problem
+        self.settings = dict(settings or {})
+        self.lifting = _LIFTED if lifts is None else lifts
+        self.cases = tuple(cases)
+        self.names: list[str] = []
+        self.x: list[Any] = []
+        self.bounds: list[tuple[float, float]] = []
+        self.rows: list[tuple[str, Any, float, float]] = []
+        self.lifts: list[Lift] = []
+        self.touches: dict[str, tuple[Touch, ...]] = {}
+        self.products: list[tuple[Factor, ...]] = []
+        self.shared: dict[str, Any] = {}
+        self.taken: set[str] = set()
+        self.objective: Any = ca.SX(0)
+        self.design = {name: self.parameter(name, *ends) for name, ends in problem.free.items()}
+        # A weight is 1 where its parameter is 0, and else its size: a number that is 0 stays one.
+        given = {
+            n: s
+            for n, s in self.settings.items()
+            if problem.fixed.get(n) or (n in problem.fixed and not problem.asks_radius)
+        }
+        nominal = problem.ordered({**self.design, **given})
+        directed = [k for k, case in enumerate(self.cases, start=1) if case.direction]
+        radius = self.variable(RADIUS, 0.0) if directed else ca.SX(0)
+        varied = [case.applied(nominal, radius, problem.weights) for case in self.cases]
+        self.values = [self.derived(k, parameters) for k, parameters in enumerate([nominal, *varied])]
+        self.scale = scale_of(problem)
+        self.a = self.polynomial(0)
+        self.covered = [k for k, case in enumerate(self.cases, start=1) if not case.direction] or [0]
+        if directed:
+            self.lifts.append(lift_radius(self, directed))
+            self.shared[RADIUS] = radius
+
+    @property
+    def unit(self) -> float:
+        return self.scale.unit
+
+    def polynomial(self, case: int) -> list[Any]:
+        """Coefficients in one case, near 1 as roots and mass matrices go."""
+        return self.scale.scaled(self.values[case].coefficients)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return len(self.x), len(self.rows)
+
+    def derived(self, case: int, parameters: Mapping[str, Any]) -> Values:
+        """Everything derived from the design in one case."""
+        of = self.problem.parameter_set
+        lift = partial(self._lift, case)
+        return Values(self.problem.model, of, parameters, extra=(*ROOT_QUANTITIES, NO_RADIUS), lift=lift)
+
+    def variable(self, name: str, lower: float = -np.inf, upper: float = np.inf) -> Any:
+        symbol = ca.SX.sym(name)
+        self.names.append(name)
+        self.x.append(symbol)
+        self.bounds.append((lower, upper))
+        return symbol
+
+    def parameter(self, name: str, lower: float, upper: float) -> Any:
+        """A free parameter, as a variable or as the arctangent of one."""
+        if self.problem.parameter_set[name].tangent:
+            return ca.atan(self.variable(f"tan({name})", np.tan(lower), np.tan(upper)))
+        return self.variable(name, lower, upper)
+
+    def row(self, name: str, expression: Any, lower: float, upper: float) -> None:
+        self.rows.append((name, ca.SX(expression), lower, upper))
+
+    def equal(self, name: str, left: Sequence[Any], right: Sequence[Any]) -> None:
+        """Equations between coefficient lists; the leading ones agree by construction."""
+        for a, b in zip(left[1:], right[1:], strict=True):
+            self.row(name, a - b, 0.0, 0.0)
+
+    def real_roots(self) -> None:
+        """Every case heavily damped."""
+        asked = (self.problem.objective, *self.problem.conditions.values())
+        line = any("abscissa" in expression.names for expression in asked if expression)
+        lifted = lift_real_roots(self, line)
+        self.lifts.append(lifted.lift)
+        self.take("damping_ratio", 1.0)
+        if line:
+            self.touches["abscissa"] = lifted.touches
+            self.shared["abscissa"] = lifted.symbol
+
+    def take(self, name: str, value: float) -> None:
+        """A number for a root quantity; limits on it alone hold by the form of the factors, or the recheck tells."""
+        self.shared[name] = ca.SX(value)
+        self.taken.add(name)
+
+    def constraints(self, without: Collection[str] = ()) -> None:
+        """A row for each constraint in each case that it differs in."""
+        for name, condition in self.problem.conditions.items():
+            if name in without:
+                continue
+            if len(condition.names) == 1 and condition.names[0] in self.taken:
+                continue
+            for value in self.in_each_case(condition, self.settings.get(name + LIMIT)):
+                self.row(name, value, *condition.allowed)
+
+    def optimise(self) -> None:
+        """The objective: where it differs between cases, the worst of them."""
+        expression = self.problem.objective
+        if expression is None:
+            return
+        sign = self.problem.sign
+        values = [sign * value for value in self.in_each_case(expression)]
+        self.objective = values[0]
+        if len(values) > 1:
+            self.objective = self.variable("objective")
+            worst = partial(_worst_guess, sign, expression, tuple(self.covered))
+            self.lifts.append(Lift("objective", 1, worst))
+            for value in values:
+                self.row("objective", value - self.objective, -np.inf, 0.0)
+
+    def in_each_case(self, expression: Expression, limit: Any = None) -> list[Any]:
+        """The expression's value in every case that it differs in, or the nominal one; see `Expression.symbolic`."""
+        covered = self.covered if varies(self.problem, expression, self.cases) else [0]
+        return [expression.symbolic(self.values[k], limit) for k in covered]
+
+    def pattern(self, pattern: Pattern) -> None:
+        unknowns = [self.variable(f"{pattern.name}.{u}") for u in pattern.unknowns]
+        self.lifts.append(Lift(pattern.name, len(unknowns), lambda v, z: pattern.guesses(z[0])))
+        if pattern.abscissa is not None and self.covered == [0]:
+            self.shared["abscissa"] = self.unit * pattern.abscissa(unknowns)
+        matched = [self.a[0] * c for c in pattern.monic(unknowns)]
+        if freedom(self.problem).count >= 0:
+            self.equal(pattern.name, self.a, matched)
+        else:
+            self.objective = sum((a - b) ** 2 for a, b in zip(self.a, matched, strict=True))
+        for expression in pattern.nonnegative(unknowns):
+            self.row(pattern.name, expression, 0.0, np.inf)
+
+    def nearest_to(self, design: Mapping[str, float]) -> None:
+        for name, symbol in self.design.items():
+            lower, upper = self.problem.free[name]
+            self.objective += ((symbol - design[name]) / (upper - lower)) ** 2
+
+    def finish(self, formulation: str) -> NLP:
+        g = ca.vertcat(*[r[1] for r in self.rows]) if self.rows else ca.SX(0, 1)
+        inputs = {"x": ca.vertcat(*self.x)}
+        if self.settings:
+            inputs["p"] = ca.vertcat(*self.settings.values())
+        outputs = {"f": ca.densify(self.objective), "g": ca.densify(g)}
+        functions = ca.Function("nlp", [*inputs.values()], [*outputs.values()], [*inputs], [*outputs])
+        return NLP(
+            formulation=formulation,
+            variables=tuple(self.names),
+            functions=functions,
+            lower=tuple(lo for lo, _ in self.bounds),
+            upper=tuple(hi for _, hi in self.bounds),
+            rows=tuple(r[0] for r in self.rows),
+            row_lower=tuple(r[2] for r in self.rows),
+            row_upper=tuple(r[3] for r in self.rows),
+            lifts=tuple(self.lifts),
+            cases=self.cases,
+            touches=self.touches,
+            products=tuple(self.products),
+            exact=bool(self.products) and formulation == "abscissa",
+            settings=(np.nan,) * len(self.settings),
+            unit=self.unit,
+            size=objective_size(self.problem),
+            units=units_of(self.problem),
+            objective_unit=objective_unit(self.problem),
+        )
+
+    def _lift(self, case: int, quantity: Quantity, values: Values) -> Any:
+        """A quantity as a variable, bound by factors or by its division-free equation."""
+        name = quantity.name
+        if name in self.shared:
+            return self.shared[name]
+        if name in self.lifting:
+            lifted = self.lifting[name](self)
+            self.lifts.append(lifted.lift)
+            self.touches[name] = lifted.touches
+            self.products += lifted.products
+            self.shared[name] = lifted.symbol
+            return lifted.symbol
+        if quantity.equation is None and (not quantity.pieces or tempts(self.problem, name)):
+            return None
+        ends = (-np.inf, np.inf) if quantity.pieces else (quantity.range.lower, quantity.range.upper)
+        symbol, lift = lift_quantity(self, name, case, ends)
+        self.lifts.append(lift)
+        if quantity.equation is not None:
+            self.row(name, quantity.equation(values, symbol), 0.0, 0.0)
+        for piece in quantity.pieces:
+            above = ca.SX(symbol - piece(values))
+            # A limit that equals a constant piece would share its multiplier with it.
+            varies_with_design = any(ca.depends_on(above, x) for x in self.x if x is not symbol)
+            self.row(name, above, 0.0 if varies_with_design else -_LEEWAY, np.inf)
+        return symbol
+
+
+_LIFTED: Mapping[str, Lifting] = {"abscissa": lift_abscissa, "damping_ratio": lift_damping_ratio}
+
+
+def _worst_guess(
+    sign: float, expression: Expression, covered: Sequence[int], values: Sequence[Values], z: Sequence[Any]
+) -> list[list[float]]:
+    found = [sign * float(expression(values[k])) for k in covered]
+    return [[max((v for v in found if np.isfinite(v)), default=0.0)]]

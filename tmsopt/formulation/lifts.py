@@ -7,7 +7,6 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tmsopt.design.cases import Case
 from tmsopt.formulation.nlp import Factor, Lift, Touch
 from tmsopt.models import Values
 from tmsopt.records import Array
@@ -31,6 +30,10 @@ class Rows(Protocol):
         """Coefficients in one case, in the NLP's own unit of the roots."""
 
     @property
+    def covered(self) -> Sequence[int]:
+        """Numbers of the cases that root quantities are the worst over."""
+
+    @property
     def unit(self) -> float:
         """The NLP's own unit of the roots."""
 
@@ -49,12 +52,12 @@ class Lifted:
     products: tuple[tuple[Factor, ...], ...]
 
 
-def lift_abscissa(build: Rows, covered: Sequence[int], values: Sequence[Values]) -> Lifted:
+def lift_abscissa(build: Rows) -> Lifted:
     """γ with p(t + γ) = a0 ∏ (t² + βᵢ t + κᵢ), βᵢ, κᵢ ≥ 0, in every case: at or right of every root.
 
     An odd degree has one factor t + δ, δ ≥ 0, more. Some β = 0, κ = 0 or δ = 0 puts a root on the line Re s = γ.
     """
-    gamma = build.variable("abscissa")
+    covered, gamma = build.covered, build.variable("abscissa")
     touches: list[Touch] = []
     products: list[tuple[Factor, ...]] = []
     for case in covered:
@@ -77,11 +80,12 @@ def lift_abscissa(build: Rows, covered: Sequence[int], values: Sequence[Values])
     return Lifted(build.unit * gamma, lift, tuple(touches), tuple(products))
 
 
-def lift_damping_ratio(build: Rows, covered: Sequence[int], values: Sequence[Values]) -> Lifted:
+def lift_damping_ratio(build: Rows) -> Lifted:
     """ζ with p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ, in every case: at or below every damping ratio.
 
     pᵢ = 2 ζ wᵢ puts a pair on the edge of the sector. An odd degree has one factor s + d, d ≥ 0, more.
     """
+    covered, first = build.covered, build.size[0]
     zeta = build.variable("damping_ratio", -1.0, 1.0)
     touches: list[Touch] = []
     products: list[tuple[Factor, ...]] = []
@@ -99,17 +103,17 @@ def lift_damping_ratio(build: Rows, covered: Sequence[int], values: Sequence[Val
             monic.append([1, build.variable(f"d.{case}", 0.0)])
         build.equal("damping_ratio", a, [a[0] * c for c in product(*monic)])
         products.append(tuple(factors))
-    size = 1 + sum(len(values[case].coefficients) - 1 for case in covered)
-    guess = partial(_damping_guess, covered)
-    return Lifted(zeta, Lift("damping_ratio", size, guess), tuple(touches), tuple(products))
+    lift = Lift("damping_ratio", build.size[0] - first, partial(_damping_guess, covered))
+    return Lifted(zeta, lift, tuple(touches), tuple(products))
 
 
-def lift_real_roots(build: Rows, covered: Sequence[int], values: Sequence[Values], line: bool) -> Lifted:
+def lift_real_roots(build: Rows, line: bool) -> Lifted:
     """Heavy damping: γ ≤ 0 and roots γ − d₁, γ − d₁ − d₂, …, all dᵢ ≥ 0, in every case; γ = 0 unless a `line` is asked.
 
     As many equations as sectors and half-planes need twice over, and regular at multiple roots, where the dᵢ between
     them are at their bound 0; p² ≥ 4q has dependent gradients there. d₁ = 0 puts a root on the line Re s = γ.
     """
+    covered, first = build.covered, build.size[0]
     gamma = build.variable("abscissa", upper=0.0) if line else 0.0
     touches: list[Touch] = []
     for case in covered:
@@ -119,14 +123,14 @@ def lift_real_roots(build: Rows, covered: Sequence[int], values: Sequence[Values
         touches.append(Touch(partial(_step_distance, at), variable=at))
         distances = [sum(steps[:k], 0) for k in range(1, len(a))]
         build.equal("abscissa", shift(a, gamma), [a[0] * c for c in product(*([1, d] for d in distances))])
-    size = int(line) + sum(len(values[case].coefficients) - 1 for case in covered)
-    return Lifted(build.unit * gamma, Lift("abscissa", size, partial(_real_guess, covered, line)), tuple(touches), ())
+    lift = Lift("abscissa", build.size[0] - first, partial(_real_guess, covered, line))
+    return Lifted(build.unit * gamma, lift, tuple(touches), ())
 
 
-def lift_radius(build: Rows, radius: Any, directions: Sequence[tuple[int, Case]], values: Sequence[Values]) -> Lift:
+def lift_radius(build: Rows, directions: Sequence[int]) -> Lift:
     """Stability at the distance `radius` in the given directions: p = a0 ∏ (s² + βᵢ s + κᵢ) at each, a0 of one sign."""
     size = 0
-    for case, _ in directions:
+    for case in directions:
         a = build.polynomial(case)
         monic = [
             [1, build.variable(f"b{k}.{case}", 0.0), build.variable(f"c{k}.{case}", 0.0)]
@@ -137,7 +141,7 @@ def lift_radius(build: Rows, radius: Any, directions: Sequence[tuple[int, Case]]
         size += len(a) - 1
         build.row("radius", a[0] * build.polynomial(0)[0], 0.0, np.inf)
         build.equal("radius", a, [a[0] * c for c in product(*monic)])
-    return Lift("radius", 1 + size, partial(_radius_guess, [case for case, _ in directions]))
+    return Lift("radius", 1 + size, partial(_radius_guess, directions))
 
 
 def lift_quantity(build: Rows, name: str, case: int, ends: tuple[float, float]) -> tuple[Any, Lift]:

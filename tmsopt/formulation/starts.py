@@ -164,8 +164,7 @@ def _judged(problem: Problem, columns: Mapping[str, Array]) -> tuple[Array | Non
                 values.define(name, found)
     objective = None
     if problem.objective is not None:
-        sign = -1.0 if problem.sense == "maximize" else 1.0
-        every = [sign * np.broadcast_to(problem.objective(values), shape) for values in each]
+        every = [problem.sign * np.broadcast_to(problem.objective(values), shape) for values in each]
         objective = reduce(np.maximum, every)
     conditions = problem.conditions.values()
     excesses = [reduce(np.maximum, [_excess(c, values, shape) for values in each]) for c in conditions]
@@ -179,14 +178,7 @@ def _values(problem: Problem, parameters: Mapping[str, Any], shape: tuple[int, .
 
 def _excess(condition: Expression, values: Values, shape: tuple[int, ...]) -> Array:
     """By how much a comparison is violated."""
-    difference = np.broadcast_to(np.asarray(condition(values), dtype=float), shape)
-    match condition.comparison:
-        case "<=":
-            return np.asarray(np.maximum(difference, 0))
-        case ">=":
-            return np.asarray(np.maximum(-difference, 0))
-        case _:
-            return np.asarray(np.abs(difference))
+    return np.asarray(condition.excess(np.broadcast_to(np.asarray(condition(values), dtype=float), shape)))
 
 
 def _in_spreads(column: Array) -> Array:

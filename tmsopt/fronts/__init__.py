@@ -6,7 +6,4 @@ In: a problem with `pareto`. Out: a `Front` of designs none of which beats anoth
 from tmsopt.fronts.front import Front
 from tmsopt.fronts.pareto import pareto
 
-__all__ = [
-    "Front",
-    "pareto",
-]
+__all__ = ["Front", "pareto"]

@@ -10,7 +10,7 @@ from tmsopt.fronts.front import Front, FrontPoint, Gap, Kink, efficient
 from tmsopt.fronts.subproblems import Asker, least, point
 from tmsopt.records import Progress
 
-Values = tuple[float, ...]
+Objectives = tuple[float, ...]
 
 _SAME = 1e-9  # of the range: rounding of polished optima
 _UNUSED = 1e-6  # of the range: an eps whose limit the best design does not use
@@ -122,7 +122,7 @@ class _Search:
         gap = unknown[1] - unknown[0] <= enough * self.range[axis]
         return _Stretch(left, right, size, axis, unknown, True, bool(failures), gap)
 
-    def _led_nowhere(self, probe: _Probe, low: Values, high: Values) -> bool:
+    def _led_nowhere(self, probe: _Probe, low: Objectives, high: Objectives) -> bool:
         """Whether a probe between two neighbours failed, or found nothing better than the one that is lower in it."""
         k = probe.axis
         margin = _UNUSED * self.range[k]
@@ -150,7 +150,7 @@ class _Search:
             self.probes.append(_Probe(s.axis, eps, known))
 
     def probe(self, axis: int, eps: float, near: Sequence[Solution], few: bool = False) -> FrontPoint | None:
-        ask = replace(self.ask, seed=self.ask.seed + len(self.probes))
+        ask = self.ask.later(len(self.probes))
         solution = least(ask, 1 - axis, {axis: eps}, near, few)
         found = None if solution is None else point(ask, solution)
         if found is not None or not few:

@@ -1,16 +1,14 @@
 """A Pareto front as data: efficient designs, where the way they are limited changes, and what is missing."""
 
-import csv
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from os import PathLike
 from typing import Any
 
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
-
-SCHEMA = 1
+from tmsopt.disk import write_csv
+from tmsopt.records import plain
 
 
 @dataclass(frozen=True)
@@ -33,6 +31,11 @@ class FrontPoint:
     def structure(self) -> str:
         """The roots on the rightmost line, e.g. ``EP4``."""
         return self.solution.structure
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``; numbers that do not exist are None."""
+        solution = plain(self.solution, "parameters abscissa abscissa_realised structure")
+        return plain(self, "objectives") | solution | plain(self, "limits label")
 
 
 @dataclass(frozen=True)
@@ -113,52 +116,23 @@ class Front:
                 "label": point.label,
             }
 
+    def write_csv(self, path: str | PathLike[str]) -> None:
+        """The points in one table.
+
+        Raises:
+            OSError: when the file cannot be written.
+        """
+        write_csv(path, list(self.rows()))
+
     def to_json(self) -> dict[str, Any]:
         """The JSON of `tmsopt solve` for a front; numbers that do not exist are None."""
         return {
-            "schema": SCHEMA,
-            "title": self.problem.title,
-            "model": self.problem.model.name,
+            **self.problem.heading,
             "status": "optimal",
             "objective": {"sense": "pareto", "expressions": list(self.objectives)},
-            "ideal": list(self.ideal),
-            "nadir": list(self.nadir),
-            "points": [_point(p) for p in self.points],
-            "kinks": [{"name": k.name, "index": k.index, "width": k.width} for k in self.kinks],
-            "gaps": [{"reason": g.reason, "index": g.index, "failed": g.failed} for g in self.gaps],
-            "notes": list(self.notes),
-            "solved": self.solved,
+            **plain(self, "ideal nadir points kinks gaps notes solved"),
             "seconds": round(self.seconds, 4),
         }
-
-
-def write_csv(front: Front, path: Path) -> None:
-    """The points in one table.
-
-    Raises:
-        OSError: when the file cannot be written.
-    """
-    rows = list(front.rows())
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.DictWriter(stream, fieldnames=list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-
-
-def _point(point: FrontPoint) -> dict[str, Any]:
-    return {
-        "objectives": list(point.objectives),
-        "parameters": {n: _finite(v) for n, v in point.solution.parameters.items()},
-        "abscissa": _finite(point.solution.abscissa),
-        "abscissa_realised": _finite(point.solution.abscissa_realised),
-        "structure": point.structure,
-        "limits": list(point.limits),
-        "label": point.label,
-    }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
 
 
 def efficient(points: Sequence[FrontPoint], slack: Sequence[float]) -> list[FrontPoint]:

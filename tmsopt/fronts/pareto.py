@@ -3,32 +3,26 @@
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Unpack
 
-from tmsopt.design.problem import Problem, checked
+from tmsopt.design.files import Given, problem_of
 from tmsopt.design.solution import NotSolved, Solution
 from tmsopt.errors import Fault, InputError
+from tmsopt.formulation.options import Asked, Options, options_of
 from tmsopt.fronts.curve import curve
 from tmsopt.fronts.front import Front, FrontPoint
 from tmsopt.fronts.subproblems import Asker, best_first, point
 from tmsopt.fronts.surface import surface
-from tmsopt.records import Progress
 
 POINTS = 25
 STARTS = 2
 """New starts per sub-problem, beside the neighbours' designs."""
 
+_DEFAULTS = Options(starts=STARTS)
 _ALIKE = 1e-7  # relative difference of ends that counts as no conflict, that of optima that count as the same
 
 
-def pareto(
-    problem: Problem,
-    points: int = POINTS,
-    *,
-    starts: int = STARTS,
-    seed: int = 0,
-    linear_solver: str = "mumps",
-    progress: Progress | None = None,
-) -> Front:
+def pareto(problem: Given, points: int = POINTS, **options: Unpack[Asked]) -> Front:
     """The front of two or three objectives, each minimised, with its ends, kinks and gaps.
 
     Two objectives: minimise one subject to the other ≤ eps, the next eps where neighbours are farthest apart and on
@@ -38,23 +32,23 @@ def pareto(
     Args:
         problem: with ``pareto``; ``locate`` and constraints narrow the designs.
         points: asked for along the front; kinks and ends of gaps come on top.
-        starts: new starts per sub-problem, beside the designs of the neighbours.
-        seed: of the quasi-random starting designs.
-        linear_solver: ``mumps`` or ``spral``.
-        progress: called with (sub-problems solved, about how many in all).
+        options: ``starts`` per sub-problem beside the designs of the neighbours, 2 by default, ``seed`` and
+            ``linear_solver`` as of `solve`, and ``progress``, called with (sub-problems solved, about how many in all).
 
     Raises:
         NotSolved: when an objective has no optimum, carrying the best point found.
         InputError: for a problem without ``pareto``.
         ValueError: for fewer than 2 points or 0 starts.
     """
-    if not checked(problem).pareto:
+    problem = problem_of(problem)
+    if not problem.pareto:
         message = 'no front is asked for; write e.g. pareto = ["abscissa", "Fr"], or use tmsopt.solve'
         raise InputError([Fault(message, ("objective",))])
-    if points < 2 or starts < 0:
-        raise ValueError(f"points = {points}, starts = {starts}; accepted: 2 or more, 0 or more")
+    how = options_of(options, defaults=_DEFAULTS)
+    if points < 2 or how.starts < 0:
+        raise ValueError(f"points = {points}, starts = {how.starts}; accepted: 2 or more, 0 or more")
     began = time.perf_counter()
-    ask = Asker(problem, starts, seed, linear_solver)
+    progress, ask = how.progress, Asker(problem, replace(how, progress=None))
     n = len(ask.texts)
     ends = tuple(_labelled(ask, k, _believed(best_first(ask, [(k + j) % n for j in range(n)]))) for k in range(n))
     front = Front(problem, ask.texts, ends[:1], (), (), n, 0.0)

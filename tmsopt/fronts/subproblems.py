@@ -7,9 +7,9 @@ from itertools import pairwise
 from tmsopt.checks.recheck import recheck
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
+from tmsopt.formulation.options import STARTS, Options
 from tmsopt.fronts.front import FrontPoint
-from tmsopt.solver.multistart import STARTS
-from tmsopt.solver.solve import solve
+from tmsopt.solver.solve import solved
 
 _RETRY = 16  # starts for a sub-problem that the neighbours' designs and a few starts did not solve
 _SLACK = 1e-9  # of a best value held while the next is minimised: what the recheck of a constraint forgives
@@ -23,20 +23,26 @@ class Asker:
 
     Attributes:
         problem: with `pareto`.
-        starts: new starts per sub-problem, against branches that the neighbours do not lead to.
-        seed: of the first of them.
+        options: how to solve each, with so many new starts, against branches that the neighbours do not lead to.
         ranges: of the objectives over the front, once its ends are known.
     """
 
     problem: Problem
-    starts: int
-    seed: int
-    linear_solver: str = "mumps"
+    options: Options
     ranges: tuple[float, ...] = ()
 
     def solve(self, problem: Problem, starts: int) -> Solution:
         """The rechecked solution of a sub-problem, whatever its status."""
-        return solve(problem, starts=starts, seed=self.seed, linear_solver=self.linear_solver, throw=False)
+        return solved(problem, replace(self.options, starts=starts))
+
+    def later(self, count: int) -> "Asker":
+        """The same with other starts."""
+        return replace(self, options=replace(self.options, seed=self.options.seed + count))
+
+    @property
+    def starts(self) -> int:
+        """New starts per sub-problem."""
+        return self.options.starts
 
     @property
     def texts(self) -> tuple[str, ...]:
@@ -83,7 +89,7 @@ def least(
     trials = [(_started(asked, n), 1 if few or m else 1 + ask.starts) for m, n in enumerate(near)] or [(asked, _RETRY)]
     ended = [ask.solve(problem, starts) for problem, starts in trials]
     if not few and all(s.status != "optimal" for s in ended):
-        ended.append(replace(ask, seed=ask.seed + 1).solve(asked, _RETRY))
+        ended.append(ask.later(1).solve(asked, _RETRY))
     found = min((s for s in ended if s.status == "optimal"), key=lambda s: s.value, default=None)
     return found if found is None or not ask.ranges else _tightened(ask, k, limits, found)
 

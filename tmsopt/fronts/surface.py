@@ -1,7 +1,6 @@
 """The front of three objectives: a grid of limits on two of them, over the payoff table."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from tmsopt.design.solution import Solution
 from tmsopt.fronts.front import FrontPoint, Gap, efficient
@@ -41,7 +40,7 @@ def surface(
             if meets:  # the best under looser limits is the best here
                 solved[i, j] = meets[0]
                 continue
-            found = least(replace(ask, seed=ask.seed + count), 0, limits, near or [p.solution for p in ends])
+            found = least(ask.later(count), 0, limits, near or [p.solution for p in ends])
             count += 1
             if found is None and not solvable(ask, 0, limits):
                 impossible.add((i, j))

@@ -7,11 +7,4 @@ first.
 from tmsopt.margins.boundaries import edges, heavily_damped
 from tmsopt.margins.nearest import Nearest, Robustness, nearest, robustness
 
-__all__ = [
-    "Nearest",
-    "Robustness",
-    "edges",
-    "heavily_damped",
-    "nearest",
-    "robustness",
-]
+__all__ = ["Nearest", "Robustness", "edges", "heavily_damped", "nearest", "robustness"]

@@ -1,25 +1,33 @@
 """The nearest point of a boundary: by how much a design may change before it is unstable, or heavily damped no more."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
-from tmsopt.design.problem import Problem, checked
+from tmsopt.design.files import Given, problem_of
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
-from tmsopt.margins.approach import ALIKE, Approach, approach
+from tmsopt.formulation.ipopt import ipopt, polisher
+from tmsopt.formulation.nlp import NLP
 from tmsopt.margins.boundaries import KINDS, Edge, edges, lies_on
-from tmsopt.margins.rays import Crossing, between, crossings, most_damped
+from tmsopt.margins.rays import RayCrossing, between, most_damped, ray_crossings
 from tmsopt.margins.surroundings import Place, placed
-from tmsopt.records import Array, Table
+from tmsopt.records import Array, Table, plain
 
 STABILITY = ("weave", "capsize", "infinity")
 """The boundaries of stability: a pair on the imaginary axis, a root 0, a root through infinity."""
 
+_ALIKE = 1e-9
+"""Relative difference of distances that is no difference."""
+
 _ROUNDS = 3
+_ITERATIONS = 200
+_FEASIBLE = 1e-10  # violation of scaled coefficients, up to which a point counts as on the edge
+_STATIONARY = 1e-8
 
 
 @dataclass(frozen=True)
@@ -49,15 +57,7 @@ class Nearest:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
-        return {
-            "kind": self.kind,
-            "found": self.found,
-            "distance": self.distance if self.found else None,
-            "parameters": dict(self.parameters),
-            "direction": dict(self.direction),
-            "refined": self.refined,
-            "direct": self.direct,
-        }
+        return plain(self, "kind found distance parameters direction refined direct")
 
 
 @dataclass(frozen=True)
@@ -106,23 +106,33 @@ class Robustness:
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
         return {
-            "stable": self.stable,
-            "heavily_damped": self.heavily_damped,
-            "radius": _number(self.radius),
-            "to_stability": _number(self.to_stability),
+            **plain(self, "stable heavily_damped radius to_stability"),
             "limit": self.limit.kind if self.limit.found else None,
-            "parameters": dict(self.parameters),
-            "weights": dict(self.weights),
+            **plain(self, "parameters weights"),
             "nearest": {n.kind: n.to_json() for n in (self.weave, self.capsize, self.infinity, self.heavy_damping)},
         }
 
 
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+@dataclass(frozen=True)
+class _Approach:
+    """Where one run ended.
+
+    Attributes:
+        u: displacement, in weights.
+        refined: whether the conditions of a nearest point hold to rounding.
+    """
+
+    u: Array
+    refined: bool
+
+    @property
+    def distance(self) -> float:
+        """√Σ u²."""
+        return float(np.linalg.norm(self.u))
 
 
 def nearest(
-    design: Solution | Problem,
+    design: Given,
     pattern: str,
     *,
     parameters: Mapping[str, float] | None = None,
@@ -135,7 +145,7 @@ def nearest(
     the edge of heavy damping is the way out of it, for another the way into it.
 
     Args:
-        design: a solution, or a problem with `parameters`.
+        design: a solution; or a problem or its file, with `parameters`.
         parameters: a value per parameter (rad, SI units); by default those of the solution, or all fixed ones.
         weights: parameter → change that counts as 1; by default those of the problem, or else |x0| for every
             parameter, fixed ones too, except those with a default value (g), so that distances are relative. Where
@@ -147,40 +157,29 @@ def nearest(
     if pattern not in KINDS:
         raise InputError([Fault(f"unknown boundary {pattern!r}; {suggest(str(pattern), KINDS)}", ("pattern",))])
     place = _place(design, parameters, weights)
-    return _nearest(place, crossings(place.space), pattern)
+    return _nearest(place, ray_crossings(place.space), pattern)
 
 
 def robustness(
-    design: Solution | Problem,
-    *,
-    parameters: Mapping[str, float] | None = None,
-    weights: Mapping[str, float] | None = None,
+    design: Given, *, parameters: Mapping[str, float] | None = None, weights: Mapping[str, float] | None = None
 ) -> Robustness:
     """The nearest points of all boundaries, and the radius within which a design stays stable.
 
     Arguments, distances and exceptions are those of `nearest`.
     """
     place = _place(design, parameters, weights)
-    seen = crossings(place.space)
+    seen = ray_crossings(place.space)
     found = [_nearest(place, seen, kind) for kind in KINDS]
     limit = min((n for n in found if n.kind in STABILITY), key=lambda n: n.distance)
     if limit.found and not limit.direct:  # another boundary is nearer, and no ray met it
         u = np.array([limit.direction[n] for n in place.weights])
         seen = sorted([*seen, *between(place.space, u)], key=lambda c: c.distance)
         found = [_nearest(place, seen, kind) for kind in KINDS]
-    return Robustness(
-        place.stable,
-        place.heavily_damped,
-        Table(place.parameters),
-        Table(place.weights),
-        *found,
-    )
+    return Robustness(place.stable, place.heavily_damped, Table(place.parameters), Table(place.weights), *found)
 
 
-def _place(
-    design: Solution | Problem, parameters: Mapping[str, float] | None, weights: Mapping[str, float] | None
-) -> Place:
-    problem = design.problem if isinstance(design, Solution) else checked(design)
+def _place(design: Given, parameters: Mapping[str, float] | None, weights: Mapping[str, float] | None) -> Place:
+    problem = problem_of(design)
     if weights is None and problem.weights:
         weights = problem.weights
     if isinstance(design, Solution):
@@ -191,18 +190,18 @@ def _place(
     return placed(problem, problem.ordered(parameters or {}), weights)
 
 
-def _nearest(place: Place, seen: list[Crossing], kind: str) -> Nearest:
+def _nearest(place: Place, seen: list[RayCrossing], kind: str) -> Nearest:
     """The least distance over the pieces of one boundary."""
     if kind == "heavy damping" and place.on_edge:
         zero = dict.fromkeys(place.weights, 0.0)
         return Nearest(kind, 0.0, Table(place.parameters), Table(zero), refined=True, direct=True)
     mine = [s for s in seen if s.edge in KINDS[kind]]
-    best = Approach(np.zeros(0), False)
+    best = _Approach(np.zeros(0), False)
     pieces = edges(place.problem.model.degree)
     for edge, sign, starts in _pieces(place, mine, kind):
         best = min(best, _best(place, pieces[edge], sign, starts), key=_length)
-    if mine and mine[0].distance < _length(best) * (1 - ALIKE):
-        best = Approach(mine[0].u, False)
+    if mine and mine[0].distance < _length(best) * (1 - _ALIKE):
+        best = _Approach(mine[0].u, False)
     if not best.u.size:
         return Nearest(kind)
     on_the_way = [c for c in between(place.space, best.u) if kind == "heavy damping" or c.edge in STABILITY]
@@ -216,11 +215,11 @@ def _nearest(place: Place, seen: list[Crossing], kind: str) -> Nearest:
     )
 
 
-def _length(found: Approach) -> float:
+def _length(found: _Approach) -> float:
     return found.distance if found.u.size else math.inf
 
 
-def _pieces(place: Place, seen: list[Crossing], kind: str) -> Iterator[tuple[str, float, list[Array]]]:
+def _pieces(place: Place, seen: list[RayCrossing], kind: str) -> Iterator[tuple[str, float, list[Array]]]:
     """Each edge that rays crossed, the sign of a0, and starts; the way into heavy damping is sought without a ray."""
     starts: dict[tuple[str, float], list[Array]] = {}
     for crossing in seen:
@@ -232,11 +231,11 @@ def _pieces(place: Place, seen: list[Crossing], kind: str) -> Iterator[tuple[str
         yield edge, sign, points
 
 
-def _best(place: Place, edge: Edge, sign: float, starts: list[Array]) -> Approach:
+def _best(place: Place, edge: Edge, sign: float, starts: list[Array]) -> _Approach:
     """The nearest of where the starts lead; what is crossed on the way there is started from too."""
-    best = Approach(np.zeros(0), False)
+    best = _Approach(np.zeros(0), False)
     size = min((float(np.linalg.norm(u)) for u in starts if u.any()), default=1.0)
-    run = approach(place, edge, sign, size)
+    run = _approach(place, edge, sign, size)
     for _ in range(_ROUNDS):
         for u in starts:
             found = run(u, _length(best))
@@ -248,3 +247,51 @@ def _best(place: Place, edge: Edge, sign: float, starts: list[Array]) -> Approac
         if not starts:
             break
     return best
+
+
+def _approach(place: Place, edge: Edge, sign: float, size: float) -> Callable[[Array, float], _Approach | None]:
+    """A function from a start, and a distance to beat, to a nearest point of an edge; None where it ends elsewhere.
+
+    Args:
+        sign: sign of a0 on the side of the edge that is stable or heavily damped.
+        size: distance to expect, the unit in which the NLP measures.
+    """
+    nlp = _nlp(place, edge, sign, size)
+    run, polish = ipopt(nlp, max_iterations=_ITERATIONS), polisher(nlp)
+    n = len(place.weights)
+
+    def from_start(u: Array, below: float) -> _Approach | None:
+        c = sign * place.space.coefficients(u)
+        if not (np.all(np.isfinite(c)) and c.any()):
+            return None
+        raw = run(np.concatenate([u / size, edge.guess(c)]))
+        if float(np.linalg.norm(raw.x[:n])) * size >= below * (1 - _ALIKE):
+            return None
+        point = polish(raw, nlp)
+        if not point.violation <= _FEASIBLE:
+            return None
+        u_found = np.clip(point.x[:n] * size, place.space.lower, place.space.upper)
+        return _Approach(u_found, point.stationarity <= _STATIONARY)
+
+    return from_start
+
+
+def _nlp(place: Place, edge: Edge, sign: float, size: float) -> NLP:
+    """Minimise y·y, y = u/size, over displacements and the unknowns of the edge."""
+    n, extra = len(place.weights), len(edge.unknowns)
+    x = ca.SX.sym("x", n + extra)
+    y, unknowns = [x[k] for k in range(n)], [x[n + k] for k in range(extra)]
+    c = ca.vertsplit(sign * place.symbolic(size * x[:n]))
+    equations = [e / place.sizes[k] for e, k in zip(edge.equations(c, unknowns), edge.powers, strict=True)]
+    others = edge.nonnegative(c, unknowns)
+    f, g = sum(v * v for v in y), ca.vertcat(*equations, *others)
+    return NLP(
+        formulation="nearest",
+        variables=(*place.weights, *edge.unknowns),
+        functions=ca.Function("nlp", [x], [f, g]),
+        lower=(*(place.space.lower / size).tolist(), *[0.0] * extra),
+        upper=(*(place.space.upper / size).tolist(), *edge.upper),
+        rows=(*[edge.name] * len(equations), *["others"] * len(others)),
+        row_lower=(0.0,) * (len(equations) + len(others)),
+        row_upper=(*[0.0] * len(equations), *[np.inf] * len(others)),
+    )

@@ -39,7 +39,7 @@ class Space:
 
 
 @dataclass(frozen=True)
-class Crossing:
+class RayCrossing:
     """A point just beyond an edge.
 
     Attributes:
@@ -53,21 +53,21 @@ class Crossing:
     distance: float
 
 
-def crossings(space: Space, seed: int = 0) -> list[Crossing]:
+def ray_crossings(space: Space, seed: int = 0) -> list[RayCrossing]:
     """The nearest few crossings of each edge in different directions, nearest first."""
     rays = directions(space, seed)
     return along(space, rays, np.broadcast_to(_RADII, (len(rays), len(_RADII))))
 
 
-def between(space: Space, u: Array) -> list[Crossing]:
+def between(space: Space, u: Array) -> list[RayCrossing]:
     """Crossings on the straight way to u, short of its end."""
     return along(space, u[None, :], np.linspace(0.0, 1.0, _POINTS)[None, :-1])
 
 
-def along(space: Space, rays: Array, t: Array) -> list[Crossing]:
+def along(space: Space, rays: Array, t: Array) -> list[RayCrossing]:
     """Crossings between displacements t · ray, t of shape (rays, steps)."""
     c = space.coefficients(space.along(rays[:, None, :], t))
-    found: list[Crossing] = []
+    found: list[RayCrossing] = []
     for heavy, test in ((False, _stable), (True, heavily_damped)):
         inside = test(c)
         ray, step = np.nonzero(inside[:, 1:] != inside[:, :-1])
@@ -186,12 +186,12 @@ class _Bracket:
         """Names of the edges that each has crossed."""
         return [losses(c, heavy) for c in self.sides()[0]]
 
-    def crossings(self, heavy: bool) -> list[Crossing]:
+    def crossings(self, heavy: bool) -> list[RayCrossing]:
         """As data."""
         beyond, sign = self.sides()
         u = self.space.along(self.rays, self.high)
         return [
-            Crossing(name, float(sign[k]), u[k], float(np.linalg.norm(u[k])))
+            RayCrossing(name, float(sign[k]), u[k], float(np.linalg.norm(u[k])))
             for k, c in enumerate(beyond)
             for name in losses(c, heavy)
         ]

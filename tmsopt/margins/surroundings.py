@@ -12,7 +12,7 @@ import numpy as np
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import STRUCTURE_TOLERANCE
 from tmsopt.errors import Fault, InputError, suggest
-from tmsopt.margins.cofactor import terms
+from tmsopt.margins.boundaries import terms
 from tmsopt.margins.rays import Space
 from tmsopt.models import Range
 from tmsopt.records import Array

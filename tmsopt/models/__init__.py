@@ -20,36 +20,11 @@ MODELS = {tms.name: tms, whipple.name: whipple}
 """Models that a problem file can name."""
 
 __all__ = [
-    "CONSTANTS",
-    "FUNCTIONS",
-    "GRAVITY",
-    "MODELS",
-    "TAKEN",
-    "Bicycle",
-    "Model",
-    "Parameter",
-    "ParameterSet",
-    "Quantity",
-    "Range",
-    "Unfit",
-    "Values",
-    "canonical",
-    "copo",
-    "decimal",
-    "from_coefficients",
-    "from_matrices",
-    "from_si",
-    "latex",
-    "matrices",
-    "named",
-    "problem_text",
-    "read_bicycle",
-    "spin",
-    "tms",
-    "to_si",
-    "whipple",
+    "CONSTANTS", "FUNCTIONS", "GRAVITY", "MODELS", "TAKEN", "Bicycle", "Model", "Parameter", "ParameterSet",
+    "Quantity", "Range", "Unfit", "Values", "canonical", "copo", "decimal", "from_coefficients", "from_matrices",
+    "from_si", "latex", "matrices", "named", "problem_text", "read_bicycle", "spin", "tms", "to_si", "whipple",
     "write_bicycle",
-]
+]  # fmt: skip
 
 
 def named(name: str) -> Model:

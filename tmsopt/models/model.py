@@ -56,6 +56,7 @@ class Parameter:
         tangent: whether the coefficients are polynomial in the tangent, so that an optimiser moves that.
         multiple_of: unit of the scale that a dimensionless parameter is a multiple of, e.g. ``m`` for wheelbases.
         sides: names of the designs with a negative and a positive value, where these are searched separately.
+        counterpart: of one in SI, the dimensionless parameter that it gives, where that has another name.
     """
 
     name: str
@@ -67,6 +68,7 @@ class Parameter:
     tangent: bool = False
     multiple_of: str = ""
     sides: tuple[str, str] | None = None
+    counterpart: str = ""
 
     def may_change(self, value: float) -> bool:
         """Whether a builder may get it wrong: no constant of nature, nor something that a design does not have."""
@@ -83,6 +85,8 @@ class Quantity:
             exactly when x is the quantity, within `range`. An optimiser then carries x as a variable.
         pieces: where the quantity is the greatest of several, each of these. An optimiser then carries a variable
             above all of them, if more of the quantity is never an advantage.
+        counterpart: what a dimensionless one is in SI, derived from SI parameters.
+        aside: whether a report has it in a sentence, and not in its table.
     """
 
     name: str
@@ -93,6 +97,8 @@ class Quantity:
     equation: Callable[[Mapping[str, Any], Any], Any] | None = None
     range: Range = Range()
     pieces: tuple[Formula, ...] = ()
+    counterpart: "Quantity | None" = None
+    aside: bool = False
 
 
 @dataclass(frozen=True)
@@ -198,11 +204,7 @@ class Values(Mapping[str, Any]):
         native = of.native(parameters)
         self.coefficients = model.polynomial(**model.algebraic(native))
         self._at = (model, of, dict(parameters), dict(ranges or {}))
-        self._known = {
-            **native,
-            **dict(zip(model.coefficient_names(), self.coefficients, strict=True)),
-            **parameters,
-        }
+        self._known = {**native, **dict(zip(model.coefficient_names(), self.coefficients, strict=True)), **parameters}
         self._formulas = {q.name: q for q in (*model.quantities, *of.quantities, *extra)}
         self._lift = lift
 

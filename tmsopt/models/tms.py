@@ -20,7 +20,7 @@ _NOT_NEGATIVE = Range(lower=0.0)
 _NOT_POSITIVE = Range(upper=0.0)
 _TILT = Range(-np.pi / 2, np.pi / 2, closed=False)
 
-_LAMBDA_S = Parameter(
+LAMBDA_S = Parameter(
     "lambda_s", "rad", "steer axis tilt", r"\lambda_s", _TILT, tangent=True, sides=("backward tilt", "forward tilt")
 )
 
@@ -40,7 +40,7 @@ _NATIVE = ParameterSet(
         ),
         Parameter("zeta_B", "1", "rear frame centre of mass, downward", r"\zeta_B", _NOT_POSITIVE, multiple_of="m"),
         Parameter("zeta_H", "1", "front assembly centre of mass, downward", r"\zeta_H", _NOT_POSITIVE, multiple_of="m"),
-        _LAMBDA_S,
+        LAMBDA_S,
     ),
     native=dict,
 )
@@ -83,27 +83,23 @@ def _pencil(p: Mapping[str, Any]) -> tuple[Matrix, ...]:
     return matrices(**dimensions, sine=T * cosine, cosine=cosine)
 
 
-def _rate(p: Mapping[str, Any]) -> Any:
-    return sqrt(p["g"] / p["w"])
-
-
 _SI = ParameterSet(
     "SI",
     (
         Parameter("w", "m", "wheelbase", "w", _POSITIVE),
-        Parameter("v", "m/s", "forward speed", "v", _NOT_NEGATIVE),
+        Parameter("v", "m/s", "forward speed", "v", _NOT_NEGATIVE, counterpart="Fr"),
         Parameter("g", "m/s^2", "gravity", "g", _POSITIVE, default=GRAVITY),
-        _LAMBDA_S,
+        LAMBDA_S,
         Parameter("m_B", "kg", "mass of the rear frame", "m_B", _POSITIVE),
-        Parameter("x_B", "m", "rear frame centre of mass, forward of the rear contact", "x_B"),
-        Parameter("z_B", "m", "rear frame centre of mass, downward", "z_B", _NOT_POSITIVE),
-        Parameter("m_H", "kg", "mass of the front assembly", "m_H", _NOT_NEGATIVE),
-        Parameter("x_H", "m", "front assembly centre of mass, forward of the rear contact", "x_H"),
-        Parameter("z_H", "m", "front assembly centre of mass, downward", "z_H", _NOT_POSITIVE),
+        Parameter("x_B", "m", "rear frame centre of mass, forward of the rear contact", "x_B", counterpart="chi_B"),
+        Parameter("z_B", "m", "rear frame centre of mass, downward", "z_B", _NOT_POSITIVE, counterpart="zeta_B"),
+        Parameter("m_H", "kg", "mass of the front assembly", "m_H", _NOT_NEGATIVE, counterpart="mu"),
+        Parameter("x_H", "m", "front assembly centre of mass, forward of the rear contact", "x_H", counterpart="chi_H"),
+        Parameter("z_H", "m", "front assembly centre of mass, downward", "z_H", _NOT_POSITIVE, counterpart="zeta_H"),
     ),
     native=from_si,
     quantities=SI_QUANTITIES,
-    rate=_rate,
+    rate=lambda p: sqrt(p["g"] / p["w"]),
 )
 
 tms = Model(

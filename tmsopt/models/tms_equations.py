@@ -40,16 +40,7 @@ def matrices(
     """
     nu_H = (chi_H - 1) * cosine - zeta_H * sine
     lean = mu * zeta_H + zeta_B
-    M = [
-        [mu * zeta_H * zeta_H + zeta_B * zeta_B, -mu * zeta_H * nu_H],
-        [-mu * zeta_H * nu_H, mu * nu_H * nu_H],
-    ]
-    V = [
-        [0 * Fr, -(mu * chi_H * zeta_H + chi_B * zeta_B) * Fr * cosine],
-        [0 * Fr, mu * chi_H * nu_H * Fr * cosine],
-    ]
-    P = [
-        [lean, -Fr * Fr * cosine * lean - mu * nu_H],
-        [-mu * nu_H, mu * (Fr * Fr * cosine - sine) * nu_H],
-    ]
+    M = [[mu * zeta_H * zeta_H + zeta_B * zeta_B, -mu * zeta_H * nu_H], [-mu * zeta_H * nu_H, mu * nu_H * nu_H]]
+    V = [[0 * Fr, -(mu * chi_H * zeta_H + chi_B * zeta_B) * Fr * cosine], [0 * Fr, mu * chi_H * nu_H * Fr * cosine]]
+    P = [[lean, -Fr * Fr * cosine * lean - mu * nu_H], [-mu * nu_H, mu * (Fr * Fr * cosine - sine) * nu_H]]
     return M, V, P

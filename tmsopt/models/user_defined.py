@@ -186,6 +186,10 @@ def _rebuilt(
     def as_printed(values: Mapping[str, Any]) -> list[Any]:
         return _polynomial(kind, blocks(walk(entry.function, [values[n] for n in names], _DECIMALS)[0]))
 
+    def alone(written: Any) -> Any:
+        formula = formulas([written], names)
+        return lambda values: formula(values)[0]
+
     lost = _vanishing(as_printed, names)
     if lost is None:
         raise Unfit(shapes[0][0], "makes a polynomial without s, which has no root")
@@ -202,13 +206,12 @@ def _rebuilt(
     made = Model(
         name=name,
         title=name,
-        degree=len(written[:count]) - 1 - lost if kind == "coefficients" else _degree(shapes) - lost,
+        degree=(count - 1 if kind == "coefficients" else shapes[0][1] * (1 if shapes[0][0] == "A" else 2)) - lost,
         sets=(of,),
         algebraic=dict,
         polynomial=coefficients,
         quantities=tuple(
-            Quantity(n, "1", "quantity", latex(n), _quantity(formulas([written[count + k]], names)))
-            for k, n in enumerate(derived)
+            Quantity(n, "1", "quantity", latex(n), alone(x)) for n, x in zip(derived, written[count:], strict=True)
         ),
         pencil=None if kind == "coefficients" else lambda values: _pencil(blocks(entry(values))),
     )
@@ -228,18 +231,6 @@ def _statement(entry: Formulas, shapes: Sequence[tuple[str, int, int]], derived:
 def _ball(x: Any) -> Any:
     """A coefficient as a ball, or as the series that it is."""
     return x if isinstance(x, flint.arb_series) else flint.arb(exact(x))
-
-
-def _degree(shapes: Sequence[tuple[str, int, int]]) -> int:
-    key, size, _ = shapes[0]
-    return size if key == "A" else 2 * size
-
-
-def _quantity(formula: Formulas) -> Any:
-    def value(values: Mapping[str, Any]) -> Any:
-        return formula(values)[0]
-
-    return value
 
 
 def _polynomial(kind: str, blocks: dict[str, Matrix]) -> list[Any]:

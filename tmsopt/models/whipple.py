@@ -7,10 +7,8 @@ in the same parameters, with the same roots per second.
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Range
-from tmsopt.models.tms import GRAVITY
+from tmsopt.models.tms import GRAVITY, LAMBDA_S
 from tmsopt.models.whipple_equations import carvallo_whipple, matrices
 from tmsopt.models.whipple_quantities import QUANTITIES, algebraic, canonical
 
@@ -20,7 +18,6 @@ _POSITIVE = Range(lower=0.0, closed=False)
 _NOT_NEGATIVE = Range(lower=0.0)
 _NOT_POSITIVE = Range(upper=0.0)
 _ANY = Range()
-_TILT = Range(-np.pi / 2, np.pi / 2, closed=False)
 
 
 def _length(name: str, meaning: str, latex: str, range: Range = _ANY, default: float | None = None) -> Parameter:
@@ -36,10 +33,6 @@ def _inertia(name: str, meaning: str, range: Range = _NOT_NEGATIVE) -> Parameter
     return Parameter(name, "kg m^2", meaning, rf"I_{{{body}{axes}}}", range, default=0.0)
 
 
-def _per_second(p: Mapping[str, Any]) -> int:
-    return 1
-
-
 _NO_RADIUS = "a wheel without radius would turn infinitely fast"
 
 _SI = ParameterSet(
@@ -47,10 +40,7 @@ _SI = ParameterSet(
     (
         _length("w", "wheelbase", "w", _POSITIVE),
         _length("c", "trail, how far the steer axis meets the ground ahead of the front contact", "c", default=0.0),
-        Parameter(
-            "lambda_s", "rad", "steer axis tilt", r"\lambda_s", _TILT,
-            tangent=True, sides=("backward tilt", "forward tilt"),
-        ),
+        LAMBDA_S,
         Parameter("g", "m/s^2", "gravity", "g", _POSITIVE, default=GRAVITY),
         Parameter("v", "m/s", "forward speed", "v", _NOT_NEGATIVE),
         _length("r_R", "radius of the rear wheel", "r_R", _NOT_NEGATIVE, 0.0),
@@ -76,7 +66,7 @@ _SI = ParameterSet(
     ),
     native=dict,
     quantities=QUANTITIES,
-    rate=_per_second,
+    rate=lambda p: 1,
     needs={"I_Ryy": ("r_R", _NO_RADIUS), "I_Fyy": ("r_F", _NO_RADIUS)},
 )  # fmt: skip
 

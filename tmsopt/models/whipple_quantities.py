@@ -73,14 +73,6 @@ def _powers(v: Design) -> tuple[Any, ...]:
     return powers_of_speed(*matrices(**bodies, sine=of["w"] * of["T"], cosine=of["w"], turn=1))
 
 
-def _S_R(v: Design) -> Any:
-    return spin(v["I_Ryy"], v["r_R"])
-
-
-def _S_F(v: Design) -> Any:
-    return spin(v["I_Fyy"], v["r_F"])
-
-
 def _v_capsize(v: Design) -> Any:
     b = _powers(v)
     return sqrt(v["g"] * quotient(-b[6], b[7]))
@@ -125,21 +117,9 @@ def _least(one: Any, other: Any, b: tuple[Any, ...]) -> Any:
     return chosen(least < above, least, np.nan)
 
 
-def _m_T(v: Design) -> Any:
-    return v["m_R"] + v["m_B"] + v["m_H"] + v["m_F"]
-
-
-def _x_T(v: Design) -> Any:
-    return (v["m_B"] * v["x_B"] + v["m_H"] * v["x_H"] + v["m_F"] * v["w"]) / v["m_T"]
-
-
 def _z_T(v: Design) -> Any:
     moment = v["m_B"] * v["z_B"] + v["m_H"] * v["z_H"] - v["m_R"] * v["r_R"] - v["m_F"] * v["r_F"]
     return moment / v["m_T"]
-
-
-def _load_front(v: Design) -> Any:
-    return v["x_T"] / v["w"]
 
 
 def _load_rear(v: Design) -> Any:
@@ -148,24 +128,8 @@ def _load_rear(v: Design) -> Any:
     return (v["m_R"] * w + v["m_B"] * (w - v["x_B"]) + v["m_H"] * (w - v["x_H"])) / (v["m_T"] * w)
 
 
-def _N_F(v: Design) -> Any:
-    return v["load_front"] * v["m_T"] * v["g"]
-
-
-def _N_R(v: Design) -> Any:
-    return v["load_rear"] * v["m_T"] * v["g"]
-
-
 def _rear_lift(v: Design) -> Any:
     return -v["load_rear"] * v["m_T"]
-
-
-def _m_ballast_rear(v: Design) -> Any:
-    return positive_part(_rear_lift(v))
-
-
-def _mechanical_trail(v: Design) -> Any:
-    return v["c"] * _sine_cosine(v)[1]
 
 
 def _fork_offset(v: Design) -> Any:
@@ -178,10 +142,6 @@ def _u_H(v: Design) -> Any:
     return (v["x_H"] - v["w"] - v["c"]) * cosine - v["z_H"] * sine
 
 
-def _u_A(v: Design) -> Any:
-    return quotient(v["m_H"] * v["u_H"] + v["m_F"] * v["fork_offset"], v["m_H"] + v["m_F"])
-
-
 def _mass_margin(v: Design) -> Any:
     """Smaller eigenvalue of M."""
     (first, mixed), (_, second) = canonical(v)[0]
@@ -191,44 +151,54 @@ def _mass_margin(v: Design) -> Any:
 QUANTITIES = (
     Quantity(
         "omega0", "1/s", "−(a4/a0)^(1/4), the mean decay of the roots", r"\omega_0", omega0,
-        equation=omega0_equation,
-        range=_NOT_POSITIVE,
+        equation=omega0_equation, range=_NOT_POSITIVE,
     ),
     Quantity("v_weave", "m/s", "least speed at which a pair of roots is imaginary", r"v_\mathrm{w}", _v_weave),
     Quantity(
         "v_capsize", "m/s", "speed at which a root is 0", r"v_\mathrm{c}", _v_capsize,
-        equation=_v_capsize_equation,
-        range=_NOT_NEGATIVE,
+        equation=_v_capsize_equation, range=_NOT_NEGATIVE,
     ),
-    Quantity("mechanical_trail", "m", "distance of the front contact from the steer axis", r"c_m", _mechanical_trail),
+    Quantity(
+        "mechanical_trail", "m", "distance of the front contact from the steer axis", r"c_m",
+        lambda v: v["c"] * _sine_cosine(v)[1],
+    ),
     Quantity("fork_offset", "m", "distance of the front wheel centre from the steer axis", r"o_F", _fork_offset),
     Quantity("u_H", "m", "distance of the handlebar's centre of mass from the steer axis", "u_H", _u_H),
-    Quantity("u_A", "m", "distance of the centre of mass of the front assembly from the steer axis", "u_A", _u_A),
-    Quantity("m_T", "kg", "mass of the whole bicycle", "m_T", _m_T),
-    Quantity("x_T", "m", "centre of mass of the whole bicycle, forward of the rear contact", "x_T", _x_T),
+    Quantity(
+        "u_A", "m", "distance of the centre of mass of the front assembly from the steer axis", "u_A",
+        lambda v: quotient(v["m_H"] * v["u_H"] + v["m_F"] * v["fork_offset"], v["m_H"] + v["m_F"]),
+    ),
+    Quantity("m_T", "kg", "mass of the whole bicycle", "m_T", lambda v: v["m_R"] + v["m_B"] + v["m_H"] + v["m_F"]),
+    Quantity(
+        "x_T", "m", "centre of mass of the whole bicycle, forward of the rear contact", "x_T",
+        lambda v: (v["m_B"] * v["x_B"] + v["m_H"] * v["x_H"] + v["m_F"] * v["w"]) / v["m_T"],
+    ),
     Quantity("z_T", "m", "centre of mass of the whole bicycle, downward", "z_T", _z_T),
     Quantity(
         "load_front", "1", "share of the weight on the front wheel, negative where it lifts", r"N_F/(N_F + N_R)",
-        _load_front,
+        lambda v: v["x_T"] / v["w"],
     ),
     Quantity(
         "load_rear", "1", "share of the weight on the rear wheel, negative where it lifts", r"N_R/(N_F + N_R)",
         _load_rear,
     ),
-    Quantity("N_F", "N", "load on the front wheel at rest, negative where it lifts", "N_F", _N_F),
-    Quantity("N_R", "N", "load on the rear wheel at rest, negative where it lifts", "N_R", _N_R),
+    Quantity(
+        "N_F", "N", "load on the front wheel at rest, negative where it lifts", "N_F",
+        lambda v: v["load_front"] * v["m_T"] * v["g"],
+    ),
+    Quantity(
+        "N_R", "N", "load on the rear wheel at rest, negative where it lifts", "N_R",
+        lambda v: v["load_rear"] * v["m_T"] * v["g"],
+    ),
     Quantity(
         "m_ballast_rear", "kg", "mass at the rear contact that keeps the rear wheel down", r"m_\mathrm{ballast}",
-        _m_ballast_rear,
-        range=_NOT_NEGATIVE,
-        pieces=(nothing, _rear_lift),
+        lambda v: positive_part(_rear_lift(v)), range=_NOT_NEGATIVE, pieces=(nothing, _rear_lift),
     ),
-    Quantity("S_R", "kg m", "spin of the rear wheel, I_Ryy/r_R", "S_R", _S_R),
-    Quantity("S_F", "kg m", "spin of the front wheel, I_Fyy/r_F", "S_F", _S_F),
+    Quantity("S_R", "kg m", "spin of the rear wheel, I_Ryy/r_R", "S_R", lambda v: spin(v["I_Ryy"], v["r_R"])),
+    Quantity("S_F", "kg m", "spin of the front wheel, I_Fyy/r_F", "S_F", lambda v: spin(v["I_Fyy"], v["r_F"])),
     Quantity(
         "mass_margin", "kg m^2", "smallest eigenvalue of the mass matrix, 0 where it is singular", r"\min\sigma(M)",
-        _mass_margin,
-        range=_NOT_NEGATIVE,
+        _mass_margin, range=_NOT_NEGATIVE,
     ),
 )  # fmt: skip
 """Quantities of a design. A mass at the rear contact has no part in the lateral motion."""

@@ -6,6 +6,8 @@ first; `ledger` recomputes every claim.
 
 from tmsopt.paper.compare import Comparison, compare
 from tmsopt.paper.experiment import experiment
+from tmsopt.paper.ledger import verify
+from tmsopt.paper.ledger.entry import Ledger
 from tmsopt.paper.locus import locus, table_1_loci
 from tmsopt.paper.reference import benchmark, experimental, optimised, table_1
 from tmsopt.paper.sketch import sketch
@@ -21,22 +23,7 @@ from tmsopt.paper.universal import (
 )
 
 __all__ = [
-    "Comparison",
-    "benchmark",
-    "compare",
-    "ep_set",
-    "experiment",
-    "experimental",
-    "heavy_section",
-    "locus",
-    "normalised",
-    "optimised",
-    "sketch",
-    "spire",
-    "spire_faces",
-    "stability_margin",
-    "table_1",
-    "table_1_loci",
-    "table_1_paths",
-    "universal_path",
-]
+    "Comparison", "Ledger", "benchmark", "compare", "ep_set", "experiment", "experimental", "heavy_section",
+    "locus", "normalised", "optimised", "sketch", "spire", "spire_faces", "stability_margin", "table_1",
+    "table_1_loci", "table_1_paths", "universal_path", "verify",
+]  # fmt: skip

@@ -1,18 +1,16 @@
 """A numeric optimum beside the closed-form laws, law by law, and beside the other formulation."""
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Unpack
 
 from tmsopt.checks.law_rows import LawRow, law_rows
-from tmsopt.design.problem import Problem
+from tmsopt.design.files import Given, question_of
 from tmsopt.design.solution import Solution
+from tmsopt.formulation.options import Asked, Options, options_of
 from tmsopt.models import tms
-from tmsopt.records import Progress
+from tmsopt.records import SCHEMA, plain
 from tmsopt.roots import PATTERNS
-from tmsopt.solver.multistart import STARTS
-from tmsopt.solver.solve import solve
+from tmsopt.solver.solve import solved
 
 
 @dataclass(frozen=True)
@@ -41,66 +39,28 @@ class Comparison:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
-
-        def number(x: float) -> float | None:
-            return float(x) if math.isfinite(x) else None
-
-        return {
-            "schema": 1,
-            "design": self.design.to_json(),
-            "laws": [
-                {
-                    "label": row.label,
-                    "subject": row.subject,
-                    "numeric": number(row.numeric),
-                    "law": number(row.law),
-                    "residual": number(row.residual) if row.applies else None,
-                    "relative": number(row.relative) if row.applies else None,
-                    "applies": row.applies,
-                    "agrees": row.agrees,
-                    "reason": row.reason,
-                }
-                for row in self.laws
-            ],
-            "formulations": {
-                "formulation": self.design.formulation,
-                "other": None if self.other is None else self.other.to_json(),
-                "differences": {name: number(x) for name, x in self.differences.items()},
-                "reason": self.reason,
-            },
-        }
+        formulations = {"formulation": self.design.formulation} | plain(self, "other differences reason")
+        return {"schema": SCHEMA} | plain(self, "design laws") | {"formulations": formulations}
 
 
-def compare(
-    design: Solution | Problem,
-    *,
-    starts: int = STARTS,
-    seed: int = 0,
-    linear_solver: str = "mumps",
-    progress: Progress | None = None,
-) -> Comparison:
+def compare(design: Given, **options: Unpack[Asked]) -> Comparison:
     """Set a design beside the laws of the paper, which are of skates alone, and solve it by the other formulation.
 
     The laws are of one design at one speed: scenarios and tolerances are left aside, and the problem is solved again.
 
     Args:
-        design: a solution, or a problem to solve first.
-        starts, seed, linear_solver, progress: as for `solve`, for the solves that this takes.
+        design: a solution; or a problem or its file, solved first.
+        options: for the solves that this takes; see `solve`.
     """
-
-    def solved(problem: Problem) -> Solution:
-        return solve(problem, starts=starts, seed=seed, linear_solver=linear_solver, throw=False, progress=progress)
-
-    problem = design if isinstance(design, Problem) else design.problem
-    if problem.scenarios or problem.tolerances:
-        design = problem.nominal
-    if isinstance(design, Problem):
-        design = solved(design)
-    other, reason = _other_formulation(design, solved)
-    return Comparison(design, tuple(law_rows(design)) if design.problem.model is tms else (), other, reason)
+    how = options_of(options)
+    problem = question_of(design)
+    one = isinstance(design, Solution) and not (problem.scenarios or problem.tolerances)
+    found = solved(design if one else problem.nominal, how)
+    other, reason = _other_formulation(found, how)
+    return Comparison(found, tuple(law_rows(found)) if found.problem.model is tms else (), other, reason)
 
 
-def _other_formulation(design: Solution, solved: Callable[[Problem], Solution]) -> tuple[Solution | None, str]:
+def _other_formulation(design: Solution, options: Options) -> tuple[Solution | None, str]:
     problem = design.problem
     if design.status != "optimal":
         return None, f"the design is {design.status}"
@@ -115,7 +75,7 @@ def _other_formulation(design: Solution, solved: Callable[[Problem], Solution]) 
         restated = replace(problem, locate=design.structure, start={})
         if square:  # there may be several such designs: the one near this
             restated = replace(restated, minimize=None, maximize=None, start=_near(design))
-    other = solved(restated)
+    other = solved(restated, options)
     if other.status != "optimal":
         return None, f"the {other.formulation} formulation ended {other.status}"
     return other, ""

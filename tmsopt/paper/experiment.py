@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from tmsopt import laws
-from tmsopt.paper.reference import Bicycle, benchmark, experimental, optimised
+from tmsopt.paper.reference import ReferenceBicycle, benchmark, experimental, optimised
 from tmsopt.records import Array
 from tmsopt.roots import is_stable
 
@@ -22,7 +22,7 @@ _JUST_ABOVE = 1 + 1e-6  # of Fr_c: where a bicycle that gains stability at Fr_c 
 
 
 @dataclass(frozen=True)
-class Point:
+class ExperimentPoint:
     """A bicycle in the plane of the law: χ_B over ζ_B/ζ_H; ω0 where it fulfils the law for any χ_H (equation chib)."""
 
     name: str
@@ -61,7 +61,7 @@ class Experiment:
 
     ratio: Array
     law: Array
-    points: tuple[Point, ...]
+    points: tuple[ExperimentPoint, ...]
     chi_B: float
     lambda_s: float
     least_tilt: float
@@ -79,19 +79,15 @@ def experiment(lambda_s: float = TILT, mass_ratios: tuple[float, ...] = MASS_RAT
     ratio = np.linspace(1.0, 3.0, _POINTS)
     curves = [_critical(1.0, np.nan, lambda_s), *(_critical(p["chi_H"], mu, lambda_s) for mu in mass_ratios)]
     return Experiment(
-        ratio=ratio,
-        law=np.asarray(laws.chib1(-ratio, np.full_like(ratio, -1.0))),
-        points=tuple(_point(bicycle) for bicycle in (built, benchmark(), optimised())),
-        chi_B=p["chi_B"],
-        lambda_s=lambda_s,
-        least_tilt=float(np.arctan((p["chi_H"] - 1) / p["zeta_H"])),
-        critical=tuple(curves),
-    )
+        ratio=ratio, law=np.asarray(laws.chib1(-ratio, np.full_like(ratio, -1.0))),
+        points=tuple(_point(bicycle) for bicycle in (built, benchmark(), optimised())), chi_B=p["chi_B"],
+        lambda_s=lambda_s, least_tilt=float(np.arctan((p["chi_H"] - 1) / p["zeta_H"])), critical=tuple(curves),
+    )  # fmt: skip
 
 
-def _point(bicycle: Bicycle) -> Point:
+def _point(bicycle: ReferenceBicycle) -> ExperimentPoint:
     p = bicycle.parameters
-    return Point(bicycle.name, p["zeta_B"] / p["zeta_H"], p["chi_B"], p["chi_H"], bicycle.omega0)
+    return ExperimentPoint(bicycle.name, p["zeta_B"] / p["zeta_H"], p["chi_B"], p["chi_H"], bicycle.omega0)
 
 
 def _critical(chi_H: float, mu: float, lambda_s: float, slack: float = 0.01) -> CriticalSpeed:
@@ -118,15 +114,10 @@ def _critical(chi_H: float, mu: float, lambda_s: float, slack: float = 0.01) -> 
     stable = bool(np.isfinite(level(float(least.x))))
     best = float(least.x) if stable else np.nan
     return CriticalSpeed(
-        chi_B=chi_B,
-        Fr_c=value(chi_B),
-        chi_H=chi_H,
-        mu=mu,
-        best=(best, level(best)),
-        own=level(p["chi_B"]),
+        chi_B=chi_B, Fr_c=value(chi_B), chi_H=chi_H, mu=mu, best=(best, level(best)), own=level(p["chi_B"]),
         flat=_flat(square, best, (low + margin, high - margin), (1 + slack) ** 2) if stable else (np.nan, np.nan),
         slack=slack,
-    )
+    )  # fmt: skip
 
 
 def _flat(

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from tmsopt.models import Model, ParameterSet
-from tmsopt.models import tms as bicycle_model
+from tmsopt.models import Model, ParameterSet, tms as bicycle_model
 from tmsopt.paper.reference import TILT_OFFSETS, on_ep_set
 from tmsopt.paper.universal import universal_path
 from tmsopt.records import Array, Complex
@@ -31,7 +30,7 @@ class Track:
 
 
 @dataclass(frozen=True)
-class Mark:
+class DoubleRoots:
     """A multiple root: ``EP4``, ``2EP2``, ``CEP2``, or ``EP2`` for one real double root; `s` lists it, once each."""
 
     name: str
@@ -56,7 +55,7 @@ class Locus:
     values: Array
     roots: Complex
     tracks: tuple[Track, ...]
-    marks: tuple[Mark, ...]
+    marks: tuple[DoubleRoots, ...]
     crossings: tuple[tuple[float, float], ...]
 
 
@@ -96,7 +95,7 @@ def locus(
         found = np.insert(found, coarse + 1, roots(coefficients(middle)), axis=0)
         values = np.insert(values, coarse + 1, middle)
     path = universal_path(model, of, parameters, sweep, values)
-    pairs = [Mark(e.name, e.value, _double_roots(e.name, e.A, e.omega0)) for e in path.events if "EP" in e.name]
+    pairs = [DoubleRoots(e.name, e.value, _double_roots(e.name, e.A, e.omega0)) for e in path.events if "EP" in e.name]
     marks = [*pairs, *_real_double_roots(coefficients, values, [m.value for m in pairs])]
     crossings = [
         (e.value, abs(e.omega0) * float(np.sqrt(e.A[2] / e.A[0])))
@@ -118,24 +117,16 @@ def table_1_loci(Fr_max: float = 5.0) -> tuple[LocusRow, LocusRow, LocusRow]:
 def _row(name: str, Fr_max: float) -> LocusRow:
     bicycle = on_ep_set(name, TILT_OFFSETS[name])
     offset = 0.1 if name == "CEP2" else 0.01
+    chi_B = bicycle.parameters["chi_B"]
+    shifts = {r"\sqrt{2}": 0.0, rf"\sqrt{{2}} - {offset:g}": -offset, rf"\sqrt{{2}} + {offset:g}": offset}
     law, below, above = (
         locus(
-            bicycle_model,
-            bicycle_model.sets[0],
-            {**bicycle.parameters, "chi_B": bicycle.parameters["chi_B"] + shift},
-            "Fr",
-            (0.0, Fr_max),
+            bicycle_model, bicycle_model.sets[0], {**bicycle.parameters, "chi_B": chi_B + shift}, "Fr", (0.0, Fr_max),
             title=text,
         )
-        for shift, text in (
-            (0.0, r"\sqrt{2}"),
-            (-offset, rf"\sqrt{{2}} - {offset:g}"),
-            (offset, rf"\sqrt{{2}} + {offset:g}"),
-        )
-    )
-    return LocusRow(
-        name, bicycle.parameters["lambda_s"], bicycle.omega0, bicycle.parameters["chi_B"], offset, (law, below, above)
-    )
+        for text, shift in shifts.items()
+    )  # fmt: skip
+    return LocusRow(name, bicycle.parameters["lambda_s"], bicycle.omega0, chi_B, offset, (law, below, above))
 
 
 def _fine(found: Complex, resolution: float) -> NDArray[np.bool_]:
@@ -184,7 +175,9 @@ def _double_roots(name: str, A: Array, omega0: float) -> Complex:
     return roots(np.array([1.0, float(A[0]) / 2, 1.0])) * abs(omega0)
 
 
-def _real_double_roots(coefficients: Callable[[ArrayLike], Array], values: Array, known: list[float]) -> list[Mark]:
+def _real_double_roots(
+    coefficients: Callable[[ArrayLike], Array], values: Array, known: list[float]
+) -> list[DoubleRoots]:
     """Where the discriminant changes sign: two real roots meet. It keeps its sign at 2EP2 and CEP2."""
 
     def quartic(at: ArrayLike) -> list[Array]:
@@ -202,7 +195,7 @@ def _real_double_roots(coefficients: Callable[[ArrayLike], Array], values: Array
         if found[low] * found[high] > 0 or any(values[low] <= v <= values[high] for v in known):
             continue
         at = float(brentq(value, values[low], values[high], xtol=1e-15, rtol=1e-15))
-        marks.append(Mark("EP2", at, np.array([_closest_pair(roots(coefficients(at)))])))
+        marks.append(DoubleRoots("EP2", at, np.array([_closest_pair(roots(coefficients(at)))])))
     return marks
 
 

@@ -55,11 +55,11 @@ def tilt_plane(chi_B_offset: float = 0.0, points: tuple[int, int] = (320, 240), 
     tilt = np.linspace(*TILT, 1200)
     curves = {"Frc1": (np.sqrt(laws.Frc1(chi_B, ZETA_B, ZETA_H, tilt)), tilt)}
     if chi_B_offset:
-        return Plane(_charted(problem, points, boundaries), None, curves, {})
+        return Plane(chart(problem, points=points, boundaries=boundaries), None, curves, {})
     curves["epset"] = (np.asarray(laws.epset(ZETA_B, ZETA_H, tilt)), tilt)
     curves["tls"] = (np.array(FR), np.full(2, at["lambda_s"]))
     marked = {"EP4": (at["Fr"], at["lambda_s"])}
-    return Plane(_charted(problem, points, boundaries), ep_set(), curves, marked)
+    return Plane(chart(problem, points=points, boundaries=boundaries), ep_set(), curves, marked)
 
 
 def chi_B_plane(tilt_offset: float = 0.0, points: tuple[int, int] = (320, 240), boundaries: bool = True) -> Plane:
@@ -75,7 +75,7 @@ def chi_B_plane(tilt_offset: float = 0.0, points: tuple[int, int] = (320, 240), 
     marked = {"least Fr_c": (float(laws.frm(ZETA_B, ZETA_H, tilt)), at["chi_B"])}
     if not tilt_offset:
         marked["EP4"] = (at["Fr"], at["chi_B"])
-    return Plane(_charted(problem, points, boundaries), None, curves, marked)
+    return Plane(chart(problem, points=points, boundaries=boundaries), None, curves, marked)
 
 
 def section(Fr_offset: float, points: tuple[int, int] = (240, 200)) -> Plane:
@@ -86,7 +86,7 @@ def section(Fr_offset: float, points: tuple[int, int] = (240, 200)) -> Plane:
     chi_B = np.linspace(*CHI_B, 1200)
     onset = np.arctan(Fr**2 / laws.Frc1(chi_B, ZETA_B, ZETA_H, np.pi / 4))  # Frc1 is linear in tan λ_s
     marked = {} if Fr_offset else {"EP4": (at["chi_B"], at["lambda_s"])}
-    return Plane(_charted(problem, points, True), None, {"Frc1": (chi_B, np.asarray(onset))}, marked)
+    return Plane(chart(problem, points=points), None, {"Frc1": (chi_B, np.asarray(onset))}, marked)
 
 
 def surface() -> Swallowtail:
@@ -105,7 +105,3 @@ def bicycle(fixed: Mapping[str, float], free: Mapping[str, tuple[float, float]])
     """The χ_H = 1 bicycle with the heights of the benchmark."""
     always = {"chi_H": 1.0, "zeta_B": ZETA_B, "zeta_H": ZETA_H, "mu": MU}
     return Problem(tms, fixed={**always, **fixed}, free=dict(free))
-
-
-def _charted(problem: Problem, points: tuple[int, int], boundaries: bool) -> Chart:
-    return chart(problem, points=points, boundaries=boundaries)

@@ -18,7 +18,7 @@ TILT_OFFSETS = Table({"EP4": 0.0, "2EP2": -0.05, "CEP2": 0.8})
 
 
 @dataclass(frozen=True)
-class Bicycle:
+class ReferenceBicycle:
     """A bicycle of the paper.
 
     Attributes:
@@ -32,14 +32,14 @@ class Bicycle:
     omega0: float = math.nan
 
 
-def benchmark(Fr: float | None = None) -> Bicycle:
+def benchmark(Fr: float | None = None) -> ReferenceBicycle:
     """The benchmark (equation bench), by default at its critical speed (equation flus), as it has no other."""
     native = from_si({**laws.bench, "v": 0.0, "g": GRAVITY})
     native["Fr"] = float(laws.Fr_c(*(native[n] for n in _GEOMETRY))) if Fr is None else Fr
-    return Bicycle("benchmark", Table({name: float(value) for name, value in native.items()}))
+    return ReferenceBicycle("benchmark", Table({name: float(value) for name, value in native.items()}))
 
 
-def optimised() -> Bicycle:
+def optimised() -> ReferenceBicycle:
     """The optimised benchmark: ω0 = −1 with χ_H, ζ_B, ζ_H of the benchmark (equations chib, a2, w0)."""
     chi_H = laws.bench["x_H"] / laws.bench["w"]
     point = laws.ep4(-1.0, ZETA_B, ZETA_H, chi_H)[0]
@@ -47,16 +47,16 @@ def optimised() -> Bicycle:
         "Fr": float(point.Fr), "mu": float(point.mu), "chi_B": float(point.chi_B), "chi_H": chi_H,
         "zeta_B": ZETA_B, "zeta_H": ZETA_H, "lambda_s": float(point.lambda_s),
     }  # fmt: skip
-    return Bicycle("optimised benchmark", Table(parameters), -1.0)
+    return ReferenceBicycle("optimised benchmark", Table(parameters), -1.0)
 
 
-def table_1() -> tuple[Bicycle, Bicycle, Bicycle]:
+def table_1() -> tuple[ReferenceBicycle, ReferenceBicycle, ReferenceBicycle]:
     """The rows EP4, 2EP2 and CEP2 of Table 1, at their exceptional points (equations chib1, tls, epset)."""
     ep4, double, pair = (on_ep_set(name, offset) for name, offset in TILT_OFFSETS.items())
     return ep4, double, pair
 
 
-def on_ep_set(name: str, tilt_offset: float) -> Bicycle:
+def on_ep_set(name: str, tilt_offset: float) -> ReferenceBicycle:
     """The χ_H = 1 bicycle on the EP set whose steer axis tilt differs from that of EP4 by an offset in rad."""
     point = laws.ep4_chi_H_1(ZETA_B, ZETA_H)
     tilt = float(point.lambda_s) + tilt_offset
@@ -66,12 +66,12 @@ def on_ep_set(name: str, tilt_offset: float) -> Bicycle:
         "Fr": Fr, "mu": MU, "chi_B": float(point.chi_B), "chi_H": 1.0,
         "zeta_B": ZETA_B, "zeta_H": ZETA_H, "lambda_s": tilt,
     }  # fmt: skip
-    return Bicycle(name, Table(parameters), float(point.omega0))
+    return ReferenceBicycle(name, Table(parameters), float(point.omega0))
 
 
-def experimental() -> Bicycle:
+def experimental() -> ReferenceBicycle:
     """The bicycle that was built, as measured on its photograph; speed, mass ratio and tilt are not given."""
-    return Bicycle("experimental", Table({"chi_B": 1.526, "chi_H": 0.921, "zeta_B": -1.158, "zeta_H": -0.526}))
+    return ReferenceBicycle("experimental", Table({"chi_B": 1.526, "chi_H": 0.921, "zeta_B": -1.158, "zeta_H": -0.526}))
 
 
 _GEOMETRY = ("mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")

@@ -16,14 +16,14 @@ from tmsopt.models import Model, ParameterSet, tms
 from tmsopt.paper.reference import table_1
 from tmsopt.records import Array
 
-Chart = Callable[[ArrayLike], tuple[Array, Array]]
+Sweep = Callable[[ArrayLike], tuple[Array, Array]]
 
 SAME = 1e-9
 """Relative difference of scaled coefficients that counts as none: rounding and a Brent root leave about 1e-12."""
 
 
 @dataclass(frozen=True)
-class Event:
+class PathEvent:
     """A point of a path: it enters or leaves stability (``stable``, ``unstable``) or meets the EP set.
 
     Attributes:
@@ -57,7 +57,7 @@ class UniversalPath:
     values: Array
     A: Array
     omega0: Array
-    events: tuple[Event, ...]
+    events: tuple[PathEvent, ...]
 
 
 def normalised(coefficients: ArrayLike) -> tuple[Array, Array]:
@@ -163,13 +163,12 @@ def spire_faces(limit: float, points: int = 41) -> tuple[Array, Array, Array]:
         return spire(v * low * m(u), v * low * t(u))
 
     return (
-        face(np.ones_like, lambda a: 2 * a),
-        face(lambda a: -np.ones_like(a), lambda a: 2 * a),
+        face(np.ones_like, lambda a: 2 * a), face(lambda a: -np.ones_like(a), lambda a: 2 * a),
         face(lambda a: 2 * a - 1, lambda a: 2 * np.ones_like(a)),
-    )
+    )  # fmt: skip
 
 
-def _events(chart: Chart, grid: Array, A: Array) -> list[Event]:
+def _events(chart: Sweep, grid: Array, A: Array) -> list[PathEvent]:
     """Changes of stability, and points of the EP set, each at a change of sign between two grid values."""
     found: list[tuple[float, str]] = []
     margin = stability_margin(A)
@@ -184,10 +183,10 @@ def _events(chart: Chart, grid: Array, A: Array) -> list[Event]:
             near = max(abs(float(_below_ep_set(at))), abs(float(_skew(at)))) <= SAME * float(np.abs(at).max())
             if near and not any(abs(value - v) <= SAME * abs(value) for v, name in found if "EP" in name):
                 found.append((value, _ep_name(float(at[0]))))
-    return [Event(name, value, *_single(chart, value)) for value, name in sorted(found)]
+    return [PathEvent(name, value, *_single(chart, value)) for value, name in sorted(found)]
 
 
-def _value(function: Callable[[Array], Array], chart: Chart, value: float) -> float:
+def _value(function: Callable[[Array], Array], chart: Sweep, value: float) -> float:
     return float(function(chart(value)[0]))
 
 
@@ -207,7 +206,7 @@ def _ep_name(A1: float) -> str:
     return "CEP2" if abs(A1) < 4 else "2EP2"
 
 
-def _single(chart: Chart, value: float) -> tuple[Array, float]:
+def _single(chart: Sweep, value: float) -> tuple[Array, float]:
     A, omega0 = chart(value)
     return A, float(omega0)
 

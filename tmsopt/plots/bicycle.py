@@ -186,9 +186,8 @@ def _motion(ax: Axes, data: Sketch, reach: float) -> None:
     big = "-|>,head_width=0.3,head_length=0.6"
     start, level = max(1.0, float(data.B[0]), float(data.H[0])) + 0.08, -reach + 0.03
     for end, begin, colour in (
-        ((start + 0.3, level), (start, level), REAL),
-        ((-0.2, -reach + 0.3), (-0.2, -reach + 0.06), "0.3"),
-    ):
+        ((start + 0.3, level), (start, level), REAL), ((-0.2, -reach + 0.3), (-0.2, -reach + 0.06), "0.3"),
+    ):  # fmt: skip
         ax.annotate("", end, begin, arrowprops={"arrowstyle": big, "linewidth": 1.5, "color": colour})
     ax.text(start + 0.15, level - 0.035, "$v$", fontsize=12, horizontalalignment="center", color=REAL)
     ax.text(-0.17, -reach + 0.17, "$g$", fontsize=12, color="0.3")
@@ -208,10 +207,6 @@ def _turn(ax: Axes, centre: Array, about: Array, name: str, offset: Array) -> No
         arrowprops={"arrowstyle": "-|>,head_width=0.28,head_length=0.5", "color": HEAVY, "shrinkA": 0, "shrinkB": 0},
     )  # fmt: skip
     ax.text(
-        centre[0] + offset[0],
-        centre[1] + offset[1],
-        name,
-        fontsize=12,
-        horizontalalignment="center",
+        centre[0] + offset[0], centre[1] + offset[1], name, fontsize=12, horizontalalignment="center",
         verticalalignment="center",
-    )
+    )  # fmt: skip

@@ -120,6 +120,13 @@ def domain_handles(domain: Domain) -> list[Line2D]:
     return handles
 
 
+def frame(ax: Axes, chart: Chart) -> None:
+    """Symbols of the two parameters, and limits at the ends of the grid."""
+    label_axes(ax, chart.problem.parameter_set, *chart.axes)
+    ax.set_xlim(chart.grid[0][0], chart.grid[0][-1])
+    ax.set_ylim(chart.grid[1][0], chart.grid[1][-1])
+
+
 def chart_figure(chart: Chart, layer: str = "kind") -> Figure:
     """A chart with the exact boundaries on top, hatched where a constraint is violated."""
     figure = new_figure(6.4, 5.4)
@@ -136,9 +143,7 @@ def chart_figure(chart: Chart, layer: str = "kind") -> Figure:
         handles += domain_handles(chart.domain)
     violated = draw_violated(ax, chart)
     handles += [violated] if violated else []
-    label_axes(ax, chart.problem.parameter_set, *chart.axes)
-    ax.set_xlim(chart.grid[0][0], chart.grid[0][-1])
-    ax.set_ylim(chart.grid[1][0], chart.grid[1][-1])
+    frame(ax, chart)
     ax.set_title(chart.problem.title, fontsize=11)
     legend_below(figure, handles)
     place_names(ax, names)

@@ -49,20 +49,11 @@ def place_names(ax: Axes, names: Sequence[Name]) -> None:
     curves = [xy[np.isfinite(xy).all(axis=1)] for xy in curves]
     places = np.array([place for place, _ in merged])
     textalloc.allocate(
-        ax,
-        places[:, 0],
-        places[:, 1],
-        [", ".join(words) for _, words in merged],
-        x_scatter=places[:, 0],
-        y_scatter=places[:, 1],
-        x_lines=[xy[:, 0] for xy in curves if len(xy) > 1],
-        y_lines=[xy[:, 1] for xy in curves if len(xy) > 1],
-        textsize=_SIZE,
-        linecolor="0.4",
-        linewidth=0.6,
-        zorder=7,
+        ax, places[:, 0], places[:, 1], [", ".join(words) for _, words in merged], x_scatter=places[:, 0],
+        y_scatter=places[:, 1], x_lines=[xy[:, 0] for xy in curves if len(xy) > 1],
+        y_lines=[xy[:, 1] for xy in curves if len(xy) > 1], textsize=_SIZE, linecolor="0.4", linewidth=0.6, zorder=7,
         path_effects=[withStroke(linewidth=2.5, foreground="white")],
-    )
+    )  # fmt: skip
 
 
 def label_axes(ax: Axes, of: ParameterSet, horizontal: str, vertical: str) -> None:

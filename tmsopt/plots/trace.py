@@ -43,14 +43,10 @@ def draw_branch(ax: Axes, branch: Branch, horizontal: str, vertical: str, width:
         first = start - 1 if start and start - 1 in events else start
         end = stop if stop - 1 in events else stop + 1  # no gap: an event belongs to both of its sides
         ax.plot(
-            x[first:end],
-            y[first:end],
-            color=colour(kind),
-            linewidth=width if satisfied else width / 2,
-            linestyle="--" if kind.startswith("CEP") else "-" if satisfied else ":",
-            alpha=1.0 if stable else 0.35,
+            x[first:end], y[first:end], color=colour(kind), linewidth=width if satisfied else width / 2,
+            linestyle="--" if kind.startswith("CEP") else "-" if satisfied else ":", alpha=1.0 if stable else 0.35,
             label=_label(ax, kind + ("" if stable else ", unstable") + ("" if satisfied else ", constraint violated")),
-        )
+        )  # fmt: skip
         start = stop
 
 

@@ -8,10 +8,4 @@ from tmsopt.proofs.factored import Factored, abscissa_formula
 from tmsopt.proofs.proof import Proof, prove_design
 from tmsopt.proofs.prove import prove
 
-__all__ = [
-    "Factored",
-    "Proof",
-    "abscissa_formula",
-    "prove",
-    "prove_design",
-]
+__all__ = ["Factored", "Proof", "abscissa_formula", "prove", "prove_design"]

@@ -12,7 +12,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.models.exact import Written
 from tmsopt.proofs import rational
 from tmsopt.proofs.factored import Factored, of_pattern
-from tmsopt.proofs.system import ROUNDINGS, Equations, choose, equations
+from tmsopt.proofs.system import ROUNDINGS, Chosen, Equations, choose, equations
 from tmsopt.roots import Pattern
 from tmsopt.roots.patterns.structure import nearest_unknowns
 
@@ -52,8 +52,7 @@ def exactly(problem: Problem, pattern: Pattern, design: Written) -> Existing | N
     a = exact_coefficients(problem, design)
     if a is None or not rational.has(pattern.name, a):
         return None
-    equalities = [c for c in problem.conditions.values() if c.comparison == "=="]
-    if equalities:
+    if any(c.equality for c in problem.conditions.values()):
         return None
     balls = design.balls()
     tangents = {n: balls[n].tan() for n in balls if problem.parameter_set[n].tangent}
@@ -139,7 +138,7 @@ def _proved(system: Equations, start: Mapping[str, Any], among: list[str], digit
     middle = refined(system, start, names, digits)
     enclosure = enclosed(system, middle, names, digits)
     at = {**middle, **enclosure.balls}
-    distance, explained = _distance(chosen.explained, start, enclosure)
+    distance, explained = _distance(chosen, start, enclosure)
     tangents = {n: at[n] for n in of.names if of[n].tangent}
     parameters = {n: at[n].atan() if n in tangents else at[n] for n in of.names}
     coefficients = problem.model.coefficients(parameters, of)
@@ -160,20 +159,22 @@ def _proved(system: Equations, start: Mapping[str, Any], among: list[str], digit
     )
 
 
-def _distance(explained: Mapping[str, float], start: Mapping[str, Any], enclosure: Enclosure) -> tuple[float, float]:
+def _distance(chosen: Chosen, start: Mapping[str, Any], enclosure: Enclosure) -> tuple[float, float]:
     """The moved parameter that the stored design is off most, against what rounding explains.
 
     Raises:
-        Refused: if it is off by more, or if rounding takes it out of the box in which the solution is unique.
+        Refused: if it is off by more, or if rounding takes it, or a root, out of the box in which the solution is
+            unique: beside an EP4 are EP3s, of which the last bit of a stored number would choose one.
     """
-    off = {n: upper(abs(enclosure.balls[n] - start[n])) for n in explained}
+    explained = chosen.explained
+    off = {n: upper(abs(enclosure.balls[n] - start[n])) for n in chosen.moved}
     loose = max(explained, key=lambda n: explained[n], default=None)
     if loose and not explained[loose] < enclosure.uniqueness:
         raise Refused(
             f"nearly singular: rounding alone moves {loose} by {explained[loose]:.2g}, and the solution is the only "
             f"one within {enclosure.uniqueness:.2g} only; hold another parameter, or give exact numbers"
         )
-    worst = max(explained, key=lambda n: off[n] / explained[n], default=None)
+    worst = max(off, key=lambda n: off[n] / explained[n], default=None)
     if worst is None:
         return 0.0, 0.0
     if off[worst] > explained[worst]:

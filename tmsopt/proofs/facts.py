@@ -118,10 +118,10 @@ def limits(problem: Problem, found: Existing) -> dict[str, str]:
     verdicts = {}
     for name, condition in problem.conditions.items():
         difference = flint.arb(condition.enclosure(values, decimal_fraction))
-        if condition.comparison == "==":
+        if condition.equality:
             verdicts[name] = _equal(difference, equations=found.method == "Krawczyk")
         else:
-            verdicts[name] = _met(difference if condition.comparison == ">=" else -difference)
+            verdicts[name] = _met(difference if condition.sign < 0 else -difference)
     return verdicts
 
 

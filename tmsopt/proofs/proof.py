@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import flint
@@ -17,9 +17,8 @@ from tmsopt.models.exact import Written, written
 from tmsopt.proofs import rational
 from tmsopt.proofs.existence import Existing, beside, exact_coefficients, exactly
 from tmsopt.proofs.facts import NOTHING, Verdict, as_stored, heavy_damping, inside, limits, stability
-from tmsopt.records import Table
-from tmsopt.roots import PATTERNS, Pattern, Root
-from tmsopt.roots import pattern as pattern_of
+from tmsopt.records import Table, plain
+from tmsopt.roots import PATTERNS, Pattern, Root, pattern as pattern_of
 from tmsopt.roots.patterns.naming import implies, shown_patterns
 from tmsopt.roots.patterns.pattern import LINES
 
@@ -94,32 +93,11 @@ class Proof:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``: decimals as text, summaries as numbers, None for what does not exist."""
-        tables = {
-            n: {k: asdict(v) for k, v in getattr(self, n).items()} for n in ("parameters", "tangents", "unknowns")
-        }
-        summaries = {
-            n: x if math.isfinite(x := getattr(self, n)) else None
-            for n in ("radius", "uniqueness", "distance", "explained")
-        }
         return {
-            "claim": self.claim,
-            "proved": self.proved,
-            "reason": self.reason,
-            "pattern": self.pattern,
-            "method": self.method,
-            "digits": self.digits,
+            **plain(self, "claim proved reason pattern method digits"),
             "of": "the design as stored" if self.stored or not self.proved else "the proved design",
-            **tables,
-            "moved": list(self.moved),
-            "held": dict(self.held),
-            "stated": list(self.stated),
-            **summaries,
-            "roots": [asdict(r) for r in self.roots],
-            "abscissa": asdict(self.abscissa) if self.abscissa else None,
-            "stable": asdict(self.stable),
-            "heavily_damped": asdict(self.heavily_damped),
-            "inside": asdict(self.inside),
-            "limits": dict(self.limits),
+            **plain(self, "parameters tangents unknowns moved held stated radius uniqueness distance explained"),
+            **plain(self, "roots abscissa stable heavily_damped inside limits"),
             "seconds": round(self.seconds, 4),
         }
 

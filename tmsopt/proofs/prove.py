@@ -1,17 +1,18 @@
 """The existence of what a problem asks for, proved: solve first, then prove."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Unpack
 
-from tmsopt.design.problem import Problem, checked
+from tmsopt.design.files import Given
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError
+from tmsopt.formulation.options import AskedOfSolve, options_of
 from tmsopt.proofs.proof import DIGITS, Proof, prove_design
-from tmsopt.solver.solve import solve
+from tmsopt.solver.solve import solved
 
 
 def prove(
-    design: Problem | Solution, digits: int = DIGITS, *, exact: Mapping[str, Any] | None = None, **options: Any
+    design: Given, digits: int = DIGITS, *, exact: Mapping[str, Any] | None = None, **options: Unpack[AskedOfSolve]
 ) -> Proof:
     """Prove that the design a problem asks for exists, in ball arithmetic, with what follows for its stability.
 
@@ -20,7 +21,7 @@ def prove(
     in `Proof.reason`, never guessed.
 
     Args:
-        design: a problem, which is solved first, or its solution.
+        design: a solution; or a problem or its file, solved first.
         digits: that every number is given to.
         exact: parameter, or ``tan(lambda_s)`` → the number that it is exactly: an int, a Fraction, a ``flint.fmpq``,
             text such as ``"-2/5"`` or ``"20 deg"``. Other numbers stand for the shortest decimals that print them.
@@ -33,7 +34,7 @@ def prove(
     if isinstance(design, Solution) and options:
         message = f"found {', '.join(options)}; options are for solving, and this is solved: give the problem instead"
         raise InputError([Fault(message, ("options",))])
-    found = design if isinstance(design, Solution) else solve(checked(design), throw=False, **options)
+    found = solved(design, options_of(options, AskedOfSolve))
     problem = found.problem
     if found.status != "optimal":
         reason = f"the problem is not solved ({found.status}): there is no design to prove"

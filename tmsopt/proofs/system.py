@@ -82,7 +82,7 @@ def equations(problem: Problem, pattern: Pattern, parameters: Mapping[str, float
     Raises:
         Refused: for an equality that cannot be evaluated in balls.
     """
-    equalities = tuple(c for c in problem.conditions.values() if c.comparison == "==")
+    equalities = tuple(c for c in problem.conditions.values() if c.equality)
     beyond = [n for n in (RADIUS, "damping_ratio") if any(n in c.names for c in equalities)]
     if beyond:
         raise Refused(f"an == constraint uses {beyond[0]}, which has no equation in balls; drop it to prove the rest")
@@ -104,7 +104,7 @@ class Chosen:
     """Parameters to move, and how well they are determined.
 
     Attributes:
-        explained: moved parameter → how far ROUNDINGS of every number may move it.
+        explained: moved parameter, or unknown of the equations → how far ROUNDINGS of every number may move it.
     """
 
     moved: tuple[str, ...]
@@ -147,8 +147,8 @@ def choose(system: Equations, at: Mapping[str, Any], among: Sequence[str]) -> Ch
     square = jacobian[:, [names.index(n) for n in (*moved, *system.unknowns)]]
     effect = np.abs(np.linalg.pinv(square)) @ rounding * (ROUNDINGS * _EPS)
     floors = {n: _NOTHING * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
-    explained = {n: float(e) + 2 * _EPS * abs(float(at[n])) + floors[n] for n, e in zip(moved, effect, strict=False)}
-    return Chosen(moved, explained)
+    solved = zip((*moved, *system.unknowns), effect, strict=True)
+    return Chosen(moved, {n: float(e) + 2 * _EPS * abs(float(at[n])) + floors.get(n, 0.0) for n, e in solved})
 
 
 def _many(count: int, noun: str) -> str:

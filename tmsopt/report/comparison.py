@@ -1,4 +1,4 @@
-"""TODO"""
+"""A design beside the laws of the paper, and one formulation beside the other, as text."""
 
 from tmsopt.models.tms import tms
 from tmsopt.paper.compare import Comparison

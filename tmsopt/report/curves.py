@@ -1,4 +1,4 @@
-"""TODO"""
+"""Traces, charts and fronts as text: what is on them, and where their events are."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -121,7 +121,7 @@ def _summary(branch: Branch, trace: Trace) -> str:
         if pattern(branch.pattern, trace.problem.model.degree).rest
         else f"stable on {share}"
     )
-    if any(c.comparison != "==" for c in trace.problem.conditions.values()):
+    if any(not c.equality for c in trace.problem.conditions.values()):
         states += f", constraints hold on {100 * float(np.mean(branch.satisfied)):.0f} %"
     form = "closed" if branch.closed else "open"
     kinds = " and ".join(dict.fromkeys(kinds_along(branch)))

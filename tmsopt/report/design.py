@@ -1,19 +1,15 @@
 """Solutions and comparisons as text for a reader."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 
 from tmsopt.design.solution import Solution
-from tmsopt.design.units import reading
 from tmsopt.models.tms import GRAVITY, tms, to_si
-from tmsopt.report import rows as plain
 from tmsopt.report.limits import bound_lines, case_lines, relaxation_lines
-from tmsopt.report.rows import pitching, skate_rows
+from tmsopt.report.rows import parameter_rows, pitching, quantity_rows
 from tmsopt.report.text import columns, number
 from tmsopt.roots import Root
 from tmsopt.solver.all_designs import Every
 
-_SI_OF = {"Fr": "v", "mu": "m_H", "chi_B": "x_B", "chi_H": "x_H", "zeta_B": "z_B", "zeta_H": "z_H"}
-_SI = tms.parameter_set("SI")
 _ASKED = {"a0": "must not be 0", "coefficients": "must have values"}
 
 
@@ -26,14 +22,10 @@ def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float
 def solution_table(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> str:
     """A design with its roots, bound, limits and remarks; of skates, dimensionless and in SI side by side."""
     lines = [solution.problem.title or "untitled problem", headline(solution), ""]
-    if solution.problem.model is tms:
-        si = si_parameters(solution, w, m_B, g)
-        lines += [*columns(_parameter_rows(solution, si)), "", *columns(skate_rows(solution, si)), ""]
+    si = si_parameters(solution, w, m_B, g)
+    lines += [*columns(parameter_rows(solution, si)), "", *columns(quantity_rows(solution, si)), ""]
+    if "load_rear" in solution.quantities:
         lines.append(pitching(solution, si))
-    else:
-        lines += [*columns(plain.parameter_rows(solution)), "", *columns(plain.quantity_rows(solution)), ""]
-        if "load_rear" in solution.quantities:
-            lines.append(pitching(solution, solution.parameters))
     lines += facts(solution)
     return "\n".join(line.rstrip() for line in lines).rstrip()
 
@@ -76,34 +68,6 @@ def headline(solution: Solution) -> str:
     if solution.status == "infeasible":
         proven = ", proven" if solution.bound.proven else ""
     return "   ".join(part for part in (f"{words}{proven}", located, asked, f"structure {solution.structure}") if part)
-
-
-def _parameter_rows(solution: Solution, si: Mapping[str, float]) -> list[Sequence[str]]:
-    own = solution.problem.parameter_set.name == "SI"
-    scale = "SI" if own else f"SI for w = {si['w']:g} m, m_B = {si['m_B']:g} kg"
-    rows: list[Sequence[str]] = [("", "dimensionless", "", scale, "", "")]
-    for name, value in solution.dimensionless.items():
-        symbol = _SI_OF.get(name, name)
-        free = _freedom(solution, symbol if own else name)
-        if symbol == "v":
-            rows.append((name, number(value), symbol, number(si["v"]), "m/s", free))
-            rows.append(("", "", "", *_read("v", si), ""))
-        else:
-            rows.append((name, number(value), symbol, *_read(symbol, si), free))
-    if own:
-        rows += [("", "", n, *_read(n, si), _freedom(solution, n)) for n in ("w", "m_B")]
-    return rows
-
-
-def _read(symbol: str, si: Mapping[str, float]) -> tuple[str, str]:
-    """An SI parameter as a builder reads it, and its unit."""
-    value, unit = reading(si[symbol], _SI[symbol].unit)
-    return number(value), unit
-
-
-def _freedom(solution: Solution, name: str) -> str:
-    problem = solution.problem
-    return "free" if name in problem.free else "scenario" if name in problem.scenarios else "fixed"
 
 
 def facts(solution: Solution) -> list[str]:

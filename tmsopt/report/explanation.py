@@ -1,9 +1,9 @@
-"""What an optimum means, as lines for a reader."""
+"""What an optimum means, how its multiple roots split, and how far its boundaries are, as lines for a reader."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
 
+from tmsopt.design.solution import Solution
 from tmsopt.diagnosis.diagnosis import Diagnosis
 from tmsopt.diagnosis.splitting import DEVIATION, Law, Response
 from tmsopt.explanation.explain import Explanation
@@ -11,12 +11,6 @@ from tmsopt.explanation.optimality import NOT_COVERED, OnLine, Optimality
 from tmsopt.explanation.rounding import ALONE, Rounded
 from tmsopt.margins.nearest import Nearest, Robustness
 from tmsopt.report.text import columns, number
-
-if TYPE_CHECKING:
-    from tmsopt.design.solution import Solution
-    from tmsopt.diagnosis.diagnosis import Diagnosis
-    from tmsopt.explanation.explain import Explanation
-    from tmsopt.margins.nearest import Robustness
 
 _MAIN = 0.5
 """Share of the largest change above which a parameter is named in the headline."""
@@ -30,6 +24,23 @@ _WORDS = {
 
 
 _ROUNDING = 1e-16
+
+
+def meaning_lines(
+    solution: Solution,
+    explanation: Explanation | None,
+    robustness: Robustness | None,
+    diagnoses: Sequence[Diagnosis],
+    details: bool = False,
+) -> Iterator[str]:
+    """What was found out about a solution; nothing of what was not asked for."""
+    if explanation:
+        yield from ["", *explained_lines(explanation)]
+    if robustness:
+        nominal = "of the nominal design, without its scenarios and tolerances:\n" if solution.worst else ""
+        yield "\n" + nominal + robustness_table(robustness)
+    if lines := diagnosis_lines(diagnoses, details):
+        yield from ["", *lines]
 
 
 def explained_lines(explanation: Explanation) -> list[str]:
@@ -80,51 +91,6 @@ def _row(what: str, to: str, row: Rounded) -> tuple[str, ...]:
 
 def _violated(violations: Mapping[str, float]) -> str:
     return ", ".join(f"{name} by {value:.1g}" for name, value in violations.items())
-
-
-def meaning(solution: "Solution") -> dict[str, Any]:
-    """What the optimum means, for JSON."""
-    robust, found = _robust(solution), _diagnosed(solution)
-    return {
-        "meaning": _explained(solution).to_json(),
-        **({"robustness": robust.to_json()} if robust else {}),
-        **({"diagnosis": [d.to_json() for d in found]} if found else {}),
-    }
-
-
-def meaning_lines(solution: "Solution", brief: bool, details: bool) -> Iterator[str]:
-    """The same as text: nothing if brief, but for the details of multiple roots where these are asked for."""
-    if not brief:
-        from tmsopt.report.explanation import explained_lines
-
-        yield from ["", *explained_lines(_explained(solution))]
-        if robust := _robust(solution):
-            nominal = "of the nominal design, without its scenarios and tolerances:\n" if solution.worst else ""
-            yield "\n" + nominal + robustness_table(robust)
-    if (not brief or details) and (lines := diagnosis_lines(_diagnosed(solution), details)):
-        yield from ["", *lines]
-
-
-def _explained(solution: "Solution") -> "Explanation":
-    from tmsopt.explanation.explain import explain
-
-    return explain(solution)
-
-
-def _robust(solution: "Solution") -> "Robustness | None":
-    """The nearest boundaries; None where a root is at infinity, or nothing feasible was found."""
-    from tmsopt.margins.nearest import robustness
-
-    if not math.isfinite(solution.abscissa) or solution.status == "infeasible":
-        return None
-    return robustness(solution)
-
-
-def _diagnosed(solution: "Solution") -> "tuple[Diagnosis, ...]":
-    """The multiple roots of a design that was found."""
-    from tmsopt.diagnosis.diagnosis import diagnose
-
-    return diagnose(solution) if solution.status == "optimal" else ()
 
 
 def diagnosis_lines(diagnoses: Sequence[Diagnosis], details: bool = False) -> list[str]:

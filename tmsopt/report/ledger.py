@@ -24,10 +24,10 @@ def ledger_table(ledger: Ledger) -> str:
         lines += [title, "=" * len(title), ""]
         for entry in entries:
             lines += [*_entry(entry), ""]
-    return "\n".join([*lines, *summary(ledger)])
+    return "\n".join([*lines, *verdict_lines(ledger)])
 
 
-def summary(ledger: Ledger) -> list[str]:
+def verdict_lines(ledger: Ledger) -> list[str]:
     """The number of entries per verdict, and of all."""
     counts = [*ledger.counts.items(), ("entries", len(ledger.entries))]
     return [f"{count:4d}  {verdict}" for verdict, count in counts]

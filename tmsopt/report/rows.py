@@ -1,4 +1,8 @@
-"""The rows of a report for any model: parameters, times, frequencies and quantities, in the units a builder reads."""
+"""The rows of a report for any model: parameters, times, frequencies and quantities, in the units a builder reads.
+
+Of a model that is dimensionless and in SI, the dimensionless number stands first in each row, and what it is in SI
+beside it.
+"""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -7,93 +11,118 @@ from typing import Any
 from tmsopt.checks.recheck import FEASIBLE
 from tmsopt.design.solution import Solution
 from tmsopt.design.units import decay_time, frequencies, growth_time, reading
-from tmsopt.models import Parameter, Quantity, Values
-from tmsopt.models.tms import tms
+from tmsopt.models import Model, Parameter, Quantity, Values
 from tmsopt.report.text import number
 
-_SI = tms.parameter_set("SI")
+TableRow = Sequence[str]
+Cells = tuple[str, str, str]
+"""Symbol, number and unit."""
 
-
-Row = Sequence[str]
-
+_FIRST = ("Fr_c", "nu_H", "mass_margin")
+"""Quantities that come before those that follow in the order of the model."""
 _SHARES = ("load_front", "load_rear")
+_DIGITS = {"m/s": 8, "N": 6}
+"""Of a quantity beside a dimensionless one, where these are fewer than all."""
 
 
-def parameter_rows(solution: Solution) -> list[Row]:
-    """Rows of four cells: name, number, unit, and whether it is free; those that are 0 as by default are left out."""
-    problem = solution.problem
-    rows: list[Row] = []
-    for parameter in problem.parameter_set.parameters:
-        value = solution.parameters[parameter.name]
-        if parameter.name in problem.free:
-            how = "free"
-        elif parameter.name in problem.scenarios:
-            how = "scenario"
-        elif value == 0 == parameter.default:
-            continue
-        else:
-            how = "fixed"
-        rows.append((parameter.name, *_read(value, parameter), how))
-    return rows
-
-
-def quantity_rows(solution: Solution) -> list[Row]:
-    """Rows of three cells: what, number, unit. Quantities that do not exist are left out."""
-    of, model = solution.problem.parameter_set, solution.problem.model
-    rows: list[Row] = [*_motion(solution)]
-    for quantity in (*model.quantities, *of.quantities):
-        value = float(solution.quantities.get(quantity.name, math.nan))
-        if quantity.name in _SHARES:
-            rows.append((quantity.name, f"{100 * (value if abs(value) > FEASIBLE else 0.0):.6g}", "%"))
-        elif math.isfinite(value):
-            rows.append((quantity.name, *_read(value, quantity)))
-    return rows
-
-
-def _motion(solution: Solution) -> Iterator[Row]:
-    of = solution.problem.parameter_set
-    rate = None if of.rate is None else float(of.rate(solution.parameters))
-    timed = "1/s" if rate == 1 else ""
-    yield "abscissa", number(solution.abscissa), timed
-    yield "  as stored", number(solution.abscissa_realised), timed
-    if rate is not None:
-        for name, time in (
-            ("decay time", decay_time(solution.abscissa, rate)),
-            ("growth time", growth_time(solution.abscissa, rate)),
-        ):
-            if math.isfinite(time):
-                yield name, f"{time:.4g}", "s"
-    yield "damping_ratio", number(solution.quantities["damping_ratio"]), ""
-    if rate is not None:
-        for hertz in frequencies(solution.roots, rate):
-            yield "frequency", f"{hertz:.6g}", "Hz"
-
-
-def _read(value: float, of: Parameter | Quantity) -> tuple[str, str]:
-    value, unit = reading(value, of.unit)
-    return number(value), "" if unit == "1" else unit
-
-
-def skate_rows(solution: Solution, si: Mapping[str, float]) -> list[Row]:
-    """Rows of five cells: a dimensionless quantity with its number, and its counterpart in SI with number and unit.
+def parameter_rows(solution: Solution, si: Mapping[str, float]) -> list[TableRow]:
+    """Names, numbers, units, and which are free; those that are 0 as by default are left out.
 
     Args:
-        si: the SI parameters of the design.
+        si: the parameters in SI; of a model without a dimensionless form those of the solution.
     """
-    assert _SI.rate is not None
-    rate = float(_SI.rate(si))
-    q, values = solution.quantities, Values(tms, _SI, si)
-    return [
-        ("abscissa", number(solution.abscissa), *_time(solution.abscissa, rate)),
-        ("  as stored", number(solution.abscissa_realised), *_time(solution.abscissa_realised, rate)),
-        *_oscillation(q["damping_ratio"], frequencies(solution.roots, rate)),
-        *_critical_speed(q["Fr_c"], float(values["v_c"])),
-        ("nu_H", number(q["nu_H"]), "u_H", *_in_units(float(values["u_H"]), "m")),
-        ("mass_margin", number(q["mass_margin"]), "", "", ""),
-        ("chi_T", number(q["chi_T"]), "x_T", *_in_units(q["chi_T"] * si["w"], "m")),
-        _load("load_front", q["load_front"], "N_F", float(values["N_F"])),
-        _load("load_rear", q["load_rear"], "N_R", float(values["N_R"])),
-    ]
+    problem = solution.problem
+    of = problem.parameter_set
+    if not _paired(problem.model):
+        listed = [(p, solution.parameters[p.name], _freedom(solution, p.name)) for p in of.parameters]
+        return [(*_read(p, x), how) for p, x, how in listed if how != "fixed" or not x == 0 == p.default]
+    native, scaled = problem.model.sets[0], problem.model.parameter_set("SI")
+    counterpart = {p.counterpart or p.name: p for p in scaled.parameters}
+    own = of is scaled
+    scale = "SI" if own else f"SI for w = {si['w']:g} m, m_B = {si['m_B']:g} kg"
+    rows: list[TableRow] = [("", "dimensionless", "", scale, "", "")]
+    for p in native.parameters:
+        other = counterpart[p.name]
+        how = _freedom(solution, other.name if own else p.name)
+        beside = _beside((p.name, number(solution.dimensionless[p.name])), _readings(other, si[other.name]))
+        rows += [(*row, how if k == 0 else "") for k, row in enumerate(beside)]
+    rest = [p for name, p in counterpart.items() if own and name not in native.names and p.default is None]
+    return rows + [("", "", *_read(p, si[p.name]), _freedom(solution, p.name)) for p in rest]
+
+
+def quantity_rows(solution: Solution, si: Mapping[str, float]) -> list[TableRow]:
+    """What the roots and the quantities of a model are; without a dimensionless form, only those that exist."""
+    model, found = solution.problem.model, solution.quantities
+    paired = _paired(model)
+    of = model.parameter_set("SI") if paired else solution.problem.parameter_set
+    rows = list(_motion(solution, None if of.rate is None else float(of.rate(si)), paired))
+    if not paired:
+        every = (*model.quantities, *of.quantities)
+        return rows + [_read(q, x) for q in every if math.isfinite(x := float(found.get(q.name, math.nan)))]
+    values = Values(model, of, si)
+    for q in sorted(model.quantities, key=lambda q: (*_FIRST, q.name).index(q.name)):
+        name, value, unit = _read(q, found[q.name])
+        other = q.counterpart if math.isfinite(found[q.name]) else None
+        cells = _readings(other, float(other.value(values)) if float(value) else 0.0) if other else []
+        rows += [] if q.aside else _beside((name, f"{value} {unit}".rstrip()), cells)
+    alone = [q for q in of.quantities if not q.aside and q not in [q.counterpart for q in model.quantities]]
+    return rows + [("", "", *_read(q, float(values[q.name]))) for q in alone]
+
+
+def _paired(model: Model) -> bool:
+    """Whether a model is dimensionless and in SI."""
+    return any(p.counterpart for of in model.sets for p in of.parameters)
+
+
+def _freedom(solution: Solution, name: str) -> str:
+    problem = solution.problem
+    return "free" if name in problem.free else "scenario" if name in problem.scenarios else "fixed"
+
+
+def _motion(solution: Solution, rate: float | None, paired: bool) -> Iterator[TableRow]:
+    """Abscissae with the times that they stand for, damping ratio and frequencies; beside each other if paired."""
+    hertz = [] if rate is None else frequencies(solution.roots, rate)
+    waves = [("frequency", f"{f:.6g}", "Hz") for f in hertz]
+    damping = "damping_ratio", number(solution.quantities["damping_ratio"])
+    abscissae = ("abscissa", solution.abscissa), ("  as stored", solution.abscissa_realised)
+    if paired:
+        for name, abscissa in abscissae:
+            yield from _beside((name, number(abscissa)), _times(abscissa, rate))
+        yield from _beside(damping, waves or [("frequency", "none", "")])
+        return
+    for name, abscissa in abscissae:
+        yield name, number(abscissa), "1/s" if rate == 1 else ""
+    yield from _times(solution.abscissa, rate)
+    yield *damping, ""
+    yield from waves
+
+
+def _times(abscissa: float, rate: float | None) -> list[Cells]:
+    if rate is None:
+        return []
+    times = ("decay time", decay_time(abscissa, rate)), ("growth time", growth_time(abscissa, rate))
+    return [(name, f"{time:.4g}", "s") for name, time in times if math.isfinite(time)]
+
+
+def _beside(left: tuple[str, str], cells: Sequence[Cells]) -> list[TableRow]:
+    """A dimensionless number, and what is beside it: the first in its row, others below."""
+    return [(*(left if k == 0 else ("", "")), *cell) for k, cell in enumerate(cells or [("", "", "")])]
+
+
+def _read(of: Parameter | Quantity, value: float) -> Cells:
+    if of.name in _SHARES:
+        return of.name, f"{100 * value if abs(value) > FEASIBLE else 0.0:.6g}", "%"
+    value, unit = reading(value, of.unit)
+    return of.name, number(value), "" if unit == "1" else unit
+
+
+def _readings(of: Parameter | Quantity, value: float) -> list[Cells]:
+    """A speed in m/s too."""
+    digits = _DIGITS.get(of.unit, 12) if isinstance(of, Quantity) else 12
+    read, unit = reading(value, of.unit)
+    if of.unit != "m/s":
+        return [(of.name, f"{read:.{digits}g}", unit)]
+    return [(of.name, f"{value:.{digits}g}", of.unit), ("", f"{read:.{digits}g}", unit)]
 
 
 def pitching(solution: Solution, si: Mapping[str, float]) -> str:
@@ -127,34 +156,3 @@ def _prevented(solution: Solution, si: Mapping[str, float], each: Sequence[Mappi
     return (
         f"; more than {mass} of ballast at the {lifted} contact prevents it, without any effect on the lateral motion"
     )
-
-
-def _in_units(value: float, unit: str) -> tuple[str, str]:
-    value, unit = reading(value, unit)
-    return number(value), unit
-
-
-def _time(abscissa: float, rate: float) -> tuple[str, str, str]:
-    for name, time in (("decay time", decay_time(abscissa, rate)), ("growth time", growth_time(abscissa, rate))):
-        if math.isfinite(time):
-            return name, f"{time:.4g}", "s"
-    return "", "", ""
-
-
-def _oscillation(damping_ratio: float, hertz: Sequence[float]) -> list[Row]:
-    cells = [("frequency", f"{f:.6g}", "Hz") for f in hertz] or [("frequency", "none", "")]
-    return [("damping_ratio", number(damping_ratio), *cells[0]), *(("", "", *cell) for cell in cells[1:])]
-
-
-def _critical_speed(Fr_c: float, v_c: float) -> list[Row]:
-    if not math.isfinite(Fr_c):
-        return [("Fr_c", number(Fr_c), "", "", "")]
-    kmh, unit = reading(v_c, "m/s")
-    return [("Fr_c", number(Fr_c), "v_c", f"{v_c:.8g}", "m/s"), ("", "", "", f"{kmh:.8g}", unit)]
-
-
-def _load(name: str, share: float, symbol: str, newtons: float) -> Row:
-    """One wheel; what is only rounding reads as 0."""
-    if abs(share) <= FEASIBLE:
-        share = newtons = 0.0
-    return name, f"{100 * share:.6g} %", symbol, f"{newtons:.6g}", "N"

@@ -7,9 +7,9 @@ first; `patterns` says which roots meet, `quartics` takes millions at once.
 from tmsopt.roots.count import real_roots
 from tmsopt.roots.exact import exact_abscissa, exact_roots
 from tmsopt.roots.numeric import abscissa, backward_error, rebuilt, roots
-from tmsopt.roots.patterns.composed import composition, pattern
+from tmsopt.roots.patterns.composed import PATTERNS, composition, pattern
 from tmsopt.roots.patterns.multiplicity import multiple_real_roots
-from tmsopt.roots.patterns.pattern import PATTERNS, Pattern
+from tmsopt.roots.patterns.pattern import Pattern
 from tmsopt.roots.patterns.structure import Structure, pattern_distance, structure
 from tmsopt.roots.polynomial import Root, determinant, evaluate, product, quadratic_pencil, shift
 from tmsopt.roots.quartics.classes import CLASSES, Classes, quartic_classes, quartic_is_stable
@@ -17,38 +17,9 @@ from tmsopt.roots.quartics.quartic import Factors, Motion, abscissa_and_damping,
 from tmsopt.roots.stability import discriminant, hurwitz_minors, is_stable, lienard_chipart, routh
 
 __all__ = [
-    "CLASSES",
-    "PATTERNS",
-    "Classes",
-    "Factors",
-    "Motion",
-    "Pattern",
-    "Root",
-    "Structure",
-    "abscissa",
-    "abscissa_and_damping",
-    "backward_error",
-    "composition",
-    "determinant",
-    "discriminant",
-    "evaluate",
-    "exact_abscissa",
-    "exact_roots",
-    "hurwitz_minors",
-    "is_stable",
-    "lienard_chipart",
-    "multiple_real_roots",
-    "pattern",
-    "pattern_distance",
-    "product",
-    "quadratic_pencil",
-    "quartic_classes",
-    "quartic_factors",
-    "quartic_is_stable",
-    "real_roots",
-    "rebuilt",
-    "roots",
-    "routh",
-    "shift",
-    "structure",
-]
+    "CLASSES", "PATTERNS", "Classes", "Factors", "Motion", "Pattern", "Root", "Structure", "abscissa",
+    "abscissa_and_damping", "backward_error", "composition", "determinant", "discriminant", "evaluate",
+    "exact_abscissa", "exact_roots", "hurwitz_minors", "is_stable", "lienard_chipart", "multiple_real_roots",
+    "pattern", "pattern_distance", "product", "quadratic_pencil", "quartic_classes", "quartic_factors",
+    "quartic_is_stable", "real_roots", "rebuilt", "roots", "routh", "shift", "structure",
+]  # fmt: skip

@@ -15,15 +15,19 @@ def exact_roots(coefficients: Sequence[Any], digits: int = DIGITS) -> tuple[Root
     The square-free factorisation decides multiplicities, ball arithmetic isolates the roots to `digits`; the
     values returned are those rounded to double precision.
     """
+    with flint.ctx.workdps(digits):
+        found = [Root(float(z.real.mid()), float(z.imag.mid()), m) for z, m in isolated_roots(coefficients)]
+    return tuple(sorted(found, key=lambda r: (-r.re, -r.im)))
+
+
+def isolated_roots(coefficients: Sequence[Any]) -> list[tuple[Any, int]]:
+    """The distinct ones as balls of the working precision, each with its multiplicity."""
     terms = [rational(c) for c in coefficients]
     common = flint.fmpz(1)
     for term in terms:
         common = common.lcm(term.q)
-    with flint.ctx.workdps(digits):
-        polynomial = flint.fmpz_poly([int(t.p * (common // t.q)) for t in reversed(terms)])
-        isolated: Any = polynomial.complex_roots()  # pairs (ball, multiplicity)
-        found = [Root(float(z.real.mid()), float(z.imag.mid()), int(m)) for z, m in isolated]
-    return tuple(sorted(found, key=lambda r: (-r.re, -r.im)))
+    polynomial: Any = flint.fmpz_poly([int(t.p * (common // t.q)) for t in reversed(terms)])
+    return [(z, int(m)) for z, m in polynomial.complex_roots()]
 
 
 def exact_abscissa(coefficients: Sequence[Any]) -> float:

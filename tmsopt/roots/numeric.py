@@ -4,13 +4,11 @@ Next to a k-fold root each single root is uncertain by the k-th root of the roun
 together, by the coefficients that they rebuild.
 """
 
-from typing import Any
-
-import flint
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tmsopt.records import Array
+from tmsopt.roots.exact import isolated_roots
 
 _POLISHED = 4e-15  # backward error below which more Newton steps are not worth their time
 _STEPS = 6  # Newton doubles the digits at each step; companion eigenvalues start with 4 or more
@@ -94,9 +92,7 @@ def _factors(values: NDArray[np.complex128]) -> Array:
 
 def _isolated(coefficients: Array, found: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """The roots of one polynomial, correctly rounded; those found already where they do not fit into doubles."""
-    ratios = [float(x).as_integer_ratio() for x in coefficients[::-1]]
-    common = max(q for _, q in ratios)  # a power of two, as all are
-    isolated: Any = flint.fmpz_poly([p * (common // q) for p, q in ratios]).complex_roots()
+    isolated = isolated_roots(coefficients.tolist())
     each = [complex(float(z.real.mid()), float(z.imag.mid())) for z, m in isolated for _ in range(m)]
     exact = np.array(sorted(each, key=lambda z: (z.imag == 0, z.real, abs(z.imag), -z.imag)))
     return exact if exact.shape == found.shape and np.all(np.isfinite(exact)) else found

@@ -5,17 +5,8 @@ In: a `Problem`. Out: a `Solution` that was rechecked, or the least that would h
 """
 
 from tmsopt.solver.all_designs import Every, coverage_of, solve_all
-from tmsopt.solver.box import sides
 from tmsopt.solver.multistart import same
-from tmsopt.solver.solve import solve
-from tmsopt.solver.workspace import Family
+from tmsopt.solver.solve import solve, solved
+from tmsopt.solver.workspace import Family, Workspace, workspace
 
-__all__ = [
-    "Every",
-    "Family",
-    "coverage_of",
-    "same",
-    "sides",
-    "solve",
-    "solve_all",
-]
+__all__ = ["Every", "Family", "Workspace", "coverage_of", "same", "solve", "solve_all", "solved", "workspace"]

@@ -1,27 +1,31 @@
 """All designs with a pattern in a box, as far as many starts find them, with a statement of what they cover."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
 from tmsopt.checks.recheck import recheck
+from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError
 from tmsopt.formulation.formulate import design_of, matching
 from tmsopt.formulation.nlp import NLP
+from tmsopt.formulation.options import Asked, Options, options_of
 from tmsopt.formulation.starts import completions, spread
-from tmsopt.records import Array
+from tmsopt.records import Array, plain
 from tmsopt.solver.multistart import Runner
 from tmsopt.solver.newton import newton, square_system
-from tmsopt.solver.solve import solve
+from tmsopt.solver.solve import solved
+from tmsopt.solver.workspace import workspace
 
 MOST = 1024
 """Starts at most."""
 
+_DEFAULTS = Options(starts=MOST)
 _FEWEST = 48
 _AGAIN = 3  # times that every solution must have been met before the search may end
 _SAME = 1e-7  # of the box: distance of designs that are one solution, whatever their factors are called
@@ -53,14 +57,9 @@ class Coverage:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
+        found = plain(self)
         expected = round(self.expected, 4) if math.isfinite(self.expected) else None
-        return {
-            "starts": self.starts,
-            "hits": list(self.hits),
-            "expected": expected,
-            "chance": round(self.chance, 6),
-            "singular": self.singular,
-        }
+        return found | {"expected": expected, "chance": round(self.chance, 6)}
 
 
 @dataclass(frozen=True)
@@ -72,36 +71,36 @@ class Every:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
-        return {"solutions": [s.to_json() for s in self.solutions], "coverage": self.coverage.to_json()}
+        return plain(self)
 
 
-def solve_all(
-    problem: Problem,
-    *,
-    starts: int = MOST,
-    seed: int = 0,
-    linear_solver: str = "mumps",
-    progress: Callable[[int, int], None] | None = None,
-) -> Every:
+def solve_all(problem: Given, **options: Unpack[Asked]) -> Every:
     """Every design in the box with the pattern that a problem locates, where that leaves no freedom.
 
     Newton's method runs from designs spread over the box with every way to share out their roots, and IPOPT from some
     of them, until each solution was met three times and an estimate expects no more, or after `starts`. Solutions are
     told apart by their parameters, so factors that change places are no other solution.
 
+    Args:
+        options: ``starts`` at most, `MOST` by default, ``seed``, ``linear_solver`` and ``progress``; see
+            `tmsopt.formulation.Options`.
+
     Raises:
         InputError: for a problem that locates no pattern, or leaves freedom.
     """
+    problem = problem_of(problem)
     _check(problem)
+    work = workspace(problem, options_of(options, defaults=_DEFAULTS))
+    starts, progress = work.options.starts, work.options.progress
     nlp = matching(problem)
     system = square_system(nlp)
     assert system is not None  # as many conditions as parameters
-    runner = Runner(problem, nlp, linear_solver, touching=False)
+    runner = Runner(work, nlp)
     width = np.array([hi - lo for lo, hi in problem.free.values()])
     found: list[Array] = []
     hits: list[int] = []
     done = singular = 0
-    for design in spread(problem, seed):
+    for design in spread(problem, work.options.seed):
         if done >= starts or _covered(done, hits):
             break
         ends = [newton(system, x) for x in completions(nlp, problem, design)]
@@ -185,5 +184,5 @@ def coverage_of(done: int, hits: list[int], singular: int = 0) -> Coverage:
 
 def _solution(problem: Problem, design: Mapping[str, float]) -> Solution:
     """A design with its standing: of the same problem, where nothing is free."""
-    fixed = solve(replace(problem, fixed=problem.ordered(design), free={}, start={}), throw=False)
+    fixed = solved(replace(problem, fixed=problem.ordered(design), free={}, start={}))
     return replace(fixed, problem=problem, freedom=freedom(problem), formulation="matching")

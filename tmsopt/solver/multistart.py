@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,12 +13,9 @@ from tmsopt.formulation.formulate import abscissa, design_of, middle
 from tmsopt.formulation.ipopt import Run, ipopt
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import complete, designs, opposite, worth
-from tmsopt.records import Array, Progress
+from tmsopt.records import Array
 from tmsopt.roots import roots
-from tmsopt.solver.workspace import Family
-
-STARTS = 64
-"""Starts tried at most; most problems settle with a dozen."""
+from tmsopt.solver.workspace import Workspace
 
 _ENOUGH = 12  # starts tried before agreement counts
 _AGREE = 5  # starts at the best value that end the search
@@ -51,57 +48,26 @@ class Candidate:
     feasible: bool
 
 
-def search(
-    problem: Problem,
-    nlp: NLP,
-    *,
-    starts: int,
-    seed: int,
-    exhaustive: bool,
-    linear_solver: str,
-    progress: Progress | None,
-    touching: bool = False,
-    near: Mapping[str, float] | None = None,
-    family: Family | None = None,
-) -> list[Candidate]:
-    """Where every start ended that was tried, in order.
-
-    Args:
-        near: a design close to the optimum, perhaps, tried before all others.
-        family: that the problem is one of.
-        touching: hold every root quantity at its exact value, in the way that each start is closest to, where a mere
-            bound on it would let the optimiser claim too much.
-    """
-    run = Runner(problem, nlp, linear_solver, touching, family or Family())
-    candidates: list[Candidate] = []
-    if near:
-        candidates.append(run.ended({**middle(problem), **near}, near=True))
-        if not exhaustive and _settled(problem, candidates):
+def search(work: Workspace, nlp: NLP) -> list[Candidate]:
+    """Where every start ended that was tried, in order; a design near the optimum, where one is given, before all."""
+    run, part, options = Runner(work, nlp, work.touching), work.part, work.options
+    starts, candidates = options.starts, list[Candidate]()
+    if options.near:
+        candidates.append(run.ended({**middle(part), **options.near}, near=True))
+        if not options.exhaustive and _settled(part, candidates):
             return candidates
-    if problem.start and len(candidates) < starts:  # the user's own
-        candidates.append(run.ended(middle(problem), near=True))
-    for design in designs(problem, seed, max(starts - len(candidates), 0)):
+    if part.start and len(candidates) < starts:  # the user's own
+        candidates.append(run.ended(middle(part), near=True))
+    for design in designs(part, options.seed, max(starts - len(candidates), 0)):
         candidates.append(run.ended(design, hopeful=any(c.feasible for c in candidates)))
-        if progress:
-            progress(len(candidates), starts)
-        if not exhaustive and _settled(problem, candidates):
+        if options.progress:
+            options.progress(len(candidates), starts)
+        if not options.exhaustive and _settled(part, candidates):
             candidates += _beside(run, candidates, starts - len(candidates))
             break
-    if problem.pattern is not None and not any(c.feasible for c in candidates):
-        candidates += _rescued(problem, nlp, seed, linear_solver)
+    if part.pattern is not None and not any(c.feasible for c in candidates):
+        candidates += _rescued(work, nlp)
     return candidates
-
-
-def follow(
-    problem: Problem,
-    nlp: NLP,
-    design: Mapping[str, float],
-    linear_solver: str,
-    near: bool = True,
-    touching: bool = False,
-) -> Candidate:
-    """Where IPOPT ends from a design, close to it or not."""
-    return Runner(problem, nlp, linear_solver, touching).ended(design, near)
 
 
 def _beside(run: "Runner", candidates: Sequence[Candidate], most: int) -> list[Candidate]:
@@ -109,10 +75,10 @@ def _beside(run: "Runner", candidates: Sequence[Candidate], most: int) -> list[C
 
     Of optima at different faces of the box all far starts may end at the same, be it the best or not.
     """
-    problem, found = run.problem, list[Candidate]()
+    part, found = run.work.part, list[Candidate]()
     best = min((c for c in candidates if c.feasible), key=lambda c: c.objective, default=None)
-    while best is not None and problem.objective is not None and not _proven(problem, best):
-        others = opposite(problem, design_of(problem, best.run.x.tolist()))
+    while best is not None and part.objective is not None and not _proven(part, best):
+        others = opposite(part, run.work.design_at(best.run.x))
         ended = [run.ended(design, near=True) for design in others[: max(most - len(found), 0)]]
         found += ended
         better = [c for c in ended if c.feasible and c.objective < best.objective]
@@ -124,13 +90,16 @@ def _beside(run: "Runner", candidates: Sequence[Candidate], most: int) -> list[C
 
 @dataclass(frozen=True)
 class Runner:
-    """IPOPT on one NLP, started anew where an end is not to be trusted."""
+    """IPOPT on one NLP, started anew where an end is not to be trusted.
 
-    problem: Problem
+    Attributes:
+        touching: hold every root quantity at its exact value, in the way that each start is closest to, where a mere
+            bound on it would let the optimiser claim too much.
+    """
+
+    work: Workspace
     nlp: NLP
-    linear_solver: str
-    touching: bool
-    family: Family = field(default_factory=Family)
+    touching: bool = False
 
     def ended(self, design: Mapping[str, float], near: bool = False, hopeful: bool = True) -> Candidate:
         """Where a start ends, with the factors shared out anew as long as that helps."""
@@ -142,7 +111,7 @@ class Runner:
                 break
             if not np.all(np.isfinite(best.run.x)):
                 break
-            ended = self._once(design_of(self.problem, best.run.x.tolist()), "near" if again % 2 == 0 else "far")
+            ended = self._once(self.work.design_at(best.run.x), "near" if again % 2 == 0 else "far")
             if best.feasible and (not ended.feasible or ended.objective >= best.objective - _SAME):
                 break
             best = ended
@@ -150,20 +119,20 @@ class Runner:
 
     def _no_worse(self, best: Candidate, design: Mapping[str, float]) -> Candidate:
         """Where it ended, or where a start that was better than that ends if IPOPT keeps to it."""
-        if self.problem.pattern is not None or worth(self.problem, design) >= best.objective - _SAME:
+        if self.work.part.pattern is not None or worth(self.work.part, design) >= best.objective - _SAME:
             return best
         kept = self._once(design, "near")
         return kept if kept.feasible and kept.objective < best.objective else best
 
     def _once(self, design: Mapping[str, float], start: str) -> Candidate:
-        x = complete(self.nlp, self.problem, design, start == "near")
+        x = complete(self.nlp, self.work.part, design, start == "near")
         limits = self.nlp.touching(x) if self.touching else self.nlp
-        return _candidate(self.problem, limits, self.family.ipopt(self.nlp, self.linear_solver, start)(x, limits))
+        return _candidate(self.work.part, limits, self.work.ipopt(self.nlp, start)(x, limits))
 
 
 def claim(problem: Problem, candidate: Candidate) -> float:
     """The objective that a candidate claims, in the problem's own sense."""
-    return -candidate.objective if problem.sense == "maximize" else candidate.objective
+    return problem.sign * candidate.objective
 
 
 def same(a: float, b: float, size: float = 1.0) -> bool:
@@ -242,11 +211,11 @@ def _coefficients(problem: Problem, nlp: NLP, run: Run) -> Array:
     return np.array([[float(c) for c in problem.model.coefficients(p, of)] for p in varied])
 
 
-def _rescued(problem: Problem, nlp: NLP, seed: int, linear_solver: str) -> list[Candidate]:
+def _rescued(work: Workspace, nlp: NLP) -> list[Candidate]:
     """Starts where the abscissa is least under the same constraints: multiple roots are often met there."""
-    relaxed = replace(problem, locate=None, minimize="abscissa", maximize=None, scenarios={}, tolerances={})
+    relaxed = replace(work.part, locate=None, minimize="abscissa", maximize=None, scenarios={}, tolerances={})
     leading = abscissa(relaxed)
-    lead = ipopt(leading, linear_solver)
-    ended = [lead(complete(leading, relaxed, d)).x for d in designs(relaxed, seed, _RESCUES)]
-    reached = [design_of(problem, x.tolist()) for x in ended if np.all(np.isfinite(x))]
-    return [follow(problem, nlp, design, linear_solver) for design in reached]
+    lead = ipopt(leading, work.options)
+    ended = [lead(complete(leading, relaxed, d)).x for d in designs(relaxed, work.options.seed, _RESCUES)]
+    run = Runner(work, nlp)
+    return [run.ended(work.design_at(x), near=True) for x in ended if np.all(np.isfinite(x))]

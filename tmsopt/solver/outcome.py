@@ -8,14 +8,14 @@ import numpy as np
 
 from tmsopt.checks.recheck import Checked, recheck
 from tmsopt.design.cases import Case
-from tmsopt.design.problem import Problem, freedom
+from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Branch, Relaxation, Starts
 from tmsopt.formulation.formulate import design_of
+from tmsopt.formulation.ipopt import Point
 from tmsopt.formulation.nlp import NLP
-from tmsopt.formulation.polish import Point
 from tmsopt.solver.multistart import Candidate, claim, same
 from tmsopt.solver.newton import other_branches
-from tmsopt.solver.workspace import Family
+from tmsopt.solver.workspace import Workspace
 
 _STATIONARY = 1e-6  # gradient of the Lagrangian at which a point counts as converged whatever IPOPT says
 _ALIKE = 3  # candidates of one objective looked at closely
@@ -65,19 +65,19 @@ def evaluated(problem: Problem, cases: Sequence[Case]) -> Finding:
 
 
 def found(
-    problem: Problem, nlp: NLP, trial: Trial | None, starts: Starts, cases: Sequence[Case] | None = None
+    work: Workspace, nlp: NLP, trial: Trial | None, starts: Starts, cases: Sequence[Case] | None = None
 ) -> Finding | None:
     """A trial as a finding, in the given cases, by default those of the NLP; None where it is not feasible at all."""
     if trial is None:
         return None
-    point, parameters = trial.point, trial.parameters
-    checked = trial.checked if cases is None else recheck(problem, parameters, cases, trial.checked.around)
-    counted = freedom(problem)
+    problem, point, parameters = work.problem, trial.point, trial.parameters
+    checked = trial.checked if cases is None else work.recheck(parameters, cases)
+    counted = work.freedom
     if sum(checked.violations.values()) > _SPURIOUS and counted.count >= 0:
         return None
     converged = trial.candidate.run.status in _CONVERGED or point.stationarity <= _STATIONARY
     notes: tuple[str, ...] = ()
-    if not honest(problem, trial):
+    if not honest(work, trial):
         converged = False
         claimed = claim(problem, trial.candidate)
         notes = (f"the solver's objective {claimed:.9g} is not the design's, {checked.objective:.9g}",)
@@ -111,57 +111,54 @@ def counted(candidates: Sequence[Candidate], at_best: float) -> Starts:
     )
 
 
-def survivor(problem: Problem, nlp: NLP, candidates: Sequence[Candidate], family: Family | None = None) -> Trial | None:
+def survivor(work: Workspace, nlp: NLP, candidates: Sequence[Candidate]) -> Trial | None:
     """The first of the best candidates to pass the recheck once polished, or the one that fails it least."""
-    family = family or Family()
-    polish = family.polisher(nlp)
+    polish, problem = work.family.polisher(nlp), work.problem
     kept: Trial | None = None
     tried: list[float] = []
     for candidate in sorted((c for c in candidates if c.feasible), key=lambda c: c.objective):
         alike = sum(same(candidate.objective, value, nlp.size) for value in tried)
-        if kept and not kept.checked.violations and honest(problem, kept) and not alike:
+        if kept and not kept.checked.violations and honest(work, kept) and not alike:
             break
         if alike >= _ALIKE:
             continue
         tried.append(candidate.objective)
         point = polish(candidate.run, candidate.nlp)
         parameters = problem.ordered(design_of(problem, point.x.tolist()))
-        checked = recheck(problem, parameters, nlp.cases, family.around(problem, parameters))
+        checked = work.recheck(parameters, nlp.cases)
         trial = Trial(candidate, point, parameters, checked)
-        if kept is None or ahead(problem, trial, kept):
+        if kept is None or ahead(work, trial, kept):
             kept = trial
-        if not trial.checked.violations and point.stationarity <= _STATIONARY and honest(problem, trial):
+        if not trial.checked.violations and point.stationarity <= _STATIONARY and honest(work, trial):
             break
     return kept
 
 
-def honest(problem: Problem, trial: Trial) -> bool:
+def honest(work: Workspace, trial: Trial) -> bool:
     """Whether the objective that the solver claims is the design's own."""
-    if problem.objective is None:
+    if work.problem.objective is None:
         return True
-    claimed = -trial.point.objective if problem.sense == "maximize" else trial.point.objective
+    claimed = work.problem.sign * trial.point.objective
     return math.isclose(claimed, trial.checked.objective, rel_tol=_CLAIMED, abs_tol=_CLAIMED)
 
 
 def better(problem: Problem, one: Finding, other: Finding) -> bool:
     """Whether one finding beats another: optimal before not, then by objective."""
-    sign = -1.0 if problem.sense == "maximize" else 1.0
     ranks = [
-        (f.status != "optimal", sign * f.checked.objective if math.isfinite(f.checked.objective) else 0.0)
+        (f.status != "optimal", problem.sign * f.checked.objective if math.isfinite(f.checked.objective) else 0.0)
         for f in (one, other)
     ]
     return ranks[0] < ranks[1]
 
 
-def ahead(problem: Problem, one: Trial, other: Trial) -> bool:
+def ahead(work: Workspace, one: Trial, other: Trial) -> bool:
     """Whether one trial beats another: by violation first, then by the objective that the recheck found."""
-    return _rank(problem, one) < _rank(problem, other)
+    return _rank(work.problem.sign, one) < _rank(work.problem.sign, other)
 
 
-def _rank(problem: Problem, trial: Trial) -> tuple[float, float]:
-    """Violation first, then the objective that the recheck found."""
+def _rank(sign: float, trial: Trial) -> tuple[float, float]:
     value = trial.point.objective if math.isnan(trial.checked.objective) else trial.checked.objective
-    return sum(trial.checked.violations.values()), -value if problem.sense == "maximize" else value
+    return sum(trial.checked.violations.values()), sign * value
 
 
 def _active(problem: Problem, nlp: NLP, point: Point) -> dict[str, float]:
@@ -173,7 +170,7 @@ def _active(problem: Problem, nlp: NLP, point: Point) -> dict[str, float]:
     active: dict[str, float] = {}
     if problem.objective is None:
         return active
-    sign = -1.0 if problem.sense == "maximize" else 1.0
+    sign = problem.sign
     rows = zip(nlp.rows, point.row_multipliers.tolist(), nlp.row_lower, nlp.row_upper, strict=True)
     for row, multiplier, lower, upper in rows:
         if row in problem.constraints and abs(multiplier) > _MULTIPLIER:

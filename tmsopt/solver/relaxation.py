@@ -11,7 +11,6 @@ import numpy as np
 from tmsopt.checks.recheck import FEASIBLE, excesses
 from tmsopt.checks.worst_case import worst_cases
 from tmsopt.design.cases import Case
-from tmsopt.design.dependence import overclaims
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Relaxation
 from tmsopt.formulation.formulate import formulate
@@ -19,9 +18,9 @@ from tmsopt.formulation.nlp import NLP, Lift
 from tmsopt.formulation.starts import designs
 from tmsopt.models import Values
 from tmsopt.records import Table
-from tmsopt.solver.box import sides
 from tmsopt.solver.multistart import Candidate, Runner, same
 from tmsopt.solver.outcome import Trial, survivor
+from tmsopt.solver.workspace import Workspace, workspace
 
 _ROUNDS = 12  # times that cases are added
 _TRIED = 16  # starts of a relaxation at most
@@ -57,29 +56,25 @@ class Limit:
         return max(beyond if self.name.endswith(".max") else -beyond, 0.0)
 
 
-def relax(
-    problem: Problem, seed: int, linear_solver: str, cases: Sequence[Case] = (), alone: bool = True
-) -> Relaxation | None:
+def relax(work: Workspace) -> Relaxation | None:
     """The least relaxation: of the constraints, or of the box too where these alone cannot help; None if none is found.
 
     Amounts are added up relative to the limits as written, those of the box in its widths. One limit that can do it
     alone for less than all together shows that the search for these was caught, and wins.
-
-    Args:
-        alone: also find how far each limit of the conflict would have to give if no other does.
     """
-    listed = tuple(cases) or problem.cases
-    problem = replace(problem, minimize=None, maximize=None, pareto=())  # what is asked beside the limits plays no part
+    listed, options = work.problem.cases, work.options
+    problem = replace(work.problem, minimize=None, maximize=None, pareto=())  # what else is asked plays no part
     for wide, limits in _stages(problem):
-        ended = [_least_covered(side.problem, limits, seed, linear_solver, listed) for side in sides(wide)]
+        sides = [workspace(part.part, options) for part in workspace(wide, options).parts()]
+        ended = [_least_covered(side, limits, listed) for side in sides]
         reached = [(trial, nlp) for trial, nlp in ended if trial is not None]
         if not reached:
             continue
         trial, nlp = min(reached, key=lambda found: found[0].point.objective)
         amounts = _amounts(wide, limits, trial.parameters, nlp.cases)
         conflict = _conflict(nlp, limits, trial)
-        wanted = alone and len(conflict) > 1
-        single = _alone(problem, conflict, trial, linear_solver, nlp.cases) if wanted else {}
+        wanted = options.alone and len(conflict) > 1
+        single = _alone(workspace(problem, options), conflict, trial, nlp.cases) if wanted else {}
         return Relaxation(Table(trial.parameters), Table(amounts), conflict, Table(single))
     return None
 
@@ -126,25 +121,23 @@ def _widened(problem: Problem, names: Collection[str]) -> Problem:
     return replace(problem, free=free)
 
 
-def _least_covered(
-    wide: Problem, limits: Sequence[Limit], seed: int, linear_solver: str, listed: Sequence[Case]
-) -> tuple[Trial | None, NLP]:
+def _least_covered(work: Workspace, limits: Sequence[Limit], listed: Sequence[Case]) -> tuple[Trial | None, NLP]:
     """The least relaxation of one part of the box, with cases added until none between them needs more."""
-    trial, nlp = _least(wide, limits, seed, linear_solver, listed)
+    trial, nlp = _least(work, limits, listed)
     movable = [limit for limit in limits if not limit.parameter]
     if trial is not None and trial.point.objective > _NOTHING and len(movable) > 1:
         for limit in movable:
-            single = _least(wide, [limit], seed, linear_solver, listed, few=True)
+            single = _least(work, [limit], listed, few=True)
             if single[0] is not None and single[0].point.objective < trial.point.objective * (1 - _TIE):
-                elastic = _elastic(wide, formulate(wide, listed, elastic=True), limits)
-                run = Runner(wide, elastic, linear_solver, overclaims(wide))
-                again = survivor(_unlimited(wide, limits), elastic, [run.ended(single[0].parameters, near=True)])
+                elastic = _elastic(work.problem, listed, limits)
+                ended = Runner(work, elastic, work.touching).ended(single[0].parameters, near=True)
+                again = survivor(_unlimited(work, limits), elastic, [ended])
                 if again is not None and not again.checked.violations and _ahead(again, trial):
                     trial, nlp = again, elastic
     for _ in range(_ROUNDS if listed else 0):
-        if trial is None or not (more := _beyond(wide, limits, trial, nlp.cases)):
+        if trial is None or not (more := _beyond(work.problem, limits, trial, nlp.cases)):
             break
-        trial, nlp = _least(wide, limits, seed, linear_solver, (*nlp.cases, *more), trial)
+        trial, nlp = _least(work, limits, (*nlp.cases, *more), trial)
     return trial, nlp
 
 
@@ -153,29 +146,21 @@ def _ahead(one: Trial, other: Trial) -> bool:
 
 
 def _least(
-    wide: Problem,
-    limits: Sequence[Limit],
-    seed: int,
-    linear_solver: str,
-    cases: Sequence[Case],
-    before: Trial | None = None,
-    few: bool = False,
+    work: Workspace, limits: Sequence[Limit], cases: Sequence[Case], before: Trial | None = None, few: bool = False
 ) -> tuple[Trial | None, NLP]:
     """The design with the least weighted sum of amounts that a few starts reach, or the one `before` leads to."""
-    nlp = _elastic(wide, formulate(wide, cases, elastic=True), limits)
-    candidates: list[Candidate] = []
-    if before is not None:
-        candidates = [Runner(wide, nlp, linear_solver, overclaims(wide)).ended(before.parameters, near=True)]
+    nlp = _elastic(work.problem, cases, limits)
+    run = Runner(work, nlp, work.touching)
+    candidates = [] if before is None else [run.ended(before.parameters, near=True)]
     if not any(c.feasible for c in candidates):
-        candidates = _ends(wide, nlp, seed, linear_solver, 2 * _FEW if few else _TRIED)
-    trial = survivor(_unlimited(wide, limits), nlp, candidates)
+        candidates = _ends(run, 2 * _FEW if few else _TRIED)
+    trial = survivor(_unlimited(work, limits), nlp, candidates)
     return (trial if trial is not None and not trial.checked.violations else None), nlp
 
 
-def _ends(wide: Problem, nlp: NLP, seed: int, linear_solver: str, most: int) -> list[Candidate]:
-    run = Runner(wide, nlp, linear_solver, overclaims(wide))
+def _ends(run: Runner, most: int) -> list[Candidate]:
     candidates: list[Candidate] = []
-    for design in designs(wide, seed, most):
+    for design in designs(run.work.part, run.work.options.seed, most):
         candidates.append(run.ended(design, hopeful=any(c.feasible for c in candidates)))
         feasible = [c.objective for c in candidates if c.feasible]
         if feasible and min(feasible) <= _NOTHING:
@@ -185,11 +170,11 @@ def _ends(wide: Problem, nlp: NLP, seed: int, linear_solver: str, most: int) -> 
     return candidates
 
 
-def _unlimited(problem: Problem, limits: Sequence[Limit]) -> Problem:
-    """The problem without the constraints that may move, whose violation is the point of it."""
+def _unlimited(work: Workspace, limits: Sequence[Limit]) -> Workspace:
+    """The same without the constraints that may move, whose violation is the point of it."""
     moved = {limit.name for limit in limits}
-    kept = {n: c for n, c in problem.constraints.items() if n not in moved}
-    return replace(problem, constraints=kept, minimize=None, maximize=None)
+    kept = {n: c for n, c in work.problem.constraints.items() if n not in moved}
+    return replace(work, problem=replace(work.problem, constraints=kept, minimize=None, maximize=None))
 
 
 def _beyond(wide: Problem, limits: Sequence[Limit], trial: Trial, cases: Sequence[Case]) -> list[Case]:
@@ -228,26 +213,26 @@ def _conflict(nlp: NLP, limits: Sequence[Limit], trial: Trial) -> tuple[str, ...
     return tuple(dict.fromkeys(names))
 
 
-def _alone(
-    problem: Problem, conflict: Sequence[str], trial: Trial, linear_solver: str, cases: Sequence[Case]
-) -> dict[str, float]:
+def _alone(work: Workspace, conflict: Sequence[str], trial: Trial, cases: Sequence[Case]) -> dict[str, float]:
     """How far each limit of a conflict must be moved if nothing else is; those that cannot do it alone are left out."""
+    problem = work.problem
     limits = {limit.name: limit for limit in (*_constraint_limits(problem), *_bound_limits(problem))}
     found: dict[str, float] = {}
     for limit in (limits[name] for name in conflict):
         wide = _widened(problem, [limit.parameter] if limit.parameter else [])
-        nlp = _elastic(wide, formulate(wide, cases, elastic=True), [limit])
-        run = Runner(wide, nlp, linear_solver, touching=overclaims(wide))
+        nlp, widened = _elastic(wide, cases, [limit]), workspace(wide, work.options)
+        run = Runner(widened, nlp, widened.touching)
         here = {n: min(max(trial.parameters[n], lo), hi) for n, (lo, hi) in wide.free.items()}
         candidates = [run.ended(here, near=True), *(run.ended(d, hopeful=False) for d in designs(wide, 0, _FEW))]
-        ended = survivor(_unlimited(wide, [limit]), nlp, candidates)
+        ended = survivor(_unlimited(widened, [limit]), nlp, candidates)
         if ended is not None and not ended.checked.violations:
             found |= _amounts(wide, [limit], ended.parameters, nlp.cases)
     return found
 
 
-def _elastic(wide: Problem, nlp: NLP, limits: Sequence[Limit]) -> NLP:
+def _elastic(wide: Problem, cases: Sequence[Case], limits: Sequence[Limit]) -> NLP:
     """minimise Σ slack / scale, with each limit moved by its slack; everything else holds."""
+    nlp = formulate(wide, cases, elastic=True)
     names = [limit.name for limit in limits]
     x, slack = ca.SX.sym("x", len(nlp.variables)), ca.SX.sym("s", len(limits))
     g = nlp.at(x)[1]

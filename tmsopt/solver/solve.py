@@ -2,77 +2,70 @@
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Unpack
 
 from tmsopt.checks.bound import instant_bound
-from tmsopt.checks.coverage import cover
 from tmsopt.checks.digits import certified
 from tmsopt.checks.recheck import Checked
-from tmsopt.design.problem import Problem, freedom, unasked
+from tmsopt.checks.worst_case import cover
+from tmsopt.design.files import Given, question_of
+from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.solution import Bound, NotSolved, Solution, Starts
-from tmsopt.errors import InputError
-from tmsopt.records import Progress, Table
-from tmsopt.solver.box import sides
-from tmsopt.solver.multistart import STARTS
+from tmsopt.formulation.options import DEFAULTS, AskedOfSolve, Options, options_of
+from tmsopt.records import Table
 from tmsopt.solver.outcome import Finding, better, evaluated
-from tmsopt.solver.search import Explored, Options, evaluated_cases, explore, without_any
-from tmsopt.solver.workspace import Family
+from tmsopt.solver.search import Explored, evaluated_cases, explore, without_any
+from tmsopt.solver.workspace import Family, workspace
 
 
 def solve(
-    problem: Problem,
-    *,
-    starts: int = STARTS,
-    seed: int = 0,
-    exhaustive: bool = False,
-    linear_solver: str = "mumps",
-    throw: bool = True,
-    progress: Progress | None = None,
-    near: Mapping[str, float] | None = None,
-    family: Family | None = None,
-    alone: bool = True,
+    problem: Given, *, throw: bool = True, family: Family | None = None, **options: Unpack[AskedOfSolve]
 ) -> Solution:
     """Find the best design, from several starts, and check it independently of the solver.
 
     Args:
-        starts: starts tried at most; the search ends early when several agree or optimality is proven.
-        seed: of the quasi-random starting designs.
-        exhaustive: try all the starts, even when several agree.
-        linear_solver: ``mumps`` or ``spral``.
+        problem: or the path of its file.
         throw: raise NotSolved unless the status is ``optimal``; otherwise return the best point with its status.
-        progress: called with (starts done, starts at most).
-        near: a design that may be close to the optimum, tried first; where both signs of a parameter are searched,
-            only its own is.
         family: what was built for other problems that differ in numbers alone, to be used again.
-        alone: of an infeasible problem, also find how far each limit in conflict would have to give alone.
+        options: ``starts``, ``seed``, ``exhaustive``, ``linear_solver``, ``progress``, ``near`` and ``alone``; see
+            `tmsopt.formulation.Options`.
 
     Raises:
         NotSolved: carrying the best point found, when `throw`.
         InputError: when parameters are free and nothing is asked of them.
         ValueError: for another linear solver or fewer than one start.
     """
-    if faults := unasked(problem):
-        raise InputError(faults)
-    if starts < 1:
-        raise ValueError(f"starts = {starts}; accepted: 1 or more")
+    problem = question_of(problem)
+    solution = solved(problem, options_of(options, AskedOfSolve), family)
+    if throw and solution.status != "optimal":
+        raise NotSolved(solution)
+    return solution
+
+
+def solved(design: Given, options: Options = DEFAULTS, family: Family | None = None) -> Solution:
+    """A solution as it is; of a problem, or of a file, what `solve` finds, whatever its status."""
+    if isinstance(design, Solution):
+        return design
+    problem = question_of(design)
+    if options.starts < 1:
+        raise ValueError(f"starts = {options.starts}; accepted: 1 or more")
     began = time.perf_counter()
     notes: tuple[str, ...] = ()
     values: dict[str, float] = {}
     if problem.free:
-        family = family or Family()
-        near = near and {n: min(max(near[n], lo), hi) for n, (lo, hi) in problem.free.items()}
-        options = Options(starts, seed, exhaustive, linear_solver, progress, near, family, alone)
-        explored = [explore(problem, side, options) for side in sides(problem) if near is None or side.holds(near)]
-        finding = _winner(problem, explored) or without_any(problem, explored, options)
+        if options.near:
+            near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items()}
+            options = replace(options, near=near)
+        work = workspace(problem, options, family)
+        explored = [explore(part) for part in work.parts() if not options.near or part.holds(options.near)]
+        finding = _winner(problem, explored) or without_any(work, sum(len(e.candidates) for e in explored))
         notes = _sides_note(problem, explored, finding)
         values = _side_values(explored)
     else:
         finding = evaluated(problem, evaluated_cases(problem, problem.ordered({})))
-    solution = _assembled(problem, finding, notes, values, began)
-    if throw and solution.status != "optimal":
-        raise NotSolved(solution)
-    return solution
+    return _assembled(problem, finding, notes, values, began)
 
 
 def _winner(problem: Problem, explored: Sequence[Explored]) -> Finding | None:
@@ -90,11 +83,11 @@ def _winner(problem: Problem, explored: Sequence[Explored]) -> Finding | None:
 def _side_values(explored: Sequence[Explored]) -> dict[str, float]:
     """The best objective of each part of the box; nan where it has no optimal design."""
     return {
-        part.side.name: part.finding.checked.objective
+        part.name: part.finding.checked.objective
         if part.finding is not None and part.finding.status == "optimal"
         else math.nan
         for part in explored
-        if part.side.name
+        if part.name
     }
 
 
@@ -103,15 +96,15 @@ def _sides_note(problem: Problem, explored: Sequence[Explored], finding: Finding
     won = next((part for part in explored if part.finding and part.finding.parameters == finding.parameters), None)
     if len(explored) == 1 or won is None or finding.status != "optimal":
         return ()
-    sentences = [f"both signs were searched: {won.side.name} wins"]
+    sentences = [f"both signs were searched: {won.name} wins"]
     for part in explored:
         if part is not won:
             if part.finding is None or part.finding.status != "optimal":
-                sentences.append(f"with {part.side.name} nothing feasible was found")
+                sentences.append(f"with {part.name} nothing feasible was found")
             elif problem.objective is not None:
-                sentences.append(f"the best with {part.side.name} is {part.finding.checked.objective:.9g}")
+                sentences.append(f"the best with {part.name} is {part.finding.checked.objective:.9g}")
             else:
-                sentences.append(f"there is one with {part.side.name} too")
+                sentences.append(f"there is one with {part.name} too")
     return ("; ".join(sentences),)
 
 

@@ -1,28 +1,32 @@
-"""Problems that differ in numbers alone: their NLPs and solvers, built once and used again for each."""
+"""What solving needs of a problem again and again, made once: for one problem, or for many that differ in numbers."""
 
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, TypeVar
 
 import casadi as ca
+import numpy as np
 
+from tmsopt.checks.recheck import Checked, recheck
 from tmsopt.design.cases import Case
-from tmsopt.design.dependence import demands_heavy_damping, tempts
+from tmsopt.design.dependence import demands_heavy_damping, overclaims, tempts
 from tmsopt.design.limit import limit_of
-from tmsopt.design.problem import Problem, freedom
-from tmsopt.formulation.builder import LIMIT
-from tmsopt.formulation.formulate import formulate, middle
-from tmsopt.formulation.ipopt import Run, ipopt
-from tmsopt.formulation.nlp import NLP
-from tmsopt.formulation.polish import Point, polisher
-from tmsopt.formulation.scale import objective_unit, scale_of, units_of
+from tmsopt.design.problem import Freedom, Problem, freedom
+from tmsopt.formulation.formulate import LIMIT, design_of, formulate, middle
+from tmsopt.formulation.ipopt import Point, Run, ipopt, polisher
+from tmsopt.formulation.nlp import NLP, objective_unit, scale_of, units_of
+from tmsopt.formulation.options import DEFAULTS, Options
 from tmsopt.margins.nearest import Robustness, robustness
 from tmsopt.models import Quantity, Values
-from tmsopt.solver.box import narrowed
+from tmsopt.records import Array
 
 _KEPT = 32
 """NLPs kept, with three solvers each: where cases are added row by row, most are not met again."""
+
+_THIN = 1e-9
+"""Width of a part of the box below which it is not worth a search of its own."""
 
 T = TypeVar("T")
 
@@ -55,9 +59,9 @@ class Family:
         )
         return narrowed(replace(nlp, settings=tuple(_value(problem, name) for name in self.varied)), problem)
 
-    def ipopt(self, nlp: NLP, linear_solver: str, start: str) -> Callable[..., Run]:
+    def ipopt(self, nlp: NLP, options: Options, start: str) -> Callable[..., Run]:
         """A solver of an NLP of the family; see `ipopt`."""
-        return self._of(nlp, (linear_solver, start), lambda: ipopt(nlp, linear_solver, start=start))
+        return self._of(nlp, (options.of_ipopt, start), lambda: ipopt(nlp, options, start))
 
     def polisher(self, nlp: NLP) -> Callable[[Run, NLP], Point]:
         """A polisher of an NLP of the family; see `polisher`."""
@@ -74,6 +78,84 @@ class Family:
         """Something made of an NLP's functions, which are kept with it lest another gets their address."""
         made: T = _kept(self._made, (id(nlp.functions), options), lambda: (nlp.functions, make()), 3 * _KEPT)[1]
         return made
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """One problem, and everything that solving it asks for more than once.
+
+    Attributes:
+        part: the problem on the part of the box that designs are drawn from, e.g. one sign of one parameter.
+        name: of the part, e.g. ``forward tilt``; empty for the whole box.
+        family: that the problem is one of.
+    """
+
+    problem: Problem
+    part: Problem
+    options: Options
+    family: Family
+    name: str = ""
+
+    @cached_property
+    def freedom(self) -> Freedom:
+        """Degrees of freedom of the problem."""
+        return freedom(self.problem)
+
+    @cached_property
+    def touching(self) -> bool:
+        """Whether root quantities must be held at their exact values: bounds on them would let the search overclaim."""
+        return overclaims(self.problem)
+
+    def formulate(self, cases: Sequence[Case], damping_ratio: float | None = None) -> NLP:
+        """The NLP of the problem on this part of the box."""
+        nlp = self.family.formulate(self.problem, cases, damping_ratio)
+        return narrowed(nlp, self.part) if self.part is not self.problem else nlp
+
+    def ipopt(self, nlp: NLP, start: str) -> Callable[..., Run]:
+        """A solver of an NLP; see `formulation.ipopt`."""
+        return self.family.ipopt(nlp, self.options, start)
+
+    def design_at(self, x: Array) -> dict[str, float]:
+        """The free parameters at a point of an NLP, inside the part of the box."""
+        return design_of(self.part, x.tolist())
+
+    def recheck(self, parameters: Mapping[str, float], cases: Sequence[Case]) -> Checked:
+        """What a design is in the given cases; see `checks.recheck`."""
+        return recheck(self.problem, parameters, cases, self.family.around(self.problem, parameters))
+
+    def parts(self) -> "tuple[Workspace, ...]":
+        """The parts into which a parameter with two sides divides the box, positive values first."""
+        of = self.problem.parameter_set
+        for name, (lower, upper) in self.problem.free.items():
+            names = of[name].sides
+            if names is not None and lower < -_THIN and upper > _THIN:
+                halves = ((names[1], (0.0, upper)), (names[0], (lower, 0.0)))
+                return tuple(replace(self, part=_on(self.problem, name, ends), name=side) for side, ends in halves)
+        return (self,)
+
+    def holds(self, design: Mapping[str, float]) -> bool:
+        """Whether a design, as far as it is given, is on this part."""
+        return all(lower <= design.get(n, lower) <= upper for n, (lower, upper) in self.part.free.items())
+
+
+def workspace(problem: Problem, options: Options = DEFAULTS, family: Family | None = None) -> Workspace:
+    """The workspace of a problem in its whole box."""
+    return Workspace(problem, problem, options, family or Family())
+
+
+def _on(problem: Problem, name: str, ends: tuple[float, float]) -> Problem:
+    """The problem with a smaller range of one parameter, and its start where that fits."""
+    inside = all(ends[0] <= v <= ends[1] for n, v in problem.start.items() if n == name)
+    return replace(problem, free={**problem.free, name: ends}, start=problem.start if inside else {})
+
+
+def narrowed(nlp: NLP, problem: Problem) -> NLP:
+    """An NLP with the box of a problem that has the same free parameters."""
+    of = problem.parameter_set
+    lower, upper = list(nlp.lower), list(nlp.upper)
+    for k, (name, ends) in enumerate(problem.free.items()):
+        lower[k], upper[k] = (float(np.tan(e)) if of[name].tangent else e for e in ends)
+    return replace(nlp, lower=tuple(lower), upper=tuple(upper))
 
 
 def _kept(known: OrderedDict[Hashable, T], key: Hashable, make: Callable[[], T], most: int = _KEPT) -> T:

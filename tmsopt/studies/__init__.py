@@ -4,12 +4,12 @@ In: a study file, or `Study`. Out: `Results`, kept row by row in a store that su
 then `run`; `engines` carries rows out, `store` keeps them.
 """
 
-from tmsopt.studies.export import ENDINGS, check_export, columns, export
+from tmsopt.studies.export import FORMATS, check_export, columns, export
 from tmsopt.studies.load import load_study
 from tmsopt.studies.monte_carlo import Sampling, monte_carlo, planned
 from tmsopt.studies.neighbours import blocks
 from tmsopt.studies.row import Row
-from tmsopt.studies.run import Results, run_study
+from tmsopt.studies.run import Results, fill, run_study
 from tmsopt.studies.samples import Span, grid, latin_hypercube, sobol, sobol_note
 from tmsopt.studies.solving import Solver, alone
 from tmsopt.studies.study import Study, definition, over_grid
@@ -17,31 +17,7 @@ from tmsopt.studies.summary import Share, summary, wilson, yield_of
 from tmsopt.studies.vary import read_csv
 
 __all__ = [
-    "ENDINGS",
-    "Results",
-    "Row",
-    "Sampling",
-    "Share",
-    "Solver",
-    "Span",
-    "Study",
-    "alone",
-    "blocks",
-    "check_export",
-    "columns",
-    "definition",
-    "export",
-    "grid",
-    "latin_hypercube",
-    "load_study",
-    "monte_carlo",
-    "over_grid",
-    "planned",
-    "read_csv",
-    "run_study",
-    "sobol",
-    "sobol_note",
-    "summary",
-    "wilson",
-    "yield_of",
-]
+    "FORMATS", "Results", "Row", "Sampling", "Share", "Solver", "Span", "Study", "alone", "blocks", "check_export",
+    "columns", "definition", "export", "fill", "grid", "latin_hypercube", "load_study", "monte_carlo", "over_grid",
+    "planned", "read_csv", "run_study", "sobol", "sobol_note", "summary", "wilson", "yield_of",
+]  # fmt: skip

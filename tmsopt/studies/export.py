@@ -48,13 +48,24 @@ class _Sparse:
         return Column(values, present)
 
 
-ENDINGS = ("csv", "parquet", "nc")
+@dataclass(frozen=True)
+class Format:
+    """How rows are written to a file of one ending.
+
+    Attributes:
+        write: takes header → column, the path, and metadata as JSON.
+        needs: modules that the extra ``data`` brings.
+    """
+
+    write: Callable[[Mapping[str, Column], Path, str], None]
+    needs: tuple[str, ...] = ()
+
 
 _CHUNK = 10_000  # rows turned into text at once
 
 
 def export(rows: Iterable[Row], path: Path | str, metadata: Mapping[str, Any] | None = None) -> None:
-    """Write rows to a file whose ending says how: ``.csv``, ``.parquet`` or ``.nc``; doubles come back bit by bit.
+    """Write rows to a file whose ending says how, one of `FORMATS`; doubles come back bit by bit.
 
     Headers are those of `columns`. A blank in CSV is nan or absent; Parquet has null for what is absent; netCDF nan, on
     the dimension ``row``, and where the rows fill a grid also in the group ``grid``, over the values that vary.
@@ -70,7 +81,7 @@ def export(rows: Iterable[Row], path: Path | str, metadata: Mapping[str, Any] | 
     check_export(path)
     try:
         with whole(path) as temporary:
-            _WRITERS[_ending(path)](columns(rows), temporary, json.dumps(metadata or {}))
+            FORMATS[_ending(path)].write(columns(rows), temporary, json.dumps(metadata or {}))
     except OSError as error:
         raise InputError([Fault(f"cannot be written: {error.strerror or error}", file=str(path))]) from error
 
@@ -81,13 +92,13 @@ def check_export(path: Path) -> None:
     Raises:
         InputError: for another ending, a missing package or folder, or what is there and is no file.
     """
-    if _ending(path) not in _WRITERS:
-        accepted = ", ".join(f".{e}" for e in ENDINGS)
+    if _ending(path) not in FORMATS:
+        accepted = ", ".join(f".{e}" for e in FORMATS)
         raise InputError([Fault(f"found '{path}'; accepted: a file name ending in {accepted}", ("export",))])
     if (path.exists() and not path.is_file()) or not path.parent.is_dir():
         problem = "is no regular file" if path.exists() else "is in a folder that does not exist"
         raise InputError([Fault(f"'{path}' {problem}; give the path of a file to write", ("export",))])
-    for module in _NEEDED.get(_ending(path), ()):
+    for module in FORMATS[_ending(path)].needs:
         _needed(module)
 
 
@@ -165,15 +176,12 @@ def _needed(module: str) -> Any:
         raise InputError([Fault(message, ("export",))]) from error
 
 
-_NEEDED = {"parquet": ("pyarrow", "pyarrow.parquet"), "nc": ("xarray", "netCDF4")}
-
-_NEEDED = {"parquet": ("pyarrow", "pyarrow.parquet"), "nc": ("xarray", "netCDF4")}
-
-_WRITERS: Mapping[str, Callable[[Mapping[str, Column], Path, str], None]] = {
-    "csv": _csv,
-    "parquet": _parquet,
-    "nc": _netcdf,
+FORMATS: Mapping[str, Format] = {
+    "csv": Format(_csv),
+    "parquet": Format(_parquet, ("pyarrow", "pyarrow.parquet")),
+    "nc": Format(_netcdf, ("xarray", "netCDF4")),
 }
+"""Ending → format; another one is added here."""
 
 
 def columns(rows: Iterable[Row]) -> dict[str, Column]:

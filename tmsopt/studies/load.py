@@ -8,12 +8,12 @@ from typing import Any
 
 from pydantic import Field, StrictBool, StrictInt, StrictStr
 
-from tmsopt.design.files import load, posed
+from tmsopt.design.files import posed, question_of
 from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.toml import Key, Number, Page, Section, fitted, read_page, within
 from tmsopt.design.units import with_unit
 from tmsopt.errors import Fault, InputError, short, suggest
-from tmsopt.solver.multistart import STARTS
+from tmsopt.formulation.options import STARTS
 from tmsopt.studies.monte_carlo import DISTRIBUTIONS, Sampling
 from tmsopt.studies.study import Study
 from tmsopt.studies.validate import METHODS, MOST_ROWS, common_faults, count_faults, name_fault
@@ -139,10 +139,12 @@ def _problem(page: Page) -> tuple[list[Fault], Problem | None]:
     stated = page.data.get("problem")
     if isinstance(stated, dict):
         faults, problem = posed(stated, str(page.data.get("title", "")) or Path(page.file).stem)
+        if problem is not None and not problem.pareto:
+            faults += unasked(problem)
         faults = within("problem", faults)
     elif isinstance(stated, str):
         try:
-            faults, problem = [], load(Path(page.file).parent / stated)
+            faults, problem = [], question_of(Path(page.file).parent / stated, front=True)
         except InputError as error:
             faults, problem = [f if f.line else _of_problem_file(stated, f) for f in error.faults], None
     else:

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.problem import Problem, checked, unasked
+from tmsopt.design.files import Given, problem_of
+from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.solution import NotSolved, Solution
 from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.formulation.options import STARTS
 from tmsopt.records import Column, Table
-from tmsopt.solver.multistart import STARTS
-from tmsopt.solver.solve import solve
+from tmsopt.solver.solve import solve, solved
 from tmsopt.studies.study import Study
 from tmsopt.studies.validate import MOST_ROWS, common_faults, count_faults
 
@@ -49,7 +50,8 @@ class Sampling:
     report: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        problem = checked(self.problem)
+        problem = problem_of(self.problem)
+        object.__setattr__(self, "problem", problem)
         found = [*unasked(problem), *_tolerance_faults(problem, self.tolerances or problem.tolerances)]
         found += [
             *common_faults(problem, self.seed, self.starts, self.report),
@@ -83,7 +85,7 @@ def planned(asked: Study | Sampling, progress: Callable[[int, int], None] | None
 
 
 def monte_carlo(
-    design: Solution,
+    design: Given,
     rows: int,
     seed: int = 0,
     distribution: str = "uniform",
@@ -99,16 +101,18 @@ def monte_carlo(
     meets them. The first rows of a longer study are those of a shorter one.
 
     Args:
+        design: a solution; or a problem or its file, solved first.
         tolerances: parameter → how far it may be off either way; those of the design's problem where None.
 
     Raises:
         NotSolved: for a design that is not optimal.
         InputError: listing everything else that is wrong.
     """
-    if design.status != "optimal":
-        raise NotSolved(design)
-    stated = design.problem.tolerances if tolerances is None else tolerances
-    drawn, notes = _as_built(design)
+    solution = solved(design)
+    if solution.status != "optimal":
+        raise NotSolved(solution)
+    stated = solution.problem.tolerances if tolerances is None else tolerances
+    drawn, notes = _as_built(solution)
     found = [*_tolerance_faults(drawn, stated), *_draw_faults(rows, distribution), *count_faults("seed", seed, 0)]
     if found := found or _room_faults(drawn, stated):
         raise InputError(found)
@@ -120,7 +124,7 @@ def monte_carlo(
     return Study(
         problem=drawn,
         columns=columns,
-        title=title or design.problem.title,
+        title=title or solution.problem.title,
         seed=seed,
         report=report,
         method="monte_carlo",
@@ -131,7 +135,7 @@ def monte_carlo(
 def _as_built(design: Solution) -> tuple[Problem, tuple[str, ...]]:
     """The design's problem with everything fixed and nothing asked that no product can meet; what was left out."""
     problem = design.problem
-    equal = [name for name, condition in problem.conditions.items() if condition.comparison == "=="]
+    equal = [name for name, condition in problem.conditions.items() if condition.equality]
     left_out = equal + ([f"the pattern {problem.locate}"] if problem.locate else [])
     notes = (f"left out, for no drawn design meets it exactly: {', '.join(left_out)}",) if left_out else ()
     fixed = replace(

@@ -29,11 +29,10 @@ def _to_and_fro(study: Study) -> Integers:
     sizes = tuple((study.grid_shape or {}).values())
     place = np.arange(len(study))
     digits, stride = [], len(study)
-    for size, (axis, column) in zip(sizes, enumerate(study.columns.values()), strict=True):
+    for size, values in zip(sizes, study.axes.values(), strict=True):
         stride //= size
         turn, step = np.divmod(place // stride, size)
         step = np.where(turn % 2 == 1, size - 1 - step, step)
-        values = np.moveaxis(np.asarray(column).reshape(sizes), axis, 0).reshape(size, -1)[:, 0]
         digits.append(np.argsort(values, kind="stable")[step])
     return np.ravel_multi_index(tuple(digits), sizes).astype(np.int64)
 

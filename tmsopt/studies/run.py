@@ -15,6 +15,7 @@ from tmsopt.records import Progress
 from tmsopt.studies.engines import Note, Unit, cluster, cores, in_process, processes
 from tmsopt.studies.engines.work import silent
 from tmsopt.studies.export import columns, export
+from tmsopt.studies.load import load_study
 from tmsopt.studies.monte_carlo import Sampling, planned
 from tmsopt.studies.neighbours import blocks
 from tmsopt.studies.row import Row
@@ -23,8 +24,8 @@ from tmsopt.studies.store.store import Store, open_store
 from tmsopt.studies.study import Study, definition
 from tmsopt.studies.summary import Summary, summary
 
-_COMMIT = 0.2
-"""s of rows in one transaction: what a kill may cost, and some 20 times what a transaction takes."""
+_COMMIT = 1.0
+"""s of rows in one transaction: what a kill may cost, and some 30 times what a transaction takes."""
 
 _FEW = 32  # rows for which no workers are started unless asked for: they take seconds to come up
 
@@ -70,7 +71,7 @@ class Results:
 
 
 def run_study(
-    study: Study | Sampling,
+    study: Study | Sampling | str | PathLike[str],
     store: str | PathLike[str] | None = None,
     *,
     workers: int | None = None,
@@ -84,8 +85,9 @@ def run_study(
     The rows are the same, bit by bit, whoever solves them and in whatever order.
 
     Args:
-        store: path of an SQLite file that keeps each row as soon as it is solved; the same call goes on after an
-            interruption. Rows are held in memory only, without it.
+        study: or the path of its file.
+        store: path of an SQLite file that keeps the rows as they are solved, once a second; the same call goes on after
+            an interruption. Rows are held in memory only, without it.
         workers: processes of this machine; 1 solves in this one. By default as many as cores, or 1 for few rows.
         scheduler: address of a Dask scheduler, such as ``tcp://host:8786``, in place of workers.
         fresh: move a store that is there aside, and start anew.
@@ -96,9 +98,10 @@ def run_study(
         InputError: for a store of another study, and whatever else cannot be done as asked.
         NotSolved: where a Monte Carlo study has no design to draw around.
     """
-    if faults := list(_faults(study, workers)):
+    stated = load_study(study) if isinstance(study, str | PathLike) else study
+    if faults := list(_faults(stated, workers)):
         raise InputError(faults)
-    asked = planned(study)
+    asked = planned(stated)
     if store is None:
         kept: list[Row] = []
         began, engine, solved = time.perf_counter(), "", 0
@@ -118,9 +121,7 @@ def run_study(
 def _faults(study: object, workers: object) -> Iterator[Fault]:
     """What is wrong with the call."""
     if not isinstance(study, Study | Sampling):
-        message = (
-            f"found {short(study)}; accepted: a Study, such as tmsopt.load_study(FILE) or tmsopt.over_grid(problem, …)"
-        )
+        message = f"found {short(study)}; accepted: a Study, as of tmsopt.over_grid, or the path of a study file"
         yield Fault(message, ("study",))
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
         yield Fault(f"found {workers!r}; accepted: a whole number, 1 or more", ("workers",))

@@ -104,7 +104,7 @@ class Solver:
         """Whether one solution of a row beats another by more than rounding."""
         if one.status != "optimal" or other.status != "optimal":
             return one.status == "optimal" and other.status != "optimal"
-        sign = -1.0 if self.study.problem.sense == "maximize" else 1.0
+        sign = self.study.problem.sign
         return sign * one.objective < sign * other.objective and not same(one.objective, other.objective)
 
     def _answer(self, number: int, neighbour: Row | None = None, afar: int = 0) -> Answer:

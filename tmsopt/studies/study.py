@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 
 from tmsopt.design.cases import Band
+from tmsopt.design.files import Given, problem_of
 from tmsopt.design.limit import with_limit
 from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
-from tmsopt.records import Column, Table
-from tmsopt.solver.multistart import STARTS
+from tmsopt.formulation.options import STARTS
+from tmsopt.records import Array, Column, Table
 from tmsopt.studies.samples import grid
 from tmsopt.studies.validate import faults
 
@@ -65,6 +66,15 @@ class Study:
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
 
+    @property
+    def axes(self) -> dict[str, Array]:
+        """Of a full grid, axis → its values in their order."""
+        found, stride = {}, len(self)
+        for name, size in (self.grid_shape or {}).items():
+            stride //= size
+            found[name] = np.asarray(self.columns[name])[: size * stride : stride]
+        return found
+
     def varied(self, row: int) -> Table[float]:
         """What the study gives a row, counted from 0.
 
@@ -103,7 +113,7 @@ class Study:
 
 
 def over_grid(
-    problem: Problem,
+    problem: Given,
     axes: Mapping[str, Sequence[float]],
     *,
     title: str = "",
@@ -118,7 +128,7 @@ def over_grid(
         InputError: listing everything that is wrong with it.
     """
     return Study(
-        problem=problem,
+        problem=problem_of(problem),
         columns=grid(axes),
         title=title,
         seed=seed,
@@ -149,12 +159,7 @@ def definition(study: Study) -> dict[str, Any]:
 def _columns(study: Study) -> dict[str, Any]:
     if study.grid_shape is None:
         return {"columns": {name: list(column) for name, column in study.columns.items()}}
-    sizes = tuple(study.grid_shape.values())
-    axes = {}
-    for axis, (name, column) in enumerate(study.columns.items()):
-        values = np.moveaxis(np.asarray(column).reshape(sizes), axis, 0)
-        axes[name] = values.reshape(sizes[axis], -1)[:, 0].tolist()
-    return {"grid": axes, "axes": list(axes)}
+    return {"grid": {name: values.tolist() for name, values in study.axes.items()}, "axes": list(study.axes)}
 
 
 def _problem(problem: Problem) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
-from tmsopt.records import Table
+from tmsopt.records import Table, plain
 from tmsopt.studies.row import STATUSES, Row
 from tmsopt.studies.study import Study
 
@@ -35,8 +35,7 @@ class Share:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
-        low, high = self.interval
-        return {"count": self.count, "of": self.of, "share": self.share if self.of else None, "interval": [low, high]}
+        return plain(self, "count of share interval")
 
 
 @dataclass(frozen=True)
@@ -60,13 +59,7 @@ class Yield:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
-        return {
-            "stable": self.stable.to_json(),
-            "feasible": self.feasible.to_json(),
-            "good": self.good.to_json(),
-            "failed": self.failed,
-            "abscissa": {q: v if math.isfinite(v) else None for q, v in self.abscissa.items()},
-        }
+        return plain(self)
 
 
 _AMOUNT = re.compile(r" by [-+\d.e]+")
@@ -107,17 +100,9 @@ class Summary:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
+        spread = {n: dict(zip(("min", "median", "max"), ends, strict=True)) for n, ends in self.spread.items()}
         return {
-            "rows": self.rows,
-            "counts": dict(self.counts),
-            "best": None if self.best is None else self.best.to_json(),
-            "causes": dict(self.causes),
-            "spread": {n: dict(zip(("min", "median", "max"), ends, strict=True)) for n, ends in self.spread.items()},
-            "stable": self.stable,
-            "structures": dict(self.structures),
-            "proven": self.proven,
-            "warm": self.warm,
-            "laws": dict(self.laws),
+            **(plain(self, "rows counts best causes spread stable structures proven warm laws") | {"spread": spread}),
             "row_seconds": round(self.seconds, 4),
             **({"monte_carlo": self.product.to_json()} if self.product else {}),
         }
@@ -128,7 +113,7 @@ def summary(study: Study, rows: Iterable[Row]) -> Summary:
     known = list(rows)
     optimal = [row for row in known if row.status == "optimal"]
     counts = Counter(row.status for row in known)
-    sign = -1.0 if study.problem.sense == "maximize" else 1.0
+    sign = study.problem.sign
     ranked = [row for row in optimal if math.isfinite(row.objective)]
     laws: dict[str, float] = {}
     for row in known:

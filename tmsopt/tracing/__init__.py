@@ -4,7 +4,7 @@ In: a problem whose pattern leaves one freedom. Out: `Trace` with `Branch`es, `D
 first; `continuation` follows one curve, `seeds` finds where to begin, `events` names what happens on it.
 """
 
-from tmsopt.tracing.branch import Branch, Trace, varying, write_csv
+from tmsopt.tracing.branch import Branch, Event, Trace
 from tmsopt.tracing.continuation import (
     End,
     between,
@@ -22,23 +22,6 @@ from tmsopt.tracing.swallowtail import Swallowtail, swallowtail
 from tmsopt.tracing.trace import trace
 
 __all__ = [
-    "Branch",
-    "Domain",
-    "End",
-    "Swallowtail",
-    "Trace",
-    "between",
-    "both_ways",
-    "contains",
-    "crossing",
-    "curve",
-    "domain",
-    "project",
-    "same",
-    "swallowtail",
-    "tangent_at",
-    "trace",
-    "varying",
-    "walk",
-    "write_csv",
-]
+    "Branch", "Domain", "End", "Event", "Swallowtail", "Trace", "between", "both_ways", "contains", "crossing",
+    "curve", "domain", "project", "same", "swallowtail", "tangent_at", "trace", "walk",
+]  # fmt: skip

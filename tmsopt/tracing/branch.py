@@ -1,19 +1,16 @@
 """A traced curve of a root pattern as data: points, tangents, labels, events."""
 
-import csv
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from os import PathLike
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
-from tmsopt.records import Array, Table
-
-SCHEMA = 1
+from tmsopt.disk import write_csv
+from tmsopt.records import Array, Table, plain
 
 
 @dataclass(frozen=True)
@@ -90,10 +87,6 @@ class Branch:
             }
 
     def _told_apart(self, unknown: str) -> str:
-        """The name of an unknown, with the pattern's before it where a parameter has it too."""
-        return f"{self.pattern}.{unknown}" if unknown in self.parameters else unknown
-
-    def _column(self, unknown: str) -> str:
         """The name of an unknown's column, told from a parameter of the same name, such as a damping c."""
         return f"{self.pattern}.{unknown}" if unknown in self.parameters else unknown
 
@@ -102,18 +95,11 @@ class Branch:
         columns: dict[str, list[Any]] = {}
         for row in self.rows():
             for name, value in row.items():
-                columns.setdefault(name, []).append(_finite(value))
-        return {
-            "pattern": self.pattern,
-            "closed": self.closed,
-            "points": len(self),
-            "residual": self.residual,
-            "events": [
-                {"name": e.name, "detail": e.detail, "index": e.index, "parameters": dict(e.parameters)}
-                for e in self.events
-            ],
-            "columns": columns,
-        }
+                columns.setdefault(name, []).append(value)
+        found = plain(self, "pattern closed")
+        found |= {"points": len(self), "residual": self.residual}
+        events = [plain(event, "name detail index parameters") for event in self.events]
+        return found | {"events": events, "columns": plain(columns)}
 
 
 @dataclass(frozen=True)
@@ -142,47 +128,33 @@ class Trace:
         """Events of all branches."""
         return tuple(e for b in self.branches for e in b.events)
 
+    @property
+    def varying(self) -> list[str]:
+        """The free parameters, those that stay the same on every branch last."""
+
+        def moves(name: str) -> bool:
+            low, high = self.problem.free[name]
+            return any(np.ptp(b.parameters[name]) > 1e-9 * (high - low) for b in self.branches)
+
+        return sorted(self.problem.free, key=lambda name: not moves(name))
+
+    def write_csv(self, path: str | PathLike[str]) -> None:
+        """All branches in one table, a column `branch` before the others.
+
+        Raises:
+            OSError: when the file cannot be written.
+        """
+        write_csv(path, [{"branch": k, **row} for k, branch in enumerate(self.branches) for row in branch.rows()])
+
     def to_json(self) -> dict[str, Any]:
         """The JSON of `tmsopt trace`."""
         return {
-            "schema": SCHEMA,
-            "title": self.problem.title,
-            "model": self.problem.model.name,
+            **self.problem.heading,
             "pattern": self.pattern,
             "free": list(self.problem.free),
-            "branches": [b.to_json() for b in self.branches],
-            "starts": self.starts,
-            "points": self.points,
-            "seconds": self.seconds,
+            **plain(self, "branches starts points seconds"),
             "seconds_per_point": self.seconds_walking / max(self.points, 1),
         }
-
-
-def write_csv(trace: Trace, path: Path) -> None:
-    """All branches in one table, a column `branch` before the others.
-
-    Raises:
-        OSError: when the file cannot be written.
-    """
-    rows = [{"branch": k, **row} for k, branch in enumerate(trace.branches) for row in branch.rows()]
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.DictWriter(stream, fieldnames=list(rows[0]) if rows else ["branch"])
-        writer.writeheader()
-        writer.writerows(rows)
-
-
-def _finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def varying(trace: Trace) -> list[str]:
-    """The free parameters, those that stay the same on every branch last."""
-
-    def moves(name: str) -> bool:
-        low, high = trace.problem.free[name]
-        return any(np.ptp(b.parameters[name]) > 1e-9 * (high - low) for b in trace.branches)
-
-    return sorted(trace.problem.free, key=lambda name: not moves(name))
 
 
 def kinds_along(branch: Branch) -> list[str]:

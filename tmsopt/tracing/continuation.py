@@ -28,6 +28,7 @@ _SOLVED = 1e-10
 
 _FINE = 1e-17
 _FAR = 1e6  # in units of the scale; further out the equations lose their digits
+_FADING = 1e5  # there a step that fails has lost them already: which one does is up to rounding, the limit is not
 _SAME = 1e-7
 _EDGE = 1e-12  # of a variable of order 1: rounding beside a limit that a curve lies in
 CLOSED = "closed"
@@ -181,7 +182,7 @@ def walk(on: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
                 break  # nan does not come here
             s /= 2
             if s < _SMALLEST:
-                return _ended(ys, ts, End(SINGULAR))
+                return _ended(ys, ts, End(INFINITE if np.abs(y).max() > _FADING else SINGULAR))
         if len(ys) > 2 and 0 < ahead <= s and far <= 2 * s and advance.returns(y, t, ahead):
             return _ended([*ys, ys[0]], [*ts, ts[0]], End(CLOSED))
         if slack < 0 and not _along(on, new, tangent):

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.design.problem import Problem, checked
-from tmsopt.records import Array
+from tmsopt.design.files import Given, problem_of
+from tmsopt.design.problem import Problem
+from tmsopt.records import Array, plain
 from tmsopt.roots import pattern, real_roots
 from tmsopt.roots.meetings import nearest_two
 from tmsopt.tracing.branch import Branch, Event
@@ -72,22 +73,16 @@ class Domain:
 
     def to_json(self) -> dict[str, Any]:
         """Arcs as columns of their parameters."""
-        return {
-            name: [{"kind": arc.kind, "points": {n: c.tolist() for n, c in arc.points.items()}} for arc in arcs]
-            for name, arcs in (
-                ("stability", self.stability),
-                ("heavy_damping", self.heavy_damping),
-                ("parting", self.parting),
-            )
-        } | {"corners": [{"name": c.name, "detail": c.detail, **c.parameters} for c in self.corners]}
+        corners = [{"name": c.name, "detail": c.detail, **c.parameters} for c in self.corners]
+        return plain(self, "stability heavy_damping parting") | {"corners": corners}
 
 
-def domain(problem: Problem, *, step: float = STEP, starts: int = STARTS, seed: int = 0) -> Domain:
+def domain(problem: Given, *, step: float = STEP, starts: int = STARTS, seed: int = 0) -> Domain:
     """Boundaries of stability and of heavy damping in the plane of the two free parameters.
 
     Constraints of the problem are left aside. `step`, `starts` and `seed` are those of `trace`.
     """
-    plane = replace(checked(problem), constraints={}, minimize=None, maximize=None, locate=None)
+    plane = replace(problem_of(problem), constraints={}, minimize=None, maximize=None, locate=None)
     found = {
         name: [b for b in trace(plane, name, step=step, starts=starts, seed=seed).branches if not _in_edge(b, plane)]
         for name in ("weave", "capsize", "EP2")

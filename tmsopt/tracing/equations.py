@@ -14,8 +14,7 @@ from tmsopt.formulation.formulate import matching, variables_of
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import spread
 from tmsopt.records import Array
-from tmsopt.roots import Pattern, roots
-from tmsopt.roots import pattern as pattern_of
+from tmsopt.roots import Pattern, pattern as pattern_of, roots
 from tmsopt.tracing.continuation import Curve, curve
 
 _SAMPLE = 32  # designs by which sizes are judged
@@ -65,7 +64,7 @@ class Traced:
 def prepare(problem: Problem) -> Traced:
     """The equations of a pattern problem, compiled for tracing."""
     pattern = pattern_of(str(problem.locate), problem.model.degree)
-    equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].comparison == "=="}
+    equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].equality}
     nlp = matching(replace(problem, constraints=equalities))
     free = len(problem.free)
     unknowns = slice(free, free + len(pattern.unknowns))

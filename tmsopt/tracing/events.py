@@ -11,8 +11,7 @@ import numpy as np
 from tmsopt.design.problem import Problem
 from tmsopt.models import Values
 from tmsopt.records import Array, Table
-from tmsopt.roots import Pattern, roots
-from tmsopt.roots import pattern as pattern_of
+from tmsopt.roots import Pattern, pattern as pattern_of, roots
 from tmsopt.roots.patterns.pattern import mean_size
 from tmsopt.tracing.branch import Branch, Event
 from tmsopt.tracing.continuation import CLOSED, Curve, End, Walk, project

@@ -101,11 +101,8 @@ def _rows(factor: list[Any], count: int) -> Array:
 def satisfied(problem: Problem, values: Values, count: int) -> Truth:
     inside = np.ones(count, dtype=bool)
     for condition in problem.conditions.values():
-        difference = np.broadcast_to(np.asarray(condition(values), dtype=float), count)
-        if condition.comparison == "<=":
-            inside &= difference <= 0
-        elif condition.comparison == ">=":
-            inside &= difference >= 0
+        if not condition.equality:
+            inside &= condition.holds(np.broadcast_to(np.asarray(condition(values), dtype=float), count))
     return inside
 
 
@@ -132,7 +129,7 @@ def marks(problem: Problem, pattern: Pattern, unknowns: slice, within: Sequence[
     for k, parameter in enumerate(problem.free):
         yield Mark("fold", parameter, of_tangent(k))
     for name, condition in problem.conditions.items():
-        if condition.comparison != "==":
+        if not condition.equality:
             yield Mark("constraint", name, _condition(problem, pattern, unknowns, condition))
 
 

@@ -117,11 +117,7 @@ def _blocks(count: int, size: int = 256) -> Iterator[slice]:
 
 
 def seeds(
-    ready: Traced,
-    starts: int,
-    seed: int,
-    through: Sequence[Mapping[str, float]],
-    lines: Sequence[Mapping[str, Array]],
+    ready: Traced, starts: int, seed: int, through: Sequence[Mapping[str, float]], lines: Sequence[Mapping[str, Array]]
 ) -> Iterator[tuple[int, Array | None]]:
     """Points of the pattern's curve in the box, found from many designs, and the number of these; None where one fails.
 

@@ -12,6 +12,7 @@ from itertools import groupby
 import numpy as np
 from scipy.optimize import brentq
 
+from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
 from tmsopt.records import Array
@@ -63,7 +64,7 @@ class Swallowtail:
     crossing: Trace
 
 
-def swallowtail(problem: Problem, rows: int = 48, across: int = 24, starts: int = STARTS) -> Swallowtail:
+def swallowtail(problem: Given, rows: int = 48, across: int = 24, starts: int = STARTS) -> Swallowtail:
     """The surface of real negative double roots in the box of three free parameters: one, and an affine pair.
 
     Args:
@@ -76,6 +77,7 @@ def swallowtail(problem: Problem, rows: int = 48, across: int = 24, starts: int 
         InputError: for another number of free parameters, coefficients that are not affine in two of them, or a
             model of degree 2 or 3, whose roots cannot meet two by two.
     """
+    problem = problem_of(problem)
     if problem.model.degree < _LEAST:
         message = (
             f"model '{problem.model.name}' has degree {problem.model.degree}; accepted: {_LEAST} or more, for a "
@@ -153,10 +155,7 @@ class _Affine:
 
 def _on_surface(parts: tuple[Array, Array, Array], r: Array) -> tuple[Array, Array]:
     """x and y for which r is a double root: p(r) = p′(r) = 0 by Cramer's rule."""
-    (A, B, C), (dA, dB, dC) = (
-        [np.polyval(p, r) for p in parts],
-        [np.polyval(np.polyder(p), r) for p in parts],
-    )
+    (A, B, C), (dA, dB, dC) = ([np.polyval(p, r) for p in parts], [np.polyval(np.polyder(p), r) for p in parts])
     with np.errstate(all="ignore"):
         size = B * dC - C * dB
         return (C * dA - A * dC) / size, (A * dB - B * dA) / size

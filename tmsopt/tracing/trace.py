@@ -8,7 +8,8 @@ from itertools import chain
 
 import numpy as np
 
-from tmsopt.design.problem import Problem, checked, freedom
+from tmsopt.design.files import Given, problem_of
+from tmsopt.design.problem import Problem, freedom
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.records import Array
 from tmsopt.roots import pattern as pattern_of
@@ -27,7 +28,7 @@ MOST = 200_000
 
 
 def trace(
-    problem: Problem,
+    problem: Given,
     pattern: str | None = None,
     *,
     step: float = STEP,
@@ -53,7 +54,7 @@ def trace(
         InputError: for an unknown pattern, when the equations do not leave a curve, or for options out of range.
     """
     began = time.perf_counter()
-    problem = _asked(checked(problem), pattern)
+    problem = _asked(problem_of(problem), pattern)
     _check(problem, step, starts, most, through)
     ready = prepare(problem)
     walks: list[Walk] = []

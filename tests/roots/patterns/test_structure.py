@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 import sympy
 from helpers.oracles import abscissa_60, certified_roots, exact_multiplicities, roots_60
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from mpmath import mp
 from scipy.optimize import linprog
 

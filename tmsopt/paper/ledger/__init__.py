@@ -3,11 +3,12 @@
 In: nothing but the paper's own claims, a room per section. Out: a `Ledger` with a verdict on each. Open `entry` first.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from fnmatch import fnmatchcase
 
 import flint
 
+from tmsopt.errors import Fault, InputError
 from tmsopt.paper.ledger import (
     abscissa,
     benchmark,
@@ -25,21 +26,12 @@ from tmsopt.paper.ledger import (
 from tmsopt.paper.ledger.algebra import PRECISION
 from tmsopt.paper.ledger.entry import VERDICTS, Claim, Entry, Ledger, decimal, entry_of, proof, universal
 from tmsopt.paper.ledger.stability import BACKWARD, WITNESS
+from tmsopt.records import Progress
 
 __all__ = [
-    "BACKWARD",
-    "CLAIMS",
-    "VERDICTS",
-    "WITNESS",
-    "Claim",
-    "Entry",
-    "Ledger",
-    "decimal",
-    "matching",
-    "proof",
-    "universal",
-    "verify",
-]
+    "BACKWARD", "CLAIMS", "VERDICTS", "WITNESS", "Claim", "Entry", "Ledger", "decimal", "matching", "proof",
+    "universal", "verify",
+]  # fmt: skip
 
 SOURCE = "O. N. Kirillov, Localizing EP sets in dissipative systems and the self-stability of bicycles (2018)"
 
@@ -55,8 +47,15 @@ def matching(only: Sequence[str] = ()) -> tuple[Claim, ...]:
     return tuple(c for c in CLAIMS if not only or any(fnmatchcase(c.key, pattern) for pattern in only))
 
 
-def verify(progress: Callable[[int, int], None] | None = None, only: Sequence[str] = ()) -> Ledger:
-    """Compute the ledger, or the entries whose keys match one of the given patterns."""
+def verify(progress: Progress | None = None, only: Sequence[str] = ()) -> Ledger:
+    """Compute the ledger, or the entries whose keys match one of the given patterns.
+
+    Raises:
+        InputError: for a pattern that no key matches.
+    """
+    for pattern in only:
+        if not matching([pattern]):
+            raise InputError([Fault(f"found '{pattern}'; accepted: a key of the ledger, or a pattern", ("--only",))])
     chosen = matching(only)
     entries = []
     for done, claim in enumerate(chosen, 1):

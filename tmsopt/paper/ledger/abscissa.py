@@ -1,15 +1,12 @@
 """Section 2.3: the least spectral abscissa and the conditions for an EP4."""
 
+from tmsopt.models.exact import Tilt
 from tmsopt.models.tms import copo, matrices
 from tmsopt.paper.ledger import printed
-from tmsopt.paper.ledger.algebra import (
-    polynomials,
-    positive,
-    q,
-    ring,
-    substitute,
-)
+from tmsopt.paper.ledger.algebra import polynomials, positive, q, ring, substitute
 from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal
+from tmsopt.paper.ledger.lemmas import critical_square, general
+from tmsopt.paper.ledger.printed import laws
 from tmsopt.paper.ledger.stability import upright_case, wrongly_admitted
 from tmsopt.roots.polynomial import product
 
@@ -29,14 +26,12 @@ def product_bound() -> bool:
 
 
 @_claim(
-    "lscf-guarantee",
-    "text",
-    "lscf guarantees asymptotic stability at Fr > Fr_c",
+    "lscf-guarantee", "text", "lscf guarantees asymptotic stability at Fr > Fr_c",
     "certified roots of a second counterexample with χ_H = 1/2, far from 1",
-)
+)  # fmt: skip
 def _guarantee() -> Outcome:
     design = tuple(q(x) for x in ("10", "1", "2", "0.5", "-1", "-0.9", "1"))
-    square, a1 = printed.flus(*design[1:]), copo(*design)[1]
+    square, a1 = critical_square(design), copo(*design)[1]
     return universal(
         "χ_H ≥ 1, or a1 > 0",
         upright_case(),
@@ -47,12 +42,10 @@ def _guarantee() -> Outcome:
 
 
 @_claim(
-    "a_min",
-    "text, of FL1999",
-    "the minimum of the spectral abscissa is a_min = ω0 = −(det P/det M)^(1/4)",
+    "a_min", "text, of FL1999", "the minimum of the spectral abscissa is a_min = ω0 = −(det P/det M)^(1/4)",
     "a polynomial identity for the product of the roots; the only polynomial that attains the bound; the benchmark "
     "geometry with rational tilt",
-)
+)  # fmt: skip
 def _least() -> Outcome:
     T = q("0.1")
     a = copo(q(1), q("0.1"), q("1.2"), q("1.02"), q("-0.4"), q("-0.2"), T)
@@ -67,10 +60,7 @@ def _least() -> Outcome:
 
 
 @_claim(
-    "w0",
-    "Eq. w0",
-    "ω0 of the TMS bicycle",
-    "det P/det M of the printed matrices, as an identity of rational functions",
+    "w0", "Eq. w0", "ω0 of the TMS bicycle", "det P/det M of the printed matrices, as an identity of rational functions"
 )
 def _w0() -> Outcome:
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T, cosine = ring(f"{_NAMES} cosine")
@@ -78,27 +68,22 @@ def _w0() -> Outcome:
     det_P, det_M = (X[0][0] * X[1][1] - X[0][1] * X[1][0] for X in (P, M))
     return proof(
         det_P / det_M == printed.w0(mu, chi_H, zeta_B, zeta_H, T),
-        "Independent of Fr and χ_B. Real only where a4/a0 ≥ 0.",
-        "det P/det M is another function.",
-    )
+        "Independent of Fr and χ_B. Real only where a4/a0 ≥ 0.", "det P/det M is another function.",
+    )  # fmt: skip
 
 
 @_claim(
-    "w0-fourfold",
-    "text after Eq. w0",
-    "if ω0 is the minimum of the spectral abscissa, it is the 4-fold root",
+    "w0-fourfold", "text after Eq. w0", "if ω0 is the minimum of the spectral abscissa, it is the 4-fold root",
     "equality in the bound for the product of the roots forces both quadratic factors to be (s − ω0)²",
-)
+)  # fmt: skip
 def _fourfold() -> Outcome:
     return proof(product_bound(), "Among quartics with the same a4/a0 only (s − ω0)⁴ has the abscissa ω0.")
 
 
 @_claim(
-    "w0-Jordan",
-    "text after Eq. w0",
-    "the 4-fold root has a Jordan block of order 4",
+    "w0-Jordan", "text after Eq. w0", "the 4-fold root has a Jordan block of order 4",
     "rank of M s² + V s + P: identities that forbid its first column to vanish at any s",
-)
+)  # fmt: skip
 def _jordan() -> Outcome:
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T, s = ring(f"{_NAMES} s")
     one = T * 0 + 1
@@ -118,16 +103,14 @@ def _jordan() -> Outcome:
 
 @_claim("4poly-expansion", "Eq. 4poly", "expansion of (s − ω0)⁴", "product of four factors, as polynomials")
 def _expansion() -> Outcome:
-    (omega0,) = polynomials("omega0")
-    return proof(product(*[[1, -omega0]] * 4) == printed.poly4(omega0), otherwise="A coefficient differs.")
+    (omega0,) = ring("omega0")
+    return proof(product(*[[1, -omega0]] * 4) == list(laws.poly4(omega0)), otherwise="A coefficient differs.")
 
 
 @_claim(
-    "a1a3",
-    "Eq. a1a3",
-    "a1 = −4 ω0 a0 and a3 = −4 ω0³ a0",
+    "a1a3", "Eq. a1a3", "a1 = −4 ω0 a0 and a3 = −4 ω0³ a0",
     "coefficients of a0 times the product of four factors s − ω0",
-)
+)  # fmt: skip
 def _a1a3() -> Outcome:
     omega0, a0 = ring("omega0 a0")
     m = product([a0], *[[1, -omega0]] * 4)
@@ -135,14 +118,11 @@ def _a1a3() -> Outcome:
 
 
 @_claim(
-    "a1a3-ratio",
-    "equation after Eq. a1a3",
-    "(ζ_B χ_H − ζ_H χ_B)/(χ_B − χ_H) = −1/ω0²",
+    "a1a3-ratio", "equation after Eq. a1a3", "(ζ_B χ_H − ζ_H χ_B)/(χ_B − χ_H) = −1/ω0²",
     "a1/a3 from the determinant, set to the ratio of the coefficients of (s − ω0)⁴",
-)
+)  # fmt: skip
 def _ratio() -> Outcome:
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
-    a = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    a, (_, _, chi_B, chi_H, zeta_B, zeta_H, _) = general()
     return proof(
         a[1] / a[3] == -(zeta_B * chi_H - zeta_H * chi_B) / (chi_B - chi_H),
         "As a1/a3 = 1/ω0² at the EP4. There Fr ≠ 0 and χ_B ≠ χ_H, since a0 ω0 ≠ 0.",
@@ -150,11 +130,9 @@ def _ratio() -> Outcome:
 
 
 @_claim(
-    "chib",
-    "Eq. chib",
-    "scaling law for χ_B at EP4",
+    "chib", "Eq. chib", "scaling law for χ_B at EP4",
     "the condition a3 = ω0² a1 solved for χ_B as a linear equation of rational functions",
-)
+)  # fmt: skip
 def _chib() -> Outcome:
     omega0, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES.replace("Fr", "omega0"))
     a = copo(1 + 0 * T, mu, chi_B, chi_H, zeta_B, zeta_H, T)
@@ -162,17 +140,16 @@ def _chib() -> Outcome:
     constant = none[3] - omega0**2 * none[1]
     slope = (a[3] - omega0**2 * a[1] - constant) / chi_B
     return proof(
-        -constant / slope == printed.chib(omega0, chi_H, zeta_B, zeta_H),
-        "The only solution, as ω0² ζ_H − 1 < 0 for ζ_H ≤ 0.",
-        "The linear equation has another solution.",
-    )
+        -constant / slope == laws.chib(omega0, chi_H, zeta_B, zeta_H),
+        "The only solution, as ω0² ζ_H − 1 < 0 for ζ_H ≤ 0.", "The linear equation has another solution.",
+    )  # fmt: skip
 
 
 @_claim("a2", "Eq. a2", "the condition a2 = 6 ω0² a0", "identity of polynomials: ζ_B times left less right side")
 def _a2() -> Outcome:
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T, omega0 = ring(f"{_NAMES} omega0")
     a = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
-    law = printed.a2(Fr, mu, chi_H, zeta_B, zeta_H, T, omega0)
+    law = laws.a2(Fr, mu, chi_H, zeta_B, zeta_H, Tilt(T), omega0)
     return proof(zeta_B * law == a[2] - 6 * omega0**2 * a[0], otherwise="The difference is not 0.")
 
 

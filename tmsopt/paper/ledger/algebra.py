@@ -1,13 +1,15 @@
 """Exact polynomials and quotients, balls, certified roots and Newton's method in balls."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
+from math import prod
 from typing import Any, TypeAlias
 
 import flint
 
 from tmsopt.arithmetic.elementary import rational
+from tmsopt.arithmetic.krawczyk import enclosed, refined
+from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.polynomial import determinant, product, shift
 from tmsopt.roots.stability import lienard_chipart
 
@@ -17,13 +19,13 @@ PRECISION = 80
 Polynomial: TypeAlias = Any  # flint.fmpq_mpoly
 Ball: TypeAlias = Any  # flint.arb
 
-_STEPS = 60
-_RADIUS = 50  # decimal digits of the box in which a solution is proved
+_SOLVED = PRECISION - 15  # decimal digits to which Newton's method goes
+_RADIUS = 50  # of the box in which a solution is proved
 
 
 def q(text: str | int) -> Any:
     """An exact fraction from decimal or fraction text."""
-    return rational(Fraction(text))
+    return rational(text)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +70,10 @@ class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap h
     def __pow__(self, n: int) -> "Quotient":
         return Quotient(self.over**n, self.under**n) if n >= 0 else Quotient(self.under**-n, self.over**-n)
 
+    def sqrt(self) -> "Quotient":
+        """The square root of a square, with positive leading coefficients."""
+        return Quotient(self.over.sqrt(), self.under.sqrt())
+
     __radd__ = __add__
     __rmul__ = __mul__
 
@@ -98,15 +104,22 @@ def vanishes(value: Quotient, modulo: Polynomial) -> bool:
 
 def evaluate(polynomial: Polynomial, at: Mapping[str, Any]) -> Ball:
     """Value of a polynomial at balls, by the names of its variables."""
+    return _evaluation(polynomial)(at)
+
+
+def _evaluation(polynomial: Polynomial) -> Callable[[Mapping[str, Any]], Ball]:
+    """Its value as a function, for those who need it often."""
     names = polynomial.context().names()
-    total = flint.arb(0)
-    for powers, coefficient in polynomial.to_dict().items():
-        term = flint.arb(coefficient)
-        for name, power in zip(names, powers, strict=True):
-            if power:
-                term *= at[name] ** power
-        total += term
-    return total
+    terms = [
+        (flint.arb(coefficient), [(name, power) for name, power in zip(names, powers, strict=True) if power])
+        for powers, coefficient in polynomial.to_dict().items()
+    ]
+
+    def value(at: Mapping[str, Any]) -> Ball:
+        each = (prod((at[name] ** power for name, power in factors), start=term) for term, factors in terms)
+        return sum(each, flint.arb(0))
+
+    return value
 
 
 def substitute(polynomial: Polynomial, values: Mapping[str, Any]) -> Polynomial:
@@ -137,6 +150,11 @@ def stable(coefficients: Sequence[Any]) -> bool:
     return all(bool(quantity > 0) for quantity in lienard_chipart(signed))
 
 
+def real_roots(coefficients: Sequence[Any]) -> int:
+    """How many of its roots are real, with multiplicity, certainly."""
+    return sum(m for z, m in isolated_roots(coefficients) if z.imag == 0)
+
+
 def stable_left_of(coefficients: Sequence[Any], gamma: Any) -> bool:
     """Whether every root lies in Re s < gamma, certainly."""
     return stable(shift(coefficients, gamma))
@@ -144,17 +162,7 @@ def stable_left_of(coefficients: Sequence[Any], gamma: Any) -> bool:
 
 def unstable(coefficients: Sequence[Any]) -> bool:
     """Whether some root lies in Re s > 0, by isolating balls around the roots."""
-    return any(bool(z.real > 0) for z, _ in roots(coefficients))
-
-
-def roots(coefficients: Sequence[Any]) -> list[tuple[Any, int]]:
-    """Certified isolating balls of the roots of a polynomial with fractions, with multiplicities."""
-    common = flint.fmpz(1)
-    for c in coefficients:
-        common = common.lcm(c.q)
-    whole: Any = flint.fmpz_poly([int(c.p * (common // c.q)) for c in reversed(coefficients)])
-    found: list[tuple[Any, int]] = whole.complex_roots()
-    return found
+    return any(bool(z.real > 0) for z, _ in isolated_roots(coefficients))
 
 
 def ball_roots(coefficients: Sequence[Ball]) -> list[Any]:
@@ -166,44 +174,31 @@ def ball_roots(coefficients: Sequence[Ball]) -> list[Any]:
 
 def heavily_damped(coefficients: Sequence[Any]) -> bool:
     """Whether all roots of a polynomial with fractions are simple, real and negative."""
-    found = roots(coefficients)
+    found = isolated_roots(coefficients)
     return all(m == 1 and z.imag == 0 and bool(z.real < 0) for z, m in found)
 
 
 # Systems of equations in balls
 
 
-def solve(equations: Sequence[Polynomial], guess: Mapping[str, float], known: Mapping[str, Any]) -> dict[str, Ball]:
-    """The solution of as many polynomial equations as unknowns near a guess, proved by interval Newton.
+def matched(
+    coefficients: Sequence[Polynomial], factors: Sequence[Sequence[Any]], guess: Mapping[str, float],
+    known: Mapping[str, Any],
+) -> dict[str, Ball]:  # fmt: skip
+    """The unknowns near a guess with which a polynomial is its leading coefficient times monic factors, proved.
 
     Raises:
         ArithmeticError: where no unique solution is proved.
     """
-    with flint.ctx.workdps(PRECISION):
-        return _solve(equations, guess, known)
-
-
-def _solve(equations: Sequence[Polynomial], guess: Mapping[str, float], known: Mapping[str, Any]) -> dict[str, Ball]:
     names = list(guess)
-    slopes = [[equation.derivative(name) for name in names] for equation in equations]
-    at = {name: flint.arb(value) for name, value in guess.items()}
+    with flint.ctx.workdps(PRECISION):
+        sides = [_evaluation(equation) for equation in _differences(coefficients, factors)]
 
-    def step(point: Mapping[str, Any], box: Mapping[str, Any]) -> list[Ball]:
-        residual = flint.arb_mat([[evaluate(e, {**known, **point})] for e in equations])
-        jacobian = flint.arb_mat([[evaluate(d, {**known, **box}) for d in row] for row in slopes])
-        return [jacobian.solve(residual)[i, 0] for i in range(len(names))]
+        def system(at: Mapping[str, Any]) -> list[Any]:
+            return [side({**known, **at}) for side in sides]
 
-    for _ in range(_STEPS):
-        moves = step(at, at)
-        at = {name: (at[name] - move).mid() for name, move in zip(names, moves, strict=True)}
-        if all(abs(move.mid()) < flint.arb(10) ** (-PRECISION + 15) for move in moves):
-            break
-    radius = flint.arb(0, flint.arb(10) ** -_RADIUS)
-    box = {name: value + radius for name, value in at.items()}
-    proved = {name: at[name] - move for name, move in zip(names, step(at, box), strict=True)}
-    if not all(box[name].contains_interior(ball) for name, ball in proved.items()):
-        raise ArithmeticError(f"no unique solution proved near {dict(guess)}")
-    return proved
+        middle = refined(system, {name: flint.arb(value) for name, value in guess.items()}, names, _SOLVED)
+        return dict(enclosed(system, middle, names, _RADIUS).balls)
 
 
 def minors(matrix: Sequence[Sequence[Any]]) -> list[Any]:
@@ -214,7 +209,7 @@ def minors(matrix: Sequence[Sequence[Any]]) -> list[Any]:
     ]
 
 
-def match(coefficients: Sequence[Any], *factors: Sequence[Any]) -> list[Any]:
+def _differences(coefficients: Sequence[Any], factors: Sequence[Sequence[Any]]) -> list[Any]:
     """What must vanish for a polynomial to be its leading coefficient times the product of monic factors."""
     return [a - coefficients[0] * m for a, m in zip(coefficients[1:], product(*factors)[1:], strict=True)]
 
@@ -225,6 +220,11 @@ def slope(quotient: Quotient, name: str) -> Quotient:
     return Quotient(over.derivative(name) * under - over * under.derivative(name), under**2)
 
 
+def depends(quotient: Quotient, name: str) -> bool:
+    """Whether a quotient depends on a variable."""
+    return bool(slope(quotient, name) != 0)
+
+
 def kernel(matrix: Sequence[Sequence[Ball]]) -> list[Ball]:
     """The vector, up to a factor, that a matrix with one more column than rows maps to 0."""
     return [m if k % 2 == 0 else -m for k, m in enumerate(minors(matrix))]
@@ -233,6 +233,13 @@ def kernel(matrix: Sequence[Sequence[Ball]]) -> list[Ball]:
 def jacobian(equations: Sequence[Polynomial], names: Sequence[str], at: Mapping[str, Any]) -> list[list[Ball]]:
     """Derivatives of polynomials at balls, a row per polynomial."""
     return [[evaluate(e.derivative(name), at) for name in names] for e in equations]
+
+
+def tangent(
+    coefficients: Sequence[Polynomial], factors: Sequence[Sequence[Any]], names: Sequence[str], at: Mapping[str, Any]
+) -> list[Ball]:
+    """The direction of the curve of one unknown more on which a polynomial has monic factors, at a point of it."""
+    return kernel(jacobian(_differences(coefficients, factors), names, at))
 
 
 def composed(quotient: Quotient, at: Mapping[str, Quotient]) -> Quotient:

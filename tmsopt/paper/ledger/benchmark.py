@@ -9,25 +9,13 @@ import flint
 from tmsopt.models.tms import copo, matrices
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.abscissa import product_bound
-from tmsopt.paper.ledger.algebra import (
-    Polynomial,
-    evaluate,
-    match,
-    minors,
-    polynomials,
-    q,
-    ring,
-    solve,
-    stable,
-    stable_left_of,
-)
+from tmsopt.paper.ledger.algebra import Polynomial, evaluate, kernel, matched, polynomials, q, stable, stable_left_of
 from tmsopt.paper.ledger.entry import Claim, Outcome, decimal, digits, proof, section, universal
-from tmsopt.roots.polynomial import evaluate as value_at
-from tmsopt.roots.polynomial import quadratic_pencil, shift
+from tmsopt.paper.ledger.lemmas import general
+from tmsopt.roots.polynomial import evaluate as value_at, quadratic_pencil, shift
 
 _claim = section("2.3 Minimizing the spectral abscissa of general TMS bikes")
 
-_NAMES = "Fr mu chi_B chi_H zeta_B zeta_H T"
 _GEOMETRY = q("1.02"), q("-0.4"), q("-0.2")
 """χ_H, ζ_B and ζ_H of the benchmark."""
 
@@ -61,11 +49,9 @@ def _printed_equation(terms: Mapping[str, str], true: Polynomial) -> Outcome:
 
 
 @_claim(
-    "e1",
-    "Eq. e1",
-    "a2 = 6 ω0² a0 for the benchmark geometry",
+    "e1", "Eq. e1", "a2 = 6 ω0² a0 for the benchmark geometry",
     "the polynomial in fractions, coefficient by coefficient",
-)
+)  # fmt: skip
 def _e1() -> Outcome:
     a = _special()
     return _printed_equation(printed.E1, a[2] - 6 * a[0])
@@ -85,11 +71,9 @@ def _e3() -> Outcome:
 
 
 @_claim(
-    "e123-unique",
-    "text after Eq. e3",
-    "(e1)–(e3) have a unique solution with μ > 0",
+    "e123-unique", "text after Eq. e3", "(e1)–(e3) have a unique solution with μ > 0",
     "resultants: Fr and T eliminated, signs of the coefficients of the quadratic in μ",
-)
+)  # fmt: skip
 def _unique() -> Outcome:
     e1, e2, e3 = (_equation(terms) for terms in (printed.E1, printed.E2, printed.E3))
     in_T = e1.resultant(e2, "T"), (e1 - e3).resultant(e2, "T")
@@ -103,12 +87,16 @@ def _unique() -> Outcome:
     )
 
 
+def _family() -> list[Polynomial]:
+    """p of the benchmark's χ_H, ζ_B and ζ_H in Fr, μ, χ_B and T."""
+    Fr, mu, chi_B, T = polynomials("Fr mu chi_B T")
+    return copo(Fr, mu, chi_B, *_GEOMETRY, T)
+
+
 @cache
 def optimised() -> dict[str, Any]:
-    """Fr, μ, χ_B and T with the 4-fold root −1 for the benchmark's χ_H, ζ_B and ζ_H."""
-    Fr, mu, chi_B, T = polynomials("Fr mu chi_B T")
-    a = copo(Fr, mu, chi_B, *_GEOMETRY, T)
-    return solve(match(a, *[[1, 1]] * 4), {"Fr": 2.3, "mu": 20.0, "chi_B": 1.2, "T": 1.1}, {})
+    """Fr, μ, χ_B and T with the 4-fold root −1."""
+    return matched(_family(), [[1, 1]] * 4, {"Fr": 2.3, "mu": 20.0, "chi_B": 1.2, "T": 1.1}, {})
 
 
 _MATCHED = "p(s) = a0 (s + 1)⁴ solved for Fr, μ, χ_B, tan λ_s by interval Newton, 80 digits"
@@ -130,33 +118,27 @@ def _optimised_tilt() -> Outcome:
 
 
 @_claim(
-    "fig0-abscissa",
-    "caption of Fig. fig0",
-    "the optimised bicycle attains the least abscissa a_min = −1 at Fr_EP",
+    "fig0-abscissa", "caption of Fig. fig0", "the optimised bicycle attains the least abscissa a_min = −1 at Fr_EP",
     "the 4-fold root −1 proved by interval Newton; the product bound, which does not depend on Fr",
-)
+)  # fmt: skip
 def _fig0() -> Outcome:
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
-    a = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    a, (_, mu, _, chi_H, zeta_B, zeta_H, T) = general()
     bound = a[4] / a[0]
     free = printed.w0(mu, chi_H, zeta_B, zeta_H, T) == bound
     design = optimised()
     b = copo(design["Fr"], design["mu"], design["chi_B"], *_GEOMETRY, design["T"])
     return proof(
         free and product_bound() and (b[4] / b[0]).contains(1),
-        "Least over all Fr, and over all χ_B as well, since a4/a0 depends on neither.",
-        printed="-1",
+        "Least over all Fr, and over all χ_B as well, since a4/a0 depends on neither.", printed="-1",
         computed=digits(flint.arb(-1)),
-    )
+    )  # fmt: skip
 
 
 @_claim(
-    "e123-minimum",
-    "text after Eq. e3",
-    "the optimised bicycle attains the minimum of the spectral abscissa",
+    "e123-minimum", "text after Eq. e3", "the optimised bicycle attains the minimum of the spectral abscissa",
     "product bound with ω0 held; shifted Hurwitz conditions of a bicycle with the same χ_H, ζ_B, ζ_H and another "
     "λ_s, μ",
-)
+)  # fmt: skip
 def _whole_minimum() -> Outcome:
     better = tuple(q(x) for x in ("2.243", "5.82", "1.3366", "1.02", "-0.4", "-0.2", "0.5573"))
     slopes = _covector()
@@ -180,24 +162,20 @@ def _covector() -> list[Any]:
 
     With equal signs of the first two, c1 and c2 cannot both grow, and the abscissa cannot fall.
     """
-    Fr, mu, chi_B, T = polynomials("Fr mu chi_B T")
-    a = copo(Fr, mu, chi_B, *_GEOMETRY, T)
-    design = optimised()
+    a, design = _family(), optimised()
     rows = []
     for name in ("Fr", "chi_B", "T"):
         slopes = [evaluate(c.derivative(name), design) for c in a]
         monic = [s - slopes[0] * m for s, m in zip(slopes, (1, 4, 6, 4, 1), strict=True)]
         rows.append(shift(monic, flint.arb(-1))[1:])
-    m = minors(rows)
-    return [m[0], -m[1], m[2], -m[3]]
+    return kernel(rows)
 
 
 @_claim(
-    "EP4-swallowtail",
-    "text, of KO2013",
+    "EP4-swallowtail", "text, of KO2013",
     "the EP4 is a swallowtail singularity inside the domain of asymptotic stability",
     "versality: the changes of p with Fr, μ, χ_B, tan λ_s and the root span all changes of a quartic, in balls; Routh",
-)
+)  # fmt: skip
 def _swallowtail() -> Outcome:
     design = optimised()
     relation = _covector()
@@ -211,11 +189,9 @@ def _swallowtail() -> Outcome:
 
 
 @_claim(
-    "e123-Jordan",
-    "text after Eq. e3",
-    "all four eigenvalues merge into s = −1 with the Jordan block",
+    "e123-Jordan", "text after Eq. e3", "all four eigenvalues merge into s = −1 with the Jordan block",
     "determinant and rank of M s² + V s + P at s = −1 in balls, from the solved design",
-)
+)  # fmt: skip
 def _block() -> Outcome:
     design = optimised()
     cosine = 1 / (1 + design["T"] ** 2).sqrt()
@@ -229,11 +205,9 @@ def _block() -> Outcome:
 
 
 @_claim(
-    "fig0-benchmark",
-    "caption of Fig. fig0; text",
-    "the benchmark is generic: its growth rates meet no EP4",
+    "fig0-benchmark", "caption of Fig. fig0; text", "the benchmark is generic: its growth rates meet no EP4",
     "the EP4 condition (a3/a1)² = a4/a0 of the benchmark, in balls",
-)
+)  # fmt: skip
 def _generic() -> Outcome:
     T = (flint.arb.pi() / 36).tan()
     a = copo(flint.arb(1), q("0.1"), q("1.2"), q("1.02"), q("-0.4"), q("-0.2"), T)
@@ -246,21 +220,17 @@ def _generic() -> Outcome:
 
 
 @_claim(
-    "4poly-form",
-    "Eq. 4poly",
-    "the polynomial (chapo) takes the form (s − ω0)⁴",
+    "4poly-form", "Eq. 4poly", "the polynomial (chapo) takes the form (s − ω0)⁴",
     "leading coefficient at the EP4 of the optimised benchmark, in balls",
-)
+)  # fmt: skip
 def _form() -> Outcome:
     design = optimised()
     a = copo(design["Fr"], design["mu"], design["chi_B"], *_GEOMETRY, design["T"])
     monic = all(abs(c / a[0] - m) < flint.arb(10) ** -40 for c, m in zip(a, (1, 4, 6, 4, 1), strict=True))
     return universal(
-        "for p(s)/a0, as (chapo) with (copo) is not monic",
-        monic,
-        f"a0 = {a[0].str(10, radius=False)} at the EP4 of the optimised benchmark",
-        bool(a[0] < 1),
-    )
+        "for p(s)/a0, as (chapo) with (copo) is not monic", monic,
+        f"a0 = {a[0].str(10, radius=False)} at the EP4 of the optimised benchmark", bool(a[0] < 1),
+    )  # fmt: skip
 
 
 CLAIMS: tuple[Claim, ...] = (

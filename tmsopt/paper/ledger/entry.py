@@ -2,11 +2,13 @@
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 import flint
+
+from tmsopt.records import SCHEMA, plain
 
 EXACT = "exact"
 DIGITS_HOLD = "holds to the printed digits"
@@ -84,12 +86,7 @@ class Ledger:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
-            "schema": 1,
-            "source": self.source,
-            "counts": self.counts,
-            "entries": [asdict(entry) for entry in self.entries],
-        }
+        return {"schema": SCHEMA} | plain(self, "source counts entries")
 
 
 def section(title: str) -> Callable[..., Callable[[Callable[[], Outcome]], Claim]]:
@@ -166,15 +163,9 @@ def proof(holds: bool, remark: str = "", otherwise: str = "", printed: str = "",
 
 
 def universal(
-    condition: str,
-    under: bool,
-    against: str,
-    counterexample: bool,
-    always: bool = False,
-    printed: str = "",
-    computed: str = "",
-    remark: str = "",
-) -> Outcome:
+    condition: str, under: bool, against: str, counterexample: bool, always: bool = False, printed: str = "",
+    computed: str = "", remark: str = "",
+) -> Outcome:  # fmt: skip
     """Judge a general statement: proved always, proved under a condition and refuted outside it, or refuted.
 
     Args:

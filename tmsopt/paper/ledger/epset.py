@@ -4,34 +4,9 @@ from typing import Any
 
 import flint
 
-from tmsopt.models.tms import copo
-from tmsopt.paper.ledger import printed
-from tmsopt.paper.ledger.algebra import (
-    Quotient,
-    composed,
-    evaluate,
-    jacobian,
-    kernel,
-    match,
-    polynomials,
-    q,
-    ring,
-    slope,
-    stable,
-)
+from tmsopt.paper.ledger import lemmas, printed
+from tmsopt.paper.ledger.algebra import Quotient, composed, evaluate, polynomials, q, ring, slope, stable, tangent
 from tmsopt.paper.ledger.entry import Claim, Outcome, digits, proof, section, universal
-from tmsopt.paper.ledger.lemmas import (
-    HEIGHTS,
-    double_pair,
-    ep4,
-    normal,
-    palindrome,
-    quartic,
-    tilt_bound,
-    tilt_of_EP4,
-    tilted,
-)  # fmt: skip
-from tmsopt.paper.ledger.sets import lifted
 
 _claim = section("2.4.3 The discriminant surface and the EP set")
 
@@ -41,23 +16,21 @@ _TINY = "1e-40"
 def _set_of_pairs() -> tuple[Quotient, tuple[Quotient, ...]]:
     """Fr² on B1² − 4 B2 + 8 = 0, and the variables T, r, q."""
     T, r, scale = variables = ring("T r q")
-    one, none = (normal(x + 0 * T, r, T, r, scale) for x in (1, 0))
+    one, none = (lemmas.normal(x + 0 * T, r, T, r, scale) for x in (1, 0))
     constant = none[1] ** 2 - 4 * none[2] + 8
     slope_ = one[1] ** 2 - 4 * one[2] + 8 - constant
     return -constant / slope_, variables
 
 
 @_claim(
-    "epset",
-    "Eq. epset",
-    "Fr on the EP set",
+    "epset", "Eq. epset", "Fr on the EP set",
     "the squared factor of the discriminant solved for Fr², in r and q; a bicycle below the pole in fractions",
-)
+)  # fmt: skip
 def _epset() -> Outcome:
     square, (T, r, scale) = _set_of_pairs()
     omega0, zeta_B = -1 / scale, -(scale**2) * r
     law = printed.epset(omega0, zeta_B, T)
-    exists = 4 * scale**2 * T * (r + 1) - r * (r - 1)
+    exists = lemmas.pole(T, r, scale)
     same = law == square == 4 * (r + 1) ** 2 * scale**2 * T**2 / ((r - 1) * exists)
     radicand = _radicand(q(-1), q(-2), q("0.1"))
     return universal(
@@ -76,29 +49,28 @@ def _radicand(omega0: Any, zeta_B: Any, T: Any) -> Any:
 
 def _pair_factor() -> tuple[Any, Any]:
     """B1² − 4 B2 + 8 for r = 2, h = 1, tan λ_s = 1/10: coefficients of Fr² and 1."""
-    at_0, at_1 = (normal(q(x), q(2), q("0.1"), q(2), q(1)) for x in (0, 1))
+    at_0, at_1 = (lemmas.normal(q(x), q(2), q("0.1"), q(2), q(1)) for x in (0, 1))
     values = [b[1] ** 2 - 4 * b[2] + 8 for b in (at_0, at_1)]
     return values[1] - values[0], values[0]
 
 
 @_claim(
-    "epset-tangent",
-    "text after Eq. epset",
+    "epset-tangent", "text after Eq. epset",
     "a point where the curve has a vertical tangent in the (Fr, λ_s)-plane is the EP4",
     "dFr²/dT on the squared factor of the discriminant, its zero beside the tilt of the EP4, in r and q",
-)
+)  # fmt: skip
 def _tangent() -> Outcome:
     square, (T, r, scale) = _set_of_pairs()
     turn = r * (r - 1) / (2 * scale**2 * (r + 1))
     change = slope(square, "T")
-    exists = 4 * scale**2 * T * (r + 1) - r * (r - 1)
+    exists = lemmas.pole(T, r, scale)
     only_there = slope(change * exists**2 / (T * (T - turn)), "T") == 0
-    ep = tilt_of_EP4(r, scale**2)
+    ep = lemmas.tilt_of_EP4(r, scale**2)
     apart = ep - turn == (r - 1) ** 3 / (16 * scale**2 * (r + 1))
     at = {"T": turn, "r": r, "q": scale}
     is_turn = composed(change, at) == 0 and composed(change, {**at, "T": ep}) != 0
     speed = composed(square, at) == r / scale**2
-    nodes = flint.arb(2).sqrt()
+    point, nodes = lemmas.ep4(), flint.arb(2).sqrt()
     h = nodes / 5
     lean = (nodes * (nodes - 1) / (2 * h * (nodes + 1))).atan()
     return universal(
@@ -110,7 +82,7 @@ def _tangent() -> Outcome:
         is_turn and only_there and apart and speed and _by_hand(),
         computed=digits(lean),
         remark="For ζ_B = −0.4, ζ_H = −0.2 the vertical tangent is at Fr = √5 = 2.23607 and the λ_s given here; "
-        f"the EP4 at Fr = {ep4()['Fr'].str(6, radius=False)} and λ_s = {ep4()['T'].atan().str(8, radius=False)}: too "
+        f"the EP4 at Fr = {point['Fr'].str(6, radius=False)} and λ_s = {point['T'].atan().str(8, radius=False)}: too "
         "near to tell apart in the figure. With the axes exchanged the tangent is vertical nowhere.",
     )
 
@@ -119,8 +91,8 @@ def _by_hand() -> bool:
     """The EP set for r = 2, h = 1 at tan λ_s = 1/3 and 17/48 in fractions: (s² + b s + 1)² with b > 2 and b = 2."""
     found = []
     for T, square in ((q("1/3"), q(2)), (q("17/48"), q("289/144"))):
-        unit = quartic(q(1), q(2), T, q(2), q(1))
-        still = quartic(q(0), q(2), T, q(2), q(1))
+        unit = lemmas.quartic(q(1), q(2), T, q(2), q(1))
+        still = lemmas.quartic(q(0), q(2), T, q(2), q(1))
         b_square = square * (unit[1] / unit[0] / 2) ** 2
         a2 = still[2] + square * (unit[2] - still[2])
         found.append((a2 / unit[0] == b_square + 2, b_square))
@@ -128,15 +100,14 @@ def _by_hand() -> bool:
 
 
 @_claim(
-    "epset-2EP2",
-    "text after Eq. epset",
+    "epset-2EP2", "text after Eq. epset",
     "below the EP4 the curve is a pair of different negative double real eigenvalues (2EP2)",
     "b² − 4 c on the squared factor of the discriminant, in r and q; the solved bicycle of Table 1",
-)
+)  # fmt: skip
 def _below() -> Outcome:
-    real = double_pair("-0.05")
+    real = lemmas.double_pair("-0.05")
     return proof(
-        _kind_identity() and bool(real["b"] ** 2 > 4 * real["c"]) and bool(real["b"] > 0),
+        _kind_identity() and lemmas.are_real(real) and bool(real["b"] > 0),
         "From the pole tan λ_s = r (r − 1)/(4 h (r + 1)) of the curve up to the EP4. One Jordan block each, by "
         "w0-Jordan.",
     )
@@ -145,40 +116,34 @@ def _below() -> Outcome:
 def _kind_identity() -> bool:
     """B1² − 16 on the curve is a positive multiple of the tilt of the EP4 less the tilt, over T less the pole."""
     square, (T, r, scale) = _set_of_pairs()
-    unit = normal(1 + 0 * T, r, T, r, scale)
-    exists = 4 * scale**2 * T * (r + 1) - r * (r - 1)
-    return bool(square * unit[1] ** 2 - 16 == 64 * scale**2 * (r + 1) * (tilt_of_EP4(r, scale**2) - T) / exists)
+    unit = lemmas.normal(1 + 0 * T, r, T, r, scale)
+    exists = lemmas.pole(T, r, scale)
+    return bool(square * unit[1] ** 2 - 16 == 64 * scale**2 * (r + 1) * (lemmas.tilt_of_EP4(r, scale**2) - T) / exists)
 
 
 @_claim(
-    "epset-CEP2",
-    "text after Eq. epset; caption of Fig. fig1",
+    "epset-CEP2", "text after Eq. epset; caption of Fig. fig1",
     "above the EP4 the curve is a conjugate pair of double complex eigenvalues (CEP2)",
     "b² − 4 c on the squared factor of the discriminant, in r and q; the solved bicycle of Table 1",
-)
+)  # fmt: skip
 def _above() -> Outcome:
-    pair = double_pair("0.80")
     return proof(
-        _kind_identity() and bool(pair["b"] ** 2 < 4 * pair["c"]),
+        _kind_identity() and lemmas.are_complex(lemmas.double_pair("0.80")),
         "For every tilt above the EP4's. One Jordan block of order 2 each, by w0-Jordan.",
     )
 
 
 @_claim(
-    "epset-codimension",
-    "text after Eq. epset",
-    "the codimension of the EP set is 2",
+    "epset-codimension", "text after Eq. epset", "the codimension of the EP set is 2",
     "rank of the derivatives of the lifted equations at the EP4, the 2EP2 and the CEP2 of Table 1, in balls",
-)
+)  # fmt: skip
 def _codimension() -> Outcome:
-    p, (b, c) = lifted("b", "c")
-    design = ep4()
+    p, (b, c) = lemmas.lifted("b c")
+    design = lemmas.ep4()
     points = [{**design, "b": -2 * design["s"], "c": design["s"] ** 2}]
-    points += [{**double_pair(offset), "T": tilted(offset)} for offset in ("-0.05", "0.80")]
+    points += [{**lemmas.double_pair(offset), "T": lemmas.tilted(offset)} for offset in ("-0.05", "0.80")]
     free = ("Fr", "chi_B", "T", "b", "c")
-    full = [
-        any(not x.contains(0) for x in kernel(jacobian(match(p, [1, b, c], [1, b, c]), free, at))[:3]) for at in points
-    ]
+    full = [any(not x.contains(0) for x in tangent(p, [[1, b, c], [1, b, c]], free, at)[:3]) for at in points]
     return proof(
         all(full),
         "Four independent conditions with two unknowns b, c: a curve in the space of Fr, χ_B, λ_s; it passes smoothly "
@@ -189,15 +154,13 @@ def _codimension() -> Outcome:
 
 
 @_claim(
-    "fig1-left",
-    "caption of Fig. fig1",
-    "at χ_B = √2 the domain of heavy damping has a cuspidal point at EP4",
+    "fig1-left", "caption of Fig. fig1", "at χ_B = √2 the domain of heavy damping has a cuspidal point at EP4",
     "its two boundaries, B1² = 4 B2 − 8 and B2 + 2 = 2 B1, touch at the EP4: gradients, and the map from (Fr, "
     "T), exactly",
-)
+)  # fmt: skip
 def _cusp() -> Outcome:
-    B1, B2, (_, _, r, scale) = palindrome()
-    at = {"Fr": (r**2 + 6 * r + 1) / (4 * scale * (r + 1)), "T": tilt_of_EP4(r, scale**2), "r": r, "q": scale}
+    B1, B2, (_, _, r, scale) = lemmas.palindrome()
+    at = {"Fr": lemmas.speed_of_EP4(r, scale), "T": lemmas.tilt_of_EP4(r, scale**2), "r": r, "q": scale}
     meets = composed(B1, at) == 4 and composed(B2, at) == 6
     x, y = polynomials("x y")
     first, second = x**2 - 4 * y + 8, y + 2 - 2 * x
@@ -208,14 +171,13 @@ def _cusp() -> Outcome:
 
 
 @_claim(
-    "fig1-right",
-    "caption of Fig. fig1",
+    "fig1-right", "caption of Fig. fig1",
     "at the tilt of the EP4 the domain of heavy damping in the (Fr, χ_B)-plane degenerates into the one point",
     "tan λ_s as a function of four positive roots with product 1, bounded by sums of squares",
-)
+)  # fmt: skip
 def _degenerate() -> Outcome:
     return proof(
-        tilt_bound(),
+        lemmas.tilt_bound(),
         "h tan λ_s = (r² − 1)(r e2 + r² + 1)/(r e1 + e3)² for roots −x1 … −x4 over |ω0| with elementary "
         "symmetric e1 … e3; "
         "e1² ≥ (8/3) e2, e3² ≥ (8/3) e2 and e2 ≥ 6 bound it by its value at the EP4, with equality there only.",
@@ -223,36 +185,35 @@ def _degenerate() -> Outcome:
 
 
 @_claim(
-    "EP-Jordan-2",
-    "text after Eq. epset; caption of Fig. fig1",
+    "EP-Jordan-2", "text after Eq. epset; caption of Fig. fig1",
     "the double eigenvalues of 2EP2 and CEP2 have a Jordan block of order two",
     "second row of M s² + V s + P at the double eigenvalues of Table 1, in complex balls: it must not vanish",
-)
+)  # fmt: skip
 def _order_two() -> Outcome:
     ranks = []
     for offset in ("-0.05", "0.80"):
-        point = double_pair(offset)
+        point = lemmas.double_pair(offset)
         b, c = flint.acb(point["b"]), flint.acb(point["c"])
         root = (-b + (b * b - 4 * c).sqrt()) / 2
-        ranks.append(not (HEIGHTS[1] * root**2 + 1).contains(0))
+        ranks.append(not (lemmas.HEIGHTS[1] * root**2 + 1).contains(0))
     return proof(all(ranks), "The entry is −μ ν_H (ζ_H s² + 1), so the rank is 1 for every μ > 0.")
 
 
 @_claim(
-    "EP-kinds",
-    "text after Eq. epset",
-    "the curve is the location of three types of exceptional points",
+    "EP-kinds", "text after Eq. epset", "the curve is the location of three types of exceptional points",
     "stability, b² − 4 c and the EP4 of the three solved bicycles, in balls",
-)
+)  # fmt: skip
 def _kinds() -> Outcome:
-    design = ep4()
+    design = lemmas.ep4()
     r = design["chi_B"]
     h = r / 5
     square = 4 * (r + 1) ** 2 * h * design["T"] ** 2 / ((r - 1) * (4 * h * design["T"] * (r + 1) - r * (r - 1)))
     on_curve = abs(square - design["Fr"] ** 2) < flint.arb(_TINY)
-    bicycles = [copo(design["Fr"], q(0), design["chi_B"], q(1), *HEIGHTS, design["T"])]
+    bicycles = [lemmas.at_heights(design["Fr"], design["chi_B"], design["T"])]
     bicycles += [
-        copo(x["Fr"], q(0), x["chi_B"], q(1), *HEIGHTS, tilted(o)) for o in ("-0.05", "0.80") for x in (double_pair(o),)
+        lemmas.at_heights(x["Fr"], x["chi_B"], lemmas.tilted(o))
+        for o in ("-0.05", "0.80")
+        for x in (lemmas.double_pair(o),)
     ]
     return proof(bool(on_curve) and all(stable(p) for p in bicycles), "2EP2, EP4 and CEP2, all of stable bicycles.")
 

@@ -5,12 +5,14 @@ from typing import Any
 
 import flint
 
+from tmsopt.models.exact import Tilt
 from tmsopt.models.tms import copo
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.abscissa import product_bound
-from tmsopt.paper.ledger.algebra import match, polynomials, positive_quotient, q, ring, solve, stable_left_of
+from tmsopt.paper.ledger.algebra import matched, polynomials, positive_quotient, q, ring, stable_left_of
 from tmsopt.paper.ledger.entry import Claim, Outcome, decimal, digits, proof, section, universal
-from tmsopt.paper.ledger.lemmas import normal, tilt_bound, tilt_of_EP4
+from tmsopt.paper.ledger.lemmas import grown, normal, tilt_bound, tilt_of_EP4
+from tmsopt.paper.ledger.printed import laws
 
 _machine = section("2.4.6 How the scaling laws match the experimental TMS bike")
 _frame = section("Abstract, introduction and conclusions")
@@ -29,7 +31,7 @@ def _ep4(chi_H: Any, held: str, value: Any, guess: dict[str, float]) -> dict[str
     names = "Fr mu chi_B T s"
     gens = dict(zip(names.split(), polynomials(names), strict=True))
     a = copo(gens["Fr"], gens["mu"], gens["chi_B"], chi_H, ZETA_B, ZETA_H, gens["T"])
-    return solve(match(a, *[[1, -gens["s"]]] * 4), guess, {held: flint.arb(value)})
+    return matched(a, [[1, -gens["s"]]] * 4, guess, {held: flint.arb(value)})
 
 
 @_machine("fige-ratio", "caption of Fig. fige; text", "√(ζ_B/ζ_H)", "square root of 1.158/0.526 in balls")
@@ -41,21 +43,16 @@ def _law() -> Outcome:
 def _close() -> Outcome:
     gap = CHI_B / _ratio() - 1
     return universal(
-        "≈ read as within 3 %",
-        bool(abs(gap) < flint.arb(q("0.03"))),
-        f"1.526² = {CHI_B**2} against ζ_B/ζ_H = {ZETA_B / ZETA_H}",
-        CHI_B**2 != ZETA_B / ZETA_H,
-        computed=digits(gap),
+        "≈ read as within 3 %", bool(abs(gap) < flint.arb(q("0.03"))),
+        f"1.526² = {CHI_B**2} against ζ_B/ζ_H = {ZETA_B / ZETA_H}", CHI_B**2 != ZETA_B / ZETA_H, computed=digits(gap),
         remark="The number is the relative difference.",
-    )
+    )  # fmt: skip
 
 
 @_machine(
-    "fige-law",
-    "caption of Fig. fige; text",
-    "the machine fits the scaling law (chib1) very well",
+    "fige-law", "caption of Fig. fige; text", "the machine fits the scaling law (chib1) very well",
     "the general law (chib), derived from a3 = ω0² a1, at the machine's own χ_H and ω0 = −(ζ_B ζ_H)^(−1/4)",
-)
+)  # fmt: skip
 def _general() -> Outcome:
     square = 1 / flint.arb(ZETA_B * ZETA_H).sqrt()
     own = (square * ZETA_B - 1) / (square * ZETA_H - 1) * CHI_H
@@ -73,11 +70,9 @@ def _general() -> Outcome:
 
 
 @_machine(
-    "fige-abscissa",
-    "text",
-    "the machine is optimal with respect to the spectral abscissa",
+    "fige-abscissa", "text", "the machine is optimal with respect to the spectral abscissa",
     "EP4 of the printed positions by interval Newton: Fr, μ, tan λ_s and ω0 unknown",
-)
+)  # fmt: skip
 def _optimal_abscissa() -> Outcome:
     design = _ep4(CHI_H, "chi_B", CHI_B, {"Fr": 2.0, "mu": 1.0, "T": 0.3, "s": -1.51})
     a = copo(q(1), q(1), CHI_B, CHI_H, ZETA_B, ZETA_H, q("0.5"))
@@ -95,11 +90,9 @@ def _optimal_abscissa() -> Outcome:
 
 
 @_machine(
-    "fige-Fr_c",
-    "text",
-    "the machine is optimal with respect to Fr_c",
+    "fige-Fr_c", "text", "the machine is optimal with respect to Fr_c",
     "Fr_c² at χ_B = 1.526 over its minimum, from the identity under chibm; λ_s cancels at χ_H = 1",
-)
+)  # fmt: skip
 def _optimal_speed() -> Outcome:
     r = _ratio()
     over = 1 + (CHI_B - r) ** 2 / ((r**2 - CHI_B) * (CHI_B - 1))
@@ -115,18 +108,16 @@ def _optimal_speed() -> Outcome:
 
 
 @_machine(
-    "fige-heavy",
-    "text",
-    "the machine is optimal with respect to the domain of heavy damping",
+    "fige-heavy", "text", "the machine is optimal with respect to the domain of heavy damping",
     "the EP3 of the heights at χ_H = 1, χ_B = 1.526 by interval Newton, beside the steepest tilt for heavy damping",
-)
+)  # fmt: skip
 def _optimal_damping() -> Outcome:
     Fr, T, a, t = polynomials("Fr T a t")
     p = copo(Fr, q(0), CHI_B, q(1), ZETA_B, ZETA_H, T)
     r = _ratio()
     top = tilt_of_EP4(r, flint.arb(ZETA_B * ZETA_H).sqrt())
     guess = {"Fr": 1.31, "T": 0.17, "a": -1.7, "t": -0.34}
-    edge = solve(match(p, *[[1, -a]] * 3, [1, -t]), guess, {})
+    edge = matched(p, [*[[1, -a]] * 3, [1, -t]], guess, {})
     share = edge["T"] / top
     return universal(
         f"χ_H = 1 in place of 0.921, and in part: the cusp of the domain at χ_B = 1.526 lies at "
@@ -142,11 +133,10 @@ def _optimal_damping() -> Outcome:
 
 
 @_frame(
-    "abstract-minimum",
-    "abstract",
+    "abstract-minimum", "abstract",
     "the minimum of the spectral abscissa of a polynomial is attained at the EP of the highest possible order",
     "product bound where aₙ/a0 is given; a family of quadratics in fractions",
-)
+)  # fmt: skip
 def _minimum() -> Outcome:
     (x,) = polynomials("x")
     # s² + 2 x s + x² + x − 1 has the discriminant 4 (1 − x)
@@ -161,32 +151,26 @@ def _minimum() -> Outcome:
 
 
 @_frame(
-    "abstract-machines",
-    "abstract",
-    "the scaling laws agree with the design of the known experimental machines",
+    "abstract-machines", "abstract", "the scaling laws agree with the design of the known experimental machines",
     "χ_B over √(ζ_B/ζ_H) for the benchmark and for the machine, in balls",
-)
+)  # fmt: skip
 def _machines() -> Outcome:
     benchmark = q("1.2") / flint.arb(2).sqrt() - 1
     machine = CHI_B / _ratio() - 1
     return universal(
-        "for the realized machine, within 3 %",
-        bool(abs(machine) < flint.arb(q("0.03"))),
+        "for the realized machine, within 3 %", bool(abs(machine) < flint.arb(q("0.03"))),
         f"the benchmark of the same work has χ_B = 1.2 where (chib1) gives √2: {float(benchmark.mid()):.1%}",
-        bool(abs(benchmark) > flint.arb(q("0.1"))),
-        computed=digits(benchmark),
-    )
+        bool(abs(benchmark) > flint.arb(q("0.1"))), computed=digits(benchmark),
+    )  # fmt: skip
 
 
 @_frame(
-    "intro-connects",
-    "introduction, of KO2013",
+    "intro-connects", "introduction, of KO2013",
     "the set of complex EPs connects imaginary EPs on the boundary of stability with real EPs inside",
     "b of the double pair, with r = 1 + ρ; a double imaginary pair needs a1 = a3 = 0",
-)
+)  # fmt: skip
 def _connects() -> Outcome:
-    Fr, T, rho, scale = ring("Fr T rho q")
-    b = normal(Fr, 1 + rho, T, 1 + rho, scale)
+    b, (_, T, rho, scale) = grown()
     never = positive_quotient(b[1])
     square = printed.epset(-1 / scale, -(scale**2) * (1 + rho), T)
     pair = square * rho**2 / (scale**2 * T**2)
@@ -209,39 +193,35 @@ def _by_hand() -> bool:
 
 
 @_frame(
-    "conclusion-criteria",
-    "conclusions",
-    "the scaling laws optimize stability by several criteria simultaneously",
+    "conclusion-criteria", "conclusions", "the scaling laws optimize stability by several criteria simultaneously",
     "Fr_c², the abscissa and the steepest tilt as functions of χ_B and of λ_s",
-)
+)  # fmt: skip
 def _criteria() -> Outcome:
     T, r = ring("T r")
     least = T * (r + 1) / (r - 1)
-    quarter = printed.Frc1(r, -r, -1 / r, T / 4)
+    quarter = laws.Frc1(r, -r, -1 / r, Tilt(T / 4))
     return universal(
         "in χ_B: one value minimises Fr_c for every λ_s, carries the EP4 and the steepest heavy damping. In λ_s (tls) "
         "serves the abscissa and the steepest tilt",
-        product_bound() and tilt_bound() and printed.Frc1(r, -r, -1 / r, T) == least,
+        product_bound() and tilt_bound() and laws.Frc1(r, -r, -1 / r, Tilt(T)) == least,
         "a quarter of tan λ_s halves Fr_c, so (tls) does not minimise Fr_c",
         quarter * 4 == least,
     )
 
 
 @_frame(
-    "conclusion-laws",
-    "text of Section 2.4.6",
-    "the laws (chib1) and (tls) follow from the exact optimal solutions",
+    "conclusion-laws", "text of Section 2.4.6", "the laws (chib1) and (tls) follow from the exact optimal solutions",
     "minimum of Fr_c, minimum of the abscissa and maximum of the tilt, each solved without the laws",
-)
+)  # fmt: skip
 def _follow() -> Outcome:
     r, scale = ring("r q")
     omega0, zeta_B, zeta_H = -1 / scale, -(scale**2) * r, -(scale**2) / r
-    law = printed.tls(omega0, zeta_B, zeta_H)
+    law = laws.tls(zeta_B, zeta_H)
     return proof(
         tilt_bound()
         and product_bound()
         and law == tilt_of_EP4(r, scale**2)
-        and printed.chib(omega0, 1 + 0 * r, zeta_B, zeta_H) == r,
+        and laws.chib(omega0, 1 + 0 * r, zeta_B, zeta_H) == r,
         "(chib1) from all three problems, (tls) from two.",
     )
 

@@ -11,9 +11,10 @@ from typing import Any
 
 import flint
 
+from tmsopt.models.exact import Tilt
 from tmsopt.models.tms import copo
-from tmsopt.paper.ledger import printed
-from tmsopt.paper.ledger.algebra import Quotient, match, polynomials, positive, q, ring, solve, stable, substitute
+from tmsopt.paper.ledger.algebra import Quotient, matched, polynomials, positive, q, ring, stable, substitute
+from tmsopt.paper.ledger.printed import laws
 
 _NAMES = "Fr mu chi_B chi_H zeta_B zeta_H T"
 Design = tuple[Any, ...]  # Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T as fractions
@@ -48,17 +49,90 @@ def palindrome() -> tuple[Quotient, Quotient, tuple[Quotient, ...]]:
     return b[1], b[2], variables
 
 
+def general() -> tuple[list[Any], tuple[Quotient, ...]]:
+    """Coefficients of any bicycle and its seven parameters, as variables."""
+    variables = ring(_NAMES)
+    return copo(*variables), variables
+
+
+def monic() -> tuple[list[Any], tuple[Quotient, ...]]:
+    """Coefficients of the monic polynomial in σ for any χ_B, and the variables Fr, χ_B, T, r, q."""
+    variables = ring("Fr chi_B T r q")
+    return normal(*variables), variables
+
+
+def grown() -> tuple[list[Any], tuple[Quotient, ...]]:
+    """Those at χ_B = r = 1 + ρ and the variables Fr, T, ρ, q: all signs show."""
+    Fr, T, rho, scale = variables = ring("Fr T rho q")
+    return normal(Fr, 1 + rho, T, 1 + rho, scale), variables
+
+
+def by_hand(Fr: str, T: str) -> list[Any]:
+    """The bicycle with ζ_B = −2, ζ_H = −1/2, χ_B = 2 (r = 2, h = 1), monic, in fractions."""
+    return normal(q(Fr), q(2), q(T), q(2), q(1))
+
+
 def tilt_of_EP4(r: Any, h: Any) -> Any:
     """tan λ_s of the EP4, compact: not the printed form; see the entry tls for its proof."""
     return (r - 1) * (r**2 + 6 * r + 1) / (16 * h * (r + 1))
 
 
+def speed_of_EP4(r: Any, scale: Any) -> Any:
+    """Its Froude number; see the entry compact."""
+    return (r**2 + 6 * r + 1) / (4 * scale * (r + 1))
+
+
+def fourfold() -> bool:
+    """That tilt and speed at χ_B = r give (σ + 1)⁴, for all heights."""
+    r, scale = ring("r q")
+    return normal(speed_of_EP4(r, scale), r, tilt_of_EP4(r, scale**2), r, scale) == [1, 4, 6, 4, 1]
+
+
+def order_identity() -> bool:
+    """At B1 = 4, (u1 + 2)(u2 + 2) has the sign of tan λ_s less that of the EP4: it decides which u meets −2."""
+    T, r, scale = ring("T r q")
+    b = normal(4 * scale * T / (r - 1), r, T, r, scale)
+    return bool(b[1] == 4 and b[2] - 6 == 16 * scale**2 * (r + 1) * (T - tilt_of_EP4(r, scale**2)) / (r * (r - 1)))
+
+
+def asymmetry_identity() -> bool:
+    """b4 = 1, and b3² − b1² vanishes only at χ_B = ±r."""
+    b, (Fr, chi_B, T, r, scale) = monic()
+    difference = Fr**2 * (r**2 - 1) * (chi_B**2 - r**2) / (scale**2 * T**2 * r**2)
+    return bool(b[4] == 1 and b[3] ** 2 - b[1] ** 2 == difference)
+
+
+def pole(T: Any, r: Any, scale: Any) -> Any:
+    """What must be positive for the EP set to have a real speed: the tilt beyond its pole."""
+    return 4 * scale**2 * T * (r + 1) - r * (r - 1)
+
+
+def at_heights(Fr: Any, chi_B: Any, T: Any) -> list[Any]:
+    """Coefficients with χ_H = 1 for ζ_B = −0.4, ζ_H = −0.2; μ has no influence."""
+    return copo(Fr, q(0), chi_B, q(1), *HEIGHTS, T)
+
+
+def lifted(names: str) -> tuple[list[Any], tuple[Any, ...]]:
+    """These with Fr, χ_B, T, and the further unknowns, as polynomials of one ring."""
+    Fr, chi_B, T, *unknowns = polynomials(f"Fr chi_B T {names}")
+    return at_heights(Fr, chi_B, T), tuple(unknowns)
+
+
+def are_real(pair: dict[str, Any]) -> bool:
+    """Whether s² + b s + c has two different real roots, certainly."""
+    return bool(pair["b"] ** 2 > 4 * pair["c"])
+
+
+def are_complex(pair: dict[str, Any]) -> bool:
+    """Whether it has a complex pair, certainly."""
+    return bool(pair["b"] ** 2 < 4 * pair["c"])
+
+
 @cache
 def ep4() -> dict[str, Any]:
     """Fr, χ_B, T and the 4-fold root s for ζ_B = −0.4, ζ_H = −0.2, all four unknown, proved in balls."""
-    Fr, chi_B, T, s = polynomials("Fr chi_B T s")
-    a = copo(Fr, q(0), chi_B, q(1), *HEIGHTS, T)
-    return solve(match(a, *[[1, -s]] * 4), {"Fr": 2.2, "chi_B": 1.4, "T": 0.43, "s": -1.9}, {})
+    a, (s,) = lifted("s")
+    return matched(a, [[1, -s]] * 4, {"Fr": 2.2, "chi_B": 1.4, "T": 0.43, "s": -1.9}, {})
 
 
 def tilted(offset: str) -> Any:
@@ -69,22 +143,42 @@ def tilted(offset: str) -> Any:
 @cache
 def double_pair(offset: str) -> dict[str, Any]:
     """Fr, χ_B, b, c with p = a0 (s² + b s + c)² at that tilt, proved in balls."""
-    Fr, chi_B, b, c, T = polynomials("Fr chi_B b c T")
-    a = copo(Fr, q(0), chi_B, q(1), *HEIGHTS, T)
+    a, (b, c) = lifted("b c")
     guess = {"-0.05": (2.26, 4.1), "0.80": (4.1, 1.5), "-0.18": (2.9, 8.0)}[offset]
     tilt = {"T": tilted(offset)}
-    return solve(match(a, [1, b, c], [1, b, c]), {"Fr": guess[0], "chi_B": 1.4, "b": guess[1], "c": 3.5}, tilt)
+    return matched(a, [[1, b, c], [1, b, c]], {"Fr": guess[0], "chi_B": 1.4, "b": guess[1], "c": 3.5}, tilt)
+
+
+@cache
+def ep3_left() -> dict[str, Any]:
+    """Fr, T, the triple root a and the simple root t at χ_B = √2 − 0.1, proved in balls."""
+    p, (a, t) = lifted("a t")
+    guess = {"Fr": 2.02, "T": 0.2, "a": -0.94, "t": -14.9}
+    off = {"chi_B": flint.arb(2).sqrt() - flint.arb(q("0.1"))}
+    return {**matched(p, [*[[1, -a]] * 3, [1, -t]], guess, off), **off}
+
+
+@cache
+def ep3_right(upper: bool, offset: str = "-0.18") -> dict[str, Any]:
+    """Fr, χ_B, a, t at a tilt beside the EP4's: χ_B above √2, or below."""
+    p, (a, t) = lifted("a t")
+    guesses = {
+        ("-0.18", True): (2.185, 1.515, -3.68, -0.25), ("-0.18", False): (2.086, 1.339, -1.025, -11.6),
+        ("-0.05", True): (2.2352, 1.4283, -2.581, -0.727), ("-0.05", False): (2.2171, 1.4025, -1.396, -4.59),
+    }  # fmt: skip
+    guess = dict(zip(("Fr", "chi_B", "a", "t"), guesses[offset, upper], strict=True))
+    off = {"T": tilted(offset)}
+    return {**matched(p, [*[[1, -a]] * 3, [1, -t]], guess, off), **off}
 
 
 @cache
 def weave(offset: str, chi_B: str = "") -> dict[str, Any]:
     """Fr, ω² and the other factor at the weave boundary at that tilt; χ_B = √2 plus the given number."""
-    Fr, W, b, c, T, chi = polynomials("Fr W b c T chi")
-    a = copo(Fr, q(0), chi, q(1), *HEIGHTS, T)
-    at = {"T": tilted(offset), "chi": ep4()["chi_B"] + flint.arb(q(chi_B or "0"))}
+    a, (W, b, c) = lifted("W b c")
+    at = {"T": tilted(offset), "chi_B": ep4()["chi_B"] + flint.arb(q(chi_B or "0"))}
     slope = float(at["T"].mid())
     guess = {"Fr": (5.8 * slope) ** 0.5, "W": 3.5, "b": 2.0 / slope**0.5, "c": 3.5}
-    return solve(match(a, [1, 0, W], [1, b, c]), guess, at)
+    return matched(a, [[1, 0, W], [1, b, c]], guess, at)
 
 
 @cache
@@ -113,11 +207,16 @@ def first_four(design: Design) -> list[bool]:
     return [chi_H > 1 + zeta_H * T, chi_H < 1 - zeta_B / mu * T, chi_H < chi_B, zeta_H > zeta_B]
 
 
+def critical_square(design: Design) -> Any:
+    """Fr_c² (flus)."""
+    return laws.flus(*design[1:6], Tilt(design[6]))
+
+
 def fifth(design: Design) -> bool:
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = design
+    Fr, _, chi_B, chi_H, zeta_B, zeta_H, _ = design
     if zeta_B * chi_H == zeta_H * chi_B:
         return False
-    square = printed.flus(mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    square = critical_square(design)
     return bool(square > 0 and Fr > 0 and Fr * Fr > square)
 
 
@@ -128,8 +227,7 @@ def admitted(design: Design) -> bool:
 
 def class_identity() -> bool:
     """a4 + μ a0/ζ_B² = −T (ζ_B + μ ζ_H): with T > 0 not both a0 and a4 are negative, with T < 0 not both positive."""
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
-    a = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    a, (_, mu, _, _, zeta_B, zeta_H, T) = general()
     return bool(a[4] + mu * a[0] / zeta_B**2 == -T * (zeta_B + mu * zeta_H))
 
 
@@ -143,23 +241,18 @@ def standstill_identity() -> bool:
 
 def hurwitz_identity() -> bool:
     """a1 a2 a3 − a0 a3² − a4 a1² is (ζ_B − ζ_H) ζ_B a1 a3 (Fr² − flus), and so affine in Fr² beside Fr²."""
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
-    a0, a1, a2, a3, a4 = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
-    square = printed.flus(mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    (a0, a1, a2, a3, a4), (Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T) = general()
+    square = laws.flus(mu, chi_B, chi_H, zeta_B, zeta_H, Tilt(T))
     return bool(a1 * a2 * a3 - a0 * a3**2 - a4 * a1**2 == (zeta_B - zeta_H) * zeta_B * a1 * a3 * (Fr**2 - square))
 
 
 def necessary(line: int) -> bool:
     """No stable design of the sample with λ_s > 0 and Fr > 0 breaks a line of the conditions."""
-    for design, is_stable in designs():
-        if is_stable and design[0] > 0 and design[6] > 0:
-            lines = [*first_four(design), fifth(design)]
-            if not lines[line]:
-                return False
-    return True
+    chosen = (design for design, is_stable in designs() if is_stable and design[0] > 0 and design[6] > 0)
+    return all([*first_four(design), fifth(design)][line] for design in chosen)
 
 
-def symmetric(count: int = 4) -> tuple[list[Any], list[Any]]:
+def symmetric() -> tuple[list[Any], list[Any]]:
     """Four variables and their elementary symmetric polynomials e1 … e4."""
     x = list(polynomials("x1 x2 x3 x4"))
     e = [x[0] * 0 + 1, *[x[0] * 0] * 4]
@@ -188,8 +281,7 @@ def newton_inequalities() -> bool:
 
 def tilt_of_roots() -> bool:
     """With e1, e2, e3 of the roots −x over |ω0|: h T (r e1 + e3)² = (r² − 1)(r e2 + r² + 1), for any Fr and χ_B."""
-    Fr, chi_B, T, r, scale = ring("Fr chi_B T r q")
-    b = normal(Fr, chi_B, T, r, scale)
+    b, (_, _, T, r, scale) = monic()
     return bool(b[4] == 1 and scale**2 * T * (r * b[1] + b[3]) ** 2 == (r**2 - 1) * (r * b[2] + r**2 + 1))
 
 

@@ -4,38 +4,20 @@ from collections.abc import Sequence
 
 import flint
 
-from tmsopt.models.tms import copo
-from tmsopt.paper.ledger import printed
-from tmsopt.paper.ledger.algebra import (
-    Quotient,
-    ball_roots,
-    heavily_damped,
-    q,
-    ring,
-    roots,
-    slope,
-    stable,
-)
+from tmsopt.models.exact import Tilt
+from tmsopt.paper.ledger import lemmas, printed
+from tmsopt.paper.ledger.algebra import Quotient, ball_roots, depends, heavily_damped, q, real_roots, ring, stable
 from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal
-from tmsopt.paper.ledger.lemmas import (
-    HEIGHTS,
-    double_pair,
-    ep4,
-    normal,
-    quartic,
-    tilted,
-    weave,
-)  # fmt: skip
+from tmsopt.paper.ledger.printed import laws
+from tmsopt.roots.exact import isolated_roots
 
 _claim = section("2.4.5 Mechanism of self-stability and CEP2 as a precursor to weaving")
 
 
 @_claim(
-    "motion-limit",
-    "text",
-    "the complex EP set tends to the boundary of asymptotic stability as λ_s → π/2",
+    "motion-limit", "text", "the complex EP set tends to the boundary of asymptotic stability as λ_s → π/2",
     "Fr_EP² − Fr_c² and the real part of the double pair as rational functions of tan λ_s: degrees and limits",
-)
+)  # fmt: skip
 def _limit() -> Outcome:
     T, r, scale = ring("T r q")
     omega0, zeta_B = -1 / scale, -(scale**2) * r
@@ -57,34 +39,30 @@ def _limit() -> Outcome:
 
 
 @_claim(
-    "motion-frequency",
-    "text; Fig. fig3, lower row",
+    "motion-frequency", "text; Fig. fig3, lower row",
     "χ_B above or below √(ζ_B/ζ_H) affects the mode of higher or lower frequency",
     "ω² = a3/a1 of the critical pair against ω0², as rational functions; the solved weave boundaries of Fig. fig3",
-)
+)  # fmt: skip
 def _frequency() -> Outcome:
-    Fr, chi_B, T, r, scale = ring("Fr chi_B T r q")
-    b = normal(Fr, chi_B, T, r, scale)
+    b, (_, chi_B, _, r, _) = lemmas.monic()
     law = b[3] / b[1] - 1 == (r + 1) * (chi_B - r) / (r**2 - chi_B)
-    square = ep4()["s"] ** 2
-    solved = bool(weave("0.80", "0.1")["W"] > square > weave("0.80", "-0.1")["W"])
+    square = lemmas.ep4()["s"] ** 2
+    solved = bool(lemmas.weave("0.80", "0.1")["W"] > square > lemmas.weave("0.80", "-0.1")["W"])
     return proof(law and solved, "The pair that loses stability is faster than |ω0| exactly if χ_B > √(ζ_B/ζ_H).")
 
 
 @_claim(
-    "motion-precursor",
-    "text",
-    "near the CEP2 even a small change of χ_B can destabilize at large λ_s",
+    "motion-precursor", "text", "near the CEP2 even a small change of χ_B can destabilize at large λ_s",
     "Fr_c² at χ_B = r + ε less Fr_EP², as a rational function of tan λ_s: sign for large tan λ_s",
-)
+)  # fmt: skip
 def _precursor() -> Outcome:
     T, r, scale, eps = ring("T r q eps")
     square = printed.epset(-1 / scale, -(scale**2) * r, T)
-    critical = printed.Frc1(r + eps, -(scale**2) * r, -(scale**2) / r, T)
+    critical = laws.Frc1(r + eps, -(scale**2) * r, -(scale**2) / r, Tilt(T))
     base = T * (r + 1) / (r - 1)
     excess = critical - base == base * eps**2 / ((r**2 - r - eps) * (r + eps - 1))
-    remains = slope((square - base) * (4 * scale**2 * T * (r + 1) - r * (r - 1)) / T, "T") == 0
-    figure = [bool(weave("0.80", x)["Fr"] < double_pair("0.80")["Fr"]) for x in ("0.1", "-0.1")]
+    remains = not depends((square - base) * lemmas.pole(T, r, scale) / T, "T")
+    figure = [bool(lemmas.weave("0.80", x)["Fr"] < lemmas.double_pair("0.80")["Fr"]) for x in ("0.1", "-0.1")]
     return proof(
         excess and remains,
         "Fr_c² grows by tan λ_s times ε² while Fr_EP² − Fr_c² stays bounded, so any ε ≠ 0 does at a steep enough "
@@ -94,15 +72,12 @@ def _precursor() -> Outcome:
 
 
 @_claim(
-    "motion-symmetry",
-    "text",
-    "as λ_s → π/2 the system comes close to one with a Hamiltonian symmetry of the spectrum",
+    "motion-symmetry", "text", "as λ_s → π/2 the system comes close to one with a Hamiltonian symmetry of the spectrum",
     "odd coefficients over |ω0| as rational functions of tan λ_s and Fr²/tan λ_s",
-)
+)  # fmt: skip
 def _symmetry() -> Outcome:
-    Fr, chi_B, T, r, scale = ring("Fr chi_B T r q")
-    b = normal(Fr, chi_B, T, r, scale)
-    odd = all(slope(b[k] ** 2 * T**2 / Fr**2, name) == 0 for k in (1, 3) for name in ("T", "Fr"))
+    b, (Fr, _, T, _, _) = lemmas.monic()
+    odd = not any(depends(b[k] ** 2 * T**2 / Fr**2, name) for k in (1, 3) for name in ("T", "Fr"))
     return proof(
         odd,
         "Their squares are Fr²/tan λ_s times a constant over tan λ_s: they vanish at speeds of the order of Fr_c, "
@@ -111,64 +86,58 @@ def _symmetry() -> Outcome:
 
 
 @_claim(
-    "motion-near-circle",
-    "text; Fig. fig3",
-    "for χ_B ≠ √(ζ_B/ζ_H) the eigenvalues evolve close to the circle",
+    "motion-near-circle", "text; Fig. fig3", "for χ_B ≠ √(ζ_B/ζ_H) the eigenvalues evolve close to the circle",
     "certified moduli of the complex roots over |ω0| at Fr = 0.2, 0.4, … up to Fr_EP, for the six bicycles of "
     "Fig. fig3",
-)
+)  # fmt: skip
 def _near() -> Outcome:
     worst = [_departure(offset, shift) for offset, shift in (
         ("0", "0.01"), ("0", "-0.01"), ("-0.05", "0.01"), ("-0.05", "-0.01"), ("0.80", "0.1"), ("0.80", "-0.1"),
     )]  # fmt: skip
     return universal(
-        "'close' read as within a quarter of |ω0|, up to Fr_EP",
-        max(worst) < 0.25,
-        f"at χ_B = √2 + 0.1 in the lower row a modulus departs from |ω0| by {worst[4]:.2%}",
-        worst[4] > 0.1,
+        "'close' read as within a quarter of |ω0|, up to Fr_EP", max(worst) < 0.25,
+        f"at χ_B = √2 + 0.1 in the lower row a modulus departs from |ω0| by {worst[4]:.2%}", worst[4] > 0.1,
         remark=f"The largest departure of the six is {max(worst):.2%}; for ± 0.01 it is {max(worst[:4]):.2%}.",
-    )
+    )  # fmt: skip
 
 
 def _departure(offset: str, shift: str) -> float:
     """Largest relative distance of the complex roots from the circle."""
-    design = ep4()
-    last = float((design if offset == "0" else double_pair(offset))["Fr"].mid())
-    chi_B, T = design["chi_B"] + flint.arb(q(shift)), tilted(offset)
+    design = lemmas.ep4()
+    last = float((design if offset == "0" else lemmas.double_pair(offset))["Fr"].mid())
+    chi_B, T = design["chi_B"] + flint.arb(q(shift)), lemmas.tilted(offset)
     found = [0.0]
     for k in range(1, int(last / 0.2) + 1):
-        for z in ball_roots(copo(flint.arb(q(k) / 5), q(0), chi_B, q(1), *HEIGHTS, T)):
+        for z in ball_roots(lemmas.at_heights(flint.arb(q(k) / 5), chi_B, T)):
             if not z.imag.contains(0):
                 found.append(abs(float((abs(z) / -design["s"] - 1).mid())))
     return max(found)
 
 
 @_claim(
-    "fig3-EPs",
-    "caption of Fig. fig3",
+    "fig3-EPs", "caption of Fig. fig3",
     "at χ_B = √2 there is an EP4, a couple of real EP2, a couple of complex EP2 as Fr grows from 0 to 5",
     "the three solved bicycles, their Fr and b² − 4 c, in balls",
-)
+)  # fmt: skip
 def _three() -> Outcome:
-    real, pair = double_pair("-0.05"), double_pair("0.80")
-    kinds = bool(real["b"] ** 2 > 4 * real["c"]) and bool(pair["b"] ** 2 < 4 * pair["c"])
-    inside = all(0 < x["Fr"] < 5 for x in (ep4(), real, pair))
-    return proof(kinds and inside, "At the Froude numbers of Table 1.")
+    real, pair = lemmas.double_pair("-0.05"), lemmas.double_pair("0.80")
+    inside = all(0 < x["Fr"] < 5 for x in (lemmas.ep4(), real, pair))
+    return proof(lemmas.are_real(real) and lemmas.are_complex(pair) and inside, "At the Froude numbers of Table 1.")
 
 
 @_claim(
-    "fig3-stabilized",
-    "caption of Fig. fig3",
+    "fig3-stabilized", "caption of Fig. fig3",
     "the TMS bike is stabilized as Fr grows from 0 to 5, for each of the nine designs",
     "Fr_c of the nine by interval Newton, Routh at Fr = 5",
-)
+)  # fmt: skip
 def _stabilized() -> Outcome:
     designs = [
         (o, s) for o in ("0", "-0.05", "0.80") for s in (("", "0.1", "-0.1") if o == "0.80" else ("", "0.01", "-0.01"))
     ]
-    speeds = [weave(offset, shift)["Fr"] for offset, shift in designs]
+    speeds = [lemmas.weave(offset, shift)["Fr"] for offset, shift in designs]
     ends = [
-        stable(copo(q(5), q(0), ep4()["chi_B"] + flint.arb(q(s or "0")), q(1), *HEIGHTS, tilted(o))) for o, s in designs
+        stable(lemmas.at_heights(q(5), lemmas.ep4()["chi_B"] + flint.arb(q(s or "0")), lemmas.tilted(o)))
+        for o, s in designs
     ]
     return proof(
         all(0 < x < 5 for x in speeds) and all(ends),
@@ -177,18 +146,13 @@ def _stabilized() -> Outcome:
 
 
 @_claim(
-    "fig3-repelling",
-    "caption of Fig. fig3; text",
-    "eigenvalue curves repel near the CEP2 when χ_B ≠ √2",
+    "fig3-repelling", "caption of Fig. fig3; text", "eigenvalue curves repel near the CEP2 when χ_B ≠ √2",
     "p = a0 (s² + b s + c)² is impossible off the plane, in r and q; certified distance of the pairs at Fr_EP",
-)
+)  # fmt: skip
 def _repelling() -> Outcome:
-    Fr, chi_B, T, r, scale = ring("Fr chi_B T r q")
-    b = normal(Fr, chi_B, T, r, scale)
-    never = b[3] ** 2 - b[1] ** 2 == Fr**2 * (r**2 - 1) * (chi_B**2 - r**2) / (scale**2 * T**2 * r**2)
     gaps = [_gap(shift) for shift in ("0.1", "-0.1")]
     return proof(
-        never and all(gap > 0.01 for gap in gaps),
+        lemmas.asymmetry_identity() and all(gap > 0.01 for gap in gaps),
         f"At Fr_EP the two pairs are {gaps[0]:.3f} apart for χ_B = √2 + 0.1 and {gaps[1]:.3f} for √2 − 0.1. Near the "
         "EP4 and the 2EP2 they still meet on the real axis, as a double real root has codimension 1.",
     )
@@ -196,24 +160,23 @@ def _repelling() -> Outcome:
 
 def _gap(shift: str) -> float:
     """Distance of the two upper complex roots at Fr_EP of the lower row."""
-    chi_B = ep4()["chi_B"] + flint.arb(q(shift))
-    found = ball_roots(copo(double_pair("0.80")["Fr"], q(0), chi_B, q(1), *HEIGHTS, tilted("0.80")))
+    chi_B = lemmas.ep4()["chi_B"] + flint.arb(q(shift))
+    found = ball_roots(lemmas.at_heights(lemmas.double_pair("0.80")["Fr"], chi_B, lemmas.tilted("0.80")))
     upper = [z for z in found if z.imag > 0]
     return float(abs(upper[0] - upper[1]).lower())
 
 
 @_claim(
-    "motion-monotonic",
-    "text; Fig. fig3, middle row",
+    "motion-monotonic", "text; Fig. fig3, middle row",
     "with heavy damping the time evolution of all perturbations is monotonic exponential decay",
     "certified roots of a heavily damped bicycle and the lean component of their modes, from the second row of "
     "the matrices",
-)
+)  # fmt: skip
 def _monotonic() -> Outcome:
     # ζ_B = −2, ζ_H = −1/2, χ_B = 2, χ_H = 1, tan λ_s = 1/4, Fr = 29/20; over μ ν_H cos λ_s, with ν_H/cos λ_s = 1/8
     Fr, T = q("1.45"), q("0.25")
-    p = quartic(Fr, q(2), T, q(2), q(1))
-    modes = [z.real for z, _ in roots(p)]
+    p = lemmas.by_hand("1.45", "0.25")
+    modes = [z.real for z, _ in isolated_roots(p)]
     leans = [s * s / 8 + Fr * s + Fr**2 - T for s in modes]
     slow, fast = modes[-1], modes[0]
     visible = all(not lean.contains(0) for lean in leans)
@@ -229,11 +192,10 @@ def _monotonic() -> Outcome:
 
 
 @_claim(
-    "motion-similar",
-    "text; Fig. fig3, middle row",
+    "motion-similar", "text; Fig. fig3, middle row",
     "for smaller tilt and χ_B ≠ √(ζ_B/ζ_H) the evolution remains qualitatively the same",
     "number of certified real roots as Fr grows, tan λ_s = 0.377177 (the middle row), χ_B = √2 ± 0.01 rounded",
-)
+)  # fmt: skip
 def _similar() -> Outcome:
     below = _real_roots("1.404214", ("0.01", "2", "2.221", "2.25", "2.4"))
     above = _real_roots("1.424214", ("0.01", "2", "2.239", "2.27", "2.4"))
@@ -248,8 +210,7 @@ def _similar() -> Outcome:
 
 
 def _real_roots(chi_B: str, speeds: Sequence[str]) -> list[int]:
-    designs = [copo(q(Fr), q(0), q(chi_B), q(1), *HEIGHTS, q("0.377177")) for Fr in speeds]
-    return [sum(m for z, m in roots(p) if z.imag == 0) for p in designs]
+    return [real_roots(lemmas.at_heights(q(Fr), q(chi_B), q("0.377177"))) for Fr in speeds]
 
 
 CLAIMS: tuple[Claim, ...] = (

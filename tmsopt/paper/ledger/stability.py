@@ -6,21 +6,12 @@ from typing import Any
 
 import flint
 
+from tmsopt.models.exact import Tilt
 from tmsopt.models.tms import copo
-from tmsopt.paper.ledger import printed
-from tmsopt.paper.ledger.algebra import match, polynomials, positive, q, ring, solve, stable, unstable
+from tmsopt.paper.ledger import lemmas
+from tmsopt.paper.ledger.algebra import matched, polynomials, positive, q, ring, stable, unstable
 from tmsopt.paper.ledger.entry import EXACT, Claim, Outcome, decimal, proof, section, universal
-from tmsopt.paper.ledger.lemmas import (
-    Design,
-    admitted,
-    class_identity,
-    designs,
-    fifth,
-    first_four,
-    hurwitz_identity,
-    necessary,
-    standstill_identity,
-)
+from tmsopt.paper.ledger.printed import laws
 
 _claim = section("2.2 Asymptotic stability and the critical Froude number")
 
@@ -33,29 +24,31 @@ _NECESSARY = (
 
 @_claim("lscf-1", "Eq. lscf, line 1", "χ_H > 1 + ζ_H tan λ_s", _NECESSARY)
 def _line_1() -> Outcome:
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
-    is_a0 = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)[0] == (chi_H - (1 + zeta_H * T)) * zeta_B**2
-    return proof(is_a0 and class_identity() and necessary(0), "It is a0 > 0; a0 and a4 cannot both be negative.")
+    a, (_, _, _, chi_H, zeta_B, zeta_H, T) = lemmas.general()
+    is_a0 = a[0] == (chi_H - (1 + zeta_H * T)) * zeta_B**2
+    return proof(
+        is_a0 and lemmas.class_identity() and lemmas.necessary(0), "It is a0 > 0; a0 and a4 cannot both be negative."
+    )
 
 
 @_claim("lscf-2", "Eq. lscf, line 2", "χ_H < 1 − (ζ_B/μ) tan λ_s", _NECESSARY)
 def _line_2() -> Outcome:
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
-    is_a4 = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)[4] == (1 - zeta_B / mu * T - chi_H) * mu
-    return proof(is_a4 and class_identity() and necessary(1), "It is a4 > 0.")
+    a, (_, mu, _, chi_H, zeta_B, _, T) = lemmas.general()
+    is_a4 = a[4] == (1 - zeta_B / mu * T - chi_H) * mu
+    return proof(is_a4 and lemmas.class_identity() and lemmas.necessary(1), "It is a4 > 0.")
 
 
 @_claim("lscf-3", "Eq. lscf, line 3", "χ_H < χ_B", _NECESSARY)
 def _line_3() -> Outcome:
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
-    is_a3 = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)[3] == (chi_B - chi_H) * -zeta_B * Fr
-    return proof(is_a3 and necessary(2), "It is a3 > 0.")
+    a, (Fr, _, chi_B, chi_H, zeta_B, _, _) = lemmas.general()
+    is_a3 = a[3] == (chi_B - chi_H) * -zeta_B * Fr
+    return proof(is_a3 and lemmas.necessary(2), "It is a3 > 0.")
 
 
 @_claim("lscf-4", "Eq. lscf, line 4", "ζ_H > ζ_B", _NECESSARY)
 def _line_4() -> Outcome:
     return proof(
-        hurwitz_identity() and standstill_identity() and necessary(3),
+        lemmas.hurwitz_identity() and lemmas.standstill_identity() and lemmas.necessary(3),
         "With a0, a1, a3, a4 > 0 the Hurwitz determinant over Fr² is affine in Fr² and negative at Fr = 0, where a2 is "
         "minus a positive combination of a0 and a4; it can become positive only if its slope, which has the sign of "
         "ζ_H − ζ_B, is positive.",
@@ -65,19 +58,19 @@ def _line_4() -> Outcome:
 @_claim("lscf-5", "Eq. lscf, line 5", "Fr > Fr_c > 0", _NECESSARY)
 def _line_5() -> Outcome:
     return proof(
-        hurwitz_identity() and standstill_identity() and necessary(4),
+        lemmas.hurwitz_identity() and lemmas.standstill_identity() and lemmas.necessary(4),
         "Fr_c² is the zero of that affine function, so where a0, a1, a3, a4 > 0 and ζ_H > ζ_B it is positive of "
         "itself.",
     )
 
 
-WITNESS: Design = tuple(q(x) for x in ("2", "5", "1.2", "0.9", "-0.5", "-0.4", "0.5"))
+WITNESS: lemmas.Design = tuple(q(x) for x in ("2", "5", "1.2", "0.9", "-0.5", "-0.4", "0.5"))
 """A design that the printed conditions admit although it is unstable."""
 
 
-def wrongly_admitted(design: Design) -> bool:
+def wrongly_admitted(design: lemmas.Design) -> bool:
     """Whether the five printed conditions hold and yet a root lies on the right."""
-    return admitted(design) and unstable(copo(*design))
+    return lemmas.admitted(design) and unstable(copo(*design))
 
 
 def upright_case() -> bool:
@@ -85,32 +78,30 @@ def upright_case() -> bool:
     mu, k, d, x, y, T, w = ring("mu k d x y T w")
     chi_H, chi_B, zeta_B, zeta_H = 1 + k, 1 + k + d, -(x + y), -y
     skew = zeta_B * chi_H - zeta_H * chi_B  # a1/(Fr ζ_B); it is w > 0 where a1 < 0
-    square = printed.flus(mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    square = laws.flus(mu, chi_B, chi_H, zeta_B, zeta_H, Tilt(T))
     rest = x * (x + y) * chi_B * chi_H * T + k * chi_B * (x + y) * d
     identity = -square * (d * skew * (x + y)) == rest + k * chi_H * mu * skew
     return identity and positive((rest + k * chi_H * mu * w).over)
 
 
 @_claim(
-    "lscf-sufficient",
-    "Eq. lscf",
-    "for tan λ_s > 0 the five conditions are sufficient",
+    "lscf-sufficient", "Eq. lscf", "for tan λ_s > 0 the five conditions are sufficient",
     "an identity for Fr_c² with a1 < 0, the Routh conditions of 4000 rational designs, and certified roots of the "
     "counterexample",
-)
+)  # fmt: skip
 def _sufficient() -> Outcome:
-    upright = all(is_stable for d, is_stable in designs() if d[6] > 0 and d[3] >= 1 and admitted(d))
+    upright = all(is_stable for d, is_stable in lemmas.designs() if d[6] > 0 and d[3] >= 1 and lemmas.admitted(d))
     amended = all(
         is_stable
-        for d, is_stable in designs()
-        if d[6] > 0 and admitted(d) and d[4] * d[3] < d[5] * d[2]
+        for d, is_stable in lemmas.designs()
+        if d[6] > 0 and lemmas.admitted(d) and d[4] * d[3] < d[5] * d[2]
     )  # fmt: skip
-    wrong = sum(admitted(d) and not is_stable for d, is_stable in designs() if d[6] > 0 and d[3] < 1)
-    all_below = sum(admitted(d) for d, _ in designs() if d[6] > 0 and d[3] < 1)
-    a1, square = copo(*WITNESS)[1], printed.flus(*WITNESS[1:])
+    wrong = sum(lemmas.admitted(d) and not is_stable for d, is_stable in lemmas.designs() if d[6] > 0 and d[3] < 1)
+    all_below = sum(lemmas.admitted(d) for d, _ in lemmas.designs() if d[6] > 0 and d[3] < 1)
+    a1, square = copo(*WITNESS)[1], lemmas.critical_square(WITNESS)
     return universal(
         "χ_H ≥ 1; for χ_H < 1 the condition a1 > 0, that is ζ_B χ_H < ζ_H χ_B, must be added",
-        upright_case() and upright and amended and hurwitz_identity(),
+        upright_case() and upright and amended and lemmas.hurwitz_identity(),
         f"χ_H = 9/10, χ_B = 6/5, ζ_B = −1/2, ζ_H = −2/5, μ = 5, tan λ_s = 1/2 has Fr_c = {square} and meets all five "
         f"at Fr = 2, where a1 = {a1} and a root lies on the right",
         square == 1 and wrongly_admitted(WITNESS),
@@ -119,29 +110,27 @@ def _sufficient() -> Outcome:
 
 
 @_claim(
-    "lscf-classes",
-    "text after Eq. flus, of GAS2018",
-    "the self-stable designs form two classes, by the sign of λ_s",
+    "lscf-classes", "text after Eq. flus, of GAS2018", "the self-stable designs form two classes, by the sign of λ_s",
     "the identity a4 + μ a0/ζ_B² = −tan λ_s (ζ_B + μ ζ_H), and an example of each class by its Routh conditions",
-)
+)  # fmt: skip
 def _classes() -> Outcome:
     forward = copo(*(q(x) for x in ("4", "1", "2", "1", "-2", "-0.5", "1")))
     other = copo(*(q(x) for x in ("2", "1", "0.5", "1", "-0.5", "-2", "-0.25")))
     mirrored = all(
-        is_stable == (not any(first_four(d)) and fifth(d) and d[4] * d[3] > d[5] * d[2])
-        for d, is_stable in designs()
+        is_stable == (not any(lemmas.first_four(d)) and lemmas.fifth(d) and d[4] * d[3] > d[5] * d[2])
+        for d, is_stable in lemmas.designs()
         if d[6] < 0 and d[0] > 0
     )
-    none = not any(admitted(d) for d, _ in designs() if d[6] < 0)
+    none = not any(lemmas.admitted(d) for d, _ in lemmas.designs() if d[6] < 0)
     both = stable(forward) and stable(other) and forward[0] > 0 > other[0]
     return proof(
-        class_identity() and both and mirrored and none,
+        lemmas.class_identity() and both and mirrored and none,
         "All coefficients have the sign of λ_s, and at λ_s = 0 no bicycle is stable, as a0 and a4 differ in sign. "
         "For λ_s < 0 stability is the first four conditions reversed, a1 < 0 and Fr > Fr_c; lscf as printed is empty.",
     )
 
 
-BACKWARD: Design = tuple(q(x) for x in ("-20", "1", "-1.1", "-1", "-0.4", "-0.2", "11"))
+BACKWARD: lemmas.Design = tuple(q(x) for x in ("-20", "1", "-1.1", "-1", "-0.4", "-0.2", "11"))
 """A design that is stable rolling backward: both masses behind the rear contact."""
 
 
@@ -159,17 +148,15 @@ def _backward_slopes() -> bool:
 
 
 @_claim(
-    "lscf-backward",
-    "text after Eq. flus, of GAS2018",
-    "backward stability is excluded",
+    "lscf-backward", "text after Eq. flus, of GAS2018", "backward stability is excluded",
     "signs of a1 and a3 at Fr < 0 for ζ_H > ζ_B, which the Hurwitz determinant demands, the Routh conditions of the "
     "rational designs with Fr < 0, and of the counterexample",
-)
+)  # fmt: skip
 def _backward() -> Outcome:
-    sample = not any(is_stable for d, is_stable in designs() if d[0] < 0 and d[3] >= 0)
+    sample = not any(is_stable for d, is_stable in lemmas.designs() if d[0] < 0 and d[3] >= 0)
     return universal(
         "χ_H ≥ 0, the front assembly's mass not behind the rear contact",
-        _backward_slopes() and hurwitz_identity() and standstill_identity() and sample,
+        _backward_slopes() and lemmas.hurwitz_identity() and lemmas.standstill_identity() and sample,
         "χ_B = −11/10, χ_H = −1, ζ_B = −2/5, ζ_H = −1/5, μ = 1, tan λ_s = 11 is stable at Fr = −20, by its Routh "
         f"conditions: a0 = {copo(*BACKWARD)[0]}, a1 = {copo(*BACKWARD)[1]}, a3 = {copo(*BACKWARD)[3]}, "
         f"a4 = {copo(*BACKWARD)[4]}",
@@ -180,18 +167,15 @@ def _backward() -> Outcome:
 
 
 @_claim(
-    "flus",
-    "Eq. flus",
-    "the critical Froude number",
+    "flus", "Eq. flus", "the critical Froude number",
     "p(iω) = 0 with ω² eliminated: the Hurwitz determinant as an identity of rational functions",
-)
+)  # fmt: skip
 def _flus() -> Outcome:
-    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
-    a0, a1, a2, a3, a4 = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    (a0, a1, a2, a3, a4), (Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T) = lemmas.general()
     W = a3 / a1  # ω² from the imaginary part
     real = a0 * W**2 - a2 * W + a4
     lead = -(zeta_B - zeta_H) * zeta_B * W  # of Fr² in the real part
-    square = printed.flus(mu, chi_B, chi_H, zeta_B, zeta_H, T)
+    square = laws.flus(mu, chi_B, chi_H, zeta_B, zeta_H, Tilt(T))
     return proof(
         real == lead * (Fr**2 - square),
         "For every χ_H and either sign of λ_s it is the speed at which the Hurwitz determinant vanishes. It bounds "
@@ -206,34 +190,30 @@ def _sides(Fr: str) -> bool:
 
 
 @_claim(
-    "Fr_c-sides",
-    "text after Eq. flus",
-    "unstable at 0 ≤ Fr < Fr_c, asymptotically stable at Fr > Fr_c",
+    "Fr_c-sides", "text after Eq. flus", "unstable at 0 ≤ Fr < Fr_c, asymptotically stable at Fr > Fr_c",
     "sign of the Hurwitz determinant on either side, exactly; Fr = 0 by the evenness of p; the counterexample by Routh",
-)
+)  # fmt: skip
 def _sides_of_critical() -> Outcome:
     _, mu, chi_B, chi_H, zeta_B, zeta_H, T = ring(_NAMES)
     still = copo(0 * T, mu, chi_B, chi_H, zeta_B, zeta_H, T)
     even = still[1] == 0 and still[3] == 0
     regular = all(
-        is_stable == (d[0] ** 2 > printed.flus(*d[1:]))
-        for d, is_stable in designs()
-        if d[0] > 0 and d[6] > 0 and all(first_four(d)) and d[4] * d[3] < d[5] * d[2]
+        is_stable == (d[0] ** 2 > lemmas.critical_square(d))
+        for d, is_stable in lemmas.designs()
+        if d[0] > 0 and d[6] > 0 and all(lemmas.first_four(d)) and d[4] * d[3] < d[5] * d[2]
     )
     return universal(
         "a0, a1, a3, a4 have one sign, which lscf gives for χ_H ≥ 1",
-        even and regular and hurwitz_identity() and standstill_identity(),
+        even and regular and lemmas.hurwitz_identity() and lemmas.standstill_identity(),
         "the design of lscf-sufficient, Fr_c = 1, is unstable at Fr = 2 and at Fr = 10",
-        not _sides("2") and not _sides("10") and printed.flus(*WITNESS[1:]) == 1,
+        not _sides("2") and not _sides("10") and lemmas.critical_square(WITNESS) == 1,
     )
 
 
 @_claim(
-    "Fr_c-weaving",
-    "text after Eq. flus",
-    "Fr_c lies on the boundary of stability and dynamic instability (weaving)",
+    "Fr_c-weaving", "text after Eq. flus", "Fr_c lies on the boundary of stability and dynamic instability (weaving)",
     "division of p by s² + a3/a1, the remainder proportional to the Hurwitz determinant",
-)
+)  # fmt: skip
 def _weaving() -> Outcome:
     a0, a1, a2, a3, a4 = ring("a0 a1 a2 a3 a4")
     W = a3 / a1
@@ -255,7 +235,7 @@ def benchmark() -> dict[str, Any]:
     Fr, W, b, c, T = polynomials("Fr W b c T")
     a = copo(Fr, q("1/10"), q("1.2"), q("1.02"), q("-0.4"), q("-0.2"), T)
     tilt = {"T": (flint.arb.pi() / 36).tan()}
-    return solve(match(a, [1, 0, W], [1, b, c]), {"Fr": 0.9, "W": 1.07, "b": 2.0, "c": 5.0}, tilt)
+    return matched(a, [[1, 0, W], [1, b, c]], {"Fr": 0.9, "W": 1.07, "b": 2.0, "c": 5.0}, tilt)
 
 
 _MATCHED = "p(s) = a0 (s² + ω²)(s² + b s + c) solved for Fr, ω², b, c by interval Newton, 80 digits"
@@ -268,7 +248,7 @@ def _bench() -> Outcome:
     T, Fr = (flint.arb.pi() / 36).tan(), benchmark()["Fr"]
     geometry = q("0.1"), q("1.2"), q("1.02"), q("-0.4"), q("-0.2")
     above, below = (copo(Fr + flint.arb(step), *geometry, T) for step in ("1e-9", "-1e-9"))
-    return proof(stable(above) and not stable(below) and all(first_four((Fr, *geometry, T))))
+    return proof(stable(above) and not stable(below) and all(lemmas.first_four((Fr, *geometry, T))))
 
 
 @_claim("fr1-Fr_c", "Eq. fr1", "Fr_c of the benchmark", _MATCHED)

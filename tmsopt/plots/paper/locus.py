@@ -8,26 +8,16 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from tmsopt.paper.locus import Locus, LocusRow, Mark, Track
+from tmsopt.paper.locus import DoubleRoots, Locus, LocusRow, Track
 from tmsopt.plots.style import COMPLEX, CRITICAL, LINE, MARK, REAL, new_figure
 
 COLOURS = (LINE, CRITICAL, MARK)
 """χ_B of the law, below it, above it."""
 
-NAMES = {
-    "EP4": r"$\mathrm{EP}_4$",
-    "2EP2": r"$2\mathrm{EP}_2$",
-    "CEP2": r"$\mathrm{CEP}_2$",
-    "EP2": r"$\mathrm{EP}_2$",
-}
+NAMES = {"EP4": r"$\mathrm{EP}_4$", "2EP2": r"$2\mathrm{EP}_2$", "CEP2": r"$\mathrm{CEP}_2$", "EP2": r"$\mathrm{EP}_2$"}
 """Multiple roots in the symbols of the paper."""
 
-_PLACES = {
-    "EP4": ((-34, 9),),
-    "2EP2": ((22, 26), (1, 33)),
-    "CEP2": ((10, -17), (10, 12)),
-    "EP2": ((6, -13),),
-}
+_PLACES = {"EP4": ((-34, 9),), "2EP2": ((22, 26), (1, 33)), "CEP2": ((10, -17), (10, 12)), "EP2": ((6, -13),)}
 """Where the names stand beside the roots, in points, by ascending real and imaginary part."""
 
 Window = tuple[float, float, float, float]
@@ -136,13 +126,8 @@ def _legend(row: LocusRow) -> list[Line2D]:
 
 def _key(row: LocusRow) -> list[Line2D]:
     first, last = row.loci[0].values[[0, -1]]
-    dot: dict[str, Any] = {
-        "linestyle": "none",
-        "marker": "o",
-        "markeredgecolor": "black",
-        "markeredgewidth": 0.6,
-        "markersize": 6,
-    }
+    dot: dict[str, Any] = {"linestyle": "none", "marker": "o", "markeredgecolor": "black", "markeredgewidth": 0.6}
+    dot["markersize"] = 6
     return [
         Line2D([], [], color="0.55", alpha=0.45, linewidth=3.5, label=rf"$|s| = |\omega_0| = {abs(row.omega0):.4f}$"),
         Line2D([], [], color=REAL, label=r"real multiple root, $\chi_B = \sqrt{2}$", **dot),
@@ -157,7 +142,7 @@ def _key(row: LocusRow) -> list[Line2D]:
     ]  # fmt: skip
 
 
-def _name(ax: Axes, mark: Mark, omega0: float) -> None:
+def _name(ax: Axes, mark: DoubleRoots, omega0: float) -> None:
     """The name of a multiple root at each of its places inside the axes, with a leader where it stands off."""
     (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
     for k, s in enumerate(sorted(mark.s, key=lambda z: (z.real, z.imag))):

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from tmsopt.paper.planes import Plane
-from tmsopt.plots.chart import class_handles, domain_handles, draw_classes, draw_domain
-from tmsopt.plots.labels import Name, label_axes, place_names
+from tmsopt.plots.chart import class_handles, domain_handles, draw_classes, draw_domain, frame
+from tmsopt.plots.labels import Name, place_names
 from tmsopt.plots.style import COMPLEX, CRITICAL, LINE, MARK, REAL, legend_below, new_figure
 from tmsopt.plots.trace import draw_branch
 
@@ -40,7 +40,7 @@ def draw_plane(ax: Axes, plane: Plane) -> list[Name]:
         for branch in plane.ep_set.branches:
             draw_branch(ax, branch, chart.axes[0], chart.axes[1], width=2.0)
     names += _draw_marked(ax, plane)
-    _frame(ax, plane)
+    frame(ax, plane.chart)
     return names
 
 
@@ -70,7 +70,7 @@ def draw_abscissa(ax: Axes, plane: Plane, low: float, high: float) -> ScalarMapp
     legend = ax.legend(fontsize=7.5, facecolor="0.25", framealpha=0.85, loc="upper left")
     for text in legend.get_texts():
         text.set_color("white")
-    _frame(ax, plane)
+    frame(ax, plane.chart)
     place_names(ax, names)
     return mesh
 
@@ -107,10 +107,3 @@ def _draw_marked(ax: Axes, plane: Plane) -> list[Name]:
         ax.plot([x], [y], "o", color=MARK, markeredgecolor="white", markersize=6, zorder=6)
     words = {"least Fr_c": r"least $\mathrm{Fr}_c$"}
     return [Name(words.get(name, name), x, y) for name, (x, y) in plane.marked.items()]
-
-
-def _frame(ax: Axes, plane: Plane) -> None:
-    chart = plane.chart
-    label_axes(ax, chart.problem.parameter_set, *chart.axes)
-    ax.set_xlim(chart.grid[0][0], chart.grid[0][-1])
-    ax.set_ylim(chart.grid[1][0], chart.grid[1][-1])

@@ -116,12 +116,9 @@ def universal_figure(paths: Sequence[UniversalPath], faces: Sequence[Array], swe
     projected = any(np.nanmax(np.abs(path.A[:, 0] - path.A[:, 2]), initial=0.0) > 1e-6 for path in paths)
     right.set_title("(b) section $A_1 = A_3$" + (", paths projected on it" if projected else ""), fontsize=9.5)
     figure.legend(
-        handles=[*_path_handles(paths), *_key(swept, paths)],
-        loc="outside lower center",
-        ncols=3 if len(paths) > 3 else 4,
-        fontsize=8,
-        frameon=False,
-    )
+        handles=[*_path_handles(paths), *_key(swept, paths)], loc="outside lower center",
+        ncols=3 if len(paths) > 3 else 4, fontsize=8, frameon=False,
+    )  # fmt: skip
     return figure
 
 

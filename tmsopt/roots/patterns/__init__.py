@@ -5,16 +5,10 @@ multiplicities. Open `pattern` first: what a pattern is; then `structure`: which
 """
 
 from tmsopt.roots.patterns.descriptions import STRUCTURES, in_words
-from tmsopt.roots.patterns.enclosed import enclosed_roots, nearest, nearest_decimal, nearest_double
+from tmsopt.roots.patterns.enclosed import enclosed_roots, nearest_decimal, nearest_double, nearest_roots
 from tmsopt.roots.patterns.naming import implies, shown_patterns
 
 __all__ = [
-    "STRUCTURES",
-    "enclosed_roots",
-    "implies",
-    "in_words",
-    "nearest",
-    "nearest_decimal",
-    "nearest_double",
+    "STRUCTURES", "enclosed_roots", "implies", "in_words", "nearest_decimal", "nearest_double", "nearest_roots",
     "shown_patterns",
-]
+]  # fmt: skip

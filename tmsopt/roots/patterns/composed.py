@@ -5,19 +5,20 @@ coefficients, so that the equations stay linear in them.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cache, partial
 from itertools import combinations, islice, product
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from tmsopt.roots.meetings import meeting, weave_test
 from tmsopt.roots.numeric import rebuilt
-from tmsopt.roots.patterns.parts import AXIS, Part, parts_of
-from tmsopt.roots.patterns.pattern import PATTERNS, Pattern, Roots
-from tmsopt.roots.polynomial import evaluate
-from tmsopt.roots.polynomial import product as multiplied
+from tmsopt.roots.patterns.parts import AXIS, ENDS, Part, parts_of
+from tmsopt.roots.patterns.pattern import QUARTIC, Pattern, Roots
+from tmsopt.roots.polynomial import evaluate, product as multiplied
 
 _GUESSES = 24  # unknowns to start from, the nearest of all ways to choose the roots
 _LOOKED_AT = 512  # ways to choose the roots at most
@@ -49,12 +50,10 @@ def composition(name: str) -> list[tuple[str, int, int]]:
 def _pattern(name: str, degree: int) -> Pattern:
     groups = parts_of(name)
     canonical = _joined(name)
-    if degree == PATTERNS["EP4"].degree and canonical in PATTERNS:
-        return PATTERNS[canonical]
     taken = sum(g.roots for g in groups)
     if taken > degree:
         raise ValueError(f"'{name}' takes {taken} roots, and the polynomial has {degree}")
-    return _composed(canonical, groups, degree)
+    return replace(_composed(canonical, groups, degree), **(QUARTIC.get(canonical, {}) if degree == 4 else {}))
 
 
 def _composed(name: str, groups: tuple[Part, ...], degree: int) -> Pattern:
@@ -97,7 +96,7 @@ def _composed(name: str, groups: tuple[Part, ...], degree: int) -> Pattern:
         rest=off_axis if any(g.kind in AXIS for g in groups) else None,
         test=_test(alone),
         marks=_marks(groups, slices, others),
-        ends={"W": "the pair meets in a double root 0"} if "W" in names else {},
+        ends={u: ENDS[g.kind] for g in groups for u in g.unknowns if u == "W"} if "W" in names else {},
         degree=degree,
     )
 
@@ -169,3 +168,7 @@ def _guesses(groups: tuple[Part, ...], others: int, z: Roots) -> list[list[float
         mismatch = float(np.linalg.norm(columns[:, 0] + columns[:, 1:] @ rest - target / size))
         found[(*(x for u in choice for x in u), *rest.tolist())] = mismatch
     return [list(u) for u in sorted(found, key=found.__getitem__)[:_GUESSES]]
+
+
+PATTERNS: Mapping[str, Pattern] = MappingProxyType({name: pattern(name, 4) for name in QUARTIC})
+"""Patterns of a quartic that are not made up of others, by name."""

@@ -14,9 +14,11 @@ import flint
 import numpy as np
 
 from tmsopt.arithmetic.elementary import as_ball, rational
+from tmsopt.roots.exact import isolated_roots
+from tmsopt.roots.patterns.composed import PATTERNS
 from tmsopt.roots.patterns.fitting import Form
 from tmsopt.roots.patterns.naming import shown
-from tmsopt.roots.patterns.pattern import LINES, PATTERNS, Pattern
+from tmsopt.roots.patterns.pattern import LINES, Pattern
 from tmsopt.roots.patterns.shape import Shape
 from tmsopt.roots.polynomial import Root, evaluate, product
 
@@ -65,7 +67,7 @@ def enclosed_roots(coefficients: Sequence[Any]) -> tuple[Enclosed, ...] | None:
     degree = len(terms) - 1
     if degree > 0:
         slope = [(degree - k) * c for k, c in enumerate(terms[:-1])]
-        for z, multiplicity in _isolated([rational(t) for t in terms]):
+        for z, multiplicity in isolated_roots(terms):
             if multiplicity > 1:
                 if not all(t.is_exact() for t in terms):
                     return None
@@ -80,7 +82,7 @@ def enclosed_roots(coefficients: Sequence[Any]) -> tuple[Enclosed, ...] | None:
     return _sorted(found)
 
 
-def nearest(name: str, coefficients: Sequence[Any], roots: Sequence[Root]) -> tuple[Enclosed, ...] | None:
+def nearest_roots(name: str, coefficients: Sequence[Any], roots: Sequence[Root]) -> tuple[Enclosed, ...] | None:
     """Roots of the polynomial nearest to a given one among those of a structure; None where the fit does not converge.
 
     Nearest is: least in the sum over k = 1 … n of (Δₖ/wₖ)², where Δₖ is the change of the k-th coefficient of the
@@ -170,16 +172,6 @@ def _double(x: Fraction) -> float:
         return x.numerator / x.denominator  # rounded correctly, whatever the length of the two
     except OverflowError:
         return float("inf") if x > 0 else float("-inf")
-
-
-def _isolated(terms: Sequence[flint.fmpq]) -> list[tuple[Any, int]]:
-    """Distinct roots of a polynomial with rational coefficients, each as a ball with its multiplicity."""
-    common = flint.fmpz(1)
-    for term in terms:
-        common = common.lcm(term.q)
-    polynomial = flint.fmpz_poly([int(t.p * (common // t.q)) for t in reversed(terms)])
-    isolated: Any = polynomial.complex_roots()
-    return [(z, int(m)) for z, m in isolated]
 
 
 def _overlap(found: Sequence[Enclosed]) -> bool:

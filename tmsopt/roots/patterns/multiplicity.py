@@ -13,15 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tmsopt.records import Array
-from tmsopt.roots.numeric import rebuilt, roots
-from tmsopt.roots.numeric import roots as numeric_roots
+from tmsopt.roots.numeric import rebuilt, roots as numeric_roots
 from tmsopt.roots.patterns.fitting import gauss_newton, relative_distance, sizes
 from tmsopt.roots.patterns.shape import Group, Shape
 from tmsopt.roots.polynomial import Root
 
 _NEAR = 0.05  # relative distance of a guess that can still lead to a polynomial within any sensible tolerance
-
-
 _NEARLY_REAL = 1e-2  # |Im z|/|z| up to which a root of a derivative may stand for a real one
 _WORTH = 1e-6  # relative change that makes a place a multiple root, up to which a fit is worth its time
 _TIMES = 1e3  # likewise, times the tolerance: a place found on a derivative need not be the best one
@@ -178,17 +175,15 @@ def multiple_real_roots(coefficients: ArrayLike, tolerance: float) -> tuple[Root
     the root sum of squares of the changes, each relative to the terms that make up a coefficient.
     """
     c = np.asarray(coefficients, dtype=float)
-    z = roots(c)
+    z = numeric_roots(c)
     z = z[np.lexsort((z.imag, z.real))]
     size = np.maximum(rebuilt(-np.abs(z).astype(complex)), 1e-100)
     gaps = np.abs(np.diff(z)) / (np.abs(z[1:]) + np.abs(z[:-1]) + 1e-300)
     for cuts in range(len(z) - 1):
         ends = np.sort(np.argsort(-gaps, kind="stable")[:cuts]) + 1
         groups = np.split(z, ends)
-        shape, means = (
-            Shape(tuple(Group(len(g), real=True) for g in groups), 0),
-            np.array([g.mean().real for g in groups]),
-        )
+        shape = Shape(tuple(Group(len(g), real=True) for g in groups), 0)
+        means = np.array([g.mean().real for g in groups])
         if relative_distance(shape, means, c / c[0], size) > _NEAR:
             continue
         fitted = gauss_newton(shape, means, c / c[0], size)

@@ -23,6 +23,9 @@ _WORDS = {
     "capsize": "a root at 0",
 }
 
+ENDS = {"weave": "the pair meets in a double root 0", "resonance": "both pairs meet in a 4-fold root 0"}
+"""What happens where W of s² + W reaches 0."""
+
 
 @dataclass(frozen=True)
 class Part:

@@ -1,4 +1,4 @@
-"""Root patterns as products of monic factors with unknown coefficients, and those of a quartic by name.
+"""Root patterns as products of monic factors with unknown coefficients, and what those of a quartic have of their own.
 
 ``p(s) = a0 · product(factors(unknowns))`` is a smooth system in the parameters and the unknowns, regular where
 the roots themselves are not.
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.roots.polynomial import product
-from tmsopt.roots.stability import discriminant, hurwitz_minors
+from tmsopt.roots.stability import hurwitz_minors
 
 Roots = NDArray[np.complex128]
 
@@ -127,94 +127,45 @@ def _pair_test(a: Sequence[Any]) -> Any:
     return np.where(a[1] * a[3] > 0, hurwitz_minors(a)[2], np.nan)
 
 
-PATTERNS: Mapping[str, Pattern] = MappingProxyType(
+QUARTIC: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {
-        p.name: p
-        for p in (
-            Pattern(
-                "EP4",
-                "4-fold real root",
-                ("r",),
-                lambda u: [[1, -u[0]]] * 4,
-                lambda z: [[float(z.mean().real)]],
-                abscissa=lambda u: u[0],
-            ),
-            Pattern(
-                "EP3",
-                "3-fold real root and a simple one",
-                ("r", "t"),
-                lambda u: [[1, -u[0]]] * 3 + [[1, -u[1]]],
-                _triple_guesses,
-                marks={"EP4": lambda u: u[0] - u[1]},
-            ),
-            Pattern(
-                "2EP2",
-                "two real double roots",
-                ("b", "c"),
-                lambda u: [[1, u[0], u[1]]] * 2,
-                _double_quadratic_guess,
-                lambda u: [u[0] * u[0] - 4 * u[1]],
-                marks={"EP4": lambda u: u[0] * u[0] - 4 * u[1]},
-            ),
-            Pattern(
-                "CEP2",
-                "a complex double pair",
-                ("b", "c"),
-                lambda u: [[1, u[0], u[1]]] * 2,
-                _double_quadratic_guess,
-                lambda u: [4 * u[1] - u[0] * u[0]],
-                abscissa=lambda u: -u[0] / 2,
-                marks={"EP4": lambda u: u[0] * u[0] - 4 * u[1]},
-            ),
-            Pattern(
-                "EP2",
-                "a real double root: the discriminant surface",
-                ("r", "b", "c"),
-                lambda u: [[1, -u[0]]] * 2 + [[1, u[1], u[2]]],
-                lambda z: [[float(a.mean().real), *quadratic(b)] for a, b in _two(z)],
-                test=discriminant,
-                marks={
-                    "EP3": lambda u: u[0] * u[0] + u[1] * u[0] + u[2],
-                    "2EP2": lambda u: u[1] * u[1] - 4 * u[2],
-                    "double zero": lambda u: u[0],
-                    "capsize": lambda u: u[2],
-                },
-            ),
-            Pattern(
-                "weave",
-                "a pair on the imaginary axis",
-                ("W", "b", "c"),
-                lambda u: [[1, 0, u[0]], [1, u[1], u[2]]],
-                lambda z: [[abs(float(a.prod().real)), *quadratic(b)] for a, b in _two(z)],
-                lambda u: [u[0]],
-                rest=lambda u: [[1, u[1], u[2]]],
-                test=_pair_test,
-                ends={"W": "the pair meets in a double root 0"},
-            ),
-            Pattern(
-                "capsize",
-                "a root at 0",
-                ("b", "c", "d"),
-                lambda u: [[1, 0], [1, u[0], u[1], u[2]]],
-                lambda z: [[float(x) for x in np.poly(z)[1:4].real]],
-                rest=lambda u: [[1, u[0], u[1], u[2]]],
-                test=lambda a: a[-1],
-                marks={"double zero": lambda u: u[2], "EP2": lambda u: discriminant([1, *u])},
-            ),
-            Pattern(
-                "resonance",
-                "a double imaginary pair (1:1 resonance)",
-                ("W",),
-                lambda u: [[1, 0, u[0]]] * 2,
-                lambda z: [[float(np.abs(z).mean()) ** 2]],
-                lambda u: [u[0]],
-                rest=lambda u: [],
-                ends={"W": "both pairs meet in a 4-fold root 0"},
-            ),
-        )
+        "EP4": {"meaning": "4-fold real root", "guesses": lambda z: [[float(z.mean().real)]]},
+        "EP3": {
+            "meaning": "3-fold real root and a simple one",
+            "unknowns": ("r", "t"),
+            "factors": lambda u: [[1, -u[0]]] * 3 + [[1, -u[1]]],
+            "guesses": _triple_guesses,
+            "marks": {"EP4": lambda u: u[0] - u[1]},
+        },
+        "2EP2": {"meaning": "two real double roots", "guesses": _double_quadratic_guess},
+        "CEP2": {"meaning": "a complex double pair", "guesses": _double_quadratic_guess},
+        "EP2": {
+            "meaning": "a real double root: the discriminant surface",
+            "unknowns": ("r", "b", "c"),
+            "guesses": lambda z: [[float(a.mean().real), *quadratic(b)] for a, b in _two(z)],
+            "marks": {
+                "EP3": lambda u: u[0] * u[0] + u[1] * u[0] + u[2],
+                "2EP2": lambda u: u[1] * u[1] - 4 * u[2],
+                "double zero": lambda u: u[0],
+                "capsize": lambda u: u[2],
+            },
+        },
+        "weave": {
+            "meaning": "a pair on the imaginary axis",
+            "unknowns": ("W", "b", "c"),
+            "guesses": lambda z: [[abs(float(a.prod().real)), *quadratic(b)] for a, b in _two(z)],
+            "test": _pair_test,
+        },
+        "capsize": {
+            "meaning": "a root at 0",
+            "unknowns": ("b", "c", "d"),
+            "guesses": lambda z: [[float(x) for x in np.poly(z)[1:4].real]],
+        },
+        "resonance": {"guesses": lambda z: [[float(np.abs(z).mean()) ** 2]]},
     }
 )
-"""Patterns of a quartic, by name."""
+"""Patterns of a quartic that are not made up of others: what they have of their own, guesses without a choice of roots
+and shorter words and names, beside what their parts make them."""
 
 
 LINES: Mapping[str, Pattern] = MappingProxyType(

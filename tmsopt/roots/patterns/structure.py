@@ -8,9 +8,10 @@ from numpy.typing import ArrayLike
 
 from tmsopt.records import Array
 from tmsopt.roots.numeric import roots as numeric_roots
+from tmsopt.roots.patterns.composed import PATTERNS
 from tmsopt.roots.patterns.fitting import gauss_newton, relative_distance, sizes
 from tmsopt.roots.patterns.multiplicity import Fit, decided
-from tmsopt.roots.patterns.pattern import LINES, PATTERNS, Pattern, Roots
+from tmsopt.roots.patterns.pattern import LINES, Pattern, Roots
 from tmsopt.roots.polynomial import Root
 
 ROUNDING = 8 * np.finfo(float).eps

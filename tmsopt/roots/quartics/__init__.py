@@ -7,8 +7,4 @@ exceptional points. Open `quartic` first.
 from tmsopt.roots.quartics.degenerate import hard_factors
 from tmsopt.roots.quartics.factors import cube_root, largest_root
 
-__all__ = [
-    "cube_root",
-    "hard_factors",
-    "largest_root",
-]
+__all__ = ["cube_root", "hard_factors", "largest_root"]

@@ -15,8 +15,7 @@ import numpy as np
 from tmsopt.roots.quartics import factors, signs
 from tmsopt.roots.quartics.degenerate import ACCEPTED, GOOD, STEPS
 from tmsopt.roots.quartics.factors import abscissa, damping_ratio, error, monic, newton, start
-from tmsopt.roots.quartics.signs import classes as class_of
-from tmsopt.roots.quartics.signs import stable as is_stable
+from tmsopt.roots.quartics.signs import classes as class_of, stable as is_stable
 
 _FORMULAS = (
     factors.third_of_exponent,

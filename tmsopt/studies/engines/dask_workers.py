@@ -9,7 +9,7 @@ from contextlib import suppress
 from typing import Any
 
 from tmsopt.errors import Fault, InputError
-from tmsopt.studies.engines.work import EngineError, Unit, Work, attempt
+from tmsopt.studies.engines.work import EngineError, Unit, keep, timed
 from tmsopt.studies.row import Row
 
 TOPIC = "tmsopt-rows"
@@ -17,9 +17,6 @@ TOPIC = "tmsopt-rows"
 COMPARED = ("tmsopt", "casadi", "numpy", "scipy")
 """Distributions whose versions decide about bits."""
 _MESSAGE = 0.02  # s of finished work that is worth a message of its own
-_KEPT = 4  # studies that a worker keeps the solvers of
-_WORKS: dict[str, Work] = {}
-"""Of this process: digest → work with the solvers it has built. Tasks of Dask have no other place to keep anything."""
 
 
 PATIENCE = 10.0
@@ -126,10 +123,8 @@ def versions() -> Callable[[], dict[str, str]]:
 
 
 def receive(digest: str, blob: bytes, dask_worker: Any) -> str:
-    """Keep the work, the last of a few; what tells this process from a later one at the same address."""
-    _WORKS[digest] = _WORKS.pop(digest) if digest in _WORKS else pickle.loads(blob)
-    while len(_WORKS) > _KEPT:
-        del _WORKS[next(iter(_WORKS))]
+    """Keep the work; what tells this process from a later one at the same address."""
+    keep(digest, blob)
     return str(dask_worker.id)
 
 
@@ -147,14 +142,11 @@ def solve(run: str, number: int, digest: str, process: str, units: tuple[Unit, .
     worker = get_worker()
     if worker.id != process:
         return
-    work = _WORKS[digest]
     done: list[tuple[Unit, Sequence[Row], float]] = []
     sent = time.perf_counter()
     for unit in units:
-        started = time.perf_counter()
-        rows = attempt(work, unit)
+        done.append(timed(digest, unit))
         now = time.perf_counter()
-        done.append((unit, rows, now - started))
         if now - sent >= _MESSAGE or unit == units[-1]:
             worker.log_event(TOPIC, {"run": run, "batch": number, "done": pickle.dumps(done)})
             done, sent = [], now

@@ -1,21 +1,15 @@
 """Engines of this machine: this process, or a few of its own."""
 
-import multiprocessing
-import signal
-import threading
-from collections.abc import Generator, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
-from typing import Any
+from collections.abc import Generator, Sequence
+from queue import Empty, SimpleQueue
 
 from tmsopt.errors import Fault, InputError
+from tmsopt.processes import Inbox, Worker
 from tmsopt.studies.engines.dispatch import Ledger
-from tmsopt.studies.engines.serve import READY, serve
-from tmsopt.studies.engines.work import EngineError, Note, Unit, Work, attempt, pickled, silent
+from tmsopt.studies.engines.work import EngineError, Note, Unit, Work, attempt, keep, pickled, silent, timed
 from tmsopt.studies.row import Row
 
+_READY, _HERE = "ready", "here"
 _ONE_THREAD = dict.fromkeys(
     (
         "OMP_NUM_THREADS",
@@ -29,6 +23,8 @@ _ONE_THREAD = dict.fromkeys(
     "1",
 )
 _STILLBORN = 8  # workers in a row that end before they are ready; then it is not chance
+_LOOK = 1.0  # s; some systems do not hear Ctrl-C while they wait
+_PATIENCE = 5.0  # s that a worker may take to end when it has closed its pipe
 
 
 def cores() -> int:
@@ -47,8 +43,8 @@ def in_process(work: Work, units: Sequence[Unit], note: Note = silent) -> Genera
 def processes(work: Work, units: Sequence[Unit], workers: int, note: Note = silent) -> Generator[Row]:
     """Rows of the units as they come, solved by processes of this machine with one thread each.
 
-    Every worker has a pipe of its own, so a finished unit that it has sent survives it, and what it was doing when it
-    ended is known. Workers end when this generator is closed, interrupted, or its process is killed.
+    A finished unit that a worker has sent survives it, and what it was doing when it ended is known. Workers end when
+    this generator is closed, interrupted, or its process is killed.
 
     Raises:
         InputError: for less than one worker.
@@ -57,112 +53,63 @@ def processes(work: Work, units: Sequence[Unit], workers: int, note: Note = sile
     if workers < 1:
         raise InputError([Fault(f"{workers}; accepted: 1 or more, here up to {cores()} are of use", ("workers",))])
     ledger = Ledger(work, units, note)
-    crew: dict[Connection, _Worker] = {}
+    inbox: Inbox = SimpleQueue()
+    crew: dict[Worker, bool] = {}  # with whether they have the work
     stillborn = 0
     try:
         blob = pickled(work)
         while ledger.unfinished:
             while len(crew) < min(workers, ledger.unfinished):
-                worker = _start(blob)
-                crew[worker.pipe] = worker
+                worker = Worker(inbox, _ONE_THREAD)
+                worker.send(_take, blob)
+                crew[worker] = False
                 ledger.join(worker.name)
-            for worker in crew.values():
-                worker.send(ledger.batch(worker.name))
-            for pipe in wait(list(crew)):
-                worker = crew[pipe]  # type: ignore[index]  # wait returns what it was given
-                message = worker.receive()
-                if message is None:
-                    del crew[worker.pipe]
-                    stillborn += not worker.ready
-                    yield from _ended(ledger, worker, stillborn, note)
-                elif isinstance(message, str):
-                    worker.ready, stillborn = _ready(message), 0
-                else:
-                    unit, rows, seconds = message
-                    if ledger.delivered(worker.name, unit, seconds):
-                        yield from rows
+            for worker in crew:
+                for unit in ledger.batch(worker.name):
+                    worker.send(timed, _HERE, unit)
+            try:
+                worker, message = inbox.get(timeout=_LOOK)
+            except Empty:
+                continue
+            if message is None:
+                ready = crew.pop(worker)
+                stillborn += not ready
+                yield from _ended(ledger, worker, ready, stillborn, note)
+            elif isinstance(message, str):
+                crew[worker], stillborn = _ready(message), 0
+            else:
+                unit, rows, seconds = message
+                if ledger.delivered(worker.name, unit, seconds):
+                    yield from rows
     finally:
-        for worker in crew.values():
-            worker.process.terminate()
-        for worker in crew.values():
+        for worker in crew:
             worker.end()
+
+
+def _take(blob: bytes) -> str:
+    """Keep the work in this worker: `_READY`, or why it cannot be."""
+    try:
+        keep(_HERE, blob)
+    except Exception as error:
+        return repr(error)
+    return _READY
 
 
 def _ready(message: str) -> bool:
     """Whether a worker has the work."""
-    if message != READY:
+    if message != _READY:
         raise EngineError(f"worker processes cannot load the study: {message}")
     return True
 
 
-def _ended(ledger: Ledger, worker: "_Worker", stillborn: int, note: Note) -> Sequence[Row]:
+def _ended(ledger: Ledger, worker: Worker, ready: bool, stillborn: int, note: Note) -> Sequence[Row]:
     """Rows given up because a worker ended."""
-    cause = worker.end()
+    cause = worker.end(_PATIENCE)
     if stillborn == _STILLBORN:
         raise EngineError(f"worker processes end before they start ({cause})")
     told = f"worker {worker.name} died ({cause})"
-    if worker.ready:
+    if ready:
         return ledger.ended(worker.name, told, cause)
     ledger.returned(worker.name)
     note(f"{told} before it started")
     return ()
-
-
-@dataclass
-class _Worker:
-    process: BaseProcess
-    pipe: Connection
-    ready: bool = False
-
-    @property
-    def name(self) -> str:
-        return str(self.process.pid)
-
-    def send(self, units: Sequence[Unit]) -> None:
-        if units:
-            with suppress(OSError):  # it has ended; its pipe says so when it is read
-                self.pipe.send(units)
-
-    def receive(self) -> Any:
-        """The next message; None once it has ended and all it sent is read."""
-        try:
-            return self.pipe.recv()
-        except (EOFError, OSError):
-            return None
-
-    def end(self) -> str:
-        """How the process ended; it has been told to, or closed its pipe by ending."""
-        from loky.backend.utils import kill_process_tree
-
-        self.pipe.close()
-        self.process.join(5.0)
-        if self.process.exitcode is None:
-            kill_process_tree(self.process)
-        code = self.process.exitcode or 0
-        return f"signal {-code}" if code < 0 else f"exit code {code}"
-
-
-def _start(blob: bytes) -> _Worker:
-    """A new worker. Loky's processes neither copy this one nor run its script again."""
-    import loky  # noqa: F401  # registers its kind of process
-
-    ours, theirs = multiprocessing.Pipe()
-    make = multiprocessing.get_context("loky").Process  # type: ignore[attr-defined]
-    process: BaseProcess = make(target=serve, args=(theirs, blob), env=_ONE_THREAD, daemon=True)
-    with _interrupts_held():
-        process.start()
-    theirs.close()
-    return _Worker(process, ours)
-
-
-@contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """What is started meanwhile never hears Ctrl-C, from its first instruction on; here it comes a moment later."""
-    if not hasattr(signal, "pthread_sigmask") or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -1,6 +1,7 @@
 """What engines carry out: units of rows."""
 
 import pickle
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Protocol
@@ -49,6 +50,25 @@ def attempt(work: Work, unit: Unit) -> list[Row]:
             return [row for number in unit for row in attempt(work, (number,))]
         return [replace(work.lost(unit[0], repr(error)), status="failed")]
     return rows
+
+
+_WORKS: dict[str, Work] = {}
+"""Of this process: digest → work with the solvers it has built."""
+_KEPT = 4  # studies that a worker keeps the solvers of
+
+
+def keep(digest: str, blob: bytes) -> None:
+    """Have the work at hand in this process, the last of a few."""
+    _WORKS[digest] = _WORKS.pop(digest) if digest in _WORKS else pickle.loads(blob)
+    while len(_WORKS) > _KEPT:
+        del _WORKS[next(iter(_WORKS))]
+
+
+def timed(digest: str, unit: Unit) -> tuple[Unit, list[Row], float]:
+    """A unit of work that is kept here: its rows, and the seconds that they took."""
+    started = time.perf_counter()
+    rows = attempt(_WORKS[digest], unit)
+    return unit, rows, time.perf_counter() - started
 
 
 def pickled(work: Work) -> bytes:

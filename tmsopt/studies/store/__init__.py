@@ -3,13 +3,6 @@
 In: finished rows. Out: the same rows to the bit, whatever happened in between. Open `store` first.
 """
 
-from tmsopt.studies.store.locking import journal, lock
 from tmsopt.studies.store.store import Store, open_store, read_store
 
-__all__ = [
-    "Store",
-    "journal",
-    "lock",
-    "open_store",
-    "read_store",
-]
+__all__ = ["Store", "open_store", "read_store"]

@@ -9,6 +9,7 @@ from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from tmsopt import disk
 from tmsopt.errors import Fault, InputError
 from tmsopt.studies.store.definition import Definition, pack, unpack
 from tmsopt.studies.store.provenance import host, now
@@ -32,7 +33,8 @@ CREATE INDEX by_status ON rows (status);
 
 _PAUSE = 0.001  # seconds between two questions to a store that is locked
 
-_COMPANIONS = ("-wal", "-journal", "-shm")
+_COMPANIONS = ("-journal", "-wal", "-shm")
+"""What SQLite keeps beside a store, the last two for one of an earlier version."""
 
 _MEANINGS = {
     sqlite3.SQLITE_FULL: "the disk is full; make room and run the same command again, the rows in the store are safe",
@@ -121,9 +123,6 @@ def _header(path: Path) -> tuple[int, int]:
 
 def create(path: Path, definition: Definition, versions: Mapping[str, str], platform: str) -> None:
     """Write a new store without rows. It gets its name when complete, so what has the name is a store."""
-    unfinished = path.with_name(f".{path.name}.unfinished")  # one name, so that a killed one's is overwritten
-    for ending in ("", *_COMPANIONS):
-        Path(f"{unfinished}{ending}").unlink(missing_ok=True)
     about = {
         "definition": json.dumps(definition.plain),
         "seed": json.dumps(definition.plain.get("seed")),
@@ -132,20 +131,17 @@ def create(path: Path, definition: Definition, versions: Mapping[str, str], plat
         "platform": platform,
         "versions": json.dumps(versions),
     }
-    try:
-        with closing(sqlite3.connect(unfinished, isolation_level=None)) as connection:
-            connection.execute(f"PRAGMA application_id={APPLICATION}")
-            connection.execute(f"PRAGMA user_version={SCHEMA}")
-            connection.executescript(f"BEGIN; {_TABLES}")
-            connection.executemany("INSERT INTO about VALUES (?, ?)", about.items())
-            for name, values in definition.columns.items():
-                packed = pack(values)
-                row = (name, len(values), zlib.crc32(packed), packed)
-                connection.execute("INSERT INTO columns VALUES (?, ?, ?, ?)", row)
-            connection.execute("COMMIT")
-        unfinished.rename(path)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    with disk.whole(path, locked=True) as place, closing(sqlite3.connect(place, isolation_level=None)) as connection:
+        connection.execute("PRAGMA journal_mode=MEMORY")  # what is not finished is not kept
+        connection.execute(f"PRAGMA application_id={APPLICATION}")
+        connection.execute(f"PRAGMA user_version={SCHEMA}")
+        connection.executescript(f"BEGIN; {_TABLES}")
+        connection.executemany("INSERT INTO about VALUES (?, ?)", about.items())
+        for name, values in definition.columns.items():
+            packed = pack(values)
+            row = (name, len(values), zlib.crc32(packed), packed)
+            connection.execute("INSERT INTO columns VALUES (?, ?, ?, ?)", row)
+        connection.execute("COMMIT")
 
 
 def definition(connection: sqlite3.Connection, path: Path) -> Definition:
@@ -168,19 +164,17 @@ def definition(connection: sqlite3.Connection, path: Path) -> Definition:
         raise refuse(path, f"{message} ({error})") from error
 
 
-def connect_to_write(path: Path, journal: str) -> sqlite3.Connection:
-    """A connection whose commits survive ``kill -9`` of this process at any moment.
+def connect_to_write(path: Path) -> sqlite3.Connection:
+    """A connection whose commits survive ``kill -9`` of this process at any moment, and power cuts.
 
-    They do once they have reached the system, whatever `synchronous` says. It says what a power cut may cost. With a
-    write-ahead log and NORMAL the log is forced to disk when it is copied into the store, every 1000 pages: a power cut
-    may cost the rows since then, which are solved again, and damages nothing. A rollback journal could be damaged with
-    NORMAL; FULL forces every commit to disk, and costs no row that was acknowledged.
+    A rollback journal, forced to disk at every commit: it works on every file system, and what is committed is in one
+    file. A commit takes some waits for the disk, so they should be few.
     """
     connection = sqlite3.connect(path, isolation_level=None, timeout=PATIENCE, check_same_thread=False)
     try:
-        connection.execute(f"PRAGMA journal_mode={journal}").fetchone()
-        (kept,) = connection.execute("PRAGMA journal_mode").fetchone()  # a reader may keep it from changing
-        connection.execute(f"PRAGMA synchronous={'NORMAL' if kept == 'wal' else 'FULL'}")
+        with suppress(sqlite3.OperationalError):  # somebody reads a store of an earlier version by its write-ahead log
+            connection.execute("PRAGMA journal_mode=DELETE").fetchone()
+        connection.execute("PRAGMA synchronous=FULL")
     except BaseException:
         connection.close()
         raise
@@ -228,14 +222,6 @@ def ask(connection: sqlite3.Connection, query: str, values: Sequence[Any] | Mapp
             time.sleep(_PAUSE)
 
 
-def finish(connection: sqlite3.Connection) -> None:
-    """Close a store that was written; without readers it is left as one plain file, readable from any place."""
-    connection.execute("PRAGMA busy_timeout=0")
-    with suppress(sqlite3.Error):
-        connection.execute("PRAGMA journal_mode=DELETE").fetchone()
-    connection.close()
-
-
 def aside(path: Path) -> Path:
     """Move a store to ``name.1.sqlite``, or the first number that is free; the lock must be held.
 
@@ -243,27 +229,14 @@ def aside(path: Path) -> Path:
         OSError: when it cannot be moved, e.g. while somebody reads it on Windows.
     """
     if path.exists():
-        connection = sqlite3.connect(path, isolation_level=None)
-        with suppress(sqlite3.Error):  # a damaged one is moved as it is
+        with suppress(sqlite3.Error), closing(connect_to_write(path)) as connection:  # a damaged one is moved as it is
             ask(connection, "SELECT * FROM sessions")
             # A commit clears the journal that a killed writer left; an UPDATE that changes nothing would not be one.
             ((schema,),) = ask(connection, "PRAGMA user_version")
             connection.execute(f"PRAGMA user_version={schema}")
-        finish(connection)
-    number = 1
-    while any(Path(f"{_numbered(path, number)}{ending}").exists() for ending in ("", *_COMPANIONS)):
-        number += 1
-    moved = _numbered(path, number)
-    for ending in ("", *_COMPANIONS):
-        if Path(f"{path}{ending}").exists():
-            Path(f"{path}{ending}").rename(f"{moved}{ending}")
-    return moved
+    return disk.aside(path, _COMPANIONS)
 
 
 def leftovers(path: Path) -> bool:
     """Whether journals lie beside a store that is gone: SQLite would play them into a new one of that name."""
     return any(Path(f"{path}{ending}").exists() for ending in _COMPANIONS)
-
-
-def _numbered(path: Path, number: int) -> Path:
-    return path.with_name(f"{path.stem}.{number}{path.suffix}")

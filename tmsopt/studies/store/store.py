@@ -11,12 +11,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from tmsopt.disk import Lock, differences, lock
 from tmsopt.errors import InputError
 from tmsopt.studies.row import STATUSES, Row
 from tmsopt.studies.store import database
 from tmsopt.studies.store.database import ask, explained, refuse
-from tmsopt.studies.store.definition import Definition, differences
-from tmsopt.studies.store.locking import Lock, journal, lock
+from tmsopt.studies.store.definition import Definition
 from tmsopt.studies.store.packing import SELECT, packed, unpacked
 from tmsopt.studies.store.provenance import changed, host, now, versions
 
@@ -31,7 +31,6 @@ class Store:
         path: of the file.
         warnings: what the user should know, one line each, such as other versions of the libraries.
         moved: where ``fresh`` put the store that was there before.
-        journal: ``wal`` or ``delete``, see `journal.journal`.
     """
 
     def __init__(
@@ -46,7 +45,6 @@ class Store:
         self.path, self.warnings, self.moved = path, tuple(warnings), moved
         self._connection, self._lock, self._session = connection, held, session
         self._closed, self._turn = False, threading.Lock()
-        self.journal: str = ask(connection, "PRAGMA journal_mode")[0][0]
 
     def __enter__(self) -> "Store":
         return self
@@ -67,8 +65,8 @@ class Store:
         try:
             with suppress(sqlite3.Error):  # on a full disk there is a better error than this one
                 self._connection.execute("UPDATE sessions SET ended = ? WHERE id = ?", (now(), self._session))
-            database.finish(self._connection)
         finally:
+            self._connection.close()
             self._lock.release()
 
     def add(self, rows: Sequence[Row]) -> None:
@@ -248,19 +246,20 @@ def _opened(path: Path, wanted: Definition, today: dict[str, str], fresh: bool, 
     if not _occupied(path):
         database.create(path, wanted, today, platform.platform())
     with closing(database.connect_to_read(path)) as connection:  # what is refused is not changed
-        found = differences(database.definition(connection, path), wanted)
+        known = database.definition(connection, path)
+        found = list(differences(known.data, wanted.data, ("in the store", "in the file")))
         earlier = ask(connection, "SELECT DISTINCT versions FROM sessions WHERE rows > 0 ORDER BY id")
     if found:
         raise refuse(path, *_changed_study(found))
     warnings = list(dict.fromkeys(line for (then,) in earlier for line in changed(json.loads(then), today)))
-    connection = database.connect_to_write(path, journal(path.parent))
+    connection = database.connect_to_write(path)
     try:
         line = (now(), os.getpid(), host(), json.dumps(today))
         query = "INSERT INTO sessions (started, pid, host, versions) VALUES (?, ?, ?, ?)"
         session = connection.execute(query, line).lastrowid
         return Store(path, connection, held, session or 0, warnings, moved)
     except BaseException:
-        database.finish(connection)
+        connection.close()
         raise
 
 

@@ -1,0 +1,211 @@
+"""The front door: what README, docs/ and CONTRIBUTING say is there, runs, and gives the answers printed."""
+
+import math
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import tmsopt
+from tmsopt.cli import main
+
+ROOT = Path(__file__).parents[1]
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+README, CONTRIBUTING = (ROOT / name for name in ("README.md", "CONTRIBUTING.md"))
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    """The fenced blocks of a page."""
+    return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+
+
+def prose(page: Path) -> str:
+    """A page without its fenced blocks."""
+    return re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+
+
+def anchors(page: Path) -> set[str]:
+    """What a link may name after #: a heading in lower case, spaces as hyphens, other signs left out."""
+    headings = re.findall(r"^#+ (.*)$", prose(page), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def answer(text: str) -> list[str]:
+    """The lines of a printed answer, spaces and what is left out aside."""
+    return [" ".join(line.split()) for line in text.splitlines() if line.strip() and line.strip() != "…"]
+
+
+def agrees(printed: str, now: str) -> bool:
+    """The same words, and the same numbers within the rounding of the last digits: other machines, other sums."""
+    if NUMBER.sub("", printed) != NUMBER.sub("", now):
+        return False
+    pairs = zip(NUMBER.findall(printed), NUMBER.findall(now), strict=True)
+    return all(math.isclose(float(a), float(b), rel_tol=1e-7) for a, b in pairs)
+
+
+def solved(file: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
+    """What the command prints."""
+    with pytest.raises(SystemExit) as stop:
+        main(args=["solve", str(file), "--brief"], prog_name="tmsopt")
+    assert stop.value.code == 0
+    return answer(capsys.readouterr().out)
+
+
+def test_the_pages_are_there() -> None:
+    """So that nothing below passes because nothing was read."""
+    assert {"README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "index.md"} <= {p.name for p in PAGES}
+
+
+def test_the_readme_is_one_page() -> None:
+    assert len(README.read_text(encoding="utf-8").splitlines()) <= 150
+
+
+def test_the_two_commands_stand_between_the_markers() -> None:
+    """One a line, as the gate reads and runs them."""
+    inside = re.findall(r"<!-- commands -->\n```sh\n(.*?)\n```\n<!-- /commands -->", README.read_text(), re.DOTALL)
+    assert len(inside) == 1
+    install, test = inside[0].splitlines()
+    assert install == 'pip install ".[certify]" && tmsopt solve problems/ep4.toml'
+    assert test.startswith('pip install -e ".[test]" && pytest')
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    targets = re.findall(r"\]\(([^)\s]+)\)", prose(page))
+    for target in (t for t in targets if not re.match(r"[a-z]+:", t)):
+        name, _, anchor = target.partition("#")
+        found = (page.parent / name).resolve() if name else page
+        assert found.exists(), target
+        assert not anchor or anchor in anchors(found), target
+
+
+def test_every_page_is_in_the_table_of_contents() -> None:
+    linked = set(re.findall(r"\]\((\w+\.md)\)", (ROOT / "docs" / "index.md").read_text(encoding="utf-8")))
+    assert linked == {p.name for p in (ROOT / "docs").glob("*.md")} - {"index.md"}
+
+
+def test_every_problem_is_listed() -> None:
+    linked = set(re.findall(r"\]\(\.\./problems/([\w.]+)\)", (ROOT / "docs" / "problems.md").read_text()))
+    found = {p.name for suffix in ("toml", "py") for p in (ROOT / "problems").glob(f"*.{suffix}")}
+    assert linked == found
+
+
+def test_pictures_are_small() -> None:
+    pictures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", README.read_text(encoding="utf-8"))
+    assert "docs/bicycle.png" in pictures
+    assert all((ROOT / p).stat().st_size < 200_000 for p in pictures)
+
+
+def test_every_command_is_documented() -> None:
+    rows = re.findall(r"^\| `tmsopt (\w+)", (ROOT / "docs" / "command_line.md").read_text(), re.MULTILINE)
+    assert set(rows) == set(main.commands)
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if p.name != "CHANGELOG.md"], ids=lambda p: p.name)
+def test_public_names_exist(page: Path) -> None:
+    """What a page calls tmsopt.something is public; the change log names what is gone, too."""
+    text = "\n".join(line for line in page.read_text(encoding="utf-8").splitlines() if not line.startswith("$ "))
+    for name, inner in re.findall(r"(?<![\w/])tmsopt\.([A-Za-z_]\w*)(?:\.(\w+))?", text):
+        assert name in tmsopt.__all__, name
+        if inner and name in ("laws", "models", "roots"):
+            assert hasattr(getattr(tmsopt, name), inner), f"{name}.{inner}"
+
+
+# CONTRIBUTING
+
+
+def tree() -> list[str]:
+    """The packages of CONTRIBUTING's tree, in its order, with the path that the indentation gives them."""
+    (drawn,) = (block for block in blocks(CONTRIBUTING, "text") if block.startswith("tmsopt/"))
+    found: list[str] = []
+    above: list[str] = []
+    for indent, name in re.findall(r"^( *)(\w+)/", drawn, re.MULTILINE):
+        above = [*above[: len(indent) // 2], name]
+        found.append("/".join(above))
+    return found[1:]
+
+
+def test_the_tree_has_every_package() -> None:
+    packages = {str(p.parent.relative_to(ROOT)) for p in (ROOT / "tmsopt").rglob("__init__.py")} - {"tmsopt"}
+    assert sorted(tree()) == sorted(packages)
+
+
+def test_the_tree_is_in_the_order_of_the_floors() -> None:
+    from test_architecture import FLOOR
+
+    floors = [FLOOR[path.split("/")[1]] for path in tree()]
+    assert floors == sorted(floors)
+
+
+def test_files_that_contributing_names_exist() -> None:
+    named = re.findall(r"`([\w./]+/[\w./]*\.\w+)`", prose(CONTRIBUTING))
+    assert len(named) > 20
+    assert [path for path in named if not (ROOT / path).is_file()] == []
+
+
+def test_the_table_has_the_changes_that_a_maintainer_makes() -> None:
+    rows = re.findall(r"^\| (?:an? |the |another )([^|]+) \|", prose(CONTRIBUTING), re.MULTILINE)
+    assert len(rows) == 10
+    assert {"derived quantity", "root pattern", "model", "order of the report", "constraint type"} <= set(rows)
+
+
+def test_one_version() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    cited = re.search(r"^version: (\S+)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
+    assert cited is not None
+    assert {tmsopt.__version__, cited[1]} == {project["version"]}
+
+
+# What the README shows
+
+
+def test_the_examples_are_problem_files(tmp_path: Path) -> None:
+    robot, absorber = blocks(README, "toml")
+    for number, text in enumerate((robot, absorber)):
+        file = tmp_path / f"{number}.toml"
+        file.write_text(text, encoding="utf-8")
+        assert tmsopt.load(file).minimize == "abscissa"
+    whole = tomllib.loads((ROOT / "problems" / "delivery_robot.toml").read_text(encoding="utf-8"))
+    assert tomllib.loads(robot) == {k: v for k, v in whole.items() if k not in ("title", "model")}
+
+
+def test_the_robot_has_the_answer_that_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    printed = blocks(README, "text")[0]
+    command, *lines = answer(printed)
+    assert command == "$ tmsopt solve problems/delivery_robot.toml"
+    now = iter(solved(ROOT / "problems" / "delivery_robot.toml", capsys))
+    for line in lines:  # in this order, others between them
+        assert any(agrees(line, other) for other in now), line
+
+
+def test_the_absorber_has_the_answer_that_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """And its closed form: (s² + bs + k)² has k = w = 1/(1 + mu), b² = mu/(1 + mu), c = 2 b mu/(1 + mu)."""
+    file = tmp_path / "absorber.toml"
+    file.write_text(blocks(README, "toml")[1], encoding="utf-8")
+    now, (command, *printed) = solved(file, capsys), answer(blocks(README, "text")[1])
+    assert command == "$ tmsopt solve absorber.toml"
+    assert all(any(agrees(line, other) for other in now) for line in printed)
+    share = 0.1 / 1.1
+    abscissa, c, w = -math.sqrt(share) / 2, 2 * share**1.5, 1 / 1.1
+    for line, value in zip(printed, (abscissa, c, w), strict=True):
+        assert any(math.isclose(float(n), value, rel_tol=1e-11) for n in NUMBER.findall(line)), line
+
+
+def test_the_figures_stand_in_the_results() -> None:
+    """Solved, proved and tried: the counts of the table are those of the benchmarks."""
+    results = (ROOT / "benchmarks" / "results.md").read_text(encoding="utf-8")
+    counts = re.findall(r"\d+ of \d+", README.read_text(encoding="utf-8"))
+    assert len(counts) >= 6
+    assert [c for c in counts if c not in results] == []
+
+
+def test_the_first_python_example_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    names: dict[str, object] = {}
+    exec(blocks(ROOT / "docs" / "python.md", "python")[0], names)
+    design = names["design"]
+    assert isinstance(design, tmsopt.Solution)
+    assert design.structure == "EP4"
+    assert design.parameters["chi_B"] == pytest.approx(math.sqrt(2), abs=1e-12)

@@ -1,0 +1,96 @@
+"""The public functions: a problem, its file and its solution are the same question, and what else is given is refused."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import tmsopt
+
+PROBLEMS = Path(__file__).parents[1] / "problems"
+EP4, PLANE = PROBLEMS / "ep4.toml", PROBLEMS / "chart.toml"
+
+ASKED: dict[str, Callable[[Any], Any]] = {
+    "solve": lambda given: tmsopt.solve(given).parameters,
+    "compare": lambda given: [row.numeric for row in tmsopt.compare(given).laws],
+    "prove": lambda given: tmsopt.prove(given).parameters,
+    "certify": lambda given: tmsopt.certify(given, seconds=20).bound,
+    "speeds": lambda given: tmsopt.speeds(given).found,
+    "explain": lambda given: tmsopt.explain(given).summary,
+    "optimality": lambda given: tmsopt.optimality(given).verdict,
+    "diagnose": tmsopt.diagnose,
+}
+"""Verbs about a design: a problem is solved first."""
+
+DRAWN: dict[str, Callable[[Any], Any]] = {
+    "chart": lambda given: tmsopt.chart(given, points=(12, 9), boundaries=False).kind.tolist(),
+    "trace": lambda given: len(tmsopt.trace(given, "capsize", starts=4).branches),
+    "domain": lambda given: tmsopt.domain(given, starts=4).to_json(),
+}
+"""Verbs about a box: nothing need be asked."""
+
+
+@pytest.mark.parametrize("verb", ASKED)
+def test_a_design_may_be_given_as_problem_file_or_solution(verb: str) -> None:
+    if verb == "certify":
+        pytest.importorskip("pyscipopt")
+    asked = ASKED[verb]
+    answer = asked(EP4)
+    assert asked(str(EP4)) == answer
+    assert asked(tmsopt.load(EP4)) == answer
+    assert asked(tmsopt.solve(EP4)) == answer
+
+
+@pytest.mark.parametrize("verb", DRAWN)
+def test_a_box_may_be_given_as_problem_or_file(verb: str) -> None:
+    assert DRAWN[verb](PLANE) == DRAWN[verb](tmsopt.load(PLANE))
+
+
+@pytest.mark.parametrize("verb", [*ASKED, *DRAWN])
+@pytest.mark.parametrize("wrong", [3, None, ["Fr"], b"problems/ep4.toml"], ids=repr)
+def test_anything_else_is_refused_in_words(verb: str, wrong: object) -> None:
+    if verb == "certify":
+        pytest.importorskip("pyscipopt")
+    with pytest.raises(tmsopt.InputError, match="accepted: a Problem, the path of a problem file, or a Solution"):
+        (ASKED | DRAWN)[verb](wrong)
+
+
+def test_a_file_must_ask_where_the_verb_needs_a_question() -> None:
+    """At the line of the file where there is one."""
+    assert not tmsopt.load(PLANE).minimize
+    with pytest.raises(tmsopt.InputError, match=r"chart\.toml:\d+: .*nothing is asked"):
+        tmsopt.solve(PLANE)
+    with pytest.raises(tmsopt.InputError, match="nothing is asked"):
+        tmsopt.solve(tmsopt.load(PLANE))
+    with pytest.raises(tmsopt.InputError, match="asks for a front"):
+        tmsopt.prove(PROBLEMS / "pareto.toml")
+
+
+def test_what_arguments_and_results_are_made_of_is_public() -> None:
+    with pytest.raises(tmsopt.InputError) as caught:
+        tmsopt.load(PROBLEMS / "nothing.toml")
+    assert all(isinstance(fault, tmsopt.Fault) for fault in caught.value.faults)
+    assert all(isinstance(band, tmsopt.Band) for band in tmsopt.load(PROBLEMS / "speed_band.toml").scenarios.values())
+
+
+def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="solves"):
+        _ = tmsopt.solves  # type: ignore[attr-defined]
+
+
+def test_names_are_functions_whatever_was_imported_before() -> None:
+    """`tmsopt.solver.solve` is a room and a function; the public name is the function, in any order of imports."""
+    script = (
+        "import tmsopt.solver.solve, tmsopt.charts.chart; import tmsopt; assert callable(tmsopt.solve); tmsopt.chart"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True, cwd=PROBLEMS.parent)
+
+
+def test_a_study_may_be_given_by_its_file() -> None:
+    named = tmsopt.run_study(PROBLEMS / "study_sway.toml", workers=1)
+    assert [row.status for row in named.rows] == ["optimal"] * len(named.study)
+    with pytest.raises(tmsopt.InputError, match="accepted: a Study"):
+        tmsopt.run_study(3)  # type: ignore[arg-type]

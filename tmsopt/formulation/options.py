@@ -1,0 +1,73 @@
+"""How to solve: declared here once, and handed on as one from the verb that a user calls to IPOPT."""
+
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypedDict
+
+from tmsopt.errors import suggest
+from tmsopt.records import Progress
+
+STARTS = 64
+"""Starts tried at most; most problems settle with a dozen."""
+
+
+class Asked(TypedDict, total=False):
+    """What every verb that solves lets its user say by name; see `Options`."""
+
+    starts: int
+    seed: int
+    linear_solver: str
+    progress: Progress | None
+
+
+class AskedOfSolve(Asked, total=False):
+    """What `solve` lets its user say beside that."""
+
+    exhaustive: bool
+    near: Mapping[str, float] | None
+    alone: bool
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to solve.
+
+    Attributes:
+        starts: starts tried at most; the search ends early when several agree or optimality is proven.
+        seed: of the quasi-random starting designs.
+        linear_solver: ``mumps`` or ``spral``.
+        progress: called with (starts done, starts at most).
+        exhaustive: try all the starts, even when several agree.
+        near: a design that may be close to the optimum, tried first; where both signs of a parameter are searched,
+            only its own is.
+        alone: of an infeasible problem, also find how far each limit in conflict would have to give alone.
+    """
+
+    starts: int = STARTS
+    seed: int = 0
+    linear_solver: str = "mumps"
+    progress: Progress | None = None
+    exhaustive: bool = False
+    near: Mapping[str, float] | None = None
+    alone: bool = True
+
+    @property
+    def of_ipopt(self) -> Hashable:
+        """What IPOPT must know: where it is the same, a solver can be used again."""
+        return self.linear_solver
+
+
+DEFAULTS = Options()
+
+
+def options_of(asked: Asked | AskedOfSolve, accepted: type = Asked, defaults: Options = DEFAULTS) -> Options:
+    """Options that a user named, and the verb's own defaults for the others.
+
+    Raises:
+        TypeError: for a name that is not accepted.
+    """
+    given: dict[str, Any] = {**vars(defaults), **asked}
+    for name in asked:
+        if name not in accepted.__annotations__:
+            raise TypeError(f"unknown option '{name}'; {suggest(name, accepted.__annotations__)}")
+    return Options(**given)
