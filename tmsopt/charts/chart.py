@@ -183,23 +183,6 @@ def chart(
         raise InputError([Fault(message, ("workers",))])
     wanted = layers if layers is not None else tuple(LAYERS) if folder is None else USUAL
     work = survey(problem, axes, points, wanted, quantities, engine, single)
-    return charted(work, folder, workers, fresh, tile, boundaries, progress)
-
-
-def charted(
-    work: Survey,
-    folder: str | Path | None = None,
-    workers: int = 1,
-    fresh: bool = False,
-    tile: int = TILE,
-    boundaries: bool = False,
-    progress: Progress | None = None,
-) -> Chart:
-    """A survey carried out; see `chart`.
-
-    Raises:
-        InputError: for more designs than memory has room for; for a folder that holds another chart, or is damaged.
-    """
     path, grid = None if folder is None else Path(folder), work.grid
     if path is None and grid.size > LARGEST:
         message = f"{grid.size:.3g} designs do not fit into memory; give a folder, or {LARGEST:.0e} or less"
@@ -216,8 +199,8 @@ def charted(
         before = done = sum(t.designs for t in target.done.values())
         if progress:
             progress(done, grid.size)
-        for rows, layers, counts in computed(work, left, workers):
-            target.write(rows, layers, counts)
+        for rows, arrays, counts in computed(work, left, workers):
+            target.write(rows, arrays, counts)
             done += counts.designs
             if progress:
                 progress(done, grid.size)
@@ -253,7 +236,7 @@ def _about(work: Survey, tile: int) -> dict[str, Any]:
             "model": problem.model.name,
             **({} if problem.model.statement is None else {"statement": dict(problem.model.statement)}),
             "fixed": dict(problem.fixed),
-            "constraints": {n: t for n, t in problem.constraints.items() if problem.conditions[n].comparison != "=="},
+            "constraints": {n: t for n, t in problem.constraints.items() if not problem.conditions[n].equality},
         },
         "axes": {
             n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v), "unit": of[n].unit}

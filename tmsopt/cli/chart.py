@@ -132,19 +132,14 @@ def chart(
     if as_json:
         write_json(found.to_json())
     else:
-        from tmsopt.report.curves import chart_table
-
-        click.echo(chart_table(found))
+        click.echo(tmsopt.report.chart_table(found))
     if folder is not None:
         click.echo(f"wrote {folder}", err=True)
     if plot is not None:
-        from tmsopt.plots.chart import chart_figure
-        from tmsopt.plots.style import save
-
         with bad_input():
             shown = found if whole else tmsopt.chart(**_shown(found, held), **how, boundaries=boundaries)
             with saving("--plot", plot):
-                save(chart_figure(shown, layer), plot)
+                tmsopt.plots.save(tmsopt.plots.chart_figure(shown, layer), plot)
 
 
 @contextmanager

@@ -17,7 +17,8 @@ _LARGE = (10_000, 10_000)
 
 def charted(folder: str, points: tuple[int, int], engine: str = "auto", **options: object) -> Chart:
     """A chart of the plane in a folder that is not there yet."""
-    return chart(PLANE, folder=Path(folder) / "a.chart", points=points, engine=engine, **options)  # type: ignore[arg-type]
+    asked = {"folder": Path(folder) / "a.chart", "points": points, "engine": engine, "boundaries": False, **options}
+    return chart(PLANE, **asked)  # type: ignore[arg-type]
 
 
 def rate(engine: str, points: tuple[int, int], **options: object) -> float:
