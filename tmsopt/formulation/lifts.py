@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -13,8 +13,33 @@ from tmsopt.records import Array
 from tmsopt.roots import product, shift
 from tmsopt.roots.patterns.pattern import Roots
 
-if TYPE_CHECKING:
-    from tmsopt.formulation.formulate import Builder
+
+class Rows(Protocol):
+    """An NLP under construction."""
+
+    def variable(self, name: str, lower: float = ..., upper: float = ...) -> Any:
+        """A new variable."""
+
+    def row(self, name: str, expression: Any, lower: float, upper: float) -> None:
+        """A new row."""
+
+    def equal(self, name: str, left: Sequence[Any], right: Sequence[Any]) -> None:
+        """Equations between coefficient lists."""
+
+    def polynomial(self, case: int) -> list[Any]:
+        """Coefficients in one case, in the NLP's own unit of the roots."""
+
+    @property
+    def covered(self) -> Sequence[int]:
+        """Numbers of the cases that root quantities are the worst over."""
+
+    @property
+    def unit(self) -> float:
+        """The NLP's own unit of the roots."""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Number of variables and rows so far."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +52,7 @@ class Lifted:
     products: tuple[tuple[Factor, ...], ...]
 
 
-def lift_abscissa(build: "Builder") -> Lifted:
+def lift_abscissa(build: Rows) -> Lifted:
     """γ with p(t + γ) = a0 ∏ (t² + βᵢ t + κᵢ), βᵢ, κᵢ ≥ 0, in every case: at or right of every root.
 
     An odd degree has one factor t + δ, δ ≥ 0, more. Some β = 0, κ = 0 or δ = 0 puts a root on the line Re s = γ.
@@ -55,7 +80,7 @@ def lift_abscissa(build: "Builder") -> Lifted:
     return Lifted(build.unit * gamma, lift, tuple(touches), tuple(products))
 
 
-def lift_damping_ratio(build: "Builder") -> Lifted:
+def lift_damping_ratio(build: Rows) -> Lifted:
     """ζ with p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ, in every case: at or below every damping ratio.
 
     pᵢ = 2 ζ wᵢ puts a pair on the edge of the sector. An odd degree has one factor s + d, d ≥ 0, more.
@@ -82,7 +107,7 @@ def lift_damping_ratio(build: "Builder") -> Lifted:
     return Lifted(zeta, lift, tuple(touches), tuple(products))
 
 
-def lift_real_roots(build: "Builder", line: bool) -> Lifted:
+def lift_real_roots(build: Rows, line: bool) -> Lifted:
     """Heavy damping: γ ≤ 0 and roots γ − d₁, γ − d₁ − d₂, …, all dᵢ ≥ 0, in every case; γ = 0 unless a `line` is asked.
 
     As many equations as sectors and half-planes need twice over, and regular at multiple roots, where the dᵢ between
@@ -102,7 +127,7 @@ def lift_real_roots(build: "Builder", line: bool) -> Lifted:
     return Lifted(build.unit * gamma, lift, tuple(touches), ())
 
 
-def lift_radius(build: "Builder", directions: Sequence[int]) -> Lift:
+def lift_radius(build: Rows, directions: Sequence[int]) -> Lift:
     """Stability at the distance `radius` in the given directions: p = a0 ∏ (s² + βᵢ s + κᵢ) at each, a0 of one sign."""
     size = 0
     for case in directions:
@@ -119,7 +144,7 @@ def lift_radius(build: "Builder", directions: Sequence[int]) -> Lift:
     return Lift("radius", 1 + size, partial(_radius_guess, directions))
 
 
-def lift_quantity(build: "Builder", name: str, case: int, ends: tuple[float, float]) -> tuple[Any, Lift]:
+def lift_quantity(build: Rows, name: str, case: int, ends: tuple[float, float]) -> tuple[Any, Lift]:
     """A derived quantity as a variable, to be tied by its division-free equation."""
     symbol = build.variable(name if case == 0 else f"{name}.{case}", *ends)
     return symbol, Lift(name, 1, lambda values, z: [[_finite(values[case][name])]])
