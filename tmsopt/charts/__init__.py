@@ -13,6 +13,5 @@ from tmsopt.charts.survey import LAYERS, USUAL, USUAL_POINTS, Grid, axes_of, sur
 
 __all__ = [
     "LARGEST", "LAYERS", "USUAL", "USUAL_POINTS", "Chart", "Grid", "array_function", "axes_of", "chart", "charted",
-    "check_netcdf", "classified", "classify", "engine_of", "open_chart", "save_layers", "survey",
-    "tally", "total",
+    "check_netcdf", "classified", "classify", "engine_of", "open_chart", "save_layers", "survey", "tally", "total",
 ]  # fmt: skip
