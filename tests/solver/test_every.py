@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -144,6 +145,20 @@ def test_of_one_pair_and_of_seven_roots() -> None:
 def test_problems_without_single_solutions_are_refused(problem: tmsopt.Problem, said: str) -> None:
     with pytest.raises(tmsopt.InputError, match=said):
         tmsopt.solve_all(problem)
+
+
+def test_a_constraint_on_what_has_no_formula_is_refused() -> None:
+    """ω0 is an unknown beside those of the pattern; its formula in the coefficients is refused by no one."""
+    file = Path(__file__).parents[2] / "problems" / "optimised_benchmark.toml"
+    said = "the constraints use omega0, .*accepted: parameters, coefficients, and quantities with a formula"
+    with pytest.raises(tmsopt.InputError, match=said):
+        tmsopt.solve_all(file)
+    run = CliRunner().invoke(main, ["solve", str(file), "--all"])
+    assert run.exit_code == 2
+    assert "ask for one design alone" in run.output
+    written = replace(tmsopt.load(file), constraints={"decay": "a4 == a0"})
+    (design,) = all_of(written, starts=4).solutions
+    assert design.parameters["mu"] == pytest.approx(20.84626701, rel=1e-9)
 
 
 def test_of_the_command_line(tmp_path: Path) -> None:

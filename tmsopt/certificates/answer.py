@@ -141,9 +141,8 @@ def doubt(question: Question, design: Mapping[str, float]) -> str:
         nlp = question.program(sign)
         x = complete(nlp, question.problem, design)
         rows = np.array(nlp.at(x)[1]).ravel()
-        sizes = np.array(
-            [max(map(abs, ends)) for ends in ranges(nlp.functions, list(zip(nlp.lower, nlp.upper, strict=True)))[1]]
-        )
+        reached = ranges(nlp.functions, list(zip(nlp.lower, nlp.upper, strict=True)))[1]
+        sizes = np.array([max(map(abs, ends)) for ends in reached])
         sizes = np.where(np.isfinite(sizes), np.maximum(sizes, 1e-300), 1.0)
         off = np.maximum(np.array(nlp.row_lower) - rows, rows - np.array(nlp.row_upper)) / sizes
         span = np.maximum(1.0, np.abs(x))

@@ -136,9 +136,8 @@ def sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lifted:
             build.row("damping_ratio", other - one, 0.0, np.inf)
         build.equal("damping_ratio", a, [a[0] * c for c in product(*monic)])
     build.row("damping_ratio", 1 - zeta, 0.0, np.inf)  # real roots would satisfy any larger one, too
-    return Lifted(
-        ca.SX(zeta), Lift("damping_ratio", size, partial(_sector_guess, frame, looked, ratio, build.unit)), (), ()
-    )
+    guess = partial(_sector_guess, frame, looked, ratio, build.unit)
+    return Lifted(ca.SX(zeta), Lift("damping_ratio", size, guess), (), ())
 
 
 def bound_unknowns(frame: Frame, build: Builder, pattern: Pattern) -> None:

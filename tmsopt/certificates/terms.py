@@ -60,12 +60,6 @@ def refuse_huge(over: Any, name: str, most: float = _HUGE) -> None:
 
 def scale_of(size: float) -> float:
     """What to divide a variable or row by that is at most so large."""
-    power = _power_of_two(size)
-    return min(power, 1.0)
-
-
-def _power_of_two(size: float) -> float:
-    """Nearest power of two, from above; 1 where there is no size."""
     if not (math.isfinite(size) and size > 0):
         return 1.0
-    return float(2.0 ** min(max(math.ceil(math.log2(size)), _LEAST_POWER), 1000))
+    return float(2.0 ** min(max(math.ceil(math.log2(size)), _LEAST_POWER), 0))

@@ -208,9 +208,8 @@ class _Translation:
         if a.degree == 0:
             return constant(least**exponent)
         a = self.variable(a)
-        low, high = (
-            flint.arb(e) ** flint.arb(exponent) if math.isfinite(e) else flint.arb("inf") for e in (least, most)
-        )
+        power = flint.arb(exponent)
+        low, high = (flint.arb(e) ** power if math.isfinite(e) else flint.arb("inf") for e in (least, most))
         v = self.free(max(interval(low)[0], 0.0), interval(high)[1])
         self.scip.addCons(v.expression / v.scale == a.expression**exponent / v.scale)
         return v
@@ -229,9 +228,8 @@ class _Translation:
         if name == "log":  # SCIP keeps the argument of its own away from 0
             self.scip.addCons(a.expression / a.scale == self.functions.exp(v.expression) / a.scale)
         else:
-            size = (
-                v.scale if name == "exp" else max(v.scale, CANCELLED)
-            )  # others are as small as their argument is known
+            # Others than exp are as small as their argument is known.
+            size = v.scale if name == "exp" else max(v.scale, CANCELLED)
             self.scip.addCons(v.expression / size == getattr(self.functions, name)(a.expression) / size)
         return v
 

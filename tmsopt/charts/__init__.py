@@ -12,7 +12,6 @@ from tmsopt.charts.summary import tally, total
 from tmsopt.charts.survey import LAYERS, USUAL, USUAL_POINTS, Grid, axes_of, survey
 
 __all__ = [
-    "LARGEST", "LAYERS", "USUAL", "USUAL_POINTS", "Chart", "Grid", "array_function", "axes_of", "chart",
-    "check_netcdf", "classified", "classify", "engine_of", "open_chart", "save_layers", "survey",
-    "tally", "total",
+    "LARGEST", "LAYERS", "USUAL", "USUAL_POINTS", "Chart", "Grid", "array_function", "axes_of", "chart", "check_netcdf",
+    "classified", "classify", "engine_of", "open_chart", "save_layers", "survey", "tally", "total",
 ]  # fmt: skip

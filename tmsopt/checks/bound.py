@@ -219,8 +219,7 @@ def _linear(model: Model, name: str, box: Box, order: int = 2) -> bool:
     for part in (Fraction(1, 2), Fraction(2, 3)):
         at = _exact(model, name, box, part, [Fraction(1, 3) + k for k in range(order + 2)])
         for row in zip(*at, strict=True):
-            for first in range(2):
-                terms = row[first : first + order + 1]
+            for terms in (row[: order + 1], row[1:]):
                 if not _vanishes(sum((-1) ** k * math.comb(order, k) * c for k, c in enumerate(terms))):
                     return False
     return True

@@ -86,9 +86,14 @@ def _measured(
 ) -> float:
     """The value of a root quantity in one case, or of an expression with the given worst root quantities."""
     values = problem.values(case.applied(parameters))
+    return float(_value(values, what, shared))
+
+
+def _value(values: Values, what: Expression | str, shared: Mapping[str, float]) -> Any:
+    """A root quantity, or an expression with the given worst root quantities."""
     for name, value in shared.items():
         values.define(name, value)
-    return float(values[what] if isinstance(what, str) else what(values))
+    return values[what] if isinstance(what, str) else what(values)
 
 
 @dataclass(frozen=True)
@@ -102,9 +107,8 @@ class _Space:
     def case(self, u: Array) -> Case:
         """The case at a point of the cube."""
         at, offset = self._columns(u)
-        return Case(
-            Table({**self.at, **{n: float(v) for n, v in at.items()}}), Table({n: float(v) for n, v in offset.items()})
-        )
+        values, moves = ({n: float(v) for n, v in table.items()} for table in (at, offset))
+        return Case(Table({**self.at, **values}), Table(moves))
 
     def peaks(
         self,
@@ -133,9 +137,8 @@ class _Space:
             best, value, reach = u[k], high[k], step
             for _ in range(_LOOKS):
                 moves = reach * rng.uniform(-1, 1, (_AROUND, size))
-                moves[::2] *= np.arange(size) == rng.integers(
-                    0, size, (len(moves[::2]), 1)
-                )  # along one side: edges stay
+                side = rng.integers(0, size, (len(moves[::2]), 1))
+                moves[::2] *= np.arange(size) == side  # along one side: edges stay
                 around = np.clip(best + moves, 0, 1)
                 trial = badness(around)
                 top = int(np.argmax(trial))
@@ -170,10 +173,8 @@ def _evaluated(
     varied = Case(offset=offset).applied(parameters)  # type: ignore[arg-type]
     columns = {n: np.broadcast_to(np.asarray(v, dtype=float), count) for n, v in varied.items()}
     values = Values(problem.model, problem.parameter_set, columns, extra=ARRAY_ROOT_QUANTITIES)
-    for name, value in shared.items():
-        values.define(name, value)
     with np.errstate(all="ignore"):
-        return np.broadcast_to(np.asarray(values[what] if isinstance(what, str) else what(values), dtype=float), count)
+        return np.broadcast_to(np.asarray(_value(values, what, shared), dtype=float), count)
 
 
 def _grid(size: int) -> Array:
@@ -262,12 +263,9 @@ class _Box:
         if not lower < middle < upper:
             return ()
         shares = {**self.shares, key: self.shares[key] / 2}
-        parts: list[_Box] = []
-        for part in ((lower, middle), (middle, upper)):
-            changed: dict[str, Any] = {"at": self.at, "offset": self.offset}
-            changed[table] = {**changed[table], name: part}
-            parts.append(_Box(**changed, shares=shares))
-        return tuple(parts)
+        whole: dict[str, Any] = {"at": self.at, "offset": self.offset, "shares": shares}
+        parts = ((lower, middle), (middle, upper))
+        return tuple(_Box(**whole | {table: {**whole[table], name: part}}) for part in parts)
 
 
 def _first(problem: Problem) -> Iterator[_Box]:

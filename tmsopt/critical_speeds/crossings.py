@@ -30,7 +30,6 @@ from tmsopt.roots.stability import lienard_chipart
 _SAME = 1e-12  # relative to the largest root: difference of two that are one; a k-fold one scatters by 1e-120/k
 _NOTHING = flint.fmpq(1, 10**90)  # of the largest coefficient: one that is 0 but for the digits of y
 
-
 Stretch = tuple[float, float]
 """Two ends of a band."""
 
@@ -102,11 +101,14 @@ def crossings(
     marginal = [split is not None and _marginal(split, middle) for _, _, middle in cells]
     kept = [stable or on for (stable, _), on in zip(states, marginal, strict=True)]
     changed = {float(y): kept[k] != kept[k + 1] for k, y in enumerate(marks)}
+    always = {"infinity": len(a) < len(every)}
+    if split:
+        always |= {"capsize": split.zeros > 0, "weave": len(split.mirrored) > 1, "EP2": split.repeated}
     return Crossings(
         tuple(Crossing(float(y), kind, root, first, changed[float(y)]) for y, kind, root, first in found),
         _bands(cells, [stable for stable, _ in states]),
         _bands(cells, [damped for _, damped in states]),
-        (*(("infinity",) if len(a) < len(every) else ()), *_always(split)),
+        tuple(kind for kind, holds in always.items() if holds),
         _bands(cells, marginal),
         split.zeros if split else 0,
     )
@@ -120,21 +122,10 @@ def _conditions(a: Sequence[Polynomial]) -> tuple[dict[str, Polynomial], Lasting
     if all(kinds.values()):
         return kinds, None
     split = lasting(a)
-    kinds["capsize"] = _of_products(split.mirrored[-1], split.rest[-1])
+    kinds["capsize"] = trimmed((flint.fmpq_poly(split.mirrored[-1]) * flint.fmpq_poly(split.rest[-1])).coeffs())
     kinds["weave"] = of_values(split.rest, _mirrored) if len(split.rest) > 1 else []
     kinds["EP2"] = of_values(split.once, _double) if len(split.once) > 1 else []
     return kinds, split
-
-
-def _of_products(first: Polynomial, second: Polynomial) -> Polynomial:
-    return trimmed(list((flint.fmpq_poly(list(first)) * flint.fmpq_poly(list(second))).coeffs()))
-
-
-def _always(split: Lasting | None) -> tuple[str, ...]:
-    if split is None:
-        return ()
-    holds = {"capsize": split.zeros > 0, "weave": len(split.mirrored) > 1, "EP2": split.repeated}
-    return tuple(kind for kind, always in holds.items() if always)
 
 
 def _marginal(split: Lasting, y: Any) -> bool:
@@ -219,8 +210,7 @@ def _state(coefficients: Sequence[Any]) -> tuple[bool, bool]:
 def _cells(marks: Sequence[Any], lower: Any, upper: Any | None) -> Iterator[tuple[float, float, Any]]:
     """The gaps between marks: both ends, and a number between them."""
     ends = [lower, *marks]
-    for k, low in enumerate(ends):
-        high = ends[k + 1] if k + 1 < len(ends) else upper
+    for low, high in zip(ends, [*marks, upper], strict=True):
         if high is None:
             yield float(low), float("inf"), low + 1 + abs(low)
         else:
@@ -241,20 +231,18 @@ def _bands(cells: Sequence[tuple[float, float, Any]], inside: Sequence[bool]) ->
 def _mirrored(a: Sequence[Any]) -> Any:
     """Δₙ₋₁, which is 0 where two roots are s and −s."""
     n = len(a) - 1
-    entry = [[2 * (j + 1) - (i + 1) for j in range(n - 1)] for i in range(n - 1)]
-    matrix = [[a[k] if 0 <= k <= n else flint.fmpq(0) for k in row] for row in entry]
-    return flint.fmpq_mat(n - 1, n - 1, [x for row in matrix for x in row]).det()
+    places = [2 * j - i for i in range(1, n) for j in range(1, n)]
+    return flint.fmpq_mat(n - 1, n - 1, [a[k] if 0 <= k <= n else flint.fmpq(0) for k in places]).det()
 
 
 def _double(a: Sequence[Any]) -> Any:
     """The resultant of a polynomial and its derivative, by Euclid's algorithm."""
-    p = flint.fmpq_poly(list(reversed(a)))
+    p = flint.fmpq_poly(a[::-1])
     q, value = p.derivative(), flint.fmpq(1)
     while q.degree() > 0:
         rest = p % q
         if rest.degree() < 0:
             return flint.fmpq(0)
-        lead = q[q.degree()]
-        value = value * (-1) ** (p.degree() * q.degree()) * lead ** (p.degree() - rest.degree())
+        value = value * (-1) ** (p.degree() * q.degree()) * q[q.degree()] ** (p.degree() - rest.degree())
         p, q = q, rest
     return value * q[0] ** p.degree()

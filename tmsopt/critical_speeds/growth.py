@@ -63,7 +63,8 @@ def growth(design: Solution, end: float | None = None, over: str | None = None) 
     """
     of, parameters, name = _written(design, over)
     model = design.problem.model
-    at, critical = parameters[name], _critical(design, of, parameters, name)
+    known = f"{name}_c" in model.quantity_names(of)
+    at, critical = parameters[name], float(Values(model, of, parameters)[f"{name}_c"]) if known else math.nan
     low, high = _ends(design, name, end, at, critical)
     crowd = np.linspace(-1, 1, 301) ** 5 * (high - low)
     first = low + (high - low) / _POINTS if name in SPEEDS else low  # at rest a speed leaves roots 0
@@ -80,18 +81,8 @@ def growth(design: Solution, end: float | None = None, over: str | None = None) 
         stable, heavily_damped = bands.stable, bands.heavily_damped
     except InputError:  # no polynomials in it
         inside = is_stable(a)
-        stable = _runs(values, inside)
-        heavily_damped = _runs(values, inside & np.all(found.imag == 0, axis=-1))
-    return Growth(
-        over=of[name],
-        values=values,
-        roots=found,
-        critical=critical,
-        design=at,
-        structure=design.structure,
-        stable=stable,
-        heavily_damped=heavily_damped,
-    )
+        stable, heavily_damped = _runs(values, inside), _runs(values, inside & np.all(found.imag == 0, axis=-1))
+    return Growth(of[name], values, found, critical, at, design.structure, stable, heavily_damped)
 
 
 def _written(design: Solution, over: str | None) -> tuple[ParameterSet, dict[str, float], str]:
@@ -106,12 +97,6 @@ def _written(design: Solution, over: str | None) -> tuple[ParameterSet, dict[str
         return problem.parameter_set, dict(design.parameters), over
     accepted = dict.fromkeys((*native.names, *problem.parameter_set.names))
     raise InputError([Fault(f"found '{over}'; {suggest(over, accepted)}", ("over",))])
-
-
-def _critical(design: Solution, of: ParameterSet, parameters: Mapping[str, float], name: str) -> float:
-    model = design.problem.model
-    known = f"{name}_c" in model.quantity_names(of)
-    return float(Values(model, of, parameters)[f"{name}_c"]) if known else math.nan
 
 
 def _ends(design: Solution, name: str, end: float | None, at: float, critical: float) -> Stretch:

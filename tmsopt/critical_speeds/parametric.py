@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import count
+from itertools import count, islice
+from math import prod
 from typing import Any
 
 import flint
@@ -13,7 +14,6 @@ Polynomial = Sequence[Any]
 """Coefficients in y, exact fractions, ascending."""
 Bivariate = list[list[Any]]
 """A polynomial in s, descending, each coefficient a polynomial in y."""
-
 
 DIGITS = 120
 """Of y: a k-fold root then scatters by 1e-120/k."""
@@ -44,13 +44,7 @@ def interpolated(values: Callable[[Any], Sequence[Any]], most: int = 40) -> list
 def of_values(a: Sequence[Polynomial], function: Callable[[Sequence[Any]], Any]) -> Polynomial:
     """A polynomial function of the coefficients as a polynomial in y, from its values where a0 is not 0."""
     degree = max(len(c) - 1 for c in a) * 2 * len(a)
-    points: list[Any] = []
-    for k in count(1):
-        y = flint.fmpq(k)
-        if value_at(a, y)[0] != 0:
-            points.append(y)
-        if len(points) > degree:
-            break
+    points = list(islice((y for y in map(flint.fmpq, count(1)) if value_at(a[:1], y)[0] != 0), degree + 1))
     table = [function(value_at(a, y)) for y in points]
     newton = []
     for j in range(len(points)):
@@ -61,22 +55,13 @@ def of_values(a: Sequence[Polynomial], function: Callable[[Sequence[Any]], Any])
 
 def value_at(a: Sequence[Polynomial], y: Any) -> list[Any]:
     """Coefficients for a y."""
-    values = []
-    for polynomial in a:
-        value = flint.fmpq(0)
-        for c in reversed(polynomial):
-            value = value * y + c
-        values.append(value)
-    return values
+    return [flint.fmpq_poly(list(polynomial))(y) for polynomial in a]
 
 
 def real_places(polynomial: Polynomial, lower: Any, upper: Any | None) -> list[Any]:
     """Different real roots between two ends, as fractions that are right to the digits carried."""
-    common = flint.fmpz(1)
-    for c in polynomial:
-        common = common.lcm(c.q)
     with flint.ctx.workdps(DIGITS):
-        roots: Any = flint.fmpz_poly([int(c.p * (common // c.q)) for c in polynomial]).complex_roots()
+        roots: Any = flint.fmpq_poly(list(polynomial)).numer().complex_roots()
         real = [rational(z.real) for z, _ in roots if z.imag == 0]
     return sorted(y for y in real if y > lower and (upper is None or y < upper))
 
@@ -124,29 +109,17 @@ def lasting(coefficients: Sequence[Polynomial]) -> Lasting:
     context = flint.fmpq_mpoly_ctx.get(["s", "y"], "lex")
     s, y = context.gens()
     degree = len(coefficients) - 1
-    terms = {
-        (degree - k, power): value
-        for k, polynomial in enumerate(coefficients)
-        for power, value in enumerate(polynomial)
-        if value != 0
-    }
+    every = ((degree - k, j, value) for k, polynomial in enumerate(coefficients) for j, value in enumerate(polynomial))
+    terms = {(i, j): value for i, j, value in every if value != 0}
     zeros = min(power for power, _ in terms)
     p = context.from_dict({(i - zeros, j): value for (i, j), value in terms.items()})
     factors = [(f, times) for f, times in p.factor_squarefree()[1] if f.degrees()[0] > 0]
-    one = context.from_dict({(0, 0): 1})
-    once = one
-    for f, _ in factors:
-        once = once * f
+    once = prod((f for f, _ in factors), start=context.from_dict({(0, 0): 1}))
     mirrored = once.gcd(once.compose(-s, y))
-    both = p.gcd(p.compose(-s, y))
-    return Lasting(
-        zeros,
-        _rows(mirrored),
-        _rows(once / mirrored),
-        _rows(once * s if zeros else once),
-        any(times > 1 for _, times in factors),
-        both.degrees()[0] > mirrored.degrees()[0],
-    )
+    repeated = any(times > 1 for _, times in factors)
+    repeats_mirrored = p.gcd(p.compose(-s, y)).degrees()[0] > mirrored.degrees()[0]
+    rest, single = _rows(once / mirrored), _rows(once * s if zeros else once)
+    return Lasting(zeros, _rows(mirrored), rest, single, repeated, repeats_mirrored)
 
 
 def _rows(p: Any) -> Bivariate:

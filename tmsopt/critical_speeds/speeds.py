@@ -74,13 +74,8 @@ class Speeds:
             "unit": self.problem.parameter_set[self.parameter].unit,
             "range": list(plain(self, "lower upper").values()),
             "found": [
-                {
-                    self.parameter: c.at,
-                    "kind": c.kind,
-                    **plain(c.root),
-                    "rightmost": c.rightmost,
-                    "stability_changes": c.changes,
-                }
+                {self.parameter: c.at, "kind": c.kind, **plain(c.root), "rightmost": c.rightmost}
+                | {"stability_changes": c.changes}
                 for c in self.found
             ],
             **plain(self, "stable heavily_damped"),
@@ -116,9 +111,8 @@ def speeds(
     of = asked.parameter_set
     name = parameter if parameter is not None else speed_of(of)
     if name is None:
-        known = " ".join(of.names)
         message = f"the model '{asked.model.name}' has no parameter that is a speed; say which one varies, "
-        message += f"`--parameter NAME` (`parameter=` in Python); accepted: {known}"
+        message += f"`--parameter NAME` (`parameter=` in Python); accepted: {' '.join(of.names)}"
         raise InputError([Fault(message, ("parameter",))])
     if name not in of.names:
         raise InputError([Fault(f"unknown parameter '{name}'; {suggest(name, of.names)}", ("parameter",))])
@@ -130,19 +124,7 @@ def speeds(
         raise InputError([Fault(message, ("between",))])
     a = coefficients_over(asked.model, of, own, name)
     met = crossings(a, exact(float(lower)), exact(float(upper)) if math.isfinite(upper) else None)
-    return Speeds(
-        problem=asked,
-        parameter=name,
-        parameters=Table(own),
-        lower=float(lower),
-        upper=float(upper),
-        found=met.found,
-        stable=met.stable,
-        heavily_damped=met.heavily_damped,
-        always=met.always,
-        marginal=met.marginal,
-        zeros=met.zeros,
-    )
+    return Speeds(asked, name, Table(own), float(lower), float(upper), **vars(met))
 
 
 def speed_of(of: ParameterSet) -> str | None:
@@ -179,10 +161,8 @@ def _linear(model: Model, of: ParameterSet, own: Mapping[str, float], name: str)
         InputError: where one is no such function.
     """
     with flint.ctx.workdps(_DIGITS):
-        first, second, third = (
-            {n: flint.arb(v) for n, v in model.algebraic(of.native(_exact(own, of, name, k))).items()}
-            for k in (1, 2, 3)
-        )
+        at = ({n: flint.fmpq(k) if n == name else exact(float(own[n])) for n in of.names} for k in (1, 2, 3))
+        first, second, third = ({n: flint.arb(v) for n, v in model.algebraic(of.native(d)).items()} for d in at)
         found = {}
         for n, a in first.items():
             slope, bend = second[n] - a, third[n] - second[n] - (second[n] - a)
@@ -192,7 +172,3 @@ def _linear(model: Model, of: ParameterSet, own: Mapping[str, float], name: str)
             moves = not slope.contains(0)
             found[n] = (rational(a - slope) if moves else rational(a), rational(slope) if moves else flint.fmpq(0))
     return found
-
-
-def _exact(own: Mapping[str, float], of: ParameterSet, name: str, value: int) -> dict[str, Any]:
-    return {n: flint.fmpq(value) if n == name else exact(float(own[n])) for n in of.names}

@@ -1,7 +1,7 @@
 """Cases: the variations of one design that it must stand up to, over a band, within tolerances, at a distance."""
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -89,7 +89,8 @@ def first_cases(
     scenarios: Mapping[str, Scenario], tolerances: Mapping[str, float], directions: Sequence[str] = ()
 ) -> tuple[Case, ...]:
     """Scenario points with the corners of the tolerance box, and a step either way in each of the directions."""
-    grid = list(_grid(scenarios))
+    points = itertools.product(*(points_of(s) for s in scenarios.values()))
+    grid = [Table(dict(zip(scenarios, point, strict=True))) for point in points]
     corners = [
         Table({n: s * t for (n, t), s in zip(tolerances.items(), signs, strict=True)})
         for signs in itertools.product((-1.0, 1.0), repeat=len(tolerances))
@@ -100,9 +101,3 @@ def first_cases(
     cases = tuple(Case(at, corner) for at, pair in zip(grid, pairs, strict=True) for corner in pair)
     steps = tuple(Case(direction=Table({name: sign})) for name in directions for sign in (-1.0, 1.0))
     return (() if cases == (Case(),) else cases) + steps
-
-
-def _grid(scenarios: Mapping[str, Scenario]) -> Iterator[Table[float]]:
-    values: Sequence[tuple[float, ...]] = [points_of(s) for s in scenarios.values()]
-    for point in itertools.product(*values):
-        yield Table(dict(zip(scenarios, point, strict=True)))

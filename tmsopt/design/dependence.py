@@ -41,9 +41,7 @@ def overclaims(problem: Problem) -> bool:
 
 def tempts(problem: Problem, name: str, worse: float = 1.0) -> bool:
     """Whether objective or constraints get better, at some design, as a quantity moves up (or down: `worse` −1)."""
-    asked = [(problem.sign, problem.objective)]
-    for condition in problem.conditions.values():
-        asked.append((condition.sign, condition))
+    asked = [(problem.sign, problem.objective), *((c.sign, c) for c in problem.conditions.values())]
     return any(e is not None and _falls(problem, sign, e, name, worse) for sign, e in asked)
 
 

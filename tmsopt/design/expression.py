@@ -52,12 +52,9 @@ def _method(name: str) -> Callable[[Any], Any]:
 
 
 _BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
     ast.Pow: operator.pow,
-}
+}  # fmt: skip
 _SYMBOLIC = _Arithmetic(
     {**{name: getattr(ca, name) for name in FUNCTIONS[:9]}, "abs": ca.fabs, "min": ca.fmin, "max": ca.fmax},
     _as_array,
@@ -66,11 +63,7 @@ _SYMBOLIC = _Arithmetic(
 _NUMERIC = _Arithmetic(
     {
         **{name: getattr(np, name) for name in ("sin", "cos", "tan", "sqrt", "exp", "log", "abs")},
-        "asin": np.arcsin,
-        "acos": np.arccos,
-        "atan": np.arctan,
-        "min": np.minimum,
-        "max": np.maximum,
+        **{"asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "min": np.minimum, "max": np.maximum},
     },
     _as_array,
     _BINARY,
@@ -172,28 +165,16 @@ class Expression:
         return sides[0] - sides[1] if len(sides) == 2 else sides[0]
 
 
-def parse_value(text: str, accepted: Iterable[str]) -> Expression:
-    """Parse an expression for a value, such as an objective.
+def parse_value(text: str, accepted: Iterable[str] | None, example: str = "abscissa") -> Expression:
+    """Parse an expression for a value, such as an objective; in names of the author's own where none are `accepted`.
 
     Raises:
         ExpressionError: with what was found and what is accepted.
     """
     body = _parse(text)
     if isinstance(body, ast.Compare):
-        raise ExpressionError(f"'{text}' is a comparison; accepted: a value, such as 'abscissa'")
-    return Expression(text, _checked_names(body, text, list(accepted)))
-
-
-def parse_formula(text: str) -> Expression:
-    """Parse an expression in names of the author's own, such as an entry of a matrix.
-
-    Raises:
-        ExpressionError: with what was found and what is accepted.
-    """
-    body = _parse(text)
-    if isinstance(body, ast.Compare):
-        raise ExpressionError(f"'{text}' is a comparison; accepted: a value, such as 'k1 + k2'")
-    return Expression(text, _checked_names(body, text, None))
+        raise ExpressionError(f"'{text}' is a comparison; accepted: a value, such as '{example}'")
+    return Expression(text, _checked_names(body, text, None if accepted is None else list(accepted)))
 
 
 def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -133,33 +132,22 @@ def posed(data: Mapping[str, Any], title: str) -> tuple[list[Fault], Problem | N
     shape_faults += model_faults
     faults, problem = shape_faults, None
     if model is not None and parsed is not None:
-        numbers = _numbers(parsed, model)
-        faults = shape_faults + numbers.faults
+        unit_faults, numbers = _numbers(parsed, model)
+        faults = shape_faults + unit_faults
         for fault in shape_faults:
             if fault.key[:1] in (("parameters",), ("scenarios",)) and len(fault.key) > 1:
-                numbers.fixed[fault.key[1]] = math.nan  # known to be given, and already reported
+                numbers["fixed"][fault.key[1]] = math.nan  # known to be given, and already reported
         try:
             problem = Problem(
                 model=model,
-                fixed=numbers.fixed,
-                free=numbers.free,
-                start=numbers.start,
-                scenarios=numbers.scenarios,
-                tolerances=numbers.tolerances,
-                weights=numbers.weights,
                 constraints=parsed.constraints,
-                minimize=parsed.objective.minimize,
-                maximize=parsed.objective.maximize,
-                pareto=() if parsed.objective.pareto is None else parsed.objective.pareto,
-                locate=parsed.objective.locate,
                 title=parsed.title or title,
+                **numbers,
+                **vars(parsed.objective) | {"pareto": parsed.objective.pareto or ()},
             )
         except InputError as error:
-            reported = (
-                {f.key[:2] for f in faults}
-                | {("parameters", *f.key[1:2]) for f in faults}
-                | {f.key[:1] for f in faults if f.key[:1] == ("objective",)}
-            )
+            reported = {f.key[:2] for f in faults} | {("parameters", *f.key[1:2]) for f in faults}
+            reported |= {f.key[:1] for f in faults if f.key[:1] == ("objective",)}
             faults = faults + [f for f in error.faults if f.key[:2] not in reported]
     return faults, problem
 
@@ -213,21 +201,8 @@ def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault: 
             return Fault(f"found {short(found)}; accepted: {'a table' if table else 'a text in quotes'}", key)
 
 
-@dataclass(frozen=True)
-class _Numbers:
-    """The numbers of a file in the parameters' own units."""
-
-    faults: list[Fault]
-    fixed: dict[str, Any]
-    free: dict[str, tuple[Any, Any]]
-    start: dict[str, Any]
-    scenarios: dict[str, Any]
-    tolerances: dict[str, Any]
-    weights: dict[str, Any]
-
-
-def _numbers(written: _File, model: Model) -> _Numbers:
-    """Every number, with written units converted."""
+def _numbers(written: _File, model: Model) -> tuple[list[Fault], dict[str, Any]]:
+    """Tables of a problem with every number in the parameter's own unit, and what is wrong with the units."""
     faults: list[Fault] = []
     of = guess_parameter_set(model, {**written.parameters, **written.scenarios})
 
@@ -258,6 +233,7 @@ def _numbers(written: _File, model: Model) -> _Numbers:
             scenarios[name] = Band(lower, upper, band.points)
         else:
             scenarios[name] = tuple(number(value, "scenarios", name) for value in band)
-    tolerances = {name: number(value, "tolerances", name) for name, value in written.tolerances.items()}
-    weights = {name: number(value, "weights", name) for name, value in written.weights.items()}
-    return _Numbers(faults, fixed, free, start, scenarios, tolerances, weights)
+    tables: dict[str, Any] = {"fixed": fixed, "free": free, "start": start, "scenarios": scenarios}
+    for table in ("tolerances", "weights"):
+        tables[table] = {name: number(value, table, name) for name, value in getattr(written, table).items()}
+    return faults, tables

@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.design.expression import Expression, ExpressionError, parse_formula
+from tmsopt.design.expression import Expression, ExpressionError, parse_value
 from tmsopt.errors import Fault, short, suggest
 from tmsopt.models import Model, Unfit, from_coefficients, from_matrices
 from tmsopt.models.names import unusable
@@ -143,7 +143,7 @@ class _Reader:
     def parsed(self, text: str, key: tuple[str, ...], where: str) -> Expression | None:
         """An expression; None for one with a fault."""
         try:
-            expression = parse_formula(text)
+            expression = parse_value(text, None, example="k1 + k2")
         except ExpressionError as error:
             self.fault(f"{where}{error}", *key)
             return None

@@ -67,13 +67,12 @@ class Problem:
         given = {n: v for n, v in given.items() if n not in self.free}
         pinned = {n: lo for n, (lo, hi) in self.free.items() if hi - lo <= _POINT * max(abs(lo), abs(hi))}
         ends = {n: (float(lo), float(hi)) for n, (lo, hi) in self.free.items() if n not in pinned}
-        object.__setattr__(self, "fixed", {n: float(v) for n, v in {**given, **pinned}.items()})
-        object.__setattr__(self, "free", ends)
-        object.__setattr__(self, "constraints", dict(self.constraints))
-        object.__setattr__(self, "tolerances", {n: float(t) for n, t in self.tolerances.items()})
-        object.__setattr__(self, "weights", {n: float(w) for n, w in self.weights.items()})
-        object.__setattr__(self, "start", {n: float(v) for n, v in self.start.items() if n in ends})
-        object.__setattr__(self, "pareto", tuple(self.pareto))
+        numbers = {"fixed": {**given, **pinned}, "tolerances": self.tolerances, "weights": self.weights}
+        numbers["start"] = {n: v for n, v in self.start.items() if n in ends}
+        plain: dict[str, Any] = {table: {n: float(v) for n, v in values.items()} for table, values in numbers.items()}
+        plain |= {"free": ends, "constraints": dict(self.constraints), "pareto": tuple(self.pareto)}
+        for name, value in plain.items():
+            object.__setattr__(self, name, value)
 
     @property
     def variations(self) -> dict[str, Scenario]:
@@ -114,13 +113,9 @@ class Problem:
     @property
     def sense(self) -> str:
         """``minimize``, ``maximize``, ``pareto``, ``locate``, or ``evaluate`` when nothing is asked."""
-        if self.minimize is not None:
-            return "minimize"
-        if self.maximize is not None:
-            return "maximize"
-        if self.pareto:
-            return "pareto"
-        return "locate" if self.locate else "evaluate"
+        asked = {"minimize": self.minimize is not None, "maximize": self.maximize is not None}
+        asked |= {"pareto": bool(self.pareto), "locate": bool(self.locate), "evaluate": True}
+        return next(sense for sense, stated in asked.items() if stated)
 
     @property
     def sign(self) -> float:
@@ -175,9 +170,8 @@ def weighted(of: ParameterSet, weights: Mapping[str, float], fixed: Mapping[str,
 def unasked(problem: Problem) -> list[Fault]:
     """What is wrong with solving a problem that has not one question; a chart needs none."""
     if problem.pareto:
-        message = (
-            "asks for a front, not for one design; use tmsopt.pareto, or write minimize with one of the expressions"
-        )
+        advice = "use tmsopt.pareto, or write minimize with one of the expressions"
+        message = f"asks for a front, not for one design; {advice}"
         return [Fault(message, ("objective", "pareto"))]
     if not problem.free or problem.sense != "evaluate":
         return []

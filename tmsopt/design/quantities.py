@@ -27,10 +27,6 @@ def _structure(values: Mapping[str, Any]) -> Structure:
     return structure(a, STRUCTURE_TOLERANCE, off)
 
 
-def _abscissa(values: Mapping[str, Any]) -> float:
-    return float(values["structure"].abscissa)
-
-
 def _damping_ratio(values: Mapping[str, Any]) -> float:
     roots = values["structure"].roots
     ratios = (-r.re / math.hypot(r.re, r.im) if r.re or r.im else 0.0 for r in roots)
@@ -38,7 +34,7 @@ def _damping_ratio(values: Mapping[str, Any]) -> float:
 
 
 ROOT_QUANTITIES = (
-    Quantity("abscissa", "1", "largest real part of the roots", r"\alpha", _abscissa),
+    Quantity("abscissa", "1", "largest real part of the roots", r"\alpha", lambda v: float(v["structure"].abscissa)),
     Quantity("damping_ratio", "1", "least −Re s/|s| over the roots", r"\zeta", _damping_ratio),
 )
 """Quantities of the roots, each the worst over the cases that a problem lists."""
@@ -72,16 +68,14 @@ def _array_roots(values: Mapping[str, Any]) -> NDArray[np.complex128]:
     return np.where(np.all(np.isfinite(a), axis=-1, keepdims=True), roots(regular(a)), np.nan)
 
 
-def _array_abscissa(values: Mapping[str, Any]) -> Array:
-    return np.asarray(_array_roots(values).real.max(axis=-1))
-
-
 def _array_damping(values: Mapping[str, Any]) -> Array:
     z = _array_roots(values)
     return np.asarray(np.min(-z.real / (np.abs(z) + 1e-300), axis=-1))
 
 
-_ARRAY_FORMULAS = {"abscissa": _array_abscissa, "damping_ratio": _array_damping}
+_ARRAY_FORMULAS = (lambda values: np.asarray(_array_roots(values).real.max(axis=-1)), _array_damping)
 
-ARRAY_ROOT_QUANTITIES = (*(replace(q, value=_ARRAY_FORMULAS[q.name]) for q in ROOT_QUANTITIES), NO_RADIUS)
+ARRAY_ROOT_QUANTITIES = (
+    *(replace(q, value=formula) for q, formula in zip(ROOT_QUANTITIES, _ARRAY_FORMULAS, strict=True)), NO_RADIUS,
+)  # fmt: skip
 """The same for arrays of designs, by numeric roots."""

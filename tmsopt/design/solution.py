@@ -173,12 +173,8 @@ class Solution:
         return {
             **problem.heading,
             "status": self.status,
-            "objective": {
-                "sense": problem.sense,
-                "expression": text,
-                **plain(self, "value"),
-                **({"locate": problem.locate} if problem.locate else {}),
-            },
+            "objective": {"sense": problem.sense, "expression": text, **plain(self, "value")}
+            | ({"locate": problem.locate} if problem.locate else {}),
             **plain(self, "parameters abscissa abscissa_realised roots structure"),
             "active": plain(self.active, digits=GAIN_DIGITS),
             "violations": plain(self.violations, digits=GAIN_DIGITS),

@@ -62,18 +62,13 @@ def _name_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     for name in problem.fixed:
         if name in problem.free:
             yield Fault(f"'{name}' is both fixed and free; keep one", ("parameters", name))
-    missing = _missing(problem, of)
-    if missing:
+    given = tables["parameters"].keys() | problem.scenarios
+    if missing := [p.name for p in of.parameters if p.name not in given and p.default is None]:
         example = f"{missing[0]} = 1.0, or {missing[0]} = {{ min = 0.5, max = 2 }}"
         yield Fault(f"missing parameter {', '.join(missing)}; write e.g. {example}", ("parameters",))
     for name in problem.start:
         if name not in problem.free:
             yield Fault(f"start for '{name}', which is not a free parameter", ("parameters", name, "start"))
-
-
-def _missing(problem: Stated, of: ParameterSet) -> list[str]:
-    given = {*problem.fixed, *problem.free, *problem.scenarios}
-    return [p.name for p in of.parameters if p.name not in given and p.default is None]
 
 
 def _value_faults(problem: Stated, of: ParameterSet, name: str) -> Iterator[Fault]:

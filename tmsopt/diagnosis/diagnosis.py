@@ -55,12 +55,8 @@ class Diagnosis:
             **({"singular_values": plain(self.jordan, "zero nonzero threshold", digits=6)} if self.jordan else {}),
             **plain(self, "distance", digits=6),
             "responses": [
-                {
-                    "parameter": r.parameter,
-                    "change": "relative" if r.relative else "absolute",
-                    "unmoved": r.unmoved,
-                    "laws": [_law(law) for law in r.laws],
-                }
+                {"parameter": r.parameter, "change": "relative" if r.relative else "absolute"}
+                | {"unmoved": r.unmoved, "laws": [_law(law) for law in r.laws]}
                 for r in self.responses
             ],
         }
@@ -103,9 +99,7 @@ def _ideal(model: Model, of: ParameterSet, design: Mapping[str, float], structur
     if balls is None:
         return [(r, flint.acb(r.re, r.im)) for r in structure.roots]
     middles = [flint.acb(z.re.mid(), z.im.mid()) for z in balls]
-    return [
-        (Root(float(m.real), float(m.imag), z.multiplicity), m) for z, m in zip(balls, middles, strict=True)
-    ]  # fmt: skip
+    return [(Root(float(m.real), float(m.imag), z.multiplicity), m) for z, m in zip(balls, middles, strict=True)]
 
 
 def _diagnosis(
@@ -117,18 +111,9 @@ def _diagnosis(
     partial = ranks.partial if ranks else (k,)
     geometric = ranks.geometric if ranks else 1
     kind = "semisimple" if geometric == k else "defective" if geometric == 1 else "partly defective"
-    responses = [response(model, of, design, ideal, place, name) for name in of.names]
-    return Diagnosis(
-        re=root.re,
-        im=root.im,
-        algebraic=k,
-        geometric=geometric,
-        partial=partial,
-        kind=kind,
-        jordan=ranks,
-        distance=structure.distance,
-        responses=tuple(sorted(responses, key=_sensitivity)),
-    )
+    responses = (response(model, of, design, ideal, place, name) for name in of.names)
+    ordered = tuple(sorted(responses, key=_sensitivity))
+    return Diagnosis(root.re, root.im, k, geometric, partial, kind, ranks, structure.distance, ordered)
 
 
 def _ranks(
@@ -143,10 +128,8 @@ def _ranks(
 
 
 def _sensitivity(response: Response) -> tuple[float, float]:
-    if not response.laws:
-        return math.inf, 0.0
-    first = response.laws[0].branches
-    return float(first.exponent), -first.size
+    first = response.laws[0].branches if response.laws else None
+    return (float(first.exponent), -first.size) if first else (math.inf, 0.0)
 
 
 def _law(law: Law) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import Any
 import flint
 import numpy as np
 
+from tmsopt.diagnosis.splitting import middle
 from tmsopt.records import Array, Complex
 
 Matrix = Sequence[Sequence[Any]]
@@ -62,21 +63,16 @@ def jordan(matrices: Sequence[Matrix], s: Any, multiplicity: int, threshold: flo
     blocks = [scale * unit**i * _numbers(_derivative(matrices, s, i)) for i in range(min(d, multiplicity - 1) + 1)]
     values = np.linalg.svd(blocks[0], compute_uv=False)[::-1] / np.linalg.norm(size * scale, 2)
     geometric = _nullity(values, 1, multiplicity, threshold)
-    return Jordan(
-        geometric=geometric,
-        partial=_partial(blocks, n, multiplicity, geometric, threshold),
-        zero=float(values[geometric - 1]),
-        nonzero=float(values[geometric]) if geometric < n else float("inf"),
-        threshold=threshold,
-    )
+    partial = _partial(blocks, n, multiplicity, geometric, threshold)
+    nonzero = float(values[geometric]) if geometric < n else float("inf")
+    return Jordan(geometric, partial, float(values[geometric - 1]), nonzero, threshold)
 
 
 def _nullity(values: Array, least: int, most: int, threshold: float) -> int:
     """How many singular values, in ascending order, count as 0."""
     most = min(most, len(values), max(least, int(np.sum(values <= threshold))))
     above = np.log(np.maximum(np.append(values, 1.0), _ROUNDING))
-    gaps = above[least : most + 1] - above[least - 1 : most]
-    return least + int(np.argmax(gaps))
+    return least + int(np.argmax(above[least : most + 1] - above[least - 1 : most]))
 
 
 def _partial(
@@ -112,8 +108,7 @@ def _derivative(matrices: Sequence[Matrix], s: Any, order: int) -> list[list[Any
 
 def _equilibrated(size: Array) -> tuple[Array, Array]:
     """Powers of two for rows and columns that bring the largest entry of each near 1."""
-    rows: Array = np.ones(len(size))
-    columns: Array = np.ones(len(size))
+    rows, columns = np.ones((2, len(size)))
     for _ in range(_SWEEPS):
         scaled = np.outer(rows, columns) * size
         high, wide = scaled.max(axis=1), scaled.max(axis=0)
@@ -124,9 +119,4 @@ def _equilibrated(size: Array) -> tuple[Array, Array]:
 
 def _numbers(matrix: Matrix) -> Complex:
     """Middles of balls as complex doubles."""
-    return np.array([[_number(x) for x in row] for row in matrix])
-
-
-def _number(x: Any) -> complex:
-    z = flint.acb(x)
-    return complex(float(z.real.mid()), float(z.imag.mid()))
+    return np.array([[middle(flint.acb(x)) for x in row] for row in matrix])

@@ -40,8 +40,7 @@ class Branches:
         """Every t for a real ε, to leading order."""
         found: list[complex] = []
         for constant in self.constants:
-            power = complex(constant) * eps**self.numerator
-            first = power ** (1 / self.denominator)
+            first = (complex(constant) * eps**self.numerator) ** (1 / self.denominator)
             found += [first * np.exp(2j * np.pi * k / self.denominator) for k in range(self.denominator)]
         return found
 
@@ -64,9 +63,7 @@ def branches(terms: Sequence[Sequence[complex]]) -> tuple[tuple[Branches, ...], 
     for (j1, m1), (j2, m2) in pairwise(hull):
         width, drop = j2 - j1, m1 - m2
         q = width // gcd(width, drop)
-        polynomial = [0j] * (width // q + 1)
-        for i in range(width // q + 1):
-            polynomial[-1 - i] = complex(terms[m1 - i * q * drop // width][j1 + i * q])
+        polynomial = [complex(terms[m1 - i * q * drop // width][j1 + i * q]) for i in reversed(range(width // q + 1))]
         found.append(Branches(width, drop * q // width, q, _roots(np.array(polynomial))))
     return tuple(sorted(found, key=lambda b: b.exponent)), hull[0][0]
 

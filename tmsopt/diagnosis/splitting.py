@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import comb
 from typing import Any
 
@@ -21,7 +21,6 @@ _NOTHING = 1e-9  # of its terms: a derivative that vanishes at the exact multipl
 _FAINT = 1e-13  # of the coefficients' own terms: a derivative that rounding of the design alone may bring about
 _DECADES = range(-16, 1)  # of the changes at which a law is tried
 _WITHIN = (0.75, 0.5, 0.25)  # and, before the first decade at which it fails
-
 
 Ideal = Sequence[tuple[Root, Any]]
 """Each root of the nearest polynomial with the structure, and as a complex ball without a radius."""
@@ -77,12 +76,13 @@ def response(
     series = changed(flint.arb_series([0, 1], prec=k + 1))
     unit = abs(s) if abs(s) > 0 else abs(max((z for _, z in ideal), key=lambda z: float(abs(z)))) or flint.arb(1)
     size = _taylor([abs(c) for c in base], abs(s), unit, k)
-    terms = [[0j] * k + [_number(_taylor(base, s, unit, k)[k])]]
+    terms = [[0j] * k + [middle(_taylor(base, s, unit, k)[k])]]
     for m in range(1, k + 1):
         order = [c[m] if isinstance(c, flint.arb_series) else flint.arb(0) for c in series]
         values, sizes = _taylor(order, s, unit, k), _taylor([abs(c) for c in order], abs(s), unit, k)
-        floors = [_NOTHING * _middle(a) + _FAINT * _middle(b) for a, b in zip(sizes, size, strict=True)]
-        terms.append([z if abs(z := _number(v)) > f else 0j for v, f in zip(values, floors, strict=True)])
+        pairs = zip(sizes, size, strict=True)
+        floors = [_NOTHING * float(abs(a).mid()) + _FAINT * float(abs(b).mid()) for a, b in pairs]
+        terms.append([z if abs(z := middle(v)) > f else 0j for v, f in zip(values, floors, strict=True)])
     found, unmoved = branches(terms)
     laws = []
     for branch in found:
@@ -114,7 +114,7 @@ def _deviation(predicted: Sequence[complex], k: int, coefficients: Sequence[Any]
     scale = max(abs(t) for t in predicted)
     shifted = _taylor(coefficients, s, unit * scale, len(coefficients) - 1)
     # Of 1/t, so that those sought are the largest roots: companion eigenvalues have these to all digits.
-    values = np.array([_number(c / shifted[k].abs_upper()) for c in shifted])
+    values = np.array([middle(c / shifted[k].abs_upper()) for c in shifted])
     if not np.all(np.isfinite(values)) or not np.any(values[: k + 1]):
         return math.inf
     inverse = np.roots(values)
@@ -124,8 +124,7 @@ def _deviation(predicted: Sequence[complex], k: int, coefficients: Sequence[Any]
 
 def _in_unit(branch: Branches, unit: float) -> Branches:
     """With the shift in the unit of s."""
-    constants = tuple(c * unit**branch.denominator for c in branch.constants)
-    return Branches(branch.roots, branch.numerator, branch.denominator, constants)
+    return replace(branch, constants=tuple(c * unit**branch.denominator for c in branch.constants))
 
 
 def _taylor(coefficients: Sequence[Any], s: Any, unit: Any, last: int) -> list[Any]:
@@ -142,9 +141,6 @@ def _ball(x: Any) -> Any:
     return x[0] if isinstance(x, flint.arb_series) else flint.arb(x)
 
 
-def _number(x: Any) -> complex:
+def middle(x: Any) -> complex:
+    """The middle of a complex ball."""
     return complex(float(x.real.mid()), float(x.imag.mid()))
-
-
-def _middle(x: Any) -> float:
-    return float(abs(x).mid())

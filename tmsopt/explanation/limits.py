@@ -9,7 +9,7 @@ from tmsopt.design.expression import parse_value, written_sides
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.errors import InputError
-from tmsopt.explanation.steps import LimitStep, natural_step, reported_unit, step_within, unit_of, with_reported_unit
+from tmsopt.explanation.steps import natural_step, reported_unit, step_within, unit_of, with_reported_unit
 from tmsopt.records import plain
 from tmsopt.solver.solve import solve
 
@@ -121,54 +121,28 @@ def _of_bound(solution: Solution, bound: str) -> Lever:
     # an angle is measured by its box, for 0 is a tilt like any other
     size = width if parameter.unit == "rad" or not limit else min(abs(limit), width)
     step = step_within(parameter.unit, size, limit, direction, parameter.range)
-    return _lever(
-        solution,
-        name=bound,
-        kind="bound",
-        limit=with_reported_unit(limit, parameter.unit),
-        physical=is_physical(problem, bound),
-        move=f"{step.text if step else 'nothing'} {'more' if direction > 0 else 'less'} {bound}",
-        step=direction * step.size if step else 0.0,
-    )
+    words = f"{step.text if step else 'nothing'} {'more' if direction > 0 else 'less'} {bound}"
+    change, written = direction * step.size if step else 0.0, with_reported_unit(limit, parameter.unit)
+    return _lever(solution, bound, "bound", written, is_physical(problem, bound), words, change)
 
 
 def _of_row(solution: Solution, name: str) -> Lever:
     problem = solution.problem
     condition, text = problem.conditions[name], problem.constraints[name]
-    sign = _better_side(solution, name) if condition.equality else condition.sign
     step = natural_step(unit_of(problem, condition), _size(solution, text))
-    verb = "moving" if condition.equality else "relaxing"
-    return _lever(
-        solution,
-        name=name,
-        kind="constraint",
-        limit=text,
-        physical=False,
-        move=f"{verb} {name} ({text}) by {_signed(step, sign) if verb == 'moving' else step.text}",
-        step=sign * step.size,
-    )
+    sign, words = condition.sign, f"relaxing {name} ({text}) by {step.text}"
+    if condition.equality:  # the right-hand side moves to where the objective is better
+        sign = math.copysign(1.0, -problem.sign * solution.active[name])
+        words = f"moving {name} ({text}) by {'' if sign > 0 else '-'}{step.text}"
+    return _lever(solution, name, "constraint", text, False, words, sign * step.size)
 
 
-def _lever(solution: Solution, **given: Any) -> Lever:
-    unit, one = _gained(solution.problem)
-    return Lever(per_unit=abs(solution.active[given["name"]]), gained_unit=unit, gained_one=one, **given)
-
-
-def _gained(problem: Problem) -> tuple[str, float]:
-    """Unit of the objective in words, where it is a parameter with a unit."""
-    text = (problem.minimize or problem.maximize or "").strip()
-    of = problem.parameter_set
-    return reported_unit(of[text].unit) if text in of.names else ("1", 1.0)
-
-
-def _signed(step: LimitStep, sign: float) -> str:
-    return step.text if sign > 0 else f"-{step.text}"
-
-
-def _better_side(solution: Solution, name: str) -> float:
-    """The direction in which moving the right-hand side of an equality improves the objective."""
-    change = solution.active[name]
-    return math.copysign(1.0, -solution.problem.sign * change)
+def _lever(solution: Solution, name: str, kind: str, limit: str, physical: bool, move: str, step: float) -> Lever:
+    text = (solution.problem.minimize or solution.problem.maximize or "").strip()
+    of = solution.problem.parameter_set
+    unit, one = reported_unit(of[text].unit) if text in of.names else ("1", 1.0)
+    per_unit = abs(solution.active[name])
+    return Lever(name, kind, limit, physical, move, step, per_unit, gained_unit=unit, gained_one=one)
 
 
 def _size(solution: Solution, text: str) -> float:
@@ -218,16 +192,13 @@ def _resolved(solution: Solution, lever: Lever) -> Lever:
 
 def _reasons(solution: Solution, lever: Lever, found: Solution) -> Iterator[str]:
     """Why the gain is not what the multiplier says."""
-    plain = True
     if found.structure != solution.structure:
         yield f"the structure changes from {solution.structure} to {found.structure}"
-        plain = False
-    for words, names in (
-        ("no longer binds", [n for n in solution.active if n not in found.active]),
-        ("binds instead", [n for n in found.active if n not in solution.active]),
+    for words, names, others in (
+        ("no longer binds", solution.active, found.active),
+        ("binds instead", found.active, solution.active),
     ):
-        if names:
-            yield f"{' and '.join(names)} {words}"
-            plain = False
-    if plain:
+        if gone := [n for n in names if n not in others]:
+            yield f"{' and '.join(gone)} {words}"
+    if found.structure == solution.structure and set(found.active) == set(solution.active):
         yield f"the gain is not linear over this step ({found.structure} before and after)"

@@ -57,10 +57,6 @@ class OnLine:
     kappa: float = math.nan
     ties: tuple[float, ...] = ()
 
-    def to_json(self) -> dict[str, Any]:
-        """Plain data for ``json.dumps``."""
-        return plain(self)
-
 
 @dataclass(frozen=True)
 class Optimality:
@@ -230,22 +226,18 @@ def _pays(around: Program, found: Conditions) -> str:
 
 def _way(solution: Solution, beyond: Better) -> str:
     """The better design by what changes most."""
-    problem = solution.problem
-    now = solution.parameters
-    changes = {n: beyond.parameters[n] - now[n] for n in problem.free}
-    parts = [f"{n} {beyond.parameters[n]:.6g}" for n, change in changes.items() if abs(change) > 1e-9 * abs(now[n])]
+    now, then = solution.parameters, beyond.parameters
+    parts = [f"{n} {then[n]:.6g}" for n in solution.problem.free if abs(then[n] - now[n]) > 1e-9 * abs(now[n])]
     return f"{', '.join(parts)} gives {beyond.value:.6g}"
 
 
 def _on_line(around: Program, found: Conditions) -> tuple[OnLine, ...]:
     """The roots on the line with their multipliers."""
     listed = []
-    total = sum(
-        around.line[h.cluster].multiplicity * y
-        for h, y in zip(around.held, found.multipliers, strict=True) if h.name == "c1"
-    )  # fmt: skip
+    held = list(zip(around.held, found.multipliers, strict=True))
+    total = sum(around.line[h.cluster].multiplicity * y for h, y in held if h.name == "c1")
     for k, root in enumerate(around.line):
-        own = {h.name: float(y) for h, y in zip(around.held, found.multipliers, strict=True) if h.cluster == k}
+        own = {h.name: float(y) for h, y in held if h.cluster == k}
         first, second = own.pop("c1"), own.pop("c2", math.nan)
         share = float(root.multiplicity * first / total) if total else math.nan
         beta = first / 2 if root.im else first  # β moves two roots of a pair, by half of it

@@ -130,8 +130,7 @@ def program(problem: Problem, solution: Solution) -> Program:
               for n, s in zip(problem.free, ca.vertsplit(symbols), strict=False)}  # fmt: skip
     gamma = nlp.unit * symbols[names.index("abscissa")]
     a = problem.model.coefficients(problem.ordered(design), problem.parameter_set)
-    factored = _factored(a, float(values.coefficients[0]), gamma, line, rest)
-    build.add(factored)
+    factored = _factored(build, a, float(values.coefficients[0]), gamma, line, rest)
     expression = ca.vertcat(f, *build.rows)
     idle = tuple(n for k, n in enumerate(problem.free) if not ca.depends_on(expression, symbols[k]))
     kept = [k for k, n in enumerate(names) if (n in problem.free and n not in idle) or n in needed]
@@ -199,26 +198,22 @@ class _Rows:
         elif np.isfinite(upper) and abs(value - upper) <= _ACTIVE * (1 + abs(upper)):
             self.one(Held(name, True), upper - expression)
 
-    def add(self, factored: "_Factored") -> None:
-        for held, expression in zip(factored.held, factored.rows, strict=True):
-            self.one(held, expression)
-
 
 @dataclass(frozen=True)
 class _Factored:
-    """The coefficients of the factors as unknowns, with their equations and what is held of them."""
+    """The coefficients of the factors as unknowns."""
 
     names: list[str]
     unknowns: list[Any]
     values: list[float]
     sizes: list[float]
-    held: list[Held]
-    rows: list[Any]
 
 
-def _factored(a: Sequence[Any], lead: float, gamma: Any, line: Sequence[Root], rest: Sequence[Root]) -> _Factored:
+def _factored(
+    build: _Rows, a: Sequence[Any], lead: float, gamma: Any, line: Sequence[Root], rest: Sequence[Root]
+) -> _Factored:
     """p(t + γ) = a0 · ∏ q · r with the roots of the structure as the values of the unknowns; `lead` is a0's."""
-    made = _Factored([], [], [], [], [], [])
+    made = _Factored([], [], [], [])
     size = max(np.hypot(r.re, r.im) for r in (*line, *rest))
 
     def unknown(name: str, value: float, power: int) -> Any:
@@ -231,8 +226,7 @@ def _factored(a: Sequence[Any], lead: float, gamma: Any, line: Sequence[Root], r
 
     def coefficient(name: str, power: int, cluster: int, signed: bool) -> Any:
         symbol = unknown(f"{name}.{cluster}", 0.0, power)
-        made.held.append(Held(name, signed, cluster, size**power))
-        made.rows.append(symbol)
+        build.one(Held(name, signed, cluster, size**power), symbol)
         return symbol
 
     factors = []
@@ -251,8 +245,7 @@ def _factored(a: Sequence[Any], lead: float, gamma: Any, line: Sequence[Root], r
     factors.append([1, *(unknown(f"r{k}", float(monic[k]), k) for k in range(1, len(monic)))])
     moved, matched = shift(a, gamma), product(*factors)
     for k in range(1, len(moved)):
-        made.held.append(Held("roots", False, size=abs(lead) * size**k))
-        made.rows.append(moved[k] - a[0] * matched[k])
+        build.one(Held("roots", False, size=abs(lead) * size**k), moved[k] - a[0] * matched[k])
     return made
 
 

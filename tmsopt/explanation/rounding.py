@@ -84,15 +84,10 @@ def rounded(solution: Solution, names: Iterable[str], digits: int) -> Rounded:
     for one in (values, *each):
         one.define("abscissa", realised)  # known already, and better than by fitting structures
         one.define("damping_ratio", ratio)
-    return Rounded(
-        digits=digits,
-        written=Table({n: _with_unit(text, of[n].unit) for n, text in written.items()}),
-        realised=realised,
-        loss=realised - solution.abscissa,
-        damping_ratio=ratio,
-        objective=float(problem.objective(values)) if problem.objective else math.nan,
-        violations=Table(_violations(problem, plain, [values, *each])),
-    )
+    texts = Table({n: _with_unit(text, of[n].unit) for n, text in written.items()})
+    objective = float(problem.objective(values)) if problem.objective else math.nan
+    violated = Table(_violations(problem, plain, [values, *each]))
+    return Rounded(digits, texts, realised, realised - solution.abscissa, ratio, objective, violated)
 
 
 def worst(alone: Mapping[str, Rounded]) -> str:
@@ -113,16 +108,12 @@ def _violations(problem: Problem, parameters: Mapping[str, float], each: Sequenc
     for name, condition in problem.conditions.items():
         if RADIUS not in condition.names:  # it takes a search of its own
             at = each if varies(problem, condition, problem.cases) else each[:1]
-            found[name] = max((condition.violation(values) for values in at), key=_or_infinite)
+            found[name] = max((condition.violation(v) for v in at), key=lambda x: math.inf if math.isnan(x) else x)
     for name, (lower, upper) in problem.free.items():
         x = parameters[name]
         found[f"{name}.min"] = (lower - x) / max(1.0, abs(lower))
         found[f"{name}.max"] = (x - upper) / max(1.0, abs(upper))
     return {name: v for name, v in found.items() if not v <= FEASIBLE}
-
-
-def _or_infinite(value: float) -> float:
-    return math.inf if math.isnan(value) else value
 
 
 def _damping_ratio(coefficients: Sequence[float]) -> float:

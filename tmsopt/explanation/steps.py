@@ -42,10 +42,7 @@ def natural_step(unit: str, size: float) -> LimitStep:
 
 def step_within(unit: str, size: float, limit: float, direction: float, allowed: Range) -> LimitStep | None:
     """The largest natural step that keeps a moved limit physically possible; None at a physical end."""
-    for step in _steps(unit, size):
-        if limit + direction * step.size in allowed:
-            return step
-    return None
+    return next((step for step in _steps(unit, size) if limit + direction * step.size in allowed), None)
 
 
 def with_reported_unit(value: float, unit: str, digits: int = 10) -> str:
@@ -73,12 +70,9 @@ def _steps(unit: str, size: float) -> Iterator[LimitStep]:
     """Ever smaller steps, from the natural one down."""
     size = abs(size) if abs(size) > _TINY else 1.0
     name, one, first = _NATURAL.get(unit, (unit, 1.0, 0.0))
-    largest = first
-    if unit in _NATURAL:
-        while largest * one > _LARGEST[unit] * size:
-            largest /= 10
-    else:
-        largest = _one_two_five(_PART * size)
+    largest = first if unit in _NATURAL else _one_two_five(_PART * size)
+    while unit in _NATURAL and largest * one > _LARGEST[unit] * size:
+        largest /= 10
     step = largest
     while step >= _SMALLEST * largest:
         yield LimitStep(step * one, f"{step:.4g}" if name == "1" else f"{step:.4g} {name}")

@@ -150,11 +150,8 @@ class Builder:
         self.objective: Any = ca.SX(0)
         self.design = {name: self.parameter(name, *ends) for name, ends in problem.free.items()}
         # A weight is 1 where its parameter is 0, and else its size: a number that is 0 stays one.
-        given = {
-            n: s
-            for n, s in self.settings.items()
-            if problem.fixed.get(n) or (n in problem.fixed and not problem.asks_radius)
-        }
+        kept = {n for n, x in problem.fixed.items() if x or not problem.asks_radius}
+        given = {n: s for n, s in self.settings.items() if n in kept}
         nominal = problem.ordered({**self.design, **given})
         directed = [k for k, case in enumerate(self.cases, start=1) if case.direction]
         radius = self.variable(RADIUS, 0.0) if directed else ca.SX(0)

@@ -24,17 +24,12 @@ LINEAR_SOLVERS = ("mumps", "spral")
 # Larger steps away from the bounds and shorter ones towards them: on the EP4 problem this takes a third fewer
 # iterations and reaches EP4 from more of the starts. Scaling and refining linear systems of a dozen unknowns costs
 # a quarter of the time and changes no result.
-_FAR = {
-    "bound_push": 0.1,
-    "bound_frac": 0.1,
-    "tau_min": 0.9,
-    "min_refinement_steps": 0,
-    "linear_system_scaling": "none",
-}
+_QUICK = {"min_refinement_steps": 0, "linear_system_scaling": "none"}
+_FAR = {"bound_push": 0.1, "bound_frac": 0.1, "tau_min": 0.9, **_QUICK}
 _NEAR = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-6}
 # A start that satisfies the equations of many cases is worth keeping to: with the barrier of far starts IPOPT
 # throws that away, and half as many starts of band designs end at the best optimum.
-_EXACT = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-4, **dict(list(_FAR.items())[3:])}
+_EXACT = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-4, **_QUICK}
 _SETTINGS: dict[str, dict[str, Any]] = {"far": _FAR, "exact": _EXACT, "near": _NEAR}
 
 _STEPS = 12

@@ -118,9 +118,9 @@ class NLP:
 
     def at(self, x: Any, settings: Any = None) -> Any:
         """f and g for numbers or CasADi expressions; with the NLP's own settings unless others are given."""
-        return (
-            self.functions(x, self.settings if settings is None else settings) if self.settings else self.functions(x)
-        )
+        if not self.settings:
+            return self.functions(x)
+        return self.functions(x, self.settings if settings is None else settings)
 
     @property
     def equations(self) -> int:

@@ -226,8 +226,8 @@ def _thinned(search: _Search) -> Front:
             words[i].append("gap begins")
             words[i + 1].append("gap ends")
         elif s.changes and not (s.left.label or s.right.label):
-            changes += [(i, name, s.length) for name in change_names(s.left, s.right)]
-            words[i] += change_names(s.left, s.right)
+            words[i] += (names := change_names(s.left, s.right))
+            changes += [(i, name, s.length) for name in names]
     spacing = sum(s.length for s in stretches if not s.gap) / max(search.points - 1, 1)
     kept: list[int] = []
     since = math.inf
@@ -260,12 +260,9 @@ def _ahead(stretches: Sequence[_Stretch], words: Sequence[list[str]]) -> list[fl
 
 
 def _missing(ask: Asker, s: _Stretch) -> str:
-    text = ask.texts[s.axis]
-    ends = sorted((s.left.objectives[s.axis], s.right.objectives[s.axis]))
-    where = f"{text} from {ends[0]:.6g} to {ends[1]:.6g}"
-    if s.failed:
-        return f"not solved for {where}; try more starts"
-    return f"no efficient design was found with {where}"
+    low, high = sorted((s.left.objectives[s.axis], s.right.objectives[s.axis]))
+    where = f"{ask.texts[s.axis]} from {low:.6g} to {high:.6g}"
+    return f"not solved for {where}; try more starts" if s.failed else f"no efficient design was found with {where}"
 
 
 def change_names(before: FrontPoint, after: FrontPoint) -> list[str]:

@@ -1,12 +1,11 @@
 """Pareto fronts by eps-constraints, warm-started along the front."""
 
 import time
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Unpack
 
 from tmsopt.design.files import Given, problem_of
-from tmsopt.design.solution import NotSolved, Solution
+from tmsopt.design.solution import NotSolved
 from tmsopt.errors import Fault, InputError
 from tmsopt.formulation.options import Asked, Options, options_of
 from tmsopt.fronts.curve import curve
@@ -50,35 +49,30 @@ def pareto(problem: Given, points: int = POINTS, **options: Unpack[Asked]) -> Fr
     began = time.perf_counter()
     progress, ask = how.progress, Asker(problem, replace(how, progress=None))
     n = len(ask.texts)
-    ends = tuple(_labelled(ask, k, _believed(best_first(ask, [(k + j) % n for j in range(n)]))) for k in range(n))
+    ends = tuple(_end(ask, k) for k in range(n))
     front = Front(problem, ask.texts, ends[:1], (), (), n, 0.0)
     ranges = [max(p.objectives[k] for p in ends) - min(p.objectives[k] for p in ends) for k in range(n)]
     conflict = [r > _ALIKE * (1 + max(abs(p.objectives[k]) for p in ends)) for k, r in enumerate(ranges)]
     ask = replace(ask, ranges=tuple(ranges))
-    if n == 2:
-        front = curve(ask, ends, points, progress) if all(conflict) else _no_conflict(front, ends)
-    elif any(conflict):
+    if not (all(conflict) if n == 2 else any(conflict)):
+        best = min(ends, key=lambda p: sum(p.objectives))
+        note = "the objectives are not in conflict: one design is best in all of them, and the front is that point"
+        front = replace(front, points=(replace(best, label="best in all"),), notes=(note,))
+    elif n == 2:
+        front = curve(ask, ends, points, progress)
+    else:
         found, gaps, solved = surface(ask, ends, points, progress)
         front = replace(front, points=found, gaps=gaps, solved=solved)
-    else:
-        front = _no_conflict(front, ends)
     return replace(front, seconds=time.perf_counter() - began)
 
 
-def _believed(solution: Solution) -> Solution:
+def _end(ask: Asker, k: int) -> FrontPoint:
+    """The end of the front where objective `k` is best, with its label."""
+    n = len(ask.texts)
+    solution = best_first(ask, [(k + j) % n for j in range(n)])
     if solution.status != "optimal":
         raise NotSolved(solution)
-    return solution
-
-
-def _labelled(ask: Asker, k: int, solution: Solution) -> FrontPoint:
     text = ask.texts[k].strip()
     opposite = text.removeprefix("-").strip()
     greatest = text != opposite and opposite.isidentifier()
     return replace(point(ask, solution), label=f"greatest {opposite}" if greatest else f"least {text}")
-
-
-def _no_conflict(front: Front, ends: Sequence[FrontPoint]) -> Front:
-    best = min(ends, key=lambda p: sum(p.objectives))
-    note = "the objectives are not in conflict: one design is best in all of them, and the front is that point"
-    return replace(front, points=(replace(best, label="best in all"),), notes=(note,))

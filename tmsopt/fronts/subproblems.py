@@ -40,11 +40,6 @@ class Asker:
         return replace(self, options=replace(self.options, seed=self.options.seed + count))
 
     @property
-    def starts(self) -> int:
-        """New starts per sub-problem."""
-        return self.options.starts
-
-    @property
     def texts(self) -> tuple[str, ...]:
         """The objectives."""
         return tuple(self.problem.pareto)
@@ -86,7 +81,9 @@ def least(
     asked = subproblem(ask, k, limits)
     if pin is not None and near:
         asked = _pinned(ask, asked, pin, near[0])
-    trials = [(_started(asked, n), 1 if few or m else 1 + ask.starts) for m, n in enumerate(near)] or [(asked, _RETRY)]
+    trials = [(_started(asked, n), 1 if few or m else 1 + ask.options.starts) for m, n in enumerate(near)] or [
+        (asked, _RETRY)
+    ]
     ended = [ask.solve(problem, starts) for problem, starts in trials]
     if not few and all(s.status != "optimal" for s in ended):
         ended.append(ask.later(1).solve(asked, _RETRY))
@@ -135,10 +132,8 @@ def point(ask: Asker, solution: Solution) -> FrontPoint:
     """A design as a point of the front."""
     active = [n for n in solution.active if n in ask.problem.constraints]
     for name, (low, high) in ask.problem.free.items():
-        value = solution.parameters[name]
-        for end, at in (("min", low), ("max", high)):
-            if abs(value - at) <= _AT_END * (high - low):
-                active.append(f"{name}.{end}")
+        near = (("min", low), ("max", high))
+        active += [f"{name}.{end}" for end, at in near if abs(solution.parameters[name] - at) <= _AT_END * (high - low)]
     return FrontPoint(objectives(ask, solution), solution, tuple(active))
 
 
@@ -151,7 +146,7 @@ def _tightened(ask: Asker, k: int, limits: Mapping[int, float], found: Solution)
     held = {**limits, k: values[k] + _SLACK * (1 + abs(values[k]))}
     rest = " + ".join(f"({ask.texts[j]}) / {ask.ranges[j]!r}" for j in loose)
     asked = _pinned(ask, replace(subproblem(ask, k, held), minimize=rest), k, found)
-    better = ask.solve(_started(asked, found), 1 + ask.starts)
+    better = ask.solve(_started(asked, found), 1 + ask.options.starts)
     gain = sum((values[j] - b) / ask.ranges[j] for j, b in enumerate(objectives(ask, better)) if j in loose)
     return better if better.status == "optimal" and gain > _WORTH else found
 

@@ -56,20 +56,16 @@ class Edge:
 @lru_cache(maxsize=16)
 def edges(degree: int) -> Mapping[str, Edge]:
     """Every piece of a boundary among the polynomials of a degree ≥ 2, by name."""
-    return MappingProxyType(
-        {
-            edge.name: edge
-            for edge in (
-                _divided("weave", degree, _pair, real=False),
-                _ended("capsize", degree, degree, real=False),
-                _ended("infinity", degree, 0, real=False),
-                _divided("EP2", degree, _double, real=True),
-                _ended("capsize, real", degree, degree, real=True),
-                _ended("infinity, real", degree, 0, real=True),
-                _whole(degree),
-            )
-        }
+    every = (
+        _divided("weave", degree, _pair, real=False),
+        _ended("capsize", degree, degree, real=False),
+        _ended("infinity", degree, 0, real=False),
+        _divided("EP2", degree, _double, real=True),
+        _ended("capsize, real", degree, degree, real=True),
+        _ended("infinity, real", degree, 0, real=True),
+        _whole(degree),
     )
+    return MappingProxyType({edge.name: edge for edge in every})
 
 
 def _pair(e: Any) -> list[Any]:

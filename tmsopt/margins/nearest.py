@@ -115,20 +115,15 @@ class Robustness:
 
 @dataclass(frozen=True)
 class _Approach:
-    """Where one run ended.
+    """Where one run ended, in weights; `refined` where the conditions of a nearest point hold to rounding."""
 
-    Attributes:
-        u: displacement, in weights.
-        refined: whether the conditions of a nearest point hold to rounding.
-    """
-
-    u: Array
-    refined: bool
+    u: Array = field(default_factory=lambda: np.zeros(0))
+    refined: bool = False
 
     @property
     def distance(self) -> float:
-        """√Σ u²."""
-        return float(np.linalg.norm(self.u))
+        """√Σ u²; inf for no point."""
+        return float(np.linalg.norm(self.u)) if self.u.size else math.inf
 
 
 def nearest(
@@ -196,27 +191,17 @@ def _nearest(place: Place, seen: list[RayCrossing], kind: str) -> Nearest:
         zero = dict.fromkeys(place.weights, 0.0)
         return Nearest(kind, 0.0, Table(place.parameters), Table(zero), refined=True, direct=True)
     mine = [s for s in seen if s.edge in KINDS[kind]]
-    best = _Approach(np.zeros(0), False)
+    best = _Approach()
     pieces = edges(place.problem.model.degree)
     for edge, sign, starts in _pieces(place, mine, kind):
-        best = min(best, _best(place, pieces[edge], sign, starts), key=_length)
-    if mine and mine[0].distance < _length(best) * (1 - _ALIKE):
+        best = min(best, _best(place, pieces[edge], sign, starts), key=lambda found: found.distance)
+    if mine and mine[0].distance < best.distance * (1 - _ALIKE):
         best = _Approach(mine[0].u, False)
     if not best.u.size:
         return Nearest(kind)
-    on_the_way = [c for c in between(place.space, best.u) if kind == "heavy damping" or c.edge in STABILITY]
-    return Nearest(
-        kind,
-        _length(best),
-        Table(place.design(best.u)),
-        Table(dict(zip(place.weights, best.u.tolist(), strict=True))),
-        best.refined,
-        not on_the_way,
-    )
-
-
-def _length(found: _Approach) -> float:
-    return found.distance if found.u.size else math.inf
+    direct = not any(kind == "heavy damping" or c.edge in STABILITY for c in between(place.space, best.u))
+    direction = Table(dict(zip(place.weights, best.u.tolist(), strict=True)))
+    return Nearest(kind, best.distance, Table(place.design(best.u)), direction, best.refined, direct)
 
 
 def _pieces(place: Place, seen: list[RayCrossing], kind: str) -> Iterator[tuple[str, float, list[Array]]]:
@@ -233,12 +218,12 @@ def _pieces(place: Place, seen: list[RayCrossing], kind: str) -> Iterator[tuple[
 
 def _best(place: Place, edge: Edge, sign: float, starts: list[Array]) -> _Approach:
     """The nearest of where the starts lead; what is crossed on the way there is started from too."""
-    best = _Approach(np.zeros(0), False)
+    best = _Approach()
     size = min((float(np.linalg.norm(u)) for u in starts if u.any()), default=1.0)
     run = _approach(place, edge, sign, size)
     for _ in range(_ROUNDS):
         for u in starts:
-            found = run(u, _length(best))
+            found = run(u, best.distance)
             if found is not None and lies_on(sign * place.space.coefficients(found.u), edge, place.sizes):
                 best = found
         if not best.u.size:

@@ -74,7 +74,7 @@ def along(space: Space, rays: Array, t: Array) -> list[RayCrossing]:
         if not ray.size:
             continue
         all_of = _Bracket(space, test, rays[ray], t[ray, step], t[ray, step + 1], inside[ray, step]).narrowed(*_COARSE)
-        names = all_of.names(heavy)
+        names = [losses(c, heavy) for c in all_of.sides()[0]]
         distance = np.linalg.norm(space.along(all_of.rays, all_of.high), axis=1)
         unit = all_of.rays / np.linalg.norm(all_of.rays, axis=1, keepdims=True)
         for name in sorted({n for each in names for n in each}):
@@ -181,10 +181,6 @@ class _Bracket:
         within, beyond = (self.at(np.where(self.inside == side, self.low, self.high)) for side in (True, False))
         sign = np.sign(within[:, 0])
         return sign[:, None] * beyond, sign
-
-    def names(self, heavy: bool) -> list[tuple[str, ...]]:
-        """Names of the edges that each has crossed."""
-        return [losses(c, heavy) for c in self.sides()[0]]
 
     def crossings(self, heavy: bool) -> list[RayCrossing]:
         """As data."""

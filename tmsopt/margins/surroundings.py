@@ -125,9 +125,8 @@ def placed(problem: Problem, parameters: Mapping[str, float], weights: Mapping[s
     if faults:
         raise InputError(faults)
     own = {n: float(parameters[n]) for n in problem.parameter_set.names}
-    if weights is None:
-        return Place(problem, own, relative(problem, own))
-    return Place(problem, own, {n: float(weights[n]) for n in own if weights.get(n, 0.0) > 0})
+    given = relative(problem, own) if weights is None else weights
+    return Place(problem, own, {n: float(given[n]) for n in own if given.get(n, 0.0) > 0})
 
 
 def relative(problem: Problem, parameters: Mapping[str, float]) -> dict[str, float]:
@@ -164,9 +163,8 @@ def _weight_faults(problem: Problem, weights: Mapping[str, float]) -> Iterator[F
         elif not _is_number(weight) or weight < 0:
             yield Fault(f"found {weight!r}; accepted: a number above 0, or 0 for a parameter that stays", key)
     if not any(_is_number(w) and w > 0 for w in weights.values()):
-        yield Fault(
-            f"no weight is above 0; give one to a parameter that may change: {' '.join(of.names)}", ("weights",)
-        )
+        message = f"no weight is above 0; give one to a parameter that may change: {' '.join(of.names)}"
+        yield Fault(message, ("weights",))
 
 
 def _is_number(value: Any) -> bool:

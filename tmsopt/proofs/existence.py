@@ -103,9 +103,7 @@ def _beside(problem: Problem, pattern: Pattern, design: Written, stored: Mapping
     raise Refused(reasons[0] if reasons else f"no {pattern.name} is anywhere near the design")
 
 
-def _choices(
-    problem: Problem, stored: Mapping[str, float], free: list[str], count: int
-) -> Iterator[list[str]]:  # fmt: skip
+def _choices(problem: Problem, stored: Mapping[str, float], free: list[str], count: int) -> Iterator[list[str]]:
     """Free parameters to move: first only those inside their ranges, so that the proved design stays in the box."""
     ends = {n: problem.free[n] for n in free}
     inner = [n for n, (lo, hi) in ends.items() if min(stored[n] - lo, hi - stored[n]) > _INSIDE * (hi - lo)]

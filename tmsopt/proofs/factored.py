@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 import flint
@@ -40,19 +40,13 @@ class Factored:
     def abscissa(self) -> Any:
         """The largest real part; None where no factor tells."""
         tops = [_rightmost(factor) for factor, _ in self.factors]
-        top = tops[0]
-        for other in tops[1:]:
-            top = None if top is None or other is None else top.max(other)
-        return top
+        return None if any(top is None for top in tops) else reduce(lambda a, b: a.max(b), tops)
 
     @cached_property
     def damping_ratio(self) -> Any:
         """The least −Re s/|s|; None where the balls cannot tell."""
-        ratios = [_ratio(z) for z in self.roots or ()]
-        least = ratios[0] if ratios else None
-        for other in ratios[1:]:
-            least = None if least is None or other is None else least.min(other)
-        return least
+        ratios = [_ratio(z) for z in self.roots or ()] or [None]
+        return None if any(ratio is None for ratio in ratios) else reduce(lambda a, b: a.min(b), ratios)
 
     @cached_property
     def stable(self) -> bool | None:
@@ -82,9 +76,8 @@ def of_pattern(pattern: Pattern, unknowns: Sequence[Any]) -> Factored:
 def abscissa_formula(pattern: Pattern, unknowns: Sequence[Any]) -> Any:
     """Largest real part as a formula of one factor, the one whose root is rightmost in the middles; nan for none."""
     formulas = [_formula(factor) for factor, _ in of_pattern(pattern, unknowns).factors]
-    return (
-        max(formulas, key=lambda f: float(_constant(f))) if all(f is not None for f in formulas) else flint.arb("nan")
-    )
+    told = all(f is not None for f in formulas)
+    return max(formulas, key=lambda f: float(_constant(f))) if told else flint.arb("nan")
 
 
 def _formula(factor: Factor) -> Any:
@@ -168,10 +161,7 @@ def _rightmost(factor: Factor) -> Any:
     own = roots_of(factor)
     if own is None:
         return None
-    top = own[0].re
-    for z in own[1:]:
-        top = top.max(z.re)
-    return top
+    return reduce(lambda a, b: a.max(b), (z.re for z in own))
 
 
 def _ratio(root: Enclosed) -> Any:

@@ -133,11 +133,7 @@ def prove_design(
     with flint.ctx.workdps(2 * digits + _EXTRA):
         patterns = _patterns(problem, structure, roots)
         proof = _proved(_asked(problem, case), design, varied, structure, patterns, digits)
-        return replace(proof, seconds=_since(began))
-
-
-def _since(began: float) -> float:
-    return time.perf_counter() - began
+        return replace(proof, seconds=time.perf_counter() - began)
 
 
 def _asked(problem: Problem, case: Case | None) -> Problem:

@@ -64,9 +64,7 @@ class Equations:
         of = self.problem.parameter_set
         own = {n: at[n].atan() if of[n].tangent else at[n] for n in of.names}
         known = {q.name for q in self.lifted}
-        values = Values(
-            self.problem.model, of, own, lift=lambda q, v: at[q.name] if q.name in known else None
-        )  # fmt: skip
+        values = Values(self.problem.model, of, own, lift=lambda q, v: at[q.name] if q.name in known else None)
         u = [at[n] for n in self.of_pattern]
         a = values.coefficients
         left = [p - a[0] * c for p, c in zip(a[1:], self.pattern.monic(u)[1:], strict=True)]

@@ -86,13 +86,12 @@ def solve_all(problem: Given, **options: Unpack[Asked]) -> Every:
             `tmsopt.formulation.Options`.
 
     Raises:
-        InputError: for a problem that locates no pattern, or leaves freedom.
+        InputError: for a problem that locates no pattern, leaves freedom, or constrains a quantity without a formula.
     """
     problem = problem_of(problem)
-    _check(problem)
+    nlp = _posed(problem)
     work = workspace(problem, options_of(options, defaults=_DEFAULTS))
     starts, progress = work.options.starts, work.options.progress
-    nlp = matching(problem)
     system = square_system(nlp)
     assert system is not None  # as many conditions as parameters
     runner = Runner(work, nlp)
@@ -135,7 +134,8 @@ def solve_all(problem: Given, **options: Unpack[Asked]) -> Every:
     return Every(tuple(solutions), coverage_of(done, [hits[k] for k in order], singular))
 
 
-def _check(problem: Problem) -> None:
+def _posed(problem: Problem) -> NLP:
+    """The equations of a problem; refused where they are not those of single solutions in the parameters alone."""
     counted = freedom(problem)
     if problem.pattern is None or problem.objective is not None:
         message = "all solutions are those of a pattern; write locate = 'EP3', or another, and no minimize or maximize"
@@ -146,6 +146,13 @@ def _check(problem: Problem) -> None:
         conditions = f"{counted.conditions} condition{'' if counted.conditions == 1 else 's'}"
         message = f"{free} and {conditions} do not make single solutions; {advice}"
         raise InputError([Fault(message, ("parameters",))])
+    nlp = matching(problem)
+    if carried := [lift.name for lift in nlp.lifts if lift.name != problem.pattern.name]:
+        found = f"the constraints use {', '.join(carried)}, which only an equation of its own or the roots define"
+        accepted = "parameters, coefficients, and quantities with a formula in these"
+        advice = "write them so, or ask for one design alone by solve, which names other solutions too"
+        raise InputError([Fault(f"{found}; accepted: {accepted}; {advice}", ("constraints",))])
+    return nlp
 
 
 def _named(problem: Problem, point: Array) -> dict[str, float]:

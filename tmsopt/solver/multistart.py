@@ -82,9 +82,8 @@ def _beside(run: "Runner", candidates: Sequence[Candidate], most: int) -> list[C
         ended = [run.ended(design, near=True) for design in others[: max(most - len(found), 0)]]
         found += ended
         better = [c for c in ended if c.feasible and c.objective < best.objective]
-        best = min(
-            (c for c in better if not same(c.objective, best.objective)), key=lambda c: c.objective, default=None
-        )
+        apart = [c for c in better if not same(c.objective, best.objective)]
+        best = min(apart, key=lambda c: c.objective, default=None)
     return found
 
 
@@ -180,15 +179,10 @@ def _settled(problem: Problem, candidates: list[Candidate]) -> bool:
     if problem.objective is None:  # any point of a square pattern will do, and any that meets too many conditions
         count = freedom(problem).count
         return agreeing >= (1 if count == 0 or (count < 0 and best <= _MET) else _AGREE)
-    n, w = len(feasible), _different([c.objective for c in feasible], feasible[0].nlp.size)
+    ordered = sorted(c.objective for c in feasible)
+    n, w = len(feasible), 1 + sum(not same(a, b, feasible[0].nlp.size) for a, b in pairwise(ordered))
     seen = n > w + 2 and w * (n - 1) <= (w + 0.5) * (n - w - 2)
     return len(candidates) >= _ENOUGH and agreeing >= _AGREE and seen
-
-
-def _different(objectives: list[float], size: float) -> int:
-    """Number of different optima among the objectives."""
-    ordered = sorted(objectives)
-    return 1 + sum(not same(a, b, size) for a, b in pairwise(ordered))
 
 
 def _proven(problem: Problem, candidate: Candidate) -> bool:
@@ -197,10 +191,8 @@ def _proven(problem: Problem, candidate: Candidate) -> bool:
         return False
     a = _coefficients(problem, candidate.nlp, candidate.run)[0]
     own = -(abs(a[-1] / a[0]) ** (1 / problem.model.degree)) if a[0] else -math.inf
-    return (
-        closed(candidate.objective - own, own, candidate.nlp.size)
-        and instant_bound(problem, candidate.objective).proven
-    )
+    near = closed(candidate.objective - own, own, candidate.nlp.size)
+    return near and instant_bound(problem, candidate.objective).proven
 
 
 def _coefficients(problem: Problem, nlp: NLP, run: Run) -> Array:

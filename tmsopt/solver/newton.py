@@ -33,7 +33,9 @@ def other_branches(problem: Problem, nlp: NLP, found: Mapping[str, float]) -> tu
     known = [np.array([found[n] for n in problem.free])]
     for start in designs(problem, 0, _STARTS):
         origin = complete(nlp, problem, start)
-        for mirrored in (origin, *_mirrors(problem, origin)):
+        # The start, and with one free parameter at a time of the other sign, where its physical range would forbid it.
+        images = (np.where(np.arange(len(origin)) == k, -origin, origin) for k in range(len(problem.free)))
+        for mirrored in (origin, *images):
             ended = newton(system, mirrored)
             if ended is None or not ended.isolated:
                 continue
@@ -56,16 +58,6 @@ def square_system(nlp: NLP) -> ca.Function | None:
         return None
     equations = ca.vertcat(*[g[k] for k in equalities])
     return ca.Function("system", [x], [equations, ca.jacobian(equations, x), g])
-
-
-def _mirrors(problem: Problem, x: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """The start with one free parameter at a time of the other sign, where its physical range would forbid it."""
-    images = []
-    for k in range(len(problem.free)):
-        image = x.copy()
-        image[k] = -image[k]
-        images.append(image)
-    return images
 
 
 @dataclass(frozen=True)

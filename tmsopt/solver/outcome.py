@@ -89,17 +89,9 @@ def found(
         status = "infeasible"
         surplus = f"{counted.conditions} conditions for {counted.free} free parameters"
         notes += (f"{surplus}, and they are not consistent; free {-counted.count} more, or drop a constraint",)
-    return Finding(
-        parameters,
-        checked,
-        status,
-        _active(problem, nlp, point),
-        starts,
-        nlp.formulation,
-        tuple(nlp.cases if cases is None else cases),
-        other_branches(problem, nlp, parameters) if counted.kind == "square" else (),
-        notes,
-    )
+    active, looked = _active(problem, nlp, point), tuple(nlp.cases if cases is None else cases)
+    branches = other_branches(problem, nlp, parameters) if counted.kind == "square" else ()
+    return Finding(parameters, checked, status, active, starts, nlp.formulation, looked, branches, notes)
 
 
 def counted(candidates: Sequence[Candidate], at_best: float) -> Starts:
@@ -153,12 +145,9 @@ def better(problem: Problem, one: Finding, other: Finding) -> bool:
 
 def ahead(work: Workspace, one: Trial, other: Trial) -> bool:
     """Whether one trial beats another: by violation first, then by the objective that the recheck found."""
-    return _rank(work.problem.sign, one) < _rank(work.problem.sign, other)
-
-
-def _rank(sign: float, trial: Trial) -> tuple[float, float]:
-    value = trial.point.objective if math.isnan(trial.checked.objective) else trial.checked.objective
-    return sum(trial.checked.violations.values()), sign * value
+    values = [t.point.objective if math.isnan(t.checked.objective) else t.checked.objective for t in (one, other)]
+    own, others = (sum(t.checked.violations.values()) for t in (one, other))
+    return (own, work.problem.sign * values[0]) < (others, work.problem.sign * values[1])
 
 
 def _active(problem: Problem, nlp: NLP, point: Point) -> dict[str, float]:
@@ -180,9 +169,8 @@ def _active(problem: Problem, nlp: NLP, point: Point) -> dict[str, float]:
         multiplier, x = float(point.bound_multipliers[k]), float(point.x[k])
         ends = [float(np.tan(e)) if of[name].tangent else e for e in problem.free[name]]
         apart = _TOUCHES * (ends[1] - ends[0])
-        if (
-            abs(multiplier) > _MULTIPLIER and min(abs(x - e) for e in ends) <= apart
-        ):  # not where two sides of the box meet
+        at_end = min(abs(x - e) for e in ends) <= apart  # not where two sides of the box meet
+        if abs(multiplier) > _MULTIPLIER and at_end:
             slope = 1 + x * x if of[name].tangent else 1.0  # d tan λ / dλ
             active[f"{name}.{'max' if multiplier > 0 else 'min'}"] = abs(multiplier) * slope
     return active

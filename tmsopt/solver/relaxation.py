@@ -132,17 +132,14 @@ def _least_covered(work: Workspace, limits: Sequence[Limit], listed: Sequence[Ca
                 elastic = _elastic(work.problem, listed, limits)
                 ended = Runner(work, elastic, work.touching).ended(single[0].parameters, near=True)
                 again = survivor(_unlimited(work, limits), elastic, [ended])
-                if again is not None and not again.checked.violations and _ahead(again, trial):
+                less = again is not None and again.point.objective < trial.point.objective
+                if again is not None and less and not again.checked.violations:
                     trial, nlp = again, elastic
     for _ in range(_ROUNDS if listed else 0):
         if trial is None or not (more := _beyond(work.problem, limits, trial, nlp.cases)):
             break
         trial, nlp = _least(work, limits, (*nlp.cases, *more), trial)
     return trial, nlp
-
-
-def _ahead(one: Trial, other: Trial) -> bool:
-    return one.point.objective < other.point.objective
 
 
 def _least(

@@ -77,17 +77,8 @@ def without_any(work: Workspace, tried: int) -> Finding:
             return finding
         advice = "try more starts, give one, or keep a0 away from 0 (for tms, nu_H >= 0.02; for whipple, u_H >= 0.02)"
         status, note = "not_converged", f"feasible designs exist, but {none} converged; {advice}"
-    return Finding(
-        parameters,
-        checked,
-        status,
-        {},
-        Starts(tried=tried),
-        nlp.formulation,
-        cases,
-        notes=(note,),
-        relaxation=relaxation,
-    )
+    starts, notes = Starts(tried=tried), (note,)
+    return Finding(parameters, checked, status, {}, starts, nlp.formulation, cases, notes=notes, relaxation=relaxation)
 
 
 def evaluated_cases(problem: Problem, parameters: Mapping[str, float]) -> tuple[Case, ...]:

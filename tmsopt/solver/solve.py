@@ -82,13 +82,8 @@ def _winner(problem: Problem, explored: Sequence[Explored]) -> Finding | None:
 
 def _side_values(explored: Sequence[Explored]) -> dict[str, float]:
     """The best objective of each part of the box; nan where it has no optimal design."""
-    return {
-        part.name: part.finding.checked.objective
-        if part.finding is not None and part.finding.status == "optimal"
-        else math.nan
-        for part in explored
-        if part.name
-    }
+    found = {part.name: part.finding for part in explored if part.name}
+    return {n: f.checked.objective if f and f.status == "optimal" else math.nan for n, f in found.items()}
 
 
 def _sides_note(problem: Problem, explored: Sequence[Explored], finding: Finding) -> tuple[str, ...]:

@@ -77,7 +77,8 @@ class Branch:
                 "arclength": float(self.arclength[k]),
                 **{name: float(column[k]) for name, column in self.parameters.items()},
                 **{f"d_{name}": float(column[k]) for name, column in self.tangent.items()},
-                **{self._told_apart(name): float(column[k]) for name, column in self.unknowns.items()},
+                # a parameter may have the name of an unknown, such as a damping c
+                **{f"{self.pattern}.{n}" if n in self.parameters else n: float(c[k]) for n, c in self.unknowns.items()},
                 "abscissa": float(self.abscissa[k]),
                 "kind": str(self.kinds[k]),
                 "stable": bool(self.stable[k]),
@@ -86,18 +87,13 @@ class Branch:
                 "event": "; ".join(marks.get(k, [])),
             }
 
-    def _told_apart(self, unknown: str) -> str:
-        """The name of an unknown's column, told from a parameter of the same name, such as a damping c."""
-        return f"{self.pattern}.{unknown}" if unknown in self.parameters else unknown
-
     def to_json(self) -> dict[str, Any]:
         """Columns and events; numbers that do not exist are null."""
         columns: dict[str, list[Any]] = {}
         for row in self.rows():
             for name, value in row.items():
                 columns.setdefault(name, []).append(value)
-        found = plain(self, "pattern closed")
-        found |= {"points": len(self), "residual": self.residual}
+        found = plain(self, "pattern closed") | {"points": len(self), "residual": self.residual}
         events = [plain(event, "name detail index parameters") for event in self.events]
         return found | {"events": events, "columns": plain(columns)}
 
@@ -161,7 +157,6 @@ def kinds_along(branch: Branch) -> list[str]:
     """The pattern of each point, a special point counted with the one before it."""
     special = {e.index for e in branch.events if str(branch.kinds[e.index]) == e.name}
     kinds = [str(k) for k in branch.kinds]
-    for row in sorted(special):
-        if len(kinds) > 1:
-            kinds[row] = kinds[row - 1] if row else kinds[1]
+    for row in sorted(special) if len(kinds) > 1 else ():
+        kinds[row] = kinds[row - 1] if row else kinds[1]
     return kinds

@@ -14,18 +14,14 @@ from scipy.optimize import brentq
 
 from tmsopt.records import Array
 
-_CONVERGED = 1e-8
-"""Last Newton step, relative to the point: the error left is its square."""
-
+_CONVERGED = 1e-8  # last Newton step, relative to the point: the error left is its square
 _CONTRACTION = 0.1  # of the second Newton step against the first: slower means that the prediction was too far
 _COSINE = np.cos(0.15)  # of the angle between tangents: a sharper turn takes a smaller step
 _SMALLEST = 1e-12
 _GROWTH = 1.5
 _ROOM = 4.0  # steps of variables without a box, against those with one: nobody looks at their spacing
 _REMOTE = 100.0  # units of the scale beyond which points lie ever further apart, towards infinity
-_SOLVED = 1e-10
-"""Residual, relative to the terms of the equations, of a solution: a stationary point of the residual is none."""
-
+_SOLVED = 1e-10  # residual, relative to the terms, of a solution: a stationary point of the residual is none
 _FINE = 1e-17
 _FAR = 1e6  # in units of the scale; further out the equations lose their digits
 _FADING = 1e5  # there a step that fails has lost them already: which one does is up to rounding, the limit is not
@@ -208,11 +204,8 @@ def both_ways(on: Curve, y: Array, step: float, most: int) -> Walk | None:
     back = walk(on, y, -t, step, most)
     if len(ahead.y) + len(back.y) < 4:
         return None
-    return Walk(
-        y=np.concatenate([back.y[::-1], ahead.y[1:]]),
-        t=np.concatenate([-back.t[::-1], ahead.t[1:]]),
-        ends=(back.ends[1], ahead.ends[1]),
-    )
+    points, tangents = np.concatenate([back.y[::-1], ahead.y[1:]]), np.concatenate([-back.t[::-1], ahead.t[1:]])
+    return Walk(points, tangents, (back.ends[1], ahead.ends[1]))
 
 
 def between(on: Curve, y: Array, t: Array, s: float) -> tuple[Array, Array]:
@@ -289,12 +282,8 @@ def _evaluate(system: ca.Function, y: Array) -> tuple[Array, Array]:
 def _reach(on: Curve, y: Array, t: Array) -> float:
     """Longest step, per unit of `step`: boxed variables by their box, the others by their own size."""
     boxed = np.logical_and(np.isfinite(on.lower), np.isfinite(on.upper))
-    return float(
-        np.min(
-            np.where(boxed, 1.0, _ROOM * (1 + np.abs(y)) * np.sqrt(np.maximum(1, np.abs(y) / _REMOTE)))
-            / (np.abs(t) + 1e-300)
-        )
-    )
+    room = np.where(boxed, 1.0, _ROOM * (1 + np.abs(y)) * np.sqrt(np.maximum(1, np.abs(y) / _REMOTE)))
+    return float(np.min(room / (np.abs(t) + 1e-300)))
 
 
 def _along(on: Curve, y: Array, t: Array) -> bool:

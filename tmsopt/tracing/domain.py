@@ -9,11 +9,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
-from tmsopt.records import Array, plain
+from tmsopt.records import Array, Truth, plain
 from tmsopt.roots import pattern, real_roots
 from tmsopt.roots.meetings import nearest_two
 from tmsopt.tracing.branch import Branch, Event
@@ -23,7 +22,6 @@ from tmsopt.tracing.trace import STARTS, STEP, trace
 
 _CLOSE = 5e-3
 """Widths of the box, a step, between the last point before infinity or a singular end and the corner it belongs to."""
-
 
 _EDGE = 1e-9  # widths of the box: a branch that starts beside an edge, not in it, leaves it by more
 
@@ -97,31 +95,24 @@ def domain(problem: Given, *, step: float = STEP, starts: int = STARTS, seed: in
     damping += [arc for curve in infinite for arc in _runs(curve, curve.heavily_damped)]
     parting = [arc for b in (*found["EP2"], *found["capsize"]) for arc in _pieces(b, _parts(b), plane, at_infinity)]
     parting += [arc for curve in infinite for arc in _runs(curve, curve.parting)]
-    corners = [c for b in (*unstable_beyond, *found["EP2"]) for c in _corners(b, b.stable, b.heavily_damped, plane)]
-    return Domain(
-        tuple(stability),
-        tuple(damping),
-        tuple(parting),
-        tuple(_distinct([*corners, *(c for curve in infinite for c in _changes(curve, corners=True))])),
-    )
+    corners = [c for b in (*unstable_beyond, *found["EP2"]) for c in _corners(b, plane)]
+    corners = _distinct([*corners, *(c for curve in infinite for c in _changes(curve, corners=True))])
+    return Domain(tuple(stability), tuple(damping), tuple(parting), tuple(corners))
 
 
 def _in_edge(branch: Branch, problem: Problem) -> bool:
     """Whether a branch lies in an edge of the box, which bounds the picture anyway: it has one side only."""
-    return any(
-        bool(np.all(np.abs(branch.parameters[n] - limit) <= _EDGE * (high - low)))
-        for n, (low, high) in problem.free.items()
-        for limit in (low, high)
-    )
+    limits = ((n, limit, high - low) for n, (low, high) in problem.free.items() for limit in (low, high))
+    return any(bool(np.all(np.abs(branch.parameters[n] - limit) <= _EDGE * width)) for n, limit, width in limits)
 
 
-def _runs(curve: Infinity, inside: NDArray[np.bool_]) -> Iterator[Arc]:
+def _runs(curve: Infinity, inside: Truth) -> Iterator[Arc]:
     """Runs of segments that bound a domain."""
     for start, stop in _edges(inside):
         yield Arc("infinity", {n: column[start : stop + 1] for n, column in curve.parameters.items()})
 
 
-def _edges(inside: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _edges(inside: Truth) -> list[tuple[int, int]]:
     """Begin and end of every run of truth."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
@@ -136,9 +127,7 @@ def _changes(curve: Infinity, corners: bool = False) -> Iterator[Corner]:
         yield Corner(name, detail, {n: float(column[row]) for n, column in curve.parameters.items()})
 
 
-def _pieces(
-    branch: Branch, inside: NDArray[np.bool_], problem: Problem, at_infinity: Sequence[Corner]
-) -> Iterator[Arc]:
+def _pieces(branch: Branch, inside: Truth, problem: Problem, at_infinity: Sequence[Corner]) -> Iterator[Arc]:
     """Runs of points that bound a domain; the events at their ends belong to them."""
     marked = inside.copy()
     beyond: dict[int, Corner] = {}
@@ -168,7 +157,7 @@ def _near(problem: Problem, event: Event, corners: Sequence[Corner]) -> list[Cor
     return sorted((c for c in corners if distance(c) <= _CLOSE), key=distance, reverse=True)
 
 
-def _parts(branch: Branch) -> NDArray[np.bool_]:
+def _parts(branch: Branch) -> Truth:
     """Where one side has a positive real root and the other, unstable too, has none."""
     rest = _rest(branch)
     alone = np.ones(len(branch), dtype=bool)
@@ -182,7 +171,7 @@ def _rest(branch: Branch) -> list[Any]:
     return [np.ones(len(branch)), *(column for name, column in branch.unknowns.items() if name != "r")]
 
 
-def _once(branch: Branch) -> NDArray[np.bool_]:
+def _once(branch: Branch) -> Truth:
     """Where a curve of two double roots is met by the larger of them: the other draws the same curve again."""
     if not np.any(branch.kinds == "2EP2"):
         return np.ones(len(branch), dtype=bool)
@@ -190,11 +179,9 @@ def _once(branch: Branch) -> NDArray[np.bool_]:
     return np.asarray((branch.kinds != "2EP2") | (r - other >= -1e-12 * np.abs(other)))
 
 
-def _corners(
-    branch: Branch, stable: NDArray[np.bool_], damped: NDArray[np.bool_], problem: Problem
-) -> Iterator[Corner]:
+def _corners(branch: Branch, problem: Problem) -> Iterator[Corner]:
     """Events where a boundary of a domain turns, crosses another or ends inside the box."""
-    inside = damped if branch.pattern == "EP2" else stable
+    inside = branch.heavily_damped if branch.pattern == "EP2" else branch.stable
     for event in branch.events:
         if _turns(branch, event, problem) and np.any(inside[max(event.index - 1, 0) : event.index + 2]):
             name = "double zero" if event.name == "end" else event.name

@@ -18,7 +18,6 @@ from tmsopt.roots import Pattern, pattern as pattern_of, roots
 from tmsopt.tracing.continuation import Curve, curve
 
 _SAMPLE = 32  # designs by which sizes are judged
-
 _VANISHED = 1e-9
 
 

@@ -18,18 +18,12 @@ from tmsopt.tracing.continuation import CLOSED, Curve, End, Walk, project
 from tmsopt.tracing.monitors import all_real, parameters_of, satisfied, stability, values_of, vanishes
 from tmsopt.tracing.zeros import TOGETHER, Found, located, refined
 
-_NEAR = 1e-3
-"""Distance within which an EP4 is looked for beside an EP3 and a 2EP2."""
-_TOUCHING = {"EP3", "2EP2"}
-"""What a double root meets at an EP4, a triple root and a second double one."""
-_LOW = 1e-2
-"""Relative size of the marks beside a place where they may touch 0: they grow with the square of a step of 0.1."""
+_NEAR = 1e-3  # distance within which an EP4 is looked for beside an EP3 and a 2EP2
+_TOUCHING = {"EP3", "2EP2"}  # what a double root meets at an EP4, a triple root and a second double one
+_LOW = 1e-2  # of the marks beside a place where they may touch 0: they grow with the square of a step of 0.1
 _EXACT = 1e-13  # mismatch of a coefficient of an EP4, relative to its terms: some roundings
-
-
 _SAME_DESIGN = 1e-6
 """Like `TOGETHER`, in the free parameters alone: where the traced equations are singular, the unknowns scatter."""
-
 _FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
 
 _KINDS = ("EP", "several", "zero", "weave", "capsize", "EP2", "constraint", "fold")
@@ -50,8 +44,7 @@ def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, wal
     columns = parameters_of(problem, x)
     u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]
     kinds = pattern.kind(u)
-    special = [m for m, mark in pattern.marks.items() if vanishes(mark, pattern, u)]
-    for name in special:
+    for name in (m for m, mark in pattern.marks.items() if vanishes(mark, pattern, u)):
         kinds[:] = name
     for event, row in zip(merged, rows, strict=True):
         if event.name in pattern.marks or event.name == "EP4":
@@ -59,15 +52,12 @@ def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, wal
     free = list(problem.free)
     width = np.diff(x, axis=0)[:, : len(free)] / on.scale[: len(free)]
     values = values_of(problem, pattern, columns, u)
-    events = [
-        Event(e.name, e.detail, Table({n: float(c[row]) for n, c in columns.items()}), row)
-        for e, row in zip(merged, rows, strict=True)
-    ]
-    ends = () if walked.closed else ((walked.ends[0], 0), (walked.ends[1], len(x) - 1))
-    events += [
-        Event("end", _end_words(problem, pattern, end), Table({n: float(c[row]) for n, c in columns.items()}), row)
-        for end, row in ends
-    ]
+    named = [(e.name, e.detail, row) for e, row in zip(merged, rows, strict=True)]
+    if not walked.closed:
+        ends = zip(walked.ends, (0, len(x) - 1), strict=True)
+        named += [("end", _end_words(problem, pattern, end), row) for end, row in ends]
+    at = [Table({n: float(c[row]) for n, c in columns.items()}) for *_, row in named]
+    events = [Event(name, detail, place, row) for (name, detail, row), place in zip(named, at, strict=True)]
     return Branch(
         pattern=str(problem.locate),
         parameters=columns,

@@ -23,7 +23,6 @@ from tmsopt.tracing.monitors import margins, sign_changes
 from tmsopt.tracing.seeds import unexplained
 
 _NOTHING = 1e-12  # of its size over the box: a constant term this small all along the curve vanishes with a0
-
 _MOST = 10**6
 
 

@@ -6,12 +6,11 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import NO_RADIUS, ROOT_QUANTITIES
 from tmsopt.models import Values
-from tmsopt.records import Array, Truth
+from tmsopt.records import Array, Complex, Truth
 from tmsopt.roots import Pattern, is_stable, lienard_chipart, roots
 from tmsopt.roots.meetings import CLOSED, balance, nearest_two
 
@@ -23,7 +22,6 @@ CHANGES = "stability changes"
 """Detail of the marks that count only where they change it."""
 
 _ROUNDED = 1e-14  # a tangent, its inverse and the scale: some roundings
-
 _REAL = 1e-6  # of |s|: a factor with a double root has coefficients right to 1e-15 and roots to the root of that
 
 
@@ -55,18 +53,15 @@ def _within(v: Array, low: float, high: float) -> Array:
 def values_of(problem: Problem, pattern: Pattern, columns: Mapping[str, Array], u: list[Array]) -> Values:
     """Quantities along a curve; those of the roots come from the factors, where multiple roots are exact."""
 
-    def factor_roots(_: Any) -> NDArray[np.complex128]:
+    def factor_roots() -> Complex:
         parts = [np.stack(np.broadcast_arrays(*f, u[0]), axis=-1)[:, :-1] for f in pattern.factors(u)]
         return np.concatenate([roots(part) for part in parts], axis=-1)
 
-    def abscissa(_: Any) -> Array:
-        return np.asarray(factor_roots(_).real.max(axis=-1))
-
     def damping_ratio(_: Any) -> Array:
-        z = factor_roots(_)
+        z = factor_roots()
         return np.asarray(np.min(-z.real / (np.abs(z) + 1e-300), axis=-1))
 
-    formulas = {"abscissa": abscissa, "damping_ratio": damping_ratio}
+    formulas = {"abscissa": lambda _: np.asarray(factor_roots().real.max(axis=-1)), "damping_ratio": damping_ratio}
     extra = [*(replace(q, value=formulas[q.name]) for q in ROOT_QUANTITIES), NO_RADIUS]
     return Values(problem.model, problem.parameter_set, columns, extra=extra)
 
@@ -94,8 +89,7 @@ def all_real(factors: list[list[Any]], count: int) -> Truth:
 
 def _rows(factor: list[Any], count: int) -> Array:
     """Coefficients of one factor along a curve, shape (count, degree + 1)."""
-    columns = (np.broadcast_to(np.asarray(c, dtype=float), count) for c in factor)
-    return np.stack(list(columns), axis=-1)
+    return np.stack([np.broadcast_to(np.asarray(c, dtype=float), count) for c in factor], axis=-1)
 
 
 def satisfied(problem: Problem, values: Values, count: int) -> Truth:

@@ -9,14 +9,13 @@ from tmsopt.design.problem import Problem
 from tmsopt.formulation.starts import spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots.meetings import CLOSED
-from tmsopt.tracing.continuation import INFINITE, Curve, Walk, project
+from tmsopt.tracing.continuation import INFINITE, Walk, project
 from tmsopt.tracing.equations import Traced, design_at, starting_points
 
 _BACK = 300.0  # size of an unknown from which a curve is looked for on the other side of infinity
 _FAR = 1e5  # unknowns of a seed, in units of their scale: beyond, a0 all but vanishes
 _ROUNDS = 8  # times the starts asked for, at most
 _GUESSES = 4  # starting values of the unknowns tried at each design
-
 
 POINTS = 256
 """Along each axis; an edge of the grid is as long as a step of a trace."""
@@ -25,6 +24,7 @@ FEWER = 96
 """Likewise where the tests take roots, above the degrees with closed forms: 9 216 polynomials take a second or two."""
 
 _PATIENCE = 32  # designs in a row that lead to nothing new
+_BLOCK = 256  # points whose distances from a line are found at once
 
 
 def coefficients(problem: Problem, columns: Mapping[str, Array]) -> Array:
@@ -105,15 +105,11 @@ def apart(points: Array, line: Array, distance: float) -> Truth:
     start, along = line[:-1], np.diff(line, axis=0)
     length = np.maximum(np.sum(along**2, axis=1), 1e-300)
     far = np.ones(len(points), dtype=bool)
-    for rows in _blocks(len(points)):
+    for rows in (slice(k, k + _BLOCK) for k in range(0, len(points), _BLOCK)):
         offset = points[rows, None] - start
         share = np.clip(np.sum(offset * along, axis=2) / length, 0, 1)
         far[rows] = np.min(np.sum((offset - share[..., None] * along) ** 2, axis=2), axis=1) > distance**2
     return far
-
-
-def _blocks(count: int, size: int = 256) -> Iterator[slice]:
-    return (slice(k, k + size) for k in range(0, count, size))
 
 
 def seeds(
@@ -159,10 +155,7 @@ def beyond_infinity(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int,
     it.
     """
     free = len(ready.problem.free)
-    done = 0
-    while done < len(walks):
-        walked = walks[done]
-        done += 1
+    for walked in walks:  # they may grow meanwhile
         for end, y in zip(walked.ends, (walked.y[::-1], walked.y), strict=True):
             if end.reason != INFINITE:
                 continue
@@ -172,18 +165,17 @@ def beyond_infinity(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int,
                 (here, far), weight = (y[begin, :free], y[-1, :free]), size[begin] / size[-1]
                 limit = (far - weight * here) / (1 - weight)
                 x = (2 * limit - here) * ready.on.scale[:free]
-                yield 0, _seed(ready, _floats(design_at(ready.problem, x)), None, None)
-
-
-def _floats(design: Mapping[str, Any]) -> dict[str, float]:
-    return {n: float(v) for n, v in design.items()}
+                yield 0, _seed(ready, {n: float(v) for n, v in design_at(ready.problem, x).items()}, None, None)
 
 
 def _seed(ready: Traced, design: Mapping[str, float], guess: int | None, held: int | None) -> Array | None:
     """A point of the curve near a design, from a guess of that number, or the best guess."""
     on, free = ready.on, len(ready.problem.free)
     tried = starting_points(ready.nlp, ready.problem, design, None if guess is None else guess + 1)
-    x = min(tried, key=lambda t: _mismatch(on, t), default=None) if guess is None else next(iter(tried[guess:]), None)
+    if guess is None:
+        x = min(tried, key=lambda t: float(np.abs(np.array(on.evaluate(t / on.scale)[0])).max()), default=None)
+    else:
+        x = next(iter(tried[guess:]), None)
     if x is None:
         return None
     y = project(on.evaluate, x / on.scale, held)
@@ -192,7 +184,3 @@ def _seed(ready: Traced, design: Mapping[str, float], guess: int | None, held: i
     y = np.clip(y, on.lower, on.upper)
     a = ready.problem.values(ready.problem.ordered(design_at(ready.problem, y * on.scale))).coefficients
     return y if ready.size.leads(np.array([float(c) for c in a])) else None
-
-
-def _mismatch(on: Curve, x: Array) -> float:
-    return float(np.abs(np.array(on.evaluate(x / on.scale)[0])).max())

@@ -145,9 +145,8 @@ class _Affine:
         A, B, C = self.at(first)
         for x, y in ((2.0, 3.0), (-1.0, 0.5)):
             predicted = A + x * B + y * C
-            if not np.allclose(
-                self._coefficients(first, x, y), predicted, rtol=1e-9, atol=1e-9 * np.abs(predicted).max()
-            ):
+            leeway = 1e-9 * np.abs(predicted).max()
+            if not np.allclose(self._coefficients(first, x, y), predicted, rtol=1e-9, atol=leeway):
                 pair = " and ".join(self.axes[1:])
                 message = f"the coefficients are not affine in {pair}; put two in which they are last"
                 raise InputError([Fault(message, ("parameters",))])
@@ -172,11 +171,8 @@ def _cuts(affine: _Affine, first: float, crossing: Trace, ready: Traced) -> list
     limits = affine.limits()
 
     def slack(r: Array) -> Array:
-        sides = [
-            np.minimum(v - low, high - v) / (high - low)
-            for v, (low, high) in zip(_on_surface(parts, r), limits, strict=True)
-        ]
-        least = np.minimum(*sides)
+        inside = zip(_on_surface(parts, r), limits, strict=True)
+        least = np.minimum(*(np.minimum(v - low, high - v) / (high - low) for v, (low, high) in inside))
         return np.where(np.isfinite(least), least, -1.0)
 
     scan = -np.geomspace(1e3, 1e-3, _SCAN)
@@ -186,10 +182,9 @@ def _cuts(affine: _Affine, first: float, crossing: Trace, ready: Traced) -> list
     intervals = []
     for start, stop in zip(bounds[::2], bounds[1::2], strict=True):
         ends = [scan[start], scan[stop - 1]]
-        if start > 0:
-            ends[0] = brentq(lambda r: float(slack(np.array(r))), scan[start - 1], scan[start])
-        if stop < _SCAN:
-            ends[1] = brentq(lambda r: float(slack(np.array(r))), scan[stop - 1], scan[stop])
+        for k, row in ((0, start), (1, stop)):
+            if 0 < row < _SCAN:
+                ends[k] = brentq(lambda r: float(slack(np.array(r))), scan[row - 1], scan[row])
         low, high = float(ends[0]), float(ends[1])
         between = sorted((r, kind) for r, kind in edges if low < r < high)
         intervals.append([(low, "box"), *between, (high, "box")])
@@ -198,9 +193,7 @@ def _cuts(affine: _Affine, first: float, crossing: Trace, ready: Traced) -> list
 
 def _triple(parts: tuple[Array, Array, Array]) -> list[float]:
     """Real triple roots: p, p′ and p″ vanish together for some (x, y) exactly where their determinant does."""
-    A, B, C = ([p, np.polyder(p), np.polyder(p, 2)] for p in parts)
-
-    rows = [[P[k].tolist() for P in (A, B, C)] for k in range(3)]
+    rows = [[np.polyder(p, k).tolist() for p in parts] for k in range(3)]
     found = np.roots(np.trim_zeros(np.array(determinant(rows)), "f"))
     return [float(z.real) for z in found if abs(z.imag) <= 1e-9 * abs(z) and z.real < 0]
 
@@ -240,15 +233,10 @@ def _patch(affine: _Affine, grid: Array, left: Array, right: Array, across: int)
     x, y = np.empty_like(r), np.empty_like(r)
     for k, first in enumerate(grid):
         x[k], y[k] = _on_surface(affine.at(float(first)), r[k])
-    first_column = np.broadcast_to(grid[:, None], r.shape)
-    names = affine.axes
-    natural = affine.natural(x, y)
+    points = dict(zip(affine.axes, (np.broadcast_to(grid[:, None], r.shape), *affine.natural(x, y)), strict=True))
     middle = (len(grid) // 2, across // 2)
-    return Patch(
-        points={names[0]: first_column, names[1]: natural[0], names[2]: natural[1]},
-        r=r,
-        heavily_damped=_damped(affine.at(float(grid[middle[0]])), float(x[middle]), float(y[middle]), float(r[middle])),
-    )
+    damped = _damped(affine.at(float(grid[middle[0]])), float(x[middle]), float(y[middle]), float(r[middle]))
+    return Patch(points, r, damped)
 
 
 def _damped(parts: tuple[Array, Array, Array], x: float, y: float, r: float) -> bool:

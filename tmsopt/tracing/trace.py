@@ -59,8 +59,7 @@ def trace(
     ready = prepare(problem)
     walks: list[Walk] = []
     lines: list[dict[str, Array]] = []
-    walking = 0.0
-    tried = 0
+    walking, tried = 0.0, 0
     sources = (seeds(ready, starts, seed, through, lines), missed(ready, lines), beyond_infinity(ready, walks))
     for count, y in chain.from_iterable(sources):
         tried = max(tried, count)
@@ -162,7 +161,5 @@ STEPS = (1e-6, 0.1)
 """Least and greatest longest step."""
 
 _FEWEST = 4  # points that make a curve with tangents
-
-
 _MET = 1e-3  # mismatch of the coefficients beyond which a curve is none of the pattern
 _NEAR = 1e-3  # widths of the box between ends that are one singular point: the equations lose digits there

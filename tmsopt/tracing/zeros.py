@@ -17,9 +17,7 @@ TOGETHER = 1e-6
 
 _DIP = 0.5
 """Share of a small value that a parabola must fall further by, for its least to be looked for between the steps."""
-
 _ASTRAY = 2.0  # arclengths: a point further off lies on another curve, as beside a singular point it may
-
 _ROUNDING = 1e-14  # of a variable of order 1
 
 
@@ -52,10 +50,8 @@ def refined(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walk
             def height(s: float, k: int = k, mark: Mark = mark, sign: float = float(side[k - 1])) -> float:
                 return sign * _at(on, walked, k, mark, s)
 
-            found = minimize_scalar(
-                height, bounds=(-steps[k - 1], steps[k]), method="bounded", options={"xatol": 1e-14}
-            )
-            s = float(found.x)
+            ends = (-steps[k - 1], steps[k])
+            s = float(minimize_scalar(height, bounds=ends, method="bounded", options={"xatol": 1e-14}).x)
             y, t = between(on, walked.y[k], walked.t[k], s)
             if np.abs(y - walked.y[k]).max() <= _ASTRAY * abs(s) and t @ walked.t[k] > 0:
                 added[(k, s) if s >= 0 else (k - 1, steps[k - 1] + s)] = y, t
