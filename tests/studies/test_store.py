@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from helpers.rows import STUDY, row
 from hypothesis import given, settings, strategies as st
 
 from tmsopt.disk import lock
@@ -33,20 +34,8 @@ store = import_module("tmsopt.studies.store.store")
 
 TASKS = ("write", "log")
 """Of a process: write, and write with the write-ahead log that earlier versions had."""
-STUDY: dict[str, Any] = {
-    "problem": {"parameters": {"mu": 0.1, "zeta_B": -0.4}, "objective": {"minimize": "abscissa"}},
-    "columns": {"mu": [0.1, 0.2, 0.3], "zeta_B": [-0.4, -0.5, -0.6]},
-    "seed": 7,
-}
 SPECIAL = (math.nan, math.inf, -math.inf, -0.0, 0.0, 5e-324, -2.2250738585072011e-308, 1.7976931348623157e308, 0.1)
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and limits of POSIX")
-
-
-def row(number: int, **given: Any) -> Row:
-    varied = Table({"mu": 0.1 * number})
-    return Row(
-        number, 1000 + number, **({"varied": varied, "status": "optimal", "abscissa": -1 / (1 + number)} | given)
-    )
 
 
 def bits(value: Any) -> Any:
@@ -79,8 +68,9 @@ def path(tmp_path: Path) -> Iterator[Path]:
 WRITER = """
 import os, random, sys, time
 from pathlib import Path
-sys.path[:0] = [str(Path(place).resolve()) for place in ("tests", "tests/studies")]
-from test_store import STUDY, row, store
+sys.path.insert(0, str(Path("tests").resolve()))
+from helpers.rows import STUDY, row
+from tmsopt.studies.store import store
 path, task = sys.argv[1:]
 with store.open_store(path, STUDY) as opened:
     print(os.getpid(), flush=True)
@@ -577,8 +567,9 @@ def test_a_store_of_an_earlier_version_is_written_also_while_somebody_reads_it(p
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-sys.path[:0] = [str(Path(place).resolve()) for place in ("tests", "tests/studies")]
-from test_store import STUDY, row, store
+sys.path.insert(0, str(Path("tests").resolve()))
+from helpers.rows import STUDY, row
+from tmsopt.studies.store import store
 
 def killed_after(events):
     def hook(event, given):
