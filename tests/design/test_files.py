@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import tmsopt
+from tmsopt.design import question_of
 from tmsopt.disk import LARGEST
 
 STUDIES = set(Path("problems").glob("study_*.toml"))
@@ -126,7 +127,7 @@ def test_bad_input_is_placed_and_explained(write, kind):
     text, line, words = BAD[kind]
     path = write(text)
     with pytest.raises(tmsopt.InputError) as caught:
-        tmsopt.load(path)
+        question_of(path)
     at_line = [f for f in caught.value.faults if f.line == line]
     assert at_line, str(caught.value)
     message = "\n".join(map(str, at_line))
