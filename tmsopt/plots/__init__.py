@@ -4,15 +4,6 @@ In: results of any verb. Out: figures, saved whole or not at all. Open `style` f
 source.
 """
 
-from tmsopt.plots.bicycle import draw_bicycle, draw_distance
-from tmsopt.plots.chart import chart_figure
-from tmsopt.plots.front import front_figure
-from tmsopt.plots.growth import draw_frequencies, draw_growth_rates, growth_figure
-from tmsopt.plots.labels import Name, place_names
-from tmsopt.plots.style import new_figure, save
-from tmsopt.plots.trace import trace_figure
+import lazy_loader
 
-__all__ = [
-    "Name", "chart_figure", "draw_bicycle", "draw_distance", "draw_frequencies", "draw_growth_rates",
-    "front_figure", "growth_figure", "new_figure", "place_names", "save", "trace_figure",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
