@@ -4,13 +4,6 @@ In: a solution. Out: the solution with a proved bound. Open `certify` first; `qu
 `translation` writes it in SCIP's terms, `race` runs it apart.
 """
 
-from tmsopt.certificates.certify import certify, check_installed
-from tmsopt.certificates.interlacing import interlace, interlacing, squares_of, unknowns
-from tmsopt.certificates.question import Question
-from tmsopt.certificates.race import Crew
-from tmsopt.certificates.scip import FOUND, INFEASIBLE, Decision, available, decide, task
+import lazy_loader
 
-__all__ = [
-    "FOUND", "INFEASIBLE", "Crew", "Decision", "Question", "available", "certify", "check_installed", "decide",
-    "interlace", "interlacing", "squares_of", "task", "unknowns",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

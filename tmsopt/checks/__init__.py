@@ -4,9 +4,6 @@ In: a problem and a design. Out: its objective and violations, its worst case, b
 bands, certified digits, the laws it obeys. Open `recheck` first.
 """
 
-from tmsopt.checks.bound import omega0_bound, relation_bound
-from tmsopt.checks.law_rows import law_rows
-from tmsopt.checks.recheck import realised_abscissa, recheck
-from tmsopt.checks.worst_case import cover, worst_cases
+import lazy_loader
 
-__all__ = ["cover", "law_rows", "omega0_bound", "realised_abscissa", "recheck", "relation_bound", "worst_cases"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,9 +4,6 @@ In: a design, and a parameter that varies. Out: `Speeds`, roots of polynomials o
 to draw. Open `speeds` first.
 """
 
-from tmsopt.critical_speeds.crossings import crossings
-from tmsopt.critical_speeds.growth import growth
-from tmsopt.critical_speeds.parametric import interpolated
-from tmsopt.critical_speeds.speeds import Speeds, speeds
+import lazy_loader
 
-__all__ = ["Speeds", "crossings", "growth", "interpolated", "speeds"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -3,9 +3,6 @@
 In: a solution. Out: a `Diagnosis` of each multiple root. Open `diagnosis` first.
 """
 
-from tmsopt.diagnosis.diagnosis import Diagnosis, diagnose, diagnosed
-from tmsopt.diagnosis.jordan import is_regular, jordan
-from tmsopt.diagnosis.puiseux import branches
-from tmsopt.diagnosis.splitting import Response
+import lazy_loader
 
-__all__ = ["Diagnosis", "Response", "branches", "diagnose", "diagnosed", "is_regular", "jordan"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

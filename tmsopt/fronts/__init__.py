@@ -3,7 +3,6 @@
 In: a problem with `pareto`. Out: a `Front` of designs none of which beats another. Open `pareto` first.
 """
 
-from tmsopt.fronts.front import Front
-from tmsopt.fronts.pareto import pareto
+import lazy_loader
 
-__all__ = ["Front", "pareto"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,7 +4,6 @@ In: a design with weights on its parameters. Out: the nearest point of each boun
 first.
 """
 
-from tmsopt.margins.boundaries import edges, heavily_damped
-from tmsopt.margins.nearest import Nearest, Robustness, nearest, robustness
+import lazy_loader
 
-__all__ = ["Nearest", "Robustness", "edges", "heavily_damped", "nearest", "robustness"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

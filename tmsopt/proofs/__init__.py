@@ -4,8 +4,6 @@ In: a solution. Out: a `Proof`: every number with its radius, or the reason why 
 `existence`.
 """
 
-from tmsopt.proofs.factored import Factored, abscissa_formula
-from tmsopt.proofs.proof import Proof, prove_design
-from tmsopt.proofs.prove import prove
+import lazy_loader
 
-__all__ = ["Factored", "Proof", "abscissa_formula", "prove", "prove_design"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,9 +4,6 @@ In: a `Problem`. Out: a `Solution` that was rechecked, or the least that would h
 `search`.
 """
 
-from tmsopt.solver.all_designs import Every, coverage_of, solve_all
-from tmsopt.solver.multistart import same
-from tmsopt.solver.solve import solve, solved
-from tmsopt.solver.workspace import Family, Workspace, workspace
+import lazy_loader
 
-__all__ = ["Every", "Family", "Workspace", "coverage_of", "same", "solve", "solve_all", "solved", "workspace"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

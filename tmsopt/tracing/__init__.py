@@ -4,24 +4,6 @@ In: a problem whose pattern leaves one freedom. Out: `Trace` with `Branch`es, `D
 first; `continuation` follows one curve, `seeds` finds where to begin, `events` names what happens on it.
 """
 
-from tmsopt.tracing.branch import Branch, Event, Trace
-from tmsopt.tracing.continuation import (
-    End,
-    between,
-    both_ways,
-    contains,
-    crossing,
-    curve,
-    project,
-    same,
-    tangent_at,
-    walk,
-)
-from tmsopt.tracing.domain import Domain, domain
-from tmsopt.tracing.swallowtail import Swallowtail, swallowtail
-from tmsopt.tracing.trace import trace
+import lazy_loader
 
-__all__ = [
-    "Branch", "Domain", "End", "Event", "Swallowtail", "Trace", "between", "both_ways", "contains", "crossing",
-    "curve", "domain", "project", "same", "swallowtail", "tangent_at", "trace", "walk",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,11 +4,6 @@ In: names such as EP4 or EP2+CEP2, and coefficients of polynomials. Out: factore
 multiplicities. Open `pattern` first: what a pattern is; then `structure`: which one a polynomial has.
 """
 
-from tmsopt.roots.patterns.descriptions import STRUCTURES, in_words
-from tmsopt.roots.patterns.enclosed import enclosed_roots, nearest_decimal, nearest_double, nearest_roots
-from tmsopt.roots.patterns.naming import implies, shown_patterns
+import lazy_loader
 
-__all__ = [
-    "STRUCTURES", "enclosed_roots", "implies", "in_words", "nearest_decimal", "nearest_double", "nearest_roots",
-    "shown_patterns",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,7 +4,6 @@ In: arrays of coefficients. Out: factors, abscissae, damping ratios and classes 
 exceptional points. Open `quartic` first.
 """
 
-from tmsopt.roots.quartics.degenerate import hard_factors
-from tmsopt.roots.quartics.factors import cube_root, largest_root
+import lazy_loader
 
-__all__ = ["cube_root", "hard_factors", "largest_root"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -3,6 +3,6 @@
 In: finished rows. Out: the same rows to the bit, whatever happened in between. Open `store` first.
 """
 
-from tmsopt.studies.store.store import Store, open_store, read_store
+import lazy_loader
 
-__all__ = ["Store", "open_store", "read_store"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,2 @@
+from .front import Front as Front
+from .pareto import pareto as pareto

@@ -1,0 +1,2 @@
+from .boundaries import edges as edges, heavily_damped as heavily_damped
+from .nearest import Nearest as Nearest, Robustness as Robustness, nearest as nearest, robustness as robustness
