@@ -121,40 +121,25 @@ class Chart:
         """Summary, boundaries and corners; the arrays themselves go to a file."""
         grid, counts, plane = Grid(self.axes, self.grid), self.counts, self.path is None and len(self.grid) == 2
         return {
-            "schema": 1,
-            "title": self.about["title"],
-            "model": self.about["problem"]["model"],
+            "schema": 1, "title": self.about["title"], "model": self.about["problem"]["model"],
             "axes": {
                 n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v)}
                 for n, v in zip(self.axes, self.grid, strict=True)
             },
-            **({} if plane else {"layers": list(self.layers)}),
-            "classes": counts.shares,
+            **({} if plane else {"layers": list(self.layers)}), "classes": counts.shares,
             "satisfied": None if counts.satisfied is None else counts.satisfied / counts.designs,
             "least_abscissa": {"value": counts.least, **grid.at(counts.place)} if counts.place >= 0 else None,
             **({"boundaries": self.domain and self.domain.to_json()} if plane or self.domain else {}),
-            "fallbacks": counts.fallbacks,
-            **({} if self.path is None else {"path": str(self.path)}),
-            **self.run,
-        }
+            "fallbacks": counts.fallbacks, **({} if self.path is None else {"path": str(self.path)}), **self.run,
+        }  # fmt: skip
 
 
 def chart(
-    problem: Given,
-    axes: Sequence[str] | None = None,
-    *,
-    folder: str | Path | None = None,
-    points: Sequence[int] | None = None,
-    layers: Sequence[str] | None = None,
-    quantities: Mapping[str, str] | None = None,
-    single: bool = False,
-    engine: str = "auto",
-    workers: int = 1,
-    fresh: bool = False,
-    tile: int = TILE,
-    boundaries: bool = True,
-    progress: Progress | None = None,
-) -> Chart:
+    problem: Given, axes: Sequence[str] | None = None, *, folder: str | Path | None = None,
+    points: Sequence[int] | None = None, layers: Sequence[str] | None = None,
+    quantities: Mapping[str, str] | None = None, single: bool = False, engine: str = "auto", workers: int = 1,
+    fresh: bool = False, tile: int = TILE, boundaries: bool = True, progress: Progress | None = None,
+) -> Chart:  # fmt: skip
     """Classify every design of a grid over the two or three free parameters; the others must be fixed.
 
     Equality constraints are left aside. A chart in a folder goes on where the same call was ended before.
@@ -230,8 +215,7 @@ def _about(work: Survey, tile: int) -> dict[str, Any]:
     problem, grid = work.problem, work.grid
     of = problem.parameter_set
     return {
-        "schema": SCHEMA,
-        "title": problem.title,
+        "schema": SCHEMA, "title": problem.title,
         "problem": {
             "model": problem.model.name,
             **({} if problem.model.statement is None else {"statement": dict(problem.model.statement)}),
@@ -242,17 +226,14 @@ def _about(work: Survey, tile: int) -> dict[str, Any]:
             n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v), "unit": of[n].unit}
             for n, v in zip(grid.axes, grid.values, strict=True)
         },
-        "dimensions": list(grid.axes[::-1]),
-        "shape": list(grid.shape),
+        "dimensions": list(grid.axes[::-1]), "shape": list(grid.shape),
         "layers": {
             n: {"dtype": np.lib.format.dtype_to_descr(work.dtype(n))}
             | ({"expression": work.quantities[n]} if n in work.quantities else {})
             for n in work.names
         },
-        "classes": list(CLASSES),
-        "versions": {"tmsopt": version("tmsopt")},
-        "tile": tile,
-    }
+        "classes": list(CLASSES), "versions": {"tmsopt": version("tmsopt")}, "tile": tile,
+    }  # fmt: skip
 
 
 def _kept_tile(path: Path, fresh: bool) -> int | None:

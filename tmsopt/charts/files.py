@@ -26,13 +26,11 @@ def save_layers(problem: Problem, grid: Grid, layers: Mapping[str, NDArray[Any]]
         OSError: when the file cannot be written.
     """
     about: dict[str, Any] = {
-        "title": problem.title,
-        "model": problem.model.name,
+        "title": problem.title, "model": problem.model.name,
         **({} if problem.model.statement is None else {"statement": dict(problem.model.statement)}),
-        "dimensions": [_axis(n, layers) for n in grid.axes[::-1]],
-        "classes": list(CLASSES),
+        "dimensions": [_axis(n, layers) for n in grid.axes[::-1]], "classes": list(CLASSES),
         "fixed": dict(problem.fixed),
-    }
+    }  # fmt: skip
     if path.suffix.lower() == ".nc":
         _save_netcdf(problem, grid, layers, about, path)
         return

@@ -51,12 +51,9 @@ def tally(layers: Mapping[str, NDArray[Any]], first: int, fallbacks: int = 0, se
     return Tally(
         designs=next(iter(layers.values())).size,
         classes=() if kind is None else tuple(int(np.count_nonzero(kind == c)) for c in range(len(CLASSES))),
-        satisfied=None if satisfied is None else int(np.count_nonzero(satisfied)),
-        least=least,
-        place=place,
-        fallbacks=fallbacks,
-        seconds=seconds,
-    )
+        satisfied=None if satisfied is None else int(np.count_nonzero(satisfied)), least=least, place=place,
+        fallbacks=fallbacks, seconds=seconds,
+    )  # fmt: skip
 
 
 def total(parts: Iterable[Tally]) -> Tally:
@@ -66,11 +63,7 @@ def total(parts: Iterable[Tally]) -> Tally:
     least, place = min(known, default=(math.nan, -1))
     satisfied = [t.satisfied for t in every if t.satisfied is not None]
     return Tally(
-        designs=sum(t.designs for t in every),
-        classes=tuple(map(sum, zip(*(t.classes for t in every), strict=True))),
-        satisfied=sum(satisfied) if satisfied else None,
-        least=least,
-        place=place,
-        fallbacks=sum(t.fallbacks for t in every),
-        seconds=sum(t.seconds for t in every),
-    )
+        designs=sum(t.designs for t in every), classes=tuple(map(sum, zip(*(t.classes for t in every), strict=True))),
+        satisfied=sum(satisfied) if satisfied else None, least=least, place=place,
+        fallbacks=sum(t.fallbacks for t in every), seconds=sum(t.seconds for t in every),
+    )  # fmt: skip

@@ -17,13 +17,9 @@ from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.records import Array
 
 LAYERS: Mapping[str, DTypeLike] = {
-    "kind": np.int8,
-    "abscissa": np.float64,
-    "damping_ratio": np.float64,
-    "real_roots": np.int8,
-    "satisfied": np.bool_,
+    "kind": np.int8, "abscissa": np.float64, "damping_ratio": np.float64, "real_roots": np.int8, "satisfied": np.bool_,
     "margin": np.float64,
-}
+}  # fmt: skip
 """What can be computed of every design; see `Chart`."""
 
 USUAL = ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied")
@@ -176,14 +172,10 @@ _QUANTITY, _CONDITION = "quantity ", "condition "
 
 
 def survey(
-    problem: Given,
-    axes: Sequence[str] | None = None,
-    points: Sequence[int] | None = None,
-    layers: Sequence[str] = USUAL,
-    quantities: Mapping[str, str] | None = None,
-    engine: str = "auto",
+    problem: Given, axes: Sequence[str] | None = None, points: Sequence[int] | None = None,
+    layers: Sequence[str] = USUAL, quantities: Mapping[str, str] | None = None, engine: str = "auto",
     single: bool = False,
-) -> Survey:
+) -> Survey:  # fmt: skip
     """What is to be computed over a grid of the free parameters, checked.
 
     Args:
@@ -233,15 +225,10 @@ def _over(
     others |= parsed(problem, {n: n for n in problem.model.coefficient_names()})
     settled = {**problem.fixed, **grid.across()}
     return Survey(
-        problem=problem,
-        grid=grid,
-        layers=layers,
-        quantities=extra,
-        engine=engine,
-        single=single,
+        problem=problem, grid=grid, layers=layers, quantities=extra, engine=engine, single=single,
         before=array_function(problem, others).settled(settled),
         after=array_function(problem, of_roots).settled(settled),
-    )
+    )  # fmt: skip
 
 
 def axes_of(problem: Problem, axes: Sequence[str] | None = None) -> tuple[str, ...]:

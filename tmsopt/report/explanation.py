@@ -16,23 +16,14 @@ _MAIN = 0.5
 """Share of the largest change above which a parameter is named in the headline."""
 _WIDE = 12
 """Parameters up to which each has a column; of more, each has a row."""
-_WORDS = {
-    "weave": "weave",
-    "capsize": "capsize",
-    "infinity": "a root through infinity (a0 = 0)",
-}
-
-
+_WORDS = {"weave": "weave", "capsize": "capsize", "infinity": "a root through infinity (a0 = 0)"}
 _ROUNDING = 1e-16
 
 
 def meaning_lines(
-    solution: Solution,
-    explanation: Explanation | None,
-    robustness: Robustness | None,
-    diagnoses: Sequence[Diagnosis],
+    solution: Solution, explanation: Explanation | None, robustness: Robustness | None, diagnoses: Sequence[Diagnosis],
     details: bool = False,
-) -> Iterator[str]:
+) -> Iterator[str]:  # fmt: skip
     """What was found out about a solution; nothing of what was not asked for."""
     if explanation:
         yield from ["", *explained_lines(explanation)]

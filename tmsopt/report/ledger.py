@@ -55,16 +55,8 @@ def ledger_page(ledger: Ledger) -> str:
 
 
 def _rows(entry: Entry) -> list[tuple[str, str]]:
-    return [
-        (name, text)
-        for name, text in (
-            ("printed", entry.printed),
-            ("computed", entry.computed),
-            ("route", entry.route),
-            ("remark", entry.remark),
-        )
-        if text
-    ]
+    said = {"printed": entry.printed, "computed": entry.computed, "route": entry.route, "remark": entry.remark}
+    return [(name, text) for name, text in said.items() if text]
 
 
 def _entry(entry: Entry) -> list[str]:

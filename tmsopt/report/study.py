@@ -63,15 +63,12 @@ def _row_cells(study: Study, rows: Sequence[Row]) -> list[tuple[str, ...]]:
 def _cells(study: Study, row: Row, asked: bool, free: Sequence[str]) -> tuple[str, ...]:
     known = row.status in ("optimal", "not_converged") or (row.status == "infeasible" and not study.problem.free)
     return (
-        str(row.number),
-        *(_short(row.varied[n]) for n in study.columns),
-        _word(study, row.status),
-        *([_short(row.objective) if known else ""] if asked else []),
-        _short(row.abscissa) if known else "",
+        str(row.number), *(_short(row.varied[n]) for n in study.columns), _word(study, row.status),
+        *([_short(row.objective) if known else ""] if asked else []), _short(row.abscissa) if known else "",
         row.structure if known else "",
         *(_short(row.parameters[n]) if known and n in row.parameters else "" for n in free),
         *(_short(row.reports[text]) if known and text in row.reports else "" for text in _reports(study)),
-    )
+    )  # fmt: skip
 
 
 def _facts(study: Study, found: Summary) -> list[str]:

@@ -74,26 +74,15 @@ def planned(asked: Study | Sampling, progress: Callable[[int, int], None] | None
         return asked
     design = solve(asked.problem, starts=asked.starts, progress=progress)
     return monte_carlo(
-        design,
-        asked.rows,
-        asked.seed,
-        asked.distribution,
-        asked.tolerances or None,
-        title=asked.title,
+        design, asked.rows, asked.seed, asked.distribution, asked.tolerances or None, title=asked.title,
         report=asked.report,
-    )
+    )  # fmt: skip
 
 
 def monte_carlo(
-    design: Given,
-    rows: int,
-    seed: int = 0,
-    distribution: str = "uniform",
-    tolerances: Mapping[str, float] | None = None,
-    *,
-    title: str = "",
-    report: Sequence[str] = (),
-) -> Study:
+    design: Given, rows: int, seed: int = 0, distribution: str = "uniform",
+    tolerances: Mapping[str, float] | None = None, *, title: str = "", report: Sequence[str] = (),
+) -> Study:  # fmt: skip
     """The study of `rows` designs drawn around one, in which nothing is free.
 
     Each parameter with a tolerance is drawn on its own; the others stay as they are. Inequalities and scenarios stay,
@@ -122,14 +111,9 @@ def monte_carlo(
         for (name, tolerance), error in zip(stated.items(), errors, strict=True)
     }
     return Study(
-        problem=drawn,
-        columns=columns,
-        title=title or solution.problem.title,
-        seed=seed,
-        report=report,
-        method="monte_carlo",
-        notes=notes,
-    )
+        problem=drawn, columns=columns, title=title or solution.problem.title, seed=seed, report=report,
+        method="monte_carlo", notes=notes,
+    )  # fmt: skip
 
 
 def _as_built(design: Solution) -> tuple[Problem, tuple[str, ...]]:
@@ -139,14 +123,9 @@ def _as_built(design: Solution) -> tuple[Problem, tuple[str, ...]]:
     left_out = equal + ([f"the pattern {problem.locate}"] if problem.locate else [])
     notes = (f"left out, for no drawn design meets it exactly: {', '.join(left_out)}",) if left_out else ()
     fixed = replace(
-        problem,
-        fixed=dict(design.parameters),
-        free={},
-        start={},
-        tolerances={},
-        locate=None,
+        problem, fixed=dict(design.parameters), free={}, start={}, tolerances={}, locate=None,
         constraints={n: text for n, text in problem.constraints.items() if n not in equal},
-    )
+    )  # fmt: skip
     return fixed, notes
 
 

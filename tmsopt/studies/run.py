@@ -71,15 +71,10 @@ class Results:
 
 
 def run_study(
-    study: Study | Sampling | str | PathLike[str],
-    store: str | PathLike[str] | None = None,
-    *,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    fresh: bool = False,
-    progress: Progress | None = None,
+    study: Study | Sampling | str | PathLike[str], store: str | PathLike[str] | None = None, *,
+    workers: int | None = None, scheduler: str | None = None, fresh: bool = False, progress: Progress | None = None,
     note: Note = silent,
-) -> Results:
+) -> Results:  # fmt: skip
     """Solve every row of a study that its store does not have yet.
 
     The rows are the same, bit by bit, whoever solves them and in whatever order.
@@ -128,14 +123,9 @@ def _faults(study: object, workers: object) -> Iterator[Fault]:
 
 
 def fill(
-    study: Study,
-    store: Store,
-    *,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    progress: Progress | None = None,
-    note: Note = silent,
-) -> tuple[int, float, str]:
+    study: Study, store: Store, *, workers: int | None = None, scheduler: str | None = None,
+    progress: Progress | None = None, note: Note = silent,
+) -> tuple[int, float, str]:  # fmt: skip
     """Solve the rows that an open store lacks; how many, in how many seconds, and by which engine."""
     began = time.perf_counter()
     done = store.done()

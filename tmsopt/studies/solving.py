@@ -131,41 +131,22 @@ class Solver:
 
     def _unsolved(self, number: int, status: str, cause: str, began: float | None = None) -> Row:
         return Row(
-            number=number,
-            seed=self.study.seed_of(number),
-            varied=self.study.varied(number),
-            status=status,
-            cause=cause,
-            seconds=0.0 if began is None else time.perf_counter() - began,
-            host=platform.node(),
-        )
+            number=number, seed=self.study.seed_of(number), varied=self.study.varied(number), status=status,
+            cause=cause, seconds=0.0 if began is None else time.perf_counter() - began, host=platform.node(),
+        )  # fmt: skip
 
     def _solved(self, number: int, solution: Solution, warm: bool) -> Row:
         problem, bound = solution.problem, solution.bound
         values = problem.values(solution.parameters)
         reports = {text: float(parse_value(text, problem.vocabulary)(values)) for text in self.study.report}
         return Row(
-            number=number,
-            seed=self.study.seed_of(number),
-            varied=self.study.varied(number),
-            status=solution.status,
-            cause=_cause(solution),
-            objective=solution.value,
-            abscissa=solution.abscissa,
-            damping_ratio=solution.quantities["damping_ratio"],
-            structure=solution.structure,
-            parameters=solution.parameters,
-            reports=Table(reports),
-            bound=bound.value,
-            gap=bound.gap,
-            proven=bound.proven,
-            method=bound.method,
-            laws=Table(_laws(solution)),
-            violations=solution.violations,
-            starts=solution.starts.tried,
-            warm=warm,
-            host=platform.node(),
-        )
+            number=number, seed=self.study.seed_of(number), varied=self.study.varied(number), status=solution.status,
+            cause=_cause(solution), objective=solution.value, abscissa=solution.abscissa,
+            damping_ratio=solution.quantities["damping_ratio"], structure=solution.structure,
+            parameters=solution.parameters, reports=Table(reports), bound=bound.value, gap=bound.gap,
+            proven=bound.proven, method=bound.method, laws=Table(_laws(solution)), violations=solution.violations,
+            starts=solution.starts.tried, warm=warm, host=platform.node(),
+        )  # fmt: skip
 
 
 @cache

@@ -113,31 +113,18 @@ class Study:
 
 
 def over_grid(
-    problem: Given,
-    axes: Mapping[str, Sequence[float]],
-    *,
-    title: str = "",
-    seed: int = 0,
-    starts: int = STARTS,
-    warm: bool = False,
-    report: Sequence[str] = (),
-) -> Study:
+    problem: Given, axes: Mapping[str, Sequence[float]], *, title: str = "", seed: int = 0, starts: int = STARTS,
+    warm: bool = False, report: Sequence[str] = (),
+) -> Study:  # fmt: skip
     """The study of every combination of the axes' values, the last axis fastest.
 
     Raises:
         InputError: listing everything that is wrong with it.
     """
     return Study(
-        problem=problem_of(problem),
-        columns=grid(axes),
-        title=title,
-        seed=seed,
-        starts=starts,
-        warm=warm,
-        report=report,
-        grid_shape={name: len(values) for name, values in axes.items()},
-        method="grid",
-    )
+        problem=problem_of(problem), columns=grid(axes), title=title, seed=seed, starts=starts, warm=warm,
+        report=report, grid_shape={name: len(values) for name, values in axes.items()}, method="grid",
+    )  # fmt: skip
 
 
 def definition(study: Study) -> dict[str, Any]:
@@ -147,13 +134,9 @@ def definition(study: Study) -> dict[str, Any]:
     order of names in ``order`` counts as well: starts are spread over the free parameters in turn.
     """
     return {
-        "problem": _problem(study.problem),
-        **_columns(study),
-        "seed": study.seed,
-        "starts": study.starts,
-        "warm": study.warm,
-        "report": list(study.report),
-    }
+        "problem": _problem(study.problem), **_columns(study), "seed": study.seed, "starts": study.starts,
+        "warm": study.warm, "report": list(study.report),
+    }  # fmt: skip
 
 
 def _columns(study: Study) -> dict[str, Any]:
@@ -169,10 +152,8 @@ def _problem(problem: Problem) -> dict[str, Any]:
         "free": {name: [float(low), float(high)] for name, (low, high) in problem.free.items()},
         "constraints": dict(problem.constraints),
         "scenarios": {name: _scenario(s) for name, s in problem.variations.items()},
-        "tolerances": _floats(problem.tolerances),
-        "weights": _floats(problem.weights),
-        "start": _floats(problem.start),
-    }
+        "tolerances": _floats(problem.tolerances), "weights": _floats(problem.weights), "start": _floats(problem.start),
+    }  # fmt: skip
     return {
         "model": problem.model.name if problem.model.statement is None else dict(problem.model.statement),
         "parameters": problem.parameter_set.name,

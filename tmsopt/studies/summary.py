@@ -120,19 +120,14 @@ def summary(study: Study, rows: Iterable[Row]) -> Summary:
         for label, residual in row.laws.items():
             laws[label] = max(laws.get(label, 0.0), abs(residual))
     return Summary(
-        rows=len(study),
-        counts=Table({status: counts[status] for status in STATUSES if counts[status]}),
+        rows=len(study), counts=Table({status: counts[status] for status in STATUSES if counts[status]}),
         best=min(ranked, key=lambda row: sign * row.objective, default=None),
         causes=_causes(row for row in known if row.status != "optimal"),
         spread=Table({name: ends for name in ("objective", "abscissa") if (ends := _ends(name, optimal))}),
-        stable=sum(row.abscissa < 0 for row in known),
-        structures=_ranked(row.structure for row in optimal),
-        proven=sum(row.proven for row in known),
-        warm=sum(row.warm for row in known),
-        laws=Table(laws),
-        seconds=sum(row.seconds for row in known),
-        product=yield_of(known) if study.method == "monte_carlo" else None,
-    )
+        stable=sum(row.abscissa < 0 for row in known), structures=_ranked(row.structure for row in optimal),
+        proven=sum(row.proven for row in known), warm=sum(row.warm for row in known), laws=Table(laws),
+        seconds=sum(row.seconds for row in known), product=yield_of(known) if study.method == "monte_carlo" else None,
+    )  # fmt: skip
 
 
 def _causes(rows: Iterable[Row]) -> Table[int]:

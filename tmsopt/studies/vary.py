@@ -20,8 +20,6 @@ from tmsopt.studies.validate import MOST_ROWS, name_fault
 LARGEST = 1_000_000_000
 """Bytes."""
 _SHOWN = 20  # faults of cells; a file in another format has one in each
-
-
 _RANGE = "{ min = 0.1, max = 1 }"
 _AXIS = "{ min = 0.1, max = 1, points = 10 }"
 _ACCEPTED = {

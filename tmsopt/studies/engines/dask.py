@@ -127,18 +127,9 @@ class _Engine:
                 continue
             self.sent += 1
             future = self.client.submit(
-                solve,
-                self.run,
-                self.sent,
-                self.digest,
-                worker,
-                units,
-                key=f"tmsopt-{self.run}-{self.sent}",
-                pure=False,
-                workers=[place],
-                allow_other_workers=False,
-                fifo_timeout=0,
-            )
+                solve, self.run, self.sent, self.digest, worker, units, key=f"tmsopt-{self.run}-{self.sent}",
+                pure=False, workers=[place], allow_other_workers=False, fifo_timeout=0,
+            )  # fmt: skip
             self.batches[self.sent] = _Batch(worker, set(units), future)
             future.add_done_callback(lambda _, number=self.sent: self.inbox.put(("over", number)))
 

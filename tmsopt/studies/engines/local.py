@@ -12,16 +12,11 @@ from tmsopt.studies.row import Row
 _READY, _HERE = "ready", "here"
 _ONE_THREAD = dict.fromkeys(
     (
-        "OMP_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-        "MKL_NUM_THREADS",
-        "BLIS_NUM_THREADS",
-        "VECLIB_MAXIMUM_THREADS",
-        "NUMEXPR_NUM_THREADS",
-        "NUMBA_NUM_THREADS",
+        "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS",
+        "NUMEXPR_NUM_THREADS", "NUMBA_NUM_THREADS",
     ),
     "1",
-)
+)  # fmt: skip
 _STILLBORN = 8  # workers in a row that end before they are ready; then it is not chance
 _LOOK = 1.0  # s; some systems do not hear Ctrl-C while they wait
 _PATIENCE = 5.0  # s that a worker may take to end when it has closed its pipe

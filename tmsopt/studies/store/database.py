@@ -124,13 +124,9 @@ def _header(path: Path) -> tuple[int, int]:
 def create(path: Path, definition: Definition, versions: Mapping[str, str], platform: str) -> None:
     """Write a new store without rows. It gets its name when complete, so what has the name is a store."""
     about = {
-        "definition": json.dumps(definition.plain),
-        "seed": json.dumps(definition.plain.get("seed")),
-        "created": now(),
-        "host": host(),
-        "platform": platform,
-        "versions": json.dumps(versions),
-    }
+        "definition": json.dumps(definition.plain), "seed": json.dumps(definition.plain.get("seed")), "created": now(),
+        "host": host(), "platform": platform, "versions": json.dumps(versions),
+    }  # fmt: skip
     with disk.whole(path, locked=True) as place, closing(sqlite3.connect(place, isolation_level=None)) as connection:
         connection.execute("PRAGMA journal_mode=MEMORY")  # what is not finished is not kept
         connection.execute(f"PRAGMA application_id={APPLICATION}")

@@ -34,14 +34,9 @@ class Store:
     """
 
     def __init__(
-        self,
-        path: Path,
-        connection: sqlite3.Connection,
-        held: Lock | None = None,
-        session: int = 0,
-        warnings: Sequence[str] = (),
-        moved: Path | None = None,
-    ) -> None:
+        self, path: Path, connection: sqlite3.Connection, held: Lock | None = None, session: int = 0,
+        warnings: Sequence[str] = (), moved: Path | None = None,
+    ) -> None:  # fmt: skip
         self.path, self.warnings, self.moved = path, tuple(warnings), moved
         self._connection, self._lock, self._session = connection, held, session
         self._closed, self._turn = False, threading.Lock()
