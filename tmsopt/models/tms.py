@@ -35,15 +35,14 @@ _NATIVE = ParameterSet(
         Parameter("Fr", "1", "Froude number v/√(g w)", r"\mathrm{Fr}", _NOT_NEGATIVE),
         Parameter("mu", "1", "mass ratio m_H/m_B", r"\mu", _NOT_NEGATIVE, multiple_of="kg"),
         Parameter("chi_B", "1", "rear frame centre of mass, forward of the rear contact", r"\chi_B", multiple_of="m"),
-        Parameter(
-            "chi_H", "1", "front assembly centre of mass, forward of the rear contact", r"\chi_H", multiple_of="m"
-        ),
+        Parameter("chi_H", "1", "front assembly centre of mass, forward of the rear contact", r"\chi_H",
+            multiple_of="m"),
         Parameter("zeta_B", "1", "rear frame centre of mass, downward", r"\zeta_B", _NOT_POSITIVE, multiple_of="m"),
         Parameter("zeta_H", "1", "front assembly centre of mass, downward", r"\zeta_H", _NOT_POSITIVE, multiple_of="m"),
         LAMBDA_S,
     ),
     native=dict,
-)
+)  # fmt: skip
 
 
 def from_si(p: Mapping[str, Any]) -> dict[str, Any]:

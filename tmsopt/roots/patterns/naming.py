@@ -81,9 +81,8 @@ def _take(left: list[int], order: int) -> None:
 def _unknowns(shape: Shape) -> tuple[str, ...]:
     """Names as in other patterns, numbered only where there are several of a kind."""
     kinds = [u.rstrip("0123456789") for u in shape.unknowns]
-    return tuple(
-        kind if kind != "d" and kinds.count(kind) == 1 else u for u, kind in zip(shape.unknowns, kinds, strict=True)
-    )
+    each = zip(shape.unknowns, kinds, strict=True)
+    return tuple(kind if kind != "d" and kinds.count(kind) == 1 else u for u, kind in each)
 
 
 def _factors(shape: Shape, unknowns: Sequence[Any]) -> list[list[Any]]:

@@ -1,5 +1,6 @@
 """The multiplicity structure of a polynomial within a stated tolerance, decided on coefficients."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -215,14 +216,6 @@ def _fits(pattern: Pattern, c: Array, found: Roots, size: Array, near: float) ->
 
 def _roots_of(pattern: Pattern, unknowns: Array) -> tuple[Root, ...]:
     """Roots of the factors, equal factors counted as multiplicity."""
-    counted: dict[tuple[float, ...], int] = {}
-    for factor in pattern.factors(list(unknowns)):
-        key = tuple(float(x) for x in factor)
-        counted[key] = counted.get(key, 0) + 1
-    return _sorted(
-        [
-            Root(float(z.real), float(z.imag), count)
-            for factor, count in counted.items()
-            for z in numeric_roots(np.array(factor))
-        ]
-    )
+    counted = Counter(tuple(float(x) for x in factor) for factor in pattern.factors(list(unknowns)))
+    found = ((z, m) for factor, m in counted.items() for z in numeric_roots(np.array(factor)))
+    return _sorted([Root(float(z.real), float(z.imag), m) for z, m in found])
