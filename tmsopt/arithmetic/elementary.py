@@ -26,7 +26,8 @@ def tan(x: Any) -> Any:
 def sqrt(x: Any) -> Any:
     """Square root of x; nan, without a warning, for a negative float."""
     if isinstance(x, flint.fmpq):
-        return _exact_sqrt(x)
+        is_square = x >= 0 and x.p.is_square() and x.q.is_square()
+        return flint.fmpq(x.p.isqrt(), x.q.isqrt()) if is_square else flint.arb(x).sqrt()
     if hasattr(x, "sqrt"):
         return x.sqrt()
     with np.errstate(invalid="ignore"):
@@ -114,13 +115,6 @@ def as_ball(x: Any) -> Any:
 
 
 _WHOLE = 1000  # exponent up to which a power is a product
-
-
-def _exact_sqrt(x: flint.fmpq) -> Any:
-    """Of a square the exact root."""
-    if x >= 0 and x.p.is_square() and x.q.is_square():
-        return flint.fmpq(x.p.isqrt(), x.q.isqrt())
-    return flint.arb(x).sqrt()
 
 
 def _chosen(a: Any, b: Any, sign: int) -> Any:

@@ -72,11 +72,5 @@ def _power(x: Any, y: Any) -> Any:
     return x**y
 
 
-INTERVALS: Arithmetic = {
-    **BALLS,
-    ca.OP_CONST: flint.arb,
-    ca.OP_SQ: square,
-    ca.OP_POW: _power,
-    ca.OP_CONSTPOW: _power,
-}
+INTERVALS: Arithmetic = {**BALLS, ca.OP_CONST: flint.arb, ca.OP_SQ: square, ca.OP_POW: _power, ca.OP_CONSTPOW: _power}
 """Operations on balls as wide as a box, where an even power must not reach below 0."""

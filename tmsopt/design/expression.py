@@ -56,30 +56,23 @@ _BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Pow: operator.pow,
 }  # fmt: skip
 _SYMBOLIC = _Arithmetic(
-    {**{name: getattr(ca, name) for name in FUNCTIONS[:9]}, "abs": ca.fabs, "min": ca.fmin, "max": ca.fmax},
-    _as_array,
+    {**{name: getattr(ca, name) for name in FUNCTIONS[:9]}, "abs": ca.fabs, "min": ca.fmin, "max": ca.fmax}, _as_array,
     _BINARY,
-)
+)  # fmt: skip
 _NUMERIC = _Arithmetic(
     {
         **{name: getattr(np, name) for name in ("sin", "cos", "tan", "sqrt", "exp", "log", "abs")},
         **{"asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "min": np.minimum, "max": np.maximum},
     },
-    _as_array,
-    _BINARY,
-)
+    _as_array, _BINARY,
+)  # fmt: skip
 _BALLS = _Arithmetic(
     {
         **{name: _method(name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "exp", "log")},
-        "sqrt": elementary.sqrt,
-        "abs": elementary.magnitude,
-        "min": elementary.lesser,
-        "max": elementary.greater,
+        "sqrt": elementary.sqrt, "abs": elementary.magnitude, "min": elementary.lesser, "max": elementary.greater,
     },
-    elementary.exact,
-    {**_BINARY, ast.Div: elementary.quotient, ast.Pow: elementary.power},
-    flint.arb.pi,
-)
+    elementary.exact, {**_BINARY, ast.Div: elementary.quotient, ast.Pow: elementary.power}, flint.arb.pi,
+)  # fmt: skip
 
 
 class ExpressionError(ValueError):

@@ -139,12 +139,9 @@ def posed(data: Mapping[str, Any], title: str) -> tuple[list[Fault], Problem | N
                 numbers["fixed"][fault.key[1]] = math.nan  # known to be given, and already reported
         try:
             problem = Problem(
-                model=model,
-                constraints=parsed.constraints,
-                title=parsed.title or title,
-                **numbers,
+                model=model, constraints=parsed.constraints, title=parsed.title or title, **numbers,
                 **vars(parsed.objective) | {"pareto": parsed.objective.pareto or ()},
-            )
+            )  # fmt: skip
         except InputError as error:
             reported = {f.key[:2] for f in faults} | {("parameters", *f.key[1:2]) for f in faults}
             reported |= {f.key[:1] for f in faults if f.key[:1] == ("objective",)}

@@ -165,26 +165,21 @@ class Solution:
         text = problem.minimize or problem.maximize or problem.locate or "abscissa"
         cases = {"worst_case": self.worst, "least_damped_case": self.least_damped}
         optional = {
-            **{name: case and plain(case, "at offset") for name, case in cases.items()},
-            **plain(self, "cover"),
-            "sides": plain(self.sides, digits=SIDE_DIGITS),
-            **plain(self, "relaxation si"),
-        }
+            **{name: case and plain(case, "at offset") for name, case in cases.items()}, **plain(self, "cover"),
+            "sides": plain(self.sides, digits=SIDE_DIGITS), **plain(self, "relaxation si"),
+        }  # fmt: skip
         return {
-            **problem.heading,
-            "status": self.status,
-            "objective": {"sense": problem.sense, "expression": text, **plain(self, "value")}
-            | ({"locate": problem.locate} if problem.locate else {}),
+            **problem.heading, "status": self.status,
+            "objective": {"sense": problem.sense, "expression": text, **plain(self, "value")} | (
+                {"locate": problem.locate} if problem.locate else {}
+            ),
             **plain(self, "parameters abscissa abscissa_realised roots structure"),
-            "active": plain(self.active, digits=GAIN_DIGITS),
-            "violations": plain(self.violations, digits=GAIN_DIGITS),
-            **plain(self, "bound starts"),
-            "seconds": round(self.seconds, 4),
+            "active": plain(self.active, digits=GAIN_DIGITS), "violations": plain(self.violations, digits=GAIN_DIGITS),
+            **plain(self, "bound starts"), "seconds": round(self.seconds, 4),
             **plain(self, "quantities dimensionless formulation"),
-            "freedom": plain(self.freedom, "free conditions count kind"),
-            **plain(self, "branches notes"),
+            "freedom": plain(self.freedom, "free conditions count kind"), **plain(self, "branches notes"),
             **{name: value for name, value in optional.items() if value},
-        }
+        }  # fmt: skip
 
 
 class NotSolved(RuntimeError):

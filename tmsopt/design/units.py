@@ -23,13 +23,9 @@ _UNIT = re.compile(rf"[A-Za-zµμ°%]+{_POWER}(?:\s*[*/ ]\s*[A-Za-zµμ°%]+{_PO
 """Names with one-digit powers, joined by * / or a space: anything richer could keep a parser busy for ever."""
 
 _EXAMPLES = {
-    "1": "a number",
-    "rad": "'5 deg' or '0.1 rad'",
-    "m": "'40 cm' or '1.2 m'",
-    "kg": "'10 kg' or '500 g'",
-    "m/s": "'15 km/h' or '4 m/s'",
-    "m/s^2": "'9.81 m/s^2'",
-}
+    "1": "a number", "rad": "'5 deg' or '0.1 rad'", "m": "'40 cm' or '1.2 m'", "kg": "'10 kg' or '500 g'",
+    "m/s": "'15 km/h' or '4 m/s'", "m/s^2": "'9.81 m/s^2'",
+}  # fmt: skip
 
 _READ_IN = MappingProxyType({"m": ("mm", 1000), "m/s": ("km/h", 18), "rad": ("deg", 180)})
 
@@ -134,13 +130,9 @@ def frequencies(roots: Iterable[Any], rate: Any, pi: Any = math.pi) -> tuple[Any
 
 
 def readings(
-    of: ParameterSet,
-    parameters: Mapping[str, Any],
-    quantities: Mapping[str, Any],
-    abscissa: Any,
-    roots: Iterable[Any],
+    of: ParameterSet, parameters: Mapping[str, Any], quantities: Mapping[str, Any], abscissa: Any, roots: Iterable[Any],
     pi: Any = math.pi,
-) -> Iterator[tuple[str, Any, int]]:
+) -> Iterator[tuple[str, Any, int]]:  # fmt: skip
     """Times, frequencies, and everything with a unit, by names that end in the unit: ``v_kmh``, ``x_B_mm``.
 
     Numbers of any kind, each with the decimal digits to round it to, 0 for none. Nothing for a set that has no unit of

@@ -193,14 +193,9 @@ class Values(Mapping[str, Any]):
     """
 
     def __init__(
-        self,
-        model: Model,
-        of: ParameterSet,
-        parameters: Mapping[str, Any],
-        extra: Iterable[Quantity] = (),
-        lift: Callable[[Quantity, "Values"], Any] | None = None,
-        ranges: Mapping[str, float] | None = None,
-    ) -> None:
+        self, model: Model, of: ParameterSet, parameters: Mapping[str, Any], extra: Iterable[Quantity] = (),
+        lift: Callable[[Quantity, "Values"], Any] | None = None, ranges: Mapping[str, float] | None = None,
+    ) -> None:  # fmt: skip
         native = of.native(parameters)
         self.coefficients = model.polynomial(**model.algebraic(native))
         self._at = (model, of, dict(parameters), dict(ranges or {}))

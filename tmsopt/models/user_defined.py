@@ -36,14 +36,9 @@ _GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 def from_matrices(
-    M: Any = None,
-    D: Any = None,
-    K: Any = None,
-    *,
-    A: Any = None,
-    name: str = "stated",
+    M: Any = None, D: Any = None, K: Any = None, *, A: Any = None, name: str = "stated",
     quantities: Mapping[str, Any] | None = None,
-) -> Model:
+) -> Model:  # fmt: skip
     """A model of M q″ + D q′ + K q = 0, or of x′ = A x, from CasADi expressions.
 
     Args:
@@ -158,13 +153,9 @@ def _made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) ->
 
 @lru_cache(maxsize=64)
 def _rebuilt(
-    kind: str,
-    name: str,
-    names: tuple[str, ...],
-    shapes: tuple[tuple[str, int, int], ...],
-    derived: tuple[str, ...],
+    kind: str, name: str, names: tuple[str, ...], shapes: tuple[tuple[str, int, int], ...], derived: tuple[str, ...],
     serialized: str,
-) -> Model:
+) -> Model:  # fmt: skip
     """A model from plain data; in each process there is one of each."""
     entry = Formulas(names, ca.Function.deserialize(serialized))
     count = sum(rows * columns for _, rows, columns in shapes)

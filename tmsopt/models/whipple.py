@@ -64,9 +64,7 @@ _SI = ParameterSet(
         _inertia("I_Fxx", "moment of inertia of the front wheel about a diameter"),
         _inertia("I_Fyy", "moment of inertia of the front wheel about its axle"),
     ),
-    native=dict,
-    quantities=QUANTITIES,
-    rate=lambda p: 1,
+    native=dict, quantities=QUANTITIES, rate=lambda p: 1,
     needs={"I_Ryy": ("r_R", _NO_RADIUS), "I_Fyy": ("r_F", _NO_RADIUS)},
 )  # fmt: skip
 
@@ -80,12 +78,7 @@ def _pencil(p: Mapping[str, Any]) -> tuple[Matrix, ...]:
 
 
 whipple = Model(
-    name="whipple",
-    title="Carvallo–Whipple bicycle",
-    degree=4,
-    sets=(_SI,),
-    algebraic=algebraic,
-    polynomial=carvallo_whipple,
-    pencil=_pencil,
-)
+    name="whipple", title="Carvallo–Whipple bicycle", degree=4, sets=(_SI,), algebraic=algebraic,
+    polynomial=carvallo_whipple, pencil=_pencil,
+)  # fmt: skip
 """The Carvallo–Whipple bicycle; its roots are in 1/s."""

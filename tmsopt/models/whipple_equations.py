@@ -65,15 +65,10 @@ def powers_of_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix) -> tuple[Any,
     lean has neither damping nor stiffness from the speed, so no higher power appears.
     """
     return (
-        M[0][0] * M[1][1] - M[0][1] * M[1][0],
-        _mixed(M, C1),
-        _mixed(M, K0),
-        _mixed(M, K2) - C1[0][1] * C1[1][0],
-        _mixed(C1, K0),
-        -C1[1][0] * K2[0][1],
-        K0[0][0] * K0[1][1] - K0[0][1] * K0[1][0],
+        M[0][0] * M[1][1] - M[0][1] * M[1][0], _mixed(M, C1), _mixed(M, K0), _mixed(M, K2) - C1[0][1] * C1[1][0],
+        _mixed(C1, K0), -C1[1][0] * K2[0][1], K0[0][0] * K0[1][1] - K0[0][1] * K0[1][0],
         K0[0][0] * K2[1][1] - K0[1][0] * K2[0][1],
-    )
+    )  # fmt: skip
 
 
 def carvallo_whipple(

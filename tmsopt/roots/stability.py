@@ -1,6 +1,6 @@
 """Stability and discriminant from the coefficients alone, with no root computed."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import flint
@@ -96,13 +96,8 @@ def _by_routh(c: Array, exact: bool) -> NDArray[np.bool_]:
     refuted = np.concatenate([negative, np.zeros((len(rows), 1), bool)], axis=1)[np.arange(len(rows)), first]
     stable[rows] = certain
     for k in rows[~(certain | refuted)]:
-        stable[k] = _exactly_stable(flat[k].tolist())
+        stable[k] = all(x > 0 for x in _column([flint.fmpq(*a.as_integer_ratio()) for a in flat[k].tolist()]))
     return np.asarray(stable.reshape(c.shape[:-1]))
-
-
-def _exactly_stable(coefficients: Sequence[float]) -> bool:
-    """Routh's scheme in fractions."""
-    return all(x > 0 for x in _column([flint.fmpq(*c.as_integer_ratio()) for c in coefficients]))
 
 
 def discriminant(coefficients: Coefficients) -> Any:

@@ -59,20 +59,15 @@ def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, wal
     at = [Table({n: float(c[row]) for n, c in columns.items()}) for *_, row in named]
     events = [Event(name, detail, place, row) for (name, detail, row), place in zip(named, at, strict=True)]
     return Branch(
-        pattern=str(problem.locate),
-        parameters=columns,
-        unknowns=dict(zip(pattern.unknowns, u, strict=True)),
+        pattern=str(problem.locate), parameters=columns, unknowns=dict(zip(pattern.unknowns, u, strict=True)),
         tangent=dict(zip(free, _natural_tangent(problem, on, x, t).T, strict=True)),
-        arclength=np.concatenate([[0.0], np.cumsum(np.linalg.norm(width, axis=1))]),
-        kinds=kinds,
+        arclength=np.concatenate([[0.0], np.cumsum(np.linalg.norm(width, axis=1))]), kinds=kinds,
         stable=stability(pattern.remaining(u), len(x)),
         heavily_damped=all_real(pattern.remaining(u), len(x)) & ("W" not in pattern.unknowns),
-        satisfied=satisfied(problem, values, len(x)),
-        abscissa=np.broadcast_to(values["abscissa"], len(x)),
-        events=tuple(sorted(events, key=lambda e: e.index)),
-        closed=walked.closed,
+        satisfied=satisfied(problem, values, len(x)), abscissa=np.broadcast_to(values["abscissa"], len(x)),
+        events=tuple(sorted(events, key=lambda e: e.index)), closed=walked.closed,
         residual=float(np.max(_residual(values, pattern.monic(u), u))),
-    )
+    )  # fmt: skip
 
 
 def _doubled(pattern: Pattern) -> tuple[int, tuple[str, ...]]:

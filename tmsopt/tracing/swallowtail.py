@@ -93,14 +93,19 @@ def swallowtail(problem: Given, rows: int = 48, across: int = 24, starts: int = 
     affine = _Affine(plain, axes)
     cusps = trace(plain, "EP3", starts=starts)
     crossing = trace(plain, "2EP2", starts=starts)
-    critical = _critical(cusps, crossing, axes[0])
+    events = [*cusps.events, *crossing.events]
+    # The number of edges in a row changes at EP4, and at folds of the edges.
+    changes = [e for e in events if e.name == "EP4" or (e.name == "fold" and axes[0] in e.detail)]
     low, high = plain.free[axes[0]]
-    grid = np.unique(np.concatenate([np.linspace(low, high, rows), *(value + _AROUND for value in critical)]))
+    grid = np.unique(
+        np.concatenate([np.linspace(low, high, rows), *(e.parameters[axes[0]] + _AROUND for e in changes)])
+    )
     grid = grid[(grid >= low) & (grid <= high)]
     ready = prepare(crossing.problem)
     cuts = [_cuts(affine, float(value), crossing, ready) for value in grid]
     patches = []
-    for _, run in groupby(range(len(grid)), key=lambda k: _signature(cuts[k])):
+    # Neighbouring rows with the same cuts in the same order belong to one set of patches.
+    for _, run in groupby(range(len(grid)), key=lambda k: [[kind for _, kind in interval] for interval in cuts[k]]):
         inside = list(run)
         if len(inside) < 2:
             continue
@@ -160,11 +165,6 @@ def _on_surface(parts: tuple[Array, Array, Array], r: Array) -> tuple[Array, Arr
         return (C * dA - A * dC) / size, (A * dB - B * dA) / size
 
 
-def _signature(cuts: list[list[Cut]]) -> tuple[tuple[str, ...], ...]:
-    """What cuts a row, in order: neighbouring rows with one signature belong to one set of patches."""
-    return tuple(tuple(kind for _, kind in interval) for interval in cuts)
-
-
 def _cuts(affine: _Affine, first: float, crossing: Trace, ready: Traced) -> list[list[Cut]]:
     """For each interval of r inside the box, ascending: its ends, and the edges between them."""
     parts = affine.at(first)
@@ -219,12 +219,6 @@ def _doubles(affine: _Affine, first: float, crossing: Trace, ready: Traced) -> l
             if spread > 0:
                 found += [float(-b / 2 - np.sqrt(spread)), float(-b / 2 + np.sqrt(spread))]
     return found
-
-
-def _critical(cusps: Trace, crossing: Trace, name: str) -> Array:
-    """Values of a parameter where the number of edges in a row changes: EP4, and folds of the edges."""
-    events = [*cusps.events, *crossing.events]
-    return np.array([e.parameters[name] for e in events if e.name == "EP4" or (e.name == "fold" and name in e.detail)])
 
 
 def _patch(affine: _Affine, grid: Array, left: Array, right: Array, across: int) -> Patch:

@@ -28,16 +28,9 @@ MOST = 200_000
 
 
 def trace(
-    problem: Given,
-    pattern: str | None = None,
-    *,
-    step: float = STEP,
-    starts: int = STARTS,
-    seed: int = 0,
-    most: int = MOST,
-    through: Sequence[Mapping[str, float]] = (),
-    progress: Report | None = None,
-) -> Trace:
+    problem: Given, pattern: str | None = None, *, step: float = STEP, starts: int = STARTS, seed: int = 0,
+    most: int = MOST, through: Sequence[Mapping[str, float]] = (), progress: Report | None = None,
+) -> Trace:  # fmt: skip
     """Every branch of a pattern in the box of the free parameters, one more of which is free than the pattern ties.
 
     Args:

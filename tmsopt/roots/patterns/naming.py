@@ -48,13 +48,10 @@ def _pattern(shape: Shape, start: Sequence[Any]) -> Pattern:
     tied, others = ([g for g in shape.groups if g.tied is on] for on in (True, False))
     return Pattern(
         name=" beside ".join(_name(groups) for groups in (tied, others) if groups),
-        meaning=_meaning(tied, others) + (" beside other roots" if shape.rest else ""),
-        unknowns=_unknowns(shape),
-        factors=partial(_factors, shape),
-        guesses=lambda z: [[float(x) for x in start]],
-        nonnegative=shape.gaps,
+        meaning=_meaning(tied, others) + (" beside other roots" if shape.rest else ""), unknowns=_unknowns(shape),
+        factors=partial(_factors, shape), guesses=lambda z: [[float(x) for x in start]], nonnegative=shape.gaps,
         degree=shape.degree,
-    )
+    )  # fmt: skip
 
 
 def implies(roots: Sequence[Root], name: str) -> bool:
@@ -84,9 +81,8 @@ def _take(left: list[int], order: int) -> None:
 def _unknowns(shape: Shape) -> tuple[str, ...]:
     """Names as in other patterns, numbered only where there are several of a kind."""
     kinds = [u.rstrip("0123456789") for u in shape.unknowns]
-    return tuple(
-        kind if kind != "d" and kinds.count(kind) == 1 else u for u, kind in zip(shape.unknowns, kinds, strict=True)
-    )
+    each = zip(shape.unknowns, kinds, strict=True)
+    return tuple(kind if kind != "d" and kinds.count(kind) == 1 else u for u, kind in each)
 
 
 def _factors(shape: Shape, unknowns: Sequence[Any]) -> list[list[Any]]:

@@ -82,10 +82,8 @@ class Shape:
 
     def monic(self, unknowns: Sequence[Any]) -> list[Any]:
         """Coefficients of the product of all factors, descending from 1."""
-        each = [
-            f for f, g in zip(self.group_factors(unknowns), self.groups, strict=True) for _ in range(g.multiplicity)
-        ]
-        return product(*each, self.rest_factor(unknowns))
+        each = zip(self.group_factors(unknowns), self.groups, strict=True)
+        return product(*(f for f, g in each for _ in range(g.multiplicity)), self.rest_factor(unknowns))
 
     def start(self, places: Sequence[complex], rest: Sequence[Any]) -> list[Any]:
         """Unknowns for one root of each group, that of a pair in the upper half-plane, and the rest's coefficients."""

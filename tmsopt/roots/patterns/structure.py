@@ -1,5 +1,6 @@
 """The multiplicity structure of a polynomial within a stated tolerance, decided on coefficients."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -22,15 +23,9 @@ HIGHEST = 12
 
 # Of a quartic, most degenerate first: pattern, multiplicity of its rightmost root, roots on its rightmost line.
 _CANDIDATES = (
-    (PATTERNS["EP4"], 4, 4),
-    (PATTERNS["2EP2"], 2, 2),
-    (PATTERNS["CEP2"], 2, 4),
-    (PATTERNS["EP3"], 3, 3),
-    (LINES["EP2+pair"], 1, 4),
-    (PATTERNS["EP2"], 2, 2),
-    (LINES["pair+real"], 1, 3),
-    (LINES["two pairs"], 1, 4),
-)
+    (PATTERNS["EP4"], 4, 4), (PATTERNS["2EP2"], 2, 2), (PATTERNS["CEP2"], 2, 4), (PATTERNS["EP3"], 3, 3),
+    (LINES["EP2+pair"], 1, 4), (PATTERNS["EP2"], 2, 2), (LINES["pair+real"], 1, 3), (LINES["two pairs"], 1, 4),
+)  # fmt: skip
 
 _NEAR = 0.05  # relative distance of a guess that can still lead to a pattern within any sensible tolerance
 _CLOSED = 1e-10  # of the squared root size: a pattern contains its own boundary, as CEP2 and 2EP2 contain EP4
@@ -221,14 +216,6 @@ def _fits(pattern: Pattern, c: Array, found: Roots, size: Array, near: float) ->
 
 def _roots_of(pattern: Pattern, unknowns: Array) -> tuple[Root, ...]:
     """Roots of the factors, equal factors counted as multiplicity."""
-    counted: dict[tuple[float, ...], int] = {}
-    for factor in pattern.factors(list(unknowns)):
-        key = tuple(float(x) for x in factor)
-        counted[key] = counted.get(key, 0) + 1
-    return _sorted(
-        [
-            Root(float(z.real), float(z.imag), count)
-            for factor, count in counted.items()
-            for z in numeric_roots(np.array(factor))
-        ]
-    )
+    counted = Counter(tuple(float(x) for x in factor) for factor in pattern.factors(list(unknowns)))
+    found = ((z, m) for factor, m in counted.items() for z in numeric_roots(np.array(factor)))
+    return _sorted([Root(float(z.real), float(z.imag), m) for z, m in found])

@@ -18,17 +18,9 @@ from tmsopt.roots.quartics.factors import abscissa, damping_ratio, error, monic,
 from tmsopt.roots.quartics.signs import classes as class_of, stable as is_stable
 
 _FORMULAS = (
-    factors.third_of_exponent,
-    factors.cube_root,
-    factors.largest_root,
-    factors.ordered,
-    monic,
-    start,
-    error,
-    newton,
-    abscissa,
-    damping_ratio,
-)
+    factors.third_of_exponent, factors.cube_root, factors.largest_root, factors.ordered, monic, start, error, newton,
+    abscissa, damping_ratio,
+)  # fmt: skip
 """Each uses only those before it."""
 
 _N = 512  # numbers of a block; with nine arrays of them it stays in the first cache
@@ -59,11 +51,9 @@ def _compiled(name: str) -> Loop:
     numbers, pairs = types.float64[::1], types.float64[:, ::1]
     codes, truths = types.int8[::1], types.boolean[::1]
     body, filled = {
-        "factors": (_factors, (pairs, pairs, truths)),
-        "motion": (_motion, (numbers, numbers, truths)),
-        "classes": (_classes, (codes, codes, truths)),
-        "stable": (_stable, (truths,)),
-    }[name]
+        "factors": (_factors, (pairs, pairs, truths)), "motion": (_motion, (numbers, numbers, truths)),
+        "classes": (_classes, (codes, codes, truths)), "stable": (_stable, (truths,)),
+    }[name]  # fmt: skip
     compiled: Loop = numba.njit(types.void(*given, *filled), error_model="numpy", nogil=True)(_bound(body, _known()))
     return compiled
 
