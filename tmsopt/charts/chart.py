@@ -174,10 +174,9 @@ def chart(
         raise InputError([Fault(message, ("points",))])
     about = _about(work, (None if path is None else _kept_tile(path, fresh)) or tile)
     where: AbstractContextManager[Memory | Folder] = (
-        nullcontext(Memory(grid, {n: work.dtype(n) for n in work.names}))
-        if path is None
+        nullcontext(Memory(grid, {n: work.dtype(n) for n in work.names})) if path is None
         else writing(path, about, dict(zip(grid.axes, grid.values, strict=True)), fresh)
-    )
+    )  # fmt: skip
     began = time.perf_counter()
     with where as target:
         left = complete(target.done, grid.tiles(about["tile"]))

@@ -100,7 +100,21 @@ def array_function(problem: Problem, expressions: Mapping[str, str | Expression]
     Raises:
         InputError: for a text that is no expression of this problem.
     """
-    return _array_function(problem.model, problem.parameter_set, parsed(problem, expressions))
+    model, of, stated = problem.model, problem.parameter_set, parsed(problem, expressions)
+    with _as_written():
+        symbols = {n: ca.SX.sym(n) for n in (*of.names, *_ROOT)}
+        values = Values(model, of, {n: symbols[n] for n in of.names}, extra=(NO_RADIUS,))
+        for name in _ROOT:
+            values.define(name, symbols[name])
+        written = {n: s for n, e in stated.items() if (s := _symbolic(e, values)) is not None}
+        column = ca.densify(ca.vertcat(*written.values())) if written else ca.SX(0, 1)
+        function = ca.Function("f", [ca.vertcat(*symbols.values())], [column], {"cse": True})
+    try:
+        found = program(function)
+    except NotAccepted:  # an operation that only CasADi has: every expression by the formulas
+        written, found = {}, Program(())
+    others = {n: e for n, e in stated.items() if n not in written}
+    return ArrayFunction(model, of, found, tuple(written), others)
 
 
 def parsed(problem: Problem, expressions: Mapping[str, str | Expression]) -> dict[str, Expression]:
@@ -111,32 +125,14 @@ def parsed(problem: Problem, expressions: Mapping[str, str | Expression]) -> dic
     """
     found: dict[str, Expression] = {}
     faults: list[Fault] = []
-    for name, expression in expressions.items():
+    for name, given in expressions.items():
         try:
-            text = expression
-            found[name] = text if isinstance(text, Expression) else parse_value(text, problem.vocabulary)
+            found[name] = given if isinstance(given, Expression) else parse_value(given, problem.vocabulary)
         except ExpressionError as error:
             faults.append(Fault(str(error), ("quantities", name)))
     if faults:
         raise InputError(faults)
     return found
-
-
-def _array_function(model: Model, of: ParameterSet, expressions: Mapping[str, Expression]) -> ArrayFunction:
-    with _as_written():
-        symbols = {n: ca.SX.sym(n) for n in (*of.names, *_ROOT)}
-        values = Values(model, of, {n: symbols[n] for n in of.names}, extra=(NO_RADIUS,))
-        for name in _ROOT:
-            values.define(name, symbols[name])
-        written = {n: s for n, e in expressions.items() if (s := _symbolic(e, values)) is not None}
-        column = ca.densify(ca.vertcat(*written.values())) if written else ca.SX(0, 1)
-        function = ca.Function("f", [ca.vertcat(*symbols.values())], [column], {"cse": True})
-    try:
-        found = program(function)
-    except NotAccepted:  # an operation that only CasADi has: every expression by the formulas
-        written, found = {}, Program(())
-    others = {n: e for n, e in expressions.items() if n not in written}
-    return ArrayFunction(model, of, found, tuple(written), others)
 
 
 def _symbolic(expression: Expression, values: Values) -> Any:

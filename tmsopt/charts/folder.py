@@ -57,7 +57,8 @@ class Folder:
             stream.write(np.ascontiguousarray(array).data)
         self.done[rows.start] = counts
         line = {"row": rows.start, "rows": len(rows), **asdict(counts)}
-        self._waiting.append(json.dumps(_plain(line)).encode() + b"\n")
+        line = {n: None if isinstance(v, float) and not np.isfinite(v) else v for n, v in line.items()}
+        self._waiting.append(json.dumps(line).encode() + b"\n")
         if time.monotonic() - self._synced > _SYNC:
             self.sync()
 
@@ -103,10 +104,8 @@ def writing(path: Path, about: Mapping[str, Any], axes: Mapping[str, NDArray[Any
         done, end = _read_record(path)
         record.truncate(end)
         record.seek(end)
-        layers: dict[str, tuple[IO[bytes], int]] = {}
-        for name in about["layers"]:
-            offset = _offset(path, name, about)
-            layers[name] = (stack.enter_context(_layer(path, name).open("r+b")), offset)
+        offsets = {n: _offset(path, n, about) for n in about["layers"]}
+        layers = {n: (stack.enter_context(_layer(path, n).open("r+b")), at) for n, at in offsets.items()}
         folder = Folder(path, int(about["shape"][-1]), done, layers, record)
         try:
             yield folder
@@ -251,10 +250,6 @@ def _read_record(path: Path) -> tuple[dict[int, Tally], int]:
         except (ValueError, KeyError, TypeError):
             raise damaged(path, f"line {number} of {TILES} is not a tile's") from None
     return done, sum(len(line) + 1 for line in lines[:-1])
-
-
-def _plain(data: Mapping[str, Any]) -> dict[str, Any]:
-    return {n: None if isinstance(v, float) and not np.isfinite(v) else v for n, v in data.items()}
 
 
 def complete(done: Iterable[int], tiles: Iterable[range]) -> list[range]:

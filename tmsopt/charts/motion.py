@@ -81,7 +81,6 @@ _BLOCK = 8192
 def _any_degree(coefficients: Sequence[Array], wanted: Collection[str]) -> Classified:
     shape = np.broadcast_shapes(*(c.shape for c in coefficients))
     flat = [np.broadcast_to(c, shape).ravel() for c in coefficients]
-    size = flat[0].size
     found = Classified()
     if _OF_SIGNS & set(wanted):
         found = replace(found, kind=np.zeros(shape, np.int8), real_roots=np.zeros(shape, np.int8))
@@ -89,7 +88,7 @@ def _any_degree(coefficients: Sequence[Array], wanted: Collection[str]) -> Class
         found = replace(found, abscissa=np.full(shape, np.nan), damping_ratio=np.full(shape, np.nan))
     layers = {n: v.reshape(-1) for n in (*_OF_SIGNS, *_OF_ROOTS) if (v := getattr(found, n)) is not None}
     fallbacks = 0
-    for first in range(0, size, _BLOCK):
+    for first in range(0, flat[0].size, _BLOCK):
         part = slice(first, first + _BLOCK)
         a = np.stack([c[part] for c in flat], axis=-1)
         regular = np.flatnonzero(np.all(np.isfinite(a), axis=1) & (a[:, 0] != 0))

@@ -70,9 +70,11 @@ def front_table(front: Front) -> str:
     free = [n for n in front.problem.free if n not in texts]
     count = f"{len(front)} point" + ("s" if len(front) != 1 else "")
     where = f", designs with {front.problem.locate}" if front.problem.locate else ""
+    special = ((len(front.kinks), "kink"), (len(front.gaps), "gap"))
+    counted = "".join(f"{n} {word}{'s' if n > 1 else ''}, " for n, word in special if n)
     lines = [
         front.problem.title or "untitled problem",
-        f"front of least {', '.join(texts)}{where}: {count}, {_counted(front)}"
+        f"front of least {', '.join(texts)}{where}: {count}, {counted}"
         f"{front.solved} sub-problems; {front.seconds:.2f} s",
         "",
     ]
@@ -84,14 +86,6 @@ def front_table(front: Front) -> str:
     lines += columns(rows)
     remarks = [f"gap: {gap.reason}" for gap in front.gaps] + [f"note: {note}" for note in front.notes]
     return "\n".join(line.rstrip() for line in [*lines, *([""] if remarks else []), *remarks])
-
-
-def _counted(front: Front) -> str:
-    words = ""
-    for found, word in ((front.kinks, "kink"), (front.gaps, "gap")):
-        if found:
-            words += f"{len(found)} {word}{'s' if len(found) > 1 else ''}, "
-    return words
 
 
 def trace_table(trace: Trace) -> str:
@@ -116,11 +110,8 @@ def trace_table(trace: Trace) -> str:
 
 def _summary(branch: Branch, trace: Trace) -> str:
     share = f"{100 * float(np.mean(branch.stable)):.0f} % of its points"
-    states = (
-        f"bounds stability on {share}"
-        if pattern(branch.pattern, trace.problem.model.degree).rest
-        else f"stable on {share}"
-    )
+    rest = pattern(branch.pattern, trace.problem.model.degree).rest
+    states = f"{'bounds stability' if rest else 'stable'} on {share}"
     if any(not c.equality for c in trace.problem.conditions.values()):
         states += f", constraints hold on {100 * float(np.mean(branch.satisfied)):.0f} %"
     form = "closed" if branch.closed else "open"

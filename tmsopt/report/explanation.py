@@ -1,7 +1,7 @@
 """What an optimum means, how its multiple roots split, and how far its boundaries are, as lines for a reader."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from tmsopt.design.solution import Solution
 from tmsopt.diagnosis.diagnosis import Diagnosis
@@ -69,19 +69,13 @@ def _root_line(root: OnLine) -> str:
 
 def _rows(explanation: Explanation) -> list[Sequence[str]]:
     rows: list[Sequence[str]] = [("rounded", "to", "abscissa", "loses", "damping_ratio", "violates")]
-    for name, row in explanation.rounding.items():
-        rows.append(_row(f"{name} alone", row.written[name], row))
-    for row in explanation.precision:
-        rows.append(_row("all", f"{row.digits} digits", row))
-    return rows
+    rows += [_row(f"{name} alone", row.written[name], row) for name, row in explanation.rounding.items()]
+    return rows + [_row("all", f"{row.digits} digits", row) for row in explanation.precision]
 
 
 def _row(what: str, to: str, row: Rounded) -> tuple[str, ...]:
-    return (what, to, number(row.realised), f"{row.loss:.2g}", f"{row.damping_ratio:.4g}", _violated(row.violations))
-
-
-def _violated(violations: Mapping[str, float]) -> str:
-    return ", ".join(f"{name} by {value:.1g}" for name, value in violations.items())
+    violated = ", ".join(f"{name} by {value:.1g}" for name, value in row.violations.items())
+    return (what, to, number(row.realised), f"{row.loss:.2g}", f"{row.damping_ratio:.4g}", violated)
 
 
 def diagnosis_lines(diagnoses: Sequence[Diagnosis], details: bool = False) -> list[str]:

@@ -50,7 +50,8 @@ def ledger_page(ledger: Ledger) -> str:
     for title, entries in groupby(ledger.entries, key=lambda entry: entry.section):
         lines += ["", f"## {title}"]
         for entry in entries:
-            lines += ["", *_markdown(entry)]
+            head = f"**`{entry.key}`** {_escaped(entry.statement)} ({_escaped(entry.place)}): **{entry.verdict}**"
+            lines += ["", head, "", *(f"- {name}: {_escaped(text)}" for name, text in _rows(entry))]
     return "\n".join(lines) + "\n"
 
 
@@ -69,11 +70,6 @@ def _wrapped(text: str, first: str, rest: str) -> list[str]:
     return textwrap.wrap(
         text, _WIDTH, initial_indent=first, subsequent_indent=rest, break_long_words=False, break_on_hyphens=False
     )
-
-
-def _markdown(entry: Entry) -> list[str]:
-    head = f"**`{entry.key}`** {_escaped(entry.statement)} ({_escaped(entry.place)}): **{entry.verdict}**"
-    return [head, "", *(f"- {name}: {_escaped(text)}" for name, text in _rows(entry))]
 
 
 def _escaped(text: str) -> str:

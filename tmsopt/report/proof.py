@@ -26,7 +26,8 @@ def _numbers(problem: Problem, proof: Proof) -> list[str]:
     """What was solved for, and the roots."""
     rows = []
     for name in proof.moved:
-        rows.append((name, *_cells(proof.parameters[name]), _unit(problem, name)))
+        unit = problem.parameter_set[name].unit
+        rows.append((name, *_cells(proof.parameters[name]), "" if unit == "1" else unit))
         if name in proof.tangents:
             rows.append((f"tan({name})", *_cells(proof.tangents[name]), ""))
     rows += [(name, *_cells(number), "") for name, number in proof.unknowns.items()]
@@ -60,10 +61,9 @@ def _place(problem: Problem, proof: Proof) -> list[str]:
 def _facts(proof: Proof) -> list[str]:
     of = " (of the design as stored)" if proof.stored and proof.reason else ""
     facts = [
-        _verdict(f"stable{of}", proof.stable),
-        _verdict(f"heavily damped{of}", proof.heavily_damped),
+        _verdict(f"stable{of}", proof.stable), _verdict(f"heavily damped{of}", proof.heavily_damped),
         _verdict("in the box", proof.inside),
-    ]
+    ]  # fmt: skip
     return facts + [f"{name}: {verdict}" for name, verdict in proof.limits.items()]
 
 
@@ -91,11 +91,6 @@ def _fraction(text: str) -> str:
 
 def _cells(number: Number) -> tuple[str, str]:
     return number.value, "exact" if number.radius == "0" else f"± {number.radius}"
-
-
-def _unit(problem: Problem, name: str) -> str:
-    unit = problem.parameter_set[name].unit
-    return "" if unit == "1" else unit
 
 
 def _verdict(what: str, verdict: Verdict) -> str:

@@ -16,9 +16,10 @@ def speeds_table(found: Speeds) -> str:
     unit = found.problem.parameter_set[found.parameter].unit
     read = reading(1.0, unit)[1]
     symbol = found.parameter + ("" if unit == "1" else f" {unit}")
+    end = f" < {found.upper:.6g}" if math.isfinite(found.upper) else ""
     lines = [
         found.problem.title or "untitled problem",
-        f"{_range(found)}, by exact root isolation for the numbers as stored",
+        f"{found.lower:.6g} < {found.parameter}{end}, by exact root isolation for the numbers as stored",
         "",
     ]
     rows: list[Sequence[str]] = [("", symbol, read if read != unit else "", "root", "")]
@@ -60,11 +61,6 @@ def _marginally(found: Speeds) -> str:
         kind = "marginally stable" if "weave" in found.always else "stable"
         return f"{kind} but for the {found.zeros}-fold root 0"
     return "marginally stable (no root right of the imaginary axis, those on it simple)"
-
-
-def _range(found: Speeds) -> str:
-    end = f" < {found.upper:.6g}" if math.isfinite(found.upper) else ""
-    return f"{found.lower:.6g} < {found.parameter}{end}"
 
 
 def _root(c: Crossing) -> str:

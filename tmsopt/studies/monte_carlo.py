@@ -54,9 +54,8 @@ class Sampling:
         object.__setattr__(self, "problem", problem)
         found = [*unasked(problem), *_tolerance_faults(problem, self.tolerances or problem.tolerances)]
         found += [
-            *common_faults(problem, self.seed, self.starts, self.report),
-            *_draw_faults(self.rows, self.distribution),
-        ]
+            *common_faults(problem, self.seed, self.starts, self.report), *_draw_faults(self.rows, self.distribution),
+        ]  # fmt: skip
         if found:
             raise InputError(found)
         object.__setattr__(self, "tolerances", Table({n: float(t) for n, t in self.tolerances.items()}))

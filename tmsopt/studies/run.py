@@ -107,10 +107,8 @@ def run_study(
         kept.sort(key=lambda row: row.number)
         return Results(asked, tuple(kept), solved, time.perf_counter() - began, engine)
     with open_store(Path(store), definition(asked), fresh=fresh) as opened:
-        solved, seconds, engine = fill(
-            asked, opened, workers=workers, scheduler=scheduler, progress=progress, note=note
-        )
-        return Results(asked, tuple(opened.rows()), solved, seconds, engine)
+        made = fill(asked, opened, workers=workers, scheduler=scheduler, progress=progress, note=note)
+        return Results(asked, tuple(opened.rows()), *made)
 
 
 def _faults(study: object, workers: object) -> Iterator[Fault]:

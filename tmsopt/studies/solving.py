@@ -170,10 +170,9 @@ def _cause(solution: Solution) -> str:
     violated = ", ".join(f"{name} by {amount:.3g}" for name, amount in solution.violations.items())
     conflict = solution.relaxation.conflict if solution.relaxation else ()
     parts = [
-        f"violated: {violated}" if violated else "",
-        f"in conflict: {', '.join(conflict)}" if conflict else "",
+        f"violated: {violated}" if violated else "", f"in conflict: {', '.join(conflict)}" if conflict else "",
         *solution.notes,
-    ]
+    ]  # fmt: skip
     return "; ".join(part for part in parts if part)
 
 

@@ -157,10 +157,9 @@ def _problem(problem: Problem) -> dict[str, Any]:
     return {
         "model": problem.model.name if problem.model.statement is None else dict(problem.model.statement),
         "parameters": problem.parameter_set.name,
-        "objective": {sense: text for sense, text in asked.items() if text is not None},
-        **tables,
+        "objective": {sense: text for sense, text in asked.items() if text is not None}, **tables,
         "order": {name: list(table) for name, table in tables.items() if len(table) > 1 and name != "fixed"},
-    }
+    }  # fmt: skip
 
 
 def _floats(table: Any) -> dict[str, float]:

@@ -103,9 +103,8 @@ class Summary:
         spread = {n: dict(zip(("min", "median", "max"), ends, strict=True)) for n, ends in self.spread.items()}
         return {
             **(plain(self, "rows counts best causes spread stable structures proven warm laws") | {"spread": spread}),
-            "row_seconds": round(self.seconds, 4),
-            **({"monte_carlo": self.product.to_json()} if self.product else {}),
-        }
+            "row_seconds": round(self.seconds, 4), **({"monte_carlo": self.product.to_json()} if self.product else {}),
+        }  # fmt: skip
 
 
 def summary(study: Study, rows: Iterable[Row]) -> Summary:
