@@ -37,6 +37,7 @@ def verdicts() -> dict[str, np.ndarray]:
     return {name: np.concatenate(values) for name, values in parts.items()}
 
 
+@pytest.mark.slow
 def test_both_verdicts_agree_on_a_million_designs(verdicts: dict[str, np.ndarray]) -> None:
     judged = verdicts["relative"] > BOUNDARY
     # |abscissa| has a density of order 1 at 0, so of a million about 1e-3 fall below 1e-9: next to none is left out
@@ -45,6 +46,7 @@ def test_both_verdicts_agree_on_a_million_designs(verdicts: dict[str, np.ndarray
     assert not different.any(), f"{different.sum()} designs differ, first at {np.flatnonzero(different)[:5]}"
 
 
+@pytest.mark.slow
 def test_every_kind_of_design_is_well_represented(verdicts: dict[str, np.ndarray]) -> None:
     stable, normal = verdicts["roots"], verdicts["tilt"] > 0
     for tilt in (normal, ~normal):
