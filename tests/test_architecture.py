@@ -205,6 +205,15 @@ def test_no_room_is_long() -> None:
     assert {m: n for m, s in SOURCES.items() if (n := s.count("\n")) > LINES and m != "tmsopt.laws"} == {}
 
 
+def test_a_class_name_has_one_meaning() -> None:
+    homes: dict[str, list[str]] = {}
+    for module, source in SOURCES.items():
+        for node in nodes(source):
+            if isinstance(node, ast.ClassDef):
+                homes.setdefault(node.name, []).append(module)
+    assert {name: found for name, found in homes.items() if len(found) > 1} == {}
+
+
 def test_no_package_has_the_name_of_a_public_function() -> None:
     """A package tmsopt/solve would take the place of tmsopt.solve; some are public as packages."""
     assert set(FLOOR) & set(import_module(PACKAGE).__all__) == {"laws", "models", "plots", "report", "roots"}

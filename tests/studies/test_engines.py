@@ -15,7 +15,7 @@ from helpers.works import Fake, Unloadable
 
 from tmsopt.errors import InputError
 from tmsopt.studies import Row
-from tmsopt.studies.engines import EngineError, Ledger, cluster, cores, in_process, processes
+from tmsopt.studies.engines import Assignments, EngineError, cluster, cores, in_process, processes
 
 Units = Sequence[tuple[int, ...]]
 Engine = Callable[..., Iterator[Row]]
@@ -226,18 +226,18 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: P
 
 def test_a_row_that_ended_a_worker_is_tried_again_in_no_company() -> None:
     """Short units are sent several at a time, but none to a worker that holds a suspect."""
-    ledger = Ledger(Fake(Path()), singles(200), lambda line: None)
-    ledger.join("first")
-    while (batch := ledger.batch("first")) != () and len(batch) < 4:
+    assignments = Assignments(Fake(Path()), singles(200), lambda line: None)
+    assignments.join("first")
+    while (batch := assignments.batch("first")) != () and len(batch) < 4:
         for unit in batch:
-            ledger.delivered("first", unit, 0.001)
+            assignments.delivered("first", unit, 0.001)
     suspect = batch[0]
-    ledger.ended("first", "a worker died", "")
-    ledger.join("second")
-    assert ledger.batch("second") == (suspect,)
-    assert ledger.batch("second") == ()
-    ledger.delivered("second", suspect, 0.001)
-    assert len(ledger.batch("second")) > 1
+    assignments.ended("first", "a worker died", "")
+    assignments.join("second")
+    assert assignments.batch("second") == (suspect,)
+    assert assignments.batch("second") == ()
+    assignments.delivered("second", suspect, 0.001)
+    assert len(assignments.batch("second")) > 1
 
 
 @pytest.mark.parametrize("seed", range(50))
@@ -247,39 +247,39 @@ def test_every_row_is_settled_once_whatever_happens(seed: int) -> None:
     size = chance.randint(1, 4)
     units = [tuple(range(n, n + size)) for n in range(0, 12 * size, size)]
     work = Fake(Path())
-    ledger = Ledger(work, units, lambda line: None)
+    assignments = Assignments(work, units, lambda line: None)
     settled: Counter[int] = Counter()
     held: dict[str, list[tuple[int, ...]]] = {}
     late: list[tuple[str, tuple[int, ...]]] = []
     ends: Counter[int] = Counter()
     for step in range(2000):
-        if not ledger.unfinished:
+        if not assignments.unfinished:
             break
         if not held:
             held[str(step)] = []
-            ledger.join(str(step))
+            assignments.join(str(step))
         for worker, mine in held.items():
-            mine.extend(ledger.batch(worker))
+            mine.extend(assignments.batch(worker))
         worker = chance.choice(list(held))
         mine = held[worker]
         event = chance.choice(["deliver"] * 4 + ["end", "leave", "join", "late"])
         if event == "deliver" and mine:
             unit = mine.pop(0)
-            assert ledger.delivered(worker, unit, chance.random())
+            assert assignments.delivered(worker, unit, chance.random())
             settled.update(unit)
         elif event == "late" and late:
-            assert not ledger.delivered(*late.pop(), 0.1)
+            assert not assignments.delivered(*late.pop(), 0.1)
         elif event == "end":
             late.extend((worker, unit) for unit in held.pop(worker))
             ends.update(mine[0] if mine else ())
-            settled.update(row.number for row in ledger.ended(worker, "a worker died", ""))
+            settled.update(row.number for row in assignments.ended(worker, "a worker died", ""))
         elif event == "leave":
             late.extend((worker, unit) for unit in held.pop(worker))
-            ledger.returned(worker)
+            assignments.returned(worker)
         elif event == "join" and len(held) < 4:
             held[f"another {step}"] = []
-            ledger.join(f"another {step}")
-    assert not ledger.unfinished
+            assignments.join(f"another {step}")
+    assert not assignments.unfinished
     assert settled == Counter(range(12 * size))
     assert max(ends.values(), default=0) <= (2 if size == 1 else 4)  # twice in its block, twice alone
 
@@ -288,16 +288,16 @@ def test_every_row_is_settled_once_whatever_happens(seed: int) -> None:
 def test_batches_take_a_fifth_of_a_second_and_get_smaller_towards_the_end(
     seconds: float, least: float, most: float, tmp_path: Path
 ) -> None:
-    ledger = Ledger(Fake(tmp_path), singles(5000), lambda line: None)
-    ledger.join("a")
-    ledger.join("b")
+    assignments = Assignments(Fake(tmp_path), singles(5000), lambda line: None)
+    assignments.join("a")
+    assignments.join("b")
     sizes: list[int] = []
-    while ledger.unfinished:
+    while assignments.unfinished:
         for worker in "ab":
-            batch = ledger.batch(worker)
+            batch = assignments.batch(worker)
             sizes += [len(batch)] if batch else []
             for unit in batch:
-                ledger.delivered(worker, unit, seconds)
+                assignments.delivered(worker, unit, seconds)
     assert sizes[:3] == [1, 1, 1]
     assert least <= max(sizes) * seconds <= most
     assert sizes[-1] == 1

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,8 +11,7 @@ import click
 from tmsopt.cli.common import BAD_INPUT, INTERRUPTED, bad_input, check_output, saving, write_json
 
 if TYPE_CHECKING:
-    from tmsopt.studies import Study
-    from tmsopt.studies.store import Store
+    from tmsopt.studies import Results, Sampling, Study
 
 _EXAMPLES = """
 \b
@@ -78,20 +78,12 @@ def study(
         if row is not None:
             _show_row(asked, row, as_json)
             return
-        from tmsopt.studies import definition
-        from tmsopt.studies.store import open_store
-
-        with open_store(path, definition(asked), fresh=fresh) as opened:
-            for line in (*opened.warnings, *([f"moved the old store to {opened.moved}"] if opened.moved else [])):
-                click.echo(line, err=True)
-            figures = _filled(asked, opened, workers, scheduler)
-            _show(asked, opened, figures, as_json)
-            for target in exports:
-                from tmsopt.studies import export
-
-                with saving("--export", target):
-                    export(opened.rows(), target, opened.about())
-    if figures.get("interrupted"):
+        results, stopped = _carried_out(asked, path, fresh, {"workers": workers, "scheduler": scheduler})
+        _show(results, path, stopped, as_json)
+        for target in exports:
+            with saving("--export", target):
+                results.export(target)
+    if stopped:
         click.echo(f"stopped: the rows solved so far are in {path}; the same command goes on", err=True)
         sys.exit(INTERRUPTED)
 
@@ -109,7 +101,7 @@ def _check_together(row: int | None, scheduler: str | None, workers: int | None,
         raise InputError([Fault("is for processes of this machine; leave it out with --scheduler", ("--workers",))])
 
 
-def _planned(asked: Any) -> "Study":
+def _planned(asked: "Study | Sampling") -> "Study":
     """The study, with the design of a Monte Carlo one solved first."""
     from tmsopt import NotSolved
     from tmsopt.studies import planned
@@ -121,59 +113,54 @@ def _planned(asked: Any) -> "Study":
         sys.exit(BAD_INPUT)
 
 
-def _filled(asked: "Study", opened: "Store", workers: int | None, scheduler: str | None) -> dict[str, Any]:
-    """Solve what is missing, with a progress bar; figures of the run."""
+def _carried_out(asked: "Study", path: Path, fresh: bool, where: Mapping[str, Any]) -> "tuple[Results, bool]":
+    """The study with its rows, solved with a progress bar, and whether it was stopped on the way."""
     from tqdm import tqdm
 
-    from tmsopt.studies import fill
+    from tmsopt import run_study
     from tmsopt.studies.engines import EngineError
 
-    present = len(opened.done())
-    figures: dict[str, Any] = {"store": str(opened.path), "rows_found": present}
-    if present:
-        click.echo(f"{present} of {len(asked)} rows are in {opened.path}", err=True)
-    if present == len(asked):
-        return figures
     shown = sys.stderr.isatty()
-    with tqdm(
-        total=len(asked), initial=present, desc="rows", unit="row", delay=1 if shown else 10,
-        mininterval=0.1 if shown else 10, leave=False, file=sys.stderr,
-    ) as bar:  # fmt: skip
+    pace = {"delay": 1, "mininterval": 0.1} if shown else {"delay": 10, "mininterval": 10}
+    with tqdm(desc="rows", unit="row", leave=False, file=sys.stderr, **pace) as bar:
 
         def update(done: int, most: int) -> None:
+            if bar.total is None:
+                bar.initial = bar.n = done
+            bar.total = most
             bar.update(done - bar.n)
 
         def note(line: str) -> None:
             bar.write(line, file=sys.stderr)
 
         try:
-            solved, seconds, engine = fill(
-                asked, opened, workers=workers, scheduler=scheduler, progress=update, note=note
-            )
+            return run_study(asked, path, fresh=fresh, progress=update, note=note, **where), False
         except KeyboardInterrupt:
-            return figures | {"interrupted": True}
+            if bar.total is None:  # before the first row
+                raise
+            return replace(run_study(asked, path, most=0), found=int(bar.initial)), True
         except EngineError as error:
-            click.echo(f"{error}; the rows solved so far are in {opened.path}", err=True)
+            click.echo(f"{error}; the rows solved so far are in {path}", err=True)
             sys.exit(BAD_INPUT)
-    return figures | {"rows_solved": solved, "seconds": round(seconds, 4), "engine": engine}
 
 
-def _show(asked: "Study", opened: "Store", figures: dict[str, Any], as_json: bool) -> None:
+def _show(results: "Results", path: Path, stopped: bool, as_json: bool) -> None:
     from tmsopt.report import study_table
-    from tmsopt.studies import summary
 
-    found = summary(asked, opened.rows())
+    asked, solved, seconds = results.study, results.solved, results.seconds
     if as_json:
+        run: dict[str, Any] = {"store": str(path), "rows_found": results.found}
+        if stopped:
+            run["interrupted"] = True
+        elif results.found < len(asked):
+            run |= {"rows_solved": solved, "seconds": round(seconds, 4), "engine": results.engine}
         head = {"schema": 1, "title": asked.title, "model": asked.problem.model.name, "method": asked.method}
-        write_json(head | found.to_json() | {"run": figures, "table": [row.to_json() for row in opened.rows()]})
+        write_json(head | results.summary.to_json() | {"run": run, "table": [row.to_json() for row in results.rows]})
         return
-    click.echo(study_table(asked, found, opened.rows()))
-    if figures.get("rows_solved"):
-        rate = figures["rows_solved"] / max(figures["seconds"], 1e-9)
-        click.echo(
-            f"{figures['rows_solved']} rows solved in {figures['seconds']:.3g} s, {rate:.3g} a second, "
-            f"{figures['engine']}; store: {opened.path}"
-        )
+    click.echo(study_table(asked, results.summary, results.rows))
+    if solved:
+        rate = solved / max(seconds, 1e-9)
+        click.echo(f"{solved} rows solved in {seconds:.3g} s, {rate:.3g} a second, {results.engine}; store: {path}")
 
 
 def _show_row(asked: "Study", number: int, as_json: bool) -> None:

@@ -69,7 +69,7 @@ class Starts:
 
 
 @dataclass(frozen=True)
-class Branch:
+class OtherBranch:
     """Another solution of a square system, and the limits that exclude it."""
 
     parameters: Table[float]
@@ -143,7 +143,7 @@ class Solution:
     dimensionless: Table[float]
     formulation: str
     freedom: Freedom
-    branches: tuple[Branch, ...] = ()
+    branches: tuple[OtherBranch, ...] = ()
     notes: tuple[str, ...] = field(default=())
     worst: Case | None = None
     least_damped: Case | None = None

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.optimize import lsq_linear
 
-from tmsopt.explanation.program import Program
+from tmsopt.explanation.program import LocalProgram
 from tmsopt.records import Array
 
 STATIONARY = 1e-8
@@ -46,7 +46,7 @@ class Conditions:
     firm: NDArray[np.bool_]
 
 
-def conditions(program: Program) -> Conditions:
+def conditions(program: LocalProgram) -> Conditions:
     """Multipliers, rank and curvature at the point of a program."""
     _, gradient, _, jacobian, _ = program.at(program.x)
     signed = np.array([held.signed for held in program.held])
@@ -84,7 +84,7 @@ def curved(curvature: float) -> int:
     return int(curvature > _CURVED) - int(curvature < -_CURVED)
 
 
-def _curvature(program: Program, multipliers: Array, firm: Array, steepness: float) -> tuple[float, Array]:
+def _curvature(program: LocalProgram, multipliers: Array, firm: Array, steepness: float) -> tuple[float, Array]:
     """Least curvature along what is held firmly, relative to the largest or the slope, and its direction."""
     free = null_space(firm, rcond=_RANK) if len(firm) else np.eye(len(program.x))
     if not free.shape[1]:

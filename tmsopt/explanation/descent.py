@@ -12,7 +12,7 @@ import numpy as np
 from tmsopt.checks.recheck import recheck
 from tmsopt.design.solution import Solution
 from tmsopt.explanation.conditions import Conditions, curved
-from tmsopt.explanation.program import Program
+from tmsopt.explanation.program import LocalProgram
 from tmsopt.formulation.formulate import design_of
 from tmsopt.records import Array, Table
 
@@ -36,7 +36,7 @@ class Better:
     order: int
 
 
-def better(program: Program, found: Conditions, solution: Solution) -> Better | None:
+def better(program: LocalProgram, found: Conditions, solution: Solution) -> Better | None:
     """The design after the longest step downhill that improves; None where none does."""
     problem = program.problem
     judged = solution.abscissa if (problem.minimize or "").strip() == "abscissa" else solution.value
@@ -57,7 +57,7 @@ def better(program: Program, found: Conditions, solution: Solution) -> Better | 
     return None
 
 
-def _along(program: Program, found: Conditions, both: bool) -> Iterator[Array]:
+def _along(program: LocalProgram, found: Conditions, both: bool) -> Iterator[Array]:
     """Points on the way, the farthest first."""
     jacobian = program.at(program.x)[3]
     signed = np.array([held.signed for held in program.held])
@@ -71,7 +71,7 @@ def _along(program: Program, found: Conditions, both: bool) -> Iterator[Array]:
                 yield x
 
 
-def _corrected(program: Program, x: Array, target: Array) -> Array | None:
+def _corrected(program: LocalProgram, x: Array, target: Array) -> Array | None:
     """The nearest point at which what is held has given values, by Newton's method; None where it fails."""
     start = x
     for _ in range(_NEWTON):

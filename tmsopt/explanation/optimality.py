@@ -27,7 +27,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.explanation.conditions import POSITIVE, STATIONARY, Conditions, conditions, curved
 from tmsopt.explanation.descent import Better, better
-from tmsopt.explanation.program import NotCovered, Program, program
+from tmsopt.explanation.program import LocalProgram, NotCovered, program
 from tmsopt.records import Table, plain
 from tmsopt.solver.solve import solved
 
@@ -165,7 +165,9 @@ def _judged(solution: Solution) -> Problem:
     return problem
 
 
-def _verdict(solution: Solution, around: Program, found: Conditions, beyond: Better | None) -> tuple[str, int, str]:
+def _verdict(
+    solution: Solution, around: LocalProgram, found: Conditions, beyond: Better | None
+) -> tuple[str, int, str]:
     """Verdict, derivatives that decide it, and the sentence."""
     problem, name = around.problem, f"this {solution.structure} is"
     extreme = f"local {'maximum' if problem.sense == 'maximize' else 'minimum'} of {_goal(problem)}"
@@ -184,7 +186,7 @@ def _verdict(solution: Solution, around: Program, found: Conditions, beyond: Bet
     return STRICT, 2, f"{name} a strict {extreme}: {held}, and along what these leave free it curves {bend}{idle}"
 
 
-def _doubt(around: Program, found: Conditions) -> str:
+def _doubt(around: LocalProgram, found: Conditions) -> str:
     """Why nothing is decided where no better design was found; empty where the conditions decide."""
     if found.residual > STATIONARY or (found.downhill.any() and np.isnan(found.curvature)):
         return f"multipliers leave {found.residual:.1g} of the gradient, and no better design was found downhill"
@@ -203,17 +205,17 @@ def _goal(problem: Problem) -> str:
     return (problem.minimize or problem.maximize or "").strip()
 
 
-def _unknowns(around: Program) -> int:
+def _unknowns(around: LocalProgram) -> int:
     """Free parameters that matter, and the abscissa."""
     return sum(name in around.problem.free for name in around.variables) + 1
 
 
-def _count(around: Program, unknowns: int) -> int:
+def _count(around: LocalProgram, unknowns: int) -> int:
     """What is held, less the equations that only serve to define the other variables."""
     return len(around.held) - (len(around.x) - unknowns)
 
 
-def _pays(around: Program, found: Conditions) -> str:
+def _pays(around: LocalProgram, found: Conditions) -> str:
     """What pays, to first order or by its curvature."""
     if curved(found.curvature) < 0:
         return "stationary, but curved downwards along what is held"
@@ -231,7 +233,7 @@ def _way(solution: Solution, beyond: Better) -> str:
     return f"{', '.join(parts)} gives {beyond.value:.6g}"
 
 
-def _on_line(around: Program, found: Conditions) -> tuple[OnLine, ...]:
+def _on_line(around: LocalProgram, found: Conditions) -> tuple[OnLine, ...]:
     """The roots on the line with their multipliers."""
     listed = []
     held = list(zip(around.held, found.multipliers, strict=True))
@@ -245,7 +247,7 @@ def _on_line(around: Program, found: Conditions) -> tuple[OnLine, ...]:
     return tuple(listed)
 
 
-def _limits(solution: Solution, around: Program, found: Conditions) -> Mapping[str, float]:
+def _limits(solution: Solution, around: LocalProgram, found: Conditions) -> Mapping[str, float]:
     """Gain of the objective per unit that a limit is relaxed; of an equality, change per unit added on the right."""
     problem = around.problem
     limits: dict[str, float] = {}

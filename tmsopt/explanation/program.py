@@ -58,7 +58,7 @@ class Held:
 
 
 @dataclass(frozen=True)
-class Program:
+class LocalProgram:
     """minimise f(x) with h(x) = 0 or ≥ 0, at a point where all of h is 0.
 
     Attributes:
@@ -89,7 +89,7 @@ class Program:
         return float(f.item()), gradient.ravel(), h.ravel(), jacobian, hessian
 
 
-def program(problem: Problem, solution: Solution) -> Program:
+def program(problem: Problem, solution: Solution) -> LocalProgram:
     """The program of a problem at a design, from the roots of its structure; none is computed again.
 
     Raises:
@@ -145,7 +145,7 @@ def program(problem: Problem, solution: Solution) -> Program:
               else size / nlp.unit if names[k] == "abscissa"
               else max(abs(known[names[k]]), 1e-3) for k in kept]  # fmt: skip
     x = ca.vertcat(*(symbols[k] for k in kept), *factored.unknowns)
-    return Program(
+    return LocalProgram(
         problem=problem,
         variables=(*(names[k] for k in kept), *factored.names),
         x=np.array([*(known[names[k]] for k in kept), *factored.values]),

@@ -162,7 +162,11 @@ def robustness(
 
     Arguments, distances and exceptions are those of `nearest`.
     """
-    place = _place(design, parameters, weights)
+    return surveyed(_place(design, parameters, weights))
+
+
+def surveyed(place: Place) -> Robustness:
+    """The nearest points of all boundaries around a design."""
     seen = ray_crossings(place.space)
     found = [_nearest(place, seen, kind) for kind in KINDS]
     limit = min((n for n in found if n.kind in STABILITY), key=lambda n: n.distance)

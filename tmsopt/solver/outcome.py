@@ -9,12 +9,14 @@ import numpy as np
 from tmsopt.checks.recheck import Checked, recheck
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
-from tmsopt.design.solution import Branch, Relaxation, Starts
+from tmsopt.design.solution import OtherBranch, Relaxation, Starts
 from tmsopt.formulation.formulate import design_of
 from tmsopt.formulation.ipopt import Point
 from tmsopt.formulation.nlp import NLP
+from tmsopt.formulation.starts import complete, designs
+from tmsopt.records import Array, Table
 from tmsopt.solver.multistart import Candidate, claim, same
-from tmsopt.solver.newton import other_branches
+from tmsopt.solver.newton import solutions
 from tmsopt.solver.workspace import Workspace
 
 _STATIONARY = 1e-6  # gradient of the Lagrangian at which a point counts as converged whatever IPOPT says
@@ -23,6 +25,8 @@ _CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_F
 _SPURIOUS = 1e-3  # violation that no lack of digits explains: equations met only because all coefficients vanish
 _MULTIPLIER = 1e-9  # below it a limit does not bind
 _TOUCHES = 1e-10  # of a range: distance that IPOPT may leave to an end that binds
+_BRANCH_STARTS = 12
+_SAME_BRANCH = 1e-6  # relative difference of parameters
 _CLAIMED = 1e-6  # relative difference of the claimed objective from the design's own
 
 
@@ -41,7 +45,7 @@ class Finding:
     starts: Starts
     formulation: str
     cases: tuple[Case, ...] = ()
-    branches: tuple[Branch, ...] = ()
+    branches: tuple[OtherBranch, ...] = ()
     notes: tuple[str, ...] = ()
     relaxation: Relaxation | None = None
 
@@ -90,7 +94,7 @@ def found(
         surplus = f"{counted.conditions} conditions for {counted.free} free parameters"
         notes += (f"{surplus}, and they are not consistent; free {-counted.count} more, or drop a constraint",)
     active, looked = _active(problem, nlp, point), tuple(nlp.cases if cases is None else cases)
-    branches = other_branches(problem, nlp, parameters) if counted.kind == "square" else ()
+    branches = _other_branches(problem, nlp, parameters) if counted.kind == "square" else ()
     return Finding(parameters, checked, status, active, starts, nlp.formulation, looked, branches, notes)
 
 
@@ -174,3 +178,37 @@ def _active(problem: Problem, nlp: NLP, point: Point) -> dict[str, float]:
             slope = 1 + x * x if of[name].tangent else 1.0  # d tan λ / dλ
             active[f"{name}.{'max' if multiplier > 0 else 'min'}"] = abs(multiplier) * slope
     return active
+
+
+def _other_branches(problem: Problem, nlp: NLP, found: Mapping[str, float]) -> tuple[OtherBranch, ...]:
+    """Solutions of the equations other than the one found, each with the bounds and rows that it violates."""
+    of = problem.parameter_set
+    branches: list[OtherBranch] = []
+    known = [np.array([found[n] for n in problem.free])]
+    starts = (complete(nlp, problem, start) for start in designs(problem, 0, _BRANCH_STARTS))
+    for x in solutions(nlp, starts, len(problem.free)):
+        values = np.array([np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, x, strict=False)])
+        if any(np.abs(values - k).max() <= _SAME_BRANCH * (1 + np.abs(k).max()) for k in known):
+            continue
+        known.append(values)
+        parameters = problem.ordered(dict(zip(problem.free, values.tolist(), strict=True)))
+        branches.append(OtherBranch(Table(parameters), _excluded(problem, nlp, x)))
+    return tuple(sorted(branches, key=lambda b: len(b.excluded_by)))
+
+
+def _excluded(problem: Problem, nlp: NLP, x: Array) -> tuple[str, ...]:
+    """Names of the bounds and inequality rows that a solution violates."""
+    g = np.array(nlp.at(x)[1]).ravel()
+    names = []
+    for k, name in enumerate(problem.free):
+        if x[k] < nlp.lower[k] - 1e-9:
+            names.append(f"{name}.min")
+        if x[k] > nlp.upper[k] + 1e-9:
+            names.append(f"{name}.max")
+    for k in range(len(problem.free), len(nlp.variables)):
+        if x[k] < nlp.lower[k] - 1e-9 or x[k] > nlp.upper[k] + 1e-9:
+            names.append(nlp.variables[k])
+    for k, name in enumerate(nlp.rows):
+        if g[k] < nlp.row_lower[k] - 1e-9 or g[k] > nlp.row_upper[k] + 1e-9:
+            names.append(name)
+    return tuple(dict.fromkeys(names))

@@ -18,7 +18,8 @@ from tmsopt.formulation.formulate import LIMIT, design_of, formulate, middle
 from tmsopt.formulation.ipopt import Point, Run, ipopt, polisher
 from tmsopt.formulation.nlp import NLP, objective_unit, scale_of, units_of
 from tmsopt.formulation.options import DEFAULTS, Options
-from tmsopt.margins.nearest import Robustness, robustness
+from tmsopt.margins.nearest import Robustness, surveyed
+from tmsopt.margins.surroundings import placed
 from tmsopt.models import Quantity, Values
 from tmsopt.records import Array
 
@@ -72,7 +73,7 @@ class Family:
         if not problem.asks_radius:
             return None
         key = (tuple(parameters.items()), tuple(problem.weights.items()))
-        return _kept(self._around, key, lambda: robustness(problem, parameters=parameters))
+        return _kept(self._around, key, lambda: surveyed(placed(problem, parameters, problem.weights or None)))
 
     def _of(self, nlp: NLP, options: Hashable, make: Callable[[], T]) -> T:
         """Something made of an NLP's functions, which are kept with it lest another gets their address."""

@@ -25,7 +25,7 @@ _LARGEST = 2**63 - 1
 
 
 @dataclass(frozen=True)
-class Column:
+class PartialColumn:
     """The values of one name, one per row.
 
     Attributes:
@@ -41,11 +41,11 @@ class _Sparse:
     def __init__(self) -> None:
         self.values, self.places = array("d"), array("q")
 
-    def full(self, count: int) -> Column:
+    def full(self, count: int) -> PartialColumn:
         places = np.array(self.places, dtype=np.int64)
         values, present = np.full(count, np.nan), np.zeros(count, dtype=bool)
         values[places], present[places] = np.array(self.values), True
-        return Column(values, present)
+        return PartialColumn(values, present)
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Format:
         needs: modules that the extra ``data`` brings.
     """
 
-    write: Callable[[Mapping[str, Column], Path, str], None]
+    write: Callable[[Mapping[str, PartialColumn], Path, str], None]
     needs: tuple[str, ...] = ()
 
 
@@ -106,7 +106,7 @@ def _ending(path: Path) -> str:
     return path.suffix.lstrip(".").lower()
 
 
-def _csv(table: Mapping[str, Column], path: Path, _: str) -> None:
+def _csv(table: Mapping[str, PartialColumn], path: Path, _: str) -> None:
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(table)
@@ -123,17 +123,17 @@ def _texts(values: np.ndarray[Any, Any]) -> list[str]:
     return [str(v) for v in values.tolist()]
 
 
-def _parquet(table: Mapping[str, Column], path: Path, metadata: str) -> None:
+def _parquet(table: Mapping[str, PartialColumn], path: Path, metadata: str) -> None:
     pa, parquet = _needed("pyarrow"), _needed("pyarrow.parquet")
     arrays = {name: pa.array(c.values, _kind(pa, c), mask=~c.present, from_pandas=False) for name, c in table.items()}
     parquet.write_table(pa.table(arrays).replace_schema_metadata({"tmsopt": metadata}), path)
 
 
-def _kind(pa: Any, column: Column) -> Any:
+def _kind(pa: Any, column: PartialColumn) -> Any:
     return pa.string() if column.values.dtype == object else pa.from_numpy_dtype(column.values.dtype)
 
 
-def _netcdf(table: Mapping[str, Column], path: Path, metadata: str) -> None:
+def _netcdf(table: Mapping[str, PartialColumn], path: Path, metadata: str) -> None:
     xarray = _needed("xarray")
     rows = table["number"].values
     names = _names(table)
@@ -184,7 +184,7 @@ FORMATS: Mapping[str, Format] = {
 """Ending → format; another one is added here."""
 
 
-def columns(rows: Iterable[Row]) -> dict[str, Column]:
+def columns(rows: Iterable[Row]) -> dict[str, PartialColumn]:
     """Header → column, in the order of the fields of a row; 8 bytes per number while they are collected."""
     plain: dict[str, list[Any] | array[float]] = {
         name: array("d") if kind is float else [] for name, kind in _FIELDS.items() if name not in PREFIXES
@@ -198,10 +198,10 @@ def columns(rows: Iterable[Row]) -> dict[str, Column]:
             _collect(found, getattr(row, name), count)
         count += 1
     everywhere = np.ones(count, dtype=bool)
-    made: dict[str, Column] = {}
+    made: dict[str, PartialColumn] = {}
     for name, kind in _FIELDS.items():
         if name in plain:
-            made[name] = Column(_array(plain[name], kind), everywhere)
+            made[name] = PartialColumn(_array(plain[name], kind), everywhere)
         else:
             made |= {header(name, key): sparse.full(count) for key, sparse in tables[name].items()}
     return made
@@ -226,7 +226,7 @@ def _array(values: "list[Any] | array[float]", kind: Any) -> NDArray[Any]:
     return np.array(values, dtype=object if kind is str else kind)
 
 
-def levels(columns: Mapping[str, Column]) -> dict[str, Array]:
+def levels(columns: Mapping[str, PartialColumn]) -> dict[str, Array]:
     """Header → ascending values along that axis, where every combination of them is one row; else empty.
 
     What has one value in all rows is no axis.
@@ -242,7 +242,7 @@ def levels(columns: Mapping[str, Column]) -> dict[str, Array]:
     return axes if len(np.unique(places(columns, axes))) == count else {}
 
 
-def places(columns: Mapping[str, Column], axes: Mapping[str, Array]) -> NDArray[np.int64]:
+def places(columns: Mapping[str, PartialColumn], axes: Mapping[str, Array]) -> NDArray[np.int64]:
     """Where each row stands in the grid, flattened with the last axis fastest."""
     indices = tuple(np.searchsorted(values, columns[name].values) for name, values in axes.items())
     return np.asarray(np.ravel_multi_index(indices, tuple(len(v) for v in axes.values())), dtype=np.int64)

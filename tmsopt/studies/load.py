@@ -45,7 +45,7 @@ class _Options(Section):
     report: list[StrictStr] = Field(default_factory=list)
 
 
-class _File(Section):
+class _StudyFile(Section):
     """The shape of a study file."""
 
     title: StrictStr = ""
@@ -89,7 +89,7 @@ def load_study(path: str | PathLike[str]) -> Study | Sampling:
             f'or write a study file with problem = "{Path(page.file).name}" and what varies under [vary]'
         )
         raise InputError([Fault(message, file=page.file)])
-    faults, written = fitted(page.data, _File, _shape_fault)
+    faults, written = fitted(page.data, _StudyFile, _shape_fault)
     problem_faults, problem = _problem(page)
     faults += problem_faults
     if written is None or problem is None:
@@ -101,7 +101,7 @@ def load_study(path: str | PathLike[str]) -> Study | Sampling:
     return _study(page, written, problem, title, faults)
 
 
-def _study(page: Page, written: _File, problem: Problem, title: str, faults: list[Fault]) -> Study:
+def _study(page: Page, written: _StudyFile, problem: Problem, title: str, faults: list[Fault]) -> Study:
     """The study of a file whose rows are given by rule."""
     options = written.study
     found = Varied()
@@ -146,7 +146,7 @@ def _of_problem_file(name: str, fault: Fault) -> Fault:
     return Fault(f"'{name}' {fault.message}; the name is relative to the study file", ("problem",))
 
 
-def _method_faults(written: _File, reported: Set[Key]) -> Iterator[Fault]:
+def _method_faults(written: _StudyFile, reported: Set[Key]) -> Iterator[Fault]:
     """Keys and sections that do not go with the method, or that it needs."""
     options, method = written.study, written.study.method
     if method not in METHODS:
@@ -171,7 +171,7 @@ def _method_faults(written: _File, reported: Set[Key]) -> Iterator[Fault]:
         yield Fault("nothing is free in a Monte Carlo study, so nothing starts warm; leave it out", ("study", "warm"))
 
 
-def _option_faults(written: _File, problem: Problem) -> Iterator[Fault]:
+def _option_faults(written: _StudyFile, problem: Problem) -> Iterator[Fault]:
     options = written.study
     if options.rows is not None:
         yield from count_faults("rows", options.rows, 1, MOST_ROWS)
@@ -181,7 +181,7 @@ def _option_faults(written: _File, problem: Problem) -> Iterator[Fault]:
     yield from common_faults(problem, options.seed, options.starts, options.report)
 
 
-def _varied(page: Page, written: _File, problem: Problem) -> Varied:
+def _varied(page: Page, written: _StudyFile, problem: Problem) -> Varied:
     options = written.study
     if options.method != "csv":
         rows, seed = (max(1, min(options.rows or 1, MOST_ROWS)), max(0, options.seed))  # others are reported already
@@ -199,7 +199,7 @@ def _varied(page: Page, written: _File, problem: Problem) -> Varied:
     return Varied([Fault(text, (column,)).at(file, 1) for column, text in unknown.items() if text], columns)
 
 
-def _sampling(page: Page, written: _File, problem: Problem, title: str, faults: list[Fault]) -> Sampling:
+def _sampling(page: Page, written: _StudyFile, problem: Problem, title: str, faults: list[Fault]) -> Sampling:
     """The Monte Carlo study of a file."""
     options = written.study
     tolerances: dict[str, Any] = {}
@@ -232,7 +232,7 @@ def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:
             message = f"belongs to the problem; write [problem.{section}], or name a problem file"
             return Fault(message, key)
         case (section,) if kind == "extra_forbidden":
-            return Fault(f"unknown key '{section}'; {suggest(section, _File.model_fields)}", key)
+            return Fault(f"unknown key '{section}'; {suggest(section, _StudyFile.model_fields)}", key)
         case ("study", name) if kind == "extra_forbidden":
             return Fault(f"unknown key '{name}'; {suggest(name, _Options.model_fields)}", key)
         case ("problem",) if kind == "missing":

@@ -1,9 +1,10 @@
 """A study carried out: rows by an engine, into a store."""
 
 import time
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
+from itertools import islice
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -35,9 +36,11 @@ class Results:
     """A study with its rows, all of them unless it was interrupted.
 
     Attributes:
-        solved: rows solved now; the others were in the store.
+        solved: rows solved now.
         seconds: that they took.
         engine: ``in process``, ``2 processes`` or the address of a cluster.
+        found: rows that were in the store.
+        about: what exports say of the study: its definition, and of a store when, where and with what it was made.
     """
 
     study: Study
@@ -45,6 +48,8 @@ class Results:
     solved: int
     seconds: float
     engine: str
+    found: int = 0
+    about: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def column(self, name: str) -> NDArray[Any]:
         """The values of one column, one per row, nan where a row has none: by a header of an exported file.
@@ -67,13 +72,13 @@ class Results:
 
     def export(self, path: str | PathLike[str]) -> None:
         """Write the rows to a CSV, Parquet or netCDF file; see `store.export.export`."""
-        export(self.rows, Path(path), {"definition": definition(self.study)})
+        export(self.rows, Path(path), self.about or {"definition": definition(self.study)})
 
 
 def run_study(
     study: Study | Sampling | str | PathLike[str], store: str | PathLike[str] | None = None, *,
-    workers: int | None = None, scheduler: str | None = None, fresh: bool = False, progress: Progress | None = None,
-    note: Note = silent,
+    workers: int | None = None, scheduler: str | None = None, fresh: bool = False, most: int | None = None,
+    progress: Progress | None = None, note: Note = silent,
 ) -> Results:  # fmt: skip
     """Solve every row of a study that its store does not have yet.
 
@@ -86,8 +91,9 @@ def run_study(
         workers: processes of this machine; 1 solves in this one. By default as many as cores, or 1 for few rows.
         scheduler: address of a Dask scheduler, such as ``tcp://host:8786``, in place of workers.
         fresh: move a store that is there aside, and start anew.
-        progress: called with rows done and in all.
-        note: called with a line about workers that end.
+        most: rows to solve now, at most; 0 to see what a store has.
+        progress: called with rows done and in all, first with those found.
+        note: called with a line about the store, and about workers that end.
 
     Raises:
         InputError: for a store of another study, and whatever else cannot be done as asked.
@@ -101,14 +107,20 @@ def run_study(
         kept: list[Row] = []
         began, engine, solved = time.perf_counter(), "", 0
         rows, engine = _solved(asked, set(), workers, scheduler, note)
-        for row in _counted(rows, 0, len(asked), progress):
-            kept.append(row)
-            solved += 1
+        with closing(rows):
+            for row in _counted(islice(rows, most), 0, len(asked), progress):
+                kept.append(row)
+                solved += 1
         kept.sort(key=lambda row: row.number)
         return Results(asked, tuple(kept), solved, time.perf_counter() - began, engine)
     with open_store(Path(store), definition(asked), fresh=fresh) as opened:
-        made = fill(asked, opened, workers=workers, scheduler=scheduler, progress=progress, note=note)
-        return Results(asked, tuple(opened.rows()), *made)
+        for line in (*opened.warnings, *([f"moved the old store to {opened.moved}"] if opened.moved else [])):
+            note(line)
+        found = len(opened.done())
+        if found:
+            note(f"{found} of {len(asked)} rows are in {opened.path}")
+        made = fill(asked, opened, workers=workers, scheduler=scheduler, most=most, progress=progress, note=note)
+        return Results(asked, tuple(opened.rows()), *made, found, opened.about())
 
 
 def _faults(study: object, workers: object) -> Iterator[Fault]:
@@ -122,7 +134,7 @@ def _faults(study: object, workers: object) -> Iterator[Fault]:
 
 def fill(
     study: Study, store: Store, *, workers: int | None = None, scheduler: str | None = None,
-    progress: Progress | None = None, note: Note = silent,
+    most: int | None = None, progress: Progress | None = None, note: Note = silent,
 ) -> tuple[int, float, str]:  # fmt: skip
     """Solve the rows that an open store lacks; how many, in how many seconds, and by which engine."""
     began = time.perf_counter()
@@ -132,7 +144,7 @@ def fill(
     solved, last = 0, began
     with closing(rows):
         try:
-            for row in _counted(rows, len(done), len(study), progress):
+            for row in _counted(islice(rows, most), len(done), len(study), progress):
                 if row.number in done:
                     continue  # of a block that had been stored in part
                 fresh.append(row)
@@ -168,6 +180,8 @@ def _units(study: Study, done: set[int]) -> Iterable[Unit]:
 
 
 def _counted(rows: Iterable[Row], done: int, most: int, progress: Progress | None) -> Iterator[Row]:
+    if progress:
+        progress(done, most)
     for row in rows:
         yield row
         done += 1

@@ -28,14 +28,14 @@ _AFAR = 1
 
 
 @dataclass(frozen=True)
-class Answer:
+class SolvedRow:
     """A row, and the solution that it says the most important of; None where there is none."""
 
     row: Row
     solution: Solution | None = None
 
 
-def alone(study: Study, number: int) -> Answer:
+def alone(study: Study, number: int) -> SolvedRow:
     """One row solved without the others, to the same bits; with warm starts, with the other rows of its block.
 
     Raises:
@@ -61,7 +61,7 @@ class Solver:
         """The rows of a unit."""
         return [answer.row for answer in self.answers(numbers)]
 
-    def answers(self, numbers: Sequence[int]) -> list[Answer]:
+    def answers(self, numbers: Sequence[int]) -> list[SolvedRow]:
         """The rows of a unit, each with its solution."""
         with _pools().limit(limits=1):
             if self.study.warm and len(numbers) > 1:
@@ -80,7 +80,7 @@ class Solver:
         free = {f"{name}.{end}" for name in self.study.problem.free for end in ("min", "max")}
         return Family([name for name in self.study.columns if name not in free])
 
-    def _block(self, numbers: Sequence[int]) -> list[Answer]:
+    def _block(self, numbers: Sequence[int]) -> list[SolvedRow]:
         """Both ends from many starts, the others from their neighbours and from afar; back again where that is better.
 
         An optimum that is carried along can be overtaken by another on the way. The far end and the start from afar
@@ -107,7 +107,7 @@ class Solver:
         sign = self.study.problem.sign
         return sign * one.objective < sign * other.objective and not same(one.objective, other.objective)
 
-    def _answer(self, number: int, neighbour: Row | None = None, afar: int = 0) -> Answer:
+    def _answer(self, number: int, neighbour: Row | None = None, afar: int = 0) -> SolvedRow:
         """One row, near a neighbour's optimum and from so many starts afar if that leads to an optimum."""
         began = time.perf_counter()
         try:
@@ -124,10 +124,10 @@ class Solver:
             row = self._solved(number, solution, warm)
         except InputError as error:
             cause = "; ".join(str(fault) for fault in error.faults)
-            return Answer(self._unsolved(number, "failed", cause, began))
+            return SolvedRow(self._unsolved(number, "failed", cause, began))
         except Exception as error:  # a row that breaks the program must not end a study
-            return Answer(self._unsolved(number, "failed", f"{type(error).__name__}: {error}", began))
-        return Answer(replace(row, seconds=time.perf_counter() - began), solution)
+            return SolvedRow(self._unsolved(number, "failed", f"{type(error).__name__}: {error}", began))
+        return SolvedRow(replace(row, seconds=time.perf_counter() - began), solution)
 
     def _unsolved(self, number: int, status: str, cause: str, began: float | None = None) -> Row:
         return Row(
@@ -157,7 +157,7 @@ def _pools() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def _new(answer: Answer) -> bool:
+def _new(answer: SolvedRow) -> bool:
     """Whether a row may have another optimum than the neighbour that it was started from."""
     starts = answer.solution.starts if answer.solution is not None else None
     return starts is not None and (not answer.row.warm or starts.at_best < starts.tried)

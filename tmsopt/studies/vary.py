@@ -59,7 +59,7 @@ def varied(problem: Problem, table: Mapping[str, Any], method: str, rows: int, s
         if wrong := name_fault(problem, name):
             faults.append(Fault(wrong, key))
         else:
-            read[name] = _Reader(problem, name, key, faults).read(spec, method)
+            read[name] = _VaryReader(problem, name, key, faults).read(spec, method)
     if faults:
         return Varied(faults)
     try:
@@ -119,7 +119,7 @@ class _Points:
 
 
 @dataclass(frozen=True)
-class _Reader:
+class _VaryReader:
     """Reads one entry; adds what is wrong with it to `faults`."""
 
     problem: Problem

@@ -13,7 +13,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from tmsopt.studies.engines.dask_workers import PATIENCE, TOPIC, admitted, check_threads, connected, solve
-from tmsopt.studies.engines.dispatch import Ledger
+from tmsopt.studies.engines.dispatch import Assignments
 from tmsopt.studies.engines.work import EngineError, Note, Unit, Work, pickled, silent
 from tmsopt.studies.row import Row
 
@@ -37,11 +37,11 @@ def cluster(work: Work, units: Sequence[Unit], address: str, note: Note = silent
     """
     blob = pickled(work)
     client = connected(address)
-    engine = _Engine(client, address, Ledger(work, units, note), note, blob)
+    engine = _Engine(client, address, Assignments(work, units, note), note, blob)
     try:
         client.subscribe_topic(TOPIC, lambda event: engine.inbox.put(("rows", event[1])))
         client.subscribe_topic("all", lambda event: engine.inbox.put(("news", event[1])))
-        while engine.ledger.unfinished:
+        while engine.assignments.unfinished:
             engine.look()
             engine.send()
             yield from engine.hear()
@@ -78,7 +78,7 @@ class _Engine:
 
     client: Any
     address: str
-    ledger: Ledger
+    assignments: Assignments
     note: Note
     blob: bytes
     run: str = field(default_factory=lambda: uuid.uuid4().hex)
@@ -122,7 +122,7 @@ class _Engine:
     def send(self) -> None:
         """Give every worker what it should have."""
         for worker, place in self.places.items():
-            units = self.ledger.batch(worker)
+            units = self.assignments.batch(worker)
             if not units:
                 continue
             self.sent += 1
@@ -155,7 +155,7 @@ class _Engine:
         if batch is None:
             return
         for unit, rows, seconds in pickle.loads(done):
-            if self.ledger.delivered(batch.worker, unit, seconds):
+            if self.assignments.delivered(batch.worker, unit, seconds):
                 self.failures = 0
                 batch.missing.discard(unit)
                 yield from rows
@@ -189,12 +189,12 @@ class _Engine:
 
     def _died(self, worker: str) -> Sequence[Row]:
         place = self._forget(worker)
-        return self.ledger.ended(worker, f"worker {place} died", "")
+        return self.assignments.ended(worker, f"worker {place} died", "")
 
     def _recall(self, worker: str) -> None:
         """Nobody is to blame: what the worker holds waits again; if it is still there, the next look takes it in."""
         self._forget(worker)
-        self.ledger.returned(worker)
+        self.assignments.returned(worker)
 
     def _forget(self, worker: str) -> str:
         place = self.places.pop(worker)
@@ -221,7 +221,7 @@ class _Engine:
         match answer:
             case str():
                 self.places[answer] = place
-                self.ledger.join(answer)
+                self.assignments.join(answer)
             case OSError():
                 self.looked = -_LOOK  # it is gone, or the next look asks again
             case Exception():

@@ -14,7 +14,7 @@ _RECENT = 64  # units whose mean time says how long the next ones take
 _KILLS = 2  # workers that a row may end
 
 
-class Ledger:
+class Assignments:
     """The units of a study between those who solve them.
 
     A worker holds its units first in, first out, and hands over each as it is finished. So when it ends, the first one

@@ -5,7 +5,7 @@ from queue import Empty, SimpleQueue
 
 from tmsopt.errors import Fault, InputError
 from tmsopt.processes import Inbox, Worker
-from tmsopt.studies.engines.dispatch import Ledger
+from tmsopt.studies.engines.dispatch import Assignments
 from tmsopt.studies.engines.work import EngineError, Note, Unit, Work, attempt, keep, pickled, silent, timed
 from tmsopt.studies.row import Row
 
@@ -47,20 +47,20 @@ def processes(work: Work, units: Sequence[Unit], workers: int, note: Note = sile
     """
     if workers < 1:
         raise InputError([Fault(f"{workers}; accepted: 1 or more, here up to {cores()} are of use", ("workers",))])
-    ledger = Ledger(work, units, note)
+    assignments = Assignments(work, units, note)
     inbox: Inbox = SimpleQueue()
     crew: dict[Worker, bool] = {}  # with whether they have the work
     stillborn = 0
     try:
         blob = pickled(work)
-        while ledger.unfinished:
-            while len(crew) < min(workers, ledger.unfinished):
+        while assignments.unfinished:
+            while len(crew) < min(workers, assignments.unfinished):
                 worker = Worker(inbox, _ONE_THREAD)
                 worker.send(_take, blob)
                 crew[worker] = False
-                ledger.join(worker.name)
+                assignments.join(worker.name)
             for worker in crew:
-                for unit in ledger.batch(worker.name):
+                for unit in assignments.batch(worker.name):
                     worker.send(timed, _HERE, unit)
             try:
                 worker, message = inbox.get(timeout=_LOOK)
@@ -69,12 +69,12 @@ def processes(work: Work, units: Sequence[Unit], workers: int, note: Note = sile
             if message is None:
                 ready = crew.pop(worker)
                 stillborn += not ready
-                yield from _ended(ledger, worker, ready, stillborn, note)
+                yield from _ended(assignments, worker, ready, stillborn, note)
             elif isinstance(message, str):
                 crew[worker], stillborn = _ready(message), 0
             else:
                 unit, rows, seconds = message
-                if ledger.delivered(worker.name, unit, seconds):
+                if assignments.delivered(worker.name, unit, seconds):
                     yield from rows
     finally:
         for worker in crew:
@@ -97,14 +97,14 @@ def _ready(message: str) -> bool:
     return True
 
 
-def _ended(ledger: Ledger, worker: Worker, ready: bool, stillborn: int, note: Note) -> Sequence[Row]:
+def _ended(assignments: Assignments, worker: Worker, ready: bool, stillborn: int, note: Note) -> Sequence[Row]:
     """Rows given up because a worker ended."""
     cause = worker.end(_PATIENCE)
     if stillborn == _STILLBORN:
         raise EngineError(f"worker processes end before they start ({cause})")
     told = f"worker {worker.name} died ({cause})"
     if ready:
-        return ledger.ended(worker.name, told, cause)
-    ledger.returned(worker.name)
+        return assignments.ended(worker.name, told, cause)
+    assignments.returned(worker.name)
     note(f"{told} before it started")
     return ()

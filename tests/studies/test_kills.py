@@ -1,0 +1,77 @@
+"""Ten thousand rows through twenty kills at random moments: of the study, and of its workers."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tmsopt.studies import alone, load_study, planned
+from tmsopt.studies.store import read_store
+
+EP4 = Path(__file__).parents[2] / "problems" / "ep4.toml"
+ROWS, KILLS, SAMPLE = 10_000, 20, 25
+PAUSE = (0.3, 2.0)
+"""s of work between kills: some shorter than the second after which rows are committed, some longer."""
+
+
+def stored(path: Path) -> set[int]:
+    """Numbers of the rows that the store has acknowledged."""
+    try:
+        with read_store(path) as store:
+            return store.done()
+    except ValueError:  # not made yet
+        return set()
+
+
+def workers_of(pid: int) -> list[int]:
+    found = subprocess.run(["ps", "-o", "pid=,args=", "--ppid", str(pid)], capture_output=True, text=True, check=False)
+    return [int(line.split()[0]) for line in found.stdout.splitlines() if "tmsopt.processes" in line]
+
+
+@pytest.mark.slow
+def test_nothing_is_lost_or_solved_twice(tmp_path: Path) -> None:
+    """What the store has acknowledged stays there and is never solved again; rows have the bits of any other run."""
+    (tmp_path / "built.toml").write_text(
+        f'title = "built"\nproblem = "{EP4}"\n[study]\nmethod = "monte_carlo"\nrows = {ROWS}\n'
+        '[tolerances]\nchi_B = "5 mm"\nlambda_s = "0.5 deg"\nFr = 0.02\n',
+        encoding="utf-8",
+    )
+    path, rng = tmp_path / "s.sqlite", random.Random(0)
+    command = [sys.executable, "-m", "tmsopt", "study", "built.toml", "--workers", "2", "--store", str(path), "--json"]
+
+    def start() -> "subprocess.Popen[bytes]":
+        return subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    process, acknowledged, killed = start(), set[int](), {"study": 0, "worker": 0}
+    for _ in range(KILLS):
+        while process.poll() is None and len(stored(path)) <= len(acknowledged):
+            time.sleep(0.05)
+        time.sleep(rng.uniform(*PAUSE))
+        assert process.poll() is None, "the study ended before all kills; give it more rows"
+        there = stored(path)
+        assert acknowledged <= there
+        acknowledged = there
+        workers = workers_of(process.pid)
+        if workers and rng.random() < 0.5:
+            os.kill(rng.choice(workers), signal.SIGKILL)
+            killed["worker"] += 1
+        else:
+            process.kill()
+            process.wait()
+            killed["study"] += 1
+            process = start()
+    assert process.wait() == 0
+    assert min(killed.values()) >= KILLS // 4
+    study = planned(load_study(tmp_path / "built.toml"))
+    with read_store(path) as store:
+        rows = {row.number: row for row in store.rows()}
+        added = sum(session["rows"] for session in store.sessions())
+    assert sorted(rows) == list(range(ROWS))
+    assert added == ROWS
+    for number in rng.sample(range(ROWS), SAMPLE):
+        assert alone(study, number).row.identity == rows[number].identity
