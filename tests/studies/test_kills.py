@@ -53,9 +53,6 @@ def test_nothing_is_lost_or_solved_twice(tmp_path: Path) -> None:
             time.sleep(0.05)
         time.sleep(rng.uniform(*PAUSE))
         assert process.poll() is None, "the study ended before all kills; give it more rows"
-        there = stored(path)
-        assert acknowledged <= there
-        acknowledged = there
         workers = workers_of(process.pid)
         if workers and rng.random() < 0.5:
             os.kill(rng.choice(workers), signal.SIGKILL)
@@ -65,6 +62,9 @@ def test_nothing_is_lost_or_solved_twice(tmp_path: Path) -> None:
             process.wait()
             killed["study"] += 1
             process = start()
+        there = stored(path)
+        assert acknowledged <= there
+        acknowledged = there
     assert process.wait() == 0
     assert min(killed.values()) >= KILLS // 4
     study = planned(load_study(tmp_path / "built.toml"))
