@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from tmsopt.arithmetic import EVERYTHING, INTERVALS, NotAccepted, ball, interval, ranges, root_bound, walk
-from tmsopt.certificates import FOUND, INFEASIBLE, available, decide, interlacing, squares_of, task, unknowns
+from tmsopt.certificates import FOUND, INFEASIBLE, SCIP, interlacing, squares_of, task, unknowns
 from tmsopt.design import parse_value
 from tmsopt.formulation import NLP
 from tmsopt.roots import product
 
-scip = pytest.mark.skipif(not available(), reason="SCIP is not installed")
+scip = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
 
 # Interlacing. The polynomials are products of rational factors, so where their roots are is known without computing
 # any, on the axis too.
@@ -341,7 +341,7 @@ def test_every_operation_is_what_it_is(text: str) -> None:
     at, _ = ONE_OF_EACH[text]
     value = float(parse_value(text, ("x",))({"x": at}))
     for sign in (1.0, -1.0):
-        decision = decide(task(least(text, (at, at), sign), 5.0, least=True))
+        decision = SCIP.decide(task(least(text, (at, at), sign), 5.0, least=True))
         assert decision.verdict == FOUND
         assert decision.bound == pytest.approx(sign * value, abs=3e-6 * (1 + abs(value)))
         assert decision.bound <= sign * value
@@ -355,7 +355,7 @@ def test_no_value_is_below_the_bound(text: str) -> None:
     values = parse_value(text, ("x",))({"x": np.linspace(*ends, 30001)})
     for sign in (1.0, -1.0):
         lowest = float((sign * values).min())
-        decision = decide(task(least(text, ends, sign), 5.0, least=True))
+        decision = SCIP.decide(task(least(text, ends, sign), 5.0, least=True))
         assert decision.verdict == FOUND
         assert lowest - 1e-5 * (1 + abs(lowest)) <= decision.bound <= lowest
 
@@ -386,7 +386,7 @@ def constrained(texts: Sequence[str], ends: Sequence[tuple[float, float]], most:
     ],
 )
 def test_possible_and_impossible(texts: tuple[str, ...], possible: bool) -> None:
-    decision = decide(task(constrained(texts, [(-2, 2), (0.5, 2)]), 5.0))
+    decision = SCIP.decide(task(constrained(texts, [(-2, 2), (0.5, 2)]), 5.0))
     assert decision.verdict == (FOUND if possible else INFEASIBLE)
     if possible:
         x, y = decision.point if decision.point is not None else (math.nan, math.nan)
@@ -404,7 +404,9 @@ def test_hardly_any_room_is_room(text: str, width: float) -> None:
     centre = {"x": 1.7, "y": 0.9}
     value = float(parse_value(text, ("x", "y"))(centre))
     ends = [(v - width, v + width) for v in centre.values()]
-    assert decide(task(constrained([f"{text} - ({value!r})", f"{value!r} - ({text})"], ends), 5.0)).verdict == FOUND
+    assert (
+        SCIP.decide(task(constrained([f"{text} - ({value!r})", f"{value!r} - ({text})"], ends), 5.0)).verdict == FOUND
+    )
 
 
 def drawn_expression(rng: np.random.Generator, depth: int) -> str:
@@ -431,7 +433,10 @@ def test_what_is_possible_is_never_called_impossible(seed: int) -> None:
     for value in (known.min(), known.max(), known[0]) if len(known) else ():
         slack = 1e-8 * (1 + abs(value))
         rows = [f"{text} - ({float(value + slack)!r})", f"({float(value - slack)!r}) - ({text})"]
-        assert decide(task(constrained(rows, [(-1.0, 1.5), (0.25, 2.0)]), 0.5)).verdict != INFEASIBLE, (text, value)
+        assert SCIP.decide(task(constrained(rows, [(-1.0, 1.5), (0.25, 2.0)]), 0.5)).verdict != INFEASIBLE, (
+            text,
+            value,
+        )
 
 
 @scip
@@ -440,7 +445,7 @@ def test_a_row_without_variables() -> None:
         x = ca.SX.sym("x", 2)
         f = ca.Function("f", [x], [ca.SX(0), ca.vertcat(ca.SX(value))])
         nlp = NLP("test", ("x", "y"), f, (0.0, 0.0), (1.0, 1.0), ("row",), (-math.inf,), (0.0,))
-        assert decide(task(nlp, 5.0)).verdict == verdict
+        assert SCIP.decide(task(nlp, 5.0)).verdict == verdict
 
 
 @scip
@@ -448,4 +453,4 @@ def test_an_operation_that_scip_lacks_is_named() -> None:
     x = ca.SX.sym("x")
     f = ca.Function("f", [x], [ca.floor(x), ca.SX(0, 1)])
     with pytest.raises(NotAccepted, match="floor"):
-        decide(task(NLP("test", ("x",), f, (0.0,), (1.0,), (), (), ()), 1.0))
+        SCIP.decide(task(NLP("test", ("x",), f, (0.0,), (1.0,), (), (), ()), 1.0))

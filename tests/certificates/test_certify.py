@@ -20,17 +20,18 @@ from scipy.optimize import brentq  # type: ignore[import-untyped]
 
 from benchmarks.suites import REFERENCES, random_problem, references
 from tmsopt import InputError, Problem, Solution, certify, models, solve
-from tmsopt.certificates import Crew, available
+from tmsopt.certificates import SCIP, UNDECIDED, Crew, Decision, GlobalSolver, Task
 from tmsopt.cli import main
 from tmsopt.design import Band, Bound
 from tmsopt.records import Array
+from tmsopt.report import solution_table
 
 certifying = import_module("tmsopt.certificates.certify")
 interlaces = import_module("tmsopt.certificates.interlacing")
 started = import_module("tmsopt.processes")
 lines = import_module("tmsopt.certificates.half_planes")
 
-pytestmark = pytest.mark.skipif(not available(), reason="SCIP is not installed")
+pytestmark = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
 
 HEIGHTS = {"mu": 0.1, "chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2}
 OMEGA0 = -((0.4 * 0.2) ** -0.25)  # where chi_H = 1
@@ -494,7 +495,7 @@ def test_progress_is_told(slow_plane: Solution) -> None:
 
 def test_a_crew_is_closed_whatever_happens(children: list[Any]) -> None:
     def fail() -> None:
-        with Crew() as crew:
+        with Crew(SCIP) as crew:
             crew.ahead(2)
             raise ZeroDivisionError
 
@@ -512,10 +513,39 @@ def test_time_must_be_positive(slow_plane: Solution, seconds: float) -> None:
         certify(slow_plane, seconds=seconds)
 
 
-def test_without_scip_the_error_says_what_to_install(slow_plane: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(certifying, "available", lambda: False)
+@pytest.fixture
+def without_scip(monkeypatch: pytest.MonkeyPatch) -> None:
+    missing = replace(SCIP, module="no_such_module")
+    monkeypatch.setattr(certifying, "SOLVER", missing)
+
+
+@pytest.mark.usefixtures("without_scip")
+def test_without_scip_the_error_says_what_to_install(slow_plane: Solution) -> None:
     with pytest.raises(InputError, match=r"PySCIPOpt is not installed; pip install 'tmsopt\[certify\]'"):
         certify(slow_plane)
+
+
+class TimidSolver:
+    """What a second global solver is: it can be anything that decides tasks; this one never does."""
+
+    @staticmethod
+    def prepare() -> None: ...
+
+    @staticmethod
+    def decide(asked: Task) -> Decision:
+        return Decision(UNDECIDED, nodes=7)
+
+
+TIMID = GlobalSolver("Timid", "math", "", 0.0, TimidSolver.prepare, TimidSolver.decide)
+
+
+def test_another_global_solver_is_asked_and_named(slow_plane: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever searched, the bound that holds without a search stays, under its own name."""
+    monkeypatch.setattr(certifying, "SOLVER", TIMID)
+    bound = certify(slow_plane, seconds=0.5).bound
+    assert (bound.method, bound.value, bound.proven) == ("omega0", slow_plane.bound.value, False)
+    assert (bound.solver, bound.nodes > 0) == ("Timid", True)
+    assert "branch and bound with Timid" in solution_table(replace(slow_plane, bound=bound))
 
 
 def test_a_front_has_no_bound() -> None:
@@ -565,8 +595,8 @@ def test_command(file: Path, slow_plane: Solution) -> None:
     assert bound["value"] == pytest.approx(slow_plane.value, rel=CLOSED)
 
 
-def test_command_without_scip(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(certifying, "available", lambda: False)
+@pytest.mark.usefixtures("without_scip")
+def test_command_without_scip(file: Path) -> None:
     code, out, err = run("solve", file, "--certify")
     assert (code, out) == (2, "")
     assert "pip install 'tmsopt[certify]'" in err

@@ -16,7 +16,7 @@ from mpmath import mp
 
 import tmsopt
 from tmsopt.arithmetic import Number
-from tmsopt.certificates import FOUND, INFEASIBLE, Question, available, decide, task
+from tmsopt.certificates import FOUND, INFEASIBLE, SCIP, Question, task
 from tmsopt.checks import omega0_bound, relation_bound
 from tmsopt.models import Model, from_coefficients, from_matrices
 from tmsopt.proofs import Proof, abscissa_formula, prove_design
@@ -25,7 +25,7 @@ from tmsopt.roots.patterns import implies, shown_patterns
 
 rational = import_module("tmsopt.proofs.rational")
 
-scip = pytest.mark.skipif(not available(), reason="SCIP is not installed")
+scip = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
 
 R6 = math.sqrt(15) / 5
 
@@ -170,7 +170,7 @@ def test_more_parameters_than_have_corners() -> None:
 
 def verdict(problem: tmsopt.Problem, limit: float | None) -> set[str]:
     question = Question(problem, limit=limit)
-    return {decide(task(question.program(sign), 20.0)).verdict for sign in question.signs()}
+    return {SCIP.decide(task(question.program(sign), 20.0)).verdict for sign in question.signs()}
 
 
 @scip
@@ -235,7 +235,7 @@ def test_patterns_are_excluded_or_found_in_any_unit(most: float, told: str) -> N
     problem = tmsopt.Problem(
         model, free={"a": (1.0, most), "b": (0.0, 20.0), "c": (0.0, 20.0), "d": (0.0, 20.0)}, locate="EP5"
     )
-    assert {decide(task(Question(problem, unit=128.0).program(1), 20.0)).verdict} == {told}
+    assert {SCIP.decide(task(Question(problem, unit=128.0).program(1), 20.0)).verdict} == {told}
 
 
 @scip

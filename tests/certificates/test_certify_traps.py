@@ -9,10 +9,10 @@ import pytest
 
 from tmsopt import Problem, certify, solve
 from tmsopt.arithmetic import NotAccepted, ball, interval, square
-from tmsopt.certificates import INFEASIBLE, Crew, Decision, Question, interlace, squares_of
+from tmsopt.certificates import INFEASIBLE, SCIP, Crew, Decision, Question, interlace, squares_of, task
 from tmsopt.models import tms
 
-scip = pytest.importorskip("pyscipopt") and pytest.importorskip("tmsopt.certificates.scip")
+pytestmark = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
 
 FIXED = {"Fr": 2.0, "mu": 0.5, "chi_B": 1.3, "chi_H": 1.0, "zeta_B": -0.6, "zeta_H": -0.3, "lambda_s": 0.5}
 CAPSIZE = {**FIXED, "chi_H": 1.2, "mu": 5.0}  # a4 < 0 for tan λ_s < 5/3: one root s > 0, so ζ = −1
@@ -26,7 +26,7 @@ def question(free: Mapping[str, tuple[float, float]], *constraints: str, base: A
 
 
 def verdicts(asked: Question) -> set[str]:
-    return {scip.decide(scip.task(asked.program(sign), 5.0)).verdict for sign in asked.signs()}
+    return {SCIP.decide(task(asked.program(sign), 5.0)).verdict for sign in asked.signs()}
 
 
 @pytest.mark.parametrize(("lower", "upper"), [(-1.5, 0.2), (-0.2, 1.5), (-1.0, 1.0), (0.0, 2.0), (-3.0, -1.0)])

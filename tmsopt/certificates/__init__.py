@@ -1,7 +1,7 @@
 """Certify: no better design exists in the box, by spatial branch and bound (SCIP).
 
-In: a solution. Out: the solution with a proved bound. Open `certify` first; `question` is what SCIP is asked,
-`translation` writes it in SCIP's terms, `race` runs it apart.
+In: a solution. Out: the solution with a proved bound. Open `certify` first; `tasks` is what a global solver is asked,
+`scip` is one, `race` runs it apart.
 """
 
 import lazy_loader

@@ -7,11 +7,13 @@ from .interlacing import (
 )
 from .question import Question as Question
 from .race import Crew as Crew
-from .scip import (
+from .scip import SCIP as SCIP
+from .tasks import (
     FOUND as FOUND,
     INFEASIBLE as INFEASIBLE,
+    UNDECIDED as UNDECIDED,
     Decision as Decision,
-    available as available,
-    decide as decide,
+    GlobalSolver as GlobalSolver,
+    Task as Task,
     task as task,
 )

@@ -12,7 +12,7 @@ from tmsopt.arithmetic.intervals import ranges
 from tmsopt.arithmetic.walk import NotAccepted
 from tmsopt.certificates.question import Question
 from tmsopt.certificates.race import Crew
-from tmsopt.certificates.scip import FOUND, INFEASIBLE, UNDECIDED, Decision, Task, task
+from tmsopt.certificates.tasks import FOUND, INFEASIBLE, UNDECIDED, Decision, Task, task
 from tmsopt.design.solution import Solution
 from tmsopt.formulation.formulate import design_of, variables_of
 from tmsopt.formulation.starts import complete

@@ -10,8 +10,8 @@ from tmsopt.certificates.answer import Answer, Clock, SecondsPassed, answer, con
 from tmsopt.certificates.half_planes import over
 from tmsopt.certificates.question import Question
 from tmsopt.certificates.race import Crew
-from tmsopt.certificates.scip import FOUND, INFEASIBLE, UNDECIDED, available
-from tmsopt.certificates.translation import FEASIBILITY
+from tmsopt.certificates.scip import SCIP
+from tmsopt.certificates.tasks import FOUND, INFEASIBLE, UNDECIDED
 from tmsopt.checks.bound import instant_bound
 from tmsopt.checks.recheck import recheck
 from tmsopt.design.cases import Case
@@ -22,6 +22,9 @@ from tmsopt.design.solution import Bound, Solution
 from tmsopt.errors import Fault, InputError
 from tmsopt.formulation.formulate import Builder
 from tmsopt.solver.solve import solve, solved
+
+SOLVER = SCIP
+"""Who is asked."""
 
 SECONDS = 60.0
 """Time for a proof, by default."""
@@ -64,7 +67,7 @@ def certify(design: Given, *, seconds: float = SECONDS, progress: SecondsPassed 
         return _noted(found, "nothing is free, so there is nothing to bound")
     if problem.objective is None and found.status == "optimal":
         return _noted(found, "nothing is minimised or maximised, so there is nothing to bound")
-    with Crew() as crew:
+    with Crew(SOLVER) as crew:
         clock = Clock(seconds, crew, progress)
         try:
             for _ in range(_REPLACED):
@@ -77,14 +80,13 @@ def certify(design: Given, *, seconds: float = SECONDS, progress: SecondsPassed 
 
 
 def check_installed() -> None:
-    """Refuse where SCIP is missing.
+    """Refuse where the global solver is missing.
 
     Raises:
         InputError: with what to install.
     """
-    if not available():
-        message = "PySCIPOpt is not installed; pip install 'tmsopt[certify]', from a checkout pip install '.[certify]'"
-        raise InputError([Fault(message, ("certify",))])
+    if not SOLVER.available:
+        raise InputError([Fault(SOLVER.missing, ("certify",))])
 
 
 def _bounded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
@@ -96,7 +98,7 @@ def _bounded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     if words := doubt(admitted, _free(design)):
         return _noted(design, f"no bound: {words}"), False
     if contradicted(admitted, _free(design), clock):
-        return _noted(design, "no bound: SCIP's relaxation excludes the design that was found"), False
+        return _noted(design, f"no bound: {SOLVER.name}'s relaxation excludes the design that was found"), False
     proved, failed = math.inf, 0.0
     while (level := _next(proved, failed)) is not None and clock.left > 0:
         share = 1.0 if level in (_FINER, _COARSER[-1]) else _SHARE
@@ -131,9 +133,11 @@ def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
         return answered.better, True
     if answered.verdict == INFEASIBLE:
         if not recheck(design.problem, design.parameters, _cases(design)).violations:
-            return _noted(design, "no proof: SCIP's relaxation excludes the feasible design that was found"), False
+            return _noted(
+                design, f"no proof: {SOLVER.name}'s relaxation excludes the feasible design that was found"
+            ), False
         none = -math.inf if design.problem.sense == "maximize" else math.inf
-        bound = Bound(none, 0.0, True, "scip", clock.used, clock.nodes, FEASIBILITY)
+        bound = _searched(none, 0.0, True, clock)
         return replace(design, status="infeasible", bound=bound), False
     words = "branch and bound did not decide in time whether any design is feasible"
     left = replace(design, bound=_bound(design, math.inf, clock))
@@ -172,7 +176,12 @@ def _bound(design: Solution, level: float, clock: Clock) -> Bound:
     """What has been proved."""
     gap = _gap(design.value, level) if math.isfinite(level) else math.inf
     value = design.value - design.problem.sign * gap if math.isfinite(gap) else -design.problem.sign * math.inf
-    return Bound(value, gap, level <= PROVEN, "scip", clock.used, clock.nodes, FEASIBILITY)
+    return _searched(value, gap, level <= PROVEN, clock)
+
+
+def _searched(value: float, gap: float, proven: bool, clock: Clock) -> Bound:
+    method, took = SOLVER.name.lower(), (clock.used, clock.nodes)
+    return Bound(value, gap, proven, method, *took, tolerance=SOLVER.tolerance, solver=SOLVER.name)
 
 
 def _stronger(design: Solution, known: Bound, searched: Bound) -> Bound:

@@ -1,4 +1,4 @@
-"""SCIP on several questions side by side, the first that is done stopping the others.
+"""A global solver on several questions side by side, the first that is done stopping the others.
 
 SCIP can crash, and two of it in the threads of one process do. In a process of its own it takes nothing with it, can be
 stopped at any moment, and what it prints is not seen.
@@ -9,17 +9,18 @@ from collections.abc import Callable, Sequence
 from queue import Empty, SimpleQueue
 
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.certificates.scip import INFEASIBLE, UNDECIDED, Decision, Task, decide, prepare
+from tmsopt.certificates.tasks import INFEASIBLE, UNDECIDED, Decision, GlobalSolver, Task
 from tmsopt.processes import Inbox, Worker
 
 _TICK = 0.02  # seconds between looks
-_GRACE = 5.0  # seconds that SCIP may take longer than it was given, as it does in the midst of a relaxation
+_GRACE = 5.0  # seconds that a solver may take longer than it was given, as SCIP does in the midst of a relaxation
 
 
 class Crew:
     """Processes that are kept from one question to the next; to be closed."""
 
-    def __init__(self) -> None:
+    def __init__(self, solver: GlobalSolver) -> None:
+        self._solver = solver
         self._idle: list[Worker] = []
         self._inbox: Inbox = SimpleQueue()
 
@@ -34,13 +35,13 @@ class Crew:
         """Start processes that will be needed."""
         while len(self._idle) < count:
             self._idle.append(Worker(self._inbox, apart=True))
-            self._idle[-1].send(prepare)
+            self._idle[-1].send(self._solver.prepare)
 
     def race(self, tasks: Sequence[Task], tick: Callable[[], None] = lambda: None) -> list[Decision]:
         """Decisions on tasks, run all at once, until one is shown to have no feasible point.
 
         Raises:
-            NotAccepted: for operations or numbers that cannot be written for SCIP, if no task can.
+            NotAccepted: for operations or numbers that the solver cannot take, if no task can.
             KeyboardInterrupt: when the user stops it; no process is left behind.
         """
         self.ahead(len(tasks))
@@ -49,7 +50,7 @@ class Crew:
         running = {self._idle.pop(): number for number in range(len(tasks))}
         try:
             for worker, number in running.items():
-                worker.send(_answer, tasks[number])
+                worker.send(_answer, self._solver.decide, tasks[number])
             while running:
                 tick()
                 try:
@@ -78,7 +79,7 @@ class Crew:
         return [answer for answer in answers if isinstance(answer, Decision)]
 
 
-def _answer(task: Task) -> Decision | NotAccepted:
+def _answer(decide: Callable[[Task], Decision], task: Task) -> Decision | NotAccepted:
     try:
         return decide(task)
     except NotAccepted as error:

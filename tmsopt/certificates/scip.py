@@ -1,67 +1,20 @@
 """The one caller of SCIP: tasks in, decisions by spatial branch and bound out."""
 
-import importlib.util
 import math
 import time
-from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tmsopt.certificates.tasks import FOUND, INFEASIBLE, UNDECIDED, Decision, GlobalSolver, Task
 from tmsopt.certificates.translation import FEASIBILITY, translate
-from tmsopt.formulation.nlp import NLP
 
 _LEAST = 0.01  # seconds
 _MARGIN = 1e-6  # relative, for what tolerances do to a bound
-
-INFEASIBLE, FOUND, UNDECIDED = "infeasible", "found", "undecided"
-
-
-@dataclass(frozen=True)
-class Decision:
-    """What branch and bound came to.
-
-    Attributes:
-        verdict: ``infeasible``, ``found``, or ``undecided`` when time ran out.
-        point: of the NLP, where one was found.
-        bound: no feasible point has a lesser objective, if that was asked.
-    """
-
-    verdict: str
-    point: NDArray[np.float64] | None = None
-    bound: float = -math.inf
-    nodes: int = 0
-
-
-@dataclass(frozen=True)
-class Task:
-    """What SCIP is asked.
-
-    Attributes:
-        least: whether for the least objective; else for any feasible point.
-        within: limits for the first variables, narrower than their ranges.
-    """
-
-    nlp: NLP
-    seconds: float
-    least: bool = False
-    within: tuple[tuple[float, float], ...] = ()
-
-
-def available() -> bool:
-    """Whether SCIP is installed."""
-    return importlib.util.find_spec("pyscipopt") is not None
 
 
 def prepare() -> None:
     """Load SCIP before the first task."""
     import pyscipopt  # noqa: F401
-
-
-def task(nlp: NLP, seconds: float, *, least: bool = False, within: tuple[tuple[float, float], ...] = ()) -> Task:
-    """An NLP for SCIP: whether it has any feasible point, or a bound on its objective."""
-    bare = replace(nlp, lifts=(), touches={}, products=(), cases=())  # what SCIP does not need cannot always be pickled
-    return Task(bare, seconds, least, within)
 
 
 def decide(asked: Task) -> Decision:
@@ -94,3 +47,13 @@ def decide(asked: Task) -> Decision:
         bound=math.inf if status == "infeasible" else bound - FEASIBILITY - _MARGIN * abs(bound),
         nodes=int(model.getNTotalNodes()),
     )
+
+
+SCIP = GlobalSolver(
+    name="SCIP",
+    module="pyscipopt",
+    missing="PySCIPOpt is not installed; pip install 'tmsopt[certify]', from a checkout pip install '.[certify]'",
+    tolerance=FEASIBILITY,
+    prepare=prepare,
+    decide=decide,
+)

@@ -42,7 +42,8 @@ class Bound:
         method: how the bound was found: ``omega0``, ``relation`` (of the coefficients), ``scip``, …; ``none``.
         seconds: that branch and bound took.
         nodes: that it needed.
-        tolerance: its feasibility tolerance; it is a proof in floating-point arithmetic. 0 without it.
+        tolerance: its feasibility tolerance; it is a proof in floating-point arithmetic.
+        solver: who searched, such as ``SCIP``, whoever's bound it is; empty without a search.
     """
 
     value: float = -math.inf
@@ -52,11 +53,12 @@ class Bound:
     seconds: float = 0.0
     nodes: int = 0
     tolerance: float = 0.0
+    solver: str = ""
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
         search = {"seconds": round(self.seconds, 4), "nodes": self.nodes, "feasibility_tolerance": self.tolerance}
-        return plain(self, "value gap proven method") | (search if self.tolerance else {})
+        return plain(self, "value gap proven method") | (search if self.solver else {})
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ def headline(solution: Solution) -> str:
     text = problem.minimize or problem.maximize
     asked = f"{problem.sense} {text} = {number(solution.value)}" if text else ""
     located = f"locate {problem.locate}" if problem.locate else ""
-    by = f" to {solution.bound.gap:.0e}" if solution.bound.tolerance else ""
+    by = f" to {solution.bound.gap:.0e}" if solution.bound.solver else ""
     proven = f", proven globally{by}" if solution.bound.proven else ""
     words = solution.status.replace("_", " ")
     if solution.status == "infeasible":

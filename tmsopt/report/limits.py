@@ -13,17 +13,17 @@ from tmsopt.report.text import number
 def bound_lines(solution: Solution) -> list[str]:
     """What no design of the box can beat, and how that is known."""
     bound = solution.bound
-    search = f"branch and bound with SCIP, {bound.nodes} nodes, {bound.seconds:.1f} s"
+    search = f"branch and bound with {bound.solver}, {bound.nodes} nodes, {bound.seconds:.1f} s"
     kind = f"a floating-point proof, feasibility tolerance {bound.tolerance:.0e}"
     if solution.status == "infeasible":
         return [f"proved: no design in the box satisfies all constraints ({search}); {kind}"] if bound.proven else []
     if not math.isfinite(bound.value):
-        return [f"bound: none found in time ({search})"] if bound.tolerance else []
+        return [f"bound: none found in time ({search})"] if bound.solver else []
     side = "above" if solution.problem.sense == "maximize" else "below"
     lines = [f"bound: no design in the box is {side} {number(bound.value)} ({bound.method}); gap {bound.gap:.1e}"]
-    if bound.method == "scip":
+    if bound.method == bound.solver.lower():
         lines.append(f"       {search}; {kind}")
-    elif bound.tolerance:
+    elif bound.solver:
         lines.append(f"       {search} found none better in time")
     return lines
 
