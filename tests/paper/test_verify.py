@@ -2,6 +2,7 @@
 wrong digit or a wrong formula in the paper would change a verdict."""
 
 import json
+from collections import Counter
 from decimal import ROUND_HALF_EVEN, Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -465,7 +466,15 @@ def test_the_text_fits_the_page_and_counts(ledger) -> None:
 
 
 def test_the_page_in_the_repository_is_the_ledger(ledger) -> None:
-    assert PAGE.read_text(encoding="utf-8") == ledger_page(ledger)
+    again = "`tmsopt verify --markdown problems/paper.md` writes it anew"
+    assert PAGE.read_text(encoding="utf-8") == ledger_page(ledger), again
+
+
+def test_the_documentation_counts_as_the_ledger(ledger) -> None:
+    text = " ".join((PAGE.parents[1] / "docs" / "paper.md").read_text(encoding="utf-8").split())
+    verdicts = Counter(entry.verdict for entry in ledger.entries)
+    assert f"{len(ledger.entries)} numbers and statements" in text
+    assert f"{verdicts['EXACT']} are exact" in text
 
 
 def test_the_command(tmp_path) -> None:

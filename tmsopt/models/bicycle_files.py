@@ -14,7 +14,7 @@ from pathlib import Path
 
 from tmsopt.disk import read_text
 from tmsopt.errors import Fault, InputError, suggest
-from tmsopt.models.whipple import whipple
+from tmsopt.models.bicycles import whipple
 from tmsopt.records import Table
 
 _OF = whipple.sets[0]

@@ -16,10 +16,9 @@ from tmsopt.arithmetic.elementary import exact, is_ball
 from tmsopt.arithmetic.formulas import Formulas, formulas
 from tmsopt.arithmetic.operations import BALLS
 from tmsopt.arithmetic.walk import operation_name, steps, walk
+from tmsopt.models.built_in import MODELS
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
 from tmsopt.models.names import latex, spelled, unusable
-from tmsopt.models.tms import tms
-from tmsopt.models.whipple import whipple
 from tmsopt.roots.polynomial import characteristic_polynomial, quadratic_pencil
 
 _ACCEPTED = "accepted: finite numbers, and SX expressions of them"
@@ -121,7 +120,7 @@ def _made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) ->
     key = next(iter(matrices))
     if not isinstance(name, str) or not name.strip() or not name.isprintable():
         raise Unfit("name", f"found {name!r}; accepted: a text of one line")
-    if name.strip() in (tms.name, whipple.name):
+    if name.strip() in MODELS:
         raise Unfit("name", f"'{name.strip()}' is a model of tmsopt's own; give yours another name")
     if not isinstance(quantities or {}, Mapping):
         raise Unfit("quantities", f"found {type(quantities).__name__}; accepted: a mapping of names to expressions")

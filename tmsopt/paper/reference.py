@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from tmsopt import laws
-from tmsopt.models.tms import GRAVITY, from_si
+from tmsopt.models import GRAVITY, from_si
 from tmsopt.records import Table
 
 ZETA_B, ZETA_H = laws.bench["z_B"] / laws.bench["w"], laws.bench["z_H"] / laws.bench["w"]

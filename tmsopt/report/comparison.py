@@ -1,6 +1,6 @@
 """A design beside the laws of the paper, and one formulation beside the other, as text."""
 
-from tmsopt.models.tms import tms
+from tmsopt.models import tms
 from tmsopt.paper.compare import Comparison
 from tmsopt.report.design import facts, headline
 from tmsopt.report.text import columns, number

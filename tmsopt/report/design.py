@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 
 from tmsopt.design.solution import Solution
-from tmsopt.models.tms import GRAVITY, tms, to_si
+from tmsopt.models import GRAVITY, tms, to_si
 from tmsopt.report.limits import bound_lines, case_lines, relaxation_lines
 from tmsopt.report.rows import parameter_rows, pitching, quantity_rows
 from tmsopt.report.text import columns, number

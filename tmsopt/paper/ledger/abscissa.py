@@ -1,7 +1,7 @@
 """Section 2.3: the least spectral abscissa and the conditions for an EP4."""
 
+from tmsopt.models import copo, matrices
 from tmsopt.models.exact import Tilt
-from tmsopt.models.tms import copo, matrices
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.algebra import polynomials, positive, q, ring, substitute
 from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal

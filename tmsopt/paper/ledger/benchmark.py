@@ -6,7 +6,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.models.tms import copo, matrices
+from tmsopt.models import copo, matrices
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.abscissa import product_bound
 from tmsopt.paper.ledger.algebra import Polynomial, evaluate, kernel, matched, polynomials, q, stable, stable_left_of

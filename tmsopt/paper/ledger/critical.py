@@ -2,8 +2,8 @@
 
 from typing import Any
 
+from tmsopt.models import copo
 from tmsopt.models.exact import Tilt
-from tmsopt.models.tms import copo
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.algebra import depends, polynomials, q, ring
 from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal

@@ -2,7 +2,7 @@
 
 import flint
 
-from tmsopt.models.tms import copo
+from tmsopt.models import copo
 from tmsopt.paper.ledger import lemmas, printed
 from tmsopt.paper.ledger.algebra import Quotient, depends, polynomials, q, ring, vanishes
 from tmsopt.paper.ledger.entry import Claim, Outcome, decimal, digits, proof, section

@@ -5,8 +5,8 @@ from typing import Any
 
 import flint
 
+from tmsopt.models import copo
 from tmsopt.models.exact import Tilt
-from tmsopt.models.tms import copo
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.abscissa import product_bound
 from tmsopt.paper.ledger.algebra import matched, polynomials, positive_quotient, q, ring, stable_left_of

@@ -11,8 +11,8 @@ from typing import Any
 
 import flint
 
+from tmsopt.models import copo
 from tmsopt.models.exact import Tilt
-from tmsopt.models.tms import copo
 from tmsopt.paper.ledger.algebra import Quotient, matched, polynomials, positive, q, ring, stable, substitute
 from tmsopt.paper.ledger.printed import laws
 

@@ -2,8 +2,8 @@
 
 import flint
 
+from tmsopt.models import matrices, tms
 from tmsopt.models.exact import Tilt
-from tmsopt.models.tms import matrices, tms
 from tmsopt.paper.ledger import printed
 from tmsopt.paper.ledger.algebra import depends, polynomials, q, ring
 from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal

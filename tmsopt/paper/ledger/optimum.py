@@ -4,7 +4,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.models.tms import copo
+from tmsopt.models import copo
 from tmsopt.paper.ledger import lemmas
 from tmsopt.paper.ledger.abscissa import product_bound
 from tmsopt.paper.ledger.algebra import heavily_damped, polynomials, positive_quotient, q, ring, stable

@@ -6,8 +6,8 @@ from typing import Any
 
 import flint
 
+from tmsopt.models import copo
 from tmsopt.models.exact import Tilt
-from tmsopt.models.tms import copo
 from tmsopt.paper.ledger import lemmas
 from tmsopt.paper.ledger.algebra import matched, polynomials, positive, q, ring, stable, unstable
 from tmsopt.paper.ledger.entry import EXACT, Claim, Outcome, decimal, proof, section, universal

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from tmsopt.arithmetic.elementary import sqrt, tan
+from tmsopt.models.bicycles.tms_equations import compact_copo, copo, matrices
+from tmsopt.models.bicycles.tms_quantities import NATIVE_QUANTITIES, SI_QUANTITIES
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Range
-from tmsopt.models.tms_equations import compact_copo, copo, matrices
-from tmsopt.models.tms_quantities import NATIVE_QUANTITIES, SI_QUANTITIES
 
 __all__ = ["GRAVITY", "copo", "from_si", "matrices", "tms", "to_si"]
 

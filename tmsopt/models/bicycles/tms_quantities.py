@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from tmsopt.arithmetic.elementary import chosen, is_ball, positive_part, quotient, sqrt, tan
-from tmsopt.models.bicycle import nothing, omega0, omega0_equation, smaller_eigenvalue
+from tmsopt.models.bicycles.bicycle import nothing, omega0, omega0_equation, smaller_eigenvalue
+from tmsopt.models.bicycles.tms_equations import matrices
 from tmsopt.models.model import Quantity, Range
-from tmsopt.models.tms_equations import matrices
 
 _NOT_NEGATIVE = Range(lower=0.0)
 _NOT_POSITIVE = Range(upper=0.0)

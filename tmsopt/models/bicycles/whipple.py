@@ -7,10 +7,10 @@ in the same parameters, with the same roots per second.
 from collections.abc import Mapping
 from typing import Any
 
+from tmsopt.models.bicycles.tms import GRAVITY, LAMBDA_S
+from tmsopt.models.bicycles.whipple_equations import carvallo_whipple, matrices
+from tmsopt.models.bicycles.whipple_quantities import QUANTITIES, algebraic, canonical
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Range
-from tmsopt.models.tms import GRAVITY, LAMBDA_S
-from tmsopt.models.whipple_equations import carvallo_whipple, matrices
-from tmsopt.models.whipple_quantities import QUANTITIES, algebraic, canonical
 
 __all__ = ["canonical", "carvallo_whipple", "matrices", "whipple"]
 
