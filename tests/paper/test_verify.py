@@ -474,7 +474,7 @@ def test_the_documentation_counts_as_the_ledger(ledger) -> None:
     text = " ".join((PAGE.parents[1] / "docs" / "paper.md").read_text(encoding="utf-8").split())
     verdicts = Counter(entry.verdict for entry in ledger.entries)
     assert f"{len(ledger.entries)} numbers and statements" in text
-    assert f"{verdicts['EXACT']} are exact" in text
+    assert f"{verdicts['exact']} are exact" in text
 
 
 def test_the_command(tmp_path) -> None:
