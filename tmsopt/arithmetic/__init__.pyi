@@ -1,25 +1,13 @@
 from .arrays import Program as Program, program as program
 from .balls import Number as Number, number as number
 from .elementary import (
-    exact as exact,
-    greater as greater,
-    lesser as lesser,
-    magnitude as magnitude,
-    positive_part as positive_part,
-    power as power,
-    quotient as quotient,
-    sqrt as sqrt,
-    tan as tan,
+    exact as exact, greater as greater, lesser as lesser, magnitude as magnitude, positive_part as positive_part,
+    power as power, quotient as quotient, sqrt as sqrt, tan as tan,
 )
 from .formulas import formulas as formulas
 from .intervals import (
-    EVERYTHING as EVERYTHING,
-    INTERVALS as INTERVALS,
-    ball as ball,
-    interval as interval,
-    ranges as ranges,
-    root_bound as root_bound,
-    square as square,
+    EVERYTHING as EVERYTHING, INTERVALS as INTERVALS, ball as ball, interval as interval, ranges as ranges,
+    root_bound as root_bound, square as square,
 )
 from .krawczyk import Refused as Refused, enclosed as enclosed, refined as refined
 from .operations import ARRAYS as ARRAYS, BALLS as BALLS

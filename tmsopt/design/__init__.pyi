@@ -1,8 +1,6 @@
 from .cases import Band as Band, Case as Case
 from .expression import (
-    Expression as Expression,
-    ExpressionError as ExpressionError,
-    parse_comparison as parse_comparison,
+    Expression as Expression, ExpressionError as ExpressionError, parse_comparison as parse_comparison,
     parse_value as parse_value,
 )
 from .files import Given as Given, load as load, problem_of as problem_of, question_of as question_of
@@ -11,9 +9,6 @@ from .problem import Problem as Problem, freedom as freedom
 from .quantities import NO_RADIUS as NO_RADIUS, ROOT_NAMES as ROOT_NAMES
 from .solution import Bound as Bound, NotSolved as NotSolved, Solution as Solution, Starts as Starts
 from .units import (
-    decay_time as decay_time,
-    frequencies as frequencies,
-    growth_time as growth_time,
-    reading as reading,
+    decay_time as decay_time, frequencies as frequencies, growth_time as growth_time, reading as reading,
     with_unit as with_unit,
 )

@@ -1,12 +1,8 @@
 from .explain import Explanation as Explanation, explain as explain
 from .limits import moved as moved
 from .optimality import (
-    NOT_COVERED as NOT_COVERED,
-    NOT_MINIMAL as NOT_MINIMAL,
-    STRICT as STRICT,
-    UNDECIDED as UNDECIDED,
-    Optimality as Optimality,
-    optimality as optimality,
+    NOT_COVERED as NOT_COVERED, NOT_MINIMAL as NOT_MINIMAL, STRICT as STRICT, UNDECIDED as UNDECIDED,
+    Optimality as Optimality, optimality as optimality,
 )
 from .rounding import rounded as rounded
 from .steps import natural_step as natural_step, step_within as step_within

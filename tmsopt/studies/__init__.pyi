@@ -5,11 +5,7 @@ from .neighbours import blocks as blocks
 from .row import Row as Row
 from .run import Results as Results, fill as fill, run_study as run_study
 from .samples import (
-    Span as Span,
-    grid as grid,
-    latin_hypercube as latin_hypercube,
-    sobol as sobol,
-    sobol_note as sobol_note,
+    Span as Span, grid as grid, latin_hypercube as latin_hypercube, sobol as sobol, sobol_note as sobol_note,
 )
 from .solving import Solver as Solver, alone as alone
 from .study import Study as Study, definition as definition, over_grid as over_grid
