@@ -22,6 +22,7 @@ ASKED: dict[str, Callable[[Any], Any]] = {
     "explain": lambda given: tmsopt.explain(given).summary,
     "optimality": lambda given: tmsopt.optimality(given).verdict,
     "diagnose": tmsopt.diagnose,
+    "growth": lambda given: tmsopt.growth(given).stable,
 }
 """Verbs about a design: a problem is solved first."""
 
@@ -56,6 +57,36 @@ def test_anything_else_is_refused_in_words(verb: str, wrong: object) -> None:
         pytest.importorskip("pyscipopt")
     with pytest.raises(tmsopt.InputError, match="accepted: a Problem, the path of a problem file, or a Solution"):
         (ASKED | DRAWN)[verb](wrong)
+
+
+@pytest.mark.parametrize("reader", ["load", "load_study", "open_chart", "read_bicycle"])
+@pytest.mark.parametrize("wrong", [3, None, ["Fr"], b"problems/ep4.toml"], ids=repr)
+def test_what_is_no_path_is_refused_in_words(reader: str, wrong: object) -> None:
+    with pytest.raises(tmsopt.InputError, match="accepted: the path of a"):
+        getattr(tmsopt, reader)(wrong)
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [("starts", 0), ("starts", "5"), ("starts", 2.5), ("starts", True), ("seed", -1), ("seed", "a"), ("near", 5)],
+)
+def test_an_option_says_what_it_accepts(name: str, wrong: object) -> None:
+    with pytest.raises(tmsopt.InputError, match=f"{name}: found .*accepted: a"):
+        tmsopt.solve(EP4, **{name: wrong})  # type: ignore[arg-type]
+
+
+def test_a_near_design_may_be_given_in_part() -> None:
+    assert tmsopt.solve(EP4, near={"Fr": 2.0}).structure == "EP4"
+
+
+def test_parameters_of_a_design_must_be_numbers_and_all_there() -> None:
+    problem = tmsopt.load(EP4)
+    with pytest.raises(
+        tmsopt.InputError, match=r"parameters\.chi_B: give a number\nparameters\.lambda_s: give a number"
+    ):
+        tmsopt.speeds({"Fr": 1.0, "lambda_s": "steep"}, problem=problem)  # type: ignore[dict-item]
+    own = {"chi_B": 1.41, "lambda_s": 0.41}  # the speed is what varies
+    assert tmsopt.speeds(own, problem=EP4).found == tmsopt.speeds(own | {"Fr": 2.0}, problem=problem).found
 
 
 def test_a_file_must_ask_where_the_verb_needs_a_question() -> None:
@@ -96,3 +127,6 @@ def test_a_study_may_be_given_by_its_file(tmp_path: Path) -> None:
     assert [row.abscissa for row in results.rows] == [tmsopt.solve(EP4).abscissa] * 2  # chi_H = 1: mu plays no part
     with pytest.raises(tmsopt.InputError, match="accepted: a Study"):
         tmsopt.run_study(3)  # type: ignore[arg-type]
+    assert [row.number for row in tmsopt.run_study(file, workers=1, most=1).rows] == [0]
+    with pytest.raises(tmsopt.InputError, match="most: found -1; accepted: a whole number, 0 or more"):
+        tmsopt.run_study(file, most=-1)

@@ -1,7 +1,7 @@
 from . import laws as laws, models as models, plots as plots, report as report, roots as roots
 from .certificates import certify as certify
 from .charts import Chart as Chart, chart as chart, open_chart as open_chart
-from .critical_speeds import Speeds as Speeds, growth as growth, speeds as speeds
+from .critical_speeds import Growth as Growth, Speeds as Speeds, growth as growth, speeds as speeds
 from .design import (
     Band as Band, Bound as Bound, Case as Case, NotSolved as NotSolved, Problem as Problem, Solution as Solution,
     Starts as Starts, load as load,
@@ -11,6 +11,7 @@ from .errors import Fault as Fault, InputError as InputError
 from .explanation import (
     Explanation as Explanation, Optimality as Optimality, explain as explain, optimality as optimality,
 )
+from .formulation import Options as Options
 from .fronts import Front as Front, pareto as pareto
 from .margins import Nearest as Nearest, Robustness as Robustness, nearest as nearest, robustness as robustness
 from .models import Bicycle as Bicycle, read_bicycle as read_bicycle, write_bicycle as write_bicycle
@@ -18,8 +19,9 @@ from .paper import Comparison as Comparison, Ledger as Ledger, compare as compar
 from .proofs import Proof as Proof, prove as prove
 from .solver import Every as Every, solve as solve, solve_all as solve_all
 from .studies import (
-    Results as Results, Row as Row, Study as Study, latin_hypercube as latin_hypercube, load_study as load_study,
-    monte_carlo as monte_carlo, over_grid as over_grid, run_study as run_study, sobol as sobol,
+    Results as Results, Row as Row, Sampling as Sampling, Span as Span, Study as Study,
+    latin_hypercube as latin_hypercube, load_study as load_study, monte_carlo as monte_carlo, over_grid as over_grid,
+    run_study as run_study, sobol as sobol,
 )
 from .tracing import (
     Branch as Branch, Domain as Domain, Event as Event, Swallowtail as Swallowtail, Trace as Trace, domain as domain,

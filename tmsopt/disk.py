@@ -13,7 +13,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.errors import Fault, InputError, short, suggest
 
 if TYPE_CHECKING:
     import sqlite3
@@ -219,6 +219,17 @@ def read_text(file: str, kind: str, largest: int = LARGEST) -> str:
     except UnicodeDecodeError as error:
         line = raw[: error.start].count(b"\n") + 1
         raise InputError([Fault(f"not {form}: byte {raw[error.start]:#x} is not UTF-8").at(file, line)]) from None
+
+
+def path_of(given: object, what: str) -> Path:
+    """The path of a file that a user names.
+
+    Raises:
+        InputError: for what is none.
+    """
+    if not isinstance(given, str | PathLike):
+        raise InputError([Fault(f"found {short(given)}; accepted: the path of {what}", ("path",))])
+    return Path(given)
 
 
 def write_csv(path: str | PathLike[str], rows: Sequence[Mapping[str, Any]]) -> None:

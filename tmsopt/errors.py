@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from numbers import Integral
 from typing import Any
 
 
@@ -39,6 +40,15 @@ class InputError(ValueError):
 
     def __reduce__(self) -> tuple[type["InputError"], tuple[tuple[Fault, ...]]]:
         return InputError, (self.faults,)
+
+
+def count_faults(name: str, value: Any, least: int, most: int | None = None) -> list[Fault]:
+    """What is wrong with a whole number that a user gave."""
+    whole = isinstance(value, Integral) and not isinstance(value, bool)
+    if whole and value >= least and (most is None or value <= most):
+        return []
+    accepted = f"a whole number, {least} or more" if most is None else f"a whole number from {least} to {most}"
+    return [Fault(f"found {short(value)}; accepted: {accepted}", (name,))]
 
 
 def suggest(name: str, accepted: Iterable[str]) -> str:

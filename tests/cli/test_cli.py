@@ -167,3 +167,10 @@ def test_an_answer_that_cannot_be_written_is_no_traceback():
     assert done.returncode == 2
     assert "cannot be written" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("option", ["--certify", "--diagnose", "--plot=all.png"])
+def test_all_designs_are_not_one(capsys, option):
+    code, out, err = run(capsys, "solve", "problems/coupled_pair.toml", "--all", option)
+    assert (code, out) == (2, "")
+    assert f"{option.partition('=')[0]}: is for one design, and --all looks for all of them" in err

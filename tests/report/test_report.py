@@ -5,14 +5,16 @@ import math
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from helpers.designs import ROBOT
 
 import tmsopt
-from tmsopt.design import Solution
+from tmsopt.design import Relaxation, Solution
 from tmsopt.models import tms
+from tmsopt.records import Table
 from tmsopt.report import solution_table
 
 BENCHMARK = dict(tmsopt.load("problems/benchmark.toml").fixed)
@@ -210,3 +212,11 @@ def test_laws_charts_and_traces_are_of_the_nominal_design():
     assert asked.nominal.fixed == pytest.approx(plain.fixed, abs=1e-15)
     assert plain.nominal is plain
     assert tmsopt.compare(asked).design.abscissa == pytest.approx(tmsopt.solve(plain).abscissa, abs=1e-12)
+
+
+def test_a_limit_without_a_value_is_named_without_an_amount() -> None:
+    """omega0 is negative wherever it exists, so that at the edge of where it does nothing is large enough."""
+    design = tmsopt.solve("problems/ep4.toml")
+    conflict = Relaxation(design.parameters, Table({"trail": math.inf}), ("trail",), Table({}))
+    report = solution_table(replace(design, status="infeasible", relaxation=conflict))
+    assert re.search(r"smallest relaxation found: trail \(.*\), which has no value there", report)

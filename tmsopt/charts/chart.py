@@ -29,7 +29,8 @@ from tmsopt.charts.survey import LAYERS, USUAL, Grid, Survey, survey
 from tmsopt.charts.tiles import TILE, Memory, computed
 from tmsopt.design.files import Given
 from tmsopt.design.problem import Problem
-from tmsopt.errors import Fault, InputError
+from tmsopt.disk import path_of
+from tmsopt.errors import Fault, InputError, count_faults
 from tmsopt.models import MODELS
 from tmsopt.records import Array, Progress
 from tmsopt.roots import CLASSES
@@ -163,9 +164,8 @@ def chart(
         InputError: for bad input; for a folder that holds another chart, with the differences, or is damaged.
         OSError: where the disk is full; what is recorded stays right.
     """
-    if not isinstance(workers, int) or not 1 <= workers <= _MOST_WORKERS:
-        message = f"found {workers!r}; accepted: a whole number from 1 to {_MOST_WORKERS}"
-        raise InputError([Fault(message, ("workers",))])
+    if faults := [*count_faults("workers", workers, 1, _MOST_WORKERS), *count_faults("tile", tile, 1)]:
+        raise InputError(faults)
     wanted = layers if layers is not None else tuple(LAYERS) if folder is None else USUAL
     work = survey(problem, axes, points, wanted, quantities, engine, single)
     path, grid = None if folder is None else Path(folder), work.grid
@@ -203,7 +203,7 @@ def open_chart(path: str | Path) -> Chart:
     Raises:
         InputError: where that is none, or is not finished, or damaged.
     """
-    return _opened(Path(path))
+    return _opened(path_of(path, "a folder that tmsopt.chart made"))
 
 
 _MOST_WORKERS = 256

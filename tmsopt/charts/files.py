@@ -14,9 +14,6 @@ from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
 from tmsopt.roots import CLASSES
 
-ENDINGS = ("npz", "nc")
-"""Of the files that this writes."""
-
 
 def save_layers(problem: Problem, grid: Grid, layers: Mapping[str, NDArray[Any]], path: Path) -> None:
     """Write axes and layers by name, with what they are about, as the ending of the file says.

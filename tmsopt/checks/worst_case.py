@@ -111,13 +111,9 @@ class _Space:
         return Case(Table({**self.at, **values}), Table(moves))
 
     def peaks(
-        self,
-        problem: Problem,
-        parameters: Mapping[str, float],
-        sign: float,
-        what: Expression | str,
-        shared: Mapping[str, float],
-    ) -> Iterator[Case]:
+        self, problem: Problem, parameters: Mapping[str, float], sign: float, what: Expression | str, shared:
+        Mapping[str, float],
+    ) -> Iterator[Case]:  # fmt: skip
         """The worst few points of a grid, each moved to where it is locally worst."""
         size = len(self.bands) + len(self.tolerances)
         if size == 0:
@@ -163,13 +159,9 @@ def _spaces(problem: Problem) -> Iterator[_Space]:
 
 
 def _evaluated(
-    problem: Problem,
-    parameters: Mapping[str, Any],
-    offset: Mapping[str, Array],
-    count: int,
-    what: Expression | str,
+    problem: Problem, parameters: Mapping[str, Any], offset: Mapping[str, Array], count: int, what: Expression | str,
     shared: Mapping[str, float],
-) -> Array:
+) -> Array:  # fmt: skip
     varied = Case(offset=offset).applied(parameters)  # type: ignore[arg-type]
     columns = {n: np.broadcast_to(np.asarray(v, dtype=float), count) for n, v in varied.items()}
     values = Values(problem.model, problem.parameter_set, columns, extra=ARRAY_ROOT_QUANTITIES)

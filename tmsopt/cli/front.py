@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tmsopt import Problem
 
 
-def check_options(problem: "Problem", given: Sequence[str]) -> None:
+def check_options(problem: "Problem", given: Sequence[str], every: bool) -> None:
     """Refuse options that mean nothing for this problem.
 
     Raises:
@@ -20,6 +20,9 @@ def check_options(problem: "Problem", given: Sequence[str]) -> None:
     """
     from tmsopt import Fault, InputError
 
+    if every and (alone := [o for o in given if o in ("--certify", "--diagnose", "--plot")]):
+        message = "is for one design, and --all looks for all of them; leave one of the two out"
+        raise InputError([Fault(message, (option,)) for option in alone])
     if problem.pareto:
         if alone := [o for o in given if o in ("--certify", "--diagnose")]:
             message = "is for one design, and the file asks for a front; write minimize with one of the expressions"

@@ -137,7 +137,7 @@ def solve(
         check_output("--plot", plot, FIGURES)
         check_output("--csv", csv_file, ("csv",))
         problem = question_of(file, front=True)
-        check_options(problem, _given(context))
+        check_options(problem, _given(context), every)
         if certify:
             from tmsopt.certificates import check_installed
 

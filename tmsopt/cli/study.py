@@ -131,7 +131,10 @@ def _carried_out(asked: "Study", path: Path, fresh: bool, where: Mapping[str, An
             bar.update(done - bar.n)
 
         def note(line: str) -> None:
-            bar.write(line, file=sys.stderr)
+            if bar.total is None:  # nothing is drawn yet
+                click.echo(line, err=True)
+            else:
+                bar.write(line, file=sys.stderr)
 
         try:
             return run_study(asked, path, fresh=fresh, progress=update, note=note, **where), False

@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from tmsopt.arithmetic.elementary import exact
 from tmsopt.critical_speeds.crossings import Stretch, crossings
 from tmsopt.critical_speeds.speeds import coefficients_over
+from tmsopt.design.files import Given
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import Parameter, ParameterSet, Values
 from tmsopt.records import Array, Truth
 from tmsopt.roots import is_stable, roots
+from tmsopt.solver.solve import solved
 
 SPEEDS = ("Fr", "v")
 """Native parameters that roots are shown over unless another is named; of a model without a speed, the first free."""
@@ -48,12 +50,13 @@ class Growth:
     heavily_damped: tuple[Stretch, ...]
 
 
-def growth(design: Solution, end: float | None = None, over: str | None = None) -> Growth:
+def growth(design: Given, end: float | None = None, over: str | None = None) -> Growth:
     """Roots over a parameter, all else as designed.
 
     Points crowd around the design, where roots near an exceptional point move like a fractional power of the parameter.
 
     Args:
+        design: a solution, or a problem or its file, solved first.
         end: of a range that begins at 0; by default twice the larger of the design's and the critical speed, or for
             another parameter its box if it is free, and else up to twice the design's value.
         over: a native parameter or one of the problem; by default the speed, or the first free one.
@@ -61,6 +64,7 @@ def growth(design: Solution, end: float | None = None, over: str | None = None) 
     Raises:
         InputError: for an unknown parameter.
     """
+    design = solved(design)
     of, parameters, name = _written(design, over)
     model = design.problem.model
     known = f"{name}_c" in model.quantity_names(of)

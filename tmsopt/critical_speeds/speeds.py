@@ -85,13 +85,9 @@ class Speeds:
 
 
 def speeds(
-    design: Given | Mapping[str, float],
-    parameter: str | None = None,
-    *,
-    between: Stretch | None = None,
-    problem: Problem | None = None,
-    progress: Progress | None = None,
-) -> Speeds:
+    design: Given | Mapping[str, float], parameter: str | None = None, *, between: Stretch | None = None, problem: Given
+    | None = None, progress: Progress | None = None,
+) -> Speeds:  # fmt: skip
     """Every weave and capsize speed of a design and every speed at which roots meet, by exact root isolation.
 
     The coefficients are polynomials in the speed, so these speeds are the roots of polynomials too, and none is missed.
@@ -107,7 +103,7 @@ def speeds(
         NotSolved: where there is no design to look at.
         InputError: where the parameter does not enter as a polynomial.
     """
-    asked = (problem if problem is not None and isinstance(design, Mapping) else problem_of(design)).nominal
+    asked = problem_of(problem if problem is not None and isinstance(design, Mapping) else design).nominal
     of = asked.parameter_set
     name = parameter if parameter is not None else speed_of(of)
     if name is None:
@@ -150,7 +146,11 @@ def _parameters(design: Any, asked: Problem, name: str, progress: Progress | Non
     if isinstance(design, Solution):
         return dict(design.parameters)
     if isinstance(design, Mapping):
-        return {**asked.fixed, **design}
+        own = {**asked.fixed, **design}
+        wrong = [n for n in asked.parameter_set.names if n != name and not isinstance(own.get(n), int | float)]
+        if wrong:
+            raise InputError([Fault("give a number", ("parameters", n)) for n in wrong])
+        return {name: 1.0, **own}
     return dict(asked.fixed if set(asked.free) <= {name} else solve(asked, progress=progress).parameters)
 
 

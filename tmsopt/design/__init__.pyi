@@ -7,7 +7,9 @@ from .files import Given as Given, load as load, problem_of as problem_of, quest
 from .limit import limit_of as limit_of, with_limit as with_limit
 from .problem import Problem as Problem, freedom as freedom
 from .quantities import NO_RADIUS as NO_RADIUS, ROOT_NAMES as ROOT_NAMES
-from .solution import Bound as Bound, NotSolved as NotSolved, Solution as Solution, Starts as Starts
+from .solution import (
+    Bound as Bound, NotSolved as NotSolved, Relaxation as Relaxation, Solution as Solution, Starts as Starts,
+)
 from .units import (
     decay_time as decay_time, frequencies as frequencies, growth_time as growth_time, reading as reading,
     with_unit as with_unit,

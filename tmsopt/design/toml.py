@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, StrictFloat, StrictInt, StrictStr, ValidationError
 
-from tmsopt.disk import read_text
+from tmsopt.disk import path_of, read_text
 from tmsopt.errors import Fault, InputError
 
 Number = StrictFloat | StrictInt | StrictStr
@@ -58,7 +58,8 @@ def read_page(path: str | PathLike[str], kind: str) -> Page:
     Raises:
         InputError: for a file that cannot be read, or is not TOML.
     """
-    file = str(path)
+    path_of(path, f"a {kind} file")
+    file = str(path) or "."
     text = read_text(file, f"TOML {kind} file")
     try:
         data = tomllib.loads(text)

@@ -4,7 +4,7 @@ from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypedDict
 
-from tmsopt.errors import suggest
+from tmsopt.errors import Fault, InputError, count_faults, short, suggest
 from tmsopt.records import Progress
 
 STARTS = 64
@@ -60,14 +60,25 @@ class Options:
 DEFAULTS = Options()
 
 
-def options_of(asked: Asked | AskedOfSolve, accepted: type = Asked, defaults: Options = DEFAULTS) -> Options:
+def options_of(
+    asked: Asked | AskedOfSolve, accepted: type = Asked, defaults: Options = DEFAULTS, fewest: int = 1
+) -> Options:
     """Options that a user named, and the verb's own defaults for the others.
+
+    Args:
+        fewest: starts that make sense.
 
     Raises:
         TypeError: for a name that is not accepted.
+        InputError: for a value that is not.
     """
     given: dict[str, Any] = {**vars(defaults), **asked}
     for name in asked:
         if name not in accepted.__annotations__:
             raise TypeError(f"unknown option '{name}'; {suggest(name, accepted.__annotations__)}")
+    faults = [*count_faults("starts", given["starts"], fewest), *count_faults("seed", given["seed"], 0)]
+    if not isinstance(given["near"], Mapping | None):
+        faults.append(Fault(f"found {short(given['near'])}; accepted: a mapping of parameters to values", ("near",)))
+    if faults:
+        raise InputError(faults)
     return Options(**given)

@@ -6,7 +6,7 @@ from typing import Unpack
 
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.solution import NotSolved
-from tmsopt.errors import Fault, InputError
+from tmsopt.errors import Fault, InputError, count_faults
 from tmsopt.formulation.options import Asked, Options, options_of
 from tmsopt.fronts.curve import curve
 from tmsopt.fronts.front import Front, FrontPoint
@@ -36,16 +36,15 @@ def pareto(problem: Given, points: int = POINTS, **options: Unpack[Asked]) -> Fr
 
     Raises:
         NotSolved: when an objective has no optimum, carrying the best point found.
-        InputError: for a problem without ``pareto``.
-        ValueError: for fewer than 2 points or 0 starts.
+        InputError: for a problem without ``pareto``, or fewer than 2 points.
     """
     problem = problem_of(problem)
     if not problem.pareto:
         message = 'no front is asked for; write e.g. pareto = ["abscissa", "Fr"], or use tmsopt.solve'
         raise InputError([Fault(message, ("objective",))])
-    how = options_of(options, defaults=_DEFAULTS)
-    if points < 2 or how.starts < 0:
-        raise ValueError(f"points = {points}, starts = {how.starts}; accepted: 2 or more, 0 or more")
+    how = options_of(options, defaults=_DEFAULTS, fewest=0)
+    if faults := count_faults("points", points, 2):
+        raise InputError(faults)
     began = time.perf_counter()
     progress, ask = how.progress, Asker(problem, replace(how, progress=None))
     n = len(ask.texts)

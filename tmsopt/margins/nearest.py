@@ -127,12 +127,9 @@ class _Approach:
 
 
 def nearest(
-    design: Given,
-    pattern: str,
-    *,
-    parameters: Mapping[str, float] | None = None,
-    weights: Mapping[str, float] | None = None,
-) -> Nearest:
+    design: Given, pattern: str, *, parameters: Mapping[str, float] | None = None, weights: Mapping[str, float] | None =
+    None,
+) -> Nearest:  # fmt: skip
     """The nearest point of one boundary: ``weave``, ``capsize``, ``infinity`` or ``heavy damping``.
 
     The distance is √Σ ((x − x0)/weight)² over the parameters that have a weight; the others stay. Parameters stay

@@ -10,9 +10,8 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
-from pathlib import Path
 
-from tmsopt.disk import read_text
+from tmsopt.disk import path_of, read_text
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models.bicycles import whipple
 from tmsopt.records import Table
@@ -63,7 +62,7 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
     Raises:
         InputError: listing every line that is not understood, names that are unknown, and names that are missing.
     """
-    file = Path(path)
+    file = path_of(path, "a file of bicycle parameters")
     kind = "YAML" if file.suffix.lower() in _YAML else "TXT"
     text = read_text(str(path), f"{kind} file of bicycle parameters")
     entries = list(_yaml(text) if kind == "YAML" else _lines(text))
@@ -107,7 +106,7 @@ def write_bicycle(bicycle: Bicycle | Mapping[str, float], path: str | PathLike[s
         InputError: for another ending, or parameters that are missing.
         OSError: when the file cannot be written.
     """
-    file = Path(path)
+    file = path_of(path, "the file to write")
     ending = file.suffix.lower()
     if ending not in (*_TEXT, *_YAML):
         raise InputError([Fault(f"found '{path}'; accepted: a file name ending in {', '.join((*_TEXT, *_YAML))}")])

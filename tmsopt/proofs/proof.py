@@ -12,7 +12,7 @@ from tmsopt.arithmetic.balls import Number, ProvedRoot, fraction, number
 from tmsopt.arithmetic.krawczyk import Refused
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
-from tmsopt.errors import Fault, InputError
+from tmsopt.errors import InputError, count_faults
 from tmsopt.models.exact import Written, written
 from tmsopt.proofs import rational
 from tmsopt.proofs.existence import Existing, beside, exact_coefficients, exactly
@@ -103,14 +103,9 @@ class Proof:
 
 
 def prove_design(
-    problem: Problem,
-    parameters: Mapping[str, float],
-    structure: str,
-    digits: int = DIGITS,
-    exact: Mapping[str, Any] | None = None,
-    case: Case | None = None,
-    roots: Sequence[Root] = (),
-) -> Proof:
+    problem: Problem, parameters: Mapping[str, float], structure: str, digits: int = DIGITS, exact: Mapping[str, Any] |
+    None = None, case: Case | None = None, roots: Sequence[Root] = (),
+) -> Proof:  # fmt: skip
     """Prove that the pattern which a problem locates, or which a design's roots show, exists; and what follows.
 
     Args:
@@ -125,8 +120,8 @@ def prove_design(
     Raises:
         InputError: for digits out of range, or exact numbers that are not the design's.
     """
-    if isinstance(digits, bool) or not isinstance(digits, int) or not 1 <= digits <= MOST:
-        raise InputError([Fault(f"found {digits!r}; accepted: a whole number from 1 to {MOST}", ("digits",))])
+    if faults := count_faults("digits", digits, 1, MOST):
+        raise InputError(faults)
     began = time.perf_counter()
     varied = case.applied(parameters) if case else dict(parameters)
     design = written(problem.parameter_set, varied, exact)
@@ -142,13 +137,9 @@ def _asked(problem: Problem, case: Case | None) -> Problem:
 
 
 def _proved(
-    problem: Problem,
-    design: Written,
-    varied: Mapping[str, float],
-    structure: str,
-    patterns: Sequence[Pattern],
-    digits: int,
-) -> Proof:
+    problem: Problem, design: Written, varied: Mapping[str, float], structure: str, patterns: Sequence[Pattern], digits:
+    int,
+) -> Proof:  # fmt: skip
     """The first proof that succeeds, or why none does with what holds for the design as stored."""
     reasons: list[str] = []
     for pattern in patterns or ([] if structure in _SIMPLE else _decided(problem, design)):
@@ -205,15 +196,9 @@ def _of_simple(structure: str, found: Existing) -> list[str]:
 
 
 def _assembled(
-    problem: Problem,
-    design: Written,
-    name: str,
-    pattern: Pattern | None,
-    found: Existing,
-    digits: int,
-    reasons: Sequence[str] = (),
-    stored: bool = False,
-) -> Proof:
+    problem: Problem, design: Written, name: str, pattern: Pattern | None, found: Existing, digits: int, reasons:
+    Sequence[str] = (), stored: bool = False,
+) -> Proof:  # fmt: skip
     numbers = {
         n: number(ball, digits)
         if n in found.moved or n in design.tangents or design.values[n].degrees

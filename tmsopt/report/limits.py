@@ -67,6 +67,8 @@ def relaxation_lines(solution: Solution) -> list[str]:
 
 def _move(problem: Problem, name: str, amount: float) -> str:
     """A limit moved, in words, rounded up so that it suffices."""
+    if not math.isfinite(amount):  # at the edge of where its sides exist
+        return f"{name} ({problem.constraints.get(name, name)}), which has no value there"
     parameter, _, end = name.partition(".")
     if name in problem.constraints or parameter not in problem.free:
         return f"{name} ({problem.constraints.get(name, name)}) by {_up(amount)}"

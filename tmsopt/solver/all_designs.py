@@ -83,7 +83,7 @@ def solve_all(problem: Given, **options: Unpack[Asked]) -> Every:
 
     Args:
         options: ``starts`` at most, `MOST` by default, ``seed``, ``linear_solver`` and ``progress``; see
-            `tmsopt.formulation.Options`.
+            `tmsopt.Options`.
 
     Raises:
         InputError: for a problem that locates no pattern, leaves freedom, or constrains a quantity without a formula.

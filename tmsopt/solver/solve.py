@@ -30,12 +30,12 @@ def solve(
         throw: raise NotSolved unless the status is ``optimal``; otherwise return the best point with its status.
         family: what was built for other problems that differ in numbers alone, to be used again.
         options: ``starts``, ``seed``, ``exhaustive``, ``linear_solver``, ``progress``, ``near`` and ``alone``; see
-            `tmsopt.formulation.Options`.
+            `tmsopt.Options`.
 
     Raises:
         NotSolved: carrying the best point found, when `throw`.
         InputError: when parameters are free and nothing is asked of them.
-        ValueError: for another linear solver or fewer than one start.
+        ValueError: for another linear solver.
     """
     problem = question_of(problem)
     solution = solved(problem, options_of(options, AskedOfSolve), family)
@@ -49,14 +49,12 @@ def solved(design: Given, options: Options = DEFAULTS, family: Family | None = N
     if isinstance(design, Solution):
         return design
     problem = question_of(design)
-    if options.starts < 1:
-        raise ValueError(f"starts = {options.starts}; accepted: 1 or more")
     began = time.perf_counter()
     notes: tuple[str, ...] = ()
     values: dict[str, float] = {}
     if problem.free:
         if options.near:
-            near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items()}
+            near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items() if n in options.near}
             options = replace(options, near=near)
         work = workspace(problem, options, family)
         explored = [explore(part) for part in work.parts() if not options.near or part.holds(options.near)]

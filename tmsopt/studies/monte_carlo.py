@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.solution import NotSolved, Solution
-from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.errors import Fault, InputError, count_faults, suggest
 from tmsopt.formulation.options import STARTS
 from tmsopt.records import Column, Table
 from tmsopt.solver.solve import solve, solved
 from tmsopt.studies.study import Study
-from tmsopt.studies.validate import MOST_ROWS, common_faults, count_faults
+from tmsopt.studies.validate import MOST_ROWS, common_faults
 
 DISTRIBUTIONS = ("uniform", "normal")
 """Of an error: uniform within ± tolerance; or normal, its standard deviation a third of the tolerance, cut off at

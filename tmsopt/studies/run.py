@@ -11,7 +11,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from tmsopt.errors import Fault, InputError, short, suggest
+from tmsopt.errors import Fault, InputError, count_faults, short, suggest
 from tmsopt.records import Progress
 from tmsopt.studies.engines import Note, Unit, cluster, cores, in_process, processes
 from tmsopt.studies.engines.work import silent
@@ -100,7 +100,7 @@ def run_study(
         NotSolved: where a Monte Carlo study has no design to draw around.
     """
     stated = load_study(study) if isinstance(study, str | PathLike) else study
-    if faults := list(_faults(stated, workers)):
+    if faults := list(_faults(stated, workers, most)):
         raise InputError(faults)
     asked = planned(stated)
     if store is None:
@@ -123,13 +123,13 @@ def run_study(
         return Results(asked, tuple(opened.rows()), *made, found, opened.about())
 
 
-def _faults(study: object, workers: object) -> Iterator[Fault]:
+def _faults(study: object, workers: object, most: object) -> Iterator[Fault]:
     """What is wrong with the call."""
     if not isinstance(study, Study | Sampling):
         message = f"found {short(study)}; accepted: a Study, as of tmsopt.over_grid, or the path of a study file"
         yield Fault(message, ("study",))
-    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
-        yield Fault(f"found {workers!r}; accepted: a whole number, 1 or more", ("workers",))
+    for name, value, least in (("workers", workers, 1), ("most", most, 0)):
+        yield from count_faults(name, value, least) if value is not None else ()
 
 
 def fill(

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.errors import Fault, InputError
+from tmsopt.errors import Fault, InputError, count_faults
 from tmsopt.records import Array, Column
-from tmsopt.studies.validate import MOST_ROWS, count_faults
+from tmsopt.studies.validate import MOST_ROWS
 
 _DIGITS = 15  # of a decimal number, all of which a double holds
 
@@ -139,7 +139,7 @@ def _spans(ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Span]:
             spans[name] = stated if isinstance(stated, Span) else Span(*stated)
             found += span_faults(name, spans[name])
         except TypeError:
-            accepted = "(least, greatest), or a Span"
+            accepted = "(least, greatest), or a tmsopt.Span"
             found.append(Fault(f"found {stated!r}; accepted: {accepted}", ("ranges", name)))
     if not ranges:
         found.append(Fault("nothing varies; give a range", ("ranges",)))

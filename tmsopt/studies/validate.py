@@ -9,7 +9,7 @@ import numpy as np
 from tmsopt.design.expression import ExpressionError, parse_value
 from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Problem, unasked
-from tmsopt.errors import Fault, short, suggest
+from tmsopt.errors import Fault, count_faults, short, suggest
 
 MOST_ROWS = 10_000_000
 """Rows of a study; one with more is another kind of question, such as a chart."""
@@ -113,7 +113,7 @@ def _shape_faults(study: Stated, rows: int) -> Iterator[Fault]:
         yield Fault(f"found {found!r}; accepted: an entry for each column in turn: {', '.join(study.columns)}", key)
         return
     sizes = tuple(shape.values())
-    if not all(_is_count(n, 1) for n in sizes) or math.prod(sizes) != rows:
+    if any(count_faults("points", n, 1) for n in sizes) or math.prod(sizes) != rows:
         yield Fault(f"found {' x '.join(map(str, sizes))} for {rows} rows; accepted: sizes with that product", key)
         return
     for axis, (name, values) in enumerate(study.columns.items()):
@@ -146,14 +146,3 @@ def common_faults(problem: Problem, seed: Any, starts: Any, report: Any) -> Iter
             parse_value(text, problem.vocabulary)
         except ExpressionError as error:
             yield Fault(str(error), ("report",))
-
-
-def count_faults(name: str, value: Any, least: int, most: int | None = None) -> Iterator[Fault]:
-    """What is wrong with a whole number."""
-    if not _is_count(value, least) or (most is not None and value > most):
-        accepted = f"a whole number, {least} or more" if most is None else f"a whole number from {least} to {most}"
-        yield Fault(f"found {value!r}; accepted: {accepted}", (name,))
-
-
-def _is_count(value: Any, least: int) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and value >= least

@@ -4,7 +4,7 @@ import csv
 import io
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import Any
 
@@ -12,7 +12,7 @@ from tmsopt.design.expression import written_sides
 from tmsopt.design.problem import Problem
 from tmsopt.design.units import with_unit
 from tmsopt.disk import read_text
-from tmsopt.errors import Fault, InputError, short, suggest
+from tmsopt.errors import Fault, InputError, count_faults, short, suggest
 from tmsopt.records import Column
 from tmsopt.studies.samples import Span, check_size, grid, latin_hypercube, sobol, sobol_note, span_faults
 from tmsopt.studies.validate import MOST_ROWS, name_fault
@@ -153,9 +153,8 @@ class _VaryReader:
         log, count = spec.get("log", False), spec.get("points", 2)
         if not isinstance(log, bool):
             self.faults.append(Fault(f"found {short(log)}; accepted: true or false", (*self.key, "log")))
-        if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MOST_ROWS:
-            message = f"found {short(count)}; accepted: a whole number from 2 to {MOST_ROWS}"
-            self.faults.append(Fault(message, (*self.key, "points")))
+        faults = count_faults("points", count, 2, MOST_ROWS)
+        self.faults.extend(replace(fault, key=(*self.key, *fault.key)) for fault in faults)
         if len(self.faults) > before:
             return None
         span = Span(low, high, log)
