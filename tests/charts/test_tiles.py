@@ -91,6 +91,7 @@ def test_single_precision_is_the_double_rounded(whole, tmp_path):
     assert found.layers["kind"].tobytes() == whole.layers["kind"].tobytes()
 
 
+@pytest.mark.slow
 def test_both_engines_write_the_same_bits(whole, tmp_path):
     pytest.importorskip("numba")
     found = {e: charted(tmp_path / f"{e}.chart", points=(211, 160), engine=e) for e in ("numpy", "numba")}

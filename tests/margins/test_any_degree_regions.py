@@ -6,8 +6,8 @@ cᵢ = 0, capsize at kᵢ = 0, heavy damping at cᵢ² = 4 kᵢ.
 
 from fractions import Fraction
 from math import prod
-from types import SimpleNamespace
 
+import casadi as ca
 import numpy as np
 import pytest
 from helpers import curves
@@ -18,7 +18,7 @@ from tmsopt.checks import cover, omega0_bound
 from tmsopt.critical_speeds import growth
 from tmsopt.design import Problem
 from tmsopt.margins import edges, heavily_damped, nearest, robustness
-from tmsopt.models import Model, Parameter, ParameterSet
+from tmsopt.models import Model, Parameter, ParameterSet, from_coefficients
 from tmsopt.plots import chart_figure, growth_figure
 from tmsopt.report import chart_table
 from tmsopt.roots import (
@@ -32,6 +32,7 @@ from tmsopt.roots import (
     real_roots,
     roots,
 )
+from tmsopt.solver import solve
 
 ROUNDINGS = 30
 LAYERS = ("kind", "real_roots", "abscissa", "damping_ratio")
@@ -328,11 +329,9 @@ def test_a_chart_of_a_cubic_is_that_of_the_routh_condition():
 
 def test_growth_of_a_model_without_speed():
     """s² + c s + 1 over c: stable for c > 0, heavily damped for c > 2."""
-    of = model(("c", "k"), 2, lambda c, k: [1, c, k])
-    problem = Problem(model=of, fixed={"k": 1.0}, free={"c": (-1.0, 5.0)})
-    design = SimpleNamespace(
-        problem=problem, parameters={"c": 2.0, "k": 1.0}, dimensionless={"c": 2.0, "k": 1.0}, structure="EP2"
-    )
+    c, k = ca.SX.sym("c"), ca.SX.sym("k")
+    of = from_coefficients([1, c, k])
+    design = solve(Problem(model=of, fixed={"k": 1.0}, free={"c": (-1.0, 5.0)}, minimize="(c - 2)**2"))
     data = growth(design)
     assert data.over.name == "c"
     assert (data.values[0], data.values[-1]) == (-1.0, 5.0)

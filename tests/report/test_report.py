@@ -170,7 +170,16 @@ def test_from_a_file_in_units_to_a_report_in_units(tmp_path: Path) -> None:
     """One file through the command line, as text and as JSON; v.max binds (a robot is steadier when faster)."""
     file = tmp_path / "robot.toml"
     file.write_text(FILE, encoding="utf-8")
-    command = [sys.executable, "-c", "from tmsopt.cli import main; main()", "solve", str(file), "--starts", "6"]
+    command = [
+        sys.executable,
+        "-c",
+        "from tmsopt.cli import main; main()",
+        "solve",
+        str(file),
+        "--starts",
+        "6",
+        "--brief",
+    ]
     table, data = (
         subprocess.run([*command, *more], capture_output=True, text=True, timeout=120, check=True, encoding="utf-8")
         for more in ([], ["--json"])

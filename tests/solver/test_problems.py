@@ -212,6 +212,7 @@ HEIGHTS = {"zeta_B": (-1.0, -0.3125), "zeta_H": (-1.0, -0.1875), "chi_H": (0.625
 FACTORS = {"beta_1": (0.0, 6.0), "kappa_1": (0.0, 20.0), "beta_2": (0.0, 6.0), "kappa_2": (0.0, 20.0)}
 
 
+@pytest.mark.slow
 def test_robot_is_the_best_of_all_designs_with_a_four_fold_root():
     design = solved("delivery_robot")
     point, best = hunt.least(robot_with_ep4, {}, HEIGHTS, generations=150, rounds=6)

@@ -9,6 +9,7 @@ import flint
 import numpy as np
 
 from tmsopt.checks.recheck import FEASIBLE, realised_abscissa
+from tmsopt.checks.worst_case import worst_cases
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import varies
 from tmsopt.design.problem import Problem
@@ -37,7 +38,7 @@ class Rounded:
         digits: significant digits.
         written: rounded parameter → the decimal number with its unit, e.g. ``23.5 deg``.
         realised: abscissa of the decimals, exact to double precision; the other parameters as stored. With scenarios
-            or tolerances, the worst of the cases that the design was made for.
+            or tolerances, its worst over whole bands and tolerance boxes.
         loss: realised minus ideal abscissa of the design.
         damping_ratio: of the rounded design, in double precision.
         objective: value of the objective expression; nan without one.
@@ -76,7 +77,7 @@ def rounded(solution: Solution, names: Iterable[str], digits: int) -> Rounded:
     with flint.ctx.workdps(_WORKING):
         exact: dict[str, Any] = {n: _exact(text, of[n].unit) for n, text in written.items()}
     plain = {**solution.parameters, **{n: float(x.mid()) for n, x in exact.items()}}
-    cases = _cases(solution)
+    cases = _cases(problem, plain)
     realised = max(realised_abscissa(problem, c.applied({**solution.parameters, **exact})) for c in cases)
     each = [problem.values(case.applied(plain)) for case in cases]
     ratio = min(_damping_ratio([float(c) for c in values.coefficients]) for values in each)
@@ -96,10 +97,10 @@ def worst(alone: Mapping[str, Rounded]) -> str:
     return max(losing, key=lambda name: losing[name], default="")
 
 
-def _cases(solution: Solution) -> list[Case]:
-    """The cases of a design; one that changes nothing, where there are none."""
-    listed = [case for case in solution.problem.cases if not case.direction]
-    return [*listed, *([solution.worst] if solution.worst else [])] or [Case()]
+def _cases(problem: Problem, parameters: Mapping[str, float]) -> list[Case]:
+    """The cases of a design, and its worst ones between them; one that changes nothing, where there are none."""
+    listed = [case for case in problem.cases if not case.direction]
+    return [*listed, *(w.case for w in worst_cases(problem, parameters).values())] if listed else [Case()]
 
 
 def _violations(problem: Problem, parameters: Mapping[str, float], each: Sequence[Values]) -> dict[str, float]:
