@@ -116,7 +116,7 @@ def speeds(
     allowed = of[name].range
     lower, upper = between or asked.free.get(name) or (allowed.lower, allowed.upper)
     if not math.isfinite(lower) or not lower < upper:
-        message = f"found {lower:.6g} … {upper:.6g}; accepted: a least and a greater value"
+        message = f"found {lower:.6g} … {upper:.6g}; accepted: a least value and a greater one, `--between LOW,HIGH`"
         raise InputError([Fault(message, ("between",))])
     a = coefficients_over(asked.model, of, own, name)
     met = crossings(a, exact(float(lower)), exact(float(upper)) if math.isfinite(upper) else None)
