@@ -1,9 +1,10 @@
 """Bad input as data: every fault found, with its place, and one exception that carries them all."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from numbers import Integral
+from numbers import Integral, Real
 from typing import Any
 
 
@@ -49,6 +50,11 @@ def count_faults(name: str, value: Any, least: int, most: int | None = None) -> 
         return []
     accepted = f"a whole number, {least} or more" if most is None else f"a whole number from {least} to {most}"
     return [Fault(f"found {short(value)}; accepted: {accepted}", (name,))]
+
+
+def is_number(value: Any) -> bool:
+    """Whether a user gave a finite real number."""
+    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def suggest(name: str, accepted: Iterable[str]) -> str:

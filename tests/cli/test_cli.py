@@ -169,7 +169,7 @@ def test_an_answer_that_cannot_be_written_is_no_traceback():
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("option", ["--certify", "--diagnose", "--plot=all.png"])
+@pytest.mark.parametrize("option", ["--certify", "--diagnose", "--plot=all.png", "--wheelbase=2", "--rear-mass=3"])
 def test_all_designs_are_not_one(capsys, option):
     code, out, err = run(capsys, "solve", "problems/coupled_pair.toml", "--all", option)
     assert (code, out) == (2, "")

@@ -224,7 +224,7 @@ def test_laws_charts_and_traces_are_of_the_nominal_design():
 
 
 def test_a_limit_without_a_value_is_named_without_an_amount() -> None:
-    """omega0 is negative wherever it exists, so that at the edge of where it does nothing is large enough."""
+    """As omega0 >= 0.3 has none at the edge of where omega0, negative wherever it is, exists."""
     design = tmsopt.solve("problems/ep4.toml")
     conflict = Relaxation(design.parameters, Table({"trail": math.inf}), ("trail",), Table({}))
     report = solution_table(replace(design, status="infeasible", relaxation=conflict))

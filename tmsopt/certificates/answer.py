@@ -89,10 +89,10 @@ def answer(question: Question, clock: Clock, share: float, confirm: Confirm) -> 
     a short time, and then anew in others for longer.
 
     Args:
-        confirm: what to make of a design that was found; ``undecided`` if it is none, but for SCIP's tolerance.
+        confirm: what to make of a design that was found; ``undecided`` if it is none, but for the solver's tolerance.
 
     Raises:
-        NotAccepted: for an operation that cannot be written for SCIP.
+        NotAccepted: for an operation that the solver cannot take.
     """
     end = clock.used + share * clock.left
     for sign in question.signs():
@@ -156,9 +156,9 @@ def doubt(question: Question, design: Mapping[str, float]) -> str:
 
 
 def contradicted(question: Question, design: Mapping[str, float], clock: Clock) -> bool:
-    """Whether SCIP finds nothing feasible even close around a design that is: then its other answers are worthless too.
+    """Whether the solver finds nothing feasible even close around a design that is: then no answer of it is worth much.
 
-    `doubt` looks at the equations; this looks at what became of them in SCIP, its ranges and tolerances included.
+    `doubt` looks at the equations; this looks at what became of them in the solver, its ranges and tolerances included.
     """
     at = variables_of(question.problem, design)
     verdicts = []

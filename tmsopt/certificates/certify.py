@@ -40,15 +40,15 @@ _SHARE = 0.6  # of the time that is left, for a gap that is not the last one to 
 _BETTER = 1e-9  # relative gain that counts as one
 _REPLACED = 5  # times that a design is replaced by a better one
 _SMALL = 1e-6  # of roots at 0 or at infinity, which say nothing of the others
-_STARTS = 4  # from SCIP's design, and others
-_NEARLY = 1e-3  # violation and loss beyond which a design that SCIP found is none
+_STARTS = 4  # from the design that the solver found, and others
+_NEARLY = 1e-3  # violation and loss beyond which a design that the solver found is none
 
 
 def certify(design: Given, *, seconds: float = SECONDS, progress: SecondsPassed | None = None) -> Solution:
     """The same design with a bound that no design of the box can beat; or a better design, where one is found.
 
     SCIP is asked whether any design does better than this one by a gap; the answer no is the bound. It is a proof in
-    floating-point arithmetic, to SCIP's feasibility tolerance. Of an infeasible problem, it is a proof that it is.
+    floating-point arithmetic, to its feasibility tolerance. Of an infeasible problem, it is a proof that it is.
 
     Args:
         design: what `solve` found, with throw=False where that is no optimum; or a problem or its file, solved first.
@@ -193,13 +193,13 @@ def _stronger(design: Solution, known: Bound, searched: Bound) -> Bound:
 
 
 def _from(design: Solution, start: Mapping[str, float]) -> Answer:
-    """What the design that SCIP found leads to: a better optimum, or itself, if it is feasible and better at all."""
+    """What a design that was found leads to: a better optimum, or itself, if it is feasible and better at all."""
     problem = design.problem
     known = design.value if not design.violations and problem.objective is not None else None
     seen = recheck(problem, problem.ordered(start), _cases(design))
     gain = _gain(problem, known, seen.objective)
     if max(seen.violations.values(), default=0.0) > _NEARLY or gain < -_NEARLY:
-        return Answer(UNDECIDED)  # what SCIP's tolerance made of it
+        return Answer(UNDECIDED)  # what the solver's tolerance made of it
     found = solve(replace(problem, start=start), starts=_STARTS, throw=False)
     if found.status == "optimal" and _gain(problem, known, found.value) > _BETTER:
         before = "" if known is None else f": {known:.9g} before"

@@ -12,8 +12,7 @@ from tmsopt.design.dependence import varies
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
-from tmsopt.margins.nearest import Robustness, surveyed
-from tmsopt.margins.surroundings import placed
+from tmsopt.margins.nearest import Robustness, robustness_at
 from tmsopt.models import Values
 from tmsopt.records import Table
 from tmsopt.roots import Structure, exact_abscissa, pattern_distance, roots
@@ -138,7 +137,7 @@ def _look(
     least = min(near_least, key=lambda k: float(each[k]["damping_ratio"]))
     worst = {"abscissa": each[top]["abscissa"], "damping_ratio": each[least]["damping_ratio"]}
     if around is None and problem.asks_radius:
-        around = surveyed(placed(problem, parameters, problem.weights or None))
+        around = robustness_at(problem, parameters)
     if around is not None:
         worst[RADIUS] = around.radius
     for values in (nominal, *each):

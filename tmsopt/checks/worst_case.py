@@ -111,8 +111,8 @@ class _Space:
         return Case(Table({**self.at, **values}), Table(moves))
 
     def peaks(
-        self, problem: Problem, parameters: Mapping[str, float], sign: float, what: Expression | str, shared:
-        Mapping[str, float],
+        self, problem: Problem, parameters: Mapping[str, float], sign: float, what: Expression | str,
+        shared: Mapping[str, float],
     ) -> Iterator[Case]:  # fmt: skip
         """The worst few points of a grid, each moved to where it is locally worst."""
         size = len(self.bands) + len(self.tolerances)

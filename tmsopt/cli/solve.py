@@ -130,14 +130,14 @@ def solve(
     """Find the best design that the problem FILE asks for, or the front of the best ones."""
     with bad_input():
         import tmsopt
-        from tmsopt.cli.front import check_options, write_front
+        from tmsopt.cli.front import write_front
         from tmsopt.design import question_of
 
         w, m_B = _scale("--wheelbase", wheelbase, "m"), _scale("--rear-mass", rear_mass, "kg")
         check_output("--plot", plot, FIGURES)
         check_output("--csv", csv_file, ("csv",))
         problem = question_of(file, front=True)
-        check_options(problem, _given(context), every)
+        _check_options(problem, _given(context), every)
         if certify:
             from tmsopt.certificates import check_installed
 
@@ -171,6 +171,31 @@ def solve(
     if plot is not None:
         _draw(solution, plot, w, m_B)
     sys.exit(_EXIT[solution.status])
+
+
+def _check_options(problem: "Problem", given: list[str], every: bool) -> None:
+    """Refuse options that mean nothing for this problem.
+
+    Raises:
+        InputError: naming each of them.
+    """
+    from tmsopt import Fault, InputError
+
+    alone, scaled = ("--certify", "--diagnose"), ("--wheelbase", "--rear-mass")
+    wrong: dict[str, str] = {}
+    if every:
+        message = "is for one design, and --all looks for all of them; leave one of the two out"
+        wrong |= dict.fromkeys((*alone, *scaled, "--plot"), message)
+    if problem.pareto:
+        message = "is for one design, and the file asks for a front; write minimize with one of the expressions"
+        wrong |= dict.fromkeys(alone, message)
+        message = "scales one design, and the file asks for a front; write the problem in SI instead"
+        wrong |= dict.fromkeys(scaled, message)
+    else:
+        message = 'is for a front; write pareto = ["abscissa", "Fr"] under [objective], or leave the option out'
+        wrong |= dict.fromkeys(("--points", "--csv"), message)
+    if faults := [Fault(wrong[option], (option,)) for option in given if option in wrong]:
+        raise InputError(faults)
 
 
 def _meaning(

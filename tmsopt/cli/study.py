@@ -78,6 +78,7 @@ def study(
         if row is not None:
             _show_row(asked, row, as_json)
             return
+        path = path.resolve()
         results, stopped = _carried_out(asked, path, fresh, {"workers": workers, "scheduler": scheduler})
         _show(results, path, stopped, as_json)
         for target in exports:
@@ -118,6 +119,7 @@ def _carried_out(asked: "Study", path: Path, fresh: bool, where: Mapping[str, An
     from tqdm import tqdm
 
     from tmsopt import run_study
+    from tmsopt.studies import stored
     from tmsopt.studies.engines import EngineError
 
     shown = sys.stderr.isatty()
@@ -141,7 +143,7 @@ def _carried_out(asked: "Study", path: Path, fresh: bool, where: Mapping[str, An
         except KeyboardInterrupt:
             if bar.total is None:  # before the first row
                 raise
-            return replace(run_study(asked, path, most=0), found=int(bar.initial)), True
+            return replace(stored(asked, path), found=int(bar.initial)), True
         except EngineError as error:
             click.echo(f"{error}; the rows solved so far are in {path}", err=True)
             sys.exit(BAD_INPUT)

@@ -14,6 +14,7 @@ from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.margins.surroundings import parameter_faults
 from tmsopt.models import Model, ParameterSet
 from tmsopt.records import Progress, Table, plain
 from tmsopt.solver.solve import solve
@@ -85,8 +86,8 @@ class Speeds:
 
 
 def speeds(
-    design: Given | Mapping[str, float], parameter: str | None = None, *, between: Stretch | None = None, problem: Given
-    | None = None, progress: Progress | None = None,
+    design: Given | Mapping[str, float], parameter: str | None = None, *, between: Stretch | None = None,
+    problem: Given | None = None, progress: Progress | None = None,
 ) -> Speeds:  # fmt: skip
     """Every weave and capsize speed of a design and every speed at which roots meet, by exact root isolation.
 
@@ -147,9 +148,8 @@ def _parameters(design: Any, asked: Problem, name: str, progress: Progress | Non
         return dict(design.parameters)
     if isinstance(design, Mapping):
         own = {**asked.fixed, **design}
-        wrong = [n for n in asked.parameter_set.names if n != name and not isinstance(own.get(n), int | float)]
-        if wrong:
-            raise InputError([Fault("give a number", ("parameters", n)) for n in wrong])
+        if faults := [f for f in parameter_faults(asked, own) if f.key[-1] != name]:
+            raise InputError(faults)
         return {name: 1.0, **own}
     return dict(asked.fixed if set(asked.free) <= {name} else solve(asked, progress=progress).parameters)
 

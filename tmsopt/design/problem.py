@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -99,6 +99,10 @@ class Problem:
     def asks_radius(self) -> bool:
         """Whether the objective or a constraint names the robustness radius."""
         return any(RADIUS in e.names for e in (self.objective, *self.objectives, *self.conditions.values()) if e)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What was stated: what follows from it is found anew, and cannot always be pickled."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
 
     @cached_property
     def parameter_set(self) -> ParameterSet:

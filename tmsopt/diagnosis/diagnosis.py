@@ -79,7 +79,7 @@ def diagnose(design: Given) -> tuple[Diagnosis, ...]:
 
 
 def diagnosed(
-    model: Model, of: ParameterSet, design: Mapping[str, float], structure: Structure
+    model: Model, of: ParameterSet, design: Mapping[str, float], structure: Structure,
 ) -> tuple[Diagnosis, ...]:  # fmt: skip
     """The same for any design of a model whose roots have a structure."""
     if all(root.multiplicity == 1 for root in structure.roots):
@@ -117,7 +117,7 @@ def _diagnosis(
 
 
 def _ranks(
-    model: Model, of: ParameterSet, design: Mapping[str, float], distance: float, s: Any, k: int
+    model: Model, of: ParameterSet, design: Mapping[str, float], distance: float, s: Any, k: int,
 ) -> Jordan | None:  # fmt: skip
     """Jordan structure by the matrices; None without them, or if they are singular for every s."""
     if model.pencil is None:

@@ -76,7 +76,7 @@ def _nullity(values: Array, least: int, most: int, threshold: float) -> int:
 
 
 def _partial(
-    blocks: Sequence[Complex], n: int, multiplicity: int, geometric: int, threshold: float
+    blocks: Sequence[Complex], n: int, multiplicity: int, geometric: int, threshold: float,
 ) -> tuple[int, ...]:  # fmt: skip
     """Lengths of the chains, from how many are at least 1, 2 … long."""
     if geometric == 1:

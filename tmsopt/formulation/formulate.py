@@ -39,8 +39,8 @@ _LEEWAY = 1e-9  # below a constant that a quantity is never less than
 
 
 def formulate(
-    problem: Problem, cases: Sequence[Case] = (), elastic: bool = False, damping_ratio: float | None = None, settings:
-    Mapping[str, Any] | None = None,
+    problem: Problem, cases: Sequence[Case] = (), elastic: bool = False, damping_ratio: float | None = None,
+    settings: Mapping[str, Any] | None = None,
 ) -> NLP:  # fmt: skip
     """The formulation that the problem asks for: ``matching`` for a pattern, else ``abscissa``.
 
@@ -56,8 +56,8 @@ def formulate(
 
 
 def abscissa(
-    problem: Problem, cases: Sequence[Case] = (), elastic: bool = False, damping_ratio: float | None = None, settings:
-    Mapping[str, Any] | None = None,
+    problem: Problem, cases: Sequence[Case] = (), elastic: bool = False, damping_ratio: float | None = None,
+    settings: Mapping[str, Any] | None = None,
 ) -> NLP:  # fmt: skip
     """Optimise the objective with every root quantity carried by factors, in every case; real ones if all must be."""
     build = Builder(problem, cases, settings=settings)
@@ -122,8 +122,8 @@ class Builder:
     """
 
     def __init__(
-        self, problem: Problem, cases: Sequence[Case], lifts: Mapping[str, Lifting] | None = None, settings:
-        Mapping[str, Any] | None = None,
+        self, problem: Problem, cases: Sequence[Case], lifts: Mapping[str, Lifting] | None = None,
+        settings: Mapping[str, Any] | None = None,
     ) -> None:  # fmt: skip
         self.problem = problem
         self.settings = dict(settings or {})

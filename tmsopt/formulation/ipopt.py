@@ -53,7 +53,6 @@ class Run:
     row_multipliers: Array
     bound_multipliers: Array
     status: str
-    iterations: int
 
 
 @dataclass(frozen=True)
@@ -115,7 +114,6 @@ def ipopt(nlp: NLP, options: Options = DEFAULTS, start: str = "far", max_iterati
             row_multipliers=np.array(answer["lam_g"]).ravel(),
             bound_multipliers=np.array(answer["lam_x"]).ravel() / unit,
             status=str(stats["return_status"]),
-            iterations=int(stats.get("iter_count", 0)),
         )
 
     return run

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.design.files import Given, problem_of
+from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.formulation.ipopt import ipopt, polisher
@@ -127,8 +128,8 @@ class _Approach:
 
 
 def nearest(
-    design: Given, pattern: str, *, parameters: Mapping[str, float] | None = None, weights: Mapping[str, float] | None =
-    None,
+    design: Given, pattern: str, *, parameters: Mapping[str, float] | None = None,
+    weights: Mapping[str, float] | None = None,
 ) -> Nearest:  # fmt: skip
     """The nearest point of one boundary: ``weave``, ``capsize``, ``infinity`` or ``heavy damping``.
 
@@ -159,11 +160,15 @@ def robustness(
 
     Arguments, distances and exceptions are those of `nearest`.
     """
-    return surveyed(_place(design, parameters, weights))
+    return _surveyed(_place(design, parameters, weights))
 
 
-def surveyed(place: Place) -> Robustness:
-    """The nearest points of all boundaries around a design."""
+def robustness_at(problem: Problem, parameters: Mapping[str, float]) -> Robustness:
+    """The same for the parameters of a design, with the weights of its problem."""
+    return _surveyed(placed(problem, parameters, problem.weights or None))
+
+
+def _surveyed(place: Place) -> Robustness:
     seen = ray_crossings(place.space)
     found = [_nearest(place, seen, kind) for kind in KINDS]
     limit = min((n for n in found if n.kind in STABILITY), key=lambda n: n.distance)

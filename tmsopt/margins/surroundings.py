@@ -1,6 +1,5 @@
 """A design, the weights of changes to it, and the polynomials around it."""
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +10,7 @@ import numpy as np
 
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import STRUCTURE_TOLERANCE
-from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.errors import Fault, InputError, is_number, suggest
 from tmsopt.margins.boundaries import terms
 from tmsopt.margins.rays import Space
 from tmsopt.models import Range
@@ -120,7 +119,7 @@ def placed(problem: Problem, parameters: Mapping[str, float], weights: Mapping[s
     Raises:
         InputError: listing everything that is wrong.
     """
-    faults = [*_parameter_faults(problem, parameters)]
+    faults = [*parameter_faults(problem, parameters)]
     faults += [] if weights is None else _weight_faults(problem, weights)
     if faults:
         raise InputError(faults)
@@ -139,7 +138,8 @@ def relative(problem: Problem, parameters: Mapping[str, float]) -> dict[str, flo
     return weights
 
 
-def _parameter_faults(problem: Problem, parameters: Mapping[str, float]) -> Iterator[Fault]:
+def parameter_faults(problem: Problem, parameters: Mapping[str, float]) -> Iterator[Fault]:
+    """What is wrong with the parameters of a design."""
     of = problem.parameter_set
     for name in parameters:
         if name not in of.names:
@@ -148,7 +148,7 @@ def _parameter_faults(problem: Problem, parameters: Mapping[str, float]) -> Iter
         key = ("parameters", name)
         if name not in parameters:
             yield Fault("missing; give a value for every parameter", key)
-        elif not _is_number(parameters[name]):
+        elif not is_number(parameters[name]):
             yield Fault(f"found {parameters[name]!r}; accepted: a finite number", key)
         elif parameters[name] not in of[name].range:
             yield Fault(f"found {parameters[name]:.6g}; {of[name].meaning} is {of[name].range}", key)
@@ -160,12 +160,8 @@ def _weight_faults(problem: Problem, weights: Mapping[str, float]) -> Iterator[F
         key = ("weights", name)
         if name not in of.names:
             yield Fault(f"unknown parameter '{name}'; {suggest(name, of.names)}", key)
-        elif not _is_number(weight) or weight < 0:
+        elif not is_number(weight) or weight < 0:
             yield Fault(f"found {weight!r}; accepted: a number above 0, or 0 for a parameter that stays", key)
-    if not any(_is_number(w) and w > 0 for w in weights.values()):
+    if not any(is_number(w) and w > 0 for w in weights.values()):
         message = f"no weight is above 0; give one to a parameter that may change: {' '.join(of.names)}"
         yield Fault(message, ("weights",))
-
-
-def _is_number(value: Any) -> bool:
-    return not isinstance(value, bool | str) and isinstance(value, int | float | np.number) and math.isfinite(value)

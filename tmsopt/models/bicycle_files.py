@@ -13,7 +13,7 @@ from os import PathLike
 
 from tmsopt.disk import path_of, read_text
 from tmsopt.errors import Fault, InputError, suggest
-from tmsopt.models.bicycles import whipple
+from tmsopt.models.bicycles.whipple import whipple
 from tmsopt.records import Table
 
 _OF = whipple.sets[0]

@@ -3,7 +3,8 @@
 import copyreg
 from typing import Any
 
-from tmsopt.models.bicycles import tms, whipple
+from tmsopt.models.bicycles.tms import tms
+from tmsopt.models.bicycles.whipple import whipple
 from tmsopt.models.model import Model
 
 MODELS = {model.name: model for model in (tms, whipple)}

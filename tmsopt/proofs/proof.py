@@ -103,8 +103,8 @@ class Proof:
 
 
 def prove_design(
-    problem: Problem, parameters: Mapping[str, float], structure: str, digits: int = DIGITS, exact: Mapping[str, Any] |
-    None = None, case: Case | None = None, roots: Sequence[Root] = (),
+    problem: Problem, parameters: Mapping[str, float], structure: str, digits: int = DIGITS,
+    exact: Mapping[str, Any] | None = None, case: Case | None = None, roots: Sequence[Root] = (),
 ) -> Proof:  # fmt: skip
     """Prove that the pattern which a problem locates, or which a design's roots show, exists; and what follows.
 
@@ -122,6 +122,7 @@ def prove_design(
     """
     if faults := count_faults("digits", digits, 1, MOST):
         raise InputError(faults)
+    digits = int(digits)
     began = time.perf_counter()
     varied = case.applied(parameters) if case else dict(parameters)
     design = written(problem.parameter_set, varied, exact)
@@ -137,8 +138,8 @@ def _asked(problem: Problem, case: Case | None) -> Problem:
 
 
 def _proved(
-    problem: Problem, design: Written, varied: Mapping[str, float], structure: str, patterns: Sequence[Pattern], digits:
-    int,
+    problem: Problem, design: Written, varied: Mapping[str, float], structure: str, patterns: Sequence[Pattern],
+    digits: int,
 ) -> Proof:  # fmt: skip
     """The first proof that succeeds, or why none does with what holds for the design as stored."""
     reasons: list[str] = []
@@ -196,8 +197,8 @@ def _of_simple(structure: str, found: Existing) -> list[str]:
 
 
 def _assembled(
-    problem: Problem, design: Written, name: str, pattern: Pattern | None, found: Existing, digits: int, reasons:
-    Sequence[str] = (), stored: bool = False,
+    problem: Problem, design: Written, name: str, pattern: Pattern | None, found: Existing, digits: int,
+    reasons: Sequence[str] = (), stored: bool = False,
 ) -> Proof:  # fmt: skip
     numbers = {
         n: number(ball, digits)

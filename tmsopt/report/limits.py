@@ -14,7 +14,8 @@ def bound_lines(solution: Solution) -> list[str]:
     """What no design of the box can beat, and how that is known."""
     bound = solution.bound
     search = f"branch and bound with {bound.solver}, {bound.nodes} nodes, {bound.seconds:.1f} s"
-    kind = f"a floating-point proof, feasibility tolerance {bound.tolerance:.0e}"
+    floating = f"a floating-point proof, feasibility tolerance {bound.tolerance:.0e}"
+    kind = floating if bound.tolerance else "an exact proof"
     if solution.status == "infeasible":
         return [f"proved: no design in the box satisfies all constraints ({search}); {kind}"] if bound.proven else []
     if not math.isfinite(bound.value):

@@ -129,11 +129,6 @@ class Runner:
         return _candidate(self.work.part, limits, self.work.ipopt(self.nlp, start)(x, limits))
 
 
-def claim(problem: Problem, candidate: Candidate) -> float:
-    """The objective that a candidate claims, in the problem's own sense."""
-    return problem.sign * candidate.objective
-
-
 def same(a: float, b: float, size: float = 1.0) -> bool:
     """Whether two objectives, of this size or larger, count as the same optimum."""
     return abs(a - b) <= _SAME * (size + abs(b))

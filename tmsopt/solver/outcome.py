@@ -15,7 +15,7 @@ from tmsopt.formulation.ipopt import Point
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import complete, designs
 from tmsopt.records import Array, Table
-from tmsopt.solver.multistart import Candidate, claim, same
+from tmsopt.solver.multistart import Candidate, same
 from tmsopt.solver.newton import solutions
 from tmsopt.solver.workspace import Workspace
 
@@ -26,6 +26,7 @@ _SPURIOUS = 1e-3  # violation that no lack of digits explains: equations met onl
 _MULTIPLIER = 1e-9  # below it a limit does not bind
 _TOUCHES = 1e-10  # of a range: distance that IPOPT may leave to an end that binds
 _BRANCH_STARTS = 12
+_OUTSIDE = 1e-9  # of a limit, beyond which it excludes a solution
 _SAME_BRANCH = 1e-6  # relative difference of parameters
 _CLAIMED = 1e-6  # relative difference of the claimed objective from the design's own
 
@@ -83,7 +84,7 @@ def found(
     notes: tuple[str, ...] = ()
     if not honest(work, trial):
         converged = False
-        claimed = claim(problem, trial.candidate)
+        claimed = problem.sign * trial.candidate.objective
         notes = (f"the solver's objective {claimed:.9g} is not the design's, {checked.objective:.9g}",)
     if problem.objective is not None and not math.isfinite(checked.objective):
         converged = False
@@ -198,17 +199,11 @@ def _other_branches(problem: Problem, nlp: NLP, found: Mapping[str, float]) -> t
 
 def _excluded(problem: Problem, nlp: NLP, x: Array) -> tuple[str, ...]:
     """Names of the bounds and inequality rows that a solution violates."""
-    g = np.array(nlp.at(x)[1]).ravel()
-    names = []
-    for k, name in enumerate(problem.free):
-        if x[k] < nlp.lower[k] - 1e-9:
-            names.append(f"{name}.min")
-        if x[k] > nlp.upper[k] + 1e-9:
-            names.append(f"{name}.max")
-    for k in range(len(problem.free), len(nlp.variables)):
-        if x[k] < nlp.lower[k] - 1e-9 or x[k] > nlp.upper[k] + 1e-9:
-            names.append(nlp.variables[k])
-    for k, name in enumerate(nlp.rows):
-        if g[k] < nlp.row_lower[k] - 1e-9 or g[k] > nlp.row_upper[k] + 1e-9:
-            names.append(name)
-    return tuple(dict.fromkeys(names))
+    values = (*x, *np.array(nlp.at(x)[1]).ravel())
+    lower, upper = (*nlp.lower, *nlp.row_lower), (*nlp.upper, *nlp.row_upper)
+    names: dict[str, None] = {}
+    for k, name in enumerate((*problem.free, *nlp.variables[len(problem.free) :], *nlp.rows)):
+        below, above = values[k] < lower[k] - _OUTSIDE, values[k] > upper[k] + _OUTSIDE
+        if below or above:
+            names[name if k >= len(problem.free) else f"{name}.{'min' if below else 'max'}"] = None
+    return tuple(names)

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Unpack
 
@@ -13,6 +13,7 @@ from tmsopt.checks.worst_case import cover
 from tmsopt.design.files import Given, question_of
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.solution import Bound, NotSolved, Solution, Starts
+from tmsopt.errors import Fault, InputError, is_number, short, suggest
 from tmsopt.formulation.options import DEFAULTS, AskedOfSolve, Options, options_of
 from tmsopt.records import Table
 from tmsopt.solver.outcome import Finding, better, evaluated
@@ -54,6 +55,7 @@ def solved(design: Given, options: Options = DEFAULTS, family: Family | None = N
     values: dict[str, float] = {}
     if problem.free:
         if options.near:
+            _check_near(problem, options.near)
             near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items() if n in options.near}
             options = replace(options, near=near)
         work = workspace(problem, options, family)
@@ -64,6 +66,15 @@ def solved(design: Given, options: Options = DEFAULTS, family: Family | None = N
     else:
         finding = evaluated(problem, evaluated_cases(problem, problem.ordered({})))
     return _assembled(problem, finding, notes, values, began)
+
+
+def _check_near(problem: Problem, near: Mapping[str, float]) -> None:
+    names = problem.parameter_set.names
+    faults = [Fault(f"unknown parameter '{n}'; {suggest(str(n), names)}", ("near",)) for n in near if n not in names]
+    wrong = (n for n, value in near.items() if not is_number(value))
+    faults += [Fault(f"found {short(near[n])}; accepted: a finite number", ("near", n)) for n in wrong]
+    if faults:
+        raise InputError(faults)
 
 
 def _winner(problem: Problem, explored: Sequence[Explored]) -> Finding | None:

@@ -18,8 +18,7 @@ from tmsopt.formulation.formulate import LIMIT, design_of, formulate, middle
 from tmsopt.formulation.ipopt import Point, Run, ipopt, polisher
 from tmsopt.formulation.nlp import NLP, objective_unit, scale_of, units_of
 from tmsopt.formulation.options import DEFAULTS, Options
-from tmsopt.margins.nearest import Robustness, surveyed
-from tmsopt.margins.surroundings import placed
+from tmsopt.margins.nearest import Robustness, robustness_at
 from tmsopt.models import Quantity, Values
 from tmsopt.records import Array
 
@@ -73,7 +72,7 @@ class Family:
         if not problem.asks_radius:
             return None
         key = (tuple(parameters.items()), tuple(problem.weights.items()))
-        return _kept(self._around, key, lambda: surveyed(placed(problem, parameters, problem.weights or None)))
+        return _kept(self._around, key, lambda: robustness_at(problem, parameters))
 
     def _of(self, nlp: NLP, options: Hashable, make: Callable[[], T]) -> T:
         """Something made of an NLP's functions, which are kept with it lest another gets their address."""

@@ -4,7 +4,6 @@ import time
 from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
-from itertools import islice
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,7 @@ from tmsopt.studies.monte_carlo import Sampling, planned
 from tmsopt.studies.neighbours import blocks
 from tmsopt.studies.row import Row
 from tmsopt.studies.solving import Solver
-from tmsopt.studies.store.store import Store, open_store
+from tmsopt.studies.store.store import Store, open_store, read_store
 from tmsopt.studies.study import Study, definition
 from tmsopt.studies.summary import Summary, summary
 
@@ -33,12 +32,13 @@ _FEW = 32  # rows for which no workers are started unless asked for: they take s
 
 @dataclass(frozen=True)
 class Results:
-    """A study with its rows, all of them unless it was interrupted.
+    """A study with its rows.
 
     Attributes:
-        solved: rows solved now.
+        rows: all of them; what a store had so far, of a study that was stopped.
+        solved: rows solved now; the others were in the store.
         seconds: that they took.
-        engine: ``in process``, ``2 processes`` or the address of a cluster.
+        engine: ``in process``, ``2 processes`` or the address of a cluster; empty where nothing was left to solve.
         found: rows that were in the store.
         about: what exports say of the study: its definition, and of a store when, where and with what it was made.
     """
@@ -71,14 +71,14 @@ class Results:
         return summary(self.study, self.rows)
 
     def export(self, path: str | PathLike[str]) -> None:
-        """Write the rows to a CSV, Parquet or netCDF file; see `store.export.export`."""
+        """Write the rows to a CSV, Parquet or netCDF file; see `tmsopt.studies.export`."""
         export(self.rows, Path(path), self.about or {"definition": definition(self.study)})
 
 
 def run_study(
     study: Study | Sampling | str | PathLike[str], store: str | PathLike[str] | None = None, *,
-    workers: int | None = None, scheduler: str | None = None, fresh: bool = False, most: int | None = None,
-    progress: Progress | None = None, note: Note = silent,
+    workers: int | None = None, scheduler: str | None = None, fresh: bool = False, progress: Progress | None = None,
+    note: Note = silent,
 ) -> Results:  # fmt: skip
     """Solve every row of a study that its store does not have yet.
 
@@ -91,7 +91,6 @@ def run_study(
         workers: processes of this machine; 1 solves in this one. By default as many as cores, or 1 for few rows.
         scheduler: address of a Dask scheduler, such as ``tcp://host:8786``, in place of workers.
         fresh: move a store that is there aside, and start anew.
-        most: rows to solve now, at most; 0 to see what a store has.
         progress: called with rows done and in all, first with those found.
         note: called with a line about the store, and about workers that end.
 
@@ -100,7 +99,7 @@ def run_study(
         NotSolved: where a Monte Carlo study has no design to draw around.
     """
     stated = load_study(study) if isinstance(study, str | PathLike) else study
-    if faults := list(_faults(stated, workers, most)):
+    if faults := list(_faults(stated, workers)):
         raise InputError(faults)
     asked = planned(stated)
     if store is None:
@@ -108,7 +107,7 @@ def run_study(
         began, engine, solved = time.perf_counter(), "", 0
         rows, engine = _solved(asked, set(), workers, scheduler, note)
         with closing(rows):
-            for row in _counted(islice(rows, most), 0, len(asked), progress):
+            for row in _counted(rows, 0, len(asked), progress):
                 kept.append(row)
                 solved += 1
         kept.sort(key=lambda row: row.number)
@@ -119,32 +118,45 @@ def run_study(
         found = len(opened.done())
         if found:
             note(f"{found} of {len(asked)} rows are in {opened.path}")
-        made = fill(asked, opened, workers=workers, scheduler=scheduler, most=most, progress=progress, note=note)
+        made = fill(asked, opened, workers=workers, scheduler=scheduler, progress=progress, note=note)
         return Results(asked, tuple(opened.rows()), *made, found, opened.about())
 
 
-def _faults(study: object, workers: object, most: object) -> Iterator[Fault]:
+def stored(study: Study, store: str | PathLike[str]) -> Results:
+    """The rows that a store has of a study, also while it is being solved; nothing is changed.
+
+    Raises:
+        InputError: where there is no store.
+    """
+    with read_store(Path(store)) as opened:
+        rows = tuple(opened.rows())
+        return Results(study, rows, 0, 0.0, "", len(rows), opened.about())
+
+
+def _faults(study: object, workers: object) -> Iterator[Fault]:
     """What is wrong with the call."""
     if not isinstance(study, Study | Sampling):
         message = f"found {short(study)}; accepted: a Study, as of tmsopt.over_grid, or the path of a study file"
         yield Fault(message, ("study",))
-    for name, value, least in (("workers", workers, 1), ("most", most, 0)):
-        yield from count_faults(name, value, least) if value is not None else ()
+    if workers is not None:
+        yield from count_faults("workers", workers, 1)
 
 
 def fill(
     study: Study, store: Store, *, workers: int | None = None, scheduler: str | None = None,
-    most: int | None = None, progress: Progress | None = None, note: Note = silent,
+    progress: Progress | None = None, note: Note = silent,
 ) -> tuple[int, float, str]:  # fmt: skip
     """Solve the rows that an open store lacks; how many, in how many seconds, and by which engine."""
     began = time.perf_counter()
     done = store.done()
+    if len(done) == len(study):
+        return 0, 0.0, ""
     rows, engine = _solved(study, done, workers, scheduler, note)
     fresh: list[Row] = []
     solved, last = 0, began
     with closing(rows):
         try:
-            for row in _counted(islice(rows, most), len(done), len(study), progress):
+            for row in _counted(rows, len(done), len(study), progress):
                 if row.number in done:
                     continue  # of a block that had been stored in part
                 fresh.append(row)

@@ -134,7 +134,7 @@ def definition(study: Study) -> dict[str, Any]:
     order of names in ``order`` counts as well: starts are spread over the free parameters in turn.
     """
     return {
-        "problem": _problem(study.problem), **_columns(study), "seed": study.seed, "starts": study.starts,
+        "problem": _problem(study.problem), **_columns(study), "seed": int(study.seed), "starts": int(study.starts),
         "warm": study.warm, "report": list(study.report),
     }  # fmt: skip
 

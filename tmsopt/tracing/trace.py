@@ -10,7 +10,7 @@ import numpy as np
 
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem, freedom
-from tmsopt.errors import Fault, InputError, count_faults, suggest
+from tmsopt.errors import Fault, InputError, count_faults, is_number, suggest
 from tmsopt.records import Array
 from tmsopt.roots import pattern as pattern_of
 from tmsopt.roots.patterns.composed import pattern_names
@@ -128,7 +128,7 @@ def _asked(problem: Problem, name: str | None) -> Problem:
 
 def _check(problem: Problem, step: float, starts: int, most: int, through: Sequence[Mapping[str, float]]) -> None:
     faults = [*count_faults("starts", starts, 0), *count_faults("most", most, _FEWEST)]
-    if not isinstance(step, int | float) or not STEPS[0] <= step <= STEPS[1]:
+    if not is_number(step) or not STEPS[0] <= step <= STEPS[1]:
         faults.append(Fault(f"found {step!r}; accepted: a number from {STEPS[0]:g} to {STEPS[1]:g}", ("step",)))
     for design in through:
         if set(design) != set(problem.free):
