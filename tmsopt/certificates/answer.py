@@ -113,7 +113,7 @@ def _asked(question: Question, sign: int, clock: Clock, end: float, confirm: Con
         left = min(end - clock.used, clock.left)
         if left <= 0:
             return Answer(UNDECIDED)
-        seconds = min(left, _FIRST * 2**turn)
+        seconds = min(left, _FIRST * 2.0 ** min(turn, 30))  # one that gives up at once comes to thousands of turns
         ways = [replace(question, unit=question.unit * u, compact=c) for u, c in _WAYS[turn % len(_WAYS)]]
         try:
             decisions = clock.race([task(way.program(sign, max(least, 0.0)), seconds) for way in ways])

@@ -15,7 +15,7 @@ def bound_lines(solution: Solution) -> list[str]:
     bound = solution.bound
     search = f"branch and bound with {bound.solver}, {bound.nodes} nodes, {bound.seconds:.1f} s"
     floating = f"a floating-point proof, feasibility tolerance {bound.tolerance:.0e}"
-    kind = floating if bound.tolerance else "an exact proof"
+    kind = floating if bound.tolerance else "a proof without a tolerance"
     if solution.status == "infeasible":
         return [f"proved: no design in the box satisfies all constraints ({search}); {kind}"] if bound.proven else []
     if not math.isfinite(bound.value):
