@@ -72,6 +72,19 @@ def test_what_is_no_path_is_refused_in_words(reader: str, wrong: object) -> None
         getattr(tmsopt, reader)(wrong)
 
 
+@pytest.mark.parametrize("wrong", [5, b"x"], ids=repr)
+def test_what_is_no_file_to_write_is_refused_in_words(wrong: Any) -> None:
+    study = tmsopt.over_grid(tmsopt.load(EP4), {"mu": [0.1]})
+    calls: list[Callable[[], Any]] = [
+        lambda: tmsopt.run_study(study, wrong),
+        lambda: tmsopt.run_study(study, workers=1).export(wrong),
+        lambda: tmsopt.chart(PLANE, points=(4, 4), folder=wrong),
+    ]
+    for call in calls:
+        with pytest.raises(tmsopt.InputError, match=r"path: found .*; accepted: the path of"):
+            call()
+
+
 @pytest.mark.parametrize(
     ("name", "wrong"),
     [("starts", 0), ("starts", "5"), ("starts", 2.5), ("starts", True), ("seed", -1), ("seed", "a"), ("near", 5)],
@@ -114,6 +127,11 @@ def test_parameters_of_a_design_must_be_numbers_and_all_there() -> None:
     problem = tmsopt.load(EP4)
     with pytest.raises(tmsopt.InputError, match=r"chi_B: missing(.|\n)*lambda_s: found 'steep'; accepted: a finite"):
         tmsopt.speeds({"Fr": 1.0, "lambda_s": "steep"}, problem=problem)  # type: ignore[dict-item]
+    assert set(tmsopt.speeds({"chi_B": 1.4, "lambda_s": 0.4}, problem=EP4).parameters) == {
+        *problem.fixed,
+        "chi_B",
+        "lambda_s",
+    }
     own = {"chi_B": Fraction(45, 32), "lambda_s": np.float32(0.5)}  # the speed is what varies; any real numbers do
     doubles = {"Fr": 2.0, "chi_B": 1.40625, "lambda_s": 0.5}
     assert tmsopt.speeds(own, problem=EP4).found == tmsopt.speeds(doubles, problem=problem).found  # type: ignore[arg-type]

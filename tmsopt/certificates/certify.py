@@ -133,9 +133,8 @@ def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
         return answered.better, True
     if answered.verdict == INFEASIBLE:
         if not recheck(design.problem, design.parameters, _cases(design)).violations:
-            return _noted(
-                design, f"no proof: {SOLVER.name}'s relaxation excludes the feasible design that was found"
-            ), False
+            words = f"no proof: {SOLVER.name}'s relaxation excludes the feasible design that was found"
+            return _noted(design, words), False
         none = -math.inf if design.problem.sense == "maximize" else math.inf
         bound = _searched(none, 0.0, True, clock)
         return replace(design, status="infeasible", bound=bound), False

@@ -168,7 +168,7 @@ def chart(
         raise InputError(faults)
     wanted = layers if layers is not None else tuple(LAYERS) if folder is None else USUAL
     work = survey(problem, axes, points, wanted, quantities, engine, single)
-    path, grid = None if folder is None else Path(folder), work.grid
+    path, grid = None if folder is None else path_of(folder, "a folder"), work.grid
     if path is None and grid.size > LARGEST:
         message = f"{grid.size:.3g} designs do not fit into memory; give a folder, or {LARGEST:.0e} or less"
         raise InputError([Fault(message, ("points",))])

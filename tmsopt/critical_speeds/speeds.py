@@ -150,7 +150,7 @@ def _parameters(design: Any, asked: Problem, name: str, progress: Progress | Non
         own = {**asked.fixed, **design}
         if faults := [f for f in parameter_faults(asked, own) if f.key[-1] != name]:
             raise InputError(faults)
-        return {name: 1.0, **own}
+        return own
     return dict(asked.fixed if set(asked.free) <= {name} else solve(asked, progress=progress).parameters)
 
 

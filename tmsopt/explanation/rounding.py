@@ -77,7 +77,7 @@ def rounded(solution: Solution, names: Iterable[str], digits: int) -> Rounded:
     with flint.ctx.workdps(_WORKING):
         exact: dict[str, Any] = {n: _exact(text, of[n].unit) for n, text in written.items()}
     plain = {**solution.parameters, **{n: float(x.mid()) for n, x in exact.items()}}
-    cases = _cases(problem, plain)
+    cases = _cases(solution, plain)
     realised = max(realised_abscissa(problem, c.applied({**solution.parameters, **exact})) for c in cases)
     each = [problem.values(case.applied(plain)) for case in cases]
     ratio = min(_damping_ratio([float(c) for c in values.coefficients]) for values in each)
@@ -97,10 +97,11 @@ def worst(alone: Mapping[str, Rounded]) -> str:
     return max(losing, key=lambda name: losing[name], default="")
 
 
-def _cases(problem: Problem, parameters: Mapping[str, float]) -> list[Case]:
-    """The cases of a design, and its worst ones between them; one that changes nothing, where there are none."""
-    listed = [case for case in problem.cases if not case.direction]
-    return [*listed, *(w.case for w in worst_cases(problem, parameters).values())] if listed else [Case()]
+def _cases(solution: Solution, rounded: Mapping[str, float]) -> list[Case]:
+    """The listed cases, and the worst of the design and of the rounded one; one that changes nothing without any."""
+    listed = [case for case in solution.problem.cases if not case.direction]
+    worst = [w.case for w in worst_cases(solution.problem, rounded).values()] if listed else []
+    return [*listed, *([solution.worst] if solution.worst else []), *worst] or [Case()]
 
 
 def _violations(problem: Problem, parameters: Mapping[str, float], each: Sequence[Values]) -> dict[str, float]:

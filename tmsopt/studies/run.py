@@ -5,11 +5,11 @@ from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
 
+from tmsopt.disk import path_of
 from tmsopt.errors import Fault, InputError, count_faults, short, suggest
 from tmsopt.records import Progress
 from tmsopt.studies.engines import Note, Unit, cluster, cores, in_process, processes
@@ -72,7 +72,7 @@ class Results:
 
     def export(self, path: str | PathLike[str]) -> None:
         """Write the rows to a CSV, Parquet or netCDF file; see `tmsopt.studies.export`."""
-        export(self.rows, Path(path), self.about or {"definition": definition(self.study)})
+        export(self.rows, path_of(path, "the file to write"), self.about or {"definition": definition(self.study)})
 
 
 def run_study(
@@ -112,7 +112,7 @@ def run_study(
                 solved += 1
         kept.sort(key=lambda row: row.number)
         return Results(asked, tuple(kept), solved, time.perf_counter() - began, engine)
-    with open_store(Path(store), definition(asked), fresh=fresh) as opened:
+    with open_store(path_of(store, "an SQLite file"), definition(asked), fresh=fresh) as opened:
         for line in (*opened.warnings, *([f"moved the old store to {opened.moved}"] if opened.moved else [])):
             note(line)
         found = len(opened.done())
@@ -128,7 +128,7 @@ def stored(study: Study, store: str | PathLike[str]) -> Results:
     Raises:
         InputError: where there is no store.
     """
-    with read_store(Path(store)) as opened:
+    with read_store(path_of(store, "an SQLite file")) as opened:
         rows = tuple(opened.rows())
         return Results(study, rows, 0, 0.0, "", len(rows), opened.about())
 
