@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -213,6 +214,15 @@ def test_just_inside_and_just_outside_heavy_damping():
     for Fr in (DAMPED["Fr"], DAMPED["Fr"] * 1.01, DAMPED["Fr"] * 0.99):
         found = nearest(problem(DAMPED | {"Fr": Fr}), "heavy damping", weights={"Fr": 1.0})
         assert found.distance == pytest.approx(min(abs(e - Fr) for e in edges if e > 0), rel=1e-6)
+
+
+def test_the_radius_of_a_recheck_has_the_weights_of_its_problem():
+    """Twice the change counts as 1: half the radius; distances in the same units as `nearest` gives them."""
+    asked = replace(problem(OFF), constraints={"room": "radius >= 0.001"})
+    once, twice = (replace(asked, weights={"Fr": w, "chi_B": w}) for w in (0.1, 0.2))
+    one, two = (tmsopt.solve(p).quantities["radius"] for p in (once, twice))
+    assert one == pytest.approx(robustness(problem(OFF), weights={"Fr": 0.1, "chi_B": 0.1}).radius, rel=1e-12)
+    assert two == pytest.approx(one / 2, rel=1e-9)
 
 
 def test_an_unstable_design_has_no_radius():

@@ -413,9 +413,9 @@ def test_a_killed_command_goes_on(file: Path, ending: signal.Signals) -> None:
     """Killed once some rows are stored, then run again: those rows are there, and all rows are as if nothing happened."""
     many = FILE.replace("zeta_H = [-0.2, -0.3, -0.35]", "zeta_H = { min = -0.35, max = -0.2, points = 36 }")
     file.write_text(many, encoding="utf-8")
-    run = [sys.executable, "-m", "tmsopt", "study", str(file), "--workers", "2"]
+    run = [sys.executable, "-m", "tmsopt", "study", str(file), "--workers", "2", "--json"]
     store = file.parent / "heights.sqlite"
-    process = subprocess.Popen(run, cwd=file.parent, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(run, cwd=file.parent, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     kept: set[int] = set()
     while len(kept) < 5:
         assert process.poll() is None
@@ -427,11 +427,14 @@ def test_a_killed_command_goes_on(file: Path, ending: signal.Signals) -> None:
             except InputError:
                 continue  # being made
     process.send_signal(ending)
-    _, told = process.communicate(timeout=60)
+    answer, told = process.communicate(timeout=60)
     if ending == signal.SIGINT:
         assert process.returncode == 130
         assert "the same command goes on" in told
         assert "Traceback" not in told
+        data = json.loads(answer)
+        assert data["run"] == {"store": str(store), "rows_found": 0, "interrupted": True}
+        assert kept <= {row["number"] for row in data["table"]}
     with read_store(store) as opened:
         before = {n: opened.row(n) for n in opened.done()}
     assert kept <= before.keys()
