@@ -6,11 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.models import Quantity, Values
 from tmsopt.records import Array
-from tmsopt.roots import Structure, roots, structure
+from tmsopt.roots import Structure, abscissa_and_damping, roots, structure
 
 STRUCTURE_TOLERANCE = 1e-11
 """Relative change of a coefficient within which roots count as multiple: a polished optimum is within 1e-14."""
@@ -47,6 +46,8 @@ RADIUS = "radius"
 NO_RADIUS = Quantity(RADIUS, "1", "robustness radius", "r", lambda values: math.nan)
 """Where it was not searched for, the radius is not known."""
 
+_QUARTIC = 5  # coefficients of the degree that has formulas of its own
+
 ROOT_NAMES = (*(q.name for q in ROOT_QUANTITIES), RADIUS)
 
 
@@ -61,19 +62,21 @@ def regular(coefficients: Array) -> Array:
     return np.concatenate([np.where(a[..., 0] == 0, 1e-12 * size, a[..., 0])[..., None], a[..., 1:]], axis=-1)
 
 
-def _array_roots(values: Mapping[str, Any]) -> NDArray[np.complex128]:
-    """Roots; nan at designs at which a coefficient does not exist."""
+def _array_motion(values: Mapping[str, Any]) -> tuple[Array, Array]:
+    """Abscissa and damping ratio; nan at designs at which a coefficient does not exist."""
     assert isinstance(values, Values)
     a = np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in values.coefficients)), axis=-1)
-    return np.where(np.all(np.isfinite(a), axis=-1, keepdims=True), roots(regular(a)), np.nan)
+    exist, a = np.all(np.isfinite(a), axis=-1), regular(a)
+    if a.shape[-1] == _QUARTIC:
+        motion = abscissa_and_damping(*np.moveaxis(a, -1, 0), compiled=False)
+        found = motion.abscissa, motion.damping_ratio
+    else:
+        z = roots(a)
+        found = z.real.max(axis=-1), np.min(-z.real / (np.abs(z) + 1e-300), axis=-1)
+    return np.where(exist, found[0], np.nan), np.where(exist, found[1], np.nan)
 
 
-def _array_damping(values: Mapping[str, Any]) -> Array:
-    z = _array_roots(values)
-    return np.asarray(np.min(-z.real / (np.abs(z) + 1e-300), axis=-1))
-
-
-_ARRAY_FORMULAS = (lambda values: np.asarray(_array_roots(values).real.max(axis=-1)), _array_damping)
+_ARRAY_FORMULAS = (lambda values: _array_motion(values)[0], lambda values: _array_motion(values)[1])
 
 ARRAY_ROOT_QUANTITIES = (
     *(replace(q, value=formula) for q, formula in zip(ROOT_QUANTITIES, _ARRAY_FORMULAS, strict=True)), NO_RADIUS,

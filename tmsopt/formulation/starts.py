@@ -1,19 +1,16 @@
 """Designs to start from, spread over the box, and starting values of the lifted variables that fit them."""
 
 from collections.abc import Iterator, Mapping
-from functools import reduce
 from itertools import islice, product
-from typing import Any
 
 import numpy as np
 
 from tmsopt.arithmetic.sequence import golden_steps
-from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES, RADIUS, regular
+from tmsopt.design.quantities import RADIUS, regular
 from tmsopt.formulation.formulate import middle, variables_of
+from tmsopt.formulation.judgement import judged, values_of
 from tmsopt.formulation.nlp import NLP
-from tmsopt.models import Values
 from tmsopt.records import Array
 from tmsopt.roots import is_stable, roots
 from tmsopt.roots.patterns.structure import guess_distance
@@ -119,9 +116,9 @@ def spread(problem: Problem, seed: int) -> Iterator[dict[str, float]]:
 
 def worth(problem: Problem, design: Mapping[str, float]) -> float:
     """Objective of a design in its worst case, by numeric roots; larger is worse, inf where a limit is violated."""
-    objective, excesses, _ = _judged(problem, {n: np.array(x) for n, x in design.items()})
-    feasible = objective is not None and np.isfinite(objective) and all(e <= 0 for e in excesses)
-    return float(objective) if feasible and objective is not None else np.inf
+    found = judged(problem, {n: np.array(x) for n, x in design.items()})
+    feasible = found.worth is not None and np.isfinite(found.worth) and np.all(found.excess <= 0)
+    return float(found.worth) if feasible and found.worth is not None else np.inf
 
 
 def opposite(problem: Problem, design: Mapping[str, float]) -> list[dict[str, float]]:
@@ -136,49 +133,19 @@ def opposite(problem: Problem, design: Mapping[str, float]) -> list[dict[str, fl
 
 def _merit(problem: Problem, columns: Mapping[str, Array]) -> tuple[Array, Array]:
     """Objective, and violated constraints, of many designs in their worst cases, each in units of its own spread."""
-    worst, excesses, nominal = _judged(problem, columns)
+    found = judged(problem, columns)
     shape = next(iter(columns.values())).shape
     objective, violation = np.zeros(shape), np.zeros(shape)
-    if worst is not None:
-        objective += _in_spreads(worst)
+    if found.worth is not None:
+        objective += _in_spreads(found.worth)
     if problem.pattern is not None:
-        a = regular(np.stack(np.broadcast_arrays(*_values(problem, nominal, shape).coefficients), axis=-1))
+        values = values_of(problem, problem.ordered(columns), shape)
+        a = regular(np.stack(np.broadcast_arrays(*values.coefficients), axis=-1))
         mismatch = [guess_distance(problem.pattern, c, z) for c, z in zip(a, roots(a), strict=True)]
         violation += 3 * _in_spreads(np.array(mismatch))
-    for excess in excesses:
+    for excess in found.excess:
         violation += 3 * _in_spreads(excess)
     return objective, violation
-
-
-def _judged(problem: Problem, columns: Mapping[str, Array]) -> tuple[Array | None, list[Array], Mapping[str, Any]]:
-    """Objective, larger is worse, and excess over each limit, of designs in their worst cases; and their parameters."""
-    shape = next(iter(columns.values())).shape
-    nominal = problem.ordered(columns)
-    listed = [case for case in problem.cases if not case.direction]
-    each = [_values(problem, case.applied(nominal), shape) for case in listed] or [_values(problem, nominal, shape)]
-    asked = [e for e in (problem.objective, *problem.conditions.values()) if e]
-    for name, worst in (("abscissa", np.maximum), ("damping_ratio", np.minimum)):
-        if len(each) > 1 and any(name in e.names for e in asked):
-            found = reduce(worst, [values[name] for values in each])
-            for values in each:
-                values.define(name, found)
-    objective = None
-    if problem.objective is not None:
-        every = [problem.sign * np.broadcast_to(problem.objective(values), shape) for values in each]
-        objective = reduce(np.maximum, every)
-    conditions = problem.conditions.values()
-    excesses = [reduce(np.maximum, [_excess(c, values, shape) for values in each]) for c in conditions]
-    return objective, excesses, nominal
-
-
-def _values(problem: Problem, parameters: Mapping[str, Any], shape: tuple[int, ...]) -> Values:
-    arrays = {name: np.broadcast_to(np.asarray(value, dtype=float), shape) for name, value in parameters.items()}
-    return Values(problem.model, problem.parameter_set, arrays, extra=ARRAY_ROOT_QUANTITIES)
-
-
-def _excess(condition: Expression, values: Values, shape: tuple[int, ...]) -> Array:
-    """By how much a comparison is violated."""
-    return np.asarray(condition.excess(np.broadcast_to(np.asarray(condition(values), dtype=float), shape)))
 
 
 def _in_spreads(column: Array) -> Array:

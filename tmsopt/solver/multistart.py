@@ -1,9 +1,9 @@
 """Multi-start: IPOPT from many designs, ended early when enough of them agree."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from tmsopt.solver.workspace import Workspace
 _ENOUGH = 12  # starts tried before agreement counts
 _AGREE = 5  # starts at the best value that end the search
 _HOPELESS = 16  # starts without a feasible end after which the least-violating design is looked for instead
+_ENOUGH_SAMPLED, _AGREE_SAMPLED, _HOPELESS_SAMPLED = 4, 2, 8
+"""The same where the starts come from a sample of the box."""
+
 _MET = 1e-14  # sum of squares of coefficients at which more conditions than parameters are met
 _SAME = 1e-7  # relative difference of objectives that counts as the same
 _FEASIBLE = 1e-6  # of the rows, before polishing; the recheck has the last word
@@ -54,20 +57,33 @@ def search(work: Workspace, nlp: NLP) -> list[Candidate]:
     starts, candidates = options.starts, list[Candidate]()
     if options.near:
         candidates.append(run.ended({**middle(part), **options.near}, near=True))
-        if not options.exhaustive and _settled(part, candidates):
+        if not options.exhaustive and _settled(work, candidates):
             return candidates
     if part.start and len(candidates) < starts:  # the user's own
         candidates.append(run.ended(middle(part), near=True))
-    for design in designs(part, options.seed, max(starts - len(candidates), 0)):
-        candidates.append(run.ended(design, hopeful=any(c.feasible for c in candidates)))
+    for design, near in islice(_starts(work), max(starts - len(candidates), 0)):
+        candidates.append(run.ended(design, near, hopeful=any(c.feasible for c in candidates)))
         if options.progress:
             options.progress(len(candidates), starts)
-        if not options.exhaustive and _settled(part, candidates):
-            candidates += _beside(run, candidates, starts - len(candidates))
+        if not options.exhaustive and _settled(work, candidates):
+            if work.sample is None:
+                candidates += _beside(run, candidates, starts - len(candidates))
             break
     if part.pattern is not None and not any(c.feasible for c in candidates):
         candidates += _rescued(work, nlp)
     return candidates
+
+
+def _starts(work: Workspace) -> Iterator[tuple[dict[str, float], bool]]:
+    """Designs to start from, and whether each may be near an optimum: those of the sample first, by turns."""
+    if work.sampler and work.sample:
+        refined, bold = work.sample.refined, work.sample.boldest
+        for k in range(max(len(refined), len(bold))):
+            if k < len(refined):
+                yield work.sampler.design(refined, k), True
+            if k < len(bold):
+                yield work.sampler.design(bold, k), False
+    yield from ((design, False) for design in designs(work.part, work.options.seed, work.options.starts))
 
 
 def _beside(run: "Runner", candidates: Sequence[Candidate], most: int) -> list[Candidate]:
@@ -157,15 +173,16 @@ def _spurious(problem: Problem, nlp: NLP, run: Run) -> bool:
     return bool(np.any(claimed < z.real.max(axis=1) - max(_SCATTER, _RESIDUAL ** (1 / problem.model.degree)) * size))
 
 
-def _settled(problem: Problem, candidates: list[Candidate]) -> bool:
+def _settled(work: Workspace, candidates: list[Candidate]) -> bool:
     """Whether more starts would be waste: the bound is reached, or enough of them agree on the best.
 
     With w different optima seen in n starts, w (n − 1)/(n − w − 2) are expected in all (Boender and Rinnooy Kan
     1987); the search goes on while that is more than w and a half.
     """
+    problem, sampled = work.part, work.sample is not None
     feasible = [c for c in candidates if c.feasible]
     if not feasible:
-        return len(candidates) >= _HOPELESS
+        return len(candidates) >= (_HOPELESS_SAMPLED if sampled else _HOPELESS)
     best = min(c.objective for c in feasible)
     record = candidates[-1].feasible and all(candidates[-1].objective < c.objective for c in feasible[:-1])
     if record and _proven(problem, candidates[-1]):
@@ -174,6 +191,8 @@ def _settled(problem: Problem, candidates: list[Candidate]) -> bool:
     if problem.objective is None:  # any point of a square pattern will do, and any that meets too many conditions
         count = freedom(problem).count
         return agreeing >= (1 if count == 0 or (count < 0 and best <= _MET) else _AGREE)
+    if sampled:
+        return len(candidates) >= _ENOUGH_SAMPLED and agreeing >= _AGREE_SAMPLED
     ordered = sorted(c.objective for c in feasible)
     n, w = len(feasible), 1 + sum(not same(a, b, feasible[0].nlp.size) for a, b in pairwise(ordered))
     seen = n > w + 2 and w * (n - 1) <= (w + 0.5) * (n - w - 2)

@@ -21,6 +21,7 @@ from tmsopt.formulation.options import DEFAULTS, Options
 from tmsopt.margins.nearest import Robustness, robustness_at
 from tmsopt.models import Quantity, Values
 from tmsopt.records import Array
+from tmsopt.solver.sample import Sample, Sampler
 
 _KEPT = 32
 """NLPs kept, with three solvers each: where cases are added row by row, most are not met again."""
@@ -105,6 +106,17 @@ class Workspace:
     def touching(self) -> bool:
         """Whether root quantities must be held at their exact values: bounds on them would let the search overclaim."""
         return overclaims(self.problem)
+
+    @cached_property
+    def sampler(self) -> Sampler | None:
+        """Looks at designs of this part; None where arrays cannot tell what is asked of them."""
+        asks = self.part.pattern is None and self.part.objective is not None and not self.part.asks_radius
+        return Sampler(self.part, self.options.seed) if asks else None
+
+    @cached_property
+    def sample(self) -> Sample | None:
+        """What was seen of this part before any solver."""
+        return self.sampler.sample() if self.sampler else None
 
     def formulate(self, cases: Sequence[Case], damping_ratio: float | None = None) -> NLP:
         """The NLP of the problem on this part of the box."""

@@ -1,0 +1,77 @@
+"""Many designs judged at once, by arrays: what they are worth and what they violate in their worst cases."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.design.expression import Expression
+from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES
+from tmsopt.models import Values
+from tmsopt.records import Array
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What designs are in their worst cases; numeric roots, so beside multiple ones a hint.
+
+    Attributes:
+        worth: the objective, larger is worse; None without one.
+        beyond: by how much each limit is passed, negative inside; of an equality, left minus right. Shape (limits, …).
+        equal: which limits are equalities.
+    """
+
+    worth: Array | None
+    beyond: Array
+    equal: NDArray[np.bool_]
+
+    @property
+    def excess(self) -> Array:
+        """By how much each limit is violated; inf where that does not exist."""
+        equal = self.equal.reshape(-1, *[1] * (self.beyond.ndim - 1))
+        amount = np.where(equal, np.abs(self.beyond), np.maximum(self.beyond, 0.0))
+        return np.where(np.isnan(amount), np.inf, amount)
+
+
+def judged(problem: Problem, columns: Mapping[str, Array]) -> Judged:
+    """Judge designs.
+
+    Args:
+        columns: free parameter → values, all of one shape.
+    """
+    shape = next(iter(columns.values())).shape
+    nominal = problem.ordered(columns)
+    listed = [case for case in problem.cases if not case.direction]
+    own = values_of(problem, nominal, shape)
+    each = [values_of(problem, case.applied(nominal), shape) for case in listed] or [own]
+    conditions = list(problem.conditions.values())
+    asked = [e for e in (problem.objective, *conditions) if e]
+    for name, worst in (("abscissa", np.maximum), ("damping_ratio", np.minimum)):
+        if len(each) > 1 and any(name in e.names for e in asked):
+            found = reduce(worst, [values[name] for values in each])
+            for values in (own, *each):
+                values.define(name, found)
+    worth = None
+    if problem.objective is not None:
+        every = [problem.sign * _evaluated(problem.objective, values, shape) for values in each]
+        worth = reduce(np.maximum, every)
+    beyond = [  # an equality is one of the nominal design
+        reduce(np.maximum, [c.sign * _evaluated(c, values, shape) for values in ([own] if c.equality else each)])
+        for c in conditions
+    ]
+    equal = np.array([c.equality for c in conditions], dtype=bool)
+    return Judged(worth, np.stack(beyond) if beyond else np.empty((0, *shape)), equal)
+
+
+def values_of(problem: Problem, parameters: Mapping[str, Any], shape: tuple[int, ...]) -> Values:
+    """Everything derived from designs, as arrays of one shape."""
+    arrays = {name: np.broadcast_to(np.asarray(value, dtype=float), shape) for name, value in parameters.items()}
+    return Values(problem.model, problem.parameter_set, arrays, extra=ARRAY_ROOT_QUANTITIES)
+
+
+def _evaluated(expression: Expression, values: Values, shape: tuple[int, ...]) -> Array:
+    return np.broadcast_to(np.asarray(expression(values), dtype=float), shape)

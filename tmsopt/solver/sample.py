@@ -1,0 +1,261 @@
+"""A quasi-random sample of the whole box, judged by arrays and refined: where to start, and the referee of claims."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.arithmetic.sequence import golden_steps
+from tmsopt.design.problem import Problem
+from tmsopt.formulation.judgement import Judged, judged
+from tmsopt.records import Array
+
+_MOST, _LEAST = 2**14, 2**11
+"""Designs of a sample: at most, and at least where each costs much."""
+
+_FIRST, _EACH = 2**8, 4  # designs for no parameter at all, and times as many for each
+_CORNERS = 10  # free parameters up to which all corners of the box are looked at
+_FACES = 4  # one design of so many is moved to faces of the box: many optima lie there
+_DECADES = 100.0  # ratio of the ends of a range beyond which its values are spread by their logarithms
+
+_APART = 0.15  # of the box: distance of designs that may lie in different basins
+_RANKED = 4096  # first ones of an order among which those apart are chosen
+_LEADERS, _BOLD = 8, 8  # designs to start from, of either kind
+_LOCAL = 24  # designs looked at around each that is refined, in each round
+_REACHES = tuple(np.geomspace(0.1, 3e-4, 9).tolist())  # of the box, round after round
+
+_SHELLS, _SHELL = 12, 32  # distances about a design, and designs at each
+_NEAR = 0.01  # of the box: distance of designs about one that are refined
+
+_MET = 1e-10  # of its scale: excess up to which a limit counts as met by numeric roots
+_STEPS = 12  # of Newton's method towards what violated limits allow
+_STEP = 1e-7  # of the box, for differences
+_SHARES = (1.0, 0.5, 0.1, 0.01, 1e-3)  # of a step, the best of which is taken
+
+
+@dataclass(frozen=True)
+class Space:
+    """The box of a problem as a unit cube: tangents and, over decades, logarithms evenly spread."""
+
+    problem: Problem
+
+    @property
+    def size(self) -> int:
+        """Number of free parameters."""
+        return len(self.problem.free)
+
+    def designs(self, u: Array) -> dict[str, Array]:
+        """Columns of parameters for points of shape (…, size)."""
+        found = {}
+        for k, (name, (lower, upper)) in enumerate(self.problem.free.items()):
+            ends = self._stretched(name, np.array([lower, upper]))
+            found[name] = np.clip(self._plain(name, ends[0] + (ends[1] - ends[0]) * u[..., k]), lower, upper)
+        return found
+
+    def points(self, designs: Mapping[str, float]) -> Array:
+        """The point of one design."""
+        found = []
+        for name, ends in self.problem.free.items():
+            lower, upper, x = self._stretched(name, np.array([*ends, designs[name]]))
+            found.append((x - lower) / (upper - lower))
+        return np.asarray(np.clip(found, 0.0, 1.0))
+
+    def _stretched(self, name: str, x: Array) -> Array:
+        return np.asarray(np.tan(x) if self._tangent(name) else np.log(x) if self._logarithmic(name) else x)
+
+    def _plain(self, name: str, x: Array) -> Array:
+        return np.asarray(np.arctan(x) if self._tangent(name) else np.exp(x) if self._logarithmic(name) else x)
+
+    def _tangent(self, name: str) -> bool:
+        return self.problem.parameter_set[name].tangent
+
+    def _logarithmic(self, name: str) -> bool:
+        lower, upper = self.problem.free[name]
+        return lower > 0 and upper > _DECADES * lower
+
+
+@dataclass(frozen=True)
+class Looked:
+    """Designs as points of the unit cube, with what they are; the first ones come first where nothing else decides.
+
+    Attributes:
+        worth: larger is worse; inf where it does not exist.
+        violation: sum of the excesses, each relative to its scale; 0 where all limits are met.
+    """
+
+    u: Array
+    worth: Array
+    violation: Array
+
+    def __len__(self) -> int:
+        return len(self.u)
+
+    def take(self, rows: NDArray[np.int_]) -> "Looked":
+        """Some of them."""
+        return Looked(self.u[rows], self.worth[rows], self.violation[rows])
+
+    def joined(self, other: "Looked") -> "Looked":
+        """These and others."""
+        pairs = ((self.u, other.u), (self.worth, other.worth), (self.violation, other.violation))
+        return Looked(*(np.concatenate(pair) for pair in pairs))
+
+    @property
+    def ranked(self) -> NDArray[np.int_]:
+        """Rows by violation, then by worth."""
+        return np.lexsort((self.worth, self.violation))
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What was seen of the whole box, before any solver.
+
+    Attributes:
+        refined: designs far from each other that violate least, or are best of those that violate nothing, refined.
+        boldest: designs far from each other that are best whatever they violate.
+        met: designs of the sample that meet all limits.
+    """
+
+    refined: Looked
+    boldest: Looked
+    met: int
+
+
+class Sampler:
+    """Looks at designs of one box, and counts them.
+
+    Attributes:
+        scales: of each limit's excess.
+        count: of designs looked at.
+    """
+
+    def __init__(self, problem: Problem, seed: int) -> None:
+        self.space, self.rng = Space(problem), np.random.default_rng([seed, 16])
+        self.count = 0
+        self.scales = np.ones(len(problem.conditions))
+        self._offset = np.random.default_rng(seed).random(self.space.size)
+
+    @property
+    def problem(self) -> Problem:
+        return self.space.problem
+
+    def look(self, u: Array) -> Looked:
+        """Judge points of shape (n, size)."""
+        found = self._judged(u)
+        return self._standing(u, found)
+
+    def sample(self) -> Sample:
+        """See the box."""
+        drawn = self.draw()
+        ranked = drawn.take(drawn.ranked[:_RANKED])
+        leaders = ranked.take(apart(ranked, _LEADERS))
+        if np.any(leaders.violation > 0):
+            leaders = self.nearer(leaders)
+        refined = self.refined(leaders)
+        bold = drawn.take(np.argsort(drawn.worth, kind="stable")[:_RANKED])
+        return Sample(refined.take(refined.ranked), bold.take(apart(bold, _BOLD)), int(np.sum(drawn.violation == 0)))
+
+    def draw(self) -> Looked:
+        """Corners, a quasi-random sequence, and some of it moved to faces."""
+        size = self.space.size
+        cost = max(1, len(self.problem.cases)) * (1 if self.problem.model.degree <= _QUARTIC else _SLOWER)
+        count = max(min(_FIRST * _EACH**min(size, _QUARTIC), _MOST) // cost, _LEAST)
+        u = (self._offset + np.arange(1, count + 1)[:, None] * golden_steps(size)) % 1.0
+        outer = u[::_FACES]
+        u[::_FACES] = np.where(outer < 1 / 3, 0.0, np.where(outer > 2 / 3, 1.0, outer))
+        corners = np.array(list(product((0.0, 1.0), repeat=size))) if size <= _CORNERS else np.empty((0, size))
+        u = np.concatenate([np.full((1, size), 0.5), corners, u])
+        found = self._judged(u)
+        for k, beyond in enumerate(found.beyond):
+            known = np.abs(beyond[np.isfinite(beyond)])
+            self.scales[k] = float(np.median(known)) if known.size and np.median(known) > 0 else 1.0
+        return self._standing(u, found)
+
+    def refined(self, start: Looked) -> Looked:
+        """Each design improved by random steps that become shorter, limits first."""
+        kept = start
+        rows = np.arange(len(kept))
+        for reach in _REACHES if len(kept) else ():
+            steps = self.rng.standard_normal((len(kept), _LOCAL, self.space.size))
+            steps[:, ::2] *= self.rng.random((len(kept), _LOCAL // 2, self.space.size)) < 0.5  # not in all directions
+            near = self.look(np.clip(kept.u[:, None] + reach * steps, 0.0, 1.0).reshape(-1, self.space.size))
+            both = kept.joined(near)
+            of = np.concatenate([rows, np.repeat(rows, _LOCAL)])
+            order = np.lexsort((both.worth, both.violation, of))
+            kept = both.take(order[np.searchsorted(of[order], rows)])
+        return kept
+
+    def nearer(self, start: Looked) -> Looked:
+        """Each design moved by Newton's method towards what the limits that it violates allow, the shortest way."""
+        u, kept = start.u.copy(), start
+        for _ in range(_STEPS):
+            rows = np.flatnonzero((kept.violation > 0) & np.isfinite(kept.violation))
+            if not rows.size:
+                break
+            steps = self._newton_steps(u[rows])
+            tried = np.clip(u[rows][:, None] + steps[:, None] * np.array(_SHARES)[:, None], 0.0, 1.0)
+            ends = self.look(tried.reshape(-1, self.space.size))
+            best = np.argmin(ends.violation.reshape(len(rows), -1), axis=1) + np.arange(len(rows)) * len(_SHARES)
+            better = ends.violation[best] < kept.violation[rows]
+            if not better.any():
+                break
+            u[rows[better]] = ends.u[best[better]]
+            joined = kept.joined(ends)
+            places = np.arange(len(kept))
+            places[rows[better]] = len(kept) + best[better]
+            kept = joined.take(places)
+        return kept
+
+    def design(self, found: Looked, row: int) -> dict[str, float]:
+        """The free parameters of one design."""
+        return {n: float(x) for n, x in self.space.designs(found.u[row]).items()}
+
+    def around(self, design: Mapping[str, float]) -> Looked:
+        """The best of the designs about one: near it at all distances, and with parameters at other ends of the box."""
+        u = self.space.points(design)
+        reach = np.repeat(np.geomspace(0.5, 1e-5, _SHELLS), _SHELL)[:, None]
+        steps = self.rng.standard_normal((len(reach), self.space.size))
+        steps[::2] *= self.rng.random((len(reach[::2]), self.space.size)) < 0.5
+        ends = np.repeat(u[None], 2 * self.space.size, axis=0)
+        ends[np.arange(len(ends)), np.repeat(np.arange(self.space.size), 2)] = np.tile([0.0, 1.0], self.space.size)
+        seen = self.look(np.clip(np.concatenate([u[None], u + reach * steps, ends]), 0.0, 1.0))
+        best = seen.take(seen.ranked[:_RANKED])
+        return self.refined(best.take(apart(best, _LEADERS, _NEAR)))
+
+    def _newton_steps(self, u: Array) -> Array:
+        """Shortest steps to where violated limits are met, to first order."""
+        size = self.space.size
+        ahead = np.where(u < 0.5, _STEP, -_STEP)
+        moved = u[:, None] + np.concatenate([np.zeros((1, size)), np.eye(size)])[None] * ahead[:, None]
+        found = self._judged(moved.reshape(-1, size))
+        beyond = found.beyond.reshape(len(found.beyond), len(u), size + 1) / self.scales[:, None, None]
+        violated = found.equal[:, None] | (beyond[:, :, 0] > 0)
+        target = np.where(violated, beyond[:, :, 0], 0.0)
+        slopes = np.where(violated[:, :, None], (beyond[:, :, 1:] - beyond[:, :, :1]) / ahead, 0.0)
+        slopes, target = np.nan_to_num(slopes, posinf=0.0, neginf=0.0), np.nan_to_num(target)
+        inverse = np.linalg.pinv(np.moveaxis(slopes, 0, 1), rcond=1e-10)
+        return np.asarray(-np.einsum("rnm,mr->rn", inverse, target))
+
+    def _judged(self, u: Array) -> Judged:
+        self.count += len(u)
+        return judged(self.problem, self.space.designs(u))
+
+    def _standing(self, u: Array, found: Judged) -> Looked:
+        worth = np.zeros(len(u)) if found.worth is None else found.worth
+        excess = found.excess / self.scales[:, None]
+        violation = np.where(excess <= _MET, 0.0, excess).sum(axis=0)
+        return Looked(u, np.where(np.isfinite(worth), worth, np.inf), violation)
+
+
+_QUARTIC, _SLOWER = 4, 4  # degrees above take so many times as long
+
+
+def apart(found: Looked, most: int, distance: float = _APART) -> NDArray[np.int_]:
+    """The first few rows that lie apart from each other."""
+    rows: list[int] = []
+    left = np.arange(len(found))
+    while left.size and len(rows) < most:
+        rows.append(int(left[0]))
+        left = left[np.abs(found.u[left] - found.u[left[0]]).max(axis=1) >= distance]
+    return np.array(rows, dtype=int)
