@@ -40,7 +40,7 @@ _LEEWAY = 1e-9  # below a constant that a quantity is never less than
 
 def formulate(
     problem: Problem, cases: Sequence[Case] = (), elastic: bool = False, damping_ratio: float | None = None,
-    settings: Mapping[str, Any] | None = None,
+    settings: Mapping[str, Any] | None = None, lead: int = 0,
 ) -> NLP:  # fmt: skip
     """The formulation that the problem asks for: ``matching`` for a pattern, else ``abscissa``.
 
@@ -49,18 +49,19 @@ def formulate(
         elastic: leave every constraint a row that can be relaxed.
         damping_ratio: take this for it, and leave it to the recheck whether it is.
         settings: symbols for numbers of the problem that are to be parameters of the NLP; see `Family`.
+        lead: sign of a0, where the NLP is to go as far as a0 = 0.
     """
     if problem.pattern:
         return matching(problem, cases=cases, settings=settings)
-    return abscissa(problem, cases, elastic, damping_ratio, settings)
+    return abscissa(problem, cases, elastic, damping_ratio, settings, lead)
 
 
 def abscissa(
     problem: Problem, cases: Sequence[Case] = (), elastic: bool = False, damping_ratio: float | None = None,
-    settings: Mapping[str, Any] | None = None,
+    settings: Mapping[str, Any] | None = None, lead: int = 0,
 ) -> NLP:  # fmt: skip
     """Optimise the objective with every root quantity carried by factors, in every case; real ones if all must be."""
-    build = Builder(problem, cases, settings=settings)
+    build = Builder(problem, cases, settings=settings, lead=lead)
     if damping_ratio is not None:
         build.take("damping_ratio", damping_ratio)
     elif not elastic and demands_heavy_damping(problem):
@@ -119,13 +120,14 @@ class Builder:
     Args:
         lifts: root quantity → how it is carried by variables; by default by factors.
         settings: symbols that stand for numbers of the problem.
+        lead: sign of a0 in an NLP that goes as far as a0 = 0.
     """
 
     def __init__(
         self, problem: Problem, cases: Sequence[Case], lifts: Mapping[str, Lifting] | None = None,
-        settings: Mapping[str, Any] | None = None,
+        settings: Mapping[str, Any] | None = None, lead: int = 0,
     ) -> None:  # fmt: skip
-        self.problem = problem
+        self.problem, self.lead = problem, lead
         self.settings = dict(settings or {})
         self.lifting = _LIFTED if lifts is None else lifts
         self.cases = tuple(cases)
@@ -158,6 +160,10 @@ class Builder:
     @property
     def unit(self) -> float:
         return self.scale.unit
+
+    @property
+    def leading_unit(self) -> float:
+        return self.scale.lead
 
     def polynomial(self, case: int) -> list[Any]:
         """Coefficients in one case, near 1 as roots and mass matrices go."""

@@ -38,6 +38,14 @@ class Rows(Protocol):
         """The NLP's own unit of the roots."""
 
     @property
+    def lead(self) -> int:
+        """Sign of a0 in an NLP that goes as far as a0 = 0; else 0."""
+
+    @property
+    def leading_unit(self) -> float:
+        """The NLP's own unit of a0."""
+
+    @property
     def size(self) -> tuple[int, int]:
         """Number of variables and rows so far."""
 
@@ -56,16 +64,20 @@ def lift_abscissa(build: Rows) -> Lifted:
     """γ with p(t + γ) = a0 ∏ (t² + βᵢ t + κᵢ), βᵢ, κᵢ ≥ 0, in every case: at or right of every root.
 
     An odd degree has one factor t + δ, δ ≥ 0, more. Some β = 0, κ = 0 or δ = 0 puts a root on the line Re s = γ.
+    Where the NLP goes as far as a0 = 0, the first factor is ±a0 t² + βt + κ, so that a root may be at infinity.
     """
-    covered, gamma = build.covered, build.variable("abscissa")
+    covered, gamma, lead = build.covered, build.variable("abscissa"), build.lead
     touches: list[Touch] = []
     products: list[tuple[Factor, ...]] = []
     for case in covered:
         a, monic, factors = build.polynomial(case), [], []
         for k in range(1, (len(a) - 1) // 2 + 1):
-            at = build.size[0]
-            factors.append(Factor(at, squared=False))
-            monic.append([1, build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)])
+            at, first = build.size[0], lead * a[0] if lead and k == 1 else 1
+            if isinstance(first, int):
+                factors.append(Factor(at, squared=False))
+            else:
+                build.row("a0", first, 0.0, np.inf)
+            monic.append([first, build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)])
             touches.append(Touch(partial(_pair_distance, at), variable=at))
             touches.append(Touch(partial(_real_distance, at), variable=at + 1))
         if len(a) % 2 == 0:
@@ -73,9 +85,9 @@ def lift_abscissa(build: Rows) -> Lifted:
             factors.append(Factor(at, linear=True))
             monic.append([1, build.variable(f"delta.{case}", 0.0)])
             touches.append(Touch(partial(_step_distance, at), variable=at))
-        build.equal("abscissa", shift(a, gamma), [a[0] * c for c in product(*monic)])
+        build.equal("abscissa", shift(a, gamma), [(lead or a[0]) * c for c in product(*monic)])
         products.append(tuple(factors))
-    guess, close = (partial(_abscissa_guess, covered, near) for near in (False, True))
+    guess, close = (partial(_abscissa_guess, covered, near, abs(lead) / build.leading_unit) for near in (False, True))
     lift = Lift("abscissa", 1 + len(touches), guess, close)
     return Lifted(build.unit * gamma, lift, tuple(touches), tuple(products))
 
@@ -201,14 +213,21 @@ def quadratic_pairs(z: Roots) -> list[Roots]:
     return [*pairs, *([lone.astype(complex)] if len(lone) else [])]
 
 
-def _factors(z: Roots, gamma: float) -> list[float]:
-    """β and κ of the factors about the line Re s = γ; δ of a linear one."""
+def _factors(z: Roots, gamma: float, lead: float = 1.0) -> list[float]:
+    """β and κ of the factors about the line Re s = γ; δ of a linear one.
+
+    With a `lead` other than 1, that of the first one, which then is the one with the largest roots.
+    """
     pairs = [pair - gamma for pair in quadratic_pairs(z)]
-    return [float(c) for pair in pairs for c in (-pair.sum().real, pair.prod().real)[: len(pair)]]
+    if lead != 1.0:
+        pairs.sort(key=lambda pair: (len(pair) < 2, -abs(pair.prod())))
+    leads = [lead, *[1.0] * len(pairs)]
+    each = [(a * -pair.sum().real, a * pair.prod().real)[: len(pair)] for a, pair in zip(leads, pairs, strict=False)]
+    return [float(c) for factor in each for c in factor]
 
 
 def _abscissa_guess(
-    covered: Sequence[int], near: bool, values: Sequence[Values], z: Sequence[Roots]
+    covered: Sequence[int], near: bool, led: float, values: Sequence[Values], z: Sequence[Roots]
 ) -> list[list[float]]:
     """γ a little right of the rightmost root and the factors of the shifted polynomials: feasible exactly.
 
@@ -218,7 +237,8 @@ def _abscissa_guess(
     every = np.concatenate([z[case] for case in covered])
     right, step = float(every.real.max()), 0.05 * float(np.abs(every).mean())
     gamma = right + (min(step, 0.1 * abs(right)) + 1e-6 if near else step + 1e-3)
-    return [[gamma, *(c for case in covered for c in _factors(z[case], gamma))]]
+    leads = [led * abs(float(values[case].coefficients[0])) if led else 1.0 for case in covered]
+    return [[gamma, *(c for case, a0 in zip(covered, leads, strict=True) for c in _factors(z[case], gamma, a0))]]
 
 
 def _real_guess(covered: Sequence[int], line: bool, values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:

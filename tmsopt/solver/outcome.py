@@ -140,12 +140,13 @@ def honest(work: Workspace, trial: Trial) -> bool:
 
 
 def better(problem: Problem, one: Finding, other: Finding) -> bool:
-    """Whether one finding beats another: optimal before not, then by objective."""
-    ranks = [
-        (f.status != "optimal", problem.sign * f.checked.objective if math.isfinite(f.checked.objective) else 0.0)
-        for f in (one, other)
-    ]
-    return ranks[0] < ranks[1]
+    """Whether one finding beats another: feasible before not, then by objective, then optimal before not."""
+    values = [problem.sign * f.checked.objective for f in (one, other)]
+    doubtful = [bool(f.checked.violations) or math.isinf(v) for f, v in zip((one, other), values, strict=True)]
+    if not any(doubtful) and all(map(math.isfinite, values)) and not math.isclose(*values, rel_tol=_CLAIMED):
+        return values[0] < values[1]
+    finite = [v if math.isfinite(v) else 0.0 for v in values]
+    return (doubtful[0], one.status != "optimal", finite[0]) < (doubtful[1], other.status != "optimal", finite[1])
 
 
 def ahead(work: Workspace, one: Trial, other: Trial) -> bool:

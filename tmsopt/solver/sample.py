@@ -115,11 +115,13 @@ class Sample:
         refined: designs far from each other that violate least, or are best of those that violate nothing, refined.
         boldest: designs far from each other that are best whatever they violate.
         met: designs of the sample that meet all limits.
+        spread: of the objective, over half of them.
     """
 
     refined: Looked
     boldest: Looked
     met: int
+    spread: float
 
 
 class Sampler:
@@ -154,7 +156,10 @@ class Sampler:
             leaders = self.nearer(leaders)
         refined = self.refined(leaders)
         bold = drawn.take(np.argsort(drawn.worth, kind="stable")[:_RANKED])
-        return Sample(refined.take(refined.ranked), bold.take(apart(bold, _BOLD)), int(np.sum(drawn.violation == 0)))
+        known = drawn.worth[np.isfinite(drawn.worth)]
+        spread = float(np.subtract(*np.percentile(known, [75, 25]))) if known.size else 0.0
+        met = int(np.sum(drawn.violation == 0))
+        return Sample(refined.take(refined.ranked), bold.take(apart(bold, _BOLD)), met, spread)
 
     def draw(self) -> Looked:
         """Corners, a quasi-random sequence, and some of it moved to faces."""

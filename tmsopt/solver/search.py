@@ -4,8 +4,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from tmsopt.checks.recheck import FEASIBLE
 from tmsopt.checks.worst_case import worst_cases
 from tmsopt.design.cases import Case
@@ -17,6 +15,7 @@ from tmsopt.formulation.nlp import NLP
 from tmsopt.records import Table
 from tmsopt.solver.multistart import Candidate, Runner, same, search
 from tmsopt.solver.outcome import Finding, Trial, ahead, counted, found, survivor
+from tmsopt.solver.referee import held, refereed
 from tmsopt.solver.relaxation import relax
 from tmsopt.solver.workspace import Workspace
 
@@ -24,8 +23,6 @@ _ROUNDS, _FAR_ROUNDS = 12, 40
 """Times that cases are added; each time the worst one between them shrinks to its square, roughly."""
 
 _LEADERS = 3  # optima followed when cases are added: a better one may do worse between the old cases
-_APPEALS, _APPEALED = 8, 2  # times that better designs are started from, and how many each time
-_LOST = 1e-7  # relative difference of the objective that makes a design better
 _NEARER = 1e-7  # share of the radius
 
 
@@ -56,58 +53,14 @@ def explore(work: Workspace) -> Explored:
         other = survivor(work, unstable, others)
         if other is not None and (trial is None or ahead(work, other, trial)):
             nlp, candidates, trial = unstable, others, other
-    candidates, trial, rival = _refereed(work, nlp, candidates, trial)
+    verdict = refereed(work, nlp, candidates, trial)
+    nlp, candidates, trial = verdict.nlp, verdict.candidates, verdict.trial
     starts = counted(candidates, trial.candidate.objective if trial else math.nan)
-    if rival is not None:
-        return Explored(work.name, tuple(candidates), _held(work, rival, starts))
+    if verdict.held is not None:
+        listed = evaluated_cases(work.problem, work.problem.ordered(verdict.held))
+        return Explored(work.name, tuple(candidates), held(work, verdict, starts, listed))
     finding = _covered(work, nlp, candidates, trial, starts) if cases else found(work, nlp, trial, starts)
     return Explored(work.name, tuple(candidates), finding)
-
-
-def _refereed(
-    work: Workspace, nlp: NLP, candidates: list[Candidate], trial: Trial | None
-) -> tuple[list[Candidate], Trial | None, Mapping[str, float] | None]:
-    """The search taken up again wherever a design that was looked at is better, and one that stays better."""
-    sampler, run = work.sampler, Runner(work, nlp, work.touching)
-    if sampler is None or work.sample is None:
-        return candidates, trial, None
-    rivals = work.sample.refined
-    for _ in range(_APPEALS):
-        if trial is not None:
-            free = {name: trial.parameters[name] for name in work.problem.free}
-            rivals = sampler.around(free)
-        rivals = rivals.take(np.flatnonzero((rivals.violation == 0) & (rivals.worth < _least(work, trial))))
-        if not len(rivals):
-            return candidates, trial, None
-        rivals = rivals.take(rivals.ranked)
-        ended = [run.ended(sampler.design(rivals, k), near=True) for k in range(min(len(rivals), _APPEALED))]
-        candidates = [*candidates, *ended]
-        other = survivor(work, nlp, candidates)
-        if other is None or (trial is not None and not ahead(work, other, trial)):
-            break
-        trial = other
-    best = {**work.problem.fixed, **sampler.design(rivals, 0)}
-    checked = work.recheck(work.problem.ordered(best), nlp.cases)
-    kept = not checked.violations and work.problem.sign * checked.objective < _least(work, trial)
-    return candidates, trial, best if kept else None
-
-
-def _least(work: Workspace, trial: Trial | None) -> float:
-    """What a design must be worth less than to be better than a trial."""
-    if trial is None or trial.checked.violations:
-        return math.inf
-    worth = work.problem.sign * trial.checked.objective
-    return worth - _LOST * (trial.candidate.nlp.size + abs(worth))
-
-
-def _held(work: Workspace, design: Mapping[str, float], starts: Starts) -> Finding:
-    """A design that was only looked at, better than all that the solver reached."""
-    parameters = work.problem.ordered(design)
-    cases = evaluated_cases(work.problem, parameters)
-    note = "the best design that was looked at; no start of the solver ended as good"
-    return Finding(
-        parameters, work.recheck(parameters, cases), "not_converged", {}, starts, "sampled", cases, notes=(note,)
-    )
 
 
 def without_any(work: Workspace, tried: int) -> Finding:

@@ -48,15 +48,17 @@ class Family:
         self._made: OrderedDict[Hashable, tuple[ca.Function, Any]] = OrderedDict()
         self._around: OrderedDict[Hashable, Robustness] = OrderedDict()
 
-    def formulate(self, problem: Problem, cases: Sequence[Case] = (), damping_ratio: float | None = None) -> NLP:
+    def formulate(
+        self, problem: Problem, cases: Sequence[Case] = (), damping_ratio: float | None = None, lead: int = 0
+    ) -> NLP:
         """What `formulations.formulate` gives, with the problem's numbers in place of another's of the family."""
         if not self.varied:
-            return formulate(problem, cases, damping_ratio=damping_ratio)
+            return formulate(problem, cases, damping_ratio=damping_ratio, lead=lead)
         symbols = {name: ca.SX.sym(name) for name in self.varied}
         nlp = _kept(
             self._nlps,
-            (tuple(cases), damping_ratio, *_decisions(problem, self.varied)),
-            lambda: formulate(problem, cases, damping_ratio=damping_ratio, settings=symbols),
+            (tuple(cases), damping_ratio, lead, *_decisions(problem, self.varied)),
+            lambda: formulate(problem, cases, damping_ratio=damping_ratio, settings=symbols, lead=lead),
         )
         return narrowed(replace(nlp, settings=tuple(_value(problem, name) for name in self.varied)), problem)
 
@@ -118,9 +120,9 @@ class Workspace:
         """What was seen of this part before any solver."""
         return self.sampler.sample() if self.sampler else None
 
-    def formulate(self, cases: Sequence[Case], damping_ratio: float | None = None) -> NLP:
+    def formulate(self, cases: Sequence[Case], damping_ratio: float | None = None, lead: int = 0) -> NLP:
         """The NLP of the problem on this part of the box."""
-        nlp = self.family.formulate(self.problem, cases, damping_ratio)
+        nlp = self.family.formulate(self.problem, cases, damping_ratio, lead)
         return narrowed(nlp, self.part) if self.part is not self.problem else nlp
 
     def ipopt(self, nlp: NLP, start: str) -> Callable[..., Run]:

@@ -1,0 +1,148 @@
+"""The sample as referee: a search is taken up again wherever a design that was looked at is better than its best."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tmsopt.design.cases import Case
+from tmsopt.design.solution import Starts
+from tmsopt.formulation.nlp import NLP
+from tmsopt.solver.multistart import Candidate, Runner
+from tmsopt.solver.outcome import Finding, Trial, ahead, survivor
+from tmsopt.solver.sample import Looked, Sampler
+from tmsopt.solver.workspace import Workspace
+
+_APPEALS, _APPEALED = 8, 2  # times that better designs are started from, and how many each time
+_LOST = 1e-7  # relative difference of the objective that makes a design better
+_FINER = 1e-11  # the same, where both were polished
+_OPEN = 3  # designs from which a singular mass matrix is approached
+_SINGULAR = 1e-9  # a0 in its own unit, below which it is 0 in all but name
+_INSIDE = 1e-12  # the same, of the design that is given where the best has none
+_ENDLESS = 1e6  # spreads of the objective in the box, beyond which it has no lower bound
+
+_UNBOUNDED = "unbounded: the objective has no lower bound in the box, as this design shows; limit what it divides by"
+_KEPT = "the best design that was looked at; no start of the solver ended as good"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What is left of a search.
+
+    Attributes:
+        held: free parameters of a feasible design that is better than all that the solver reached.
+        words: why it is no optimum.
+    """
+
+    nlp: NLP
+    candidates: list[Candidate]
+    trial: Trial | None
+    held: Mapping[str, float] | None = None
+    words: str = ""
+
+
+def refereed(work: Workspace, nlp: NLP, candidates: list[Candidate], trial: Trial | None) -> Verdict:
+    """The search taken up again as long as a design that was looked at is better than where it ended."""
+    sampler, sample = work.sampler, work.sample
+    if sampler is None or sample is None:
+        return Verdict(nlp, candidates, trial)
+    run, rivals = Runner(work, nlp, work.touching), sample.refined
+    for _ in range(_APPEALS):
+        if trial is not None:
+            rivals = rivals.joined(sampler.around({name: trial.parameters[name] for name in work.problem.free}))
+        rivals = _better(rivals, _least(work, trial))
+        if not len(rivals):
+            break
+        ended = [run.ended(sampler.design(rivals, k), near=True) for k in range(min(len(rivals), _APPEALED))]
+        candidates = [*candidates, *ended]
+        other = survivor(work, nlp, candidates)
+        if other is None or (trial is not None and not ahead(work, other, trial)):
+            break
+        trial = other
+    if len(rivals) or _troubled(work, candidates, trial):
+        opened = _opened(work, nlp, sampler, trial, rivals if len(rivals) else sample.refined)
+        if opened is not None:
+            return replace(opened, candidates=[*candidates, *opened.candidates])
+    if len(rivals):
+        free = sampler.design(rivals, 0)
+        checked = work.recheck(work.problem.ordered(free), nlp.cases)
+        if not checked.violations and work.problem.sign * checked.objective < _least(work, trial):
+            endless = work.problem.sign * checked.objective < -_ENDLESS * sample.spread
+            return Verdict(nlp, candidates, trial, free, _UNBOUNDED if endless else _KEPT)
+    return Verdict(nlp, candidates, trial)
+
+
+def held(work: Workspace, verdict: Verdict, starts: Starts, cases: Sequence[Case]) -> Finding:
+    """A feasible design that is no optimum, but better than all that the solver reached."""
+    assert verdict.held is not None
+    parameters = work.problem.ordered(verdict.held)
+    checked = work.recheck(parameters, cases)
+    status, words = "not_converged", (verdict.words,)
+    return Finding(parameters, checked, status, {}, starts, verdict.nlp.formulation, tuple(cases), notes=words)
+
+
+def _better(rivals: Looked, least: float) -> Looked:
+    """Those that meet all limits and are worth less, the best first."""
+    some = rivals.take(np.flatnonzero((rivals.violation == 0) & (rivals.worth < least)))
+    return some.take(some.ranked)
+
+
+def _least(work: Workspace, trial: Trial | None, lost: float = _LOST) -> float:
+    """What a design must be worth less than to be better than a trial."""
+    if trial is None or trial.checked.violations:
+        return math.inf
+    worth = work.problem.sign * trial.checked.objective
+    return worth - lost * (trial.candidate.nlp.size + abs(worth)) if math.isfinite(worth) else math.inf
+
+
+def _troubled(work: Workspace, candidates: Sequence[Candidate], trial: Trial | None) -> bool:
+    """Whether starts that met all limits ended nowhere, or the best end has a root near infinity."""
+    assert work.sample is not None
+    met = bool(np.any(work.sample.refined.violation == 0))
+    return (met and not all(c.feasible for c in candidates)) or (trial is not None and "a0" in trial.checked.violations)
+
+
+def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial | None, rivals: Looked) -> Verdict | None:
+    """A better design where the search may go as far as a0 = 0; None where it finds none."""
+    if work.touching or "abscissa" not in nlp.variables:
+        return None
+    near = [sampler.design(rivals, k) for k in range(min(len(rivals), _OPEN))]
+    near += [] if trial is None else [{name: trial.parameters[name] for name in work.problem.free}]
+    best: Verdict | None = None
+    least = _least(work, trial, _FINER)
+    for sign in (1, -1):
+        ours = [d for d in near if sign * _leading(work, d) > 0]
+        if not ours:
+            continue
+        opened = work.formulate(nlp.cases, lead=sign)
+        run = Runner(work, opened)
+        ends = [run.ended(design, near=True) for design in ours]
+        reached = min((c for c in ends if c.feasible), key=lambda c: c.objective, default=None)
+        if reached is None or not reached.objective < least:
+            continue
+        rows = [k for k, name in enumerate(opened.rows) if name == "a0"]
+        singular = bool(np.array(opened.at(reached.run.x)[1]).ravel()[rows].min() < _SINGULAR)
+        if singular:
+            inside = [_INSIDE if k in rows else lower for k, lower in enumerate(opened.row_lower)]
+            opened = replace(opened, row_lower=tuple(inside))
+            ends = [Runner(work, opened).ended(work.design_at(reached.run.x), near=True)]
+        other = survivor(work, opened, ends)
+        if other is None or other.checked.violations or not work.problem.sign * other.checked.objective < least:
+            continue
+        least = _least(work, other, _FINER)
+        best = Verdict(opened, ends, other)
+        if singular:
+            towards = f"towards a singular mass matrix (a0 = 0), to {work.problem.sign * reached.objective:.9g}"
+            words = f"no best design: it improves {towards}; {_advice(work)}"
+            best = replace(best, held={n: other.parameters[n] for n in work.problem.free}, words=words)
+    return best
+
+
+def _leading(work: Workspace, free: Mapping[str, float]) -> float:
+    return float(work.problem.values(work.problem.ordered(free)).coefficients[0])
+
+
+def _advice(work: Workspace) -> str:
+    known = {"tms": "nu_H and zeta_B", "whipple": "mass_margin"}
+    return f"keep {known.get(work.problem.model.name, 'a0')} away from 0 by a constraint"
