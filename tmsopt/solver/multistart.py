@@ -74,6 +74,16 @@ def search(work: Workspace, nlp: NLP) -> list[Candidate]:
     return candidates
 
 
+def further(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
+    """Where the starts end that a search did without; up to the first left of the axis, where that is the goal."""
+    run, found = Runner(work, nlp, work.touching), list[Candidate]()
+    for design, near in islice(_starts(work), tried, work.options.starts):
+        found.append(run.ended(design, near, hopeful=False))
+        if bounded(work.part) and found[-1].feasible and found[-1].objective < 0:
+            break
+    return found
+
+
 def _starts(work: Workspace) -> Iterator[tuple[dict[str, float], bool]]:
     """Designs to start from, and whether each may be near an optimum: those of the sample first, by turns."""
     if work.sampler and work.sample:

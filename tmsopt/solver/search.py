@@ -2,7 +2,9 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from tmsopt.checks.recheck import FEASIBLE
 from tmsopt.checks.worst_case import worst_cases
@@ -13,16 +15,18 @@ from tmsopt.design.solution import Starts
 from tmsopt.formulation.formulate import design_of, formulate, middle
 from tmsopt.formulation.nlp import NLP
 from tmsopt.records import Table
-from tmsopt.solver.multistart import Candidate, Runner, same, search
+from tmsopt.solver.multistart import Candidate, Runner, further, same, search
 from tmsopt.solver.outcome import Finding, Trial, ahead, counted, found, survivor
 from tmsopt.solver.referee import held, refereed
 from tmsopt.solver.relaxation import relax
+from tmsopt.solver.sample import Sampler
 from tmsopt.solver.workspace import Workspace
 
 _ROUNDS, _FAR_ROUNDS = 12, 40
 """Times that cases are added; each time the worst one between them shrinks to its square, roughly."""
 
 _LEADERS = 3  # optima followed when cases are added: a better one may do worse between the old cases
+_STABLE = "every root left of the axis"  # the name of a constraint
 _NEARER = 1e-7  # share of the radius
 
 
@@ -54,6 +58,11 @@ def explore(work: Workspace) -> Explored:
         if other is not None and (trial is None or ahead(work, other, trial)):
             nlp, candidates, trial = unstable, others, other
     verdict = refereed(work, nlp, candidates, trial)
+    if verdict.trial is not None and work.sampler and _wants_stability(work.problem, verdict.trial):
+        others = _left_of_the_axis(work, nlp, len(candidates))
+        other, every = survivor(work, nlp, others), [*verdict.candidates, *others]
+        better = other is not None and ahead(work, other, verdict.trial)
+        verdict = refereed(work, nlp, every, other) if better else replace(verdict, candidates=every)
     nlp, candidates, trial = verdict.nlp, verdict.candidates, verdict.trial
     starts = counted(candidates, trial.candidate.objective if trial else math.nan)
     if verdict.held is not None:
@@ -61,6 +70,25 @@ def explore(work: Workspace) -> Explored:
         return Explored(work.name, tuple(candidates), held(work, verdict, starts, listed))
     finding = _covered(work, nlp, candidates, trial, starts) if cases else found(work, nlp, trial, starts)
     return Explored(work.name, tuple(candidates), finding)
+
+
+def _left_of_the_axis(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
+    """Where starts end from designs sought for their stability alone; all starts are spent where there is any such."""
+    limits = {**work.part.constraints, _STABLE: "abscissa <= 0"}
+    asked = replace(work.part, minimize="abscissa", maximize=None, constraints=limits)
+    sampler, run = Sampler(asked, work.options.seed + 1), Runner(work, nlp, work.touching)
+    sample, ended = sampler.sample(), list[Candidate]()
+    for found, near in ((sample.refined, True), (sample.boldest, False)):
+        rows = np.flatnonzero(found.worth < 0).tolist()
+        ended += [run.ended(sampler.design(found, k), near, hopeful=False) for k in rows]
+    return [*ended, *further(work, nlp, tried)] if ended else ended
+
+
+def _wants_stability(problem: Problem, trial: Trial) -> bool:
+    """Whether a design is unstable, and the objective or a constraint is about the roots."""
+    asked = (problem.objective, *problem.conditions.values())
+    about = any({"abscissa", "damping_ratio"} & set(e.names) for e in asked if e)
+    return about and not trial.checked.structure.abscissa < 0
 
 
 def without_any(work: Workspace, tried: int) -> Finding:

@@ -134,6 +134,8 @@ def use_numba(compiled: bool | None) -> bool:
     Raises:
         ModuleNotFoundError: if asked for without numba.
     """
+    if compiled is False:
+        return False
     present = find_spec("numba") is not None
     if compiled and not present:
         raise ModuleNotFoundError('compiled loops need numba: pip install "tmsopt[fast]"', name="numba")
