@@ -21,7 +21,7 @@ _ENOUGH = 12  # starts tried before agreement counts
 _AGREE = 5  # starts at the best value that end the search
 _HOPELESS = 16  # starts without a feasible end after which the least-violating design is looked for instead
 _ENOUGH_SAMPLED, _AGREE_SAMPLED, _HOPELESS_SAMPLED = 4, 2, 8
-"""The same where the starts come from a sample of the box."""
+"""The same where the starts come from a sample of the box: so many starts for each optimum that was met."""
 
 _MET = 1e-14  # sum of squares of coefficients at which more conditions than parameters are met
 _SAME = 1e-7  # relative difference of objectives that counts as the same
@@ -61,7 +61,7 @@ def search(work: Workspace, nlp: NLP) -> list[Candidate]:
             return candidates
     if part.start and len(candidates) < starts:  # the user's own
         candidates.append(run.ended(middle(part), near=True))
-    for design, near in islice(_starts(work), max(starts - len(candidates), 0)):
+    for design, near in islice(starting(work), max(starts - len(candidates), 0)):
         candidates.append(run.ended(design, near, hopeful=any(c.feasible for c in candidates)))
         if options.progress:
             options.progress(len(candidates), starts)
@@ -77,14 +77,14 @@ def search(work: Workspace, nlp: NLP) -> list[Candidate]:
 def further(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
     """Where the starts end that a search did without; up to the first left of the axis, where that is the goal."""
     run, found = Runner(work, nlp, work.touching), list[Candidate]()
-    for design, near in islice(_starts(work), tried, work.options.starts):
+    for design, near in islice(starting(work), tried, work.options.starts):
         found.append(run.ended(design, near, hopeful=False))
         if bounded(work.part) and found[-1].feasible and found[-1].objective < 0:
             break
     return found
 
 
-def _starts(work: Workspace) -> Iterator[tuple[dict[str, float], bool]]:
+def starting(work: Workspace) -> Iterator[tuple[dict[str, float], bool]]:
     """Designs to start from, and whether each may be near an optimum: those of the sample first, by turns."""
     if work.sampler and work.sample:
         refined, bold = work.sample.refined, work.sample.boldest
@@ -201,10 +201,10 @@ def _settled(work: Workspace, candidates: list[Candidate]) -> bool:
     if problem.objective is None:  # any point of a square pattern will do, and any that meets too many conditions
         count = freedom(problem).count
         return agreeing >= (1 if count == 0 or (count < 0 and best <= _MET) else _AGREE)
-    if sampled:
-        return len(candidates) >= _ENOUGH_SAMPLED and agreeing >= _AGREE_SAMPLED
     ordered = sorted(c.objective for c in feasible)
     n, w = len(feasible), 1 + sum(not same(a, b, feasible[0].nlp.size) for a, b in pairwise(ordered))
+    if sampled:
+        return len(candidates) >= _ENOUGH_SAMPLED * w and agreeing >= _AGREE_SAMPLED
     seen = n > w + 2 and w * (n - 1) <= (w + 0.5) * (n - w - 2)
     return len(candidates) >= _ENOUGH and agreeing >= _AGREE and seen
 

@@ -10,12 +10,13 @@ from tmsopt.design.cases import Case
 from tmsopt.design.solution import Starts
 from tmsopt.formulation.nlp import NLP
 from tmsopt.solver.multistart import Candidate, Runner
-from tmsopt.solver.outcome import Finding, Trial, ahead, survivor
+from tmsopt.solver.outcome import Finding, Trial, ahead, honest, survivor
 from tmsopt.solver.sample import Looked, Sampler
 from tmsopt.solver.workspace import Workspace
 
 _APPEALS, _APPEALED = 8, 2  # times that better designs are started from, and how many each time
 _LOST = 1e-7  # relative difference of the objective that makes a design better
+_HAIRS = np.geomspace(1e-15, 1e-7, 33)  # of the way to a design that meets all limits
 _FINER = 1e-11  # the same, where both were polished
 _OPEN = 3  # designs from which a singular mass matrix is approached
 _SINGULAR = 1e-9  # a0 in its own unit, below which it is 0 in all but name
@@ -60,6 +61,8 @@ def refereed(work: Workspace, nlp: NLP, candidates: list[Candidate], trial: Tria
         if other is None or (trial is not None and not ahead(work, other, trial)):
             break
         trial = other
+    if len(rivals) and trial is not None and (nudged := _nudged(work, nlp, sampler, trial, rivals)) is not None:
+        return Verdict(nlp, candidates, nudged)
     if len(rivals) or _troubled(work, candidates, trial):
         opened = _opened(work, nlp, sampler, trial, rivals if len(rivals) else sample.refined)
         if opened is not None:
@@ -94,6 +97,18 @@ def _least(work: Workspace, trial: Trial | None, lost: float = _LOST) -> float:
         return math.inf
     worth = work.problem.sign * trial.checked.objective
     return worth - lost * (trial.candidate.nlp.size + abs(worth)) if math.isfinite(worth) else math.inf
+
+
+def _nudged(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial, rivals: Looked) -> Trial | None:
+    """An end that meets all limits a hair's breadth aside: at itself a root at 0, say, has no sign."""
+    own = sampler.space.points(trial.parameters)
+    seen = sampler.look((own + _HAIRS[:, None, None] * (rivals.u[:_APPEALED] - own)).reshape(-1, sampler.space.size))
+    for k in np.flatnonzero(seen.violation == 0)[:_APPEALED].tolist():
+        parameters = work.problem.ordered(sampler.design(seen, k))
+        moved = replace(trial, parameters=parameters, checked=work.recheck(parameters, nlp.cases))
+        if not moved.checked.violations and honest(work, moved):
+            return moved
+    return None
 
 
 def _troubled(work: Workspace, candidates: Sequence[Candidate], trial: Trial | None) -> bool:

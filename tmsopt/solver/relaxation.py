@@ -3,6 +3,7 @@
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice
 from typing import Any
 
 import casadi as ca
@@ -18,7 +19,7 @@ from tmsopt.formulation.nlp import NLP, Lift
 from tmsopt.formulation.starts import designs
 from tmsopt.models import Values
 from tmsopt.records import Table
-from tmsopt.solver.multistart import Candidate, Runner, same
+from tmsopt.solver.multistart import Candidate, Runner, same, starting
 from tmsopt.solver.outcome import Trial, survivor
 from tmsopt.solver.workspace import Workspace, workspace
 
@@ -157,8 +158,8 @@ def _least(
 
 def _ends(run: Runner, most: int) -> list[Candidate]:
     candidates: list[Candidate] = []
-    for design in designs(run.work.part, run.work.options.seed, most):
-        candidates.append(run.ended(design, hopeful=any(c.feasible for c in candidates)))
+    for design, near in islice(starting(run.work), most):
+        candidates.append(run.ended(design, near, hopeful=any(c.feasible for c in candidates)))
         feasible = [c.objective for c in candidates if c.feasible]
         if feasible and min(feasible) <= _NOTHING:
             break

@@ -23,6 +23,7 @@ _DECADES = 100.0  # ratio of the ends of a range beyond which its values are spr
 _APART = 0.15  # of the box: distance of designs that may lie in different basins
 _RANKED = 4096  # first ones of an order among which those apart are chosen
 _LEADERS, _BOLD = 8, 8  # designs to start from, of either kind
+_SOUGHT = 64  # designs from which limits are approached
 _LOCAL = 24  # designs looked at around each that is refined, in each round
 _REACHES = tuple(np.geomspace(0.1, 3e-4, 9).tolist())  # of the box, round after round
 
@@ -153,7 +154,9 @@ class Sampler:
         ranked = drawn.take(drawn.ranked[:_RANKED])
         leaders = ranked.take(apart(ranked, _LEADERS))
         if np.any(leaders.violation > 0):
-            leaders = self.nearer(leaders)
+            sought = self.nearer(ranked.take(apart(ranked, _SOUGHT, _APART / 3)))
+            sought = sought.take(sought.ranked)
+            leaders = sought.take(apart(sought, _LEADERS))
         refined = self.refined(leaders)
         bold = drawn.take(np.argsort(drawn.worth, kind="stable")[:_RANKED])
         known = drawn.worth[np.isfinite(drawn.worth)]

@@ -55,7 +55,7 @@ def explore(work: Workspace) -> Explored:
         unstable = work.formulate(cases, damping_ratio=-1.0)
         others = search(work, unstable)
         other = survivor(work, unstable, others)
-        if other is not None and (trial is None or ahead(work, other, trial)):
+        if other is not None and (trial is None or (not other.checked.violations and ahead(work, other, trial))):
             nlp, candidates, trial = unstable, others, other
     verdict = refereed(work, nlp, candidates, trial)
     if verdict.trial is not None and work.sampler and _wants_stability(work.problem, verdict.trial):
@@ -78,9 +78,9 @@ def _left_of_the_axis(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
     asked = replace(work.part, minimize="abscissa", maximize=None, constraints=limits)
     sampler, run = Sampler(asked, work.options.seed + 1), Runner(work, nlp, work.touching)
     sample, ended = sampler.sample(), list[Candidate]()
-    for found, near in ((sample.refined, True), (sample.boldest, False)):
-        rows = np.flatnonzero(found.worth < 0).tolist()
-        ended += [run.ended(sampler.design(found, k), near, hopeful=False) for k in rows]
+    for seen, near in ((sample.refined, True), (sample.boldest, False)):
+        rows = np.flatnonzero(seen.worth < 0).tolist()
+        ended += [run.ended(sampler.design(seen, k), near, hopeful=False) for k in rows]
     return [*ended, *further(work, nlp, tried)] if ended else ended
 
 

@@ -112,8 +112,8 @@ class Workspace:
     @cached_property
     def sampler(self) -> Sampler | None:
         """Looks at designs of this part; None where arrays cannot tell what is asked of them."""
-        asks = self.part.pattern is None and self.part.objective is not None and not self.part.asks_radius
-        return Sampler(self.part, self.options.seed) if asks else None
+        told = self.part.pattern is None and not self.part.asks_radius
+        return Sampler(self.part, self.options.seed) if told else None
 
     @cached_property
     def sample(self) -> Sample | None:
