@@ -13,10 +13,11 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.design.cases import Case
-from tmsopt.design.dependence import demands_heavy_damping, tempts, varies
+from tmsopt.design.dependence import demands_heavy_damping, overclaims, tempts, varies
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_QUANTITIES
+from tmsopt.formulation.kinks import unfolded
 from tmsopt.formulation.lifts import (
     Lifted,
     lift_abscissa,
@@ -42,7 +43,7 @@ def formulate(
     problem: Problem, cases: Sequence[Case] = (), elastic: bool = False, damping_ratio: float | None = None,
     settings: Mapping[str, Any] | None = None,
 ) -> NLP:  # fmt: skip
-    """The formulation that the problem asks for: ``matching`` for a pattern, else ``abscissa``.
+    """The formulation that the problem asks for: ``matching`` for a pattern, else ``abscissa``; its kinks as variables.
 
     Args:
         cases: what the design must stand up to; the nominal design alone, without any.
@@ -51,8 +52,10 @@ def formulate(
         settings: symbols for numbers of the problem that are to be parameters of the NLP; see `Family`.
     """
     if problem.pattern:
-        return matching(problem, cases=cases, settings=settings)
-    return abscissa(problem, cases, elastic, damping_ratio, settings)
+        nlp = matching(problem, cases=cases, settings=settings)
+    else:
+        nlp = abscissa(problem, cases, elastic, damping_ratio, settings)
+    return unfolded(nlp, overclaims(problem))
 
 
 def abscissa(

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 
@@ -29,6 +29,9 @@ _RESCUES = 4  # starts from abscissa optima, for a pattern that no start reached
 
 _AGAIN = 4  # times that a start is taken up again where it ended badly
 _AGAIN_HOPELESS = 1  # the same where rows are violated and no start has satisfied them yet
+_WAYS = 3  # in which root quantities and kinks are held from one start
+_CROSSINGS = 4  # times that an end may turn out to be one of another way
+_MEETS = 1e-5  # difference of distances at which two ways meet
 _SUCCESS = "Solve_Succeeded"
 
 
@@ -50,7 +53,7 @@ class Candidate:
 
 def search(work: Workspace, nlp: NLP) -> list[Candidate]:
     """Where every start ended that was tried, in order; a design near the optimum, where one is given, before all."""
-    run, part, options = Runner(work, nlp, work.touching), work.part, work.options
+    run, part, options = Runner(work, nlp), work.part, work.options
     starts, candidates = options.starts, list[Candidate]()
     if options.near:
         candidates.append(run.ended({**middle(part), **options.near}, near=True))
@@ -89,16 +92,10 @@ def _beside(run: "Runner", candidates: Sequence[Candidate], most: int) -> list[C
 
 @dataclass(frozen=True)
 class Runner:
-    """IPOPT on one NLP, started anew where an end is not to be trusted.
-
-    Attributes:
-        touching: hold every root quantity at its exact value, in the way that each start is closest to, where a mere
-            bound on it would let the optimiser claim too much.
-    """
+    """IPOPT on one NLP, started anew where an end is not to be trusted."""
 
     work: Workspace
     nlp: NLP
-    touching: bool = False
 
     def ended(self, design: Mapping[str, float], near: bool = False, hopeful: bool = True) -> Candidate:
         """Where a start ends, with the factors shared out anew as long as that helps."""
@@ -114,6 +111,7 @@ class Runner:
             if best.feasible and (not ended.feasible or ended.objective >= best.objective - _SAME):
                 break
             best = ended
+        best = self._crossed(best)
         return best if near or not best.feasible else self._no_worse(best, design)
 
     def _no_worse(self, best: Candidate, design: Mapping[str, float]) -> Candidate:
@@ -125,8 +123,25 @@ class Runner:
 
     def _once(self, design: Mapping[str, float], start: str) -> Candidate:
         x = complete(self.nlp, self.work.part, design, start == "near")
-        limits = self.nlp.touching(x) if self.touching else self.nlp
+        return min((self._from(x, way, start) for way in islice(self.nlp.touchings(x), _WAYS)), key=_rank)
+
+    def _crossed(self, best: Candidate) -> Candidate:
+        """The best that is reached from an end at which other ways are as close as the one that was held."""
+        for _ in range(_CROSSINGS if self.nlp.touches and best.feasible else 0):
+            x = best.run.x
+            ends = [self._from(x, way, "near") for way in islice(self.nlp.touchings(x, _MEETS), 2 * _WAYS)]
+            further = min(ends, key=_rank)
+            if not (further.feasible and further.objective < best.objective - _SAME):
+                break
+            best = further
+        return best
+
+    def _from(self, x: Array, limits: NLP, start: str) -> Candidate:
         return _candidate(self.work.part, limits, self.work.ipopt(self.nlp, start)(x, limits))
+
+
+def _rank(candidate: Candidate) -> tuple[bool, float]:
+    return not candidate.feasible, candidate.objective
 
 
 def same(a: float, b: float, size: float = 1.0) -> bool:

@@ -10,7 +10,7 @@ from tmsopt.checks.recheck import Checked, recheck
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import OtherBranch, Relaxation, Starts
-from tmsopt.formulation.formulate import design_of
+from tmsopt.formulation.formulate import abscissa, design_of, matching
 from tmsopt.formulation.ipopt import Point
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import complete, designs
@@ -95,7 +95,10 @@ def found(
         surplus = f"{counted.conditions} conditions for {counted.free} free parameters"
         notes += (f"{surplus}, and they are not consistent; free {-counted.count} more, or drop a constraint",)
     active, looked = _active(problem, nlp, point), tuple(nlp.cases if cases is None else cases)
-    branches = _other_branches(problem, nlp, parameters) if counted.kind == "square" else ()
+    branches: tuple[OtherBranch, ...] = ()
+    if counted.kind == "square":
+        equations = nlp if not nlp.kinks else matching(problem) if problem.pattern else abscissa(problem)
+        branches = _other_branches(problem, equations, parameters)
     return Finding(parameters, checked, status, active, starts, nlp.formulation, looked, branches, notes)
 
 

@@ -45,7 +45,7 @@ def explore(work: Workspace) -> Explored:
     nlp = work.formulate(cases)
     candidates = search(work, nlp)
     trial = survivor(work, nlp, candidates)
-    if "damping_ratio" in nlp.touches and (trial is None or _unstable(work.problem, trial)):
+    if "damping_ratio" in nlp.variables and (trial is None or _unstable(work.problem, trial)):
         # A positive real root has −1, and no sector of its own.
         unstable = work.formulate(cases, damping_ratio=-1.0)
         others = search(work, unstable)
@@ -110,7 +110,7 @@ def _covered(
         ours = [best.parameters] if best is trial else [best.parameters, trial.parameters]
         leaders = [*ours, *_leaders(work, candidates)]
         nlp = work.formulate((*nlp.cases, *more))
-        run = Runner(work, nlp, work.touching)
+        run = Runner(work, nlp)
         candidates = [run.ended(design, near=True) for design in leaders]
         trial = survivor(work, nlp, candidates)
         if _lost(work, trial, leaders, nlp):

@@ -101,11 +101,6 @@ class Workspace:
         """Degrees of freedom of the problem."""
         return freedom(self.problem)
 
-    @cached_property
-    def touching(self) -> bool:
-        """Whether root quantities must be held at their exact values: bounds on them would let the search overclaim."""
-        return overclaims(self.problem)
-
     def formulate(self, cases: Sequence[Case], damping_ratio: float | None = None) -> NLP:
         """The NLP of the problem on this part of the box."""
         nlp = self.family.formulate(self.problem, cases, damping_ratio)
@@ -184,7 +179,8 @@ def _decisions(problem: Problem, varied: Sequence[str]) -> tuple[Hashable, ...]:
     box = (tuple(problem.free.items()), tuple(middle(problem).items())) if nearest else tuple(problem.free)
     zero = tuple(problem.fixed.get(name) == 0 for name in varied) if problem.asks_radius else ()
     units = (scale_of(problem), units_of(problem), objective_unit(problem))
-    return units, heavy, texts, box, zero, tuple(tempts(problem, name) for name in _pieced(problem))
+    roots = (overclaims(problem), *(tempts(problem, name) for name in _pieced(problem)))
+    return units, heavy, texts, box, zero, roots
 
 
 def _pieced(problem: Problem) -> list[str]:
