@@ -28,6 +28,7 @@ _TOUCHES = 1e-10  # of a range: distance that IPOPT may leave to an end that bin
 _BRANCH_STARTS = 12
 _OUTSIDE = 1e-9  # of a limit, beyond which it excludes a solution
 _SAME_BRANCH = 1e-6  # relative difference of parameters
+_DOUBT = 100.0  # roots that rounding parts are off alike in the NLP and in the recheck
 _CLAIMED = 1e-6  # relative difference of the claimed objective from the design's own
 
 
@@ -152,10 +153,17 @@ def better(problem: Problem, one: Finding, other: Finding) -> bool:
 
 
 def ahead(work: Workspace, one: Trial, other: Trial) -> bool:
-    """Whether one trial beats another: by violation first, then by the objective that the recheck found."""
-    values = [t.point.objective if math.isnan(t.checked.objective) else t.checked.objective for t in (one, other)]
-    own, others = (sum(t.checked.violations.values()) for t in (one, other))
-    return (own, work.problem.sign * values[0]) < (others, work.problem.sign * values[1])
+    """Whether one trial beats another: by violation first, then by the objective that the recheck found.
+
+    Where that is not the solver's, what lies between them is weighed against it.
+    """
+    ranks = []
+    for trial in (one, other):
+        claimed, own = trial.point.objective, work.problem.sign * trial.checked.objective
+        doubt = 0.0 if honest(work, trial) else _DOUBT * abs(claimed - own)
+        violation = sum(trial.checked.violations.values())
+        ranks.append((violation, claimed if math.isnan(own) else own + doubt))
+    return ranks[0] < ranks[1]
 
 
 def _active(problem: Problem, nlp: NLP, point: Point) -> dict[str, float]:
