@@ -17,6 +17,7 @@ from tmsopt.design.dependence import demands_heavy_damping, overclaims, tempts, 
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_QUANTITIES
+from tmsopt.formulation.flat import unflattened
 from tmsopt.formulation.kinks import unfolded
 from tmsopt.formulation.lifts import (
     Lifted,
@@ -55,7 +56,7 @@ def formulate(
         nlp = matching(problem, cases=cases, settings=settings)
     else:
         nlp = abscissa(problem, cases, elastic, damping_ratio, settings)
-    return unfolded(nlp, overclaims(problem))
+    return unfolded(nlp if elastic else unflattened(nlp, problem.constraints), overclaims(problem))
 
 
 def abscissa(
