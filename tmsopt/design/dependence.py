@@ -10,11 +10,11 @@ import numpy as np
 from tmsopt.design.cases import Case
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import NO_RADIUS, ROOT_NAMES, ROOT_QUANTITIES
+from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTITIES
 from tmsopt.models import Model, Quantity, Values
 
 _DESIGNS = 32  # designs at which the direction of a root quantity is looked at
-_GUESSES = (-2.0, -1.0, -0.3, 0.1, 0.7)  # values of a root quantity
+_DECADES = 3.0  # from 1, up and down, over which values of a root quantity are drawn
 _STEP = 1e-3
 
 
@@ -65,12 +65,13 @@ def _falls(problem: Problem, sign: float, expression: Expression, name: str, wor
     ends = np.array([problem.free[n] for n in problem.free]).reshape(-1, 2)
     for _ in range(_DESIGNS):
         drawn = problem.ordered(dict(zip(problem.free, rng.uniform(*ends.T).tolist(), strict=True)))
-        found = {n: float(rng.choice(_GUESSES)) for n in ROOT_NAMES}
+        found = {n: float(rng.choice((-1, 1)) * 10 ** rng.uniform(-_DECADES, _DECADES)) for n in ROOT_NAMES}
+        found |= {"damping_ratio": float(rng.uniform(-1, 1)), RADIUS: abs(found[RADIUS])}
         if name not in found:
             found[name] = float(rng.uniform(0.1, 2.0))
         before, after = (
             _with(problem.values(drawn), expression, {**found, name: value})
-            for value in (found[name], found[name] + worse * _STEP)
+            for value in (found[name], found[name] + worse * _STEP * min(1.0, abs(found[name])))
         )
         change = sign * (after - before)
         if change < 0 or (expression.equality and change != 0):

@@ -21,13 +21,16 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.design.dependence import demands_heavy_damping, overclaims
+from tmsopt.design.dependence import demands_heavy_damping
 from tmsopt.design.files import Given
 from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.design.solution import Solution
 from tmsopt.explanation.conditions import POSITIVE, STATIONARY, Conditions, conditions, curved
 from tmsopt.explanation.descent import Better, better
 from tmsopt.explanation.program import LocalProgram, NotCovered, program
+from tmsopt.formulation.formulate import formulate
+from tmsopt.formulation.starts import complete
 from tmsopt.records import Table, plain
 from tmsopt.solver.solve import solved
 
@@ -160,8 +163,15 @@ def _judged(solution: Solution) -> Problem:
         problem = replace(problem, locate=None, minimize="abscissa")
     if demands_heavy_damping(problem):
         raise NotCovered("heavy damping is asked for, which holds the roots on the real line as well")
-    if overclaims(problem):
+    nlp = formulate(problem)
+    if set(nlp.touches) & set(ROOT_NAMES):
         raise NotCovered("an objective or constraint asks for a large abscissa or a small damping ratio")
+    x = complete(nlp, problem, solution.parameters)
+    if "abscissa" in nlp.variables:
+        x[nlp.variables.index("abscissa")] = solution.abscissa / nlp.unit
+    rows = np.array(nlp.at(nlp.filled(x))[1]).ravel()
+    if any(np.sort(rows[list(kink.rows)])[1] <= _MET for kink in nlp.kinks):
+        raise NotCovered("two sides of an abs, min or max meet there")
     return problem
 
 

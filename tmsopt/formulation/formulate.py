@@ -13,10 +13,12 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.design.cases import Case
-from tmsopt.design.dependence import demands_heavy_damping, tempts, varies
+from tmsopt.design.dependence import demands_heavy_damping, overclaims, tempts, varies
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_QUANTITIES
+from tmsopt.formulation.flat import unflattened
+from tmsopt.formulation.kinks import unfolded
 from tmsopt.formulation.lifts import (
     Lifted,
     lift_abscissa,
@@ -42,7 +44,7 @@ def formulate(
     problem: Problem, cases: Sequence[Case] = (), elastic: bool = False, damping_ratio: float | None = None,
     settings: Mapping[str, Any] | None = None, lead: int = 0,
 ) -> NLP:  # fmt: skip
-    """The formulation that the problem asks for: ``matching`` for a pattern, else ``abscissa``.
+    """The formulation that the problem asks for: ``matching`` for a pattern, else ``abscissa``; its kinks as variables.
 
     Args:
         cases: what the design must stand up to; the nominal design alone, without any.
@@ -52,8 +54,10 @@ def formulate(
         lead: sign of a0, where the NLP is to go as far as a0 = 0.
     """
     if problem.pattern:
-        return matching(problem, cases=cases, settings=settings)
-    return abscissa(problem, cases, elastic, damping_ratio, settings, lead)
+        nlp = matching(problem, cases=cases, settings=settings)
+    else:
+        nlp = abscissa(problem, cases, elastic, damping_ratio, settings, lead)
+    return unfolded(nlp if elastic else unflattened(nlp, problem.constraints), overclaims(problem))
 
 
 def abscissa(

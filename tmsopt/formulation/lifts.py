@@ -95,11 +95,12 @@ def lift_abscissa(build: Rows) -> Lifted:
 def lift_damping_ratio(build: Rows) -> Lifted:
     """ζ with p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ, in every case: at or below every damping ratio.
 
-    pᵢ = 2 ζ wᵢ puts a pair on the edge of the sector. An odd degree has one factor s + d, d ≥ 0, more.
+    pᵢ = 2 ζ wᵢ puts a pair on the edge of the sector; with real roots alone, ζ = 1. An odd degree has one factor s + d,
+    d ≥ 0, more.
     """
     covered, first = build.covered, build.size[0]
     zeta = build.variable("damping_ratio", -1.0, 1.0)
-    touches: list[Touch] = []
+    touches = [Touch(lambda x: 1.0, variable=first, value=1.0)]
     products: list[tuple[Factor, ...]] = []
     for case in covered:
         a, monic, factors = build.polynomial(case), [], []
@@ -166,15 +167,15 @@ _DOUBLE = 1e-3  # of the largest root: distance of two real ones that may be mea
 
 
 def _pair_distance(at: int, x: Array) -> float:
-    """Distance of a complex pair of t² + βt + κ from the line; inf for a real pair."""
-    beta, kappa = x[at], x[at + 1]
-    return float(beta / 2) if beta * beta < 4 * kappa else np.inf
+    """Distance of a complex pair of t² + βt + κ from the line, or of the middle of a real pair."""
+    return float(x[at] / 2)
 
 
 def _real_distance(at: int, x: Array) -> float:
-    """Distance of the nearer of two real roots from the line; inf for a complex pair."""
-    beta, kappa = x[at], x[at + 1]
-    return float(kappa / (beta or 1.0)) if beta * beta >= 4 * kappa else np.inf
+    """Distance of the nearer of two real roots from the line; for a complex pair, as far as it is from real, too."""
+    half, kappa = x[at] / 2, x[at + 1]
+    rest = float(np.sqrt(abs(half * half - kappa)))
+    return float(half + rest if half * half < kappa else kappa / (half + rest or 1.0))
 
 
 def _step_distance(at: int, x: Array) -> float:

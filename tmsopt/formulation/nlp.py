@@ -1,6 +1,6 @@
 """An NLP as plain data, the units it is written in, and what its solver needs to start."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
@@ -18,6 +18,9 @@ from tmsopt.roots import roots
 from tmsopt.roots.patterns.pattern import Roots
 
 _TANGLED = 1e-3  # relative distance of roots that may be meant to be one: where two factors share it, digits are lost
+
+_TIE = 1e-3
+"""Difference of distances that are the same."""
 
 _DESIGNS = 33
 _ORDINARY = (1e-2, 1e3)
@@ -43,15 +46,26 @@ class Lift:
 
 @dataclass(frozen=True)
 class Touch:
-    """One way in which a root can stand on the edge that a root quantity describes: a variable or row held at 0.
+    """One way in which a root can stand on the edge that a root quantity describes, or a kink on one of its pieces.
 
     Attributes:
-        distance: how far the root is from the edge at a point of the NLP; of several ways, the least is taken.
+        distance: how far the root is from the edge at a point of the NLP; of several ways, the least is taken. Without
+            it, what the row is off 0.
+        variable, row: what is held at a value.
     """
 
-    distance: Callable[[Array], float]
+    distance: Callable[[Array], float] | None = None
     variable: int | None = None
     row: int | None = None
+    value: float = 0.0
+
+
+@dataclass(frozen=True)
+class Greatest:
+    """A variable t that stands for the greatest of several pieces, and its rows t − piece ≥ 0."""
+
+    variable: int
+    rows: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -87,7 +101,9 @@ class NLP:
         rows: name of each row of g: a constraint's name, or the equation it belongs to.
         lifts: the variables after the free parameters, in order.
         cases: the variations of the design that its rows cover.
-        touches: root quantity → the ways in which it is met exactly; unless one is held, the NLP only bounds it.
+        touches: root quantity or kink → the ways in which it is met exactly; unless one is held, the NLP only bounds
+            it, which is too little for those that are listed.
+        kinks: those that others are made of come first.
         products: the factors of each polynomial.
         exact: whether starts satisfy the equations of all cases.
         settings: values of the numbers p that differ between the problems of a family.
@@ -108,6 +124,7 @@ class NLP:
     lifts: tuple[Lift, ...] = field(repr=False, default=())
     cases: tuple[Case, ...] = field(repr=False, default=())
     touches: Mapping[str, tuple[Touch, ...]] = field(repr=False, default_factory=dict)
+    kinks: tuple[Greatest, ...] = field(repr=False, default=())
     products: tuple[tuple[Factor, ...], ...] = field(repr=False, default=())
     exact: bool = False
     settings: tuple[float, ...] = ()
@@ -127,16 +144,40 @@ class NLP:
         """Number of equality rows."""
         return sum(lo == hi for lo, hi in zip(self.row_lower, self.row_upper, strict=True))
 
-    def touching(self, x: Array) -> "NLP":
-        """The same with every root quantity met exactly, in the way that a point is closest to."""
-        upper, row_upper = list(self.upper), list(self.row_upper)
+    def touchings(self, x: Array, tie: float = _TIE) -> Iterator["NLP"]:
+        """The same with everything in `touches` met exactly: in the ways that a point is closest to, then in others.
+
+        In each of the others one way is exchanged for one that is as close, but for a `tie`.
+        """
+        rows = np.array(self.at(x)[1]).ravel() if self.kinks else x
+        ranked: list[list[Touch]] = []
         for ways in self.touches.values():
-            nearest = min(ways, key=lambda way: way.distance(x))
-            if nearest.variable is not None:
-                upper[nearest.variable] = 0.0
-            if nearest.row is not None:
-                row_upper[nearest.row] = 0.0
-        return replace(self, upper=tuple(upper), row_upper=tuple(row_upper))
+            distances = [float(rows[way.row]) if way.distance is None else way.distance(x) for way in ways]
+            order = np.argsort(distances, kind="stable")
+            ranked.append([ways[k] for k in order if distances[k] <= distances[order[0]] + tie or k == order[0]])
+        nearest = [close[0] for close in ranked]
+        yield self._held(nearest)
+        for k, close in enumerate(ranked):
+            for way in close[1:]:
+                yield self._held([*nearest[:k], way, *nearest[k + 1 :]])
+
+    def _held(self, ways: Sequence[Touch]) -> "NLP":
+        lower, upper, row_upper = list(self.lower), list(self.upper), list(self.row_upper)
+        for way in ways:
+            if way.variable is not None:
+                lower[way.variable] = upper[way.variable] = way.value
+            if way.row is not None:
+                row_upper[way.row] = way.value
+        return replace(self, lower=tuple(lower), upper=tuple(upper), row_upper=tuple(row_upper))
+
+    def filled(self, x: Array) -> Array:
+        """A point with every kink the greatest of its pieces."""
+        x = x.copy()
+        for kink in self.kinks:
+            x[kink.variable] = 0.0
+            greatest = -float(np.array(self.at(x)[1]).ravel()[list(kink.rows)].min())
+            x[kink.variable] = greatest if np.isfinite(greatest) else 0.0
+        return x
 
     def tangled(self, x: Array) -> bool:
         """Whether two factors share a root that is double in neither of them.

@@ -88,7 +88,7 @@ def complete(nlp: NLP, problem: Problem, design: Mapping[str, float], near: bool
         guesses = guess(values, z) or [[0.0] * lift.size]
         mismatches = [_mismatch(nlp, x, guess) for guess in guesses] if len(guesses) > 1 else [0.0]
         x = x + guesses[int(np.argmin(mismatches))]
-    return np.array(x)
+    return nlp.filled(np.array(x))
 
 
 def completions(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Iterator[Array]:

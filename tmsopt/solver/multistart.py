@@ -32,6 +32,9 @@ _RESCUES = 4  # starts from abscissa optima, for a pattern that no start reached
 
 _AGAIN = 4  # times that a start is taken up again where it ended badly
 _AGAIN_HOPELESS = 1  # the same where rows are violated and no start has satisfied them yet
+_WAYS = 3  # in which root quantities and kinks are held from one start
+_CROSSINGS = 4  # times that an end may turn out to be one of another way
+_MEETS = 1e-5  # difference of distances at which two ways meet
 _SUCCESS = "Solve_Succeeded"
 
 
@@ -53,7 +56,7 @@ class Candidate:
 
 def search(work: Workspace, nlp: NLP) -> list[Candidate]:
     """Where every start ended that was tried, in order; a design near the optimum, where one is given, before all."""
-    run, part, options = Runner(work, nlp, work.touching), work.part, work.options
+    run, part, options = Runner(work, nlp), work.part, work.options
     starts, candidates = options.starts, list[Candidate]()
     if options.near:
         candidates.append(run.ended({**middle(part), **options.near}, near=True))
@@ -76,7 +79,7 @@ def search(work: Workspace, nlp: NLP) -> list[Candidate]:
 
 def further(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
     """Where the starts end that a search did without; up to the first left of the axis, where that is the goal."""
-    run, found = Runner(work, nlp, work.touching), list[Candidate]()
+    run, found = Runner(work, nlp), list[Candidate]()
     for design, near in islice(starting(work), tried, work.options.starts):
         found.append(run.ended(design, near, hopeful=False))
         if bounded(work.part) and found[-1].feasible and found[-1].objective < 0:
@@ -115,16 +118,10 @@ def _beside(run: "Runner", candidates: Sequence[Candidate], most: int) -> list[C
 
 @dataclass(frozen=True)
 class Runner:
-    """IPOPT on one NLP, started anew where an end is not to be trusted.
-
-    Attributes:
-        touching: hold every root quantity at its exact value, in the way that each start is closest to, where a mere
-            bound on it would let the optimiser claim too much.
-    """
+    """IPOPT on one NLP, started anew where an end is not to be trusted."""
 
     work: Workspace
     nlp: NLP
-    touching: bool = False
 
     def ended(self, design: Mapping[str, float], near: bool = False, hopeful: bool = True) -> Candidate:
         """Where a start ends, with the factors shared out anew as long as that helps."""
@@ -140,6 +137,7 @@ class Runner:
             if best.feasible and (not ended.feasible or ended.objective >= best.objective - _SAME):
                 break
             best = ended
+        best = self._crossed(best)
         return best if near or not best.feasible else self._no_worse(best, design)
 
     def _no_worse(self, best: Candidate, design: Mapping[str, float]) -> Candidate:
@@ -151,8 +149,25 @@ class Runner:
 
     def _once(self, design: Mapping[str, float], start: str) -> Candidate:
         x = complete(self.nlp, self.work.part, design, start == "near")
-        limits = self.nlp.touching(x) if self.touching else self.nlp
+        return min((self._from(x, way, start) for way in islice(self.nlp.touchings(x), _WAYS)), key=_rank)
+
+    def _crossed(self, best: Candidate) -> Candidate:
+        """The best that is reached from an end at which other ways are as close as the one that was held."""
+        for _ in range(_CROSSINGS if self.nlp.touches and best.feasible else 0):
+            x = best.run.x
+            ends = [self._from(x, way, "near") for way in islice(self.nlp.touchings(x, _MEETS), 2 * _WAYS)]
+            further = min(ends, key=_rank)
+            if not (further.feasible and further.objective < best.objective - _SAME):
+                break
+            best = further
+        return best
+
+    def _from(self, x: Array, limits: NLP, start: str) -> Candidate:
         return _candidate(self.work.part, limits, self.work.ipopt(self.nlp, start)(x, limits))
+
+
+def _rank(candidate: Candidate) -> tuple[bool, float]:
+    return not candidate.feasible, candidate.objective
 
 
 def same(a: float, b: float, size: float = 1.0) -> bool:
@@ -165,9 +180,11 @@ def _candidate(problem: Problem, nlp: NLP, run: Run) -> Candidate:
     rows = np.array(g).ravel()
     if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(run.x)) and math.isfinite(float(f))):
         return Candidate(nlp, run, math.inf, False)
-    outside = np.concatenate([np.array(nlp.row_lower) - rows, rows - np.array(nlp.row_upper), [0.0]])
-    feasible = outside.max() <= _FEASIBLE and run.status != "Infeasible_Problem_Detected"
-    return Candidate(nlp, run, float(f), bool(feasible) and not _spurious(problem, nlp, run))
+    outside = np.maximum(np.array(nlp.row_lower) - rows, rows - np.array(nlp.row_upper)).clip(0)
+    feasible = outside.max(initial=0.0) <= _FEASIBLE and run.status != "Infeasible_Problem_Detected"
+    # What rows, met to 1e-12, may give where they are singular: a double root off by 1e-6, as its square is by that.
+    claim = 2 * float(np.abs(np.nan_to_num(run.row_multipliers)) @ outside) if nlp.touches else 0.0
+    return Candidate(nlp, run, float(f) + claim, bool(feasible) and not _spurious(problem, nlp, run))
 
 
 def _spurious(problem: Problem, nlp: NLP, run: Run) -> bool:

@@ -10,7 +10,7 @@ from tmsopt.checks.recheck import Checked, recheck
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import OtherBranch, Relaxation, Starts
-from tmsopt.formulation.formulate import design_of
+from tmsopt.formulation.formulate import abscissa, design_of, matching
 from tmsopt.formulation.ipopt import Point
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import complete, designs
@@ -28,6 +28,7 @@ _TOUCHES = 1e-10  # of a range: distance that IPOPT may leave to an end that bin
 _BRANCH_STARTS = 12
 _OUTSIDE = 1e-9  # of a limit, beyond which it excludes a solution
 _SAME_BRANCH = 1e-6  # relative difference of parameters
+_DOUBT = 100.0  # roots that rounding parts are off alike in the NLP and in the recheck
 _CLAIMED = 1e-6  # relative difference of the claimed objective from the design's own
 
 
@@ -95,7 +96,10 @@ def found(
         surplus = f"{counted.conditions} conditions for {counted.free} free parameters"
         notes += (f"{surplus}, and they are not consistent; free {-counted.count} more, or drop a constraint",)
     active, looked = _active(problem, nlp, point), tuple(nlp.cases if cases is None else cases)
-    branches = _other_branches(problem, nlp, parameters) if counted.kind == "square" else ()
+    branches: tuple[OtherBranch, ...] = ()
+    if counted.kind == "square":
+        equations = nlp if not nlp.kinks else matching(problem) if problem.pattern else abscissa(problem)
+        branches = _other_branches(problem, equations, parameters)
     return Finding(parameters, checked, status, active, starts, nlp.formulation, looked, branches, notes)
 
 
@@ -150,10 +154,17 @@ def better(problem: Problem, one: Finding, other: Finding) -> bool:
 
 
 def ahead(work: Workspace, one: Trial, other: Trial) -> bool:
-    """Whether one trial beats another: by violation first, then by the objective that the recheck found."""
-    values = [t.point.objective if math.isnan(t.checked.objective) else t.checked.objective for t in (one, other)]
-    own, others = (sum(t.checked.violations.values()) for t in (one, other))
-    return (own, work.problem.sign * values[0]) < (others, work.problem.sign * values[1])
+    """Whether one trial beats another: by violation first, then by the objective that the recheck found.
+
+    Where that is not the solver's, what lies between them is weighed against it.
+    """
+    ranks = []
+    for trial in (one, other):
+        claimed, own = trial.point.objective, work.problem.sign * trial.checked.objective
+        doubt = 0.0 if honest(work, trial) else _DOUBT * abs(claimed - own)
+        violation = sum(trial.checked.violations.values())
+        ranks.append((violation, claimed if math.isnan(own) else own + doubt))
+    return ranks[0] < ranks[1]
 
 
 def _active(problem: Problem, nlp: NLP, point: Point) -> dict[str, float]:

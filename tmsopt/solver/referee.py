@@ -48,7 +48,7 @@ def refereed(work: Workspace, nlp: NLP, candidates: list[Candidate], trial: Tria
     sampler, sample = work.sampler, work.sample
     if sampler is None or sample is None:
         return Verdict(nlp, candidates, trial)
-    run, rivals = Runner(work, nlp, work.touching), sample.refined
+    run, rivals = Runner(work, nlp), sample.refined
     for _ in range(_APPEALS):
         if trial is not None:
             rivals = rivals.joined(sampler.around({name: trial.parameters[name] for name in work.problem.free}))
@@ -120,7 +120,7 @@ def _troubled(work: Workspace, candidates: Sequence[Candidate], trial: Trial | N
 
 def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial | None, rivals: Looked) -> Verdict | None:
     """A better design where the search may go as far as a0 = 0; None where it finds none."""
-    if work.touching or "abscissa" not in nlp.variables:
+    if nlp.touches or "abscissa" not in nlp.variables:
         return None
     near = [sampler.design(rivals, k) for k in range(min(len(rivals), _OPEN))]
     near += [] if trial is None else [{name: trial.parameters[name] for name in work.problem.free}]

@@ -131,7 +131,7 @@ def _least_covered(work: Workspace, limits: Sequence[Limit], listed: Sequence[Ca
             single = _least(work, [limit], listed, few=True)
             if single[0] is not None and single[0].point.objective < trial.point.objective * (1 - _TIE):
                 elastic = _elastic(work.problem, listed, limits)
-                ended = Runner(work, elastic, work.touching).ended(single[0].parameters, near=True)
+                ended = Runner(work, elastic).ended(single[0].parameters, near=True)
                 again = survivor(_unlimited(work, limits), elastic, [ended])
                 less = again is not None and again.point.objective < trial.point.objective
                 if again is not None and less and not again.checked.violations:
@@ -148,7 +148,7 @@ def _least(
 ) -> tuple[Trial | None, NLP]:
     """The design with the least weighted sum of amounts that a few starts reach, or the one `before` leads to."""
     nlp = _elastic(work.problem, cases, limits)
-    run = Runner(work, nlp, work.touching)
+    run = Runner(work, nlp)
     candidates = [] if before is None else [run.ended(before.parameters, near=True)]
     if not any(c.feasible for c in candidates):
         candidates = _ends(run, 2 * _FEW if few else _TRIED)
@@ -219,7 +219,7 @@ def _alone(work: Workspace, conflict: Sequence[str], trial: Trial, cases: Sequen
     for limit in (limits[name] for name in conflict):
         wide = _widened(problem, [limit.parameter] if limit.parameter else [])
         nlp, widened = _elastic(wide, cases, [limit]), workspace(wide, work.options)
-        run = Runner(widened, nlp, widened.touching)
+        run = Runner(widened, nlp)
         here = {n: min(max(trial.parameters[n], lo), hi) for n, (lo, hi) in wide.free.items()}
         candidates = [run.ended(here, near=True), *(run.ended(d, hopeful=False) for d in designs(wide, 0, _FEW))]
         ended = survivor(_unlimited(widened, [limit]), nlp, candidates)
@@ -235,16 +235,18 @@ def _elastic(wide: Problem, cases: Sequence[Case], limits: Sequence[Limit]) -> N
     x, slack = ca.SX.sym("x", len(nlp.variables)), ca.SX.sym("s", len(limits))
     g = nlp.at(x)[1]
     rows: list[tuple[str, Any, float, float]] = []
+    second: list[tuple[str, Any, float, float]] = []  # after all others, whose numbers touches and kinks know
     for k, name in enumerate(nlp.rows):
         lower, upper = nlp.row_lower[k], nlp.row_upper[k]
         if name not in names:
             rows.append((name, g[k], lower, upper))
             continue
         s = slack[names.index(name)]
-        if np.isfinite(upper):
-            rows.append((name, g[k] - s, -np.inf, upper))
-        if np.isfinite(lower):
-            rows.append((name, g[k] + s, lower, np.inf))
+        moved = [(name, g[k] - s, -np.inf, upper)] if np.isfinite(upper) else []
+        moved += [(name, g[k] + s, lower, np.inf)] if np.isfinite(lower) else []
+        rows.append(moved[0])
+        second += moved[1:]
+    rows += second
     for number, limit in enumerate(limits):
         if limit.parameter:
             at = list(wide.free).index(limit.parameter)

@@ -50,7 +50,7 @@ def explore(work: Workspace) -> Explored:
     nlp = work.formulate(cases)
     candidates = search(work, nlp)
     trial = survivor(work, nlp, candidates)
-    if "damping_ratio" in nlp.touches and (trial is None or _unstable(work.problem, trial)):
+    if "damping_ratio" in nlp.variables and (trial is None or _unstable(work.problem, trial)):
         # A positive real root has −1, and no sector of its own.
         unstable = work.formulate(cases, damping_ratio=-1.0)
         others = search(work, unstable)
@@ -76,7 +76,7 @@ def _left_of_the_axis(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
     """Where starts end from designs sought for their stability alone; all starts are spent where there is any such."""
     limits = {**work.part.constraints, _STABLE: "abscissa <= 0"}
     asked = replace(work.part, minimize="abscissa", maximize=None, constraints=limits)
-    sampler, run = Sampler(asked, work.options.seed + 1), Runner(work, nlp, work.touching)
+    sampler, run = Sampler(asked, work.options.seed + 1), Runner(work, nlp)
     sample, ended = sampler.sample(), list[Candidate]()
     for seen, near in ((sample.refined, True), (sample.boldest, False)):
         rows = np.flatnonzero(seen.worth < 0).tolist()
@@ -144,7 +144,7 @@ def _covered(
         ours = [best.parameters] if best is trial else [best.parameters, trial.parameters]
         leaders = [*ours, *_leaders(work, candidates)]
         nlp = work.formulate((*nlp.cases, *more))
-        run = Runner(work, nlp, work.touching)
+        run = Runner(work, nlp)
         candidates = [run.ended(design, near=True) for design in leaders]
         trial = survivor(work, nlp, candidates)
         if _lost(work, trial, leaders, nlp):

@@ -105,11 +105,6 @@ class Workspace:
         return freedom(self.problem)
 
     @cached_property
-    def touching(self) -> bool:
-        """Whether root quantities must be held at their exact values: bounds on them would let the search overclaim."""
-        return overclaims(self.problem)
-
-    @cached_property
     def sampler(self) -> Sampler | None:
         """Looks at designs of this part; None where arrays cannot tell what is asked of them."""
         told = self.part.pattern is None and not self.part.asks_radius
@@ -198,7 +193,8 @@ def _decisions(problem: Problem, varied: Sequence[str]) -> tuple[Hashable, ...]:
     box = (tuple(problem.free.items()), tuple(middle(problem).items())) if nearest else tuple(problem.free)
     zero = tuple(problem.fixed.get(name) == 0 for name in varied) if problem.asks_radius else ()
     units = (scale_of(problem), units_of(problem), objective_unit(problem))
-    return units, heavy, texts, box, zero, tuple(tempts(problem, name) for name in _pieced(problem))
+    roots = (overclaims(problem), *(tempts(problem, name) for name in _pieced(problem)))
+    return units, heavy, texts, box, zero, roots
 
 
 def _pieced(problem: Problem) -> list[str]:

@@ -1,0 +1,133 @@
+"""Kinks as variables: abs, min and max of an NLP, which a solver of smooth problems cannot look through.
+
+Each becomes t with a row t ≥ piece for every piece: |e| is the greatest of e and −e, a minimum of a and b minus the
+greatest of −a and −b. Where more of t is never an advantage, that is exact, as it is of a bound on a root quantity;
+elsewhere t is held equal to one piece, the others below it, case by case.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from tmsopt.arithmetic.walk import steps, walk
+from tmsopt.formulation.nlp import NLP, Greatest, Lift, Touch
+from tmsopt.models import Values
+from tmsopt.roots.patterns.pattern import Roots
+
+KINK = ".kink"
+"""Name of the rows of kinks: no constraint has it."""
+
+_WORSE = {"abscissa": 1.0, "damping_ratio": -1.0}
+"""Direction in which a root quantity gets worse; its factors bound it from that side alone."""
+
+
+def unfolded(nlp: NLP, overclaims: bool) -> NLP:
+    """An NLP with its kinks as variables, and with the touches that it needs: where more is claimed without them.
+
+    Args:
+        overclaims: whether bounds on root quantities would, kinks aside.
+    """
+    if not any(step.operation in _PIECES for step in steps(nlp.functions)):
+        return nlp if overclaims else replace(nlp, touches={})
+    build = _Unfolding(nlp)
+    x, p, f, g = build.expressions()
+    inputs = {"x": x, "p": p} if nlp.settings else {"x": x}
+    functions = ca.Function("nlp", [*inputs.values()], [f, g], [*inputs], ["f", "g"])
+    count, first = len(build.kinks), len(nlp.rows)
+    rows = sum(len(kink.rows) for kink in build.kinks)
+    plain = replace(
+        nlp,
+        variables=(*nlp.variables, *[KINK] * count),
+        functions=functions,
+        lower=(*nlp.lower, *[-np.inf] * count),
+        upper=(*nlp.upper, *[np.inf] * count),
+        rows=(*nlp.rows, *[KINK] * rows),
+        row_lower=(*nlp.row_lower, *[0.0] * rows),
+        row_upper=(*nlp.row_upper, *[np.inf] * rows),
+        lifts=(*nlp.lifts, *[Lift(KINK, 1, _filled_later)] * count),
+        kinks=tuple(build.kinks),
+    )
+    slopes = partial(_slopes, ca.jacobian(ca.vertcat(f, g), x))
+    held: dict[str, tuple[Touch, ...]] = {}
+    equal = set[int]()
+    for kink in reversed(build.kinks):  # what is made of others comes before them
+        if not _worsens(plain, slopes(kink.variable), 1.0, equal, kink.rows):
+            held[f"{KINK}{kink.variable}"] = tuple(Touch(row=k) for k in kink.rows)
+            equal.update(kink.rows)
+    rooted = range(first, first + rows)
+    for name, touches in nlp.touches.items():
+        at = slopes(nlp.variables.index(name))
+        among = {k: slope for k, slope in at.items() if k in rooted}
+        if overclaims or not _worsens(plain, among, _WORSE[name], equal):
+            held[name] = touches
+    return replace(plain, touches=held)
+
+
+class _Unfolding:
+    """Collects the kinks of one NLP; discarded once they are known."""
+
+    def __init__(self, nlp: NLP) -> None:
+        self.nlp = nlp
+        self.x = list(ca.vertsplit(ca.SX.sym("x", len(nlp.variables))))
+        self.p = list(ca.vertsplit(ca.SX.sym("p", len(nlp.settings)))) if nlp.settings else []
+        self.rows: list[Any] = []
+        self.kinks: list[Greatest] = []
+
+    def expressions(self) -> tuple[Any, Any, Any, Any]:
+        """Variables, settings, objective and rows, without a kink."""
+        x, p = ca.SX.sym("x", len(self.x)), ca.SX.sym("p", len(self.p))
+        stacked = ca.Function("stacked", [ca.vertcat(x, p)], self.nlp.at(x, p))
+        (f,), g = walk(stacked, [*self.x, *self.p], {op: partial(self.applied, op) for op in _OPERATIONS})
+        rows = ca.densify(ca.vertcat(*map(ca.SX, [*g, *self.rows])))
+        return ca.vertcat(*self.x), ca.vertcat(*self.p), ca.densify(ca.SX(f)), rows
+
+    def applied(self, operation: int, *operands: Any) -> Any:
+        """The result of an operation; of a kink that depends on variables, a new one."""
+        if operation == ca.OP_CONST:
+            return ca.SX(operands[0])
+        pieces = _PIECES.get(operation)
+        if pieces is None or not any(ca.depends_on(ca.SX(e), ca.vertcat(*self.x)) for e in operands):
+            return (ca.SX.unary if len(operands) == 1 else ca.SX.binary)(operation, *operands)
+        first, t = len(self.nlp.rows) + len(self.rows), ca.SX.sym(KINK)
+        every = pieces(*operands)
+        self.kinks.append(Greatest(len(self.x), tuple(range(first, first + len(every)))))
+        self.x.append(t)
+        self.rows += [t - piece for piece in every]
+        return -t if operation == ca.OP_FMIN else t
+
+
+_PIECES: Mapping[int, Callable[..., Sequence[Any]]] = {
+    ca.OP_FABS: lambda e: (e, -e), ca.OP_FMAX: lambda a, b: (a, b), ca.OP_FMIN: lambda a, b: (-a, -b),
+}  # fmt: skip
+_OPERATIONS = {getattr(ca, name) for name in dir(ca) if name.startswith("OP_")}
+
+
+def _slopes(jacobian: Any, variable: int) -> dict[int, Any]:
+    """By how much the objective (−1) and the rows change with a variable, where they do."""
+    column = jacobian[:, variable]
+    return {k - 1: column[k] for k in range(column.size1()) if not column[k].is_zero()}
+
+
+def _worsens(nlp: NLP, slopes: Mapping[int, Any], worse: float, equal: set[int], but: Sequence[int] = ()) -> bool:
+    """Whether it is certain that nothing gets better as a variable moves up (or down: `worse` −1), rows `but` aside.
+
+    It is where slopes are constants of the right sign. Rows that may be held `equal` get better either way.
+    """
+    for k, slope in slopes.items():
+        if k in but:
+            continue
+        below, above = (True, False) if k < 0 else (np.isinf(nlp.row_lower[k]), np.isinf(nlp.row_upper[k]))
+        if k in equal or below == above or not slope.is_constant():
+            return False
+        if worse * float(slope) * (1 if below else -1) < 0:
+            return False
+    return True
+
+
+def _filled_later(values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
+    """What a kink starts from is known once the variables before it are."""
+    return [[0.0]]
