@@ -81,16 +81,16 @@ def found(
     counted = work.freedom
     if sum(checked.violations.values()) > _SPURIOUS and counted.count >= 0:
         return None
-    converged = trial.candidate.run.status in _CONVERGED or point.stationarity <= _STATIONARY
+    ended = converged(trial)
     notes: tuple[str, ...] = ()
     if not honest(work, trial):
-        converged = False
+        ended = False
         claimed = problem.sign * trial.candidate.objective
         notes = (f"the solver's objective {claimed:.9g} is not the design's, {checked.objective:.9g}",)
     if problem.objective is not None and not math.isfinite(checked.objective):
-        converged = False
+        ended = False
         notes = ("the objective does not exist at the design where the search ended; constrain what it divides by",)
-    status = "optimal" if converged and not checked.violations else "not_converged"
+    status = "optimal" if ended and not checked.violations else "not_converged"
     if counted.kind == "over-determined" and checked.violations:
         status = "infeasible"
         surplus = f"{counted.conditions} conditions for {counted.free} free parameters"
@@ -101,6 +101,11 @@ def found(
         equations = nlp if not nlp.kinks else matching(problem) if problem.pattern else abscissa(problem)
         branches = _other_branches(problem, equations, parameters)
     return Finding(parameters, checked, status, active, starts, nlp.formulation, looked, branches, notes)
+
+
+def converged(trial: Trial) -> bool:
+    """Whether the solver stopped at an optimum of its own, by its word or by the gradient."""
+    return trial.candidate.run.status in _CONVERGED or trial.point.stationarity <= _STATIONARY
 
 
 def counted(candidates: Sequence[Candidate], at_best: float) -> Starts:

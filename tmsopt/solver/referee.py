@@ -10,8 +10,8 @@ from tmsopt.design.cases import Case
 from tmsopt.design.solution import Starts
 from tmsopt.formulation.nlp import NLP
 from tmsopt.solver.multistart import Candidate, Runner
-from tmsopt.solver.outcome import Finding, Trial, ahead, honest, survivor
-from tmsopt.solver.sample import Looked, Sampler
+from tmsopt.solver.outcome import Finding, Trial, ahead, converged, honest, survivor
+from tmsopt.solver.sample import Looked, Sample, Sampler
 from tmsopt.solver.workspace import Workspace
 
 _APPEALS, _APPEALED = 8, 2  # times that better designs are started from, and how many each time
@@ -45,9 +45,19 @@ class Verdict:
 
 def refereed(work: Workspace, nlp: NLP, candidates: list[Candidate], trial: Trial | None) -> Verdict:
     """The search taken up again as long as a design that was looked at is better than where it ended."""
-    sampler, sample = work.sampler, work.sample
-    if sampler is None or sample is None:
+    if work.sampler is None or work.sample is None:
         return Verdict(nlp, candidates, trial)
+    verdict = _appealed(work, work.sampler, work.sample, Verdict(nlp, candidates, trial))
+    trial = verdict.trial
+    if verdict.held is not None or trial is None or converged(trial) or trial.checked.violations:
+        return verdict
+    if not _endless(work, work.sample, trial.checked.objective):
+        return verdict
+    return replace(verdict, held={name: trial.parameters[name] for name in work.problem.free}, words=_UNBOUNDED)
+
+
+def _appealed(work: Workspace, sampler: Sampler, sample: Sample, so_far: Verdict) -> Verdict:
+    nlp, candidates, trial = so_far.nlp, so_far.candidates, so_far.trial
     run, rivals = Runner(work, nlp), sample.refined
     for _ in range(_APPEALS):
         if trial is not None:
@@ -71,9 +81,14 @@ def refereed(work: Workspace, nlp: NLP, candidates: list[Candidate], trial: Tria
         free = sampler.design(rivals, 0)
         checked = work.recheck(work.problem.ordered(free), nlp.cases)
         if not checked.violations and work.problem.sign * checked.objective < _least(work, trial):
-            endless = work.problem.sign * checked.objective < -_ENDLESS * sample.spread
+            endless = _endless(work, sample, checked.objective)
             return Verdict(nlp, candidates, trial, free, _UNBOUNDED if endless else _KEPT)
     return Verdict(nlp, candidates, trial)
+
+
+def _endless(work: Workspace, sample: Sample, value: float) -> bool:
+    """Whether an objective that no solver stopped at is far below what it is elsewhere in the box."""
+    return work.problem.sign * value < -_ENDLESS * sample.spread < 0
 
 
 def held(work: Workspace, verdict: Verdict, starts: Starts, cases: Sequence[Case]) -> Finding:
