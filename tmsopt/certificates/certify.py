@@ -6,12 +6,12 @@ from dataclasses import replace
 from functools import partial
 
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.certificates.answer import Answer, Clock, SecondsPassed, answer, contradicted, doubt
-from tmsopt.certificates.half_planes import over
-from tmsopt.certificates.question import Question
-from tmsopt.certificates.race import Crew
-from tmsopt.certificates.scip import SCIP
-from tmsopt.certificates.tasks import FOUND, INFEASIBLE, UNDECIDED
+from tmsopt.branch_and_bound.answer import Answer, Clock, SecondsPassed, answer, contradicted, doubt
+from tmsopt.branch_and_bound.half_planes import over
+from tmsopt.branch_and_bound.question import Question, unit_of
+from tmsopt.branch_and_bound.race import Crew
+from tmsopt.branch_and_bound.stability import SOLVER
+from tmsopt.branch_and_bound.tasks import FOUND, INFEASIBLE, UNDECIDED
 from tmsopt.checks.bound import instant_bound
 from tmsopt.checks.recheck import recheck
 from tmsopt.design.cases import Case
@@ -22,9 +22,6 @@ from tmsopt.design.solution import Bound, Solution
 from tmsopt.errors import Fault, InputError
 from tmsopt.formulation.formulate import Builder
 from tmsopt.solver.solve import solve, solved
-
-SOLVER = SCIP
-"""Who is asked."""
 
 SECONDS = 60.0
 """Time for a proof, by default."""
@@ -39,7 +36,6 @@ _CLOSE = 1.5  # ratio of a gap proved and one not proved that is not worth narro
 _SHARE = 0.6  # of the time that is left, for a gap that is not the last one to be tried
 _BETTER = 1e-9  # relative gain that counts as one
 _REPLACED = 5  # times that a design is replaced by a better one
-_SMALL = 1e-6  # of roots at 0 or at infinity, which say nothing of the others
 _STARTS = 4  # from the design that the solver found, and others
 _NEARLY = 1e-3  # violation and loss beyond which a design that the solver found is none
 
@@ -127,7 +123,7 @@ def _next(proved: float, failed: float) -> float | None:
 
 def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     """No design was found: the proof that there is none, or one after all."""
-    anything = Question(design.problem, _cases(design), None, _unit(design))
+    anything = Question(design.problem, _cases(design), None, unit_of(design.roots))
     answered = answer(anything, clock, 1.0, partial(_from, design))
     if answered.better is not None:
         return answered.better, True
@@ -168,7 +164,7 @@ def _over_the_box(design: Solution) -> Bound:
 def _question(design: Solution, level: float) -> Question:
     """Whether any design is better by a gap of some level."""
     limit = design.value - design.problem.sign * _gap(design.value, level)
-    return Question(design.problem, _cases(design), limit, _unit(design))
+    return Question(design.problem, _cases(design), limit, unit_of(design.roots))
 
 
 def _bound(design: Solution, level: float, clock: Clock) -> Bound:
@@ -239,13 +235,6 @@ def _cases(design: Solution) -> tuple[Case, ...]:
     listed = design.problem.cases
     worst = [case for case in (design.worst, design.least_damped) if case is not None and case not in listed]
     return (*listed, *dict.fromkeys(worst)) if listed else ()
-
-
-def _unit(design: Solution) -> float:
-    """Geometric mean of the sizes of the roots, as a power of two."""
-    sizes = [math.hypot(r.re, r.im) for r in design.roots for _ in range(r.multiplicity)]
-    known = [math.log2(size) for size in sizes if _SMALL < size < 1 / _SMALL]
-    return float(2.0 ** round(sum(known) / len(known))) if known else 1.0
 
 
 def _noted(design: Solution, words: str) -> Solution:

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.arithmetic.intervals import Interval, ranges, root_bound
-from tmsopt.certificates.interlacing import interlace, squares_of, unknowns
+from tmsopt.branch_and_bound.interlacing import interlace, squares_of, unknowns
 from tmsopt.formulation.formulate import Builder
 from tmsopt.formulation.lifts import Lifted, quadratic_pairs
 from tmsopt.formulation.nlp import Lift
