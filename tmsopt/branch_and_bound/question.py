@@ -17,7 +17,6 @@ from tmsopt.design.cases import Case
 from tmsopt.design.dependence import tempts
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.formulation.formulate import Builder, Lifting
 from tmsopt.formulation.nlp import NLP
 from tmsopt.roots import Root
@@ -64,8 +63,7 @@ class Question:
         build.objective = sign * ca.SX(compact(self.problem.model, build.values[first])[0])
         if over(build, [build.objective])[0][0] > 0:
             return None
-        rooted = [name for name, c in self.problem.conditions.items() if set(c.names) & set(ROOT_NAMES)]
-        build.constraints(without=rooted)
+        build.constraints(without=self.problem.asked_of_roots)
         return build.finish("leading")
 
     def program(self, sign: int, least: float = 0.0) -> NLP:

@@ -11,7 +11,6 @@ from tmsopt.branch_and_bound.scip import SCIP
 from tmsopt.branch_and_bound.tasks import FOUND, INFEASIBLE
 from tmsopt.checks.recheck import Checked, recheck
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.formulation.formulate import middle
 
 SOLVER = SCIP
@@ -27,7 +26,7 @@ class Stability:
 
     Attributes:
         any: True where `design` is, by a recheck; False where it is proved that none is; None where it is not known.
-        design: free parameters, to be improved: what was found, be it at the edge or off in a limit by a rounding.
+        design: free parameters of a stable design, to be improved: it may be off in a limit by the solver's tolerance.
     """
 
     any: bool | None = None
@@ -50,8 +49,7 @@ def any_stable(problem: Problem, seconds: float, known: Mapping[str, float] | No
     """
     if not SOLVER.available or not problem.free:
         return Stability()
-    others = [n for n, c in problem.conditions.items() if not set(c.names) & set(ROOT_NAMES)]
-    kept = {n: problem.constraints[n] for n in others}
+    kept = {n: text for n, text in problem.constraints.items() if n not in problem.asked_of_roots}
     asked = replace(problem, minimize="abscissa", maximize=None, pareto=(), constraints=kept)
     best = _checked(asked, {n: known[n] for n in problem.free} if known else middle(problem))
     unit = unit_of(best.structure.roots)
@@ -63,15 +61,13 @@ def any_stable(problem: Problem, seconds: float, known: Mapping[str, float] | No
             if told.verdict == INFEASIBLE:
                 believed = known is None or best.violations or _admits(at_axis, best, known, clock)
                 return Stability(False) if believed and not clock.interrupted else Stability()
-            found = told.other
-            if found and not _stable(asked, found):
-                further = answer(replace(at_axis, limit=-_MARGIN * unit), clock, 1.0, _any)
-                found = further.other or found
+            if told.verdict == FOUND and _judged(asked, told.other).design is None:  # it is on the axis
+                told = answer(replace(at_axis, limit=-_MARGIN * unit), clock, 1.0, _any)
         except NotAccepted:
             return Stability()
     if clock.interrupted:
         raise KeyboardInterrupt
-    return Stability(True if found and _stable(asked, found) else None, found)
+    return _judged(asked, told.other)
 
 
 def _any(design: Mapping[str, float]) -> Answer:
@@ -83,9 +79,11 @@ def _checked(problem: Problem, design: Mapping[str, float]) -> Checked:
     return recheck(problem, problem.ordered(design))
 
 
-def _stable(problem: Problem, design: Mapping[str, float]) -> bool:
-    checked = _checked(problem, design)
-    return max(checked.structure.abscissa, checked.realised) < 0 and not checked.violations
+def _judged(problem: Problem, design: Mapping[str, float] | None) -> Stability:
+    """What a design says that the solver found."""
+    if design is None or not max((checked := _checked(problem, design)).structure.abscissa, checked.realised) < 0:
+        return Stability()
+    return Stability(None if checked.violations else True, design)
 
 
 def _admits(question: Question, best: Checked, known: Mapping[str, float], clock: Clock) -> bool:
