@@ -166,11 +166,11 @@ class Solution:
 
     @property
     def stability_sought(self) -> bool:
-        """Whether something is free, and the objective or a limit that is violated names a quantity of the roots."""
+        """Whether parameters are free for what a limit that is violated, or else the objective, says of the roots."""
         problem = self.problem
         objective = () if problem.objective is None else problem.objective.names
-        roots = set(objective) & set(ROOT_NAMES) or set(self.violations) & set(problem.asked_of_roots)
-        return bool(problem.free and roots)
+        limits = set(self.violations) & set(problem.asked_of_roots)
+        return bool(problem.free and (limits if self.violations else set(objective) & set(ROOT_NAMES)))
 
     @property
     def any_stable(self) -> bool | None:

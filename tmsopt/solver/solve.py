@@ -9,7 +9,7 @@ from typing import Unpack
 from tmsopt.branch_and_bound.stability import SOLVER, any_stable
 from tmsopt.checks.bound import instant_bound
 from tmsopt.checks.digits import certified
-from tmsopt.checks.recheck import Checked
+from tmsopt.checks.recheck import Checked, recheck
 from tmsopt.checks.worst_case import cover
 from tmsopt.design.files import Given, question_of
 from tmsopt.design.problem import Problem, freedom
@@ -71,6 +71,17 @@ def solved(design: Given, options: Options = DEFAULTS, family: Family | None = N
         finding = evaluated(problem, evaluated_cases(problem, problem.ordered({})))
     solution = _assembled(problem, finding, notes, values, began)
     return _with_stability(solution, options, family, began) if options.stability else solution
+
+
+def standing(problem: Problem, design: Mapping[str, float], note: str) -> Solution:
+    """A design as it is, whoever found it: ``not_converged``, or ``infeasible`` where it violates something."""
+    began = time.perf_counter()
+    parameters = problem.ordered(design)
+    cases = evaluated_cases(problem, parameters)
+    checked = recheck(problem, parameters, cases)
+    status = "infeasible" if checked.violations else "not_converged"
+    finding = Finding(parameters, checked, status, {}, Starts(), "none", cases, notes=(note,))
+    return _assembled(problem, finding, (), {}, began)
 
 
 def _with_stability(solution: Solution, options: Options, family: Family | None, began: float) -> Solution:
