@@ -1,5 +1,8 @@
 """Whether a design is stable, and whether any is, as solutions and reports say it: s² + (x − 2) s + 1 is where x > 2."""
 
+import time
+from dataclasses import replace
+from importlib import import_module
 from typing import Any
 
 import casadi as ca
@@ -9,6 +12,8 @@ import tmsopt
 from tmsopt.branch_and_bound import SCIP
 from tmsopt.models import from_coefficients
 from tmsopt.report import solution_table
+
+solving = import_module("tmsopt.solver.solve")
 
 scip = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
 
@@ -83,6 +88,17 @@ def test_who_does_not_ask_for_stability_is_told_of_none() -> None:
     design = found(3.0, minimize="x")
     assert (design.stable, design.any_stable) == (False, None)
     assert headline(design)[1].startswith("minimize")
+
+
+@scip
+def test_a_stable_design_that_the_search_missed_is_found() -> None:
+    """The best design of the box 0 ≤ x ≤ 1, sold as that of 0 ≤ x ≤ 3, where −1/2 is least, at x = 3."""
+    part = found(1.0, stability=0.0)
+    missed = replace(part, problem=replace(part.problem, free={"x": (0.0, 3.0)}))
+    design = solving._with_stability(missed, tmsopt.Options(stability=10.0), None, time.perf_counter())
+    assert (design.status, design.stable, design.any_stable) == ("optimal", True, True)
+    assert design.value == pytest.approx(-0.5, abs=1e-12)
+    assert any("branch and bound found the stable design" in note for note in design.notes)
 
 
 @scip
