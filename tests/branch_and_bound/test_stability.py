@@ -88,13 +88,18 @@ def test_a_solver_that_says_no_to_everything_is_not_believed(monkeypatch: pytest
 
 
 @scip
-def test_an_interrupt_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    def stop(*_: Any) -> Any:
-        raise KeyboardInterrupt
+@pytest.mark.parametrize("when", ["asked", "proved"])
+def test_an_interrupt_goes_on(when: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """While the question is asked, or while its answer is looked at: the tasks within limits do that."""
+
+    def stop(self: Crew, tasks: Any, tick: Any = None) -> list[Decision]:
+        if when == "asked" or tasks[0].within:
+            raise KeyboardInterrupt
+        return [Decision(INFEASIBLE)]
 
     monkeypatch.setattr(Crew, "race", stop)
     with pytest.raises(KeyboardInterrupt):
-        any_stable(problem(DAMPED, {"x": (0, 3)}), SECONDS)
+        any_stable(problem(DAMPED, {"x": (0, 1)}), SECONDS, known={"x": 1.0})
 
 
 @scip

@@ -58,16 +58,16 @@ def any_stable(problem: Problem, seconds: float, known: Mapping[str, float] | No
         clock = Clock(seconds, crew)
         try:
             told = answer(at_axis, clock, _SHARE, _any)
-            if told.verdict == INFEASIBLE:
-                believed = known is None or best.violations or _admits(at_axis, best, known, clock)
-                return Stability(False) if believed and not clock.interrupted else Stability()
+            proved = told.verdict == INFEASIBLE
+            if proved and known is not None and not best.violations:
+                proved = _admits(at_axis, best, known, clock)
             if told.verdict == FOUND and _judged(asked, told.other).design is None:  # it is on the axis
                 told = answer(replace(at_axis, limit=-_MARGIN * unit), clock, 1.0, _any)
         except NotAccepted:
             return Stability()
     if clock.interrupted:
         raise KeyboardInterrupt
-    return _judged(asked, told.other)
+    return Stability(False) if proved else _judged(asked, told.other)
 
 
 def _any(design: Mapping[str, float]) -> Answer:
