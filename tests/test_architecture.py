@@ -22,6 +22,7 @@ FLOORS = (
     ("formulation",),
     ("tracing", "margins"),
     ("checks", "charts"),
+    ("branch_and_bound",),
     ("solver",),
     ("certificates", "proofs", "explanation", "diagnosis", "fronts", "critical_speeds", "studies", "paper"),
     ("report", "plots"),

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tmsopt.arithmetic import EVERYTHING, INTERVALS, NotAccepted, ball, interval, ranges, root_bound, walk
-from tmsopt.certificates import FOUND, INFEASIBLE, SCIP, interlacing, squares_of, task, unknowns
+from tmsopt.branch_and_bound import FOUND, INFEASIBLE, SCIP, interlacing, squares_of, task, unknowns
 from tmsopt.design import parse_value
 from tmsopt.formulation import NLP
 from tmsopt.roots import product

@@ -22,17 +22,17 @@ from scipy.optimize import brentq  # type: ignore[import-untyped]
 
 from benchmarks.suites import REFERENCES, random_problem, references
 from tmsopt import InputError, Problem, Solution, certify, models, solve
-from tmsopt.certificates import SCIP, UNDECIDED, Crew, Decision, GlobalSolver, Task
+from tmsopt.branch_and_bound import SCIP, UNDECIDED, Crew, Decision, GlobalSolver, Task
 from tmsopt.cli import main
 from tmsopt.design import Band, Bound
 from tmsopt.records import Array
 from tmsopt.report import solution_table
 
-answering = import_module("tmsopt.certificates.answer")
+answering = import_module("tmsopt.branch_and_bound.answer")
 certifying = import_module("tmsopt.certificates.certify")
-interlaces = import_module("tmsopt.certificates.interlacing")
+interlaces = import_module("tmsopt.branch_and_bound.interlacing")
 started = import_module("tmsopt.processes")
-lines = import_module("tmsopt.certificates.half_planes")
+lines = import_module("tmsopt.branch_and_bound.half_planes")
 
 pytestmark = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
 

@@ -16,7 +16,7 @@ from mpmath import mp
 
 import tmsopt
 from tmsopt.arithmetic import Number
-from tmsopt.certificates import FOUND, INFEASIBLE, SCIP, Question, task
+from tmsopt.branch_and_bound import FOUND, INFEASIBLE, SCIP, Question, task
 from tmsopt.checks import omega0_bound, relation_bound
 from tmsopt.models import Model, from_coefficients, from_matrices
 from tmsopt.proofs import Proof, abscissa_formula, prove_design

@@ -9,7 +9,7 @@ import pytest
 
 from tmsopt import Problem, certify, solve
 from tmsopt.arithmetic import NotAccepted, ball, interval, square
-from tmsopt.certificates import INFEASIBLE, SCIP, Crew, Decision, Question, interlace, squares_of, task
+from tmsopt.branch_and_bound import INFEASIBLE, SCIP, Crew, Decision, Question, interlace, squares_of, task
 from tmsopt.models import tms
 
 pytestmark = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")

@@ -8,6 +8,7 @@ from dataclasses import FrozenInstanceError, replace
 from importlib import import_module
 from itertools import pairwise
 
+import casadi as ca
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -17,7 +18,7 @@ from scipy.optimize import brentq, minimize_scalar
 import tmsopt
 from tmsopt import InputError, NotSolved, Problem
 from tmsopt.cli import main
-from tmsopt.models import tms
+from tmsopt.models import from_coefficients, tms
 from tmsopt.solver import solved
 
 subproblems = import_module("tmsopt.fronts.subproblems")
@@ -344,6 +345,29 @@ def command(*arguments):
     return CliRunner().invoke(main, [str(a) for a in arguments])
 
 
+@pytest.mark.parametrize("objectives", [("abscissa", "x"), ("abscissa", "x", "-y")])
+def test_designs_that_are_not_stable_are_marked(tmp_path, objectives):
+    """s² + (x − 2) s + 1 + y is stable where x > 2 alone."""
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    problem = Problem(from_coefficients([1, x - 2, 1 + y]), free={"x": (0, 3), "y": (0, 1)}, pareto=objectives)
+    front = tmsopt.pareto(problem, points=8)
+    stable = [p.solution.parameters["x"] > 2 for p in front.points]
+    assert set(stable) == {True, False}
+    assert [p.stable for p in front.points] == stable
+    assert [p["stable"] for p in front.to_json()["points"]] == stable
+    front.write_csv(tmp_path / "front.csv")
+    rows = csv.DictReader((tmp_path / "front.csv").read_text(encoding="utf-8").splitlines())
+    assert [row["stable"] for row in rows] == [str(s).lower() for s in stable]
+    table = tmsopt.report.front_table(front).splitlines()
+    at = next(line for line in table if " stable" in line).index("stable")
+    assert [line[at:].split()[0] for line in table if line[at : at + 3] in ("yes", "no ", "no")] == [
+        "yes" if s else "no" for s in stable
+    ]
+    lines = tmsopt.plots.front_figure(front).axes[0].get_lines()
+    ringed = next(line for line in lines if line.get_label() == "not stable").get_xydata()
+    assert ringed.tolist() == [list(p.objectives[:2]) for p, s in zip(front.points, stable, strict=True) if not s]
+
+
 @pytest.fixture
 def file(tmp_path):
     path = tmp_path / "wave.toml"
@@ -359,7 +383,7 @@ def test_the_command_writes_table_csv_and_plot(file, tmp_path):
     rows = list(csv.DictReader((tmp_path / "front.csv").read_text(encoding="utf-8").splitlines()))
     assert list(rows[0]) == [
         "chi_B", "sin(2*chi_B) - 0.3*chi_B", "Fr", "mu", "chi_H", "zeta_B", "zeta_H", "lambda_s",
-        "abscissa", "structure", "limits", "label",
+        "abscissa", "structure", "stable", "limits", "label",
     ]  # fmt: skip
     assert len(rows) == done.stdout.split("sub-problems")[1].count("\n  ") - 1  # a heading, then a row a point
     x = np.array([float(r["chi_B"]) for r in rows])

@@ -96,10 +96,26 @@ def test_the_header() -> None:
     row = Row(0, 0, Table({"mu": 1.0}), "optimal", parameters=Table({"mu": 1.0, "seed": 2.0}), reports=Table({"chi_T": 3.0}),
         laws=Table({"chib": 4.0}), violations=Table({"trail": 5.0}))  # fmt: skip
     assert list(columns([row])) == [
-        "number", "seed", "varied.mu", "status", "cause", "objective", "abscissa", "damping_ratio", "structure",
-        "mu", "parameter.seed", "report.chi_T", "bound", "gap", "proven", "method", "law.chib", "violation.trail",
+        "number", "seed", "varied.mu", "status", "cause", "objective", "abscissa", "abscissa_realised", "damping_ratio",
+        "structure", "stable", "mu", "parameter.seed", "report.chi_T", "bound", "gap", "proven", "method", "law.chib", "violation.trail",
         "starts", "warm", "seconds", "host",
     ]  # fmt: skip
+
+
+def test_whether_a_row_is_stable(tmp_path: Path) -> None:
+    """Ideal and as stored; of a row without a design, and of one with a root at infinity, that is not known."""
+    ends = [(-1.0, -1.0), (1.0, 1.0), (-1e-6, 1e-4), (0.0, 0.0), (math.nan, math.nan), (math.inf, math.inf)]
+    rows = [Row(k, 0, Table(), "optimal", abscissa=a, abscissa_realised=b) for k, (a, b) in enumerate(ends)]
+    truth = [True, False, False, False, None, None]
+    assert [row.to_json()["stable"] for row in rows] == truth
+    assert [Row.from_json(row.to_json()).stable for row in rows] == truth
+    export(rows, tmp_path / "rows.csv")
+    assert read_csv(tmp_path / "rows.csv")["stable"] == ["true", "false", "false", "false", "", ""]
+    pytest.importorskip("netCDF4")
+    export(rows, tmp_path / "rows.parquet")
+    assert read_parquet(tmp_path / "rows.parquet")["stable"] == truth
+    export(rows, tmp_path / "rows.nc")
+    assert str(read_netcdf(tmp_path / "rows.nc")["stable"]) == "[1.0, 0.0, 0.0, 0.0, nan, nan]"
 
 
 def test_absent_and_nan_differ_in_parquet(tmp_path: Path) -> None:

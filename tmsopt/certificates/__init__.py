@@ -1,7 +1,6 @@
 """Certify: no better design exists in the box, by spatial branch and bound (SCIP).
 
-In: a solution. Out: the solution with a proved bound. Open `certify` first; `tasks` is what a global solver is asked,
-`scip` is one, `race` runs it apart.
+In: a solution. Out: the solution with a proved bound, or a better one. Open `certify`.
 """
 
 import lazy_loader

@@ -1,11 +1,1 @@
 from .certify import certify as certify, check_installed as check_installed
-from .interlacing import (
-    interlace as interlace, interlacing as interlacing, squares_of as squares_of, unknowns as unknowns,
-)
-from .question import Question as Question
-from .race import Crew as Crew
-from .scip import SCIP as SCIP
-from .tasks import (
-    FOUND as FOUND, INFEASIBLE as INFEASIBLE, UNDECIDED as UNDECIDED, Decision as Decision,
-    GlobalSolver as GlobalSolver, Task as Task, task as task,
-)

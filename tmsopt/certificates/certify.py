@@ -1,30 +1,26 @@
 """How good a design is at best: bounds proved by spatial branch and bound, and better designs where it finds them."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.certificates.answer import Answer, Clock, SecondsPassed, answer, contradicted, doubt
-from tmsopt.certificates.half_planes import over
-from tmsopt.certificates.question import Question
-from tmsopt.certificates.race import Crew
-from tmsopt.certificates.scip import SCIP
-from tmsopt.certificates.tasks import FOUND, INFEASIBLE, UNDECIDED
+from tmsopt.branch_and_bound.answer import Clock, SecondsPassed, answer, contradicted, doubt
+from tmsopt.branch_and_bound.half_planes import over
+from tmsopt.branch_and_bound.question import Question, unit_of
+from tmsopt.branch_and_bound.race import Crew
+from tmsopt.branch_and_bound.stability import SOLVER
+from tmsopt.branch_and_bound.tasks import INFEASIBLE
+from tmsopt.certificates.improvement import FLOOR, confirmed, feasible
 from tmsopt.checks.bound import instant_bound
 from tmsopt.checks.recheck import recheck
 from tmsopt.design.cases import Case
 from tmsopt.design.files import Given, question_of
-from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.design.solution import Bound, Solution
 from tmsopt.errors import Fault, InputError
 from tmsopt.formulation.formulate import Builder
-from tmsopt.solver.solve import solve, solved
-
-SOLVER = SCIP
-"""Who is asked."""
+from tmsopt.solver.solve import solved
 
 SECONDS = 60.0
 """Time for a proof, by default."""
@@ -34,14 +30,9 @@ PROVEN = 1e-4
 
 _FINER = 1e-6  # proved next: closer to SCIP's own tolerance a smaller gap would be an illusion
 _COARSER = (1e-2, 1e-1, 1.0, 10.0)  # proved where the first cannot be
-_FLOOR = 0.1
+_STEPS = (1.0, 0.1, 1e-2, 1e-3, PROVEN)
 _CLOSE = 1.5  # ratio of a gap proved and one not proved that is not worth narrowing
 _SHARE = 0.6  # of the time that is left, for a gap that is not the last one to be tried
-_BETTER = 1e-9  # relative gain that counts as one
-_REPLACED = 5  # times that a design is replaced by a better one
-_SMALL = 1e-6  # of roots at 0 or at infinity, which say nothing of the others
-_STARTS = 4  # from the design that the solver found, and others
-_NEARLY = 1e-3  # violation and loss beyond which a design that the solver found is none
 
 
 def certify(design: Given, *, seconds: float = SECONDS, progress: SecondsPassed | None = None) -> Solution:
@@ -65,15 +56,14 @@ def certify(design: Given, *, seconds: float = SECONDS, progress: SecondsPassed 
     problem = question_of(found)
     if not problem.free:
         return _noted(found, "nothing is free, so there is nothing to bound")
-    if problem.objective is None and found.status == "optimal":
+    if problem.objective is None and feasible(found):
         return _noted(found, "nothing is minimised or maximised, so there is nothing to bound")
     with Crew(SOLVER) as crew:
         clock = Clock(seconds, crew, progress)
         try:
-            for _ in range(_REPLACED):
-                found, replaced = (_bounded if found.status == "optimal" else _excluded)(found, clock)
-                if not replaced:
-                    break
+            replaced = True
+            while replaced and not (problem.objective is None and feasible(found)):
+                found, replaced = (_bounded if feasible(found) else _excluded)(found, clock)
         except NotAccepted as error:
             return _noted(found, f"branch and bound cannot take {error}, so there is no bound")
         return _noted(found, "the proof was interrupted") if clock.interrupted else found
@@ -90,7 +80,7 @@ def check_installed() -> None:
 
 
 def _bounded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
-    """An optimum with the smallest gap that can be proved, or a better one in its place."""
+    """A feasible design with the smallest gap that can be proved, or a better one in its place."""
     known = _known(design)
     if known.proven:
         return replace(design, bound=known), False
@@ -100,13 +90,12 @@ def _bounded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     if contradicted(admitted, _free(design), clock):
         return _noted(design, f"no bound: {SOLVER.name}'s relaxation excludes the design that was found"), False
     proved, failed = math.inf, 0.0
-    while (level := _next(proved, failed)) is not None and clock.left > 0:
+    converged = design.status == "optimal"
+    while (level := _next(proved, failed, converged)) is not None and clock.left > 0:
         share = 1.0 if level in (_FINER, _COARSER[-1]) else _SHARE
-        answered = answer(_question(design, level), clock, share, partial(_from, design))
+        answered = answer(_question(design, level), clock, share, partial(confirmed, design, _cases(design)))
         if answered.better is not None:
             return answered.better, True
-        if answered.other is not None:
-            design = _beaten(design, answered.other)
         if answered.verdict == INFEASIBLE:
             proved = level
         else:
@@ -114,8 +103,13 @@ def _bounded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     return replace(design, bound=_stronger(design, known, _bound(design, proved, clock))), False
 
 
-def _next(proved: float, failed: float) -> float | None:
-    """The gap to try after the least one proved and the last one not proved; None when that is enough."""
+def _next(proved: float, failed: float, converged: bool) -> float | None:
+    """The gap to try after the least one proved and the last one not proved; None when that is enough.
+
+    A design that did not converge is left by large steps first, for each step leads to no more than a design.
+    """
+    if not converged and failed == 0:
+        return next((level for level in _STEPS if level < proved), None)
     if proved == math.inf:
         return next((level for level in (PROVEN, *_COARSER) if level > failed), None)
     if failed == 0:
@@ -127,8 +121,8 @@ def _next(proved: float, failed: float) -> float | None:
 
 def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     """No design was found: the proof that there is none, or one after all."""
-    anything = Question(design.problem, _cases(design), None, _unit(design))
-    answered = answer(anything, clock, 1.0, partial(_from, design))
+    anything = Question(design.problem, _cases(design), None, unit_of(design.roots))
+    answered = answer(anything, clock, 1.0, partial(confirmed, design, _cases(design)))
     if answered.better is not None:
         return answered.better, True
     if answered.verdict == INFEASIBLE:
@@ -139,8 +133,7 @@ def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
         bound = _searched(none, 0.0, True, clock)
         return replace(design, status="infeasible", bound=bound), False
     words = "branch and bound did not decide in time whether any design is feasible"
-    left = replace(design, bound=_bound(design, math.inf, clock))
-    return _beaten(left, answered.other) if answered.other else _noted(left, words), False
+    return _noted(replace(design, bound=_bound(design, math.inf, clock)), words), False
 
 
 def _known(design: Solution) -> Bound:
@@ -168,7 +161,7 @@ def _over_the_box(design: Solution) -> Bound:
 def _question(design: Solution, level: float) -> Question:
     """Whether any design is better by a gap of some level."""
     limit = design.value - design.problem.sign * _gap(design.value, level)
-    return Question(design.problem, _cases(design), limit, _unit(design))
+    return Question(design.problem, _cases(design), limit, unit_of(design.roots))
 
 
 def _bound(design: Solution, level: float, clock: Clock) -> Bound:
@@ -191,43 +184,8 @@ def _stronger(design: Solution, known: Bound, searched: Bound) -> Bound:
     return replace(searched, value=known.value, gap=known.gap, proven=proven, method=known.method)
 
 
-def _from(design: Solution, start: Mapping[str, float]) -> Answer:
-    """What a design that was found leads to: a better optimum, or itself, if it is feasible and better at all."""
-    problem = design.problem
-    known = design.value if not design.violations and problem.objective is not None else None
-    seen = recheck(problem, problem.ordered(start), _cases(design))
-    gain = _gain(problem, known, seen.objective)
-    if max(seen.violations.values(), default=0.0) > _NEARLY or gain < -_NEARLY:
-        return Answer(UNDECIDED)  # what the solver's tolerance made of it
-    found = solve(replace(problem, start=start), starts=_STARTS, throw=False)
-    if found.status == "optimal" and _gain(problem, known, found.value) > _BETTER:
-        before = "" if known is None else f": {known:.9g} before"
-        words = f"branch and bound found a better design than the search from many starts{before}"
-        return Answer(FOUND, better=_noted(replace(found, problem=problem), words))
-    if not seen.violations and gain > _BETTER:
-        return Answer(FOUND, other={**start, "objective": seen.objective})
-    return Answer(UNDECIDED)
-
-
-def _beaten(design: Solution, other: Mapping[str, float]) -> Solution:
-    """The design, with the words that it is not the best one."""
-    of = ", ".join(f"{name} = {value:.9g}" for name, value in other.items())
-    words = f"not the best: branch and bound found {of}, from which the solver did not converge; start it from there"
-    kept = tuple(note for note in design.notes if not note.startswith("not the best"))
-    return replace(design, notes=(*kept, words))
-
-
-def _gain(problem: Problem, known: float | None, value: float) -> float:
-    """Relative improvement of the objective; inf where none is known, −inf for a value that does not exist."""
-    if known is None or not math.isfinite(known):
-        return math.inf
-    if not math.isfinite(value):
-        return -math.inf
-    return problem.sign * (known - value) / max(_FLOOR, abs(known))
-
-
 def _gap(value: float, level: float) -> float:
-    return level * max(_FLOOR, abs(value))
+    return level * max(FLOOR, abs(value))
 
 
 def _free(design: Solution) -> dict[str, float]:
@@ -239,13 +197,6 @@ def _cases(design: Solution) -> tuple[Case, ...]:
     listed = design.problem.cases
     worst = [case for case in (design.worst, design.least_damped) if case is not None and case not in listed]
     return (*listed, *dict.fromkeys(worst)) if listed else ()
-
-
-def _unit(design: Solution) -> float:
-    """Geometric mean of the sizes of the roots, as a power of two."""
-    sizes = [math.hypot(r.re, r.im) for r in design.roots for _ in range(r.multiplicity)]
-    known = [math.log2(size) for size in sizes if _SMALL < size < 1 / _SMALL]
-    return float(2.0 ** round(sum(known) / len(known))) if known else 1.0
 
 
 def _noted(design: Solution, words: str) -> Solution:

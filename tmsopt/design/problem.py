@@ -143,6 +143,11 @@ class Problem:
         return {name: parse_comparison(text, self.vocabulary) for name, text in self.constraints.items()}
 
     @property
+    def asked_of_roots(self) -> tuple[str, ...]:
+        """Names of the constraints that name a quantity of the roots."""
+        return tuple(n for n, c in self.conditions.items() if set(c.names) & set(ROOT_NAMES))
+
+    @property
     def vocabulary(self) -> tuple[str, ...]:
         """Every name that an expression may use."""
         of = self.parameter_set

@@ -6,6 +6,7 @@ from typing import Any
 
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Freedom, Problem
+from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.design.units import Reading
 from tmsopt.records import Table, plain
 from tmsopt.roots import Root
@@ -125,6 +126,8 @@ class Solution:
         cover: what is known of every case together, proven or not.
         sides: part of the box, such as ``forward tilt`` → its best objective, nan where it has no feasible design.
         relaxation: of an infeasible problem, the smallest move of its limits that leaves a feasible design.
+        stable_elsewhere: of a design that is not stable, whether branch and bound found one that is: False where it
+            proved that there is none, None where it was not asked or did not decide.
         si: the design in s, Hz, mm, km/h, degrees, N and kg; empty unless the problem is written in SI.
     """
 
@@ -152,7 +155,32 @@ class Solution:
     cover: Cover | None = None
     sides: Table[float] = field(default_factory=Table)
     relaxation: Relaxation | None = None
+    stable_elsewhere: bool | None = None
     si: Table[Reading] = field(default_factory=Table)
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether all roots lie left of the axis: ideal and as stored, in the worst case; None where there are none."""
+        ends = (self.abscissa, self.abscissa_realised)
+        return max(ends) < 0 if all(map(math.isfinite, ends)) else None
+
+    @property
+    def stability_sought(self) -> bool:
+        """Whether parameters are free for what a limit that is violated, or else the objective, says of the roots."""
+        problem = self.problem
+        objective = () if problem.objective is None else problem.objective.names
+        limits = set(self.violations) & set(problem.asked_of_roots)
+        return bool(problem.free and (limits if self.violations else set(objective) & set(ROOT_NAMES)))
+
+    @property
+    def any_stable(self) -> bool | None:
+        """Whether any design in the box is stable, limits on the roots aside: True, False where proved, or None."""
+        if self.stable:
+            return True
+        problem = self.problem
+        least = (problem.minimize or "").strip() == "abscissa" and not problem.asked_of_roots
+        bounded = least and self.status == "optimal" and self.bound.value >= 0
+        return False if bounded else self.stable_elsewhere
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None.
@@ -175,7 +203,7 @@ class Solution:
             "objective": {"sense": problem.sense, "expression": text, **plain(self, "value")} | (
                 {"locate": problem.locate} if problem.locate else {}
             ),
-            **plain(self, "parameters abscissa abscissa_realised roots structure"),
+            **plain(self, "parameters abscissa abscissa_realised stable any_stable roots structure"),
             "active": plain(self.active, digits=GAIN_DIGITS), "violations": plain(self.violations, digits=GAIN_DIGITS),
             **plain(self, "bound starts"), "seconds": round(self.seconds, 4),
             **plain(self, "quantities dimensionless formulation"),

@@ -4,7 +4,7 @@ from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypedDict
 
-from tmsopt.errors import Fault, InputError, count_faults, short, suggest
+from tmsopt.errors import Fault, InputError, count_faults, is_number, short, suggest
 from tmsopt.records import Progress
 
 STARTS = 64
@@ -26,6 +26,7 @@ class AskedOfSolve(Asked, total=False):
     exhaustive: bool
     near: Mapping[str, float] | None
     alone: bool
+    stability: float
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,8 @@ class Options:
         near: a design that may be close to the optimum, tried first; where both signs of a parameter are searched,
             only its own is.
         alone: of an infeasible problem, also find how far each limit in conflict would have to give alone.
+        stability: where a stable design was looked for and none was found, seconds for branch and bound to look for one
+            or to prove that there is none; 0 to do without. `solve` gives it 5, where SCIP is installed.
     """
 
     starts: int = STARTS
@@ -50,6 +53,7 @@ class Options:
     exhaustive: bool = False
     near: Mapping[str, float] | None = None
     alone: bool = True
+    stability: float = 0.0
 
     @property
     def of_ipopt(self) -> Hashable:
@@ -79,6 +83,8 @@ def options_of(
     faults = [*count_faults("starts", given["starts"], fewest), *count_faults("seed", given["seed"], 0)]
     if not isinstance(given["near"], Mapping | None):
         faults.append(Fault(f"found {short(given['near'])}; accepted: a mapping of parameters to values", ("near",)))
+    if not (is_number(given["stability"]) and given["stability"] >= 0):
+        faults.append(Fault(f"found {short(given['stability'])}; accepted: seconds, 0 or more", ("stability",)))
     if faults:
         raise InputError(faults)
     return Options(**given)

@@ -32,9 +32,14 @@ class FrontPoint:
         """The roots on the rightmost line, e.g. ``EP4``."""
         return self.solution.structure
 
+    @property
+    def stable(self) -> bool | None:
+        """Whether all roots lie left of the axis; see `Solution`."""
+        return self.solution.stable
+
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
-        solution = plain(self.solution, "parameters abscissa abscissa_realised structure")
+        solution = plain(self.solution, "parameters abscissa abscissa_realised stable structure")
         return plain(self, "objectives") | solution | plain(self, "limits label")
 
 
@@ -104,7 +109,7 @@ class Front:
         return tuple(max(column) for column in zip(*(p.objectives for p in self.points), strict=True))
 
     def rows(self) -> Iterable[dict[str, Any]]:
-        """One record per point, as written to CSV: objectives, parameters, abscissa, structure, limits, label."""
+        """One record per point, as written to CSV: objectives, parameters, roots, limits, label."""
         for point in self.points:
             values = dict(zip(self.objectives, point.objectives, strict=True))
             yield {
@@ -112,6 +117,7 @@ class Front:
                 **{name: value for name, value in point.solution.parameters.items() if name not in values},
                 "abscissa": point.solution.abscissa,
                 "structure": point.structure,
+                "stable": "" if point.stable is None else str(point.stable).lower(),
                 "limits": "; ".join(point.limits),
                 "label": point.label,
             }

@@ -25,16 +25,16 @@ def _style(structure: str) -> tuple[str, str]:
 
 
 def front_figure(front: Front) -> Figure:
-    """Two objectives: the curve, cut at gaps, points by structure. Three: points, the third objective as colour."""
+    """Two objectives: the curve, cut at gaps, points by structure. Three: points, the third objective as colour.
+
+    Those that are not stable have a ring.
+    """
     figure = new_figure(6.4, 5.0)
     ax = figure.subplots()
     label_objectives(ax, front)
     ax.set_title(front.problem.title or "Pareto front", fontsize=11)
-    if len(front.objectives) == 2:
-        names = draw_front(ax, front)
-        legend_below(figure, ax.get_legend_handles_labels()[0])
-    else:
-        names = _draw_three(figure, ax, front)
+    names = draw_front(ax, front) if len(front.objectives) == 2 else _draw_three(figure, ax, front)
+    legend_below(figure, ax.get_legend_handles_labels()[0])
     ax.margins(0.08)
     place_names(ax, names)
     return figure
@@ -55,6 +55,7 @@ def draw_front(ax: Axes, front: Front) -> list[Name]:
         own = values[[p.structure == structure for p in front.points]]
         colour, marker = _style(structure)
         ax.plot(*own.T, marker, color=colour, markersize=4, zorder=3, label=structure, linestyle="none")
+    _ring_unstable(ax, front)
     return _names(front.points)
 
 
@@ -68,7 +69,24 @@ def _draw_three(figure: Figure, ax: Axes, front: Front) -> list[Name]:
     values = np.array([p.objectives for p in front.points])
     drawn = ax.scatter(values[:, 0], values[:, 1], c=values[:, 2], cmap=matplotlib.colormaps["viridis"], s=22, zorder=3)
     figure.colorbar(drawn, ax=ax, label=_axis(front, front.objectives[2]))
+    _ring_unstable(ax, front)
     return _names(front.points)
+
+
+def _ring_unstable(ax: Axes, front: Front) -> None:
+    """A ring around each design that is not stable, or is not known to be."""
+    rings = np.array([p.objectives[:2] for p in front.points if not p.stable])
+    if len(rings):
+        ax.plot(
+            *rings.T,
+            "o",
+            color=LINE,
+            markerfacecolor="none",
+            markersize=8,
+            zorder=2.5,
+            label="not stable",
+            linestyle="none",
+        )
 
 
 def _names(points: tuple[FrontPoint, ...]) -> list[Name]:

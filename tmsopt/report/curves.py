@@ -8,7 +8,7 @@ import numpy as np
 from tmsopt.charts.chart import Chart
 from tmsopt.fronts.front import Front
 from tmsopt.models import ParameterSet
-from tmsopt.report.text import columns, number, with_unit
+from tmsopt.report.text import columns, number, with_unit, yes_no
 from tmsopt.roots import pattern
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
 
@@ -64,7 +64,7 @@ def _summary_table(of: ParameterSet, data: Mapping[str, Any]) -> str:
 
 
 def front_table(front: Front) -> str:
-    """Points one a row: objectives, free parameters, structure, limits that bind, ends and kinks."""
+    """Points one a row: objectives, free parameters, structure, whether stable, limits that bind, ends and kinks."""
     of = front.problem.parameter_set
     texts = [t.strip() for t in front.objectives]
     free = [n for n in front.problem.free if n not in texts]
@@ -79,10 +79,10 @@ def front_table(front: Front) -> str:
         "",
     ]
     headings = [with_unit(of, t) if t in of.names else t for t in texts]
-    rows = [(*headings, *(with_unit(of, n) for n in free), "structure", "limits that bind", "")]
+    rows = [(*headings, *(with_unit(of, n) for n in free), "structure", "stable", "limits that bind", "")]
     for p in front.points:
         numbers = [number(v) for v in p.objectives] + [f"{p.solution.parameters[n]:.8g}" for n in free]
-        rows.append((*numbers, p.structure, ", ".join(p.limits), p.label))
+        rows.append((*numbers, p.structure, yes_no(p.stable), ", ".join(p.limits), p.label))
     lines += columns(rows)
     remarks = [f"gap: {gap.reason}" for gap in front.gaps] + [f"note: {note}" for note in front.notes]
     return "\n".join(line.rstrip() for line in [*lines, *([""] if remarks else []), *remarks])

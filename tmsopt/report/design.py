@@ -67,7 +67,21 @@ def headline(solution: Solution) -> str:
     words = solution.status.replace("_", " ")
     if solution.status == "infeasible":
         proven = ", proven" if solution.bound.proven else ""
-    return "   ".join(part for part in (f"{words}{proven}", located, asked, f"structure {solution.structure}") if part)
+    parts = (f"{words}{proven}", stability(solution), located, asked, f"structure {solution.structure}")
+    return "   ".join(part for part in parts if part)
+
+
+def stability(solution: Solution) -> str:
+    """Of a design that is not stable though that was looked for: whether any is."""
+    problem, known = solution.problem, solution.any_stable
+    if solution.stable is not False or not (known is False or solution.stability_sought):
+        return ""
+    if known is None:
+        return "no stable design found, not proved"
+    if known:
+        return "not stable, though there are stable designs in the box"
+    limited = problem.locate or len(problem.constraints) > len(problem.asked_of_roots)
+    return f"no design in the box is stable (proved){' under its constraints' if limited else ''}"
 
 
 def facts(solution: Solution) -> list[str]:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from itertools import islice
 
 from tmsopt.models import ParameterSet
-from tmsopt.report.text import columns, number, with_unit
+from tmsopt.report.text import columns, number, with_unit, yes_no
 from tmsopt.studies.row import Row
 from tmsopt.studies.study import Study
 from tmsopt.studies.summary import Share, Summary
@@ -55,7 +55,7 @@ def _row_cells(study: Study, rows: Sequence[Row]) -> list[tuple[str, ...]]:
     free = [name for name in study.problem.free if name not in study.columns]
     text = study.problem.minimize or study.problem.maximize
     asked = [text] if text and text != "abscissa" and text not in free else []
-    heads = ["row", *(_head(of, n) for n in study.columns), "status", *asked, "abscissa", "structure"]
+    heads = ["row", *(_head(of, n) for n in study.columns), "status", *asked, "abscissa", "structure", "stable"]
     heads += [*(_head(of, n) for n in free), *(_report_head(study, text) for text in _reports(study))]
     return [tuple(heads), *(_cells(study, row, bool(asked), free) for row in rows)]
 
@@ -65,7 +65,7 @@ def _cells(study: Study, row: Row, asked: bool, free: Sequence[str]) -> tuple[st
     return (
         str(row.number), *(_short(row.varied[n]) for n in study.columns), _word(study, row.status),
         *([_short(row.objective) if known else ""] if asked else []), _short(row.abscissa) if known else "",
-        row.structure if known else "",
+        row.structure if known else "", yes_no(row.stable) if known else "",
         *(_short(row.parameters[n]) if known and n in row.parameters else "" for n in free),
         *(_short(row.reports[text]) if known and text in row.reports else "" for text in _reports(study)),
     )  # fmt: skip

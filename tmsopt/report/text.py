@@ -11,6 +11,11 @@ def number(value: float) -> str:
     return f"{value:.12g}" if math.isfinite(value) else "none"
 
 
+def yes_no(value: bool | None) -> str:
+    """In a table; empty where it is not known."""
+    return "" if value is None else "yes" if value else "no"
+
+
 def with_unit(of: ParameterSet, name: str) -> str:
     """A parameter with the unit of its numbers, e.g. ``v m/s``."""
     unit = of[name].unit

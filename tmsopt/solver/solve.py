@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Unpack
 
+from tmsopt.branch_and_bound.stability import SOLVER, any_stable
 from tmsopt.checks.bound import instant_bound
 from tmsopt.checks.digits import certified
-from tmsopt.checks.recheck import Checked
+from tmsopt.checks.recheck import Checked, recheck
 from tmsopt.checks.worst_case import cover
 from tmsopt.design.files import Given, question_of
 from tmsopt.design.problem import Problem, freedom
@@ -20,6 +21,9 @@ from tmsopt.solver.outcome import Finding, better, evaluated
 from tmsopt.solver.search import Explored, evaluated_cases, explore, without_any
 from tmsopt.solver.workspace import Family, workspace
 
+_ASKING = replace(DEFAULTS, stability=5.0)
+_NEAR = 4  # starts where branch and bound found a stable design, that design the first of them
+
 
 def solve(
     problem: Given, *, throw: bool = True, family: Family | None = None, **options: Unpack[AskedOfSolve]
@@ -30,8 +34,8 @@ def solve(
         problem: or the path of its file.
         throw: raise NotSolved unless the status is ``optimal``; otherwise return the best point with its status.
         family: what was built for other problems that differ in numbers alone, to be used again.
-        options: ``starts``, ``seed``, ``exhaustive``, ``linear_solver``, ``progress``, ``near`` and ``alone``; see
-            `tmsopt.Options`.
+        options: ``starts``, ``seed``, ``exhaustive``, ``linear_solver``, ``progress``, ``near``, ``alone`` and
+            ``stability``; see `tmsopt.Options`.
 
     Raises:
         NotSolved: carrying the best point found, when `throw`.
@@ -39,7 +43,7 @@ def solve(
         ValueError: for another linear solver.
     """
     problem = question_of(problem)
-    solution = solved(problem, options_of(options, AskedOfSolve), family)
+    solution = solved(problem, options_of(options, AskedOfSolve, _ASKING), family)
     if throw and solution.status != "optimal":
         raise NotSolved(solution)
     return solution
@@ -65,7 +69,38 @@ def solved(design: Given, options: Options = DEFAULTS, family: Family | None = N
         values = _side_values(explored)
     else:
         finding = evaluated(problem, evaluated_cases(problem, problem.ordered({})))
-    return _assembled(problem, finding, notes, values, began)
+    solution = _assembled(problem, finding, notes, values, began)
+    return _with_stability(solution, options, family, began) if options.stability else solution
+
+
+def standing(problem: Problem, design: Mapping[str, float], note: str) -> Solution:
+    """A design as it is, whoever found it: ``not_converged``, or ``infeasible`` where it violates something."""
+    began = time.perf_counter()
+    parameters = problem.ordered(design)
+    cases = evaluated_cases(problem, parameters)
+    checked = recheck(problem, parameters, cases)
+    status = "infeasible" if checked.violations else "not_converged"
+    finding = Finding(parameters, checked, status, {}, Starts(), "none", cases, notes=(note,))
+    return _assembled(problem, finding, (), {}, began)
+
+
+def _with_stability(solution: Solution, options: Options, family: Family | None, began: float) -> Solution:
+    """Of a search for stability that found none: whether there is any, and the design that one leads to."""
+    problem = solution.problem
+    if solution.stable is not False or solution.any_stable is False or not solution.stability_sought:
+        return solution
+    asked = any_stable(problem, options.stability, solution.parameters)
+    if asked.design is not None:
+        there = replace(options, near=asked.design, starts=min(options.starts, _NEAR), stability=0.0)
+        found = solved(problem, there, family)
+        gain = problem.sign * (solution.value - found.value)
+        if found.status == "optimal" and (solution.status != "optimal" or gain > 0):
+            words = "branch and bound found the stable design from which this one was reached"
+            solution = replace(found, notes=(*found.notes, words))
+    elif asked.any is False:
+        words = f"a floating-point proof by {SOLVER.name}, feasibility tolerance {SOLVER.tolerance:.0e}"
+        solution = replace(solution, notes=(*solution.notes, f"that no design is stable is {words}"))
+    return replace(solution, stable_elsewhere=asked.any, seconds=time.perf_counter() - began)
 
 
 def _check_near(problem: Problem, near: Mapping[str, float]) -> None:

@@ -4,7 +4,7 @@ import csv
 import json
 from array import array
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,11 @@ from tmsopt.studies.row import Row
 PREFIXES = {"varied": "varied.", "parameters": "", "reports": "report.", "laws": "law.", "violations": "violation."}
 """Of the header for the names in each table of a row. Parameters have none; one called as a field of the row, such as
 ``seed``, is ``parameter.seed``. The header of a value so depends on nothing but its own name."""
-_FIELDS = {f.name: f.type for f in fields(Row)}
+_FIELDS: dict[str, Any] = {}
+for _field in fields(Row):
+    _FIELDS[_field.name] = _field.type
+    if _field.name == "structure":
+        _FIELDS["stable"] = bool  # or None
 _LARGEST = 2**63 - 1
 
 
@@ -35,6 +39,12 @@ class PartialColumn:
 
     values: NDArray[Any]
     present: NDArray[np.bool_]
+
+    @property
+    def numbers(self) -> NDArray[Any]:
+        """The values; truths of which some are absent as 1, 0 and nan."""
+        lacking = self.values.dtype == np.bool_ and not self.present.all()
+        return np.where(self.present, self.values, np.nan) if lacking else self.values
 
 
 class _Sparse:
@@ -111,13 +121,13 @@ def _csv(table: Mapping[str, PartialColumn], path: Path, _: str) -> None:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(table)
         for first in range(0, len(next(iter(table.values())).values), _CHUNK):
-            texts = [_texts(c.values[first : first + _CHUNK]) for c in table.values()]
+            texts = [_texts(c.values[first : first + _CHUNK], c.present[first:]) for c in table.values()]
             writer.writerows(zip(*texts, strict=True))
 
 
-def _texts(values: np.ndarray[Any, Any]) -> list[str]:
+def _texts(values: np.ndarray[Any, Any], present: NDArray[np.bool_]) -> list[str]:
     if values.dtype == np.bool_:
-        return ["true" if v else "false" for v in values.tolist()]
+        return [("true" if v else "false") if p else "" for v, p in zip(values.tolist(), present, strict=False)]
     if values.dtype == np.float64:
         return ["" if v != v else repr(v) for v in values.tolist()]  # noqa: PLR0124
     return [str(v) for v in values.tolist()]
@@ -137,6 +147,7 @@ def _netcdf(table: Mapping[str, PartialColumn], path: Path, metadata: str) -> No
     xarray = _needed("xarray")
     rows = table["number"].values
     names = _names(table)
+    table = {name: replace(c, values=c.numbers) for name, c in table.items()}
     try:
         over_rows = {names[n]: ("row", c.values, {"long_name": n}) for n, c in table.items()}
         made = xarray.Dataset(over_rows, {"row": rows}, {"tmsopt": metadata})
@@ -197,11 +208,13 @@ def columns(rows: Iterable[Row]) -> dict[str, PartialColumn]:
         for name, found in tables.items():
             _collect(found, getattr(row, name), count)
         count += 1
-    everywhere = np.ones(count, dtype=bool)
     made: dict[str, PartialColumn] = {}
     for name, kind in _FIELDS.items():
         if name in plain:
-            made[name] = PartialColumn(_array(plain[name], kind), everywhere)
+            present = (
+                np.array([v is not None for v in plain[name]], bool) if name == "stable" else np.ones(count, dtype=bool)
+            )
+            made[name] = PartialColumn(_array(plain[name], kind), present)
         else:
             made |= {header(name, key): sparse.full(count) for key, sparse in tables[name].items()}
     return made

@@ -24,6 +24,7 @@ class Row:
         status: one of `STATUSES`.
         cause: why the status is not ``optimal``; empty where it is.
         objective: value of the objective expression; nan where there is none.
+        abscissa, abscissa_realised: as in `Solution`; rows of older stores have the first alone.
         parameters: every parameter of the set the problem is written in.
         reports: the expressions that the study asked for.
         bound: a value that no design in the box can beat; −inf where none is known.
@@ -42,6 +43,7 @@ class Row:
     cause: str = ""
     objective: float = math.nan
     abscissa: float = math.nan
+    abscissa_realised: float = math.nan
     damping_ratio: float = math.nan
     structure: str = ""
     parameters: Table[float] = field(default_factory=Table)
@@ -58,6 +60,11 @@ class Row:
     host: str = ""
 
     @property
+    def stable(self) -> bool | None:
+        """Whether all roots lie left of the axis, ideal and as stored; None where there are none."""
+        return None if not math.isfinite(self.abscissa) else self.abscissa < 0 and not self.abscissa_realised >= 0
+
+    @property
     def identity(self) -> str:
         """Everything but `seconds` and `host`, as text: equal for equal bits, nan included."""
         kept = {name: value for name, value in self.to_json().items() if name not in ("seconds", "host")}
@@ -65,7 +72,8 @@ class Row:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``: None is nan, or no bound; other infinities are text, ``"-inf"``."""
-        return {f.name: _plain(getattr(self, f.name), f.type, _ABSENT.get(f.name, math.nan)) for f in _FIELDS}
+        data = {f.name: _plain(getattr(self, f.name), f.type, _ABSENT.get(f.name, math.nan)) for f in _FIELDS}
+        return data | {"stable": self.stable}
 
     @staticmethod
     def from_json(data: Mapping[str, Any]) -> "Row":

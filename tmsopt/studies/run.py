@@ -63,7 +63,7 @@ class Results:
         found = columns(self.rows)
         if name not in found:
             raise InputError([Fault(f"no column '{name}'; {suggest(name, found)}", ("column",))])
-        return found[name].values
+        return found[name].numbers
 
     @property
     def summary(self) -> Summary:

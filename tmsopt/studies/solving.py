@@ -113,7 +113,7 @@ class Solver:
         try:
             problem = self.study.row_problem(number)
             options: dict[str, Any] = {"seed": self.study.seed_of(number), "throw": False, "family": self._family}
-            options["alone"] = False  # it takes longer than the rest of an infeasible row
+            options |= {"alone": False, "stability": 0.0}  # they take longer than the rest of a row without a design
             solution = None
             if neighbour is not None and neighbour.status == "optimal":
                 near = {name: neighbour.parameters[name] for name in problem.free}
@@ -142,7 +142,8 @@ class Solver:
         return Row(
             number=number, seed=self.study.seed_of(number), varied=self.study.varied(number), status=solution.status,
             cause=_cause(solution), objective=solution.value, abscissa=solution.abscissa,
-            damping_ratio=solution.quantities["damping_ratio"], structure=solution.structure,
+            abscissa_realised=solution.abscissa_realised, damping_ratio=solution.quantities["damping_ratio"],
+            structure=solution.structure,
             parameters=solution.parameters, reports=Table(reports), bound=bound.value, gap=bound.gap,
             proven=bound.proven, method=bound.method, laws=Table(_laws(solution)), violations=solution.violations,
             starts=solution.starts.tried, warm=warm, host=platform.node(),

@@ -43,7 +43,7 @@ class Yield:
     """Shares of the rows drawn; rows that failed count in none of them.
 
     Attributes:
-        stable: abscissa below 0, in the worst scenario.
+        stable: all roots left of the axis, in the worst scenario.
         feasible: every constraint met.
         good: both.
         failed: rows without an answer.
@@ -76,7 +76,7 @@ class Summary:
         best: the optimal row with the best objective; None where there is none.
         causes: cause of rows that are not optimal → how many have it, numbers in it aside, the commonest first.
         spread: ``objective``, ``abscissa`` → least, median and greatest over the optimal rows.
-        stable: rows whose abscissa is below 0.
+        stable: rows whose design is stable.
         structures: structure → optimal rows that have it, the commonest first.
         proven: rows whose bound is closed.
         warm: rows started from a neighbour's optimum.
@@ -123,7 +123,7 @@ def summary(study: Study, rows: Iterable[Row]) -> Summary:
         best=min(ranked, key=lambda row: sign * row.objective, default=None),
         causes=_causes(row for row in known if row.status != "optimal"),
         spread=Table({name: ends for name in ("objective", "abscissa") if (ends := _ends(name, optimal))}),
-        stable=sum(row.abscissa < 0 for row in known), structures=_ranked(row.structure for row in optimal),
+        stable=sum(row.stable is True for row in known), structures=_ranked(row.structure for row in optimal),
         proven=sum(row.proven for row in known), warm=sum(row.warm for row in known), laws=Table(laws),
         seconds=sum(row.seconds for row in known), product=yield_of(known) if study.method == "monte_carlo" else None,
     )  # fmt: skip
@@ -154,9 +154,9 @@ def yield_of(rows: Iterable[Row]) -> Yield:
             failed += 1
             continue
         answered.append(math.inf if math.isnan(row.abscissa) else row.abscissa)
-        stable += row.abscissa < 0
+        stable += row.stable is True
         feasible += row.status == "optimal"
-        good += row.abscissa < 0 and row.status == "optimal"
+        good += row.stable is True and row.status == "optimal"
     answered.sort()
     most = len(answered)
     at = {f"{q:g}": answered[max(math.ceil(q * most) - 1, 0)] for q in QUANTILES if most}

@@ -4,22 +4,24 @@ With the abscissa the objective, the limit is a vertical line that is known, and
 coefficients alone. If the answer is no, the limit is a bound on what any design of the box can reach.
 """
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
 import casadi as ca
 import numpy as np
 
-from tmsopt.certificates.half_planes import Frame, bound_unknowns, compact, half_planes, over, sectors
+from tmsopt.branch_and_bound.half_planes import Frame, bound_unknowns, compact, half_planes, over, sectors
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import tempts
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.formulation.formulate import Builder, Lifting
 from tmsopt.formulation.nlp import NLP
+from tmsopt.roots import Root
 
+_SMALL = 1e-6  # of roots at 0 or at infinity, which say nothing of the others
 _DEEP = 99  # levels to which expressions are compared
 
 _WORSE = {"abscissa": 1.0, "damping_ratio": -1.0}
@@ -61,8 +63,7 @@ class Question:
         build.objective = sign * ca.SX(compact(self.problem.model, build.values[first])[0])
         if over(build, [build.objective])[0][0] > 0:
             return None
-        rooted = [name for name, c in self.problem.conditions.items() if set(c.names) & set(ROOT_NAMES)]
-        build.constraints(without=rooted)
+        build.constraints(without=self.problem.asked_of_roots)
         return build.finish("leading")
 
     def program(self, sign: int, least: float = 0.0) -> NLP:
@@ -115,3 +116,10 @@ def _threshold(condition: Expression, name: str, worse: float) -> float | None:
     at = [float(condition({name: value})) for value in (0.0, 1.0)]
     slope = at[1] - at[0]
     return -at[0] / slope if slope * condition.sign * worse > 0 else None
+
+
+def unit_of(roots: Iterable[Root]) -> float:
+    """Geometric mean of the sizes of roots, as a power of two."""
+    sizes = [math.hypot(r.re, r.im) for r in roots for _ in range(r.multiplicity)]
+    known = [math.log2(size) for size in sizes if _SMALL < size < 1 / _SMALL]
+    return float(2.0 ** round(sum(known) / len(known))) if known else 1.0

@@ -10,9 +10,9 @@ import numpy as np
 
 from tmsopt.arithmetic.intervals import ranges
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.certificates.question import Question
-from tmsopt.certificates.race import Crew
-from tmsopt.certificates.tasks import FOUND, INFEASIBLE, UNDECIDED, Decision, Task, task
+from tmsopt.branch_and_bound.question import Question
+from tmsopt.branch_and_bound.race import Crew
+from tmsopt.branch_and_bound.tasks import FOUND, INFEASIBLE, UNDECIDED, Decision, Task, task
 from tmsopt.design.solution import Solution
 from tmsopt.formulation.formulate import design_of, variables_of
 from tmsopt.formulation.starts import complete

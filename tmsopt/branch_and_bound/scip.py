@@ -5,8 +5,8 @@ import time
 
 import numpy as np
 
-from tmsopt.certificates.tasks import FOUND, INFEASIBLE, UNDECIDED, Decision, GlobalSolver, Task
-from tmsopt.certificates.translation import FEASIBILITY, translate
+from tmsopt.branch_and_bound.tasks import FOUND, INFEASIBLE, UNDECIDED, Decision, GlobalSolver, Task
+from tmsopt.branch_and_bound.translation import FEASIBILITY, translate
 
 _LEAST = 0.01  # seconds
 _MARGIN = 1e-6  # relative, for what tolerances do to a bound

@@ -13,7 +13,7 @@ import flint
 
 from tmsopt.arithmetic.intervals import INTERVALS, ball, interval
 from tmsopt.arithmetic.walk import NotAccepted, walk
-from tmsopt.certificates.terms import CANCELLED, Term, constant, refuse_huge, scale_of
+from tmsopt.branch_and_bound.terms import CANCELLED, Term, constant, refuse_huge, scale_of
 from tmsopt.formulation.nlp import NLP
 
 FEASIBILITY = 1e-9

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from queue import Empty, SimpleQueue
 
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.certificates.tasks import INFEASIBLE, UNDECIDED, Decision, GlobalSolver, Task
+from tmsopt.branch_and_bound.tasks import INFEASIBLE, UNDECIDED, Decision, GlobalSolver, Task
 from tmsopt.processes import Inbox, Worker
 
 _TICK = 0.02  # seconds between looks

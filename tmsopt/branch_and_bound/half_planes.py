@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -11,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.arithmetic.intervals import Interval, ranges, root_bound
-from tmsopt.certificates.interlacing import interlace, squares_of, unknowns
+from tmsopt.branch_and_bound.interlacing import interlace, squares_of, unknowns
 from tmsopt.formulation.formulate import Builder
 from tmsopt.formulation.lifts import Lifted, quadratic_pairs
 from tmsopt.formulation.nlp import Lift
@@ -64,9 +65,10 @@ class Frame:
 
 def compact(model: Model, values: Values) -> list[Any]:
     """Coefficients but for a positive factor, in as few products as the model knows."""
-    if model.compact is None:
-        return list(values.coefficients)
-    return model.compact(**model.algebraic({name: values[name] for name in model.sets[0].names}))
+    with suppress(ZeroDivisionError):  # by a parameter that is fixed at 0
+        if model.compact is not None:
+            return model.compact(**model.algebraic({name: values[name] for name in model.sets[0].names}))
+    return list(values.coefficients)
 
 
 def over(build: Builder, expressions: Sequence[Any]) -> list[Interval]:
