@@ -8,6 +8,7 @@ from tmsopt.branch_and_bound.answer import Answer, Clock, answer, contradicted, 
 from tmsopt.branch_and_bound.question import Question, unit_of
 from tmsopt.branch_and_bound.race import Crew
 from tmsopt.branch_and_bound.scip import SCIP
+from tmsopt.branch_and_bound.signs import none_stable
 from tmsopt.branch_and_bound.tasks import FOUND, INFEASIBLE
 from tmsopt.checks.recheck import Checked, recheck
 from tmsopt.design.problem import Problem
@@ -27,10 +28,12 @@ class Stability:
     Attributes:
         any: True where `design` is, by a recheck; False where it is proved that none is; None where it is not known.
         design: free parameters of a stable design, to be improved: it may be off in a limit by the solver's tolerance.
+        proof: of what kind, in words.
     """
 
     any: bool | None = None
     design: Mapping[str, float] | None = None
+    proof: str = ""
 
 
 def any_stable(problem: Problem, seconds: float, known: Mapping[str, float] | None = None) -> Stability:
@@ -47,6 +50,8 @@ def any_stable(problem: Problem, seconds: float, known: Mapping[str, float] | No
     Raises:
         KeyboardInterrupt: when the user stops it.
     """
+    if none_stable(problem):
+        return Stability(False, proof="by signs of coefficients, in interval arithmetic")
     if not SOLVER.available or not problem.free:
         return Stability()
     kept = {n: text for n, text in problem.constraints.items() if n not in problem.asked_of_roots}
@@ -67,7 +72,8 @@ def any_stable(problem: Problem, seconds: float, known: Mapping[str, float] | No
             return Stability()
     if clock.interrupted:
         raise KeyboardInterrupt
-    return Stability(False) if proved else _judged(asked, told.other)
+    by = f"in floating-point arithmetic, by {SOLVER.name}, feasibility tolerance {SOLVER.tolerance:.0e}"
+    return Stability(False, proof=by) if proved else _judged(asked, told.other)
 
 
 def _any(design: Mapping[str, float]) -> Answer:

@@ -168,7 +168,7 @@ class Sampler:
         """Corners, a quasi-random sequence, and some of it moved to faces."""
         size = self.space.size
         cost = max(1, len(self.problem.cases)) * (1 if self.problem.model.degree <= _QUARTIC else _SLOWER)
-        count = max(min(_FIRST * _EACH**min(size, _QUARTIC), _MOST) // cost, _LEAST)
+        count = max(min(_FIRST * _EACH ** min(size, _QUARTIC), _MOST) // cost, _LEAST)
         u = (self._offset + np.arange(1, count + 1)[:, None] * golden_steps(size)) % 1.0
         outer = u[::_FACES]
         u[::_FACES] = np.where(outer < 1 / 3, 0.0, np.where(outer > 2 / 3, 1.0, outer))

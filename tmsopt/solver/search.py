@@ -58,7 +58,8 @@ def explore(work: Workspace) -> Explored:
         if other is not None and (trial is None or (not other.checked.violations and ahead(work, other, trial))):
             nlp, candidates, trial = unstable, others, other
     verdict = refereed(work, nlp, candidates, trial)
-    if verdict.trial is not None and work.sampler and _wants_stability(work.problem, verdict.trial):
+    wanting = verdict.trial is not None and _wants_stability(work.problem, verdict.trial)
+    if verdict.trial is not None and work.sampler and wanting and not work.never_stable:
         others = _left_of_the_axis(work, nlp, len(candidates))
         other, every = survivor(work, nlp, others), [*verdict.candidates, *others]
         better = other is not None and ahead(work, other, verdict.trial)

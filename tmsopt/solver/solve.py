@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Unpack
 
-from tmsopt.branch_and_bound.stability import SOLVER, any_stable
+from tmsopt.branch_and_bound.stability import any_stable
 from tmsopt.checks.bound import instant_bound
 from tmsopt.checks.digits import certified
 from tmsopt.checks.recheck import Checked, recheck
@@ -98,8 +98,7 @@ def _with_stability(solution: Solution, options: Options, family: Family | None,
             words = "branch and bound found the stable design from which this one was reached"
             solution = replace(found, notes=(*found.notes, words))
     elif asked.any is False:
-        words = f"a floating-point proof by {SOLVER.name}, feasibility tolerance {SOLVER.tolerance:.0e}"
-        solution = replace(solution, notes=(*solution.notes, f"that no design is stable is {words}"))
+        solution = replace(solution, notes=(*solution.notes, f"that no design is stable is proved {asked.proof}"))
     return replace(solution, stable_elsewhere=asked.any, seconds=time.perf_counter() - began)
 
 

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import casadi as ca
 import numpy as np
 
+from tmsopt.branch_and_bound.signs import none_stable
 from tmsopt.checks.recheck import Checked, recheck
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import demands_heavy_damping, overclaims, tempts
@@ -114,6 +115,11 @@ class Workspace:
     def sample(self) -> Sample | None:
         """What was seen of this part before any solver."""
         return self.sampler.sample() if self.sampler else None
+
+    @cached_property
+    def never_stable(self) -> bool:
+        """Whether it is certain at once that no design of this part is stable."""
+        return none_stable(self.part)
 
     def formulate(self, cases: Sequence[Case], damping_ratio: float | None = None, lead: int = 0) -> NLP:
         """The NLP of the problem on this part of the box."""

@@ -1,0 +1,64 @@
+"""No stable design, by signs: a polynomial has all roots left of the axis only where its coefficients have one sign."""
+
+from collections import deque
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from tmsopt.arithmetic.intervals import ranges
+from tmsopt.arithmetic.walk import NotAccepted
+from tmsopt.design.problem import Problem
+from tmsopt.records import Array
+
+_BOXES = 48  # looked at, beyond which it is left to others
+
+
+def none_stable(problem: Problem) -> bool:
+    """Whether it is certain, by interval arithmetic alone, that no design of the box is stable, limits or not.
+
+    In each part of the box two coefficients have different signs, or a Hurwitz determinant of degree 3 or 4 is of the
+    wrong one. Of a problem with several cases nothing is said.
+    """
+    if problem.cases or not problem.free:
+        return False
+    x = ca.SX.sym("x", len(problem.free))
+    a = problem.model.coefficients(
+        problem.ordered(dict(zip(problem.free, ca.vertsplit(x), strict=True))), problem.parameter_set
+    )
+    tests = ca.vertcat(*map(ca.SX, [*a, *_determinants(a)]))
+    function = ca.Function("signs", [x], [ca.densify(tests)], {"cse": True})
+    left = deque([[(lo, hi) for lo, hi in problem.free.values()]])
+    widths = np.array([hi - lo for lo, hi in problem.free.values()])
+    for _ in range(_BOXES):
+        if not left:
+            return True
+        box = left.popleft()
+        try:
+            (ends,) = (np.array(row) for row in ranges(function, box))
+        except NotAccepted:
+            return False
+        if _excluded(ends, len(a)):
+            continue
+        k = int(np.argmax(np.array([hi - lo for lo, hi in box]) / widths))
+        lo, hi = box[k]
+        middle = lo + (hi - lo) / 2
+        left += [[*box[:k], part, *box[k + 1 :]] for part in ((lo, middle), (middle, hi))]
+    return not left
+
+
+def _determinants(a: list[Any]) -> list[Any]:
+    """A Hurwitz determinant that has the sign of a0 wherever all roots are left of the axis; for degrees 3 and 4."""
+    if len(a) == 4:
+        return [a[0] * (a[1] * a[2] - a[0] * a[3])]
+    if len(a) == 5:
+        return [a[1] * a[2] * a[3] - a[0] * a[3] ** 2 - a[4] * a[1] ** 2]
+    return []
+
+
+def _excluded(ends: Array, count: int) -> bool:
+    positive, negative = ends[:, 0] > 0, ends[:, 1] < 0
+    if positive[:count].any() and negative[:count].any():
+        return True
+    lead = 1 if positive[0] else -1 if negative[0] else 0
+    return bool(lead and (negative if lead > 0 else positive)[count:].any())
