@@ -4,7 +4,6 @@ A function that is not rational is an unknown of its own, one for each argument,
 tan = sin/cos, √x² = x and |x|² = x². What vanishes for another reason is not seen to.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -19,34 +18,63 @@ from tmsopt.arithmetic.walk import Arithmetic, steps
 _WHOLE = 64  # exponent up to which a power is a product
 
 
-@dataclass(frozen=True)
-class Quotient:
-    """A quotient of polynomials with fractions for coefficients; numbers may stand beside it."""
+@dataclass(frozen=True, eq=False)
+class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap hash
+    """A quotient of two polynomials; equal to another if the cross products are."""
 
-    above: Any
-    below: Any
+    over: Any
+    under: Any
+
+    def __post_init__(self) -> None:
+        common = self.over.gcd(self.under)
+        if not common.is_constant():
+            object.__setattr__(self, "over", self.over // common)
+            object.__setattr__(self, "under", self.under // common)
 
     def __add__(self, other: Any) -> "Quotient":
-        o = self._made(other)
-        return _reduced(self.above * o.below + o.above * self.below, self.below * o.below)
+        o = self._other(other)
+        return Quotient(self.over * o.under + o.over * self.under, self.under * o.under)
 
     def __mul__(self, other: Any) -> "Quotient":
-        o = self._made(other)
-        return _reduced(self.above * o.above, self.below * o.below)
+        o = self._other(other)
+        return Quotient(self.over * o.over, self.under * o.under)
 
-    __radd__, __rmul__ = __add__, __mul__
+    def __truediv__(self, other: Any) -> "Quotient":
+        o = self._other(other)
+        if o.over == 0:
+            raise ZeroDivisionError("division by the zero quotient")
+        return Quotient(self.over * o.under, self.under * o.over)
 
     def __neg__(self) -> "Quotient":
-        return Quotient(-self.above, self.below)
+        return Quotient(-self.over, self.under)
 
-    def inverse(self) -> "Quotient":
-        """1 over this; ZeroDivisionError for 0."""
-        if not self.above:
-            raise ZeroDivisionError
-        return Quotient(self.below, self.above)
+    def __sub__(self, other: Any) -> "Quotient":
+        return self + (-self._other(other))
 
-    def _made(self, other: Any) -> "Quotient":
-        return other if isinstance(other, Quotient) else Quotient(0 * self.below + other, 0 * self.below + 1)
+    def __rsub__(self, other: Any) -> "Quotient":
+        return self._other(other) - self
+
+    def __rtruediv__(self, other: Any) -> "Quotient":
+        return self._other(other) / self
+
+    def __pow__(self, n: int) -> "Quotient":
+        return Quotient(self.over**n, self.under**n) if n >= 0 else Quotient(self.under**-n, self.over**-n)
+
+    def sqrt(self) -> "Quotient":
+        """The square root of a square, with positive leading coefficients."""
+        return Quotient(self.over.sqrt(), self.under.sqrt())
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+    def __eq__(self, other: object) -> bool:
+        o = self._other(other)
+        return bool(self.over * o.under == o.over * self.under)
+
+    def _other(self, other: Any) -> "Quotient":
+        if isinstance(other, Quotient):
+            return other
+        return Quotient(self.under * 0 + other, self.under * 0 + 1)
 
 
 class Field:
@@ -67,10 +95,10 @@ class Field:
         rational: dict[int, Callable[..., Any]] = {
             ca.OP_CONST: self.number,
             ca.OP_ADD: lambda a, b: a + b,
-            ca.OP_SUB: lambda a, b: a + -b,
+            ca.OP_SUB: lambda a, b: a - b,
             ca.OP_MUL: lambda a, b: a * b,
-            ca.OP_DIV: lambda a, b: a * b.inverse(),
-            ca.OP_INV: Quotient.inverse,
+            ca.OP_DIV: lambda a, b: a / b,
+            ca.OP_INV: lambda a: 1 / a,
             ca.OP_NEG: lambda a: -a,
             ca.OP_SQ: lambda a: a * a,
             ca.OP_TWICE: lambda a: 2 * a,
@@ -80,7 +108,7 @@ class Field:
             ca.OP_FABS: lambda a: self._applied(ca.OP_FABS, a, square=lambda: a * a),
             ca.OP_COS: partial(self._applied, ca.OP_COS),
             ca.OP_SIN: self._sine,
-            ca.OP_TAN: lambda a: self._sine(a) * self._applied(ca.OP_COS, a).inverse(),
+            ca.OP_TAN: lambda a: self._sine(a) / self._applied(ca.OP_COS, a),
         }
         every = {getattr(ca, name) for name in dir(ca) if name.startswith("OP_")}
         return {**{op: partial(self._applied, op) for op in every}, **rational}
@@ -94,19 +122,19 @@ class Field:
             return bool(x == 0)
         for at, square in reversed(self._squares):
             powers, rest = [self.number(1.0)], self.number(0.0)
-            for exponents, coefficient in x.above.to_dict().items():
+            for exponents, coefficient in x.over.to_dict().items():
                 while len(powers) <= exponents[at] // 2:
                     powers.append(powers[-1] * square)
                 kept = (*exponents[:at], exponents[at] % 2, *exponents[at + 1 :])
                 term = self._context.from_dict({kept: coefficient})
                 rest = rest + powers[exponents[at] // 2] * Quotient(term, self._one)
             x = rest
-        return not x.above
+        return not x.over
 
     def _applied(self, operation: int, *operands: Quotient, square: Callable[[], Quotient] | None = None) -> Quotient:
         """An unknown for what a function makes of its operands, the same for the same."""
         for known, given, made in self._known:
-            if known == operation and all(not (a + -b).above for a, b in zip(given, operands, strict=True)):
+            if known == operation and all(a == b for a, b in zip(given, operands, strict=True)):
                 return made
         at, self._used = self._used, self._used + 1
         made = self._free(at)
@@ -117,22 +145,15 @@ class Field:
 
     def _sine(self, a: Quotient) -> Quotient:
         cosine = self._applied(ca.OP_COS, a)
-        return self._applied(ca.OP_SIN, a, square=lambda: 1 + -(cosine * cosine))
+        return self._applied(ca.OP_SIN, a, square=lambda: 1 - cosine * cosine)
 
     def _power(self, a: Quotient, b: Quotient) -> Quotient:
-        exponent = b.above.leading_coefficient() / b.below.leading_coefficient() if b.above else flint.fmpq(0)
-        whole = b.above.is_constant() and b.below.is_constant() and exponent.q == 1
+        exponent = b.over.leading_coefficient() / b.under.leading_coefficient() if b.over else flint.fmpq(0)
+        whole = b.over.is_constant() and b.under.is_constant() and exponent.q == 1
         if not whole or abs(exponent) > _WHOLE:
             return self._applied(ca.OP_POW, a, b)
-        raised = math.prod([a] * abs(int(exponent.p)), start=self.number(1.0))
-        return raised if exponent >= 0 else raised.inverse()
+        n = int(exponent.p)
+        return a**n if n >= 0 else 1 / a**-n
 
     def _free(self, at: int) -> Quotient:
         return Quotient(self._context.gens()[at], self._one)
-
-
-def _reduced(above: Any, below: Any) -> Quotient:
-    if below.is_constant():
-        return Quotient(above, below)
-    shared = above.gcd(below)
-    return Quotient(above // shared, below // shared)
