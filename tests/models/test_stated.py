@@ -170,7 +170,11 @@ def test_matrices_of_any_kind(matrix: Any) -> None:
 @pytest.mark.parametrize(
     ("lead", "degree"),
     [(ca.sqrt(1 - k), 2), (ca.fmax(0, k - 10), 2), (ca.fmax(0, -k), 2), (ca.log(k - 100), 2), (k - c, 2),
-     (k - k, 1), ((k + c) ** 2 - k * k - 2 * k * c - c * c, 1), (ca.sin(k) ** 2 + ca.cos(k) ** 2 - 1, 1)],
+     (ca.fmax(0, k - 1e30), 2), (ca.fmin(0, c + 1e30), 2),  # 0 at every size that one would try
+     (k - k, 1), ((k + c) ** 2 - k * k - 2 * k * c - c * c, 1), (ca.sin(k) ** 2 + ca.cos(k) ** 2 - 1, 1),
+     (k / (k + c) + c / (k + c) - 1, 1), (ca.sqrt(k) ** 2 - k, 1), (ca.tan(c) * ca.cos(c) - ca.sin(c), 1),
+     (0.1 * k + 0.2 * k - 0.3 * k, 1), (ca.fabs(k - c) ** 4 - (k - c) ** 4, 1), (k * k**-1 - 1, 1),
+     (ca.exp(k / c) - ca.exp(2 * k / (2 * c)), 1), (ca.sqrt(ca.cos(k) ** 2) ** 2 + ca.sin(k) ** 2 - 1, 1)],
 )  # fmt: skip
 def test_a_leading_coefficient_is_left_out_only_where_it_is_nought_for_all(lead: Any, degree: int) -> None:
     assert from_coefficients([lead, 1, k + c]).degree == degree
@@ -184,6 +188,11 @@ def test_singular_mass_matrices() -> None:
     assert [float(x) for x in model.coefficients({"k": 2.0})] == pytest.approx([4.3, 4.3, 5, 2], rel=1e-15)
     with pytest.raises(Unfit, match="without s"):
         from_matrices([[0]], None, [[k]])
+    # A mass without inertia, m q″ coupled by a lever of length c: M is of rank 1, and the first two coefficients are
+    # det M and M × D, which without damping is 0 too.
+    model = from_matrices([[k, k / c], [k / c, k / c**2]], None, [[1, 0], [0, k]])
+    assert model.degree == 2
+    assert [float(x) for x in model.coefficients({"k": 2.0, "c": 4.0})] == pytest.approx([2 * 2 + 2 / 16, 0, 2])
 
 
 def test_quantities_may_use_one_another_and_stand_in_entries(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from tmsopt.arithmetic.elementary import exact, is_ball
 from tmsopt.arithmetic.formulas import Formulas, formulas
+from tmsopt.arithmetic.identity import Field
 from tmsopt.arithmetic.operations import BALLS
 from tmsopt.arithmetic.walk import operation_name, steps, walk
 from tmsopt.models.built_in import MODELS
@@ -28,7 +29,7 @@ _FINITE = "accepted: finite numbers, and expressions of them"
 MOST = {"M": 6, "A": 12, "coefficients": 12}
 """Largest size of M, D, K; of A; largest degree."""
 
-_SAMPLES = 24  # designs at which a leading coefficient must vanish to count as none
+_SAMPLES = 24  # designs at which a leading coefficient must vanish for it to be looked at
 _DIGITS = 60
 _DECIMALS = {**BALLS, ca.OP_CONST: lambda x: flint.fmpq(*Fraction(repr(x)).as_integer_ratio())}
 _GOLDEN = (math.sqrt(5) - 1) / 2
@@ -176,12 +177,25 @@ def _rebuilt(
     def as_printed(values: Mapping[str, Any]) -> list[Any]:
         return _polynomial(kind, blocks(walk(entry.function, [values[n] for n in names], _DECIMALS)[0]))
 
+    def vanish(leading: int) -> int:
+        """How many of so many leading coefficients are 0 by their expressions, one after the other."""
+        field = Field(entry.function)
+        try:
+            found = blocks(walk(entry.function, field.inputs, field.arithmetic())[0])
+        except ZeroDivisionError:
+            return 0
+        for n in ("D", "K")[max(leading - 1, 0) :] if "M" in found else ():  # without part in these coefficients
+            found[n] = [[0] * len(found["M"]) for _ in found["M"]]
+        row = _polynomial(kind, found)[:leading]
+        return next((k for k, c in enumerate(row) if not field.vanishes(c)), leading)
+
     def alone(written: Any) -> Any:
         formula = formulas([written], names)
         return lambda values: formula(values)[0]
 
     lost = _vanishing(as_printed, names)
-    if lost is None:
+    lost = lost and vanish(lost)
+    if lost == (degree := count - 1 if kind == "coefficients" else shapes[0][1] * (1 if shapes[0][0] == "A" else 2)):
         raise Unfit(shapes[0][0], "makes a polynomial without s, which has no root")
     quick = formulas(every(symbols)[lost:], names)
 
@@ -196,7 +210,7 @@ def _rebuilt(
     made = Model(
         name=name,
         title=name,
-        degree=(count - 1 if kind == "coefficients" else shapes[0][1] * (1 if shapes[0][0] == "A" else 2)) - lost,
+        degree=degree - lost,
         sets=(of,),
         algebraic=dict,
         polynomial=coefficients,
@@ -240,11 +254,11 @@ def _pencil(blocks: dict[str, Matrix]) -> tuple[Matrix, ...]:
     return M, blocks.get("D") or [[0] * len(M) for _ in M], blocks["K"]
 
 
-def _vanishing(polynomial: Any, names: Sequence[str]) -> int | None:
-    """Number of leading coefficients that are 0 for all parameters, as of a singular M; None if all but the last are.
+def _vanishing(polynomial: Any, names: Sequence[str]) -> int:
+    """Number of leading coefficients that may be 0 for all parameters, as of a singular M: others are not, at a design.
 
-    Decided in balls of 60 digits at designs of many sizes and signs, where a formula that is not 0 is not everywhere,
-    for numbers as they print: [[0.1, 0.7], [0.3, 2.1]] is meant to be singular, and in binary it is not.
+    In balls of 60 digits at designs of many sizes and signs, for numbers as they print: [[0.1, 0.7], [0.3, 2.1]] is
+    meant to be singular, and in binary it is not.
     """
     lost, known = 0, False
     with flint.ctx.workdps(_DIGITS):
@@ -263,7 +277,7 @@ def _vanishing(polynomial: Any, names: Sequence[str]) -> int | None:
                 lost, known = (min(lost, nonzero) if known else nonzero), True
             if known and lost == 0:
                 return 0
-    return lost if not known or lost < len(row) - 1 else None
+    return lost
 
 
 class Unfit(ValueError):

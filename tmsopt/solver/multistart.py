@@ -154,9 +154,10 @@ class Runner:
     def _crossed(self, best: Candidate) -> Candidate:
         """The best that is reached from an end at which other ways are as close as the one that was held."""
         for _ in range(_CROSSINGS if self.nlp.touches and best.feasible else 0):
-            x = best.run.x
-            ends = [self._from(x, way, "near") for way in islice(self.nlp.touchings(x, _MEETS), 2 * _WAYS)]
-            further = min(ends, key=_rank)
+            x, held = best.run.x, _limits(best.nlp)
+            others = (way for way in self.nlp.touchings(x, _MEETS) if _limits(way) != held)
+            ends = [self._from(x, way, "near") for way in islice(others, 2 * _WAYS)]
+            further = min(ends, key=_rank, default=best)
             if not (further.feasible and further.objective < best.objective - _SAME):
                 break
             best = further
@@ -164,6 +165,10 @@ class Runner:
 
     def _from(self, x: Array, limits: NLP, start: str) -> Candidate:
         return _candidate(self.work.part, limits, self.work.ipopt(self.nlp, start)(x, limits))
+
+
+def _limits(nlp: NLP) -> tuple[tuple[float, ...], ...]:
+    return nlp.lower, nlp.upper, nlp.row_upper
 
 
 def _rank(candidate: Candidate) -> tuple[bool, float]:

@@ -1,13 +1,13 @@
 """Exact polynomials and quotients, balls, certified roots and Newton's method in balls."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from math import prod
 from typing import Any, TypeAlias
 
 import flint
 
 from tmsopt.arithmetic.elementary import rational
+from tmsopt.arithmetic.identity import Quotient
 from tmsopt.arithmetic.krawczyk import enclosed, refined
 from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.polynomial import determinant, product, shift
@@ -26,65 +26,6 @@ _RADIUS = 50  # of the box in which a solution is proved
 def q(text: str | int) -> Any:
     """An exact fraction from decimal or fraction text."""
     return rational(text)
-
-
-@dataclass(frozen=True, eq=False)
-class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap hash
-    """A quotient of two polynomials; equal to another if the cross products are."""
-
-    over: Polynomial
-    under: Polynomial
-
-    def __post_init__(self) -> None:
-        common = self.over.gcd(self.under)
-        if not common.is_constant():
-            object.__setattr__(self, "over", self.over // common)
-            object.__setattr__(self, "under", self.under // common)
-
-    def __add__(self, other: Any) -> "Quotient":
-        o = self._other(other)
-        return Quotient(self.over * o.under + o.over * self.under, self.under * o.under)
-
-    def __mul__(self, other: Any) -> "Quotient":
-        o = self._other(other)
-        return Quotient(self.over * o.over, self.under * o.under)
-
-    def __truediv__(self, other: Any) -> "Quotient":
-        o = self._other(other)
-        if o.over == 0:
-            raise ZeroDivisionError("division by the zero quotient")
-        return Quotient(self.over * o.under, self.under * o.over)
-
-    def __neg__(self) -> "Quotient":
-        return Quotient(-self.over, self.under)
-
-    def __sub__(self, other: Any) -> "Quotient":
-        return self + (-self._other(other))
-
-    def __rsub__(self, other: Any) -> "Quotient":
-        return self._other(other) - self
-
-    def __rtruediv__(self, other: Any) -> "Quotient":
-        return self._other(other) / self
-
-    def __pow__(self, n: int) -> "Quotient":
-        return Quotient(self.over**n, self.under**n) if n >= 0 else Quotient(self.under**-n, self.over**-n)
-
-    def sqrt(self) -> "Quotient":
-        """The square root of a square, with positive leading coefficients."""
-        return Quotient(self.over.sqrt(), self.under.sqrt())
-
-    __radd__ = __add__
-    __rmul__ = __mul__
-
-    def __eq__(self, other: object) -> bool:
-        o = self._other(other)
-        return bool(self.over * o.under == o.over * self.under)
-
-    def _other(self, other: Any) -> "Quotient":
-        if isinstance(other, Quotient):
-            return other
-        return Quotient(self.under * 0 + other, self.under * 0 + 1)
 
 
 def ring(names: str) -> tuple[Quotient, ...]:

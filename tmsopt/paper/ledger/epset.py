@@ -4,8 +4,9 @@ from typing import Any
 
 import flint
 
+from tmsopt.arithmetic.identity import Quotient
 from tmsopt.paper.ledger import lemmas, printed
-from tmsopt.paper.ledger.algebra import Quotient, composed, evaluate, polynomials, q, ring, slope, stable, tangent
+from tmsopt.paper.ledger.algebra import composed, evaluate, polynomials, q, ring, slope, stable, tangent
 from tmsopt.paper.ledger.entry import Claim, Outcome, digits, proof, section, universal
 
 _claim = section("2.4.3 The discriminant surface and the EP set")

@@ -2,9 +2,10 @@
 
 import flint
 
+from tmsopt.arithmetic.identity import Quotient
 from tmsopt.models import copo
 from tmsopt.paper.ledger import lemmas, printed
-from tmsopt.paper.ledger.algebra import Quotient, depends, polynomials, q, ring, vanishes
+from tmsopt.paper.ledger.algebra import depends, polynomials, q, ring, vanishes
 from tmsopt.paper.ledger.entry import Claim, Outcome, decimal, digits, proof, section
 from tmsopt.paper.ledger.printed import laws
 

@@ -11,9 +11,10 @@ from typing import Any
 
 import flint
 
+from tmsopt.arithmetic.identity import Quotient
 from tmsopt.models import copo
 from tmsopt.models.exact import Tilt
-from tmsopt.paper.ledger.algebra import Quotient, matched, polynomials, positive, q, ring, stable, substitute
+from tmsopt.paper.ledger.algebra import matched, polynomials, positive, q, ring, stable, substitute
 from tmsopt.paper.ledger.printed import laws
 
 _NAMES = "Fr mu chi_B chi_H zeta_B zeta_H T"

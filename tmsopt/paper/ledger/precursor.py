@@ -4,9 +4,10 @@ from collections.abc import Sequence
 
 import flint
 
+from tmsopt.arithmetic.identity import Quotient
 from tmsopt.models.exact import Tilt
 from tmsopt.paper.ledger import lemmas, printed
-from tmsopt.paper.ledger.algebra import Quotient, ball_roots, depends, heavily_damped, q, real_roots, ring, stable
+from tmsopt.paper.ledger.algebra import ball_roots, depends, heavily_damped, q, real_roots, ring, stable
 from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal
 from tmsopt.paper.ledger.printed import laws
 from tmsopt.roots.exact import isolated_roots
