@@ -64,11 +64,16 @@ class Bound:
 
 @dataclass(frozen=True)
 class Starts:
-    """How many starts were tried, converged to a feasible point, and ended at the best one."""
+    """How many starts were tried, converged to a feasible point, and ended at the best one.
+
+    Attributes:
+        looked: designs of the box that were looked at beside, to know where to start, and whether any is better.
+    """
 
     tried: int = 0
     converged: int = 0
     at_best: int = 0
+    looked: int = 0
 
 
 @dataclass(frozen=True)

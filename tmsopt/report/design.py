@@ -106,9 +106,9 @@ def facts(solution: Solution) -> list[str]:
         lines.append(f"also solved by {where}; excluded by {', '.join(branch.excluded_by) or 'nothing'}")
     if solution.starts.tried:
         s = solution.starts
-        lines.append(
-            f"starts: {s.tried} tried, {s.converged} converged, {s.at_best} at the best; {solution.seconds:.2f} s"
-        )
+        looked = f"; {s.looked} designs looked at" if s.looked else ""
+        tried = f"starts: {s.tried} tried, {s.converged} converged, {s.at_best} at the best"
+        lines.append(f"{tried}{looked}; {solution.seconds:.2f} s")
     return [*lines, *(f"note: {note}" for note in solution.notes)]
 
 

@@ -82,7 +82,8 @@ def further(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
     run, found = Runner(work, nlp), list[Candidate]()
     for design, near in islice(starting(work), tried, work.options.starts):
         found.append(run.ended(design, near, hopeful=False))
-        if bounded(work.part) and found[-1].feasible and found[-1].objective < 0:
+        left = bounded(work.part) and found[-1].feasible and found[-1].objective < 0
+        if left or sum(not c.feasible for c in found) >= _HOPELESS:
             break
     return found
 
@@ -213,8 +214,9 @@ def _settled(work: Workspace, candidates: list[Candidate]) -> bool:
     """
     problem, sampled = work.part, work.sample is not None
     feasible = [c for c in candidates if c.feasible]
+    failed = len(candidates) - len(feasible)
     if not feasible:
-        return len(candidates) >= (_HOPELESS_SAMPLED if sampled else _HOPELESS)
+        return failed >= (_HOPELESS_SAMPLED if sampled else _HOPELESS)
     best = min(c.objective for c in feasible)
     record = candidates[-1].feasible and all(candidates[-1].objective < c.objective for c in feasible[:-1])
     if record and _proven(problem, candidates[-1]):
@@ -225,6 +227,8 @@ def _settled(work: Workspace, candidates: list[Candidate]) -> bool:
         return agreeing >= (1 if count == 0 or (count < 0 and best <= _MET) else _AGREE)
     ordered = sorted(c.objective for c in feasible)
     n, w = len(feasible), 1 + sum(not same(a, b, feasible[0].nlp.size) for a, b in pairwise(ordered))
+    if sampled and failed >= _HOPELESS:  # which takes long; the sample is the judge of what was found
+        return True
     if sampled:
         return len(candidates) >= _ENOUGH_SAMPLED * w and agreeing >= _AGREE_SAMPLED
     seen = n > w + 2 and w * (n - 1) <= (w + 0.5) * (n - w - 2)

@@ -108,6 +108,12 @@ def converged(trial: Trial) -> bool:
     return trial.candidate.run.status in _CONVERGED or trial.point.stationarity <= _STATIONARY
 
 
+def mass_advice(problem: Problem) -> str:
+    """How to keep the mass matrix from being singular, in the names of a model."""
+    known = {"tms": "nu_H and zeta_B", "whipple": "mass_margin"}
+    return f"keep {known.get(problem.model.name, 'a0')} away from 0 by a constraint"
+
+
 def counted(candidates: Sequence[Candidate], at_best: float) -> Starts:
     """How the starts of a search ended."""
     return Starts(

@@ -10,7 +10,7 @@ from tmsopt.design.cases import Case
 from tmsopt.design.solution import Starts
 from tmsopt.formulation.nlp import NLP
 from tmsopt.solver.multistart import Candidate, Runner
-from tmsopt.solver.outcome import Finding, Trial, ahead, converged, honest, survivor
+from tmsopt.solver.outcome import Finding, Trial, ahead, converged, honest, mass_advice, survivor
 from tmsopt.solver.sample import Looked, Sample, Sampler
 from tmsopt.solver.workspace import Workspace
 
@@ -54,6 +54,22 @@ def refereed(work: Workspace, nlp: NLP, candidates: list[Candidate], trial: Tria
     if not _endless(work, work.sample, trial.checked.objective):
         return verdict
     return replace(verdict, held={name: trial.parameters[name] for name in work.problem.free}, words=_UNBOUNDED)
+
+
+def ideal(work: Workspace) -> Finding | None:
+    """A design of the sample that no other can beat: all its roots real and negative, where the damping ratio is asked.
+
+    Of one case alone: others would have to be covered.
+    """
+    problem, sample = work.problem, work.sample
+    if problem.cases or (problem.maximize or "").strip() != "damping_ratio" or not (work.sampler and sample):
+        return None
+    for k in np.flatnonzero((sample.refined.violation == 0) & (sample.refined.worth <= -1))[:_APPEALED].tolist():
+        parameters = problem.ordered(work.sampler.design(sample.refined, k))
+        checked = work.recheck(parameters, ())
+        if not checked.violations and checked.objective == 1:
+            return Finding(parameters, checked, "optimal", {}, Starts(), "abscissa")
+    return None
 
 
 def _appealed(work: Workspace, sampler: Sampler, sample: Sample, so_far: Verdict) -> Verdict:
@@ -164,15 +180,10 @@ def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial | None, ri
         best = Verdict(opened, ends, other)
         if singular:
             towards = f"towards a singular mass matrix (a0 = 0), to {work.problem.sign * reached.objective:.9g}"
-            words = f"no best design: it improves {towards}; {_advice(work)}"
+            words = f"no best design: it improves {towards}; {mass_advice(work.problem)}"
             best = replace(best, held={n: other.parameters[n] for n in work.problem.free}, words=words)
     return best
 
 
 def _leading(work: Workspace, free: Mapping[str, float]) -> float:
     return float(work.problem.values(work.problem.ordered(free)).coefficients[0])
-
-
-def _advice(work: Workspace) -> str:
-    known = {"tms": "nu_H and zeta_B", "whipple": "mass_margin"}
-    return f"keep {known.get(work.problem.model.name, 'a0')} away from 0 by a constraint"

@@ -16,8 +16,8 @@ from tmsopt.formulation.formulate import design_of, formulate, middle
 from tmsopt.formulation.nlp import NLP
 from tmsopt.records import Table
 from tmsopt.solver.multistart import Candidate, Runner, further, same, search
-from tmsopt.solver.outcome import Finding, Trial, ahead, counted, found, survivor
-from tmsopt.solver.referee import held, refereed
+from tmsopt.solver.outcome import Finding, Trial, ahead, counted, found, mass_advice, survivor
+from tmsopt.solver.referee import held, ideal, refereed
 from tmsopt.solver.relaxation import relax
 from tmsopt.solver.sample import Sampler
 from tmsopt.solver.workspace import Workspace
@@ -46,6 +46,8 @@ class Explored:
 
 def explore(work: Workspace) -> Explored:
     """Search one part of the box from many starts, exactly and in all cases."""
+    if best := ideal(work):
+        return Explored(work.name, (), best)
     cases = work.problem.cases
     nlp = work.formulate(cases)
     candidates = search(work, nlp)
@@ -110,7 +112,7 @@ def without_any(work: Workspace, tried: int) -> Finding:
         trial = survivor(work, nlp, ended)
         if finding := found(work, nlp, trial, Starts(tried + 2, sum(c.feasible for c in ended), 1)):
             return finding
-        advice = "try more starts, give one, or keep a0 away from 0 (for tms, nu_H >= 0.02; for whipple, u_H >= 0.02)"
+        advice = f"try more starts, give one, or {mass_advice(problem)}"
         status, note = "not_converged", f"feasible designs exist, but {none} converged; {advice}"
     starts, notes = Starts(tried=tried), (note,)
     return Finding(parameters, checked, status, {}, starts, nlp.formulation, cases, notes=notes, relaxation=relaxation)

@@ -17,7 +17,7 @@ from tmsopt.design.solution import Bound, NotSolved, Solution, Starts
 from tmsopt.errors import Fault, InputError, is_number, short, suggest
 from tmsopt.formulation.options import DEFAULTS, AskedOfSolve, Options, options_of
 from tmsopt.records import Table
-from tmsopt.solver.outcome import Finding, better, evaluated
+from tmsopt.solver.outcome import Finding, better, evaluated, mass_advice
 from tmsopt.solver.search import Explored, evaluated_cases, explore, without_any
 from tmsopt.solver.workspace import Family, workspace
 
@@ -63,8 +63,11 @@ def solved(design: Given, options: Options = DEFAULTS, family: Family | None = N
             near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items() if n in options.near}
             options = replace(options, near=near)
         work = workspace(problem, options, family)
-        explored = [explore(part) for part in work.parts() if not options.near or part.holds(options.near)]
+        parts = [part for part in work.parts() if not options.near or part.holds(options.near)]
+        explored = [explore(part) for part in parts]
         finding = _winner(problem, explored) or without_any(work, sum(len(e.candidates) for e in explored))
+        looked = sum(part.sampler.count for part in parts if part.sampler)
+        finding = replace(finding, starts=replace(finding.starts, looked=looked))
         notes = _sides_note(problem, explored, finding)
         values = _side_values(explored)
     else:
@@ -186,9 +189,7 @@ def _stability_note(problem: Problem, checked: Checked, optimal: bool) -> tuple[
     if "coefficients" in checked.violations:
         return ("a coefficient has no value at this design; keep away from what divides by 0, or has no root",)
     if "a0" in checked.violations:
-        known = {"tms": "nu_H and zeta_B", "whipple": "mass_margin"}
-        keep = known.get(problem.model.name, "a0")
-        return (f"the mass matrix is singular (a0 = 0), so a root is at infinity; keep {keep} away from 0",)
+        return (f"the mass matrix is singular (a0 = 0), so a root is at infinity; {mass_advice(problem)}",)
     asked = [n for n, c in problem.conditions.items() if n in checked.violations and "abscissa" in c.names]
     if asked and checked.structure.abscissa >= 0:
         return ("no stable design was found that meets the other limits; this is the least unstable one",)
