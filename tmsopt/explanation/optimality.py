@@ -170,7 +170,7 @@ def _judged(solution: Solution) -> Problem:
     if "abscissa" in nlp.variables:
         x[nlp.variables.index("abscissa")] = solution.abscissa / nlp.unit
     rows = np.array(nlp.at(nlp.filled(x))[1]).ravel()
-    if any(np.sort(rows[list(kink.rows)])[1] <= _MET for kink in nlp.kinks):
+    if any(np.sort(rows[list(kink.rows)])[1] <= _MET for kink in nlp.kinks if not kink.quotient):
         raise NotCovered("two sides of an abs, min or max meet there")
     return problem
 

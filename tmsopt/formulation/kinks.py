@@ -3,6 +3,9 @@
 Each becomes t with a row t ≥ piece for every piece: |e| is the greatest of e and −e, a minimum of a and b minus the
 greatest of −a and −b. Where more of t is never an advantage, that is exact, as it is of a bound on a root quantity;
 elsewhere t is held equal to one piece, the others below it, case by case.
+
+A quotient or a tangent with a pole in the box becomes t with an equation t · denominator = numerator: on its own side
+of the pole a solver then has nothing to look through, and the other side is infinitely far.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,7 +16,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.arithmetic.walk import steps, walk
+from tmsopt.arithmetic.intervals import ranges
+from tmsopt.arithmetic.walk import NotAccepted, steps, walk
 from tmsopt.formulation.nlp import NLP, Greatest, Lift, Touch
 from tmsopt.models import Values
 from tmsopt.roots.patterns.pattern import Roots
@@ -31,10 +35,13 @@ def unfolded(nlp: NLP, overclaims: bool) -> NLP:
     Args:
         overclaims: whether bounds on root quantities would, kinks aside.
     """
-    if not any(step.operation in _PIECES for step in steps(nlp.functions)):
-        return nlp if overclaims else replace(nlp, touches={})
+    plain = nlp if overclaims else replace(nlp, touches={})
+    if not any(step.operation in _PIECES or step.operation in _POLES for step in steps(nlp.functions)):
+        return plain
     build = _Unfolding(nlp)
     x, p, f, g = build.expressions()
+    if not build.kinks:
+        return plain
     inputs = {"x": x, "p": p} if nlp.settings else {"x": x}
     functions = ca.Function("nlp", [*inputs.values()], [f, g], [*inputs], ["f", "g"])
     count, first = len(build.kinks), len(nlp.rows)
@@ -47,7 +54,7 @@ def unfolded(nlp: NLP, overclaims: bool) -> NLP:
         upper=(*nlp.upper, *[np.inf] * count),
         rows=(*nlp.rows, *[KINK] * rows),
         row_lower=(*nlp.row_lower, *[0.0] * rows),
-        row_upper=(*nlp.row_upper, *[np.inf] * rows),
+        row_upper=(*nlp.row_upper, *(0.0 if kink.quotient else np.inf for kink in build.kinks for _ in kink.rows)),
         lifts=(*nlp.lifts, *[Lift(KINK, 1, _filled_later)] * count),
         kinks=tuple(build.kinks),
     )
@@ -55,7 +62,9 @@ def unfolded(nlp: NLP, overclaims: bool) -> NLP:
     held: dict[str, tuple[Touch, ...]] = {}
     equal = set[int]()
     for kink in reversed(build.kinks):  # what is made of others comes before them
-        if not _worsens(plain, slopes(kink.variable), 1.0, equal, kink.rows):
+        if kink.quotient:
+            equal.update(kink.rows)
+        elif not _worsens(plain, slopes(kink.variable), 1.0, equal, kink.rows):
             held[f"{KINK}{kink.variable}"] = tuple(Touch(row=k) for k in kink.rows)
             equal.update(kink.rows)
     rooted = range(first, first + rows)
@@ -89,6 +98,8 @@ class _Unfolding:
         """The result of an operation; of a kink that depends on variables, a new one."""
         if operation == ca.OP_CONST:
             return ca.SX(operands[0])
+        if operation in _POLES:
+            return self._divided(operation, *operands)
         pieces = _PIECES.get(operation)
         if pieces is None or not any(ca.depends_on(ca.SX(e), ca.vertcat(*self.x)) for e in operands):
             return (ca.SX.unary if len(operands) == 1 else ca.SX.binary)(operation, *operands)
@@ -99,7 +110,33 @@ class _Unfolding:
         self.rows += [t - piece for piece in every]
         return -t if operation == ca.OP_FMIN else t
 
+    def _divided(self, operation: int, *operands: Any) -> Any:
+        """A quotient or tangent; as a new variable where the denominator may be 0 in the box."""
+        numerator, denominator = _POLES[operation](*operands)
+        plain = (ca.SX.unary if len(operands) == 1 else ca.SX.binary)(operation, *operands)
+        known = self.x[: len(self.nlp.variables)]
+        if not ca.depends_on(denominator, ca.vertcat(*known)) or ca.depends_on(
+            denominator, ca.vertcat(*self.x[len(known) :], *self.p)
+        ):
+            return plain
+        ends = list(zip(self.nlp.lower, self.nlp.upper, strict=True))
+        try:
+            ((lower, upper),) = ranges(ca.Function("d", [ca.vertcat(*known)], [denominator]), ends)[0]
+        except NotAccepted:
+            return plain
+        if lower > 0 or upper < 0:
+            return plain
+        t = ca.SX.sym(KINK)
+        self.kinks.append(Greatest(len(self.x), (len(self.nlp.rows) + len(self.rows),), quotient=True))
+        self.x.append(t)
+        self.rows.append(t * denominator - numerator)
+        return t
 
+
+_POLES: Mapping[int, Callable[..., tuple[Any, Any]]] = {
+    ca.OP_DIV: lambda a, b: (ca.SX(a), ca.SX(b)), ca.OP_INV: lambda b: (ca.SX(1), ca.SX(b)),
+    ca.OP_TAN: lambda e: (ca.sin(ca.SX(e)), ca.cos(ca.SX(e))),
+}  # fmt: skip
 _PIECES: Mapping[int, Callable[..., Sequence[Any]]] = {
     ca.OP_FABS: lambda e: (e, -e), ca.OP_FMAX: lambda a, b: (a, b), ca.OP_FMIN: lambda a, b: (-a, -b),
 }  # fmt: skip

@@ -62,10 +62,15 @@ class Touch:
 
 @dataclass(frozen=True)
 class Greatest:
-    """A variable t that stands for the greatest of several pieces, and its rows t − piece ≥ 0."""
+    """A variable t that stands for the greatest of several pieces, and its rows t − piece ≥ 0.
+
+    Attributes:
+        quotient: it stands for a quotient instead, with one row t · denominator − numerator = 0.
+    """
 
     variable: int
     rows: tuple[int, ...]
+    quotient: bool = False
 
 
 @dataclass(frozen=True)
@@ -175,8 +180,12 @@ class NLP:
         x = x.copy()
         for kink in self.kinks:
             x[kink.variable] = 0.0
-            greatest = -float(np.array(self.at(x)[1]).ravel()[list(kink.rows)].min())
-            x[kink.variable] = greatest if np.isfinite(greatest) else 0.0
+            value = -float(np.array(self.at(x)[1]).ravel()[list(kink.rows)].min())
+            if kink.quotient:
+                x[kink.variable] = 1.0
+                denominator = float(np.array(self.at(x)[1]).ravel()[kink.rows[0]]) + value
+                value = value / denominator if denominator else 0.0
+            x[kink.variable] = value if np.isfinite(value) else 0.0
         return x
 
     def tangled(self, x: Array) -> bool:
