@@ -112,13 +112,15 @@ class Runner:
                 break
             best = ended
         best = self._crossed(best)
-        return best if near or not best.feasible else self._no_worse(best, design)
+        if not best.feasible or (near and not self.nlp.touches):
+            return best
+        return self._no_worse(best, design, "far" if near else "near")
 
-    def _no_worse(self, best: Candidate, design: Mapping[str, float]) -> Candidate:
-        """Where it ended, or where a start that was better than that ends if IPOPT keeps to it."""
+    def _no_worse(self, best: Candidate, design: Mapping[str, float], start: str) -> Candidate:
+        """Where it ended, or where a start that was better than that ends if IPOPT keeps to it, or does not."""
         if self.work.part.pattern is not None or worth(self.work.part, design) >= best.objective - _SAME:
             return best
-        kept = self._once(design, "near")
+        kept = self._once(design, start)
         return kept if kept.feasible and kept.objective < best.objective else best
 
     def _once(self, design: Mapping[str, float], start: str) -> Candidate:
