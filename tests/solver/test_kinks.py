@@ -126,6 +126,14 @@ def test_a_bicycle_with_a_wished_decay(asked, optimum):
         assert own == pytest.approx(-0.3, abs=1e-7)  # simple roots are right to 1e-13 or so
 
 
+def test_a_positive_real_root_has_a_damping_ratio_of_minus_1():
+    """s² + 0.2 s + k is unstable for k < 0 alone, with the root −0.1 + √(0.01 − k), at most 0.4 as k ≥ −0.24."""
+    k = ca.SX.sym("k")
+    model = from_coefficients([1, 0.2, k])
+    problem = tmsopt.Problem(model=model, free={"k": (-0.24, 2.0)}, minimize="damping_ratio - abscissa")
+    assert solve(problem).value == pytest.approx(-1.4, abs=TOLERANCE)
+
+
 def test_a_kink_over_the_designs_of_a_pattern():
     """An EP3 at Fr = 2: the value says that it is there, and the pattern is checked by the solution."""
     design = solve(bicycle(minimize="abs(Fr - 2)", locate="EP3"))

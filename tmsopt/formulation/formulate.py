@@ -23,6 +23,7 @@ from tmsopt.formulation.lifts import (
     Lifted,
     lift_abscissa,
     lift_damping_ratio,
+    lift_positive_root,
     lift_quantity,
     lift_radius,
     lift_real_roots,
@@ -68,6 +69,8 @@ def abscissa(
     build = Builder(problem, cases, settings=settings, lead=lead)
     if damping_ratio is not None:
         build.take("damping_ratio", damping_ratio)
+        if len(build.covered) == 1 and tempts(problem, "damping_ratio", worse=-1.0):
+            build.lifts.append(lift_positive_root(build))
     elif not elastic and demands_heavy_damping(problem):
         build.real_roots()
     build.constraints()

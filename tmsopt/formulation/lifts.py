@@ -120,6 +120,15 @@ def lift_damping_ratio(build: Rows) -> Lifted:
     return Lifted(zeta, lift, tuple(touches), tuple(products))
 
 
+def lift_positive_root(build: Rows) -> Lift:
+    """A damping ratio of −1 in the one case there is: p = a0 (s − r) q(s), r ≥ 0."""
+    (case,) = build.covered
+    a = build.polynomial(case)
+    r, *q = build.variable("r", 0.0), *(build.variable(f"q{k}") for k in range(1, len(a) - 1))
+    build.equal("damping_ratio", a, [a[0] * c for c in product([1, -r], [1, *q])])
+    return Lift("r", len(a) - 1, partial(_positive_guess, case))
+
+
 def lift_real_roots(build: Rows, line: bool) -> Lifted:
     """Heavy damping: γ ≤ 0 and roots γ − d₁, γ − d₁ − d₂, …, all dᵢ ≥ 0, in every case; γ = 0 unless a `line` is asked.
 
@@ -260,6 +269,13 @@ def _damping_guess(covered: Sequence[int], values: Sequence[Values], z: Sequence
         for c in (-pair.sum().real, np.sqrt(abs(pair.prod().real)))[: len(pair)]
     ]
     return [[min(max(ratio - 0.05, -0.95), 0.95), *factors]]
+
+
+def _positive_guess(case: int, values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
+    """The rightmost real root, or what is nearest to one, and the polynomial of the others."""
+    first = int(np.argmax(z[case].real - 2 * np.abs(z[case].imag)))
+    rest = np.atleast_1d(np.poly(np.delete(z[case], first))).real
+    return [[max(float(z[case][first].real), 0.0), *map(float, rest[1:])]]
 
 
 def _radius_guess(directions: Sequence[int], values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:

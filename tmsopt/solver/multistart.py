@@ -23,6 +23,8 @@ _HOPELESS = 16  # starts without a feasible end after which the least-violating 
 _ENOUGH_SAMPLED, _AGREE_SAMPLED, _HOPELESS_SAMPLED = 4, 2, 8
 """The same where the starts come from a sample of the box: so many starts for each optimum that was met."""
 
+_NARROW = 0.02  # share of a sample that meets all limits, below which twice as many starts are wanted
+
 _MET = 1e-14  # sum of squares of coefficients at which more conditions than parameters are met
 _SAME = 1e-7  # relative difference of objectives that counts as the same
 _FEASIBLE = 1e-6  # of the rows, before polishing; the recheck has the last word
@@ -54,10 +56,10 @@ class Candidate:
     feasible: bool
 
 
-def search(work: Workspace, nlp: NLP) -> list[Candidate]:
+def search(work: Workspace, nlp: NLP, most: int | None = None) -> list[Candidate]:
     """Where every start ended that was tried, in order; a design near the optimum, where one is given, before all."""
     run, part, options = Runner(work, nlp), work.part, work.options
-    starts, candidates = options.starts, list[Candidate]()
+    starts, candidates = min(options.starts, most or options.starts), list[Candidate]()
     if options.near:
         candidates.append(run.ended({**middle(part), **options.near}, near=True))
         if not options.exhaustive and _settled(work, candidates):
@@ -139,13 +141,15 @@ class Runner:
                 break
             best = ended
         best = self._crossed(best)
-        return best if near or not best.feasible else self._no_worse(best, design)
+        if not best.feasible or (near and not self.nlp.touches):
+            return best
+        return self._no_worse(best, design, "far" if near else "near")
 
-    def _no_worse(self, best: Candidate, design: Mapping[str, float]) -> Candidate:
-        """Where it ended, or where a start that was better than that ends if IPOPT keeps to it."""
+    def _no_worse(self, best: Candidate, design: Mapping[str, float], start: str) -> Candidate:
+        """Where it ended, or where a start that was better than that ends if IPOPT keeps to it, or does not."""
         if self.work.part.pattern is not None or worth(self.work.part, design) >= best.objective - _SAME:
             return best
-        kept = self._once(design, "near")
+        kept = self._once(design, start)
         return kept if kept.feasible and kept.objective < best.objective else best
 
     def _once(self, design: Mapping[str, float], start: str) -> Candidate:
@@ -230,7 +234,8 @@ def _settled(work: Workspace, candidates: list[Candidate]) -> bool:
     if sampled and failed >= _HOPELESS:  # which takes long; the sample is the judge of what was found
         return True
     if sampled:
-        return len(candidates) >= _ENOUGH_SAMPLED * w and agreeing >= _AGREE_SAMPLED
+        each = _ENOUGH_SAMPLED if work.sample and work.sample.met > _NARROW * work.sample.size else 2 * _ENOUGH_SAMPLED
+        return len(candidates) >= each * w and agreeing >= _AGREE_SAMPLED
     seen = n > w + 2 and w * (n - 1) <= (w + 0.5) * (n - w - 2)
     return len(candidates) >= _ENOUGH and agreeing >= _AGREE and seen
 

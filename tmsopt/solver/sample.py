@@ -115,13 +115,14 @@ class Sample:
     Attributes:
         refined: designs far from each other that violate least, or are best of those that violate nothing, refined.
         boldest: designs far from each other that are best whatever they violate.
-        met: designs of the sample that meet all limits.
+        met, size: designs of the sample that meet all limits, and of all.
         spread: of the objective, over half of them.
     """
 
     refined: Looked
     boldest: Looked
     met: int
+    size: int
     spread: float
 
 
@@ -162,7 +163,7 @@ class Sampler:
         known = drawn.worth[np.isfinite(drawn.worth)]
         spread = float(np.subtract(*np.percentile(known, [75, 25]))) if known.size else 0.0
         met = int(np.sum(drawn.violation == 0))
-        return Sample(refined.take(refined.ranked), bold.take(apart(bold, _BOLD)), met, spread)
+        return Sample(refined.take(refined.ranked), bold.take(apart(bold, _BOLD)), met, len(drawn), spread)
 
     def draw(self) -> Looked:
         """Corners, a quasi-random sequence, and some of it moved to faces."""

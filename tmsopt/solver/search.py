@@ -27,6 +27,7 @@ _ROUNDS, _FAR_ROUNDS = 12, 40
 
 _LEADERS = 3  # optima followed when cases are added: a better one may do worse between the old cases
 _STABLE = "every root left of the axis"  # the name of a constraint
+_FEWER = 8  # starts for positive real roots where the others have led somewhere
 _NEARER = 1e-7  # share of the radius
 
 
@@ -52,10 +53,10 @@ def explore(work: Workspace) -> Explored:
     nlp = work.formulate(cases)
     candidates = search(work, nlp)
     trial = survivor(work, nlp, candidates)
-    if "damping_ratio" in nlp.variables and (trial is None or _unstable(work.problem, trial)):
+    if "damping_ratio" in nlp.variables and (trial is None or _unstable(work.problem, nlp, trial)):
         # A positive real root has −1, and no sector of its own.
         unstable = work.formulate(cases, damping_ratio=-1.0)
-        others = search(work, unstable)
+        others = search(work, unstable, _FEWER if trial and nlp.touches else work.options.starts)
         other = survivor(work, unstable, others)
         if other is not None and (trial is None or (not other.checked.violations and ahead(work, other, trial))):
             nlp, candidates, trial = unstable, others, other
@@ -124,8 +125,10 @@ def evaluated_cases(problem: Problem, parameters: Mapping[str, float]) -> tuple[
     return (*listed, *(w.case for w in worst_cases(problem, parameters).values())) if listed else ()
 
 
-def _unstable(problem: Problem, trial: Trial) -> bool:
+def _unstable(problem: Problem, nlp: NLP, trial: Trial) -> bool:
     """Whether the best design may have been kept from positive real roots, where the damping ratio is not the goal."""
+    if "damping_ratio" in nlp.touches:  # the less of it the better, somewhere
+        return True
     asked = problem.objective is not None and "damping_ratio" in problem.objective.names
     return not asked and trial.checked.structure.abscissa > 0
 
