@@ -1,4 +1,4 @@
-"""Formulas multiplied out: polynomials in symbols, with exact fractions, or balls where these are none, as coefficients.
+"""Formulas multiplied out: polynomials in symbols with exact fractions, or balls, for coefficients.
 
 What a model computes of balls it computes of these too, so no constant is folded in doubles on the way.
 """
@@ -57,7 +57,7 @@ class Formal:
     @cached_property
     def key(self) -> str:
         """Equal for the same terms."""
-        return " + ".join(sorted(f"{c} {[(s.key, p) for s, p in m]}" for m, c in self.terms.items()))
+        return " + ".join(sorted(f"{_digits(c)} {[(s.key, p) for s, p in m]}" for m, c in self.terms.items()))
 
     @property
     def constant(self) -> Any:
@@ -101,11 +101,10 @@ class Formal:
         return -self + other
 
     def __truediv__(self, other: Any) -> "Formal":
-        divisor = _formal(other)
-        return self * (divisor.applied("inv") if divisor.constant is None else 1 / divisor.constant)
+        return self * _inverse(_formal(other))
 
     def __rtruediv__(self, other: Any) -> "Formal":
-        return _formal(other) / self
+        return _inverse(self) * other
 
     def __pow__(self, exponent: Any) -> "Formal":
         power = _formal(exponent).constant
@@ -115,7 +114,7 @@ class Formal:
         if power is None or power != whole or abs(whole) > _WHOLE:
             raise NotAccepted("a power that is not whole, or too high")
         if whole < 0:
-            return 1 / self**-whole
+            return _inverse(self**-whole)
         found = Formal({(): flint.fmpq(1)})
         for _ in range(whole):
             found = found * self
@@ -205,8 +204,18 @@ def _formal(x: Any) -> Formal:
     return Formal({(): flint.fmpq(*x.as_integer_ratio()) if isinstance(x, int | float) else x})
 
 
+def _inverse(x: Formal) -> Formal:
+    return x.applied("inv") if x.constant is None else _formal(1 / x.constant)
+
+
 def _exact(x: Any) -> bool:
     return isinstance(x, flint.fmpq) or x.is_exact()
+
+
+def _digits(c: Any) -> str:
+    """All of a coefficient."""
+    finite = isinstance(c, flint.arb) and c.is_finite()
+    return f"{c.mid().man_exp()} {c.rad().man_exp()}" if finite else str(c)
 
 
 def _times(m: Monomial, n: Monomial) -> Monomial:

@@ -13,10 +13,10 @@ import flint
 from tmsopt.arithmetic.balls import number
 from tmsopt.arithmetic.elementary import rational
 from tmsopt.arithmetic.formal import variable
-from tmsopt.arithmetic.intervals import ball, interval
+from tmsopt.arithmetic.intervals import interval
 from tmsopt.arithmetic.krawczyk import Enclosure, Refused, enclosed, refined
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.completeness.conditions import Chart, Ends, charts
+from tmsopt.completeness.conditions import Sheet, Ends, sheets
 from tmsopt.completeness.pruning import SMALL, Box, Pruned, Puzzle, prune
 from tmsopt.completeness.statement import Completeness, Undecided
 from tmsopt.completeness.trees import ends, partial, tree
@@ -37,7 +37,7 @@ _TIME = "time was over"
 _STOPPED = "interrupted"
 _UNITS = 1.375  # of the usual unit: roots are often at 1, where large and small ones meet
 _CARRIED, _DIGITS, _SHOWN = 60, 40, 25  # decimal digits: of arithmetic, of a zero, of a design
-_TURN = 0.25  # seconds
+_TURN, _LONGEST = 0.25, 1e6  # seconds
 _MOST = 400  # boxes that can neither be emptied nor be split: then they are no isolated designs
 _SAID = 12  # places that are named
 
@@ -63,13 +63,13 @@ def completeness(problem: Problem, seconds: float = SECONDS, progress: Progress 
     began = time.perf_counter()
     with flint.ctx.workdps(_CARRIED):
         try:
-            posed = [(chart, *_puzzle(chart)) for chart in _charts(problem)]
+            posed = [(sheet, *_puzzle(sheet)) for sheet in _sheets(problem)]
         except (NotAccepted, TypeError) as error:
             return Completeness(False, f"branch and prune cannot take {error}")
         run = _Run(began + seconds, seconds, progress)
         try:
-            for chart, puzzle, box in posed:
-                run.search(chart, puzzle, box)
+            for sheet, puzzle, box in posed:
+                run.search(sheet, puzzle, box)
         except KeyboardInterrupt:
             run.stopped = _STOPPED
         finally:
@@ -79,13 +79,13 @@ def completeness(problem: Problem, seconds: float = SECONDS, progress: Progress 
 
 @dataclass(frozen=True)
 class _Zero:
-    """A solution of the equations of a chart, proved.
+    """A solution of the equations of a sheet, proved.
 
     Attributes:
         near: the box in which it is the only one.
     """
 
-    chart: Chart
+    sheet: Sheet
     enclosure: Enclosure
     near: Box
 
@@ -101,13 +101,13 @@ class _Run:
     boxes: int = 0
     stopped: str = ""
     zeros: list[_Zero] = field(default_factory=list)
-    left: list[tuple[Chart, Box, str]] = field(default_factory=list)
+    left: list[tuple[Sheet, Box, str]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.worker = Worker(self.inbox, apart=True)
 
-    def search(self, chart: Chart, puzzle: Puzzle, first: Box) -> None:
-        """All zeros of a chart in its box."""
+    def search(self, sheet: Sheet, puzzle: Puzzle, first: Box) -> None:
+        """All zeros of a sheet in its box."""
         known: list[_Zero] = []
         waiting: list[Box] = [first]
         small: list[Box] = []
@@ -119,8 +119,8 @@ class _Run:
                 waiting = list(pruned.left)
                 small += pruned.small
                 for box in pruned.met:
-                    zero = _zero(chart, box)
-                    if zero and not any(_within(zero.enclosure.balls, chart.names, other.near) for other in known):
+                    zero = _zero(sheet, box)
+                    if zero and not any(_within(zero.enclosure.balls, sheet.names, other.near) for other in known):
                         known.append(zero)
                         waiting.append(box)
                     elif halves := _halves(box, puzzle.widths):
@@ -132,8 +132,8 @@ class _Run:
         except KeyboardInterrupt:
             self.stopped = _STOPPED
         self.zeros += known
-        self.left += [(chart, box, _SINGULAR) for box in small]
-        self.left += [(chart, box, self.stopped or _SINGULAR) for box in waiting]
+        self.left += [(sheet, box, _SINGULAR) for box in small]
+        self.left += [(sheet, box, self.stopped or _SINGULAR) for box in waiting]
 
     def asked(self, puzzle: Puzzle, boxes: Sequence[Box], proved: Sequence[Box], most: int) -> Pruned:
         """What a worker makes of boxes; these again where time is over."""
@@ -143,7 +143,7 @@ class _Run:
         if left > 0:
             self.worker.send(prune, puzzle, boxes, proved, min(_TURN, left), most)
             try:
-                _, answer = self.inbox.get(timeout=left + _TURN)
+                _, answer = self.inbox.get(timeout=min(left, _LONGEST) + _TURN)
                 if answer is not None:
                     return answer  # type: ignore[no-any-return]
                 self.stopped = "branch and prune ended by an error"
@@ -172,10 +172,11 @@ class _Run:
             boxes=self.boxes,
             seconds=seconds,
             undecided=undecided,
+            stopped=self.stopped == _STOPPED,
         )
 
 
-def _charts(problem: Problem) -> Iterator[Chart]:
+def _sheets(problem: Problem) -> Iterator[Sheet]:
     """The equations, one for each way in which the roots may be small or large."""
     assert problem.pattern is not None
     equalities = tuple(c for c in problem.conditions.values() if c.equality)
@@ -194,28 +195,28 @@ def _charts(problem: Problem) -> Iterator[Chart]:
     scale = scale_of(problem)
     scale = Scale(_UNITS * scale.unit, scale.lead)
     held = {n: rational(decimal(x)) for n, x in problem.fixed.items()}
-    for pieces in charts(problem.pattern.name):
-        yield Chart(problem, pieces, scale, equalities, tuple(met.values()), held)
+    for pieces in sheets(problem.pattern.name):
+        yield Sheet(problem, pieces, scale, equalities, tuple(met.values()), held)
 
 
-def _puzzle(chart: Chart) -> tuple[Puzzle, Box]:
+def _puzzle(sheet: Sheet) -> tuple[Puzzle, Box]:
     """Equations and limits as plain data, and the box of all unknowns.
 
     Raises:
         NotAccepted: for equations that have no such form.
     """
-    names = chart.names
+    names = sheet.names
     at = {n: variable(n) for n in names}
-    equations = tuple(tree(e, names) for e in chart(at))
-    limits = [*chart.nonnegative(at), *chart.ascending(at)]
-    values = chart.values(at)
-    for condition in chart.problem.conditions.values():
+    equations = tuple(tree(e, names) for e in sheet(at))
+    limits = [*sheet.nonnegative(at), *sheet.ascending(at)]
+    values = sheet.values(at)
+    for condition in sheet.problem.conditions.values():
         if not condition.equality:
             try:
                 limits.append(-condition.sign * condition.enclosure(values, decimal_fraction))
             except (NotAccepted, TypeError, KeyError):
                 continue  # it takes no part, and is asked of every design that is found
-    box = tuple(_range(ends) for ends in _ends(chart))
+    box = tuple(_range(ends) for ends in _ends(sheet))
     guarded = set().union(*(partial(e) for e in equations))
     trees = tuple(tree(limit, names) for limit in limits)
     return Puzzle(equations, trees, tuple(sorted(guarded)), tuple(_width(*limits) for limits in box)), box
@@ -225,15 +226,15 @@ def _width(lo: float, hi: float) -> float:
     return hi - lo if math.isfinite(hi - lo) else 1.0
 
 
-def _ends(chart: Chart) -> list[tuple[Any, Any]]:
+def _ends(sheet: Sheet) -> list[tuple[Any, Any]]:
     """Least and greatest value of each unknown, as balls."""
-    problem = chart.problem
-    found = []
-    for name, limits in problem.free.items():
-        both = [flint.arb(rational(decimal(x))) for x in limits]
-        found.append(tuple(x.tan() for x in both) if problem.parameter_set[name].tangent else tuple(both))
-    for lo, hi in [(q.range.lower, q.range.upper) for q in chart.lifted] + [r for p in chart.pieces for r in p.ranges]:
-        found.append((flint.arb(lo), flint.arb(hi)))
+    problem = sheet.problem
+    found: list[tuple[Any, Any]] = []
+    for name, (least, greatest) in problem.free.items():
+        lo, hi = flint.arb(rational(decimal(least))), flint.arb(rational(decimal(greatest)))
+        found.append((lo.tan(), hi.tan()) if problem.parameter_set[name].tangent else (lo, hi))
+    for low, high in [(q.range.lower, q.range.upper) for q in sheet.lifted] + [r for p in sheet.pieces for r in p.ranges]:
+        found.append((flint.arb(low), flint.arb(high)))
     return found
 
 
@@ -242,16 +243,16 @@ def _range(limits: tuple[Any, Any]) -> Ends:
     return lo[0], hi[1]
 
 
-def _zero(chart: Chart, box: Box) -> _Zero | None:
+def _zero(sheet: Sheet, box: Box) -> _Zero | None:
     """The zero beside a box, proved; None where the test fails."""
-    start = {n: flint.arb(lo + (hi - lo) / 2) for n, (lo, hi) in zip(chart.names, box, strict=True)}
+    start = {n: flint.arb(lo + (hi - lo) / 2) for n, (lo, hi) in zip(sheet.names, box, strict=True)}
     try:
-        middle = refined(chart, start, chart.names, _DIGITS)
-        found = enclosed(chart, middle, chart.names, _DIGITS)
+        middle = refined(sheet, start, sheet.names, _DIGITS)
+        found = enclosed(sheet, middle, sheet.names, _DIGITS)
     except (Refused, ZeroDivisionError, ValueError):
         return None
-    near = [(middle[n] - found.uniqueness, middle[n] + found.uniqueness) for n in chart.names]
-    return _Zero(chart, found, tuple((interval(lo)[1], interval(hi)[0]) for lo, hi in near))
+    near = [(middle[n] - found.uniqueness, middle[n] + found.uniqueness) for n in sheet.names]
+    return _Zero(sheet, found, tuple((interval(lo)[1], interval(hi)[0]) for lo, hi in near))
 
 
 def _within(balls: Mapping[str, Any], names: Sequence[str], box: Box) -> bool:
@@ -260,17 +261,19 @@ def _within(balls: Mapping[str, Any], names: Sequence[str], box: Box) -> bool:
 
 def _standing(zero: _Zero) -> str | None:
     """The limit on which a design lies as far as can be told, or empty; None for one beyond a limit."""
-    chart, at = zero.chart, zero.enclosure.balls
-    values = chart.values(at)
+    sheet, at = zero.sheet, zero.enclosure.balls
+    values = sheet.values(at)
     room: list[tuple[str, Any]] = []
-    for name, (lo, hi) in zip(chart.names, _ends(chart), strict=True):
+    for name, (lo, hi) in zip(sheet.names, _ends(sheet), strict=True):
         said = "" if name.startswith(":") else name
         room += [(said and f"the least {said}", at[name] - lo), (said and f"the greatest {said}", hi - at[name])]
-    room += [("the edge of the pattern", x) for x in chart.nonnegative(at)]
-    room += [("", x) for x in chart.ascending(at)]
-    for name, condition in chart.problem.conditions.items():
+    room += [("the edge of the pattern", x) for x in sheet.nonnegative(at)]
+    room += [("", x) for x in sheet.ascending(at)]
+    for name, condition in sheet.problem.conditions.items():
         if not condition.equality:
-            room.append((f"constraint {name}", -condition.sign * flint.arb(condition.enclosure(values, decimal_fraction))))
+            room.append(
+                (f"constraint {name}", -condition.sign * flint.arb(condition.enclosure(values, decimal_fraction)))
+            )
     if any(x < 0 for _, x in room):
         return None
     on = [said for said, x in room if said and not x > 0]
@@ -288,7 +291,7 @@ def _halves(box: Box, widths: Sequence[float]) -> list[Box]:
     return [(*box[:k], ends, *box[k + 1 :]) for ends in ((lo, middle), (middle, hi))]
 
 
-def _places(problem: Problem, left: Iterable[tuple[Chart, Box, str]]) -> list[tuple[Box, str]]:
+def _places(problem: Problem, left: Iterable[tuple[Sheet, Box, str]]) -> list[tuple[Box, str]]:
     """Hulls in the free parameters of boxes that touch."""
     count = len(problem.free)
     places: list[tuple[Box, str]] = []

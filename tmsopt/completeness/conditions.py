@@ -57,9 +57,14 @@ class Piece:
     def factor(self, unknowns: Sequence[Any]) -> list[Any]:
         """Monic, in s or in 1/s."""
         u = self.own(unknowns)
-        return {"root": lambda: [1, -u[0]], "axis": lambda: [1, 0, u[0]], "zero": lambda: [1, 0]}.get(
-            self.kind, lambda: [1, *u]
-        )()
+        match self.kind:
+            case "root":
+                return [1, -u[0]]
+            case "axis":
+                return [1, 0, u[0]]
+            case "zero":
+                return [1, 0]
+        return [1, *u]
 
     def place(self, unknowns: Sequence[Any]) -> Any:
         """What ascends among factors that may change places."""
@@ -76,7 +81,7 @@ class Piece:
         return []
 
 
-def charts(name: str) -> Iterator[tuple[Piece, ...]]:
+def sheets(name: str) -> Iterator[tuple[Piece, ...]]:
     """The ways in which the roots of a pattern may be small or large."""
     for choice in product(*(list(_ways(part)) for part in parts_of(name))):
         pieces: list[Piece] = []
@@ -102,7 +107,7 @@ def _ways(part: Part) -> Iterator[list[tuple[str, int, bool]]]:
 
 
 @dataclass(frozen=True)
-class Chart:
+class Sheet:
     """The equations of a pattern where some of its roots are small and the others large; names go to any numbers.
 
     A parameter goes by its name, an angle by its tangent; a quantity with an equation of its own by its name; the

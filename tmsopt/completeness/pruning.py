@@ -73,7 +73,9 @@ def prune(puzzle: Puzzle, boxes: Sequence[Box], proved: Sequence[Box], seconds: 
         raise RuntimeError("doubles are not rounded upwards, as codac needs it")
     contractors = _contractors(puzzle)
     known = [_vector(codac, box) for box in proved]
-    left, met, small = list(boxes), [], []
+    left = list(boxes)
+    met: list[Box] = []
+    small: list[Box] = []
     end, count = time.perf_counter() + seconds, 0
     while left and not met and len(small) < most and (count == 0 or time.perf_counter() < end):
         x = _vector(codac, left.pop())
@@ -218,24 +220,16 @@ def _scalar(codac: Any, x: Any, found: Tree) -> Any:
 
 
 def _expression(codac: Any, found: Tree, x: Any) -> Any:
-    match found:
-        case ("x", k):
-            return codac.ScalarExpr(x[k])
-        case ("c", least, greatest):
-            return codac.ScalarExpr(codac.Interval(least, greatest))
-        case ("+", a, b):
-            return _expression(codac, a, x) + _expression(codac, b, x)
-        case ("*", a, b):
-            return _expression(codac, a, x) * _expression(codac, b, x)
-        case ("^", a, 2):
-            return codac.sqr(_expression(codac, a, x))
-        case ("^", a, power):
-            return codac.pow(_expression(codac, a, x), codac.ScalarExpr(codac.Interval(power)))
-        case ("inv", a):
-            return codac.ScalarExpr(codac.Interval(1.0)) / _expression(codac, a, x)
-        case (name, a):
-            return getattr(codac, name)(_expression(codac, a, x))
-    raise ValueError(found)
+    operation, *rest = found
+    parts = [_expression(codac, part, x) for part in rest if isinstance(part, tuple)]
+    return {
+        "x": lambda: codac.ScalarExpr(x[rest[0]]),
+        "c": lambda: codac.ScalarExpr(codac.Interval(*rest)),
+        "+": lambda: parts[0] + parts[1],
+        "*": lambda: parts[0] * parts[1],
+        "^": lambda: codac.pow(parts[0], codac.ScalarExpr(codac.Interval(rest[1]))),
+        "inv": lambda: codac.ScalarExpr(codac.Interval(1.0)) / parts[0],
+    }.get(operation, lambda: getattr(codac, operation)(*parts))()
 
 
 def _vector(codac: Any, box: Box) -> Any:

@@ -32,6 +32,7 @@ class Completeness:
         boxes: that interval branch and prune looked at.
         seconds: that it took.
         undecided: where it did not decide.
+        stopped: whether Ctrl-C ended it.
     """
 
     complete: bool
@@ -41,6 +42,7 @@ class Completeness:
     boxes: int = 0
     seconds: float = 0.0
     undecided: tuple[Undecided, ...] = ()
+    stopped: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
