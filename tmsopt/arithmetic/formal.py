@@ -89,7 +89,8 @@ class Formal:
                 found[both] = found[both] + c * d if both in found else c * d
         return Formal(found)
 
-    __radd__, __rmul__ = __add__, __mul__
+    __radd__ = __add__
+    __rmul__ = __mul__
 
     def __neg__(self) -> "Formal":
         return Formal({m: -c for m, c in self.terms.items()})

@@ -16,7 +16,7 @@ from tmsopt.arithmetic.formal import variable
 from tmsopt.arithmetic.intervals import interval
 from tmsopt.arithmetic.krawczyk import Enclosure, Refused, enclosed, refined
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.completeness.conditions import Sheet, Ends, sheets
+from tmsopt.completeness.conditions import Ends, Sheet, sheets
 from tmsopt.completeness.pruning import SMALL, Box, Pruned, Puzzle, prune
 from tmsopt.completeness.statement import Completeness, Undecided
 from tmsopt.completeness.trees import ends, partial, tree
@@ -233,7 +233,9 @@ def _ends(sheet: Sheet) -> list[tuple[Any, Any]]:
     for name, (least, greatest) in problem.free.items():
         lo, hi = flint.arb(rational(decimal(least))), flint.arb(rational(decimal(greatest)))
         found.append((lo.tan(), hi.tan()) if problem.parameter_set[name].tangent else (lo, hi))
-    for low, high in [(q.range.lower, q.range.upper) for q in sheet.lifted] + [r for p in sheet.pieces for r in p.ranges]:
+    for low, high in [(q.range.lower, q.range.upper) for q in sheet.lifted] + [
+        r for p in sheet.pieces for r in p.ranges
+    ]:
         found.append((flint.arb(low), flint.arb(high)))
     return found
 

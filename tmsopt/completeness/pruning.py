@@ -22,7 +22,7 @@ SMALL = 1e-7
 """Of the first box: what is smaller is not split."""
 
 _GAIN = 0.9  # of a width: contracting goes on where one shrinks below
-_ROUNDS = 6
+_ROUNDS = 8
 _WIDER = 0.1  # of a width: the box in which a zero is looked for is so much wider at each end
 
 
@@ -119,15 +119,17 @@ class _Contractors:
 
     def contract(self, x: Any) -> bool:
         """Shrink a box around its zeros; whether Newton's operator shows one in it, or just beside."""
-        zero = False
+        zero, self.slopes = False, None
         for _ in range(_ROUNDS):
-            before = [x[k].diam() for k in range(x.size())]
+            before = x.diam()
             for row in self.rows:
                 row.contract(x)
                 if x.is_empty():
                     return False
+            if _shrunk(x, before):
+                continue
             zero = self.newton(x) or zero
-            if x.is_empty() or all(x[k].diam() >= _GAIN * d for k, d in enumerate(before) if d > 0):
+            if x.is_empty() or not _shrunk(x, before):
                 break
         return zero
 
@@ -144,6 +146,7 @@ class _Contractors:
         slopes, value = self.system.diff(wide), self.system.eval(codac.EvalMode.NATURAL, middle)
         if slopes.is_empty() or value.is_empty() or slopes.is_unbounded() or value.is_unbounded():
             return False
+        self.slopes = slopes
         try:
             inverse = np.linalg.inv([[slopes[i, k].mid() for k in range(n)] for i in range(n)])
         except np.linalg.LinAlgError:
@@ -196,10 +199,7 @@ class _Contractors:
         """How much each variable's width adds to those of the equations, at most 1 each; or its share of the first."""
         n = x.size()
         own = [min(x[k].diam() / self.widths[k], 1.0) if self.widths[k] > 0 else 0.0 for k in range(n)]
-        if x.is_unbounded() or not self.regular(x):
-            return own
-        slopes = self.system.diff(x)
-        if slopes.is_empty() or slopes.is_unbounded():
+        if (slopes := self.slopes) is None:
             return own
         total = [0.0] * n
         for i in range(n):
@@ -208,6 +208,11 @@ class _Contractors:
             if whole > 0:
                 total = [t + p / whole for t, p in zip(total, parts, strict=True)]
         return [t + 1e-3 * s for t, s in zip(total, own, strict=True)]
+
+
+def _shrunk(x: Any, before: Any) -> bool:
+    """Whether a side of a box is now notably shorter."""
+    return any(x[k].diam() < _GAIN * before[k] for k in range(x.size()))
 
 
 @cache
