@@ -89,8 +89,11 @@ class Formal:
                 found[both] = found[both] + c * d if both in found else c * d
         return Formal(found)
 
-    __radd__ = __add__
-    __rmul__ = __mul__
+    def __radd__(self, other: Any) -> "Formal":
+        return self.__add__(other)
+
+    def __rmul__(self, other: Any) -> "Formal":
+        return self.__mul__(other)
 
     def __neg__(self) -> "Formal":
         return Formal({m: -c for m, c in self.terms.items()})
@@ -99,13 +102,13 @@ class Formal:
         return self + -_formal(other)
 
     def __rsub__(self, other: Any) -> "Formal":
-        return -self + other
+        return -self + _formal(other)
 
     def __truediv__(self, other: Any) -> "Formal":
         return self * _inverse(_formal(other))
 
     def __rtruediv__(self, other: Any) -> "Formal":
-        return _inverse(self) * other
+        return _inverse(self) * _formal(other)
 
     def __pow__(self, exponent: Any) -> "Formal":
         power = _formal(exponent).constant
