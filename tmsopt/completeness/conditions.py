@@ -185,18 +185,19 @@ class Sheet:
 def conditions(a: Sequence[Any], pieces: Sequence[Piece], unknowns: Sequence[Any]) -> list[Any]:
     """Expressions that are all 0 where the factors divide a polynomial, each as often as its power says.
 
-    Where they make up all of it, its coefficients less those of the product, in fewer terms; else the remainders.
+    Where they make up all of it, its coefficients less those of the product, in fewer terms; else the remainders, of
+    small and of large roots apart, for these are not the same.
     """
     left: list[Any] = []
     for outer in (False, True):
-        a = a[::-1] if outer else a
+        rest = a[::-1] if outer else a
         factors = [p.factor(unknowns) for p in pieces if p.outer == outer for _ in range(p.order)]
         whole = multiplied(*factors)
         if len(whole) == len(a):
-            return left + [c - a[0] * f for c, f in zip(a[1:], whole[1:], strict=True)]
+            return left + [c - rest[0] * f for c, f in zip(rest[1:], whole[1:], strict=True)]
         for factor in factors:
-            a, rest = divided(a, factor)
-            left += rest
+            rest, remainder = divided(rest, factor)
+            left += remainder
     return left
 
 

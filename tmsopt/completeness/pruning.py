@@ -111,7 +111,7 @@ class _Contractors:
         x = codac.VectorVar(n)
         self.system = codac.AnalyticFunction([x], [_expression(codac, e, x) for e in puzzle.equations])
         zero = codac.IntervalVector([[0.0, 0.0]] * n)
-        self.rows = [codac.CtcInverse(self.system, zero, False)]
+        self.rows = [codac.CtcInverse(self.system, zero, not puzzle.guarded)]
         nonnegative = codac.Interval(0.0, math.inf)
         for limit in puzzle.limits:
             self.rows.append(codac.CtcInverse(_scalar(codac, x, limit), nonnegative, False))
@@ -120,13 +120,13 @@ class _Contractors:
     def contract(self, x: Any) -> bool:
         """Shrink a box around its zeros; whether Newton's operator shows one in it, or just beside."""
         zero, self.slopes = False, None
-        for _ in range(_ROUNDS):
+        for turn in range(_ROUNDS):
             before = x.diam()
             for row in self.rows:
                 row.contract(x)
                 if x.is_empty():
                     return False
-            if _shrunk(x, before):
+            if _shrunk(x, before) and turn < _ROUNDS - 1:
                 continue
             zero = self.newton(x) or zero
             if x.is_empty() or not _shrunk(x, before):
