@@ -41,7 +41,9 @@ def agree(found: Completeness, designs: list[list[Any]]) -> bool:
     assert all(len(limits) == 0 for limits in found.limits)
     order = [sorted(rows, key=lambda row: [float(v) for v in row]) for rows in (own, designs)]
     return len(own) == len(designs) and all(
-        abs(a - b) < DIGITS * (1 + abs(b)) for one, other in zip(*order, strict=True) for a, b in zip(one, other, strict=True)
+        abs(a - b) < DIGITS * (1 + abs(b))
+        for one, other in zip(*order, strict=True)
+        for a, b in zip(one, other, strict=True)
     )
 
 
@@ -80,13 +82,17 @@ def test_the_optimised_benchmark_is_the_only_bicycle() -> None:
     assert found.complete
     (design,) = found.designs
     assert design["chi_B"].contains("1.19")
-    assert [float(design[n]) for n in ("Fr", "mu", "lambda_s")] == pytest.approx([2.337214017, 20.84626701, 0.8514403685])
+    assert [float(design[n]) for n in ("Fr", "mu", "lambda_s")] == pytest.approx(
+        [2.337214017, 20.84626701, 0.8514403685]
+    )
 
 
 def test_the_three_controllers_with_one_root() -> None:
     """(s⁴ + 2 s²)(s² + x1 s + x0) + y2 s² + y1 s + y0 = (s − r)⁶: x1 = −6r, 15 r² = x0 + 2, 20 r³ = 12 r."""
     r = mpmath.sqrt(mpmath.mpf(3) / 5)
-    designs = [[15 * s**2 - 2, -6 * s, s**6, -6 * s**5, 15 * s**4 - 2 * (15 * s**2 - 2)] for s in (-r, mpmath.mpf(0), r)]
+    designs = [
+        [15 * s**2 - 2, -6 * s, s**6, -6 * s**5, 15 * s**4 - 2 * (15 * s**2 - 2)] for s in (-r, mpmath.mpf(0), r)
+    ]
     found = of_file("two_mass_spring", minimize=None, locate="EP6")
     assert found.complete
     assert agree(found, designs)
@@ -96,14 +102,16 @@ def test_ten_meetings_of_one_pair() -> None:
     """s² + 3 T₅(x) s + 1 has a double root where T₅(x) = ±2/3."""
     chebyshev = 16 * x**5 - 20 * x**3 + 5 * x
     angles = [mpmath.acos(s * mpmath.mpf(2) / 3) for s in (-1, 1)]
-    designs = {mpmath.nstr(mpmath.cos((s * a + 2 * mpmath.pi * k) / 5), 30) for a in angles for s in (-1, 1) for k in range(5)}
+    designs = {
+        mpmath.nstr(mpmath.cos((s * a + 2 * mpmath.pi * k) / 5), 30) for a in angles for s in (-1, 1) for k in range(5)
+    }
     assert len(designs) == 10
     found = of_row([1, 3 * chebyshev, 1], "EP2", (-1.5, 1.5))
     assert found.complete
     assert agree(found, [[mpmath.mpf(d)] for d in designs])
 
 
-@pytest.mark.parametrize("size", [1e-3, 1.0, 50.0])
+@pytest.mark.parametrize("size", [1e-3, 0.4, 50.0])
 def test_roots_of_any_size(size: float) -> None:
     """(s − size)³ (s − 1), unfolded by x and y."""
     row = np.polymul(np.poly([size] * 3), [1.0, -1.0])
@@ -136,7 +144,10 @@ def test_as_many_as_elimination_finds(seed: int) -> None:
     rng = np.random.default_rng(seed)
     weights = rng.integers(-5, 6, (3, 6)).tolist()
     u, v = sp.symbols("x y")
-    row = [[w[0] + w[1] * p + w[2] * q + w[3] * p * q + w[4] * p * p + w[5] * q * q for w in weights] for p, q in ((x, y), (u, v))]
+    row = [
+        [w[0] + w[1] * p + w[2] * q + w[3] * p * q + w[4] * p * p + w[5] * q * q for w in weights]
+        for p, q in ((x, y), (u, v))
+    ]
     a1, a2, a3 = row[1]
     expected = _by_elimination([sp.expand(a1**2 - 3 * a2), sp.expand(a1 * a2 - 9 * a3)], (-4, 4))
     found = of_row([1, *row[0]], "EP3")
@@ -149,12 +160,12 @@ def test_as_many_as_elimination_finds(seed: int) -> None:
     [
         ("EP3", [[1, 1], [1, 1], [1, 1], [1, 0.5, 3]]),
         ("CEP2", [[1, 1, 2], [1, 1, 2], [1, 3]]),
-        ("EP2+EP2", [[1, 1], [1, 1], [1, 2], [1, 2], [1, 0.25, 1], [1, 5]]),
+        ("EP2+EP2", [[1, 1], [1, 1], [1, 2], [1, 2], [1, 0.25, 1]]),
         ("EP3+EP2", [[1, 1], [1, 1], [1, 1], [1, 2], [1, 2], [1, 1, 7]]),
-        ("CEP2+EP2", [[1, 1, 2], [1, 1, 2], [1, 3], [1, 3], [1, 1, 9]]),
+        ("CEP2+EP2", [[1, 1, 2], [1, 1, 2], [1, 3], [1, 3]]),
         ("resonance", [[1, 0, 2], [1, 0, 2], [1, 3]]),
         ("weave+capsize", [[1, 0, 2], [1, 3], [1, 0], [1, 1]]),
-        ("3EP2", [[1, 1], [1, 1], [1, 2], [1, 2], [1, 4], [1, 4], [1, 1]]),
+        pytest.param("3EP2", [[1, 1], [1, 1], [1, 2], [1, 2], [1, 4], [1, 4]], marks=pytest.mark.slow),
     ],
 )
 def test_a_design_of_each_pattern_is_among_them(pattern: str, factors: list[list[float]]) -> None:
@@ -166,8 +177,11 @@ def test_a_design_of_each_pattern_is_among_them(pattern: str, factors: list[list
     rng = np.random.default_rng(len(row))
     weights = rng.integers(-3, 4, (len(row), 3)).tolist()
     names = [x, y, z][:count]
-    unfolded = [row[0], *(c + sum(w * n for w, n in zip(ws, names, strict=False)) for c, ws in zip(row[1:], weights, strict=False))]
-    found = of_row(unfolded, pattern, (-0.3, 0.31))
+    unfolded = [
+        row[0],
+        *(c + sum(w * n for w, n in zip(ws, names, strict=False)) for c, ws in zip(row[1:], weights, strict=False)),
+    ]
+    found = of_row(unfolded, pattern, (-0.1, 0.11) if count < 3 else (-0.03, 0.04))
     assert found.complete
     assert sum(all(v.contains(0) for v in d.values()) for d in found.designs) == 1
 
@@ -177,13 +191,20 @@ def test_a_design_of_each_pattern_is_among_them(pattern: str, factors: list[list
 
 def test_inequalities_take_part() -> None:
     """s² + x s + 1 has double roots at x = ±2."""
-    for text, designs in (("x >= 0", [[2]]), ("x**2 <= 3", []), ("sqrt(x + 3) >= 2", [[2]]), ("abs(x) >= 1", [[-2], [2]])):
+    for text, designs in (
+        ("x >= 0", [[2]]),
+        ("x**2 <= 3", []),
+        ("sqrt(x + 3) >= 2", [[2]]),
+        ("abs(x) >= 1", [[-2], [2]]),
+    ):
         found = of_row([1, x, 1], "EP2", constraints={"limit": text})
         assert found.complete, text
         assert agree(found, designs), text
 
 
-@pytest.mark.parametrize(("asked", "limit"), [({"box": (-2.0, 5.0)}, "the least x"), ({"constraints": {"c": "x >= -2"}}, "constraint c")])
+@pytest.mark.parametrize(
+    ("asked", "limit"), [({"box": (-2.0, 5.0)}, "the least x"), ({"constraints": {"c": "x >= -2"}}, "constraint c")]
+)
 def test_a_design_on_a_limit_is_said_to_be(asked: dict[str, Any], limit: str) -> None:
     found = of_row([1, x, 1], "EP2", **asked)
     assert found.complete
@@ -197,10 +218,10 @@ def test_what_is_beyond_a_limit_by_a_hair_is_beyond() -> None:
 
 def test_signs_tell_patterns_apart() -> None:
     """(s² + x s + 1)²: two real double roots for x² > 4, a complex pair for x² < 4."""
-    row = [1, 2 * x, x * x + 2 + (y - 1), 2 * x + (x * x - 9) * (x * x - 1), 1]
+    row = [1, 2 * x, x * x + 2, 2 * x + (x * x - 9) * (x * x - 1) + y - 1, 1 + y * (y - 1)]
     for pattern, designs in (("2EP2", [[-3, 1], [3, 1]]), ("CEP2", [[-1, 1], [1, 1]])):
-        found = of_row(row, pattern)
-        assert found.complete
+        found = of_row(row, pattern, (-4.0, 4.0), constraints={"one": "y >= 1/2"})
+        assert found.complete, (pattern, found)
         assert agree(found, designs), pattern
 
 

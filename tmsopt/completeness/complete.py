@@ -219,7 +219,9 @@ def _puzzle(sheet: Sheet) -> tuple[Puzzle, Box]:
     box = tuple(_range(ends) for ends in _ends(sheet))
     guarded = set().union(*(partial(e) for e in equations))
     trees = tuple(tree(limit, names) for limit in limits)
-    return Puzzle(equations, trees, tuple(sorted(guarded)), tuple(_width(*limits) for limits in box)), box
+    more = tuple(tree(e, names) for e in sheet.shared(at))
+    widths = tuple(_width(*limits) for limits in box)
+    return Puzzle(equations, trees, tuple(sorted(guarded)), widths, more), box
 
 
 def _width(lo: float, hi: float) -> float:

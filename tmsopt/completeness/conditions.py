@@ -151,12 +151,17 @@ class Sheet:
     def __call__(self, at: Mapping[str, Any]) -> list[Any]:
         """Left sides of the equations: as many as unknowns."""
         values = self.values(at)
-        u = [at[n] for n in self.unknowns]
-        lead, unit = exact(self.scale.lead), exact(self.scale.unit)
-        a = [c / (lead * unit**k) for k, c in enumerate(values.coefficients)]
-        left = conditions(a, self.pieces, u)
+        left = conditions(self._scaled(values), self.pieces, [at[n] for n in self.unknowns])
         left += [q.equation(values, at[q.name]) for q in self.lifted if q.equation]
         return left + [e.enclosure(values, decimal_fraction) for e in self.equalities]
+
+    def shared(self, at: Mapping[str, Any]) -> list[Any]:
+        """What must be 0 beside the equations where roots of size 1 count as small and as large."""
+        return shared(self._scaled(self.values(at)), self.pieces, [at[n] for n in self.unknowns])
+
+    def _scaled(self, values: Values) -> list[Any]:
+        lead, unit = exact(self.scale.lead), exact(self.scale.unit)
+        return [c / (lead * unit**k) for k, c in enumerate(values.coefficients)]
 
     def nonnegative(self, at: Mapping[str, Any]) -> list[Any]:
         """What must be ≥ 0 for the unknowns to be those of the pattern."""
@@ -186,7 +191,7 @@ def conditions(a: Sequence[Any], pieces: Sequence[Piece], unknowns: Sequence[Any
     """Expressions that are all 0 where the factors divide a polynomial, each as often as its power says.
 
     Where they make up all of it, its coefficients less those of the product, in fewer terms; else the remainders, of
-    small and of large roots apart, for these are not the same.
+    small and of large roots apart. See `shared`.
     """
     left: list[Any] = []
     for outer in (False, True):
@@ -197,6 +202,23 @@ def conditions(a: Sequence[Any], pieces: Sequence[Piece], unknowns: Sequence[Any
             return left + [c - rest[0] * f for c, f in zip(rest[1:], whole[1:], strict=True)]
         for factor in factors:
             rest, remainder = divided(rest, factor)
+            left += remainder
+    return left
+
+
+def shared(a: Sequence[Any], pieces: Sequence[Piece], unknowns: Sequence[Any]) -> list[Any]:
+    """What `conditions` leaves out: that a small and a large root are two, though both are of size 1.
+
+    Remainders of what the factors of small roots leave, divided by those of large ones; none where all are of a kind.
+    """
+    inner, outer = ([p.factor(unknowns) for p in pieces if p.outer == o for _ in range(p.order)] for o in (False, True))
+    left: list[Any] = []
+    if inner and outer:
+        for factor in inner:
+            a, _ = divided(a, factor)
+        a = a[::-1]
+        for factor in outer:
+            a, remainder = divided(a, factor)
             left += remainder
     return left
 

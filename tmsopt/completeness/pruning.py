@@ -33,6 +33,7 @@ class Puzzle:
     Attributes:
         equations: trees that must be 0, as many as variables.
         limits: trees that must be ≥ 0.
+        more: trees that must be 0 too.
         guarded: functions with their arguments that must exist for the equations to have slopes.
         widths: of the first box, 1 where it has no end.
     """
@@ -41,6 +42,7 @@ class Puzzle:
     limits: tuple[Tree, ...]
     guarded: tuple[tuple[str, Tree], ...]
     widths: tuple[float, ...]
+    more: tuple[Tree, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -112,9 +114,9 @@ class _Contractors:
         self.system = codac.AnalyticFunction([x], [_expression(codac, e, x) for e in puzzle.equations])
         zero = codac.IntervalVector([[0.0, 0.0]] * n)
         self.rows = [codac.CtcInverse(self.system, zero, not puzzle.guarded)]
-        nonnegative = codac.Interval(0.0, math.inf)
-        for limit in puzzle.limits:
-            self.rows.append(codac.CtcInverse(_scalar(codac, x, limit), nonnegative, False))
+        allowed = [(codac.Interval(0.0, math.inf), puzzle.limits), (codac.Interval(0.0), puzzle.more)]
+        for over, trees in allowed:
+            self.rows += [codac.CtcInverse(_scalar(codac, x, found), over, False) for found in trees]
         self.arguments = [_scalar(codac, x, argument) for _, argument in puzzle.guarded]
 
     def contract(self, x: Any) -> bool:
