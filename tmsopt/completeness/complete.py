@@ -64,7 +64,7 @@ def completeness(problem: Problem, seconds: float = SECONDS, progress: Progress 
     with flint.ctx.workdps(_CARRIED):
         try:
             posed = [(sheet, *_puzzle(sheet)) for sheet in _sheets(problem)]
-        except (NotAccepted, TypeError) as error:
+        except (NotAccepted, TypeError, ZeroDivisionError) as error:
             return Completeness(False, f"branch and prune cannot take {error}")
         run = _Run(began + seconds, seconds, progress)
         try:
@@ -130,7 +130,7 @@ class _Run:
                 if len(small) >= _MOST:
                     break
         except KeyboardInterrupt:
-            self.stopped = _STOPPED
+            self.stopped, waiting = _STOPPED, [first]  # whatever was in hand
         self.zeros += known
         self.left += [(sheet, box, _SINGULAR) for box in small]
         self.left += [(sheet, box, self.stopped or _SINGULAR) for box in waiting]
@@ -165,8 +165,8 @@ class _Run:
         undecided = tuple(Undecided(_ranges(problem, box), reason) for box, reason in places)
         reasons = dict.fromkeys(u.reason for u in undecided)
         return Completeness(
-            complete=not self.left,
-            reason="; ".join(reasons),
+            complete=not (self.left or self.stopped),
+            reason="; ".join(reasons) or self.stopped,
             designs=tuple(Table(_numbers(problem, at)) for at, _ in designs),
             limits=tuple(limit for _, limit in designs),
             boxes=self.boxes,
@@ -214,7 +214,7 @@ def _puzzle(sheet: Sheet) -> tuple[Puzzle, Box]:
         if not condition.equality:
             try:
                 limits.append(-condition.sign * condition.enclosure(values, decimal_fraction))
-            except (NotAccepted, TypeError, KeyError):
+            except (NotAccepted, TypeError, KeyError, ZeroDivisionError):
                 continue  # it takes no part, and is asked of every design that is found
     box = tuple(_range(ends) for ends in _ends(sheet))
     guarded = set().union(*(partial(e) for e in equations))

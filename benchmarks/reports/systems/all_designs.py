@@ -68,7 +68,7 @@ def report(asked: Asked) -> str:
     rows = [_row(index, asked) for index in range(min(asked.of(len(_ASKED), 2), len(_ASKED)))]
     header = ("degree", "pattern", "search: designs", "starts", "time", "proof: designs", "boxes", "time")
     about = (
-        f"Polynomials with stable roots, each coefficient but the first moved by a quadratic form in two parameters, of "
+        "Polynomials with stable roots, each coefficient but the first moved by a quadratic form in two parameters, of "
         f"EP4 in three, all in ±{_REACH:g}; seed {asked.seed}. The search is `solve_all(problem, seconds=0)`: Newton's "
         "method and IPOPT until each design was met three times and an estimate expects no more. The proof is interval "
         "branch and prune (codac), which shows that there is no other design; its time includes the start of a "
