@@ -280,3 +280,29 @@ def test_progress_is_told_in_seconds() -> None:
     completeness(tmsopt.load(PROBLEMS / "coupled_pair.toml"), 30, lambda *done: told.append(done))
     assert told
     assert all(0 <= done <= most == 30 for done, most in told)
+
+
+def test_limits_on_derived_quantities_take_part() -> None:
+    """The optimised benchmark has ω0 = −1, Fr above its weave boundary, and needs 0.61 of ballast at the rear wheel."""
+    for text, count in (("omega0 <= -1/2", 1), ("Fr >= Fr_c", 1), ("ballast_rear <= 0.1", 0), ("abscissa <= -1/2", 1)):
+        found = of_file("optimised_benchmark", constraints={"decay": "omega0 == -1", "limit": text})
+        assert found.complete, text
+        assert len(found.designs) == count, text
+        assert not any(found.limits), text
+    on = of_file("optimised_benchmark", constraints={"decay": "abscissa == -1", "limit": "omega0 <= -1"})
+    assert on.limits == ("constraint limit",)
+
+
+def test_ctrl_c_is_no_end() -> None:
+    """Whatever was in hand is undecided."""
+
+    def stop(done: int, most: int) -> None:
+        raise KeyboardInterrupt
+
+    found = completeness(tmsopt.load(PROBLEMS / "coupled_pair.toml"), progress=stop)
+    assert not found.complete
+    assert found.stopped
+    assert found.reason == "interrupted"
+    assert found.undecided[0].ranges["c2"] == (-3.0, 3.0)
+    every = tmsopt.solve_all(PROBLEMS / "coupled_pair.toml", progress=stop)
+    assert every.coverage is None
