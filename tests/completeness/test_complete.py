@@ -181,7 +181,7 @@ def test_a_design_of_each_pattern_is_among_them(pattern: str, factors: list[list
         row[0],
         *(c + sum(w * n for w, n in zip(ws, names, strict=False)) for c, ws in zip(row[1:], weights, strict=False)),
     ]
-    found = of_row(unfolded, pattern, (-0.1, 0.11) if count < 3 else (-0.03, 0.04))
+    found = of_row(unfolded, pattern, (-0.05, 0.06) if count < 3 else (-0.02, 0.03))
     assert found.complete
     assert sum(all(v.contains(0) for v in d.values()) for d in found.designs) == 1
 
@@ -237,6 +237,18 @@ def test_where_two_designs_meet_stays_undecided() -> None:
     for place in found.undecided:
         assert max(map(abs, place.ranges["x"])) < 1e-3  # x² of boxes 1e-7 as wide as the first
     assert any(lo <= 0 <= hi for lo, hi in (p.ranges["x"] for p in found.undecided))
+
+
+def test_a_curve_of_designs_stays_undecided_and_no_more() -> None:
+    """s⁴ + (Om² − 1 − k) s² + k: both pairs meet wherever Om = 1 + √k, from 1.71 to 2.73 in this box."""
+    Om, k = ca.SX.sym("Om"), ca.SX.sym("k")
+    model = from_coefficients([1, 0, Om**2 - 1 - k, 0, k])
+    found = completeness(tmsopt.Problem(model=model, free={"Om": (0.5, 6.0), "k": (0.5, 3.0)}, locate="CEP2"))
+    assert not found.complete
+    assert "singular" in found.reason
+    lower, upper = (f(place.ranges["Om"][j] for place in found.undecided) for j, f in ((0, min), (1, max)))
+    assert 1.6 < lower <= 1 + math.sqrt(0.5)
+    assert 1 + math.sqrt(3) <= upper < 2.84
 
 
 def test_time_that_is_over() -> None:

@@ -74,7 +74,7 @@ def test_no_box_loses_a_zero() -> None:
             reach = [(float(rng.choice([0, 1, 2.5])), float(rng.choice([0, 0.5, 3]))) for _ in NAMES]
             box = tuple((float(c) - lo, float(c) + hi) for c, (lo, hi) in zip(at, reach, strict=True))
             puzzle = Puzzle(tuple(equations), (), (), tuple(hi - lo for lo, hi in box))
-            worker.send(prune, puzzle, [box], [], 0.2, 50)
+            worker.send(prune, puzzle, [box], [], 0.2, 50, 1e-7)
             _, pruned = inbox.get(timeout=60)
             left = [*pruned.left, *pruned.met, *pruned.small]
             assert any(all(lo <= c <= hi for c, (lo, hi) in zip(at, b, strict=True)) for b in left)

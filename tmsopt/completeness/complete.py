@@ -17,7 +17,7 @@ from tmsopt.arithmetic.intervals import interval
 from tmsopt.arithmetic.krawczyk import Enclosure, Refused, enclosed, refined
 from tmsopt.arithmetic.walk import NotAccepted
 from tmsopt.completeness.conditions import Ends, Sheet, sheets
-from tmsopt.completeness.pruning import SMALL, Box, Pruned, Puzzle, prune
+from tmsopt.completeness.pruning import Box, Pruned, Puzzle, prune
 from tmsopt.completeness.statement import Completeness, Undecided
 from tmsopt.completeness.trees import ends, partial, tree
 from tmsopt.design.problem import Problem
@@ -38,7 +38,8 @@ _STOPPED = "interrupted"
 _UNITS = 1.375  # of the usual unit: roots are often at 1, where large and small ones meet
 _CARRIED, _DIGITS, _SHOWN = 60, 40, 25  # decimal digits: of arithmetic, of a zero, of a design
 _TURN, _LONGEST = 0.25, 1e6  # seconds
-_MOST = 400  # boxes that can neither be emptied nor be split: then they are no isolated designs
+_SMALL, _COARSE = 1e-7, 1e-2  # of the first box: what is smaller is not split
+_MOST = 400  # boxes so small, and they are no isolated designs: from then on ten times as large ones are small
 _SAID = 12  # places that are named
 
 
@@ -111,10 +112,11 @@ class _Run:
         known: list[_Zero] = []
         waiting: list[Box] = [first]
         small: list[Box] = []
+        most, least = _MOST, _SMALL
         try:
             while waiting and not self.stopped:
                 proved = [zero.near for zero in known]
-                pruned = self.asked(puzzle, waiting, proved, _MOST - len(small))
+                pruned = self.asked(puzzle, waiting, proved, most - len(small), least)
                 self.boxes += pruned.boxes
                 waiting = list(pruned.left)
                 small += pruned.small
@@ -123,25 +125,27 @@ class _Run:
                     if zero and not any(_within(zero.enclosure.balls, sheet.names, other.near) for other in known):
                         known.append(zero)
                         waiting.append(box)
-                    elif halves := _halves(box, puzzle.widths):
+                    elif halves := _halves(box, puzzle.widths, least):
                         waiting += halves
                     else:
                         small.append(box)
-                if len(small) >= _MOST:
-                    break
+                if len(small) >= most:
+                    if least >= _COARSE:
+                        break
+                    most, least = most + _MOST, 10 * least
         except KeyboardInterrupt:
             self.stopped, waiting = _STOPPED, [first]  # whatever was in hand
         self.zeros += known
         self.left += [(sheet, box, _SINGULAR) for box in small]
         self.left += [(sheet, box, self.stopped or _SINGULAR) for box in waiting]
 
-    def asked(self, puzzle: Puzzle, boxes: Sequence[Box], proved: Sequence[Box], most: int) -> Pruned:
+    def asked(self, puzzle: Puzzle, boxes: Sequence[Box], proved: Sequence[Box], most: int, least: float) -> Pruned:
         """What a worker makes of boxes; these again where time is over."""
         left = self.end - time.perf_counter()
         if self.progress:
             self.progress(round(min(self.seconds - left, self.seconds)), round(self.seconds))
         if left > 0:
-            self.worker.send(prune, puzzle, boxes, proved, min(_TURN, left), most)
+            self.worker.send(prune, puzzle, boxes, proved, min(_TURN, left), most, least)
             try:
                 _, answer = self.inbox.get(timeout=min(left, _LONGEST) + _TURN)
                 if answer is not None:
@@ -284,13 +288,13 @@ def _standing(zero: _Zero) -> str | None:
     return ", ".join(on + ["a0 = 0"] * flint.arb(values.coefficients[0]).contains(0))
 
 
-def _halves(box: Box, widths: Sequence[float]) -> list[Box]:
+def _halves(box: Box, widths: Sequence[float], least: float) -> list[Box]:
     """A box cut across its longest side; none for one that is small."""
     share = [(hi - lo) / w if w > 0 else 0.0 for (lo, hi), w in zip(box, widths, strict=True)]
     k = max(range(len(box)), key=share.__getitem__)
     lo, hi = box[k]
     middle = lo + (hi - lo) / 2
-    if not (share[k] > SMALL and lo < middle < hi):
+    if not (share[k] > least and lo < middle < hi):
         return []
     return [(*box[:k], ends, *box[k + 1 :]) for ends in ((lo, middle), (middle, hi))]
 

@@ -18,9 +18,6 @@ from tmsopt.completeness.trees import Tree
 Box = tuple[tuple[float, float], ...]
 """Least and greatest value of each variable."""
 
-SMALL = 1e-7
-"""Of the first box: what is smaller is not split."""
-
 _GAIN = 0.9  # of a width: contracting goes on where one shrinks below
 _ROUNDS = 8
 _WIDER = 0.1  # of a width: the box in which a zero is looked for is so much wider at each end
@@ -62,12 +59,15 @@ class Pruned:
     small: tuple[Box, ...]
 
 
-def prune(puzzle: Puzzle, boxes: Sequence[Box], proved: Sequence[Box], seconds: float, most: int) -> Pruned:
+def prune(
+    puzzle: Puzzle, boxes: Sequence[Box], proved: Sequence[Box], seconds: float, most: int, least: float
+) -> Pruned:
     """Contract, drop and split boxes, the last one first, until time is over or a new zero was met.
 
     Args:
         proved: boxes with one zero each, which is known: nothing more is to be found in these.
         most: boxes at most that can neither be emptied nor be split.
+        least: share of the first box: what is smaller is not split.
     """
     import codac
 
@@ -87,7 +87,7 @@ def prune(puzzle: Puzzle, boxes: Sequence[Box], proved: Sequence[Box], seconds: 
             continue
         if zero:
             met.append(_box(x))
-        elif halves := contractors.halves(x):
+        elif halves := contractors.halves(x, least):
             left += [_box(half) for half in halves]
         else:
             small.append(_box(x))
@@ -188,10 +188,10 @@ class _Contractors:
                 return False
         return True
 
-    def halves(self, x: Any) -> list[Any]:
+    def halves(self, x: Any, least: float) -> list[Any]:
         """A box cut where the equations change most across it; none for one that is small."""
         n = x.size()
-        wide = [k for k in range(n) if x[k].diam() < math.inf and x[k].diam() > SMALL * self.widths[k]]
+        wide = [k for k in range(n) if x[k].diam() < math.inf and x[k].diam() > least * self.widths[k]]
         wide = [k for k in wide if x[k].lb() < x[k].mid() < x[k].ub()]
         if not wide:
             return []
