@@ -21,7 +21,7 @@ FLOORS = (
     ("design",),
     ("formulation",),
     ("tracing", "margins"),
-    ("checks", "charts"),
+    ("checks", "charts", "completeness"),
     ("branch_and_bound",),
     ("solver",),
     ("certificates", "proofs", "explanation", "diagnosis", "fronts", "critical_speeds", "studies", "paper"),

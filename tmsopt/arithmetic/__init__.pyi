@@ -4,6 +4,7 @@ from .elementary import (
     exact as exact, greater as greater, lesser as lesser, magnitude as magnitude, positive_part as positive_part,
     power as power, quotient as quotient, sqrt as sqrt, tan as tan,
 )
+from .formal import variable as variable
 from .formulas import formulas as formulas
 from .intervals import (
     EVERYTHING as EVERYTHING, INTERVALS as INTERVALS, ball as ball, interval as interval, ranges as ranges,

@@ -11,6 +11,8 @@ import casadi as ca
 import flint
 import numpy as np
 
+from tmsopt.arithmetic.formal import Formal
+
 DIGITS = 60
 
 
@@ -98,8 +100,8 @@ def is_symbolic(x: Any) -> bool:
 
 
 def is_ball(x: Any) -> bool:
-    """Whether x is a number of ball arithmetic, exact fractions among them."""
-    return isinstance(x, flint.fmpq | flint.arb | flint.arb_series)
+    """Whether x is a number of ball arithmetic, exact fractions and formulas of these among them."""
+    return isinstance(x, flint.fmpq | flint.arb | flint.arb_series | Formal)
 
 
 def exact(x: Any) -> Any:

@@ -119,13 +119,21 @@ class _Seconds(click.ParamType[float]):
     help="Prove within SECONDS that nothing better exists, or find it (SCIP). Write it after FILE. [60 if left out]",
 )  # fmt: skip
 @click.option(
-    "--all", "every", is_flag=True, help="Of a pattern that leaves no freedom: all designs in the box that have it."
+    "--all", "every", is_flag=True,
+    help="Of a pattern that leaves no freedom: all designs in the box that have it, with a proof that they are all "
+    "(codac), or a search.",
+)  # fmt: skip
+@click.option(
+    "--seconds",
+    type=click.FloatRange(0, min_open=True),
+    default=None,
+    help="Time for the proof of --all. [default: 60]",
 )
 @click.pass_context
 def solve(
     context: click.Context, file: Path, as_json: bool, starts: int | None, seed: int, linear_solver: str,
     plot: Path | None, csv_file: Path | None, points: int | None, wheelbase: str, rear_mass: str, brief: bool,
-    details: bool, certify: float | None, every: bool,
+    details: bool, certify: float | None, every: bool, seconds: float | None,
 ) -> None:  # fmt: skip
     """Find the best design that the problem FILE asks for, or the front of the best ones."""
     with bad_input():
@@ -144,7 +152,7 @@ def solve(
             check_installed()
     asked = options(starts=starts, seed=seed, linear_solver=linear_solver)
     if every:
-        _solve_all(problem, as_json, asked)
+        _solve_all(problem, as_json, asked | options(seconds=seconds))
     if problem.pareto:
         try:
             write_front(problem, asked | options(points=points), as_json, plot, csv_file)
@@ -186,6 +194,8 @@ def _check_options(problem: "Problem", given: list[str], every: bool) -> None:
     if every:
         message = "is for one design, and --all looks for all of them; leave one of the two out"
         wrong |= dict.fromkeys((*alone, *scaled, "--plot"), message)
+    else:
+        wrong["--seconds"] = "is for the proof of --all; write --all too, or leave it out"
     if problem.pareto:
         message = "is for one design, and the file asks for a front; write minimize with one of the expressions"
         wrong |= dict.fromkeys(alone, message)
@@ -216,7 +226,7 @@ def _solve_all(problem: "Problem", as_json: bool, asked: dict[str, Any]) -> NoRe
     """Write all designs with a pattern, and end."""
     import tmsopt
 
-    with bad_input(), progress() as update:
+    with bad_input(), progress("step") as update:
         found = tmsopt.solve_all(problem, progress=update, **asked)
     if as_json:
         write_json(problem.heading | found.to_json())

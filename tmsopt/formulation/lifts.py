@@ -96,9 +96,9 @@ def lift_damping_ratio(build: Rows) -> Lifted:
     """ζ with p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ, in every case: at or below every damping ratio.
 
     pᵢ = 2 ζ wᵢ puts a pair on the edge of the sector; with real roots alone, ζ = 1. An odd degree has one factor s + d,
-    d ≥ 0, more.
+    d ≥ 0, more. Where the NLP goes as far as a0 = 0, the first factor is m² s² + p s + w², m² = ±a0, p ≥ 2 ζ m w.
     """
-    covered, first = build.covered, build.size[0]
+    covered, first, lead = build.covered, build.size[0], build.lead
     zeta = build.variable("damping_ratio", -1.0, 1.0)
     touches = [Touch(lambda x: 1.0, variable=first, value=1.0)]
     products: list[tuple[Factor, ...]] = []
@@ -107,16 +107,22 @@ def lift_damping_ratio(build: Rows) -> Lifted:
         for k in range(1, (len(a) - 1) // 2 + 1):
             at, row = build.size
             factors.append(Factor(at, squared=True))
-            p, w = build.variable(f"p{k}.{case}"), build.variable(f"w{k}.{case}", 0.0)
-            monic.append([1, p, w * w])
-            build.row("damping_ratio", p - 2 * zeta * w, 0.0, np.inf)
+            p, w, m = build.variable(f"p{k}.{case}"), build.variable(f"w{k}.{case}", 0.0), 1.0
+            if lead and k == 1:
+                factors.pop()
+                m = build.variable(f"m.{case}", 0.0)
+                build.row("a0", lead * a[0], 0.0, np.inf)
+                build.row("damping_ratio", m * m - lead * a[0], 0.0, 0.0)
+            monic.append([m * m, p, w * w])
+            build.row("damping_ratio", p - 2 * zeta * m * w, 0.0, np.inf)
             touches.append(Touch(partial(_sector_distance, at), row=row))
         if len(a) % 2 == 0:
             factors.append(Factor(build.size[0], linear=True))
             monic.append([1, build.variable(f"d.{case}", 0.0)])
-        build.equal("damping_ratio", a, [a[0] * c for c in product(*monic)])
+        build.equal("damping_ratio", a, [(lead or a[0]) * c for c in product(*monic)])
         products.append(tuple(factors))
-    lift = Lift("damping_ratio", build.size[0] - first, partial(_damping_guess, covered))
+    guess = partial(_damping_guess, covered, abs(lead) / build.leading_unit)
+    lift = Lift("damping_ratio", build.size[0] - first, guess)
     return Lifted(zeta, lift, tuple(touches), tuple(products))
 
 
@@ -259,16 +265,18 @@ def _real_guess(covered: Sequence[int], line: bool, values: Sequence[Values], z:
     return [[*([gamma] if line else []), *(float(d) for part in steps for d in part)]]
 
 
-def _damping_guess(covered: Sequence[int], values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
+def _damping_guess(
+    covered: Sequence[int], led: float, values: Sequence[Values], z: Sequence[Roots]
+) -> list[list[float]]:
+    """ζ a little less than it is, p and w of every factor; the first with a leading coefficient, and its root, if led."""
     every = np.concatenate([z[case] for case in covered])
-    ratio = float(np.min(-every.real / (np.abs(every) + 1e-300)))
-    factors = [
-        float(c)
-        for case in covered
-        for pair in quadratic_pairs(z[case])
-        for c in (-pair.sum().real, np.sqrt(abs(pair.prod().real)))[: len(pair)]
-    ]
-    return [[min(max(ratio - 0.05, -0.95), 0.95), *factors]]
+    found = [min(max(float(np.min(-every.real / (np.abs(every) + 1e-300))) - 0.05, -0.95), 0.95)]
+    for case in covered:
+        a0 = led * abs(float(values[case].coefficients[0])) if led else 1.0
+        factors = _factors(z[case], 0.0, a0)
+        roots = [np.sqrt(abs(c)) if k % 2 else c for k, c in enumerate(factors)]
+        found += [*roots[:2], *([np.sqrt(a0)] if led else []), *roots[2:]]
+    return [[float(x) for x in found]]
 
 
 def _positive_guess(case: int, values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:

@@ -92,12 +92,11 @@ def complete(nlp: NLP, problem: Problem, design: Mapping[str, float], near: bool
 
 
 def completions(nlp: NLP, problem: Problem, design: Mapping[str, float]) -> Iterator[Array]:
-    """Starts from a design with every guess of the one lift that an NLP has, such as a pattern's unknowns."""
-    (lift,) = nlp.lifts
+    """Starts from a design with every guess of what an NLP lifts, such as a pattern's unknowns."""
     values = [problem.values(problem.ordered(design))]
     z = list(roots(regular(np.array([[float(c) for c in v.coefficients] for v in values]))) / nlp.unit)
-    for guess in lift.guess(values, z):
-        yield np.array(variables_of(problem, design) + guess)
+    for guesses in product(*(lift.guess(values, z) for lift in nlp.lifts)):
+        yield np.array([*variables_of(problem, design), *(x for guess in guesses for x in guess)])
 
 
 def spread(problem: Problem, seed: int) -> Iterator[dict[str, float]]:

@@ -233,8 +233,9 @@ def _statement(entry: Formulas, shapes: Sequence[tuple[str, int, int]], derived:
 
 
 def _ball(x: Any) -> Any:
-    """A coefficient as a ball, or as the series that it is."""
-    return x if isinstance(x, flint.arb_series) else flint.arb(exact(x))
+    """A coefficient as a ball, or as the series or the formula that it is."""
+    x = exact(x)
+    return flint.arb(x) if isinstance(x, flint.fmpq) else x
 
 
 def _polynomial(kind: str, blocks: dict[str, Matrix]) -> list[Any]:

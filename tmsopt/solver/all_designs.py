@@ -1,4 +1,4 @@
-"""All designs with a pattern in a box, as far as many starts find them, with a statement of what they cover."""
+"""All designs with a pattern in a box: proved to be all, or as far as many starts find them and what these cover."""
 
 import math
 from collections.abc import Mapping
@@ -7,7 +7,10 @@ from typing import Any, Unpack
 
 import numpy as np
 
+from tmsopt.arithmetic.balls import Number
 from tmsopt.checks.recheck import recheck
+from tmsopt.completeness.complete import SECONDS, completeness
+from tmsopt.completeness.statement import Completeness
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.solution import Solution
@@ -20,7 +23,7 @@ from tmsopt.records import Array, plain
 from tmsopt.solver.multistart import Runner
 from tmsopt.solver.newton import newton, square_system
 from tmsopt.solver.solve import solved
-from tmsopt.solver.workspace import workspace
+from tmsopt.solver.workspace import Workspace, workspace
 
 MOST = 1024
 """Starts at most."""
@@ -64,26 +67,38 @@ class Coverage:
 
 @dataclass(frozen=True)
 class Every:
-    """All solutions found, those met most often first."""
+    """All solutions that were found.
+
+    Attributes:
+        solutions: in the order of their parameters where they are proved to be all, else those met most often first.
+        coverage: of the search; None where there was none.
+        completeness: of the proof; None where none was asked for.
+        proved: of each solution, whether it is proved to exist.
+    """
 
     solutions: tuple[Solution, ...]
-    coverage: Coverage
+    coverage: Coverage | None = None
+    completeness: Completeness | None = None
+    proved: tuple[bool, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
         return plain(self)
 
 
-def solve_all(problem: Given, **options: Unpack[Asked]) -> Every:
+def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Asked]) -> Every:
     """Every design in the box with the pattern that a problem locates, where that leaves no freedom.
 
-    Newton's method runs from designs spread over the box with every way to share out their roots, and IPOPT from some
-    of them, until each solution was met three times and an estimate expects no more, or after `starts`. Solutions are
-    told apart by their parameters, so factors that change places are no other solution.
+    Interval branch and prune (codac, of the extra ``certify``) shows which designs there are, and that there is no
+    other. Where it does not come to an end in time, or codac is missing, Newton's method runs from designs spread over
+    the box with every way to share out their roots, and IPOPT from some of them, until each solution was met three
+    times and an estimate expects no more, or after `starts`. Solutions are told apart by their parameters, so factors
+    that change places are no other solution.
 
     Args:
-        options: ``starts`` at most, `MOST` by default, ``seed``, ``linear_solver`` and ``progress``; see
-            `tmsopt.Options`.
+        seconds: for the proof at most; 0 for the search alone.
+        options: ``starts`` at most, `MOST` by default, ``seed``, ``linear_solver`` and ``progress``, called with
+            seconds of the proof and then with starts; see `tmsopt.Options`.
 
     Raises:
         InputError: for a problem that locates no pattern, leaves freedom, or constrains a quantity without a formula.
@@ -91,6 +106,20 @@ def solve_all(problem: Given, **options: Unpack[Asked]) -> Every:
     problem = problem_of(problem)
     nlp = _posed(problem)
     work = workspace(problem, options_of(options, defaults=_DEFAULTS))
+    proof = completeness(problem, seconds, work.options.progress) if seconds > 0 else None
+    proved = [] if proof is None else [_clipped(problem, design) for design in proof.designs]
+    found, coverage = ([], None) if proof and (proof.complete or proof.stopped) else _search(problem, nlp, work)
+    width = np.array([hi - lo for lo, hi in problem.free.values()])
+    new = [x for x in proved if not any(_same(x, y, width) for y in found)]
+    if coverage:
+        coverage = replace(coverage, hits=(*coverage.hits, *(0 for _ in new)))
+    solutions = tuple(_solution(problem, _named(problem, x)) for x in [*found, *new])
+    told = tuple(any(_same(x, y, width) for y in proved) for x in [*found, *new])
+    return Every(solutions, coverage, proof, told)
+
+
+def _search(problem: Problem, nlp: NLP, work: Workspace) -> tuple[list[Array], Coverage]:
+    """Solutions that many starts lead to, those met most often first."""
     starts, progress = work.options.starts, work.options.progress
     system = square_system(nlp)
     assert system is not None  # as many conditions as parameters
@@ -115,7 +144,7 @@ def solve_all(problem: Given, **options: Unpack[Asked]) -> Every:
             if not end.isolated:
                 doubtful = doubtful or not recheck(problem, problem.ordered(_named(problem, point))).violations
                 continue
-            known = next((k for k, other in enumerate(found) if np.max(np.abs(point - other) / width) <= _SAME), None)
+            known = next((k for k, other in enumerate(found) if _same(point, other, width)), None)
             if known is None:
                 if recheck(problem, problem.ordered(_named(problem, point))).violations:
                     continue
@@ -130,8 +159,7 @@ def solve_all(problem: Given, **options: Unpack[Asked]) -> Every:
         if progress:
             progress(done, starts)
     order = np.argsort([-h for h in hits], kind="stable")
-    solutions = [_solution(problem, _named(problem, found[k])) for k in order]
-    return Every(tuple(solutions), coverage_of(done, [hits[k] for k in order], singular))
+    return [found[k] for k in order], coverage_of(done, [hits[k] for k in order], singular)
 
 
 def _posed(problem: Problem) -> NLP:
@@ -147,12 +175,21 @@ def _posed(problem: Problem) -> NLP:
         message = f"{free} and {conditions} do not make single solutions; {advice}"
         raise InputError([Fault(message, ("parameters",))])
     nlp = matching(problem)
-    if carried := [lift.name for lift in nlp.lifts if lift.name != problem.pattern.name]:
-        found = f"the constraints use {', '.join(carried)}, which only an equation of its own or the roots define"
+    if nlp.touches:
+        found = f"the constraints use {', '.join(nlp.touches)}, which only the roots define"
         accepted = "parameters, coefficients, and quantities with a formula in these"
         advice = "write them so, or ask for one design alone by solve, which names other solutions too"
         raise InputError([Fault(f"{found}; accepted: {accepted}; {advice}", ("constraints",))])
     return nlp
+
+
+def _same(one: Array, other: Array, width: Array) -> bool:
+    return bool(np.max(np.abs(one - other) / width) <= _SAME)
+
+
+def _clipped(problem: Problem, design: Mapping[str, Number]) -> Array:
+    """A proved design as doubles in the box."""
+    return np.array([min(max(float(design[n]), lo), hi) for n, (lo, hi) in problem.free.items()])
 
 
 def _named(problem: Problem, point: Array) -> dict[str, float]:

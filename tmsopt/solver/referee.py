@@ -151,7 +151,7 @@ def _troubled(work: Workspace, candidates: Sequence[Candidate], trial: Trial | N
 
 def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial | None, rivals: Looked) -> Verdict | None:
     """A better design where the search may go as far as a0 = 0; None where it finds none."""
-    if nlp.touches or "abscissa" not in nlp.variables:
+    if nlp.touches or not nlp.products:
         return None
     near = [sampler.design(rivals, k) for k in range(min(len(rivals), _OPEN))]
     near += [] if trial is None else [{name: trial.parameters[name] for name in work.problem.free}]
