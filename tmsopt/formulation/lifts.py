@@ -66,20 +66,22 @@ def lift_abscissa(build: Rows) -> Lifted:
     An odd degree has one factor t + δ, δ ≥ 0, more. Some β = 0, κ = 0 or δ = 0 puts a root on the line Re s = γ.
     Where the NLP goes as far as a0 = 0, the first factor is ±a0 t² + βt + κ, so that a root may be at infinity.
     """
-    covered, gamma, lead = build.covered, build.variable("abscissa"), build.lead
+    covered, first, lead = build.covered, build.size[0], build.lead
+    gamma = build.variable("abscissa")
     touches: list[Touch] = []
     products: list[tuple[Factor, ...]] = []
     for case in covered:
         a, monic, factors = build.polynomial(case), [], []
         for k in range(1, (len(a) - 1) // 2 + 1):
-            at, first = build.size[0], lead * a[0] if lead and k == 1 else 1
-            if isinstance(first, int):
+            at, a0 = build.size[0], lead * a[0] if lead and k == 1 else 1
+            if isinstance(a0, int):
                 factors.append(Factor(at, squared=False))
             else:
-                build.row("a0", first, 0.0, np.inf)
-            monic.append([first, build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)])
-            touches.append(Touch(partial(_pair_distance, at), variable=at))
-            touches.append(Touch(partial(_real_distance, at), variable=at + 1))
+                build.row("a0", a0, 0.0, np.inf)
+            monic.append([a0, build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)])
+            if not lead or k > 1 or len(a) <= _TWO_FACTORS:  # the largest roots do not stand on the line
+                touches.append(Touch(partial(_pair_distance, at), variable=at))
+                touches.append(Touch(partial(_real_distance, at), variable=at + 1))
         if len(a) % 2 == 0:
             at = build.size[0]
             factors.append(Factor(at, linear=True))
@@ -88,7 +90,7 @@ def lift_abscissa(build: Rows) -> Lifted:
         build.equal("abscissa", shift(a, gamma), [(lead or a[0]) * c for c in product(*monic)])
         products.append(tuple(factors))
     guess, close = (partial(_abscissa_guess, covered, near, abs(lead) / build.leading_unit) for near in (False, True))
-    lift = Lift("abscissa", 1 + len(touches), guess, close)
+    lift = Lift("abscissa", build.size[0] - first, guess, close)
     return Lifted(build.unit * gamma, lift, tuple(touches), tuple(products))
 
 
@@ -105,7 +107,7 @@ def lift_damping_ratio(build: Rows) -> Lifted:
     for case in covered:
         a, monic, factors = build.polynomial(case), [], []
         for k in range(1, (len(a) - 1) // 2 + 1):
-            at, row = build.size
+            at = build.size[0]
             factors.append(Factor(at, squared=True))
             p, w, m = build.variable(f"p{k}.{case}"), build.variable(f"w{k}.{case}", 0.0), 1.0
             if lead and k == 1:
@@ -115,7 +117,8 @@ def lift_damping_ratio(build: Rows) -> Lifted:
                 build.row("damping_ratio", m * m - lead * a[0], 0.0, 0.0)
             monic.append([m * m, p, w * w])
             build.row("damping_ratio", p - 2 * zeta * m * w, 0.0, np.inf)
-            touches.append(Touch(partial(_sector_distance, at), row=row))
+            if not lead or k > 1 or len(a) <= _TWO_FACTORS:
+                touches.append(Touch(partial(_sector_distance, at), row=build.size[1] - 1))
         if len(a) % 2 == 0:
             factors.append(Factor(build.size[0], linear=True))
             monic.append([1, build.variable(f"d.{case}", 0.0)])
@@ -178,6 +181,7 @@ def lift_quantity(build: Rows, name: str, case: int, ends: tuple[float, float]) 
     return symbol, Lift(name, 1, lambda values, z: [[_finite(values[case][name])]])
 
 
+_TWO_FACTORS = 4  # coefficients, beyond which there are two quadratic factors or more
 _DOUBLE = 1e-3  # of the largest root: distance of two real ones that may be meant to be one
 
 
@@ -268,7 +272,7 @@ def _real_guess(covered: Sequence[int], line: bool, values: Sequence[Values], z:
 def _damping_guess(
     covered: Sequence[int], led: float, values: Sequence[Values], z: Sequence[Roots]
 ) -> list[list[float]]:
-    """ζ a little less than it is, p and w of every factor; the first with a leading coefficient, and its root, if led."""
+    """ζ a little less than it is, and p and w of every factor; if led, the first with a leading coefficient, and m."""
     every = np.concatenate([z[case] for case in covered])
     found = [min(max(float(np.min(-every.real / (np.abs(every) + 1e-300))) - 0.05, -0.95), 0.95)]
     for case in covered:

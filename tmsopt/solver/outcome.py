@@ -130,7 +130,7 @@ def survivor(work: Workspace, nlp: NLP, candidates: Sequence[Candidate]) -> Tria
     tried: list[float] = []
     for candidate in sorted((c for c in candidates if c.feasible), key=lambda c: c.objective):
         alike = sum(same(candidate.objective, value, nlp.size) for value in tried)
-        if kept and not kept.checked.violations and honest(work, kept) and not alike:
+        if kept and not kept.checked.violations and honest(work, kept) and not _flattered(kept) and not alike:
             break
         if alike >= _ALIKE:
             continue
@@ -174,8 +174,14 @@ def ahead(work: Workspace, one: Trial, other: Trial) -> bool:
         claimed, own = trial.point.objective, work.problem.sign * trial.checked.objective
         doubt = 0.0 if honest(work, trial) else _DOUBT * abs(claimed - own)
         violation = sum(trial.checked.violations.values())
-        ranks.append((violation, claimed if math.isnan(own) else own + doubt))
+        ranks.append((violation, _flattered(trial), claimed if math.isnan(own) else own + doubt))
     return ranks[0] < ranks[1]
+
+
+def _flattered(trial: Trial) -> bool:
+    """Whether an end that is no optimum owes its standing to a multiple root that it only comes close to."""
+    ideal, stored = trial.checked.structure.abscissa, trial.checked.realised
+    return not converged(trial) and not math.isclose(ideal, stored, rel_tol=_CLAIMED, abs_tol=_CLAIMED)
 
 
 def _active(problem: Problem, nlp: NLP, point: Point) -> dict[str, float]:

@@ -9,7 +9,7 @@ import numpy as np
 from tmsopt.design.cases import Case
 from tmsopt.design.solution import Starts
 from tmsopt.formulation.nlp import NLP
-from tmsopt.solver.multistart import Candidate, Runner
+from tmsopt.solver.multistart import Candidate, Runner, same
 from tmsopt.solver.outcome import Finding, Trial, ahead, converged, honest, mass_advice, survivor
 from tmsopt.solver.sample import Looked, Sample, Sampler
 from tmsopt.solver.workspace import Workspace
@@ -17,6 +17,7 @@ from tmsopt.solver.workspace import Workspace
 _APPEALS, _APPEALED = 8, 2  # times that better designs are started from, and how many each time
 _LOST = 1e-7  # relative difference of the objective that makes a design better
 _HAIRS = np.geomspace(1e-15, 1e-7, 33)  # of the way to a design that meets all limits
+_TOWARDS = 30  # random designs in whose direction an end is moved
 _FINER = 1e-11  # the same, where both were polished
 _OPEN = 3  # designs from which a singular mass matrix is approached
 _SINGULAR = 1e-9  # a0 in its own unit, below which it is 0 in all but name
@@ -87,7 +88,8 @@ def _appealed(work: Workspace, sampler: Sampler, sample: Sample, so_far: Verdict
         if other is None or (trial is not None and not ahead(work, other, trial)):
             break
         trial = other
-    if len(rivals) and trial is not None and (nudged := _nudged(work, nlp, sampler, trial, rivals)) is not None:
+    nudged = _nudged(work, nlp, sampler, candidates, trial, rivals if len(rivals) else sample.refined)
+    if nudged is not None:
         return Verdict(nlp, candidates, nudged)
     if len(rivals) or _troubled(work, candidates, trial):
         opened = _opened(work, nlp, sampler, trial, rivals if len(rivals) else sample.refined)
@@ -130,15 +132,23 @@ def _least(work: Workspace, trial: Trial | None, lost: float = _LOST) -> float:
     return worth - lost * (trial.candidate.nlp.size + abs(worth)) if math.isfinite(worth) else math.inf
 
 
-def _nudged(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial, rivals: Looked) -> Trial | None:
+def _nudged(
+    work: Workspace, nlp: NLP, sampler: Sampler, candidates: Sequence[Candidate], trial: Trial | None, near: Looked
+) -> Trial | None:
     """An end that meets all limits a hair's breadth aside: at itself a root at 0, say, has no sign."""
-    own = sampler.space.points(trial.parameters)
-    seen = sampler.look((own + _HAIRS[:, None, None] * (rivals.u[:_APPEALED] - own)).reshape(-1, sampler.space.size))
-    for k in np.flatnonzero(seen.violation == 0)[:_APPEALED].tolist():
-        parameters = work.problem.ordered(sampler.design(seen, k))
-        moved = replace(trial, parameters=parameters, checked=work.recheck(parameters, nlp.cases))
-        if not moved.checked.violations and honest(work, moved):
-            return moved
+    least, best = _least(work, trial), min((c.objective for c in candidates if c.feasible), default=math.inf)
+    ends = [c for c in candidates if c.feasible and c.objective < least and same(c.objective, best, nlp.size)]
+    for end in ends[:_APPEALED]:
+        own = sampler.space.points(work.design_at(end.run.x))
+        towards = np.concatenate([near.u[:_APPEALED], sampler.rng.random((_TOWARDS, sampler.space.size))])
+        seen = sampler.look((own + _HAIRS[:, None, None] * (towards - own)).reshape(-1, sampler.space.size))
+        for k in np.flatnonzero((seen.violation == 0) & (seen.worth < least))[:_APPEALED].tolist():
+            parameters = work.problem.ordered(sampler.design(seen, k))
+            whole = survivor(work, nlp, [end])
+            assert whole is not None
+            moved = replace(whole, parameters=parameters, checked=work.recheck(parameters, nlp.cases))
+            if not moved.checked.violations and honest(work, moved):
+                return moved
     return None
 
 
@@ -151,19 +161,21 @@ def _troubled(work: Workspace, candidates: Sequence[Candidate], trial: Trial | N
 
 def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial | None, rivals: Looked) -> Verdict | None:
     """A better design where the search may go as far as a0 = 0; None where it finds none."""
-    if nlp.touches or not nlp.products:
+    if not nlp.products:
         return None
-    near = [sampler.design(rivals, k) for k in range(min(len(rivals), _OPEN))]
-    near += [] if trial is None else [{name: trial.parameters[name] for name in work.problem.free}]
+    origins = [(sampler.design(rivals, k), True) for k in range(min(len(rivals), _OPEN))]
+    origins += [] if trial is None else [({name: trial.parameters[name] for name in work.problem.free}, True)]
+    bold = work.sample.boldest if work.sample else rivals
+    origins += [(sampler.design(bold, k), False) for k in range(min(len(bold), _OPEN))]
     best: Verdict | None = None
     least = _least(work, trial, _FINER)
     for sign in (1, -1):
-        ours = [d for d in near if sign * _leading(work, d) > 0]
+        ours = [(design, near) for design, near in origins if sign * _leading(work, design) > 0]
         if not ours:
             continue
         opened = work.formulate(nlp.cases, lead=sign)
         run = Runner(work, opened)
-        ends = [run.ended(design, near=True) for design in ours]
+        ends = [run.ended(design, near, hopeful=False) for design, near in ours]
         reached = min((c for c in ends if c.feasible), key=lambda c: c.objective, default=None)
         if reached is None or not reached.objective < least:
             continue
