@@ -67,7 +67,8 @@ def search(work: Workspace, nlp: NLP, most: int | None = None) -> list[Candidate
     if part.start and len(candidates) < starts:  # the user's own
         candidates.append(run.ended(middle(part), near=True))
     for design, near in islice(starting(work), max(starts - len(candidates), 0)):
-        candidates.append(run.ended(design, near, hopeful=any(c.feasible for c in candidates)))
+        hopeful = work.sample is None and any(c.feasible for c in candidates)
+        candidates.append(_otherwise(run, design, run.ended(design, near, hopeful)))
         if options.progress:
             options.progress(len(candidates), starts)
         if not options.exhaustive and _settled(work, candidates):
@@ -77,6 +78,16 @@ def search(work: Workspace, nlp: NLP, most: int | None = None) -> list[Candidate
     if part.pattern is not None and not any(c.feasible for c in candidates):
         candidates += _rescued(work, nlp)
     return candidates
+
+
+def _otherwise(run: "Runner", design: Mapping[str, float], ended: Candidate) -> Candidate:
+    """Where a start ends that first took a way on which a0 may vanish, if it ended nowhere by the usual one."""
+    work, nlp = run.work, run.nlp
+    if ended.feasible or work.sample is None or not nlp.products:
+        return ended
+    lead = -1 if float(work.problem.values(work.problem.ordered(design)).coefficients[0]) < 0 else 1
+    led = Runner(work, work.formulate(nlp.cases, lead=lead)).ended(design, near=True, hopeful=False)
+    return run.ended(work.design_at(led.run.x), near=True, hopeful=False) if led.feasible else ended
 
 
 def further(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
