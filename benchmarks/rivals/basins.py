@@ -1,7 +1,6 @@
 """The best design that anybody finds without the package: samples, evolutions in islands, local steps between roots.
 
-Equations, and limits that random designs miss, are met by steps of Newton in all parameters; the roots of a minimax
-problem by SLSQP in a variable above each of them.
+Equations, and limits that random designs miss, are met by steps of Newton in all parameters; `lifted` has the steps.
 """
 
 import time
@@ -10,10 +9,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment, minimize
 from scipy.stats import qmc
 
-from benchmarks.judges import Designs, eigenvalues, evaluated, exactly, root_values
+from benchmarks.judges import Designs, eigenvalues, exactly, root_values
 from benchmarks.rivals.lifted import lifted
 from benchmarks.rivals.searches import quiet
 from tmsopt import Problem
@@ -28,9 +26,7 @@ _SAMPLES = 17  # 2 to the power of it: quasi-random designs
 _KEPT = 12_000  # of them, whose roots are found
 _ISLANDS = 6
 _GENERATIONS = 260
-_LOCAL = 8  # ends from which SLSQP goes on
-
-_LIFTED = 5  # of them, from which the factors do too
+_LOCAL = 6  # ends from which SLSQP goes on
 
 
 @dataclass(frozen=True)
@@ -169,75 +165,6 @@ class _Search:
         first = merit.argmin(axis=1)
         return u[:, np.arange(count), first], merit[np.arange(count), first]
 
-    def smooth(self, start: Array, margin: float = 0.0) -> Array:
-        """SLSQP from one design in variables (u, A, D), with A above every real part and D below every damping."""
-        at, n = self.at, self.n
-        rooted = at.about_roots or any(r.rooted for r in at.rows)
-        state: dict[str, Any] = {}
-
-        def worked(z: Array, count: int) -> tuple[Any, Array]:
-            values = at.values(self.x(z[:n]))
-            values.define("abscissa", z[n])
-            values.define("damping_ratio", z[n + 1])
-            return values, at.coefficients(values, count)
-
-        def sorted_roots(a: Array) -> Array:
-            z = eigenvalues(a[None])[0]
-            z = z[z.imag >= 0] if np.count_nonzero(z.imag > 0) * 2 + np.count_nonzero(z.imag == 0) == len(z) else z
-            before = state.get("roots")
-            if before is not None and len(before) == len(z):
-                return np.asarray(z[linear_sum_assignment(np.abs(before[:, None] - z[None]))[1]])
-            return np.asarray(z)
-
-        def every(z: Array) -> tuple[float, Array, Array, Array, Array]:
-            """Value, inequalities (>= 0), equations, and their slopes with the value's first."""
-            key = z.tobytes()
-            if state.get("key") == key:
-                return state["all"]  # type: ignore[no-any-return]
-            shift = np.where(z > 0.5, -_STEP, _STEP)
-            shift[n:] = _STEP
-            around = np.concatenate([z[:, None], z[:, None] + np.diag(shift)], axis=1)
-            with np.errstate(all="ignore"):
-                values, a = worked(around, n + 3)
-                size = np.zeros(n + 3)
-                value = at.sign * (np.asarray(evaluated(at.objective, values)) + size)
-                rows = [(np.asarray(r.apart(values)) + size, r) for r in at.rows]
-            below = [-g - margin for g, r in rows if r.comparison != "=="]
-            equal = [g for g, r in rows if r.comparison == "=="]
-            if rooted:
-                roots = sorted_roots(a[0])
-                state["roots"] = roots
-                powers = roots[:, None] ** np.arange(a.shape[1] - 1, -1, -1)
-                slope = np.polyval(np.polyder(a[0]), roots)
-                moved = roots[:, None] - (powers @ (a - a[0]).T) / slope[:, None]
-                below += [around[n] - w.real for w in moved]
-                below += [-w.real / np.abs(w) - around[n + 1] for w in moved if abs(w[0]) > 1e-12]
-            g, h = (np.array(part).reshape(-1, n + 3) for part in (below, equal))
-            slopes = [(np.nan_to_num(p[..., 1:] - p[..., :1]) / shift) for p in (value[None], g, h)]
-            state["key"] = key
-            state["all"] = (float(np.nan_to_num(value[0], nan=1e6)), np.nan_to_num(g[:, 0], nan=-1.0),
-                            np.nan_to_num(h[:, 0], nan=1.0), slopes[0][0], slopes[1:])  # fmt: skip
-            return state["all"]  # type: ignore[no-any-return]
-
-        u = start.copy()
-        values = self.values(u[:, None], True)
-        z: Any = np.concatenate([u, [float(values["abscissa"][0]), float(values["damping_ratio"][0])]])
-        if not np.all(np.isfinite(z)) or abs(z[n]) > 900:
-            return start
-        rules: Any = [
-            {"type": "ineq", "fun": lambda z: every(z)[1], "jac": lambda z: every(z)[4][0]}
-        ]  # fmt: skip
-        if self.equal:
-            rules.append({"type": "eq", "fun": lambda z: every(z)[2], "jac": lambda z: every(z)[4][1]})
-
-        def value(z: Array) -> float:
-            return float(every(z)[0])
-
-        way: dict[str, Any] = {"method": "SLSQP", "options": {"maxiter": 80, "ftol": 1e-15}}
-        way |= {"jac": lambda z: every(z)[3], "bounds": [(0, 1)] * n + [(None, None)] * 2, "constraints": rules}
-        answer: Any = minimize(value, z, **way)
-        return np.asarray(np.clip(np.nan_to_num(answer.x[:n], nan=0.5), 0, 1))
-
 
 def best_known(problem: Problem, seed: int = 0, effort: float = 1.0) -> Best:
     """The best design that is feasible within `MET` by isolated roots, of everything that was tried."""
@@ -288,14 +215,7 @@ def _around(search: _Search, near: Array, size: int) -> Array:
 
 
 def _locally(search: _Search, starts: Array, margin: float = 0.0) -> Iterator[tuple[str, Array]]:
-    for k in range(starts.shape[1]):
-        try:
-            yield "SLSQP", search.smooth(starts[:, k], margin)
-        except (ValueError, np.linalg.LinAlgError, IndexError):
-            continue
-    if search.at.about_roots or any(r.rooted for r in search.at.rows):
-        for k in range(min(_LIFTED, starts.shape[1])):
-            yield from (("factors", end) for end in lifted(search.at, starts[:, k], margin))
+    return (("SLSQP", end) for k in range(starts.shape[1]) for end in lifted(search.at, starts[:, k], margin))
 
 
 def _judged(search: _Search, ends: list[tuple[str, Array]], began: float) -> Best:
@@ -307,7 +227,7 @@ def _judged(search: _Search, ends: list[tuple[str, Array]], began: float) -> Bes
     every = np.array([e for _, e in ends]).T
     ranks = np.minimum(search.merit(every), search.at(search.x(every), MET).merit)
     order = np.argsort(ranks, kind="stable")
-    lifts = [k for k in range(len(ends)) if ends[k][0].startswith("factors")]
+    lifts = [k for k in range(len(ends)) if ends[k][0].startswith("SLSQP")]
     for k in dict.fromkeys([*order[:8], *sorted(lifts, key=lambda k: float(ranks[k]))[:12]]):
         for u in {e.tobytes(): e for e in (every[:, k], search.repaired(every[:, [k]], 8)[:, 0])}.values():
             design = dict(zip(search.at.names, map(float, search.x(u[:, None])[:, 0]), strict=True))

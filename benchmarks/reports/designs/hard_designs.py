@@ -36,6 +36,7 @@ class Verdict:
         why: what is wrong with it, empty where it is right.
         excess: of the claimed value over the best known, relative to that or to `SCALE`; nan where there is none.
         better: whether the claim is confirmed, and better than the reference.
+        seconds: of the processor.
         target: the reference.
     """
 
@@ -56,16 +57,16 @@ class Verdict:
 def judged(index: int, seed: int, target: Target) -> Verdict:
     """A solve of one problem with default settings, judged."""
     problem = hard_problem(index, seed)
-    began = time.perf_counter()
+    began = time.process_time()
     nothing = Verdict(index, hard_family(index), CRASHED, "", "", math.nan, {}, math.nan, False, 0.0, (), target)
     try:
         solution = solve(problem, throw=False)
     except Exception as error:
         why = f"{type(error).__name__}: {error}"[:200]
-        return replace(nothing, why=why, seconds=time.perf_counter() - began)
+        return replace(nothing, why=why, seconds=time.process_time() - began)
     design = {n: float(solution.parameters[n]) for n in problem.free}
     own = replace(nothing, status=solution.status, value=float(solution.value), design=design,
-                  seconds=time.perf_counter() - began, notes=tuple(solution.notes))  # fmt: skip
+                  seconds=time.process_time() - began, notes=tuple(solution.notes))  # fmt: skip
     match solution.status:
         case "optimal":
             return _optimal(problem, own)
@@ -174,7 +175,7 @@ def parts(verdicts: Sequence[Verdict]) -> Iterator[str]:
         "References come from samples, differential evolution and SLSQP on eigenvalues, without the package, and count "
         f"if they violate nothing by more than 1e-9 by isolated roots. Right is an optimum within {SOLVED:.0e} of the "
         f"best known, relative to it or to {SCALE}, that is what it claims to be; infeasible where no feasible design "
-        "is known; no optimum, with a note, where the best known is unbounded."
+        "is known; no optimum, with a note, where the best known is unbounded. Times are those of the processor."
     )
     names = dict.fromkeys(hard_family(i) for i in range(HARD_COUNT))
     rows = [
