@@ -1,5 +1,6 @@
 """Local steps that are smooth at multiple roots: SLSQP in the parameters and in the factors of the polynomial."""
 
+import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +12,7 @@ from benchmarks.judges import Designs, Roots, eigenvalues, evaluated
 from tmsopt.records import Array
 
 _STEP = 1e-7  # of the box, for differences
+_STEPS, _EVALUATIONS = 60, 120  # of SLSQP, which may go on for ever beside a kink
 _SMALL = 1e-12  # imaginary part of a real root, relative
 
 
@@ -58,11 +60,15 @@ class Lifted:
         scale = np.maximum(np.abs(a[1:]), 1e-3 * np.abs(a).max())
         known: dict[bytes, Any] = {}
 
+        last = first
+
         def every(w: Array) -> Any:
+            nonlocal last
             key = w.tobytes()
             if key not in known:
-                known.clear()
-                known[key] = self._evaluated(w, right, damped, scale)
+                if len(known) >= _EVALUATIONS:
+                    raise StopIteration
+                known[key], last = self._evaluated(w, right, damped, scale), w.copy()
             return known[key]
 
         rules: Any = [
@@ -73,14 +79,15 @@ class Lifted:
         def value(w: Array) -> float:
             return float(every(w)[0])
 
-        way: dict[str, Any] = {"method": "SLSQP", "options": {"maxiter": 100, "ftol": 1e-16}}
+        way: dict[str, Any] = {"method": "SLSQP", "options": {"maxiter": _STEPS, "ftol": 1e-15}}
         way |= {
             "jac": lambda w: every(w)[3],
             "bounds": [(0, 1)] * n + [(None, None)] * (len(first) - n),
             "constraints": rules,
         }
-        answer: Any = minimize(value, first, **way)
-        return np.asarray(np.clip(np.nan_to_num(answer.x[:n], nan=0.5), 0, 1))
+        with contextlib.suppress(StopIteration):
+            last = np.asarray(minimize(value, first, **way).x)
+        return np.asarray(np.clip(np.nan_to_num(last[:n], nan=0.5), 0, 1))
 
     @property
     def _objective(self) -> str:
@@ -151,7 +158,10 @@ def _factors(z: Roots, pairing: int) -> Array:
 def lifted(at: Designs, start: Array, margin: float = 0.0) -> Iterator[Array]:
     """Ends of SLSQP from one start, for the ways to pair its real roots."""
     way = Lifted(at, margin)
-    for pairing in (0, 3):
+    with np.errstate(all="ignore"):
+        a = at.coefficients(at.values(way.x(start[:, None])), 1)
+    paired = {_factors(eigenvalues(a)[0], pairing).tobytes(): pairing for pairing in (3, 0)}
+    for pairing in paired.values():
         try:
             yield way.solved(start, pairing)
         except (ValueError, np.linalg.LinAlgError, IndexError):
