@@ -25,6 +25,7 @@ _STEP = 1e-7  # of the box, for differences
 _SAMPLES = 17  # 2 to the power of it: quasi-random designs
 _KEPT = 12_000  # of them, whose roots are found
 _ISLANDS = 6
+_THIN = 0.03  # share of feasible designs below which every design of an evolution is moved to the limits
 _GENERATIONS = 260
 _LOCAL = 6  # ends from which SLSQP goes on
 
@@ -58,6 +59,7 @@ class _Search:
         self.n = len(self.width)
         self.equal = self.at.equalities
         self.slack = _EQUAL if self.equal else 0.0
+        self.thin = bool(self.equal)
 
     def x(self, u: Array) -> Array:
         lower, upper = self.at.lower[:, None], self.at.upper[:, None]
@@ -113,6 +115,7 @@ class _Search:
         violation = np.concatenate([self.at.plain(self.x(part)) for part in np.array_split(u, 8, axis=1)])
         violation = np.nan_to_num(violation, nan=1e3)
         free = np.flatnonzero(violation <= 0)
+        self.thin = bool(self.equal) or len(free) < _THIN * u.shape[1]
         picked = [self.rng.permutation(free)[:_KEPT]]
         missing = max(_KEPT // 3, _KEPT - len(free)) if any(not r.rooted for r in self.at.rows) or self.equal else 0
         near = np.argsort(violation, kind="stable")[len(free) : len(free) + missing // 2]
@@ -157,7 +160,7 @@ class _Search:
                 trial < 0, u * self.rng.random(), np.where(trial > 1, 1 - (1 - u) * self.rng.random(), trial)
             )
             flat = trial.reshape(n, -1)
-            flat = self.repaired(flat, 3) if self.equal else flat
+            flat = self.repaired(flat, 3, every=True) if self.thin else flat
             found = self.merit(flat).reshape(count, size)
             better = found <= merit
             u = np.where(better, flat.reshape(n, count, size), u)

@@ -190,6 +190,6 @@ def _machine(
     names = {str(n) for n in rng.choice(list(ranges), count, replace=False)}
     if either:
         names = {*sorted(names - {"lambda_s"})[: count - 1], "lambda_s"}
-    whole = rng.random() < 0.5
+    whole = bool(rng.random() < 0.5) and count < len(ROBOT)  # all free in the whole box: one problem is enough
     free = {n: ranges[n] if whole or n == "lambda_s" else drawn_box(rng, n, ranges[n]) for n in ranges if n in names}
     return free, {n: rounded(float(rng.uniform(*ranges[n]))) for n in ranges if n not in names}
