@@ -6,6 +6,7 @@ first: eigenvalues over scenarios; `exact` decides at multiple roots, `bands` pr
 
 from benchmarks.judges.attempts import EXACT, FEASIBLE, SCALE, SOLVED, Attempt, attempt, started_at
 from benchmarks.judges.bands import abscissa_below, highest_abscissa
+from benchmarks.judges.designs import Designs, Exactly, exactly
 from benchmarks.judges.eigenvalues import Roots, companion, eigenvalues, root_values, worst_roots
 from benchmarks.judges.exact import MET, SAME, confirmed, confirmed_system, exact_polynomial, ideals, same, values_of
 from benchmarks.judges.grid import Judge, Verdict, verdict
@@ -22,7 +23,9 @@ __all__ = [
     "SCALE",
     "SOLVED",
     "Attempt",
+    "Designs",
     "Entries",
+    "Exactly",
     "Judge",
     "Roots",
     "System",
@@ -36,6 +39,7 @@ __all__ = [
     "eigenvalues",
     "evaluated",
     "exact_polynomial",
+    "exactly",
     "highest_abscissa",
     "ideals",
     "root_values",

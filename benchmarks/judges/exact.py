@@ -43,11 +43,23 @@ def confirmed(problem: Problem, design: Mapping[str, float], claimed: float) -> 
     The grant of `Verdict` is not enough here: it is what rounding of coefficients does to eigenvalues of the stored
     design, and where rounded parameters already took that away from the point, further rounding does little.
     """
+    return any(same(claimed, float(near.real.max())) for near in near_roots(problem, design))
+
+
+def near_roots(problem: Problem, design: Mapping[str, float]) -> Iterator[Roots]:
+    """The roots of a design as stored, then of polynomials with multiple roots whose coefficients it rounds.
+
+    Raises:
+        ZeroDivisionError: where a coefficient does not exist, or the leading one is 0.
+    """
     with flint.ctx.workdps(_DIGITS):
         exact = {n: flint.arb(v) for n, v in problem.ordered({n: design[n] for n in problem.free}).items()}
-        found = exact_roots(problem.model.coefficients(exact, problem.parameter_set))
+        a = [flint.arb(c) for c in problem.model.coefficients(exact, problem.parameter_set)]
+        if not all(c.is_finite() for c in a) or a[0].contains(0):
+            raise ZeroDivisionError("no roots")
+        found = exact_roots(a)
     z = np.array([complex(r.re, r.im) for r in found for _ in range(r.multiplicity)])
-    return any(same(claimed, float(near.real.max())) for near in _rounded(z, ROUNDED * _sizes(z)))
+    yield from _rounded(z, ROUNDED * _sizes(z))
 
 
 def confirmed_system(system: System, design: Mapping[str, float], claimed: float) -> bool:

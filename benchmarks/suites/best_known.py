@@ -12,7 +12,8 @@ from benchmarks.judges import same
 
 REFERENCES = Path("benchmarks/suites/references.json")
 OSCILLATORS = Path("benchmarks/suites/oscillators.json")
-"""Where the values of the random designs and of the random systems are kept."""
+HARD = Path("benchmarks/suites/hard_references.json")
+"""Where the values of the random designs, of the random systems and of the hard problems are kept."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,36 @@ class Known:
     evaluations: int
 
 
+@dataclass(frozen=True)
+class Target:
+    """The best that is known of one hard problem.
+
+    Attributes:
+        value: of the objective in the problem's own sense; nan where no design is known to be feasible.
+        violation: of the design, relative to the size of the two sides; the least known where none is feasible.
+        design: the free parameters.
+        how: what found it.
+    """
+
+    index: int
+    family: str
+    value: float
+    violation: float
+    design: Mapping[str, float]
+    how: str
+    seconds: float
+
+    @property
+    def solvable(self) -> bool:
+        """Whether a design is known to be feasible."""
+        return math.isfinite(self.value)
+
+
+def targets(path: Path = HARD) -> dict[int, Target]:
+    """Index → what is known, as kept in the file; empty where there is none."""
+    return {row["index"]: Target(**row) for row in read(path).get("problems", [])}
+
+
 def references(path: Path = REFERENCES) -> dict[int, Reference]:
     """Index → what is known, as kept in the file; empty where there is none."""
     rows = read(path).get("problems", [])
@@ -85,7 +116,7 @@ def read(path: Path) -> dict[str, Any]:
     return dict(json.loads(path.read_text(encoding="utf-8"), object_hook=numbers)) if path.exists() else {}
 
 
-def write(path: Path, head: Mapping[str, Any], name: str, rows: Iterable[Reference | Known]) -> None:
+def write(path: Path, head: Mapping[str, Any], name: str, rows: Iterable[Reference | Known | Target]) -> None:
     """One line per problem, in order; the old file stays until the new one is complete."""
     lines = ",\n".join(json.dumps(_row(one), allow_nan=False) for one in sorted(rows, key=lambda one: one.index))
     top = ",\n".join(f"{json.dumps(key)}: {json.dumps(value)}" for key, value in head.items())
@@ -94,5 +125,5 @@ def write(path: Path, head: Mapping[str, Any], name: str, rows: Iterable[Referen
     os.replace(draft, path)
 
 
-def _row(one: Reference | Known) -> dict[str, Any]:
+def _row(one: Reference | Known | Target) -> dict[str, Any]:
     return {n: None if isinstance(v, float) and math.isnan(v) else v for n, v in asdict(one).items()}

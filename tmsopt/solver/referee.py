@@ -29,7 +29,7 @@ _KEPT = "the best design that was looked at; no start of the solver ended as goo
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Standing:
     """What is left of a search.
 
     Attributes:
@@ -44,17 +44,17 @@ class Verdict:
     words: str = ""
 
 
-def refereed(work: Workspace, nlp: NLP, candidates: list[Candidate], trial: Trial | None) -> Verdict:
+def refereed(work: Workspace, nlp: NLP, candidates: list[Candidate], trial: Trial | None) -> Standing:
     """The search taken up again as long as a design that was looked at is better than where it ended."""
     if work.sampler is None or work.sample is None:
-        return Verdict(nlp, candidates, trial)
-    verdict = _appealed(work, work.sampler, work.sample, Verdict(nlp, candidates, trial))
-    trial = verdict.trial
-    if verdict.held is not None or trial is None or converged(trial) or trial.checked.violations:
-        return verdict
+        return Standing(nlp, candidates, trial)
+    standing = _appealed(work, work.sampler, work.sample, Standing(nlp, candidates, trial))
+    trial = standing.trial
+    if standing.held is not None or trial is None or converged(trial) or trial.checked.violations:
+        return standing
     if not _endless(work, work.sample, trial.checked.objective):
-        return verdict
-    return replace(verdict, held={name: trial.parameters[name] for name in work.problem.free}, words=_UNBOUNDED)
+        return standing
+    return replace(standing, held={name: trial.parameters[name] for name in work.problem.free}, words=_UNBOUNDED)
 
 
 def ideal(work: Workspace) -> Finding | None:
@@ -73,7 +73,7 @@ def ideal(work: Workspace) -> Finding | None:
     return None
 
 
-def _appealed(work: Workspace, sampler: Sampler, sample: Sample, so_far: Verdict) -> Verdict:
+def _appealed(work: Workspace, sampler: Sampler, sample: Sample, so_far: Standing) -> Standing:
     nlp, candidates, trial = so_far.nlp, so_far.candidates, so_far.trial
     run, rivals = Runner(work, nlp), sample.refined
     for _ in range(_APPEALS):
@@ -90,7 +90,7 @@ def _appealed(work: Workspace, sampler: Sampler, sample: Sample, so_far: Verdict
         trial = other
     nudged = _nudged(work, nlp, sampler, candidates, trial, rivals if len(rivals) else sample.refined)
     if nudged is not None:
-        return Verdict(nlp, candidates, nudged)
+        return Standing(nlp, candidates, nudged)
     if len(rivals) or _troubled(work, candidates, trial):
         opened = _opened(work, nlp, sampler, trial, rivals if len(rivals) else sample.refined)
         if opened is not None:
@@ -100,8 +100,8 @@ def _appealed(work: Workspace, sampler: Sampler, sample: Sample, so_far: Verdict
         checked = work.recheck(work.problem.ordered(free), nlp.cases)
         if not checked.violations and work.problem.sign * checked.objective < _least(work, trial):
             endless = _endless(work, sample, checked.objective)
-            return Verdict(nlp, candidates, trial, free, _UNBOUNDED if endless else _KEPT)
-    return Verdict(nlp, candidates, trial)
+            return Standing(nlp, candidates, trial, free, _UNBOUNDED if endless else _KEPT)
+    return Standing(nlp, candidates, trial)
 
 
 def _endless(work: Workspace, sample: Sample, value: float) -> bool:
@@ -109,13 +109,13 @@ def _endless(work: Workspace, sample: Sample, value: float) -> bool:
     return work.problem.sign * value < -_ENDLESS * sample.spread < 0
 
 
-def held(work: Workspace, verdict: Verdict, starts: Starts, cases: Sequence[Case]) -> Finding:
+def held(work: Workspace, standing: Standing, starts: Starts, cases: Sequence[Case]) -> Finding:
     """A feasible design that is no optimum, but better than all that the solver reached."""
-    assert verdict.held is not None
-    parameters = work.problem.ordered(verdict.held)
+    assert standing.held is not None
+    parameters = work.problem.ordered(standing.held)
     checked = work.recheck(parameters, cases)
-    status, words = "not_converged", (verdict.words,)
-    return Finding(parameters, checked, status, {}, starts, verdict.nlp.formulation, tuple(cases), notes=words)
+    status, words = "not_converged", (standing.words,)
+    return Finding(parameters, checked, status, {}, starts, standing.nlp.formulation, tuple(cases), notes=words)
 
 
 def _better(rivals: Looked, least: float) -> Looked:
@@ -159,7 +159,7 @@ def _troubled(work: Workspace, candidates: Sequence[Candidate], trial: Trial | N
     return (met and not all(c.feasible for c in candidates)) or (trial is not None and "a0" in trial.checked.violations)
 
 
-def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial | None, rivals: Looked) -> Verdict | None:
+def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial | None, rivals: Looked) -> Standing | None:
     """A better design where the search may go as far as a0 = 0; None where it finds none."""
     if not nlp.products:
         return None
@@ -167,7 +167,7 @@ def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial | None, ri
     origins += [] if trial is None else [({name: trial.parameters[name] for name in work.problem.free}, True)]
     bold = work.sample.boldest if work.sample else rivals
     origins += [(sampler.design(bold, k), False) for k in range(min(len(bold), _OPEN))]
-    best: Verdict | None = None
+    best: Standing | None = None
     least = _least(work, trial, _FINER)
     for sign in (1, -1):
         ours = [(design, near) for design, near in origins if sign * _leading(work, design) > 0]
@@ -189,7 +189,7 @@ def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial | None, ri
         if other is None or other.checked.violations or not work.problem.sign * other.checked.objective < least:
             continue
         least = _least(work, other, _FINER)
-        best = Verdict(opened, ends, other)
+        best = Standing(opened, ends, other)
         if singular:
             towards = f"towards a singular mass matrix (a0 = 0), to {work.problem.sign * reached.objective:.9g}"
             words = f"no best design: it improves {towards}; {mass_advice(work.problem)}"

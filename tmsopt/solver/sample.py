@@ -37,7 +37,7 @@ _SHARES = (1.0, 0.5, 0.1, 0.01, 1e-3)  # of a step, the best of which is taken
 
 
 @dataclass(frozen=True)
-class Space:
+class Cube:
     """The box of a problem as a unit cube: tangents and, over decades, logarithms evenly spread."""
 
     problem: Problem
@@ -135,7 +135,7 @@ class Sampler:
     """
 
     def __init__(self, problem: Problem, seed: int) -> None:
-        self.space, self.rng = Space(problem), np.random.default_rng([seed, 16])
+        self.space, self.rng = Cube(problem), np.random.default_rng([seed, 16])
         self.count = 0
         self.scales = np.ones(len(problem.conditions))
         self._offset = np.random.default_rng(seed).random(self.space.size)

@@ -60,18 +60,18 @@ def explore(work: Workspace) -> Explored:
         other = survivor(work, unstable, others)
         if other is not None and (trial is None or (not other.checked.violations and ahead(work, other, trial))):
             nlp, candidates, trial = unstable, others, other
-    verdict = refereed(work, nlp, candidates, trial)
-    wanting = verdict.trial is not None and _wants_stability(work.problem, verdict.trial)
-    if verdict.trial is not None and work.sampler and wanting and not work.never_stable:
+    standing = refereed(work, nlp, candidates, trial)
+    wanting = standing.trial is not None and _wants_stability(work.problem, standing.trial)
+    if standing.trial is not None and work.sampler and wanting and not work.never_stable:
         others = _left_of_the_axis(work, nlp, len(candidates))
-        other, every = survivor(work, nlp, others), [*verdict.candidates, *others]
-        better = other is not None and ahead(work, other, verdict.trial)
-        verdict = refereed(work, nlp, every, other) if better else replace(verdict, candidates=every)
-    nlp, candidates, trial = verdict.nlp, verdict.candidates, verdict.trial
+        other, every = survivor(work, nlp, others), [*standing.candidates, *others]
+        better = other is not None and ahead(work, other, standing.trial)
+        standing = refereed(work, nlp, every, other) if better else replace(standing, candidates=every)
+    nlp, candidates, trial = standing.nlp, standing.candidates, standing.trial
     starts = counted(candidates, trial.candidate.objective if trial else math.nan)
-    if verdict.held is not None:
-        listed = evaluated_cases(work.problem, work.problem.ordered(verdict.held))
-        return Explored(work.name, tuple(candidates), held(work, verdict, starts, listed))
+    if standing.held is not None:
+        listed = evaluated_cases(work.problem, work.problem.ordered(standing.held))
+        return Explored(work.name, tuple(candidates), held(work, standing, starts, listed))
     finding = _covered(work, nlp, candidates, trial, starts) if cases else found(work, nlp, trial, starts)
     return Explored(work.name, tuple(candidates), finding)
 
