@@ -33,6 +33,7 @@ _EXACT = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-4, **_QUICK}
 _SETTINGS: dict[str, dict[str, Any]] = {"far": _FAR, "exact": _EXACT, "near": _NEAR}
 
 _STEPS = 12
+_STALLED = 1e-14  # relative step of Newton's method, below which it ends once the steps no longer shrink
 _STATIONARY = 1e-9
 _SINGULAR = 1e11  # size of a solution, for a right side of size 1, that betrays a singular matrix
 _ROUNDINGS = 32 * float(np.finfo(float).eps)  # shifts of high degrees are sums of sums
@@ -220,7 +221,7 @@ def _newton(conditions: _Conditions, run: Run, loose: bool, freed: NDArray[np.bo
     held = np.logical_or(low, high) & ~np.asarray(freed)
     target = np.where(low, conditions.row_lower, conditions.row_upper)[held]
     rows = np.where(held, run.row_multipliers, 0.0)
-    n, m = int(free.sum()), int(held.sum())
+    n, m, last = int(free.sum()), int(held.sum()), np.inf
     for _ in range(_STEPS):
         _, gradient, g, jacobian, hessian = conditions.at(x, rows)
         active = jacobian[np.ix_(held, free)]
@@ -234,8 +235,10 @@ def _newton(conditions: _Conditions, run: Run, loose: bool, freed: NDArray[np.bo
         x[free] += solution[:n]
         rows = np.zeros_like(rows)
         rows[held] = solution[n:]
-        if np.all(np.abs(solution[:n]) <= 1e-16 * (1 + np.abs(x[free]))):
+        size = np.abs(solution[:n] / (1 + np.abs(x[free]))).max(initial=0.0)
+        if size <= _STALLED and size > last / 2:  # rounding alone is left
             break
+        last = size
     if not np.all(np.isfinite(x)):
         return None
     x = np.clip(x, lower, upper)

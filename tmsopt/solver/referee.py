@@ -20,6 +20,7 @@ _HAIRS = np.geomspace(1e-15, 1e-7, 33)  # of the way to a design that meets all 
 _TOWARDS = 30  # random designs in whose direction an end is moved
 _FINER = 1e-11  # the same, where both were polished
 _OPEN = 3  # designs from which a singular mass matrix is approached
+_FAR_OFF = 1e5  # ratio of the largest root to the others that makes it one near infinity
 _SINGULAR = 1e-9  # a0 in its own unit, below which it is 0 in all but name
 _INSIDE = 1e-12  # the same, of the design that is given where the best has none
 _ENDLESS = 1e6  # spreads of the objective in the box, beyond which it has no lower bound
@@ -155,8 +156,10 @@ def _nudged(
 def _troubled(work: Workspace, candidates: Sequence[Candidate], trial: Trial | None) -> bool:
     """Whether starts that met all limits ended nowhere, or the best end has a root near infinity."""
     assert work.sample is not None
-    met = bool(np.any(work.sample.refined.violation == 0))
-    return (met and not all(c.feasible for c in candidates)) or (trial is not None and "a0" in trial.checked.violations)
+    if bool(np.any(work.sample.refined.violation == 0)) and not all(c.feasible for c in candidates):
+        return True
+    sizes = sorted(math.hypot(r.re, r.im) for r in trial.checked.structure.roots) if trial else []
+    return trial is not None and (not sizes or sizes[-1] > _FAR_OFF * float(np.median(sizes)))
 
 
 def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial | None, rivals: Looked) -> Standing | None:

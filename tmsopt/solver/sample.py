@@ -1,6 +1,6 @@
 """A quasi-random sample of the whole box, judged by arrays and refined: where to start, and the referee of claims."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -12,7 +12,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.formulation.judgement import Judged, judged
 from tmsopt.records import Array
 
-_MOST, _LEAST = 2**14, 2**11
+_MOST, _LEAST = 2**13, 2**11
 """Designs of a sample: at most, and at least where each costs much."""
 
 _FIRST, _EACH = 2**8, 4  # designs for no parameter at all, and times as many for each
@@ -21,11 +21,12 @@ _FACES = 4  # one design of so many is moved to faces of the box: many optima li
 _DECADES = 100.0  # ratio of the ends of a range beyond which its values are spread by their logarithms
 
 _APART = 0.15  # of the box: distance of designs that may lie in different basins
-_RANKED = 4096  # first ones of an order among which those apart are chosen
+_RANKED = 1024  # first ones of an order among which those apart are chosen
 _LEADERS, _BOLD = 8, 8  # designs to start from, of either kind
 _SOUGHT = 64  # designs from which limits are approached
-_LOCAL = 24  # designs looked at around each that is refined, in each round
-_REACHES = tuple(np.geomspace(0.1, 3e-4, 9).tolist())  # of the box, round after round
+_LOCAL = 40  # designs looked at around each that is refined, in each round
+_REACHES = (0.1, 0.03, 0.008, 2e-3, 4e-4)  # of the box, round after round
+_CLOSER = _REACHES[2:]  # the same, of designs that are close to each other
 
 _SHELLS, _SHELL = 12, 32  # distances about a design, and designs at each
 _NEAR = 0.01  # of the box: distance of designs about one that are refined
@@ -181,11 +182,11 @@ class Sampler:
             self.scales[k] = float(np.median(known)) if known.size and np.median(known) > 0 else 1.0
         return self._standing(u, found)
 
-    def refined(self, start: Looked) -> Looked:
+    def refined(self, start: Looked, reaches: Sequence[float] = _REACHES) -> Looked:
         """Each design improved by random steps that become shorter, limits first."""
         kept = start
         rows = np.arange(len(kept))
-        for reach in _REACHES if len(kept) else ():
+        for reach in reaches if len(kept) else ():
             steps = self.rng.standard_normal((len(kept), _LOCAL, self.space.size))
             steps[:, ::2] *= self.rng.random((len(kept), _LOCAL // 2, self.space.size)) < 0.5  # not in all directions
             near = self.look(np.clip(kept.u[:, None] + reach * steps, 0.0, 1.0).reshape(-1, self.space.size))
@@ -230,7 +231,7 @@ class Sampler:
         ends[np.arange(len(ends)), np.repeat(np.arange(self.space.size), 2)] = np.tile([0.0, 1.0], self.space.size)
         seen = self.look(np.clip(np.concatenate([u[None], u + reach * steps, ends]), 0.0, 1.0))
         best = seen.take(seen.ranked[:_RANKED])
-        return self.refined(best.take(apart(best, _LEADERS, _NEAR)))
+        return self.refined(best.take(apart(best, _LEADERS, _NEAR)), _CLOSER)
 
     def _newton_steps(self, u: Array) -> Array:
         """Shortest steps to where violated limits are met, to first order."""
