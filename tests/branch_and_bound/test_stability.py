@@ -97,6 +97,7 @@ def test_an_interrupt_goes_on(when: str, monkeypatch: pytest.MonkeyPatch) -> Non
             raise KeyboardInterrupt
         return [Decision(INFEASIBLE)]
 
+    monkeypatch.setattr(asking, "none_stable", lambda problem: False)
     monkeypatch.setattr(Crew, "race", stop)
     with pytest.raises(KeyboardInterrupt):
         any_stable(problem(DAMPED, {"x": (0, 1)}), SECONDS, known={"x": 1.0})
@@ -110,4 +111,5 @@ def test_what_scip_cannot_take_is_left_undecided() -> None:
 def test_without_a_global_solver_nothing_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(asking, "SOLVER", replace(SCIP, module="no_such_module"))
     monkeypatch.setattr(asking, "Crew", None)
+    monkeypatch.setattr(asking, "none_stable", lambda problem: False)
     assert any_stable(problem(DAMPED, {"x": (0, 1)}), SECONDS) == Stability()

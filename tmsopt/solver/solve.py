@@ -73,7 +73,8 @@ def solved(design: Given, options: Options = DEFAULTS, family: Family | None = N
     else:
         finding = evaluated(problem, evaluated_cases(problem, problem.ordered({})))
     solution = _assembled(problem, finding, notes, values, began)
-    return _with_stability(solution, options, family, began) if options.stability else solution
+    asking = options.stability and not options.near  # which keeps to its side of the box
+    return _with_stability(solution, options, family, began) if asking else solution
 
 
 def standing(problem: Problem, design: Mapping[str, float], note: str) -> Solution:
