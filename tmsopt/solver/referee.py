@@ -58,6 +58,16 @@ def refereed(work: Workspace, nlp: NLP, candidates: list[Candidate], trial: Tria
     return replace(standing, held={name: trial.parameters[name] for name in work.problem.free}, words=_UNBOUNDED)
 
 
+def _at_infinity(work: Workspace, sample: Sample, trial: Trial | None) -> Looked:
+    """Designs with a singular mass matrix that are better than a trial, their roots at infinity left aside."""
+    if not sample.singular:
+        return sample.refined.take(np.arange(0))
+    a0 = work.part.model.coefficient_names()[0]
+    limits = {**work.part.constraints, "a singular mass matrix": f"{a0} == 0"}
+    sampler = Sampler(replace(work.part, constraints=limits), work.options.seed)
+    return _better(sampler.sample().refined, _least(work, trial))
+
+
 def ideal(work: Workspace) -> Finding | None:
     """A design of the sample that no other can beat: all its roots real and negative, where the damping ratio is asked.
 
@@ -92,8 +102,9 @@ def _appealed(work: Workspace, sampler: Sampler, sample: Sample, so_far: Standin
     nudged = _nudged(work, nlp, sampler, candidates, trial, rivals if len(rivals) else sample.refined)
     if nudged is not None:
         return Standing(nlp, candidates, nudged)
-    if len(rivals) or _troubled(work, candidates, trial):
-        opened = _opened(work, nlp, sampler, trial, rivals if len(rivals) else sample.refined)
+    beyond = _at_infinity(work, sample, trial)
+    if len(rivals) or len(beyond) or _troubled(work, candidates, trial):
+        opened = _opened(work, nlp, sampler, trial, (rivals if len(rivals) else sample.refined).joined(beyond))
         if opened is not None:
             return replace(opened, candidates=[*candidates, *opened.candidates])
     if len(rivals):
@@ -166,14 +177,15 @@ def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial | None, ri
     """A better design where the search may go as far as a0 = 0; None where it finds none."""
     if not nlp.products:
         return None
-    origins = [(sampler.design(rivals, k), True) for k in range(min(len(rivals), _OPEN))]
+    rows = [*range(len(rivals))][:_OPEN] + [*range(len(rivals))][_OPEN:][-_OPEN:]
+    origins = [(sampler.design(rivals, k), True) for k in rows]
     origins += [] if trial is None else [({name: trial.parameters[name] for name in work.problem.free}, True)]
     bold = work.sample.boldest if work.sample else rivals
     origins += [(sampler.design(bold, k), False) for k in range(min(len(bold), _OPEN))]
     best: Standing | None = None
     least = _least(work, trial, _FINER)
     for sign in (1, -1):
-        ours = [(design, near) for design, near in origins if sign * _leading(work, design) > 0]
+        ours = [(design, near) for design, near in origins if sign * _leading(work, design) > -_SINGULAR]
         if not ours:
             continue
         opened = work.formulate(nlp.cases, lead=sign)
@@ -201,4 +213,6 @@ def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial | None, ri
 
 
 def _leading(work: Workspace, free: Mapping[str, float]) -> float:
-    return float(work.problem.values(work.problem.ordered(free)).coefficients[0])
+    """a0 relative to the other coefficients."""
+    a = [float(c) for c in work.problem.values(work.problem.ordered(free)).coefficients]
+    return a[0] / max(map(abs, a))

@@ -31,6 +31,8 @@ _CLOSER = _REACHES[2:]  # the same, of designs that are close to each other
 _SHELLS, _SHELL = 12, 32  # distances about a design, and designs at each
 _NEAR = 0.01  # of the box: distance of designs about one that are refined
 
+_VANISHING = 1e-3  # of its usual size: a leading coefficient that may come to 0
+
 _MET = 1e-10  # of its scale: excess up to which a limit counts as met by numeric roots
 _STEPS = 12  # of Newton's method towards what violated limits allow
 _STEP = 1e-7  # of the box, for differences
@@ -118,6 +120,7 @@ class Sample:
         boldest: designs far from each other that are best whatever they violate.
         met, size: designs of the sample that meet all limits, and of all.
         spread: of the objective, over half of them.
+        singular: whether a0 comes near 0 among those that violate least, so that the mass matrix may be singular.
     """
 
     refined: Looked
@@ -125,6 +128,7 @@ class Sample:
     met: int
     size: int
     spread: float
+    singular: bool
 
 
 class Sampler:
@@ -164,7 +168,9 @@ class Sampler:
         known = drawn.worth[np.isfinite(drawn.worth)]
         spread = float(np.subtract(*np.percentile(known, [75, 25]))) if known.size else 0.0
         met = int(np.sum(drawn.violation == 0))
-        return Sample(refined.take(refined.ranked), bold.take(apart(bold, _BOLD)), met, len(drawn), spread)
+        a0 = self._leading(ranked.u)
+        singular = bool(a0.min() * a0.max() <= 0 or np.abs(a0).min() < _VANISHING * np.median(np.abs(a0)))
+        return Sample(refined.take(refined.ranked), bold.take(apart(bold, _BOLD)), met, len(drawn), spread, singular)
 
     def draw(self) -> Looked:
         """Corners, a quasi-random sequence, and some of it moved to faces."""
@@ -246,6 +252,13 @@ class Sampler:
         slopes, target = np.nan_to_num(slopes, posinf=0.0, neginf=0.0), np.nan_to_num(target)
         inverse = np.linalg.pinv(np.moveaxis(slopes, 0, 1), rcond=1e-10)
         return np.asarray(-np.einsum("rnm,mr->rn", inverse, target))
+
+    def _leading(self, u: Array) -> Array:
+        """The leading coefficient of designs."""
+        problem = self.problem
+        with np.errstate(all="ignore"):
+            a0 = problem.model.coefficients(problem.ordered(self.space.designs(u)), problem.parameter_set)[0]
+        return np.asarray(np.nan_to_num(np.broadcast_to(np.asarray(a0, dtype=float), len(u))))
 
     def _judged(self, u: Array) -> Judged:
         self.count += len(u)
