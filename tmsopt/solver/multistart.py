@@ -15,18 +15,15 @@ from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import complete, designs, opposite, worth
 from tmsopt.records import Array
 from tmsopt.roots import roots
+from tmsopt.solver.sample import NARROW
 from tmsopt.solver.workspace import Workspace
 
 _ENOUGH = 12  # starts tried before agreement counts
 _AGREE = 5  # starts at the best value that end the search
 _HOPELESS = 16  # starts without a feasible end after which the least-violating design is looked for instead
-_ENOUGH_SAMPLED, _ENOUGH_NARROW, _AGREE_SAMPLED, _HOPELESS_SAMPLED = 2, 8, 2, 8
+_ENOUGH_SAMPLED, _ENOUGH_NARROW, _AGREE_SAMPLED, _HOPELESS_SAMPLED = 3, 8, 2, 8
 """The same where the starts come from a sample of the box: so many for each optimum met, more where little is feasible.
-
-Of 164 feasible random designs two for each optimum find the best in all but two, whose mass matrix becomes singular.
 """
-
-_NARROW = 0.02  # share of a sample that meets all limits, below which little is feasible
 
 _MET = 1e-14  # sum of squares of coefficients at which more conditions than parameters are met
 _SAME = 1e-7  # relative difference of objectives that counts as the same
@@ -69,7 +66,7 @@ def search(work: Workspace, nlp: NLP, most: int | None = None) -> list[Candidate
             return candidates
     if part.start and len(candidates) < starts:  # the user's own
         candidates.append(run.ended(middle(part), near=True))
-    for design, near in islice(starting(work), max(starts - len(candidates), 0)):
+    for design, near in islice(starting(work, candidates), max(starts - len(candidates), 0)):
         hopeful = work.sample is None and any(c.feasible for c in candidates)
         candidates.append(_otherwise(run, design, run.ended(design, near, hopeful)))
         if options.progress:
@@ -104,15 +101,22 @@ def further(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
     return found
 
 
-def starting(work: Workspace) -> Iterator[tuple[dict[str, float], bool]]:
-    """Designs to start from, and whether each may be near an optimum: those of the sample first, by turns."""
+def starting(work: Workspace, ended: Sequence[Candidate] = ()) -> Iterator[tuple[dict[str, float], bool]]:
+    """Designs to start from, and whether each may be near an optimum: those of the sample first, by turns.
+
+    After the first of either kind, the one that is farthest from where starts `ended` meanwhile: those beside it would
+    end there too.
+    """
     if work.sampler and work.sample:
-        refined, bold = work.sample.refined, work.sample.boldest
-        for k in range(max(len(refined), len(bold))):
-            if k < len(refined):
-                yield work.sampler.design(refined, k), True
-            if k < len(bold):
-                yield work.sampler.design(bold, k), False
+        sides = [(work.sample.refined, True), (work.sample.boldest, False)]
+        left = [list(range(len(seen))) for seen, _ in sides]
+        while any(left):
+            for (seen, near), rows in zip(sides, left, strict=True):
+                if rows:
+                    reached = [work.sampler.space.points(work.design_at(c.run.x)) for c in ended if c.feasible]
+                    gaps = [min((float(np.linalg.norm(seen.u[k] - u)) for u in reached), default=0.0) for k in rows]
+                    first = len(rows) == len(seen)
+                    yield work.sampler.design(seen, rows.pop(0 if first else int(np.argmax(gaps)))), near
     yield from ((design, False) for design in designs(work.part, work.options.seed, work.options.starts))
 
 
@@ -248,7 +252,7 @@ def _settled(work: Workspace, candidates: list[Candidate]) -> bool:
     if sampled and failed >= _HOPELESS:  # which takes long; the sample is the judge of what was found
         return True
     if sampled:
-        each = _ENOUGH_SAMPLED if work.sample and work.sample.met > _NARROW * work.sample.size else _ENOUGH_NARROW
+        each = _ENOUGH_SAMPLED if work.sample and work.sample.met > NARROW * work.sample.size else _ENOUGH_NARROW
         return len(candidates) >= each * w and agreeing >= _AGREE_SAMPLED
     seen = n > w + 2 and w * (n - 1) <= (w + 0.5) * (n - w - 2)
     return len(candidates) >= _ENOUGH and agreeing >= _AGREE and seen

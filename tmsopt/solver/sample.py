@@ -23,7 +23,8 @@ _DECADES = 100.0  # ratio of the ends of a range beyond which its values are spr
 _APART = 0.15  # of the box: distance of designs that may lie in different basins
 _RANKED = 1024  # first ones of an order among which those apart are chosen
 _LEADERS, _BOLD = 8, 8  # designs to start from, of either kind
-_SOUGHT = 64  # designs from which limits are approached
+_SOUGHT = 256  # designs from which limits are approached
+NARROW = 0.02  # share of designs that meet all limits, below which little is feasible
 _LOCAL = 40  # designs looked at around each that is refined, in each round
 _REACHES = (0.1, 0.03, 0.008, 2e-3, 4e-4)  # of the box, round after round
 _CLOSER = _REACHES[2:]  # the same, of designs that are close to each other
@@ -159,10 +160,10 @@ class Sampler:
         drawn = self.draw()
         ranked = drawn.take(drawn.ranked[:_RANKED])
         leaders = ranked.take(apart(ranked, _LEADERS))
-        if np.any(leaders.violation > 0):
+        if np.sum(drawn.violation == 0) < NARROW * len(drawn):
             sought = self.nearer(ranked.take(apart(ranked, _SOUGHT, _APART / 3)))
             sought = sought.take(sought.ranked)
-            leaders = sought.take(apart(sought, _LEADERS))
+            leaders = sought.take(apart(sought, 2 * _LEADERS))
         refined = self.refined(leaders)
         bold = drawn.take(np.argsort(drawn.worth, kind="stable")[:_RANKED])
         known = drawn.worth[np.isfinite(drawn.worth)]
