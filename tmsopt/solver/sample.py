@@ -1,6 +1,6 @@
 """A quasi-random sample of the whole box, judged by arrays and refined: where to start, and the referee of claims."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 
@@ -27,10 +27,9 @@ _SOUGHT = 256  # designs from which limits are approached
 NARROW = 0.02  # share of designs that meet all limits, below which little is feasible
 _LOCAL = 40  # designs looked at around each that is refined, in each round
 _REACHES = (0.1, 0.03, 0.008, 2e-3, 4e-4)  # of the box, round after round
-_CLOSER = _REACHES[2:]  # the same, of designs that are close to each other
 
-_SHELLS, _SHELL = 12, 32  # distances about a design, and designs at each
-_NEAR = 0.01  # of the box: distance of designs about one that are refined
+_SHELLS, _SHELL = 12, 64  # distances about a design, and designs at each
+_NEAR = 0.01  # of the box: distance of designs about one that count as different
 
 _VANISHING = 1e-3  # of its usual size: a leading coefficient that may come to 0
 
@@ -189,11 +188,11 @@ class Sampler:
             self.scales[k] = float(np.median(known)) if known.size and np.median(known) > 0 else 1.0
         return self._standing(u, found)
 
-    def refined(self, start: Looked, reaches: Sequence[float] = _REACHES) -> Looked:
+    def refined(self, start: Looked) -> Looked:
         """Each design improved by random steps that become shorter, limits first."""
         kept = start
         rows = np.arange(len(kept))
-        for reach in reaches if len(kept) else ():
+        for reach in _REACHES if len(kept) else ():
             steps = self.rng.standard_normal((len(kept), _LOCAL, self.space.size))
             steps[:, ::2] *= self.rng.random((len(kept), _LOCAL // 2, self.space.size)) < 0.5  # not in all directions
             near = self.look(np.clip(kept.u[:, None] + reach * steps, 0.0, 1.0).reshape(-1, self.space.size))
@@ -238,7 +237,7 @@ class Sampler:
         ends[np.arange(len(ends)), np.repeat(np.arange(self.space.size), 2)] = np.tile([0.0, 1.0], self.space.size)
         seen = self.look(np.clip(np.concatenate([u[None], u + reach * steps, ends]), 0.0, 1.0))
         best = seen.take(seen.ranked[:_RANKED])
-        return self.refined(best.take(apart(best, _LEADERS, _NEAR)), _CLOSER)
+        return best.take(apart(best, _LEADERS, _NEAR))
 
     def _newton_steps(self, u: Array) -> Array:
         """Shortest steps to where violated limits are met, to first order."""

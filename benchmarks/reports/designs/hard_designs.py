@@ -78,8 +78,15 @@ def judged(index: int, seed: int, target: Target) -> Verdict:
             least = f"feasible at {target.value:.9g}, violation {target.violation:.0e}"
             return replace(own, label=INFEASIBLE, why=least) if target.solvable else replace(own, label=RIGHT)
         case _:
-            honest = bool(solution.notes) and open_ended(problem, target)
+            honest = bool(solution.notes) and (open_ended(problem, target) or _surpassed(problem, own))
             return replace(own, label=RIGHT) if honest else replace(own, label=UNANSWERED, why=_unanswered(target))
+
+
+def _surpassed(problem: Problem, own: Verdict) -> bool:
+    """Whether a design that is said not to be the best is what it claims to be, and better than the best known."""
+    if confirmed_value(problem, own.design, own.value):
+        return False
+    return not own.target.solvable or problem.sign * (own.value - own.target.value) <= SOLVED * SCALE
 
 
 def open_ended(problem: Problem, target: Target) -> bool:
@@ -191,7 +198,7 @@ def parts(verdicts: Sequence[Verdict]) -> Iterator[str]:
         "References come from samples, differential evolution and SLSQP on eigenvalues, without the package, and count "
         "if they violate nothing by more than 1e-9 by isolated roots. Right is an optimum that is what it claims to "
         f"be, within {SOLVED:.0e} of the best known, relative to it or to {SCALE}; infeasible where no feasible design "
-        "is known; no optimum, with a note, where the best known has no bound or a singular mass matrix. Times are "
+        "is known; no optimum, with a note, where the best known has no bound or a singular mass matrix, or is surpassed. Times are "
         "those of the processor."
     )
     names = dict.fromkeys(hard_family(i) for i in range(HARD_COUNT))
