@@ -91,6 +91,8 @@ def found(
         ended = False
         notes = ("the objective does not exist at the design where the search ended; constrain what it divides by",)
     status = "optimal" if ended and not checked.violations else "not_converged"
+    if status != "optimal" and not notes and not checked.violations:
+        notes = ("feasible, but the solver did not converge here: a better design may be close",)
     if counted.kind == "over-determined" and checked.violations:
         status = "infeasible"
         surplus = f"{counted.conditions} conditions for {counted.free} free parameters"
