@@ -20,7 +20,7 @@ class Judged:
     """What designs are in their worst cases; numeric roots, so beside multiple ones a hint.
 
     Attributes:
-        worth: the objective, larger is worse; None without one.
+        worth: the objective, larger is worse, nan where there is no motion to speak of; None without one.
         beyond: by how much each limit is passed, negative inside; of an equality, left minus right. Shape (limits, …).
         equal: which limits are equalities.
     """
@@ -55,22 +55,29 @@ def judged(problem: Problem, columns: Mapping[str, Array]) -> Judged:
             found = reduce(worst, [values[name] for values in each])
             for values in (own, *each):
                 values.define(name, found)
+    moves = reduce(np.logical_and, [_moves(values, shape) for values in each])
     worth = None
     if problem.objective is not None:
         every = [problem.sign * _evaluated(problem.objective, values, shape) for values in each]
-        worth = reduce(np.maximum, every)
+        worth = np.where(moves, reduce(np.maximum, every), np.nan)
     beyond = [  # an equality is one of the nominal design
         reduce(np.maximum, [c.sign * _evaluated(c, values, shape) for values in ([own] if c.equality else each)])
         for c in conditions
     ]
     equal = np.array([c.equality for c in conditions], dtype=bool)
-    return Judged(worth, np.stack(beyond) if beyond else np.empty((0, *shape)), equal)
+    return Judged(worth, np.where(moves, np.stack(beyond), np.nan) if beyond else np.empty((0, *shape)), equal)
 
 
 def values_of(problem: Problem, parameters: Mapping[str, Any], shape: tuple[int, ...]) -> Values:
     """Everything derived from designs, as arrays of one shape."""
     arrays = {name: np.broadcast_to(np.asarray(value, dtype=float), shape) for name, value in parameters.items()}
     return Values(problem.model, problem.parameter_set, arrays, extra=ARRAY_ROOT_QUANTITIES)
+
+
+def _moves(values: Values, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Whether all coefficients exist, and the mass matrix is not singular: the recheck takes no other design."""
+    a = [np.broadcast_to(np.asarray(c, dtype=float), shape) for c in values.coefficients]
+    return np.asarray(np.isfinite(a).all(axis=0) & (a[0] != 0))
 
 
 def _evaluated(expression: Expression, values: Values, shape: tuple[int, ...]) -> Array:

@@ -64,7 +64,8 @@ def lift_abscissa(build: Rows) -> Lifted:
     """γ with p(t + γ) = a0 ∏ (t² + βᵢ t + κᵢ), βᵢ, κᵢ ≥ 0, in every case: at or right of every root.
 
     An odd degree has one factor t + δ, δ ≥ 0, more. Some β = 0, κ = 0 or δ = 0 puts a root on the line Re s = γ.
-    Where the NLP goes as far as a0 = 0, the first factor is ±a0 t² + βt + κ, so that a root may be at infinity.
+    Where the NLP goes as far as a0 = 0, the first factor is ±a0 t² + βt + κ, so that a root may be at infinity; of an
+    odd degree the linear one is ±a0 t + δ instead.
     """
     covered, first, lead = build.covered, build.size[0], build.lead
     gamma = build.variable("abscissa")
@@ -72,21 +73,25 @@ def lift_abscissa(build: Rows) -> Lifted:
     products: list[tuple[Factor, ...]] = []
     for case in covered:
         a, monic, factors = build.polynomial(case), [], []
+        odd = len(a) % 2 == 0
+        if lead:
+            build.row("a0", lead * a[0], 0.0, np.inf)
         for k in range(1, (len(a) - 1) // 2 + 1):
-            at, a0 = build.size[0], lead * a[0] if lead and k == 1 else 1
-            if isinstance(a0, int):
+            at, led = build.size[0], lead and k == 1 and not odd
+            if not led:
                 factors.append(Factor(at, squared=False))
-            else:
-                build.row("a0", a0, 0.0, np.inf)
-            monic.append([a0, build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)])
-            if not lead or k > 1 or len(a) <= _TWO_FACTORS:  # the largest roots do not stand on the line
+            beta, kappa = build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)
+            monic.append([lead * a[0] if led else 1, beta, kappa])
+            if not led or len(a) <= _TWO_FACTORS:  # the largest roots do not stand on the line
                 touches.append(Touch(partial(_pair_distance, at), variable=at))
                 touches.append(Touch(partial(_real_distance, at), variable=at + 1))
-        if len(a) % 2 == 0:
+        if odd:
             at = build.size[0]
-            factors.append(Factor(at, linear=True))
-            monic.append([1, build.variable(f"delta.{case}", 0.0)])
-            touches.append(Touch(partial(_step_distance, at), variable=at))
+            monic.append([lead * a[0] if lead else 1, build.variable(f"delta.{case}", 0.0)])
+            if not lead:
+                factors.append(Factor(at, linear=True))
+            if not lead or len(a) <= _TWO_FACTORS // 2:
+                touches.append(Touch(partial(_step_distance, at), variable=at))
         build.equal("abscissa", shift(a, gamma), [(lead or a[0]) * c for c in product(*monic)])
         products.append(tuple(factors))
     guess, close = (partial(_abscissa_guess, covered, near, abs(lead) / build.leading_unit) for near in (False, True))
@@ -98,7 +103,8 @@ def lift_damping_ratio(build: Rows) -> Lifted:
     """ζ with p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ, in every case: at or below every damping ratio.
 
     pᵢ = 2 ζ wᵢ puts a pair on the edge of the sector; with real roots alone, ζ = 1. An odd degree has one factor s + d,
-    d ≥ 0, more. Where the NLP goes as far as a0 = 0, the first factor is m² s² + p s + w², m² = ±a0, p ≥ 2 ζ m w.
+    d ≥ 0, more. Where the NLP goes as far as a0 = 0, the first factor is m² s² + p s + w², m² = ±a0, p ≥ 2 ζ m w; of an
+    odd degree the linear one is ±a0 s + d instead.
     """
     covered, first, lead = build.covered, build.size[0], build.lead
     zeta = build.variable("damping_ratio", -1.0, 1.0)
@@ -106,22 +112,25 @@ def lift_damping_ratio(build: Rows) -> Lifted:
     products: list[tuple[Factor, ...]] = []
     for case in covered:
         a, monic, factors = build.polynomial(case), [], []
+        odd = len(a) % 2 == 0
+        if lead:
+            build.row("a0", lead * a[0], 0.0, np.inf)
         for k in range(1, (len(a) - 1) // 2 + 1):
-            at = build.size[0]
-            factors.append(Factor(at, squared=True))
+            at, led = build.size[0], lead and k == 1 and not odd
             p, w, m = build.variable(f"p{k}.{case}"), build.variable(f"w{k}.{case}", 0.0), 1.0
-            if lead and k == 1:
-                factors.pop()
+            if led:
                 m = build.variable(f"m.{case}", 0.0)
-                build.row("a0", lead * a[0], 0.0, np.inf)
                 build.row("damping_ratio", m * m - lead * a[0], 0.0, 0.0)
+            else:
+                factors.append(Factor(at, squared=True))
             monic.append([m * m, p, w * w])
             build.row("damping_ratio", p - 2 * zeta * m * w, 0.0, np.inf)
-            if not lead or k > 1 or len(a) <= _TWO_FACTORS:
+            if not led or len(a) <= _TWO_FACTORS:
                 touches.append(Touch(partial(_sector_distance, at), row=build.size[1] - 1))
-        if len(a) % 2 == 0:
-            factors.append(Factor(build.size[0], linear=True))
-            monic.append([1, build.variable(f"d.{case}", 0.0)])
+        if odd:
+            if not lead:
+                factors.append(Factor(build.size[0], linear=True))
+            monic.append([lead * a[0] if lead else 1, build.variable(f"d.{case}", 0.0)])
         build.equal("damping_ratio", a, [(lead or a[0]) * c for c in product(*monic)])
         products.append(tuple(factors))
     guess = partial(_damping_guess, covered, abs(lead) / build.leading_unit)
@@ -236,12 +245,13 @@ def quadratic_pairs(z: Roots) -> list[Roots]:
 def _factors(z: Roots, gamma: float, lead: float = 1.0) -> list[float]:
     """β and κ of the factors about the line Re s = γ; δ of a linear one.
 
-    With a `lead` other than 1, that of the first one, which then is the one with the largest roots.
+    With a `lead` other than 1, that of the linear one, or else of the first, which then has the largest roots.
     """
     pairs = [pair - gamma for pair in quadratic_pairs(z)]
     if lead != 1.0:
         pairs.sort(key=lambda pair: (len(pair) < 2, -abs(pair.prod())))
-    leads = [lead, *[1.0] * len(pairs)]
+    leads = [1.0] * len(pairs)
+    leads[-(len(z) % 2)] = lead
     each = [(a * -pair.sum().real, a * pair.prod().real)[: len(pair)] for a, pair in zip(leads, pairs, strict=False)]
     return [float(c) for factor in each for c in factor]
 
@@ -272,14 +282,14 @@ def _real_guess(covered: Sequence[int], line: bool, values: Sequence[Values], z:
 def _damping_guess(
     covered: Sequence[int], led: float, values: Sequence[Values], z: Sequence[Roots]
 ) -> list[list[float]]:
-    """ζ a little less than it is, and p and w of every factor; if led, the first with a leading coefficient, and m."""
+    """ζ a little less than it is, and p and w of every factor; if led, the led one with its coefficient, and m."""
     every = np.concatenate([z[case] for case in covered])
     found = [min(max(float(np.min(-every.real / (np.abs(every) + 1e-300))) - 0.05, -0.95), 0.95)]
     for case in covered:
         a0 = led * abs(float(values[case].coefficients[0])) if led else 1.0
         factors = _factors(z[case], 0.0, a0)
         roots = [np.sqrt(abs(c)) if k % 2 else c for k, c in enumerate(factors)]
-        found += [*roots[:2], *([np.sqrt(a0)] if led else []), *roots[2:]]
+        found += [*roots[:2], *([np.sqrt(a0)] if led and len(z[case]) % 2 == 0 else []), *roots[2:]]
     return [[float(x) for x in found]]
 
 

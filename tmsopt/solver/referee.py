@@ -19,6 +19,7 @@ _LOST = 1e-7  # relative difference of the objective that makes a design better
 _HAIRS = np.geomspace(1e-15, 1e-7, 33)  # of the way to a design that meets all limits
 _TOWARDS = 30  # random designs in whose direction an end is moved
 _FINER = 1e-11  # the same, where both were polished
+_FINEST = np.geomspace(1e-4, 1e-10, 19).tolist()  # of the box: steps that improve a design that is kept as it is
 _OPEN = 3  # designs from which a singular mass matrix is approached
 _FAR_OFF = 1e5  # ratio of the largest root to the others that makes it one near infinity
 _SINGULAR = 1e-9  # a0 in its own unit, below which it is 0 in all but name
@@ -107,8 +108,8 @@ def _appealed(work: Workspace, sampler: Sampler, sample: Sample, so_far: Standin
         opened = _opened(work, nlp, sampler, trial, (rivals if len(rivals) else sample.refined).joined(beyond))
         if opened is not None:
             return replace(opened, candidates=[*candidates, *opened.candidates])
-    if len(rivals):
-        free = sampler.design(rivals, 0)
+    for some in (sampler.refined(rivals.take(np.arange(1)), _FINEST), rivals) if len(rivals) else ():
+        free = sampler.design(some, 0)
         checked = work.recheck(work.problem.ordered(free), nlp.cases)
         if not checked.violations and work.problem.sign * checked.objective < _least(work, trial):
             endless = _endless(work, sample, checked.objective)
@@ -170,7 +171,7 @@ def _troubled(work: Workspace, candidates: Sequence[Candidate], trial: Trial | N
     if bool(np.any(work.sample.refined.violation == 0)) and not all(c.feasible for c in candidates):
         return True
     sizes = sorted(math.hypot(r.re, r.im) for r in trial.checked.structure.roots) if trial else []
-    return trial is not None and (not sizes or sizes[-1] > _FAR_OFF * float(np.median(sizes)))
+    return trial is not None and (not sizes or sizes[-1] > _FAR_OFF * sizes[(len(sizes) - 1) // 2])
 
 
 def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial | None, rivals: Looked) -> Standing | None:
