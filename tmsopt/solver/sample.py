@@ -1,6 +1,6 @@
 """A quasi-random sample of the whole box, judged by arrays and refined: where to start, and the referee of claims."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -188,11 +188,11 @@ class Sampler:
             self.scales[k] = float(np.median(known)) if known.size and np.median(known) > 0 else 1.0
         return self._standing(u, found)
 
-    def refined(self, start: Looked) -> Looked:
+    def refined(self, start: Looked, reaches: Sequence[float] = _REACHES) -> Looked:
         """Each design improved by random steps that become shorter, limits first."""
         kept = start
         rows = np.arange(len(kept))
-        for reach in _REACHES if len(kept) else ():
+        for reach in reaches if len(kept) else ():
             steps = self.rng.standard_normal((len(kept), _LOCAL, self.space.size))
             steps[:, ::2] *= self.rng.random((len(kept), _LOCAL // 2, self.space.size)) < 0.5  # not in all directions
             near = self.look(np.clip(kept.u[:, None] + reach * steps, 0.0, 1.0).reshape(-1, self.space.size))
