@@ -55,7 +55,8 @@ class Cube:
         found = {}
         for k, (name, (lower, upper)) in enumerate(self.problem.free.items()):
             ends = self._stretched(name, np.array([lower, upper]))
-            found[name] = np.clip(self._plain(name, ends[0] + (ends[1] - ends[0]) * u[..., k]), lower, upper)
+            inside = np.clip(self._plain(name, ends[0] + (ends[1] - ends[0]) * u[..., k]), lower, upper)
+            found[name] = np.select([u[..., k] <= 0, u[..., k] >= 1], [lower, upper], inside)  # to the last digit
         return found
 
     def points(self, designs: Mapping[str, float]) -> Array:
@@ -178,8 +179,7 @@ class Sampler:
         cost = max(1, len(self.problem.cases)) * (1 if self.problem.model.degree <= _QUARTIC else _SLOWER)
         count = max(min(_FIRST * _EACH ** min(size, _QUARTIC), _MOST) // cost, _LEAST)
         u = (self._offset + np.arange(1, count + 1)[:, None] * golden_steps(size)) % 1.0
-        outer = u[::_FACES]
-        u[::_FACES] = np.where(outer < 1 / 3, 0.0, np.where(outer > 2 / 3, 1.0, outer))
+        u[::_FACES] = np.clip(3 * u[::_FACES] - 1, 0.0, 1.0)
         corners = np.array(list(product((0.0, 1.0), repeat=size))) if size <= _CORNERS else np.empty((0, size))
         u = np.concatenate([np.full((1, size), 0.5), corners, u])
         found = self._judged(u)
