@@ -216,4 +216,4 @@ def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial | None, ri
 def _leading(work: Workspace, free: Mapping[str, float]) -> float:
     """a0 relative to the other coefficients."""
     a = [float(c) for c in work.problem.values(work.problem.ordered(free)).coefficients]
-    return a[0] / max(map(abs, a))
+    return a[0] / (max(map(abs, a)) or 1.0)
