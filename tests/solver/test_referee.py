@@ -55,7 +55,7 @@ def stuck(monkeypatch: pytest.MonkeyPatch, at: float, feasible: bool = True) -> 
 
 
 def test_a_search_in_the_wrong_basin_is_taken_up_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(multistart, "starting", lambda work: iter([({"x": 0.9}, True)] * 64))
+    monkeypatch.setattr(multistart, "starting", lambda work, ended=(): iter([({"x": 0.9}, True)] * 64))
     design = tmsopt.solve(problem(WELLS, WIDE))
     assert design.value == pytest.approx(depth(LEFT), abs=MET)
     assert design.status == "optimal"

@@ -185,6 +185,8 @@ def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial | None, ri
     origins += [(sampler.design(bold, k), False) for k in range(min(len(bold), _OPEN))]
     best: Standing | None = None
     least = _least(work, trial, _FINER)
+    if trial is not None and abs(_leading(work, trial.parameters)) < _SINGULAR:  # it is all but there already
+        least = _least(work, trial, -_LOST)
     for sign in (1, -1):
         ours = [(design, near) for design, near in origins if sign * _leading(work, design) > -_SINGULAR]
         if not ours:
@@ -209,6 +211,8 @@ def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial | None, ri
         if singular:
             towards = f"towards a singular mass matrix (a0 = 0), to {work.problem.sign * reached.objective:.9g}"
             words = f"no best design: it improves {towards}; {mass_advice(work.problem)}"
+            if work.sample and _endless(work, work.sample, work.problem.sign * reached.objective):
+                words = _UNBOUNDED
             best = replace(best, held={n: other.parameters[n] for n in work.problem.free}, words=words)
     return best
 
