@@ -151,10 +151,9 @@ def test_a_limit_makes_it_an_optimum(coefficients: Any, asked: Any, best: float)
     ],
     ids=["both signs", "one sign", "two roots", "two parameters"],
 )
-@pytest.mark.parametrize("seed", [0, 1])
-def test_an_abscissa_without_a_lower_bound_is_said_to_have_none(coefficients: Any, free: Any, seed: int) -> None:
+def test_an_abscissa_without_a_lower_bound_is_said_to_have_none(coefficients: Any, free: Any) -> None:
     """It is −1/x, or −(1 + y)/x: below anything as x goes to 0 from above."""
-    design = tmsopt.solve(problem(coefficients, free), throw=False, seed=seed)
+    design = tmsopt.solve(problem(coefficients, free), throw=False)
     assert design.status == "not_converged"
     assert any(note.startswith("unbounded") for note in design.notes)
     assert design.value < -1e6
