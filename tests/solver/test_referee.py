@@ -54,9 +54,10 @@ def stuck(monkeypatch: pytest.MonkeyPatch, at: float, feasible: bool = True) -> 
     monkeypatch.setattr(multistart.Runner, "ended", ended)
 
 
-def test_a_search_in_the_wrong_basin_is_taken_up_again(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("objective", ["abscissa", "x**4/4 - x**2/2 + x/10 - 1"])
+def test_a_search_in_the_wrong_basin_is_taken_up_again(objective: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(multistart, "starting", lambda work: iter([({"x": 0.9}, True)] * 64))
-    design = tmsopt.solve(problem(WELLS, WIDE))
+    design = tmsopt.solve(problem(WELLS, WIDE, minimize=objective))
     assert design.value == pytest.approx(depth(LEFT), abs=MET)
     assert design.status == "optimal"
 
@@ -172,12 +173,12 @@ def test_a_bound_far_away_is_still_one() -> None:
 # Ends at which a root has no sign, and values that cannot be beaten
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("lower", [0.0, -1.0])
 @pytest.mark.parametrize("sign", [1, -1])
-def test_an_end_at_a_root_at_0_is_moved_by_a_hair(seed: int, sign: int) -> None:
+def test_an_end_at_a_root_at_0_is_moved_by_a_hair(lower: float, sign: int) -> None:
     """(s + x)(s² + 0.6 s + 1) has the damping ratio 0.3 for x > 0, 0 at x = 0 and −1 below: no least x, but a limit."""
     a = [sign * c for c in product([1, x], [1, 0.6, 1])]
-    design = tmsopt.solve(problem(a, {"x": (-1.0, 1.0)}, ("damping_ratio >= 0.1",), minimize="x"), seed=seed)
+    design = tmsopt.solve(problem(a, {"x": (lower, 1.0)}, ("damping_ratio >= 0.1",), minimize="x"))
     assert design.status == "optimal"
     assert 0 < design.value <= 1e-7
     assert not design.violations
