@@ -1,5 +1,6 @@
 """The sample as referee: no claim stands that a design contradicts which was looked at; optima that no design has."""
 
+from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
@@ -12,6 +13,7 @@ from tmsopt.models import from_coefficients
 from tmsopt.roots import product
 
 multistart = import_module("tmsopt.solver.multistart")
+sampling = import_module("tmsopt.solver.sample")
 
 x, y = ca.SX.sym("x"), ca.SX.sym("y")
 MET = 1e-8  # what is asked of every value
@@ -49,7 +51,7 @@ def stuck(monkeypatch: pytest.MonkeyPatch, at: float, feasible: bool = True) -> 
 
     def ended(self: Any, design: Any, near: bool = False, hopeful: bool = True) -> Any:
         found = real(self, {"x": at}, near, hopeful)
-        return found if feasible else multistart.replace(found, feasible=False)
+        return found if feasible else replace(found, feasible=False)
 
     monkeypatch.setattr(multistart.Runner, "ended", ended)
 
@@ -58,6 +60,22 @@ def stuck(monkeypatch: pytest.MonkeyPatch, at: float, feasible: bool = True) -> 
 def test_a_search_in_the_wrong_basin_is_taken_up_again(objective: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(multistart, "starting", lambda work: iter([({"x": 0.9}, True)] * 64))
     design = tmsopt.solve(problem(WELLS, WIDE, minimize=objective))
+    assert design.value == pytest.approx(depth(LEFT), abs=MET)
+    assert design.status == "optimal"
+
+
+def test_the_neighbourhood_of_an_end_is_looked_at_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where neither the sample nor the starts know of the other basin."""
+    real = sampling.Sampler.sample
+
+    def half(self: Any) -> Any:
+        whole = real(self)
+        kept = (seen.take(np.flatnonzero(seen.u[:, 0] > 0.6)) for seen in (whole.refined, whole.boldest))
+        return replace(whole, **dict(zip(("refined", "boldest"), kept, strict=True)))
+
+    monkeypatch.setattr(sampling.Sampler, "sample", half)
+    monkeypatch.setattr(multistart, "starting", lambda work: iter([({"x": 0.9}, True)] * 64))
+    design = tmsopt.solve(problem(WELLS, WIDE))
     assert design.value == pytest.approx(depth(LEFT), abs=MET)
     assert design.status == "optimal"
 
