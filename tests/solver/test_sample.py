@@ -86,7 +86,7 @@ def test_every_design_that_is_judged_is_counted(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_the_sample_fills_the_box_to_its_faces_and_corners() -> None:
-    """No hole of a tenth of the box, against 0.9^2 ^ 4000 of chance; every face and all corners."""
+    """No hole of a tenth of the box, inside or on a face; and all corners."""
     drawn = Sampler(problem(), 0).draw()
     assert drawn.u.min() == 0
     assert drawn.u.max() == 1
@@ -98,6 +98,19 @@ def test_the_sample_fills_the_box_to_its_faces_and_corners() -> None:
         for end in (0.0, 1.0):
             face = np.sort(drawn.u[drawn.u[:, k] == end][:, 1 - k])
             assert np.diff(face).max() < 0.1
+
+
+def test_all_corners_of_a_box_of_many_parameters() -> None:
+    names = [f"p{k}" for k in range(8)]
+    model = from_coefficients([1, 9 + sum(ca.SX.sym(n) for n in names)])
+    drawn = Sampler(problem(model=model, free=dict.fromkeys(names, (-1.0, 1.0))), 0).draw()
+    corners = drawn.u[np.all((drawn.u == 0) | (drawn.u == 1), axis=1)]
+    assert len(np.unique(corners, axis=0)) == 2**8
+
+
+def test_limits_come_before_worth() -> None:
+    seen = Looked(np.zeros((4, 1)), np.array([3.0, 1.0, 2.0, -9.0]), np.array([0.0, 0.5, 0.0, np.inf]))
+    assert seen.ranked.tolist() == [2, 0, 1, 3]
 
 
 def test_the_sample_stands_for_its_seed() -> None:
@@ -158,6 +171,13 @@ def test_limits_are_met_by_the_way_of_newton(limits: tuple[str, ...], share: flo
                 assert np.max(off) <= 1e-9  # excess of 1e-10 of what is usual, which is 1 or so
 
 
+def test_what_cannot_be_met_is_not_left_for_worse() -> None:
+    """sin(20 x) is 1 at most; beside its crests Newton's steps lead anywhere."""
+    _, start, ends = sought(problem(("sin(20*x) >= 1.5",)), count=200)
+    assert np.all(ends.violation <= start.violation)
+    assert np.mean(ends.violation < start.violation) > 0.8
+
+
 def test_a_pole_is_approached_from_its_own_side() -> None:
     """1/(x − y) ≥ 1000 is met for 0 < x − y ≤ 0.001, and from x < y by no small step."""
     sampler = Sampler(problem(("1/(x - y) >= 1000",)), 0)
@@ -184,6 +204,17 @@ def test_what_is_refined_is_no_worse_limits_first() -> None:
     again = sampler.look(ends.u)
     assert np.array_equal(again.worth, ends.worth)
     assert np.array_equal(again.violation, ends.violation)
+
+
+def test_what_starts_are_made_of_meets_equalities() -> None:
+    """Which no design that is only drawn does."""
+    sampler = Sampler(problem(("x**2 + y**2 == 0.5", "x*y <= 0.1")), 0)
+    seen = sampler.sample()
+    at = sampler.space.designs(seen.refined.u)
+    assert seen.met == 0
+    assert len(seen.refined) >= 4
+    assert at["x"] ** 2 + at["y"] ** 2 == pytest.approx(0.5, abs=1e-9)
+    assert np.all(at["x"] * at["y"] <= 0.1 + 1e-9)
 
 
 def test_the_neighbourhood_of_a_design_reaches_from_a_hair_to_the_other_end_of_the_box() -> None:

@@ -9,7 +9,6 @@ import numpy as np
 from tmsopt.arithmetic.intervals import ranges
 from tmsopt.arithmetic.walk import NotAccepted
 from tmsopt.design.problem import Problem
-from tmsopt.records import Array
 
 _BOXES = 48  # looked at, beyond which it is left to others
 
@@ -17,8 +16,8 @@ _BOXES = 48  # looked at, beyond which it is left to others
 def none_stable(problem: Problem) -> bool:
     """Whether it is certain, by interval arithmetic alone, that no design of the box is stable, limits or not.
 
-    In each part of the box two coefficients have different signs, or a Hurwitz determinant of degree 3 or 4 is of the
-    wrong one. Of a problem with several cases nothing is said.
+    In each part of the box two coefficients have different signs, or one and a Hurwitz determinant of degree 3 or 4. Of
+    a problem with several cases nothing is said.
     """
     if problem.cases or not problem.free:
         return False
@@ -38,7 +37,7 @@ def none_stable(problem: Problem) -> bool:
             (ends,) = (np.array(row) for row in ranges(function, box))
         except NotAccepted:
             return False
-        if _excluded(ends, len(a)):
+        if (ends[:, 0] > 0).any() and (ends[:, 1] < 0).any():
             continue
         k = int(np.argmax(np.array([hi - lo for lo, hi in box]) / widths))
         lo, hi = box[k]
@@ -48,17 +47,9 @@ def none_stable(problem: Problem) -> bool:
 
 
 def _determinants(a: list[Any]) -> list[Any]:
-    """A Hurwitz determinant that has the sign of a0 wherever all roots are left of the axis; for degrees 3 and 4."""
+    """A Hurwitz determinant of degree 3 or 4 that has the coefficients' sign where all roots are left of the axis."""
     if len(a) == 4:
         return [a[0] * (a[1] * a[2] - a[0] * a[3])]
     if len(a) == 5:
         return [a[1] * a[2] * a[3] - a[0] * a[3] ** 2 - a[4] * a[1] ** 2]
     return []
-
-
-def _excluded(ends: Array, count: int) -> bool:
-    positive, negative = ends[:, 0] > 0, ends[:, 1] < 0
-    if positive[:count].any() and negative[:count].any():
-        return True
-    lead = 1 if positive[0] else -1 if negative[0] else 0
-    return bool(lead and (negative if lead > 0 else positive)[count:].any())
