@@ -260,9 +260,10 @@ def test_time_that_is_over() -> None:
     assert all(place.ranges["x"] == (-4.0, 4.0) for place in found.undecided)
 
 
-def test_what_cannot_be_written_is_said() -> None:
-    """A power that varies."""
-    found = of_row([1, x, ca.power(2.0, x)], "EP2")
+@pytest.mark.parametrize(("last", "limits"), [(ca.power(2.0, x), {}), (1 + 0 * x, {"most": "log(x + 5) <= 2"})])
+def test_what_cannot_be_written_is_said(last: Any, limits: dict[str, str]) -> None:
+    """A power that varies; a logarithm, at which codac ends its process."""
+    found = of_row([1, x, last], "EP2", constraints=limits)
     assert not found.complete
     assert "cannot take" in found.reason
 

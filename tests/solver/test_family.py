@@ -192,3 +192,15 @@ def test_a_member_of_another_size_is_solved_in_units_of_its_own(varied):
         found, alone = (solve(problem, family=f) for f in (family, Family((varied,))))
         assert dict(found.parameters) == dict(alone.parameters)
         assert found.abscissa == pytest.approx(-fixed["r"], rel=1e-9)
+
+
+def test_a_pole_in_the_box_of_one_member_is_none_in_that_of_another():
+    """1/x becomes a variable where x may be 0, and there alone, whichever box came first."""
+    x, y = (ca.SX.sym(n) for n in "xy")
+    model = from_coefficients([1, x, y])
+    ends = ((0.5, 3.0), (-0.5, 3.0))
+    boxes = [Problem(model, fixed={"y": 2.0}, free={"x": e}, minimize="abscissa + 0.1/x") for e in ends]
+    for order in (boxes, boxes[::-1]):
+        family = Family(("y",))
+        sizes = {problem.free["x"]: len(family.formulate(problem).variables) for problem in order}
+        assert sizes[ends[1]] == sizes[ends[0]] + 1

@@ -196,7 +196,8 @@ def _decisions(problem: Problem, varied: Sequence[str]) -> tuple[Hashable, ...]:
     heavy = problem.pattern is None and demands_heavy_damping(problem)
     texts = tuple(problem.constraints.items()) if heavy else ()
     nearest = problem.pattern is not None and problem.objective is None and freedom(problem).count > 0
-    box = (tuple(problem.free.items()), tuple(middle(problem).items())) if nearest else tuple(problem.free)
+    # The box decides which quotients may have a pole in it.
+    box = (tuple(problem.free.items()), tuple(middle(problem).items()) if nearest else ())
     zero = tuple(problem.fixed.get(name) == 0 for name in varied) if problem.asks_radius else ()
     units = (scale_of(problem), units_of(problem), objective_unit(problem))
     roots = (overclaims(problem), *(tempts(problem, name) for name in _pieced(problem)))
