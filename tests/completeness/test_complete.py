@@ -319,3 +319,11 @@ def test_ctrl_c_is_no_end() -> None:
     assert found.undecided[0].ranges["c2"] == (-3.0, 3.0)
     every = tmsopt.solve_all(PROBLEMS / "coupled_pair.toml", progress=stop)
     assert every.coverage is None
+
+
+@pytest.mark.parametrize(("limit", "kept"), [("x**1.5 <= 5", 2.0), ("1/(x - 2) <= 5", -2.0)])
+def test_a_design_at_which_a_limit_has_no_value_is_none(limit: str, kept: float) -> None:
+    """s² + x s + 1 has its double roots at x = 2 and x = -2."""
+    found = of_row([1, x, 1], "EP2", (-3.0, 3.0), constraints={"a": limit})
+    assert found.complete
+    assert [float(design["x"].value) for design in found.designs] == pytest.approx([kept], abs=1e-9)

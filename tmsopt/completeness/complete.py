@@ -20,6 +20,7 @@ from tmsopt.completeness.conditions import Ends, Sheet, sheets
 from tmsopt.completeness.pruning import Box, Pruned, Puzzle, prune
 from tmsopt.completeness.statement import Completeness, Undecided
 from tmsopt.completeness.trees import ends, partial, tree
+from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
 from tmsopt.formulation.nlp import Scale, scale_of
@@ -279,13 +280,20 @@ def _standing(zero: _Zero) -> str | None:
     room += [("", x) for x in sheet.ascending(at)]
     for name, condition in sheet.problem.conditions.items():
         if not condition.equality:
-            room.append(
-                (f"constraint {name}", -condition.sign * flint.arb(condition.enclosure(values, decimal_fraction)))
-            )
+            excess = condition.sign * flint.arb(condition.enclosure(values, decimal_fraction))
+            if not excess.is_finite() and not _met(sheet.problem, condition, at):
+                return None
+            room.append((f"constraint {name}", -excess))
     if any(x < 0 for _, x in room):
         return None
     on = [said for said, x in room if said and not x > 0]
     return ", ".join(on + ["a0 = 0"] * flint.arb(values.coefficients[0]).contains(0))
+
+
+def _met(problem: Problem, condition: Expression, at: Mapping[str, Any]) -> bool:
+    """Whether a constraint that may not exist somewhere near exists at the middle, and is met."""
+    values = problem.values(problem.ordered({name: float(at[name].mid()) for name in problem.free}))
+    return bool(condition.violation(values) <= 0)
 
 
 def _halves(box: Box, widths: Sequence[float], least: float) -> list[Box]:

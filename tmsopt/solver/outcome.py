@@ -29,6 +29,7 @@ _BRANCH_STARTS = 12
 _OUTSIDE = 1e-9  # of a limit, beyond which it excludes a solution
 _SAME_BRANCH = 1e-6  # relative difference of parameters
 _DOUBT = 100.0  # roots that rounding parts are off alike in the NLP and in the recheck
+_STORED, _SPREAD = 1e-14, 100.0  # relative roundings of coefficients, and by what a place may enlarge their m-th root
 _CLAIMED = 1e-6  # relative difference of the claimed objective from the design's own
 
 
@@ -90,6 +91,9 @@ def found(
     if problem.objective is not None and not math.isfinite(checked.objective):
         ended = False
         notes = ("the objective does not exist at the design where the search ended; constrain what it divides by",)
+    if _unclear(checked):
+        ended = False
+        notes = ("rounding leaves too little of the coefficients to tell the roots apart; keep a0 away from 0",)
     status = "optimal" if ended and not checked.violations else "not_converged"
     if status != "optimal" and not notes and not checked.violations:
         notes = ("feasible, but the solver did not converge here: a better design may be close",)
@@ -178,6 +182,16 @@ def ahead(work: Workspace, one: Trial, other: Trial) -> bool:
         violation = sum(trial.checked.violations.values())
         ranks.append((violation, _flattered(trial), claimed if math.isnan(own) else own + doubt))
     return ranks[0] < ranks[1]
+
+
+def _unclear(checked: Checked) -> bool:
+    """Whether the roots as stored are farther from the multiple ones that they count as than an m-th root explains."""
+    roots = checked.structure.roots
+    if not roots or not math.isfinite(checked.realised):
+        return False
+    sizes = sorted(math.hypot(r.re, r.im) for r in roots)
+    scatter = _SPREAD * _STORED ** (1 / max(r.multiplicity for r in roots)) * sizes[len(sizes) // 2]
+    return bool(abs(checked.structure.abscissa - checked.realised) > scatter)
 
 
 def _flattered(trial: Trial) -> bool:

@@ -18,15 +18,17 @@ _APPEALS, _APPEALED = 8, 2  # times that better designs are started from, and ho
 _LOST = 1e-7  # relative difference of the objective that makes a design better
 _HAIRS = np.geomspace(1e-15, 1e-7, 33)  # of the way to a design that meets all limits
 _TOWARDS = 30  # random designs in whose direction an end is moved
-_FINER = 1e-11  # the same, where both were polished
+_FINER = 1e-11  # the same as `_LOST`, where both were polished
 _FINEST = np.geomspace(1e-4, 1e-10, 19).tolist()  # of the box: steps that improve a design that is kept as it is
+_KEPT_AT_MOST = 8  # designs that were looked at and are checked closely
 _OPEN = 3  # designs from which a singular mass matrix is approached
 _FAR_OFF = 1e5  # ratio of the largest root to the others that makes it one near infinity
 _SINGULAR = 1e-9  # a0 in its own unit, below which it is 0 in all but name
-_INSIDE = 1e-12  # the same, of the design that is given where the best has none
+_SCATTER = 2e-3  # relative, more than roots beside a 4-fold one are off in double precision
+_INSIDE = 1e-12  # a0 in its own unit, of the design that is given where the best has none
 _ENDLESS = 1e6  # spreads of the objective in the box, beyond which it has no lower bound
 
-_UNBOUNDED = "unbounded: the objective has no lower bound in the box, as this design shows; limit what it divides by"
+_UNBOUNDED = "unbounded, as far as was looked: what this design reaches is far below all else; limit what it divides by"
 _KEPT = "the best design that was looked at; no start of the solver ended as good"
 
 
@@ -101,15 +103,16 @@ def _appealed(work: Workspace, sampler: Sampler, sample: Sample, so_far: Standin
             break
         trial = other
     nudged = _nudged(work, nlp, sampler, candidates, trial, rivals if len(rivals) else sample.refined)
-    if nudged is not None:
+    if nudged is not None and not len(_better(rivals, _least(work, nudged))):
         return Standing(nlp, candidates, nudged)
     beyond = _at_infinity(work, sample, trial)
     if len(rivals) or len(beyond) or _troubled(work, candidates, trial):
         opened = _opened(work, nlp, sampler, trial, (rivals if len(rivals) else sample.refined).joined(beyond))
         if opened is not None:
             return replace(opened, candidates=[*candidates, *opened.candidates])
-    for some in (sampler.refined(rivals.take(np.arange(1)), _FINEST), rivals) if len(rivals) else ():
-        free = sampler.design(some, 0)
+    kept = sampler.refined(rivals.take(np.arange(min(len(rivals), 1))), _FINEST).joined(rivals)
+    for k in range(min(len(kept), _KEPT_AT_MOST)):
+        free = sampler.design(kept, k)
         checked = work.recheck(work.problem.ordered(free), nlp.cases)
         if not checked.violations and work.problem.sign * checked.objective < _least(work, trial):
             endless = _endless(work, sample, checked.objective)
@@ -119,7 +122,7 @@ def _appealed(work: Workspace, sampler: Sampler, sample: Sample, so_far: Standin
 
 def _endless(work: Workspace, sample: Sample, value: float) -> bool:
     """Whether an objective that no solver stopped at is far below what it is elsewhere in the box."""
-    return work.problem.sign * value < -_ENDLESS * sample.spread < 0
+    return math.isfinite(value) and work.problem.sign * value < -_ENDLESS * sample.spread < 0
 
 
 def held(work: Workspace, standing: Standing, starts: Starts, cases: Sequence[Case]) -> Finding:
@@ -204,7 +207,9 @@ def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial | None, ri
             opened = replace(opened, row_lower=tuple(inside))
             ends = [Runner(work, opened).ended(work.design_at(reached.run.x), near=True)]
         other = survivor(work, opened, ends)
-        if other is None or other.checked.violations or not work.problem.sign * other.checked.objective < least:
+        if other is None or other.checked.violations or _merged(other):
+            continue
+        if not work.problem.sign * other.checked.objective < least:
             continue
         least = _least(work, other, _FINER)
         best = Standing(opened, ends, other)
@@ -215,6 +220,12 @@ def _opened(work: Workspace, nlp: NLP, sampler: Sampler, trial: Trial | None, ri
                 words = _UNBOUNDED
             best = replace(best, held={n: other.parameters[n] for n in work.problem.free}, words=words)
     return best
+
+
+def _merged(trial: Trial) -> bool:
+    """Whether roots that are far apart count as one: beside a0 = 0 rounding leaves little of the coefficients."""
+    ideal, stored = trial.checked.structure.abscissa, trial.checked.realised
+    return abs(ideal - stored) > _SCATTER * abs(ideal)
 
 
 def _leading(work: Workspace, free: Mapping[str, float]) -> float:

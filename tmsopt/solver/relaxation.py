@@ -24,7 +24,7 @@ from tmsopt.solver.outcome import Trial, survivor
 from tmsopt.solver.workspace import Workspace, workspace
 
 _ROUNDS = 12  # times that cases are added
-_TRIED = 16  # starts of a relaxation at most
+_TRIED = 8  # starts of a relaxation at most
 _FEW = 3  # starts for one limit alone, besides the relaxed design
 _AGREE = 3  # of them at the best value that end it
 _TIE = 1e-3  # of a scale, by which equal limits differ: one moved is easier to read than two moved by halves

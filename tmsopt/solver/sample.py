@@ -170,7 +170,7 @@ class Sampler:
         spread = float(np.subtract(*np.percentile(known, [75, 25]))) if known.size else 0.0
         met = int(np.sum(drawn.violation == 0))
         a0 = self._leading(ranked.u)
-        singular = bool(a0.min() * a0.max() <= 0 or np.abs(a0).min() < _VANISHING * np.median(np.abs(a0)))
+        singular = bool(a0.min() <= 0 <= a0.max() or np.abs(a0).min() < _VANISHING * np.median(np.abs(a0)))
         return Sample(refined.take(refined.ranked), bold.take(apart(bold, _BOLD)), met, len(drawn), spread, singular)
 
     def draw(self) -> Looked:
