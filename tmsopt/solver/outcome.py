@@ -29,6 +29,7 @@ _BRANCH_STARTS = 12
 _OUTSIDE = 1e-9  # of a limit, beyond which it excludes a solution
 _SAME_BRANCH = 1e-6  # relative difference of parameters
 _DOUBT = 100.0  # roots that rounding parts are off alike in the NLP and in the recheck
+_NOTHING = 1e-9  # of a range: what is smaller is rounded as if it stood for 0
 _STORED, _SPREAD = 1e-14, 100.0  # relative roundings of coefficients, and by what a place may enlarge their m-th root
 _CLAIMED = 1e-6  # relative difference of the claimed objective from the design's own
 
@@ -91,7 +92,7 @@ def found(
     if problem.objective is not None and not math.isfinite(checked.objective):
         ended = False
         notes = ("the objective does not exist at the design where the search ended; constrain what it divides by",)
-    if _unclear(checked):
+    if any(0 < abs(parameters[n]) < _NOTHING * (hi - lo) for n, (lo, hi) in problem.free.items()) and _unclear(checked):
         ended = False
         notes = ("rounding leaves too little of the coefficients to tell the roots apart; keep a0 away from 0",)
     status = "optimal" if ended and not checked.violations else "not_converged"
