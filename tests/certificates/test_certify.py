@@ -151,6 +151,7 @@ def test_a_limit_on_the_tilt() -> None:
         assert growth(**at).min() >= design.bound.value
 
 
+@pytest.mark.slow
 def test_the_slowest_stable_speed(slowest: Solution) -> None:
     """Of the designs of a grid whose abscissa is at most −0.2, none is slower than the bound; some nearly as slow."""
     design = certify(slowest, seconds=SECONDS)
@@ -172,6 +173,7 @@ def test_the_greatest_stable_tilt() -> None:
     assert design.value - 2 * (tilt[1, 0] - tilt[0, 0]) <= greatest <= design.bound.value
 
 
+@pytest.mark.slow
 def test_the_greatest_abscissa() -> None:
     """Bounded from above: the line must have a root on it, or any line to the right would do."""
     free = {"chi_B": (1.01, 3.0), "lambda_s": (0.1, 0.5)}
@@ -183,6 +185,7 @@ def test_the_greatest_abscissa() -> None:
     assert greatest <= design.bound.value
 
 
+@pytest.mark.slow
 def test_the_greatest_damping_ratio() -> None:
     """Below 1, since the speed is; of a grid, none above the bound."""
     design = certify(
@@ -355,6 +358,7 @@ def test_what_a_law_excludes(slow_plane: Solution, limit: str, asked: dict[str, 
     assert abs(design.bound.value) == math.inf
 
 
+@pytest.mark.slow
 def test_a_corner_is_enough() -> None:
     """Of the plane only a 1e-12th, at the corner Fr = χ_B = 3, has a product of 8.99999; found there or not."""
     asked = problem(constraints={"corner": "Fr*chi_B >= 8.99999"}, minimize="abscissa")

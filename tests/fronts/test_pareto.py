@@ -176,6 +176,7 @@ def test_points_do_not_dominate_one_another_and_are_spread(front):
     assert front.gaps == ()
 
 
+@pytest.mark.slow
 def test_the_order_of_objectives_does_not_matter(front):
     other = tmsopt.pareto(problem(pareto=["Fr", "abscissa"]), 3, starts=0)
     for p in other.points:
@@ -345,6 +346,7 @@ def command(*arguments):
     return CliRunner().invoke(main, [str(a) for a in arguments])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("objectives", [("abscissa", "x"), ("abscissa", "x", "-y")])
 def test_designs_that_are_not_stable_are_marked(tmp_path, objectives):
     """s² + (x − 2) s + 1 + y is stable where x > 2 alone."""
