@@ -45,8 +45,12 @@ class Explored:
     finding: Finding | None
 
 
-def explore(work: Workspace) -> Explored:
-    """Search one part of the box from many starts, exactly and in all cases."""
+def explore(work: Workspace, insist: bool = True) -> Explored:
+    """Search one part of the box from many starts, exactly and in all cases.
+
+    Args:
+        insist: on a stable design; another part of the box may have one.
+    """
     if best := ideal(work):
         return Explored(work.name, (), best)
     cases = work.problem.cases
@@ -61,7 +65,7 @@ def explore(work: Workspace) -> Explored:
         if other is not None and (trial is None or (not other.checked.violations and ahead(work, other, trial))):
             nlp, candidates, trial = unstable, others, other
     standing = refereed(work, nlp, candidates, trial)
-    wanting = standing.trial is not None and _wants_stability(work.problem, standing.trial)
+    wanting = insist and standing.trial is not None and _wants_stability(work.problem, standing.trial)
     if standing.trial is not None and work.sampler and wanting and not work.never_stable:
         others = _left_of_the_axis(work, nlp, len(candidates))
         other, every = survivor(work, nlp, others), [*standing.candidates, *others]

@@ -64,7 +64,10 @@ def solved(design: Given, options: Options = DEFAULTS, family: Family | None = N
             options = replace(options, near=near)
         work = workspace(problem, options, family)
         parts = [part for part in work.parts() if not options.near or part.holds(options.near)]
-        explored = [explore(part) for part in parts]
+        explored: list[Explored] = []
+        for part in parts:
+            stable = any(e.finding and e.finding.checked.structure.abscissa < 0 for e in explored)
+            explored.append(explore(part, insist=not stable))
         finding = _winner(problem, explored) or without_any(work, sum(len(e.candidates) for e in explored))
         looked = sum(part.sampler.count for part in parts if part.sampler)
         finding = replace(finding, starts=replace(finding.starts, looked=looked))
