@@ -408,12 +408,11 @@ def test_a_better_design_takes_the_place_of_a_worse_one() -> None:
 
 
 @pytest.mark.slow
-def test_a_better_design_than_many_starts_find() -> None:
-    """The default solve of this problem stops at +0.0138; the value that is kept was found by differential evolution."""
+def test_a_basin_that_many_starts_miss() -> None:
+    """Where a dozen starts agree on +0.0138; the value that is kept was found by differential evolution."""
     design = certify(random_problem(32), seconds=5.0)
     assert design.value == pytest.approx(KEPT[32].value, rel=1e-6)
     assert design.bound.value <= KEPT[32].value
-    assert any("found a better design" in note for note in design.notes)
 
 
 # Processes
