@@ -95,6 +95,8 @@ def further(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
     run, found = Runner(work, nlp), list[Candidate]()
     for design, near in islice(starting(work), tried, work.options.starts):
         found.append(run.ended(design, near, hopeful=False))
+        if work.options.progress:
+            work.options.progress(tried + len(found), work.options.starts)
         left = bounded(work.part) and found[-1].feasible and found[-1].objective < 0
         if left or sum(not c.feasible for c in found) >= _HOPELESS:
             break

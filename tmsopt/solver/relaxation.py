@@ -160,6 +160,8 @@ def _ends(run: Runner, most: int) -> list[Candidate]:
     candidates: list[Candidate] = []
     for design, near in islice(starting(run.work), most):
         candidates.append(run.ended(design, near, hopeful=any(c.feasible for c in candidates)))
+        if run.work.options.progress:
+            run.work.options.progress(len(candidates), most)
         feasible = [c.objective for c in candidates if c.feasible]
         if feasible and min(feasible) <= _NOTHING:
             break
