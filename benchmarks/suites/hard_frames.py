@@ -10,19 +10,11 @@ import numpy as np
 
 from benchmarks.judges import NOWHERE, eigenvalues, evaluated, root_values
 from benchmarks.suites.random_designs import Box, drawn_box, drawn_value, rounded
+from benchmarks.suites.varied_designs import RANGES
 from tmsopt import Problem
 from tmsopt.models import Model, Values, tms, whipple
 from tmsopt.records import Array
 
-RANGES: Mapping[str, Box] = {
-    "Fr": (0.5, 5.0),
-    "mu": (0.03, 12.0),
-    "chi_B": (0.4, 2.5),
-    "chi_H": (0.75, 1.25),
-    "zeta_B": (-1.4, -0.15),
-    "zeta_H": (-1.0, -0.1),
-    "lambda_s": (0.03, 1.25),
-}
 ROBOT: Mapping[str, Box] = {
     "v": (1.7, 3.0),
     "m_H": (0.4, 4.0),

@@ -16,6 +16,8 @@ _MOST, _LEAST = 2**13, 2**11
 """Designs of a sample: at most, and at least where each costs much."""
 
 _FIRST, _EACH = 2**8, 4  # designs for no parameter at all, and times as many for each
+_QUICK, _SLOWER = 4, 4  # degree with formulas of its own, and how many times as long those above take
+_MANY = 4  # free parameters, beyond which no more designs are drawn
 _CORNERS = 10  # free parameters up to which all corners of the box are looked at
 _FACES = 4  # one design of so many is moved to faces of the box: many optima lie there
 _DECADES = 100.0  # ratio of the ends of a range beyond which its values are spread by their logarithms
@@ -176,8 +178,8 @@ class Sampler:
     def draw(self) -> Looked:
         """Corners, a quasi-random sequence, and some of it moved to faces."""
         size = self.space.size
-        cost = max(1, len(self.problem.cases)) * (1 if self.problem.model.degree <= _QUARTIC else _SLOWER)
-        count = max(min(_FIRST * _EACH ** min(size, _QUARTIC), _MOST) // cost, _LEAST)
+        cost = max(1, len(self.problem.cases)) * (1 if self.problem.model.degree <= _QUICK else _SLOWER)
+        count = max(min(_FIRST * _EACH ** min(size, _MANY), _MOST) // cost, _LEAST)
         u = (self._offset + np.arange(1, count + 1)[:, None] * golden_steps(size)) % 1.0
         u[::_FACES] = np.clip(3 * u[::_FACES] - 1, 0.0, 1.0)
         corners = np.array(list(product((0.0, 1.0), repeat=size))) if size <= _CORNERS else np.empty((0, size))
@@ -269,9 +271,6 @@ class Sampler:
         excess = found.excess / self.scales[:, None]
         violation = np.where(excess <= _MET, 0.0, excess).sum(axis=0)
         return Looked(u, np.where(np.isfinite(worth), worth, np.inf), violation)
-
-
-_QUARTIC, _SLOWER = 4, 4  # degrees above take so many times as long
 
 
 def apart(found: Looked, most: int, distance: float = _APART) -> NDArray[np.int_]:

@@ -52,7 +52,7 @@ class Family:
     def formulate(
         self, problem: Problem, cases: Sequence[Case] = (), damping_ratio: float | None = None, lead: int = 0
     ) -> NLP:
-        """What `formulations.formulate` gives, with the problem's numbers in place of another's of the family."""
+        """What `formulate` gives, with the problem's numbers in place of another's of the family."""
         if not self.varied:
             return formulate(problem, cases, damping_ratio=damping_ratio, lead=lead)
         symbols = {name: ca.SX.sym(name) for name in self.varied}
