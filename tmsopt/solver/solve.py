@@ -66,7 +66,8 @@ def solved(design: Given, options: Options = DEFAULTS, family: Family | None = N
         parts = [part for part in work.parts() if not options.near or part.holds(options.near)]
         explored: list[Explored] = []
         for part in parts:
-            stable = any(e.finding and e.finding.checked.structure.abscissa < 0 for e in explored)
+            met = [e.finding.checked for e in explored if e.finding and not e.finding.checked.violations]
+            stable = any(checked.structure.abscissa < 0 for checked in met)
             explored.append(explore(part, insist=not stable))
         finding = _winner(problem, explored) or without_any(work, sum(len(e.candidates) for e in explored))
         looked = sum(part.sampler.count for part in parts if part.sampler)
