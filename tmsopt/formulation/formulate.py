@@ -50,7 +50,7 @@ def formulate(
     Args:
         cases: what the design must stand up to; the nominal design alone, without any.
         elastic: leave every constraint a row that can be relaxed.
-        damping_ratio: take this for it, and leave it to the recheck whether it is.
+        damping_ratio: take this for it: 1, by real roots, or −1, and leave it to the recheck whether it is.
         settings: symbols for numbers of the problem that are to be parameters of the NLP; see `Family`.
         lead: sign of a0, where the NLP is to go as far as a0 = 0.
     """
@@ -67,12 +67,12 @@ def abscissa(
 ) -> NLP:  # fmt: skip
     """Optimise the objective with every root quantity carried by factors, in every case; real ones if all must be."""
     build = Builder(problem, cases, settings=settings, lead=lead)
-    if damping_ratio is not None:
+    if damping_ratio == 1 or (damping_ratio is None and not elastic and demands_heavy_damping(problem)):
+        build.real_roots()
+    elif damping_ratio is not None:
         build.take("damping_ratio", damping_ratio)
         if len(build.covered) == 1 and tempts(problem, "damping_ratio", worse=-1.0):
             build.lifts.append(lift_positive_root(build))
-    elif not elastic and demands_heavy_damping(problem):
-        build.real_roots()
     build.constraints()
     build.optimise()
     return build.finish("abscissa")

@@ -9,7 +9,7 @@ import numpy as np
 
 from tmsopt.checks.bound import bounded, closed, instant_bound
 from tmsopt.design.problem import Problem, freedom
-from tmsopt.formulation.formulate import abscissa, design_of, middle
+from tmsopt.formulation.formulate import abscissa, design_of, matching, middle
 from tmsopt.formulation.ipopt import Run, ipopt
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import complete, designs, opposite, worth
@@ -30,6 +30,8 @@ _SAME = 1e-7  # relative difference of objectives that counts as the same
 _FEASIBLE = 1e-6  # of the rows, before polishing; the recheck has the last word
 _SCATTER = 0.01  # of the size of the roots: in double precision those beside a 4-fold one are off by 4e-4
 _RESIDUAL = 1e-11  # of the equations: an n-fold root is off by its n-th root
+_LEADS, _LEADING = 3, 60  # designs with one root, and with one pair, that are started from, and iterations towards each
+_PAIRED = range(4, 13, 2)  # degrees at which one pair may be all roots
 _RESCUES = 4  # starts from abscissa optima, for a pattern that no start reached
 
 _AGAIN = 4  # times that a start is taken up again where it ended badly
@@ -276,6 +278,31 @@ def _coefficients(problem: Problem, nlp: NLP, run: Run) -> Array:
     varied = [c.applied(nominal) for c in nlp.cases if not c.direction] or [nominal]
     of = problem.parameter_set
     return np.array([[float(c) for c in problem.model.coefficients(p, of)] for p in varied])
+
+
+def exceptional(work: Workspace) -> list[dict[str, float]]:
+    """Designs with one root, or one pair, of full multiplicity: those of least abscissa, where enough is free for them.
+
+    The least abscissa is often at one, and where a0 may vanish it may stand in so thin a needle that no sample sees it,
+    while equations lead there.
+    """
+    part, sampler, sample, degree = work.part, work.sampler, work.sample, work.part.model.degree
+    limits = {name: text for name, text in part.constraints.items() if name not in part.asked_of_roots}
+    found: list[Candidate] = []
+    for pattern in (f"EP{degree}", *([f"CEP{degree // 2}"] if degree in _PAIRED else [])):
+        asked = replace(part, locate=pattern, minimize="abscissa", maximize=None, constraints=limits)
+        asked = replace(asked, scenarios={}, tolerances={})
+        if sampler is None or sample is None or freedom(asked).count < 0:
+            continue
+        leading = matching(asked)
+        lead, ended = ipopt(leading, work.options, max_iterations=_LEADING), list[Candidate]()
+        for seen in (sample.boldest, sample.refined):
+            starts = (complete(leading, asked, sampler.design(seen, k)) for k in range(len(seen)))
+            ended += [_candidate(asked, leading, lead(x)) for x in starts]
+        for _ in range(_LEADS):
+            others = [c for c in ended if c.feasible and not any(same(c.objective, f.objective, c.nlp.size) for f in found)]
+            found += sorted(others, key=lambda c: c.objective)[:1]
+    return [work.design_at(c.run.x) for c in found]
 
 
 def _rescued(work: Workspace, nlp: NLP) -> list[Candidate]:

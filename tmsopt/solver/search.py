@@ -1,7 +1,7 @@
 """The search of one part of the box, with cases added until the worst one is covered."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from tmsopt.design.solution import Starts
 from tmsopt.formulation.formulate import design_of, formulate, middle
 from tmsopt.formulation.nlp import NLP
 from tmsopt.records import Table
-from tmsopt.solver.multistart import Candidate, Runner, further, same, search
+from tmsopt.solver.multistart import Candidate, Runner, exceptional, further, same, search
 from tmsopt.solver.outcome import Finding, Trial, ahead, counted, found, mass_advice, survivor
 from tmsopt.solver.referee import held, ideal, refereed
 from tmsopt.solver.relaxation import relax
@@ -55,15 +55,17 @@ def explore(work: Workspace, insist: bool = True) -> Explored:
         return Explored(work.name, (), best)
     cases = work.problem.cases
     nlp = work.formulate(cases)
-    candidates = search(work, nlp)
+    mixed = {"abscissa", "damping_ratio"} <= set(nlp.variables)
+    needles = bool(work.sample and work.sample.singular and "abscissa" in nlp.variables)
+    leads = exceptional(work) if mixed or needles else []
+    candidates = [*search(work, nlp, _FEWER if mixed and leads else None), *_from(work, nlp, leads)]
     trial = survivor(work, nlp, candidates)
-    if "damping_ratio" in nlp.variables and (trial is None or _unstable(work.problem, nlp, trial)):
-        # A positive real root has −1, and no sector of its own.
-        unstable = work.formulate(cases, damping_ratio=-1.0)
-        others = search(work, unstable, _FEWER if trial and nlp.touches else work.options.starts)
-        other = survivor(work, unstable, others)
+    for ratio, most in _ratios(work, nlp, trial):
+        fixed = work.formulate(cases, damping_ratio=ratio)
+        others = _from(work, fixed, leads) if leads and ratio == 1 else search(work, fixed, most)
+        other = survivor(work, fixed, others)
         if other is not None and (trial is None or (not other.checked.violations and ahead(work, other, trial))):
-            nlp, candidates, trial = unstable, others, other
+            nlp, candidates, trial = fixed, others, other
     standing = refereed(work, nlp, candidates, trial)
     wanting = insist and standing.trial is not None and _wants_stability(work.problem, standing.trial)
     if standing.trial is not None and work.sampler and wanting and not work.never_stable:
@@ -78,6 +80,11 @@ def explore(work: Workspace, insist: bool = True) -> Explored:
         return Explored(work.name, tuple(candidates), held(work, standing, starts, listed))
     finding = _covered(work, nlp, candidates, trial, starts) if cases else found(work, nlp, trial, starts)
     return Explored(work.name, tuple(candidates), finding)
+
+
+def _from(work: Workspace, nlp: NLP, designs: Sequence[Mapping[str, float]]) -> list[Candidate]:
+    run = Runner(work, nlp)
+    return [run.ended(design, near=True, hopeful=False) for design in designs]
 
 
 def _left_of_the_axis(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
@@ -127,6 +134,15 @@ def evaluated_cases(problem: Problem, parameters: Mapping[str, float]) -> tuple[
     """The listed cases of a design and the worst ones between them."""
     listed = problem.cases
     return (*listed, *(w.case for w in worst_cases(problem, parameters).values())) if listed else ()
+
+
+def _ratios(work: Workspace, nlp: NLP, trial: Trial | None) -> Iterator[tuple[float, int]]:
+    """Damping ratios at which to search again, and from how many starts."""
+    if {"abscissa", "damping_ratio"} <= set(nlp.variables):  # where real roots meet, sectors and half-planes are singular
+        yield 1.0, _FEWER
+    if "damping_ratio" in nlp.variables and (trial is None or _unstable(work.problem, nlp, trial)):
+        # A positive real root has −1, and no sector of its own.
+        yield -1.0, _FEWER if trial and nlp.touches else work.options.starts
 
 
 def _unstable(problem: Problem, nlp: NLP, trial: Trial) -> bool:
