@@ -30,7 +30,7 @@ _SAME = 1e-7  # relative difference of objectives that counts as the same
 _FEASIBLE = 1e-6  # of the rows, before polishing; the recheck has the last word
 _SCATTER = 0.01  # of the size of the roots: in double precision those beside a 4-fold one are off by 4e-4
 _RESIDUAL = 1e-11  # of the equations: an n-fold root is off by its n-th root
-_LEADS, _LEADING = 3, 60  # designs with one root, and with one pair, that are started from, and iterations towards each
+_LEADS = 3  # designs with one root, and with one pair, that are started from
 _PAIRED = range(4, 13, 2)  # degrees at which one pair may be all roots
 _RESCUES = 4  # starts from abscissa optima, for a pattern that no start reached
 
@@ -295,12 +295,13 @@ def exceptional(work: Workspace) -> list[dict[str, float]]:
         if sampler is None or sample is None or freedom(asked).count < 0:
             continue
         leading = matching(asked)
-        lead, ended = ipopt(leading, work.options, max_iterations=_LEADING), list[Candidate]()
+        lead, ended = ipopt(leading, work.options), list[Candidate]()
         for seen in (sample.boldest, sample.refined):
             starts = (complete(leading, asked, sampler.design(seen, k)) for k in range(len(seen)))
             ended += [_candidate(asked, leading, lead(x)) for x in starts]
         for _ in range(_LEADS):
-            others = [c for c in ended if c.feasible and not any(same(c.objective, f.objective, c.nlp.size) for f in found)]
+            known = [c.objective for c in found]
+            others = (c for c in ended if c.feasible and not any(same(c.objective, f, c.nlp.size) for f in known))
             found += sorted(others, key=lambda c: c.objective)[:1]
     return [work.design_at(c.run.x) for c in found]
 

@@ -112,9 +112,9 @@ def found(
 
 
 def converged(trial: Trial) -> bool:
-    """Whether the solver stopped at an optimum of its own, by its word or by the gradient, and at one of the problem."""
+    """Whether the solver stopped at an optimum of its own, by its word or by the gradient, and on the rows."""
     ended = trial.candidate.run.status in _CONVERGED or trial.point.stationarity <= _STATIONARY
-    return ended and trial.point.violation <= _EXACT  # IPOPT's word is one on rows as it scales them
+    return ended and trial.point.violation <= _EXACT  # its word is one on rows as it scales them
 
 
 def mass_advice(problem: Problem) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -25,6 +26,7 @@ _DECADES = 100.0  # ratio of the ends of a range beyond which its values are spr
 _APART = 0.15  # of the box: distance of designs that may lie in different basins
 _RANKED = 1024  # first ones of an order among which those apart are chosen
 _LEADERS, _BOLD = 8, 8  # designs to start from, of either kind
+_CELL = 0.05  # of the box
 _SOUGHT = 256  # designs from which limits are approached
 NARROW = 0.02  # share of designs that meet all limits, below which little is feasible
 _LOCAL = 40  # designs looked at around each that is refined, in each round
@@ -54,12 +56,12 @@ class Cube:
 
     def designs(self, u: Array) -> dict[str, Array]:
         """Columns of parameters for points of shape (…, size)."""
-        found = {}
-        for k, (name, (lower, upper)) in enumerate(self.problem.free.items()):
-            ends = self._stretched(name, np.array([lower, upper]))
-            inside = np.clip(self._plain(name, ends[0] + (ends[1] - ends[0]) * u[..., k]), lower, upper)
-            found[name] = np.select([u[..., k] <= 0, u[..., k] >= 1], [lower, upper], inside)  # to the last digit
-        return found
+        lower, upper, first, width = (e.reshape(-1, *[1] * (u.ndim - 1)) for e in self._ends)
+        place = np.moveaxis(u, -1, 0)
+        rows = zip(self.problem.free, first + width * place, strict=True)
+        x = np.minimum(np.maximum(np.stack([self._plain(name, row) for name, row in rows]), lower), upper)
+        x = np.where(place <= 0, lower, np.where(place >= 1, upper, x))  # to the last digit
+        return dict(zip(self.problem.free, x, strict=True))
 
     def points(self, designs: Mapping[str, float]) -> Array:
         """The point of one design."""
@@ -68,6 +70,13 @@ class Cube:
             lower, upper, x = self._stretched(name, np.array([*ends, designs[name]]))
             found.append((x - lower) / (upper - lower))
         return np.asarray(np.clip(found, 0.0, 1.0))
+
+    @cached_property
+    def _ends(self) -> Array:
+        """Lower and upper ends; the lower ones and the widths, stretched. Shape (4, size)."""
+        plain = np.array([*self.problem.free.values()]).reshape(-1, 2)
+        ends = np.array([self._stretched(n, e) for n, e in zip(self.problem.free, plain, strict=True)]).reshape(-1, 2)
+        return np.stack([*plain.T, ends[:, 0], ends[:, 1] - ends[:, 0]])
 
     def _stretched(self, name: str, x: Array) -> Array:
         return np.asarray(np.tan(x) if self._tangent(name) else np.log(x) if self._logarithmic(name) else x)
@@ -163,7 +172,7 @@ class Sampler:
         ranked = drawn.take(drawn.ranked[:_RANKED])
         leaders = ranked.take(apart(ranked, _LEADERS))
         if np.sum(drawn.violation == 0) < NARROW * len(drawn):
-            sought = self.nearer(ranked.take(apart(ranked, _SOUGHT, _APART / 3)))
+            sought = self.nearer(ranked.take(_spread(ranked, _SOUGHT)))
             sought = sought.take(sought.ranked)
             leaders = sought.take(apart(sought, 2 * _LEADERS))
         refined = self.refined(leaders)
@@ -271,6 +280,12 @@ class Sampler:
         excess = found.excess / self.scales[:, None]
         violation = np.where(excess <= _MET, 0.0, excess).sum(axis=0)
         return Looked(u, np.where(np.isfinite(worth), worth, np.inf), violation)
+
+
+def _spread(found: Looked, most: int) -> NDArray[np.int_]:
+    """The first few rows in cells of their own: what `apart` gives for many, in a fraction of its time."""
+    cells = np.floor(found.u / _CELL) @ np.random.default_rng(0).random(found.u.shape[1])
+    return np.asarray(np.sort(np.unique(cells, return_index=True)[1])[:most])
 
 
 def apart(found: Looked, most: int, distance: float = _APART) -> NDArray[np.int_]:

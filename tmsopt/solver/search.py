@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tmsopt.checks.bound import bounded
 from tmsopt.checks.recheck import FEASIBLE
 from tmsopt.checks.worst_case import worst_cases
 from tmsopt.design.cases import Case
@@ -91,7 +92,12 @@ def _left_of_the_axis(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
     """Where starts end from designs sought for their stability alone; all starts are spent where there is any such."""
     limits = {**work.part.constraints, _STABLE: "abscissa <= 0"}
     asked = replace(work.part, minimize="abscissa", maximize=None, constraints=limits)
-    sampler, run = Sampler(asked, work.options.seed + 1), Runner(work, nlp)
+    seed = work.options.seed + 1
+    sampler, run = Sampler(asked, seed), Runner(work, nlp)
+    if bounded(work.part) and work.sample:  # without limits the boldest designs show whether any is near the axis
+        least = Sampler(replace(asked, constraints={}), seed).refined(work.sample.boldest)
+        if not np.any(least.worth < 0):
+            return []
     sample, ended = sampler.sample(), list[Candidate]()
     for seen, near in ((sample.refined, True), (sample.boldest, False)):
         rows = np.flatnonzero(seen.worth < 0).tolist()
@@ -138,8 +144,8 @@ def evaluated_cases(problem: Problem, parameters: Mapping[str, float]) -> tuple[
 
 def _ratios(work: Workspace, nlp: NLP, trial: Trial | None) -> Iterator[tuple[float, int]]:
     """Damping ratios at which to search again, and from how many starts."""
-    if {"abscissa", "damping_ratio"} <= set(nlp.variables):  # where real roots meet, sectors and half-planes are singular
-        yield 1.0, _FEWER
+    if {"abscissa", "damping_ratio"} <= set(nlp.variables):
+        yield 1.0, _FEWER  # where real roots meet, sectors and half-planes are singular together
     if "damping_ratio" in nlp.variables and (trial is None or _unstable(work.problem, nlp, trial)):
         # A positive real root has −1, and no sector of its own.
         yield -1.0, _FEWER if trial and nlp.touches else work.options.starts

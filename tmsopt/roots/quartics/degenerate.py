@@ -36,6 +36,8 @@ def hard_factors(c: Array) -> tuple[Array, Rows, int]:
         The factors in units of 2^unit each, nan for coefficients that are not finite or a leading 0; the units; the
         number of quartics that took companion eigenvalues.
     """
+    if not c.size:
+        return np.empty((4, 0)), np.empty(0, dtype=int), 0
     with np.errstate(all="ignore"):
         regular = np.flatnonzero(np.all(np.isfinite(c), axis=0) & (c[0] != 0))
         unit = np.zeros(c.shape[1], dtype=int)
