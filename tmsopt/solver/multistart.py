@@ -289,10 +289,12 @@ def exceptional(work: Workspace) -> list[dict[str, float]]:
     part, sampler, sample, degree = work.part, work.sampler, work.sample, work.part.model.degree
     limits = {name: text for name, text in part.constraints.items() if name not in part.asked_of_roots}
     found: list[Candidate] = []
+    if sampler is None or sample is None or degree == 1:
+        return []
     for pattern in (f"EP{degree}", *([f"CEP{degree // 2}"] if degree in _PAIRED else [])):
         asked = replace(part, locate=pattern, minimize="abscissa", maximize=None, constraints=limits)
         asked = replace(asked, scenarios={}, tolerances={})
-        if sampler is None or sample is None or freedom(asked).count < 0:
+        if freedom(asked).count < 0:
             continue
         leading = matching(asked)
         lead, ended = ipopt(leading, work.options), list[Candidate]()

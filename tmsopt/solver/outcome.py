@@ -30,8 +30,8 @@ _BRANCH_STARTS = 12
 _OUTSIDE = 1e-9  # of a limit, beyond which it excludes a solution
 _SAME_BRANCH = 1e-6  # relative difference of parameters
 _DOUBT = 100.0  # roots that rounding parts are off alike in the NLP and in the recheck
-_NOTHING = 1e-9  # of a range: what is smaller is rounded as if it stood for 0
 _STORED, _SPREAD = 1e-14, 100.0  # relative roundings of coefficients, and by what a place may enlarge their m-th root
+_UNCLEAR = "rounding leaves too little of the coefficients to tell the roots apart; keep a0 and the roots away from 0"
 _CLAIMED = 1e-6  # relative difference of the claimed objective from the design's own
 
 
@@ -93,9 +93,9 @@ def found(
     if problem.objective is not None and not math.isfinite(checked.objective):
         ended = False
         notes = ("the objective does not exist at the design where the search ended; constrain what it divides by",)
-    if any(0 < abs(parameters[n]) < _NOTHING * (hi - lo) for n, (lo, hi) in problem.free.items()) and _unclear(checked):
+    if _unclear(problem, checked):
         ended = False
-        notes = ("rounding leaves too little of the coefficients to tell the roots apart; keep a0 away from 0",)
+        notes = (_UNCLEAR,)
     status = "optimal" if ended and not checked.violations else "not_converged"
     if status != "optimal" and not notes and not checked.violations:
         notes = ("feasible, but the solver did not converge here: a better design may be close",)
@@ -187,13 +187,21 @@ def ahead(work: Workspace, one: Trial, other: Trial) -> bool:
     return ranks[0] < ranks[1]
 
 
-def _unclear(checked: Checked) -> bool:
-    """Whether the roots as stored are farther from the multiple ones that they count as than an m-th root explains."""
+def _unclear(problem: Problem, checked: Checked) -> bool:
+    """Whether the roots as stored are farther from the multiple ones that they count as than an m-th root explains.
+
+    Several that are 0 but for rounding have no damping ratio to speak of.
+    """
     roots = checked.structure.roots
     if not roots or not math.isfinite(checked.realised):
         return False
     sizes = sorted(math.hypot(r.re, r.im) for r in roots)
-    scatter = _SPREAD * _STORED ** (1 / max(r.multiplicity for r in roots)) * sizes[len(sizes) // 2]
+    asked = any("damping_ratio" in e.names for e in (problem.objective, *problem.conditions.values()) if e)
+    if asked and any(r.multiplicity > 1 and 0 < math.hypot(r.re, r.im) < _STORED * sizes[-1] for r in roots):
+        return True
+    rightmost = max(roots, key=lambda r: r.re)
+    own = math.hypot(rightmost.re, rightmost.im) * _SPREAD * _STORED ** (1 / rightmost.multiplicity)
+    scatter = own + _STORED * sizes[-1]
     return bool(abs(checked.structure.abscissa - checked.realised) > scatter)
 
 
