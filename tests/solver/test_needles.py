@@ -52,8 +52,10 @@ def test_both_root_quantities_at_their_best_at_one_design() -> None:
     """No damping ratio is above 1 and no abscissa below the least, so a design with both is the best of any sum."""
     least = tmsopt.solve(ROBOT)
     assert least.structure == "EP4"
-    both = tmsopt.solve(replace(ROBOT, minimize=None, maximize="damping_ratio - 0.14*abscissa"))
-    assert both.value == pytest.approx(1 - 0.14 * least.value, abs=1e-8)
+    both = tmsopt.solve(replace(ROBOT, minimize=None, maximize="damping_ratio - 0.14*abscissa"), throw=False)
+    # Beside a0 = 0 doubles hold such a root to 1e-4 of its size, and it may be said that they do not.
+    assert both.value == pytest.approx(1 - 0.14 * least.value, abs=1e-4)
+    assert both.violations == {}
 
 
 @pytest.mark.parametrize(("violation", "ended"), [(1e-12, True), (1e-7, False)])
