@@ -137,7 +137,6 @@ def rational(x: Any, digits: int = DIGITS) -> flint.fmpq:
     if isinstance(x, flint.fmpq):
         return x
     if isinstance(x, flint.arb):
-        mantissa, exponent = x.mid().man_exp()
-        return flint.fmpq(mantissa) * flint.fmpq(2) ** int(exponent)
+        return x.mid().fmpq()
     ratio = Fraction(x)
     return flint.fmpq(ratio.numerator, ratio.denominator)
