@@ -166,7 +166,7 @@ def _along(model: Model, corners: Mapping[str, Array], name: str, box: Box, know
     for k, (top, bottom) in enumerate(zip(tops, bottoms, strict=True)):
         if _inside(bottom).size:
             return np.array([math.inf]), set()
-        turning = np.polysub(np.polymul(np.polyder(top), bottom), np.polymul(top, np.polyder(bottom)))
+        turning = np.convolve(np.polyder(top), bottom) - np.convolve(top, np.polyder(bottom))
         at = {n: float(column[k]) for n, column in corners.items()}
         for u in (-1.0, 1.0, *_inside(turning)):
             points.append({**at, name: (lower + upper) / 2 + (upper - lower) / 2 * float(u)})
@@ -175,7 +175,10 @@ def _along(model: Model, corners: Mapping[str, Array], name: str, box: Box, know
 
 def _inside(polynomial: Array) -> Array:
     """Real roots in [-1, 1] of a fitted polynomial, with a margin for rounding."""
-    clean = np.where(np.abs(polynomial) > 1e-13 * np.abs(polynomial).max(), polynomial, 0.0)
+    size = np.abs(polynomial)
+    if size[-1] > 1.001 * size[:-1].sum():  # the constant term outweighs the others
+        return np.empty(0)
+    clean = np.where(size > 1e-13 * size.max(), polynomial, 0.0)
     found = np.roots(clean)
     close = (np.abs(found.imag) < 1e-6) & (np.abs(found.real) <= 1 + 1e-6)
     return np.asarray(np.clip(found.real[close], -1.0, 1.0))
