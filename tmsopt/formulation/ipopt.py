@@ -90,6 +90,7 @@ def ipopt(nlp: NLP, options: Options = DEFAULTS, start: str = "far", max_iterati
     settings: dict[str, Any] = {
         "print_time": False,
         "show_eval_warnings": False,
+        "no_nlp_grad": True,
         "ipopt.print_level": 0,
         "ipopt.sb": "yes",
         "ipopt.linear_solver": options.linear_solver,
@@ -99,21 +100,20 @@ def ipopt(nlp: NLP, options: Options = DEFAULTS, start: str = "far", max_iterati
         "ipopt.obj_scaling_factor": 1 / nlp.objective_unit,
         **{f"ipopt.{name}": value for name, value in _SETTINGS[start].items()},
     }
-    unit = np.array([*nlp.units, *[1.0] * (len(nlp.variables) - len(nlp.units))])
-    x, p = ca.SX.sym("x", len(nlp.variables)), ca.SX.sym("p", len(nlp.settings))
-    f, g = nlp.at(x if np.all(unit == 1) else x * unit, p)
-    solver = ca.nlpsol("solver", "ipopt", {"x": x, "p": p, "f": f, "g": g}, settings)
+    unit, (function, derivatives) = nlp.unit_of_each, nlp.derived
+    solver = ca.nlpsol("solver", "ipopt", function, {**settings, **derivatives})
 
     def run(x0: Array, limits: NLP = nlp) -> Run:
         lower, upper = np.array(limits.lower), np.array(limits.upper)
-        rows = {"lbg": np.array(limits.row_lower), "ubg": np.array(limits.row_upper)}
+        first, *ends = ((column / unit).tolist() for column in (x0, lower, upper))  # quicker in CasADi than arrays
+        rows = {"lbg": limits.row_lower, "ubg": limits.row_upper}
         with _interruptible():
-            answer = solver(x0=x0 / unit, p=limits.settings, lbx=lower / unit, ubx=upper / unit, **rows)
+            answer = solver(x0=first, p=limits.settings, lbx=ends[0], ubx=ends[1], **rows)
         stats = solver.stats()
         return Run(
-            x=np.clip(np.array(answer["x"]).ravel() * unit, lower, upper),
-            row_multipliers=np.array(answer["lam_g"]).ravel(),
-            bound_multipliers=np.array(answer["lam_x"]).ravel() / unit,
+            x=np.clip(answer["x"].full().ravel() * unit, lower, upper),
+            row_multipliers=answer["lam_g"].full().ravel(),
+            bound_multipliers=answer["lam_x"].full().ravel() / unit,
             status=str(stats["return_status"]),
         )
 
@@ -169,7 +169,8 @@ class _Conditions:
 
     def at(self, x: Array, rows: Array) -> tuple[float, Array, Array, Array, Array]:
         """Objective, its gradient, rows, their Jacobian, and the Hessian of the Lagrangian."""
-        f, gradient, g, jacobian, hessian = (np.array(part) for part in self.expand(x, rows, self.settings))
+        every = self.expand(x.tolist(), rows.tolist(), self.settings)
+        f, gradient, g, jacobian, hessian = (part.full() for part in every)
         return float(f.item()), gradient.ravel(), g.ravel(), jacobian, hessian
 
     def point(self, x: Array, rows: Array, bounds: Array) -> Point:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import combinations
 from typing import Any
 
@@ -22,6 +23,7 @@ _TANGLED = 1e-3  # relative distance of roots that may be meant to be one: where
 _TIE = 1e-3
 """Difference of distances that are the same."""
 
+_FIRST = {"f": "grad:f:x", "g": "jac:g:x"}  # derivatives, as CasADi writes them
 _DESIGNS = 33
 _ORDINARY = (1e-2, 1e3)
 
@@ -140,9 +142,26 @@ class NLP:
 
     def at(self, x: Any, settings: Any = None) -> Any:
         """f and g for numbers or CasADi expressions; with the NLP's own settings unless others are given."""
+        x = x.tolist() if isinstance(x, np.ndarray) else x
         if not self.settings:
             return self.functions(x)
         return self.functions(x, self.settings if settings is None else settings)
+
+    @property
+    def unit_of_each(self) -> Array:
+        """What a solver moves each variable in."""
+        return np.array([*self.units, *[1.0] * (len(self.variables) - len(self.units))])
+
+    @cached_property
+    def derived(self) -> tuple[ca.Function, dict[str, ca.Function]]:
+        """(x, p) → (f, g) in these units, and what CasADi else derives of it anew for every solver."""
+        x, p, unit = ca.SX.sym("x", len(self.variables)), ca.SX.sym("p", len(self.settings)), self.unit_of_each
+        function = ca.Function("nlp", [x, p], self.at(x if np.all(unit == 1) else x * unit, p), ["x", "p"], ["f", "g"])
+        hessian = function.factory(
+            "curved", ["x", "p", "lam:f", "lam:g"], ["triu:hess:gamma:x:x"], {"gamma": ["f", "g"]}
+        )
+        gradient, jacobian = (function.factory("d" + of, ["x", "p"], [of, d]) for of, d in _FIRST.items())
+        return function, {"grad_f": gradient, "jac_g": jacobian, "hess_lag": hessian}
 
     @property
     def equations(self) -> int:
