@@ -100,8 +100,12 @@ def ipopt(nlp: NLP, options: Options = DEFAULTS, start: str = "far", max_iterati
         "ipopt.obj_scaling_factor": 1 / nlp.objective_unit,
         **{f"ipopt.{name}": value for name, value in _SETTINGS[start].items()},
     }
-    unit, (function, derivatives) = nlp.unit_of_each, nlp.derived
-    solver = ca.nlpsol("solver", "ipopt", function, {**settings, **derivatives})
+    unit = np.array([*nlp.units, *[1.0] * (len(nlp.variables) - len(nlp.units))])
+    stated, derivatives = nlp.derived
+    if not np.all(unit == 1):
+        x, p = ca.SX.sym("x", len(nlp.variables)), ca.SX.sym("p", len(nlp.settings))
+        stated, derivatives = ca.Function("nlp", [x, p], nlp.at(x * unit, p), ["x", "p"], ["f", "g"]), {}
+    solver = ca.nlpsol("solver", "ipopt", stated, {**settings, **derivatives})
 
     def run(x0: Array, limits: NLP = nlp) -> Run:
         lower, upper = np.array(limits.lower), np.array(limits.upper)
@@ -122,12 +126,10 @@ def ipopt(nlp: NLP, options: Options = DEFAULTS, start: str = "far", max_iterati
 
 def polisher(nlp: NLP) -> Callable[[Run, NLP], Point]:
     """A function that refines runs of one NLP under given limits; the better of refined and raw point is returned."""
-    x = ca.SX.sym("x", len(nlp.variables))
-    multipliers = ca.SX.sym("m", len(nlp.rows))
-    p = ca.SX.sym("p", len(nlp.settings))
-    f, g = nlp.at(x, p)
-    hessian = ca.hessian(f + ca.dot(multipliers, g), x)[0]
-    expand = ca.Function("kkt", [x, multipliers, p], [f, ca.gradient(f, x), g, ca.jacobian(g, x), hessian])
+    _, derivatives = nlp.derived
+    x, rows, p = (ca.SX.sym(name, len(of)) for name, of in (("x", nlp.variables), ("m", nlp.rows), ("p", nlp.settings)))
+    first = [e for name in ("grad_f", "jac_g") for e in derivatives[name](x, p)]
+    expand = ca.Function("kkt", [x, rows, p], [*first, ca.triu2symm(derivatives["hess_lag"](x, p, 1, rows))])
 
     def polish(run: Run, limits: NLP) -> Point:
         ends = (np.array(e) for e in (limits.lower, limits.upper, limits.row_lower, limits.row_upper))

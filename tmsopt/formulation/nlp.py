@@ -147,21 +147,14 @@ class NLP:
             return self.functions(x)
         return self.functions(x, self.settings if settings is None else settings)
 
-    @property
-    def unit_of_each(self) -> Array:
-        """What a solver moves each variable in."""
-        return np.array([*self.units, *[1.0] * (len(self.variables) - len(self.units))])
-
     @cached_property
     def derived(self) -> tuple[ca.Function, dict[str, ca.Function]]:
-        """(x, p) → (f, g) in these units, and what CasADi else derives of it anew for every solver."""
-        x, p, unit = ca.SX.sym("x", len(self.variables)), ca.SX.sym("p", len(self.settings)), self.unit_of_each
-        function = ca.Function("nlp", [x, p], self.at(x if np.all(unit == 1) else x * unit, p), ["x", "p"], ["f", "g"])
-        hessian = function.factory(
-            "curved", ["x", "p", "lam:f", "lam:g"], ["triu:hess:gamma:x:x"], {"gamma": ["f", "g"]}
-        )
-        gradient, jacobian = (function.factory("d" + of, ["x", "p"], [of, d]) for of, d in _FIRST.items())
-        return function, {"grad_f": gradient, "jac_g": jacobian, "hess_lag": hessian}
+        """(x, p) → (f, g), and what CasADi else derives of it anew for every solver."""
+        x, p = ca.SX.sym("x", len(self.variables)), ca.SX.sym("p", len(self.settings))
+        function = ca.Function("nlp", [x, p], self.at(x, p), ["x", "p"], ["f", "g"])
+        first = {of: function.factory("d" + of, ["x", "p"], [of, d]) for of, d in _FIRST.items()}
+        second = function.factory("dd", ["x", "p", "lam:f", "lam:g"], ["triu:hess:gamma:x:x"], {"gamma": ["f", "g"]})
+        return function, {"grad_f": first["f"], "jac_g": first["g"], "hess_lag": second}
 
     @property
     def equations(self) -> int:
