@@ -91,6 +91,7 @@ def ipopt(nlp: NLP, options: Options = DEFAULTS, start: str = "far", max_iterati
         "print_time": False,
         "show_eval_warnings": False,
         "no_nlp_grad": True,
+        "calc_lam_p": False,
         "ipopt.print_level": 0,
         "ipopt.sb": "yes",
         "ipopt.linear_solver": options.linear_solver,
