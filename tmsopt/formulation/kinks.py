@@ -91,8 +91,8 @@ class _Unfolding:
         x, p = ca.SX.sym("x", len(self.x)), ca.SX.sym("p", len(self.p))
         stacked = ca.Function("stacked", [ca.vertcat(x, p)], self.nlp.at(x, p))
         (f,), g = walk(stacked, [*self.x, *self.p], {op: partial(self.applied, op) for op in _OPERATIONS})
-        rows = ca.densify(ca.vertcat(*map(ca.SX, [*g, *self.rows])))
-        return ca.vertcat(*self.x), ca.vertcat(*self.p), ca.densify(ca.SX(f)), rows
+        rows = ca.densify(ca.vertcat(*g, *self.rows))
+        return ca.vertcat(*self.x), ca.vertcat(*self.p), ca.densify(f), rows
 
     def applied(self, operation: int, *operands: Any) -> Any:
         """The result of an operation; of a kink that depends on variables, a new one."""
@@ -101,7 +101,7 @@ class _Unfolding:
         if operation in _POLES:
             return self._divided(operation, *operands)
         pieces = _PIECES.get(operation)
-        if pieces is None or not any(ca.depends_on(ca.SX(e), ca.vertcat(*self.x)) for e in operands):
+        if pieces is None or not any(ca.depends_on(e, ca.vertcat(*self.x)) for e in operands):
             return (ca.SX.unary if len(operands) == 1 else ca.SX.binary)(operation, *operands)
         first, t = len(self.nlp.rows) + len(self.rows), ca.SX.sym(KINK)
         every = pieces(*operands)
@@ -134,8 +134,7 @@ class _Unfolding:
 
 
 _POLES: Mapping[int, Callable[..., tuple[Any, Any]]] = {
-    ca.OP_DIV: lambda a, b: (ca.SX(a), ca.SX(b)), ca.OP_INV: lambda b: (ca.SX(1), ca.SX(b)),
-    ca.OP_TAN: lambda e: (ca.sin(ca.SX(e)), ca.cos(ca.SX(e))),
+    ca.OP_DIV: lambda a, b: (a, b), ca.OP_INV: lambda b: (ca.SX(1), b), ca.OP_TAN: lambda e: (ca.sin(e), ca.cos(e)),
 }  # fmt: skip
 _PIECES: Mapping[int, Callable[..., Sequence[Any]]] = {
     ca.OP_FABS: lambda e: (e, -e), ca.OP_FMAX: lambda a, b: (a, b), ca.OP_FMIN: lambda a, b: (-a, -b),
