@@ -16,8 +16,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.arithmetic.intervals import ranges
-from tmsopt.arithmetic.walk import NotAccepted, steps, walk
+from tmsopt.arithmetic.intervals import INTERVALS, ball, interval, ranges
+from tmsopt.arithmetic.walk import NotAccepted, walk
 from tmsopt.formulation.nlp import NLP, Greatest, Lift, Touch
 from tmsopt.models import Values
 from tmsopt.roots.patterns.pattern import Roots
@@ -36,7 +36,7 @@ def unfolded(nlp: NLP, overclaims: bool) -> NLP:
         overclaims: whether bounds on root quantities would, kinks aside.
     """
     plain = nlp if overclaims else replace(nlp, touches={})
-    if not any(step.operation in _PIECES or step.operation in _POLES for step in steps(nlp.functions)):
+    if not (nlp.settings or _suspect(nlp)):
         return plain
     build = _Unfolding(nlp)
     x, p, f, g = build.expressions()
@@ -74,6 +74,26 @@ def unfolded(nlp: NLP, overclaims: bool) -> NLP:
         if overclaims or not _worsens(plain, among, _WORSE[name], equal):
             held[name] = touches
     return replace(plain, touches=held)
+
+
+def _suspect(nlp: NLP) -> bool:
+    """Whether there may be a kink, or a pole in the box: of most NLPs one look by interval arithmetic denies it.
+
+    Not of those with settings, whose functions have two vectors.
+    """
+
+    def divided(operation: int, *operands: Any) -> Any:
+        lower, upper = interval(INTERVALS[ca.OP_COS](*operands) if operation == ca.OP_TAN else operands[-1])
+        if lower <= 0 <= upper:
+            raise NotAccepted
+        return INTERVALS[operation](*operands)
+
+    known = {o: f for o, f in INTERVALS.items() if o not in _PIECES} | {o: partial(divided, o) for o in _POLES}
+    try:
+        walk(nlp.functions, [ball(ends) for ends in zip(nlp.lower, nlp.upper, strict=True)], known)
+    except NotAccepted:
+        return True
+    return False
 
 
 class _Unfolding:
