@@ -7,7 +7,7 @@ a time, whose arrays stay in the cache.
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -134,7 +134,7 @@ def _pruned(taken: Sequence[Instruction]) -> Program:
         if taken[k].operation == ca.OP_OUTPUT or k in needed:
             needed.update((k, *taken[k].operands))
     place = {k: number for number, k in enumerate(sorted(needed))}
-    return Program(tuple(replace(taken[k], operands=tuple(place[o] for o in taken[k].operands)) for k in place))
+    return Program(tuple(taken[k]._replace(operands=tuple(place[o] for o in taken[k].operands)) for k in place))
 
 
 def _leaf(step: Instruction, given: Mapping[int, Any]) -> Any:

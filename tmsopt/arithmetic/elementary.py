@@ -99,6 +99,11 @@ def is_symbolic(x: Any) -> bool:
     return isinstance(x, ca.SX | ca.MX)
 
 
+def as_symbol(x: Any) -> Any:
+    """A number as a CasADi expression; one of these unchanged, as a copy takes as long as ten operations."""
+    return x if isinstance(x, ca.SX) else ca.SX(x)
+
+
 def is_ball(x: Any) -> bool:
     """Whether x is a number of ball arithmetic, exact fractions and formulas of these among them."""
     return isinstance(x, flint.fmpq | flint.arb | flint.arb_series | Formal)
@@ -137,7 +142,6 @@ def rational(x: Any, digits: int = DIGITS) -> flint.fmpq:
     if isinstance(x, flint.fmpq):
         return x
     if isinstance(x, flint.arb):
-        mantissa, exponent = x.mid().man_exp()
-        return flint.fmpq(mantissa) * flint.fmpq(2) ** int(exponent)
+        return x.mid().fmpq()
     ratio = Fraction(x)
     return flint.fmpq(ratio.numerator, ratio.denominator)

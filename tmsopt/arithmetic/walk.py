@@ -2,8 +2,8 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import casadi as ca
 
@@ -27,7 +27,7 @@ def walk(
     Raises:
         NotAccepted: for an operation that the arithmetic does not have.
     """
-    taken = list(steps(function))
+    taken = _taken(function)
     left = Counter(k for step in taken for k in step.operands)
     values: list[Any] = []
     outputs: list[list[Any]] = [[arithmetic[ca.OP_CONST](0.0)] * function.nnz_out(k) for k in range(function.n_out())]
@@ -41,7 +41,7 @@ def walk(
             case ca.OP_CONST:
                 value = arithmetic[ca.OP_CONST](step.constant)
             case operation if operation in arithmetic:
-                value = arithmetic[operation](*(values[k] for k in step.operands))
+                value = arithmetic[operation](*[values[k] for k in step.operands])
                 value = shared(value) if left[len(values)] > 1 else value
             case operation:
                 raise NotAccepted(operation_name(operation))
@@ -53,8 +53,7 @@ def walk(
     return outputs
 
 
-@dataclass(frozen=True)
-class Instruction:
+class Instruction(NamedTuple):
     """One instruction of a function.
 
     Attributes:
@@ -87,6 +86,12 @@ def steps(function: ca.Function) -> Iterator[Instruction]:
             case _:
                 yield Instruction(operation, tuple(held[r] for r in inputs))
         held[outputs[0]] = k
+
+
+@lru_cache(maxsize=8)
+def _taken(function: ca.Function) -> tuple[Instruction, ...]:
+    """The instructions of a function that is met again at once, as with the boxes of a branch and bound."""
+    return tuple(steps(function))
 
 
 def operation_name(operation: int) -> str:

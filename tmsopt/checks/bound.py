@@ -22,7 +22,7 @@ import casadi as ca
 import flint
 import numpy as np
 
-from tmsopt.arithmetic.elementary import as_ball, exact, quotient, rational
+from tmsopt.arithmetic.elementary import as_ball, exact, quotient
 from tmsopt.arithmetic.walk import steps
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Bound
@@ -52,6 +52,7 @@ _RATIONAL = {
 """Operations that make rational functions; CasADi writes whole powers with these."""
 
 Box = Mapping[str, tuple[float, float]]
+Exact = Mapping[str, Any]
 Known = Mapping[tuple[str, float], Any]
 
 
@@ -107,10 +108,11 @@ def _largest_product(problem: Problem) -> float:
     if len(problem.free) > _CORNERS or not is_rational(problem.model, problem.model.sets[0]):
         return _enclosed_product(problem)
     model, (box, known) = problem.model, _algebraic_box(problem)
-    constant = [n for n, (lo, hi) in box.items() if lo == hi or _plays_no_role(model, n, box)]
+    inside = [_point_of(box, part) for part in (Fraction(1, 2), Fraction(2, 3))]
+    constant = [n for n, (lo, hi) in box.items() if lo == hi or _plays_no_role(model, n, inside)]
     varying = [n for n in box if n not in constant]
-    curved = [n for n in varying if not _linear(model, n, box)]
-    if len(curved) > 1 or not all(_linear(model, n, box, _DEGREE + 1) for n in curved):
+    curved = [n for n in varying if not _linear(model, n, inside)]
+    if len(curved) > 1 or not all(_linear(model, n, inside, _DEGREE + 1) for n in curved):
         return _enclosed_product(problem)
     ends = [box[n] if n in varying and n not in curved else ((box[n][0] + box[n][1]) / 2,) for n in box]
     corners = dict(zip(box, np.array(list(itertools.product(*ends))).T, strict=True))
@@ -164,7 +166,7 @@ def _along(model: Model, corners: Mapping[str, Array], name: str, box: Box, know
     for k, (top, bottom) in enumerate(zip(tops, bottoms, strict=True)):
         if _inside(bottom).size:
             return np.array([math.inf]), set()
-        turning = np.polysub(np.polymul(np.polyder(top), bottom), np.polymul(top, np.polyder(bottom)))
+        turning = np.convolve(np.polyder(top), bottom) - np.convolve(top, np.polyder(bottom))
         at = {n: float(column[k]) for n, column in corners.items()}
         for u in (-1.0, 1.0, *_inside(turning)):
             points.append({**at, name: (lower + upper) / 2 + (upper - lower) / 2 * float(u)})
@@ -173,7 +175,10 @@ def _along(model: Model, corners: Mapping[str, Array], name: str, box: Box, know
 
 def _inside(polynomial: Array) -> Array:
     """Real roots in [-1, 1] of a fitted polynomial, with a margin for rounding."""
-    clean = np.where(np.abs(polynomial) > 1e-13 * np.abs(polynomial).max(), polynomial, 0.0)
+    size = np.abs(polynomial)
+    if size[-1] > 1.001 * size[:-1].sum():  # the constant term outweighs the others
+        return np.empty(0)
+    clean = np.where(size > 1e-13 * size.max(), polynomial, 0.0)
     found = np.roots(clean)
     close = (np.abs(found.imag) < 1e-6) & (np.abs(found.real) <= 1 + 1e-6)
     return np.asarray(np.clip(found.real[close], -1.0, 1.0))
@@ -202,22 +207,22 @@ def _algebraic_box(problem: Problem) -> tuple[dict[str, tuple[float, float]], Kn
     return box, known
 
 
-def _plays_no_role(model: Model, name: str, box: Box) -> bool:
+def _plays_no_role(model: Model, name: str, inside: Sequence[Exact]) -> bool:
     """Whether aₙ/a0 is free of a parameter: exact arithmetic at points where a difference would show."""
-    for part in (Fraction(1, 2), Fraction(2, 3)):
-        (last, first), (last2, first2) = _exact(model, name, box, part, [Fraction(3, 7), Fraction(11, 5)])
+    for others in inside:
+        (last, first), (last2, first2) = _exact(model, name, others, [Fraction(3, 7), Fraction(11, 5)])
         if not _vanishes(last * first2 - last2 * first):
             return False
     return True
 
 
-def _linear(model: Model, name: str, box: Box, order: int = 2) -> bool:
+def _linear(model: Model, name: str, inside: Sequence[Exact], order: int = 2) -> bool:
     """Whether the exact differences of an order of aₙ and a0 vanish, at points where others would show.
 
     Those of order 2 do where both are linear in the parameter, those of order k where they are of a degree below k.
     """
-    for part in (Fraction(1, 2), Fraction(2, 3)):
-        at = _exact(model, name, box, part, [Fraction(1, 3) + k for k in range(order + 2)])
+    for others in inside:
+        at = _exact(model, name, others, [Fraction(1, 3) + k for k in range(order + 2)])
         for row in zip(*at, strict=True):
             for terms in (row[: order + 1], row[1:]):
                 if not _vanishes(sum((-1) ** k * math.comb(order, k) * c for k, c in enumerate(terms))):
@@ -230,13 +235,17 @@ def _vanishes(x: Any) -> bool:
     return bool(x == 0)
 
 
-def _exact(model: Model, name: str, box: Box, part: Fraction, at: Sequence[Fraction]) -> list[tuple[Any, Any]]:
-    """aₙ and a0 for exact values of one parameter, the others fixed somewhere in the box."""
-    others = {
-        n: rational(lo) if lo == hi else rational(lo + (hi - lo) * float(part * Fraction(k, 13)))
+def _point_of(box: Box, part: Fraction) -> Exact:
+    """Exact values somewhere in a box."""
+    return {
+        n: exact(lo) if lo == hi else exact(lo + (hi - lo) * float(part * Fraction(k, 13)))
         for k, (n, (lo, hi)) in enumerate(box.items(), start=3)
     }
-    rows = (model.polynomial(**{**others, name: rational(x)}) for x in at)
+
+
+def _exact(model: Model, name: str, others: Exact, at: Sequence[Fraction]) -> list[tuple[Any, Any]]:
+    """aₙ and a0 for exact values of one parameter, the others fixed."""
+    rows = (model.polynomial(**{**others, name: exact(x)}) for x in at)
     return [(a[-1], a[0]) for a in rows]
 
 

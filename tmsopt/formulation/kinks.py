@@ -16,8 +16,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.arithmetic.intervals import ranges
-from tmsopt.arithmetic.walk import NotAccepted, steps, walk
+from tmsopt.arithmetic.intervals import INTERVALS, ball, interval, ranges
+from tmsopt.arithmetic.walk import NotAccepted, walk
 from tmsopt.formulation.nlp import NLP, Greatest, Lift, Touch
 from tmsopt.models import Values
 from tmsopt.roots.patterns.pattern import Roots
@@ -36,7 +36,7 @@ def unfolded(nlp: NLP, overclaims: bool) -> NLP:
         overclaims: whether bounds on root quantities would, kinks aside.
     """
     plain = nlp if overclaims else replace(nlp, touches={})
-    if not any(step.operation in _PIECES or step.operation in _POLES for step in steps(nlp.functions)):
+    if not (nlp.settings or _suspect(nlp)):
         return plain
     build = _Unfolding(nlp)
     x, p, f, g = build.expressions()
@@ -76,6 +76,26 @@ def unfolded(nlp: NLP, overclaims: bool) -> NLP:
     return replace(plain, touches=held)
 
 
+def _suspect(nlp: NLP) -> bool:
+    """Whether there may be a kink, or a pole in the box: of most NLPs one look by interval arithmetic denies it.
+
+    Not of those with settings, whose functions have two vectors.
+    """
+
+    def divided(operation: int, *operands: Any) -> Any:
+        lower, upper = interval(INTERVALS[ca.OP_COS](*operands) if operation == ca.OP_TAN else operands[-1])
+        if lower <= 0 <= upper:
+            raise NotAccepted
+        return INTERVALS[operation](*operands)
+
+    known = {o: f for o, f in INTERVALS.items() if o not in _PIECES} | {o: partial(divided, o) for o in _POLES}
+    try:
+        walk(nlp.functions, [ball(ends) for ends in zip(nlp.lower, nlp.upper, strict=True)], known)
+    except NotAccepted:
+        return True
+    return False
+
+
 class _Unfolding:
     """Collects the kinks of one NLP; discarded once they are known."""
 
@@ -91,8 +111,8 @@ class _Unfolding:
         x, p = ca.SX.sym("x", len(self.x)), ca.SX.sym("p", len(self.p))
         stacked = ca.Function("stacked", [ca.vertcat(x, p)], self.nlp.at(x, p))
         (f,), g = walk(stacked, [*self.x, *self.p], {op: partial(self.applied, op) for op in _OPERATIONS})
-        rows = ca.densify(ca.vertcat(*map(ca.SX, [*g, *self.rows])))
-        return ca.vertcat(*self.x), ca.vertcat(*self.p), ca.densify(ca.SX(f)), rows
+        rows = ca.densify(ca.vertcat(*g, *self.rows))
+        return ca.vertcat(*self.x), ca.vertcat(*self.p), ca.densify(f), rows
 
     def applied(self, operation: int, *operands: Any) -> Any:
         """The result of an operation; of a kink that depends on variables, a new one."""
@@ -101,7 +121,7 @@ class _Unfolding:
         if operation in _POLES:
             return self._divided(operation, *operands)
         pieces = _PIECES.get(operation)
-        if pieces is None or not any(ca.depends_on(ca.SX(e), ca.vertcat(*self.x)) for e in operands):
+        if pieces is None or not any(ca.depends_on(e, ca.vertcat(*self.x)) for e in operands):
             return (ca.SX.unary if len(operands) == 1 else ca.SX.binary)(operation, *operands)
         first, t = len(self.nlp.rows) + len(self.rows), ca.SX.sym(KINK)
         every = pieces(*operands)
@@ -134,8 +154,7 @@ class _Unfolding:
 
 
 _POLES: Mapping[int, Callable[..., tuple[Any, Any]]] = {
-    ca.OP_DIV: lambda a, b: (ca.SX(a), ca.SX(b)), ca.OP_INV: lambda b: (ca.SX(1), ca.SX(b)),
-    ca.OP_TAN: lambda e: (ca.sin(ca.SX(e)), ca.cos(ca.SX(e))),
+    ca.OP_DIV: lambda a, b: (a, b), ca.OP_INV: lambda b: (ca.SX(1), b), ca.OP_TAN: lambda e: (ca.sin(e), ca.cos(e)),
 }  # fmt: skip
 _PIECES: Mapping[int, Callable[..., Sequence[Any]]] = {
     ca.OP_FABS: lambda e: (e, -e), ca.OP_FMAX: lambda a, b: (a, b), ca.OP_FMIN: lambda a, b: (-a, -b),

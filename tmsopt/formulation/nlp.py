@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import combinations
 from typing import Any
 
@@ -22,6 +23,7 @@ _TANGLED = 1e-3  # relative distance of roots that may be meant to be one: where
 _TIE = 1e-3
 """Difference of distances that are the same."""
 
+_FIRST = {"f": "grad:f:x", "g": "jac:g:x"}  # derivatives, as CasADi writes them
 _DESIGNS = 33
 _ORDINARY = (1e-2, 1e3)
 
@@ -140,9 +142,19 @@ class NLP:
 
     def at(self, x: Any, settings: Any = None) -> Any:
         """f and g for numbers or CasADi expressions; with the NLP's own settings unless others are given."""
+        x = x.tolist() if isinstance(x, np.ndarray) else x
         if not self.settings:
             return self.functions(x)
         return self.functions(x, self.settings if settings is None else settings)
+
+    @cached_property
+    def derived(self) -> tuple[ca.Function, dict[str, ca.Function]]:
+        """(x, p) → (f, g), and what CasADi else derives of it anew for every solver."""
+        x, p = ca.SX.sym("x", len(self.variables)), ca.SX.sym("p", len(self.settings))
+        function = ca.Function("nlp", [x, p], self.at(x, p), ["x", "p"], ["f", "g"])
+        first = {of: function.factory("d" + of, ["x", "p"], [of, d]) for of, d in _FIRST.items()}
+        second = function.factory("dd", ["x", "p", "lam:f", "lam:g"], ["triu:hess:gamma:x:x"], {"gamma": ["f", "g"]})
+        return function, {"grad_f": first["f"], "jac_g": first["g"], "hess_lag": second}
 
     @property
     def equations(self) -> int:

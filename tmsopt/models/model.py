@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import flint
@@ -119,7 +120,7 @@ class ParameterSet:
     rate: Formula | None = None
     needs: Mapping[str, tuple[str, str]] = field(default_factory=dict, hash=False)
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters, in the order of the documentation."""
         return tuple(p.name for p in self.parameters)

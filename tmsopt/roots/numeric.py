@@ -34,8 +34,8 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
     scaled = monic / scale[:, None] ** np.arange(n + 1)
     factors = _factors(_companion_eigenvalues(scaled))
     with np.errstate(over="ignore", invalid="ignore"):  # roots 300 orders apart: what overflows is not an improvement
-        factors, error = _newton(factors, scaled)
-        found = _factor_roots(factors)[:, :n] * scale[:, None]
+        found, error = _newton(factors, scaled)
+        found = found * scale[:, None]
     for row in np.flatnonzero(error > _JOINT):
         found[row] = _isolated(c.reshape(-1, n + 1)[row], found[row])
     return found.reshape(*c.shape[:-1], n)
@@ -98,22 +98,24 @@ def _isolated(coefficients: Array, found: NDArray[np.complex128]) -> NDArray[np.
     return exact if exact.shape == found.shape and np.all(np.isfinite(exact)) else found
 
 
-def _newton(factors: Array, monic: Array) -> tuple[Array, Array]:
-    """Newton's method on the factor coefficients, on the rows that need it; with the backward errors left."""
+def _newton(factors: Array, monic: Array) -> tuple[NDArray[np.complex128], Array]:
+    """Roots by Newton's method on the factor coefficients, on the rows that need it; with the backward errors left."""
     n = monic.shape[-1] - 1
-    error = backward_error(monic, _factor_roots(factors)[:, :n])
+    found = _factor_roots(factors)[:, :n]
+    error = backward_error(monic, found)
     for _ in range(_STEPS):
         rows = np.flatnonzero(error > _POLISHED)
         if not rows.size:
             break
         trial = factors[rows] + _newton_step(factors[rows], monic[rows])
-        trial_error = backward_error(monic[rows], _factor_roots(trial)[:, :n])
+        moved = _factor_roots(trial)[:, :n]
+        trial_error = backward_error(monic[rows], moved)
         better = trial_error < error[rows]
         if not better.any():
             break
-        factors[rows[better]] = trial[better]
+        factors[rows[better]], found[rows[better]] = trial[better], moved[better]
         error[rows[better]] = trial_error[better]
-    return factors, error
+    return found, error
 
 
 def _newton_step(factors: Array, monic: Array) -> Array:
@@ -169,9 +171,8 @@ def _factor_roots(factors: Array) -> NDArray[np.complex128]:
 
 def _elementary(values: NDArray[np.complex128] | Array) -> NDArray[np.complex128]:
     """Coefficients of ∏ (s − value)."""
-    result = np.ones((*values.shape[:-1], 1), dtype=complex)
+    result = np.zeros((*values.shape[:-1], values.shape[-1] + 1), dtype=complex)
+    result[..., 0] = 1
     for k in range(values.shape[-1]):
-        grown = np.concatenate([result, np.zeros_like(result[..., :1])], axis=-1)
-        grown[..., 1:] -= values[..., k : k + 1] * result
-        result = grown
+        result[..., 1 : k + 2] -= values[..., k : k + 1] * result[..., : k + 1]
     return result

@@ -13,8 +13,8 @@ Coefficients = Sequence[Any]
 
 def product(*factors: Coefficients) -> list[Any]:
     """Coefficients of the product of polynomials given by their coefficients."""
-    result: list[Any] = [1]
-    for factor in factors:
+    result: list[Any] = list(factors[0]) if factors else [1]
+    for factor in factors[1:]:
         terms: list[Any] = [0] * (len(result) + len(factor) - 1)
         for i, a in enumerate(result):
             for j, b in enumerate(factor):

@@ -7,7 +7,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Context, Decimal
-from fractions import Fraction
 from typing import Any
 
 import flint
@@ -147,7 +146,7 @@ def nearest_decimal(ball: Any, digits: int) -> float | None:
     if not _finite(ball):
         return float("nan")
     context = Context(prec=digits, rounding=ROUND_HALF_EVEN)
-    ends = {context.divide(Decimal(e.numerator), Decimal(e.denominator)) for e in _ends(ball)}
+    ends = {context.divide(Decimal(int(e.p)), Decimal(int(e.q))) for e in _ends(ball)}
     return float(ends.pop()) + 0.0 if len(ends) == 1 else None
 
 
@@ -155,21 +154,17 @@ def _finite(ball: Any) -> bool:
     return ball.is_finite() if isinstance(ball, flint.arb) else isinstance(ball, flint.fmpq)
 
 
-def _ends(ball: Any) -> set[Fraction]:
+def _ends(ball: Any) -> tuple[flint.fmpq, ...]:
     """Both ends without rounding, at any working precision."""
     if isinstance(ball, flint.fmpq):
-        return {_fraction(ball)}
-    middle, radius = (_fraction(rational(part)) for part in (ball.mid(), ball.rad()))
-    return {middle - radius, middle + radius}
+        return (ball,)
+    middle, radius = rational(ball.mid()), rational(ball.rad())
+    return middle - radius, middle + radius
 
 
-def _fraction(x: flint.fmpq) -> Fraction:
-    return Fraction(int(x.p), int(x.q))
-
-
-def _double(x: Fraction) -> float:
+def _double(x: flint.fmpq) -> float:
     try:
-        return x.numerator / x.denominator  # rounded correctly, whatever the length of the two
+        return int(x.p) / int(x.q)  # rounded correctly, whatever the length of the two
     except OverflowError:
         return float("inf") if x > 0 else float("-inf")
 

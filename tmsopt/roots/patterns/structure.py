@@ -71,8 +71,9 @@ def structure(coefficients: ArrayLike, tolerance: float = 1e-12, off: ArrayLike 
         ValueError: for another shape, coefficients that are not finite, or a leading 0.
     """
     c = _checked(coefficients)
-    size = _sizes(c, numeric_roots(c), off, tolerance)
-    return _of_quartic(c, size, tolerance) if len(c) == 5 else _of_any(c, size, tolerance)
+    found = numeric_roots(c)
+    size = _sizes(c, found, off, tolerance)
+    return (_of_quartic if len(c) == 5 else _of_any)(c, found, size, tolerance)
 
 
 def _sizes(c: Array, found: Roots, off: ArrayLike | None, tolerance: float) -> Array:
@@ -132,8 +133,7 @@ def _matching(pattern: Pattern, coefficients: ArrayLike) -> Array:
     return c
 
 
-def _of_quartic(c: Array, size: Array, tolerance: float) -> Structure:
-    found = numeric_roots(c)
+def _of_quartic(c: Array, found: Roots, size: Array, tolerance: float) -> Structure:
     undecided: Structure | None = None
     for pattern, multiplicity, on_line in _CANDIDATES:
         for candidate in _fits(pattern, c, found, size, _NEAR):
@@ -147,8 +147,7 @@ def _of_quartic(c: Array, size: Array, tolerance: float) -> Structure:
     return undecided or Structure(_simple_name(found), _simple(found), 0.0)
 
 
-def _of_any(c: Array, size: Array, tolerance: float) -> Structure:
-    found = numeric_roots(c)
+def _of_any(c: Array, found: Roots, size: Array, tolerance: float) -> Structure:
     nonzero = np.abs(found[found != 0])
     unit = 2.0 ** np.round(np.mean(np.log2(nonzero))) if nonzero.size else 1.0
     units = unit ** np.arange(len(c))
