@@ -19,9 +19,9 @@ from tmsopt.formulation.nlp import NLP, Lift
 from tmsopt.formulation.starts import designs
 from tmsopt.models import Values
 from tmsopt.records import Table
-from tmsopt.solver.multistart import Candidate, Runner, same, starting
+from tmsopt.solver.multistart import Runner, same, starting
 from tmsopt.solver.outcome import Trial, survivor
-from tmsopt.solver.workspace import Workspace, workspace
+from tmsopt.solver.workspace import Candidate, Workspace, workspace
 
 _ROUNDS = 12  # times that cases are added
 _TRIED = 8  # starts of a relaxation at most
