@@ -153,7 +153,7 @@ def _with_stability(solution: Solution, options: Options, family: Family | None,
         return solution
     asked = any_stable(problem, options.stability, solution.parameters, options.asking)
     if asked.design is not None:
-        few = replace(options, starts=min(options.starts, _NEAR), stability=0.0, interruptible=False)
+        few = replace(options, starts=min(options.starts, _NEAR), stability=0.0, alone=False, interruptible=False)
         found = solved(problem, replace(few, near=asked.design), family)
         gain = problem.sign * (solution.value - found.value)
         if found.status == "optimal" and (solution.status != "optimal" or gain > 0):
