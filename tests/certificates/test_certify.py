@@ -444,6 +444,7 @@ def test_an_interrupt_keeps_the_design(slow_plane: Solution, children: list[Any]
 
     design = certify(slow_plane, seconds=SECONDS, progress=stop)
     assert "the proof was interrupted" in design.notes
+    assert design.interrupted
     assert design.value == slow_plane.value
     assert not design.bound.proven
 

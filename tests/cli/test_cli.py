@@ -1,14 +1,26 @@
 """The command line by its contract: streams, exit status, JSON, figures; in a process of its own where that matters."""
 
+import io
 import json
 import math
+import os
+import signal
+import struct
 import subprocess
 import sys
+import time
+from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tmsopt.cli import main
+
+if os.name == "posix":
+    import fcntl
+    import pty
+    import termios
 
 KEYS = {
     "schema", "title", "model", "status", "objective", "parameters", "abscissa", "abscissa_realised", "roots",
@@ -174,3 +186,106 @@ def test_all_designs_are_not_one(capsys, option):
     code, out, err = run(capsys, "solve", "problems/coupled_pair.toml", "--all", option)
     assert (code, out) == (2, "")
     assert f"{option.partition('=')[0]}: is for one design, and --all looks for all of them" in err
+
+
+MACHINE = """
+model = "tms"
+
+[parameters]
+v = 1.98
+m_B = 9.6
+m_H = 3.45
+w = 0.25
+x_B = { min = 0.03, max = 0.4 }
+x_H = { min = 0.15, max = 0.36 }
+z_B = { min = -0.35, max = -0.06 }
+z_H = -0.0978
+lambda_s = { min = -0.6, max = 0.6 }
+
+[objective]
+minimize = "abscissa"
+
+[constraints]
+front = "N_F <= 175.0"
+arm = "x_H - x_B >= -0.039"
+"""
+"""Its steer arm may vanish: a search of many seconds."""
+
+UNSTABLE = """
+model = "tms"
+
+[parameters]
+Fr = { min = 0.1, max = 0.5 }
+mu = 0.1
+chi_B = 1.2
+chi_H = 1.0
+zeta_B = -0.4
+zeta_H = -0.2
+lambda_s = 0.4
+
+[objective]
+minimize = "abscissa"
+"""
+"""Slower than it capsizes."""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="terminals and signals of POSIX")
+@pytest.mark.usefixtures("interruptible")
+def test_ctrl_c_leaves_the_best_so_far_once_progress_shows(tmp_path):
+    path = tmp_path / "machine.toml"
+    path.write_text(MACHINE)
+    leader, follower = pty.openpty()
+    fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("4H", 24, 80, 0, 0))  # a new one is 0 columns wide
+    command = [sys.executable, "-m", "tmsopt", "solve", str(path), "--json"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=follower, text=True)
+    os.close(follower)
+    shown = b""
+    while b"starts:" not in shown:
+        shown += os.read(leader, 1000)
+    process.send_signal(signal.SIGINT)
+    answer = process.communicate(timeout=60)[0]
+    os.close(leader)
+    assert process.returncode == 130
+    data = json.loads(answer)
+    assert (data["status"], data["interrupted"], data["violations"]) == ("not_converged", True, {})
+    assert any("the user stopped the search after" in note for note in data["notes"])
+    at = data["parameters"]
+    assert at["x_H"] - at["x_B"] >= -0.039 * (1 + 1e-9)
+    assert 9.81 * (9.6 * at["x_B"] + 3.45 * at["x_H"]) / 0.25 <= 175 * (1 + 1e-9)  # N_F: moments about the rear contact
+    roots = np.roots([data["quantities"][f"a{k}"] for k in range(5)])
+    assert data["objective"]["value"] == pytest.approx(roots.real.max(), rel=1e-6)
+
+
+def test_a_second_one_or_an_early_one_ends_with_130(monkeypatch, capsys):
+    def stop(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(import_module("tmsopt.solver.solve"), "explore", stop)
+    monkeypatch.setattr(import_module("tmsopt.solver.solve"), "_so_far", stop)
+    for command in ("solve", "prove", "compare", "speeds"):
+        status, out, err = run(capsys, command, "problems/ep4.toml")
+        assert (status, out, err) == (130, "", "stopped: there is nothing to show\n")
+
+
+def test_the_question_for_a_stable_design_is_shown(monkeypatch, tmp_path):
+    """On a terminal, and its end is no end of the answer in hand."""
+
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    def asked(problem, seconds, known, progress):
+        time.sleep(1.0)  # before which nothing is shown
+        progress(2.2, seconds)
+        raise KeyboardInterrupt
+
+    path = tmp_path / "box.toml"
+    path.write_text(UNSTABLE)
+    monkeypatch.setattr(import_module("tmsopt.solver.solve"), "any_stable", asked)
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    monkeypatch.setattr(sys, "stdout", io.StringIO())
+    with pytest.raises(SystemExit) as stop:
+        main(args=["solve", str(path), "--brief"], prog_name="tmsopt")
+    assert stop.value.code == 130
+    assert "looking for a stable design: second 2 of 5" in sys.stderr.getvalue()
+    assert "the user stopped the question whether any design is stable" in sys.stdout.getvalue()

@@ -176,3 +176,21 @@ def test_a_solved_problem_has_no_relaxation():
     design = tmsopt.solve(problem(minimize="abscissa"))
     assert design.relaxation is None
     assert "relaxation" not in design.to_json()
+
+
+def test_what_starts_met_on_the_way_counts():
+    """A damping ratio is 1 at most, and that where all roots are real; no start of the relaxation ends there."""
+    box = {"mu": (0.034, 3.3), "chi_B": (0.904, 1.33), "zeta_B": (-1.08, -0.25), "zeta_H": (-0.407, -0.222)}
+    plane = "(zeta_B + 0.67)/0.42 + (lambda_s - 0.64)/0.61 <= 0.385"
+    asked = tmsopt.Problem(
+        TMS, fixed={"Fr": 2.77, "chi_H": 0.795}, free={**box, "lambda_s": (0.03, 1.25)}, maximize="damping_ratio",
+        constraints={"damped": "damping_ratio >= 1.009", "plane": plane},
+    )  # fmt: skip
+    design = tmsopt.solve(asked, throw=False, stability=0.0)
+    assert dict(design.relaxation.amounts) == {"damped": pytest.approx(0.009, abs=1e-9)}
+    relaxed = replace(asked, fixed=design.relaxation.parameters, free={})
+    roots = np.roots([float(a) for a in relaxed.values(relaxed.fixed).coefficients])
+    assert roots.imag.tolist() == [0.0] * 4
+    at = relaxed.fixed
+    assert (at["zeta_B"] + 0.67) / 0.42 + (at["lambda_s"] - 0.64) / 0.61 <= 0.385 + 1e-9
+    assert roots.real.max() < 0

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.branch_and_bound.answer import Answer, Clock, answer, contradicted, doubt
+from tmsopt.branch_and_bound.answer import Answer, Clock, SecondsPassed, answer, contradicted, doubt
 from tmsopt.branch_and_bound.question import Question, unit_of
 from tmsopt.branch_and_bound.race import Crew
 from tmsopt.branch_and_bound.scip import SCIP
@@ -36,7 +36,12 @@ class Stability:
     proof: str = ""
 
 
-def any_stable(problem: Problem, seconds: float, known: Mapping[str, float] | None = None) -> Stability:
+def any_stable(
+    problem: Problem,
+    seconds: float,
+    known: Mapping[str, float] | None = None,
+    progress: SecondsPassed | None = None,
+) -> Stability:
     """Whether any design in the box has all its roots left of the axis, in every case that the problem lists.
 
     Its constraints and its pattern hold, but for constraints on the roots themselves. Refuted is more than is claimed:
@@ -46,6 +51,7 @@ def any_stable(problem: Problem, seconds: float, known: Mapping[str, float] | No
     Args:
         seconds: at most, but for those that a process takes to start; without a global solver none pass.
         known: parameters of the best design known. A question that excludes what it should admit proves nothing.
+        progress: called with the seconds that passed and those there are.
 
     Raises:
         KeyboardInterrupt: when the user stops it.
@@ -60,7 +66,7 @@ def any_stable(problem: Problem, seconds: float, known: Mapping[str, float] | No
     unit = unit_of(best.structure.roots)
     at_axis = Question(asked, asked.cases, 0.0, unit)
     with Crew(SOLVER) as crew:
-        clock = Clock(seconds, crew)
+        clock = Clock(seconds, crew, progress)
         try:
             told = answer(at_axis, clock, _SHARE, _any)
             proved = told.verdict == INFEASIBLE

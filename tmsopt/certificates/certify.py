@@ -66,7 +66,7 @@ def certify(design: Given, *, seconds: float = SECONDS, progress: SecondsPassed 
                 found, replaced = (_bounded if feasible(found) else _excluded)(found, clock)
         except NotAccepted as error:
             return _noted(found, f"branch and bound cannot take {error}, so there is no bound")
-        return _noted(found, "the proof was interrupted") if clock.interrupted else found
+        return replace(_noted(found, "the proof was interrupted"), interrupted=True) if clock.interrupted else found
 
 
 def check_installed() -> None:

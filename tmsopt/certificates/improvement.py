@@ -71,7 +71,7 @@ def _reached(problem: Problem, known: float | None, point: Mapping[str, float], 
 
 
 def _solved(problem: Problem, starts: int = _STARTS, near: Mapping[str, float] | None = None) -> Solution:
-    return solve(problem, starts=starts, near=near, throw=False, alone=False, stability=0.0)
+    return solve(problem, starts=starts, near=near, throw=False, alone=False, stability=0.0, interruptible=False)
 
 
 def gained(problem: Problem, known: float | None, value: float) -> float:

@@ -12,7 +12,7 @@ import click
 
 from tmsopt import __version__
 from tmsopt.cli.chart import chart
-from tmsopt.cli.common import BAD_INPUT
+from tmsopt.cli.common import BAD_INPUT, INTERRUPTED
 from tmsopt.cli.figure import figure
 from tmsopt.cli.import_ import convert
 from tmsopt.cli.prove import prove
@@ -27,9 +27,12 @@ class _Commands(click.Group):
     """Commands whose answer may meet a full disk."""
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command; what cannot be written ends it with a message."""
+        """Run a command; what cannot be written, and Ctrl-C, end it with a message."""
         try:
             return super().invoke(ctx)
+        except KeyboardInterrupt:
+            click.echo("stopped: there is nothing to show", err=True)
+            sys.exit(INTERRUPTED)
         except OSError as error:
             if error.errno == errno.EPIPE:  # the reader has enough: click ends quietly
                 raise

@@ -35,24 +35,32 @@ def bad_input() -> Iterator[None]:
 
 
 @contextmanager
-def progress(what: str = "start", scaled: bool = False) -> Iterator[Callable[[int, int], None]]:
+def progress(what: str = "start", scaled: bool = False, shown: str | None = None) -> Iterator[Callable[..., None]]:
     """A progress bar on stderr, shown on a terminal when the work takes longer than a second.
 
     Args:
         scaled: write large numbers as 12.3M; the first call says what was done before.
+        shown: how, in place of a bar.
     """
     from tqdm import tqdm
 
     options: dict[str, Any] = {"unit_scale": scaled, "delay": 1, "disable": None, "leave": False, "file": sys.stderr}
-    with tqdm(desc=f"{what}s", unit=what, **options) as bar:
+    with tqdm(desc=f"{what}s", unit=what, bar_format=shown, **options) as bar:
 
-        def update(done: int, most: int) -> None:
+        def update(done: float, most: float) -> None:
             if scaled and bar.total is None:
                 bar.initial = bar.n = done
-            bar.total = most
-            bar.update(done - bar.n)
+            bar.total = round(most)
+            bar.update(round(done) - bar.n)
 
         yield update
+
+
+@contextmanager
+def solving() -> Iterator[dict[str, Any]]:
+    """Options of `solve` by which it shows how far it is."""
+    with progress() as update, progress("second", shown="looking for a stable design: second {n} of {total}") as ask:
+        yield {"progress": update, "asking": ask}
 
 
 def check_output(option: str, path: Path | None, endings: Sequence[str], folders: Sequence[str] = ()) -> None:

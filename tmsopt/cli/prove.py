@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import DONE, INFEASIBLE, NOT_CONVERGED, bad_input, options, progress, write_json
+from tmsopt.cli.common import DONE, INFEASIBLE, NOT_CONVERGED, bad_input, options, solving, write_json
 
 _EXAMPLES = """
 \b
@@ -44,8 +44,9 @@ def prove(file: Path, as_json: bool, digits: int, exact: tuple[str, ...], starts
 
         given = _named(exact)
         problem = question_of(file)
-        with progress() as update:
-            solution = tmsopt.solve(problem, throw=False, progress=update, **options(starts=starts, seed=seed))
+        with solving() as shown:
+            asked = options(starts=starts, seed=seed) | shown
+            solution = tmsopt.solve(problem, throw=False, interruptible=False, **asked)
         proof = tmsopt.prove(solution, digits, exact=given)
     if as_json:
         write_json({"title": problem.title, "status": solution.status, **proof.to_json()})

@@ -12,6 +12,7 @@ from tmsopt.cli.common import (
     DONE,
     FIGURES,
     INFEASIBLE,
+    INTERRUPTED,
     NOT_CONVERGED,
     bad_input,
     check_output,
@@ -19,6 +20,7 @@ from tmsopt.cli.common import (
     options,
     progress,
     saving,
+    solving,
     write_json,
 )
 
@@ -41,7 +43,8 @@ Examples:
 A file with pareto = ["abscissa", "Fr"] under [objective] gives the front: two or three expressions, each minimised; a
 minus sign maximises, as in "-lambda_s".
 
-Exit status: 0 solved, 2 bad input, 3 infeasible, 4 not converged.
+Exit status: 0 solved, 2 bad input, 3 infeasible, 4 not converged, 130 stopped by Ctrl-C: the answer is then the best
+design so far.
 """
 
 _COMPARE_EXAMPLES = """
@@ -160,10 +163,11 @@ def solve(
         except tmsopt.NotSolved as error:
             solution, plot = error.solution, None
     else:
-        with progress() as update:
-            solution = tmsopt.solve(problem, throw=False, progress=update, **asked)
-        if certify:
+        with solving() as shown:
+            solution = tmsopt.solve(problem, throw=False, **shown, **asked)
+        if certify and not solution.interrupted:
             solution = _certified(solution, certify)
+    brief = brief or solution.interrupted
     if as_json:
         explanation, near, multiple = _meaning(solution, brief, details=False)
         meaning = {
@@ -178,7 +182,7 @@ def solve(
             click.echo(line)
     if plot is not None:
         _draw(solution, plot, w, m_B)
-    sys.exit(_EXIT[solution.status])
+    sys.exit(INTERRUPTED if solution.interrupted else _EXIT[solution.status])
 
 
 def _check_options(problem: "Problem", given: list[str], every: bool) -> None:
@@ -260,7 +264,7 @@ def _certified(solution: "Solution", seconds: float) -> "Solution":
     import tmsopt
 
     with progress("second") as update:
-        return tmsopt.certify(solution, seconds=seconds, progress=lambda done, most: update(round(done), round(most)))
+        return tmsopt.certify(solution, seconds=seconds, progress=update)
 
 
 def _given(context: click.Context) -> list[str]:

@@ -151,7 +151,9 @@ def _parameters(design: Any, asked: Problem, name: str, progress: Progress | Non
         if faults := [f for f in parameter_faults(asked, own) if f.key[-1] != name]:
             raise InputError(faults)
         return own
-    return dict(asked.fixed if set(asked.free) <= {name} else solve(asked, progress=progress).parameters)
+    if set(asked.free) <= {name}:
+        return dict(asked.fixed)
+    return dict(solve(asked, progress=progress, interruptible=False).parameters)
 
 
 def _linear(model: Model, of: ParameterSet, own: Mapping[str, float], name: str) -> dict[str, tuple[Any, Any]]:

@@ -133,6 +133,7 @@ class Solution:
         relaxation: of an infeasible problem, the smallest move of its limits that leaves a feasible design.
         stable_elsewhere: of a design that is not stable, whether branch and bound found one that is: False where it
             proved that there is none, None where it was not asked or did not decide.
+        interrupted: whether the user ended the work before it was done.
         si: the design in s, Hz, mm, km/h, degrees, N and kg; empty unless the problem is written in SI.
     """
 
@@ -161,6 +162,7 @@ class Solution:
     sides: Table[float] = field(default_factory=Table)
     relaxation: Relaxation | None = None
     stable_elsewhere: bool | None = None
+    interrupted: bool = False
     si: Table[Reading] = field(default_factory=Table)
 
     @property
@@ -201,7 +203,7 @@ class Solution:
         cases = {"worst_case": self.worst, "least_damped_case": self.least_damped}
         optional = {
             **{name: case and plain(case, "at offset") for name, case in cases.items()}, **plain(self, "cover"),
-            "sides": plain(self.sides, digits=SIDE_DIGITS), **plain(self, "relaxation si"),
+            "sides": plain(self.sides, digits=SIDE_DIGITS), **plain(self, "relaxation interrupted si"),
         }  # fmt: skip
         return {
             **problem.heading, "status": self.status,

@@ -176,7 +176,7 @@ def _resolved(solution: Solution, lever: Lever) -> Lever:
         return replace(lever, reason="the moved problem cannot be written down")
     gain, found = math.nan, None
     for starts in (1, _RETRY):
-        again = solve(asked, starts=starts, throw=False, stability=0.0)
+        again = solve(asked, starts=starts, throw=False, stability=0.0, interruptible=False)
         better = -problem.sign * (again.value - solution.value)
         if again.status == "optimal" and not better <= gain:
             gain, found = better, again

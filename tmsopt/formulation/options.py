@@ -1,6 +1,6 @@
 """How to solve: declared here once, and handed on as one from the verb that a user calls to IPOPT."""
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypedDict
 
@@ -27,6 +27,8 @@ class AskedOfSolve(Asked, total=False):
     near: Mapping[str, float] | None
     alone: bool
     stability: float
+    asking: Callable[[float, float], None] | None
+    interruptible: bool
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,9 @@ class Options:
         alone: of an infeasible problem, also find how far each limit in conflict would have to give alone.
         stability: where a stable design was looked for and none was found, seconds for branch and bound to look for one
             or to prove that there is none; 0 to do without. `solve` gives it 5, where SCIP is installed.
+        asking: called meanwhile, with the seconds that passed and those there are.
+        interruptible: whether Ctrl-C ends the search with the best design so far, as `solve` has it; else it goes on to
+            whoever called, as it always does where no design is in hand yet.
     """
 
     starts: int = STARTS
@@ -54,6 +59,8 @@ class Options:
     near: Mapping[str, float] | None = None
     alone: bool = True
     stability: float = 0.0
+    asking: Callable[[float, float], None] | None = None
+    interruptible: bool = False
 
     @property
     def of_ipopt(self) -> Hashable:

@@ -16,7 +16,7 @@ from tmsopt.formulation.starts import complete, designs, opposite, worth
 from tmsopt.records import Array
 from tmsopt.roots import roots
 from tmsopt.solver.sample import NARROW
-from tmsopt.solver.workspace import Workspace
+from tmsopt.solver.workspace import Candidate, Workspace
 
 _ENOUGH = 12  # starts tried before agreement counts
 _AGREE = 5  # starts at the best value that end the search
@@ -40,22 +40,6 @@ _WAYS = 3  # in which root quantities and kinks are held from one start
 _CROSSINGS = 4  # times that an end may turn out to be one of another way
 _MEETS = 1e-5  # difference of distances at which two ways meet
 _SUCCESS = "Solve_Succeeded"
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """Where one start ended.
-
-    Attributes:
-        nlp: with the limits that held.
-        objective: of the NLP; inf unless finite.
-        feasible: whether rows and bounds hold as IPOPT left them.
-    """
-
-    nlp: NLP
-    run: Run
-    objective: float
-    feasible: bool
 
 
 def search(work: Workspace, nlp: NLP, most: int | None = None) -> list[Candidate]:
@@ -163,9 +147,10 @@ class Runner:
                 break
             best = ended
         best = self._crossed(best)
-        if not best.feasible or (near and not self.nlp.touches):
-            return best
-        return self._no_worse(best, design, "far" if near else "near")
+        if best.feasible and (not near or self.nlp.touches):
+            best = self._no_worse(best, design, "far" if near else "near")
+        self.work.met.append((self.nlp, best))
+        return best
 
     def _no_worse(self, best: Candidate, design: Mapping[str, float], start: str) -> Candidate:
         """Where it ended, or where a start that was better than that ends if IPOPT keeps to it, or does not."""
@@ -176,7 +161,7 @@ class Runner:
 
     def _once(self, design: Mapping[str, float], start: str) -> Candidate:
         x = complete(self.nlp, self.work.part, design, start == "near")
-        return min((self._from(x, way, start) for way in islice(self.nlp.touchings(x), _WAYS)), key=_rank)
+        return min((self._from(x, way, start) for way in islice(self.nlp.touchings(x), _WAYS)), key=rank)
 
     def _crossed(self, best: Candidate) -> Candidate:
         """The best that is reached from an end at which other ways are as close as the one that was held."""
@@ -184,7 +169,7 @@ class Runner:
             x, held = best.run.x, _limits(best.nlp)
             others = (way for way in self.nlp.touchings(x, _MEETS) if _limits(way) != held)
             ends = [self._from(x, way, "near") for way in islice(others, 2 * _WAYS)]
-            further = min(ends, key=_rank, default=best)
+            further = min(ends, key=rank, default=best)
             if not (further.feasible and further.objective < best.objective - _SAME):
                 break
             best = further
@@ -198,7 +183,8 @@ def _limits(nlp: NLP) -> tuple[tuple[float, ...], ...]:
     return nlp.lower, nlp.upper, nlp.row_upper
 
 
-def _rank(candidate: Candidate) -> tuple[bool, float]:
+def rank(candidate: Candidate) -> tuple[bool, float]:
+    """Of two candidates, the better one has the lower rank."""
     return not candidate.feasible, candidate.objective
 
 

@@ -15,9 +15,9 @@ from tmsopt.formulation.ipopt import Point
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import complete, designs
 from tmsopt.records import Array, Table
-from tmsopt.solver.multistart import Candidate, same
+from tmsopt.solver.multistart import same
 from tmsopt.solver.newton import solutions
-from tmsopt.solver.workspace import Workspace
+from tmsopt.solver.workspace import Candidate, Workspace
 
 _STATIONARY = 1e-6  # gradient of the Lagrangian at which a point counts as converged whatever IPOPT says
 _ALIKE = 3  # candidates of one objective looked at closely

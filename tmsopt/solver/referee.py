@@ -9,10 +9,10 @@ import numpy as np
 from tmsopt.design.cases import Case
 from tmsopt.design.solution import Starts
 from tmsopt.formulation.nlp import NLP
-from tmsopt.solver.multistart import Candidate, Runner, same
+from tmsopt.solver.multistart import Runner, same
 from tmsopt.solver.outcome import Finding, Trial, ahead, converged, honest, mass_advice, survivor
 from tmsopt.solver.sample import Looked, Sample, Sampler
-from tmsopt.solver.workspace import Workspace
+from tmsopt.solver.workspace import Candidate, Workspace
 
 _APPEALS, _APPEALED = 8, 2  # times that better designs are started from, and how many each time
 _LOST = 1e-7  # relative difference of the objective that makes a design better

@@ -14,14 +14,14 @@ from tmsopt.checks.worst_case import worst_cases
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Relaxation
-from tmsopt.formulation.formulate import formulate
+from tmsopt.formulation.formulate import design_of, formulate
 from tmsopt.formulation.nlp import NLP, Lift
 from tmsopt.formulation.starts import designs
 from tmsopt.models import Values
 from tmsopt.records import Table
-from tmsopt.solver.multistart import Candidate, Runner, same, starting
+from tmsopt.solver.multistart import Runner, same, starting
 from tmsopt.solver.outcome import Trial, survivor
-from tmsopt.solver.workspace import Workspace, workspace
+from tmsopt.solver.workspace import Candidate, Workspace, workspace
 
 _ROUNDS = 12  # times that cases are added
 _TRIED = 8  # starts of a relaxation at most
@@ -32,6 +32,7 @@ _WIDER = 3.0  # widths of the box by which its bounds may give way
 _INSET = 1e-3  # share of the width kept from a physical end that is excluded
 _HOLDS = 1e-5  # multiplier, per scale or width of the box, above which a limit takes part in the conflict
 _NOTHING = 1e-12  # sum of amounts at which the problem is feasible as it is
+_FINEST = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # of the box: steps that improve a design that is kept as it is
 _ROUND_UP = 1e-12  # of an amount, so that the relaxed design is inside
 
 
@@ -61,7 +62,8 @@ def relax(work: Workspace) -> Relaxation | None:
     """The least relaxation: of the constraints, or of the box too where these alone cannot help; None if none is found.
 
     Amounts are added up relative to the limits as written, those of the box in its widths. One limit that can do it
-    alone for less than all together shows that the search for these was caught, and wins.
+    alone for less than all together shows that the search for these was caught, and wins; so does a design that was
+    met on the way, of whose conflict no more is known than what it moves.
     """
     listed, options = work.problem.cases, work.options
     problem = replace(work.problem, minimize=None, maximize=None, pareto=())  # what else is asked plays no part
@@ -69,15 +71,32 @@ def relax(work: Workspace) -> Relaxation | None:
         sides = [workspace(part.part, options) for part in workspace(wide, options).parts()]
         ended = [_least_covered(side, limits, listed) for side in sides]
         reached = [(trial, nlp) for trial, nlp in ended if trial is not None]
-        if not reached:
+        trial, nlp = min(reached, key=lambda found: found[0].point.objective, default=(None, None))
+        met = [found for side in sides for found in _met(work, side, limits) if not listed]
+        least, seen = min(met, key=lambda found: found[0], default=(np.inf, None))
+        if seen and (trial is None or least < trial.point.objective * (1 - _TIE)):
+            return seen
+        if trial is None or nlp is None:
             continue
-        trial, nlp = min(reached, key=lambda found: found[0].point.objective)
         amounts = _amounts(wide, limits, trial.parameters, nlp.cases)
         conflict = _conflict(nlp, limits, trial)
         wanted = options.alone and len(conflict) > 1
         single = _alone(workspace(problem, options), conflict, trial, nlp.cases) if wanted else {}
         return Relaxation(Table(trial.parameters), Table(amounts), conflict, Table(single))
     return None
+
+
+def _met(work: Workspace, side: Workspace, limits: Sequence[Limit]) -> Iterator[tuple[float, Relaxation]]:
+    """What designs need that were met on the way: the least violating one looked at, and where starts ended."""
+    designs = [design_of(work.problem, end.run.x.tolist()) for _, end in work.met if np.all(np.isfinite(end.run.x))]
+    if side.sampler and side.sample:
+        refined = side.sampler.refined(side.sample.refined.take(np.arange(1)), _FINEST)
+        designs.append(side.sampler.design(refined, 0))
+    for parameters in map(side.problem.ordered, designs):
+        if not _unlimited(side, limits).recheck(parameters, ()).violations:
+            amounts = _amounts(side.problem, limits, parameters, ())
+            total = sum(abs(amounts.get(limit.name, 0.0)) / limit.scale for limit in limits)
+            yield total, Relaxation(Table(parameters), Table(amounts), tuple(amounts))
 
 
 def _stages(problem: Problem) -> Iterator[tuple[Problem, list[Limit]]]:

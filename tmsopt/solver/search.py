@@ -16,12 +16,12 @@ from tmsopt.design.solution import Starts
 from tmsopt.formulation.formulate import design_of, formulate, middle
 from tmsopt.formulation.nlp import NLP
 from tmsopt.records import Table
-from tmsopt.solver.multistart import Candidate, Runner, exceptional, further, same, search
+from tmsopt.solver.multistart import Runner, exceptional, further, same, search
 from tmsopt.solver.outcome import Finding, Trial, ahead, counted, found, mass_advice, survivor
 from tmsopt.solver.referee import held, ideal, refereed
 from tmsopt.solver.relaxation import relax
 from tmsopt.solver.sample import Sampler
-from tmsopt.solver.workspace import Workspace
+from tmsopt.solver.workspace import Candidate, Workspace
 
 _ROUNDS, _FAR_ROUNDS = 12, 40
 """Times that cases are added; each time the worst one between them shrinks to its square, roughly."""

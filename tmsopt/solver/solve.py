@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Unpack
 
 from tmsopt.branch_and_bound.stability import any_stable
@@ -15,13 +16,17 @@ from tmsopt.design.files import Given, question_of
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.solution import Bound, NotSolved, Solution, Starts
 from tmsopt.errors import Fault, InputError, is_number, short, suggest
+from tmsopt.formulation.formulate import design_of
 from tmsopt.formulation.options import DEFAULTS, AskedOfSolve, Options, options_of
 from tmsopt.records import Table
-from tmsopt.solver.outcome import Finding, better, evaluated, mass_advice
+from tmsopt.solver.multistart import rank
+from tmsopt.solver.outcome import Finding, better, counted, evaluated, mass_advice, survivor
 from tmsopt.solver.search import Explored, evaluated_cases, explore, without_any
-from tmsopt.solver.workspace import Family, workspace
+from tmsopt.solver.workspace import Family, Workspace, workspace
 
-_ASKING = replace(DEFAULTS, stability=5.0)
+_ASKING = replace(DEFAULTS, stability=5.0, interruptible=True)
+_WAIT = 1.0  # seconds after an interrupt in which the best of where starts ended is looked for
+_SEEN, _SAME = 3, 1e-9  # designs of a sample that may be the best then; what an end must promise more than the best has
 _NEAR = 4  # starts where branch and bound found a stable design, that design the first of them
 
 
@@ -30,17 +35,20 @@ def solve(
 ) -> Solution:
     """Find the best design, from several starts, and check it independently of the solver.
 
+    Ctrl-C ends the search with the best design so far, ``not_converged`` and `interrupted`; a second one ends that too.
+
     Args:
         problem: or the path of its file.
         throw: raise NotSolved unless the status is ``optimal``; otherwise return the best point with its status.
         family: what was built for other problems that differ in numbers alone, to be used again.
-        options: ``starts``, ``seed``, ``exhaustive``, ``linear_solver``, ``progress``, ``near``, ``alone`` and
-            ``stability``; see `tmsopt.Options`.
+        options: ``starts``, ``seed``, ``exhaustive``, ``linear_solver``, ``progress``, ``near``, ``alone``,
+            ``stability``, ``asking`` and ``interruptible``; see `tmsopt.Options`.
 
     Raises:
         NotSolved: carrying the best point found, when `throw`.
         InputError: when parameters are free and nothing is asked of them.
         ValueError: for another linear solver.
+        KeyboardInterrupt: when the user ends it before there is any design, or `interruptible` is False.
     """
     problem = question_of(problem)
     solution = solved(problem, options_of(options, AskedOfSolve, _ASKING), family)
@@ -57,6 +65,7 @@ def solved(design: Given, options: Options = DEFAULTS, family: Family | None = N
     began = time.perf_counter()
     notes: tuple[str, ...] = ()
     values: dict[str, float] = {}
+    interrupted = False
     if problem.free:
         if options.near:
             _check_near(problem, options.near)
@@ -65,31 +74,76 @@ def solved(design: Given, options: Options = DEFAULTS, family: Family | None = N
         work = workspace(problem, options, family)
         parts = [part for part in work.parts() if not options.near or part.holds(options.near)]
         explored: list[Explored] = []
-        for part in parts:
-            met = [e.finding.checked for e in explored if e.finding and not e.finding.checked.violations]
-            stable = any(checked.structure.abscissa < 0 for checked in met)
-            explored.append(explore(part, insist=not stable))
-        finding = _winner(problem, explored) or without_any(work, sum(len(e.candidates) for e in explored))
+        try:
+            for part in parts:
+                met = [e.finding.checked for e in explored if e.finding and not e.finding.checked.violations]
+                stable = any(checked.structure.abscissa < 0 for checked in met)
+                explored.append(explore(part, insist=not stable))
+            finding = _winner(problem, explored) or without_any(work, sum(len(e.candidates) for e in explored))
+        except KeyboardInterrupt:
+            so_far = _so_far(parts) if options.interruptible else None
+            if so_far is None:
+                raise
+            finding, interrupted = so_far, True
         looked = sum(part.sampler.count for part in parts if part.sampler)
         finding = replace(finding, starts=replace(finding.starts, looked=looked))
         notes = _sides_note(problem, explored, finding)
         values = _side_values(explored)
     else:
         finding = evaluated(problem, evaluated_cases(problem, problem.ordered({})))
-    solution = _assembled(problem, finding, notes, values, began)
-    asking = options.stability and not options.near  # which keeps to its side of the box
-    return _with_stability(solution, options, family, began) if asking else solution
+    solution = replace(_assembled(problem, finding, notes, values, began), interrupted=interrupted)
+    if interrupted or not options.stability or options.near:  # which keeps to its side of the box
+        return solution
+    try:
+        return _with_stability(solution, options, family, began)
+    except KeyboardInterrupt:
+        if not options.interruptible:
+            raise
+        words = "the user stopped the question whether any design is stable"
+        return replace(solution, interrupted=True, notes=(*solution.notes, words))
 
 
 def standing(problem: Problem, design: Mapping[str, float], note: str) -> Solution:
     """A design as it is, whoever found it: ``not_converged``, or ``infeasible`` where it violates something."""
     began = time.perf_counter()
+    return _assembled(problem, replace(_as_it_is(problem, design), notes=(note,)), (), {}, began)
+
+
+def _as_it_is(problem: Problem, design: Mapping[str, float]) -> Finding:
     parameters = problem.ordered(design)
     cases = evaluated_cases(problem, parameters)
     checked = recheck(problem, parameters, cases)
     status = "infeasible" if checked.violations else "not_converged"
-    finding = Finding(parameters, checked, status, {}, Starts(), "none", cases, notes=(note,))
-    return _assembled(problem, finding, (), {}, began)
+    return Finding(parameters, checked, status, {}, Starts(), "none", cases)
+
+
+def _so_far(parts: Sequence[Workspace]) -> Finding | None:
+    """The best design that an interrupted search has met: of those looked at before, and where starts ended."""
+    problem, met, end = parts[0].problem, parts[0].met, time.perf_counter() + _WAIT
+    looked = [(part.sampler, vars(part).get("sample")) for part in parts]  # not to be made for this
+    seen = [(of, s.refined, row) for of, s in looked if of and s for row in range(min(len(s.refined), _SEEN))]
+    found = [_as_it_is(problem, of.design(refined, row)) for of, refined, row in seen]
+    best = min(found, key=partial(_order, problem), default=None)
+    for nlp, candidate in sorted((m for m in met if math.isfinite(m[1].objective)), key=lambda m: rank(m[1])):
+        if best and candidate.feasible and _order(problem, best) <= (0.0, candidate.objective + _SAME):
+            continue
+        if best and time.perf_counter() > end:
+            break
+        trial = survivor(parts[0], nlp, [candidate])
+        free = design_of(problem, (trial.point if trial else candidate.run).x.tolist())
+        found = [*([best] if best else []), _as_it_is(problem, free)]
+        best = min(found, key=partial(_order, problem))
+    if best is None:
+        return None
+    starts = counted([candidate for _, candidate in met], problem.sign * best.checked.objective)
+    words = f"the user stopped the search after {len(met)} starts; this is the best design so far"
+    return replace(best, starts=starts, formulation=met[0][0].formulation if met else "none", notes=(words,))
+
+
+def _order(problem: Problem, finding: Finding) -> tuple[float, float]:
+    """Of two designs as they are, the better one comes first: by violation, then by objective."""
+    value = problem.sign * finding.checked.objective
+    return sum(finding.checked.violations.values()), -math.inf if problem.objective is None else value
 
 
 def _with_stability(solution: Solution, options: Options, family: Family | None, began: float) -> Solution:
@@ -97,10 +151,10 @@ def _with_stability(solution: Solution, options: Options, family: Family | None,
     problem = solution.problem
     if solution.stable is not False or solution.any_stable is False or not solution.stability_sought:
         return solution
-    asked = any_stable(problem, options.stability, solution.parameters)
+    asked = any_stable(problem, options.stability, solution.parameters, options.asking)
     if asked.design is not None:
-        there = replace(options, near=asked.design, starts=min(options.starts, _NEAR), stability=0.0)
-        found = solved(problem, there, family)
+        few = replace(options, starts=min(options.starts, _NEAR), stability=0.0, alone=False, interruptible=False)
+        found = solved(problem, replace(few, near=asked.design), family)
         gain = problem.sign * (solution.value - found.value)
         if found.status == "optimal" and (solution.status != "optimal" or gain > 0):
             words = "branch and bound found the stable design from which this one was reached"

@@ -2,7 +2,7 @@
 
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -85,6 +85,22 @@ class Family:
 
 
 @dataclass(frozen=True)
+class Candidate:
+    """Where one start ended.
+
+    Attributes:
+        nlp: with the limits that held.
+        objective: of the NLP; inf unless finite.
+        feasible: whether rows and bounds hold as IPOPT left them.
+    """
+
+    nlp: NLP
+    run: Run
+    objective: float
+    feasible: bool
+
+
+@dataclass(frozen=True)
 class Workspace:
     """One problem, and everything that solving it asks for more than once.
 
@@ -92,6 +108,7 @@ class Workspace:
         part: the problem on the part of the box that designs are drawn from, e.g. one sign of one parameter.
         name: of the part, e.g. ``forward tilt``; empty for the whole box.
         family: that the problem is one of.
+        met: where starts ended in any part of the box, each with the NLP that it was started in.
     """
 
     problem: Problem
@@ -99,6 +116,7 @@ class Workspace:
     options: Options
     family: Family
     name: str = ""
+    met: list[tuple[NLP, Candidate]] = field(default_factory=list, compare=False)
 
     @cached_property
     def freedom(self) -> Freedom:

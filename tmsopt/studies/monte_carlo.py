@@ -71,7 +71,7 @@ def planned(asked: Study | Sampling, progress: Callable[[int, int], None] | None
     """
     if isinstance(asked, Study):
         return asked
-    design = solve(asked.problem, starts=asked.starts, progress=progress)
+    design = solve(asked.problem, starts=asked.starts, progress=progress, interruptible=False)
     return monte_carlo(
         design, asked.rows, asked.seed, asked.distribution, asked.tolerances or None, title=asked.title,
         report=asked.report,

@@ -113,7 +113,8 @@ class Solver:
         try:
             problem = self.study.row_problem(number)
             options: dict[str, Any] = {"seed": self.study.seed_of(number), "throw": False, "family": self._family}
-            options |= {"alone": False, "stability": 0.0}  # they take longer than the rest of a row without a design
+            # What takes longer than the rest of a row without a design is left out, and Ctrl-C is for the whole study.
+            options |= {"alone": False, "stability": 0.0, "interruptible": False}
             solution = None
             if neighbour is not None and neighbour.status == "optimal":
                 near = {name: neighbour.parameters[name] for name in problem.free}

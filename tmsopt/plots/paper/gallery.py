@@ -69,7 +69,7 @@ def _growth() -> "Figure":
     from tmsopt.solver.solve import solve
 
     others = {name: value for name, value in benchmark().parameters.items() if name != "Fr"}
-    fastest = solve(Problem(tms, fixed=others, free={"Fr": (0.1, 4.0)}, minimize="abscissa"))
+    fastest = solve(Problem(tms, fixed=others, free={"Fr": (0.1, 4.0)}, minimize="abscissa"), interruptible=False)
     best = solve(Problem(tms, fixed=dict(optimised().parameters)))
     figure = new_figure(9.2, 4.2)
     left, right = figure.subplots(1, 2, sharey=True)
