@@ -93,7 +93,7 @@ def found(
     if problem.objective is not None and not math.isfinite(checked.objective):
         ended = False
         notes = ("the objective does not exist at the design where the search ended; constrain what it divides by",)
-    if _unclear(problem, checked):
+    if unclear(problem, checked):
         ended = False
         notes = (_UNCLEAR,)
     status = "optimal" if ended and not checked.violations else "not_converged"
@@ -187,7 +187,7 @@ def ahead(work: Workspace, one: Trial, other: Trial) -> bool:
     return ranks[0] < ranks[1]
 
 
-def _unclear(problem: Problem, checked: Checked) -> bool:
+def unclear(problem: Problem, checked: Checked) -> bool:
     """Whether the roots as stored are farther from the multiple ones that they count as than an m-th root explains.
 
     Several that are 0 but for rounding have no damping ratio to speak of.

@@ -10,7 +10,7 @@ from tmsopt.design.cases import Case
 from tmsopt.design.solution import Starts
 from tmsopt.formulation.nlp import NLP
 from tmsopt.solver.multistart import Runner, same
-from tmsopt.solver.outcome import Finding, Trial, ahead, converged, honest, mass_advice, survivor
+from tmsopt.solver.outcome import Finding, Trial, ahead, converged, honest, mass_advice, survivor, unclear
 from tmsopt.solver.sample import Looked, Sample, Sampler
 from tmsopt.solver.workspace import Candidate, Workspace
 
@@ -21,6 +21,7 @@ _TOWARDS = 30  # random designs in whose direction an end is moved
 _FINER = 1e-11  # the same as `_LOST`, where both were polished
 _FINEST = np.geomspace(1e-4, 1e-10, 19).tolist()  # of the box: steps that improve a design that is kept as it is
 _KEPT_AT_MOST = 8  # designs that were looked at and are checked closely
+_SAME_DESIGN = 1e-3  # of the box: beside a multiple root numeric ones look better by a hair
 _OPEN = 3  # designs from which a singular mass matrix is approached
 _FAR_OFF = 1e5  # ratio of the largest root to the others that makes it one near infinity
 _SINGULAR = 1e-9  # a0 in its own unit, below which it is 0 in all but name
@@ -132,6 +133,26 @@ def held(work: Workspace, standing: Standing, starts: Starts, cases: Sequence[Ca
     checked = work.recheck(parameters, cases)
     status, words = "not_converged", (standing.words,)
     return Finding(parameters, checked, status, {}, starts, standing.nlp.formulation, tuple(cases), notes=words)
+
+
+def outdone(work: Workspace, finding: Finding) -> Finding:
+    """What was found, or where some start ended if that is better than what is called optimal."""
+    sampler, ends = work.sampler, [c for _, c in work.met if np.all(np.isfinite(c.run.x))]
+    if finding.status != "optimal" or sampler is None or not ends or work.part.objective is None:
+        return finding
+    own = sampler.space.points(finding.parameters)
+    u = np.array([sampler.space.points(work.design_at(c.run.x)) for c in ends])
+    worth = work.problem.sign * finding.checked.objective
+    least = worth - _LOST * (ends[0].nlp.size + abs(worth))
+    others = _better(sampler.look(u[np.abs(u - own).max(axis=1) > _SAME_DESIGN]), least)
+    for k in range(min(len(others), _APPEALED)):
+        parameters = work.problem.ordered(sampler.design(others, k))
+        checked = work.recheck(parameters, finding.cases)
+        told = not checked.violations and not unclear(work.problem, checked)
+        if told and work.problem.sign * checked.objective < least:
+            doubted = replace(finding, parameters=parameters, checked=checked, status="not_converged", active={})
+            return replace(doubted, branches=(), notes=(_KEPT,))
+    return finding
 
 
 def _better(rivals: Looked, least: float) -> Looked:

@@ -18,7 +18,7 @@ from tmsopt.formulation.nlp import NLP
 from tmsopt.records import Table
 from tmsopt.solver.multistart import Runner, exceptional, further, same, search
 from tmsopt.solver.outcome import Finding, Trial, ahead, counted, found, mass_advice, survivor
-from tmsopt.solver.referee import held, ideal, refereed
+from tmsopt.solver.referee import held, ideal, outdone, refereed
 from tmsopt.solver.relaxation import relax
 from tmsopt.solver.sample import Sampler
 from tmsopt.solver.workspace import Candidate, Workspace
@@ -80,7 +80,7 @@ def explore(work: Workspace, insist: bool = True) -> Explored:
         listed = evaluated_cases(work.problem, work.problem.ordered(standing.held))
         return Explored(work.name, tuple(candidates), held(work, standing, starts, listed))
     finding = _covered(work, nlp, candidates, trial, starts) if cases else found(work, nlp, trial, starts)
-    return Explored(work.name, tuple(candidates), finding)
+    return Explored(work.name, tuple(candidates), outdone(work, finding) if finding else None)
 
 
 def _from(work: Workspace, nlp: NLP, designs: Sequence[Mapping[str, float]]) -> list[Candidate]:
