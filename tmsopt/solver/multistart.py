@@ -69,7 +69,7 @@ def search(work: Workspace, nlp: NLP, most: int | None = None) -> list[Candidate
 def _otherwise(run: "Runner", design: Mapping[str, float], ended: Candidate) -> Candidate:
     """Where a start ends that first took a way on which a0 may vanish, if it ended nowhere by the usual one."""
     work, nlp = run.work, run.nlp
-    if ended.feasible or work.sample is None or not nlp.products:
+    if ended.feasible or work.sample is None or not (nlp.products and work.sample.singular):
         return ended
     lead = -1 if float(work.problem.values(work.problem.ordered(design)).coefficients[0]) < 0 else 1
     led = Runner(work, work.formulate(nlp.cases, lead=lead)).ended(design, near=True, hopeful=False)

@@ -21,7 +21,7 @@ from tmsopt.solver.workspace import Candidate, Workspace
 
 _STATIONARY = 1e-6  # gradient of the Lagrangian at which a point counts as converged whatever IPOPT says
 _ALIKE = 3  # candidates of one objective looked at closely
-_EXACT = 1e-8  # violation of rows of size 1, above which an end is off by more than a polished one
+_EXACT, _POLISHED = 1e-8, 1e-9  # violation of rows and gradient, one of which a polished end is below
 _CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found")
 _SPURIOUS = 1e-3  # violation that no lack of digits explains: equations met only because all coefficients vanish
 _MULTIPLIER = 1e-9  # below it a limit does not bind
@@ -114,7 +114,8 @@ def found(
 def converged(trial: Trial) -> bool:
     """Whether the solver stopped at an optimum of its own, by its word or by the gradient, and on the rows."""
     ended = trial.candidate.run.status in _CONVERGED or trial.point.stationarity <= _STATIONARY
-    return ended and trial.point.violation <= _EXACT  # its word is one on rows as it scales them
+    exact = trial.point.violation <= _EXACT or trial.point.stationarity <= _POLISHED
+    return ended and exact  # its word is one on rows as it scales them
 
 
 def mass_advice(problem: Problem) -> str:

@@ -107,7 +107,7 @@ def _appealed(work: Workspace, sampler: Sampler, sample: Sample, so_far: Standin
     if nudged is not None and not len(_better(rivals, _least(work, nudged))):
         return Standing(nlp, candidates, nudged)
     beyond = _at_infinity(work, sample, trial)
-    if len(rivals) or len(beyond) or _troubled(work, candidates, trial):
+    if len(rivals) or len(beyond) or (sample.singular and _troubled(work, candidates, trial)):
         opened = _opened(work, nlp, sampler, trial, (rivals if len(rivals) else sample.refined).joined(beyond))
         if opened is not None:
             return replace(opened, candidates=[*candidates, *opened.candidates])
