@@ -31,7 +31,7 @@ _OUTSIDE = 1e-9  # of a limit, beyond which it excludes a solution
 _SAME_BRANCH = 1e-6  # relative difference of parameters
 _DOUBT = 100.0  # roots that rounding parts are off alike in the NLP and in the recheck
 _STORED, _SPREAD = 1e-14, 100.0  # relative roundings of coefficients, and by what a place may enlarge their m-th root
-_UNCLEAR = "rounding leaves too little of the coefficients to tell the roots apart; keep a0 and the roots away from 0"
+UNCLEAR = "rounding leaves too little of the coefficients to tell the roots apart; keep a0 and the roots away from 0"
 _CLAIMED = 1e-6  # relative difference of the claimed objective from the design's own
 
 
@@ -95,7 +95,7 @@ def found(
         notes = ("the objective does not exist at the design where the search ended; constrain what it divides by",)
     if unclear(problem, checked):
         ended = False
-        notes = (_UNCLEAR,)
+        notes = (UNCLEAR,)
     status = "optimal" if ended and not checked.violations else "not_converged"
     if status != "optimal" and not notes and not checked.violations:
         notes = ("feasible, but the solver did not converge here: a better design may be close",)

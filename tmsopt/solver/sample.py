@@ -35,7 +35,7 @@ _REACHES = (0.1, 0.03, 0.008, 2e-3, 4e-4)  # of the box, round after round
 _SHELLS, _SHELL = 12, 64  # distances about a design, and designs at each
 _NEAR = 0.01  # of the box: distance of designs about one that count as different
 
-_VANISHING = 1e-3  # of its usual size: a leading coefficient that may come to 0
+_VANISHING = 1e-2  # of its usual size: a leading coefficient that may come to 0
 
 _MET = 1e-10  # of its scale: excess up to which a limit counts as met by numeric roots
 _STEPS = 12  # of Newton's method towards what violated limits allow

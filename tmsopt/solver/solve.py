@@ -20,13 +20,14 @@ from tmsopt.formulation.formulate import design_of
 from tmsopt.formulation.options import DEFAULTS, AskedOfSolve, Options, options_of
 from tmsopt.records import Table
 from tmsopt.solver.multistart import rank
-from tmsopt.solver.outcome import Finding, better, counted, evaluated, mass_advice, survivor
+from tmsopt.solver.outcome import UNCLEAR, Finding, better, counted, evaluated, mass_advice, survivor
 from tmsopt.solver.search import Explored, evaluated_cases, explore, without_any
 from tmsopt.solver.workspace import Family, Workspace, workspace
 
 _ASKING = replace(DEFAULTS, stability=5.0, interruptible=True)
 _WAIT = 1.0  # seconds after an interrupt in which the best of where starts ended is looked for
 _SEEN, _SAME = 3, 1e-9  # designs of a sample that may be the best then; what an end must promise more than the best has
+_TOLD = 1e-6  # relative: difference of a value in doubles from the exact one, above which rounding chose the design
 _NEAR = 4  # starts where branch and bound found a stable design, that design the first of them
 
 
@@ -211,8 +212,12 @@ def _sides_note(problem: Problem, explored: Sequence[Explored], finding: Finding
 def _assembled(
     problem: Problem, finding: Finding, notes: tuple[str, ...], sides: dict[str, float], began: float
 ) -> Solution:
-    checked, optimal = finding.checked, finding.status == "optimal"
+    checked = finding.checked
     numbers = certified(problem, finding.parameters, checked, finding.cases)
+    told = math.isclose(numbers.value, checked.objective, rel_tol=_TOLD, abs_tol=_TOLD / 100)
+    if finding.status == "optimal" and problem.free and problem.objective is not None and not told:
+        finding = replace(finding, status="not_converged", notes=(*finding.notes, UNCLEAR))
+    optimal = finding.status == "optimal"
     listed = bool(problem.variations or problem.tolerances)
     covered = cover(problem, finding.parameters, numbers.abscissa) if listed and optimal else None
     return Solution(
