@@ -30,7 +30,8 @@ _BRANCH_STARTS = 12
 _OUTSIDE = 1e-9  # of a limit, beyond which it excludes a solution
 _SAME_BRANCH = 1e-6  # relative difference of parameters
 _DOUBT = 100.0  # roots that rounding parts are off alike in the NLP and in the recheck
-_STORED, _SPREAD = 1e-14, 100.0  # relative roundings of coefficients, and by what a place may enlarge their m-th root
+_STORED = 1e-8  # relative: what rounding of steep parameters may leave of a coefficient, and so of an m-fold root
+_ZERO = 1e-14  # of the largest root: below it one is 0 but for rounding
 UNCLEAR = "rounding leaves too little of the coefficients to tell the roots apart; keep a0 and the roots away from 0"
 _CLAIMED = 1e-6  # relative difference of the claimed objective from the design's own
 
@@ -198,11 +199,10 @@ def unclear(problem: Problem, checked: Checked) -> bool:
         return False
     sizes = sorted(math.hypot(r.re, r.im) for r in roots)
     asked = any("damping_ratio" in e.names for e in (problem.objective, *problem.conditions.values()) if e)
-    if asked and any(r.multiplicity > 1 and 0 < math.hypot(r.re, r.im) < _STORED * sizes[-1] for r in roots):
+    if asked and any(r.multiplicity > 1 and 0 < math.hypot(r.re, r.im) < _ZERO * sizes[-1] for r in roots):
         return True
-    rightmost = max(roots, key=lambda r: r.re)
-    own = math.hypot(rightmost.re, rightmost.im) * _SPREAD * _STORED ** (1 / rightmost.multiplicity)
-    scatter = own + _STORED * sizes[-1]
+    each = (math.hypot(r.re, r.im) * _STORED ** (1 / r.multiplicity) for r in roots)
+    scatter = max(each) + _ZERO * sizes[-1]
     return bool(abs(checked.structure.abscissa - checked.realised) > scatter)
 
 
