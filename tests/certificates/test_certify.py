@@ -320,6 +320,7 @@ def test_a_singular_mass_matrix_within_the_box() -> None:
     assert design.bound.value <= growth(Fr=Fr, chi_H=chi_H, chi_B=1.3).min()
 
 
+@pytest.mark.slow
 def test_a_nearly_singular_problem() -> None:
     """A design of the suite without a limit on ν_H; its value is kept beside it, found in many ways."""
     kept = KEPT[48]
@@ -546,6 +547,7 @@ class TimidSolver:
 TIMID = GlobalSolver("Timid", "math", "", 0.0, TimidSolver.prepare, TimidSolver.decide)
 
 
+@pytest.mark.slow
 def test_another_global_solver_is_asked_and_named(slow_plane: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever searched, the bound that holds without a search stays, under its own name."""
     monkeypatch.setattr(certifying, "SOLVER", TIMID)

@@ -264,7 +264,10 @@ def test_positive_part_is_exact() -> None:
     [
         {"rear": "N_R >= 20", "front": "N_F >= 10", "offset": "u_H >= 0.015", "inertia": "mass_margin >= 1e-4"},
         {"ballast": "m_ballast_rear <= 2", "offset": "u_H >= 0.015", "inertia": "mass_margin >= 1e-4"},
-        {"share": "load_rear >= 0.1", "other": "load_front >= 0.3", "offset": "u_H >= 0.015"},
+        pytest.param(
+            {"share": "load_rear >= 0.1", "other": "load_front >= 0.3", "offset": "u_H >= 0.015"},
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_a_builders_limits_hold_by_statics(tmp_path: Any, limits: dict[str, str]) -> None:

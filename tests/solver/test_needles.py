@@ -48,6 +48,7 @@ def test_no_random_design_is_near_the_needle() -> None:
     assert np.min(found.worth[found.excess.max(axis=0) == 0]) > -1
 
 
+@pytest.mark.slow
 def test_both_root_quantities_at_their_best_at_one_design() -> None:
     """No damping ratio is above 1 and no abscissa below the least, so a design with both is the best of any sum."""
     least = tmsopt.solve(ROBOT)

@@ -48,6 +48,7 @@ def test_a_worst_case_along_an_edge_of_many_tolerances(n, width):
     assert worst_cases(problem, problem.ordered({}))["constraint peak"].value == pytest.approx(n, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_no_warning_where_a_start_runs_into_a_singular_mass_matrix():
     problem = tmsopt.Problem(
         TMS,

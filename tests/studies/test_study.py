@@ -243,6 +243,7 @@ def test_a_valley_that_neither_end_knows_is_found_on_the_way_and_carried_both_wa
         assert row.objective == pytest.approx(min(0.1 * mu, 0.03, 0.1 * (1 - mu)), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_warm_rows_are_the_same_alone_and_by_processes() -> None:
     study = over_grid(TWO, {"mu": np.linspace(0, 1, 24).tolist()}, warm=True)
     here = identities(run_study(study, workers=1).rows)
