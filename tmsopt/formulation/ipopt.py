@@ -26,7 +26,7 @@ LINEAR_SOLVERS = ("mumps", "spral")
 # a quarter of the time and changes no result.
 _QUICK = {"min_refinement_steps": 0, "linear_system_scaling": "none"}
 _FAR = {"bound_push": 0.1, "bound_frac": 0.1, "tau_min": 0.9, **_QUICK}
-_NEAR = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-6}
+_NEAR = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-6, **_QUICK}
 # A start that satisfies the equations of many cases is worth keeping to: with the barrier of far starts IPOPT
 # throws that away, and half as many starts of band designs end at the best optimum.
 _EXACT = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-4, **_QUICK}
