@@ -25,6 +25,7 @@ _ENOUGH_SAMPLED, _ENOUGH_NARROW, _AGREE_SAMPLED, _HOPELESS_SAMPLED = 3, 8, 2, 8
 """The same where the starts come from a sample of the box: so many for each optimum met, more where little is feasible.
 """
 
+_FEW = 2  # optima met, beyond which there may be many
 _MET = 1e-14  # sum of squares of coefficients at which more conditions than parameters are met
 _SAME = 1e-7  # relative difference of objectives that counts as the same
 _FEASIBLE = 1e-6  # of the rows, before polishing; the recheck has the last word
@@ -242,7 +243,8 @@ def _settled(work: Workspace, candidates: list[Candidate]) -> bool:
     if sampled and failed >= _HOPELESS:  # which takes long; the sample is the judge of what was found
         return True
     if sampled:
-        each = _ENOUGH_SAMPLED if work.sample and work.sample.met > NARROW * work.sample.size else _ENOUGH_NARROW
+        wide = work.sample is not None and work.sample.met > NARROW * work.sample.size
+        each = _ENOUGH_SAMPLED if wide else _ENOUGH_NARROW if w <= _FEW else 2 * _ENOUGH_NARROW
         return len(candidates) >= each * w and agreeing >= _AGREE_SAMPLED
     seen = n > w + 2 and w * (n - 1) <= (w + 0.5) * (n - w - 2)
     return len(candidates) >= _ENOUGH and agreeing >= _AGREE and seen
