@@ -59,7 +59,10 @@ MEMBERS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow if n in ("tolerance", "quantity in pieces") else ()) for n in MEMBERS])
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=pytest.mark.slow if n in ("tolerance", "quantity in pieces") else ()) for n in MEMBERS],
+)
 def test_a_member_is_solved_as_alone_and_whatever_came_before(name: str) -> None:
     """The same optimum as without a family; the very same bits in a family of its own."""
     varied, member, values = MEMBERS[name]

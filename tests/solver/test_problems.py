@@ -114,8 +114,9 @@ def test_answer_is_attained_and_a_global_search_ends_there(name):
         assert low <= design.parameters[parameter] <= high
     value, violation = merit(dict(design.parameters))
     assert violation <= FEASIBLE
-    # Parameters rounded to doubles shift a 4-fold root by 4e-4, and a double one by 1e-8 times its coefficients.
-    assert value == pytest.approx(design.value, abs=1e-3 if design.structure == "EP4" else max(tolerance, 1e-7))
+    # Parameters rounded to doubles shift a 4-fold root by 4e-4, and a double one, as in the worst corner of a tolerance, by
+    # the root of some dozens of roundings.
+    assert value == pytest.approx(design.value, abs=1e-3 if design.structure == "EP4" else max(tolerance, 3e-7))
     assert design.value <= best + (1e-9 if name not in RELAXED else tolerance)
     assert design.value == pytest.approx(best, abs=tolerance)
 

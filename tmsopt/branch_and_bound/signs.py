@@ -10,7 +10,7 @@ from tmsopt.arithmetic.intervals import ranges
 from tmsopt.arithmetic.walk import NotAccepted
 from tmsopt.design.problem import Problem
 
-_BOXES = 48  # looked at, beyond which it is left to others
+_BOXES = 300  # looked at, beyond which it is left to others
 
 
 def none_stable(problem: Problem) -> bool:
