@@ -95,8 +95,8 @@ def _left_of_the_axis(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
     seed = work.options.seed + 1
     sampler, run = Sampler(asked, seed), Runner(work, nlp)
     if bounded(work.part) and work.sample:  # without limits the boldest designs show whether any is near the axis
-        least = Sampler(replace(asked, constraints={}), seed).refined(work.sample.boldest)
-        if not np.any(least.worth < 0):
+        free = Sampler(replace(asked, constraints={}), seed)
+        if not np.any(free.refined(free.look(work.sample.boldest.u)).worth < 0):
             return []
     sample, ended = sampler.sample(), list[Candidate]()
     for seen, near in ((sample.refined, True), (sample.boldest, False)):
