@@ -13,7 +13,11 @@ from tmsopt.models import from_coefficients
 from tmsopt.roots import product
 
 multistart = import_module("tmsopt.solver.multistart")
+outcome = import_module("tmsopt.solver.outcome")
+referee = import_module("tmsopt.solver.referee")
 sampling = import_module("tmsopt.solver.sample")
+searching = import_module("tmsopt.solver.search")
+workspaces = import_module("tmsopt.solver.workspace")
 
 x, y = ca.SX.sym("x"), ca.SX.sym("y")
 MET = 1e-8  # what is asked of every value
@@ -96,6 +100,31 @@ def test_the_right_basin_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     design = tmsopt.solve(problem(WELLS, WIDE), throw=False)
     assert (design.status, design.notes) == ("optimal", ())
     assert design.value == pytest.approx(depth(LEFT), abs=MET)
+
+
+@pytest.mark.parametrize(
+    ("found", "between", "status", "value"),
+    [
+        (RIGHT, -2.0, "not_converged", depth(LEFT)),
+        (LEFT, -2.0, "optimal", depth(LEFT)),
+        (RIGHT, 2.0, "optimal", depth(RIGHT)),
+    ],
+)
+def test_no_optimum_stands_that_a_start_ended_better_than(
+    found: float, between: float, status: str, value: float
+) -> None:
+    """On the left designs change between the three values of a band that are looked at first, for better or worse."""
+    worse = between * ca.sin(2 * np.pi * y) ** 2 * (x - RIGHT) ** 2
+    asked = problem([1, WELLS[1] - worse], WIDE, scenarios={"y": tmsopt.Band(0.0, 1.0, 3)}, minimize="abscissa")
+    work = workspaces.workspace(asked)
+    nlp = work.formulate(asked.cases)
+    ends = {at: multistart.Runner(work, nlp).ended({"x": at}, near=True) for at in (LEFT, RIGHT)}
+    trial = outcome.survivor(work, nlp, [ends[found]])
+    own = searching._covered(work, nlp, [ends[found]], trial, outcome.counted([], 0.0))
+    assert own.status == "optimal"
+    left = referee.outdone(work, own)
+    assert left.status == status
+    assert left.checked.objective == pytest.approx(value, abs=MET)
 
 
 @pytest.mark.parametrize("limits", [(), ("x <= -0.5", "abscissa <= -1.3")])

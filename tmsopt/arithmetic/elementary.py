@@ -99,11 +99,6 @@ def is_symbolic(x: Any) -> bool:
     return isinstance(x, ca.SX | ca.MX)
 
 
-def as_symbol(x: Any) -> Any:
-    """A number as a CasADi expression; one of these unchanged, as a copy takes as long as ten operations."""
-    return x if isinstance(x, ca.SX) else ca.SX(x)
-
-
 def is_ball(x: Any) -> bool:
     """Whether x is a number of ball arithmetic, exact fractions and formulas of these among them."""
     return isinstance(x, flint.fmpq | flint.arb | flint.arb_series | Formal)

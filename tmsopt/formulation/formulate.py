@@ -12,7 +12,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.arithmetic.elementary import as_symbol
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import demands_heavy_damping, overclaims, tempts, varies
 from tmsopt.design.expression import Expression
@@ -201,7 +200,8 @@ class Builder:
         return self.variable(name, lower, upper)
 
     def row(self, name: str, expression: Any, lower: float, upper: float) -> None:
-        self.rows.append((name, as_symbol(expression), lower, upper))
+        symbol = isinstance(expression, ca.SX)  # a copy of one takes as long as ten operations
+        self.rows.append((name, expression if symbol else ca.SX(expression), lower, upper))
 
     def equal(self, name: str, left: Sequence[Any], right: Sequence[Any]) -> None:
         """Equations between coefficient lists; the leading ones agree by construction."""

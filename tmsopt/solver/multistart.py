@@ -194,6 +194,15 @@ def same(a: float, b: float, size: float = 1.0) -> bool:
     return abs(a - b) <= _SAME * (size + abs(b))
 
 
+def distinct(candidates: Sequence[Candidate], known: Sequence[Candidate] = ()) -> list[Candidate]:
+    """The best candidate of each optimum, other than the known ones, the best first."""
+    kept: list[Candidate] = []
+    for c in sorted((c for c in candidates if c.feasible), key=lambda c: c.objective):
+        if not any(same(c.objective, other.objective, c.nlp.size) for other in (*known, *kept)):
+            kept.append(c)
+    return kept
+
+
 def _candidate(problem: Problem, nlp: NLP, run: Run) -> Candidate:
     f, g = nlp.at(run.x)
     rows = np.array(g).ravel()
@@ -289,10 +298,7 @@ def exceptional(work: Workspace) -> list[dict[str, float]]:
         for seen in (sample.boldest, sample.refined):
             starts = (complete(leading, asked, sampler.design(seen, k)) for k in range(len(seen)))
             ended += [_candidate(asked, leading, lead(x)) for x in starts]
-        for _ in range(_LEADS):
-            known = [c.objective for c in found]
-            others = (c for c in ended if c.feasible and not any(same(c.objective, f, c.nlp.size) for f in known))
-            found += sorted(others, key=lambda c: c.objective)[:1]
+        found += distinct(ended, found)[:_LEADS]
     return [work.design_at(c.run.x) for c in found]
 
 

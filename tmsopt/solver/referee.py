@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tmsopt.checks.worst_case import worst_cases
 from tmsopt.design.cases import Case
 from tmsopt.design.solution import Starts
 from tmsopt.formulation.nlp import NLP
@@ -31,6 +32,7 @@ _ENDLESS = 1e6  # spreads of the objective in the box, beyond which it has no lo
 
 _UNBOUNDED = "unbounded, as far as was looked: what this design reaches is far below all else; limit what it divides by"
 _KEPT = "the best design that was looked at; no start of the solver ended as good"
+_PASSED = "where a start of the solver ended: not known to be an optimum, but better than those that are"
 
 
 @dataclass(frozen=True)
@@ -146,12 +148,14 @@ def outdone(work: Workspace, finding: Finding) -> Finding:
     least = worth - _LOST * (ends[0].nlp.size + abs(worth))
     others = _better(sampler.look(u[np.abs(u - own).max(axis=1) > _SAME_DESIGN]), least)
     for k in range(min(len(others), _APPEALED)):
-        parameters = work.problem.ordered(sampler.design(others, k))
-        checked = work.recheck(parameters, finding.cases)
+        parameters, cases = work.problem.ordered(sampler.design(others, k)), finding.cases
+        if cases:  # those between them are worst elsewhere than at what was found
+            cases = (*cases, *(w.case for w in worst_cases(work.problem, parameters).values()))
+        checked = work.recheck(parameters, cases)
         told = not checked.violations and not unclear(work.problem, checked)
         if told and work.problem.sign * checked.objective < least:
-            doubted = replace(finding, parameters=parameters, checked=checked, status="not_converged", active={})
-            return replace(doubted, branches=(), notes=(_KEPT,))
+            doubted = replace(finding, parameters=parameters, checked=checked, cases=cases, status="not_converged")
+            return replace(doubted, active={}, branches=(), notes=(_PASSED,))
     return finding
 
 

@@ -16,7 +16,7 @@ from tmsopt.design.solution import Starts
 from tmsopt.formulation.formulate import design_of, formulate, middle
 from tmsopt.formulation.nlp import NLP
 from tmsopt.records import Table
-from tmsopt.solver.multistart import Runner, exceptional, further, same, search
+from tmsopt.solver.multistart import Runner, distinct, exceptional, further, same, search
 from tmsopt.solver.outcome import Finding, Trial, ahead, counted, found, mass_advice, survivor
 from tmsopt.solver.referee import held, ideal, outdone, refereed
 from tmsopt.solver.relaxation import relax
@@ -95,8 +95,8 @@ def _left_of_the_axis(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
     seed = work.options.seed + 1
     sampler, run = Sampler(asked, seed), Runner(work, nlp)
     if bounded(work.part) and work.sample:  # without limits the boldest designs show whether any is near the axis
-        least = Sampler(replace(asked, constraints={}), seed).refined(work.sample.boldest)
-        if not np.any(least.worth < 0):
+        free = Sampler(replace(asked, constraints={}), seed)
+        if not np.any(free.refined(free.look(work.sample.boldest.u)).worth < 0):
             return []
     sample, ended = sampler.sample(), list[Candidate]()
     for seen, near in ((sample.refined, True), (sample.boldest, False)):
@@ -243,8 +243,4 @@ def _nearer(nlp: NLP, trial: Trial) -> list[Case]:
 
 def _leaders(work: Workspace, candidates: Sequence[Candidate]) -> list[dict[str, float]]:
     """The designs of the best few different optima."""
-    kept: list[Candidate] = []
-    for candidate in sorted((c for c in candidates if c.feasible), key=lambda c: c.objective):
-        if not any(same(candidate.objective, k.objective, candidate.nlp.size) for k in kept):
-            kept.append(candidate)
-    return [design_of(work.problem, c.run.x.tolist()) for c in kept[:_LEADERS]]
+    return [design_of(work.problem, c.run.x.tolist()) for c in distinct(candidates)[:_LEADERS]]

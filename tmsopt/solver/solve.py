@@ -144,7 +144,8 @@ def _so_far(parts: Sequence[Workspace]) -> Finding | None:
 def _order(problem: Problem, finding: Finding) -> tuple[float, float]:
     """Of two designs as they are, the better one comes first: by violation, then by objective."""
     value = problem.sign * finding.checked.objective
-    return sum(finding.checked.violations.values()), -math.inf if problem.objective is None else value
+    worth = -math.inf if problem.objective is None else math.inf if math.isnan(value) else value
+    return sum(finding.checked.violations.values()), worth
 
 
 def _with_stability(solution: Solution, options: Options, family: Family | None, began: float) -> Solution:

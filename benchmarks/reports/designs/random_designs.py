@@ -54,7 +54,7 @@ class Record:
     def error(self) -> float:
         """Relative error of the default solve; inf where it ends at no feasible design.
 
-        Where a problem has no best design, and it says so, that of the best one it gives.
+        A design counts that is given without a claim to be the best, as where a problem has none.
         """
         return self.relative(self.default.value) if self.default.optimal or self.default.feasible else math.inf
 
