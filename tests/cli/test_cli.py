@@ -264,7 +264,7 @@ def test_a_second_one_or_an_early_one_ends_with_130(monkeypatch, capsys):
     monkeypatch.setattr(import_module("tmsopt.solver.solve"), "_so_far", stop)
     for command in ("solve", "prove", "compare", "speeds"):
         status, out, err = run(capsys, command, "problems/ep4.toml")
-        assert (status, out, err) == (130, "", "stopped: there is nothing to show\n")
+        assert (status, out, err) == (130, "", "stopped; what was printed before stands\n")
 
 
 def test_the_question_for_a_stable_design_is_shown(monkeypatch, tmp_path):

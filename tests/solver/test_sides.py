@@ -130,3 +130,15 @@ def test_matching_on_both_sides():
     law = laws.ep4_chi_H_1(-0.2, -0.4)
     assert np.tan(design.parameters["lambda_s"]) == pytest.approx(float(law.tan_lambda_s), abs=1e-10)
     assert any("backward tilt wins" in n for n in design.notes)
+
+
+def test_sides_that_are_equally_good_are_said_to_be() -> None:
+    """No design with Fr >= 0.6 is better than 0.6, whatever its tilt."""
+    free = {"Fr": (0.6, 1.0), "lambda_s": (-0.5, 0.5)}
+    fixed = {"mu": 0.1, "chi_B": 1.0, "chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2}
+    design = tmsopt.solve(tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, minimize="Fr"))
+    assert design.value == pytest.approx(0.6, abs=1e-12)
+    assert design.sides["forward tilt"] == pytest.approx(design.sides["backward tilt"], abs=1e-12)
+    (note,) = [n for n in design.notes if "both signs" in n]
+    assert "is as good as" in note
+    assert "wins" not in note

@@ -31,7 +31,7 @@ class _Commands(click.Group):
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt:
-            click.echo("stopped: there is nothing to show", err=True)
+            click.echo("stopped; what was printed before stands", err=True)
             sys.exit(INTERRUPTED)
         except OSError as error:
             if error.errno == errno.EPIPE:  # the reader has enough: click ends quietly

@@ -58,7 +58,7 @@ def explore(work: Workspace, insist: bool = True) -> Explored:
     nlp = work.formulate(cases)
     mixed = {"abscissa", "damping_ratio"} <= set(nlp.variables)
     needles = bool(work.sample and work.sample.singular and "abscissa" in nlp.variables)
-    leads = exceptional(work) if mixed or needles else []
+    leads = exceptional(work) if (mixed or needles) and not work.options.near else []
     candidates = [*search(work, nlp, _FEWER if mixed and leads else None), *_from(work, nlp, leads)]
     trial = survivor(work, nlp, candidates)
     for ratio, most in _ratios(work, nlp, trial):

@@ -17,9 +17,10 @@ from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.solution import Bound, NotSolved, Solution, Starts
 from tmsopt.errors import Fault, InputError, is_number, short, suggest
 from tmsopt.formulation.formulate import design_of
+from tmsopt.formulation.nlp import objective_size
 from tmsopt.formulation.options import DEFAULTS, AskedOfSolve, Options, options_of
 from tmsopt.records import Table
-from tmsopt.solver.multistart import rank
+from tmsopt.solver.multistart import rank, same
 from tmsopt.solver.outcome import UNCLEAR, Finding, better, counted, evaluated, mass_advice, survivor
 from tmsopt.solver.search import Explored, evaluated_cases, explore, without_any
 from tmsopt.solver.workspace import Family, Workspace, workspace
@@ -27,7 +28,7 @@ from tmsopt.solver.workspace import Family, Workspace, workspace
 _ASKING = replace(DEFAULTS, stability=5.0, interruptible=True)
 _WAIT = 1.0  # seconds after an interrupt in which the best of where starts ended is looked for
 _SEEN, _SAME = 3, 1e-9  # designs of a sample that may be the best then; what an end must promise more than the best has
-_TOLD = 1e-6  # relative: difference of a value in doubles from the exact one, above which rounding chose the design
+_TOLD = 1e-6  # relative and absolute: difference of a value in doubles from the exact one, above which rounding decided
 _NEAR = 4  # starts where branch and bound found a stable design, that design the first of them
 
 
@@ -201,12 +202,15 @@ def _sides_note(problem: Problem, explored: Sequence[Explored], finding: Finding
     sentences = [f"both signs were searched: {won.name} wins"]
     for part in explored:
         if part is not won:
-            if part.finding is None or part.finding.status != "optimal":
+            if part.finding is None or part.finding.checked.violations:
                 sentences.append(f"with {part.name} nothing feasible was found")
-            elif problem.objective is not None:
-                sentences.append(f"the best with {part.name} is {part.finding.checked.objective:.9g}")
-            else:
+            elif problem.objective is None:
                 sentences.append(f"there is one with {part.name} too")
+            elif same(part.finding.checked.objective, finding.checked.objective, objective_size(problem)):
+                return (f"both signs were searched: {part.name} is as good as {won.name}",)
+            else:
+                found = "the best" if part.finding.status == "optimal" else "what was found"
+                sentences.append(f"{found} with {part.name} is {part.finding.checked.objective:.9g}")
     return ("; ".join(sentences),)
 
 
@@ -215,7 +219,7 @@ def _assembled(
 ) -> Solution:
     checked = finding.checked
     numbers = certified(problem, finding.parameters, checked, finding.cases)
-    told = math.isclose(numbers.value, checked.objective, rel_tol=_TOLD, abs_tol=_TOLD / 100)
+    told = math.isclose(numbers.value, checked.objective, rel_tol=_TOLD, abs_tol=_TOLD)
     if finding.status == "optimal" and problem.free and problem.objective is not None and not told:
         finding = replace(finding, status="not_converged", notes=(*finding.notes, UNCLEAR))
     optimal = finding.status == "optimal"
