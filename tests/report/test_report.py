@@ -166,6 +166,7 @@ inertia = "mass_margin >= 1e-4\""""
 )
 
 
+@pytest.mark.slow
 def test_from_a_file_in_units_to_a_report_in_units(tmp_path: Path) -> None:
     """One file through the command line, as text and as JSON; v.max binds (a robot is steadier when faster)."""
     file = tmp_path / "robot.toml"
