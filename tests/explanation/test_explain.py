@@ -63,6 +63,7 @@ def test_height_of_the_front_mass_beside_the_law_of_omega0():
     assert "decays faster (proven)" in explanation.summary
 
 
+@pytest.mark.slow
 def test_least_speed_of_an_ep4_beside_its_closed_form():
     """Fr = (r² + 6r + 1)/(4 √h (r + 1)), r = chi_B, h = omega0⁻², grows with r: it leans on chi_B.min."""
 

@@ -49,6 +49,7 @@ def test_laws_for_chi_H_1_do_not_apply_elsewhere():
     assert comparison.other.formulation == "abscissa"
 
 
+@pytest.mark.slow
 def test_binding_constraint_is_the_reason_why_a_law_does_not_apply():
     problem = replace(tmsopt.load("problems/ep4.toml"), constraints={"tilt": "lambda_s <= 0.3"})
     comparison = tmsopt.compare(problem)

@@ -262,7 +262,10 @@ def test_positive_part_is_exact() -> None:
 @pytest.mark.parametrize(
     "limits",
     [
-        {"rear": "N_R >= 20", "front": "N_F >= 10", "offset": "u_H >= 0.015", "inertia": "mass_margin >= 1e-4"},
+        pytest.param(
+            {"rear": "N_R >= 20", "front": "N_F >= 10", "offset": "u_H >= 0.015", "inertia": "mass_margin >= 1e-4"},
+            marks=pytest.mark.slow,
+        ),
         {"ballast": "m_ballast_rear <= 2", "offset": "u_H >= 0.015", "inertia": "mass_margin >= 1e-4"},
         pytest.param(
             {"share": "load_rear >= 0.1", "other": "load_front >= 0.3", "offset": "u_H >= 0.015"},

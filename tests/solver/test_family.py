@@ -61,7 +61,12 @@ MEMBERS = {
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(n, marks=pytest.mark.slow if n in ("tolerance", "quantity in pieces") else ()) for n in MEMBERS],
+    [
+        pytest.param(
+            n, marks=pytest.mark.slow if n in ("tolerance", "quantity in pieces", "heavy damping or not") else ()
+        )
+        for n in MEMBERS
+    ],
 )
 def test_a_member_is_solved_as_alone_and_whatever_came_before(name: str) -> None:
     """The same optimum as without a family; the very same bits in a family of its own."""
