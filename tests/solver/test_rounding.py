@@ -59,3 +59,16 @@ def test_a_value_that_hangs_on_rounding_is_no_optimum(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(module, "certified", exact)
     assert tmsopt.solve(PLAIN, throw=False).status == status
+
+
+@pytest.mark.parametrize(
+    ("room", "name", "said"),
+    [
+        ("outcome", "unclear", lambda problem, checked: True),
+        ("search", "outdone", lambda work, finding: replace(finding, status="not_converged")),
+    ],
+)
+def test_every_optimum_is_asked(monkeypatch: pytest.MonkeyPatch, room: str, name: str, said: Any) -> None:
+    assert tmsopt.solve(PLAIN, throw=False).status == "optimal"
+    monkeypatch.setattr(import_module(f"tmsopt.solver.{room}"), name, said)
+    assert tmsopt.solve(PLAIN, throw=False).status == "not_converged"
