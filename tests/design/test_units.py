@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from tmsopt.design import with_unit
+from tmsopt.units import with_unit
 
 AT_ONCE = 1.0
 """Seconds; pint needs a third of one to start."""

@@ -20,9 +20,9 @@ from mpmath import mp
 
 import tmsopt
 from tmsopt.arithmetic import positive_part
-from tmsopt.design import decay_time, frequencies, growth_time, reading, with_unit
 from tmsopt.models import Values, matrices, tms, to_si
 from tmsopt.roots import Root
+from tmsopt.units import decay_time, frequencies, growth_time, reading, with_unit
 
 NATIVE, SI = tms.sets
 EPS = np.finfo(float).eps

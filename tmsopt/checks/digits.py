@@ -18,11 +18,11 @@ from tmsopt.design.cases import Case
 from tmsopt.design.dependence import varies
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
-from tmsopt.design.units import Reading, readings
 from tmsopt.models import Values
 from tmsopt.records import Table
 from tmsopt.roots import Root, Structure
 from tmsopt.roots.patterns.enclosed import Enclosed, enclosed_roots, nearest_decimal, nearest_double, nearest_roots
+from tmsopt.units import Reading, readings
 
 _PRECISIONS = (212, 424, 848, 1696)
 """Bits carried, one after the other until they suffice; the first are 60 digits, half of which a fit may lose."""

@@ -233,8 +233,8 @@ def _check_plot(plot: Path | None, layer: str, accepted: tuple[str, ...], axes: 
 
 def _held(problem: "Problem", cut: dict[str, str]) -> dict[str, float]:
     """The parameter that a figure holds, as a number in its box."""
-    from tmsopt.design import with_unit
     from tmsopt.errors import Fault, InputError, suggest
+    from tmsopt.units import with_unit
 
     held = {}
     for name, text in cut.items():

@@ -277,7 +277,7 @@ def _given(context: click.Context) -> list[str]:
 def _scale(option: str, text: str, unit: str) -> float:
     """A positive length or mass of the command line."""
     from tmsopt import Fault, InputError
-    from tmsopt.design import with_unit
+    from tmsopt.units import with_unit
 
     try:
         try:

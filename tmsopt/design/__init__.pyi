@@ -10,7 +10,4 @@ from .quantities import NO_RADIUS as NO_RADIUS, ROOT_NAMES as ROOT_NAMES
 from .solution import (
     Bound as Bound, NotSolved as NotSolved, Relaxation as Relaxation, Solution as Solution, Starts as Starts,
 )
-from .units import (
-    decay_time as decay_time, frequencies as frequencies, growth_time as growth_time, reading as reading,
-    with_unit as with_unit,
-)
+from .unit_system import Unit as Unit, unit_of as unit_of

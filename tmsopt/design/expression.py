@@ -19,6 +19,7 @@ import numpy as np
 from tmsopt.arithmetic import elementary
 from tmsopt.errors import suggest
 from tmsopt.models.names import CONSTANTS, FUNCTIONS
+from tmsopt.units import dimensions
 
 COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
 
@@ -73,6 +74,9 @@ _BALLS = _Arithmetic(
     },
     elementary.exact, {**_BINARY, ast.Div: elementary.quotient, ast.Pow: elementary.power}, flint.arb.pi,
 )  # fmt: skip
+_DIMENSIONS = _Arithmetic(
+    dimensions.FUNCTIONS, lambda x: x, {**_BINARY, ast.Pow: dimensions.power}, dimensions.Dimension
+)
 
 
 class ExpressionError(ValueError):
@@ -112,6 +116,14 @@ class Expression:
         the number π. The ball is nan where the value does not exist, or may not.
         """
         return self._evaluate(values, _BALLS if number is elementary.exact else replace(_BALLS, number=number))
+
+    def dimension(self, units: Mapping[str, str]) -> dimensions.Dimension:
+        """What its value has units of, for the units of what it names; of a comparison, of both sides."""
+        try:
+            found = self._evaluate({n: dimensions.Dimension.of(units.get(n, "1")) for n in self.names}, _DIMENSIONS)
+        except ArithmeticError:  # a number divided by 0
+            found = None
+        return found if isinstance(found, dimensions.Dimension) else dimensions.Dimension()
 
     def violation(self, values: Mapping[str, Any]) -> float:
         """By how much a numeric design violates a comparison, relative to the size of its sides; nan if undefined."""

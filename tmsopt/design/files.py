@@ -13,8 +13,7 @@ from tmsopt.design.model_table import stated_model
 from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.solution import Solution
 from tmsopt.design.toml import Number, Section, fitted, read_page
-from tmsopt.design.units import with_unit
-from tmsopt.design.validate import VARIATIONS, guess_parameter_set
+from tmsopt.design.validate import VARIATIONS
 from tmsopt.errors import Fault, InputError, short, suggest
 from tmsopt.models import MODELS, Model
 from tmsopt.models.bicycle_files import read_bicycle
@@ -132,14 +131,13 @@ def posed(data: Mapping[str, Any], title: str) -> tuple[list[Fault], Problem | N
     shape_faults += model_faults
     faults, problem = shape_faults, None
     if model is not None and parsed is not None:
-        unit_faults, numbers = _numbers(parsed, model)
-        faults = shape_faults + unit_faults
+        tables = _tables(parsed)
         for fault in shape_faults:
             if fault.key[:1] in (("parameters",), ("scenarios",)) and len(fault.key) > 1:
-                numbers["fixed"][fault.key[1]] = math.nan  # known to be given, and already reported
+                tables["fixed"][fault.key[1]] = math.nan  # known to be given, and already reported
         try:
             problem = Problem(
-                model=model, constraints=parsed.constraints, title=parsed.title or title, **numbers,
+                model=model, constraints=parsed.constraints, title=parsed.title or title, **tables,
                 **vars(parsed.objective) | {"pareto": parsed.objective.pareto or ()},
             )  # fmt: skip
         except InputError as error:
@@ -198,39 +196,19 @@ def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault: 
             return Fault(f"found {short(found)}; accepted: {'a table' if table else 'a text in quotes'}", key)
 
 
-def _numbers(written: _File, model: Model) -> tuple[list[Fault], dict[str, Any]]:
-    """Tables of a problem with every number in the parameter's own unit, and what is wrong with the units."""
-    faults: list[Fault] = []
-    of = guess_parameter_set(model, {**written.parameters, **written.scenarios})
+def _tables(written: _File) -> dict[str, Any]:
+    """Tables of a problem, numbers as typed."""
+    free = {n: v for n, v in written.parameters.items() if isinstance(v, _FreeParameter)}
 
-    def number(value: Any, table: str, name: str, *end: str) -> Any:
-        if not isinstance(value, str) or name not in of.names:
-            return value
-        unit = of[name].unit
-        if unit == "1" and table in ("tolerances", "weights"):
-            unit = of[name].multiple_of or unit  # a tolerance of 5 mm is one of 0.005 wheelbases of 1 m
-        try:
-            return with_unit(value, unit)
-        except ValueError as error:
-            faults.append(Fault(str(error), (table, name, *end)))
-            return value
+    def ends(band: _Band) -> tuple[Any, Any]:
+        return band.min, band.max
 
-    fixed, free, start = {}, {}, {}
-    scenarios: dict[str, Any] = {}
-    for name, value in written.parameters.items():
-        if isinstance(value, _FreeParameter):
-            free[name] = tuple(number(getattr(value, end), "parameters", name, end) for end in ("min", "max"))
-            if value.start is not None:
-                start[name] = number(value.start, "parameters", name, "start")
-        else:
-            fixed[name] = number(value, "parameters", name)
-    for name, band in written.scenarios.items():
-        if isinstance(band, _Band):
-            lower, upper = (number(getattr(band, end), "scenarios", name, end) for end in ("min", "max"))
-            scenarios[name] = Band(lower, upper, band.points)
-        else:
-            scenarios[name] = tuple(number(value, "scenarios", name) for value in band)
-    tables: dict[str, Any] = {"fixed": fixed, "free": free, "start": start, "scenarios": scenarios}
-    for table in ("tolerances", "weights"):
-        tables[table] = {name: number(value, table, name) for name, value in getattr(written, table).items()}
-    return faults, tables
+    return {
+        "fixed": {n: v for n, v in written.parameters.items() if n not in free},
+        "free": {n: (v.min, v.max) for n, v in free.items()},
+        "start": {n: v.start for n, v in free.items() if v.start is not None},
+        "scenarios": {
+            n: Band(*ends(s), s.points) if isinstance(s, _Band) else s for n, s in written.scenarios.items()
+        },
+        "tolerances": written.tolerances, "weights": written.weights,
+    }  # fmt: skip

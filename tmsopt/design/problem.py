@@ -14,6 +14,7 @@ from tmsopt.errors import Fault, InputError
 from tmsopt.models import Model, ParameterSet, Values
 from tmsopt.records import SCHEMA
 from tmsopt.roots import Pattern, pattern
+from tmsopt.units import TABLES, numbers
 
 _POINT = 1e-12
 """Relative width below which a range is a number: a few roundings leave nothing to move in."""
@@ -38,6 +39,8 @@ class Problem:
         tolerances: parameter → how far it may be off either way; likewise.
         weights: parameter → size of a change that counts as 1 in the robustness radius; by default relative changes
             of every parameter.
+        units: parameter → unit in which it was typed, for reports; by default those of numbers given as texts. Any
+            number may be given as a text with a unit, such as ``free={"w": ("25 cm", "60 cm")}``.
 
     Raises:
         InputError: listing everything that is wrong, each with the accepted values.
@@ -56,20 +59,25 @@ class Problem:
     tolerances: Mapping[str, float] = field(default_factory=dict)
     weights: Mapping[str, float] = field(default_factory=dict)
     pareto: Sequence[str] = ()
+    units: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "scenarios", {n: as_scenario(s) for n, s in self.scenarios.items()})
-        if found := list(faults(self)):
-            raise InputError(found)
         of = guess_parameter_set(self.model, {**self.fixed, **self.free, **self.scenarios})
+        read, units, unreadable = numbers({table: getattr(self, table) for table in TABLES}, of)
+        for name, value in (*read.items(), ("units", {**units, **self.units})):
+            object.__setattr__(self, name, value)
+        places = {f.key[:2] for f in unreadable}
+        if found := [*unreadable, *(f for f in faults(self) if f.key[:2] not in places)]:
+            raise InputError(found)
         nominal = {n: middle_of(s) for n, s in self.variations.items()}
         given = {p.name: p.default for p in of.parameters if p.default is not None} | nominal | dict(self.fixed)
         given = {n: v for n, v in given.items() if n not in self.free}
         pinned = {n: lo for n, (lo, hi) in self.free.items() if hi - lo <= _POINT * max(abs(lo), abs(hi))}
         ends = {n: (float(lo), float(hi)) for n, (lo, hi) in self.free.items() if n not in pinned}
-        numbers = {"fixed": {**given, **pinned}, "tolerances": self.tolerances, "weights": self.weights}
-        numbers["start"] = {n: v for n, v in self.start.items() if n in ends}
-        plain: dict[str, Any] = {table: {n: float(v) for n, v in values.items()} for table, values in numbers.items()}
+        kept = {"fixed": {**given, **pinned}, "tolerances": self.tolerances, "weights": self.weights}
+        kept["start"] = {n: v for n, v in self.start.items() if n in ends}
+        plain: dict[str, Any] = {table: {n: float(v) for n, v in values.items()} for table, values in kept.items()}
         plain |= {"free": ends, "constraints": dict(self.constraints), "pareto": tuple(self.pareto)}
         for name, value in plain.items():
             object.__setattr__(self, name, value)

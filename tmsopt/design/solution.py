@@ -7,9 +7,9 @@ from typing import Any
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Freedom, Problem
 from tmsopt.design.quantities import ROOT_NAMES
-from tmsopt.design.units import Reading
 from tmsopt.records import Table, plain
 from tmsopt.roots import Root
+from tmsopt.units import Reading
 
 
 @dataclass(frozen=True)

@@ -110,6 +110,7 @@ class ParameterSet:
         native: the model's native parameters for given values of this set.
         quantities: derived quantities that only this set has.
         rate: for values of this set, how many 1/s a rate of 1 is; None where the set has no unit of time.
+        root_unit: unit of the roots of the model's polynomial for values of this set.
         needs: parameter → one that must be above 0 where the first is not 0, and what is impossible otherwise.
     """
 
@@ -118,6 +119,7 @@ class ParameterSet:
     native: Callable[[Mapping[str, Any]], dict[str, Any]]
     quantities: tuple[Quantity, ...] = ()
     rate: Formula | None = None
+    root_unit: str = "1"
     needs: Mapping[str, tuple[str, str]] = field(default_factory=dict, hash=False)
 
     @cached_property

@@ -5,9 +5,9 @@ import math
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
-from tmsopt.design.units import reading
 from tmsopt.models import ParameterSet
 from tmsopt.report.text import number
+from tmsopt.units import reading
 
 
 def bound_lines(solution: Solution) -> list[str]:

@@ -10,9 +10,9 @@ from typing import Any
 
 from tmsopt.checks.recheck import FEASIBLE
 from tmsopt.design.solution import Solution
-from tmsopt.design.units import decay_time, frequencies, growth_time, reading
 from tmsopt.models import Model, Parameter, Quantity, Values
 from tmsopt.report.text import number
+from tmsopt.units import decay_time, frequencies, growth_time, reading
 
 TableRow = Sequence[str]
 Cells = tuple[str, str, str]

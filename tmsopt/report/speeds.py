@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 
 from tmsopt.critical_speeds.crossings import Crossing
 from tmsopt.critical_speeds.speeds import Speeds
-from tmsopt.design.units import reading
 from tmsopt.report.text import columns
+from tmsopt.units import reading
 
 _DIGITS = 15
 

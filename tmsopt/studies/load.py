@@ -11,13 +11,13 @@ from pydantic import Field, StrictBool, StrictInt, StrictStr
 from tmsopt.design.files import posed, question_of
 from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.toml import Key, Number, Page, Section, fitted, read_page, within
-from tmsopt.design.units import with_unit
 from tmsopt.errors import Fault, InputError, count_faults, short, suggest
 from tmsopt.formulation.options import STARTS
 from tmsopt.studies.monte_carlo import DISTRIBUTIONS, Sampling
 from tmsopt.studies.study import Study
 from tmsopt.studies.validate import METHODS, MOST_ROWS, common_faults, name_fault
 from tmsopt.studies.vary import Varied, read_csv, unit_of, varied
+from tmsopt.units import with_unit
 
 _NEEDED = {"latin_hypercube": ("rows",), "sobol": ("rows",), "csv": ("csv",), "monte_carlo": ("rows",)}
 _OWN = {"rows": ("latin_hypercube", "sobol", "monte_carlo"), "csv": ("csv",), "distribution": ("monte_carlo",)}

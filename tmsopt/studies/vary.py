@@ -10,12 +10,12 @@ from typing import Any
 
 from tmsopt.design.expression import written_sides
 from tmsopt.design.problem import Problem
-from tmsopt.design.units import with_unit
 from tmsopt.disk import read_text
 from tmsopt.errors import Fault, InputError, count_faults, short, suggest
 from tmsopt.records import Column
 from tmsopt.studies.samples import Span, check_size, grid, latin_hypercube, sobol, sobol_note, span_faults
 from tmsopt.studies.validate import MOST_ROWS, name_fault
+from tmsopt.units import with_unit
 
 LARGEST = 1_000_000_000
 """Bytes."""

@@ -82,7 +82,7 @@ _SI = ParameterSet(
         Parameter("x_H", "m", "front assembly centre of mass, forward of the rear contact", "x_H", counterpart="chi_H"),
         Parameter("z_H", "m", "front assembly centre of mass, downward", "z_H", _NOT_POSITIVE, counterpart="zeta_H"),
     ),
-    native=from_si, quantities=SI_QUANTITIES, rate=lambda p: sqrt(p["g"] / p["w"]),
+    native=from_si, quantities=SI_QUANTITIES, rate=lambda p: sqrt(p["g"] / p["w"]), root_unit="√(g/w)",
 )  # fmt: skip
 
 tms = Model(

@@ -64,7 +64,7 @@ _SI = ParameterSet(
         _inertia("I_Fxx", "moment of inertia of the front wheel about a diameter"),
         _inertia("I_Fyy", "moment of inertia of the front wheel about its axle"),
     ),
-    native=dict, quantities=QUANTITIES, rate=lambda p: 1,
+    native=dict, quantities=QUANTITIES, rate=lambda p: 1, root_unit="1/s",
     needs={"I_Ryy": ("r_R", _NO_RADIUS), "I_Fyy": ("r_F", _NO_RADIUS)},
 )  # fmt: skip
 

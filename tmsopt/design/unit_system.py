@@ -1,0 +1,80 @@
+"""The units in which a problem was written: of parameters, of quantities, and of any expression in them."""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from tmsopt.design.expression import Expression, parse_comparison, parse_value
+from tmsopt.design.problem import Problem
+from tmsopt.models import Parameter, Quantity
+from tmsopt.units import Dimension, factor
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit that a problem was written in.
+
+    Attributes:
+        text: such as ``km/h``; empty without one.
+        one: what one of it is in the unit that the number is kept in (SI, rad).
+    """
+
+    text: str = ""
+    one: float = 1.0
+
+    def number(self, value: float, digits: int = 5) -> str:
+        """A number in this unit, without its name; ``none`` where it does not exist, and no −0."""
+        return f"{value / self.one + 0.0:.{digits}g}" if math.isfinite(value) else "none"
+
+    def show(self, value: float, digits: int = 5) -> str:
+        """A number in this unit, with its name."""
+        return f"{self.number(value, digits)}{f' {self.text}' if self.text and math.isfinite(value) else ''}"
+
+
+def unit_of(problem: Problem, text: str) -> Unit:
+    """The unit in which a problem has a parameter, a bound such as ``v.max``, a constraint or any expression.
+
+    What was typed with a unit has that one; a quantity has the one in which most parameters of its kind were typed; a
+    plain number the model's own.
+    """
+    units = si_units(problem)
+    name = text.strip().removesuffix(".min").removesuffix(".max").removesuffix(".limit")
+    if name in problem.parameter_set.names:
+        return _typed(problem.units.get(name, ""), units[name])
+    if name in units:
+        return _of_kind(problem, Dimension.of(units[name]))
+    return _of_kind(problem, dimension_of(problem, text, units))
+
+
+def si_units(problem: Problem) -> dict[str, str]:
+    """The unit in which each parameter, quantity and root quantity of a problem is computed; ``1`` without one."""
+    of = problem.parameter_set
+    listed: tuple[Parameter | Quantity, ...] = (*problem.model.quantities, *of.quantities, *of.parameters)
+    rates = {"abscissa": of.root_unit, "decay_rate": "1/s", "decay_time": "s", "frequency": "Hz"}
+    return dict.fromkeys(problem.vocabulary, "1") | rates | {q.name: q.unit for q in listed}
+
+
+def dimension_of(problem: Problem, text: str, units: Mapping[str, str] | None = None) -> Dimension:
+    """Of an expression, or of a constraint, by its name or its text."""
+    text = problem.constraints.get(text, text)
+    parse: Callable[..., Expression] = (
+        parse_comparison if any(sign in text for sign in ("<=", ">=", "==")) else parse_value
+    )
+    try:
+        return parse(text, problem.vocabulary).dimension(si_units(problem) if units is None else units)
+    except ValueError:  # a pattern, or what else has no unit
+        return Dimension()
+
+
+def _of_kind(problem: Problem, dimension: Dimension) -> Unit:
+    """The unit most parameters of a dimension were typed in."""
+    of, unit = problem.parameter_set, dimension.unit
+    typed = Counter(problem.units[n] for n in of.names if n in problem.units and Dimension.of(of[n].unit) == dimension)
+    return _typed(typed.most_common(1)[0][0] if typed else "", unit)
+
+
+def _typed(written: str, unit: str) -> Unit:
+    if unit == "1":
+        return Unit()
+    return Unit(written, factor(written, unit)) if written else Unit(unit)

@@ -1,0 +1,8 @@
+"""Units: text such as "40 cm" as a number, the unit of an expression, times and frequencies that roots stand for.
+
+In: texts, numbers, parameter sets. Out: numbers in the parameters' own units, and names of units. Open `text` first.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,77 @@
+"""Numbers in SI as a builder reads them, and the times that roots stand for."""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from types import MappingProxyType
+from typing import Any
+
+from tmsopt.models import ParameterSet
+
+Reading = float | tuple[float, ...]
+"""A number, or one for each of several roots; nan where it does not exist."""
+
+_READ_IN = MappingProxyType({"m": ("mm", 1000), "m/s": ("km/h", 18), "rad": ("deg", 180)})
+
+
+READ_DIGITS = 15
+"""Digits of a reading in another unit: what was written as 15 km/h reads 15 again, not what roundings made of it."""
+
+
+def read_in(value: Any, unit: str, pi: Any = math.pi) -> tuple[Any, str, int]:
+    """A number in SI as a builder reads it: in mm, km/h and degrees, others as they are.
+
+    Returns:
+        The number, of any kind; its unit; and the decimal digits to round it to, 0 where it is not converted.
+    """
+    if unit not in _READ_IN:
+        return value, unit, 0
+    name, factor = _READ_IN[unit]
+    return value * factor / {"mm": 1, "km/h": 5, "deg": pi}[name], name, READ_DIGITS
+
+
+def reading(value: float, unit: str) -> tuple[float, str]:
+    """A number in SI as a builder reads it, with its unit, to 15 digits where it is converted."""
+    value, unit, digits = read_in(value, unit)
+    return float(f"{value:.{digits}g}") if digits else value, unit
+
+
+def decay_time(abscissa: Any, rate: Any) -> Any:
+    """Seconds in which the slowest part of a disturbance falls to 1/e; nan unless it falls.
+
+    Args:
+        abscissa: largest real part of the roots, dimensionless.
+        rate: how many 1/s a rate of 1 is (`ParameterSet.rate`).
+    """
+    return 1 / (-abscissa * rate) if abscissa < 0 else math.nan
+
+
+def growth_time(abscissa: Any, rate: Any) -> Any:
+    """Seconds in which the fastest part of a disturbance grows e-fold; nan unless it grows."""
+    return decay_time(-abscissa, rate)
+
+
+def frequencies(roots: Iterable[Any], rate: Any, pi: Any = math.pi) -> tuple[Any, ...]:
+    """Frequency in Hz of each distinct oscillating pair of roots, in the order of the roots."""
+    return tuple(root.im * rate / (2 * pi) for root in roots if root.im > 0)
+
+
+def readings(
+    of: ParameterSet, parameters: Mapping[str, Any], quantities: Mapping[str, Any], abscissa: Any, roots: Iterable[Any],
+    pi: Any = math.pi,
+) -> Iterator[tuple[str, Any, int]]:  # fmt: skip
+    """Times, frequencies, and everything with a unit, by names that end in the unit: ``v_kmh``, ``x_B_mm``.
+
+    Numbers of any kind, each with the decimal digits to round it to, 0 for none. Nothing for a set that has no unit of
+    time.
+    """
+    if of.rate is None:
+        return
+    rate = of.rate(parameters)
+    yield "decay_time_s", decay_time(abscissa, rate), 0
+    yield "growth_time_s", growth_time(abscissa, rate), 0
+    yield "frequencies_Hz", frequencies(roots, rate, pi), 0
+    units = {p.name: p.unit for p in of.parameters} | {q.name: q.unit for q in of.quantities}
+    for name in (n for n, unit in units.items() if unit != "1"):
+        value = parameters[name] if name in parameters else quantities[name]
+        read, unit, digits = read_in(value, units[name], pi)
+        yield f"{name}_{''.join(filter(str.isalnum, unit))}", read, digits

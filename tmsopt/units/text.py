@@ -1,0 +1,95 @@
+"""Text such as "40 cm" or "1 deg" as a number in the parameter's own unit."""
+
+import math
+import re
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+_LONGEST = 80
+_LARGEST_DENOMINATOR = 10**6  # of a factor between units, such as 5/18
+_ROUNDED = 4e-16  # relative error of a factor in double precision
+_QUANTITY = re.compile(r"(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.+-].*)?", re.ASCII)
+_POWER = r"(?:\s*(?:\*\*|\^)\s*-?\d)?"
+_UNIT = re.compile(rf"[A-Za-zµμ°%]+{_POWER}(?:\s*[*/ ]\s*[A-Za-zµμ°%]+{_POWER})*", re.ASCII)
+"""Names with one-digit powers, joined by * / or a space: anything richer could keep a parser busy for ever."""
+
+_EXAMPLES = {
+    "1": "a number", "rad": "'5 deg' or '0.1 rad'", "m": "'40 cm' or '1.2 m'", "kg": "'10 kg' or '500 g'",
+    "m/s": "'15 km/h' or '4 m/s'", "m/s^2": "'9.81 m/s^2'",
+}  # fmt: skip
+
+
+def with_unit(text: str, unit: str) -> float:
+    """The number that a text with a unit stands for, in `unit`.
+
+    Raises:
+        ValueError: saying what was found and what is accepted.
+    """
+    return read(text, unit)[0]
+
+
+def read(text: str, unit: str) -> tuple[float, str]:
+    """The same, with the unit as written.
+
+    Raises:
+        ValueError: likewise.
+    """
+    accepted = f"accepted: {_EXAMPLES.get(unit, unit)}"
+    if unit != "1":
+        accepted += f", or a number without quotes in {unit}"
+    parts = _QUANTITY.fullmatch(text.strip()) if len(text) <= _LONGEST else None
+    if parts is None:
+        raise ValueError(f"found '{text[:_LONGEST]}', not a number with a unit; {accepted}")
+    number, written = float(parts["number"]), parts["unit"]
+    if not math.isfinite(number):
+        raise ValueError(f"found '{text}', a number beyond double precision; {accepted}")
+    if not written:
+        raise ValueError(f"found '{text}', a number in quotes without a unit; {accepted}")
+    if unit == "1":
+        raise ValueError(f"found '{text}', but the parameter is dimensionless; {accepted}")
+    written = written.replace("²", "^2").replace("³", "^3")
+    if not _UNIT.fullmatch(written):
+        raise ValueError(f"found the unit '{written}', which does not read as a unit; {accepted}")
+    one = _factor(written.replace("°", "deg"), unit)
+    if one is None:
+        raise ValueError(f"found the unit '{written}', which is not known or not a unit of {unit}; {accepted}")
+    if not math.isfinite(number * one):
+        raise ValueError(f"found '{text}', a number beyond double precision; {accepted}")
+    share = Fraction(one).limit_denominator(_LARGEST_DENOMINATOR)
+    if abs(share - Fraction(one)) > _ROUNDED * share:  # an angle
+        return number * one, written
+    value = float(Fraction(parts["number"]) * share)  # the double nearest to what is written: 70 cm is 0.7 m
+    return value, written
+
+
+def factor(written: str, unit: str) -> float:
+    """How many `unit` one of a unit is that was read before; of what is kept as a fraction, the nearest double."""
+    found = _factor(written.replace("°", "deg"), unit)
+    assert found is not None, written
+    share = Fraction(found).limit_denominator(_LARGEST_DENOMINATOR)
+    return found if abs(share - Fraction(found)) > _ROUNDED * share else float(share)
+
+
+@cache
+def _factor(written: str, unit: str) -> float | None:
+    """How many `unit` one written unit is, or None where it is not one."""
+    registry = _registry()
+    try:
+        # Angles carry no dimension for pint, so their power is compared by name.
+        found = registry.parse_units(written)
+        powers = dict(registry.Quantity(1.0, found).to_base_units().unit_items())
+        if powers.get("radian", 0) != (unit == "rad"):
+            return None
+        quantity = registry.Quantity(2.0, found).to(unit)
+        offset = registry.Quantity(0.0, found).to(unit)
+    except Exception:  # pint raises AssertionError, tokenizer and attribute errors on malformed text
+        return None
+    return float(quantity.magnitude) / 2 if offset.magnitude == 0 else None
+
+
+@cache
+def _registry() -> Any:
+    import pint  # a third of a second, paid only where a unit is written
+
+    return pint.UnitRegistry()
