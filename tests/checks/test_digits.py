@@ -177,6 +177,11 @@ def wrong_digits(data: Mapping[str, Any]) -> list[str]:
             other = damping_60(roots_60(polynomial_60(**native_60(in_case(data["parameters"], least)))))
             shown = data["quantities"]["damping_ratio"]
             true["damping_ratio"] = other if abs(other - shown) < 1e-11 else mp.mpf(shown)
+        if "si" in data:
+            rate = mp.sqrt(mp.mpf(p["g"]) / mp.mpf(p["w"]))
+            true["decay_rate"] = -abscissa * rate
+            true["decay_time"] = 1 / (-abscissa * rate) if abscissa < 0 else None
+            true["frequency"] = max(mp.im(z) for z in ideal) * rate / (2 * mp.pi)
         for name, value in data["quantities"].items():
             if name != "radius":  # a search of its own, over all parameters
                 compare(name, value, true[name])

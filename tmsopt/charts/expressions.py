@@ -12,7 +12,7 @@ import numpy as np
 
 from tmsopt.arithmetic.arrays import Program, program
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.design.expression import Expression, ExpressionError, parse_value
+from tmsopt.design.expression import Expression, ExpressionError
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES, NO_RADIUS, ROOT_QUANTITIES
 from tmsopt.errors import Fault, InputError
@@ -127,7 +127,7 @@ def parsed(problem: Problem, expressions: Mapping[str, str | Expression]) -> dic
     faults: list[Fault] = []
     for name, given in expressions.items():
         try:
-            found[name] = given if isinstance(given, Expression) else parse_value(given, problem.vocabulary)
+            found[name] = given if isinstance(given, Expression) else problem.read(given)
         except ExpressionError as error:
             faults.append(Fault(str(error), ("quantities", name)))
     if faults:

@@ -22,7 +22,7 @@ from tmsopt.models import Values
 from tmsopt.records import Table
 from tmsopt.roots import Root, Structure
 from tmsopt.roots.patterns.enclosed import Enclosed, enclosed_roots, nearest_decimal, nearest_double, nearest_roots
-from tmsopt.units import Reading, readings
+from tmsopt.units import Reading, frequencies, readings
 
 _PRECISIONS = (212, 424, 848, 1696)
 """Bits carried, one after the other until they suffice; the first are 60 digits, half of which a fit may lose."""
@@ -140,10 +140,15 @@ class _Design:
         if roots.damped:
             known["damping_ratio"] = reduce(lesser, (_ratio(r) for r in roots.damped))
             yield ("quantities", "damping_ratio"), known["damping_ratio"], 0
+        of, own = self.problem.parameter_set, _exact(self.parameters)
+        if of.rate is not None:
+            rates = frequencies(roots.ideal, of.rate(own), flint.arb.pi())
+            nominal.define("frequency", reduce(greater, rates, flint.arb(0)))
+        nominal.define("abscissa", known.get("abscissa", math.nan))
         for name in checked.quantities:
             if name not in ("damping_ratio", RADIUS):
                 yield ("quantities", name), nominal[name], 0
-        native = self.problem.parameter_set.native(_exact(self.parameters))
+        native = of.native(own)
         for name in checked.dimensionless:
             yield ("dimensionless", name), native[name], 0
         yield from self.si(nominal, known.get("abscissa", math.nan), roots.ideal)

@@ -36,6 +36,8 @@ class Checked:
     """A design's roots, objective and violations: in its worst case, where it has several.
 
     Attributes:
+        violations: name → violation relative to the size of the two sides, where beyond tolerance.
+        amounts: the same in the units of the sides.
         worst: the case with the largest abscissa, of those looked at.
         least_damped: the case with the least damping ratio.
         around: the boundaries nearest to the design, where the problem asks for the robustness radius.
@@ -45,6 +47,7 @@ class Checked:
     realised: float
     objective: float
     violations: Table[float]
+    amounts: Table[float]
     quantities: Table[float]
     dimensionless: Table[float]
     worst: Case = field(default_factory=Case)
@@ -65,12 +68,13 @@ def recheck(
     """
     looked = _look(problem, parameters, problem.cases if cases is None else cases, around)
     listed, nominal, each, top, around = looked.cases, looked.nominal, looked.each, looked.top, looked.around
-    violations = {}
+    violations, amounts = {}, {}
     for name, condition in problem.conditions.items():
         at = looked.at(problem, condition)
         violation, worst = max(((condition.violation(v), v) for v in at), key=lambda pair: _or_infinite(pair[0]))
         if not violation <= FEASIBLE or (violation > 0 and _beyond(problem, condition, worst)):
             violations[name] = violation
+            amounts[name] = float(condition.excess(float(condition(worst))))
     structure = each[top]["structure"]
     if not math.isfinite(structure.abscissa):
         exist = all(math.isfinite(float(c)) for c in each[top].coefficients)
@@ -84,11 +88,15 @@ def recheck(
     names = [n for n in (*problem.model.quantity_names(of), "damping_ratio") if n not in problem.model.sets[0].names]
     if around is not None:
         names.append(RADIUS)
+    if of.rate is not None and structure.roots:  # times and frequencies are those of the worst case
+        nominal.define("abscissa", structure.abscissa)
+        nominal.define("structure", structure)
     return Checked(
         structure=structure,
         realised=realised_abscissa(problem, listed[top].applied(parameters) if listed else parameters),
         objective=_objective(problem, nominal, each, listed),
         violations=Table(violations),
+        amounts=Table(violations | amounts),
         quantities=Table({name: float(nominal[name]) for name in names}),
         dimensionless=Table({n: float(v) for n, v in of.native(parameters).items()}),
         worst=listed[top] if listed else Case(),

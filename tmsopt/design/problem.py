@@ -8,7 +8,7 @@ from typing import Any
 
 from tmsopt.design.cases import Band, Case, Scenario, as_scenario, first_cases, middle_of
 from tmsopt.design.expression import Expression, parse_comparison, parse_value
-from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTITIES, STRUCTURE
+from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTITIES, STRUCTURE, spelled_out
 from tmsopt.design.validate import faults, guess_parameter_set
 from tmsopt.errors import Fault, InputError
 from tmsopt.models import Model, ParameterSet, Values
@@ -138,17 +138,27 @@ class Problem:
     def objective(self) -> Expression | None:
         """The expression to optimise, if there is one."""
         text = self.minimize if self.minimize is not None else self.maximize
-        return None if text is None else parse_value(text, self.vocabulary)
+        return None if text is None else self.read(text)
 
     @cached_property
     def objectives(self) -> tuple[Expression, ...]:
         """The expressions of a front, each to be minimised."""
-        return tuple(parse_value(text, self.vocabulary) for text in self.pareto)
+        return tuple(self.read(text) for text in self.pareto)
 
     @cached_property
     def conditions(self) -> dict[str, Expression]:
         """The constraints, parsed."""
-        return {name: parse_comparison(text, self.vocabulary) for name, text in self.constraints.items()}
+        of = self.parameter_set
+        texts = {name: spelled_out(text, of) for name, text in self.constraints.items()}
+        return {name: parse_comparison(text, self.vocabulary) for name, text in texts.items()}
+
+    def read(self, text: str) -> Expression:
+        """An expression in the vocabulary, names that are short for others spelled out.
+
+        Raises:
+            ExpressionError: for what is none.
+        """
+        return parse_value(spelled_out(text, self.parameter_set), self.vocabulary)
 
     @property
     def asked_of_roots(self) -> tuple[str, ...]:

@@ -1,13 +1,14 @@
 """Quantities of the roots, for any model: what an expression may say about stability."""
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from tmsopt.models import Quantity, Values
+from tmsopt.models import ParameterSet, Quantity, Values
 from tmsopt.records import Array
 from tmsopt.roots import Structure, abscissa_and_damping, roots, structure
 
@@ -49,6 +50,12 @@ NO_RADIUS = Quantity(RADIUS, "1", "robustness radius", "r", lambda values: math.
 _QUARTIC = 5  # coefficients of the degree that has formulas of its own
 
 ROOT_NAMES = (*(q.name for q in ROOT_QUANTITIES), RADIUS)
+
+
+def spelled_out(text: str, of: ParameterSet) -> str:
+    """An expression with the names that are short for others written out: decay_rate as -(abscissa*sqrt(g/w))."""
+    short = {q.name: q.stands_for for q in of.quantities if q.stands_for}
+    return re.sub(rf"\b({'|'.join(short)})\b", lambda found: short[found[0]], text) if short else text
 
 
 def regular(coefficients: Array) -> Array:

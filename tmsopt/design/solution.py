@@ -7,6 +7,7 @@ from typing import Any
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Freedom, Problem
 from tmsopt.design.quantities import ROOT_NAMES
+from tmsopt.design.unit_system import unit_of
 from tmsopt.records import Table, plain
 from tmsopt.roots import Root
 from tmsopt.units import Reading
@@ -119,7 +120,8 @@ class Solution:
             the structure, as `roots.enclosed.nearest` defines it; for simple roots of the design's own.
         structure: which roots stand on the rightmost line, e.g. ``EP4``.
         active: constraint or bound (``Fr.max``) → gain of the objective per unit that the limit is relaxed.
-        violations: name → violation relative to the size of the two sides, where beyond tolerance.
+        violations: name → by how much it is violated, in its own units (rad, SI), where beyond tolerance; of a pattern,
+            relative to the coefficients.
         quantities: derived quantities; nan where one does not exist.
         dimensionless: the native parameters.
         formulation: ``abscissa``, ``matching`` or ``none``.
@@ -220,12 +222,18 @@ class Solution:
         }  # fmt: skip
 
 
+def violated_by(solution: Solution) -> str:
+    """What a solution violates, and by how much, in the units in which the problem was written."""
+    found = solution.violations.items()
+    return ", ".join(f"{name} by {unit_of(solution.problem, name).show(amount, 3)}" for name, amount in found)
+
+
 class NotSolved(RuntimeError):
     """Raised by `solve` when there is no optimal design; `solution` holds the best point found."""
 
     def __init__(self, solution: Solution) -> None:
         self.solution = solution
-        violated = ", ".join(f"{name} by {value:.3g}" for name, value in solution.violations.items())
+        violated = violated_by(solution)
         super().__init__(
             f"{solution.problem.title or 'problem'}: {solution.status}"
             + (f"; violated: {violated}" if violated else "")

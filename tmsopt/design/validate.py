@@ -232,6 +232,8 @@ def _parse_faults(parse: Any, text: Any, accepted: tuple[str, ...], key: tuple[s
         yield Fault(f"found {text!r}; accepted: an expression in quotes", key)
         return
     try:
-        parse(text, accepted)
+        if "frequency" in parse(text, accepted).names and "decay_time" in accepted:  # no name of the user's own
+            advice = "it is reported and can be recorded, not optimised; limit damping_ratio or decay_rate instead"
+            yield Fault(f"'{text}' uses frequency: {advice}", key)
     except ExpressionError as error:
         yield Fault(str(error), key)

@@ -2,14 +2,15 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from tmsopt.design.expression import parse_value, written_sides
+from tmsopt.design.expression import written_sides
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
+from tmsopt.design.unit_system import Unit, dimension_of, unit_of
 from tmsopt.errors import InputError
-from tmsopt.explanation.steps import natural_step, reported_unit, step_within, unit_of, with_reported_unit
+from tmsopt.explanation.steps import natural_step, step_within
 from tmsopt.records import plain
 from tmsopt.solver.solve import solve
 
@@ -27,7 +28,7 @@ class Lever:
     Attributes:
         name: of the constraint, or a bound such as ``Fr.max``.
         kind: ``bound`` or ``constraint``.
-        limit: the limit as written, angles in degrees.
+        limit: the limit, in the unit in which the problem was written.
         physical: whether the limit is a physical end, such as 0 for a mass, and cannot be moved.
         move: what is done to the limit, e.g. ``1 deg more lambda_s.max``.
         step: change of the limit in the unit of the parameter, with its sign; 0 where it cannot be moved.
@@ -35,8 +36,7 @@ class Lever:
         resolved: gain found by solving the moved problem; nan where that was not done or failed.
         structure: of the moved optimum; empty without one.
         reason: why the two gains differ, or why there is only one.
-        gained_unit: unit of the gains in words, e.g. ``deg``; ``1`` for a dimensionless objective.
-        gained_one: what one of that unit is in the unit of the objective.
+        gained: unit of the gains in words.
     """
 
     name: str
@@ -49,8 +49,7 @@ class Lever:
     resolved: float = math.nan
     structure: str = ""
     reason: str = ""
-    gained_unit: str = "1"
-    gained_one: float = 1.0
+    gained: Unit = field(default_factory=Unit)
 
     @property
     def predicted(self) -> float:
@@ -86,8 +85,7 @@ class Lever:
         }
 
     def _gain(self, value: float) -> str:
-        text = f"{value / self.gained_one:.3g}"
-        return text if self.gained_unit == "1" else f"{text} {self.gained_unit}"
+        return self.gained.show(value, 3)
 
 
 def levers(solution: Solution, resolve: bool = True) -> tuple[Lever, ...]:
@@ -120,16 +118,17 @@ def _of_bound(solution: Solution, bound: str) -> Lever:
     width = upper - lower
     # an angle is measured by its box, for 0 is a tilt like any other
     size = width if parameter.unit == "rad" or not limit else min(abs(limit), width)
-    step = step_within(parameter.unit, size, limit, direction, parameter.range)
+    unit = unit_of(problem, name)
+    step = step_within(unit, parameter.unit, size, limit, direction, parameter.range)
     words = f"{step.text if step else 'nothing'} {'more' if direction > 0 else 'less'} {bound}"
-    change, written = direction * step.size if step else 0.0, with_reported_unit(limit, parameter.unit)
+    change, written = direction * step.size if step else 0.0, unit.show(limit, 10)
     return _lever(solution, bound, "bound", written, is_physical(problem, bound), words, change)
 
 
 def _of_row(solution: Solution, name: str) -> Lever:
     problem = solution.problem
     condition, text = problem.conditions[name], problem.constraints[name]
-    step = natural_step(unit_of(problem, condition), _size(solution, text))
+    step = natural_step(unit_of(problem, name), dimension_of(problem, name).unit, _size(solution, text))
     sign, words = condition.sign, f"relaxing {name} ({text}) by {step.text}"
     if condition.equality:  # the right-hand side moves to where the objective is better
         sign = math.copysign(1.0, -problem.sign * solution.active[name])
@@ -138,11 +137,9 @@ def _of_row(solution: Solution, name: str) -> Lever:
 
 
 def _lever(solution: Solution, name: str, kind: str, limit: str, physical: bool, move: str, step: float) -> Lever:
-    text = (solution.problem.minimize or solution.problem.maximize or "").strip()
-    of = solution.problem.parameter_set
-    unit, one = reported_unit(of[text].unit) if text in of.names else ("1", 1.0)
-    per_unit = abs(solution.active[name])
-    return Lever(name, kind, limit, physical, move, step, per_unit, gained_unit=unit, gained_one=one)
+    text = solution.problem.minimize or solution.problem.maximize
+    gained = unit_of(solution.problem, text) if text else Unit()
+    return Lever(name, kind, limit, physical, move, step, abs(solution.active[name]), gained=gained)
 
 
 def _size(solution: Solution, text: str) -> float:
@@ -150,7 +147,7 @@ def _size(solution: Solution, text: str) -> float:
     problem = solution.problem
     left, _, right = written_sides(text)
     values = problem.values(solution.parameters)
-    sides = (abs(float(parse_value(side, problem.vocabulary)(values))) for side in (left, right))
+    sides = (abs(float(problem.read(side)(values))) for side in (left, right))
     return max((size for size in sides if math.isfinite(size)), default=1.0)
 
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import flint
@@ -15,7 +16,7 @@ from tmsopt.design.dependence import varies
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
 from tmsopt.design.solution import Solution
-from tmsopt.explanation.steps import reported_unit
+from tmsopt.design.unit_system import Unit, unit_of
 from tmsopt.models import Values
 from tmsopt.records import Table, plain
 from tmsopt.roots import roots
@@ -27,6 +28,8 @@ DIGITS = (2, 3, 4, 6)
 """Significant digits to which all parameters are rounded together."""
 
 _SAME = 1e-15  # relative change that is no rounding: a degree or two written as radians
+_DEGREE = math.pi / 180
+_LARGEST_DENOMINATOR = 10**6  # of a factor between units, such as 5/18
 _WORKING = 140  # decimal digits of the exact numbers
 
 
@@ -42,7 +45,7 @@ class Rounded:
         loss: realised minus ideal abscissa of the design.
         damping_ratio: of the rounded design, in double precision.
         objective: value of the objective expression; nan without one.
-        violations: constraint or bound that the rounding violates → by how much, relative to its size.
+        violations: constraint or bound that the rounding violates → by how much, in its own units (rad, SI).
     """
 
     digits: int
@@ -72,10 +75,10 @@ def rounded_together(solution: Solution, digits: Iterable[int] = DIGITS) -> tupl
 def rounded(solution: Solution, names: Iterable[str], digits: int) -> Rounded:
     """A design with some of its parameters rounded to significant digits."""
     problem = solution.problem
-    of = problem.parameter_set
-    written = {n: _decimal(solution.parameters[n], of[n].unit, digits) for n in names}
+    units = {n: unit_of(problem, n) for n in problem.free}
+    written = {n: _decimal(solution.parameters[n], units[n], digits) for n in names}
     with flint.ctx.workdps(_WORKING):
-        exact: dict[str, Any] = {n: _exact(text, of[n].unit) for n, text in written.items()}
+        exact: dict[str, Any] = {n: _exact(text, units[n]) for n, text in written.items()}
     plain = {**solution.parameters, **{n: float(x.mid()) for n, x in exact.items()}}
     cases = _cases(solution, plain)
     realised = max(realised_abscissa(problem, c.applied({**solution.parameters, **exact})) for c in cases)
@@ -85,7 +88,7 @@ def rounded(solution: Solution, names: Iterable[str], digits: int) -> Rounded:
     for one in (values, *each):
         one.define("abscissa", realised)  # known already, and better than by fitting structures
         one.define("damping_ratio", ratio)
-    texts = Table({n: _with_unit(text, of[n].unit) for n, text in written.items()})
+    texts = Table({n: f"{text} {units[n].text}".rstrip() for n, text in written.items()})
     objective = float(problem.objective(values)) if problem.objective else math.nan
     violated = Table(_violations(problem, plain, [values, *each]))
     return Rounded(digits, texts, realised, realised - solution.abscissa, ratio, objective, violated)
@@ -105,17 +108,20 @@ def _cases(solution: Solution, rounded: Mapping[str, float]) -> list[Case]:
 
 
 def _violations(problem: Problem, parameters: Mapping[str, float], each: Sequence[Values]) -> dict[str, float]:
-    """What is violated in any case; the first values are of the nominal design."""
+    """What is violated in any case beyond tolerance, by how much; the first values are of the nominal design."""
     found = {}
     for name, condition in problem.conditions.items():
         if RADIUS not in condition.names:  # it takes a search of its own
             at = each if varies(problem, condition, problem.cases) else each[:1]
-            found[name] = max((condition.violation(v) for v in at), key=lambda x: math.inf if math.isnan(x) else x)
+            worst = max(at, key=lambda v: math.inf if math.isnan(x := condition.violation(v)) else x)
+            if not condition.violation(worst) <= FEASIBLE:
+                found[name] = float(condition.excess(condition(worst)))
     for name, (lower, upper) in problem.free.items():
         x = parameters[name]
-        found[f"{name}.min"] = (lower - x) / max(1.0, abs(lower))
-        found[f"{name}.max"] = (x - upper) / max(1.0, abs(upper))
-    return {name: v for name, v in found.items() if not v <= FEASIBLE}
+        for end, amount, limit in (("min", lower - x, lower), ("max", x - upper, upper)):
+            if not amount <= FEASIBLE * max(1.0, abs(limit)):
+                found[f"{name}.{end}"] = amount
+    return found
 
 
 def _damping_ratio(coefficients: Sequence[float]) -> float:
@@ -128,21 +134,19 @@ def _damping_ratio(coefficients: Sequence[float]) -> float:
 
 def _short(solution: Solution, name: str, digits: int) -> bool:
     """Whether a parameter has no more digits than that."""
-    value, unit = solution.parameters[name], solution.problem.parameter_set[name].unit
-    there = float(_decimal(value, unit, digits)) * reported_unit(unit)[1]
+    value, unit = solution.parameters[name], unit_of(solution.problem, name)
+    there = float(_decimal(value, unit, digits)) * unit.one
     return abs(there - value) <= _SAME * abs(value)
 
 
-def _decimal(value: float, unit: str, digits: int) -> str:
+def _decimal(value: float, unit: Unit, digits: int) -> str:
     """A number in its reported unit, as a decimal of so many significant digits."""
-    return f"{value / reported_unit(unit)[1]:#.{digits}g}".removesuffix(".")
+    return f"{value / unit.one:#.{digits}g}".removesuffix(".")
 
 
-def _exact(text: str, unit: str) -> flint.arb:
+def _exact(text: str, unit: Unit) -> flint.arb:
     """The decimal in the parameter's own unit, at the precision of the context."""
-    return flint.arb(text) * flint.arb.pi() / 180 if reported_unit(unit)[0] == "deg" else flint.arb(text)
-
-
-def _with_unit(text: str, unit: str) -> str:
-    name = reported_unit(unit)[0]
-    return text if name == "1" else f"{text} {name}"
+    if unit.one == _DEGREE:
+        return flint.arb(text) * flint.arb.pi() / 180
+    share = Fraction(unit.one).limit_denominator(_LARGEST_DENOMINATOR)
+    return flint.arb(text) * flint.arb(flint.fmpq(share.numerator, share.denominator))

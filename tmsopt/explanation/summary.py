@@ -9,8 +9,8 @@ from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ROOT_QUANTITIES
 from tmsopt.design.solution import Solution
+from tmsopt.design.unit_system import unit_of
 from tmsopt.explanation.limits import is_physical
-from tmsopt.explanation.steps import with_reported_unit
 from tmsopt.roots.patterns.descriptions import in_words
 
 _ROOTS = {q.name for q in ROOT_QUANTITIES}
@@ -70,9 +70,7 @@ def _quality(solution: Solution) -> str:
             f"{tried}; no design in the box has {quantity} {side} {bound.value:.6g}, which leaves {bound.gap:.2g} open"
         )
     end = "greatest" if problem.sense == "maximize" else "least"
-    unit = problem.parameter_set[text].unit if text in problem.parameter_set.names else "1"
-    value = with_reported_unit(solution.value, unit, 6)
-    return f"the {end} {text} found is {value}, {tried}"
+    return f"the {end} {text} found is {unit_of(problem, text).show(solution.value, 6)}, {tried}"
 
 
 def _leant_on(solution: Solution) -> Iterator[str]:
@@ -93,7 +91,7 @@ def _leaning(solution: Solution, bound: str) -> str:
 
 def _limit(problem: Problem, bound: str) -> str:
     name, end = bound.rsplit(".", 1)
-    return with_reported_unit(problem.free[name][end == "max"], problem.parameter_set[name].unit)
+    return unit_of(problem, name).show(problem.free[name][end == "max"], 10)
 
 
 def _touching(solution: Solution, name: str) -> Iterator[str]:

@@ -235,7 +235,7 @@ def _assembled(
         roots=numbers.roots,
         structure=checked.structure.name,
         active=Table(finding.active),
-        violations=checked.violations,
+        violations=checked.amounts,
         bound=instant_bound(problem, numbers.value) if optimal else Bound(),
         starts=finding.starts,
         seconds=time.perf_counter() - began,

@@ -30,7 +30,7 @@ class Row:
         bound: a value that no design in the box can beat; −inf where none is known.
         method: how the bound was found; ``none``.
         laws: label of a law of the paper → relative residual, where the law applies.
-        violations: name → violation relative to the size of the two sides.
+        violations: name → by how much it is violated, in its own units (rad, SI).
         starts: tried.
         warm: whether it was started from a neighbour's optimum.
         seconds, host: how long it took and where; the only ones that differ when a row is solved again.

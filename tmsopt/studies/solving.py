@@ -11,8 +11,7 @@ from typing import Any
 from threadpoolctl import ThreadpoolController
 
 from tmsopt.checks.law_rows import LawRow, law_rows
-from tmsopt.design.expression import parse_value
-from tmsopt.design.solution import Solution
+from tmsopt.design.solution import Solution, violated_by
 from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.records import Table
@@ -139,7 +138,7 @@ class Solver:
     def _solved(self, number: int, solution: Solution, warm: bool) -> Row:
         problem, bound = solution.problem, solution.bound
         values = problem.values(solution.parameters)
-        reports = {text: float(parse_value(text, problem.vocabulary)(values)) for text in self.study.report}
+        reports = {text: float(problem.read(text)(values)) for text in self.study.report}
         return Row(
             number=number, seed=self.study.seed_of(number), varied=self.study.varied(number), status=solution.status,
             cause=_cause(solution), objective=solution.value, abscissa=solution.abscissa,
@@ -169,7 +168,7 @@ def _cause(solution: Solution) -> str:
     """Why a solution is not optimal, in words."""
     if solution.status == "optimal":
         return ""
-    violated = ", ".join(f"{name} by {amount:.3g}" for name, amount in solution.violations.items())
+    violated = violated_by(solution)
     conflict = solution.relaxation.conflict if solution.relaxation else ()
     parts = [
         f"violated: {violated}" if violated else "", f"in conflict: {', '.join(conflict)}" if conflict else "",

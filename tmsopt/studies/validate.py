@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.design.expression import ExpressionError, parse_value
+from tmsopt.design.expression import ExpressionError
 from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Problem, unasked
 from tmsopt.errors import Fault, count_faults, short, suggest
@@ -143,6 +143,6 @@ def common_faults(problem: Problem, seed: Any, starts: Any, report: Any) -> Iter
         try:
             if not isinstance(text, str):
                 raise ExpressionError(f"found {text!r}; accepted: an expression in quotes")
-            parse_value(text, problem.vocabulary)
+            problem.read(text)
         except ExpressionError as error:
             yield Fault(str(error), ("report",))

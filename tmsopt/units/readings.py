@@ -13,6 +13,9 @@ Reading = float | tuple[float, ...]
 _READ_IN = MappingProxyType({"m": ("mm", 1000), "m/s": ("km/h", 18), "rad": ("deg", 180)})
 
 
+_TIMES = ("decay_rate", "decay_time", "frequency")
+"""Quantities that are readings themselves."""
+
 READ_DIGITS = 15
 """Digits of a reading in another unit: what was written as 15 km/h reads 15 again, not what roundings made of it."""
 
@@ -70,7 +73,7 @@ def readings(
     yield "decay_time_s", decay_time(abscissa, rate), 0
     yield "growth_time_s", growth_time(abscissa, rate), 0
     yield "frequencies_Hz", frequencies(roots, rate, pi), 0
-    units = {p.name: p.unit for p in of.parameters} | {q.name: q.unit for q in of.quantities}
+    units = {p.name: p.unit for p in of.parameters} | {q.name: q.unit for q in of.quantities if q.name not in _TIMES}
     for name in (n for n, unit in units.items() if unit != "1"):
         value = parameters[name] if name in parameters else quantities[name]
         read, unit, digits = read_in(value, units[name], pi)

@@ -1,9 +1,11 @@
 """Formulas of quantities that bicycles of every model have."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 from tmsopt.arithmetic.elementary import quotient, sqrt
+from tmsopt.models.model import Formula, Quantity, Range
 
 _TINY = 1e-300  # keeps 0/0 away where all masses are on the ground line, and changes nothing else
 
@@ -31,3 +33,22 @@ def smaller_eigenvalue(first: Any, mixed: Any, second: Any, determinant: Any) ->
     """
     apart = sqrt((first - second) * (first - second) + 4 * mixed * mixed)
     return 2 * determinant / (first + second + apart + _TINY)
+
+
+def times(rate: Formula, written: str) -> tuple[Quantity, ...]:
+    """Quantities of time, for parameters in SI.
+
+    Args:
+        rate: how many 1/s a rate of 1 is, and the same as the expression that is written.
+    """
+    decay = f"-(abscissa*{written})"
+    return (
+        Quantity("decay_rate", "1/s", "how fast the slowest part of a disturbance dies out", r"-\alpha",
+            lambda v: -v["abscissa"] * rate(v), aside=True, stands_for=f"({decay})"),
+        Quantity("decay_time", "s", "in which the slowest part of a disturbance falls to 1/e", r"\tau",
+            lambda v: 1 / (-v["abscissa"] * rate(v)) if v["abscissa"] < 0 else math.nan, range=Range(lower=0.0),
+            aside=True, stands_for=f"(1/max({decay}, 0))"),
+        Quantity("frequency", "Hz", "of the fastest oscillation, 0 where nothing oscillates", "f",
+            lambda v: max((r.im for r in v["structure"].roots), default=0.0) * rate(v) / (2 * math.pi),
+            range=Range(lower=0.0), aside=True),
+    )  # fmt: skip

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.arithmetic.elementary import sqrt, tan
+from tmsopt.models.bicycles.bicycle import times
 from tmsopt.models.bicycles.tms_equations import compact_copo, copo, matrices
 from tmsopt.models.bicycles.tms_quantities import NATIVE_QUANTITIES, SI_QUANTITIES
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Range
@@ -69,6 +70,11 @@ def _pencil(p: Mapping[str, Any]) -> tuple[Matrix, ...]:
     return matrices(**dimensions, sine=T * cosine, cosine=cosine)
 
 
+def _rate(p: Mapping[str, Any]) -> Any:
+    """√(g/w), in 1/s."""
+    return sqrt(p["g"] / p["w"])
+
+
 _SI = ParameterSet(
     "SI",
     (
@@ -82,7 +88,7 @@ _SI = ParameterSet(
         Parameter("x_H", "m", "front assembly centre of mass, forward of the rear contact", "x_H", counterpart="chi_H"),
         Parameter("z_H", "m", "front assembly centre of mass, downward", "z_H", _NOT_POSITIVE, counterpart="zeta_H"),
     ),
-    native=from_si, quantities=SI_QUANTITIES, rate=lambda p: sqrt(p["g"] / p["w"]), root_unit="√(g/w)",
+    native=from_si, quantities=(*SI_QUANTITIES, *times(_rate, "sqrt(g/w)")), rate=_rate, root_unit="√(g/w)",
 )  # fmt: skip
 
 tms = Model(

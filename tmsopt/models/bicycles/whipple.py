@@ -7,6 +7,7 @@ in the same parameters, with the same roots per second.
 from collections.abc import Mapping
 from typing import Any
 
+from tmsopt.models.bicycles.bicycle import times
 from tmsopt.models.bicycles.tms import GRAVITY, LAMBDA_S
 from tmsopt.models.bicycles.whipple_equations import carvallo_whipple, matrices
 from tmsopt.models.bicycles.whipple_quantities import QUANTITIES, algebraic, canonical
@@ -64,7 +65,7 @@ _SI = ParameterSet(
         _inertia("I_Fxx", "moment of inertia of the front wheel about a diameter"),
         _inertia("I_Fyy", "moment of inertia of the front wheel about its axle"),
     ),
-    native=dict, quantities=QUANTITIES, rate=lambda p: 1, root_unit="1/s",
+    native=dict, quantities=(*QUANTITIES, *times(lambda p: 1, "1")), rate=lambda p: 1, root_unit="1/s",
     needs={"I_Ryy": ("r_R", _NO_RADIUS), "I_Fyy": ("r_F", _NO_RADIUS)},
 )  # fmt: skip
 
