@@ -28,10 +28,14 @@ from tmsopt.models import (
     Range,
     Values,
     copo,
+    from_coefficients,
     from_si,
+    in_words_of,
     matrices,
     tms,
     to_si,
+    whipple,
+    words_of,
 )
 from tmsopt.roots import quadratic_pencil
 
@@ -449,3 +453,12 @@ def test_what_stands_beside_a_dimensionless_number_is_that_number_in_si() -> Non
     pairs |= {name: (q.value(values), q.unit) for name, q in derived.items()}
     for name, (value, unit) in pairs.items():
         assert value == pytest.approx(values[name] * scales[unit], rel=1e-14), name
+
+
+def test_a_model_has_the_words_of_its_users() -> None:
+    """Meijaard et al. (2007) for bicycles; flutter and divergence for other systems (Ziegler 1952)."""
+    stated = from_coefficients([1, 2, 1])
+    for model in (tms, whipple):
+        assert dict(words_of(pickle.loads(pickle.dumps(model)))) == {"weave": "weave", "capsize": "capsize"}
+    assert dict(words_of(stated)) == {"weave": "flutter", "capsize": "divergence"}
+    assert in_words_of(stated, "infinity and weave") == "infinity and flutter"

@@ -10,13 +10,13 @@ from tmsopt.models.bicycles.whipple import canonical, whipple
 from tmsopt.models.bicycles.whipple_quantities import spin
 from tmsopt.models.built_in import MODELS, named
 from tmsopt.models.exact import decimal
-from tmsopt.models.model import Model, Parameter, ParameterSet, Quantity, Range, Values
+from tmsopt.models.model import Model, Parameter, ParameterSet, Quantity, Range, Values, in_words_of, words_of
 from tmsopt.models.names import CONSTANTS, FUNCTIONS, TAKEN, latex
 from tmsopt.models.user_defined import Unfit, from_coefficients, from_matrices
 
 __all__ = [
     "CONSTANTS", "FUNCTIONS", "GRAVITY", "MODELS", "TAKEN", "Bicycle", "Model", "Parameter", "ParameterSet",
     "Quantity", "Range", "Unfit", "Values", "canonical", "copo", "decimal", "from_coefficients", "from_matrices",
-    "from_si", "latex", "matrices", "named", "problem_text", "read_bicycle", "spin", "tms", "to_si", "whipple",
-    "write_bicycle",
+    "from_si", "in_words_of", "latex", "matrices", "named", "problem_text", "read_bicycle", "spin", "tms", "to_si",
+    "whipple", "words_of", "write_bicycle",
 ]  # fmt: skip

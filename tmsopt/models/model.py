@@ -1,5 +1,6 @@
 """A model as data: named parameters, derived quantities, and a characteristic polynomial in them."""
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -149,6 +150,7 @@ class Model:
         natural: whether coefficients and roots are near 1 in the model's own units.
         origin: a function and its arguments, plain data, that make this model again in another process.
         statement: of a model that a user states, plain data that tell it from others.
+        words: what its users call a pair on the imaginary axis, ``weave`` in data, and a root 0, ``capsize``.
     """
 
     name: str
@@ -163,6 +165,7 @@ class Model:
     natural: bool = False
     origin: tuple[Callable[..., "Model"], tuple[Any, ...]] | None = field(default=None, repr=False)
     statement: Mapping[str, Any] | None = field(default=None, repr=False, hash=False)
+    words: tuple[str, str] = field(default=("flutter", "divergence"), repr=False)
 
     def coefficients(self, parameters: Mapping[str, Any], of: ParameterSet | None = None) -> list[Any]:
         """Coefficients a0 … aₙ, descending, for values of any kind: floats, arrays, CasADi, balls."""
@@ -185,6 +188,16 @@ class Model:
     def parameter_set(self, name: str) -> ParameterSet:
         """The parameter set of that name."""
         return next(s for s in self.sets if s.name == name)
+
+
+def words_of(model: Model) -> Mapping[str, str]:
+    """``weave`` and ``capsize``, as data have them, → the words that the users of a model read."""
+    return dict(zip(("weave", "capsize"), model.words, strict=True))
+
+
+def in_words_of(model: Model, text: str) -> str:
+    """A name such as ``infinity and weave`` in the words of a model."""
+    return re.sub("weave|capsize", lambda found: words_of(model)[found[0]], text)
 
 
 class Values(Mapping[str, Any]):

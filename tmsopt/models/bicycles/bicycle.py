@@ -7,6 +7,9 @@ from typing import Any
 from tmsopt.arithmetic.elementary import quotient, sqrt
 from tmsopt.models.model import Formula, Quantity, Range
 
+WORDS = "weave", "capsize"
+"""What a bicycle does beyond a pair on the imaginary axis, and beyond a root 0."""
+
 _TINY = 1e-300  # keeps 0/0 away where all masses are on the ground line, and changes nothing else
 
 

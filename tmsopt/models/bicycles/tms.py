@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.arithmetic.elementary import sqrt, tan
-from tmsopt.models.bicycles.bicycle import times
+from tmsopt.models.bicycles.bicycle import WORDS, times
 from tmsopt.models.bicycles.tms_equations import compact_copo, copo, matrices
 from tmsopt.models.bicycles.tms_quantities import NATIVE_QUANTITIES, SI_QUANTITIES
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Range
@@ -94,5 +94,6 @@ _SI = ParameterSet(
 tms = Model(
     name="tms", title="two-mass-skate bicycle", degree=4, sets=(_NATIVE, _SI), algebraic=_algebraic, polynomial=copo,
     quantities=NATIVE_QUANTITIES, compact=compact_copo, pencil=_pencil, natural=True,
+    words=WORDS,
 )  # fmt: skip
 """The two-mass-skate bicycle."""
