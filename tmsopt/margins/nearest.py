@@ -17,6 +17,7 @@ from tmsopt.formulation.nlp import NLP
 from tmsopt.margins.boundaries import KINDS, Edge, edges, lies_on
 from tmsopt.margins.rays import RayCrossing, between, most_damped, ray_crossings
 from tmsopt.margins.surroundings import Place, placed
+from tmsopt.margins.witness import is_boundary
 from tmsopt.records import Array, Table, plain
 
 STABILITY = ("weave", "capsize", "infinity")
@@ -66,7 +67,10 @@ class Robustness:
     """How far a design is from each boundary.
 
     Attributes:
-        stable: whether all roots are left of the imaginary axis.
+        problem: whose design it is.
+        stable: whether all roots are left of the imaginary axis, beyond what rounding makes of them.
+        edges: the boundaries of stability that the design stands on as far as rounding tells; its other roots are left
+            of the axis. The distance to these is 0.
         heavily_damped: whether all roots are real and negative, multiple ones included.
         parameters: every parameter of the design.
         weights: the unit of change of each parameter that may change.
@@ -75,7 +79,9 @@ class Robustness:
             way into it for another; distance 0 on the edge, as for an EP4.
     """
 
+    problem: Problem = field(repr=False)
     stable: bool
+    edges: tuple[str, ...]
     heavily_damped: bool
     parameters: Table[float]
     weights: Table[float]
@@ -109,6 +115,7 @@ class Robustness:
         return {
             **plain(self, "stable heavily_damped radius to_stability"),
             "limit": self.limit.kind if self.limit.found else None,
+            **plain(self, "edges"),
             **plain(self, "parameters weights"),
             "nearest": {n.kind: n.to_json() for n in (self.weave, self.capsize, self.infinity, self.heavy_damping)},
         }
@@ -176,7 +183,9 @@ def _surveyed(place: Place) -> Robustness:
         u = np.array([limit.direction[n] for n in place.weights])
         seen = sorted([*seen, *between(place.space, u)], key=lambda c: c.distance)
         found = [_nearest(place, seen, kind) for kind in KINDS]
-    return Robustness(place.stable, place.heavily_damped, Table(place.parameters), Table(place.weights), *found)
+    stable = place.stable and not place.stands_on
+    own = Table(place.parameters), Table(place.weights)
+    return Robustness(place.problem, stable, place.stands_on, place.heavily_damped, *own, *found)
 
 
 def _place(design: Given, parameters: Mapping[str, float] | None, weights: Mapping[str, float] | None) -> Place:
@@ -193,7 +202,7 @@ def _place(design: Given, parameters: Mapping[str, float] | None, weights: Mappi
 
 def _nearest(place: Place, seen: list[RayCrossing], kind: str) -> Nearest:
     """The least distance over the pieces of one boundary."""
-    if kind == "heavy damping" and place.on_edge:
+    if kind in place.stands_on or (kind == "heavy damping" and place.on_edge):
         zero = dict.fromkeys(place.weights, 0.0)
         return Nearest(kind, 0.0, Table(place.parameters), Table(zero), refined=True, direct=True)
     mine = [s for s in seen if s.edge in KINDS[kind]]
@@ -203,7 +212,7 @@ def _nearest(place: Place, seen: list[RayCrossing], kind: str) -> Nearest:
         best = min(best, _best(place, pieces[edge], sign, starts), key=lambda found: found.distance)
     if mine and mine[0].distance < best.distance * (1 - _ALIKE):
         best = _Approach(mine[0].u, False)
-    if not best.u.size:
+    if not best.u.size or not is_boundary(place, best.u, kind == "heavy damping"):
         return Nearest(kind)
     direct = not any(kind == "heavy damping" or c.edge in STABILITY for c in between(place.space, best.u))
     direction = Table(dict(zip(place.weights, best.u.tolist(), strict=True)))

@@ -11,12 +11,14 @@ import numpy as np
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import STRUCTURE_TOLERANCE
 from tmsopt.errors import Fault, InputError, is_number, suggest
+from tmsopt.margins.axis import edges_at
 from tmsopt.margins.boundaries import terms
 from tmsopt.margins.rays import Space
 from tmsopt.models import Range
 from tmsopt.records import Array
 from tmsopt.roots import is_stable, multiple_real_roots, real_roots
 
+_NOTHING = 1e-12  # of a free parameter's range: what is smaller is 0 but for rounding
 _OPEN = 1e-6  # of the size of the parameter: how near an end that its range excludes it may come
 
 
@@ -69,6 +71,11 @@ class Place:
     def stable(self) -> bool:
         """Whether all roots are left of the imaginary axis."""
         return bool(is_stable(self._own))
+
+    @cached_property
+    def stands_on(self) -> tuple[str, ...]:
+        """The boundaries of stability that the design is on as far as rounding tells."""
+        return edges_at(self.problem, self.parameters)
 
     @cached_property
     def heavily_damped(self) -> bool:
@@ -132,9 +139,11 @@ def relative(problem: Problem, parameters: Mapping[str, float]) -> dict[str, flo
     """|value| per parameter that may change; for a value 0 the largest |value| of the same unit, 1 without one."""
     of = problem.parameter_set
     weights = {}
-    for p in (p for p in of.parameters if p.may_change(parameters[p.name])):
-        alike = [abs(parameters[q.name]) for q in of.parameters if q.unit == p.unit and p.unit not in ("1", "rad")]
-        weights[p.name] = abs(parameters[p.name]) or max(alike, default=0.0) or 1.0
+    widths = {n: high - low for n, (low, high) in problem.free.items()}
+    sizes = {n: abs(x) if abs(x) > _NOTHING * widths.get(n, 0.0) else 0.0 for n, x in parameters.items()}
+    for p in (p for p in of.parameters if p.may_change(sizes[p.name])):
+        alike = [sizes[q.name] for q in of.parameters if q.unit == p.unit and p.unit not in ("1", "rad")]
+        weights[p.name] = sizes[p.name] or max(alike, default=0.0) or 1.0
     return weights
 
 
