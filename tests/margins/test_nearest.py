@@ -3,18 +3,20 @@
 import json
 import math
 from dataclasses import replace
+from itertools import islice
 
+import casadi as ca
 import numpy as np
 import pytest
 import sympy  # type: ignore[import-untyped]
-from helpers.oracles import symbolic_copo
+from helpers.oracles import polynomial_exact, symbolic_copo
 
 import tmsopt
 from tmsopt import laws
 from tmsopt.design import Problem
 from tmsopt.errors import InputError
 from tmsopt.margins import nearest, robustness
-from tmsopt.models import tms, to_si
+from tmsopt.models import from_coefficients, from_matrices, tms, to_si
 from tmsopt.report import robustness_line, robustness_table
 from tmsopt.roots import real_roots, roots
 
@@ -306,3 +308,85 @@ def test_a_solution_is_accepted():
 def test_bad_input_is_told(arguments, told):
     with pytest.raises(InputError, match=told):
         nearest(problem(FORWARD), **{"pattern": "weave"} | arguments)
+
+
+# Boundary points in exact arithmetic, and designs on the edge
+
+
+OSCILLATOR = from_matrices([[ca.SX.sym("m")]], [[ca.SX.sym("c")]], [[ca.SX.sym("k")]])
+
+
+def oscillator(m, c, k):
+    return Problem(model=OSCILLATOR, fixed={"m": m, "c": c, "k": k})
+
+
+@pytest.mark.parametrize(
+    ("m", "c", "k", "edges", "zeros"),
+    [
+        (1.0, 0.0, 2.0, ("weave",), ("c",)),
+        (1.0, 0.1, 0.0, ("capsize",), ("k",)),
+        (0.0, 0.1, 2.0, ("infinity",), ("m",)),
+        (1.0, 0.1, 2.0, (), ()),
+        (1.0, 1e-9, 2.0, (), ()),
+        (1.0, 0.0, -2.0, (), ()),  # a root at √2
+        (0.3, 0.1 * 3 - 0.3, 2.0, ("weave",), ()),  # 5.6e-17: on the edge as far as rounding tells
+    ],
+)
+def test_an_oscillator_without_damping_is_on_the_edge(m, c, k, edges, zeros):
+    """m s² + c s + k is stable exactly where all three are positive."""
+    found = robustness(oscillator(m, c, k))
+    assert (found.edges, found.zeros) == (edges, zeros)
+    assert found.stable == (min(m, c, k) > 0 and not edges)
+    if edges:
+        assert found.limit.kind == edges[0]
+        assert found.limit.distance == found.radius == found.to_stability == 0
+        told = f"at its edge already: {zeros[0]} = 0" if zeros else "at the edge of stability as far as rounding tells"
+        assert robustness_line(found).startswith(told)
+        assert "-0" not in robustness_table(found)
+
+
+def test_what_a_change_does_is_said_in_the_words_of_a_model():
+    """c = 0 is the nearest edge of m = 1, c = 0.1, k = 2, at 100 % like the others; of a bicycle it is weave."""
+    assert robustness_line(robustness(oscillator(1.0, 0.1, 2.0), weights={"c": 1.0})) == (
+        "a change of 0.1 in the weights makes it flutter"
+    )
+    assert robustness_line(robustness(oscillator(1.0, 0.1, 2.0), weights={"k": 1.0})).endswith("makes it diverge")
+    assert robustness_line(robustness(oscillator(1.0, -0.1, 2.0), weights={"c": 0.05})) == (
+        "not stable; a change of 2 in the weights makes it stable"
+    )
+    assert robustness_line(robustness(problem(FORWARD), weights={"Fr": FORWARD["Fr"]})).endswith("makes it weave")
+
+
+def test_no_boundary_point_is_one_of_cancellation_alone():
+    """(x − y) (s² + c s + 1) has no root anywhere at x = y, and the same ones on either side."""
+    x, y, c = (ca.SX.sym(n) for n in "xyc")
+    model = from_coefficients([x - y, (x - y) * c, x - y])
+    found = robustness(Problem(model=model, fixed={"x": 1.3, "y": 0.1, "c": 0.4}), weights={"x": 1.0, "y": 1.0})
+    assert found.stable
+    assert not found.limit.found
+    assert robustness_line(found) == "no change that was looked at makes it unstable"
+
+
+def test_beside_every_boundary_point_of_stable_designs_there_is_an_unstable_one():
+    """By Hurwitz's conditions in fractions; corners are among the points, where ever more coefficients vanish."""
+    rng = np.random.default_rng(7)
+    low, high = (np.array(v) for v in ((0.3, 0.05, 0.3, 0.7, -1.0, -1.0, 0.05), (4.0, 5.0, 1.6, 1.2, -0.1, -0.1, 0.9)))
+    drawn = (dict(zip(NAMES, x.tolist(), strict=True)) for x in low + (high - low) * rng.random((2000, 7)))
+    for design in islice(filter(exactly, drawn), 10):
+        found = robustness(problem(design))
+        assert found.stable
+        for near in (found.weave, found.capsize, found.infinity):
+            if near.found:
+                u = np.array(list(near.direction.values()))
+                rays = u + near.distance * rng.choice([1e-6, 1e-3, 0.05], (4000, 1)) * rng.standard_normal((4000, 7))
+                at = moved(design, dict(found.weights), rays)
+                other = np.flatnonzero(~stable(at))[:20]
+                assert any(not exactly({n: float(at[n][k]) for n in NAMES}) for k in other)
+
+
+def exactly(design):
+    """Hurwitz's conditions in fractions, of the tangent as the double that it rounds to."""
+    at = {n: v for n, v in design.items() if n != "lambda_s"}
+    a = polynomial_exact(**at, tan_lambda_s=math.tan(design["lambda_s"]))
+    a = [-c for c in a] if a[0] < 0 else a
+    return all(c > 0 for c in a) and a[1] * a[2] * a[3] - a[0] * a[3] ** 2 - a[4] * a[1] ** 2 > 0

@@ -17,7 +17,7 @@ from tmsopt.formulation.nlp import NLP
 from tmsopt.margins.boundaries import KINDS, Edge, edges, lies_on
 from tmsopt.margins.rays import RayCrossing, between, most_damped, ray_crossings
 from tmsopt.margins.surroundings import Place, placed
-from tmsopt.margins.witness import is_boundary
+from tmsopt.margins.witness import exactly_stable, is_boundary
 from tmsopt.records import Array, Table, plain
 
 STABILITY = ("weave", "capsize", "infinity")
@@ -30,6 +30,7 @@ _ROUNDS = 3
 _ITERATIONS = 200
 _FEASIBLE = 1e-10  # violation of scaled coefficients, up to which a point counts as on the edge
 _STATIONARY = 1e-8
+_NOTHING, _SHIFT = 1e-12, 1e-3  # of a weight: what is 0 but for rounding; how far it is moved to see what it does
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,7 @@ class Robustness:
         stable: whether all roots are left of the imaginary axis, beyond what rounding makes of them.
         edges: the boundaries of stability that the design stands on as far as rounding tells; its other roots are left
             of the axis. The distance to these is 0.
+        zeros: parameters at 0 that take a design on the edge off it alone, such as the damping of one without any.
         heavily_damped: whether all roots are real and negative, multiple ones included.
         parameters: every parameter of the design.
         weights: the unit of change of each parameter that may change.
@@ -82,6 +84,7 @@ class Robustness:
     problem: Problem = field(repr=False)
     stable: bool
     edges: tuple[str, ...]
+    zeros: tuple[str, ...]
     heavily_damped: bool
     parameters: Table[float]
     weights: Table[float]
@@ -115,7 +118,7 @@ class Robustness:
         return {
             **plain(self, "stable heavily_damped radius to_stability"),
             "limit": self.limit.kind if self.limit.found else None,
-            **plain(self, "edges"),
+            **plain(self, "edges zeros"),
             **plain(self, "parameters weights"),
             "nearest": {n.kind: n.to_json() for n in (self.weave, self.capsize, self.infinity, self.heavy_damping)},
         }
@@ -185,7 +188,17 @@ def _surveyed(place: Place) -> Robustness:
         found = [_nearest(place, seen, kind) for kind in KINDS]
     stable = place.stable and not place.stands_on
     own = Table(place.parameters), Table(place.weights)
-    return Robustness(place.problem, stable, place.stands_on, place.heavily_damped, *own, *found)
+    zeros = _zeros(place) if place.stands_on else ()
+    return Robustness(place.problem, stable, place.stands_on, zeros, place.heavily_damped, *own, *found)
+
+
+def _zeros(place: Place) -> tuple[str, ...]:
+    """Parameters at 0 each of which makes a design stable alone: the edge is where what they stand for is not there."""
+    at = [n for n, weight in place.weights.items() if abs(place.parameters[n]) <= _NOTHING * weight]
+    return tuple(
+        n for n in at
+        if any(exactly_stable(place.problem, {**place.parameters, n: s * _SHIFT * place.weights[n]}) for s in (1, -1))
+    )  # fmt: skip
 
 
 def _place(design: Given, parameters: Mapping[str, float] | None, weights: Mapping[str, float] | None) -> Place:
@@ -216,7 +229,8 @@ def _nearest(place: Place, seen: list[RayCrossing], kind: str) -> Nearest:
         return Nearest(kind)
     direct = not any(kind == "heavy damping" or c.edge in STABILITY for c in between(place.space, best.u))
     direction = Table(dict(zip(place.weights, best.u.tolist(), strict=True)))
-    return Nearest(kind, best.distance, Table(place.design(best.u)), direction, best.refined, direct)
+    there = {n: 0.0 if abs(x) <= _NOTHING * place.weights.get(n, 0.0) else x for n, x in place.design(best.u).items()}
+    return Nearest(kind, best.distance, Table(there), direction, best.refined, direct)
 
 
 def _pieces(place: Place, seen: list[RayCrossing], kind: str) -> Iterator[tuple[str, float, list[Array]]]:

@@ -4,24 +4,26 @@ Where coefficients are differences of large numbers, or all vanish together, an 
 around which nothing changes.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import flint
 import numpy as np
 
 from tmsopt.design.problem import Problem
-from tmsopt.margins.axis import edges_at
-from tmsopt.margins.boundaries import heavily_damped
+from tmsopt.margins.boundaries import MATCHED, heavily_damped
 from tmsopt.margins.rays import directions
 from tmsopt.margins.surroundings import Place
 from tmsopt.records import Array
-from tmsopt.roots import exact_roots, is_stable, lienard_chipart, routh
+from tmsopt.roots import exact_roots, is_stable, lienard_chipart, multiple_real_roots, routh, shift
 
 BITS = 400
 """Of the balls in which a sign is decided; one that they leave open is 0."""
 
 _BESIDE = (1e-6, 1e-4, 1e-2)  # of the distance: how far from a point a change of stability is looked for
+_LEAST = 1e-9  # of the weights: changes that doubles tell apart
 _FEW = 4  # designs there that exact arithmetic is asked about
+_LEFT, _NEAR = (1e-4, 1e-3, 1e-2), 0.05  # of the roots' size, to move them; of the distance, that this may take
+_ROUNDS, _STEP = 4, 1e-6
 _NONE = 1e-10  # of the terms of the design's own coefficients: below it there is no polynomial
 _SMALL = 4  # degree up to which Liénard–Chipart's conditions have few terms
 
@@ -29,29 +31,46 @@ _SMALL = 4  # degree up to which Liénard–Chipart's conditions have few terms
 def is_boundary(place: Place, u: Array, heavy: bool) -> bool:
     """Whether a displacement leads to where stability changes, or to the edge of heavy damping.
 
-    Of a design that is not heavily damped that edge may be the tip of a cusp: the roots there must be real and
-    negative. Else designs right beside the point must differ from the design itself, in balls at their doubles.
+    Designs right beside the point must differ from the design itself, in balls at their doubles. From outside, that
+    edge may be the tip of a cusp: real and negative roots at the point do as well.
     """
-    c = np.abs(place.space.coefficients(u))
-    if not np.all(np.isfinite(c)) or np.all(c <= _NONE * place.sizes):
+    c = place.space.coefficients(u)
+    if not u.any():
+        return True  # the design itself is met by the equations of the edge
+    if not np.all(np.isfinite(c)) or np.all(np.abs(c) <= _NONE * place.sizes):
         return False
-    if heavy and not place.heavily_damped:
-        there = place.design(u)
-        roots = place.problem.values(there)["structure"].roots
-        return bool(roots) and all(r.im == 0 > r.re for r in roots) and not edges_at(place.problem, there)
-    inside = heavy or place.stable
+    within = place.heavily_damped if heavy else place.stable
+    if heavy and not within and np.all(np.abs(c) > _NONE * place.sizes):
+        roots = multiple_real_roots(c, MATCHED)
+        if roots is not None and all(r.re < 0 for r in roots):
+            return True
+    test = _all_real if heavy else exactly_stable
+    return any(test(place.problem, place.design(v)) != within for v in _beside(place, u, heavy, within))
+
+
+def _beside(place: Place, u: Array, heavy: bool, within: bool) -> Iterator[Array]:
+    """Displacements near one at which doubles find the other verdict."""
     size = float(np.linalg.norm(u))
     around = np.concatenate([[u / size, -u / size], directions(place.space, seed=0)])
     for reach in _BESIDE:
-        points = np.clip(u + reach * size * around, place.space.lower, place.space.upper)
+        points = np.clip(u + max(reach * size, _LEAST) * around, place.space.lower, place.space.upper)
         at = place.space.coefficients(points)
         verdict = heavily_damped(np.sign(at[:, :1]) * at) if heavy else is_stable(at, exact=False)
-        test = _all_real if heavy else exactly_stable
-        if any(
-            test(place.problem, place.design(points[k])) != inside for k in np.flatnonzero(verdict != inside)[:_FEW]
-        ):
-            return True
-    return False
+        yield from points[np.flatnonzero(verdict != within)[:_FEW]]
+    if not heavy and not within:  # towards a corner with a multiple root, stable designs are few
+        yield from (v for left in _LEFT if np.linalg.norm((v := _moved_left(place, u, left)) - u) <= _NEAR * size)
+
+
+def _moved_left(place: Place, u: Array, left: float) -> Array:
+    """A displacement at which all roots lie further to the left than at u, those at infinity too, by Gauss-Newton."""
+    target = shift(shift(place.space.coefficients(u).tolist(), left)[::-1], left)[::-1]
+    v = u
+    for _ in range(_ROUNDS):
+        steps = _STEP * np.eye(len(u))
+        slope = (place.space.coefficients(v + steps) - place.space.coefficients(v - steps)) / (2 * _STEP)
+        v = v + np.linalg.lstsq(slope.T, np.array(target) - place.space.coefficients(v), rcond=None)[0]
+        v = np.clip(v, place.space.lower, place.space.upper)
+    return v
 
 
 def exactly_stable(problem: Problem, parameters: Mapping[str, float]) -> bool:

@@ -10,13 +10,19 @@ from tmsopt.explanation.explain import Explanation
 from tmsopt.explanation.optimality import NOT_COVERED, OnLine, Optimality
 from tmsopt.explanation.rounding import ALONE, Rounded
 from tmsopt.margins.nearest import Nearest, Robustness
+from tmsopt.models import Model, in_words_of, words_of
 from tmsopt.report.text import columns, number
 
 _MAIN = 0.5
 """Share of the largest change above which a parameter is named in the headline."""
 _WIDE = 12
 """Parameters up to which each has a column; of more, each has a row."""
-_WORDS = {"weave": "weave", "capsize": "capsize", "infinity": "a root through infinity (a0 = 0)"}
+_LITTLE = 1e-3
+"""Share of the largest change below which one is 0."""
+_NAMED = 3
+"""Parameters named in the headline at most."""
+_VERBS = {"divergence": "diverge"}
+"""Of words that are no verbs."""
 _ROUNDING = 1e-16
 
 
@@ -146,14 +152,32 @@ def _change(response: Response) -> str:
 
 
 def robustness_line(found: Robustness) -> str:
-    """One sentence: how far, to what, and mostly by which parameters."""
+    """In one line: how large a change ends stability, or brings it, how, and by which parameters mostly."""
+    if found.edges:
+        on = " and ".join(_ON_EDGE[kind] for kind in found.edges)
+        if found.zeros:
+            return f"at its edge already: {', '.join(f'{n} = 0' for n in found.zeros)} ({on})"
+        return f"at the edge of stability as far as rounding tells, with {on}"
     limit = found.limit
     if not limit.found:
-        return f"robustness: no boundary of stability found; the design is {'' if found.stable else 'not '}stable"
-    where = _WORDS[limit.kind] + _mostly(limit)
+        return f"{'' if found.stable else 'not stable; '}no change that was looked at makes it {_other(found)}"
     if not found.stable:
-        return f"robustness: none, the design is not stable; {_size(found)} to stability through {where}"
-    return f"robustness: {_size(found)} to {where}"
+        return f"not stable; {_size(found)} makes it stable{_mostly(limit, found.relative)}"
+    return f"{_size(found)} {_event(found.problem.model, limit.kind)}{_mostly(limit, found.relative)}"
+
+
+_ON_EDGE = {"weave": "a pair of roots on the imaginary axis", "capsize": "a root 0", "infinity": "a root at infinity"}
+
+
+def _other(found: Robustness) -> str:
+    return "unstable" if found.stable else "stable"
+
+
+def _event(model: Model, kind: str) -> str:
+    if kind == "infinity":
+        return "takes a root through infinity (a0 = 0)"
+    word = words_of(model)[kind]
+    return f"makes it {_VERBS.get(word, word)}"
 
 
 def robustness_table(found: Robustness) -> str:
@@ -162,35 +186,53 @@ def robustness_table(found: Robustness) -> str:
     kinds = (found.weave, found.capsize, found.infinity, found.heavy_damping)
     rows: list[tuple[str, ...]] = [("relative changes" if found.relative else "changes in weights", "distance", *names)]
     for n in kinds:
-        moves = (f"{n.direction[name]:+.2%}" for name in names) if n.found else ["" for _ in names]
-        rows.append((_robust_row(n, found), _percent(n.distance) if n.found else "none found", *moves))
+        moves = _moves(n, found.relative) if n.found and n.distance else ["" for _ in names]
+        rows.append((_robust_row(n, found), _distance(n, found), *moves))
     rows.append(("weight", "", *(f"{found.weights[name]:.6g}" for name in names)))
     for n in kinds:
         if n.found and n.distance > 0:
-            rows.append((f"at {n.kind}", "", *(f"{n.parameters[name]:.8g}" for name in names)))
+            at = "at" if n.kind == "infinity" else "with"
+            word = in_words_of(found.problem.model, n.kind)
+            rows.append((f"{at} {word}", "", *(f"{n.parameters[name] + 0.0:.8g}" for name in names)))
     if len(names) > _WIDE:
         rows = list(zip(*rows, strict=True))
-    return "\n".join(line.rstrip() for line in [robustness_line(found), "", *columns(rows)])
+    return "\n".join(line.rstrip() for line in [f"robustness: {robustness_line(found)}", "", *columns(rows)])
 
 
 def _robust_row(n: Nearest, found: Robustness) -> str:
+    to = "at the edge of" if n.distance == 0 else "to"
     if n.kind != "heavy damping":
-        return f"to {n.kind}"
-    return "out of heavy damping" if found.heavily_damped else "into heavy damping"
+        return f"{to} {in_words_of(found.problem.model, n.kind)}"
+    return f"{to} {n.kind}" if n.distance == 0 else f"{'out of' if found.heavily_damped else 'into'} {n.kind}"
 
 
-def _mostly(limit: Nearest) -> str:
-    """The parameters that change most, signed."""
+def _distance(n: Nearest, found: Robustness) -> str:
+    if not n.found:
+        return "none found"
+    if n.distance == 0:
+        return ""
+    return _percent(n.distance) if found.relative else f"{n.distance:.4g}"
+
+
+def _moves(n: Nearest, relative: bool) -> list[str]:
+    """The change of each parameter; 0 for what is too little to matter."""
+    largest = max(map(abs, n.direction.values()))
+    shown = (x if abs(x) >= _LITTLE * largest else 0.0 for x in n.direction.values())
+    return ["0" if x == 0 else _percent(x, "+") if relative else f"{x:+.3g}" for x in shown]
+
+
+def _mostly(limit: Nearest, relative: bool) -> str:
+    """The parameters that change most."""
     changes = sorted(limit.direction.items(), key=lambda item: -abs(item[1]))
     largest = abs(changes[0][1])
-    named = [f"{n} {_percent(x, '+')}" for n, x in changes if largest > 0 and abs(x) >= _MAIN * largest]
-    return f" (mostly {', '.join(named)})" if named else ""
+    named = [n for n, x in changes if largest > 0 and abs(x) >= _MAIN * largest]
+    return f", mostly {', '.join(named[:_NAMED])}" if named and len(changes) > 1 else ""
 
 
 def _size(found: Robustness) -> str:
     if found.relative:
-        return f"{_percent(found.limit.distance)} relative change"
-    return f"change of {found.limit.distance:.4g} in weights"
+        return f"{_percent(found.limit.distance)} of change"
+    return f"a change of {found.limit.distance:.2g} in {'your' if found.problem.weights else 'the'} weights"
 
 
 def _percent(x: float, sign: str = "") -> str:

@@ -65,11 +65,11 @@ def backward_error(coefficients: ArrayLike, values: NDArray[np.complex128]) -> A
 
 
 def _scale(monic: Array) -> Array:
-    """Geometric mean of |roots| where no root is 0, else the largest term of the Fujiwara bound."""
+    """Geometric mean of |roots| where no root is 0, else the largest term of the Fujiwara bound; 1 where that is 0."""
     n = monic.shape[-1] - 1
     powers = np.abs(monic[:, 1:]) ** (1 / np.arange(1, n + 1))
     scale = np.where(powers[:, -1] > 0, powers[:, -1], powers.max(axis=-1))
-    return np.where(scale > 0, scale, 1.0)
+    return np.where(scale**n > 0, scale, 1.0)  # whose power may be, as well
 
 
 def _companion_eigenvalues(monic: Array) -> NDArray[np.complex128]:
