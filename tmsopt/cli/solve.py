@@ -2,7 +2,8 @@
 
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -25,16 +26,23 @@ from tmsopt.cli.common import (
 )
 
 if TYPE_CHECKING:
-    from tmsopt import Diagnosis, Explanation, Problem, Robustness, Solution
+    from tmsopt import Problem, Solution
 
 _EXIT = {"optimal": DONE, "infeasible": INFEASIBLE, "not_converged": NOT_CONVERGED}
+
+_CONTRACT = frozenset((
+    "schema", "title", "model", "status", "objective", "parameters", "units", "abscissa", "abscissa_realised", "stable",
+    "any_stable", "roots", "structure", "active", "violations", "bound", "starts", "seconds", "relaxation",
+    "worst_case", "notes", "interrupted",
+))  # fmt: skip
+"""Keys of JSON without --full."""
 
 _SOLVE_EXAMPLES = """
 \b
 Examples:
   tmsopt solve problems/ep4.toml
   tmsopt solve problems/realistic.toml --plot growth.png
-  tmsopt solve problems/realistic.toml --brief
+  tmsopt solve problems/realistic.toml --full
   tmsopt solve problems/realistic.toml --certify 30
   tmsopt solve problems/benchmark.toml --json | python -m json.tool
   tmsopt solve problems/ep4_matching.toml --all
@@ -103,19 +111,14 @@ class _Seconds(click.ParamType[float]):
 @click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write the points of a front.")
 @click.option("--points", type=click.IntRange(min=2), default=None, help="Points of a front. [default: 25]")
 @click.option(
-    "--wheelbase", default="1", show_default=True,
-    help="For SI numbers of a dimensionless problem, in m or with a unit.",
+    "--wheelbase", default=None,
+    help="Of a dimensionless bicycle (tms): show SI beside, for this wheelbase in m or with a unit. [1 if left out]",
 )  # fmt: skip
+@click.option("--rear-mass", default=None, help="Likewise, for this mass m_B of the rear frame, in kg or with a unit.")
 @click.option(
-    "--rear-mass", default="1", show_default=True,
-    help="Likewise, the mass m_B of the rear frame, in kg or with a unit.",
-)  # fmt: skip
-@click.option(
-    "--brief", is_flag=True, help="Leave out what the optimum means: gains of limits moved, rounding, robustness."
-)
-@click.option(
-    "--diagnose", "details", is_flag=True,
-    help="Of multiple roots, show how they split when each parameter changes. JSON has this always, but for --brief.",
+    "--full", is_flag=True,
+    help="All there is to say, each part under its name: every number to 12 digits, gains of limits solved again, "
+    "rounding, robustness, how multiple roots split. JSON has everything then.",
 )  # fmt: skip
 @click.option(
     "--certify", type=_Seconds(), is_flag=False, flag_value=60.0, default=None, metavar="[SECONDS]",
@@ -135,8 +138,8 @@ class _Seconds(click.ParamType[float]):
 @click.pass_context
 def solve(
     context: click.Context, file: Path, as_json: bool, starts: int | None, seed: int, linear_solver: str,
-    plot: Path | None, csv_file: Path | None, points: int | None, wheelbase: str, rear_mass: str, brief: bool,
-    details: bool, certify: float | None, every: bool, seconds: float | None,
+    plot: Path | None, csv_file: Path | None, points: int | None, wheelbase: str | None, rear_mass: str | None,
+    full: bool, certify: float | None, every: bool, seconds: float | None,
 ) -> None:  # fmt: skip
     """Find the best design that the problem FILE asks for, or the front of the best ones."""
     with bad_input():
@@ -144,7 +147,7 @@ def solve(
         from tmsopt.cli.front import write_front
         from tmsopt.design import question_of
 
-        w, m_B = _scale("--wheelbase", wheelbase, "m"), _scale("--rear-mass", rear_mass, "kg")
+        w, m_B = _scale("--wheelbase", wheelbase or "1", "m"), _scale("--rear-mass", rear_mass or "1", "kg")
         check_output("--plot", plot, FIGURES)
         check_output("--csv", csv_file, ("csv",))
         problem = question_of(file, front=True)
@@ -167,19 +170,13 @@ def solve(
             solution = tmsopt.solve(problem, throw=False, **shown, **asked)
         if certify and not solution.interrupted:
             solution = _certified(solution, certify)
-    brief = brief or solution.interrupted
     if as_json:
-        explanation, near, multiple = _meaning(solution, brief, details=False)
-        meaning = {
-            "meaning": explanation and explanation.to_json(),
-            "robustness": near and near.to_json(),
-            "diagnosis": [root.to_json() for root in multiple],
-        }
-        write_json(solution.to_json() | {name: found for name, found in meaning.items() if found})
+        write_json(_as_json(solution, full))
     else:
-        click.echo(tmsopt.report.solution_table(solution, w, m_B))
-        for line in tmsopt.report.meaning_lines(solution, *_meaning(solution, brief, details), details):
-            click.echo(line)
+        si = tmsopt.report.si_parameters(solution, w, m_B) if wheelbase or rear_mass else None
+        with _explaining(full):
+            found = tmsopt.report.findings(solution, full)
+        click.echo(tmsopt.report.design_report(solution, found, full, si))
     if plot is not None:
         _draw(solution, plot, w, m_B)
     sys.exit(INTERRUPTED if solution.interrupted else _EXIT[solution.status])
@@ -193,7 +190,7 @@ def _check_options(problem: "Problem", given: list[str], every: bool) -> None:
     """
     from tmsopt import Fault, InputError
 
-    alone, scaled = ("--certify", "--diagnose"), ("--wheelbase", "--rear-mass")
+    alone, scaled = ("--certify", "--full"), ("--wheelbase", "--rear-mass")
     wrong: dict[str, str] = {}
     if every:
         message = "is for one design, and --all looks for all of them; leave one of the two out"
@@ -208,22 +205,38 @@ def _check_options(problem: "Problem", given: list[str], every: bool) -> None:
     else:
         message = 'is for a front; write pareto = ["abscissa", "Fr"] under [objective], or leave the option out'
         wrong |= dict.fromkeys(("--points", "--csv"), message)
+    if problem.model.name != "tms" or problem.parameter_set.rate is not None:
+        message = "scales a dimensionless bicycle, and the file is not one; leave it out"
+        wrong |= dict.fromkeys(scaled, message)
     if faults := [Fault(wrong[option], (option,)) for option in given if option in wrong]:
         raise InputError(faults)
 
 
-def _meaning(
-    solution: "Solution", brief: bool, details: bool
-) -> "tuple[Explanation | None, Robustness | None, tuple[Diagnosis, ...]]":
-    """What an optimum leans on, how far its boundaries are, and how its multiple roots split, as far as asked for."""
+def _as_json(solution: "Solution", full: bool) -> dict[str, Any]:
+    """The keys of the contract; everything, and what was found out beside, where all is wanted."""
     import tmsopt
 
-    near = not brief and math.isfinite(solution.abscissa) and solution.status != "infeasible"
-    split = (details or not brief) and solution.status == "optimal"
-    return (
-        None if brief else tmsopt.explain(solution), tmsopt.robustness(solution) if near else None,
-        tmsopt.diagnose(solution) if split else (),
-    )  # fmt: skip
+    data = solution.to_json()
+    if not full:
+        return {name: value for name, value in data.items() if name in _CONTRACT}
+    found = tmsopt.report.findings(solution, full)
+    meaning = {
+        "meaning": found.explanation and found.explanation.to_json(),
+        "robustness": found.robustness and found.robustness.to_json(),
+        "diagnosis": [root.to_json() for root in found.diagnoses],
+    }
+    return data | {name: value for name, value in meaning.items() if value}
+
+
+@contextmanager
+def _explaining(full: bool) -> Iterator[None]:
+    """Say what is being done, on a terminal: limits that are moved are solved for again."""
+    shown = full and sys.stderr.isatty()
+    if shown:
+        click.echo("moving each limit that binds, and solving again …", nl=False, err=True)
+    yield
+    if shown:
+        click.echo("\r\033[K", nl=False, err=True)
 
 
 def _solve_all(problem: "Problem", as_json: bool, asked: dict[str, Any]) -> NoReturn:

@@ -177,8 +177,8 @@ def _show_row(asked: "Study", number: int, as_json: bool) -> None:
         solution = {} if solved.solution is None else {"solution": solved.solution.to_json()}
         write_json({"schema": 1, **solved.row.to_json(), **solution})
         return
-    from tmsopt.report import row_lines, solution_table
+    from tmsopt.report import design_report, row_lines
 
     click.echo(row_lines(solved.row))
     if solved.solution is not None:
-        click.echo("\n" + solution_table(solved.solution))
+        click.echo("\n" + design_report(solved.solution))

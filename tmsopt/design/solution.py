@@ -7,7 +7,7 @@ from typing import Any
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Freedom, Problem
 from tmsopt.design.quantities import ROOT_NAMES
-from tmsopt.design.unit_system import unit_of
+from tmsopt.design.unit_system import dimension_of, si_units, unit_of
 from tmsopt.records import Table, plain
 from tmsopt.roots import Root
 from tmsopt.units import Reading
@@ -191,6 +191,15 @@ class Solution:
         bounded = least and self.status == "optimal" and self.bound.value >= 0
         return False if bounded else self.stable_elsewhere
 
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each number that has one, as they are kept and as JSON has them: rad and SI."""
+        units, problem = si_units(self.problem), self.problem
+        limits = {name: dimension_of(problem, name, units).unit for name in problem.constraints}
+        text = problem.minimize or problem.maximize
+        asked = {text: dimension_of(problem, text, units).unit} if text else {}
+        return {name: unit for name, unit in {**units, **limits, **asked}.items() if unit != "1"}
+
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None.
 
@@ -212,7 +221,8 @@ class Solution:
             "objective": {"sense": problem.sense, "expression": text, **plain(self, "value")} | (
                 {"locate": problem.locate} if problem.locate else {}
             ),
-            **plain(self, "parameters abscissa abscissa_realised stable any_stable roots structure"),
+            "parameters": plain(self.parameters), "units": self.units,
+            **plain(self, "abscissa abscissa_realised stable any_stable roots structure"),
             "active": plain(self.active, digits=GAIN_DIGITS), "violations": plain(self.violations, digits=GAIN_DIGITS),
             **plain(self, "bound"), "starts": plain(self.starts, "tried converged at_best"),
             "looked": self.starts.looked, "seconds": round(self.seconds, 4),

@@ -1,7 +1,7 @@
 """A solution in words: its structure, how good it is, and what a reader must be warned of."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -39,7 +39,7 @@ def warnings(solution: Solution) -> tuple[str, ...]:
     problem = solution.problem
     idle = {name: _idle(solution, name) for name in problem.free}
     return (
-        *(_leaning(solution, bound) for bound in _leant_on(solution)),
+        *_leaning(solution, list(_leant_on(solution))),
         *(text for name in problem.free if (text := idle[name])),
         *(text for name in problem.free if not idle[name] for text in _touching(solution, name)),
     )
@@ -82,11 +82,10 @@ def _leant_on(solution: Solution) -> Iterator[str]:
                 yield bound
 
 
-def _leaning(solution: Solution, bound: str) -> str:
-    return (
-        f"the optimum leans on {bound} = {_limit(solution.problem, bound)}: if that bound is arbitrary, widen it; "
-        "if it is real, make that known by a constraint"
-    )
+def _leaning(solution: Solution, bounds: Sequence[str]) -> Iterator[str]:
+    if bounds:
+        named = ", ".join(f"{bound} = {_limit(solution.problem, bound)}" for bound in bounds)
+        yield f"the optimum leans on {named}: widen what is arbitrary, and state what is real as a constraint"
 
 
 def _limit(problem: Problem, bound: str) -> str:

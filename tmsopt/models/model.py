@@ -89,6 +89,7 @@ class Quantity:
             above all of them, if more of the quantity is never an advantage.
         counterpart: what a dimensionless one is in SI, derived from SI parameters.
         aside: whether a report has it in a sentence, and not in its table.
+        share: whether it is a part of a whole, read in percent.
         stands_for: the expression that a name is short for, in root quantities and parameters.
     """
 
@@ -102,6 +103,7 @@ class Quantity:
     pieces: tuple[Formula, ...] = ()
     counterpart: "Quantity | None" = None
     aside: bool = False
+    share: bool = False
     stands_for: str = ""
 
 

@@ -2,14 +2,14 @@
 
 from tmsopt.models import tms
 from tmsopt.paper.compare import Comparison
-from tmsopt.report.design import facts, headline
+from tmsopt.report.design import branch_lines, headline
 from tmsopt.report.text import columns, number
 
 
 def comparison_table(comparison: Comparison) -> str:
     """Law beside number where laws are known, then the two formulations beside each other."""
     design = comparison.design
-    lines = [design.problem.title or "untitled problem", headline(design), ""]
+    lines = [design.problem.title or "untitled problem", *headline(design), ""]
     rows = [("law", "of", "numeric", "law says", "relative", "")]
     for row in comparison.laws:
         verdict = row.reason or ("agrees" if row.agrees else "DIFFERS")
@@ -27,5 +27,5 @@ def comparison_table(comparison: Comparison) -> str:
         names = f"{comparison.other.formulation} minus {design.formulation}"
         rows2 = [("formulations", names)] + [(n, f"{d:.1e}") for n, d in comparison.differences.items()]
         lines += columns(rows2)
-    lines += [line for line in facts(design) if line.startswith("also solved")]
+    lines += branch_lines(design)
     return "\n".join(line.rstrip() for line in lines).rstrip()

@@ -1,17 +1,81 @@
-"""Solutions and comparisons as text for a reader."""
+"""The report of a solution: the answer on one screen, and all the rest on request, in one order."""
 
-from collections.abc import Iterable, Mapping
+import math
+import textwrap
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
-from tmsopt.completeness import Completeness
 from tmsopt.design.solution import Solution
+from tmsopt.design.unit_system import unit_of
+from tmsopt.explanation import Lever
 from tmsopt.models import GRAVITY, tms, to_si
-from tmsopt.report.limits import bound_lines, case_lines, relaxation_lines
-from tmsopt.report.rows import parameter_rows, pitching, quantity_rows
-from tmsopt.report.text import columns, number
-from tmsopt.roots import Root
-from tmsopt.solver.all_designs import Coverage, Every
+from tmsopt.report.explanation import (
+    diagnosis_lines,
+    optimality_lines,
+    robustness_line,
+    robustness_table,
+    rounding_line,
+    rounding_rows,
+)
+from tmsopt.report.findings import Findings
+from tmsopt.report.infeasible import infeasible_lines
+from tmsopt.report.limits import bound_lines, case_lines, limit_text, proof_line
+from tmsopt.report.rows import ALL, loads, motion, parameter_rows, pitching, quantity_rows, role, roots_of
+from tmsopt.report.speeds import range_line
+from tmsopt.report.text import columns
+from tmsopt.roots.patterns.descriptions import in_words
 
+WIDTH, HEIGHT = 100, 30
+"""Columns of every line; lines of the report, if not full."""
+
+_DIGITS = 5
+_ROWS = 8  # of free parameters one below the other
+_APART = ("design", "motion", "limits", "robustness")
+"""Parts with an empty line before them, where there is room."""
+
+_MORE = "more: --full; then tmsopt prove, compare, speeds, chart, trace with the same file"
 _ASKED = {"a0": "must not be 0", "coefficients": "must have values"}
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the report.
+
+    Attributes:
+        name: under which the full report has it.
+        lines: on one screen.
+        rest: what the full report has below its lines, or in place of them where it `replaces` them.
+        least: lines that stay where there is not room for all.
+    """
+
+    name: str
+    lines: list[str]
+    rest: tuple[str, ...] = ()
+    replaces: bool = False
+    least: int = 1
+
+
+def design_report(
+    solution: Solution, found: Findings | None = None, full: bool = False, si: Mapping[str, float] | None = None
+) -> str:
+    """A design: how it ended, parameters, motion, loads, limits, warnings, robustness, rounding, proof.
+
+    Args:
+        found: what there is to say beside; nothing of it by default.
+        full: all the rest as well, each part under its name.
+        si: parameters in SI for a dimensionless problem, such as `si_parameters` gives; then shown beside.
+    """
+    found = found or Findings()
+    scaled = si or si_parameters(solution)
+    parts = [p for p in _parts(solution, found, scaled, beside=si is not None) if p.lines or (full and p.rest)]
+    title = _wrapped([solution.problem.title or "untitled problem"])[0]
+    if full:
+        return "\n".join([title, *(line for part in parts for line in _named(part))])
+    blocks = {part.name: _wrapped(part.lines) for part in _fitted(parts)}
+    room = HEIGHT - 2 - sum(map(len, blocks.values()))
+    apart = [name for name in _APART if name in blocks][: max(room, 0)]
+    lines = [line for name, block in blocks.items() for line in ([""] if name in apart else []) + block]
+    return "\n".join(line.rstrip() for line in [title, *lines, _MORE])
 
 
 def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> Mapping[str, float]:
@@ -20,134 +84,195 @@ def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float
     return solution.parameters if own else to_si(solution.dimensionless, w, m_B, g)
 
 
-def solution_table(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> str:
-    """A design with its roots, bound, limits and remarks; of skates, dimensionless and in SI side by side."""
-    lines = [solution.problem.title or "untitled problem", headline(solution), ""]
-    si = si_parameters(solution, w, m_B, g)
-    lines += [*columns(parameter_rows(solution, si)), "", *columns(quantity_rows(solution, si)), ""]
-    if "load_rear" in solution.quantities:
-        lines.append(pitching(solution, si))
-    lines += facts(solution)
-    return "\n".join(line.rstrip() for line in lines).rstrip()
-
-
-def every_table(every: Every) -> str:
-    """All designs with a pattern, one column each, and what the proof or the search says about others."""
-    found, coverage, proof = every.solutions, every.coverage, every.completeness
-    known = proof is not None and proof.complete
-    many = f"{len(found)} solution{'' if len(found) == 1 else 's'}"
-    effort = f"{proof.boxes} boxes, {proof.seconds:.2g} s" if proof else ""
-    if not found:
-        none = f"no design in the box has the pattern (proved; {effort})"
-        lines = [none if known else "no single solution was met"]
-    else:
-        problem = found[0].problem
-        names = [n for n in found[0].parameters if n in problem.free]
-        rows = [("", *(str(k) for k in range(1, len(found) + 1)))]
-        rows += [(n, *(number(s.parameters[n]) for s in found)) for n in names]
-        rows += [("abscissa", *(number(s.abscissa) for s in found)), ("structure", *(s.structure for s in found))]
-        rows += [("met", *(str(h) for h in coverage.hits))] if coverage else []
-        rows += [("proved", *("yes" if p else "no" for p in every.proved))] if any(every.proved) and not known else []
-        all_of_them = f"these are all: {many} in the box (proved; {effort})"
-        lines = [problem.title or "untitled problem", f"locate {problem.locate}: {all_of_them if known else many}"]
-        lines[-1] += "" if known else " in the box"
-        lines += ["", *columns(rows), ""]
-    lines += _proof_lines(proof, effort) if proof else []
-    lines += _search_lines(coverage) if coverage else []
-    return "\n".join(line.rstrip() for line in lines).rstrip()
-
-
-def _proof_lines(proof: Completeness, effort: str) -> list[str]:
-    lines = [
-        f"solution {k} lies on a limit, {limit}, as far as 25 digits tell: it may be just beyond"
-        for k, limit in enumerate(proof.limits, start=1)
-        if limit
-    ]
-    if proof.complete:
-        return lines
-    many = f"; {len(proof.designs)} proved" if proof.designs else ""
-    lines.append(f"proof that these are all: none, {proof.reason}{f' ({effort}{many})' if proof.boxes else ''}")
-    for place in proof.undecided:
-        at = ", ".join(f"{n} {number(lo)} … {number(hi)}" for n, (lo, hi) in place.ranges.items())
-        lines.append(f"  undecided: {at}")
-    return lines
-
-
-def _search_lines(coverage: Coverage) -> list[str]:
-    doubt = (
-        f"; {coverage.singular} ended at designs with the pattern where its equations are singular: one of a "
-        "continuum of solutions, or one where two meet (tmsopt solve shows one)"
-        if coverage.singular
-        else ""
+def _parts(solution: Solution, found: Findings, si: Mapping[str, float], beside: bool) -> Iterator[Part]:
+    """In the order of the report."""
+    yield Part("answer", [*headline(solution), *(f"note: {n}" for n in solution.notes)], least=2)
+    if solution.status == "infeasible":
+        violated = _violated(solution)
+        rest = (*violated, *infeasible_lines(solution, full=True))
+        yield Part("conflict", violated + infeasible_lines(solution, full=False), rest, replaces=True, least=3)
+    yield Part("design", _design(solution, si if beside else None), tuple(columns(parameter_rows(solution, si))),
+               replaces=True, least=3)  # fmt: skip
+    yield Part(
+        "motion", _motion(solution, found), (*_stored(solution), *columns(quantity_rows(solution, si) or [("",)]))
     )
-    return [
-        f"coverage of a search: {coverage.starts} starts over the box{doubt}; "
-        f"{coverage.expected:.2f} solutions to be expected in all; "
-        f"the chance that one more start finds another is below {coverage.chance:.2g} (95 % confidence; no proof)"
-    ]
+    if "load_rear" in solution.quantities:
+        yield Part("loads", [f"{loads(solution)}; {pitching(solution, si)}"])
+    yield Part("cases", case_lines(solution))
+    explained = found.explanation
+    if explained is not None and explained.levers:
+        head = "limits that bind, and what moving each a little further buys (first order):"
+        yield Part("limits", [head, *columns([_lever(solution, lever) for lever in explained.levers])],
+                   tuple(lever.sentence for lever in explained.levers), least=3)  # fmt: skip
+    if explained is not None:
+        yield Part("warnings", [f"warning: {text}" for text in explained.warnings])
+    if found.robustness is not None:
+        yield Part("robustness", [f"robustness: {robustness_line(found.robustness)}"],
+                   tuple(robustness_table(found.robustness).splitlines()[2:]))  # fmt: skip
+    if explained is not None and explained.precision:
+        yield Part("rounding", [f"rounding: {rounding_line(explained)}"], tuple(columns(rounding_rows(explained))))
+    local = () if explained is None else optimality_lines(explained.optimality)
+    yield Part("proof", [proof_line(solution)], (*bound_lines(solution), *local))
+    yield Part("roots", [], tuple(diagnosis_lines(found.diagnoses, details=True)))
+    yield Part("search", [], tuple(_search(solution)))
 
 
-def headline(solution: Solution) -> str:
+def headline(solution: Solution) -> list[str]:
+    """What was asked and how it ended: two lines at most, in words."""
     problem = solution.problem
     text = problem.minimize or problem.maximize
-    asked = f"{problem.sense} {text} = {number(solution.value)}" if text else ""
+    value = unit_of(problem, text).show(solution.value, 8) if text else ""
     located = f"locate {problem.locate}" if problem.locate else ""
-    by = f" to {solution.bound.gap:.0e}" if solution.bound.solver else ""
-    proven = f", proven globally{by}" if solution.bound.proven else ""
-    words = solution.status.replace("_", " ")
-    if solution.status == "infeasible":
-        proven = ", proven" if solution.bound.proven else ""
-    parts = (f"{words}{proven}", stability(solution), located, asked, f"structure {solution.structure}")
-    return "   ".join(part for part in parts if part)
+    asked = f"{problem.sense} {text.strip()}" + (f" = {value}" if math.isfinite(solution.value) else "") if text else ""
+    structure = in_words(solution.structure, problem.model.degree)
+    told = ": ".join(part for part in (_ended(solution), stability(solution)) if part)
+    return [told, "; ".join(part for part in (located, asked, structure) if part)]
+
+
+def _ended(solution: Solution) -> str:
+    problem, bound = solution.problem, solution.bound
+    if solution.interrupted:
+        return "stopped before the end, the best design so far"
+    proved = ", proved" if bound.proven else ""
+    words = {
+        "infeasible": f"infeasible{'' if problem.free else ' as given'}{proved}",
+        "not_converged": "not converged, so a better design may be near",
+    }
+    if solution.status in words:
+        return words[solution.status]
+    if problem.objective is None:
+        return "found" if problem.free else "as given"
+    return f"optimal{proved or f', the best of {solution.starts.tried} starts'}"
 
 
 def stability(solution: Solution) -> str:
-    """Of a design that is not stable though that was looked for: whether any is."""
+    """Whether the design is stable; of one that is not though that was looked for, whether any is."""
     problem, known = solution.problem, solution.any_stable
-    if solution.stable is not False or not (known is False or solution.stability_sought):
-        return ""
-    if known is None:
-        return "no stable design found, not proved"
+    if solution.stable is not False:
+        return "" if solution.stable is None else "stable"
+    if known is False:
+        limited = problem.locate or len(problem.constraints) > len(problem.asked_of_roots)
+        return f"no design in the box is stable (proved){' under its constraints' if limited else ''}"
+    if not solution.stability_sought:
+        return "not stable"
     if known:
         return "not stable, though there are stable designs in the box"
-    limited = problem.locate or len(problem.constraints) > len(problem.asked_of_roots)
-    return f"no design in the box is stable (proved){' under its constraints' if limited else ''}"
+    return "not stable" if solution.interrupted else "no stable design found, not proved"
 
 
-def facts(solution: Solution) -> list[str]:
-    lines = ["roots: " + (", ".join(_roots(solution.roots)) or "none")]
-    lines += bound_lines(solution)
-    lines += case_lines(solution)
-    free = solution.freedom
-    if solution.problem.locate:
+def _violated(solution: Solution) -> list[str]:
+    problem, lines = solution.problem, []
+    for name, value in solution.violations.items():
+        asked = limit_text(problem, name) or ("pattern" if name == problem.locate else _ASKED.get(name, ""))
+        by = f" by {unit_of(problem, name).show(value, 4)}" if math.isfinite(value) else ", which has no value"
+        lines.append(f"violated: {name} ({asked}){by if name not in _ASKED else ''}")
+    return lines
+
+
+def _design(solution: Solution, si: Mapping[str, float] | None) -> list[str]:
+    """Free parameters one a row, or side by side where they are many; the others in a sentence."""
+    problem, of = solution.problem, solution.problem.parameter_set
+    shown = {p.name: unit_of(problem, p.name).show(solution.parameters[p.name], _DIGITS) for p in of.parameters}
+    free = [p for p in of.parameters if p.name in problem.free]
+    full = parameter_rows(solution, si) if si is not None else []
+    other = {row[0]: f"{row[4]} = {float(row[5]):.{_DIGITS}g} {row[6]}".rstrip() for row in full if row[4]}
+    cells = [(p.name, shown[p.name], other.get(p.name, "")) for p in free]
+    height = max(_ROWS, math.ceil(len(cells) / 3))
+    blocks = [columns(cells[k : k + height]) for k in range(0, len(cells), height)]
+    rows = (
+        ["".join(block[k] if k < len(block) else "" for block in blocks).rstrip() for k in range(len(blocks[0]))]
+        if blocks
+        else []
+    )
+    rest = [
+        f"{p.name} = {shown[p.name]}" for p in of.parameters
+        if role(solution, p.name) == "fixed" and not solution.parameters[p.name] == 0 == p.default
+    ]  # fmt: skip
+    most = 14
+    more = f", and {len(rest) - most} more" if len(rest) > most else ""
+    return rows + ([f"fixed: {', '.join(rest[:most])}{more}"] if rest else [])
+
+
+def _motion(solution: Solution, found: Findings) -> list[str]:
+    on_edge = found.robustness is not None and found.robustness.edges
+    lines = [motion(solution, bool(on_edge))]
+    roots = ", ".join(roots_of(solution.roots, _DIGITS)) or "none"
+    unit = unit_of(solution.problem, "abscissa").text
+    if found.speeds is not None:
+        lines.append(range_line(found.speeds, solution))
+    return [*lines, f"roots: {roots}{f'  in {unit}' if unit else ''}"]
+
+
+def _stored(solution: Solution) -> Iterator[str]:
+    """To all digits: the abscissa, and that of the numbers as they are stored."""
+    unit = unit_of(solution.problem, "abscissa")
+    yield f"abscissa {unit.show(solution.abscissa, ALL)}; of the parameters as rounded to doubles "\
+          f"{unit.number(solution.abscissa_realised, ALL)}"  # fmt: skip
+    yield "roots: " + (", ".join(roots_of(solution.roots, ALL)) or "none")
+
+
+def _lever(solution: Solution, lever: Lever) -> tuple[str, ...]:
+    limit = limit_text(solution.problem, lever.name)
+    if not lever.step:
+        return f"{lever.name}:", limit, "a physical end", ""
+    step = unit_of(solution.problem, lever.name).show(abs(lever.step), 4)
+    return f"{lever.name}:", limit, f"by {step}", f"buys {lever.gained.show(lever.predicted, 3)}"
+
+
+def _search(solution: Solution) -> Iterator[str]:
+    free, starts, problem = solution.freedom, solution.starts, solution.problem
+    if problem.locate:
         parameters = "parameter" if free.free == 1 else "parameters"
         conditions = "condition" if free.conditions == 1 else "conditions"
-        lines.append(f"freedom: {free.kind}, {free.free} free {parameters} and {free.conditions} {conditions}")
-    if solution.active:
-        gains = ", ".join(f"{name} ({value:.4g})" for name, value in solution.active.items())
-        lines.append(f"limits that bind (gain per unit relaxed): {gains}")
-    for name, value in solution.violations.items():
-        asked = "pattern" if name == solution.problem.locate else _ASKED.get(name, "")
-        text = solution.problem.constraints.get(name, asked)
-        lines.append(f"violated: {name} ({text}) by {value:.4g}")
-    lines += relaxation_lines(solution)
+        yield f"freedom: {free.kind}, {free.free} free {parameters} and {free.conditions} {conditions}"
+    yield from branch_lines(solution)
+    if starts.tried:
+        looked = f"; {starts.looked} designs looked at" if starts.looked else ""
+        tried = f"starts: {starts.tried} tried, {starts.converged} converged, {starts.at_best} at the best"
+        yield f"{tried}{looked}; {solution.seconds:.2f} s"
+
+
+def branch_lines(solution: Solution) -> list[str]:
+    """Other designs that solve the same equations, and what excludes them."""
+    problem, lines = solution.problem, []
     for branch in solution.branches:
-        where = ", ".join(f"{n} = {branch.parameters[n]:.10g}" for n in solution.problem.free)
+        where = ", ".join(f"{n} = {unit_of(problem, n).show(branch.parameters[n], ALL)}" for n in problem.free)
         lines.append(f"also solved by {where}; excluded by {', '.join(branch.excluded_by) or 'nothing'}")
-    if solution.starts.tried:
-        s = solution.starts
-        looked = f"; {s.looked} designs looked at" if s.looked else ""
-        tried = f"starts: {s.tried} tried, {s.converged} converged, {s.at_best} at the best"
-        lines.append(f"{tried}{looked}; {solution.seconds:.2f} s")
-    return [*lines, *(f"note: {note}" for note in solution.notes)]
+    return lines
 
 
-def _roots(roots: Iterable[Root]) -> list[str]:
-    """Roots as text, a conjugate pair as one entry."""
-    words = []
-    for root in roots:
-        if root.im < 0:
-            continue
-        value = f"{root.re:.8g}" + (f" ± {root.im:.8g}i" if root.im else "")
-        words.append(value + (f" ({root.multiplicity}-fold)" if root.multiplicity > 1 else ""))
-    return words
+def _named(part: Part) -> list[str]:
+    """A part of the full report, under its name."""
+    lines = ([] if part.replaces else part.lines) + list(part.rest)
+    return ["", part.name, "-" * len(part.name), *(line.rstrip() for line in lines)]
+
+
+def _wrapped(lines: list[str]) -> list[str]:
+    """Lines of `WIDTH` at most; rows of a table are cut."""
+    found = []
+    for line in lines:
+        if line.startswith("  "):
+            found.append(line if len(line) <= WIDTH else f"{line[: WIDTH - 1]}…")
+        else:
+            found += textwrap.wrap(line, WIDTH, subsequent_indent="  ", break_on_hyphens=False) or [""]
+    return found
+
+
+def _fitted(parts: list[Part]) -> list[Part]:
+    """Parts that fit the screen: the last lines of those that may be shorter are left out, and counted."""
+    cut = {part.name: len(part.lines) for part in parts}
+
+    def shown(part: Part) -> Part:
+        kept = cut[part.name]
+        if kept == len(part.lines):
+            return part
+        return Part(part.name, [*part.lines[:kept], f"  … {len(part.lines) - kept} more {part.name}: --full"])
+
+    def height() -> int:
+        return 2 + sum(len(_wrapped(shown(part).lines)) for part in parts)
+
+    for name in ("warnings", "limits", "answer", "conflict", "design"):
+        part = next((p for p in parts if p.name == name), None)
+        while part is not None and height() > HEIGHT and cut[name] > part.least:
+            cut[name] -= 1
+    return [shown(part) for part in parts]

@@ -1,9 +1,8 @@
 """What an optimum means, how its multiple roots split, and how far its boundaries are, as lines for a reader."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
-from tmsopt.design.solution import Solution
 from tmsopt.diagnosis.diagnosis import Diagnosis
 from tmsopt.diagnosis.splitting import DEVIATION, Law, Response
 from tmsopt.explanation.explain import Explanation
@@ -26,20 +25,6 @@ _VERBS = {"divergence": "diverge"}
 _ROUNDING = 1e-16
 
 
-def meaning_lines(
-    solution: Solution, explanation: Explanation | None, robustness: Robustness | None, diagnoses: Sequence[Diagnosis],
-    details: bool = False,
-) -> Iterator[str]:  # fmt: skip
-    """What was found out about a solution; nothing of what was not asked for."""
-    if explanation:
-        yield from ["", *explained_lines(explanation)]
-    if robustness:
-        nominal = "of the nominal design, without its scenarios and tolerances:\n" if solution.worst else ""
-        yield "\n" + nominal + robustness_table(robustness)
-    if lines := diagnosis_lines(diagnoses, details):
-        yield from ["", *lines]
-
-
 def explained_lines(explanation: Explanation) -> list[str]:
     """Summary, local optimality, levers, rounding, precision and warnings."""
     lines = [f"meaning: {explanation.summary}", *optimality_lines(explanation.optimality)]
@@ -49,7 +34,7 @@ def explained_lines(explanation: Explanation) -> list[str]:
         lines += [f"  {lever.sentence}" for lever in explanation.levers]
     if explanation.precision:
         lines.append("")
-        lines += columns(_rows(explanation))
+        lines += columns(rounding_rows(explanation))
     if explanation.worst:
         lines.append(f"rounding {explanation.worst} alone to {ALONE} digits costs most")
     return [line.rstrip() for line in lines]
@@ -73,7 +58,7 @@ def _root_line(root: OnLine) -> str:
     return f"  {place}{times}{share} multiplier of beta {root.beta:.4g}{kappa}"
 
 
-def _rows(explanation: Explanation) -> list[Sequence[str]]:
+def rounding_rows(explanation: Explanation) -> list[Sequence[str]]:
     rows: list[Sequence[str]] = [("rounded", "to", "abscissa", "loses", "damping_ratio", "violates")]
     rows += [_row(f"{name} alone", row.written[name], row) for name, row in explanation.rounding.items()]
     return rows + [_row("all", f"{row.digits} digits", row) for row in explanation.precision]
@@ -149,6 +134,10 @@ def _diagnosis_row(response: Response, law: Law) -> tuple[str, ...]:
 
 def _change(response: Response) -> str:
     return "relative" if response.relative else "absolute"
+
+
+def rounding_line(explanation: Explanation) -> str:
+    return "?"
 
 
 def robustness_line(found: Robustness) -> str:

@@ -3,11 +3,12 @@
 import math
 
 from tmsopt.design.cases import Case
+from tmsopt.design.expression import written_sides
+from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
-from tmsopt.models import ParameterSet
+from tmsopt.design.unit_system import unit_of
 from tmsopt.report.text import number
-from tmsopt.units import reading
 
 
 def bound_lines(solution: Solution) -> list[str]:
@@ -29,15 +30,72 @@ def bound_lines(solution: Solution) -> list[str]:
     return lines
 
 
+def limit_text(problem: Problem, name: str) -> str:
+    """A limit with its number in the unit in which the problem was written; empty for what is none."""
+    parameter, _, end = name.rpartition(".")
+    if name not in problem.constraints:
+        known = parameter in problem.free and end in ("min", "max")
+        return (
+            f"{'>=' if end == 'min' else '<='} {unit_of(problem, name).show(problem.free[parameter][end == 'max'], 6)}"
+            if known
+            else ""
+        )
+    text, unit = problem.constraints[name], unit_of(problem, name)
+    value = limit_of(text)
+    if value is None or not unit.text:
+        return text
+    left, sign, right = written_sides(text)
+    shown = unit.show(value, 9)
+    return f"{left} {sign} {shown}" if _is_number(right) else f"{shown} {sign} {right}"
+
+
+def _is_number(side: str) -> bool:
+    try:
+        float("".join(side.split()))
+    except ValueError:
+        return False
+    return True
+
+
+def proof_line(solution: Solution) -> str:
+    """Whether it is proved that none is better, in one line, and how to go on where it is not."""
+    bound, problem = solution.bound, solution.problem
+    text = (problem.minimize or problem.maximize or "").strip()
+    if solution.status == "infeasible":
+        return (
+            "proof: no design in the box meets all limits"
+            if bound.proven
+            else "proof: none that no design is feasible; --certify looks for one"
+        )
+    if not problem.free:
+        return "proof: nothing is free, so nothing to prove; tmsopt prove proves the roots"
+    if not text:
+        return "proof: tmsopt prove FILE proves that this design exists"
+    unit = unit_of(problem, text)
+    side = "above" if problem.sense == "maximize" else "below"
+    if bound.proven:
+        by = f" by more than {bound.gap:.1e}" if bound.tolerance else ""
+        faster = "decays faster" if solution.abscissa < 0 else "grows more slowly"
+        better = (
+            faster
+            if text == "abscissa" and problem.sense == "minimize"
+            else f"has a {'greater' if side == 'above' else 'lesser'} {text}"
+        )
+        return f"proof: no design in the box {better}{by} ({bound.method})"
+    if math.isfinite(bound.value):
+        gap = f"which leaves {unit.show(bound.gap, 2)} open; --certify closes it, or finds better"
+        return f"proof: none has {text} {side} {unit.show(bound.value, 6)} ({bound.method}), {gap}"
+    return "proof: none that this is the best; --certify proves it, or finds better"
+
+
 def case_lines(solution: Solution) -> list[str]:
     """The worst case, and what is known of all of them."""
     if solution.worst is None:
         return []
-    of = solution.problem.parameter_set
-    lines = [f"worst case: {_place(of, solution.worst)}; abscissa, roots and structure are those there"]
+    of = solution.problem
+    lines = [f"worst case: {_place(of, solution.worst)}; motion and roots are those there, the rest nominal"]
     if solution.least_damped is not None and solution.least_damped != solution.worst:
         lines.append(f"least damped case: {_place(of, solution.least_damped)}; the damping ratio is that there")
-    lines.append("parameters, loads and the other quantities are those of the nominal design")
     cover = solution.cover
     if cover is not None:
         means = f"by interval arithmetic on {cover.boxes} boxes" if cover.proven else "looked for, not proven"
@@ -45,7 +103,7 @@ def case_lines(solution: Solution) -> list[str]:
     return lines
 
 
-def _place(of: ParameterSet, case: Case) -> str:
+def _place(of: Problem, case: Case) -> str:
     """Values of scenarios and errors of parameters in a case."""
     at = [f"{n} = {_short(of, n, v)}" for n, v in case.at.items()]
     at += [f"{n} {'+' if v >= 0 else '−'} {_short(of, n, abs(v))}" for n, v in case.offset.items()]
@@ -72,11 +130,11 @@ def _move(problem: Problem, name: str, amount: float) -> str:
         return f"{name} ({problem.constraints.get(name, name)}), which has no value there"
     parameter, _, end = name.partition(".")
     if name in problem.constraints or parameter not in problem.free:
-        return f"{name} ({problem.constraints.get(name, name)}) by {_up(amount)}"
-    of = problem.parameter_set
-    value, unit = reading(amount, of[parameter].unit)
+        unit = unit_of(problem, name)
+        return f"{name} ({limit_text(problem, name) or name}) by {_up(amount / unit.one)} {unit.text}".rstrip()
+    unit = unit_of(problem, name)
     direction = "up" if end == "max" else "down"
-    return f"{name} {direction} by {_up(value)}{'' if unit == '1' else ' ' + unit}"
+    return f"{name} {direction} by {_up(amount / unit.one)} {unit.text}".rstrip()
 
 
 def _up(amount: float) -> str:
@@ -87,6 +145,5 @@ def _up(amount: float) -> str:
     return f"{math.copysign(math.ceil(abs(amount) / step) * step, amount):.6g}"
 
 
-def _short(of: ParameterSet, name: str, value: float) -> str:
-    number_, unit = reading(value, of[name].unit)
-    return f"{number_:.9g}{'' if unit == '1' else ' ' + unit}"
+def _short(problem: Problem, name: str, value: float) -> str:
+    return unit_of(problem, name).show(value, 6)

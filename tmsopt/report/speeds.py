@@ -5,6 +5,8 @@ from collections.abc import Iterator, Sequence
 
 from tmsopt.critical_speeds.crossings import Crossing
 from tmsopt.critical_speeds.speeds import Speeds
+from tmsopt.design.solution import Solution
+from tmsopt.design.unit_system import unit_of
 from tmsopt.report.text import columns
 from tmsopt.units import reading
 
@@ -89,3 +91,23 @@ def _bands(found: Speeds, bands: Sequence[tuple[float, float]]) -> str:
     unit = found.problem.parameter_set[found.parameter].unit
     text = ", ".join(words) or "nowhere"
     return text if unit == "1" or text in ("nowhere", "everywhere") else f"{text} {unit}"
+
+
+def range_line(found: Speeds, solution: Solution) -> str:
+    """In one line: the range of speed in which a design is stable, and its own speed."""
+    name = found.parameter
+    unit = unit_of(solution.problem, name)
+    bands = [
+        " ".join(
+            part
+            for part in (
+                f"from {unit.number(low)}" if low > found.lower else "",
+                f"to {unit.number(high)}" if high < found.upper else "",
+            )
+            if part
+        )
+        or "everywhere"
+        for low, high in found.stable
+    ]
+    where = f"{', '.join(bands)}{f' {unit.text}' if unit.text and bands != ['everywhere'] else ''}" or "nowhere"
+    return f"stable in {name}: {where or 'nowhere'}; this design at {unit.show(solution.parameters[name])}"

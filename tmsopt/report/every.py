@@ -1,0 +1,61 @@
+"""All designs with a pattern as text for a reader."""
+
+from tmsopt.completeness import Completeness
+from tmsopt.report.text import columns, number
+from tmsopt.solver.all_designs import Coverage, Every
+
+
+def every_table(every: Every) -> str:
+    """All designs with a pattern, one column each, and what the proof or the search says about others."""
+    found, coverage, proof = every.solutions, every.coverage, every.completeness
+    known = proof is not None and proof.complete
+    many = f"{len(found)} solution{'' if len(found) == 1 else 's'}"
+    effort = f"{proof.boxes} boxes, {proof.seconds:.2g} s" if proof else ""
+    if not found:
+        none = f"no design in the box has the pattern (proved; {effort})"
+        lines = [none if known else "no single solution was met"]
+    else:
+        problem = found[0].problem
+        names = [n for n in found[0].parameters if n in problem.free]
+        rows = [("", *(str(k) for k in range(1, len(found) + 1)))]
+        rows += [(n, *(number(s.parameters[n]) for s in found)) for n in names]
+        rows += [("abscissa", *(number(s.abscissa) for s in found)), ("structure", *(s.structure for s in found))]
+        rows += [("met", *(str(h) for h in coverage.hits))] if coverage else []
+        rows += [("proved", *("yes" if p else "no" for p in every.proved))] if any(every.proved) and not known else []
+        all_of_them = f"these are all: {many} in the box (proved; {effort})"
+        lines = [problem.title or "untitled problem", f"locate {problem.locate}: {all_of_them if known else many}"]
+        lines[-1] += "" if known else " in the box"
+        lines += ["", *columns(rows), ""]
+    lines += _proof_lines(proof, effort) if proof else []
+    lines += _search_lines(coverage) if coverage else []
+    return "\n".join(line.rstrip() for line in lines).rstrip()
+
+
+def _proof_lines(proof: Completeness, effort: str) -> list[str]:
+    lines = [
+        f"solution {k} lies on a limit, {limit}, as far as 25 digits tell: it may be just beyond"
+        for k, limit in enumerate(proof.limits, start=1)
+        if limit
+    ]
+    if proof.complete:
+        return lines
+    many = f"; {len(proof.designs)} proved" if proof.designs else ""
+    lines.append(f"proof that these are all: none, {proof.reason}{f' ({effort}{many})' if proof.boxes else ''}")
+    for place in proof.undecided:
+        at = ", ".join(f"{n} {number(lo)} … {number(hi)}" for n, (lo, hi) in place.ranges.items())
+        lines.append(f"  undecided: {at}")
+    return lines
+
+
+def _search_lines(coverage: Coverage) -> list[str]:
+    doubt = (
+        f"; {coverage.singular} ended at designs with the pattern where its equations are singular: one of a "
+        "continuum of solutions, or one where two meet (tmsopt solve shows one)"
+        if coverage.singular
+        else ""
+    )
+    return [
+        f"coverage of a search: {coverage.starts} starts over the box{doubt}; "
+        f"{coverage.expected:.2f} solutions to be expected in all; "
+        f"the chance that one more start finds another is below {coverage.chance:.2g} (95 % confidence; no proof)"
+    ]
