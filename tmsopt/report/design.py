@@ -29,6 +29,8 @@ WIDTH, HEIGHT = 100, 30
 """Columns of every line; lines of the report, if not full."""
 
 _DIGITS = 5
+_KEPT = "\xa0"  # a space where no line is broken
+_ROUNDING = 1e-15  # of a range
 _ROWS = 8  # of free parameters one below the other
 _APART = ("design", "motion", "limits", "robustness")
 """Parts with an empty line before them, where there is room."""
@@ -86,7 +88,8 @@ def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float
 
 def _parts(solution: Solution, found: Findings, si: Mapping[str, float], beside: bool) -> Iterator[Part]:
     """In the order of the report."""
-    yield Part("answer", [*headline(solution), *(f"note: {n}" for n in solution.notes)], least=2)
+    edge = found.robustness is not None and bool(found.robustness.edges)
+    yield Part("answer", [*headline(solution, edge), *(f"note: {n}" for n in solution.notes)], least=2)
     if solution.status == "infeasible":
         violated = _violated(solution)
         rest = (*violated, *infeasible_lines(solution, full=True))
@@ -117,7 +120,7 @@ def _parts(solution: Solution, found: Findings, si: Mapping[str, float], beside:
     yield Part("search", [], tuple(_search(solution)))
 
 
-def headline(solution: Solution) -> list[str]:
+def headline(solution: Solution, on_edge: bool = False) -> list[str]:
     """What was asked and how it ended: two lines at most, in words."""
     problem = solution.problem
     text = problem.minimize or problem.maximize
@@ -125,7 +128,7 @@ def headline(solution: Solution) -> list[str]:
     located = f"locate {problem.locate}" if problem.locate else ""
     asked = f"{problem.sense} {text.strip()}" + (f" = {value}" if math.isfinite(solution.value) else "") if text else ""
     structure = in_words(solution.structure, problem.model.degree)
-    told = ": ".join(part for part in (_ended(solution), stability(solution)) if part)
+    told = ": ".join(part for part in (_ended(solution), stability(solution, on_edge)) if part)
     return [told, "; ".join(part for part in (located, asked, structure) if part)]
 
 
@@ -145,11 +148,13 @@ def _ended(solution: Solution) -> str:
     return f"optimal{proved or f', the best of {solution.starts.tried} starts'}"
 
 
-def stability(solution: Solution) -> str:
+def stability(solution: Solution, on_edge: bool = False) -> str:
     """Whether the design is stable; of one that is not though that was looked for, whether any is."""
     problem, known = solution.problem, solution.any_stable
     if solution.stable is not False:
         return "" if solution.stable is None else "stable"
+    if on_edge:
+        return "on the edge of stability, as far as rounding tells"
     if known is False:
         limited = problem.locate or len(problem.constraints) > len(problem.asked_of_roots)
         return f"no design in the box is stable (proved){' under its constraints' if limited else ''}"
@@ -172,7 +177,7 @@ def _violated(solution: Solution) -> list[str]:
 def _design(solution: Solution, si: Mapping[str, float] | None) -> list[str]:
     """Free parameters one a row, or side by side where they are many; the others in a sentence."""
     problem, of = solution.problem, solution.problem.parameter_set
-    shown = {p.name: unit_of(problem, p.name).show(solution.parameters[p.name], _DIGITS) for p in of.parameters}
+    shown = {p.name: unit_of(problem, p.name).show(_tidy(solution, p.name), _DIGITS) for p in of.parameters}
     free = [p for p in of.parameters if p.name in problem.free]
     full = parameter_rows(solution, si) if si is not None else []
     other = {row[0]: f"{row[4]} = {float(row[5]):.{_DIGITS}g} {row[6]}".rstrip() for row in full if row[4]}
@@ -185,12 +190,18 @@ def _design(solution: Solution, si: Mapping[str, float] | None) -> list[str]:
         else []
     )
     rest = [
-        f"{p.name} = {shown[p.name]}" for p in of.parameters
+        f"{p.name} = {shown[p.name]}".replace(" ", _KEPT) for p in of.parameters
         if role(solution, p.name) == "fixed" and not solution.parameters[p.name] == 0 == p.default
     ]  # fmt: skip
     most = 14
     more = f", and {len(rest) - most} more" if len(rest) > most else ""
     return rows + ([f"fixed: {', '.join(rest[:most])}{more}"] if rest else [])
+
+
+def _tidy(solution: Solution, name: str) -> float:
+    """A parameter; 0 where it differs from that by less than a rounding of its range."""
+    x, (lower, upper) = solution.parameters[name], solution.problem.free.get(name, (0.0, 0.0))
+    return 0.0 if abs(x) <= _ROUNDING * (upper - lower) else x
 
 
 def _motion(solution: Solution, found: Findings) -> list[str]:
@@ -254,7 +265,8 @@ def _wrapped(lines: list[str]) -> list[str]:
         if line.startswith("  "):
             found.append(line if len(line) <= WIDTH else f"{line[: WIDTH - 1]}…")
         else:
-            found += textwrap.wrap(line, WIDTH, subsequent_indent="  ", break_on_hyphens=False) or [""]
+            wrapped = textwrap.wrap(line, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+            found += [part.replace(_KEPT, " ") for part in wrapped] or [""]
     return found
 
 

@@ -146,7 +146,7 @@ def robustness_line(found: Robustness) -> str:
         on = " and ".join(_ON_EDGE[kind] for kind in found.edges)
         if found.zeros:
             return f"at its edge already: {', '.join(f'{n} = 0' for n in found.zeros)} ({on})"
-        return f"at the edge of stability as far as rounding tells, with {on}"
+        return f"none, on the edge of stability already, with {on}"
     limit = found.limit
     if not limit.found:
         return f"{'' if found.stable else 'not stable; '}no change that was looked at makes it {_other(found)}"

@@ -83,8 +83,8 @@ def proof_line(solution: Solution) -> str:
         )
         return f"proof: no design in the box {better}{by} ({bound.method})"
     if math.isfinite(bound.value):
-        gap = f"which leaves {unit.show(bound.gap, 2)} open; --certify closes it, or finds better"
-        return f"proof: none has {text} {side} {unit.show(bound.value, 6)} ({bound.method}), {gap}"
+        known = f"nothing {side} {unit.show(bound.value, 6)} ({bound.method})"
+        return f"proof: {known}, {unit.show(bound.gap, 2)} open; --certify closes it, or finds better"
     return "proof: none that this is the best; --certify proves it, or finds better"
 
 

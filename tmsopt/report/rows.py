@@ -16,6 +16,7 @@ from tmsopt.units import frequencies
 
 TableRow = Sequence[str]
 
+_NOTHING = 1e-14  # of the size of a root, or of 1
 ALL = 12
 """Digits of a full report."""
 
@@ -91,18 +92,23 @@ def motion(solution: Solution, on_edge: bool = False) -> str:
     if not swings:
         return f"{lasts}; nothing swings"
     shown = [f if hertz.text == "Hz" else 2 * math.pi * f for f in swings]
-    name = ("frequency" if len(shown) == 1 else "frequencies") if hertz.text == "Hz" else "oscillation, rad per time,"
+    name = ("" if hertz.text == "Hz" else "angular ") + ("frequency" if len(shown) == 1 else "frequencies")
     listed = " and ".join(f"{f:.4g}" for f in dict.fromkeys(shown))
     ratio = solution.quantities["damping_ratio"]
-    return f"{lasts}; {name} {listed} {hertz.text}".rstrip() + f"; damping ratio {ratio:.4g}"
+    return (
+        f"{lasts}; {name} {listed} {hertz.text}".rstrip()
+        + f"; damping ratio {ratio if abs(ratio) > _NOTHING else 0:.4g}"
+    )
 
 
 def loads(solution: Solution) -> str:
     """What each wheel carries."""
     found, problem = solution.quantities, solution.problem
     named = [("front", "load_front", "N_F"), ("rear", "load_rear", "N_R")]
-    shares = {wheel: f"{100 * found[share]:.4g} %" for wheel, share, _ in named}
-    newtons = {w: unit_of(problem, n).show(found[n], 4) for w, _, n in named if n in found}
+    at_rest = {n: x if abs(found[share]) > FEASIBLE else 0.0 for _, share, of in named for n in (share, of)
+               if (x := found.get(n, math.nan)) == x}  # fmt: skip
+    shares = {wheel: f"{100 * at_rest[share]:.4g} %" for wheel, share, _ in named}
+    newtons = {w: unit_of(problem, n).show(at_rest[n], 4) for w, _, n in named if n in at_rest}
     return ", ".join(f"{w} wheel {newtons[w]} ({s})" if w in newtons else f"{w} wheel {s}" for w, s in shares.items())
 
 
@@ -112,7 +118,9 @@ def roots_of(roots: Sequence[Root], digits: int = 8) -> list[str]:
     for root in roots:
         if root.im < 0:
             continue
-        value = f"{root.re:.{digits}g}" + (f" ± {root.im:.{digits}g}i" if root.im else "")
+        size = math.hypot(root.re, root.im)
+        re, im = (x if abs(x) > _NOTHING * size else 0.0 for x in (root.re, root.im))
+        value = f"{re:.{digits}g}" + (f" ± {im:.{digits}g}i" if im else "")
         words.append(value + (f" ({root.multiplicity}-fold)" if root.multiplicity > 1 else ""))
     return words
 

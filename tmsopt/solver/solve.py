@@ -15,10 +15,12 @@ from tmsopt.checks.worst_case import cover
 from tmsopt.design.files import Given, question_of
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.solution import Bound, NotSolved, Solution, Starts
+from tmsopt.design.unit_system import unit_of
 from tmsopt.errors import Fault, InputError, is_number, short, suggest
 from tmsopt.formulation.formulate import design_of
 from tmsopt.formulation.nlp import objective_size
 from tmsopt.formulation.options import DEFAULTS, AskedOfSolve, Options, options_of
+from tmsopt.margins import edges_at
 from tmsopt.records import Table
 from tmsopt.solver.multistart import rank, same
 from tmsopt.solver.outcome import UNCLEAR, Finding, better, counted, evaluated, mass_advice, survivor
@@ -210,7 +212,8 @@ def _sides_note(problem: Problem, explored: Sequence[Explored], finding: Finding
                 return (f"both signs were searched: {part.name} is as good as {won.name}",)
             else:
                 found = "the best" if part.finding.status == "optimal" else "what was found"
-                sentences.append(f"{found} with {part.name} is {part.finding.checked.objective:.9g}")
+                asked = unit_of(problem, problem.minimize or problem.maximize or "")
+                sentences.append(f"{found} with {part.name} is {asked.show(part.finding.checked.objective, 6)}")
     return ("; ".join(sentences),)
 
 
@@ -244,7 +247,7 @@ def _assembled(
         formulation=finding.formulation,
         freedom=freedom(problem),
         branches=finding.branches,
-        notes=(*finding.notes, *notes, *_stability_note(problem, checked, optimal)),
+        notes=(*finding.notes, *notes, *_stability_note(problem, checked, finding.parameters, optimal)),
         worst=checked.worst if listed else None,
         least_damped=checked.least_damped if listed else None,
         cover=covered,
@@ -254,7 +257,9 @@ def _assembled(
     )
 
 
-def _stability_note(problem: Problem, checked: Checked, optimal: bool) -> tuple[str, ...]:
+def _stability_note(
+    problem: Problem, checked: Checked, parameters: Mapping[str, float], optimal: bool
+) -> tuple[str, ...]:
     if "coefficients" in checked.violations:
         return ("a coefficient has no value at this design; keep away from what divides by 0, or has no root",)
     if "a0" in checked.violations:
@@ -266,4 +271,5 @@ def _stability_note(problem: Problem, checked: Checked, optimal: bool) -> tuple[
         return ()
     if problem.free and (problem.minimize or "").strip() == "abscissa":
         return ("no stable design was found in the box; this is the least unstable one",)
-    return ("the design is not stable: abscissa >= 0",)
+    on_edge = edges_at(problem, parameters)  # neither decay nor growth, as the report says
+    return () if on_edge else ("the design is not stable: abscissa >= 0",)
