@@ -107,6 +107,34 @@ class Relaxation:
 
 
 @dataclass(frozen=True)
+class Need:
+    """What a parameter that is fixed, or held below or above it, would have to be for a design that meets all else.
+
+    Attributes:
+        parameter: such as the speed; everything else may move as the problem says.
+        value: the nearest at which such a design was found; nan where none was found.
+        most: whether it is a greatest value, and not a least one.
+        looked: from where to where it was looked for.
+        design: every parameter of that design; empty where none was found.
+    """
+
+    parameter: str
+    value: float
+    most: bool
+    looked: tuple[float, float]
+    design: Table[float] = field(default_factory=Table)
+
+    @property
+    def found(self) -> bool:
+        """Whether there is such a value."""
+        return math.isfinite(self.value)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``; a value that was not found is None."""
+        return plain(self, "parameter value most looked design")
+
+
+@dataclass(frozen=True)
 class Solution:
     """What `solve` found.
 
@@ -133,6 +161,8 @@ class Solution:
         cover: what is known of every case together, proven or not.
         sides: part of the box, such as ``forward tilt`` → its best objective, nan where it has no feasible design.
         relaxation: of an infeasible problem, the smallest move of its limits that leaves a feasible design.
+        need: of a problem without an answer, or of a design that is not stable though that was looked for, the speed
+            that it takes; None where the speed plays no part.
         stable_elsewhere: of a design that is not stable, whether branch and bound found one that is: False where it
             proved that there is none, None where it was not asked or did not decide.
         interrupted: whether the user ended the work before it was done.
@@ -163,6 +193,7 @@ class Solution:
     cover: Cover | None = None
     sides: Table[float] = field(default_factory=Table)
     relaxation: Relaxation | None = None
+    need: Need | None = None
     stable_elsewhere: bool | None = None
     interrupted: bool = False
     si: Table[Reading] = field(default_factory=Table)
@@ -214,7 +245,7 @@ class Solution:
         cases = {"worst_case": self.worst, "least_damped_case": self.least_damped}
         optional = {
             **{name: case and plain(case, "at offset") for name, case in cases.items()}, **plain(self, "cover"),
-            "sides": plain(self.sides, digits=SIDE_DIGITS), **plain(self, "relaxation interrupted si"),
+            "sides": plain(self.sides, digits=SIDE_DIGITS), **plain(self, "relaxation need interrupted si"),
         }  # fmt: skip
         return {
             **problem.heading, "status": self.status,

@@ -23,6 +23,7 @@ from tmsopt.formulation.options import DEFAULTS, AskedOfSolve, Options, options_
 from tmsopt.margins import edges_at
 from tmsopt.records import Table
 from tmsopt.solver.multistart import rank, same
+from tmsopt.solver.needs import with_need
 from tmsopt.solver.outcome import UNCLEAR, Finding, better, counted, evaluated, mass_advice, survivor
 from tmsopt.solver.search import Explored, evaluated_cases, explore, without_any
 from tmsopt.solver.workspace import Family, Workspace, workspace
@@ -99,7 +100,7 @@ def solved(design: Given, options: Options = DEFAULTS, family: Family | None = N
     if interrupted or not options.stability or options.near:  # which keeps to its side of the box
         return solution
     try:
-        return _with_stability(solution, options, family, began)
+        return with_need(_with_stability(solution, options, family, began), options)
     except KeyboardInterrupt:
         if not options.interruptible:
             raise
