@@ -7,6 +7,7 @@ from .explanation import (
     robustness_line as robustness_line, robustness_table as robustness_table,
 )
 from .findings import Findings as Findings, findings as findings
+from .infeasible import infeasible_lines as infeasible_lines
 from .ledger import ledger_page as ledger_page, ledger_table as ledger_table
 from .proof import proof_text as proof_text
 from .speeds import speeds_table as speeds_table

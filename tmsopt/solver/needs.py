@@ -25,7 +25,7 @@ def with_need(solution: Solution, options: Options) -> Solution:
         return solution
     limits = {} if set(problem.asked_of_roots) or problem.pattern else {_STABLE: "abscissa <= 0"}
     few = replace(options, starts=_STARTS, stability=0.0, alone=False, progress=None, near=None)
-    began, ends = time.perf_counter(), (math.nan, math.nan)
+    began, looked = time.perf_counter(), list[float]()
     for most, ends in _ranges(problem, name):
         freed = {**problem.free, name: ends}
         asked = replace(
@@ -37,6 +37,7 @@ def with_need(solution: Solution, options: Options) -> Solution:
             maximize=name if most else None,
             start={},
         )
+        looked += ends
         trials = [_best(part) for part in workspace(asked, few).parts()]
         found = [t.parameters for t in trials if t and not t.checked.violations]
         if found:
@@ -44,7 +45,7 @@ def with_need(solution: Solution, options: Options) -> Solution:
             return replace(solution, need=Need(name, design[name], most, ends, Table(design)))
         if time.perf_counter() - began > _SECONDS:
             break
-    return replace(solution, need=Need(name, math.nan, False, ends))
+    return replace(solution, need=Need(name, math.nan, False, (min(looked), max(looked)))) if looked else solution
 
 
 def _best(work: Workspace) -> Trial | None:
