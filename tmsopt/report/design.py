@@ -89,11 +89,14 @@ def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float
 def _parts(solution: Solution, found: Findings, si: Mapping[str, float], beside: bool) -> Iterator[Part]:
     """In the order of the report."""
     edge = found.robustness is not None and bool(found.robustness.edges)
-    yield Part("answer", [*headline(solution, edge), *(f"note: {n}" for n in solution.notes)], least=2)
+    told, asked = headline(solution, edge)
+    helps, notes = infeasible_lines(solution), [f"note: {note}" for note in solution.notes]
     if solution.status == "infeasible":
-        violated = _violated(solution)
-        rest = (*violated, *infeasible_lines(solution, full=True))
-        yield Part("conflict", violated + infeasible_lines(solution, full=False), rest, replaces=True, least=3)
+        conflict = [f"{told}: {helps[0]}" if helps else told, *helps[1:], *_violated(solution)]
+        rest = (*infeasible_lines(solution, full=True)[len(helps) :], *notes)
+        yield Part("conflict", [*conflict, f"nearest design: {asked}"], rest, least=3)
+    else:
+        yield Part("answer", [told, asked, *helps, *notes], least=2)
     yield Part("design", _design(solution, si if beside else None), tuple(columns(parameter_rows(solution, si))),
                replaces=True, least=3)  # fmt: skip
     yield Part(
@@ -120,16 +123,17 @@ def _parts(solution: Solution, found: Findings, si: Mapping[str, float], beside:
     yield Part("search", [], tuple(_search(solution)))
 
 
-def headline(solution: Solution, on_edge: bool = False) -> list[str]:
-    """What was asked and how it ended: two lines at most, in words."""
+def headline(solution: Solution, on_edge: bool = False) -> tuple[str, str]:
+    """How it ended, and what was asked, in words."""
     problem = solution.problem
     text = problem.minimize or problem.maximize
     value = unit_of(problem, text).show(solution.value, 8) if text else ""
     located = f"locate {problem.locate}" if problem.locate else ""
     asked = f"{problem.sense} {text.strip()}" + (f" = {value}" if math.isfinite(solution.value) else "") if text else ""
     structure = in_words(solution.structure, problem.model.degree)
-    told = ": ".join(part for part in (_ended(solution), stability(solution, on_edge)) if part)
-    return [told, "; ".join(part for part in (located, asked, structure) if part)]
+    stable = "" if solution.status == "infeasible" else stability(solution, on_edge)
+    told = ": ".join(part for part in (_ended(solution), stable) if part)
+    return told, "; ".join(part for part in (located, asked, structure) if part)
 
 
 def _ended(solution: Solution) -> str:

@@ -104,7 +104,7 @@ def _nearest(solution: Solution, name: str) -> str:
         if _number(other) is not None:
             if not math.isfinite(value) or not math.isfinite(relaxation.amounts.get(name, 0.0)):
                 return f": {side.strip()} has no value where the search ended"
-            return f": the nearest design found has {side.strip()} = {unit_of(problem, name).show(value)}"
+            return f": the nearest design found has {side.strip()} = {unit_of(solution.problem, name).show(value)}"
     return ""
 
 

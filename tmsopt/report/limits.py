@@ -110,40 +110,5 @@ def _place(of: Problem, case: Case) -> str:
     return ", ".join(at)
 
 
-def relaxation_lines(solution: Solution) -> list[str]:
-    """What is in conflict, and what frees it."""
-    relaxation = solution.relaxation
-    if relaxation is None or not relaxation.amounts:
-        return []
-    problem = solution.problem
-    lines = [f"in conflict: {', '.join(relaxation.conflict) or ', '.join(relaxation.amounts)}"]
-    moves = [_move(problem, name, amount) for name, amount in relaxation.amounts.items()]
-    lines.append(f"smallest relaxation found: {'; '.join(moves)}")
-    single = {n: a for n, a in relaxation.alone.items() if relaxation.amounts.keys() != {n}}
-    lines += [f"  or alone: {_move(problem, name, amount)}" for name, amount in single.items()]
-    return lines
-
-
-def _move(problem: Problem, name: str, amount: float) -> str:
-    """A limit moved, in words, rounded up so that it suffices."""
-    if not math.isfinite(amount):  # at the edge of where its sides exist
-        return f"{name} ({problem.constraints.get(name, name)}), which has no value there"
-    parameter, _, end = name.partition(".")
-    if name in problem.constraints or parameter not in problem.free:
-        unit = unit_of(problem, name)
-        return f"{name} ({limit_text(problem, name) or name}) by {_up(amount / unit.one)} {unit.text}".rstrip()
-    unit = unit_of(problem, name)
-    direction = "up" if end == "max" else "down"
-    return f"{name} {direction} by {_up(amount / unit.one)} {unit.text}".rstrip()
-
-
-def _up(amount: float) -> str:
-    """Six digits, rounded away from zero."""
-    if amount == 0:
-        return "0"
-    step = 10.0 ** (math.floor(math.log10(abs(amount))) - 5)
-    return f"{math.copysign(math.ceil(abs(amount) / step) * step, amount):.6g}"
-
-
 def _short(problem: Problem, name: str, value: float) -> str:
     return unit_of(problem, name).show(value, 6)
