@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from importlib import import_module
 from numbers import Integral, Real
 from typing import Any
 
@@ -70,3 +71,19 @@ def short(value: Any) -> str:
     """A value as found, cut where it is long."""
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "…"
+
+
+def needed(module: str, otherwise: str = "") -> Any:
+    """A module that the extra ``data`` brings.
+
+    Args:
+        otherwise: what can be done without it.
+
+    Raises:
+        InputError: where it is not installed.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        advice = f", or {otherwise}" if otherwise else ""
+        raise InputError([Fault(f'{module} is not installed; pip install "tmsopt[data]"{advice}')]) from error

@@ -1,12 +1,19 @@
-"""What records are made of, and records as plain data."""
+"""What records are made of, what results show of themselves, and records as plain data."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
-from typing import Any, TypeVar, overload
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from tmsopt.errors import needed
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from pandas import DataFrame
 
 V = TypeVar("V")
 
@@ -19,6 +26,62 @@ Truth = NDArray[np.bool_]
 
 Progress = Callable[[int, int], None]
 """Called with what is done and what there is at most."""
+
+
+class Shown(Protocol):
+    """What every result shows of itself. Who writes it stands floors above, and is found when first asked."""
+
+    def report(self, full: bool = False) -> str:
+        """The text that the command line prints; with all the rest where it is `full`."""
+        return str(_display().report(self, full))
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw it, into the given Axes or into new ones.
+
+        Raises:
+            InputError: where there is no picture of it.
+        """
+        axes: Axes = _display().drawn(self, ax)
+        return axes
+
+    def __str__(self) -> str:
+        return self.report()
+
+    def __repr__(self) -> str:
+        return str(_display().headline(self))
+
+    def _repr_html_(self) -> str:
+        return str(_display().page(self))
+
+
+class Tabular(Shown, Protocol):
+    """A result that is a table as well."""
+
+    def records(self) -> Iterable[Mapping[str, Any]]:
+        """One record per row."""
+        ...
+
+    def to_frame(self) -> "DataFrame":
+        """The table in pandas.
+
+        Raises:
+            InputError: where pandas is not installed.
+        """
+        return frame(self.records())
+
+
+def frame(rows: Iterable[Mapping[str, Any]] | Mapping[str, Any]) -> "DataFrame":
+    """Rows, or columns by name, as a table of pandas.
+
+    Raises:
+        InputError: where pandas is not installed.
+    """
+    made: DataFrame = needed("pandas").DataFrame(rows if isinstance(rows, Mapping) else list(rows))
+    return made
+
+
+def _display() -> Any:
+    return import_module("tmsopt.display")
 
 
 class Table(Mapping[str, V]):

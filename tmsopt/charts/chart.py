@@ -6,12 +6,12 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.charts.files import save_layers
+from tmsopt.charts.files import dataset, save_layers
 from tmsopt.charts.folder import (
     ABOUT,
     SCHEMA,
@@ -32,9 +32,12 @@ from tmsopt.design.problem import Problem
 from tmsopt.disk import path_of
 from tmsopt.errors import Fault, InputError, count_faults
 from tmsopt.models import MODELS
-from tmsopt.records import Array, Progress
+from tmsopt.records import Array, Progress, Shown
 from tmsopt.roots import CLASSES
 from tmsopt.tracing.domain import Domain, domain
+
+if TYPE_CHECKING:
+    from xarray import Dataset
 
 LARGEST = 20_000_000
 """Designs of a chart in memory, some 40 bytes each."""
@@ -44,8 +47,8 @@ def _layer(name: str, meaning: str) -> Any:
     return property(lambda self: self.layers[name], doc=meaning)
 
 
-@dataclass(frozen=True)
-class Chart:
+@dataclass(frozen=True, repr=False)
+class Chart(Shown):
     """Classes, roots and quantities over a grid of two or three parameters.
 
     Attributes:
@@ -117,6 +120,15 @@ class Chart:
         """
         kept = {n: self.layers[n] for n in (self.layers if layers is None else layers)}
         save_layers(self.problem, Grid(self.axes, self.grid), kept, Path(path))
+
+    def to_xarray(self) -> "Dataset":
+        """Every layer over the axes, with units.
+
+        Raises:
+            InputError: where xarray is not installed.
+        """
+        made: Dataset = dataset(self.problem, Grid(self.axes, self.grid), self.layers)
+        return made
 
     def to_json(self) -> dict[str, Any]:
         """Summary, boundaries and corners; the arrays themselves go to a file."""

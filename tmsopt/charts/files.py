@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tmsopt.charts.survey import Grid
 from tmsopt.design.problem import Problem
-from tmsopt.errors import Fault, InputError
+from tmsopt.errors import Fault, InputError, needed
 from tmsopt.roots import CLASSES
 
 
@@ -29,7 +29,8 @@ def save_layers(problem: Problem, grid: Grid, layers: Mapping[str, NDArray[Any]]
         "fixed": dict(problem.fixed),
     }  # fmt: skip
     if path.suffix.lower() == ".nc":
-        _save_netcdf(problem, grid, layers, about, path)
+        check_netcdf()
+        dataset(problem, grid, layers).to_netcdf(path)
         return
     axes = {_axis(n, layers): values for n, values in zip(grid.axes, grid.values, strict=True)}
     arrays: dict[str, Any] = {**axes, **layers}
@@ -48,24 +49,26 @@ def check_netcdf() -> None:
         raise InputError([Fault(message, ("--output",))])
 
 
-def _save_netcdf(
-    problem: Problem, grid: Grid, layers: Mapping[str, NDArray[Any]], about: Mapping[str, Any], path: Path
-) -> None:
-    check_netcdf()
-    import xarray
+def dataset(problem: Problem, grid: Grid, layers: Mapping[str, NDArray[Any]]) -> Any:
+    """Axes and layers as a dataset of xarray, with their units and meanings.
 
+    Raises:
+        InputError: where xarray is not installed.
+    """
+    xarray = needed("xarray")
     of = problem.parameter_set
     axes = {
         _axis(n, layers): (_axis(n, layers), v, {"long_name": of[n].meaning, "units": of[n].unit})
         for n, v in zip(grid.axes, grid.values, strict=True)
     }
     classes = {"flag_values": np.arange(len(CLASSES), dtype=np.int8), "flag_meanings": _words(CLASSES)}
+    dimensions = [_axis(n, layers) for n in grid.axes[::-1]]
     variables = {
-        n: (about["dimensions"], a.view(np.int8) if a.dtype == bool else a, classes if n == "kind" else {})
+        n: (dimensions, a.view(np.int8) if a.dtype == bool else a, classes if n == "kind" else {})
         for n, a in layers.items()
     }
-    known = {n: about[n] for n in ("title", "model")} | {"fixed": json.dumps(about["fixed"])}
-    xarray.Dataset(variables, axes, known).to_netcdf(path)
+    about = {"title": problem.title, "model": problem.model.name, "fixed": json.dumps(dict(problem.fixed))}
+    return xarray.Dataset(variables, axes, about)
 
 
 def _axis(name: str, layers: Mapping[str, Any]) -> str:

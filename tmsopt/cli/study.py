@@ -159,8 +159,7 @@ def _show(results: "Results", path: Path, stopped: bool, as_json: bool) -> None:
             run["interrupted"] = True
         elif results.found < len(asked):
             run |= {"rows_solved": solved, "seconds": round(seconds, 4), "engine": results.engine}
-        head = {"schema": 1, "title": asked.title, "model": asked.problem.model.name, "method": asked.method}
-        write_json(head | results.summary.to_json() | {"run": run, "table": [row.to_json() for row in results.rows]})
+        write_json(results.to_json() | {"run": run})
         return
     click.echo(study_table(asked, results.summary, results.rows))
     if solved:

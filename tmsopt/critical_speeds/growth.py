@@ -1,7 +1,7 @@
 """Roots of a design over its speed, or another parameter, with the stable and heavily damped values of it."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,7 @@ from tmsopt.design.files import Given
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import Parameter, ParameterSet, Values
-from tmsopt.records import Array, Truth
+from tmsopt.records import Array, Tabular, Truth, plain
 from tmsopt.roots import is_stable, roots
 from tmsopt.solver.solve import solved
 
@@ -25,8 +25,8 @@ SPEEDS = ("Fr", "v")
 _POINTS = 801
 
 
-@dataclass(frozen=True)
-class Growth:
+@dataclass(frozen=True, repr=False)
+class Growth(Tabular):
     """Roots of one design over one parameter.
 
     Attributes:
@@ -48,6 +48,19 @@ class Growth:
     structure: str
     stable: tuple[Stretch, ...]
     heavily_damped: tuple[Stretch, ...]
+
+    def records(self) -> Iterable[dict[str, Any]]:
+        """The roots at each value, one a row."""
+        names = [f"{part}_{k}" for k in range(1, self.roots.shape[1] + 1) for part in ("re", "im")]
+        parts = np.stack([self.roots.real, self.roots.imag], axis=-1).reshape(len(self.values), -1)
+        for value, row in zip(self.values.tolist(), parts.tolist(), strict=True):
+            yield {self.over.name: value, **dict(zip(names, row, strict=True))}
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``; numbers that do not exist are None."""
+        return {"parameter": self.over.name, "unit": self.over.unit} | plain(
+            self, "critical design structure stable heavily_damped values roots"
+        )
 
 
 def growth(design: Given, end: float | None = None, over: str | None = None) -> Growth:

@@ -1,7 +1,7 @@
 """The speeds at which a bicycle changes its kind of motion: weave, capsize, and roots that meet, all of them."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,15 +16,15 @@ from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.margins.surroundings import parameter_faults
 from tmsopt.models import Model, ParameterSet
-from tmsopt.records import Progress, Table, plain
+from tmsopt.records import Progress, Table, Tabular, plain
 from tmsopt.solver.solve import solve
 
 _DIGITS = 120  # of what is no fraction, such as the tangent of an angle
 _STRAIGHT = 1e-100  # relative; a number that is linear in the speed is so within the digits carried
 
 
-@dataclass(frozen=True)
-class Speeds:
+@dataclass(frozen=True, repr=False)
+class Speeds(Tabular):
     """What happens to one design over all its speeds.
 
     Attributes:
@@ -67,6 +67,14 @@ class Speeds:
         """Where roots meet."""
         return tuple(c for c in self.found if "EP" in c.kind)
 
+    def records(self) -> Iterable[dict[str, Any]]:
+        """What happens at each speed, one a row."""
+        return (
+            {self.parameter: c.at, "kind": c.kind, **vars(c.root), "rightmost": c.rightmost}
+            | {"stability_changes": c.changes}
+            for c in self.found
+        )
+
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; an end at infinity is null."""
         return {
@@ -74,11 +82,7 @@ class Speeds:
             "parameter": self.parameter,
             "unit": self.problem.parameter_set[self.parameter].unit,
             "range": list(plain(self, "lower upper").values()),
-            "found": [
-                {self.parameter: c.at, "kind": c.kind, **plain(c.root), "rightmost": c.rightmost}
-                | {"stability_changes": c.changes}
-                for c in self.found
-            ],
+            "found": [plain(row) for row in self.records()],
             **plain(self, "stable heavily_damped"),
             "marginally_stable": plain(self, "marginal")["marginal"],
             **plain(self, "always zeros parameters"),

@@ -8,7 +8,7 @@ from tmsopt.design.cases import Case
 from tmsopt.design.problem import Freedom, Problem
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.design.unit_system import dimension_of, si_units, unit_of
-from tmsopt.records import Table, plain
+from tmsopt.records import Shown, Table, plain
 from tmsopt.roots import Root
 from tmsopt.units import Reading
 
@@ -134,8 +134,8 @@ class Need:
         return plain(self, "parameter value most looked design")
 
 
-@dataclass(frozen=True)
-class Solution:
+@dataclass(frozen=True, repr=False)
+class Solution(Shown):
     """What `solve` found.
 
     Attributes:

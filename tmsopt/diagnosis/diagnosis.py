@@ -12,7 +12,7 @@ from tmsopt.design.files import Given
 from tmsopt.diagnosis.jordan import Jordan, is_regular, jordan
 from tmsopt.diagnosis.splitting import DEVIATION, Ideal, Law, Response, response
 from tmsopt.models import Model, ParameterSet
-from tmsopt.records import plain
+from tmsopt.records import Shown, plain
 from tmsopt.roots import Root, Structure
 from tmsopt.roots.patterns.enclosed import nearest_roots
 from tmsopt.solver.solve import solved
@@ -22,8 +22,8 @@ _RANK = 1e-7  # relative singular value that counts as 0; of a nearly semisimple
 _TIMES = 10.0  # likewise, times the root of the distance from the structure
 
 
-@dataclass(frozen=True)
-class Diagnosis:
+@dataclass(frozen=True, repr=False)
+class Diagnosis(Shown):
     """A multiple root of a design; of a complex pair, the one in the upper half-plane.
 
     Attributes:

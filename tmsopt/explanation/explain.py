@@ -1,5 +1,6 @@
 """What an optimum means: which limits it leans on and what they are worth, and how much rounding it bears."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,12 +10,12 @@ from tmsopt.explanation.limits import Lever, levers
 from tmsopt.explanation.optimality import Optimality, optimality
 from tmsopt.explanation.rounding import Rounded, rounded_alone, rounded_together, worst
 from tmsopt.explanation.summary import summary, warnings
-from tmsopt.records import Table, plain
+from tmsopt.records import Table, Tabular, plain
 from tmsopt.solver.solve import solved
 
 
-@dataclass(frozen=True)
-class Explanation:
+@dataclass(frozen=True, repr=False)
+class Explanation(Tabular):
     """What `explain` has to say of a solution.
 
     Attributes:
@@ -38,6 +39,10 @@ class Explanation:
     worst: str
     precision: tuple[Rounded, ...]
     warnings: tuple[str, ...]
+
+    def records(self) -> Iterable[dict[str, Any]]:
+        """The limits that bind, one a row."""
+        return (lever.to_json() for lever in self.levers)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""

@@ -31,7 +31,7 @@ from tmsopt.explanation.descent import Better, better
 from tmsopt.explanation.program import LocalProgram, NotCovered, program
 from tmsopt.formulation.formulate import formulate
 from tmsopt.formulation.starts import complete
-from tmsopt.records import Table, plain
+from tmsopt.records import Shown, Table, plain
 from tmsopt.solver.solve import solved
 
 STRICT, NOT_MINIMAL, UNDECIDED, NOT_COVERED = "strict minimum", "not minimal", "undecided", "not covered"
@@ -61,8 +61,8 @@ class OnLine:
     ties: tuple[float, ...] = ()
 
 
-@dataclass(frozen=True)
-class Optimality:
+@dataclass(frozen=True, repr=False)
+class Optimality(Shown):
     """Whether a design is a local optimum.
 
     Attributes:

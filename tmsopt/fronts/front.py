@@ -8,7 +8,7 @@ from typing import Any
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.disk import write_csv
-from tmsopt.records import plain
+from tmsopt.records import Tabular, plain
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,8 @@ class Gap:
     failed: bool
 
 
-@dataclass(frozen=True)
-class Front:
+@dataclass(frozen=True, repr=False)
+class Front(Tabular):
     """What `pareto` found.
 
     Attributes:
@@ -108,8 +108,8 @@ class Front:
         """Greatest value of each objective on the front."""
         return tuple(max(column) for column in zip(*(p.objectives for p in self.points), strict=True))
 
-    def rows(self) -> Iterable[dict[str, Any]]:
-        """One record per point, as written to CSV: objectives, parameters, roots, limits, label."""
+    def records(self) -> Iterable[dict[str, Any]]:
+        """One record per point: objectives, parameters, roots, limits, label."""
         for point in self.points:
             values = dict(zip(self.objectives, point.objectives, strict=True))
             yield {
@@ -117,7 +117,7 @@ class Front:
                 **{name: value for name, value in point.solution.parameters.items() if name not in values},
                 "abscissa": point.solution.abscissa,
                 "structure": point.structure,
-                "stable": "" if point.stable is None else str(point.stable).lower(),
+                "stable": point.stable,
                 "limits": "; ".join(point.limits),
                 "label": point.label,
             }
@@ -128,7 +128,8 @@ class Front:
         Raises:
             OSError: when the file cannot be written.
         """
-        write_csv(path, list(self.rows()))
+        words = {None: "", True: "true", False: "false"}
+        write_csv(path, [{**row, "stable": words[row["stable"]]} for row in self.records()])
 
     def to_json(self) -> dict[str, Any]:
         """The JSON of `tmsopt solve` for a front; numbers that do not exist are None."""

@@ -18,7 +18,7 @@ from tmsopt.margins.boundaries import KINDS, Edge, edges, lies_on
 from tmsopt.margins.rays import RayCrossing, between, most_damped, ray_crossings
 from tmsopt.margins.surroundings import Place, placed
 from tmsopt.margins.witness import exactly_stable, is_boundary
-from tmsopt.records import Array, Table, plain
+from tmsopt.records import Array, Shown, Table, plain
 
 STABILITY = ("weave", "capsize", "infinity")
 """The boundaries of stability: a pair on the imaginary axis, a root 0, a root through infinity."""
@@ -33,8 +33,8 @@ _STATIONARY = 1e-8
 _NOTHING, _SHIFT = 1e-12, 1e-3  # of a weight: what is 0 but for rounding; how far it is moved to see what it does
 
 
-@dataclass(frozen=True)
-class Nearest:
+@dataclass(frozen=True, repr=False)
+class Nearest(Shown):
     """The nearest point of a boundary.
 
     Attributes:
@@ -63,8 +63,8 @@ class Nearest:
         return plain(self, "kind found distance parameters direction refined direct")
 
 
-@dataclass(frozen=True)
-class Robustness:
+@dataclass(frozen=True, repr=False)
+class Robustness(Shown):
     """How far a design is from each boundary.
 
     Attributes:

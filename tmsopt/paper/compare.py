@@ -1,5 +1,6 @@
 """A numeric optimum beside the closed-form laws, law by law, and beside the other formulation."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Unpack
 
@@ -8,13 +9,13 @@ from tmsopt.design.files import Given, question_of
 from tmsopt.design.solution import Solution
 from tmsopt.formulation.options import Asked, Options, options_of
 from tmsopt.models import tms
-from tmsopt.records import SCHEMA, plain
+from tmsopt.records import SCHEMA, Tabular, plain
 from tmsopt.roots import PATTERNS
 from tmsopt.solver.solve import solved
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Tabular):
     """What `compare` found.
 
     Attributes:
@@ -36,6 +37,10 @@ class Comparison:
             return {}
         free = {n: self.other.parameters[n] - self.design.parameters[n] for n in self.design.problem.free}
         return {**free, "abscissa": self.other.abscissa - self.design.abscissa}
+
+    def records(self) -> Iterable[dict[str, Any]]:
+        """The laws, one a row."""
+        return (row.to_json() for row in self.laws)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""

@@ -17,7 +17,7 @@ from tmsopt.models.exact import Written, written
 from tmsopt.proofs import rational
 from tmsopt.proofs.existence import Existing, beside, exact_coefficients, exactly
 from tmsopt.proofs.facts import NOTHING, Verdict, as_stored, heavy_damping, inside, limits, stability
-from tmsopt.records import Table, plain
+from tmsopt.records import Shown, Table, plain
 from tmsopt.roots import PATTERNS, Pattern, Root, pattern as pattern_of
 from tmsopt.roots.patterns.naming import implies, shown_patterns
 from tmsopt.roots.patterns.pattern import LINES
@@ -35,8 +35,8 @@ _QUARTIC = 4  # of which every structure has a pattern of its own
 _SIMPLE = {"pair": "the rightmost roots are a simple complex pair", "real": "the rightmost root is real and simple"}
 
 
-@dataclass(frozen=True)
-class Proof:
+@dataclass(frozen=True, repr=False)
+class Proof(Shown):
     """What is proved about a design in ball arithmetic; plain data, decimals as text.
 
     Attributes:
@@ -64,6 +64,7 @@ class Proof:
         inside: whether the proved design is in the problem's box.
         limits: inequality of the problem → ``met``, ``violated``, ``binds`` or ``cannot be told``, at this design.
         seconds: that the proof took.
+        problem: whose design it is.
     """
 
     claim: str
@@ -90,6 +91,7 @@ class Proof:
     inside: Verdict = NOTHING
     limits: Table[str] = field(default_factory=Table)
     seconds: float = 0.0
+    problem: Problem | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``: decimals as text, summaries as numbers, None for what does not exist."""
@@ -129,7 +131,7 @@ def prove_design(
     with flint.ctx.workdps(2 * digits + _EXTRA):
         patterns = _patterns(problem, structure, roots)
         proof = _proved(_asked(problem, case), design, varied, structure, patterns, digits)
-        return replace(proof, seconds=time.perf_counter() - began)
+        return replace(proof, problem=problem, seconds=time.perf_counter() - began)
 
 
 def _asked(problem: Problem, case: Case | None) -> Problem:

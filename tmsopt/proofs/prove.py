@@ -38,5 +38,6 @@ def prove(
     problem = found.problem
     if found.status != "optimal":
         reason = f"the problem is not solved ({found.status}): there is no design to prove"
-        return Proof(f"a design of '{problem.title or 'the problem'}' exists", False, reason, digits=digits)
+        claim = f"a design of '{problem.title or 'the problem'}' exists"
+        return Proof(claim, False, reason, digits=digits, problem=problem)
     return prove_design(problem, found.parameters, found.structure, digits, exact, found.worst, found.roots)

@@ -11,6 +11,8 @@ from tmsopt.models import ParameterSet
 from tmsopt.report.text import columns, number, with_unit, yes_no
 from tmsopt.roots import pattern
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
+from tmsopt.tracing.domain import Domain
+from tmsopt.tracing.swallowtail import Swallowtail
 
 _FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
 
@@ -34,15 +36,37 @@ def chart_table(chart: Chart) -> str:
         where = ", ".join(f"{n} = {best[n]:.6g}{unit}" for n, unit in units.items())
         lines += ["", f"least abscissa on the grid: {best['value']:.6g} at {where}"]
     if chart.domain is not None:
-        kinds = [f"{arc.kind} ({len(arc.points[first])} points)" for arc in chart.domain.stability]
-        damped = [f"{arc.kind} ({len(arc.points[first])} points)" for arc in chart.domain.heavy_damping]
-        lines += ["", f"stability is bounded by {', '.join(kinds) or 'nothing in the box'}"]
-        lines += [f"heavy damping is bounded by {', '.join(damped) or 'nothing in the box'}"]
-        if chart.domain.corners:
-            rows = [("corner", with_unit(of, first), with_unit(of, second))]
-            rows += [(c.name, number(c.parameters[first]), number(c.parameters[second])) for c in chart.domain.corners]
-            lines += ["", *columns(rows)]
+        lines += ["", domain_table(chart.domain, of)]
     return "\n".join(line.rstrip() for line in lines)
+
+
+def domain_table(domain: Domain, of: ParameterSet | None = None) -> str:
+    """What bounds stability and heavy damping, and the corners, with units where the parameters are known."""
+    lines = []
+    for name, arcs in (("stability", domain.stability), ("heavy damping", domain.heavy_damping)):
+        kinds = [f"{arc.kind} ({len(next(iter(arc.points.values())))} points)" for arc in arcs]
+        lines.append(f"{name} is bounded by {', '.join(kinds) or 'nothing in the box'}")
+    if domain.corners:
+        names = list(domain.corners[0].parameters)
+        names = [n for n in names if any(n in arc.points for arc in (*domain.stability, *domain.heavy_damping))]
+        rows = [("corner", *(with_unit(of, n) if of else n for n in names))]
+        rows += [(c.name, *(number(c.parameters[n]) for n in names)) for c in domain.corners]
+        lines += ["", *columns(rows)]
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def swallowtail_table(found: Swallowtail) -> str:
+    """Pieces of the surface, then its edges as traces."""
+    problem = found.problem
+    damped = sum(patch.heavily_damped for patch in found.patches)
+    lines = [
+        problem.title or "untitled problem",
+        f"real negative double roots over {', '.join(found.axes)}: {len(found.patches)} patches, {damped} of them "
+        "bound heavy damping",
+    ]
+    edges = (("cuspidal edges", found.cusps), ("self-intersection", found.crossing))
+    lines += [f"{name}: {trace_headline(trace)}" for name, trace in edges]
+    return "\n".join(lines)
 
 
 def _summary_table(of: ParameterSet, data: Mapping[str, Any]) -> str:
@@ -91,21 +115,35 @@ def front_table(front: Front) -> str:
 def trace_table(trace: Trace) -> str:
     """Branches with their events, one a row, in the free parameters."""
     free, of = list(trace.problem.free), trace.problem.parameter_set
+    lines = [trace.problem.title or "untitled problem", trace_headline(trace)]
+    for number_, branch in enumerate(trace.branches, start=1):
+        lines += ["", f"branch {number_}: {_summary(branch, trace)}"]
+        lines += _event_rows(branch, {n: with_unit(of, n) for n in free})
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def trace_headline(trace: Trace) -> str:
+    """How many branches and points, and what they took."""
     per_point = 1e6 * trace.seconds_walking / max(trace.points, 1)
     count = f"{len(trace.branches)} branch" + ("es" if len(trace.branches) != 1 else "")
     points = f", {trace.points} points at {per_point:.0f} µs each" if trace.points else ""
-    lines = [
-        trace.problem.title or "untitled problem",
-        f"{trace.pattern}: {count}{points}, looked for from {trace.starts} starts; {trace.seconds:.2f} s",
-    ]
-    for number_, branch in enumerate(trace.branches, start=1):
-        lines += ["", f"branch {number_}: {_summary(branch, trace)}"]
-        rows = [("", *(with_unit(of, n) for n in free), "abscissa", "")]
-        for event in branch.events:
-            values = (number(event.parameters[n]) for n in free)
-            rows.append((event.name, *values, number(float(branch.abscissa[event.index])), event.detail))
-        lines += columns(rows)
+    return f"{trace.pattern}: {count}{points}, looked for from {trace.starts} starts; {trace.seconds:.2f} s"
+
+
+def branch_table(branch: Branch) -> str:
+    """One branch with its events, in the free parameters."""
+    form = "closed" if branch.closed else "open"
+    lines = [f"{branch.pattern}: {len(branch)} points, {form}, coefficients met to {branch.residual:.0e}"]
+    lines += _event_rows(branch, {n: n for n in branch.tangent})
     return "\n".join(line.rstrip() for line in lines)
+
+
+def _event_rows(branch: Branch, heads: Mapping[str, str]) -> list[str]:
+    rows = [("", *heads.values(), "abscissa", "")]
+    for event in branch.events:
+        values = (number(event.parameters[n]) for n in heads)
+        rows.append((event.name, *values, number(float(branch.abscissa[event.index])), event.detail))
+    return columns(rows)
 
 
 def _summary(branch: Branch, trace: Trace) -> str:

@@ -188,6 +188,18 @@ def robustness_table(found: Robustness) -> str:
     return "\n".join(line.rstrip() for line in [f"robustness: {robustness_line(found)}", "", *columns(rows)])
 
 
+def nearest_table(found: Nearest) -> str:
+    """How far one boundary is, then the nearest point and the change of each parameter in weights."""
+    if not found.found:
+        return f"no point of the boundary of {found.kind} was found"
+    lines = [f"to {found.kind}: {found.distance:.6g} in weights"]
+    if not found.refined:
+        lines[0] += ", the nearest crossing seen"
+    rows = [("", "there", "change in weights")]
+    rows += [(n, f"{found.parameters[n]:.8g}", f"{change:+.4g}") for n, change in found.direction.items()]
+    return "\n".join(line.rstrip() for line in [*lines, "", *columns(rows)])
+
+
 def _robust_row(n: Nearest, found: Robustness) -> str:
     to = "at the edge of" if n.distance == 0 else "to"
     if n.kind != "heavy damping":

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from tmsopt.critical_speeds.crossings import Crossing
+from tmsopt.critical_speeds.growth import Growth
 from tmsopt.critical_speeds.speeds import Speeds
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import unit_of
@@ -35,6 +36,20 @@ def speeds_table(found: Speeds) -> str:
         lines.append(f"{_marginally(found)}: {_bands(found, found.marginal)}")
     lines.append(f"heavily damped: {_bands(found, found.heavily_damped)}")
     return "\n".join(line.rstrip() for line in lines)
+
+
+def growth_table(found: Growth) -> str:
+    """Over what, where the design stands, and the stable and the heavily damped bands."""
+    unit = "" if found.over.unit == "1" else f" {found.over.unit}"
+    critical = f", critical value {found.critical:.8g}{unit}" if math.isfinite(found.critical) else ""
+    lines = [
+        f"roots over {found.over.name} from {found.values[0]:.6g} to {found.values[-1]:.6g}{unit}",
+        f"the design: {found.over.name} = {found.design:.8g}{unit}, structure {found.structure}{critical}",
+    ]
+    for name, bands in (("stable", found.stable), ("heavily damped", found.heavily_damped)):
+        words = ", ".join(f"{low:.8g} to {high:.8g}{unit}" for low, high in bands)
+        lines.append(f"{name}: {words or 'nowhere'}")
+    return "\n".join(lines)
 
 
 def _nothing(found: Speeds) -> str:

@@ -1,7 +1,7 @@
 """All designs with a pattern in a box: proved to be all, or as far as many starts find them and what these cover."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Unpack
 
@@ -19,7 +19,7 @@ from tmsopt.formulation.formulate import design_of, matching
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.options import Asked, Options, options_of
 from tmsopt.formulation.starts import completions, spread
-from tmsopt.records import Array, plain
+from tmsopt.records import Array, Tabular, plain
 from tmsopt.solver.multistart import Runner
 from tmsopt.solver.newton import newton, square_system
 from tmsopt.solver.solve import solved
@@ -65,8 +65,8 @@ class Coverage:
         return found | {"expected": expected, "chance": round(self.chance, 6)}
 
 
-@dataclass(frozen=True)
-class Every:
+@dataclass(frozen=True, repr=False)
+class Every(Tabular):
     """All solutions that were found.
 
     Attributes:
@@ -80,6 +80,12 @@ class Every:
     coverage: Coverage | None = None
     completeness: Completeness | None = None
     proved: tuple[bool, ...] = ()
+
+    def records(self) -> Iterable[dict[str, Any]]:
+        """The designs, one a row."""
+        for solution, proved in zip(self.solutions, self.proved, strict=True):
+            found = {"abscissa": solution.abscissa, "structure": solution.structure, "stable": solution.stable}
+            yield {**solution.parameters, **found, "proved": proved}
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""

@@ -4,8 +4,7 @@ import csv
 import json
 from array import array
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields, replace
-from importlib import import_module
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.disk import whole
-from tmsopt.errors import Fault, InputError
+from tmsopt.errors import Fault, InputError, needed
 from tmsopt.records import Array
 from tmsopt.studies.row import Row
 
@@ -109,7 +108,7 @@ def check_export(path: Path) -> None:
         problem = "is no regular file" if path.exists() else "is in a folder that does not exist"
         raise InputError([Fault(f"'{path}' {problem}; give the path of a file to write", ("export",))])
     for module in FORMATS[_ending(path)].needs:
-        _needed(module)
+        needed(module, "export to a .csv file")
 
 
 def _ending(path: Path) -> str:
@@ -134,7 +133,7 @@ def _texts(values: np.ndarray[Any, Any], present: NDArray[np.bool_]) -> list[str
 
 
 def _parquet(table: Mapping[str, PartialColumn], path: Path, metadata: str) -> None:
-    pa, parquet = _needed("pyarrow"), _needed("pyarrow.parquet")
+    pa, parquet = needed("pyarrow"), needed("pyarrow.parquet")
     arrays = {name: pa.array(c.values, _kind(pa, c), mask=~c.present, from_pandas=False) for name, c in table.items()}
     parquet.write_table(pa.table(arrays).replace_schema_metadata({"tmsopt": metadata}), path)
 
@@ -144,28 +143,36 @@ def _kind(pa: Any, column: PartialColumn) -> Any:
 
 
 def _netcdf(table: Mapping[str, PartialColumn], path: Path, metadata: str) -> None:
-    xarray = _needed("xarray")
-    rows = table["number"].values
+    xarray = needed("xarray")
     names = _names(table)
-    table = {name: replace(c, values=c.numbers) for name, c in table.items()}
+    over_rows = {names[n]: ("row", c.numbers, {"long_name": n}) for n, c in table.items()}
     try:
-        over_rows = {names[n]: ("row", c.values, {"long_name": n}) for n, c in table.items()}
-        made = xarray.Dataset(over_rows, {"row": rows}, {"tmsopt": metadata})
+        made = xarray.Dataset(over_rows, {"row": table["number"].values}, {"tmsopt": metadata})
         made.to_netcdf(path, engine="netcdf4", encoding={name: {"_FillValue": None} for name in made.variables})
-        axes = levels(table)
-        if axes:
-            order = np.argsort(places(table, axes))
-            shape, axis_names = tuple(len(v) for v in axes.values()), [names[n] for n in axes]
-            over_grid = {
-                names[n]: (axis_names, c.values[order].reshape(shape), {"long_name": n})
-                for n, c in table.items()
-                if n not in axes
-            }
-            made = xarray.Dataset(over_grid, {names[n]: v for n, v in axes.items()})
+        if (made := gridded(table)) is not None:
             encoding = {name: {"_FillValue": None} for name in made.variables}
             made.to_netcdf(path, mode="a", group="grid", engine="netcdf4", encoding=encoding)
     except RuntimeError as error:  # what the HDF5 library says of a full disk
         raise OSError(str(error)) from error
+
+
+def gridded(table: Mapping[str, PartialColumn]) -> Any:
+    """Rows that fill a grid as a dataset over the values that vary; None for others.
+
+    Raises:
+        InputError: where xarray is not installed.
+    """
+    xarray, names, axes = needed("xarray"), _names(table), levels(table)
+    if not axes:
+        return None
+    order = np.argsort(places(table, axes))
+    shape, axis_names = tuple(len(v) for v in axes.values()), [names[n] for n in axes]
+    over_grid = {
+        names[n]: (axis_names, c.numbers[order].reshape(shape), {"long_name": n})
+        for n, c in table.items()
+        if n not in axes
+    }
+    return xarray.Dataset(over_grid, {names[n]: v for n, v in axes.items()})
 
 
 def _names(headers: Iterable[str]) -> dict[str, str]:
@@ -177,14 +184,6 @@ def _names(headers: Iterable[str]) -> dict[str, str]:
             name += "_"
         made[header] = name
     return made
-
-
-def _needed(module: str) -> Any:
-    try:
-        return import_module(module)
-    except ImportError as error:
-        message = f'{module} is not installed; pip install "tmsopt[data]", or export to a .csv file'
-        raise InputError([Fault(message, ("export",))]) from error
 
 
 FORMATS: Mapping[str, Format] = {

@@ -5,16 +5,16 @@ from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
 from tmsopt.disk import path_of
 from tmsopt.errors import Fault, InputError, count_faults, short, suggest
-from tmsopt.records import Progress
+from tmsopt.records import SCHEMA, Progress, Shown, frame
 from tmsopt.studies.engines import Note, Unit, cluster, cores, in_process, processes
 from tmsopt.studies.engines.work import silent
-from tmsopt.studies.export import columns, export
+from tmsopt.studies.export import columns, export, gridded
 from tmsopt.studies.load import load_study
 from tmsopt.studies.monte_carlo import Sampling, planned
 from tmsopt.studies.neighbours import blocks
@@ -24,14 +24,18 @@ from tmsopt.studies.store.store import Store, open_store, read_store
 from tmsopt.studies.study import Study, definition
 from tmsopt.studies.summary import Summary, summary
 
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
+
 _COMMIT = 1.0
 """s of rows in one transaction: what a kill may cost, and some 30 times what a transaction takes."""
 
 _FEW = 32  # rows for which no workers are started unless asked for: they take seconds to come up
 
 
-@dataclass(frozen=True)
-class Results:
+@dataclass(frozen=True, repr=False)
+class Results(Shown):
     """A study with its rows.
 
     Attributes:
@@ -69,6 +73,32 @@ class Results:
     def summary(self) -> Summary:
         """What the rows say together: counts, best, spread, causes, and of a Monte Carlo study its shares."""
         return summary(self.study, self.rows)
+
+    def to_frame(self) -> "DataFrame":
+        """The rows as a table of pandas, with the headers of an exported file.
+
+        Raises:
+            InputError: where pandas is not installed.
+        """
+        return frame({name: column.numbers for name, column in columns(self.rows).items()})
+
+    def to_xarray(self) -> "Dataset":
+        """The rows over the values that vary, of a study whose rows fill a grid.
+
+        Raises:
+            InputError: where they do not, or xarray is not installed.
+        """
+        made: Dataset | None = gridded(columns(self.rows))
+        if made is None:
+            message = f"the {len(self.rows)} rows fill no grid; use to_frame"
+            raise InputError([Fault(message, ("study",))])
+        return made
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``: the summary, and the rows as ``table``."""
+        head = {"schema": SCHEMA, "title": self.study.title, "model": self.study.problem.model.name}
+        table = [row.to_json() for row in self.rows]
+        return head | {"method": self.study.method} | self.summary.to_json() | {"table": table}
 
     def export(self, path: str | PathLike[str]) -> None:
         """Write the rows to a CSV, Parquet or netCDF file; see `tmsopt.studies.export`."""

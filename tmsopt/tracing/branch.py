@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
 from tmsopt.disk import write_csv
-from tmsopt.records import Array, Table, plain
+from tmsopt.records import Array, Table, Tabular, plain
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,8 @@ class Event:
     index: int
 
 
-@dataclass(frozen=True)
-class Branch:
+@dataclass(frozen=True, repr=False)
+class Branch(Tabular):
     """A curve of designs with one root pattern; every event is one of its points.
 
     Attributes:
@@ -67,7 +67,7 @@ class Branch:
     def __len__(self) -> int:
         return len(self.arclength)
 
-    def rows(self) -> Iterable[dict[str, Any]]:
+    def records(self) -> Iterable[dict[str, Any]]:
         """One record per point, as written to CSV."""
         marks: dict[int, list[str]] = {}
         for event in self.events:
@@ -90,7 +90,7 @@ class Branch:
     def to_json(self) -> dict[str, Any]:
         """Columns and events; numbers that do not exist are null."""
         columns: dict[str, list[Any]] = {}
-        for row in self.rows():
+        for row in self.records():
             for name, value in row.items():
                 columns.setdefault(name, []).append(value)
         found = plain(self, "pattern closed") | {"points": len(self), "residual": self.residual}
@@ -98,8 +98,8 @@ class Branch:
         return found | {"events": events, "columns": plain(columns)}
 
 
-@dataclass(frozen=True)
-class Trace:
+@dataclass(frozen=True, repr=False)
+class Trace(Tabular):
     """Every branch of a pattern that was found in the box.
 
     Attributes:
@@ -134,13 +134,17 @@ class Trace:
 
         return sorted(self.problem.free, key=lambda name: not moves(name))
 
+    def records(self) -> Iterable[dict[str, Any]]:
+        """The points of all branches, a column `branch` before the others."""
+        return ({"branch": k, **row} for k, branch in enumerate(self.branches) for row in branch.records())
+
     def write_csv(self, path: str | PathLike[str]) -> None:
-        """All branches in one table, a column `branch` before the others.
+        """The same in a file.
 
         Raises:
             OSError: when the file cannot be written.
         """
-        write_csv(path, [{"branch": k, **row} for k, branch in enumerate(self.branches) for row in branch.rows()])
+        write_csv(path, list(self.records()))
 
     def to_json(self) -> dict[str, Any]:
         """The JSON of `tmsopt trace`."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
-from tmsopt.records import Array, Truth, plain
+from tmsopt.records import Array, Shown, Truth, plain
 from tmsopt.roots import pattern, real_roots
 from tmsopt.roots.meetings import nearest_two
 from tmsopt.tracing.branch import Branch, Event
@@ -51,8 +51,8 @@ class Corner:
     parameters: dict[str, float]
 
 
-@dataclass(frozen=True)
-class Domain:
+@dataclass(frozen=True, repr=False)
+class Domain(Shown):
     """Boundaries inside a box; where a domain leaves the box, its boundary ends at the edge. A boundary that
     lies in an edge, such as that of designs without damping, is that edge and is left out.
 

@@ -8,6 +8,7 @@ where the root is triple (EP3) and meets itself where a second pair is double (2
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -15,7 +16,7 @@ from scipy.optimize import brentq
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
-from tmsopt.records import Array
+from tmsopt.records import Array, Shown, plain
 from tmsopt.roots import determinant, is_stable, real_roots
 from tmsopt.tracing.branch import Trace
 from tmsopt.tracing.continuation import project
@@ -47,8 +48,8 @@ class Patch:
     heavily_damped: bool
 
 
-@dataclass(frozen=True)
-class Swallowtail:
+@dataclass(frozen=True, repr=False)
+class Swallowtail(Shown):
     """The surface with its edges.
 
     Attributes:
@@ -62,6 +63,10 @@ class Swallowtail:
     patches: tuple[Patch, ...]
     cusps: Trace
     crossing: Trace
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``: patches as rows of their points, edges as traces."""
+        return self.problem.heading | plain(self, "axes patches cusps crossing")
 
 
 def swallowtail(problem: Given, rows: int = 48, across: int = 24, starts: int = STARTS) -> Swallowtail:

@@ -1,14 +1,14 @@
 """What a ledger is made of: a claim, what computing it gave, and the rules that turn this into a verdict."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 import flint
 
-from tmsopt.records import SCHEMA, plain
+from tmsopt.records import SCHEMA, Tabular, plain
 
 EXACT = "exact"
 DIGITS_HOLD = "holds to the printed digits"
@@ -71,8 +71,8 @@ class Entry:
     remark: str
 
 
-@dataclass(frozen=True)
-class Ledger:
+@dataclass(frozen=True, repr=False)
+class Ledger(Tabular):
     """Every entry, in the order of the paper."""
 
     source: str
@@ -83,6 +83,10 @@ class Ledger:
         """Number of entries per verdict, every verdict named."""
         counted = Counter(entry.verdict for entry in self.entries)
         return {verdict: counted[verdict] for verdict in VERDICTS}
+
+    def records(self) -> Iterable[dict[str, Any]]:
+        """The entries, one a row."""
+        return map(plain, self.entries)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for JSON."""
