@@ -322,7 +322,7 @@ k = 1
     [
         (lambda: from_matrices(ca.MX.eye(2), None, [[k]]), "M: found MX"),
         (lambda: from_matrices([[1]], None, [[ca.MX.sym("k")]]), "is MX; make the symbols by ca.SX.sym"),
-        (lambda: from_matrices([["1"]], None, [[k]]), "row 1, column 1: found '1'"),
+        (lambda: from_matrices([[b"1"]], None, [[k]]), "row 1, column 1: found b'1'"),
         (lambda: from_matrices([[None]], None, [[k]]), "found None"),
         (lambda: from_matrices([[True]], None, [[k]]), "found True"),
         (lambda: from_matrices([[1j]], None, [[k]]), "found 1j"),
@@ -339,7 +339,10 @@ k = 1
         (lambda: from_matrices([[1]], None, [[k]], name=""), "name: found ''"),
         (lambda: from_matrices([[1]], None, [[k]], name="whipple"), "a model of tmsopt's own"),
         (lambda: from_matrices([[1]], None, [[k]], quantities={"k": k}), "'k' is the name of a parameter"),
-        (lambda: from_matrices([[1]], None, [[k]], quantities={"q": "k"}), "q: found 'k'"),
+        (lambda: from_matrices([[1]], None, [[k]], quantities={"q": b"k"}), "q: found b'k'"),
+        (lambda: from_matrices([[1]], None, [["k +"]]), "K: row 1, column 1: 'k +'"),
+        (lambda: from_matrices([[1]], None, [["sin"]]), "K: row 1, column 1: 'sin' names the function"),
+        (lambda: from_matrices([[1]], None, [["k"]], quantities={"q": "2*r", "r": "q"}), "q: uses itself: q → r → q"),
         (lambda: from_matrices([[1]], None, [[k]], quantities=[k]), "quantities: found list"),
         (lambda: from_coefficients("1k"), "coefficients: found no list"),
         (lambda: from_coefficients(np.eye(2)), "coefficients: found no list"),
@@ -479,3 +482,23 @@ def test_axes_beside_layers_of_the_same_name(tmp_path: Path) -> None:
     with np.load(tmp_path / "plane.npz") as data:
         assert data["parameter.kind"].tolist() == [1, 9]
         assert data["kind"].shape == (2, 2)
+
+
+def test_matrices_take_the_texts_that_a_file_takes() -> None:
+    """The same model as by symbols, and as of a file; texts and symbols may stand side by side."""
+    mu, w, c = (ca.SX.sym(n) for n in ("mu", "w", "c"))
+    texts = {"M": [[1, 0], [0, "mu"]], "K": [["1 + mu*w**2", "-mu*w**2"], ["-mu*w**2", "mu*w**2"]]}
+    drag, quantities = [["c", "-c"], ["-c", "c"]], {"half": "zeta/2", "zeta": "c/(2*mu*w)"}
+    stated = from_matrices(**texts, D=drag, quantities=quantities)
+    k = mu * w**2
+    by_symbols = from_matrices([[1, 0], [0, mu]], [[c, -c], [-c, c]], [[1 + k, -k], [-k, k]])
+    design = {"mu": 0.1, "c": 0.05, "w": 0.9}
+    assert stated.coefficients(design) == pytest.approx(by_symbols.coefficients(design), rel=1e-15)
+    values = tmsopt.Problem(stated, fixed=design).values(design)
+    assert values["half"] == pytest.approx(0.05 / (4 * 0.1 * 0.9), rel=1e-15)
+    mixed = from_matrices(M=np.array([[1, 0], [0, mu]]), D=drag, K=texts["K"], quantities={"zeta": c / (2 * mu * w), "half": "zeta/2"})
+    assert set(mixed.sets[0].names) == set(design)
+    assert tmsopt.Problem(mixed, fixed=design).values(design)["half"] == values["half"]
+    assert pickle.loads(pickle.dumps(stated)) is stated
+    row = from_coefficients(["1", "c", "k1 + 2"])
+    assert [float(x) for x in row.coefficients({"c": 3.0, "k1": 1.0})] == [1, 3, 3]

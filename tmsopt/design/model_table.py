@@ -4,13 +4,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import casadi as ca
-import numpy as np
-
-from tmsopt.design.expression import Expression, ExpressionError, parse_value
 from tmsopt.errors import Fault, short, suggest
 from tmsopt.models import Model, Unfit, from_coefficients, from_matrices
-from tmsopt.models.names import unusable
+from tmsopt.models.texts import Texts
 
 _MATRICES = ("M", "D", "K", "A")
 _KEYS = ("name", *_MATRICES, "coefficients", "quantities")
@@ -41,7 +37,7 @@ def stated_model(table: Mapping[str, Any]) -> tuple[list[Fault], Model | None]:
     reader.read_quantities()
     entries = {key: reader.matrix(key) for key in given if key != "coefficients"}
     row = reader.row(table["coefficients"], ("coefficients",)) if "coefficients" in given else []
-    quantities = {n: reader.quantity(n) for n in reader.written}
+    quantities = {n: reader.texts.quantity(n) for n in reader.texts.written}
     if reader.faults:
         return reader.faults, None
     try:
@@ -56,14 +52,12 @@ def stated_model(table: Mapping[str, Any]) -> tuple[list[Fault], Model | None]:
 
 
 class _Reader:
-    """Turns texts into expressions of shared symbols, and collects what is wrong; discarded after one table."""
+    """Reads the entries and collects what is wrong; discarded after one table."""
 
     def __init__(self, table: Mapping[str, Any]) -> None:
         self.table = table
         self.faults: list[Fault] = []
-        self.symbols: dict[str, Any] = {}
-        self.written: dict[str, Expression | None] = {}
-        self.known: dict[str, Any] = {}
+        self.texts = Texts(self.fault)
 
     def fault(self, message: str, *key: str) -> None:
         self.faults.append(Fault(message, ("model", *key)))
@@ -92,66 +86,19 @@ class _Reader:
         if not isinstance(entry, str):
             self.fault(f"{where}: found {short(entry)}; accepted: a finite number, or an expression in quotes", key)
             return 0
-        expression = self.parsed(entry, (key,), f"{where}: ")
-        return self.symbolic(expression) if expression else 0
+        return self.texts.entry(entry, key, where)
 
     def read_quantities(self) -> None:
-        """The formulas of the quantities, each to be had by `quantity`."""
+        """The formulas of the quantities."""
         written = self.table.get("quantities", {})
         if not isinstance(written, dict):
             self.fault(f"found {short(written)}; accepted: a table [model.quantities]", "quantities")
             return
         for name, text in written.items():
-            key = ("quantities", name)
-            if why := unusable(name):
-                self.fault(f"'{name}' {why}; give the quantity a name of its own", *key)
-            elif not isinstance(text, str):
-                self.fault(f"found {short(text)}; accepted: an expression in quotes, such as 'k1/k2'", *key)
-            else:
-                self.written[name] = self.parsed(text, key, "")
-        for name in list(self.written):
-            if circle := self.circle((name,)):
-                self.fault(f"uses itself: {' → '.join(circle)}; write it in parameters", "quantities", name)
-                self.written[name] = None
-
-    def circle(self, path: tuple[str, ...]) -> tuple[str, ...]:
-        """How a quantity leads back to itself; empty where it does not."""
-        expression = self.written.get(path[-1])
-        for name in expression.names if expression else ():
-            if name == path[0]:
-                return (*path, name)
-            if name not in path and (found := self.circle((*path, name))):
-                return found
-        return ()
-
-    def quantity(self, name: str) -> Any:
-        """A quantity as an expression of parameters."""
-        if name not in self.known:
-            expression = self.written[name]
-            self.known[name] = self.symbolic(expression) if expression else 0
-        return self.known[name]
-
-    def symbolic(self, expression: Expression) -> Any:
-        """An expression in symbols, made when first met."""
-        values = {}
-        for name in expression.names:
-            is_parameter = name not in self.written
-            values[name] = self.symbols.setdefault(name, ca.SX.sym(name)) if is_parameter else self.quantity(name)
-        with np.errstate(all="ignore"):  # what is not finite is found by the model
-            return expression.symbolic(values)
-
-    def parsed(self, text: str, key: tuple[str, ...], where: str) -> Expression | None:
-        """An expression; None for one with a fault."""
-        try:
-            expression = parse_value(text, None, example="k1 + k2")
-        except ExpressionError as error:
-            self.fault(f"{where}{error}", *key)
-            return None
-        for name in expression.names:
-            if why := unusable(name):
-                self.fault(f"{where}'{name}' {why}; give the parameter another name", *key)
-                return None
-        return expression
+            if not isinstance(text, str):
+                accepted = "an expression in quotes, such as 'k1/k2'"
+                self.fault(f"found {short(text)}; accepted: {accepted}", "quantities", name)
+        self.texts.read_quantities({n: text for n, text in written.items() if isinstance(text, str)})
 
 
 def _is_finite(number: float) -> bool:

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from tmsopt.design.expression import Expression, parse_comparison, parse_value
+from tmsopt.design.expression import Expression, dimension, parse_comparison, parse_value
 from tmsopt.design.problem import Problem
 from tmsopt.models import Parameter, Quantity
 from tmsopt.units import Dimension, factor
@@ -62,7 +62,7 @@ def dimension_of(problem: Problem, text: str, units: Mapping[str, str] | None = 
         parse_comparison if any(sign in text for sign in ("<=", ">=", "==")) else parse_value
     )
     try:
-        return parse(text, problem.vocabulary).dimension(si_units(problem) if units is None else units)
+        return dimension(parse(text, problem.vocabulary), si_units(problem) if units is None else units)
     except ValueError:  # a pattern, or what else has no unit
         return Dimension()
 

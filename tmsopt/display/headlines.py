@@ -7,27 +7,18 @@ from typing import TYPE_CHECKING
 from tmsopt.errors import short
 
 if TYPE_CHECKING:
-    from tmsopt import (
-        Branch,
-        Chart,
-        Comparison,
-        Diagnosis,
-        Domain,
-        Every,
-        Explanation,
-        Front,
-        Growth,
-        Ledger,
-        Nearest,
-        Optimality,
-        Proof,
-        Results,
-        Robustness,
-        Solution,
-        Speeds,
-        Swallowtail,
-        Trace,
-    )
+    from tmsopt.charts import Chart
+    from tmsopt.critical_speeds import Growth, Speeds
+    from tmsopt.design import Solution
+    from tmsopt.diagnosis import Diagnosis
+    from tmsopt.explanation import Explanation, Optimality
+    from tmsopt.fronts import Front
+    from tmsopt.margins import Nearest, Robustness
+    from tmsopt.paper import Comparison, Ledger
+    from tmsopt.proofs import Proof
+    from tmsopt.solver import Every
+    from tmsopt.studies import Results
+    from tmsopt.tracing import Branch, Domain, Swallowtail, Trace
 
 Words = Iterator[str]
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 from numbers import Real
-from typing import Any
+from typing import Any, NoReturn
 
 import casadi as ca
 import flint
@@ -20,9 +20,10 @@ from tmsopt.arithmetic.walk import operation_name, steps, walk
 from tmsopt.models.built_in import MODELS
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
 from tmsopt.models.names import latex, spelled, unusable
+from tmsopt.models.texts import untexted
 from tmsopt.roots.polynomial import characteristic_polynomial, quadratic_pencil
 
-_ACCEPTED = "accepted: finite numbers, and SX expressions of them"
+_ACCEPTED = "accepted: finite numbers, expressions in quotes, and SX expressions"
 _FINITE = "accepted: finite numbers, and expressions of them"
 
 
@@ -39,15 +40,17 @@ def from_matrices(
     M: Any = None, D: Any = None, K: Any = None, *, A: Any = None, name: str = "stated",
     quantities: Mapping[str, Any] | None = None,
 ) -> Model:  # fmt: skip
-    """A model of M q″ + D q′ + K q = 0, or of x′ = A x, from CasADi expressions.
+    """A model of M q″ + D q′ + K q = 0, or of x′ = A x, from expressions in text or of CasADi.
 
     Args:
-        M, D, K: square, up to 6 × 6, as nested lists, NumPy arrays, SX or DM; D left out is 0.
+        M, D, K: square, up to 6 × 6, as nested lists, NumPy arrays, SX or DM; D left out is 0. An entry is a number,
+            text as in a problem file such as ``"1 + mu*w**2"``, or an SX.
         A: square, up to 12 × 12, instead of these.
         name: one word or more for reports.
-        quantities: name → expression of the same symbols, for objectives and constraints.
+        quantities: name → expression of the same symbols, for objectives and constraints; those in text may use one
+            another.
 
-    The parameters are the symbols (``ca.SX.sym("k")``), in the order in which they appear.
+    The parameters are the names in texts and the symbols (``ca.SX.sym("k")``), in the order in which they appear.
 
     Raises:
         Unfit: for matrices that are not square, of different sizes or too large, for entries that are no finite
@@ -70,7 +73,7 @@ def from_matrices(
 
 
 def from_coefficients(coefficients: Any, *, name: str = "stated", quantities: Mapping[str, Any] | None = None) -> Model:
-    """A model by the coefficients of its characteristic polynomial, descending, as CasADi expressions.
+    """A model by the coefficients of its characteristic polynomial, descending, each as an entry of `from_matrices`.
 
     Raises:
         Unfit: for fewer than two coefficients, more than 13, or a leading one that is 0.
@@ -125,7 +128,7 @@ def _made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) ->
         raise Unfit("name", f"'{name.strip()}' is a model of tmsopt's own; give yours another name")
     if not isinstance(quantities or {}, Mapping):
         raise Unfit("quantities", f"found {type(quantities).__name__}; accepted: a mapping of names to expressions")
-    derived = dict(quantities or {})
+    matrices, derived = untexted(matrices, quantities or {}, _unfit)
     entries = [
         scalar(n, f"entry {j}" if kind == "coefficients" else f"row {i}, column {j}", x)
         for n, rows in matrices.items()
@@ -295,6 +298,10 @@ class Unfit(ValueError):
 
     def __str__(self) -> str:
         return f"{self.key}: {self.message}"
+
+
+def _unfit(message: str, key: str, *name: str) -> NoReturn:
+    raise Unfit(key, ": ".join([*name, message]))
 
 
 def scalar(key: str, where: str, value: Any) -> ca.SX:

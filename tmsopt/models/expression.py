@@ -1,0 +1,320 @@
+"""Expressions of a problem file: parsed to a small checked tree, never run as Python."""
+
+import ast
+import keyword
+import math
+import operator
+import re
+import threading
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+import flint
+import numpy as np
+
+from tmsopt.arithmetic import elementary
+from tmsopt.errors import suggest
+from tmsopt.models.names import CONSTANTS, FUNCTIONS
+
+COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
+
+_ALLOWED = {"<=": (-math.inf, 0.0), ">=": (0.0, math.inf), "==": (0.0, 0.0), "": (-math.inf, math.inf)}
+
+_LONGEST = 2000  # characters; longer texts could exhaust the parser's stack
+_DEEPEST = 200
+_LANGUAGE = f"numbers, names, + - * / **, parentheses and {' '.join(FUNCTIONS)}"
+_NOT_ACCEPTED = re.compile(r"[^ -~]|#")  # look-alike letters, line breaks and comments
+
+_UNIT = re.compile(r"\d\s*(mm|cm|m|kg|g|km/h|m/s|deg|rad|N|s)\b")
+
+
+@dataclass(frozen=True)
+class Arithmetic:
+    """What the functions, operators and numbers of an expression mean for one kind of values."""
+
+    functions: Mapping[str, Callable[..., Any]]
+    number: Callable[[Any], Any]
+    operators: Mapping[type[ast.operator], Callable[[Any, Any], Any]]
+    pi: Any = lambda: math.pi
+
+
+def _as_array(value: Any) -> Any:
+    """Python floats as NumPy's, which give nan and inf where Python raises."""
+    return np.float64(value) if isinstance(value, float | int) else value
+
+
+def _method(name: str) -> Callable[[Any], Any]:
+    return lambda x: getattr(elementary.as_ball(x), name)()
+
+
+BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+}  # fmt: skip
+_SYMBOLIC = Arithmetic(
+    {**{name: getattr(ca, name) for name in FUNCTIONS[:9]}, "abs": ca.fabs, "min": ca.fmin, "max": ca.fmax}, _as_array,
+    BINARY,
+)  # fmt: skip
+_NUMERIC = Arithmetic(
+    {
+        **{name: getattr(np, name) for name in ("sin", "cos", "tan", "sqrt", "exp", "log", "abs")},
+        **{"asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "min": np.minimum, "max": np.maximum},
+    },
+    _as_array, BINARY,
+)  # fmt: skip
+_BALLS = Arithmetic(
+    {
+        **{name: _method(name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "exp", "log")},
+        "sqrt": elementary.sqrt, "abs": elementary.magnitude, "min": elementary.lesser, "max": elementary.greater,
+    },
+    elementary.exact, {**BINARY, ast.Div: elementary.quotient, ast.Pow: elementary.power}, flint.arb.pi,
+)  # fmt: skip
+
+
+class ExpressionError(ValueError):
+    """An expression that cannot be used, with the reason."""
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A parsed expression.
+
+    Attributes:
+        text: as written.
+        names: parameters and quantities that it uses, in order of appearance.
+        comparison: ``<=``, ``>=`` or ``==`` for a constraint, empty for a plain value.
+    """
+
+    text: str
+    names: tuple[str, ...]
+    comparison: str = ""
+
+    def __call__(self, values: Mapping[str, Any]) -> Any:
+        """Value for floats or arrays; of a comparison, left minus right."""
+        with np.errstate(all="ignore"):
+            return self.evaluate(values, _NUMERIC)
+
+    def symbolic(self, values: Mapping[str, Any], limit: Any = None) -> Any:
+        """CasADi expression; of a comparison, left minus right, with `limit` in place of the number on one side."""
+        if limit is None:
+            return self.evaluate(values, _SYMBOLIC)
+        sides = [limit if _is_number(side) else _value(side, values, _SYMBOLIC) for side in self._sides()]
+        return sides[0] - sides[1]
+
+    def enclosure(self, values: Mapping[str, Any], number: Callable[[Any], Any] = elementary.exact) -> Any:
+        """Ball that certainly holds the value, for balls or exact fractions; of a comparison, left minus right.
+
+        A number in the text stands for the double nearest to it, unless `number` makes it another fraction, and pi for
+        the number π. The ball is nan where the value does not exist, or may not.
+        """
+        return self.evaluate(values, _BALLS if number is elementary.exact else replace(_BALLS, number=number))
+
+    def violation(self, values: Mapping[str, Any]) -> float:
+        """By how much a numeric design violates a comparison, relative to the size of its sides; nan if undefined."""
+        left, right = self.sides(values)
+        difference = left - right
+        excess = float(self.excess(difference))
+        return excess / max(1.0, abs(left), abs(right)) if math.isfinite(difference) else math.nan
+
+    @property
+    def equality(self) -> bool:
+        """Whether a comparison allows one value alone, so that it takes away a degree of freedom."""
+        return self.allowed[0] == self.allowed[1]
+
+    @property
+    def allowed(self) -> tuple[float, float]:
+        """Least and greatest left minus right that a comparison allows."""
+        return _ALLOWED[self.comparison]
+
+    @property
+    def sign(self) -> float:
+        """−1 where left minus right is better the greater it is; else 1, for values and equalities too."""
+        return -1.0 if self.allowed == (0.0, math.inf) else 1.0
+
+    def excess(self, difference: Any) -> Any:
+        """By how much left minus right, a number or an array of them, is beyond what a comparison allows."""
+        return np.abs(difference) if self.equality else np.maximum(self.sign * difference, 0)
+
+    def holds(self, difference: Any) -> Any:
+        """Whether a comparison allows left minus right; not where that does not exist."""
+        return self.excess(difference) <= 0
+
+    def sides(self, values: Mapping[str, Any]) -> tuple[float, float]:
+        """Both sides of a comparison for a numeric design."""
+        with np.errstate(all="ignore"):
+            left, right = (float(_value(side, values, _NUMERIC)) for side in self._sides())
+        return left, right
+
+    def _sides(self) -> list[ast.expr]:
+        body = _parse(self.text)
+        return [body.left, *body.comparators] if isinstance(body, ast.Compare) else [body]
+
+    def evaluate(self, values: Mapping[str, Any], arithmetic: Arithmetic) -> Any:
+        """Value in any arithmetic; of a comparison, left minus right."""
+        sides = [arithmetic.number(_value(side, values, arithmetic)) for side in self._sides()]
+        return sides[0] - sides[1] if len(sides) == 2 else sides[0]
+
+
+def parse_value(text: str, accepted: Iterable[str] | None, example: str = "abscissa") -> Expression:
+    """Parse an expression for a value, such as an objective; in names of the author's own where none are `accepted`.
+
+    Raises:
+        ExpressionError: with what was found and what is accepted.
+    """
+    body = _parse(text)
+    if isinstance(body, ast.Compare):
+        raise ExpressionError(f"'{text}' is a comparison; accepted: a value, such as '{example}'")
+    return Expression(text, _checked_names(body, text, None if accepted is None else list(accepted)))
+
+
+def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
+    """Parse a constraint, two values joined by one of ``<= >= ==``.
+
+    Raises:
+        ExpressionError: with what was found and what is accepted.
+    """
+    body = _parse(text)
+    if not isinstance(body, ast.Compare):
+        raise ExpressionError(f"'{text}' is not a comparison; write e.g. 'nu_H >= 0.02' with <=, >= or ==")
+    if len(body.ops) > 1:
+        raise ExpressionError(f"'{text}' joins several comparisons; write one constraint for each")
+    symbol = COMPARISONS.get(type(body.ops[0]))
+    if symbol is None:
+        raise ExpressionError(f"'{text}' compares with another sign than <=, >= or ==; use one of these")
+    known = list(accepted)
+    left, right = _checked_names(body.left, text, known), _checked_names(body.comparators[0], text, known)
+    names = tuple(dict.fromkeys(left + right))
+    if not names:
+        raise ExpressionError(f"'{text}' uses no parameter or quantity, so nothing can satisfy or violate it")
+    return Expression(text, names, symbol)
+
+
+def written_sides(text: str) -> tuple[str, str, str]:
+    """Left side, sign and right side of a comparison, as written.
+
+    Raises:
+        ExpressionError: for anything else.
+    """
+    body = _parse(text)
+    if not isinstance(body, ast.Compare) or len(body.ops) > 1 or type(body.ops[0]) not in COMPARISONS:
+        raise ExpressionError(f"'{text}' is not a comparison by <=, >= or ==")
+    return _source(body.left, text), COMPARISONS[type(body.ops[0])], _source(body.comparators[0], text)
+
+
+_ONE_AT_A_TIME = threading.Lock()
+"""Neither ast.parse (python/cpython#106905) nor warnings.catch_warnings may run in two threads at once."""
+
+
+@lru_cache(maxsize=4096)
+def _parse(text: str) -> ast.expr:
+    if len(text) > _LONGEST:
+        raise ExpressionError(f"expression of {len(text)} characters; accepted: up to {_LONGEST}")
+    if strange := _NOT_ACCEPTED.search(text.strip()):
+        raise ExpressionError(f"'{text}' contains {strange[0]!r}; accepted: one line of {_LANGUAGE}")
+    try:
+        with _ONE_AT_A_TIME, warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the tokenizer warns of texts like 1if, which fail below
+            return ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        column = f" at character {error.offset}" if isinstance(error, SyntaxError) and error.offset else ""
+        unit = _UNIT.search(text)
+        kept = next((word for word in re.findall(r"[A-Za-z_]\w*", text) if keyword.iskeyword(word)), None)
+        hint = f" ({unit[0]}: units are not written here; numbers are in m, rad, kg, m/s and N)" if unit else ""
+        hint = f"; '{kept}' is a reserved word, write e.g. {kept}_" if kept else hint
+        raise ExpressionError(f"'{text}' does not parse{column}{hint}; accepted: {_LANGUAGE}") from None
+
+
+def _checked_names(  # noqa: PLR0912 - one case per kind of node
+    node: ast.expr, text: str, accepted: list[str] | None, depth: int = 0
+) -> tuple[str, ...]:
+    """Names that an expression uses, of those accepted if these are given; raises on all but accepted arithmetic."""
+    if depth > _DEEPEST:
+        raise ExpressionError(f"'{text[:60]}…' is nested deeper than {_DEEPEST} levels")
+
+    def names_in(*nodes: ast.expr) -> tuple[str, ...]:
+        found = [name for n in nodes for name in _checked_names(n, text, accepted, depth + 1)]
+        return tuple(dict.fromkeys(found))
+
+    match node:
+        case ast.Constant(value=bool()):
+            raise ExpressionError(f"'{text}' uses {node.value!r}; accepted: numbers and names")
+        case ast.Constant(value=int() | float()):
+            _number(node, text)
+            return ()
+        case ast.Name(id=name):
+            if name in CONSTANTS:
+                return ()
+            if name in FUNCTIONS:
+                raise ExpressionError(f"'{text}' names the function {name} without its argument; write {name}(…)")
+            if accepted is not None and name not in accepted:
+                raise ExpressionError(f"'{text}' uses the unknown name '{name}'; {suggest(name, accepted)}")
+            return (name,)
+        case ast.UnaryOp(op=ast.UAdd() | ast.USub(), operand=operand):
+            return names_in(operand)
+        case ast.BinOp(left=left, op=op, right=right):
+            if type(op) not in BINARY:
+                hint = "; write a power as **" if isinstance(op, ast.BitXor) else ""
+                raise ExpressionError(f"'{text}' uses an operator other than + - * / **{hint}")
+            return names_in(left, right)
+        case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in FUNCTIONS:
+            fewest, most = (2, 99) if name in ("min", "max") else (1, 1)
+            if not fewest <= len(args) <= most:
+                wanted = "two or more arguments" if fewest == 2 else "one argument"
+                raise ExpressionError(f"'{text}' calls {name} with {len(args)} arguments; accepted: {wanted}")
+            return names_in(*args)
+        case ast.Call():
+            raise ExpressionError(f"'{text}' calls '{_source(node.func, text)}'; accepted: {' '.join(FUNCTIONS)}")
+        case ast.Attribute():
+            raise ExpressionError(f"'{text}' uses the attribute '{_source(node, text)}'; accepted: plain names")
+        case _:
+            raise ExpressionError(f"'{text}' contains '{_source(node, text)}'; accepted: {_LANGUAGE}")
+
+
+def _is_number(node: ast.expr) -> bool:
+    """Whether a side is a number and nothing else, but for its sign."""
+    return isinstance(node.operand if isinstance(node, ast.UnaryOp) else node, ast.Constant)
+
+
+def _source(node: ast.expr, text: str) -> str:
+    """The part of an expression that a node was parsed from."""
+    return ast.get_source_segment(text.strip(), node) or text
+
+
+def _number(node: ast.Constant, text: str) -> float:
+    value = node.value
+    assert isinstance(value, int | float)
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise ExpressionError(f"'{text}' contains a number beyond double precision")
+    return number
+
+
+def _value(node: ast.expr, values: Mapping[str, Any], arithmetic: Arithmetic) -> Any:
+    """Value of a checked tree."""
+    number = arithmetic.number
+    match node:
+        case ast.Constant():
+            return _number(node, "")
+        case ast.Name(id=name):
+            return arithmetic.pi() if name in CONSTANTS else values[name]
+        case ast.UnaryOp(op=op, operand=operand):
+            value = _value(operand, values, arithmetic)
+            return -value if isinstance(op, ast.USub) else value
+        case ast.BinOp(left=left, op=op, right=right):
+            a, b = _value(left, values, arithmetic), _value(right, values, arithmetic)
+            return arithmetic.operators[type(op)](number(a), number(b))
+        case ast.Call(func=ast.Name(id=name), args=args):
+            function = arithmetic.functions[name]
+            operands = [number(_value(a, values, arithmetic)) for a in args]
+            result = function(*operands[:2]) if len(operands) > 1 else function(operands[0])
+            for operand in operands[2:]:
+                result = function(result, operand)
+            return result
+    raise AssertionError(ast.dump(node))  # unreachable: the tree was checked when parsed

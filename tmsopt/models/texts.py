@@ -1,0 +1,109 @@
+"""A stated system in text: its entries and quantities as expressions of shared symbols."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from tmsopt.models.expression import Expression, ExpressionError, parse_value
+from tmsopt.models.model import Matrix
+from tmsopt.models.names import unusable
+
+
+class Texts:
+    """Turns texts into expressions of shared symbols; discarded after one statement.
+
+    Args:
+        fault: called with what is wrong with a text, and where: ``M``, or ``quantities`` and a name.
+        symbols: those that there are beside texts.
+        known: quantities that are expressions already.
+    """
+
+    def __init__(
+        self, fault: Callable[..., None], symbols: Mapping[str, Any] | None = None,
+        known: Mapping[str, Any] | None = None,
+    ) -> None:  # fmt: skip
+        self.fault = fault
+        self.symbols = dict(symbols or {})
+        self.known = dict(known or {})
+        self.written: dict[str, Expression | None] = {}
+
+    def entry(self, text: str, key: str, where: str) -> Any:
+        """One entry as an expression of CasADi; 0 for one with a fault."""
+        expression = self._parsed(text, (key,), f"{where}: ")
+        return self._symbolic(expression) if expression else 0
+
+    def read_quantities(self, texts: Mapping[str, str]) -> None:
+        """The formulas of the quantities, which may use one another, each to be had by `quantity`."""
+        for name, text in texts.items():
+            if why := unusable(name):
+                self.fault(f"'{name}' {why}; give the quantity a name of its own", "quantities", str(name))
+            else:
+                self.written[name] = self._parsed(text, ("quantities", name), "")
+        for name in list(self.written):
+            if circle := self._circle((name,)):
+                self.fault(f"uses itself: {' → '.join(circle)}; write it in parameters", "quantities", name)
+                self.written[name] = None
+
+    def quantity(self, name: str) -> Any:
+        """A quantity as an expression of parameters."""
+        if name not in self.known:
+            expression = self.written[name]
+            self.known[name] = self._symbolic(expression) if expression else 0
+        return self.known[name]
+
+    def _circle(self, path: tuple[str, ...]) -> tuple[str, ...]:
+        """How a quantity leads back to itself; empty where it does not."""
+        expression = self.written.get(path[-1])
+        for name in expression.names if expression else ():
+            if name == path[0]:
+                return (*path, name)
+            if name not in path and (found := self._circle((*path, name))):
+                return found
+        return ()
+
+    def _symbolic(self, expression: Expression) -> Any:
+        """An expression in symbols, made when first met."""
+        values = {}
+        for name in expression.names:
+            derived = name in self.written or name in self.known
+            values[name] = self.quantity(name) if derived else self.symbols.setdefault(name, ca.SX.sym(name))
+        with np.errstate(all="ignore"):  # what is not finite is found by the model
+            return expression.symbolic(values)
+
+    def _parsed(self, text: str, key: tuple[str, ...], where: str) -> Expression | None:
+        """An expression; None for one with a fault."""
+        try:
+            expression = parse_value(text, None, example="k1 + k2")
+        except ExpressionError as error:
+            self.fault(f"{where}{error}", *key)
+            return None
+        for name in expression.names:
+            if why := unusable(name):
+                self.fault(f"{where}'{name}' {why}; give the parameter another name", *key)
+                return None
+        return expression
+
+
+def untexted(
+    matrices: Mapping[str, Matrix], derived: Mapping[Any, Any], fault: Callable[..., None]
+) -> tuple[dict[str, Matrix], dict[Any, Any]]:
+    """Texts in matrices and quantities as expressions of CasADi, one symbol for each name."""
+    written = {n: x for n, x in derived.items() if isinstance(x, str)}
+    given = [x for rows in matrices.values() for row in rows for x in row] + list(derived.values())
+    if not any(isinstance(x, str) for x in given):
+        return dict(matrices), dict(derived)
+    symbols = {s.name(): s for x in given if isinstance(x, ca.SX) for s in ca.symvar(x)}
+    texts = Texts(fault, symbols, {n: x for n, x in derived.items() if n not in written})
+    texts.read_quantities(written)
+
+    def entry(x: Any, n: str, i: int, j: int) -> Any:
+        where = f"entry {j}" if n == "coefficients" else f"row {i}, column {j}"
+        return texts.entry(x, n, where) if isinstance(x, str) else x
+
+    read = {
+        n: [[entry(x, n, i, j) for j, x in enumerate(row, start=1)] for i, row in enumerate(rows, start=1)]
+        for n, rows in matrices.items()
+    }
+    return read, {n: texts.quantity(n) for n in derived}
