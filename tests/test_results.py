@@ -64,7 +64,11 @@ def studied() -> tmsopt.Results:
 
 
 def front() -> tmsopt.Front:
-    return tmsopt.pareto(replace(tmsopt.load(PROBLEMS / "pareto.toml"), title=TITLE), points=2)
+    """Of s² + cs + 1: the abscissa is −c/2."""
+    problem = tmsopt.Problem(
+        from_coefficients([1, "c", 1]), free={"c": (0.5, 1.5)}, pareto=("abscissa", "c"), title=TITLE
+    )
+    return tmsopt.pareto(problem, points=2)
 
 
 def every() -> tmsopt.Every:
@@ -101,7 +105,7 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "Swallowtail": lambda: tmsopt.swallowtail(tailed(), rows=4, across=3, starts=4),
     "Ledger": lambda: tmsopt.verify(only=["lscf-*"]),
 }
-TITLED = {"Solution", "Front", "Trace", "Chart", "Speeds", "Comparison", "Results", "Proof", "Swallowtail"}
+TITLED = {"Solution", "Front", "Trace", "Chart", "Speeds", "Comparison", "Results", "Proof", "Swallowtail", "Every"}
 made = cache(lambda name: RESULTS[name]())
 each = pytest.mark.parametrize("name", RESULTS)
 

@@ -75,14 +75,12 @@ def headline(result: Any) -> str:
 
 
 def title_of(result: Any) -> str:
-    """The title of a result, or of the problem or the design that it is of, on one line; empty without one."""
-    for at in (result, *(getattr(result, name, None) for name in ("study", "problem", "design"))):
-        problem = getattr(at, "problem", None)
-        for found in (getattr(at, "title", ""), getattr(problem, "title", "")):
-            if found:
-                return " ".join(found.split())
-    about = getattr(result, "about", {})
-    return " ".join(str(about.get("title", "")).split())
+    """The title of a result, or of the study, problem or design that it is of, on one line; empty without one."""
+    designs = (getattr(result, "design", None), *getattr(result, "solutions", ()))
+    holders = (result, getattr(result, "study", None), *designs)
+    titled = (*holders, *(getattr(holder, "problem", None) for holder in holders))
+    told = getattr(result, "about", {}).get("title", "")  # of a chart, whose folder may not hold its problem
+    return " ".join(next((t for x in titled if (t := getattr(x, "title", ""))), told).split())
 
 
 def drawn(result: Any, ax: "Axes | None" = None) -> "Axes":
