@@ -32,9 +32,7 @@ def design() -> tmsopt.Solution:
 @cache
 def plane() -> tmsopt.Problem:
     """s⁴ + 4s³ + 6s² + b s + c: stable, EP4 at b = 4, c = 1."""
-    return tmsopt.Problem(
-        from_coefficients([1, 4, 6, "b", "c"]), free={"b": (2.0, 6.0), "c": (-1.0, 3.0)}, title=TITLE
-    )
+    return tmsopt.Problem(from_coefficients([1, 4, 6, "b", "c"]), free={"b": (2.0, 6.0), "c": (-1.0, 3.0)}, title=TITLE)
 
 
 def tailed() -> tmsopt.Problem:

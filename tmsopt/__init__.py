@@ -1,5 +1,19 @@
 """tmsopt: self-stable bicycles under your own constraints, and exceptional points of small dissipative systems.
 
+Eight verbs; each takes a `Problem`, the path of its file, or a design found before:
+
+    solve       the best design                   design = tmsopt.solve("robot.toml"); print(design)
+    prove       that it exists, to 30 digits      tmsopt.prove(design).proved
+    compare     it beside the closed-form laws    print(tmsopt.compare(design))
+    speeds      where it weaves and capsizes      tmsopt.speeds(design).stable
+    robustness  how far it is from both           tmsopt.robustness(design).radius
+    trace       exceptional points as curves      tmsopt.trace("ep_set.toml", "EP2").plot()
+    chart       stability over two parameters     tmsopt.chart("chart.toml").plot()
+    run_study   thousands of such problems        tmsopt.run_study("study.toml").to_frame()
+
+Every result has `print`, `.report(full=True)`, `.plot()`, `.to_json()`; tables have `.to_frame()`. `Problem` states a
+problem in Python, `load` reads one, `models` has the bicycles and `models.from_matrices` makes any other system.
+
 The public names stand in `__init__.pyi`, once; each is imported when it is first used, so that `tmsopt --help` need not
 wait for CasADi.
 """

@@ -496,7 +496,9 @@ def test_matrices_take_the_texts_that_a_file_takes() -> None:
     assert stated.coefficients(design) == pytest.approx(by_symbols.coefficients(design), rel=1e-15)
     values = tmsopt.Problem(stated, fixed=design).values(design)
     assert values["half"] == pytest.approx(0.05 / (4 * 0.1 * 0.9), rel=1e-15)
-    mixed = from_matrices(M=np.array([[1, 0], [0, mu]]), D=drag, K=texts["K"], quantities={"zeta": c / (2 * mu * w), "half": "zeta/2"})
+    mixed = from_matrices(
+        M=np.array([[1, 0], [0, mu]]), D=drag, K=texts["K"], quantities={"zeta": c / (2 * mu * w), "half": "zeta/2"}
+    )
     assert set(mixed.sets[0].names) == set(design)
     assert tmsopt.Problem(mixed, fixed=design).values(design)["half"] == values["half"]
     assert pickle.loads(pickle.dumps(stated)) is stated

@@ -1,8 +1,9 @@
 """How to solve: declared here once, and handed on as one from the verb that a user calls to IPOPT."""
 
+import inspect
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypedDict
+from typing import Any, TypedDict, TypeVar
 
 from tmsopt.errors import Fault, InputError, count_faults, is_number, short, suggest
 from tmsopt.records import Progress
@@ -69,6 +70,25 @@ class Options:
 
 
 DEFAULTS = Options()
+
+
+Verb = TypeVar("Verb", bound=Callable[..., Any])
+
+
+def taking(accepted: type, defaults: Options = DEFAULTS) -> Callable[[Verb], Verb]:
+    """A decorator of verbs: `help` and notebooks list the options that one takes by name, each with its default."""
+
+    def listed(verb: Verb) -> Verb:
+        own = inspect.signature(verb)
+        named = [p for p in own.parameters.values() if p.kind is not p.VAR_KEYWORD]
+        options = [
+            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=getattr(defaults, name), annotation=kind)
+            for name, kind in accepted.__annotations__.items()
+        ]
+        vars(verb)["__signature__"] = own.replace(parameters=[*named, *options])
+        return verb
+
+    return listed
 
 
 def options_of(

@@ -7,7 +7,7 @@ from typing import Unpack
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.solution import NotSolved
 from tmsopt.errors import Fault, InputError, count_faults
-from tmsopt.formulation.options import Asked, Options, options_of
+from tmsopt.formulation.options import Asked, Options, options_of, taking
 from tmsopt.fronts.curve import curve
 from tmsopt.fronts.front import Front, FrontPoint
 from tmsopt.fronts.subproblems import Asker, best_first, point
@@ -21,6 +21,7 @@ _DEFAULTS = Options(starts=STARTS)
 _ALIKE = 1e-7  # relative difference of ends that counts as no conflict, that of optima that count as the same
 
 
+@taking(Asked, _DEFAULTS)
 def pareto(problem: Given, points: int = POINTS, **options: Unpack[Asked]) -> Front:
     """The front of two or three objectives, each minimised, with its ends, kinks and gaps.
 

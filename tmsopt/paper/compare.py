@@ -7,7 +7,7 @@ from typing import Any, Unpack
 from tmsopt.checks.law_rows import LawRow, law_rows
 from tmsopt.design.files import Given, question_of
 from tmsopt.design.solution import Solution
-from tmsopt.formulation.options import Asked, Options, options_of
+from tmsopt.formulation.options import Asked, Options, options_of, taking
 from tmsopt.models import tms
 from tmsopt.records import SCHEMA, Tabular, plain
 from tmsopt.roots import PATTERNS
@@ -48,6 +48,7 @@ class Comparison(Tabular):
         return {"schema": SCHEMA} | plain(self, "design laws") | {"formulations": formulations}
 
 
+@taking(Asked)
 def compare(design: Given, **options: Unpack[Asked]) -> Comparison:
     """Set a design beside the laws of the paper, which are of skates alone, and solve it by the other formulation.
 

@@ -6,11 +6,12 @@ from typing import Any, Unpack
 from tmsopt.design.files import Given
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError
-from tmsopt.formulation.options import AskedOfSolve, options_of
+from tmsopt.formulation.options import AskedOfSolve, options_of, taking
 from tmsopt.proofs.proof import DIGITS, Proof, prove_design
 from tmsopt.solver.solve import solved
 
 
+@taking(AskedOfSolve)
 def prove(
     design: Given, digits: int = DIGITS, *, exact: Mapping[str, Any] | None = None, **options: Unpack[AskedOfSolve]
 ) -> Proof:

@@ -17,7 +17,7 @@ from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError
 from tmsopt.formulation.formulate import design_of, matching
 from tmsopt.formulation.nlp import NLP
-from tmsopt.formulation.options import Asked, Options, options_of
+from tmsopt.formulation.options import Asked, Options, options_of, taking
 from tmsopt.formulation.starts import completions, spread
 from tmsopt.records import Array, Tabular, plain
 from tmsopt.solver.multistart import Runner
@@ -92,6 +92,7 @@ class Every(Tabular):
         return plain(self)
 
 
+@taking(Asked, _DEFAULTS)
 def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Asked]) -> Every:
     """Every design in the box with the pattern that a problem locates, where that leaves no freedom.
 

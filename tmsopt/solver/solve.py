@@ -19,7 +19,7 @@ from tmsopt.design.unit_system import unit_of
 from tmsopt.errors import Fault, InputError, is_number, short, suggest
 from tmsopt.formulation.formulate import design_of
 from tmsopt.formulation.nlp import objective_size
-from tmsopt.formulation.options import DEFAULTS, AskedOfSolve, Options, options_of
+from tmsopt.formulation.options import DEFAULTS, AskedOfSolve, Options, options_of, taking
 from tmsopt.margins import edges_at
 from tmsopt.records import Table
 from tmsopt.solver.multistart import rank, same
@@ -35,6 +35,7 @@ _TOLD = 1e-6  # relative and absolute: difference of a value in doubles from the
 _NEAR = 4  # starts where branch and bound found a stable design, that design the first of them
 
 
+@taking(AskedOfSolve, _ASKING)
 def solve(
     problem: Given, *, throw: bool = True, family: Family | None = None, **options: Unpack[AskedOfSolve]
 ) -> Solution:
