@@ -1,7 +1,9 @@
 """The public functions: a problem, its file and its solution are the same question, and what else is given is refused."""
 
+import inspect
 import math
 import pickle
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -153,6 +155,76 @@ def test_what_arguments_and_results_are_made_of_is_public() -> None:
         tmsopt.load(PROBLEMS / "nothing.toml")
     assert all(isinstance(fault, tmsopt.Fault) for fault in caught.value.faults)
     assert all(isinstance(band, tmsopt.Band) for band in tmsopt.load(PROBLEMS / "speed_band.toml").scenarios.values())
+
+
+WRONG: list[tuple[Callable[[], Any], str]] = [
+    (lambda: posed(constraints=["nu_H >= 0.02"]), r"constraints: found \['nu_H.*such as \{'trail': 'nu_H >= 0.02'\}"),
+    (lambda: posed(constraints="nu_H >= 0.02"), r"constraints: found 'nu_H"),
+    (lambda: posed(constraints={"trail": 3}), "constraints.trail: found 3; accepted: an expression in quotes"),
+    (lambda: posed(fixed=5), "fixed: found 5; accepted: names with their values"),
+    (lambda: posed(free={"Fr": 3}), "parameters.Fr: found 3; accepted: a pair"),
+    (lambda: posed(free=[("Fr", 1, 2)]), "free: found"),
+    (lambda: posed(free={1: (2, 3)}), "free: found"),
+    (lambda: posed(start=["Fr"]), "start: found"),
+    (lambda: posed(scenarios=3), "scenarios: found 3"),
+    (lambda: posed(tolerances="Fr"), "tolerances: found 'Fr'"),
+    (lambda: posed(weights=[0.1]), "weights: found"),
+    (lambda: posed(title=3), "title: found 3; accepted: a text"),
+    (lambda: posed(model="tms"), "model: found str; accepted: a model"),
+    (lambda: tmsopt.solve("robot.toml"), "robot.toml: no such file"),
+    (lambda: tmsopt.solve(EP4, starts=10.5), "starts: found 10.5; accepted: a whole number"),
+    (lambda: tmsopt.solve(EP4, linear_solver=3), "linear_solver: found 3; accepted: mumps spral"),
+    (lambda: tmsopt.solve(EP4, progress=3), "progress: found 3; accepted: a function"),
+    (lambda: tmsopt.solve_all(EP4, seconds="long"), "seconds: found 'long'; accepted: a number"),
+    (lambda: tmsopt.pareto(PROBLEMS / "pareto.toml", points=10.5), "points: found 10.5; accepted: a whole number"),
+    (lambda: tmsopt.prove(EP4, exact=3), "exact: found 3; accepted: names"),
+    (lambda: tmsopt.speeds(EP4, between=3), "between: found 3; accepted: a least value and a greater one"),
+    (lambda: tmsopt.speeds(EP4, 3), "parameter: unknown parameter '3'"),
+    (lambda: tmsopt.growth(EP4, end="far"), "end: found 'far'; accepted: a number"),
+    (lambda: tmsopt.trace(PLANE, "EP2", seed=10.5), "seed: found 10.5; accepted: a whole number"),
+    (lambda: tmsopt.trace(PLANE, "EP2", through={"Fr": 1}), "through: found .*accepted: a list"),
+    (lambda: tmsopt.trace(PLANE, "EP2", through=[3]), "through: found 3; accepted: names"),
+    (lambda: tmsopt.chart(PLANE, layers="abscissa"), "layers: found 'abscissa'; accepted: a list"),
+    (lambda: tmsopt.chart(PLANE, layers=[["kind"]]), "layers: found .*accepted: kind"),
+    (lambda: tmsopt.chart(PLANE, axes=3), "axes: found 3; accepted: Fr and lambda_s"),
+    (lambda: tmsopt.chart(PLANE, points=10.5), "points: found 10.5; accepted: two whole numbers"),
+    (lambda: tmsopt.chart(PLANE, quantities="nu_H"), "quantities: found 'nu_H'; accepted: names"),
+    (
+        lambda: tmsopt.chart(PLANE, quantities={"trail": 3}),
+        "quantities.trail: found 3; accepted: an expression in quotes",
+    ),
+    (lambda: tmsopt.nearest(EP4, ["weave"]), "pattern: unknown boundary"),
+    (lambda: tmsopt.robustness(EP4, parameters=["Fr"]), "parameters: found"),
+    (lambda: tmsopt.robustness(EP4, weights=3), "weights: found 3"),
+    (lambda: tmsopt.over_grid(EP4, [0.1]), "axes: found"),
+    (lambda: tmsopt.verify(only="lscf-1"), "only: found 'lscf-1'; accepted: a list"),
+]
+
+
+def posed(**changed: Any) -> tmsopt.Problem:
+    """The EP4 problem with some of its arguments changed."""
+    return replace(tmsopt.load(EP4), **changed)
+
+
+@pytest.mark.parametrize(("call", "said"), WRONG, ids=[said for _, said in WRONG])
+def test_a_wrong_type_is_answered_in_words(call: Callable[[], Any], said: str) -> None:
+    with pytest.raises(tmsopt.InputError, match=said):
+        call()
+
+
+@pytest.mark.parametrize("verb", ["solve", "prove", "compare", "solve_all", "pareto"])
+def test_the_options_of_a_verb_are_in_its_signature(verb: str) -> None:
+    """With their defaults: what `help` and the completion of a notebook read."""
+    parameters = inspect.signature(getattr(tmsopt, verb)).parameters
+    assert {"starts", "seed", "linear_solver", "progress"} <= set(parameters)
+    assert all(p.kind is not p.VAR_KEYWORD for p in parameters.values())
+    assert inspect.signature(tmsopt.solve).parameters["stability"].default == 5
+
+
+def test_help_begins_with_the_verbs() -> None:
+    verbs = re.findall(r"^    (\w+)  .*tmsopt\.(\w+)\(", tmsopt.__doc__ or "", re.MULTILINE)
+    assert len(verbs) == 8
+    assert all(name == called and callable(getattr(tmsopt, name)) for name, called in verbs)
 
 
 def test_a_name_that_is_not_there_is_an_attribute_error() -> None:

@@ -238,7 +238,7 @@ def write_csv(path: str | PathLike[str], rows: Sequence[Mapping[str, Any]]) -> N
     Raises:
         OSError: when the file cannot be written.
     """
-    with open(path, "w", newline="", encoding="utf-8") as stream:
+    with path_of(path, "the file to write").open("w", newline="", encoding="utf-8") as stream:
         writer = csv.DictWriter(stream, fieldnames=list(rows[0]) if rows else [])
         writer.writeheader()
         writer.writerows(rows)

@@ -1,7 +1,7 @@
 """Bad input as data: every fault found, with its place, and one exception that carries them all."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from importlib import import_module
@@ -30,7 +30,7 @@ class Fault:
 
     def __str__(self) -> str:
         place = f"{self.file}:{self.line}" if self.line else self.file
-        return ": ".join(part for part in (place, ".".join(self.key), self.message) if part)
+        return ": ".join(part for part in (place, ".".join(map(str, self.key)), self.message) if part)
 
 
 class InputError(ValueError):
@@ -58,9 +58,28 @@ def is_number(value: Any) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def suggest(name: str, accepted: Iterable[str]) -> str:
+def table_faults(name: str, value: Any, example: str) -> list[Fault]:
+    """What is wrong with a table of names that a user gave."""
+    if isinstance(value, Mapping) and all(isinstance(n, str) for n in value):
+        return []
+    return [Fault(f"found {short(value)}; accepted: names with their values, such as {example}", (name,))]
+
+
+def list_faults(name: str, value: Any, example: str) -> list[Fault]:
+    """What is wrong with a list that a user gave: a text is none."""
+    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
+        return []
+    return [Fault(f"found {short(value)}; accepted: a list, such as {example}", (name,))]
+
+
+def call_faults(name: str, value: Any) -> list[Fault]:
+    """What is wrong with what is to be called meanwhile, if anything is."""
+    return [] if value is None or callable(value) else [Fault(f"found {short(value)}; accepted: a function", (name,))]
+
+
+def suggest(name: Any, accepted: Iterable[str]) -> str:
     """A sentence that offers the nearest accepted name, if one is near, and lists all of them."""
-    names = list(accepted)
+    names, name = list(accepted), str(name)
     by_case = [n for n in names if n.lower() == name.lower()]
     near = by_case or get_close_matches(name, names, n=1, cutoff=0.5)
     hint = f"did you mean '{near[0]}'? " if near else ""

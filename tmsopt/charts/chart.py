@@ -1,7 +1,7 @@
 """Charts: what kind of motion each design of a grid over two or three parameters has."""
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from importlib.metadata import version
@@ -30,7 +30,7 @@ from tmsopt.charts.tiles import TILE, Memory, computed
 from tmsopt.design.files import Given
 from tmsopt.design.problem import Problem
 from tmsopt.disk import path_of
-from tmsopt.errors import Fault, InputError, count_faults
+from tmsopt.errors import Fault, InputError, call_faults, count_faults, list_faults, short, suggest
 from tmsopt.models import MODELS
 from tmsopt.records import Array, Progress, Shown
 from tmsopt.roots import CLASSES
@@ -111,15 +111,21 @@ class Chart(Shown):
         """Names of the equality constraints: they hold on curves, which `trace` follows, and nowhere on a grid."""
         return tuple(n for n, c in self.problem.conditions.items() if c.equality)
 
-    def save(self, path: str | Path, layers: Iterable[str] | None = None) -> None:
+    def save(self, path: str | Path, layers: Sequence[str] | None = None) -> None:
         """Write axes and layers, all of them unless named, as a NumPy archive or, to a name ending in nc, as netCDF.
 
         Raises:
-            InputError: for netCDF where xarray or a library for it is not installed.
+            InputError: for unknown layers; for netCDF where xarray or a library for it is not installed.
             OSError: when the file cannot be written.
         """
-        kept = {n: self.layers[n] for n in (self.layers if layers is None else layers)}
-        save_layers(self.problem, Grid(self.axes, self.grid), kept, Path(path))
+        names = tuple(self.layers) if layers is None else layers
+        faults = list_faults("layers", names, "['kind', 'abscissa']")
+        if faults := faults or [
+            Fault(f"found {short(n)}; {suggest(n, self.layers)}", ("layers",)) for n in names if n not in [*self.layers]
+        ]:
+            raise InputError(faults)
+        kept = {n: self.layers[n] for n in names}
+        save_layers(self.problem, Grid(self.axes, self.grid), kept, path_of(path, "the file to write"))
 
     def to_xarray(self) -> "Dataset":
         """Every layer over the axes, with units.
@@ -176,7 +182,8 @@ def chart(
         InputError: for bad input; for a folder that holds another chart, with the differences, or is damaged.
         OSError: where the disk is full; what is recorded stays right.
     """
-    if faults := [*count_faults("workers", workers, 1, _MOST_WORKERS), *count_faults("tile", tile, 1)]:
+    if faults := [*count_faults("workers", workers, 1, _MOST_WORKERS), *count_faults("tile", tile, 1),
+                  *call_faults("progress", progress)]:  # fmt: skip
         raise InputError(faults)
     wanted = layers if layers is not None else tuple(LAYERS) if folder is None else USUAL
     work = survey(problem, axes, points, wanted, quantities, engine, single)

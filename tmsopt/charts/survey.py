@@ -13,7 +13,7 @@ from tmsopt.charts.motion import Classified, classified, engine_of
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS, ROOT_NAMES
-from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.errors import Fault, InputError, list_faults, suggest, table_faults
 from tmsopt.records import Array
 
 LAYERS: Mapping[str, DTypeLike] = {
@@ -193,7 +193,10 @@ def survey(
     problem = problem_of(problem)
     names = axes_of(problem, axes)
     sizes = _sizes(USUAL_POINTS[len(names)] if points is None else points, len(names))
-    faults = [Fault(f"found {n!r}; {suggest(str(n), LAYERS)}", ("layers",)) for n in layers if n not in LAYERS]
+    if faults := [*list_faults("layers", layers, "['kind', 'abscissa']"),
+                  *table_faults("quantities", quantities or {}, "{'wheel_load': 'load_front/2'}")]:  # fmt: skip
+        raise InputError(faults)
+    faults = [Fault(f"found {n!r}; {suggest(n, LAYERS)}", ("layers",)) for n in layers if n not in tuple(LAYERS)]
     extra = dict(quantities or {})
     reserved = {*LAYERS, *names, "about"}
     faults += [
@@ -243,7 +246,7 @@ def axes_of(problem: Problem, axes: Sequence[str] | None = None) -> tuple[str, .
         fixed = [n for n in problem.fixed if n in ("Fr", "v")] or [*problem.fixed, "Fr"]
         advice = "; fix the others" if len(free) > 3 else f"; write e.g. {fixed[0]} = {{ min = 0.1, max = 5 }}"
         raise InputError([Fault(message + advice, ("parameters",))])
-    if axes is not None and (isinstance(axes, str) or sorted(axes) != sorted(free)):
+    if axes is not None and (list_faults("axes", axes, "") or sorted(map(str, axes)) != sorted(free)):
         raise InputError([Fault(f"found {axes!r}; accepted: {' and '.join(free)}", ("axes",))])
     return tuple(axes or free)
 

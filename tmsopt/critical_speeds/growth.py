@@ -13,7 +13,7 @@ from tmsopt.critical_speeds.crossings import Stretch, crossings
 from tmsopt.critical_speeds.speeds import coefficients_over
 from tmsopt.design.files import Given
 from tmsopt.design.solution import Solution
-from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.errors import Fault, InputError, is_number, short, suggest
 from tmsopt.models import Parameter, ParameterSet, Values
 from tmsopt.records import Array, Tabular, Truth, plain
 from tmsopt.roots import is_stable, roots
@@ -78,6 +78,8 @@ def growth(design: Given, end: float | None = None, over: str | None = None) -> 
         InputError: for an unknown parameter.
     """
     design = solved(design)
+    if not (end is None or (is_number(end) and end != 0)):
+        raise InputError([Fault(f"found {short(end)}; accepted: a number other than 0", ("end",))])
     of, parameters, name = _written(design, over)
     model = design.problem.model
     known = f"{name}_c" in model.quantity_names(of)

@@ -13,7 +13,7 @@ from tmsopt.critical_speeds.parametric import Polynomial, interpolated
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
-from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.errors import Fault, InputError, short, suggest
 from tmsopt.margins.surroundings import parameter_faults
 from tmsopt.models import Model, ParameterSet
 from tmsopt.records import Progress, Table, Tabular, plain
@@ -119,9 +119,13 @@ def speeds(
         raise InputError([Fault(f"unknown parameter '{name}'; {suggest(name, of.names)}", ("parameter",))])
     own = _parameters(design, asked, name, progress)
     allowed = of[name].range
-    lower, upper = between or asked.free.get(name) or (allowed.lower, allowed.upper)
-    if not math.isfinite(lower) or not lower < upper:
-        message = f"found {lower:.6g} … {upper:.6g}; accepted: a least value and a greater one, `--between LOW,HIGH`"
+    try:
+        lower, upper = map(float, asked.free.get(name, (allowed.lower, allowed.upper)) if between is None else between)
+        known = math.isfinite(lower) and lower < upper
+    except (TypeError, ValueError):
+        known = False
+    if not known:
+        message = f"found {short(between)}; accepted: a least value and a greater one, `--between LOW,HIGH`"
         raise InputError([Fault(message, ("between",))])
     a = coefficients_over(asked.model, of, own, name)
     met = crossings(a, exact(float(lower)), exact(float(upper)) if math.isfinite(upper) else None)

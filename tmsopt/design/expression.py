@@ -19,9 +19,7 @@ __all__ = [
     "COMPARISONS", "Expression", "ExpressionError", "dimension", "parse_comparison", "parse_value", "written_sides",
 ]  # fmt: skip
 
-_DIMENSIONS = Arithmetic(
-    dimensions.FUNCTIONS, lambda x: x, {**BINARY, ast.Pow: dimensions.power}, dimensions.Dimension
-)
+_DIMENSIONS = Arithmetic(dimensions.FUNCTIONS, lambda x: x, {**BINARY, ast.Pow: dimensions.power}, dimensions.Dimension)
 
 
 def dimension(expression: Expression, units: Mapping[str, str]) -> dimensions.Dimension:

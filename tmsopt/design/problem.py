@@ -9,7 +9,7 @@ from typing import Any
 from tmsopt.design.cases import Band, Case, Scenario, as_scenario, first_cases, middle_of
 from tmsopt.design.expression import Expression, parse_comparison, parse_value
 from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTITIES, STRUCTURE, spelled_out
-from tmsopt.design.validate import faults, guess_parameter_set
+from tmsopt.design.validate import faults, guess_parameter_set, shape_faults
 from tmsopt.errors import Fault, InputError
 from tmsopt.models import Model, ParameterSet, Values
 from tmsopt.records import SCHEMA
@@ -62,6 +62,8 @@ class Problem:
     units: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
+        if found := list(shape_faults(self)):
+            raise InputError(found)
         object.__setattr__(self, "scenarios", {n: as_scenario(s) for n, s in self.scenarios.items()})
         of = guess_parameter_set(self.model, {**self.fixed, **self.free, **self.scenarios})
         read, units, unreadable = numbers({table: getattr(self, table) for table in TABLES}, of)

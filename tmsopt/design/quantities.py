@@ -53,9 +53,16 @@ ROOT_NAMES = (*(q.name for q in ROOT_QUANTITIES), RADIUS)
 
 
 def spelled_out(text: str, of: ParameterSet) -> str:
-    """An expression with the names that are short for others written out: decay_rate as -(abscissa*sqrt(g/w))."""
+    """An expression with the names that are short for others written out: decay_rate as -(abscissa*sqrt(g/w)).
+
+    What is no text is for the parser to refuse.
+    """
     short = {q.name: q.stands_for for q in of.quantities if q.stands_for}
-    return re.sub(rf"\b({'|'.join(short)})\b", lambda found: short[found[0]], text) if short else text
+    return (
+        re.sub(rf"\b({'|'.join(short)})\b", lambda found: short[found[0]], text)
+        if short and isinstance(text, str)
+        else text
+    )
 
 
 def regular(coefficients: Array) -> Array:

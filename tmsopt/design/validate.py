@@ -7,7 +7,7 @@ from typing import Any
 from tmsopt.design.cases import Band, points_of
 from tmsopt.design.expression import ExpressionError, parse_comparison, parse_value
 from tmsopt.design.quantities import ROOT_NAMES
-from tmsopt.errors import Fault, suggest
+from tmsopt.errors import Fault, short, suggest, table_faults
 from tmsopt.models import Model, ParameterSet
 from tmsopt.roots import pattern
 from tmsopt.roots.patterns.composed import pattern_names
@@ -28,12 +28,27 @@ def guess_parameter_set(model: Model, names: Mapping[str, Any]) -> ParameterSet:
     return max(model.sets, key=lambda s: sum(n in s.names for n in names))
 
 
-def faults(problem: Stated) -> Iterator[Fault]:
-    """What is wrong with a problem, everything at once."""
+_TABLES = {
+    "fixed": "{'mu': 0.1}", "free": "{'Fr': (0.1, 5)}", "constraints": "{'trail': 'nu_H >= 0.02'}",
+    "start": "{'Fr': 2}", "scenarios": "{'v': Band(2, 6)}", "tolerances": "{'lambda_s': 0.01}", "weights": "{'v': 1}",
+    "units": "{'v': 'km/h'}",
+}  # fmt: skip
+"""Arguments that are tables, each with an example."""
+
+
+def shape_faults(problem: Stated) -> Iterator[Fault]:
+    """Arguments of a problem that are no model, tables and texts: nothing more can be said before they are."""
     if not isinstance(problem.model, Model):
         accepted = "a model, such as tmsopt.models.tms"
         yield Fault(f"found {type(problem.model).__name__}; accepted: {accepted}", ("model",))
-        return
+    for name, example in _TABLES.items():
+        yield from table_faults(name, getattr(problem, name), example)
+    if not isinstance(problem.title, str):
+        yield Fault(f"found {short(problem.title)}; accepted: a text", ("title",))
+
+
+def faults(problem: Stated) -> Iterator[Fault]:
+    """What is wrong with a problem, everything at once."""
     names = {**problem.fixed, **problem.free, **problem.scenarios}
     of = guess_parameter_set(problem.model, names)
     yield from _name_faults(problem, of)
@@ -228,9 +243,6 @@ def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
 
 
 def _parse_faults(parse: Any, text: Any, accepted: tuple[str, ...], key: tuple[str, ...]) -> Iterator[Fault]:
-    if not isinstance(text, str):
-        yield Fault(f"found {text!r}; accepted: an expression in quotes", key)
-        return
     try:
         if "frequency" in parse(text, accepted).names and "decay_time" in accepted:  # no name of the user's own
             advice = "it is reported and can be recorded, not optimised; limit damping_ratio or decay_rate instead"

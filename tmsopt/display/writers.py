@@ -31,7 +31,9 @@ class Writer:
 
 
 WRITERS: Mapping[str, Writer] = {
-    "Solution": Writer(lambda x, full: texts.design_report(x, texts.findings(x, full), full), headlines.of_solution, "draw_growth"),
+    "Solution": Writer(
+        lambda x, full: texts.design_report(x, texts.findings(x, full), full), headlines.of_solution, "draw_growth"
+    ),
     "Front": Writer(lambda x, full: texts.front_table(x), headlines.of_front, "draw_front"),
     "Trace": Writer(lambda x, full: texts.trace_table(x), headlines.of_trace, "draw_trace"),
     "Branch": Writer(lambda x, full: texts.branch_table(x), headlines.of_branch, "draw_branch"),

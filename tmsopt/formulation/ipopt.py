@@ -18,9 +18,6 @@ from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.options import DEFAULTS, Options
 from tmsopt.records import Array
 
-LINEAR_SOLVERS = ("mumps", "spral")
-"""The linear solvers in the CasADi wheel; any other name fails there without an error."""
-
 # Larger steps away from the bounds and shorter ones towards them: on the EP4 problem this takes a third fewer
 # iterations and reaches EP4 from more of the starts. Scaling and refining linear systems of a dozen unknowns costs
 # a quarter of the time and changes no result.
@@ -81,12 +78,7 @@ def ipopt(nlp: NLP, options: Options = DEFAULTS, start: str = "far", max_iterati
     `start` says what to expect of starts: ``far`` from a solution, ``exact`` in the equations, or ``near`` a solution.
 
     Not to be shared between threads.
-
-    Raises:
-        ValueError: for a linear solver other than mumps and spral.
     """
-    if options.linear_solver not in LINEAR_SOLVERS:
-        raise ValueError(f"linear solver {options.linear_solver!r}; accepted: {' '.join(LINEAR_SOLVERS)}")
     settings: dict[str, Any] = {
         "print_time": False,
         "show_eval_warnings": False,

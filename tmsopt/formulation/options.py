@@ -5,8 +5,11 @@ from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypedDict, TypeVar
 
-from tmsopt.errors import Fault, InputError, count_faults, is_number, short, suggest
+from tmsopt.errors import Fault, InputError, call_faults, count_faults, is_number, short, suggest
 from tmsopt.records import Progress
+
+LINEAR_SOLVERS = ("mumps", "spral")
+"""Inside IPOPT: those in the CasADi wheel; any other name fails there without an error."""
 
 STARTS = 64
 """Starts tried at most; most problems settle with a dozen."""
@@ -112,6 +115,10 @@ def options_of(
         faults.append(Fault(f"found {short(given['near'])}; accepted: a mapping of parameters to values", ("near",)))
     if not (is_number(given["stability"]) and given["stability"] >= 0):
         faults.append(Fault(f"found {short(given['stability'])}; accepted: seconds, 0 or more", ("stability",)))
+    if given["linear_solver"] not in LINEAR_SOLVERS:
+        message = f"found {short(given['linear_solver'])}; accepted: {' '.join(LINEAR_SOLVERS)}"
+        faults.append(Fault(message, ("linear_solver",)))
+    faults += [*call_faults("progress", given["progress"]), *call_faults("asking", given["asking"])]
     if faults:
         raise InputError(faults)
     return Options(**given)

@@ -11,7 +11,7 @@ import numpy as np
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
-from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.errors import Fault, InputError, suggest, table_faults
 from tmsopt.formulation.ipopt import ipopt, polisher
 from tmsopt.formulation.nlp import NLP
 from tmsopt.margins.boundaries import KINDS, Edge, edges, lies_on
@@ -157,8 +157,8 @@ def nearest(
     Raises:
         InputError: for another pattern, or parameters or weights that are not accepted.
     """
-    if pattern not in KINDS:
-        raise InputError([Fault(f"unknown boundary {pattern!r}; {suggest(str(pattern), KINDS)}", ("pattern",))])
+    if pattern not in tuple(KINDS):
+        raise InputError([Fault(f"unknown boundary {pattern!r}; {suggest(pattern, KINDS)}", ("pattern",))])
     place = _place(design, parameters, weights)
     return _nearest(place, ray_crossings(place.space), pattern)
 
@@ -203,6 +203,9 @@ def _zeros(place: Place) -> tuple[str, ...]:
 
 def _place(design: Given, parameters: Mapping[str, float] | None, weights: Mapping[str, float] | None) -> Place:
     problem = problem_of(design)
+    given = {"parameters": (parameters, "{'Fr': 1.2, 'mu': 0.1}"), "weights": (weights, "{'lambda_s': 0.01}")}
+    if faults := [f for n, (x, example) in given.items() if x is not None for f in table_faults(n, x, example)]:
+        raise InputError(faults)
     if weights is None and problem.weights:
         weights = problem.weights
     if isinstance(design, Solution):

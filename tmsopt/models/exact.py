@@ -10,7 +10,7 @@ from typing import Any
 import flint
 
 from tmsopt.arithmetic.elementary import exact, rational
-from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.errors import Fault, InputError, suggest, table_faults
 from tmsopt.models.model import ParameterSet
 from tmsopt.records import Table
 
@@ -111,6 +111,8 @@ def written(of: ParameterSet, parameters: Mapping[str, float], stated: Mapping[s
     Raises:
         InputError: for an unknown name, another kind of number, or one that is not the design's.
     """
+    if wrong := table_faults("exact", {} if stated is None else stated, "{'zeta_B': '-1/3'}"):
+        raise InputError(wrong)
     names = {n: n for n in of.names} | {f"tan({p.name})": p.name for p in of.parameters if p.tangent}
     values = {n: Exact(decimal(float(parameters[n]))) for n in of.names}
     tangents: dict[str, Exact] = {}

@@ -165,7 +165,7 @@ def parse_value(text: str, accepted: Iterable[str] | None, example: str = "absci
     Raises:
         ExpressionError: with what was found and what is accepted.
     """
-    body = _parse(text)
+    body = _parse(_text(text))
     if isinstance(body, ast.Compare):
         raise ExpressionError(f"'{text}' is a comparison; accepted: a value, such as '{example}'")
     return Expression(text, _checked_names(body, text, None if accepted is None else list(accepted)))
@@ -177,7 +177,7 @@ def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
     Raises:
         ExpressionError: with what was found and what is accepted.
     """
-    body = _parse(text)
+    body = _parse(_text(text))
     if not isinstance(body, ast.Compare):
         raise ExpressionError(f"'{text}' is not a comparison; write e.g. 'nu_H >= 0.02' with <=, >= or ==")
     if len(body.ops) > 1:
@@ -203,6 +203,12 @@ def written_sides(text: str) -> tuple[str, str, str]:
     if not isinstance(body, ast.Compare) or len(body.ops) > 1 or type(body.ops[0]) not in COMPARISONS:
         raise ExpressionError(f"'{text}' is not a comparison by <=, >= or ==")
     return _source(body.left, text), COMPARISONS[type(body.ops[0])], _source(body.comparators[0], text)
+
+
+def _text(given: object) -> str:
+    if not isinstance(given, str):
+        raise ExpressionError(f"found {given!r}; accepted: an expression in quotes")
+    return given
 
 
 _ONE_AT_A_TIME = threading.Lock()

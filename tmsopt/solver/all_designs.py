@@ -14,7 +14,7 @@ from tmsopt.completeness.statement import Completeness
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.solution import Solution
-from tmsopt.errors import Fault, InputError
+from tmsopt.errors import Fault, InputError, is_number, short
 from tmsopt.formulation.formulate import design_of, matching
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.options import Asked, Options, options_of, taking
@@ -111,6 +111,8 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Ask
         InputError: for a problem that locates no pattern, leaves freedom, or constrains a quantity without a formula.
     """
     problem = problem_of(problem)
+    if not is_number(seconds):
+        raise InputError([Fault(f"found {short(seconds)}; accepted: a number of seconds", ("seconds",))])
     nlp = _posed(problem)
     work = workspace(problem, options_of(options, defaults=_DEFAULTS))
     proof = completeness(problem, seconds, work.options.progress) if seconds > 0 else None

@@ -53,7 +53,6 @@ def solve(
     Raises:
         NotSolved: carrying the best point found, when `throw`.
         InputError: when parameters are free and nothing is asked of them.
-        ValueError: for another linear solver.
         KeyboardInterrupt: when the user ends it before there is any design, or `interruptible` is False.
     """
     problem = question_of(problem)

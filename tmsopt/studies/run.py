@@ -65,7 +65,7 @@ class Results(Shown):
             InputError: for a name that no row has.
         """
         found = columns(self.rows)
-        if name not in found:
+        if name not in tuple(found):
             raise InputError([Fault(f"no column '{name}'; {suggest(name, found)}", ("column",))])
         return found[name].numbers
 

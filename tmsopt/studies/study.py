@@ -10,7 +10,7 @@ from tmsopt.design.cases import Band
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.limit import with_limit
 from tmsopt.design.problem import Problem
-from tmsopt.errors import Fault, InputError
+from tmsopt.errors import Fault, InputError, table_faults
 from tmsopt.formulation.options import STARTS
 from tmsopt.records import Array, Column, Table
 from tmsopt.studies.samples import grid
@@ -121,6 +121,8 @@ def over_grid(
     Raises:
         InputError: listing everything that is wrong with it.
     """
+    if wrong := table_faults("axes", axes, "{'mu': [0.1, 0.2]}"):
+        raise InputError(wrong)
     return Study(
         problem=problem_of(problem), columns=grid(axes), title=title, seed=seed, starts=starts, warm=warm,
         report=report, grid_shape={name: len(values) for name, values in axes.items()}, method="grid",

@@ -9,7 +9,7 @@ import numpy as np
 from tmsopt.design.expression import ExpressionError
 from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Problem, unasked
-from tmsopt.errors import Fault, count_faults, short, suggest
+from tmsopt.errors import Fault, count_faults, list_faults, short, suggest
 
 MOST_ROWS = 10_000_000
 """Rows of a study; one with more is another kind of question, such as a chart."""
@@ -129,6 +129,7 @@ def _option_faults(study: Stated) -> Iterator[Fault]:
         yield Fault(f"found {study.method!r}; {suggest(str(study.method), METHODS)}", ("method",))
     if not isinstance(study.warm, bool):
         yield Fault(f"found {study.warm!r}; accepted: true or false", ("warm",))
+    yield from list_faults("notes", study.notes, "['left out: the lamp']")
     yield from common_faults(study.problem, study.seed, study.starts, study.report)
 
 
@@ -141,8 +142,6 @@ def common_faults(problem: Problem, seed: Any, starts: Any, report: Any) -> Iter
         return
     for text in report:
         try:
-            if not isinstance(text, str):
-                raise ExpressionError(f"found {text!r}; accepted: an expression in quotes")
             problem.read(text)
         except ExpressionError as error:
             yield Fault(str(error), ("report",))

@@ -10,7 +10,17 @@ import numpy as np
 
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem, freedom
-from tmsopt.errors import Fault, InputError, count_faults, is_number, suggest
+from tmsopt.errors import (
+    Fault,
+    InputError,
+    call_faults,
+    count_faults,
+    is_number,
+    list_faults,
+    short,
+    suggest,
+    table_faults,
+)
 from tmsopt.records import Array
 from tmsopt.roots import pattern as pattern_of
 from tmsopt.roots.patterns.composed import pattern_names
@@ -48,7 +58,7 @@ def trace(
     """
     began = time.perf_counter()
     problem = _asked(problem_of(problem), pattern)
-    _check(problem, step, starts, most, through)
+    _check(problem, step, starts, seed, most, through, progress)
     ready = prepare(problem)
     walks: list[Walk] = []
     lines: list[dict[str, Array]] = []
@@ -126,19 +136,26 @@ def _asked(problem: Problem, name: str | None) -> Problem:
     return asked
 
 
-def _check(problem: Problem, step: float, starts: int, most: int, through: Sequence[Mapping[str, float]]) -> None:
-    faults = [*count_faults("starts", starts, 0), *count_faults("most", most, _FEWEST)]
+def _check(
+    problem: Problem, step: float, starts: int, seed: int, most: int, through: Sequence[Mapping[str, float]],
+    progress: Report | None,
+) -> None:  # fmt: skip
+    faults = [*count_faults("starts", starts, 0), *count_faults("seed", seed, 0), *count_faults("most", most, _FEWEST)]
+    faults += [*call_faults("progress", progress), *list_faults("through", through, "[{'Fr': 1.2, 'mu': 0.1}]")]
     if not is_number(step) or not STEPS[0] <= step <= STEPS[1]:
         faults.append(Fault(f"found {step!r}; accepted: a number from {STEPS[0]:g} to {STEPS[1]:g}", ("step",)))
-    for design in through:
+    for design in through if not faults else ():
+        if wrong := table_faults("through", design, "{'Fr': 1.2, 'mu': 0.1}"):
+            faults += wrong
+            continue
         if set(design) != set(problem.free):
             names = ", ".join(problem.free)
             faults.append(Fault(f"found {', '.join(design) or 'nothing'}; accepted: each of {names}", ("through",)))
             continue
         for n, value in design.items():
             low, high = problem.free[n]
-            if not low <= value <= high:
-                message = f"{n} = {value!r} lies outside the box; accepted: {low:g} to {high:g}"
+            if not is_number(value) or not low <= value <= high:
+                message = f"{n} = {short(value)} lies outside the box; accepted: {low:g} to {high:g}"
                 faults.append(Fault(message, ("through",)))
     if faults:
         raise InputError(faults)

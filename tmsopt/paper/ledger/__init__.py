@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 
 import flint
 
-from tmsopt.errors import Fault, InputError
+from tmsopt.errors import Fault, InputError, call_faults, list_faults
 from tmsopt.paper.ledger import (
     abscissa,
     benchmark,
@@ -53,7 +53,9 @@ def verify(progress: Progress | None = None, only: Sequence[str] = ()) -> Ledger
     Raises:
         InputError: for a pattern that no key matches.
     """
-    for pattern in only:
+    if faults := [*list_faults("only", only, "['lscf-*']"), *call_faults("progress", progress)]:
+        raise InputError(faults)
+    for pattern in map(str, only):
         if not matching([pattern]):
             raise InputError([Fault(f"found '{pattern}'; accepted: a key of the ledger, or a pattern", ("--only",))])
     chosen = matching(only)
