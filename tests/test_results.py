@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import matplotlib.pyplot as plt
 import pytest
 from matplotlib.axes import Axes
 
@@ -160,10 +161,17 @@ def test_its_text_is_its_report(name: str) -> None:
 @each
 def test_it_is_drawn_into_axes(name: str) -> None:
     result = made(name)
+    if name == "Branch":
+        with pytest.raises(tmsopt.InputError, match="no picture of a Branch alone"):
+            result.plot()
+        return
     draw = getattr(tmsopt.plots, WRITERS[type(result).__name__].picture, None)
     if draw is None or "ax" in list(inspect.signature(draw).parameters)[:1]:
         pytest.skip("nothing draws it yet")
     assert isinstance(result.plot(), Axes)
+    plt.close("all")
+    assert "img" in Page(result._repr_html_()).tags
+    assert plt.get_fignums() == []
     with pytest.raises(tmsopt.InputError, match=r"ax: found .*accepted: Axes"):
         result.plot(3)
 
@@ -176,6 +184,25 @@ def test_its_page_is_whole_and_escaped(name: str) -> None:
     assert {"div", "strong", "details", "pre"} <= set(page.tags)
     assert (TITLE in page.said) == (type(made(name)).__name__ in TITLED)
     assert any(str(made(name)).splitlines()[-1] in text for text in page.said)
+
+
+def test_new_figures_are_shown_by_pyplot(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a notebook, and by plt.show(); those of the page are not, nor those of the user again."""
+
+    def draws(data: object, ax: Axes | None = None) -> Axes:
+        ax = ax or tmsopt.plots.new_figure(3, 2).subplots()
+        ax.plot([0, 1], [0, 1])
+        return ax
+
+    monkeypatch.setattr(tmsopt.plots, WRITERS["Solution"].picture, draws, raising=False)
+    before = plt.get_fignums()
+    ax = design().plot()
+    assert plt.gcf() is ax.get_figure()
+    assert len(plt.get_fignums()) == len(before) + 1
+    assert design().plot(ax) is ax
+    assert "img" in Page(design()._repr_html_()).tags
+    assert len(plt.get_fignums()) == len(before) + 1
+    plt.close(plt.gcf())
 
 
 def test_the_page_of_a_design_has_badges_and_parameters() -> None:

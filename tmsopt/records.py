@@ -36,12 +36,12 @@ class Shown(Protocol):
         return str(_display().report(self, full))
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draw it, into the given Axes or into new ones.
+        """Draw it, into the given Axes or into new ones, which a notebook and ``plt.show()`` show.
 
         Raises:
             InputError: where there is no picture of it.
         """
-        axes: Axes = _display().drawn(self, ax)
+        axes: Axes = _display().plotted(self, ax)
         return axes
 
     def __str__(self) -> str:

@@ -1,2 +1,2 @@
 from .page import page as page
-from .writers import WRITERS as WRITERS, drawn as drawn, headline as headline, report as report
+from .writers import WRITERS as WRITERS, drawn as drawn, headline as headline, plotted as plotted, report as report

@@ -22,7 +22,7 @@ class Writer:
     Attributes:
         text: of a result, and whether all the rest is asked for.
         words: what it is and how it ended, a few words each.
-        picture: the name in `tmsopt.plots` of what draws it.
+        picture: the name in `tmsopt.plots` of what draws it; empty where nothing does.
     """
 
     text: Callable[[Any, bool], str]
@@ -36,7 +36,7 @@ WRITERS: Mapping[str, Writer] = {
     ),
     "Front": Writer(lambda x, full: texts.front_table(x), headlines.of_front, "draw_front"),
     "Trace": Writer(lambda x, full: texts.trace_table(x), headlines.of_trace, "draw_trace"),
-    "Branch": Writer(lambda x, full: texts.branch_table(x), headlines.of_branch, "draw_branch"),
+    "Branch": Writer(lambda x, full: texts.branch_table(x), headlines.of_branch, ""),
     "Chart": Writer(lambda x, full: texts.chart_table(x), headlines.of_chart, "draw_chart"),
     "Speeds": Writer(lambda x, full: texts.speeds_table(x), headlines.of_speeds, "draw_speeds"),
     "Growth": Writer(lambda x, full: texts.growth_table(x), headlines.of_growth, "draw_growth"),
@@ -95,8 +95,28 @@ def drawn(result: Any, ax: "Axes | None" = None) -> "Axes":
 
     if not isinstance(ax, Axes | None):
         raise InputError([Fault(f"found {type(ax).__name__}; accepted: Axes of Matplotlib, or None", ("ax",))])
-    draw = getattr(plots, _writer(result).picture)
-    axes: Axes = draw(result, ax=ax)
+    if not (name := _writer(result).picture):
+        raise InputError([Fault(f"there is no picture of a {type(result).__name__} alone; plot what it is a part of")])
+    axes: Axes = getattr(plots, name)(result, ax=ax)
+    return axes
+
+
+def plotted(result: Any, ax: "Axes | None" = None) -> "Axes":
+    """The same for a user: a new figure is one of pyplot's, which a notebook and ``plt.show()`` show.
+
+    Raises:
+        InputError: as `drawn`.
+    """
+    axes = drawn(result, ax)
+    if ax is None:
+        import matplotlib.pyplot as plt
+        from matplotlib._pylab_helpers import Gcf
+
+        blank = plt.figure()
+        number, canvas = blank.number, type(blank.canvas)
+        plt.close(blank)
+        figure: Any = axes.get_figure()
+        Gcf.set_active(canvas.new_manager(figure, number))
     return axes
 
 
