@@ -1,7 +1,7 @@
 """Roots of a design over its speed, or another parameter, with the stable and heavily damped values of it."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.arithmetic.elementary import exact
-from tmsopt.critical_speeds.crossings import Stretch, crossings
-from tmsopt.critical_speeds.speeds import coefficients_over
+from tmsopt.critical_speeds.crossings import Crossing, Stretch, crossings
+from tmsopt.critical_speeds.modes import Mode, modes
+from tmsopt.critical_speeds.speeds import coefficients_over, speed_of
 from tmsopt.design.files import Given
+from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, is_number, short, suggest
 from tmsopt.models import Parameter, ParameterSet, Values
@@ -20,9 +22,15 @@ from tmsopt.roots import is_stable, roots
 from tmsopt.solver.solve import solved
 
 SPEEDS = ("Fr", "v")
-"""Native parameters that roots are shown over unless another is named; of a model without a speed, the first free."""
+"""Parameters that are speeds."""
+
+BICYCLES = ("tms", "whipple")
+"""Models whose modes have the names of a bicycle's: weave, capsize and castering."""
 
 _POINTS = 801
+_CROWD = np.linspace(-1, 1, 301) ** 5
+_MARGIN = 1.25  # times the last event
+_FAR = 3  # times the design and all that meets the axis: beyond, roots that meet are not waited for
 
 
 @dataclass(frozen=True, repr=False)
@@ -38,6 +46,10 @@ class Growth(Tabular):
         structure: structure of its rightmost roots.
         stable, heavily_damped: bands of values with all Re s < 0; with all s real and negative. Exact where the
             coefficients are polynomials in the parameter, else from point to point.
+        problem: that the design solves; its parameters, where `over` is one of them, have the units of its file.
+        modes: the roots again, each followed from meeting to meeting, with a name.
+        events: where roots cross the axis or meet, exact; none where the coefficients are no polynomials in `over`.
+        rate: how many 1/s a rate of 1 is, for each value; None without a unit of time.
     """
 
     over: Parameter
@@ -48,6 +60,10 @@ class Growth(Tabular):
     structure: str
     stable: tuple[Stretch, ...]
     heavily_damped: tuple[Stretch, ...]
+    problem: Problem
+    modes: tuple[Mode, ...] = ()
+    events: tuple[Crossing, ...] = ()
+    rate: Array | None = None
 
     def records(self) -> Iterable[dict[str, Any]]:
         """The roots at each value, one a row."""
@@ -66,13 +82,14 @@ class Growth(Tabular):
 def growth(design: Given, end: float | None = None, over: str | None = None) -> Growth:
     """Roots over a parameter, all else as designed.
 
-    Points crowd around the design, where roots near an exceptional point move like a fractional power of the parameter.
+    Points crowd around the design and where roots meet: there they move like a fractional power of the parameter.
 
     Args:
         design: a solution, or a problem or its file, solved first.
-        end: of a range that begins at 0; by default twice the larger of the design's and the critical speed, or for
-            another parameter its box if it is free, and else up to twice the design's value.
-        over: a native parameter or one of the problem; by default the speed, or the first free one.
+        end: of a range that begins at 0; by default of a speed a little beyond the last weave, capsize or meeting of
+            roots (one that is farther than 3 times all else is left out), or for another parameter its box if it is
+            free, and else up to twice the design's value.
+        over: a parameter of the problem or a native one; by default the speed, or the first free one.
 
     Raises:
         InputError: for an unknown parameter.
@@ -84,47 +101,74 @@ def growth(design: Given, end: float | None = None, over: str | None = None) -> 
     model = design.problem.model
     known = f"{name}_c" in model.quantity_names(of)
     at, critical = parameters[name], float(Values(model, of, parameters)[f"{name}_c"]) if known else math.nan
-    low, high = _ends(design, name, end, at, critical)
-    crowd = np.linspace(-1, 1, 301) ** 5 * (high - low)
-    first = low + (high - low) / _POINTS if name in SPEEDS else low  # at rest a speed leaves roots 0
-    grid = np.unique(np.concatenate([np.linspace(first, high, _POINTS), at + crowd]))
-    values = grid[(grid > low) & (grid <= high)] if name in SPEEDS else grid[(grid >= low) & (grid <= high)]
+    speed = name in SPEEDS
+    low, high = _ends(design, name, end, at)
+    try:
+        a = coefficients_over(model, of, parameters, name)
+        met = crossings(a, exact(low), None if speed and end is None else exact(high))
+    except InputError:  # no polynomials in it
+        met = None
+    if speed and end is None and met is not None:
+        high = _last(met.found, at)
+    events = tuple(c for c in met.found if low < c.at < high) if met is not None else ()
+    centres = [at, *(c.at for c in events if "EP" in c.kind)]
+    first = low + (high - low) / _POINTS if speed else low  # at rest a speed leaves roots 0
+    grid = np.unique(np.concatenate([np.linspace(first, high, _POINTS), *(c + _CROWD * (high - low) for c in centres)]))
+    values = grid[(grid > low) & (grid <= high)] if speed else grid[(grid >= low) & (grid <= high)]
 
     columns: Mapping[str, Any] = {**parameters, name: values}
-    a = np.stack(np.broadcast_arrays(*model.coefficients(columns, of), values)[:-1], axis=-1).astype(float)
-    shown = a[:, 0] != 0  # a root at infinity cannot be shown
-    values, a = values[shown], a[shown]
-    found = roots(a)
-    try:
-        bands = crossings(coefficients_over(model, of, parameters, name), exact(low), exact(high), bands_alone=True)
-        stable, heavily_damped = bands.stable, bands.heavily_damped
-    except InputError:  # no polynomials in it
-        inside = is_stable(a)
+    c = np.stack(np.broadcast_arrays(*model.coefficients(columns, of), values)[:-1], axis=-1).astype(float)
+    shown = c[:, 0] != 0  # a root at infinity cannot be shown
+    values, c = values[shown], c[shown]
+    found = roots(c)
+    if met is not None:
+        stable, heavily_damped = _within(met.stable, low, high), _within(met.heavily_damped, low, high)
+    else:
+        inside = is_stable(c)
         stable, heavily_damped = _runs(values, inside), _runs(values, inside & np.all(found.imag == 0, axis=-1))
-    return Growth(of[name], values, found, critical, at, design.structure, stable, heavily_damped)
+    rate = (
+        None if of.rate is None else np.broadcast_to(of.rate({**parameters, name: values}), values.shape).astype(float)
+    )
+    followed = modes(values, found, at, bicycle=model.name in BICYCLES and model.degree == 4, speed=speed)
+    return Growth(
+        of[name], values, found, critical, at, design.structure, stable, heavily_damped, design.problem, followed,
+        events, rate,
+    )  # fmt: skip
 
 
 def _written(design: Solution, over: str | None) -> tuple[ParameterSet, dict[str, float], str]:
     """The parameters of a design in the set that has the one asked for, and its name."""
     problem = design.problem
-    native = problem.model.sets[0]
+    own, native = problem.parameter_set, problem.model.sets[0]
     if over is None:
-        over = next((n for n in SPEEDS if n in native.names), None) or next(iter(problem.free), native.names[0])
+        over = speed_of(own) or next(iter(problem.free), own.names[0])
+    if over in own.names:
+        return own, dict(design.parameters), over
     if over in native.names:
         return native, dict(design.dimensionless), over
-    if over in problem.parameter_set.names:
-        return problem.parameter_set, dict(design.parameters), over
-    accepted = dict.fromkeys((*native.names, *problem.parameter_set.names))
+    accepted = dict.fromkeys((*own.names, *native.names))
     raise InputError([Fault(f"found '{over}'; {suggest(over, accepted)}", ("over",))])
 
 
-def _ends(design: Solution, name: str, end: float | None, at: float, critical: float) -> Stretch:
+def _ends(design: Solution, name: str, end: float | None, at: float) -> Stretch:
     if end is not None:
         return min(end, 0.0), max(end, 0.0)
     if name in SPEEDS:
-        return 0.0, 2 * max(at, critical if math.isfinite(critical) else 0.0, 0.5)
+        return 0.0, 2 * max(at, 0.5)
     low, high = design.problem.free.get(name, (min(2 * at, 0.0), max(2 * at, 0.0)))
     return (low, high) if low < high else (low - 1.0, high + 1.0)
+
+
+def _last(found: Sequence[Crossing], at: float) -> float:
+    """The end of a range of speeds that shows all that happens."""
+    crossed = max((c.at for c in found if c.kind in ("weave", "capsize", "infinity")), default=0.0)
+    near = _FAR * max(at, crossed, 0.5)
+    last = max((c.at for c in found if c.at <= near), default=0.0)
+    return _MARGIN * max(last, crossed, at) if last else 2 * max(at, 0.5)
+
+
+def _within(bands: Sequence[Stretch], low: float, high: float) -> tuple[Stretch, ...]:
+    return tuple((max(a, low), min(b, high)) for a, b in bands if a < high and b > low)
 
 
 def _runs(values: Array, inside: Truth) -> tuple[Stretch, ...]:

@@ -1,0 +1,124 @@
+"""Roots followed over a parameter as modes with names, from one meeting of roots to the next."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from tmsopt.records import Array, Complex
+
+_LEAST, _SHORT = 3, 1e-4  # points of a stretch, and its part of the range; where many roots meet rounding makes such
+_APART = 0.5  # of the distance to a third root: two that are nearer to one another than this meet alone
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A root, of a pair the upper one, between two places where roots meet: `values` and `roots` have shape (n,)."""
+
+    name: str
+    values: Array
+    roots: Complex
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """Where the number of real roots stays: the real ones ascending, then the pairs."""
+
+    values: Array
+    roots: Complex
+    real: int
+
+
+def modes(values: Array, found: Complex, design: float, bicycle: bool = False, speed: bool = False) -> tuple[Mode, ...]:
+    """Every root between meetings, with the name of its mode.
+
+    A root that has no part in a meeting keeps its name. Of a bicycle the names begin where one pair and two real
+    roots are, at the highest speed or else at the design: the pair is weave, the real root to the left castering, the
+    other capsize. Of other models roots are numbered from the right at the design. A pair of two real roots is named
+    after both. Where more than two roots meet, as at EP3 and EP4, names begin anew.
+
+    Args:
+        values: of the parameter, ascending, shape (n,).
+        found: roots, shape (n, degree).
+        design: value of the design.
+    """
+    parts = _stretches(values, found)
+    if not parts:
+        return ()
+    usual = [k for k, part in enumerate(parts) if bicycle and part.roots.shape[1] == 3 and part.real == 2]
+    here = min(range(len(parts)), key=lambda k: (np.abs(parts[k].values - design).min(), -len(parts[k].values)))
+    first = here if not usual or (not speed and here in usual) else usual[-1]
+    names = {first: _named(parts[first], design, bicycle)}
+    for order in (range(first, len(parts)), range(first, -1, -1)):
+        for before, k in pairwise(order):
+            passed = _passed(parts[before], names[before], parts[k], forward=k > before)
+            mixed = bicycle and any("weave +" in name or "+ weave" in name for name in passed)
+            names[k] = passed if passed and not mixed else _named(parts[k], design, bicycle)
+    return tuple(
+        Mode(name, part.values, column)
+        for k, part in enumerate(parts)
+        for name, column in zip(names[k], part.roots.T, strict=True)
+    )
+
+
+def _stretches(values: Array, found: Complex) -> list[_Stretch]:
+    real = np.count_nonzero(found.imag == 0, axis=1)
+    parts = []
+    for run in np.split(np.arange(len(values)), np.flatnonzero(np.diff(real)) + 1):
+        if len(run) < _LEAST or np.ptp(values[run]) < _SHORT * np.ptp(values):
+            continue
+        own, count = found[run], int(real[run[0]])
+        reals = np.sort(own.real[own.imag == 0].reshape(len(run), count), axis=1)
+        pairs = np.sort_complex(own[own.imag > 0].reshape(len(run), -1))
+        for k in range(1, len(run)) if pairs.shape[1] > 1 else ():
+            ahead = 2 * pairs[k - 1] - pairs[k - 2] if k > 1 else pairs[k - 1]
+            pairs[k] = pairs[k][_nearest(ahead, pairs[k])]
+        parts.append(_Stretch(values[run], np.concatenate([reals, pairs], axis=1), count))
+    return parts
+
+
+def _nearest(a: Complex, b: Complex) -> NDArray[np.intp]:
+    """For each of a its own one of b, the squares of the distances least together."""
+    return np.asarray(linear_sum_assignment(np.abs(a[:, None] - b) ** 2)[1])
+
+
+def _named(part: _Stretch, design: float, bicycle: bool) -> list[str]:
+    """Names where none are handed on: of a bicycle in words, else numbered from the right, nearest to the design."""
+    count, row = part.real, part.roots[np.abs(part.values - design).argmin()]
+    pairs = len(row) - count
+    if bicycle and (count, pairs) == (2, 1):
+        return ["castering", "capsize", "weave"]
+    if bicycle and (count, pairs) == (0, 2):
+        last = part.roots.real.max(axis=0).argmax()
+        return ["weave" if k == last else "second pair" for k in range(2)]
+    rank = np.argsort(np.argsort(-row[count:].real)) + 1
+    return [f"real {count - k}" for k in range(count)] + [f"pair {k}" for k in rank]
+
+
+def _passed(old: _Stretch, names: list[str], new: _Stretch, forward: bool) -> list[str]:
+    """Names handed on over a meeting of two roots; none where more have a part in it."""
+    if abs(old.real - new.real) != 2:
+        return []
+    many, few = (old, new) if old.real > new.real else (new, old)
+    ends = {id(old): -1 if forward else 0, id(new): 0 if forward else -1}
+    r, p = many.roots[ends[id(many)]], few.roots[ends[id(few)]]
+    i = int(np.diff(r[: many.real].real).argmin())
+    j = few.real + int(p[few.real :].imag.argmin())
+    others, rest = [k for k in range(len(r)) if k not in (i, i + 1)], [k for k in range(len(p)) if k != j]
+    apart = [np.abs(x - y).min(initial=np.inf) for x, y in ((r[others], r[i : i + 2].mean()), (p[rest], p[j].real))]
+    if abs(r[i + 1] - r[i]) > _APART * apart[0] or 2 * p[j].imag > _APART * apart[1]:
+        return []
+    reals = many.real - 2  # those that stay stand in order
+    paired = [*zip(others[:reals], rest[:reals], strict=True)]
+    if others[reals:]:
+        order = _nearest(r[others[reals:]], p[rest[reals:]])
+        paired += [(others[reals + k], rest[reals + int(m)]) for k, m in enumerate(order)]
+    if many is old:
+        both = names[i] if names[i] == names[i + 1] else f"{names[i + 1]} + {names[i]}"
+        found = {j: both} | {b: names[a] for a, b in paired}
+    else:
+        upper, _, lower = names[j].partition(" + ")
+        found = {i: lower or upper, i + 1: upper} | {a: names[b] for a, b in paired}
+    return [found[k] for k in range(len(found))]
