@@ -106,8 +106,9 @@ class _Seconds(click.ParamType[float]):
 @_common
 @click.option(
     "--plot", type=click.Path(path_type=Path),
-    help="Draw growth rates and frequencies over Fr, or the front (png, pdf, svg).",
+    help="Draw growth rates and frequencies over the speed, or the front (png, pdf, svg).",
 )  # fmt: skip
+@click.option("--over", help="What --plot draws over, e.g. lambda_s. [default: the speed, or the first free one]")
 @click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write the points of a front.")
 @click.option("--points", type=click.IntRange(min=2), default=None, help="Points of a front. [default: 25]")
 @click.option(
@@ -138,8 +139,8 @@ class _Seconds(click.ParamType[float]):
 @click.pass_context
 def solve(
     context: click.Context, file: Path, as_json: bool, starts: int | None, seed: int, linear_solver: str,
-    plot: Path | None, csv_file: Path | None, points: int | None, wheelbase: str | None, rear_mass: str | None,
-    full: bool, certify: float | None, every: bool, seconds: float | None,
+    plot: Path | None, over: str | None, csv_file: Path | None, points: int | None, wheelbase: str | None,
+    rear_mass: str | None, full: bool, certify: float | None, every: bool, seconds: float | None,
 ) -> None:  # fmt: skip
     """Find the best design that the problem FILE asks for, or the front of the best ones."""
     with bad_input():
@@ -178,7 +179,7 @@ def solve(
             found = tmsopt.report.findings(solution, full)
         click.echo(tmsopt.report.design_report(solution, found, full, si))
     if plot is not None:
-        _draw(solution, plot, w, m_B)
+        _draw(solution, plot, over, w, m_B)
     sys.exit(INTERRUPTED if solution.interrupted else _EXIT[solution.status])
 
 
@@ -304,7 +305,7 @@ def _scale(option: str, text: str, unit: str) -> float:
     return value
 
 
-def _draw(solution: "Solution", path: Path, w: float, m_B: float) -> None:
+def _draw(solution: "Solution", path: Path, over: str | None, w: float, m_B: float) -> None:
     import tmsopt
 
     if not math.isfinite(solution.abscissa):
@@ -314,5 +315,7 @@ def _draw(solution: "Solution", path: Path, w: float, m_B: float) -> None:
     if solution.problem.model is tmsopt.models.tms:
         si = tmsopt.report.si_parameters(solution, w, m_B)
         unit = (si["g"] * si["w"]) ** 0.5
+    with bad_input():
+        drawn = tmsopt.growth(solution, over=over)
     with saving("--plot", path):
-        tmsopt.plots.save(tmsopt.plots.growth_figure(tmsopt.growth(solution), solution.problem.title, unit), path)
+        tmsopt.plots.save(tmsopt.plots.growth_figure(drawn, solution.problem.title, unit), path)

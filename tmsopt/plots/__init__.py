@@ -1,7 +1,7 @@
 """Results as figures, drawn with Matplotlib.
 
-In: results of any verb. Out: figures, saved whole or not at all. Open `style` first; `paper` has the figures of the
-source.
+In: results of any verb. Out: Axes, each `draw_…` on those given or in a figure of its own; figures, saved whole or not
+at all. Open `growth` first; `paper` has the figures of the source.
 """
 
 import lazy_loader

@@ -7,8 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, Polygon
 
-from tmsopt.paper.sketch import Sketch
-from tmsopt.plots.style import CRITICAL, HEAVY, LINE, MARK, REAL, new_figure
+from tmsopt.design.solution import Solution
+from tmsopt.paper.sketch import Sketch, sketch
+from tmsopt.plots.style import CRITICAL, HEAVY, LINE, MARK, REAL, new_figure, on_axes
 from tmsopt.records import Array
 
 REAR_FRAME, FRONT_FRAME = CRITICAL, MARK
@@ -18,8 +19,13 @@ _THIN: dict[str, Any] = {"linewidth": 0.8, "color": "0.25"}
 _BOX: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
 
 
-def draw_bicycle(ax: Axes, data: Sketch) -> None:
-    """Side view with dimension lines, speed, gravity, lean φ and steer δ; z points down."""
+def draw_bicycle(data: Sketch | Solution, ax: Axes | None = None) -> Axes:
+    """A two-mass-skate bicycle to scale.
+
+    The Axes show its side in wheelbases, z down, with dimension lines, speed, gravity, lean φ and steer δ.
+    """
+    data = data if isinstance(data, Sketch) else sketch(data.dimensionless)
+    ax = on_axes(ax, 6.4, 4.1)
     reach = _reach(data)
     _ground(ax, -0.12, max(1.0, data.B[0], data.H[0]) + 0.42)
     _frames(ax, data, reach)
@@ -32,10 +38,12 @@ def draw_bicycle(ax: Axes, data: Sketch) -> None:
     ax.set_xlim(-0.42, max(1.0, data.B[0], data.H[0]) + 0.5)
     ax.set_ylim(0.36, -reach - 0.12)
     ax.set_axis_off()
+    return ax
 
 
-def draw_distance(ax: Axes, data: Sketch) -> None:
-    """An enlargement around H and the front contact: the distance u_H = ν_H w of H from the steer axis."""
+def draw_distance(data: Sketch, ax: Axes | None = None) -> Axes:
+    """The distance u_H = ν_H w of H from the steer axis; the Axes show an enlargement around H and the contact."""
+    ax = on_axes(ax, 3.4, 3.4)
     span = np.array([data.front, data.H, data.foot])
     middle, half = (span.max(axis=0) + span.min(axis=0)) / 2, 0.85 * float(np.ptp(span, axis=0).max())
     ends = np.array([data.on_axis(-2), data.on_axis(2)])
@@ -71,6 +79,7 @@ def draw_distance(ax: Axes, data: Sketch) -> None:
     ax.set_xlim(middle[0] - half, middle[0] + half)
     ax.set_ylim(middle[1] + half, middle[1] - half)
     ax.set(xticks=[], yticks=[])
+    return ax
 
 
 def bicycle_figure(data: Sketch, title: str) -> Figure:
@@ -78,8 +87,8 @@ def bicycle_figure(data: Sketch, title: str) -> Figure:
     figure = new_figure(9.0, 4.1)
     grid = figure.add_gridspec(1, 2, width_ratios=(2.35, 1))
     side, near = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
-    draw_bicycle(side, data)
-    draw_distance(near, data)
+    draw_bicycle(data, side)
+    draw_distance(data, near)
     side.set_title(title, fontsize=10.5)
     near.set_title("enlarged: $H$ and the steer axis", fontsize=9.5)
     p = data.parameters

@@ -1,6 +1,7 @@
-"""A Pareto front as a table, as a curve of two objectives, or as coloured points of three."""
+"""A Pareto front as a curve of two objectives, or as coloured points of three."""
 
 import re
+from itertools import pairwise
 
 import matplotlib
 import numpy as np
@@ -8,8 +9,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tmsopt.fronts.front import Front, FrontPoint
-from tmsopt.plots.labels import Name, place_names
-from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, legend_below, new_figure
+from tmsopt.plots.labels import Name, finished, scale_of
+from tmsopt.plots.style import (
+    CAPSIZE,
+    COMPLEX,
+    CRITICAL,
+    HEAVY,
+    LINE,
+    MARK,
+    REAL,
+    STABLE,
+    figure_of,
+    on_axes,
+)  # fmt: skip
+from tmsopt.records import Array
 
 _STYLES = {
     "EP4": (MARK, "D"), "EP3": (MARK, "^"), "2EP2": (REAL, "s"), "EP2": (REAL, "v"), "CEP2": (COMPLEX, "s"),
@@ -24,82 +37,68 @@ def _style(structure: str) -> tuple[str, str]:
     return _STYLES.get(structure) or (_STYLES["CEP2" if higher[1] else "EP4"] if higher else (LINE, "x"))
 
 
-def front_figure(front: Front) -> Figure:
-    """Two objectives: the curve, cut at gaps, points by structure. Three: points, the third objective as colour.
+def draw_front(data: Front, ax: Axes | None = None) -> Axes:
+    """A front of two objectives as a curve, cut at gaps, or of three as points, the third objective as colour.
 
-    Those that are not stable have a ring.
+    The Axes show the first two objectives, in the units of the file: points by the structure of their roots; those that
+    are not stable are hollow with a ring, and the curve is dashed along them; kinks and ends have names.
     """
-    figure = new_figure(6.4, 5.0)
-    ax = figure.subplots()
-    label_objectives(ax, front)
-    ax.set_title(front.problem.title or "Pareto front", fontsize=11)
-    names = draw_front(ax, front) if len(front.objectives) == 2 else _draw_three(figure, ax, front)
-    legend_below(figure, ax.get_legend_handles_labels()[0])
-    ax.margins(0.08)
-    place_names(ax, names)
-    return figure
+    drawn = on_axes(ax, 6.4, 5.0, data.problem.title or "Pareto front")
+    scales = [scale_of(data.problem, text) for text in data.objectives]
+    values = np.stack([s.of([p.objectives[k] for p in data.points]) for k, s in enumerate(scales)], axis=-1)
+    drawn.set(xlabel=scales[0].label, ylabel=scales[1].label)
+    (_draw_two if len(scales) == 2 else _draw_three)(drawn, data, values)
+    _ring_unstable(drawn, data, values)
+    drawn.margins(0.08)
+    return finished(drawn, ax is None, _names(data.points, values))
 
 
-def draw_front(ax: Axes, front: Front) -> list[Name]:
-    """The curve of two objectives; the names of its ends and kinks, to place."""
-    values = np.array([p.objectives for p in front.points])
-    cuts = [g.index + 1 for g in front.gaps]
-    for part in np.split(np.arange(len(front)), cuts):
-        ax.plot(values[part, 0], values[part, 1], color=LINE, linewidth=1.0, zorder=2)
-    for k, gap in enumerate(front.gaps):
-        ends = values[gap.index : gap.index + 2]
-        label = "not solved" if gap.failed else "gap: no efficient design"
-        known = any(h.get_label() == label for h in ax.get_lines())
-        ax.plot(*ends.T, color=CAPSIZE, linewidth=0.8, linestyle=":", zorder=1, label=None if k and known else label)
+def front_figure(front: Front) -> Figure:
+    """A front in a figure of its own."""
+    return figure_of(draw_front(front))
+
+
+def _draw_two(ax: Axes, front: Front, values: Array) -> None:
+    gaps = {gap.index: gap for gap in front.gaps}
+    stable = [bool(p.stable) for p in front.points]
+    for k, (a, b) in enumerate(pairwise(values)):
+        if k not in gaps:
+            whole = stable[k] and stable[k + 1]
+            ax.plot(
+                *np.stack([a, b]).T,
+                color=LINE if whole else MARK,
+                linestyle="-" if whole else "--",
+                linewidth=1,
+                zorder=2,
+            )
+        else:
+            label = "not solved" if gaps[k].failed else "gap: no efficient design"
+            ax.plot(*np.stack([a, b]).T, color=CAPSIZE, linewidth=0.8, linestyle=":", zorder=1, label=label)
     for structure in dict.fromkeys(p.structure for p in front.points):
-        own = values[[p.structure == structure for p in front.points]]
         colour, marker = _style(structure)
-        ax.plot(*own.T, marker, color=colour, markersize=4, zorder=3, label=structure, linestyle="none")
-    _ring_unstable(ax, front)
-    return _names(front.points)
+        for kept, fill in ((True, colour), (False, "white")):
+            own = values[[p.structure == structure and s is kept for p, s in zip(front.points, stable, strict=True)]]
+            if len(own):
+                ax.plot(*own.T, marker, color=colour, markerfacecolor=fill, markersize=4, zorder=3, label=structure)
 
 
-def label_objectives(ax: Axes, front: Front) -> None:
-    """Symbols of the first two objectives, with a unit for a parameter, or their text."""
-    ax.set_xlabel(_axis(front, front.objectives[0]))
-    ax.set_ylabel(_axis(front, front.objectives[1]))
-
-
-def _draw_three(figure: Figure, ax: Axes, front: Front) -> list[Name]:
-    values = np.array([p.objectives for p in front.points])
+def _draw_three(ax: Axes, front: Front, values: Array) -> None:
     drawn = ax.scatter(values[:, 0], values[:, 1], c=values[:, 2], cmap=matplotlib.colormaps["viridis"], s=22, zorder=3)
-    figure.colorbar(drawn, ax=ax, label=_axis(front, front.objectives[2]))
-    _ring_unstable(ax, front)
-    return _names(front.points)
+    figure_of(ax).colorbar(drawn, ax=ax, label=scale_of(front.problem, front.objectives[2]).label)
 
 
-def _ring_unstable(ax: Axes, front: Front) -> None:
+def _ring_unstable(ax: Axes, front: Front, values: Array) -> None:
     """A ring around each design that is not stable, or is not known to be."""
-    rings = np.array([p.objectives[:2] for p in front.points if not p.stable])
+    rings = values[[not p.stable for p in front.points], :2]
     if len(rings):
         ax.plot(
-            *rings.T,
-            "o",
-            color=LINE,
-            markerfacecolor="none",
-            markersize=8,
-            zorder=2.5,
-            label="not stable",
+            *rings.T, "o", color=LINE, markerfacecolor="none", markersize=8, zorder=2.5, label="not stable",
             linestyle="none",
-        )
+        )  # fmt: skip
 
 
-def _names(points: tuple[FrontPoint, ...]) -> list[Name]:
-    words = [(p, [w for w in p.label.split("; ") if w and not w.startswith("gap ")]) for p in points]
-    return [Name(", ".join(w).replace("->", "→"), p.objectives[0], p.objectives[1]) for p, w in words if w]
-
-
-def _axis(front: Front, text: str) -> str:
-    plain = text.strip()
-    name = plain.removeprefix("-").strip()
-    sign = "-" if name != plain else ""
-    of = front.problem.parameter_set
-    if name in of.names:
-        unit = "" if of[name].unit == "1" else f" in {of[name].unit}"
-        return f"${sign}{of[name].latex}${unit}"
-    return plain
+def _names(points: tuple[FrontPoint, ...], values: Array) -> list[Name]:
+    words = [[w for w in p.label.split("; ") if w and not w.startswith("gap ")] for p in points]
+    return [
+        Name(", ".join(w).replace("->", "→"), *map(float, at[:2])) for w, at in zip(words, values, strict=True) if w
+    ]

@@ -1,73 +1,183 @@
-"""Growth rates and frequencies over the speed, or another parameter, drawn into Axes that the caller made."""
+"""Growth rates and frequencies over the speed, or another parameter, with their modes named."""
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from matplotlib.typing import LineStyleType
 
-from tmsopt.critical_speeds.growth import SPEEDS, Growth
-from tmsopt.plots.labels import axis_label
-from tmsopt.plots.style import CRITICAL, HEAVY, LINE, MARK, STABLE, new_figure
+from tmsopt.critical_speeds.growth import SPEEDS, Growth, growth
+from tmsopt.critical_speeds.modes import Mode
+from tmsopt.design.solution import Solution
+from tmsopt.plots.labels import Name, Scale, finished, place_names, scale_over, words_of
+from tmsopt.plots.style import (
+    CAPSIZE,
+    COMPLEX,
+    CRITICAL,
+    HEAVY,
+    LINE,
+    MARK,
+    REAL,
+    STABLE,
+    legend_below,
+    new_figure,
+    on_axes,
+)  # fmt: skip
+from tmsopt.records import Array
+
+_DASHED, _DOTTED = (0, (6, 2)), (0, (4, 2, 1, 2))
+_STYLES: Mapping[str, tuple[str, LineStyleType]] = {
+    "weave": (CRITICAL, "-"), "capsize": (MARK, _DASHED), "castering": (REAL, _DOTTED),
+}  # fmt: skip
+_OTHERS: Sequence[tuple[str, LineStyleType]] = (
+    (CRITICAL, "-"), (MARK, _DASHED), (REAL, _DOTTED), (COMPLEX, "-"), (LINE, _DASHED),
+)  # fmt: skip
+"""Colours and lines of modes: of a bicycle by name, of others in their order at the design."""
+
+_EVENTS: Mapping[str, tuple[str, LineStyleType]] = {
+    "weave": (CRITICAL, "--"), "capsize": (MARK, "-."), "infinity": (CAPSIZE, (0, (1, 1))),
+}  # fmt: skip
+
+_ALONG = 0.7, 0.17  # of the width of a plot: where the first name stands, and how far left of it the next
+
+_INNER = 0.3, 0.9  # of a curve: between them, not at its ends
 
 
-def draw_growth_rates(ax: Axes, data: Growth) -> None:
-    """Growth rates Re s, with bands of stability and heavy damping, the critical value and the design marked."""
-    _bands(ax, data)
-    for column in np.sort(data.roots.real, axis=1).T:
-        ax.plot(data.values, column, color=LINE, linewidth=1.2)
-    _marks(ax, data)
-    ax.axhline(0, color="grey", linewidth=0.6)
-    ax.set_ylabel(r"growth rates $\mathrm{Re}\,s$")
-    ax.legend(loc="upper right", fontsize=8, framealpha=0.9)
+def draw_growth(data: Growth | Solution, ax: Axes | None = None) -> Axes:
+    """Growth rates of every mode over the speed, or another parameter.
+
+    The Axes show Re s, in 1/s for a problem in SI, over the parameter in the unit of the problem's file: each mode with
+    its name, bands of stability and heavy damping, lines at the values where a mode loses stability and at the
+    design's own, all with their numbers in the legend, and circles where roots meet.
+    """
+    return _drawn(data, ax, "real")
 
 
-def draw_frequencies(ax: Axes, data: Growth) -> None:
-    """Frequencies Im s, marked in the same way."""
-    _bands(ax, data)
-    for column in np.sort(data.roots.imag, axis=1).T:
-        ax.plot(data.values, column, color=LINE, linewidth=1.2)
-    _marks(ax, data)
-    ax.set_ylabel(r"frequencies $\mathrm{Im}\,s$")
-    ax.set_xlabel(_FROUDE if data.over.name == "Fr" else axis_label(data.over))
+def draw_frequencies(data: Growth | Solution, ax: Axes | None = None) -> Axes:
+    """Frequencies of every oscillating mode, marked in the same way.
+
+    The Axes show Im s, for a problem in SI as Hz, over the parameter in the unit of the problem's file.
+    """
+    return _drawn(data, ax, "imag")
 
 
-_FROUDE = r"Froude number $\mathrm{Fr} = v/\sqrt{gw}$"
-
-
-def growth_figure(data: Growth, title: str, metres_per_second: float | None = None) -> Figure:
+def growth_figure(data: Growth | Solution, title: str = "", metres_per_second: float | None = None) -> Figure:
     """Growth rates above frequencies; an upper axis shows the speed for Fr = 1 being `metres_per_second`."""
-    figure = new_figure(6.4, 6.4)
+    data = growth(data) if isinstance(data, Solution) else data
+    figure = new_figure(6.4, 6.8)
     upper, lower = figure.subplots(2, 1, sharex=True)
-    draw_growth_rates(upper, data)
-    draw_frequencies(lower, data)
-    upper.set_xlim(min(0.0, data.values[0]) if data.over.name in SPEEDS else data.values[0], data.values[-1])
-    _focus(upper, data.roots.real, data)
-    if (unit := metres_per_second) is not None:
+    names = [_curves(ax, data, part) for ax, part in ((upper, "real"), (lower, "imag"))]
+    upper.set_xlabel("")
+    if (unit := metres_per_second) is not None and data.over.name == "Fr":
         speed = upper.secondary_xaxis("top", functions=(lambda x: x * unit, lambda x: x / unit))
         speed.set_xlabel("speed $v$ in m/s")
-    figure.suptitle(title, fontsize=11)
+    figure.suptitle(title or data.problem.title, fontsize=11)
+    legend_below(figure, upper.get_legend_handles_labels()[0])
+    for ax, found in zip((upper, lower), names, strict=True):
+        place_names(ax, found)
     return figure
 
 
-def _bands(ax: Axes, data: Growth) -> None:
-    for k, (low, high) in enumerate(data.stable):
-        ax.axvspan(low, high, color=STABLE, alpha=0.18, linewidth=0, label="stable" if k == 0 else None)
-    for k, (low, high) in enumerate(data.heavily_damped):
-        ax.axvspan(low, high, color=HEAVY, alpha=0.35, linewidth=0, label="heavily damped" if k == 0 else None)
+def _drawn(data: Growth | Solution, ax: Axes | None, part: str) -> Axes:
+    data = growth(data) if isinstance(data, Solution) else data
+    drawn = on_axes(ax, 6.4, 4.4, data.problem.title)
+    return finished(drawn, ax is None, _curves(drawn, data, part))
 
 
-def _marks(ax: Axes, data: Growth) -> None:
-    symbol = f"{{{data.over.latex}}}" if "_" in data.over.latex else data.over.latex  # no second subscript
-    if np.isfinite(data.critical) and data.critical <= data.values[-1]:
-        label = rf"${symbol}_c = {data.critical:.4g}$"
-        ax.axvline(data.critical, color=CRITICAL, linewidth=1.2, linestyle="--", label=label)
-    name = rf"{symbol}_{{\mathrm{{{data.structure}}}}}" if "EP" in data.structure else symbol
-    ax.axvline(data.design, color=MARK, linewidth=1.2, linestyle=":", label=rf"${name} = {data.design:.4g}$")
+def _curves(ax: Axes, data: Growth, part: str) -> list[Name]:
+    """Everything but the legend; the names of the modes, to place."""
+    scale = scale_over(data.problem, data.over)
+    for bands, colour, alpha, words in (
+        (data.stable, STABLE, 0.18, "stable"), (data.heavily_damped, HEAVY, 0.35, "heavily damped"),
+    ):  # fmt: skip
+        for k, ends in enumerate(bands):
+            ax.axvspan(*scale.of(ends), color=colour, alpha=alpha, linewidth=0, label=words if k == 0 else None)
+    names = list(dict.fromkeys(mode.name for mode in sorted(data.modes, key=lambda m: _reached(m, data.design))))
+    for mode in data.modes:
+        if part == "imag" and not mode.roots.imag.any():
+            continue
+        colour, style = _STYLES.get(mode.name, _OTHERS[names.index(mode.name) % len(_OTHERS)])
+        ax.plot(scale.of(mode.values), _part(data, mode, part), color=colour, linewidth=1.4, linestyle=style)
+    _marks(ax, data, scale, part)
+    unit = "" if data.rate is None else " in 1/s" if part == "real" else " in Hz"
+    symbol = rf" $\mathrm{{{'Re' if part == 'real' else 'Im'}}}\,s$" if data.rate is None else ""
+    ax.set_ylabel(("growth rate" if part == "real" else "frequency") + symbol + unit)
+    ax.set_xlabel(scale.label)
+    low, high = scale.of([min(0.0, data.values[0]) if data.over.name in SPEEDS else data.values[0], data.values[-1]])
+    ax.set_xlim(low, high)
+    _focus(ax, data, part)
+    return _names(ax, data, scale, part, names)
 
 
-def _focus(ax: Axes, values: NDArray[np.float64], data: Growth) -> None:
-    """Limits that show the roots around the design even where others run away at low speed."""
-    near = values[np.abs(data.values - data.design) <= 0.75 * abs(data.design) + 0.1]
-    low, high = float(np.percentile(near, 1)), float(np.percentile(near, 99))
-    margin = 0.25 * (high - low) + 0.1
-    ax.set_ylim(low - margin, high + margin)
+def _part(data: Growth, mode: Mode, part: str) -> Array:
+    """Growth rates or frequencies of a mode as they stand on the axis."""
+    rate = np.ones(1) if data.rate is None else np.interp(mode.values, data.values, data.rate)
+    hertz = 1.0 if part == "real" or data.rate is None else 2 * np.pi
+    return np.asarray(getattr(mode.roots, part) * rate / hertz, dtype=float)
+
+
+def _marks(ax: Axes, data: Growth, scale: Scale, part: str) -> None:
+    """Lines where a mode loses stability and at the design, and circles where roots meet."""
+    unit = f" {scale.unit.text}" if scale.unit.text else ""
+    words = words_of(data.problem.model)
+    for kind, (colour, style) in _EVENTS.items():
+        at = scale.of([c.at for c in data.events if c.kind == kind])
+        label = f"{words[kind]} at {', '.join(f'{x:.4g}' for x in at)}{unit}"
+        for k, x in enumerate(at):
+            ax.axvline(x, color=colour, linewidth=1.1, linestyle=style, label=None if k else label)
+    structure = f" ({data.structure})" if "EP" in data.structure else ""
+    label = f"design at {scale.of(data.design):.4g}{unit}{structure}"
+    ax.axvline(float(scale.of(data.design)), color=LINE, linewidth=1.2, linestyle=":", label=label)
+    met = [c for c in data.events if "EP" in c.kind]
+    rates = np.ones(1) if data.rate is None else np.interp([c.at for c in met], data.values, data.rate)
+    if met:
+        heights = np.array([c.root.re if part == "real" else c.root.im for c in met]) * rates
+        heights = heights / (2 * np.pi) if part == "imag" and data.rate is not None else heights
+        ax.plot(
+            scale.of([c.at for c in met]), heights, linestyle="none", marker="o", markersize=4.5, color=LINE,
+            markerfacecolor="white", zorder=4, label="roots meet",
+        )  # fmt: skip
+    if part == "real":
+        ax.axhline(0, color="grey", linewidth=0.6, zorder=1)
+
+
+def _focus(ax: Axes, data: Growth, part: str) -> None:
+    """Limits that show the roots around the design and the events, even where others run away."""
+    centres = [data.design, *(c.at for c in data.events if c.kind in ("weave", "capsize"))]
+    low, high = min(centres), max(centres)
+    room = 0.25 * abs(data.design) + 0.05 * (data.values[-1] - data.values[0])
+    shown = [
+        _part(data, m, part)[(m.values >= low - room) & (m.values <= high + room)]
+        for m in data.modes
+        if part == "real" or m.roots.imag.any()
+    ]
+    near = np.concatenate([*shown, np.zeros(1)])
+    bottom, top = (float(np.percentile(near, q)) for q in ((1, 99) if part == "real" else (0, 99)))
+    margin = 0.2 * (top - bottom) or 0.1
+    ax.set_ylim(bottom - margin if part == "real" else 0.0, top + margin)
+
+
+def _names(ax: Axes, data: Growth, scale: Scale, part: str, names: list[str]) -> list[Name]:
+    """Each mode's name where the longest of its curves is in sight, those of several modes spread out."""
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    found = []
+    for k, name in enumerate(names):
+        pieces = []
+        for mode in data.modes:
+            x, y = scale.of(mode.values), _part(data, mode, part)
+            seen = (x > left) & (x < right) & (y > bottom) & (y < top) & ((part == "real") | (y > 0))
+            if mode.name == name and seen.any():
+                pieces.append((x[seen], y[seen]))
+        if pieces:
+            x, y = max(pieces, key=lambda piece: float(np.ptp(piece[0])))
+            place = left + (_ALONG[0] - _ALONG[1] * k) * (right - left)
+            at = int(np.abs(x - np.clip(place, *np.quantile([x[0], x[-1]], _INNER))).argmin())
+            found.append(Name(name, float(x[at]), float(y[at])))
+    return found
+
+
+def _reached(mode: Mode, design: float) -> tuple[float, float]:
+    """By which modes are put in order: how near they come to the design, and from the right there."""
+    near = np.abs(mode.values - design)
+    return round(float(near.min()) / (1e-3 + abs(design)), 3), -float(mode.roots[near.argmin()].real)

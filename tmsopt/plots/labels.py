@@ -1,18 +1,27 @@
-"""Names of marked points and of axes."""
+"""Names of marked points, units and labels of axes, words for modes, and legends."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import textalloc
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.patheffects import withStroke
+from numpy.typing import ArrayLike
 
-from tmsopt.models import Parameter, ParameterSet
+from tmsopt.critical_speeds.growth import BICYCLES
+from tmsopt.design.problem import Problem
+from tmsopt.design.unit_system import Unit, unit_of
+from tmsopt.models import Model, Parameter
+from tmsopt.plots.style import figure_of, legend_below
+from tmsopt.records import Array
 
 _SIZE = 8
 
 _SAME = 0.02  # of an axis: names of marks so close would stand beside the wrong ones
+
+FROUDE = r"Froude number $\mathrm{Fr} = v/\sqrt{gw}$"
 
 
 @dataclass(frozen=True)
@@ -22,6 +31,65 @@ class Name:
     text: str
     x: float
     y: float
+
+
+@dataclass(frozen=True)
+class Scale:
+    """An axis: the parameter or expression on it, its label, and the unit in which the problem was written."""
+
+    name: str
+    label: str
+    unit: Unit
+
+    def of(self, values: ArrayLike) -> Array:
+        """Numbers as they stand on the axis."""
+        return np.asarray(values, dtype=float) / self.unit.one
+
+
+def scale_of(problem: Problem, text: str) -> Scale:
+    """The axis of a parameter of a problem, or of an expression in them."""
+    plain = text.strip()
+    name = plain.removeprefix("-").strip()
+    unit, of = unit_of(problem, name), problem.parameter_set
+    if name == "abscissa":
+        return Scale(plain, ("−" if name != plain else "") + abscissa_label(problem), Unit())
+    symbol = f"${'-' if name != plain else ''}{of[name].latex}$" if name in of.names else plain
+    return Scale(plain, symbol + (f" in {unit.text}" if unit.text else ""), unit)
+
+
+def scale_over(problem: Problem, parameter: Parameter) -> Scale:
+    """The axis of a parameter of a problem, or of a native one that the problem is not written in."""
+    if parameter.name in problem.parameter_set.names:
+        found = scale_of(problem, parameter.name)
+    else:
+        found = Scale(parameter.name, axis_label(parameter), Unit("" if parameter.unit == "1" else parameter.unit))
+    return Scale("Fr", FROUDE, found.unit) if parameter.name == "Fr" else found
+
+
+def abscissa_label(problem: Problem, words: str = "spectral abscissa") -> str:
+    """The abscissa with its unit: 1/s of a model in SI, per √(g/w) where the model is dimensionless and its data SI."""
+    of = problem.parameter_set
+    if of.rate is None:
+        return words
+    return words + (" in 1/s" if of is problem.model.sets[0] else r" per $\sqrt{g/w}$")
+
+
+def words_of(model: Model) -> dict[str, str]:
+    """What a pair of roots, a root 0 and a root at infinity on their way to the right are called."""
+    bicycle = model.name in BICYCLES and model.statement is None
+    names = ("weave", "capsize") if bicycle else ("flutter", "divergence")
+    return {"weave": names[0], "capsize": names[1], "infinity": "root at infinity"}
+
+
+def finished(ax: Axes, own: bool, names: Sequence[Name] = (), handles: Sequence[Artist] | None = None) -> Axes:
+    """The Axes with their legend, below a figure of their own, and names beside their points."""
+    shown = ax.get_legend_handles_labels()[0] if handles is None else handles
+    if own:
+        legend_below(figure_of(ax), shown)
+    elif shown:
+        ax.legend(handles=list({str(h.get_label()): h for h in shown}.values()), fontsize=7, framealpha=0.9)
+    place_names(ax, names)
+    return ax
 
 
 def place_names(ax: Axes, names: Sequence[Name]) -> None:
@@ -42,9 +110,7 @@ def place_names(ax: Axes, names: Sequence[Name]) -> None:
             near[0][1].append(name.text)
     if not merged:
         return
-    figure = ax.get_figure(root=True)
-    assert figure is not None
-    figure.draw_without_rendering()  # settles the layout, and with it how large a text is in the axes
+    figure_of(ax).draw_without_rendering()  # settles the layout, and with it how large a text is in the axes
     curves = [np.asarray(line.get_xydata(), dtype=float) for line in ax.get_lines()]
     curves = [xy[np.isfinite(xy).all(axis=1)] for xy in curves]
     places = np.array([place for place, _ in merged])
@@ -54,12 +120,6 @@ def place_names(ax: Axes, names: Sequence[Name]) -> None:
         y_lines=[xy[:, 1] for xy in curves if len(xy) > 1], textsize=_SIZE, linecolor="0.4", linewidth=0.6, zorder=7,
         path_effects=[withStroke(linewidth=2.5, foreground="white")],
     )  # fmt: skip
-
-
-def label_axes(ax: Axes, of: ParameterSet, horizontal: str, vertical: str) -> None:
-    """Symbols and units of two parameters."""
-    ax.set_xlabel(axis_label(of[horizontal]))
-    ax.set_ylabel(axis_label(of[vertical]))
 
 
 def axis_label(parameter: Parameter) -> str:

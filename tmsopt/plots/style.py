@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -18,12 +19,29 @@ REAL, COMPLEX, CAPSIZE = "#009E73", "#CC79A7", "#999999"
 
 
 _ENTRY = 2.6  # inches of a legend entry
+_TITLE = 11
 
 
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure, sizes in inches, that needs no display."""
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
+    return figure
+
+
+def on_axes(ax: Axes | None, width: float, height: float, title: str = "") -> Axes:
+    """The Axes given, or those of a new figure with a title."""
+    if ax is not None:
+        return ax
+    ax = new_figure(width, height).subplots()
+    ax.set_title(title, fontsize=_TITLE)
+    return ax
+
+
+def figure_of(ax: Axes) -> Figure:
+    """The whole figure that Axes stand in."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
     return figure
 
 

@@ -1,12 +1,14 @@
-"""Traced branches as a table and as curves in a plane of two parameters."""
+"""Traced branches as curves in a plane of two parameters."""
 
 from itertools import groupby
 
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from tmsopt.plots.labels import Name, label_axes, place_names
-from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, legend_below, new_figure
+from tmsopt.plots.labels import Name, Scale, abscissa_label, finished, scale_of
+from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, figure_of, on_axes
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
 
 COLOURS = {
@@ -16,25 +18,37 @@ COLOURS = {
 """Colour of each pattern; complex ones are dashed besides."""
 
 _UNLABELLED = ("fold", "constraint", "end")
+_BANDS = {True: 6.0, False: 2.5}
+"""Width of the coloured band along what is stable, and what is not."""
 
 
-def draw_trace(ax: Axes, trace: Trace, horizontal: str, vertical: str) -> list[Name]:
-    """Branches in a plane of two parameters: one colour per pattern, pale where unstable; events marked.
+def draw_trace(
+    data: Trace, ax: Axes | None = None, horizontal: str | None = None, vertical: str | None = None
+) -> Axes:  # fmt: skip
+    """Branches in a plane of two parameters, by default the first two that vary along them.
 
-    They are thin where a constraint is violated. Returns the names of the events, to place.
+    The Axes show each branch as a line by its pattern (complex ones dashed, dotted where a constraint is violated) on a
+    band coloured by the abscissa, narrow where unstable; events by name; parameters in the units of the file.
     """
-    for branch in trace.branches:
-        draw_branch(ax, branch, horizontal, vertical)
-    marked = [e for e in trace.events if e.name not in _UNLABELLED]
-    names = [Name(e.name, e.parameters[horizontal], e.parameters[vertical]) for e in marked]
+    first, second, *_ = [*(n for n in (horizontal, vertical) if n), *data.varying, *data.problem.free]
+    plane = scale_of(data.problem, first), scale_of(data.problem, second)
+    drawn = on_axes(ax, 6.4, 5.0, data.problem.title or data.pattern)
+    _bands(drawn, data, plane)
+    for branch in data.branches:
+        draw_branch(drawn, branch, plane, width=1.2, tint=LINE)
+    marked = [e for e in data.events if e.name not in _UNLABELLED]
+    names = [Name(e.name, *(float(s.of(e.parameters[s.name])) for s in plane)) for e in marked]
     for name in names:
-        ax.plot([name.x], [name.y], "o", color=MARK, markersize=4, zorder=4)
-    return names
+        drawn.plot([name.x], [name.y], "o", color=MARK, markeredgecolor="white", markersize=5, zorder=4)
+    drawn.set(xlabel=plane[0].label, ylabel=plane[1].label)
+    return finished(drawn, ax is None, names)
 
 
-def draw_branch(ax: Axes, branch: Branch, horizontal: str, vertical: str, width: float = 1.4) -> None:
-    """One branch as lines, cut where its pattern, its stability or a constraint changes."""
-    x, y = branch.parameters[horizontal], branch.parameters[vertical]
+def draw_branch(
+    ax: Axes, branch: Branch, plane: tuple[Scale, Scale], width: float = 1.4, tint: str | None = None
+) -> None:  # fmt: skip
+    """One branch as lines, cut where its pattern, its stability or a constraint changes; pale where unstable."""
+    x, y = (scale.of(branch.parameters[scale.name]) for scale in plane)
     states = list(zip(kinds_along(branch), branch.stable.tolist(), branch.satisfied.tolist(), strict=True))
     events = {e.index for e in branch.events}
     start = 0
@@ -43,7 +57,7 @@ def draw_branch(ax: Axes, branch: Branch, horizontal: str, vertical: str, width:
         first = start - 1 if start and start - 1 in events else start
         end = stop if stop - 1 in events else stop + 1  # no gap: an event belongs to both of its sides
         ax.plot(
-            x[first:end], y[first:end], color=colour(kind), linewidth=width if satisfied else width / 2,
+            x[first:end], y[first:end], color=tint or colour(kind), linewidth=width if satisfied else width / 2,
             linestyle="--" if kind.startswith("CEP") else "-" if satisfied else ":", alpha=1.0 if stable else 0.35,
             label=_label(ax, kind + ("" if stable else ", unstable") + ("" if satisfied else ", constraint violated")),
         )  # fmt: skip
@@ -57,16 +71,26 @@ def colour(kind: str) -> str:
     return COMPLEX if "CEP" in kind else REAL if "+" in kind or kind[0].isdigit() else MARK
 
 
-def trace_figure(trace: Trace, horizontal: str, vertical: str) -> Figure:
+def trace_figure(trace: Trace, horizontal: str | None = None, vertical: str | None = None) -> Figure:
     """All branches of a trace in one plane."""
-    figure = new_figure(6.4, 5.0)
-    ax = figure.subplots()
-    names = draw_trace(ax, trace, horizontal, vertical)
-    label_axes(ax, trace.problem.parameter_set, horizontal, vertical)
-    ax.set_title(trace.problem.title or trace.pattern, fontsize=11)
-    legend_below(figure, ax.get_legend_handles_labels()[0])
-    place_names(ax, names)
-    return figure
+    return figure_of(draw_trace(trace, None, horizontal, vertical))
+
+
+def _bands(ax: Axes, data: Trace, plane: tuple[Scale, Scale]) -> None:
+    """Segments coloured by the abscissa of their ends, with the colour bar."""
+    segments, values, widths = [], [], []
+    for branch in data.branches:
+        points = np.stack([scale.of(branch.parameters[scale.name]) for scale in plane], axis=-1)
+        segments.append(np.stack([points[:-1], points[1:]], axis=1))
+        values.append((branch.abscissa[:-1] + branch.abscissa[1:]) / 2)
+        widths += [_BANDS[bool(s)] for s in branch.stable[:-1] & branch.stable[1:]]
+    if segments:
+        drawn = LineCollection(
+            [*np.concatenate(segments)], cmap="cividis", linewidths=widths, capstyle="projecting", zorder=1
+        )
+        drawn.set_array(np.concatenate(values))
+        ax.add_collection(drawn)
+        figure_of(ax).colorbar(drawn, ax=ax, label=abscissa_label(data.problem))
 
 
 def _label(ax: Axes, text: str) -> str | None:

@@ -64,7 +64,7 @@ def _growth() -> "Figure":
     from tmsopt.design.problem import Problem
     from tmsopt.models import tms
     from tmsopt.paper.reference import benchmark, optimised
-    from tmsopt.plots.growth import draw_growth_rates
+    from tmsopt.plots.paper.growth import draw_growth_rates
     from tmsopt.plots.style import REAL, new_figure
     from tmsopt.solver.solve import solve
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from tmsopt.paper.planes import Plane
-from tmsopt.plots.chart import class_handles, domain_handles, draw_classes, draw_domain, frame
+from tmsopt.plots.chart import class_handles, domain_curves, domain_handles, fill_classes, frame, plane_of
 from tmsopt.plots.labels import Name, place_names
 from tmsopt.plots.style import COMPLEX, CRITICAL, LINE, MARK, REAL, legend_below, new_figure
 from tmsopt.plots.trace import draw_branch
@@ -33,20 +33,20 @@ _LAW_WORDS = {
 
 def draw_plane(ax: Axes, plane: Plane) -> list[Name]:
     """Classes, exact boundaries with corners, the EP set and the marked points of a plane; names to place."""
-    chart = plane.chart
-    draw_classes(ax, chart)
-    names = draw_domain(ax, chart.domain, *chart.axes) if chart.domain is not None else []
+    chart, axes = plane.chart, plane_of(plane.chart)
+    fill_classes(ax, chart, axes)
+    names = domain_curves(ax, chart.domain, axes) if chart.domain is not None else []
     if plane.ep_set is not None:
         for branch in plane.ep_set.branches:
-            draw_branch(ax, branch, chart.axes[0], chart.axes[1], width=2.0)
+            draw_branch(ax, branch, axes, width=2.0)
     names += _draw_marked(ax, plane)
-    frame(ax, plane.chart)
+    frame(ax, chart, axes)
     return names
 
 
 def plane_handles(plane: Plane) -> list[Artist]:
     """Legend entries of the classes and the curves of a plane."""
-    handles: list[Artist] = [*class_handles(plane.chart.kind)]
+    handles: list[Artist] = [*class_handles(plane.chart.kind, plane.chart.problem.model)]
     if plane.chart.domain is not None:
         handles += domain_handles(plane.chart.domain)
     if plane.ep_set is not None:
@@ -70,7 +70,7 @@ def draw_abscissa(ax: Axes, plane: Plane, low: float, high: float) -> ScalarMapp
     legend = ax.legend(fontsize=7.5, facecolor="0.25", framealpha=0.85, loc="upper left")
     for text in legend.get_texts():
         text.set_color("white")
-    frame(ax, plane.chart)
+    frame(ax, chart, plane_of(chart))
     place_names(ax, names)
     return mesh
 

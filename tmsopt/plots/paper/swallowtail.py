@@ -21,8 +21,16 @@ from tmsopt.tracing.swallowtail import Swallowtail
 _LIGHT = np.array([0.3, -0.6, 0.75])
 
 
-def draw_swallowtail(ax: Axes3D, data: Swallowtail) -> None:
-    """Patches sorted by depth as one collection, so that nothing is drawn through, and the edges on top."""
+def draw_swallowtail(data: Swallowtail, ax: Axes3D | None = None) -> Axes3D:
+    """The discriminant surface of a design with its edges.
+
+    The Axes show three parameters (rad, SI): patches sorted by depth as one collection, so that nothing is drawn
+    through, cuspidal edges (EP3) and self-intersection (2EP2, CEP2) on top.
+    """
+    if ax is None:
+        made = new_figure(6.4, 5.6).add_subplot(projection="3d", computed_zorder=False)
+        assert isinstance(made, Axes3D)
+        ax = made
     quads, colours = [], []
     ranges = np.array([data.problem.free[n] for n in data.axes])
     width = ranges[:, 1] - ranges[:, 0]
@@ -51,6 +59,7 @@ def draw_swallowtail(ax: Axes3D, data: Swallowtail) -> None:
         label(f"${of[name].latex}$")
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         axis.set_major_locator(MaxNLocator(4, prune="both"))  # ticks of two axes must not meet at their corner
+    return ax
 
 
 def quadrilaterals(points: Array) -> Array:
@@ -65,7 +74,7 @@ def swallowtail_figure(data: Swallowtail, sections: Sequence[Plane], titles: Seq
     figure = new_figure(10.0, 9.0)
     ax = figure.add_subplot(2, 2, 1, projection="3d", computed_zorder=False)
     assert isinstance(ax, Axes3D)
-    draw_swallowtail(ax, data)
+    draw_swallowtail(data, ax)
     ax.view_init(elev=24, azim=-52)
     ax.set_box_aspect(None, zoom=0.86)  # leaves room for the vertical label
     ax.set_title("(a) discriminant surface", fontsize=10)

@@ -1,0 +1,138 @@
+"""What an optimum means: rounding, distance to the boundaries, laws beside it, all designs, and the ledger."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import NullFormatter
+
+from tmsopt.checks.law_rows import SAME_LAW
+from tmsopt.explanation import Explanation
+from tmsopt.margins import Nearest, Robustness
+from tmsopt.paper import Comparison, Ledger
+from tmsopt.plots.labels import Name, abscissa_label, finished, scale_of
+from tmsopt.plots.style import CRITICAL, STABLE, on_axes
+from tmsopt.solver import Every
+
+_LEAST = 1e-17  # of differences on a logarithmic axis: those of no double
+_SEEN = 1e-3  # of the longest bar
+_TOWARDS = {"infinity": "a root at infinity", "heavy damping": "the edge of heavy damping"}
+
+
+def draw_rounding(data: Explanation, ax: Axes | None = None) -> Axes:
+    """What rounding the parameters costs.
+
+    The Axes show by how much the abscissa changes, logarithmic, when all free parameters are rounded to so many digits
+    and when one is alone: hatched where it falls, with what is violated.
+    """
+    own = ax is None
+    rows = [(f"all to {row.digits} digits", row) for row in data.precision]
+    rows += [(f"{name} to {row.digits} digits", row) for name, row in data.rounding.items()]
+    ax = on_axes(ax, 6.0, 1.3 + 0.32 * len(rows), "what rounding does to the abscissa")
+    names = [name + (f"\nviolates {', '.join(row.violations)}" if row.violations else "") for name, row in rows]
+    words = ("rises: decays more slowly", "falls: decays faster")
+    sizes = [max(abs(row.loss), _LEAST) for _, row in rows]
+    _bars(ax, names, sizes, [row.loss <= 0 for _, row in rows], words)
+    decades = [np.floor(np.log10(min(sizes, default=1.0))), np.ceil(np.log10(max(sizes, default=1.0)) + 1e-9)]
+    ax.set(xscale="log", xlim=np.power(10.0, decades), xlabel="change of the abscissa")
+    ax.xaxis.set_minor_formatter(NullFormatter())
+    return finished(ax, own)
+
+
+def draw_robustness(data: Robustness | Nearest, ax: Axes | None = None) -> Axes:
+    """Which parameters make up the least change to a boundary; of all boundaries of stability, to the nearest.
+
+    The Axes show each parameter's part of it, in units of its weight (without weights in %); the title says how far the
+    boundaries are.
+    """
+    own, relative = ax is None, False
+    if isinstance(data, Robustness):
+        nearest, relative = data.limit, data.relative
+        near = [n for n in (data.weave, data.capsize, data.infinity, data.heavy_damping) if n.found]
+    else:
+        nearest, near = data, [data]
+    times, unit = (100.0, " %") if relative else (1.0, "")
+    parts = [(n, x) for n, x in nearest.direction.items() if abs(x) > _SEEN * nearest.distance]
+    parts.sort(key=lambda item: -abs(item[1]))
+    ax = on_axes(ax, 6.0, 1.3 + 0.26 * len(parts))
+    far = ", ".join(f"{_TOWARDS.get(n.kind, n.kind)} at {times * n.distance:.3g}{unit}" for n in near)
+    ax.set_title(far or "no boundary found", fontsize=9.5)
+    _bars(ax, [name for name, _ in parts], [times * x for _, x in parts])
+    ax.axvline(0, color="grey", linewidth=0.6)
+    ax.set_xlabel(
+        f"change towards {_TOWARDS.get(nearest.kind, nearest.kind)}"
+        + (" in %" if relative else " in units of the weights")
+    )
+    return finished(ax, own)
+
+
+def draw_comparison(data: Comparison, ax: Axes | None = None) -> Axes:
+    """The design beside the laws of the paper.
+
+    The Axes show the relative difference from each law that applies, logarithmic, with the limit of what agrees.
+    """
+    own = ax is None
+    rows = [row for row in data.laws if row.applies]
+    ax = on_axes(ax, 6.0, 1.4 + 0.26 * len(rows), data.design.problem.title)
+    agree = [bool(row.agrees) for row in rows]
+    names = [f"{row.label}: {row.subject}" for row in rows]
+    _bars(ax, names, [max(abs(row.relative), _LEAST) for row in rows], agree, ("differs", "agrees"))
+    ax.axvline(SAME_LAW, color="black", linestyle="--", linewidth=1, label=f"agrees up to {SAME_LAW:g}")
+    ax.set(xscale="log", xlim=(_LEAST, None), xlabel="relative difference from the law")
+    return finished(ax, own)
+
+
+def draw_ledger(data: Ledger, ax: Axes | None = None) -> Axes:
+    """How many claims of the paper have which verdict; the Axes show counts."""
+    own, counts = ax is None, data.counts
+    ax = on_axes(ax, 6.0, 1.2 + 0.3 * len(counts), f"{len(data.entries)} claims of the paper")
+    _bars(ax, list(counts), [float(n) for n in counts.values()])
+    for k, n in enumerate(counts.values()):
+        ax.annotate(str(n), (n, k), xytext=(4, 0), textcoords="offset points", fontsize=8, verticalalignment="center")
+    ax.margins(x=0.12)
+    ax.set_xlabel("claims")
+    return finished(ax, own)
+
+
+def draw_designs(data: Every, ax: Axes | None = None) -> Axes:
+    """All designs that were found.
+
+    The Axes show them over the first two free parameters, in the units of the file (of one parameter, the abscissa over
+    it): proved ones filled, each with its abscissa.
+    """
+    own = ax is None
+    if not data.solutions:
+        return on_axes(ax, 6.0, 4.4, "no design found")
+    problem = data.solutions[0].problem
+    ax = on_axes(ax, 6.0, 4.4, problem.title)
+    scales = [scale_of(problem, name) for name in [*problem.free][:2]]
+    points = np.stack([s.of([d.parameters[s.name] for d in data.solutions]) for s in scales], axis=-1)
+    if len(scales) < 2:
+        points = np.stack([points[:, 0], [d.abscissa for d in data.solutions]], axis=-1)
+    proved = data.proved or (False,) * len(points)
+    for wanted, fill, label in ((True, CRITICAL, "proved"), (False, "white", "found")):
+        own_points = points[[p is wanted for p in proved]]
+        if len(own_points):
+            ax.plot(*own_points.T, "o", color=CRITICAL, markerfacecolor=fill, label=label, linestyle="none")
+    ax.set(xlabel=scales[0].label, ylabel=scales[1].label if len(scales) > 1 else abscissa_label(problem))
+    ax.set_xlim(*scales[0].of(problem.free[scales[0].name]))
+    if len(scales) > 1:
+        ax.set_ylim(*scales[1].of(problem.free[scales[1].name]))
+    names = [Name(f"{d.abscissa:.4g}", float(x), float(y)) for d, (x, y) in zip(data.solutions, points, strict=True)]
+    return finished(ax, own, names)
+
+
+def _bars(
+    ax: Axes, names: Sequence[str], lengths: Sequence[float], second: Sequence[bool] | None = None,
+    words: tuple[str, str] = ("", ""),
+) -> None:  # fmt: skip
+    """Horizontal bars by name, the first one uppermost; of a second kind hatched, with words for each kind."""
+    for kind, (colour, hatch) in enumerate(((CRITICAL, ""), (STABLE, "//"))):
+        chosen = [k for k in range(len(names)) if (second[k] if second else False) is bool(kind)]
+        if chosen:
+            ax.barh(
+                chosen, [lengths[k] for k in chosen], color=colour, hatch=hatch, edgecolor="white", height=0.7,
+                label=words[kind] or None,
+            )  # fmt: skip
+    ax.set_yticks(range(len(names)), names, fontsize=8)
+    ax.invert_yaxis()

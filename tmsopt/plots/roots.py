@@ -1,0 +1,73 @@
+"""Roots in the complex plane, and how a multiple one splits."""
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from tmsopt.design.solution import Solution
+from tmsopt.diagnosis import Diagnosis
+from tmsopt.explanation import Optimality
+from tmsopt.plots.labels import finished
+from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, MARK, REAL, on_axes
+from tmsopt.proofs import Proof
+
+_COLOURS = (CRITICAL, MARK, REAL, COMPLEX, CAPSIZE)
+_STYLES = ("-", "--", "-.", ":")
+
+
+def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> Axes:
+    """Roots with their multiplicities, of a judgement of an optimum those on the rightmost line.
+
+    The Axes show the complex plane, in 1/s for a problem in SI; its right half, where motion grows, is grey. The title
+    of a proof says how narrow the proved balls are.
+    """
+    rate, unit = 1.0, ""
+    if isinstance(data, Solution):
+        if (of := data.problem.parameter_set).rate is not None:
+            rate, unit = float(of.rate(data.parameters)), " in 1/s"
+        title = f"{data.problem.title}\n{data.structure}, rightmost at {rate * data.abscissa:.5g}{unit[3:]}".strip()
+    elif isinstance(data, Proof):
+        narrow = f"each number within {data.radius:.1g}" if math.isfinite(data.radius) else data.method
+        title = f"{data.claim}:\n" + (f"proved, {narrow}" if data.proved else "not proved")
+    else:
+        title = f"{data.goal or 'abscissa'}: {data.verdict}"
+    found = {(float(r.re), float(r.im)): r.multiplicity for r in data.roots}
+    found |= {(re, -im): m for (re, im), m in found.items()}
+    own = ax is None
+    ax = on_axes(ax, 4.6, 4.4)
+    ax.set_title(title, fontsize=9.5)
+    size = rate * max((math.hypot(*z) for z in found), default=1.0) * 1.3 or 1.0
+    ax.axvspan(0, size, color="0.92", zorder=0)
+    ax.axhline(0, color="grey", linewidth=0.6)
+    ax.axvline(0, color="grey", linewidth=0.6)
+    for (re, im), m in found.items():
+        ax.plot([rate * re], [rate * im], "o" if m == 1 else "s", color=REAL if m == 1 else MARK, markersize=5 + m)
+        if m > 1:
+            ax.annotate(f"{m}-fold", (rate * re, rate * im), xytext=(7, 7), textcoords="offset points", fontsize=9)
+    right = max([0.3 * size, *(1.2 * rate * re for re, _ in found)])
+    ax.set(xlim=(-size, right), ylim=(-size, size))
+    ax.set(xlabel=rf"$\mathrm{{Re}}\,s${unit}", ylabel=rf"$\mathrm{{Im}}\,s${unit}")
+    return finished(ax, own)
+
+
+def draw_splitting(data: Diagnosis, ax: Axes | None = None) -> Axes:
+    """How far a multiple root splits when one parameter changes.
+
+    The Axes show the largest shift over the change ε, relative or for a parameter that is 0 absolute, both logarithmic:
+    a line per parameter as far as the law holds, with its exponent.
+    """
+    own = ax is None
+    place = f"pair at {data.re:.5g} ± {data.im:.5g}i" if data.im else f"root at {data.re:.5g}"
+    ax = on_axes(ax, 6.0, 4.4, f"{data.algebraic}-fold {place}, {data.kind}")
+    for k, response in enumerate(data.responses):
+        for law in response.laws[:1]:
+            reach = min(max(law.below, law.above, 1e-15), 1.0)
+            eps = np.geomspace(1e-16, reach, 2)
+            label = rf"{response.parameter}: $\varepsilon^{{{law.branches.exponent}}}$"
+            ax.loglog(
+                eps, law.branches.size * eps ** float(law.branches.exponent), color=_COLOURS[k % 5], label=label,
+                linestyle=_STYLES[k % 4], marker="o", markevery=[1], markersize=4,
+            )  # fmt: skip
+    ax.set(xlabel=r"change $\varepsilon$ of a parameter", ylabel="shift of the farthest root")
+    return finished(ax, own)

@@ -1,0 +1,57 @@
+"""What happens to a design over its speeds, as a ruler."""
+
+import math
+
+from matplotlib.axes import Axes
+
+from tmsopt.critical_speeds.speeds import Speeds
+from tmsopt.plots.labels import finished, scale_over, words_of
+from tmsopt.plots.style import CAPSIZE, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, on_axes
+
+_COLOURS = {"weave": CRITICAL, "capsize": MARK, "infinity": CAPSIZE}
+_LEVELS = 3  # heights at which names stand in turn
+_MARGIN = 1.15  # times the last event
+
+
+def draw_speeds(data: Speeds, ax: Axes | None = None) -> Axes:
+    """Every place where a root crosses the imaginary axis or roots meet.
+
+    The Axes show a ruler of the parameter, in the unit of the file, to a little beyond the last event: each event with
+    its name and value, heavier where stability changes, bands of stability and heavy damping, and the design.
+    """
+    own, problem = ax is None, data.problem
+    ax = on_axes(ax, 6.4, 2.4, problem.title)
+    scale, words = scale_over(problem, problem.parameter_set[data.parameter]), words_of(problem.model)
+    at = data.parameters.get(data.parameter, data.lower)
+    last = _MARGIN * max(c.at for c in data.found) if data.found else data.lower + 2 * abs(at) + 1
+    high = data.upper if math.isfinite(data.upper) else max(last, _MARGIN * at)
+    for bands, colour, label in ((data.stable, STABLE, "stable"), (data.heavily_damped, HEAVY, "heavily damped")):
+        for k, (a, b) in enumerate(bands):
+            ax.axvspan(
+                float(scale.of(a)), float(scale.of(min(b, high))), 0, 0.25, color=colour, label=None if k else label
+            )
+    for k, event in enumerate(data.found):
+        x, height = float(scale.of(event.at)), 0.95 - 0.62 * (k % _LEVELS) / _LEVELS
+        colour = _COLOURS.get(event.kind, REAL)
+        ax.plot([x, x], [0, height], color=colour, linewidth=2.0 if event.changes else 0.9)
+        text = f"{words.get(event.kind, event.kind)} {x:.4g}"
+        left = event.at < (data.lower + high) / 2
+        ax.annotate(
+            text, (x, height), xytext=(3 if left else -3, 0), textcoords="offset points", fontsize=8, color=LINE,
+            horizontalalignment="left" if left else "right", verticalalignment="top",
+        )  # fmt: skip
+    if data.parameter in data.parameters:
+        x = float(scale.of(at))
+        ax.plot(
+            [x],
+            [0.06],
+            "^",
+            color=LINE,
+            markersize=7,
+            label=f"design at {scale.unit.show(at, 4)}",
+            linestyle="none",
+            clip_on=False,
+        )
+    ax.set(xlim=scale.of([data.lower, high]), ylim=(0, 1.05), yticks=[], xlabel=scale.label)
+    ax.spines[["left", "right", "top"]].set_visible(False)
+    return finished(ax, own)

@@ -1,0 +1,87 @@
+"""The rows of a study: a histogram of what was built, or the objective over what varies."""
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from tmsopt.design.unit_system import Unit
+from tmsopt.plots.labels import Scale, abscissa_label, finished, scale_of
+from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, STABLE, figure_of, on_axes
+from tmsopt.records import Array, Table
+from tmsopt.solver.solve import solve
+from tmsopt.studies import Results
+
+_BINS = 25
+_PLAIN = Unit()
+
+
+def draw_histogram(data: Results, ax: Axes | None = None) -> Axes:
+    """How the designs of a study come out.
+
+    Of a Monte Carlo study the Axes show how many designs have which abscissa, or for a problem in SI which decay rate
+    in 1/s, stable ones apart from the others, with the nominal design and 0 marked and the share of stable ones in the
+    title. Of another study they show the objective over what varies first, coloured by what varies next.
+    """
+    drawn = on_axes(ax, 6.4, 4.2)
+    title = data.study.title or data.study.problem.title
+    share = _drawn_around(drawn, data) if data.study.method == "monte_carlo" else _over_what_varies(drawn, data)
+    drawn.set_title("\n".join(filter(None, (title if ax is None else "", share))), fontsize=10)
+    return finished(drawn, ax is None)
+
+
+def _drawn_around(ax: Axes, data: Results) -> str:
+    problem, rows = data.study.problem, data.rows
+    rate = problem.parameter_set.rate
+    values = np.array([_shown(r.abscissa, r.parameters, rate) for r in rows])
+    known = np.isfinite(values)
+    stable = np.array([bool(r.stable) for r in rows])
+    nominal = solve(problem, throw=False, interruptible=False)
+    edges = _edges(values[known])
+    for chosen, colour, hatch, label in (
+        (stable & known, STABLE, "", "stable"), (~stable & known, MARK, "//", "not stable"),
+    ):  # fmt: skip
+        if chosen.any():
+            ax.hist(
+                values[chosen], edges.tolist(), color=colour, edgecolor="white", hatch=hatch, linewidth=0.5, label=label
+            )
+    at = _shown(nominal.abscissa, nominal.parameters, rate)
+    ax.axvline(at, color=LINE, linestyle="--", linewidth=1.2, label=f"nominal design, {at:.4g}")
+    ax.axvline(0, color=CAPSIZE, linewidth=1.4, label="0: neither decay nor growth")
+    ax.set(ylabel="designs", xlabel=abscissa_label(problem) if rate is None else "decay rate in 1/s, below 0 of growth")
+    left_out = f", {np.count_nonzero(~known)} without roots not shown" if not known.all() else ""
+    return f"{stable.sum()} of {len(rows)} stable ({100 * stable.mean():.3g} %){left_out}" if rows else "no rows"
+
+
+def _shown(abscissa: float, parameters: Table[float], rate: object) -> float:
+    """The abscissa, or the decay rate in 1/s where there is a unit of time."""
+    return -abscissa * float(rate(parameters)) if callable(rate) and math.isfinite(abscissa) else abscissa
+
+
+def _edges(values: Array) -> Array:
+    """Edges of bins, one of them 0 where values lie on both sides, so that no bin holds growth and decay."""
+    if not values.size:
+        return np.array([0.0, 1.0])
+    low, high = float(values.min()), float(values.max())
+    width = (high - low) / _BINS or 1e-3 * (abs(high) or 1.0)
+    first = math.floor(low / width)
+    return np.array([width * k for k in range(first, math.floor(high / width) + 2)])
+
+
+def _over_what_varies(ax: Axes, data: Results) -> str:
+    study, rows = data.study, data.rows
+    first, second = [*study.columns, None, None][:2]
+    sense = study.problem.minimize or study.problem.maximize
+    found = [r for r in rows if r.status == "optimal"]
+    scale = scale_of(study.problem, sense) if sense else Scale("abscissa", abscissa_label(study.problem), _PLAIN)
+    y = scale.of([r.objective if sense else r.abscissa for r in found])
+    across = scale_of(study.problem, first) if first else None
+    x = across.of([r.varied[across.name] for r in found]) if across else np.array([r.number for r in found])
+    if second is None or not found:
+        ax.plot(x, y, "o-" if study.method == "grid" else "o", color=CRITICAL, markersize=3.5, linewidth=0.8)
+    else:
+        aside = scale_of(study.problem, second)
+        drawn = ax.scatter(x, y, c=aside.of([r.varied[second] for r in found]), s=12, cmap="cividis")
+        figure_of(ax).colorbar(drawn, ax=ax, label=aside.label)
+    ax.set(xlabel=across.label if across else "row", ylabel=scale.label)
+    return f"{len(found)} of {len(rows)} rows optimal"
