@@ -111,8 +111,8 @@ def random_designs():
 @pytest.mark.parametrize("p", [benchmark().parameters, optimised().parameters, *random_designs()])
 def test_drawn_geometry_is_that_of_the_equations(p):
     ax, near = axes(), axes()
-    draw_bicycle(ax, sketch(p))
-    draw_distance(near, sketch(p))
+    draw_bicycle(sketch(p), ax)
+    draw_distance(sketch(p), near)
     expected = (p["chi_H"] - 1) * math.cos(p["lambda_s"]) - p["zeta_H"] * math.sin(p["lambda_s"])  # below `matrices`
     for axis in (drawn(ax, "axis")[0], drawn(near, "axis")[0]):
         low, high = axis

@@ -149,7 +149,7 @@ def test_only_affine_coefficients_are_accepted():
 
 def test_the_drawn_faces_are_those_of_the_patches(surface):
     ax = new_figure(4, 4).add_subplot(projection="3d", computed_zorder=False)
-    draw_swallowtail(ax, surface)
+    draw_swallowtail(surface, ax)
     (collection,) = ax.collections
     faces = sum((p.r.shape[0] - 1) * (p.r.shape[1] - 1) for p in surface.patches)
     assert len(collection.get_facecolor()) == faces  # one collection: matplotlib sorts its faces by depth

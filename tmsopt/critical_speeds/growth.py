@@ -1,7 +1,7 @@
 """Roots of a design over its speed, or another parameter, with the stable and heavily damped values of it."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,9 +16,9 @@ from tmsopt.design.files import Given
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, is_number, short, suggest
-from tmsopt.models import Parameter, ParameterSet, Values
+from tmsopt.models import Model, Parameter, ParameterSet, Values
 from tmsopt.records import Array, Tabular, Truth, plain
-from tmsopt.roots import is_stable, roots
+from tmsopt.roots import Root, is_stable, roots
 from tmsopt.solver.solve import solved
 
 SPEEDS = ("Fr", "v")
@@ -28,6 +28,7 @@ BICYCLES = ("tms", "whipple")
 """Models whose modes have the names of a bicycle's: weave, capsize and castering."""
 
 _POINTS = 801
+_HALVINGS = 60  # of a step of the grid, to rounding
 _CROWD = np.linspace(-1, 1, 301) ** 5
 _MARGIN = 1.25  # times the last event
 _FAR = 3  # times the design and all that meets the axis: beyond, roots that meet are not waited for
@@ -48,7 +49,8 @@ class Growth(Tabular):
             coefficients are polynomials in the parameter, else from point to point.
         problem: that the design solves; its parameters, where `over` is one of them, have the units of its file.
         modes: the roots again, each followed from meeting to meeting, with a name.
-        events: where roots cross the axis or meet, exact; none where the coefficients are no polynomials in `over`.
+        events: where roots cross the axis or meet, exact; where the coefficients are no polynomials in `over`, those
+            where stability changes alone.
         rate: how many 1/s a rate of 1 is, for each value; None without a unit of time.
     """
 
@@ -110,14 +112,17 @@ def growth(design: Given, end: float | None = None, over: str | None = None) -> 
         met = None
     if speed and end is None and met is not None:
         high = _last(met.found, at)
-    events = tuple(c for c in met.found if low < c.at < high) if met is not None else ()
+    if met is not None:
+        events = tuple(c for c in met.found if low < c.at < high)
+    else:
+        steps = np.linspace(low, high, _POINTS)
+        events = tuple(_changes(lambda x: _numbers(model, of, {**parameters, name: x}), steps))
     centres = [at, *(c.at for c in events if "EP" in c.kind)]
     first = low + (high - low) / _POINTS if speed else low  # at rest a speed leaves roots 0
     grid = np.unique(np.concatenate([np.linspace(first, high, _POINTS), *(c + _CROWD * (high - low) for c in centres)]))
     values = grid[(grid > low) & (grid <= high)] if speed else grid[(grid >= low) & (grid <= high)]
 
-    columns: Mapping[str, Any] = {**parameters, name: values}
-    c = np.stack(np.broadcast_arrays(*model.coefficients(columns, of), values)[:-1], axis=-1).astype(float)
+    c = _numbers(model, of, {**parameters, name: values})
     shown = c[:, 0] != 0  # a root at infinity cannot be shown
     values, c = values[shown], c[shown]
     found = roots(c)
@@ -169,6 +174,26 @@ def _last(found: Sequence[Crossing], at: float) -> float:
 
 def _within(bands: Sequence[Stretch], low: float, high: float) -> tuple[Stretch, ...]:
     return tuple((max(a, low), min(b, high)) for a, b in bands if a < high and b > low)
+
+
+def _numbers(model: Model, of: ParameterSet, columns: Mapping[str, Any]) -> Array:
+    """Coefficients for columns of parameters, shape (n, degree + 1)."""
+    shape = np.broadcast_shapes(*(np.shape(column) for column in columns.values()))
+    return np.stack([np.broadcast_to(c, shape) for c in model.coefficients(columns, of)], axis=-1).astype(float)
+
+
+def _changes(coefficients: Callable[[Array], Array], grid: Array) -> Iterator[Crossing]:
+    """Where stability begins or ends between points of a grid, by halving."""
+    inside = is_stable(coefficients(grid))
+    for k in np.flatnonzero(inside[1:] != inside[:-1]):
+        low, high = grid[k : k + 2]
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if is_stable(coefficients(middle)) == inside[k] else (low, middle)
+        found = roots(coefficients(high))
+        first = found[np.abs(found.real).argmin()]
+        kind = "weave" if first.imag else "capsize"
+        yield Crossing(float(high), kind, Root(0.0, abs(float(first.imag))), rightmost=True, changes=True)
 
 
 def _runs(values: Array, inside: Truth) -> tuple[Stretch, ...]:

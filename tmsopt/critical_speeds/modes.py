@@ -23,7 +23,7 @@ class Mode:
 
 
 @dataclass(frozen=True)
-class _Stretch:
+class _Piece:
     """Where the number of real roots stays: the real ones ascending, then the pairs."""
 
     values: Array
@@ -63,7 +63,7 @@ def modes(values: Array, found: Complex, design: float, bicycle: bool = False, s
     )
 
 
-def _stretches(values: Array, found: Complex) -> list[_Stretch]:
+def _stretches(values: Array, found: Complex) -> list[_Piece]:
     real = np.count_nonzero(found.imag == 0, axis=1)
     parts = []
     for run in np.split(np.arange(len(values)), np.flatnonzero(np.diff(real)) + 1):
@@ -75,7 +75,7 @@ def _stretches(values: Array, found: Complex) -> list[_Stretch]:
         for k in range(1, len(run)) if pairs.shape[1] > 1 else ():
             ahead = 2 * pairs[k - 1] - pairs[k - 2] if k > 1 else pairs[k - 1]
             pairs[k] = pairs[k][_nearest(ahead, pairs[k])]
-        parts.append(_Stretch(values[run], np.concatenate([reals, pairs], axis=1), count))
+        parts.append(_Piece(values[run], np.concatenate([reals, pairs], axis=1), count))
     return parts
 
 
@@ -84,7 +84,7 @@ def _nearest(a: Complex, b: Complex) -> NDArray[np.intp]:
     return np.asarray(linear_sum_assignment(np.abs(a[:, None] - b) ** 2)[1])
 
 
-def _named(part: _Stretch, design: float, bicycle: bool) -> list[str]:
+def _named(part: _Piece, design: float, bicycle: bool) -> list[str]:
     """Names where none are handed on: of a bicycle in words, else numbered from the right, nearest to the design."""
     count, row = part.real, part.roots[np.abs(part.values - design).argmin()]
     pairs = len(row) - count
@@ -97,7 +97,7 @@ def _named(part: _Stretch, design: float, bicycle: bool) -> list[str]:
     return [f"real {count - k}" for k in range(count)] + [f"pair {k}" for k in rank]
 
 
-def _passed(old: _Stretch, names: list[str], new: _Stretch, forward: bool) -> list[str]:
+def _passed(old: _Piece, names: list[str], new: _Piece, forward: bool) -> list[str]:
     """Names handed on over a meeting of two roots; none where more have a part in it."""
     if abs(old.real - new.real) != 2:
         return []

@@ -21,14 +21,14 @@ from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import Unit
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import Model
-from tmsopt.plots.labels import Name, Scale, abscissa_label, finished, scale_of, words_of
+from tmsopt.plots.labels import AxisScale, Name, abscissa_label, finished, scale_of, words_of
 from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, figure_of, on_axes
 from tmsopt.records import Array
 from tmsopt.roots import CLASSES
 from tmsopt.solver.solve import solve
 from tmsopt.tracing.domain import Domain
 
-Plane = tuple[Scale, Scale]
+Plane = tuple[AxisScale, AxisScale]
 """The horizontal and the vertical axis."""
 
 CLASS_COLOURS = ("#FFFFFF", "#BBBBBB", "#E6E6E6", "#A6D5F0", "#F2C45A")
@@ -132,7 +132,7 @@ def draw_domain(
     arcs = (*data.stability, *data.heavy_damping, *data.parting)
     varying = [n for n in (arcs[0].points if arcs else ()) if any(np.ptp(a.points[n]) > 0 for a in arcs)]
     chosen = [*(n for n in (horizontal, vertical) if n), *varying, "", ""][:2]
-    first, second = (scale_of(problem, n) if problem else Scale(n, n, Unit()) for n in chosen)
+    first, second = (scale_of(problem, n) if problem else AxisScale(n, n, Unit()) for n in chosen)
     drawn = on_axes(ax, 6.4, 5.0, problem.title if problem else "")
     names = domain_curves(drawn, data, (first, second))
     drawn.set(xlabel=first.label, ylabel=second.label)

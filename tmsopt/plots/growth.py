@@ -10,7 +10,7 @@ from matplotlib.typing import LineStyleType
 from tmsopt.critical_speeds.growth import SPEEDS, Growth, growth
 from tmsopt.critical_speeds.modes import Mode
 from tmsopt.design.solution import Solution
-from tmsopt.plots.labels import Name, Scale, finished, place_names, scale_over, words_of
+from tmsopt.plots.labels import AxisScale, Name, finished, place_names, scale_over, words_of
 from tmsopt.plots.style import (
     CAPSIZE,
     COMPLEX,
@@ -117,7 +117,7 @@ def _part(data: Growth, mode: Mode, part: str) -> Array:
     return np.asarray(getattr(mode.roots, part) * rate / hertz, dtype=float)
 
 
-def _marks(ax: Axes, data: Growth, scale: Scale, part: str) -> None:
+def _marks(ax: Axes, data: Growth, scale: AxisScale, part: str) -> None:
     """Lines where a mode loses stability and at the design, and circles where roots meet."""
     unit = f" {scale.unit.text}" if scale.unit.text else ""
     words = words_of(data.problem.model)
@@ -148,7 +148,7 @@ def _focus(ax: Axes, data: Growth, part: str) -> None:
     low, high = min(centres), max(centres)
     room = 0.25 * abs(data.design) + 0.05 * (data.values[-1] - data.values[0])
     shown = [
-        _part(data, m, part)[(m.values >= low - room) & (m.values <= high + room)]
+        _part(data, m, part)[(part == "imag") | ((m.values >= low - room) & (m.values <= high + room))]
         for m in data.modes
         if part == "real" or m.roots.imag.any()
     ]
@@ -158,7 +158,7 @@ def _focus(ax: Axes, data: Growth, part: str) -> None:
     ax.set_ylim(bottom - margin if part == "real" else 0.0, top + margin)
 
 
-def _names(ax: Axes, data: Growth, scale: Scale, part: str, names: list[str]) -> list[Name]:
+def _names(ax: Axes, data: Growth, scale: AxisScale, part: str, names: list[str]) -> list[Name]:
     """Each mode's name where the longest of its curves is in sight, those of several modes spread out."""
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     found = []

@@ -34,7 +34,7 @@ class Name:
 
 
 @dataclass(frozen=True)
-class Scale:
+class AxisScale:
     """An axis: the parameter or expression on it, its label, and the unit in which the problem was written."""
 
     name: str
@@ -46,24 +46,24 @@ class Scale:
         return np.asarray(values, dtype=float) / self.unit.one
 
 
-def scale_of(problem: Problem, text: str) -> Scale:
+def scale_of(problem: Problem, text: str) -> AxisScale:
     """The axis of a parameter of a problem, or of an expression in them."""
     plain = text.strip()
     name = plain.removeprefix("-").strip()
     unit, of = unit_of(problem, name), problem.parameter_set
     if name == "abscissa":
-        return Scale(plain, ("−" if name != plain else "") + abscissa_label(problem), Unit())
+        return AxisScale(plain, ("−" if name != plain else "") + abscissa_label(problem), Unit())
     symbol = f"${'-' if name != plain else ''}{of[name].latex}$" if name in of.names else plain
-    return Scale(plain, symbol + (f" in {unit.text}" if unit.text else ""), unit)
+    return AxisScale(plain, symbol + (f" in {unit.text}" if unit.text else ""), unit)
 
 
-def scale_over(problem: Problem, parameter: Parameter) -> Scale:
+def scale_over(problem: Problem, parameter: Parameter) -> AxisScale:
     """The axis of a parameter of a problem, or of a native one that the problem is not written in."""
     if parameter.name in problem.parameter_set.names:
         found = scale_of(problem, parameter.name)
     else:
-        found = Scale(parameter.name, axis_label(parameter), Unit("" if parameter.unit == "1" else parameter.unit))
-    return Scale("Fr", FROUDE, found.unit) if parameter.name == "Fr" else found
+        found = AxisScale(parameter.name, axis_label(parameter), Unit("" if parameter.unit == "1" else parameter.unit))
+    return AxisScale("Fr", FROUDE, found.unit) if parameter.name == "Fr" else found
 
 
 def abscissa_label(problem: Problem, words: str = "spectral abscissa") -> str:

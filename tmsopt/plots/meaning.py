@@ -1,6 +1,7 @@
 """What an optimum means: rounding, distance to the boundaries, laws beside it, all designs, and the ledger."""
 
 from collections.abc import Sequence
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -56,7 +57,7 @@ def draw_robustness(data: Robustness | Nearest, ax: Axes | None = None) -> Axes:
     parts.sort(key=lambda item: -abs(item[1]))
     ax = on_axes(ax, 6.0, 1.3 + 0.26 * len(parts))
     far = ", ".join(f"{_TOWARDS.get(n.kind, n.kind)} at {times * n.distance:.3g}{unit}" for n in near)
-    ax.set_title(far or "no boundary found", fontsize=9.5)
+    ax.set_title(fill(far, 62) or "no boundary found", fontsize=9.5)
     _bars(ax, [name for name, _ in parts], [times * x for _, x in parts])
     ax.axvline(0, color="grey", linewidth=0.6)
     ax.set_xlabel(
@@ -110,10 +111,10 @@ def draw_designs(data: Every, ax: Axes | None = None) -> Axes:
     if len(scales) < 2:
         points = np.stack([points[:, 0], [d.abscissa for d in data.solutions]], axis=-1)
     proved = data.proved or (False,) * len(points)
-    for wanted, fill, label in ((True, CRITICAL, "proved"), (False, "white", "found")):
+    for wanted, inside, label in ((True, CRITICAL, "proved"), (False, "white", "found")):
         own_points = points[[p is wanted for p in proved]]
         if len(own_points):
-            ax.plot(*own_points.T, "o", color=CRITICAL, markerfacecolor=fill, label=label, linestyle="none")
+            ax.plot(*own_points.T, "o", color=CRITICAL, markerfacecolor=inside, label=label, linestyle="none")
     ax.set(xlabel=scales[0].label, ylabel=scales[1].label if len(scales) > 1 else abscissa_label(problem))
     ax.set_xlim(*scales[0].of(problem.free[scales[0].name]))
     if len(scales) > 1:

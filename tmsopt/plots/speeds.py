@@ -27,9 +27,8 @@ def draw_speeds(data: Speeds, ax: Axes | None = None) -> Axes:
     high = data.upper if math.isfinite(data.upper) else max(last, _MARGIN * at)
     for bands, colour, label in ((data.stable, STABLE, "stable"), (data.heavily_damped, HEAVY, "heavily damped")):
         for k, (a, b) in enumerate(bands):
-            ax.axvspan(
-                float(scale.of(a)), float(scale.of(min(b, high))), 0, 0.25, color=colour, label=None if k else label
-            )
+            low, end = scale.of([a, min(b, high)])
+            ax.axvspan(low, end, 0, 0.25, color=colour, label=None if k else label)
     for k, event in enumerate(data.found):
         x, height = float(scale.of(event.at)), 0.95 - 0.62 * (k % _LEVELS) / _LEVELS
         colour = _COLOURS.get(event.kind, REAL)
@@ -41,17 +40,8 @@ def draw_speeds(data: Speeds, ax: Axes | None = None) -> Axes:
             horizontalalignment="left" if left else "right", verticalalignment="top",
         )  # fmt: skip
     if data.parameter in data.parameters:
-        x = float(scale.of(at))
-        ax.plot(
-            [x],
-            [0.06],
-            "^",
-            color=LINE,
-            markersize=7,
-            label=f"design at {scale.unit.show(at, 4)}",
-            linestyle="none",
-            clip_on=False,
-        )
+        label = f"design at {scale.unit.show(at, 4)}"
+        ax.plot([scale.of(at)], [0.06], "^", color=LINE, markersize=7, label=label, linestyle="none", clip_on=False)
     ax.set(xlim=scale.of([data.lower, high]), ylim=(0, 1.05), yticks=[], xlabel=scale.label)
     ax.spines[["left", "right", "top"]].set_visible(False)
     return finished(ax, own)

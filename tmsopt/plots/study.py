@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from tmsopt.design.unit_system import Unit
-from tmsopt.plots.labels import Scale, abscissa_label, finished, scale_of
+from tmsopt.plots.labels import AxisScale, abscissa_label, finished, scale_of
 from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, STABLE, figure_of, on_axes
 from tmsopt.records import Array, Table
 from tmsopt.solver.solve import solve
@@ -73,7 +73,7 @@ def _over_what_varies(ax: Axes, data: Results) -> str:
     first, second = [*study.columns, None, None][:2]
     sense = study.problem.minimize or study.problem.maximize
     found = [r for r in rows if r.status == "optimal"]
-    scale = scale_of(study.problem, sense) if sense else Scale("abscissa", abscissa_label(study.problem), _PLAIN)
+    scale = scale_of(study.problem, sense) if sense else AxisScale("abscissa", abscissa_label(study.problem), _PLAIN)
     y = scale.of([r.objective if sense else r.abscissa for r in found])
     across = scale_of(study.problem, first) if first else None
     x = across.of([r.varied[across.name] for r in found]) if across else np.array([r.number for r in found])

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from tmsopt.plots.labels import Name, Scale, abscissa_label, finished, scale_of
+from tmsopt.plots.labels import AxisScale, Name, abscissa_label, finished, scale_of
 from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, figure_of, on_axes
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
 
@@ -45,7 +45,7 @@ def draw_trace(
 
 
 def draw_branch(
-    ax: Axes, branch: Branch, plane: tuple[Scale, Scale], width: float = 1.4, tint: str | None = None
+    ax: Axes, branch: Branch, plane: tuple[AxisScale, AxisScale], width: float = 1.4, tint: str | None = None
 ) -> None:  # fmt: skip
     """One branch as lines, cut where its pattern, its stability or a constraint changes; pale where unstable."""
     x, y = (scale.of(branch.parameters[scale.name]) for scale in plane)
@@ -76,7 +76,7 @@ def trace_figure(trace: Trace, horizontal: str | None = None, vertical: str | No
     return figure_of(draw_trace(trace, None, horizontal, vertical))
 
 
-def _bands(ax: Axes, data: Trace, plane: tuple[Scale, Scale]) -> None:
+def _bands(ax: Axes, data: Trace, plane: tuple[AxisScale, AxisScale]) -> None:
     """Segments coloured by the abscissa of their ends, with the colour bar."""
     segments, values, widths = [], [], []
     for branch in data.branches:
