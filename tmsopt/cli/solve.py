@@ -176,8 +176,8 @@ def solve(
     else:
         si = tmsopt.report.si_parameters(solution, w, m_B) if wheelbase or rear_mass else None
         with _explaining(full):
-            found = tmsopt.report.findings(solution, full)
-        click.echo(tmsopt.report.design_report(solution, found, full, si))
+            found = tmsopt.report.solution.findings(solution, full)
+        click.echo(tmsopt.report.solution.design_report(solution, found, full, si))
     if plot is not None:
         _draw(solution, plot, over, w, m_B)
     sys.exit(INTERRUPTED if solution.interrupted else _EXIT[solution.status])
@@ -220,7 +220,7 @@ def _as_json(solution: "Solution", full: bool) -> dict[str, Any]:
     data = solution.to_json()
     if not full:
         return {name: value for name, value in data.items() if name in _CONTRACT}
-    found = tmsopt.report.findings(solution, full)
+    found = tmsopt.report.solution.findings(solution, full)
     meaning = {
         "meaning": found.explanation and found.explanation.to_json(),
         "robustness": found.robustness and found.robustness.to_json(),

@@ -3,15 +3,14 @@ from .curves import (
     branch_table as branch_table, chart_table as chart_table, domain_table as domain_table, front_table as front_table,
     swallowtail_table as swallowtail_table, trace_table as trace_table,
 )
-from .design import design_report as design_report, si_parameters as si_parameters
 from .every import every_table as every_table
-from .explanation import (
-    diagnosis_lines as diagnosis_lines, explained_lines as explained_lines, nearest_table as nearest_table,
-    optimality_lines as optimality_lines, robustness_line as robustness_line, robustness_table as robustness_table,
-)
-from .findings import Findings as Findings, findings as findings
-from .infeasible import infeasible_lines as infeasible_lines
 from .ledger import ledger_page as ledger_page, ledger_table as ledger_table
 from .proof import proof_text as proof_text
+from .solution import (
+    design_report as design_report, si_parameters as si_parameters, diagnosis_lines as diagnosis_lines,
+    explained_lines as explained_lines, nearest_table as nearest_table, optimality_lines as optimality_lines,
+    robustness_line as robustness_line, robustness_table as robustness_table, Findings as Findings, findings as
+    findings, infeasible_lines as infeasible_lines,
+)
 from .speeds import growth_table as growth_table, speeds_table as speeds_table
 from .study import row_lines as row_lines, study_table as study_table

@@ -2,7 +2,7 @@
 
 from tmsopt.models import tms
 from tmsopt.paper.compare import Comparison
-from tmsopt.report.design import branch_lines, headline
+from tmsopt.report.solution.design import branch_lines, headline
 from tmsopt.report.text import columns, number
 
 

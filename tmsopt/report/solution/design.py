@@ -9,7 +9,7 @@ from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import unit_of
 from tmsopt.explanation import Lever
 from tmsopt.models import GRAVITY, tms, to_si
-from tmsopt.report.explanation import (
+from tmsopt.report.solution.explanation import (
     diagnosis_lines,
     optimality_lines,
     robustness_line,
@@ -17,10 +17,10 @@ from tmsopt.report.explanation import (
     rounding_line,
     rounding_rows,
 )
-from tmsopt.report.findings import Findings
-from tmsopt.report.infeasible import infeasible_lines
-from tmsopt.report.limits import bound_lines, case_lines, limit_text, proof_line
-from tmsopt.report.rows import ALL, loads, motion, parameter_rows, pitching, quantity_rows, role, roots_of
+from tmsopt.report.solution.findings import Findings
+from tmsopt.report.solution.infeasible import infeasible_lines
+from tmsopt.report.solution.limits import bound_lines, case_lines, limit_text, proof_line
+from tmsopt.report.solution.rows import ALL, loads, motion, parameter_rows, pitching, quantity_rows, role, roots_of
 from tmsopt.report.speeds import range_line
 from tmsopt.report.text import columns
 from tmsopt.roots.patterns.descriptions import in_words
@@ -40,7 +40,7 @@ _ASKED = {"a0": "must not be 0", "coefficients": "must have values"}
 
 
 @dataclass(frozen=True)
-class Part:
+class Block:
     """A part of the report.
 
     Attributes:
@@ -86,7 +86,7 @@ def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float
     return solution.parameters if own else to_si(solution.dimensionless, w, m_B, g)
 
 
-def _parts(solution: Solution, found: Findings, si: Mapping[str, float], beside: bool) -> Iterator[Part]:
+def _parts(solution: Solution, found: Findings, si: Mapping[str, float], beside: bool) -> Iterator[Block]:
     """In the order of the report."""
     edge = found.robustness is not None and bool(found.robustness.edges)
     told, asked = headline(solution, edge)
@@ -94,33 +94,33 @@ def _parts(solution: Solution, found: Findings, si: Mapping[str, float], beside:
     if solution.status == "infeasible":
         conflict = [f"{told}: {helps[0]}" if helps else told, *helps[1:], *_violated(solution)]
         rest = (*infeasible_lines(solution, full=True)[len(helps) :], *notes)
-        yield Part("conflict", [*conflict, f"nearest design: {asked}"], rest, least=3)
+        yield Block("conflict", [*conflict, f"nearest design: {asked}"], rest, least=3)
     else:
-        yield Part("answer", [told, asked, *helps, *notes], least=2)
-    yield Part("design", _design(solution, si if beside else None), tuple(columns(parameter_rows(solution, si))),
+        yield Block("answer", [told, asked, *helps, *notes], least=2)
+    yield Block("design", _design(solution, si if beside else None), tuple(columns(parameter_rows(solution, si))),
                replaces=True, least=3)  # fmt: skip
-    yield Part(
+    yield Block(
         "motion", _motion(solution, found), (*_stored(solution), *columns(quantity_rows(solution, si) or [("",)]))
     )
     if "load_rear" in solution.quantities:
-        yield Part("loads", [f"{loads(solution)}; {pitching(solution, si)}"])
-    yield Part("cases", case_lines(solution))
+        yield Block("loads", [f"{loads(solution)}; {pitching(solution, si)}"])
+    yield Block("cases", case_lines(solution))
     explained = found.explanation
     if explained is not None and explained.levers:
         head = "limits that bind, and what moving each a little further buys (first order):"
-        yield Part("limits", [head, *columns([_lever(solution, lever) for lever in explained.levers])],
+        yield Block("limits", [head, *columns([_lever(solution, lever) for lever in explained.levers])],
                    tuple(lever.sentence for lever in explained.levers), least=3)  # fmt: skip
     if explained is not None:
-        yield Part("warnings", [f"warning: {text}" for text in explained.warnings])
+        yield Block("warnings", [f"warning: {text}" for text in explained.warnings])
     if found.robustness is not None:
-        yield Part("robustness", [f"robustness: {robustness_line(found.robustness)}"],
+        yield Block("robustness", [f"robustness: {robustness_line(found.robustness)}"],
                    tuple(robustness_table(found.robustness).splitlines()[2:]))  # fmt: skip
     if explained is not None and explained.precision:
-        yield Part("rounding", [f"rounding: {rounding_line(explained)}"], tuple(columns(rounding_rows(explained))))
+        yield Block("rounding", [f"rounding: {rounding_line(explained)}"], tuple(columns(rounding_rows(explained))))
     local = () if explained is None else optimality_lines(explained.optimality)
-    yield Part("proof", [proof_line(solution)], (*bound_lines(solution), *local))
-    yield Part("roots", [], tuple(diagnosis_lines(found.diagnoses, details=True)))
-    yield Part("search", [], tuple(_search(solution)))
+    yield Block("proof", [proof_line(solution)], (*bound_lines(solution), *local))
+    yield Block("roots", [], tuple(diagnosis_lines(found.diagnoses, details=True)))
+    yield Block("search", [], tuple(_search(solution)))
 
 
 def headline(solution: Solution, on_edge: bool = False) -> tuple[str, str]:
@@ -256,7 +256,7 @@ def branch_lines(solution: Solution) -> list[str]:
     return lines
 
 
-def _named(part: Part) -> list[str]:
+def _named(part: Block) -> list[str]:
     """A part of the full report, under its name."""
     lines = ([] if part.replaces else part.lines) + list(part.rest)
     return ["", part.name, "-" * len(part.name), *(line.rstrip() for line in lines)]
@@ -274,15 +274,15 @@ def _wrapped(lines: list[str]) -> list[str]:
     return found
 
 
-def _fitted(parts: list[Part]) -> list[Part]:
+def _fitted(parts: list[Block]) -> list[Block]:
     """Parts that fit the screen: the last lines of those that may be shorter are left out, and counted."""
     cut = {part.name: len(part.lines) for part in parts}
 
-    def shown(part: Part) -> Part:
+    def shown(part: Block) -> Block:
         kept = cut[part.name]
         if kept == len(part.lines):
             return part
-        return Part(part.name, [*part.lines[:kept], f"  … {len(part.lines) - kept} more {part.name}: --full"])
+        return Block(part.name, [*part.lines[:kept], f"  … {len(part.lines) - kept} more {part.name}: --full"])
 
     def height() -> int:
         return 2 + sum(len(_wrapped(shown(part).lines)) for part in parts)
