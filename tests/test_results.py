@@ -104,7 +104,19 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "Swallowtail": lambda: tmsopt.swallowtail(tailed(), rows=4, across=3, starts=4),
     "Ledger": lambda: tmsopt.verify(only=["lscf-*"]),
 }
-TITLED = {"Solution", "Front", "Trace", "Chart", "Speeds", "Comparison", "Results", "Proof", "Swallowtail", "Every", "Robustness"}
+TITLED = {
+    "Solution",
+    "Front",
+    "Trace",
+    "Chart",
+    "Speeds",
+    "Comparison",
+    "Results",
+    "Proof",
+    "Swallowtail",
+    "Every",
+    "Robustness",
+}
 made = cache(lambda name: RESULTS[name]())
 each = pytest.mark.parametrize("name", RESULTS)
 

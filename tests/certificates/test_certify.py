@@ -26,7 +26,7 @@ from tmsopt.branch_and_bound import SCIP, UNDECIDED, Crew, Decision, GlobalSolve
 from tmsopt.cli import main
 from tmsopt.design import Band, Bound
 from tmsopt.records import Array
-from tmsopt.report import solution_table
+from tmsopt.report import design_report
 
 answering = import_module("tmsopt.branch_and_bound.answer")
 certifying = import_module("tmsopt.certificates.certify")
@@ -555,9 +555,9 @@ def test_another_global_solver_is_asked_and_named(slow_plane: Solution, monkeypa
     bound = certify(slow_plane, seconds=3.0).bound  # its process takes one of them to start
     assert (bound.method, bound.value, bound.proven) == ("omega0", slow_plane.bound.value, False)
     assert (bound.solver, bound.nodes > 0) == ("Timid", True)
-    report = solution_table(replace(slow_plane, bound=bound))
+    report = design_report(replace(slow_plane, bound=bound), full=True)
     assert re.search(r"branch and bound with Timid, \d+ nodes, .* s found none better in time", report)
-    assert "proof" not in report
+    assert "proved" not in report
 
 
 def test_a_front_has_no_bound() -> None:

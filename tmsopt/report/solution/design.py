@@ -92,7 +92,8 @@ def _parts(solution: Solution, found: Findings, si: Mapping[str, float], beside:
     told, asked = headline(solution, edge)
     helps, notes = infeasible_lines(solution), [f"note: {note}" for note in solution.notes]
     if solution.status == "infeasible":
-        conflict = [f"{told}: {helps[0]}" if helps else told, *helps[1:], *_violated(solution)]
+        first = [f"{told}: {helps[0]}"] if helps and ": " not in told else [told, *helps[:1]]
+        conflict = [*first, *helps[1:], *_violated(solution)]
         rest = (*infeasible_lines(solution, full=True)[len(helps) :], *notes)
         yield Block("conflict", [*conflict, f"nearest design: {asked}"], rest, least=3)
     else:
@@ -131,7 +132,8 @@ def headline(solution: Solution, on_edge: bool = False) -> tuple[str, str]:
     located = f"locate {problem.locate}" if problem.locate else ""
     asked = f"{problem.sense} {text.strip()}" + (f" = {value}" if math.isfinite(solution.value) else "") if text else ""
     structure = in_words(solution.structure, problem.model.degree)
-    stable = "" if solution.status == "infeasible" else stability(solution, on_edge)
+    silent = solution.status == "infeasible" and solution.any_stable is not False
+    stable = "" if silent else stability(solution, on_edge)
     told = ": ".join(part for part in (_ended(solution), stable) if part)
     return told, "; ".join(part for part in (located, asked, structure) if part)
 
