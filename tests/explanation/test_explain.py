@@ -5,6 +5,7 @@ import math
 from dataclasses import replace
 from importlib import import_module
 
+import casadi as ca
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -12,11 +13,12 @@ from helpers.oracles import polynomial_60, polynomial_floats, roots_60
 from mpmath import mp
 
 import tmsopt
+from tmsopt import laws
 from tmsopt.cli import main
-from tmsopt.design import Unit
+from tmsopt.design import Unit, unit_of
 from tmsopt.explanation import moved, natural_step, rounded, step_within
-from tmsopt.models import Range, tms
-from tmsopt.report import explained_lines
+from tmsopt.models import Range, from_coefficients, tms
+from tmsopt.report import explained_lines, rounding_line
 from tmsopt.roots.patterns import STRUCTURES
 
 ZETA_B, ZETA_H = -0.4, -0.2
@@ -409,3 +411,28 @@ def test_rounding_over_a_band_is_judged_between_its_speeds_too():
         worst = max(np.roots(c).real.max() for c in a)
         assert row.realised == pytest.approx(worst, abs=3e-7)  # the peak between two of the speeds
         assert row.loss >= -1e-9  # no design is better than the best
+
+
+def test_rounding_in_one_line_says_how_many_digits_are_enough():
+    """By companion eigenvalues of the rounded designs: those with a simple rightmost root, which doubles resolve."""
+    design = tmsopt.solve("problems/realistic.toml")
+    told = rounding_line(tmsopt.explain(design, resolve=False))
+    digits, share = (int(told.split()[k]) for k in (0, 3))
+    kept = {}
+    for n in (2, 3, 4, 6):
+        one = {name: unit_of(design.problem, name).one for name in design.problem.free}
+        short = {name: float(f"{design.parameters[name] / u:.{n}g}") * u for name, u in one.items()}
+        a = laws.copo(**{**design.parameters, **short})
+        kept[n] = np.roots(a).real.max() / design.abscissa
+    assert digits == min(n for n in kept if kept[n] >= 0.95)
+    assert share == int(100 * kept[digits])
+    assert f"digits keep {share} % of the decay; {tmsopt.explain(design).worst} needs the most" in told
+
+
+def test_rounding_that_makes_a_design_unstable_is_said_so():
+    """s² + (x − 1.23456) s + 1 is stable for x > 1.23456 alone: two digits round 1.2346, the box's end, down to 1.2."""
+    x = ca.SX.sym("x")
+    problem = tmsopt.Problem(from_coefficients([1, x - 1.23456, 1]), free={"x": (1.0, 1.23466)}, minimize="abscissa")
+    told = rounding_line(tmsopt.explain(tmsopt.solve(problem), resolve=False))
+    assert told.startswith("3 digits make it unstable (x alone: 1.23); ")
+    assert told.endswith("6 digits keep 100 % of the decay")

@@ -242,7 +242,7 @@ def test_a_double_pair_that_is_no_minimum(cep2):
     assert (found.verdict, found.order) == (NOT_MINIMAL, 1)
     assert found.residual < 1e-10  # stationary for the factors all the same
     assert certainly_better(cep2, found)
-    assert "kappa" in found.reason
+    assert "part a multiple root" in found.reason
 
 
 @pytest.mark.parametrize(
@@ -389,6 +389,6 @@ def test_a_rounded_ep4_is_not_called_a_minimum(ep4):
 def test_the_command_reports_it():
     printed = CliRunner().invoke(main, ["solve", "problems/ep4.toml"]).output
     assert "local optimality: this EP4 is a strict local minimum of abscissa" in printed
-    assert "(4-fold) multiplier of beta 0.25, of kappa 0.133" in printed
+    assert "(4-fold): to move it left 0.25, to part it 0.133" in printed
     found = json.loads(CliRunner().invoke(main, ["solve", "problems/ep4.toml", "--json"]).output)
     assert found["meaning"]["optimality"]["verdict"] == "strict minimum"

@@ -381,7 +381,7 @@ def test_structures_in_words():
     assert in_words("EP6", 6) == "all six roots meet in one (EP6)"
     assert in_words("EP4", 6) == "the four rightmost roots meet in one (EP4)"
     assert in_words("CEP3", 6) == "three complex pairs meet in one (CEP3)"
-    words = "a double complex pair, two complex pairs and a real root stand on one vertical line"
+    words = "a double complex pair, two complex pairs and a real root have one decay rate"
     assert in_words("CEP2+two pairs+real", 9) == f"{words} (CEP2+two pairs+real)"
 
 

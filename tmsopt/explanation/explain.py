@@ -1,5 +1,6 @@
 """What an optimum means: which limits it leans on and what they are worth, and how much rounding it bears."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -27,6 +28,8 @@ class Explanation(Tabular):
         rounding: free parameter → the design with it alone rounded to 3 digits.
         worst: the parameter whose rounding costs most; empty where none costs anything.
         precision: the design with all free parameters rounded to 2, 3, 4 and 6 digits.
+        goal: what was optimised, or the pattern that was located; empty where nothing was asked.
+        abscissa, value: of the design, and of its objective.
         warnings: arbitrary bounds that the design leans on, bounds touched for nothing, parameters without effect.
     """
 
@@ -39,6 +42,9 @@ class Explanation(Tabular):
     worst: str
     precision: tuple[Rounded, ...]
     warnings: tuple[str, ...]
+    goal: str = ""
+    abscissa: float = math.nan
+    value: float = math.nan
 
     def records(self) -> Iterable[dict[str, Any]]:
         """The limits that bind, one a row."""
@@ -57,6 +63,7 @@ def explain(design: Given, *, resolve: bool = True) -> Explanation:
         resolve: check each multiplier by solving again with its limit moved, from the optimum; 30 ms or so each.
     """
     solution = solved(design)
+    problem = solution.problem
     feasible = not solution.violations
     alone = rounded_alone(solution) if feasible else Table[Rounded]()
     return Explanation(
@@ -69,4 +76,7 @@ def explain(design: Given, *, resolve: bool = True) -> Explanation:
         worst=worst(alone),
         precision=rounded_together(solution) if feasible else (),
         warnings=warnings(solution),
+        goal=(problem.minimize or problem.maximize or problem.locate or "").strip(),
+        abscissa=solution.abscissa,
+        value=solution.value,
     )

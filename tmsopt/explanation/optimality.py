@@ -188,24 +188,25 @@ def _verdict(
         return UNDECIDED, 0, f"not decided whether {name} a {extreme}: {doubt}"
     unknowns = _unknowns(around)
     count = _count(around, unknowns)
-    held = f"{count} condition{'s hold' if count != 1 else ' holds'} {unknowns} unknowns"
+    held = f"{count} condition{'s that bind leave' if count != 1 else ' that binds leaves'}"
     idle = f"; without effect: {', '.join(around.idle)}" if around.idle else ""
     if np.isnan(found.curvature):
-        return STRICT, 1, f"{name} a strict {extreme}: {held}, a vertex, so the first-order conditions suffice{idle}"
+        return STRICT, 1, f"{name} a strict {extreme}: {held} none of the {unknowns} unknowns free to move{idle}"
     bend = "downwards" if solution.problem.sense == "maximize" else "upwards"
-    return STRICT, 2, f"{name} a strict {extreme}: {held}, and along what these leave free it curves {bend}{idle}"
+    free = f"{held} some of the {unknowns} unknowns free to move"
+    return STRICT, 2, f"{name} a strict {extreme}: {free}, and along these it curves {bend}{idle}"
 
 
 def _doubt(around: LocalProgram, found: Conditions) -> str:
     """Why nothing is decided where no better design was found; empty where the conditions decide."""
     if found.residual > STATIONARY or (found.downhill.any() and np.isnan(found.curvature)):
-        return f"multipliers leave {found.residual:.1g} of the gradient, and no better design was found downhill"
+        return f"nothing that binds holds {found.residual:.1g} of its gradient, yet no better design was found downhill"
     off = float((np.abs(around.at(around.x)[2]) / np.array([h.size for h in around.held])).max(initial=0.0))
     if off > _MET:
         return f"what is held is met to {off:.1g} only"
     loose = [h for h, firm in zip(around.held, found.firm, strict=True) if h.name == "c2" and not firm]
     if any(around.line[h.cluster].multiplicity > 3 for h in loose):
-        return "the multiplier of kappa vanishes"  # then c₄ ≤ c₂² may outweigh it
+        return "to first order nothing keeps a multiple root together"  # then c₄ ≤ c₂² may outweigh it
     if curved(found.curvature) <= 0 and not np.isnan(found.curvature):
         return f"along what is left free it {'gains' if curved(found.curvature) else 'is flat'} to second order"
     return ""
@@ -228,12 +229,13 @@ def _count(around: LocalProgram, unknowns: int) -> int:
 def _pays(around: LocalProgram, found: Conditions) -> str:
     """What pays, to first order or by its curvature."""
     if curved(found.curvature) < 0:
-        return "stationary, but curved downwards along what is held"
+        return "stationary, but second derivatives let it improve along what binds"
     if not found.independent or found.residual > STATIONARY:
-        return f"not stationary, for multipliers leave {found.residual:.1g} of the gradient"
+        return f"nothing that binds holds {found.residual:.1g} of its gradient"
     held = zip(around.held, found.scaled, strict=True)
-    negative = [{"c1": "beta", "c2": "kappa"}.get(h.name, h.name) for h, y in held if h.signed and y < -POSITIVE]
-    return f"negative multiplier of {' and '.join(dict.fromkeys(negative))}"
+    ways = {"c1": "move roots left of the others", "c2": "part a multiple root"}
+    paying = [ways.get(h.name, f"leave the limit {h.name}") for h, y in held if h.signed and y < -POSITIVE]
+    return f"it pays to {' and to '.join(dict.fromkeys(paying))}"
 
 
 def _way(solution: Solution, beyond: Better) -> str:

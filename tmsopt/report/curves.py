@@ -7,7 +7,7 @@ import numpy as np
 
 from tmsopt.charts.chart import Chart
 from tmsopt.fronts.front import Front
-from tmsopt.models import ParameterSet
+from tmsopt.models import Model, ParameterSet, in_words_of
 from tmsopt.report.text import columns, number, with_unit, yes_no
 from tmsopt.roots import pattern
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
@@ -20,13 +20,13 @@ _FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belon
 def chart_table(chart: Chart) -> str:
     """Shares of the classes, the best grid point, and the boundaries with their corners of a plane in memory."""
     data: dict[str, Any] = chart.to_json()
-    of = chart.problem.parameter_set
+    of, model = chart.problem.parameter_set, chart.problem.model
     if chart.path is not None or len(chart.axes) != 2:
-        return _summary_table(of, data)
+        return _summary_table(of, data, model)
     first, second = chart.axes
     size = f"{len(chart.grid[0])} × {len(chart.grid[1])}"
     lines = [chart.problem.title or "untitled problem", f"{size} designs over {first} and {second}", ""]
-    lines += columns([(name, f"{100 * share:.2f} %") for name, share in chart.shares.items() if share])
+    lines += columns([(in_words_of(model, n), f"{100 * share:.2f} %") for n, share in chart.shares.items() if share])
     if len(chart.problem.constraints) > len(chart.left_aside):
         lines.append(f"  the constraints hold on {100 * data['satisfied']:.2f} %")
     for name in chart.left_aside:
@@ -36,21 +36,21 @@ def chart_table(chart: Chart) -> str:
         where = ", ".join(f"{n} = {best[n]:.6g}{unit}" for n, unit in units.items())
         lines += ["", f"least abscissa on the grid: {best['value']:.6g} at {where}"]
     if chart.domain is not None:
-        lines += ["", domain_table(chart.domain, of)]
+        lines += ["", domain_table(chart.domain, of, model)]
     return "\n".join(line.rstrip() for line in lines)
 
 
-def domain_table(domain: Domain, of: ParameterSet | None = None) -> str:
+def domain_table(domain: Domain, of: ParameterSet | None = None, model: Model | None = None) -> str:
     """What bounds stability and heavy damping, and the corners, with units where the parameters are known."""
     lines = []
     for name, arcs in (("stability", domain.stability), ("heavy damping", domain.heavy_damping)):
-        kinds = [f"{arc.kind} ({len(next(iter(arc.points.values())))} points)" for arc in arcs]
+        kinds = [f"{_said(model, arc.kind)} ({len(next(iter(arc.points.values())))} points)" for arc in arcs]
         lines.append(f"{name} is bounded by {', '.join(kinds) or 'nothing in the box'}")
     if domain.corners:
         names = list(domain.corners[0].parameters)
         names = [n for n in names if any(n in arc.points for arc in (*domain.stability, *domain.heavy_damping))]
         rows = [("corner", *(with_unit(of, n) if of else n for n in names))]
-        rows += [(c.name, *(number(c.parameters[n]) for n in names)) for c in domain.corners]
+        rows += [(_said(model, c.name), *(number(c.parameters[n]) for n in names)) for c in domain.corners]
         lines += ["", *columns(rows)]
     return "\n".join(line.rstrip() for line in lines)
 
@@ -69,13 +69,18 @@ def swallowtail_table(found: Swallowtail) -> str:
     return "\n".join(lines)
 
 
-def _summary_table(of: ParameterSet, data: Mapping[str, Any]) -> str:
+def _said(model: Model | None, name: str) -> str:
+    """A kind of boundary, or an event, in the words of a model where that is known."""
+    return in_words_of(model, name) if model else name
+
+
+def _summary_table(of: ParameterSet, data: Mapping[str, Any], model: Model) -> str:
     """A space, or a chart in a folder: shares of the classes, the best grid point, and how fast it was made."""
     axes = data["axes"]
     size = " × ".join(str(a["points"]) for a in axes.values())
     lines = [data["title"] or "untitled problem", f"{size} designs over {', '.join(axes)}", ""]
     if data["classes"]:
-        lines += columns([(name, f"{100 * share:.2f} %") for name, share in data["classes"].items() if share])
+        lines += columns([(in_words_of(model, n), f"{100 * x:.2f} %") for n, x in data["classes"].items() if x])
     if data["satisfied"] is not None and data["satisfied"] < 1:
         lines.append(f"  the constraints hold on {100 * data['satisfied']:.2f} %")
     if best := data["least_abscissa"]:
@@ -118,7 +123,7 @@ def trace_table(trace: Trace) -> str:
     lines = [trace.problem.title or "untitled problem", trace_headline(trace)]
     for number_, branch in enumerate(trace.branches, start=1):
         lines += ["", f"branch {number_}: {_summary(branch, trace)}"]
-        lines += _event_rows(branch, {n: with_unit(of, n) for n in free})
+        lines += _event_rows(branch, {n: with_unit(of, n) for n in free}, trace.problem.model)
     return "\n".join(line.rstrip() for line in lines)
 
 
@@ -127,7 +132,8 @@ def trace_headline(trace: Trace) -> str:
     per_point = 1e6 * trace.seconds_walking / max(trace.points, 1)
     count = f"{len(trace.branches)} branch" + ("es" if len(trace.branches) != 1 else "")
     points = f", {trace.points} points at {per_point:.0f} µs each" if trace.points else ""
-    return f"{trace.pattern}: {count}{points}, looked for from {trace.starts} starts; {trace.seconds:.2f} s"
+    pattern_ = in_words_of(trace.problem.model, trace.pattern)
+    return f"{pattern_}: {count}{points}, looked for from {trace.starts} starts; {trace.seconds:.2f} s"
 
 
 def branch_table(branch: Branch) -> str:
@@ -138,11 +144,12 @@ def branch_table(branch: Branch) -> str:
     return "\n".join(line.rstrip() for line in lines)
 
 
-def _event_rows(branch: Branch, heads: Mapping[str, str]) -> list[str]:
+def _event_rows(branch: Branch, heads: Mapping[str, str], model: Model | None = None) -> list[str]:
     rows = [("", *heads.values(), "abscissa", "")]
     for event in branch.events:
         values = (number(event.parameters[n]) for n in heads)
-        rows.append((event.name, *values, number(float(branch.abscissa[event.index])), event.detail))
+        name = _said(model, event.name)
+        rows.append((name, *values, number(float(branch.abscissa[event.index])), event.detail))
     return columns(rows)
 
 
@@ -155,4 +162,5 @@ def _summary(branch: Branch, trace: Trace) -> str:
     form = "closed" if branch.closed else "open"
     kinds = " and ".join(dict.fromkeys(kinds_along(branch)))
     met = "met" if branch.residual <= _FITTING else "met only"
-    return f"{kinds}, {len(branch)} points, {form}, {states}, coefficients {met} to {branch.residual:.0e}"
+    kinds, residual = in_words_of(trace.problem.model, kinds), f"{branch.residual:.0e}"
+    return f"{kinds}, {len(branch)} points, {form}, {states}, coefficients {met} to {residual}"

@@ -8,6 +8,7 @@ from tmsopt.critical_speeds.growth import Growth
 from tmsopt.critical_speeds.speeds import Speeds
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import unit_of
+from tmsopt.models import in_words_of
 from tmsopt.report.text import columns
 from tmsopt.units import reading
 
@@ -28,7 +29,7 @@ def speeds_table(found: Speeds) -> str:
     rows: list[Sequence[str]] = [("", symbol, read if read != unit else "", "root", "")]
     for c in found.found:
         other = f"{reading(c.at, unit)[0]:.8g}" if read != unit else ""
-        rows.append((c.kind, f"{c.at:.{_DIGITS}g}", other, _root(c), _meaning(c)))
+        rows.append((in_words_of(found.problem.model, c.kind), f"{c.at:.{_DIGITS}g}", other, _root(c), _meaning(c)))
     lines += [*columns(rows), ""] if found.found else [_nothing(found), ""]
     lines += list(_always(found))
     lines.append(f"stable: {_bands(found, found.stable)}")

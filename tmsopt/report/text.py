@@ -7,8 +7,8 @@ from tmsopt.models import ParameterSet
 
 
 def number(value: float) -> str:
-    """Twelve digits, or ``none`` for a number that does not exist."""
-    return f"{value:.12g}" if math.isfinite(value) else "none"
+    """Twelve digits, or ``none`` for a number that does not exist; no −0."""
+    return f"{value + 0.0:.12g}" if math.isfinite(value) else "none"
 
 
 def yes_no(value: bool | None) -> str:

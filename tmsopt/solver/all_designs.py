@@ -175,7 +175,12 @@ def _posed(problem: Problem) -> NLP:
     """The equations of a problem; refused where they are not those of single solutions in the parameters alone."""
     counted = freedom(problem)
     if problem.pattern is None or problem.objective is not None:
-        message = "all solutions are those of a pattern; write locate = 'EP3', or another, and no minimize or maximize"
+        order = min(
+            max(len(problem.free) + 1, 2), problem.model.degree
+        )  # as many conditions as there are free parameters
+        message = (
+            f"all solutions are those of a pattern; write locate = 'EP{order}', or another, and no minimize or maximize"
+        )
         raise InputError([Fault(message, ("objective",))])
     if counted.kind != "square" or problem.cases:
         advice = "free fewer, or add == constraints" if counted.count > 0 else "free more, or ask for less"

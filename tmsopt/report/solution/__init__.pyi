@@ -2,6 +2,7 @@ from .design import design_report as design_report, si_parameters as si_paramete
 from .explanation import (
     diagnosis_lines as diagnosis_lines, explained_lines as explained_lines, nearest_table as nearest_table,
     optimality_lines as optimality_lines, robustness_line as robustness_line, robustness_table as robustness_table,
+    rounding_line as rounding_line,
 )
 from .findings import Findings as Findings, findings as findings
 from .infeasible import infeasible_lines as infeasible_lines

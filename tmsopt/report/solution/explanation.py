@@ -12,10 +12,13 @@ from tmsopt.margins.nearest import Nearest, Robustness
 from tmsopt.models import Model, in_words_of, words_of
 from tmsopt.report.text import columns, number
 
+_SHARE, _LIMIT, _NIL = 0.05, 0.01, 1e-9
+"""Of decay and objective, and of the sizes of limits: what rounding may cost; what is nothing."""
 _MAIN = 0.5
 """Share of the largest change above which a parameter is named in the headline."""
 _WIDE = 12
 """Parameters up to which each has a column; of more, each has a row."""
+_MULTIPLIERS = "what it costs, per unit, to change a root on the rightmost line"
 _LITTLE = 1e-3
 """Share of the largest change below which one is 0."""
 _NAMED = 3
@@ -40,22 +43,72 @@ def explained_lines(explanation: Explanation) -> list[str]:
     return [line.rstrip() for line in lines]
 
 
+def rounding_line(explanation: Explanation) -> str:
+    """In one line: the fewest digits that keep what was asked, what fewer cost, and the parameter that needs the most.
+
+    Kept is what is stable as the design was, within its limits to their 100th, and within 5 % in decay and objective.
+    """
+    rows = explanation.precision
+    if not rows or not math.isfinite(explanation.abscissa):
+        return ""
+    stable = explanation.abscissa < -_NIL
+    enough = next((row for row in rows if _kept(row, explanation)), None)
+    three = next((row for row in rows if row.digits == ALONE), None)
+    parts = []
+    if stable and three and not three.realised < 0:
+        alone = explanation.rounding.get(explanation.worst)
+        worst = f" ({explanation.worst} alone: {alone.written[explanation.worst]})" if alone else ""
+        parts.append(f"{ALONE} digits make it unstable{worst}")
+    if enough:
+        parts.append(f"{enough.digits} digits {_keep(enough, explanation)}")
+    else:
+        parts.append(f"{rows[-1].digits} digits {_lose(rows[-1], explanation)}")
+    needs = f"; {explanation.worst} needs the most" if explanation.worst and len(parts) == 1 else ""
+    return f"{'; '.join(parts)}{needs}"
+
+
+def _kept(row: Rounded, explanation: Explanation) -> bool:
+    good = row.loss <= max(_SHARE * abs(explanation.abscissa), _NIL)
+    off = abs(row.objective - explanation.value)  # nan where none was asked, or it takes a search
+    near = not off > max(_SHARE * abs(explanation.value), _NIL)
+    return good and near and all(v <= _LIMIT for v in row.violations.values())
+
+
+def _keep(row: Rounded, explanation: Explanation) -> str:
+    if explanation.abscissa >= -_NIL:
+        return f"move the rightmost root by {row.loss:.2g}" if row.loss > _NIL else "change next to nothing"
+    share = min(math.floor(round(100 * row.realised / explanation.abscissa, 6)), 100)
+    return f"keep {share} % of the decay"
+
+
+def _lose(row: Rounded, explanation: Explanation) -> str:
+    """What the most digits that were tried cost."""
+    if explanation.abscissa < -_NIL and row.realised >= 0:
+        return "make it unstable"
+    violated = [name for name, v in row.violations.items() if v > _LIMIT]
+    if violated:
+        return f"violate {', '.join(violated)}"
+    if explanation.abscissa >= -_NIL:
+        return f"move the rightmost root by {row.loss:.2g}"
+    return f"lose {100 * row.loss / -explanation.abscissa:.2g} % of the decay"
+
+
 def optimality_lines(optimality: Optimality) -> list[str]:
     """The verdict, then the multipliers of each root on the rightmost line."""
     if optimality.verdict == NOT_COVERED:
         return [f"local optimality: not judged, for {optimality.reason}"]
-    lines = [f"local optimality: {optimality.reason}", *map(_root_line, optimality.roots)]
+    lines = [f"local optimality: {optimality.reason}"]
     if optimality.roots:
-        lines[-1] += f"; stationary within {optimality.residual:.1g}"
-    return lines
+        lines.append(f"  {_MULTIPLIERS} (they balance within {optimality.residual:.1g}):")
+    return [*lines, *map(_root_line, optimality.roots)]
 
 
 def _root_line(root: OnLine) -> str:
     place = f"{root.re:.5g}" + (f" ± {root.im:.5g}i" if root.im else "")
     times = f" ({root.multiplicity}-fold)" if root.multiplicity > 1 else ""
-    share = f" bears {100 * root.share:.3g} % of the line," if root.share < 1 - 1e-9 else ""
-    kappa = f", of kappa {root.kappa:.4g}" if root.multiplicity > 1 else ""
-    return f"  {place}{times}{share} multiplier of beta {root.beta:.4g}{kappa}"
+    share = f" ({100 * root.share:.3g} % of what all bear)" if root.share < 1 - 1e-9 else ""
+    kappa = f", to part it {root.kappa:.4g}" if root.multiplicity > 1 else ""
+    return f"  {place}{times}: to move it left {root.beta:.4g}{share}{kappa}"
 
 
 def rounding_rows(explanation: Explanation) -> list[Sequence[str]]:
@@ -83,11 +136,12 @@ def _kind(found: Diagnosis) -> str:
     place = f"{found.re:.8g}" + (f" ± {found.im:.8g}i" if found.im else "")
     vectors = f"{found.geometric} independent eigenvector" + ("s" if found.geometric > 1 else "")
     if found.jordan is None:
-        why = "there are no matrices to judge by, so one chain, as a companion matrix has"
+        why = "there are no matrices to judge by, so one chain of eigenvectors, as for a companion matrix"
     else:
         zero = f"{found.jordan.zero:.1g}" if found.jordan.zero > _ROUNDING else f"below {_ROUNDING:g}"
-        why = f"{vectors}: relative singular value {zero}"
-        why += f" beside {found.jordan.nonzero:.2g}" if found.jordan.nonzero < float("inf") else ", and no other"
+        why = f"{vectors} instead of {found.algebraic}: " if found.geometric < found.algebraic else f"{vectors}: "
+        why += f"of the singular values of its matrix, relative to the greatest, {zero} counts as 0"
+        why += f", the next is {found.jordan.nonzero:.2g}" if found.jordan.nonzero < float("inf") else ""
     chains = f"Jordan chains of length {', '.join(map(str, found.partial))}" if found.partial else "chains not decided"
     chains = chains.replace("chains", "chain", 1) if len(found.partial) == 1 else chains
     what = "pair" if found.im else "root"
@@ -134,10 +188,6 @@ def _diagnosis_row(response: Response, law: Law) -> tuple[str, ...]:
 
 def _change(response: Response) -> str:
     return "relative" if response.relative else "absolute"
-
-
-def rounding_line(explanation: Explanation) -> str:
-    return "?"
 
 
 def robustness_line(found: Robustness) -> str:

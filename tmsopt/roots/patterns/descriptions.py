@@ -8,9 +8,9 @@ STRUCTURES = {
     "2EP2": "the roots meet two by two in two real ones (2EP2)",
     "CEP2": "two complex pairs meet in one (CEP2)",
     "EP2": "the two rightmost roots meet in a real one (EP2)",
-    "EP2+pair": "a real double root and a complex pair stand on one vertical line (EP2+pair)",
-    "pair+real": "a complex pair and a real root stand on one vertical line (pair+real)",
-    "two pairs": "two complex pairs stand on one vertical line (two pairs)",
+    "EP2+pair": "a real double root and a complex pair have one decay rate (EP2+pair)",
+    "pair+real": "a complex pair and a real root have one decay rate (pair+real)",
+    "two pairs": "two complex pairs have one decay rate (two pairs)",
     "pair": "one complex pair is rightmost (pair)",
     "real": "one real root is rightmost (real)",
     "undecided": "double precision cannot tell which roots meet (undecided)",
@@ -39,7 +39,7 @@ def in_words(structure: str, degree: int = 4) -> str:
         return f"{_NUMBERS[int(alone['order'])]} complex pairs meet in one ({structure})"
     named = [_named(part) for part in parts if part]
     listed = named[0] if len(named) == 1 else f"{', '.join(named[:-1])} and {named[-1]}"
-    return f"{listed} stand on one vertical line ({structure})"
+    return f"{listed} have one decay rate ({structure})"
 
 
 def _named(part: re.Match[str]) -> str:
