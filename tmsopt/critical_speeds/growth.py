@@ -24,9 +24,7 @@ from tmsopt.solver.solve import solved
 SPEEDS = ("Fr", "v")
 """Parameters that are speeds."""
 
-BICYCLES = ("tms", "whipple")
-"""Models whose modes have the names of a bicycle's: weave, capsize and castering."""
-
+_BICYCLE = 4  # degree of a bicycle whose modes have names
 _POINTS = 801
 _HALVINGS = 60  # of a step of the grid, to rounding
 _CROWD = np.linspace(-1, 1, 301) ** 5
@@ -134,7 +132,9 @@ def growth(design: Given, end: float | None = None, over: str | None = None) -> 
     rate = (
         None if of.rate is None else np.broadcast_to(of.rate({**parameters, name: values}), values.shape).astype(float)
     )
-    followed = modes(values, found, at, bicycle=model.name in BICYCLES and model.degree == 4, speed=speed)
+    many = [c.at for c in events if _crowded(c.kind)] + [at] * _crowded(design.structure)
+    bicycle = model.words[0] == "weave" and model.degree == _BICYCLE
+    followed = modes(values, found, at, many, bicycle=bicycle, speed=speed)
     return Growth(
         of[name], values, found, critical, at, design.structure, stable, heavily_damped, design.problem, followed,
         events, rate,
@@ -174,6 +174,11 @@ def _last(found: Sequence[Crossing], at: float) -> float:
 
 def _within(bands: Sequence[Stretch], low: float, high: float) -> tuple[Stretch, ...]:
     return tuple((max(a, low), min(b, high)) for a, b in bands if a < high and b > low)
+
+
+def _crowded(structure: str) -> bool:
+    """Whether more than two roots meet at a design."""
+    return "EP" in structure and structure != "EP2"
 
 
 def _numbers(model: Model, of: ParameterSet, columns: Mapping[str, Any]) -> Array:

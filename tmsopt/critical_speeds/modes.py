@@ -1,5 +1,6 @@
 """Roots followed over a parameter as modes with names, from one meeting of roots to the next."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -31,20 +32,25 @@ class _Piece:
     real: int
 
 
-def modes(values: Array, found: Complex, design: float, bicycle: bool = False, speed: bool = False) -> tuple[Mode, ...]:
+def modes(
+    values: Array, found: Complex, design: float, crowds: Sequence[float] = (), *, bicycle: bool = False,
+    speed: bool = False,
+) -> tuple[Mode, ...]:  # fmt: skip
     """Every root between meetings, with the name of its mode.
 
     A root that has no part in a meeting keeps its name. Of a bicycle the names begin where one pair and two real
     roots are, at the highest speed or else at the design: the pair is weave, the real root to the left castering, the
-    other capsize. Of other models roots are numbered from the right at the design. A pair of two real roots is named
-    after both. Where more than two roots meet, as at EP3 and EP4, names begin anew.
+    other capsize; of two pairs that come from no such place the one that is farther right is weave. Of other models
+    roots are numbered from the right at the design. A pair of two real roots is named after both. Where more than two
+    roots meet, as at EP3 and EP4, names begin anew.
 
     Args:
         values: of the parameter, ascending, shape (n,).
         found: roots, shape (n, degree).
         design: value of the design.
+        crowds: where more than two roots meet, besides what the roots show.
     """
-    parts = _stretches(values, found)
+    parts = _pieces(values, found, np.asarray(crowds, dtype=float))
     if not parts:
         return ()
     usual = [k for k, part in enumerate(parts) if bicycle and part.roots.shape[1] == 3 and part.real == 2]
@@ -63,10 +69,11 @@ def modes(values: Array, found: Complex, design: float, bicycle: bool = False, s
     )
 
 
-def _stretches(values: Array, found: Complex) -> list[_Piece]:
+def _pieces(values: Array, found: Complex, crowds: Array) -> list[_Piece]:
     real = np.count_nonzero(found.imag == 0, axis=1)
+    cuts = np.union1d(np.flatnonzero(np.diff(real)) + 1, np.searchsorted(values, crowds))
     parts = []
-    for run in np.split(np.arange(len(values)), np.flatnonzero(np.diff(real)) + 1):
+    for run in np.split(np.arange(len(values)), cuts):
         if len(run) < _LEAST or np.ptp(values[run]) < _SHORT * np.ptp(values):
             continue
         own, count = found[run], int(real[run[0]])

@@ -21,7 +21,7 @@ from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import Unit
 from tmsopt.errors import Fault, InputError, suggest
 from tmsopt.models import Model
-from tmsopt.plots.labels import AxisScale, Name, abscissa_label, finished, scale_of, words_of
+from tmsopt.plots.labels import AxisScale, Name, abscissa_label, events_of, finished, scale_of
 from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, figure_of, on_axes
 from tmsopt.records import Array
 from tmsopt.roots import CLASSES
@@ -68,7 +68,7 @@ def fill_classes(ax: Axes, chart: Chart, plane: Plane) -> None:
 
 def class_handles(kind: NDArray[np.int8], model: Model) -> list[Patch]:
     """Legend entries of the classes that occur."""
-    words = {kind: f"unstable by {word}" for kind, word in words_of(model).items()}
+    words = {kind: f"unstable by {word}" for kind, word in events_of(model).items()}
     present = [code for code in range(len(CLASSES)) if np.any(kind == code)]
     return [
         Patch(facecolor=CLASS_COLOURS[k], edgecolor="grey", label=words.get(CLASSES[k], CLASSES[k])) for k in present

@@ -10,7 +10,7 @@ from matplotlib.typing import LineStyleType
 from tmsopt.critical_speeds.growth import SPEEDS, Growth, growth
 from tmsopt.critical_speeds.modes import Mode
 from tmsopt.design.solution import Solution
-from tmsopt.plots.labels import AxisScale, Name, finished, place_names, scale_over, words_of
+from tmsopt.plots.labels import AxisScale, Name, events_of, finished, place_names, scale_over
 from tmsopt.plots.style import (
     CAPSIZE,
     COMPLEX,
@@ -29,6 +29,7 @@ from tmsopt.records import Array
 _DASHED, _DOTTED = (0, (6, 2)), (0, (4, 2, 1, 2))
 _STYLES: Mapping[str, tuple[str, LineStyleType]] = {
     "weave": (CRITICAL, "-"), "capsize": (MARK, _DASHED), "castering": (REAL, _DOTTED),
+    "capsize + castering": (COMPLEX, "-"), "second pair": (COMPLEX, _DASHED),
 }  # fmt: skip
 _OTHERS: Sequence[tuple[str, LineStyleType]] = (
     (CRITICAL, "-"), (MARK, _DASHED), (REAL, _DOTTED), (COMPLEX, "-"), (LINE, _DASHED),
@@ -120,7 +121,7 @@ def _part(data: Growth, mode: Mode, part: str) -> Array:
 def _marks(ax: Axes, data: Growth, scale: AxisScale, part: str) -> None:
     """Lines where a mode loses stability and at the design, and circles where roots meet."""
     unit = f" {scale.unit.text}" if scale.unit.text else ""
-    words = words_of(data.problem.model)
+    words = events_of(data.problem.model)
     for kind, (colour, style) in _EVENTS.items():
         at = scale.of([c.at for c in data.events if c.kind == kind])
         label = f"{words[kind]} at {', '.join(f'{x:.4g}' for x in at)}{unit}"

@@ -10,10 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike
 
-from tmsopt.critical_speeds.growth import BICYCLES
 from tmsopt.design.problem import Problem
 from tmsopt.design.unit_system import Unit, unit_of
-from tmsopt.models import Model, Parameter
+from tmsopt.models import Model, Parameter, words_of
 from tmsopt.plots.style import figure_of, legend_below
 from tmsopt.records import Array
 
@@ -74,11 +73,9 @@ def abscissa_label(problem: Problem, words: str = "spectral abscissa") -> str:
     return words + (" in 1/s" if of is problem.model.sets[0] else r" per $\sqrt{g/w}$")
 
 
-def words_of(model: Model) -> dict[str, str]:
+def events_of(model: Model) -> dict[str, str]:
     """What a pair of roots, a root 0 and a root at infinity on their way to the right are called."""
-    bicycle = model.name in BICYCLES and model.statement is None
-    names = ("weave", "capsize") if bicycle else ("flutter", "divergence")
-    return {"weave": names[0], "capsize": names[1], "infinity": "root at infinity"}
+    return {**words_of(model), "infinity": "root at infinity"}
 
 
 def finished(ax: Axes, own: bool, names: Sequence[Name] = (), handles: Sequence[Artist] | None = None) -> Axes:

@@ -10,6 +10,7 @@ from matplotlib.ticker import NullFormatter
 from tmsopt.checks.law_rows import SAME_LAW
 from tmsopt.explanation import Explanation
 from tmsopt.margins import Nearest, Robustness
+from tmsopt.models import words_of
 from tmsopt.paper import Comparison, Ledger
 from tmsopt.plots.labels import Name, abscissa_label, finished, scale_of
 from tmsopt.plots.style import CRITICAL, STABLE, on_axes
@@ -49,21 +50,20 @@ def draw_robustness(data: Robustness | Nearest, ax: Axes | None = None) -> Axes:
     own, relative = ax is None, False
     if isinstance(data, Robustness):
         nearest, relative = data.limit, data.relative
+        words = {**_TOWARDS, **words_of(data.problem.model)}
         near = [n for n in (data.weave, data.capsize, data.infinity, data.heavy_damping) if n.found]
     else:
-        nearest, near = data, [data]
-    times, unit = (100.0, " %") if relative else (1.0, "")
+        nearest, near, words = data, [data], _TOWARDS
+    times, unit = (100.0, "\N{NO-BREAK SPACE}%") if relative else (1.0, "")
     parts = [(n, x) for n, x in nearest.direction.items() if abs(x) > _SEEN * nearest.distance]
     parts.sort(key=lambda item: -abs(item[1]))
     ax = on_axes(ax, 6.0, 1.3 + 0.26 * len(parts))
-    far = ", ".join(f"{_TOWARDS.get(n.kind, n.kind)} at {times * n.distance:.3g}{unit}" for n in near)
+    far = ", ".join(f"{words.get(n.kind, n.kind)} at {times * n.distance:.3g}{unit}" for n in near)
     ax.set_title(fill(far, 62) or "no boundary found", fontsize=9.5)
     _bars(ax, [name for name, _ in parts], [times * x for _, x in parts])
     ax.axvline(0, color="grey", linewidth=0.6)
-    ax.set_xlabel(
-        f"change towards {_TOWARDS.get(nearest.kind, nearest.kind)}"
-        + (" in %" if relative else " in units of the weights")
-    )
+    towards = f"change towards {words.get(nearest.kind, nearest.kind)}"
+    ax.set_xlabel(f"{towards} in {'%' if relative else 'units of the weights'}")
     return finished(ax, own)
 
 

@@ -5,7 +5,7 @@ import math
 from matplotlib.axes import Axes
 
 from tmsopt.critical_speeds.speeds import Speeds
-from tmsopt.plots.labels import finished, scale_over, words_of
+from tmsopt.plots.labels import events_of, finished, scale_over
 from tmsopt.plots.style import CAPSIZE, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, on_axes
 
 _COLOURS = {"weave": CRITICAL, "capsize": MARK, "infinity": CAPSIZE}
@@ -21,7 +21,7 @@ def draw_speeds(data: Speeds, ax: Axes | None = None) -> Axes:
     """
     own, problem = ax is None, data.problem
     ax = on_axes(ax, 6.4, 2.4, problem.title)
-    scale, words = scale_over(problem, problem.parameter_set[data.parameter]), words_of(problem.model)
+    scale, words = scale_over(problem, problem.parameter_set[data.parameter]), events_of(problem.model)
     at = data.parameters.get(data.parameter, data.lower)
     last = _MARGIN * max(c.at for c in data.found) if data.found else data.lower + 2 * abs(at) + 1
     high = data.upper if math.isfinite(data.upper) else max(last, _MARGIN * at)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from tmsopt.design.unit_system import Unit
 from tmsopt.plots.labels import AxisScale, abscissa_label, finished, scale_of
@@ -81,7 +82,8 @@ def _over_what_varies(ax: Axes, data: Results) -> str:
         ax.plot(x, y, "o-" if study.method == "grid" else "o", color=CRITICAL, markersize=3.5, linewidth=0.8)
     else:
         aside = scale_of(study.problem, second)
-        drawn = ax.scatter(x, y, c=aside.of([r.varied[second] for r in found]), s=12, cmap="cividis")
+        drawn = ax.scatter(x, y, c=aside.of([r.varied[second] for r in found]), s=26, cmap="cividis", edgecolors="0.3")
         figure_of(ax).colorbar(drawn, ax=ax, label=aside.label)
     ax.set(xlabel=across.label if across else "row", ylabel=scale.label)
+    ax.xaxis.set_major_locator(MaxNLocator(6))
     return f"{len(found)} of {len(rows)} rows optimal"
