@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from tmsopt.errors import short
+from tmsopt.design import unit_of
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
@@ -28,7 +28,8 @@ def of_solution(solution: "Solution") -> Words:
     problem = solution.problem
     yield solution.status.replace("_", " ")
     asked = problem.minimize or problem.maximize
-    yield _value(asked, solution.value) if asked else _value("abscissa", solution.abscissa)
+    name, value = (asked, solution.value) if asked else ("abscissa", solution.abscissa)
+    yield f"{' '.join(name.split())} = {unit_of(problem, name).show(value)}"
     yield solution.structure
     if solution.bound.proven:
         yield "proved"
@@ -174,7 +175,7 @@ def _stable(stable: bool | None) -> Words:
 
 
 def _value(name: str, value: float) -> str:
-    return f"{short(name.strip())[1:-1]} = {value:.5g}" if math.isfinite(value) else f"no {name.strip()}"
+    return f"{name} = {value:.5g}" if math.isfinite(value) else f"no {name}"
 
 
 def _count(count: int, one: str, many: str = "") -> str:

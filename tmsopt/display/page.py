@@ -11,6 +11,7 @@ from html import escape
 from itertools import islice
 from typing import Any
 
+from tmsopt.design import Problem, unit_of
 from tmsopt.display.writers import WRITERS, drawn, report, title_of
 from tmsopt.models import Parameter
 
@@ -50,17 +51,20 @@ def _rows(result: Any) -> list[Sequence[str]]:
     problem, parameters = getattr(result, "problem", None), getattr(result, "parameters", None)
     if problem is None or not isinstance(parameters, Mapping) or not parameters:
         return []
-    of: Iterable[Parameter] = problem.parameter_set.parameters
     rows = [
-        (p.name, _cell(parameters[p.name]), "" if p.unit == "1" else p.unit, p.meaning, _role(problem, p.name))
-        for p in of
+        (p.name, *_number(problem, p, parameters[p.name]), p.meaning, "free" if p.name in problem.free else "fixed")
+        for p in problem.parameter_set.parameters
         if p.name in parameters
     ]
     return [("parameter", "value", "unit", "meaning", ""), *rows]
 
 
-def _role(problem: Any, name: str) -> str:
-    return "free" if name in problem.free else "fixed"
+def _number(problem: Problem, parameter: Parameter, value: Any) -> tuple[str, str]:
+    """A value and its unit: as the problem was written; a proved number, which is a decimal, in SI."""
+    if isinstance(value, float):
+        unit = unit_of(problem, parameter.name)
+        return unit.number(value), unit.text
+    return str(value.value), "" if parameter.unit == "1" else parameter.unit
 
 
 def _records(records: Iterable[Mapping[str, Any]]) -> list[Sequence[str]]:
@@ -73,9 +77,7 @@ def _records(records: Iterable[Mapping[str, Any]]) -> list[Sequence[str]]:
 
 
 def _cell(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    return str(getattr(value, "value", value))  # of a proved number, its decimals
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _table(rows: Sequence[Sequence[str]]) -> str:

@@ -116,7 +116,7 @@ def plotted(result: Any, ax: "Axes | None" = None) -> "Axes":
         number, canvas = blank.number, type(blank.canvas)
         plt.close(blank)
         figure: Any = axes.get_figure()
-        Gcf.set_active(canvas.new_manager(figure, number))
+        Gcf._set_new_active_manager(canvas.new_manager(figure, number))
     return axes
 
 
