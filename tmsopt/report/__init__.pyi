@@ -9,7 +9,8 @@ from .proof import proof_text as proof_text
 from .solution import (
     design_report as design_report, si_parameters as si_parameters, diagnosis_lines as diagnosis_lines,
     explained_lines as explained_lines, nearest_table as nearest_table, optimality_lines as optimality_lines,
-    robustness_line as robustness_line, robustness_table as robustness_table, Findings as Findings, findings as findings,
+    robustness_line as robustness_line, robustness_table as robustness_table, Findings as Findings,
+    findings as findings,
     infeasible_lines as infeasible_lines,
     rounding_line as rounding_line,
 )
