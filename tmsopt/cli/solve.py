@@ -176,7 +176,7 @@ def solve(
     else:
         si = tmsopt.report.si_parameters(solution, w, m_B) if wheelbase or rear_mass else None
         with _explaining(full):
-            found = tmsopt.report.solution.findings(solution, full)
+            found = tmsopt.report.findings(solution, full)
         click.echo(tmsopt.report.solution.design_report(solution, found, full, si))
     if plot is not None:
         _draw(solution, plot, over, w, m_B)
@@ -220,7 +220,7 @@ def _as_json(solution: "Solution", full: bool) -> dict[str, Any]:
     data = solution.to_json()
     if not full:
         return {name: value for name, value in data.items() if name in _CONTRACT}
-    found = tmsopt.report.solution.findings(solution, full)
+    found = tmsopt.report.findings(solution, full)
     meaning = {
         "meaning": found.explanation and found.explanation.to_json(),
         "robustness": found.robustness and found.robustness.to_json(),
