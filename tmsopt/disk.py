@@ -232,13 +232,18 @@ def path_of(given: object, what: str) -> Path:
     return Path(given)
 
 
-def write_csv(path: str | PathLike[str], rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows with the same names as one table.
+def write_csv(path: str | PathLike[str], rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> None:
+    """Write rows with the same names as one table, headed by the names with the units that they have.
 
     Raises:
         OSError: when the file cannot be written.
     """
     with path_of(path, "the file to write").open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.DictWriter(stream, fieldnames=list(rows[0]) if rows else [])
-        writer.writeheader()
-        writer.writerows(rows)
+        names = list(rows[0]) if rows else []
+        csv.writer(stream).writerow(headed(n, units.get(n, "")) for n in names)
+        csv.DictWriter(stream, fieldnames=names).writerows(rows)
+
+
+def headed(name: str, unit: str) -> str:
+    """The head of a column: ``v (m/s)``."""
+    return f"{name} ({unit})" if unit else name

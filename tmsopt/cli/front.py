@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 
 def write_front(
-    problem: "Problem", asked: dict[str, Any], as_json: bool, plot: Path | None, csv_file: Path | None
-) -> None:
+    problem: "Problem", asked: dict[str, Any], as_json: bool, plot: Path | None, csv_file: Path | None, full: bool
+) -> None:  # fmt: skip
     """Find the front and write it where it is asked for.
 
     Raises:
@@ -26,7 +26,7 @@ def write_front(
     if as_json:
         write_json(front.to_json())
     else:
-        click.echo(tmsopt.report.front_table(front))
+        click.echo(front.report(full))
     if csv_file is not None:
         with saving("--csv", csv_file):
             front.write_csv(csv_file)

@@ -162,7 +162,7 @@ def solve(
         _solve_all(problem, as_json, asked | options(seconds=seconds))
     if problem.pareto:
         try:
-            write_front(problem, asked | options(points=points), as_json, plot, csv_file)
+            write_front(problem, asked | options(points=points), as_json, plot, csv_file, full)
             return
         except tmsopt.NotSolved as error:
             solution, plot = error.solution, None
@@ -177,7 +177,7 @@ def solve(
         si = tmsopt.report.si_parameters(solution, w, m_B) if wheelbase or rear_mass else None
         with _explaining(full):
             found = tmsopt.report.findings(solution, full)
-        click.echo(tmsopt.report.solution.design_report(solution, found, full, si))
+        click.echo(tmsopt.report.design_report(solution, found, full, si))
     if plot is not None:
         _draw(solution, plot, over, w, m_B)
     sys.exit(INTERRUPTED if solution.interrupted else _EXIT[solution.status])
@@ -200,7 +200,7 @@ def _check_options(problem: "Problem", given: list[str], every: bool) -> None:
         wrong["--seconds"] = "is for the proof of --all; write --all too, or leave it out"
     if problem.pareto:
         message = "is for one design, and the file asks for a front; write minimize with one of the expressions"
-        wrong |= dict.fromkeys(alone, message)
+        wrong["--certify"] = message
         message = "scales one design, and the file asks for a front; write the problem in SI instead"
         wrong |= dict.fromkeys(scaled, message)
     else:

@@ -7,7 +7,7 @@ from typing import Any
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Freedom, Problem
 from tmsopt.design.quantities import ROOT_NAMES
-from tmsopt.design.unit_system import dimension_of, si_units, unit_of
+from tmsopt.design.unit_system import unit_of, units_of
 from tmsopt.records import Shown, Table, plain
 from tmsopt.roots import Root
 from tmsopt.units import Reading
@@ -225,11 +225,8 @@ class Solution(Shown):
     @property
     def units(self) -> dict[str, str]:
         """The unit of each number that has one, as they are kept and as JSON has them: rad and SI."""
-        units, problem = si_units(self.problem), self.problem
-        limits = {name: dimension_of(problem, name, units).unit for name in problem.constraints}
-        text = problem.minimize or problem.maximize
-        asked = {text: dimension_of(problem, text, units).unit} if text else {}
-        return {name: unit for name, unit in {**units, **limits, **asked}.items() if unit != "1"}
+        text = self.problem.minimize or self.problem.maximize
+        return units_of(self.problem, [text] if text else [])
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None.

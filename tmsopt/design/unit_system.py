@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from tmsopt.design.expression import Expression, dimension, parse_comparison, parse_value
@@ -53,6 +53,17 @@ def si_units(problem: Problem) -> dict[str, str]:
     listed: tuple[Parameter | Quantity, ...] = (*problem.model.quantities, *of.quantities, *of.parameters)
     rates = {"abscissa": of.root_unit, "decay_rate": "1/s", "decay_time": "s", "frequency": "Hz"}
     return dict.fromkeys(problem.vocabulary, "1") | rates | {q.name: q.unit for q in listed}
+
+
+def units_of(problem: Problem, texts: Iterable[str] = ()) -> dict[str, str]:
+    """The unit of each number that has one, as it is kept, computed and written as data: rad and SI.
+
+    Args:
+        texts: expressions beside parameters, quantities and constraints.
+    """
+    units = si_units(problem)
+    asked = {text: dimension_of(problem, text, units).unit for text in (*problem.constraints, *texts)}
+    return {name: unit for name, unit in {**units, **asked}.items() if unit != "1"}
 
 
 def dimension_of(problem: Problem, text: str, units: Mapping[str, str] | None = None) -> Dimension:

@@ -34,7 +34,7 @@ WRITERS: Mapping[str, Writer] = {
     "Solution": Writer(
         lambda x, full: texts.design_report(x, texts.findings(x, full), full), headlines.of_solution, "draw_growth"
     ),
-    "Front": Writer(lambda x, full: texts.front_table(x), headlines.of_front, "draw_front"),
+    "Front": Writer(texts.front_table, headlines.of_front, "draw_front"),
     "Trace": Writer(lambda x, full: texts.trace_table(x), headlines.of_trace, "draw_trace"),
     "Branch": Writer(lambda x, full: texts.branch_table(x), headlines.of_branch, ""),
     "Chart": Writer(lambda x, full: texts.chart_table(x), headlines.of_chart, "draw_chart"),
@@ -42,7 +42,7 @@ WRITERS: Mapping[str, Writer] = {
     "Growth": Writer(lambda x, full: texts.growth_table(x), headlines.of_growth, "draw_growth"),
     "Comparison": Writer(lambda x, full: texts.comparison_table(x), headlines.of_comparison, "draw_comparison"),
     "Results": Writer(
-        lambda x, full: texts.study_table(x.study, x.summary, x.rows), headlines.of_results, "draw_histogram"
+        lambda x, full: texts.study_table(x.study, x.summary, x.rows, full), headlines.of_results, "draw_histogram"
     ),
     "Proof": Writer(lambda x, full: texts.proof_text(x.problem, x), headlines.of_proof, "draw_roots"),
     "Every": Writer(lambda x, full: texts.every_table(x), headlines.of_every, "draw_designs"),

@@ -7,6 +7,7 @@ from typing import Any
 
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
+from tmsopt.design.unit_system import units_of
 from tmsopt.disk import write_csv
 from tmsopt.records import Tabular, plain
 
@@ -129,7 +130,11 @@ class Front(Tabular):
             OSError: when the file cannot be written.
         """
         words = {None: "", True: "true", False: "false"}
-        write_csv(path, [{**row, "stable": words[row["stable"]]} for row in self.records()])
+        write_csv(
+            path,
+            [{**row, "stable": words[row["stable"]]} for row in self.records()],
+            units_of(self.problem, self.objectives),
+        )
 
     def to_json(self) -> dict[str, Any]:
         """The JSON of `tmsopt solve` for a front; numbers that do not exist are None."""
@@ -137,6 +142,7 @@ class Front(Tabular):
             **self.problem.heading,
             "status": "optimal",
             "objective": {"sense": "pareto", "expressions": list(self.objectives)},
+            "units": units_of(self.problem, self.objectives),
             **plain(self, "ideal nadir points kinks gaps notes solved"),
             "seconds": round(self.seconds, 4),
         }

@@ -1,9 +1,12 @@
 """A design beside the laws of the paper, and one formulation beside the other, as text."""
 
+import textwrap
+from collections.abc import Iterator, Mapping
+
 from tmsopt.models import tms
 from tmsopt.paper.compare import Comparison
 from tmsopt.report.solution.design import branch_lines, headline
-from tmsopt.report.text import columns, number
+from tmsopt.report.text import WIDTH, columns, number
 
 
 def comparison_table(comparison: Comparison) -> str:
@@ -11,15 +14,17 @@ def comparison_table(comparison: Comparison) -> str:
     design = comparison.design
     lines = [design.problem.title or "untitled problem", *headline(design), ""]
     rows = [("law", "of", "numeric", "law says", "relative", "")]
+    silent: dict[str, list[str]] = {}
     for row in comparison.laws:
-        verdict = row.reason or ("agrees" if row.agrees else "DIFFERS")
-        relative = f"{row.relative:.1e}" if row.applies else ""
-        law = number(row.law) if row.applies else ""
-        rows.append((row.label, row.subject, number(row.numeric), law, relative, verdict))
+        if row.applies:
+            verdict = "agrees" if row.agrees else "DIFFERS"
+            rows.append((row.label, row.subject, number(row.numeric), number(row.law), f"{row.relative:.1e}", verdict))
+        else:
+            silent.setdefault(row.reason, []).append(f"{row.label} ({row.subject})")
     known = design.problem.model is tms
     model = design.problem.model
     named = f"the {model.title}" if model.statement is None else f"'{model.title}'"
-    lines += columns(rows) if known else [f"no laws are known of {named}, only of skates (tms)"]
+    lines += [*columns(rows), *_silent(silent)] if known else [f"no laws are known of {named}, only of skates (tms)"]
     lines.append("")
     if comparison.other is None:
         lines.append(f"other formulation: none, {comparison.reason}")
@@ -29,3 +34,9 @@ def comparison_table(comparison: Comparison) -> str:
         lines += columns(rows2)
     lines += branch_lines(design)
     return "\n".join(line.rstrip() for line in lines).rstrip()
+
+
+def _silent(laws: Mapping[str, list[str]]) -> Iterator[str]:
+    """Laws that say nothing of a design, by the reason."""
+    for reason, named in laws.items():
+        yield from textwrap.wrap(f"say nothing here: {', '.join(named)}; {reason}", WIDTH, subsequent_indent="  ")

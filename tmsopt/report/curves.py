@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 from tmsopt.charts.chart import Chart
+from tmsopt.design.unit_system import unit_of
 from tmsopt.fronts.front import Front
 from tmsopt.models import Model, ParameterSet, in_words_of
-from tmsopt.report.text import columns, number, with_unit, yes_no
+from tmsopt.report.text import HEIGHT, columns, number, screen, with_unit, yes_no
 from tmsopt.roots import pattern
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
 from tmsopt.tracing.domain import Domain
@@ -92,28 +93,36 @@ def _summary_table(of: ParameterSet, data: Mapping[str, Any], model: Model) -> s
     return "\n".join(line.rstrip() for line in lines)
 
 
-def front_table(front: Front) -> str:
-    """Points one a row: objectives, free parameters, structure, whether stable, limits that bind, ends and kinks."""
-    of = front.problem.parameter_set
+def front_table(front: Front, full: bool = False) -> str:
+    """Points one a row: objectives, structure, ends and kinks, limits that bind, free parameters, whether stable.
+
+    Args:
+        full: every point, with all its digits.
+    """
+    problem = front.problem
     texts = [t.strip() for t in front.objectives]
-    free = [n for n in front.problem.free if n not in texts]
+    free = [n for n in problem.free if n not in texts]
     count = f"{len(front)} point" + ("s" if len(front) != 1 else "")
-    where = f", designs with {front.problem.locate}" if front.problem.locate else ""
+    where = f", designs with {problem.locate}" if problem.locate else ""
     special = ((len(front.kinks), "kink"), (len(front.gaps), "gap"))
     counted = "".join(f"{n} {word}{'s' if n > 1 else ''}, " for n, word in special if n)
     lines = [
-        front.problem.title or "untitled problem",
+        problem.title or "untitled problem",
         f"front of least {', '.join(texts)}{where}: {count}, {counted}"
         f"{front.solved} sub-problems; {front.seconds:.2f} s",
         "",
     ]
-    headings = [with_unit(of, t) if t in of.names else t for t in texts]
-    rows = [(*headings, *(with_unit(of, n) for n in free), "structure", "stable", "limits that bind", "")]
+    units, digits = {n: unit_of(problem, n) for n in (*texts, *free)}, 12 if full else 6
+    heads = {n: f"{n} {units[n].text}".rstrip() for n in units}
+    rows = [(*(heads[t] for t in texts), "", "stable", *(heads[n] for n in free), "structure", "limits that bind")]
     for p in front.points:
-        numbers = [number(v) for v in p.objectives] + [f"{p.solution.parameters[n]:.8g}" for n in free]
-        rows.append((*numbers, p.structure, yes_no(p.stable), ", ".join(p.limits), p.label))
-    lines += columns(rows)
+        numbers = [units[t].number(v, digits) for t, v in zip(texts, p.objectives, strict=True)]
+        design = [units[n].number(p.solution.parameters[n], digits) for n in free]
+        rows.append((*numbers, p.label, yes_no(p.stable), *design, p.structure, ", ".join(p.limits)))
     remarks = [f"gap: {gap.reason}" for gap in front.gaps] + [f"note: {note}" for note in front.notes]
+    labelled = [k for k, p in enumerate(front.points) if p.label]
+    height = HEIGHT - len(lines) - len(remarks) - 2 * bool(remarks) - 3
+    lines += columns(rows) if full else screen(rows, height, labelled, "--full, --csv")
     return "\n".join(line.rstrip() for line in [*lines, *([""] if remarks else []), *remarks])
 
 

@@ -1,35 +1,43 @@
 """Studies as text for a reader."""
 
 import math
-from collections.abc import Iterable, Sequence
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
 
-from tmsopt.models import ParameterSet
-from tmsopt.report.text import columns, number, with_unit, yes_no
+from tmsopt.design.unit_system import unit_of
+from tmsopt.report.text import HEIGHT, WIDTH, columns, number, screen, yes_no
 from tmsopt.studies.row import Row
 from tmsopt.studies.study import Study
 from tmsopt.studies.summary import Share, Summary
 
 LISTED = 40
-"""Rows up to which a study is shown whole."""
+"""Rows that are shown where all is wanted."""
 
-_FIRST = 10  # rows of a longer one
+_FIRST = 10  # rows that are shown
 _CAUSES = 5
+_DIGITS = 6
 _WORDS = {"not_converged": "not converged"}
 _EVALUATED = {"optimal": "feasible"}
 
 
-def study_table(study: Study, found: Summary, rows: Iterable[Row]) -> str:
-    """What varies, how the rows ended, the rows or the first of them, the best one and what the rows say together."""
-    listed = list(islice(rows, LISTED + 1))
-    whole = len(listed) <= LISTED
-    lines = [study.title or study.problem.title or "untitled study", _headline(study, found), ""]
+def study_table(study: Study, found: Summary, rows: Iterable[Row], full: bool = False) -> str:
+    """What varies, how the rows ended, the first rows, the best one and what the rows say together.
+
+    Args:
+        full: up to `LISTED` rows, with every column.
+    """
+    listed = list(islice(rows, LISTED if full else _FIRST))
+    title = study.title or study.problem.title or "untitled study"
+    lines = [*textwrap.wrap(title, WIDTH), *textwrap.wrap(_headline(study, found), WIDTH, subsequent_indent="  "), ""]
     if listed:
-        lines += columns(_row_cells(study, listed if whole else listed[:_FIRST]))
-        lines += [] if whole else [f"  … {found.rows} rows in all; --export rows.csv writes them"]
+        cells = _row_cells(study, listed)
+        lines += columns(cells) if full else screen(cells, _FIRST, more="--export rows.csv")
+        lines += [f"  … {found.rows} rows in all; --export rows.csv writes them"] if found.rows > len(listed) else []
         lines.append("")
-    lines += _facts(study, found)
-    return "\n".join(line.rstrip() for line in lines).rstrip()
+    for fact in _facts(study, found):
+        lines += [fact] if full else textwrap.wrap(fact, WIDTH, subsequent_indent="  ")
+    return "\n".join(line.rstrip() for line in (lines if full else lines[:HEIGHT])).rstrip()
 
 
 def row_lines(row: Row) -> str:
@@ -51,31 +59,39 @@ def _headline(study: Study, found: Summary) -> str:
 
 
 def _row_cells(study: Study, rows: Sequence[Row]) -> list[tuple[str, ...]]:
-    of = study.problem.parameter_set
-    free = [name for name in study.problem.free if name not in study.columns]
-    text = study.problem.minimize or study.problem.maximize
+    problem = study.problem
+    free = [name for name in problem.free if name not in study.columns]
+    text = problem.minimize or problem.maximize
     asked = [text] if text and text != "abscissa" and text not in free else []
-    heads = ["row", *(_head(of, n) for n in study.columns), "status", *asked, "abscissa", "structure", "stable"]
-    heads += [*(_head(of, n) for n in free), *(_report_head(study, text) for text in _reports(study))]
-    return [tuple(heads), *(_cells(study, row, bool(asked), free) for row in rows)]
+    units = {n: f"{n} {unit_of(problem, n).text}".rstrip() for n in (*study.columns, *asked, *free, *_reports(study))}
+    varied, objective, rest = ([units[n] for n in names] for names in (study.columns, asked, (*free, *_reports(study))))
+    heads = ["row", *varied, "status", *objective, "abscissa", "structure", "stable", *rest]
+    return [tuple(heads), *(_cells(study, row, asked, free) for row in rows)]
 
 
-def _cells(study: Study, row: Row, asked: bool, free: Sequence[str]) -> tuple[str, ...]:
-    known = row.status in ("optimal", "not_converged") or (row.status == "infeasible" and not study.problem.free)
+def _cells(study: Study, row: Row, asked: Sequence[str], free: Sequence[str]) -> tuple[str, ...]:
+    problem = study.problem
+    known = row.status in ("optimal", "not_converged") or (row.status == "infeasible" and not problem.free)
+
+    def shown(name: str, values: Mapping[str, float]) -> str:
+        return unit_of(problem, name).number(values[name], _DIGITS) if name in values else ""
+
+    found = (row.parameters, row.reports) if known else ({}, {})
     return (
-        str(row.number), *(_short(row.varied[n]) for n in study.columns), _word(study, row.status),
-        *([_short(row.objective) if known else ""] if asked else []), _short(row.abscissa) if known else "",
+        str(row.number), *(shown(n, row.varied) for n in study.columns), _word(study, row.status),
+        *(shown(n, {n: row.objective} if known else {}) for n in asked), _short(row.abscissa) if known else "",
         row.structure if known else "", yes_no(row.stable) if known else "",
-        *(_short(row.parameters[n]) if known and n in row.parameters else "" for n in free),
-        *(_short(row.reports[text]) if known and text in row.reports else "" for text in _reports(study)),
+        *(shown(n, found[0]) for n in free), *(shown(n, found[1]) for n in _reports(study)),
     )  # fmt: skip
 
 
 def _facts(study: Study, found: Summary) -> list[str]:
     lines = []
     if found.best is not None and study.problem.free:
-        given = ", ".join(f"{name} = {number(value)}" for name, value in found.best.varied.items())
-        lines.append(f"best: row {found.best.number}, {number(found.best.objective)} at {given}")
+        problem = study.problem
+        given = ", ".join(f"{n} = {unit_of(problem, n).show(x, _DIGITS)}" for n, x in found.best.varied.items())
+        best = unit_of(problem, problem.minimize or problem.maximize or "").show(found.best.objective, _DIGITS)
+        lines.append(f"best: row {found.best.number}, {best} at {given}")
     same = (study.problem.minimize or "").strip() == "abscissa"
     for name, (least, median, most) in found.spread.items():
         if (same and name == "objective") or found.product is not None:
@@ -93,7 +109,7 @@ def _facts(study: Study, found: Summary) -> list[str]:
     if found.product is not None:
         for name in ("stable", "feasible", "good"):
             lines.append(f"{_SHARES[name]}: {_share(getattr(found.product, name))}")
-        at = ", ".join(f"{100 * float(q):g} % {number(value)}" for q, value in found.product.abscissa.items())
+        at = ", ".join(f"{100 * float(q):g} % {_short(value)}" for q, value in found.product.abscissa.items())
         lines.append(f"abscissa at most, for a share of all rows: {at}")
     for cause, count in islice(found.causes.items(), _CAUSES):
         lines.append(f"{count} × {cause}")
@@ -112,23 +128,9 @@ def _share(share: Share) -> str:
     )
 
 
-def _head(of: ParameterSet, name: str) -> str:
-    """The name of a column with its unit."""
-    stem = name.removesuffix(".min").removesuffix(".max")
-    return name if stem not in of.names else with_unit(of, stem).replace(stem, name, 1)
-
-
 def _reports(study: Study) -> list[str]:
     """What is recorded beside what has a column anyway."""
     return [text for text in study.report if text not in ("abscissa", *study.problem.free, *study.columns)]
-
-
-def _report_head(study: Study, text: str) -> str:
-    """An expression, with its unit where it is a quantity."""
-    problem = study.problem
-    quantities = {q.name: q.unit for q in (*problem.model.quantities, *problem.parameter_set.quantities)}
-    unit = quantities.get(text.strip(), "1")
-    return text if unit == "1" else f"{text} {unit}"
 
 
 def _word(study: Study, status: str) -> str:
@@ -137,4 +139,4 @@ def _word(study: Study, status: str) -> str:
 
 
 def _short(value: float) -> str:
-    return f"{value:.9g}" if math.isfinite(value) else "none"
+    return f"{value + 0.0:.{_DIGITS}g}" if math.isfinite(value) else "none"

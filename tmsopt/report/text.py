@@ -1,9 +1,12 @@
 """Numbers and columns as text."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from tmsopt.models import ParameterSet
+
+WIDTH, HEIGHT = 100, 30
+"""Columns of every line; lines of a report, if not full."""
 
 
 def number(value: float) -> str:
@@ -20,6 +23,27 @@ def with_unit(of: ParameterSet, name: str) -> str:
     """A parameter with the unit of its numbers, e.g. ``v m/s``."""
     unit = of[name].unit
     return name if unit == "1" else f"{name} {unit}"
+
+
+def screen(rows: Sequence[Sequence[str]], height: int, keep: Collection[int] = (), more: str = "--full") -> list[str]:
+    """Rows as lines that fit a screen: at most so many besides the head, 100 columns; what is left out is counted.
+
+    Args:
+        keep: numbers of rows that stay; the others are thinned evenly.
+        more: where all of them are.
+    """
+    head, *body = rows
+    chosen = range(len(body))
+    if len(body) > height:
+        spread = {round(k * (len(body) - 1) / max(height - len(keep) - 2, 1)) for k in range(height - len(keep) - 1)}
+        chosen = sorted({*keep, *spread})[: height - 1]  # type: ignore[assignment]
+    shown = [head, *(body[k] for k in chosen)]
+    most = len(head)
+    while most > 1 and len(max(columns([row[:most] for row in shown]), key=len).rstrip()) > WIDTH:
+        most -= 1
+    left = [f"{len(body) - len(chosen)} more rows"] if len(chosen) < len(body) else []
+    left += [f"more columns: {', '.join(h for h in head[most:] if h)}"] if most < len(head) else []
+    return columns([row[:most] for row in shown]) + ([f"  … {'; '.join(left)} ({more})"[:WIDTH]] if left else [])
 
 
 def columns(rows: Sequence[Sequence[str]]) -> list[str]:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from array import array
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.disk import whole
+from tmsopt.disk import headed, whole
 from tmsopt.errors import Fault, InputError, needed
 from tmsopt.records import Array
 from tmsopt.studies.row import Row
@@ -115,13 +116,21 @@ def _ending(path: Path) -> str:
     return path.suffix.lstrip(".").lower()
 
 
-def _csv(table: Mapping[str, PartialColumn], path: Path, _: str) -> None:
+def _csv(table: Mapping[str, PartialColumn], path: Path, metadata: str) -> None:
+    units = json.loads(metadata).get("units", {})
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(table)
+        writer.writerow(headed(name, units.get(_bare(name), "")) for name in table)
         for first in range(0, len(next(iter(table.values())).values), _CHUNK):
             texts = [_texts(c.values[first : first + _CHUNK], c.present[first:]) for c in table.values()]
             writer.writerows(zip(*texts, strict=True))
+
+
+def _bare(header: str) -> str:
+    """The name whose unit a column has: of what varies, is reported or violated, that without its prefix and end."""
+    for prefix in (PREFIXES["varied"], PREFIXES["reports"], PREFIXES["violations"]):
+        header = header.removeprefix(prefix)
+    return re.sub(r"\.(min|max|limit)$", "", header)
 
 
 def _texts(values: np.ndarray[Any, Any], present: NDArray[np.bool_]) -> list[str]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
+from tmsopt.design.unit_system import units_of
 from tmsopt.disk import path_of
 from tmsopt.errors import Fault, InputError, count_faults, short, suggest
 from tmsopt.records import SCHEMA, Progress, Shown, frame
@@ -102,7 +103,9 @@ class Results(Shown):
 
     def export(self, path: str | PathLike[str]) -> None:
         """Write the rows to a CSV, Parquet or netCDF file; see `tmsopt.studies.export`."""
-        export(self.rows, path_of(path, "the file to write"), self.about or {"definition": definition(self.study)})
+        about = dict(self.about or {"definition": definition(self.study)})
+        units = units_of(self.study.problem, self.study.report)
+        export(self.rows, path_of(path, "the file to write"), about | {"units": units})
 
 
 def run_study(

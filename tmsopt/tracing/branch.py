@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.problem import Problem
+from tmsopt.design.unit_system import units_of
 from tmsopt.disk import write_csv
 from tmsopt.records import Array, Table, Tabular, plain
 
@@ -144,12 +145,13 @@ class Trace(Tabular):
         Raises:
             OSError: when the file cannot be written.
         """
-        write_csv(path, list(self.records()))
+        write_csv(path, list(self.records()), units_of(self.problem))
 
     def to_json(self) -> dict[str, Any]:
         """The JSON of `tmsopt trace`."""
         return {
             **self.problem.heading, "pattern": self.pattern, "free": list(self.problem.free),
+            "units": units_of(self.problem),
             **plain(self, "branches starts points seconds"),
             "seconds_per_point": self.seconds_walking / max(self.points, 1),
         }  # fmt: skip

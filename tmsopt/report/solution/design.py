@@ -22,11 +22,8 @@ from tmsopt.report.solution.infeasible import infeasible_lines
 from tmsopt.report.solution.limits import bound_lines, case_lines, limit_text, proof_line
 from tmsopt.report.solution.rows import ALL, loads, motion, parameter_rows, pitching, quantity_rows, role, roots_of
 from tmsopt.report.speeds import range_line
-from tmsopt.report.text import columns
+from tmsopt.report.text import HEIGHT, WIDTH, columns
 from tmsopt.roots.patterns.descriptions import in_words
-
-WIDTH, HEIGHT = 100, 30
-"""Columns of every line; lines of the report, if not full."""
 
 _DIGITS = 5
 _KEPT = "\xa0"  # a space where no line is broken
