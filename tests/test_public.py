@@ -197,6 +197,7 @@ WRONG: list[tuple[Callable[[], Any], str]] = [
     (lambda: tmsopt.robustness(EP4, parameters=["Fr"]), "parameters: found"),
     (lambda: tmsopt.robustness(EP4, weights=3), "weights: found 3"),
     (lambda: tmsopt.over_grid(EP4, [0.1]), "axes: found"),
+    (lambda: tmsopt.latin_hypercube([0.1], 5), "ranges: found"),
     (lambda: tmsopt.verify(only="lscf-1"), "only: found 'lscf-1'; accepted: a list"),
 ]
 

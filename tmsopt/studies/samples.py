@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.errors import Fault, InputError, count_faults
+from tmsopt.errors import Fault, InputError, count_faults, table_faults
 from tmsopt.records import Array, Column
 from tmsopt.studies.validate import MOST_ROWS
 
@@ -132,7 +132,8 @@ def _axis(name: str, values: Any) -> Array:
 
 
 def _spans(ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Span]:
-    found: list[Fault] = []
+    if found := table_faults("ranges", ranges, "{'mu': (0.1, 0.5)}"):
+        raise InputError(found)
     spans: dict[str, Span] = {}
     for name, stated in ranges.items():
         try:
