@@ -62,6 +62,9 @@ def draw_robustness(data: Robustness | Nearest, ax: Axes | None = None) -> Axes:
     ax.set_title(fill(far, 62) or "no boundary found", fontsize=9.5)
     _bars(ax, [name for name, _ in parts], [times * x for _, x in parts])
     ax.axvline(0, color="grey", linewidth=0.6)
+    if not parts:
+        said = "the design is on the boundary" if nearest.found else "none was found"
+        ax.text(0.5, 0.5, said, transform=ax.transAxes, horizontalalignment="center", fontsize=9)
     towards = f"change towards {words.get(nearest.kind, nearest.kind)}"
     ax.set_xlabel(f"{towards} in {'%' if relative else 'units of the weights'}")
     return finished(ax, own)
