@@ -169,7 +169,7 @@ def _plain(value: Any, digits: int | None) -> Any:
         case None | bool() | int() | str():
             return value
         case float():
-            rounded = float(value) if digits is None else float(f"{value:.{digits}g}")
+            rounded = 0.0 + (float(value) if digits is None else float(f"{value:.{digits}g}"))  # no −0
             return rounded if math.isfinite(rounded) else None
         case complex():
             return {"re": _plain(value.real, digits), "im": _plain(value.imag, digits)}

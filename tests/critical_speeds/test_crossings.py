@@ -1,6 +1,7 @@
 """Places where roots meet, of polynomials that are special for every value: roots 0, mirrored, repeated. Closed forms."""
 
 import math
+import re
 
 import pytest
 
@@ -75,7 +76,7 @@ def test_a_leading_coefficient_that_is_0_for_every_value():
 
 def test_what_is_said_of_roots_that_stay_on_the_axis():
     said = speeds_table(_speeds("g", (0, 5), A=lambda g: [[g, -1, 0], [1, 0, -1], [0, 1, -g]]))
-    assert "EP3      1.41421356237309" in said or "EP3      1.4142135623731" in said
+    assert re.search(r"EP3 +1\.414213562373", said)
     assert "s = 0 is a root for every g" in said
     assert "marginally stable (no root right of the imaginary axis, those on it simple): to 1.4142136" in said
     assert "speed" not in said

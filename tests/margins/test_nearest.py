@@ -340,7 +340,7 @@ def test_an_oscillator_without_damping_is_on_the_edge(m, c, k, edges, zeros):
     if edges:
         assert found.limit.kind == edges[0]
         assert found.limit.distance == found.radius == found.to_stability == 0
-        told = f"at its edge already: {zeros[0]} = 0" if zeros else "at the edge of stability as far as rounding tells"
+        told = f"at its edge already: {zeros[0]} = 0" if zeros else "none, on the edge of stability already"
         assert robustness_line(found).startswith(told)
         assert "-0" not in robustness_table(found)
 
@@ -390,3 +390,9 @@ def exactly(design):
     a = polynomial_exact(**at, tan_lambda_s=math.tan(design["lambda_s"]))
     a = [-c for c in a] if a[0] < 0 else a
     return all(c > 0 for c in a) and a[1] * a[2] * a[3] - a[0] * a[3] ** 2 - a[4] * a[1] ** 2 > 0
+
+
+def test_an_undamped_oscillator_without_stiffness_has_both_roots_at_0():
+    """s² = 0: the scale of the roots underflows when their product does, as at 5e-324."""
+    assert abs(roots([1.0, 5e-324, 0.0])).max() <= 1e-160
+    assert robustness(oscillator(1.0, 0.0, 0.0)).edges == ("capsize",)

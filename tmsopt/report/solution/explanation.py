@@ -25,7 +25,7 @@ _NAMED = 3
 """Parameters named in the headline at most."""
 _VERBS = {"divergence": "diverge"}
 """Of words that are no verbs."""
-_ROUNDING = 1e-16
+_ROUNDING, _ROUNDED = 1e-16, 1e-13
 
 
 def explained_lines(explanation: Explanation) -> list[str]:
@@ -104,11 +104,21 @@ def optimality_lines(optimality: Optimality) -> list[str]:
 
 
 def _root_line(root: OnLine) -> str:
-    place = f"{root.re:.5g}" + (f" ± {root.im:.5g}i" if root.im else "")
+    place = _place(root.re, root.im, 5)
     times = f" ({root.multiplicity}-fold)" if root.multiplicity > 1 else ""
     share = f" ({100 * root.share:.3g} % of what all bear)" if root.share < 1 - 1e-9 else ""
-    kappa = f", to part it {root.kappa:.4g}" if root.multiplicity > 1 else ""
+    kappa = f", to part it {_seen(root.kappa, root.beta):.4g}" if root.multiplicity > 1 else ""
     return f"  {place}{times}: to move it left {root.beta:.4g}{share}{kappa}"
+
+
+def _place(re: float, im: float, digits: int) -> str:
+    """A root or a pair; a real part that is none but for rounding is 0."""
+    return f"{_seen(re, math.hypot(re, im)):.{digits}g}" + (f" ± {im:.{digits}g}i" if im else "")
+
+
+def _seen(x: float, size: float = 1.0) -> float:
+    """A number, or 0 for one that is none beside a size but for rounding."""
+    return 0.0 if abs(x) <= _ROUNDED * size else x
 
 
 def rounding_rows(explanation: Explanation) -> list[Sequence[str]]:
@@ -119,7 +129,8 @@ def rounding_rows(explanation: Explanation) -> list[Sequence[str]]:
 
 def _row(what: str, to: str, row: Rounded) -> tuple[str, ...]:
     violated = ", ".join(f"{name} by {value:.1g}" for name, value in row.violations.items())
-    return (what, to, number(row.realised), f"{row.loss:.2g}", f"{row.damping_ratio:.4g}", violated)
+    ratio, loss = _seen(row.damping_ratio), _seen(row.loss)
+    return (what, to, number(_seen(row.realised)), f"{loss:.2g}", f"{ratio:.4g}", violated)
 
 
 def diagnosis_lines(diagnoses: Sequence[Diagnosis], details: bool = False) -> list[str]:
@@ -133,7 +144,7 @@ def diagnosis_lines(diagnoses: Sequence[Diagnosis], details: bool = False) -> li
 
 
 def _kind(found: Diagnosis) -> str:
-    place = f"{found.re:.8g}" + (f" ± {found.im:.8g}i" if found.im else "")
+    place = _place(found.re, found.im, 8)
     vectors = f"{found.geometric} independent eigenvector" + ("s" if found.geometric > 1 else "")
     if found.jordan is None:
         why = "there are no matrices to judge by, so one chain of eigenvectors, as for a companion matrix"

@@ -10,6 +10,7 @@ from tmsopt.report.solution.limits import limit_text
 
 _SIGN = re.compile(r"<=|>=|==")
 _DIGITS = 5
+_OTHER = {"a0": "a mass matrix that is not singular (a0 = 0)", "coefficients": "coefficients that have values"}
 
 
 def infeasible_lines(solution: Solution, full: bool = False) -> list[str]:
@@ -41,7 +42,7 @@ def _sentence(solution: Solution) -> str:
     if not problem.free or relaxation is None or not relaxation.amounts:
         violated = _listed([_limit(problem, n) for n in solution.violations])
         return (
-            f"no design was found that meets {violated}" if problem.free else f"the design as given violates {violated}"
+            f"no design was found with {violated}" if problem.free else f"the design as given does not have {violated}"
         )
     return _conflict(solution, relaxation)
 
@@ -133,7 +134,7 @@ def _limit(problem: Problem, name: str) -> str:
         parameter, end = name.rsplit(".", 1)
         bound = unit_of(problem, name).show(problem.free[parameter][end == "max"])
         return f"{parameter} {'<=' if end == 'max' else '>='} {bound}"
-    return f"{name} ({limit_text(problem, name)})" if name in problem.constraints else name
+    return f"{name} ({limit_text(problem, name)})" if name in problem.constraints else _OTHER.get(name, name)
 
 
 def _end(problem: Problem, name: str) -> bool:
