@@ -202,3 +202,14 @@ def test_a_continuum_of_solutions_is_told_from_none() -> None:
     every = tmsopt.solve_all(problem, starts=8, seconds=0)
     assert not every.solutions
     assert every.coverage.singular > 0
+
+
+@pytest.mark.parametrize(
+    ("free", "named"), [({"Fr": (0.5, 4.0)}, "EP2"), ({"Fr": (0.5, 4.0), "chi_B": (1.1, 2.0)}, "EP3")]
+)
+def test_the_pattern_that_is_suggested_has_as_many_conditions_as_there_are_free_parameters(free, named):
+    """A k-fold root takes k − 1 conditions."""
+    fixed = {"Fr": 2.0, "chi_B": 1.4, "chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2, "lambda_s": 0.3}
+    fixed = {n: x for n, x in fixed.items() if n not in free}
+    with pytest.raises(tmsopt.InputError, match=f"locate = '{named}'"):
+        tmsopt.solve_all(tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, minimize="abscissa"))
