@@ -48,7 +48,7 @@ def agrees(printed: str, now: str) -> bool:
 def solved(file: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
     """What the command prints."""
     with pytest.raises(SystemExit) as stop:
-        main(args=["solve", str(file), "--brief"], prog_name="tmsopt")
+        main(args=["solve", str(file)], prog_name="tmsopt")
     assert stop.value.code == 0
     return answer(capsys.readouterr().out)
 

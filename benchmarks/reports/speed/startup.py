@@ -20,7 +20,7 @@ COMMANDS: Mapping[str, tuple[str, ...]] = {
     "import tmsopt": ("import tmsopt",),
     "import tmsopt; tmsopt.solve": ("import tmsopt; tmsopt.solve",),
     "tmsopt --help": (_MAIN, "--help"),
-    "tmsopt solve problems/ep4.toml --brief": (_MAIN, "solve", "problems/ep4.toml", "--brief"),
+    "tmsopt solve problems/ep4.toml --json": (_MAIN, "solve", "problems/ep4.toml", "--json"),
 }
 """By name: what follows ``python -c``."""
 

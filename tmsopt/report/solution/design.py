@@ -20,14 +20,24 @@ from tmsopt.report.solution.explanation import (
 from tmsopt.report.solution.findings import Findings
 from tmsopt.report.solution.infeasible import infeasible_lines
 from tmsopt.report.solution.limits import bound_lines, case_lines, limit_text, proof_line
-from tmsopt.report.solution.rows import ALL, loads, motion, parameter_rows, pitching, quantity_rows, role, roots_of
+from tmsopt.report.solution.rows import (
+    ALL,
+    NOTHING,
+    loads,
+    motion,
+    parameter_rows,
+    pitching,
+    quantity_rows,
+    role,
+    roots_of,
+    tidy,
+)
 from tmsopt.report.speeds import range_line
 from tmsopt.report.text import HEIGHT, WIDTH, columns
 from tmsopt.roots.patterns.descriptions import in_words
 
 _DIGITS = 5
 _KEPT = "\xa0"  # a space where no line is broken
-_ROUNDING = 1e-15  # of a range
 _ROWS = 8  # of free parameters one below the other
 _APART = ("design", "motion", "limits", "robustness")
 """Parts with an empty line before them, where there is room."""
@@ -180,7 +190,7 @@ def _violated(solution: Solution) -> list[str]:
 def _design(solution: Solution, si: Mapping[str, float] | None) -> list[str]:
     """Free parameters one a row, or side by side where they are many; the others in a sentence."""
     problem, of = solution.problem, solution.problem.parameter_set
-    shown = {p.name: unit_of(problem, p.name).show(_tidy(solution, p.name), _DIGITS) for p in of.parameters}
+    shown = {p.name: unit_of(problem, p.name).show(tidy(solution, p.name), _DIGITS) for p in of.parameters}
     free = [p for p in of.parameters if p.name in problem.free]
     full = parameter_rows(solution, si) if si is not None else []
     other = {row[0]: f"{row[4]} = {float(row[5]):.{_DIGITS}g} {row[6]}".rstrip() for row in full if row[4]}
@@ -201,12 +211,6 @@ def _design(solution: Solution, si: Mapping[str, float] | None) -> list[str]:
     return rows + ([f"fixed: {', '.join(rest[:most])}{more}"] if rest else [])
 
 
-def _tidy(solution: Solution, name: str) -> float:
-    """A parameter; 0 where it differs from that by less than a rounding of its range."""
-    x, (lower, upper) = solution.parameters[name], solution.problem.free.get(name, (0.0, 0.0))
-    return 0.0 if abs(x) <= _ROUNDING * (upper - lower) else x
-
-
 def _motion(solution: Solution, found: Findings) -> list[str]:
     on_edge = found.robustness is not None and found.robustness.edges
     lines = [motion(solution, bool(on_edge))]
@@ -220,7 +224,9 @@ def _motion(solution: Solution, found: Findings) -> list[str]:
 def _stored(solution: Solution) -> Iterator[str]:
     """To all digits: the abscissa, and that of the numbers as they are stored."""
     unit = unit_of(solution.problem, "abscissa")
-    yield f"abscissa {unit.show(solution.abscissa, ALL)}; of the parameters as rounded to doubles "\
+    size = max((math.hypot(r.re, r.im) for r in solution.roots), default=1.0)
+    abscissa = solution.abscissa if not abs(solution.abscissa) <= NOTHING * size else 0.0
+    yield f"abscissa {unit.show(abscissa, ALL)}; of the parameters as rounded to doubles "\
           f"{unit.number(solution.abscissa_realised, ALL)}"  # fmt: skip
     yield "roots: " + (", ".join(roots_of(solution.roots, ALL)) or "none")
 

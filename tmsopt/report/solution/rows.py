@@ -16,7 +16,10 @@ from tmsopt.units import frequencies
 
 TableRow = Sequence[str]
 
-_NOTHING = 1e-14  # of the size of a root, or of 1
+NOTHING = 1e-14
+"""Of the size of a root, or of 1: less is rounding."""
+
+_OF_RANGE = 1e-15  # likewise of a range
 ALL = 12
 """Digits of a full report."""
 
@@ -34,7 +37,7 @@ def parameter_rows(solution: Solution, si: Mapping[str, float]) -> list[TableRow
     values = {} if other is None else solution.dimensionless if other.rate is None else si
     rows: list[TableRow] = []
     for p in of.parameters:
-        x, how = solution.parameters[p.name], role(solution, p.name)
+        x, how = tidy(solution, p.name), role(solution, p.name)
         if how == "fixed" and x == 0 == p.default:
             continue
         beside = None if other is None else _counterpart(p, other)
@@ -63,6 +66,12 @@ def quantity_rows(solution: Solution, si: Mapping[str, float]) -> list[TableRow]
         )
         rows.append((*_cells(q, x, unit_of(problem, q.name)), "", *cells, q.meaning))
     return rows
+
+
+def tidy(solution: Solution, name: str) -> float:
+    """A parameter; 0 where it differs from that by less than a rounding of its range."""
+    x, (lower, upper) = solution.parameters[name], solution.problem.free.get(name, (0.0, 0.0))
+    return 0.0 if abs(x) <= _OF_RANGE * (upper - lower) else x
 
 
 def role(solution: Solution, name: str) -> str:
@@ -97,7 +106,7 @@ def motion(solution: Solution, on_edge: bool = False) -> str:
     ratio = solution.quantities["damping_ratio"]
     return (
         f"{lasts}; {name} {listed} {hertz.text}".rstrip()
-        + f"; damping ratio {ratio if abs(ratio) > _NOTHING else 0:.4g}"
+        + f"; damping ratio {ratio if abs(ratio) > NOTHING else 0:.4g}"
     )
 
 
@@ -119,7 +128,7 @@ def roots_of(roots: Sequence[Root], digits: int = 8) -> list[str]:
         if root.im < 0:
             continue
         size = math.hypot(root.re, root.im)
-        re, im = (x if abs(x) > _NOTHING * size else 0.0 for x in (root.re, root.im))
+        re, im = (x if abs(x) > NOTHING * size else 0.0 for x in (root.re, root.im))
         value = f"{re:.{digits}g}" + (f" ± {im:.{digits}g}i" if im else "")
         words.append(value + (f" ({root.multiplicity}-fold)" if root.multiplicity > 1 else ""))
     return words
