@@ -43,7 +43,16 @@ def parameter_rows(solution: Solution, si: Mapping[str, float]) -> list[TableRow
         beside = None if other is None else _counterpart(p, other)
         unit = unit_of(problem, p.name)
         cells = () if beside is None else _cells(beside, values[beside.name], Unit(_own(beside.unit)))
-        rows.append((p.name, unit.number(x, ALL), unit.text, how, *(cells or ("", "", "")), p.meaning))
+        rows.append(
+            (
+                p.name,
+                unit.number(x, ALL),
+                unit.text,
+                how,
+                *(cells or ("", "", "")),
+                "" if p.meaning == "parameter" else p.meaning,
+            )
+        )
     return rows
 
 
