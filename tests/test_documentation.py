@@ -189,8 +189,8 @@ def test_the_absorber_has_the_answer_that_is_printed(tmp_path: Path, capsys: pyt
     assert all(any(agrees(line, other) for other in now) for line in printed)
     share = 0.1 / 1.1
     abscissa, c, w = -math.sqrt(share) / 2, 2 * share**1.5, 1 / 1.1
-    for line, value in zip(printed, (abscissa, c, w), strict=True):
-        assert any(math.isclose(float(n), value, rel_tol=1e-11) for n in NUMBER.findall(line)), line
+    for line, value in zip(printed[:3], (abscissa, c, w), strict=True):  # five digits of parameters are shown
+        assert any(math.isclose(float(n), value, rel_tol=5e-5) for n in NUMBER.findall(line)), line
 
 
 def test_the_figures_stand_in_the_results() -> None:
