@@ -395,7 +395,7 @@ def test_a_misspelt_name_is_answered_with_the_nearest() -> None:
 
 
 def test_a_caret_is_answered_with_the_power() -> None:
-    with pytest.raises(ExpressionError, match=r"write a power as \*\*"):
+    with pytest.raises(ExpressionError, match=r"write 'Fr\*\*2'"):
         parse_value("Fr^2", NAMES)
 
 

@@ -9,6 +9,7 @@ from tmsopt.models.expression import (
     Arithmetic,
     Expression,
     ExpressionError,
+    UnknownName,
     parse_comparison,
     parse_value,
     written_sides,
@@ -16,7 +17,8 @@ from tmsopt.models.expression import (
 from tmsopt.units import dimensions
 
 __all__ = [
-    "COMPARISONS", "Expression", "ExpressionError", "dimension", "parse_comparison", "parse_value", "written_sides",
+    "COMPARISONS", "Expression", "ExpressionError", "UnknownName", "dimension", "parse_comparison", "parse_value",
+    "written_sides",
 ]  # fmt: skip
 
 _DIMENSIONS = Arithmetic(dimensions.FUNCTIONS, lambda x: x, {**BINARY, ast.Pow: dimensions.power}, dimensions.Dimension)

@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import Field, StrictFloat, StrictInt, StrictStr
 
+from tmsopt.design.advice.names import unknown_key
 from tmsopt.design.cases import POINTS, Band
 from tmsopt.design.model_table import stated_model
 from tmsopt.design.problem import Problem, unasked
@@ -17,6 +18,8 @@ from tmsopt.design.validate import VARIATIONS
 from tmsopt.errors import Fault, InputError, short, suggest
 from tmsopt.models import MODELS, Model
 from tmsopt.models.bicycle_files import read_bicycle
+
+_NO_PARAMETERS = "missing section [parameters]"
 
 
 class _FreeParameter(Section):
@@ -127,6 +130,8 @@ def posed(data: Mapping[str, Any], title: str) -> tuple[list[Fault], Problem | N
         title: of a problem that has none.
     """
     shape_faults, parsed = fitted(data, _File, _shape_fault)
+    if any(hint in f.message for f in shape_faults for hint in ("did you mean 'parameters'", "write [parameters]")):
+        shape_faults = [f for f in shape_faults if f.message != _NO_PARAMETERS]  # they are there, under another name
     model_faults, model = _model(data.get("model", "tms"))
     shape_faults += model_faults
     faults, problem = shape_faults, None
@@ -164,11 +169,11 @@ def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault: 
     key = tuple(str(k) for k in where if k not in tags)
     match key:
         case (section,) if kind == "extra_forbidden":
-            return Fault(f"unknown key '{section}'; {suggest(section, _File.model_fields)}", key)
+            return Fault(f"unknown key '{section}'; {unknown_key(section, _File.model_fields)}", key)
         case ("model",):
             return Fault(f"found {short(found)}; accepted: the name of a model in quotes, or a table [model]", key)
         case ("parameters",) if kind == "missing":
-            return Fault("missing section [parameters]", key)
+            return Fault(_NO_PARAMETERS, key)
         case ("parameters", name, end) if kind == "extra_forbidden":
             return Fault(f"unknown key '{end}' of {name}; {suggest(end, _FreeParameter.model_fields)}", key)
         case ("parameters", name, end) if kind == "missing":
@@ -177,7 +182,7 @@ def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault: 
             accepted = "a number, a text with a unit such as '5 deg', or { min = …, max = …, start = … }"
             return Fault(f"found {short(found)}; accepted: {accepted}", key[:3])
         case ("objective", sense, *_) if kind == "extra_forbidden":
-            return Fault(f"unknown key '{sense}'; {suggest(sense, _Objective.model_fields)}", key)
+            return Fault(f"unknown key '{sense}'; {unknown_key(sense, _Objective.model_fields, 'objective')}", key)
         case ("scenarios", name, end, *_) if kind == "extra_forbidden":
             return Fault(f"unknown key '{end}' of {name}; {suggest(end, _Band.model_fields)}", key)
         case ("scenarios", name, end) if kind == "missing":

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, StrictFloat, StrictInt, StrictStr, ValidationError
 
+from tmsopt.design.advice.lines import line_advice
 from tmsopt.disk import path_of, read_text
 from tmsopt.errors import Fault, InputError
 
@@ -65,8 +66,9 @@ def read_page(path: str | PathLike[str], kind: str) -> Page:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         place = re.search(r"line (\d+)", str(error))
-        message = f"not TOML: {error}"
-        raise InputError([Fault(message).at(file, int(place[1]) if place else text.count("\n") + 1)]) from None
+        line = _unclosed(text) or (int(place[1]) if place else text.count("\n") + 1)
+        written = text.splitlines()[line - 1] if text.strip() else ""
+        raise InputError([Fault(f"not TOML: {error}{line_advice(written)}").at(file, line)]) from None
     except RecursionError:
         raise InputError([Fault("not TOML: nested too deeply", file=file)]) from None
     return Page(file, data, _lines(text))
@@ -110,6 +112,7 @@ def _without(data: Mapping[str, Any], key: Key) -> dict[str, Any]:
 
 _HEADER = re.compile(r"\s*\[+\s*([^\]]+?)\s*\]+")
 _KEY = re.compile(r"\s*([A-Za-z0-9_\-.\"' ]+?)\s*=")
+_SECTION = re.compile(r"\[[A-Za-z_][\w.]*\]\s*(#.*)?$")
 _LONG_QUOTES = ('"""', "'''")
 _TOKEN = re.compile(r"""\"{3}|'{3}|\"(?:[^\"\\]|\\.)*\"|'[^']*'|[][{}#]""")
 _PART = re.compile(r"\"[^\"]*\"|'[^']*'|[^.\"']+")
@@ -130,6 +133,19 @@ def _lines(text: str) -> dict[Key, int]:
                 lines.setdefault((*section, *_path(key[1])), number)
         depth, inside = _open(line, depth, inside)
     return lines
+
+
+def _unclosed(text: str) -> int:
+    """Line of a list that is still open where another key or section begins; 0 for none."""
+    depth, inside, begun = 0, "", 0
+    for number, line in enumerate(text.splitlines(), start=1):
+        if depth == 0:
+            begun = number
+        elif not inside and (_KEY.match(line) or _SECTION.match(line)):
+            return begun
+        if depth > 0 or not _HEADER.match(line):
+            depth, inside = _open(line, depth, inside)
+    return begun if depth > 0 else 0
 
 
 def _open(line: str, depth: int, inside: str) -> tuple[int, str]:

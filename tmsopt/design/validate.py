@@ -4,8 +4,9 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from tmsopt.design.advice.names import unknown
 from tmsopt.design.cases import Band, points_of
-from tmsopt.design.expression import ExpressionError, parse_comparison, parse_value
+from tmsopt.design.expression import ExpressionError, UnknownName, parse_comparison, parse_value
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.errors import Fault, short, suggest, table_faults
 from tmsopt.models import Model, ParameterSet
@@ -73,7 +74,7 @@ def _name_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
                 (table, name),
             )
         else:
-            yield Fault(f"unknown parameter '{name}'; {suggest(name, of.names)}", (table, name))
+            yield Fault(f"unknown parameter '{name}'; {unknown(name, problem.model, of, of.names)}", (table, name))
     for name in problem.fixed:
         if name in problem.free:
             yield Fault(f"'{name}' is both fixed and free; keep one", ("parameters", name))
@@ -198,7 +199,9 @@ def _number_faults(of: ParameterSet, name: str, value: Any, key: tuple[str, ...]
     if not math.isfinite(number):
         yield Fault(f"found {value!r}; accepted: a finite number{unit and ' in' + unit}", key)
     elif number not in parameter.range:
-        yield Fault(f"{name} = {number:.6g}{unit} is not physical; {parameter.meaning} is {parameter.range}{unit}", key)
+        degrees = f'; write "{number:.6g} deg" for degrees' if parameter.unit == "rad" and abs(number) < 90 else ""
+        found = f"{name} = {number:.6g}{unit} is not physical; {parameter.meaning} is {parameter.range}{unit}{degrees}"
+        yield Fault(found, key)
 
 
 def _objective_faults(problem: Stated) -> Iterator[Fault]:
@@ -232,20 +235,22 @@ def _pareto_faults(texts: Any) -> Iterator[Fault]:
 
 def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     accepted = (*of.names, *problem.model.quantity_names(of), *ROOT_NAMES)
+
+    def parsed(parse: Any, text: Any, *key: str) -> Iterator[Fault]:
+        try:
+            if "frequency" in parse(text, accepted).names and "decay_time" in accepted:  # no name of the user's own
+                advice = "it is reported and can be recorded, not optimised; limit damping_ratio or decay_rate instead"
+                yield Fault(f"'{text}' uses frequency: {advice}", key)
+        except UnknownName as error:
+            yield Fault(f"{error.found}; {unknown(error.name, problem.model, of)}", key)
+        except ExpressionError as error:
+            yield Fault(str(error), key)
+
     for sense, text in (("minimize", problem.minimize), ("maximize", problem.maximize)):
         if text is not None:
-            yield from _parse_faults(parse_value, text, accepted, ("objective", sense))
+            yield from parsed(parse_value, text, "objective", sense)
     if isinstance(problem.pareto, Sequence) and not isinstance(problem.pareto, str):
         for text in problem.pareto:
-            yield from _parse_faults(parse_value, text, accepted, ("objective", "pareto"))
+            yield from parsed(parse_value, text, "objective", "pareto")
     for name, text in problem.constraints.items():
-        yield from _parse_faults(parse_comparison, text, accepted, ("constraints", name))
-
-
-def _parse_faults(parse: Any, text: Any, accepted: tuple[str, ...], key: tuple[str, ...]) -> Iterator[Fault]:
-    try:
-        if "frequency" in parse(text, accepted).names and "decay_time" in accepted:  # no name of the user's own
-            advice = "it is reported and can be recorded, not optimised; limit damping_ratio or decay_rate instead"
-            yield Fault(f"'{text}' uses frequency: {advice}", key)
-    except ExpressionError as error:
-        yield Fault(str(error), key)
+        yield from parsed(parse_comparison, text, "constraints", name)

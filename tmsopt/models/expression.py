@@ -18,6 +18,7 @@ import numpy as np
 
 from tmsopt.arithmetic import elementary
 from tmsopt.errors import suggest
+from tmsopt.models.advice import advice
 from tmsopt.models.names import CONSTANTS, FUNCTIONS
 
 COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
@@ -28,8 +29,6 @@ _LONGEST = 2000  # characters; longer texts could exhaust the parser's stack
 _DEEPEST = 200
 _LANGUAGE = f"numbers, names, + - * / **, parentheses and {' '.join(FUNCTIONS)}"
 _NOT_ACCEPTED = re.compile(r"[^ -~]|#")  # look-alike letters, line breaks and comments
-
-_UNIT = re.compile(r"\d\s*(mm|cm|m|kg|g|km/h|m/s|deg|rad|N|s)\b")
 
 
 @dataclass(frozen=True)
@@ -77,6 +76,14 @@ _BALLS = Arithmetic(
 
 class ExpressionError(ValueError):
     """An expression that cannot be used, with the reason."""
+
+
+class UnknownName(ExpressionError):
+    """An expression with a name that is not accepted."""
+
+    def __init__(self, text: str, name: str, accepted: Iterable[str]) -> None:
+        self.found, self.name = f"'{text}' uses the unknown name '{name}'", name
+        super().__init__(f"{self.found}; {suggest(name, accepted)}")
 
 
 @dataclass(frozen=True)
@@ -184,7 +191,7 @@ def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
         raise ExpressionError(f"'{text}' joins several comparisons; write one constraint for each")
     symbol = COMPARISONS.get(type(body.ops[0]))
     if symbol is None:
-        raise ExpressionError(f"'{text}' compares with another sign than <=, >= or ==; use one of these")
+        raise ExpressionError(f"'{text}' compares with another sign than <=, >= or =={_advice(text)}")
     known = list(accepted)
     left, right = _checked_names(body.left, text, known), _checked_names(body.comparators[0], text, known)
     names = tuple(dict.fromkeys(left + right))
@@ -220,18 +227,33 @@ def _parse(text: str) -> ast.expr:
     if len(text) > _LONGEST:
         raise ExpressionError(f"expression of {len(text)} characters; accepted: up to {_LONGEST}")
     if strange := _NOT_ACCEPTED.search(text.strip()):
-        raise ExpressionError(f"'{text}' contains {strange[0]!r}; accepted: one line of {_LANGUAGE}")
+        raise ExpressionError(f"'{text}' contains {strange[0]!r}{_advice(text)}; accepted: one line of {_LANGUAGE}")
     try:
-        with _ONE_AT_A_TIME, warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the tokenizer warns of texts like 1if, which fail below
-            return ast.parse(text.strip(), mode="eval").body
+        return _tree(text)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         column = f" at character {error.offset}" if isinstance(error, SyntaxError) and error.offset else ""
-        unit = _UNIT.search(text)
         kept = next((word for word in re.findall(r"[A-Za-z_]\w*", text) if keyword.iskeyword(word)), None)
-        hint = f" ({unit[0]}: units are not written here; numbers are in m, rad, kg, m/s and N)" if unit else ""
-        hint = f"; '{kept}' is a reserved word, write e.g. {kept}_" if kept else hint
-        raise ExpressionError(f"'{text}' does not parse{column}{hint}; accepted: {_LANGUAGE}") from None
+        own = f"; '{kept}' is a reserved word, write e.g. {kept}_" if kept else ""
+        own += " (the tilt of a bicycle is lambda_s)" if kept == "lambda" else ""
+        raise ExpressionError(f"'{text}' does not parse{column}{own}{_advice(text)}; accepted: {_LANGUAGE}") from None
+
+
+def _tree(text: str) -> ast.expr:
+    with _ONE_AT_A_TIME, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the tokenizer warns of texts like 1if, which fail below
+        return ast.parse(text.strip(), mode="eval").body
+
+
+def _advice(text: str) -> str:
+    """What to write instead."""
+
+    def reads(mended: str) -> bool:
+        try:
+            return not isinstance(_tree(mended), ast.Tuple)
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            return False
+
+    return advice(text, reads)
 
 
 def _checked_names(  # noqa: PLR0912 - one case per kind of node
@@ -257,14 +279,13 @@ def _checked_names(  # noqa: PLR0912 - one case per kind of node
             if name in FUNCTIONS:
                 raise ExpressionError(f"'{text}' names the function {name} without its argument; write {name}(…)")
             if accepted is not None and name not in accepted:
-                raise ExpressionError(f"'{text}' uses the unknown name '{name}'; {suggest(name, accepted)}")
+                raise UnknownName(text, name, accepted)
             return (name,)
         case ast.UnaryOp(op=ast.UAdd() | ast.USub(), operand=operand):
             return names_in(operand)
         case ast.BinOp(left=left, op=op, right=right):
             if type(op) not in BINARY:
-                hint = "; write a power as **" if isinstance(op, ast.BitXor) else ""
-                raise ExpressionError(f"'{text}' uses an operator other than + - * / **{hint}")
+                raise ExpressionError(f"'{text}' uses an operator other than + - * / **{_advice(text)}")
             return names_in(left, right)
         case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in FUNCTIONS:
             fewest, most = (2, 99) if name in ("min", "max") else (1, 1)
@@ -277,7 +298,7 @@ def _checked_names(  # noqa: PLR0912 - one case per kind of node
         case ast.Attribute():
             raise ExpressionError(f"'{text}' uses the attribute '{_source(node, text)}'; accepted: plain names")
         case _:
-            raise ExpressionError(f"'{text}' contains '{_source(node, text)}'; accepted: {_LANGUAGE}")
+            raise ExpressionError(f"'{text}' contains '{_source(node, text)}'{_advice(text)}; accepted: {_LANGUAGE}")
 
 
 def _is_number(node: ast.expr) -> bool:

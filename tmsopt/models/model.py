@@ -153,6 +153,9 @@ class Model:
         origin: a function and its arguments, plain data, that make this model again in another process.
         statement: of a model that a user states, plain data that tell it from others.
         words: what its users call a pair on the imaginary axis, ``weave`` in data, and a root 0, ``capsize``.
+        conventions: sentences on signs.
+        sketch: the system drawn in text, with the symbols on it.
+        absent: names that a user may look for in vain → what to write instead.
     """
 
     name: str
@@ -168,6 +171,9 @@ class Model:
     origin: tuple[Callable[..., "Model"], tuple[Any, ...]] | None = field(default=None, repr=False)
     statement: Mapping[str, Any] | None = field(default=None, repr=False, hash=False)
     words: tuple[str, str] = field(default=("flutter", "divergence"), repr=False)
+    conventions: tuple[str, ...] = field(default=(), repr=False)
+    sketch: str = field(default="", repr=False)
+    absent: Mapping[str, str] = field(default_factory=dict, repr=False, hash=False)
 
     def coefficients(self, parameters: Mapping[str, Any], of: ParameterSet | None = None) -> list[Any]:
         """Coefficients a0 … aₙ, descending, for values of any kind: floats, arrays, CasADi, balls."""

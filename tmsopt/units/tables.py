@@ -1,5 +1,6 @@
 """The tables of a problem, in which any number may be a text with a unit."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import is_dataclass, replace
 from typing import Any
@@ -31,7 +32,7 @@ def numbers(tables: Mapping[str, Any], of: ParameterSet) -> tuple[dict[str, Any]
         try:
             found, written = read(value, unit)
         except ValueError as error:
-            faults.append(Fault(str(error), (table, name, *end)))
+            faults.append(Fault(f"{error}{_meant(value)}", (table, name, *end)))
             return value
         if not sizes:
             units.setdefault(name, written)
@@ -52,3 +53,12 @@ def numbers(tables: Mapping[str, Any], of: ParameterSet) -> tuple[dict[str, Any]
     keys = dict.fromkeys(("fixed", "free", "start"), "parameters")
     found = {t: dict(read_table(t, keys.get(t, t))) if isinstance(tables[t], Mapping) else tables[t] for t in TABLES}
     return found, units, faults
+
+
+def _meant(text: str) -> str:
+    """The end of a sentence that says what to write for a text that is refused; empty where that is not known."""
+    if comma := re.fullmatch(r"\s*([+-]?\d+),(\d+.*)", text):
+        return f'; write a decimal point: "{comma[1]}.{comma[2]}"'
+    if share := re.fullmatch(r"\s*([+-]?\d+\.?\d*)\s*%\s*", text):
+        return f"; write {float(share[1]) / 100:.12g} for {share[1]} %"
+    return ""

@@ -7,6 +7,7 @@ import numpy as np
 
 from tmsopt.arithmetic.elementary import sqrt, tan
 from tmsopt.models.bicycles.bicycle import WORDS, times
+from tmsopt.models.bicycles.sketches import CONVENTIONS, TMS
 from tmsopt.models.bicycles.tms_equations import compact_copo, copo, matrices
 from tmsopt.models.bicycles.tms_quantities import NATIVE_QUANTITIES, SI_QUANTITIES
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Range
@@ -91,9 +92,14 @@ _SI = ParameterSet(
     native=from_si, quantities=(*SI_QUANTITIES, *times(_rate, "sqrt(g/w)")), rate=_rate, root_unit="√(g/w)",
 )  # fmt: skip
 
+_ABSENT = {
+    "trail": "skates have no trail; the front mass stands off the steer axis by nu_H, in SI by u_H: write "
+    "'nu_H >= 0.02' or 'u_H >= 0.02'; wheels and a trail, c, are those of model = \"whipple\"",
+}  # fmt: skip
+
 tms = Model(
     name="tms", title="two-mass-skate bicycle", degree=4, sets=(_NATIVE, _SI), algebraic=_algebraic, polynomial=copo,
     quantities=NATIVE_QUANTITIES, compact=compact_copo, pencil=_pencil, natural=True,
-    words=WORDS,
+    words=WORDS, conventions=CONVENTIONS, sketch=TMS, absent=_ABSENT,
 )  # fmt: skip
 """The two-mass-skate bicycle."""

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from tmsopt.models.bicycles.bicycle import WORDS, times
+from tmsopt.models.bicycles.sketches import CONVENTIONS, WHIPPLE
 from tmsopt.models.bicycles.tms import GRAVITY, LAMBDA_S
 from tmsopt.models.bicycles.whipple_equations import carvallo_whipple, matrices
 from tmsopt.models.bicycles.whipple_quantities import QUANTITIES, algebraic, canonical
@@ -80,6 +81,7 @@ def _pencil(p: Mapping[str, Any]) -> tuple[Matrix, ...]:
 
 whipple = Model(
     name="whipple", title="Carvallo–Whipple bicycle", degree=4, sets=(_SI,), algebraic=algebraic,
-    polynomial=carvallo_whipple, pencil=_pencil, words=WORDS,
+    polynomial=carvallo_whipple, pencil=_pencil, words=WORDS, conventions=CONVENTIONS,
+    sketch=WHIPPLE,
 )  # fmt: skip
 """The Carvallo–Whipple bicycle; its roots are in 1/s."""

@@ -1,0 +1,131 @@
+"""What is answered to what others write: each message says what to write, and what it says is accepted."""
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+
+import tmsopt
+
+ROBOT = """title = "robot"
+model = "tms"
+[parameters]
+w = "80 cm"
+v = { min = "1 m/s", max = "4 m/s" }
+m_B = "20 kg"
+m_H = "3 kg"
+x_B = "60 cm"
+z_B = "-30 cm"
+x_H = "70 cm"
+z_H = "-60 cm"
+lambda_s = { min = "-35 deg", max = "35 deg" }
+[objective]
+minimize = "abscissa"
+[constraints]
+arm = "LIMIT"
+"""
+
+
+def answered(path: Path, text: str) -> list[str]:
+    """The faults of a file, each without its path."""
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(tmsopt.InputError) as caught:
+        tmsopt.load(path)
+    return [str(fault).removeprefix(f"{path}:") for fault in caught.value.faults]
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("u_H => 0.02", "u_H >= 0.02"), ("u_H =< 0.02", "u_H <= 0.02"), ("u_H > 0.02", "u_H >= 0.02"),
+        ("u_H < 0.02", "u_H <= 0.02"), ("u_H = 0.02", "u_H == 0.02"), ("u_H ≥ 0.02", "u_H >= 0.02"),
+        ("u_H^2 <= 4", "u_H**2 <= 4"), ("2 u_H >= 0.04", "2*u_H >= 0.04"), ("u_H >= 0,02", "u_H >= 0.02"),
+        ("load_front >= 30 %", "load_front >= 0.3"), ("lambda_s <= 35 deg", "lambda_s <= 35*pi/180"),
+        ("lambda_s <= 35°", "lambda_s <= 35*pi/180"), ("λ <= 0.3", "lambda_s <= 0.3"), ("N_F >= 2 kN", "N_F >= 2000"),
+        ("u_H >= 2 cm", "u_H >= 0.02"), ("v <= 18 km/h", "v <= 5"), ("2 m_H <= 500 kg", "2*m_H <= 500"),
+    ],
+)  # fmt: skip
+def test_a_limit_is_written_as_it_should_be(tmp_path: Path, written: str, meant: str) -> None:
+    """And so written it is accepted."""
+    path = tmp_path / "robot.toml"
+    (found,) = answered(path, ROBOT.replace("LIMIT", written))
+    assert found.startswith(f"16: constraints.arm: '{written}'")
+    assert f"write '{meant}'" in found
+    path.write_text(ROBOT.replace("LIMIT", meant), encoding="utf-8")
+    assert tmsopt.load(path).constraints == {"arm": meant}
+
+
+@pytest.mark.parametrize(
+    ("written", "said"),
+    [
+        ("abs(u_H >= 0.02", r"a \) is missing"),
+        ("abs(u_H)) >= 0.02", r"a \( is missing"),
+        ("1j*u_H >= 1", "expressions are real"),
+        ("lambda <= 0.3", "reserved word.*lambda_s"),
+        ("trail >= 0.02", r"skates have no trail.*write .*'u_H >= 0.02'"),
+        ("wheelbase >= 0.02", r"write w \(wheelbase\)"),
+        ("Froude >= 2", r"write Fr \(Froude number"),
+        ("speed >= 2", r"write v \(forward speed\)"),
+        ("absissa <= 0", "did you mean 'abscissa'"),
+    ],
+)
+def test_a_limit_that_cannot_be_mended_is_explained(tmp_path: Path, written: str, said: str) -> None:
+    (found,) = answered(tmp_path / "robot.toml", ROBOT.replace("LIMIT", written))
+    assert re.match(rf"16: constraints\.arm: .*{said}", found), found
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "said"),
+    [
+        ('max = "35 deg"', "max = 35", 12, 'write "35 deg" for degrees'),
+        ("minimize", "optimise", 14, "write minimize or maximize"),
+        ("minimize", "minimise", 14, "did you mean 'minimize'"),
+        ("minimize", "maximise", 14, "did you mean 'maximize'"),
+        ("minimize", "goal", 14, "write minimize or maximize"),
+        ("[objective]", "[objectives]", 13, "did you mean 'objective'"),
+        ("[objective]", "[goal]", 13, "write [objective]"),
+        ("[constraints]", "[constraint]", 15, "did you mean 'constraints'"),
+        ("[parameters]", "[parameter]", 3, "did you mean 'parameters'"),
+        ('"tms"', '"TMS"', 2, "did you mean 'tms'"),
+        ('"tms"', "tms", 2, 'write a text in quotes: model = "tms"'),
+        ('"80 cm"', "80 cm", 4, 'in quotes: "80 cm"'),
+        ('"80 cm"', "0,8", 4, "write a decimal point: 0.8"),
+        ('"80 cm"', '"0,8 m"', 4, 'write a decimal point: "0.8 m"'),
+        ('max = "35 deg" }', 'max = "35 deg"', 12, "a } is missing"),
+        ('min = "-35 deg",', 'min = "-35 deg"', 12, "write a comma"),
+        ("[parameters]", "[parameters", 3, "a ] is missing"),
+        ('"abscissa"', '"abscissa', 14, "a quote is missing"),
+        ('"abscissa"', "abscissa", 14, 'write a text in quotes: minimize = "abscissa"'),
+        ('"tms"', "[1, [2]", 2, "a ] is missing"),
+    ],
+)
+def test_a_line_is_answered_with_what_to_write(tmp_path: Path, old: str, new: str, line: int, said: str) -> None:
+    """One fault, at its line."""
+    (found,) = answered(tmp_path / "robot.toml", ROBOT.replace("LIMIT", "u_H >= 0.02").replace(old, new))
+    assert found.startswith(f"{line}: ")
+    assert said in found
+
+
+def test_a_list_that_is_not_closed_is_found_where_it_begins(tmp_path: Path) -> None:
+    text = '[model]\nM = [[1]]\nD = [["c"]\nK = [["k"]]\n[parameters]\nc = 1\nk = 1\n'
+    (found,) = answered(tmp_path / "own.toml", text)
+    assert found.startswith("3: ")
+    assert "a ] is missing" in found
+    closed = text.replace('"c"]\n', '"c"]]\n')
+    (tmp_path / "own.toml").write_text(closed, encoding="utf-8")
+    assert set(tmsopt.load(tmp_path / "own.toml").fixed) == {"c", "k"}
+
+
+def test_a_wheelbase_of_whipple_has_a_trail() -> None:
+    with pytest.raises(tmsopt.InputError, match=r"write c \(trail,"):
+        tmsopt.Problem(model=tmsopt.models.whipple, fixed={"trail": 0.08})
+
+
+def test_degrees_are_offered_for_angles_alone() -> None:
+    with pytest.raises(tmsopt.InputError) as caught:
+        tmsopt.Problem(model=tmsopt.models.tms, fixed={"zeta_B": 0.4, "lambda_s": math.tau})
+    assert [("deg" in fault.message) for fault in caught.value.faults if "not physical" in fault.message] == [
+        False,
+        True,
+    ]

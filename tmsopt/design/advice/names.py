@@ -1,0 +1,64 @@
+"""Every name that an expression may use, with its meaning, and what was meant by one that is not among them."""
+
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
+from operator import itemgetter
+
+from tmsopt.design.quantities import NO_RADIUS, ROOT_NAMES, ROOT_QUANTITIES
+from tmsopt.errors import suggest
+from tmsopt.models import Model, Parameter, ParameterSet, Quantity
+
+_NEAR = 0.7  # of a misspelt word; what is less alike is looked for among the meanings first
+
+_SENSE = "minimize or maximize"
+_KEYS = {
+    "objective": {
+        **dict.fromkeys(("optimise", "optimize", "goal", "objective", "target", "function"), _SENSE),
+        **dict.fromkeys(("pattern", "find"), "locate"), "min": "minimize", "max": "maximize",
+    },
+    "": {
+        **dict.fromkeys(("goal", "goals", "target", "optimise", "optimize", "minimise", "maximise"), "objective"),
+        **dict.fromkeys(("minimize", "maximize", "locate", "pareto"), "objective"),
+        **dict.fromkeys(("limits", "bounds"), "constraints"), **dict.fromkeys(("variables", "params"), "parameters"),
+    },
+}  # fmt: skip
+"""Section → word that others use for one of its keys → that key."""
+
+
+def vocabulary(model: Model, of: ParameterSet) -> dict[str, Parameter | Quantity]:
+    """Every name that an expression may use, in the order of the documentation."""
+    native = () if of is model.sets[0] else model.sets[0].parameters
+    known: dict[str, Parameter | Quantity] = {
+        n: Quantity(n, "", _power(model.degree - k), f"a_{{{k}}}", itemgetter(n))
+        for k, n in enumerate(model.coefficient_names())
+    }
+    derived = (*model.quantities, *of.quantities, *ROOT_QUANTITIES, NO_RADIUS)
+    known |= {p.name: p for p in (*native, *of.parameters)} | {q.name: q for q in derived}
+    return {name: known[name] for name in (*of.names, *model.quantity_names(of), *ROOT_NAMES)}
+
+
+def _power(k: int) -> str:
+    what = "the constant coefficient" if k == 0 else f"the coefficient of s^{k}" if k > 1 else "the coefficient of s"
+    return f"{what} of the characteristic polynomial"
+
+
+def unknown(name: str, model: Model, of: ParameterSet, accepted: Iterable[str] | None = None) -> str:
+    """What to write for a name that is none: the nearest by spelling, or the one that means it."""
+    if name in model.absent:
+        return model.absent[name]
+    known = vocabulary(model, of)
+    names = list(known if accepted is None else accepted)
+    if not get_close_matches(name.lower(), [n.lower() for n in names], n=1, cutoff=_NEAR):
+        words = name.lower().replace("_", " ")
+        for n in names:
+            meaning = known[n].meaning.lower()
+            if len(words) > 3 and (words in meaning or words.replace(" ", "") in meaning.replace(" ", "")):
+                return f"write {n} ({known[n].meaning}); accepted: {' '.join(names)}"
+    return suggest(name, names)
+
+
+def unknown_key(key: str, accepted: Mapping[str, object], section: str = "") -> str:
+    """What to write for a key that a section, or the file itself, does not have."""
+    meant = _KEYS.get(section, {}).get(key.lower())
+    written = f"write {meant if section else f'[{meant}]'}; " if meant else ""
+    return written + suggest(key, accepted)

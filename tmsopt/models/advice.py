@@ -1,0 +1,58 @@
+"""What was meant by an expression that does not read as one, written as it should be."""
+
+import re
+from collections.abc import Callable
+
+_NUMBER = r"(?<![\w.])(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)"
+_UNITS = {
+    "mm": 1e-3, "cm": 0.01, "km/h": 5 / 18, "km": 1e3, "m/s": 1, "m": 1, "kg": 1, "ms": 1e-3, "s": 1, "kN": 1e3, "N": 1,
+    "Hz": 1,
+}  # fmt: skip
+"""What others write behind a number → what one of it is in an expression; a g may be the gravity."""
+
+_SIGNS = {
+    "=>": ">=", "=<": "<=", "≤": "<=", "≥": ">=", "≈": "==", "−": "-", "–": "-", "×": "*", "·": "*", "÷": "/",
+    "²": "**2", "³": "**3", "^": "**", "√": "sqrt", "π": "pi", "λ": "lambda_s", "ζ": "zeta", "χ": "chi", "ν": "nu",
+    "μ": "mu", "µ": "mu", "ω": "omega",
+}  # fmt: skip
+
+Repair = tuple[str, str | Callable[[re.Match[str]], str]]
+
+
+def _converted(found: re.Match[str]) -> str:
+    return f"{float(found[1]) * _UNITS[found[2]]:.12g}"
+
+
+_REPAIRS: tuple[Repair, ...] = (
+    *((re.escape(sign), meant) for sign, meant in _SIGNS.items()),
+    (r"(?<![<>=!])=(?!=)", "=="),
+    (r"([<>])(?!=)", r"\1="),
+    (r"(?<=\d),(?=\d)", "."),
+    (_NUMBER + r"\s*%", lambda found: f"{float(found[1]) / 100:.12g}"),
+    (_NUMBER + r"\s*(?:°|deg\b|degrees?\b)", r"\1*pi/180"),
+    (_NUMBER + r"\s*rad\b", r"\1"),
+    (_NUMBER + rf"\s*({'|'.join(_UNITS)})\b(?!\s*/)", _converted),
+    (_NUMBER + r"\s*(?=(?!j\b)[A-Za-z(])", r"\1*"),
+)
+"""What others write → what is read here, one after the other."""
+
+_WITH_UNIT = re.compile(_NUMBER + rf"\s*({'|'.join(_UNITS)}|deg|°)(?!\w)")
+
+
+def advice(text: str, reads: Callable[[str], bool]) -> str:
+    """The end of a sentence that says what to write for a text that is refused; empty where that is not known.
+
+    Args:
+        reads: whether a text parses.
+    """
+    if re.search(r"\d[jJ]\b", text):
+        return "; expressions are real: write real and imaginary parts as numbers of their own"
+    if missing := text.count("(") - text.count(")"):
+        return f"; a {'()'[missing > 0]} is missing"
+    mended = text.strip()
+    for sign, meant in _REPAIRS:
+        mended = re.sub(sign, meant, mended)
+    if mended == text.strip() or not mended.isascii() or "inf" in mended or not reads(mended):
+        return ""
+    units = " (numbers in expressions are in m, kg, s, rad and N)" if _WITH_UNIT.search(text) else ""
+    return f"; write '{mended}'{units}"
