@@ -14,6 +14,8 @@ from tmsopt import __version__
 from tmsopt.cli.chart import chart
 from tmsopt.cli.common import BAD_INPUT, INTERRUPTED
 from tmsopt.cli.figure import figure
+from tmsopt.cli.guide.describe import describe, schema
+from tmsopt.cli.guide.files import example, new
 from tmsopt.cli.import_ import convert
 from tmsopt.cli.prove import prove
 from tmsopt.cli.solve import compare, solve
@@ -47,6 +49,8 @@ def main() -> None:
 
     \b
     Examples:
+      tmsopt new robot.toml
+      tmsopt describe tms
       tmsopt solve problems/ep4.toml
       tmsopt solve problems/pareto.toml --plot front.png
       tmsopt compare problems/ep4.toml
@@ -63,5 +67,20 @@ def main() -> None:
             stream.reconfigure(errors="replace")  # a narrow terminal encoding must not lose a result
 
 
-for _command in (solve, compare, prove, speeds, trace, chart, study, figure, verify, convert):
+for _command in (
+    solve,
+    compare,
+    prove,
+    speeds,
+    trace,
+    chart,
+    study,
+    figure,
+    verify,
+    convert,
+    new,
+    example,
+    describe,
+    schema,
+):
     main.add_command(_command)

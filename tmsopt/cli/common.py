@@ -87,7 +87,10 @@ def saving(option: str, path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        click.echo(f"{option}: '{path}' cannot be written: {error.strerror}", err=True)
+        found = "is there already; give another name" if isinstance(error, FileExistsError) else (
+            f"cannot be written: {error.strerror}"
+        )  # fmt: skip
+        click.echo(f"{option}: '{path}' {found}", err=True)
         sys.exit(BAD_INPUT)
     click.echo(f"wrote {path}", err=True)
 

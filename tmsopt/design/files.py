@@ -23,37 +23,65 @@ _NO_PARAMETERS = "missing section [parameters]"
 
 
 class _FreeParameter(Section):
+    """Bounds between which a free parameter may move."""
+
     min: Number
+    """The least value."""
     max: Number
+    """The greatest value."""
     start: Number | None = None
+    """A value to start the search from, among others."""
 
 
 class _Band(Section):
+    """Every value between two, at all of which the design must do."""
+
     min: Number
+    """The least value."""
     max: Number
+    """The greatest value."""
     points: StrictInt = POINTS
+    """How many values are looked at first, 2 to 99; others are added until none between is worse."""
 
 
 class _Objective(Section):
+    """What is asked: minimize or maximize an expression, locate a pattern of roots, both, or a front of several."""
+
     minimize: StrictStr | None = None
+    """An expression to make as small as possible, such as "abscissa", the largest real part of the roots."""
     maximize: StrictStr | None = None
+    """An expression to make as large as possible, such as "damping_ratio"."""
     pareto: list[StrictStr] | None = None
+    """Two or three expressions to minimise at once, such as ["abscissa", "Fr"]; "-lambda_s" maximises."""
     locate: StrictStr | None = None
+    """The pattern of roots to find, such as "EP4" (four equal roots), "weave" or "capsize"."""
 
 
 class _File(Section):
-    """The shape of a problem file."""
+    """A design problem: which parameters are fixed, which are free, and what is asked of them."""
 
     title: StrictStr = ""
+    """One line for reports."""
     model: StrictStr | dict[str, Any] = "tms"
+    """The system: a name in quotes, or a table [model] with matrices or coefficients of your own."""
     bicycle: StrictStr | None = None
+    """A parameter file of BicycleParameters, beside this one; what stands under [parameters] goes before it."""
     parameters: dict[str, _FreeParameter | StrictFloat | StrictInt | StrictStr]
+    """A number fixes, a table { min = …, max = … } frees; texts have units, such as "40 cm"."""
     objective: _Objective = Field(default_factory=_Objective)
+    """What is asked; a chart and a trace need nothing."""
     constraints: dict[str, StrictStr] = Field(default_factory=dict)
+    """Limits, each name = "expression >= expression", with <=, >= or ==; numbers in m, kg, m/s, rad and N."""
     scenarios: dict[str, _Band | list[Number]] = Field(default_factory=dict)
+    """Values of a parameter at each of which the design must do: { min = …, max = … } or a list."""
     tolerances: dict[str, Number] = Field(default_factory=dict)
+    """How far a parameter may be off either way; the design is judged by its worst product."""
     weights: dict[str, Number] = Field(default_factory=dict)
+    """Size of a change of a parameter that counts as 1 in radius, the robustness radius."""
 
+
+SHAPE: type[Section] = _File
+"""The shape of a problem file, for editors."""
 
 Given = Problem | Solution | str | PathLike[str]
 """What every verb takes: a problem, the path of its file, or a solution, which has its problem."""

@@ -9,7 +9,14 @@ from tmsopt.models import Model, Unfit, from_coefficients, from_matrices
 from tmsopt.models.texts import Texts
 
 _MATRICES = ("M", "D", "K", "A")
-_KEYS = ("name", *_MATRICES, "coefficients", "quantities")
+KEYS = {
+    "name": "One line for reports.", "M": "Rows of the mass matrix of M q″ + D q′ + K q = 0, numbers or expressions.",
+    "D": "Rows of its damping matrix; left out, it is 0.", "K": "Rows of its stiffness matrix.",
+    "A": "Rows of the matrix of x′ = A x, in place of M, D and K.",
+    "coefficients": "Of the characteristic polynomial, descending, in place of matrices.",
+    "quantities": "Names for more expressions, to be used in objectives and constraints.",
+}  # fmt: skip
+"""Keys of the table → meaning."""
 
 _EXAMPLE = (
     "write M = [['m']], D = [['c']], K = [['k']], or A = [['a', '1'], ['b', '0']], or coefficients = ['1', 'c', 'k']"
@@ -25,8 +32,8 @@ def stated_model(table: Mapping[str, Any]) -> tuple[list[Fault], Model | None]:
     reader = _Reader(table)
     given = [key for key in (*_MATRICES, "coefficients") if key in table]
     for key in table:
-        if key not in _KEYS:
-            reader.fault(f"unknown key '{key}'; {suggest(key, _KEYS)}", key)
+        if key not in KEYS:
+            reader.fault(f"unknown key '{key}'; {suggest(key, KEYS)}", key)
     name = table.get("name", "stated")
     if not isinstance(name, str) or not name.strip() or not name.isprintable():
         reader.fault(f"found {short(name)}; accepted: a text of one line in quotes", "name")

@@ -44,7 +44,9 @@ STRUCTURE = Quantity("structure", "", "structure of the roots, multiple roots re
 RADIUS = "radius"
 """Distance to the nearest loss of stability, in the problem's weights; found by a search of its own."""
 
-NO_RADIUS = Quantity(RADIUS, "1", "robustness radius", "r", lambda values: math.nan)
+_RADIUS = "robustness radius, the least change of the parameters, in their weights, after which it is unstable"
+
+NO_RADIUS = Quantity(RADIUS, "1", _RADIUS, "r", lambda values: math.nan)
 """Where it was not searched for, the radius is not known."""
 
 _QUARTIC = 5  # coefficients of the degree that has formulas of its own

@@ -35,24 +35,43 @@ _ACCEPTED = {
 
 
 class _Options(Section):
+    """How the rows of a study are made and solved."""
+
     method: StrictStr = "grid"
+    """How rows are made of what varies."""
     rows: StrictInt | None = None
+    """How many, of latin_hypercube, sobol and monte_carlo."""
     csv: StrictStr | None = None
+    """A CSV file beside this one with a column for all that varies, of method = "csv"."""
     distribution: StrictStr | None = None
+    """Of errors within the tolerances, of monte_carlo."""
     seed: StrictInt = 0
+    """Other numbers draw other samples."""
     starts: StrictInt = STARTS
+    """Of a row, at most."""
     warm: StrictBool = False
+    """Whether neighbours start each other."""
     report: list[StrictStr] = Field(default_factory=list)
+    """Expressions recorded for every row, such as ["nu_H", "2*Fr_c"]."""
 
 
 class _StudyFile(Section):
-    """The shape of a study file."""
+    """A study: one problem solved for every row of what varies."""
 
     title: StrictStr = ""
+    """One line for reports."""
     problem: StrictStr | dict[str, Any]
+    """A problem file beside this one, or its tables as [problem.parameters] and so on."""
     study: _Options = Field(default_factory=_Options)
+    """How rows are made and solved."""
     vary: dict[str, Any] = Field(default_factory=dict)
+    """What varies from row to row: mu, "lambda_s.max" of a free parameter, "trail.limit" of a constraint."""
     tolerances: dict[str, Number] = Field(default_factory=dict)
+    """Errors that a Monte Carlo draws from, in place of those of the problem."""
+
+
+SHAPE: type[Section] = _StudyFile
+"""The shape of a study file, for editors."""
 
 
 def load_study(path: str | PathLike[str]) -> Study | Sampling:

@@ -38,8 +38,8 @@ def vocabulary(model: Model, of: ParameterSet) -> dict[str, Parameter | Quantity
 
 
 def _power(k: int) -> str:
-    what = "the constant coefficient" if k == 0 else f"the coefficient of s^{k}" if k > 1 else "the coefficient of s"
-    return f"{what} of the characteristic polynomial"
+    what = "constant coefficient" if k == 0 else f"coefficient of s^{k}" if k > 1 else "coefficient of s"
+    return f"{what} in the characteristic polynomial"
 
 
 def unknown(name: str, model: Model, of: ParameterSet, accepted: Iterable[str] | None = None) -> str:

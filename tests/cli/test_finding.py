@@ -1,0 +1,117 @@
+"""The commands by which one finds one's way, by their contract: streams, exit status, files never written over."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import tmsopt
+from tmsopt.cli import main
+from tmsopt.guide import example, examples, new_problem, schema_text
+
+Run = Callable[..., tuple[object, str, str]]
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Run:
+    """Exit status, stdout, stderr."""
+
+    def run(*arguments: object) -> tuple[object, str, str]:
+        with pytest.raises(SystemExit) as stop:
+            main(args=[*map(str, arguments)], prog_name="tmsopt")
+        written = capsys.readouterr()
+        return stop.value.code, written.out, written.err
+
+    return run
+
+
+@pytest.mark.parametrize("command", ["describe", "schema", "new", "example"])
+def test_help_has_examples_and_exit_status(run: Run, command: str) -> None:
+    status, out, _ = run(command, "--help")
+    assert status == 0
+    assert f"tmsopt {command}" in out.split("Examples:")[1]
+    assert "Exit status: 0 done, 2 bad input" in out
+
+
+@pytest.mark.parametrize("what", ["tms", "whipple", "problems/ep4.toml", "problems/coupled_pair.toml"])
+def test_describe_writes_the_report_or_json(run: Run, what: str) -> None:
+    found = tmsopt.describe(what)
+    assert run("describe", what) == (0, f"{found}\n", "")
+    status, out, err = run("describe", what, "--json")
+    assert (status, err) == (0, "")
+    assert json.loads(out) == found.to_json()
+
+
+def test_describe_answers_a_wrong_word(run: Run) -> None:
+    status, out, err = run("describe", "bicycle")
+    assert (status, out) == (2, "")
+    assert "models: tms whipple" in err
+
+
+def test_schema_is_written_once(run: Run, tmp_path: Path) -> None:
+    assert run("schema") == (0, schema_text(), "")
+    file = tmp_path / "s.json"
+    assert run("schema", "-o", file)[0] == 0
+    assert file.read_text(encoding="utf-8") == schema_text()
+    file.write_text("mine")
+    status, _, err = run("schema", "-o", file)
+    assert status == 2
+    assert "is there already" in err
+    assert file.read_text() == "mine"
+
+
+def test_a_new_problem_is_written_with_its_schema(run: Run, tmp_path: Path) -> None:
+    file = tmp_path / "robot.toml"
+    status, out, err = run("new", file)
+    assert (status, out) == (0, "")
+    assert "robot.toml" in err
+    assert file.read_text(encoding="utf-8") == new_problem("tms")
+    assert {p.name for p in tmp_path.iterdir()} == {"robot.toml", "tmsopt.schema.json"}
+    assert run("new", tmp_path / "bicycle.toml", "--model", "whipple")[0] == 0
+    assert tmsopt.load(tmp_path / "bicycle.toml").model is tmsopt.models.whipple
+
+
+@pytest.mark.parametrize("arguments", [["new"], ["example", "ep4", "--output"]])
+def test_a_file_that_is_there_stays_as_it_is(run: Run, tmp_path: Path, arguments: list[str]) -> None:
+    file, beside = tmp_path / "mine.toml", tmp_path / "tmsopt.schema.json"
+    file.write_text("mine")
+    status, _, err = run(*arguments, file)
+    assert status == 2
+    assert "is there already" in err
+    assert [p.name for p in tmp_path.iterdir()] == ["mine.toml"]
+    assert file.read_text() == "mine"
+    beside.write_text("mine too")
+    assert run(*arguments, tmp_path / "other.toml")[0] == 0
+    assert beside.read_text() == "mine too"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["new", "robot.txt"], "accepted: a file name ending in toml"),
+        (["new", "nowhere/robot.toml"], "does not exist"),
+        (["new", "robot.toml", "--model", "wipple"], "did you mean 'whipple'"),
+        (["example", "epp4"], "did you mean 'ep4'"),
+        (["example", "-o", "x.toml"], "tmsopt example lists all"),
+    ],
+)
+def test_bad_input_is_answered(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    status, out, err = run(*arguments)
+    assert (status, out) == (2, "")
+    assert said in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_examples_are_listed_shown_and_written(run: Run, tmp_path: Path) -> None:
+    status, out, _ = run("example")
+    assert status == 0
+    assert [line.split()[0] for line in out.splitlines()] == list(examples())
+    assert json.loads(run("example", "--json")[1]) == examples()
+    assert run("example", "ep4") == (0, example("ep4"), "")
+    assert run("example", "study_built", "-o", tmp_path / "built.toml")[0] == 0
+    assert {p.name for p in tmp_path.iterdir()} == {"built.toml", "ep4.toml", "tmsopt.schema.json"}
+    assert isinstance(tmsopt.load_study(tmp_path / "built.toml"), tmsopt.Sampling)

@@ -1,0 +1,139 @@
+"""Descriptions: every name that an expression may use, with its meaning; of a file, what it says, as it was typed."""
+
+import json
+import math
+import re
+from pathlib import Path
+
+import casadi as ca
+import pytest
+
+import tmsopt
+
+PROBLEMS = sorted(Path("problems").glob("*.toml"))
+BUILT_IN = ("tms", "whipple")
+
+
+def names(found: tmsopt.Description) -> set[str]:
+    return {s.name for of in found.sets for s in (*of.parameters, *of.quantities)}
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_a_model_is_described_by_its_own_tables(name: str) -> None:
+    model = getattr(tmsopt.models, name)
+    found = tmsopt.describe(name)
+    assert found == tmsopt.describe(model)
+    for of, described in zip(model.sets, found.sets, strict=True):
+        assert [(s.name, s.unit, s.meaning) for s in described.parameters] == [
+            (p.name, p.unit, p.meaning) for p in of.parameters
+        ]
+        meant = {s.name: s.meaning for s in described.quantities}
+        assert all(meant[q.name] == q.meaning for q in (*model.quantities, *of.quantities))
+        assert {"abscissa", "damping_ratio", "radius", "a0", "a4"} <= set(meant)
+        assert all(meant.values())
+        assert not set(meant) & set(of.names)
+
+
+@pytest.mark.parametrize("path", PROBLEMS, ids=lambda p: p.stem)
+def test_a_file_is_described_by_every_name_that_it_may_use(path: Path) -> None:
+    found = tmsopt.describe(path)
+    if "study" not in path.stem:
+        problem = tmsopt.load(path)
+        assert names(found) == set(problem.vocabulary)
+        assert (found.title, found.model) == (problem.title, problem.model.name)
+        assert dict(found.asked.get("constraints", {})) == problem.constraints
+    assert max(map(len, str(found).splitlines())) <= 100
+    assert all(re.search(rf"^  {re.escape(name)}( |$)", str(found), re.MULTILINE) for name in names(found))
+    assert str(found) == found.report()
+    assert "\n" not in repr(found)
+    assert json.loads(json.dumps(found.to_json(), allow_nan=False))["model"] == found.model
+
+
+def test_numbers_stand_as_they_were_typed() -> None:
+    (of,) = tmsopt.describe("problems/delivery_robot.toml").sets
+    given = {s.name: s.given for s in of.parameters}
+    assert given["w"] == "80 cm"
+    assert given["v"] == "1 m/s … 4 m/s"
+    assert given["lambda_s"] == "-35 deg … 35 deg"
+    assert given["g"] == "9.81 m/s^2"
+    assert tmsopt.describe("problems/workshop.toml").asked["tolerances"] == {"x_B": "5 mm", "lambda_s": "0.5 deg"}
+
+
+def test_a_problem_of_python_has_the_units_of_the_model() -> None:
+    free = {"lambda_s": (0.1, 1.0), "Fr": (1, 2)}
+    fixed = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1, "chi_B": 1.5}
+    problem = tmsopt.Problem(
+        tmsopt.models.tms, fixed=fixed, free=free, minimize="abscissa", scenarios={"mu": (0.1, 0.2)}
+    )
+    found = tmsopt.describe(problem)
+    (of,) = found.sets
+    assert {s.name: s.given for s in of.parameters}["lambda_s"] == "0.1 rad … 1 rad"
+    assert found.asked == {"objective": {"minimize": "abscissa"}, "scenarios": {"mu": "0.1, 0.2"}}
+
+
+def test_a_system_of_ones_own_shows_its_matrices() -> None:
+    found = tmsopt.describe("problems/coupled_pair.toml")
+    assert found.matrices["K"] == (("1 + k", "-k"), ("-k", "w + k"))
+    assert "K = [1 + k     -k]\n    [   -k  w + k]" in str(found)
+    assert found.sketch == ""
+    k, m = ca.SX.sym("k"), ca.SX.sym("m")
+    stated = tmsopt.describe(tmsopt.models.from_coefficients([m, 0, k], name="spring", quantities={"ratio": k / m}))
+    assert stated.matrices["coefficients"] == (("m", "0", "k"),)
+    (of,) = stated.sets
+    assert {q.name: q.meaning for q in of.quantities}["ratio"] == "= (k / m)"
+
+
+def test_the_patterns_are_those_that_a_problem_may_locate() -> None:
+    for name, meaning in tmsopt.describe("problems/three_masses.toml").patterns.items():  # degree 6
+        assert meaning
+        assert tmsopt.roots.pattern(name, 6).name == name
+    assert "EP6" in tmsopt.describe("problems/three_masses.toml").patterns
+    assert "EP5" not in tmsopt.describe("tms").patterns
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_the_sketch_has_every_length_mass_and_angle(name: str) -> None:
+    """And nothing else that looks like a symbol."""
+    found = tmsopt.describe(name)
+    drawn = set(re.findall(r"\b[A-Za-z]+_[A-Za-z]+\b|(?<=[ <])[wcvg](?=[ ,;>)])", found.sketch))
+    assert drawn - {"u_H"} == {p.name for p in found.sets[-1].parameters}
+    assert max(map(len, found.sketch.splitlines())) <= 100
+    assert found.sketch.isascii()
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_the_sketch_is_drawn_to_the_signs(name: str) -> None:
+    """The axis leans back at its top, to the left of a bicycle that goes right, and meets the ground by the trail ahead."""
+    lines = tmsopt.describe(name).sketch.strip("\n").splitlines()
+    ground = next(k for k, line in enumerate(lines) if line.endswith("ground"))
+    front = lines[ground].index("F")
+    axis = [line.rindex("\\", 0, front + 1) for line in lines[1:5]]  # above the wheels
+    assert axis == sorted(axis)
+    reach = axis[0] + ground - 1  # one column a line
+    trail = re.search(r"\|<c>\|", lines[ground + 1])
+    assert reach == (front if trail is None else trail.end() - 1)
+    assert trail is None or trail.start() == front
+
+
+def test_signs_are_said() -> None:
+    said = " ".join(tmsopt.describe("tms").conventions)
+    assert "z down" in said
+    assert "heights are negative" in said
+    heights = [s for s in tmsopt.describe("tms").sets[1].parameters if s.name.startswith("z_")]
+    assert [s.range for s in heights] == ["<= 0", "<= 0"]
+    tilt = next(s for s in tmsopt.describe("tms").sets[1].parameters if s.name == "lambda_s")
+    assert tilt.range == f"> {-math.degrees(math.pi / 2):g} and < 90 deg"
+
+
+@pytest.mark.parametrize("wrong", [3, None, ["tms"]], ids=repr)
+def test_anything_else_is_refused_in_words(wrong: object) -> None:
+    with pytest.raises(tmsopt.InputError, match="accepted: the name of a model"):
+        tmsopt.describe(wrong)  # type: ignore[arg-type]
+
+
+def test_a_word_that_is_no_file_is_answered_with_the_models(tmp_path: Path) -> None:
+    with pytest.raises(tmsopt.InputError, match="no such file; models: tms whipple"):
+        tmsopt.describe("bicycle")
+    (tmp_path / "bad.toml").write_text("[parameters]\nw = 1\n")
+    with pytest.raises(tmsopt.InputError, match=r"bad\.toml:1: parameters: missing parameter"):
+        tmsopt.describe(tmp_path / "bad.toml")

@@ -1,0 +1,87 @@
+"""Files to start from: new problems solve as they stand, examples come with the installed package."""
+
+import tomllib
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import tmsopt
+from tmsopt.guide import STARTS, companions, example, examples, new_problem
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.parametrize("kind", STARTS)
+def test_a_new_problem_solves_as_it_stands(kind: str, tmp_path: Path) -> None:
+    file = tmp_path / "new.toml"
+    file.write_text(new_problem(kind), encoding="utf-8")
+    design = tmsopt.solve(file)
+    assert design.status == "optimal"
+    assert design.abscissa < 0
+    assert max(map(len, new_problem(kind).splitlines())) <= 100
+
+
+@pytest.mark.parametrize("kind", STARTS)
+def test_a_new_problem_solves_with_every_hint_taken(kind: str, tmp_path: Path) -> None:
+    """What its comments offer instead of the objective reads as well."""
+    file = tmp_path / "new.toml"
+    text = new_problem(kind)
+    offered = [line[1:].split("  ")[1].strip() for line in text.splitlines() if line.startswith("#   ")]
+    assert len(offered) >= 2
+    for line in offered:
+        file.write_text(text.replace('minimize = "abscissa"\n', f"{line}\n"), encoding="utf-8")
+        assert tmsopt.load(file).sense == line.split(" = ")[0]
+
+
+def test_the_tables_that_the_new_robot_offers_are_read(tmp_path: Path) -> None:
+    text = new_problem("tms")
+    offer = text.index("# [scenarios]")
+    uncommented = "\n".join(line.removeprefix("# ") for line in text[offer:].splitlines())
+    kept = "\n".join(line for line in text[:offer].splitlines() if not line.startswith("v = "))
+    file = tmp_path / "new.toml"
+    file.write_text(f"{kept}\n{uncommented}\n", encoding="utf-8")
+    problem = tmsopt.load(file)
+    assert (set(problem.scenarios), set(problem.tolerances)) == ({"v"}, {"x_B", "lambda_s"})
+
+
+def test_the_examples_are_those_of_the_checkout_with_their_titles() -> None:
+    paths = {p.stem: p for p in (ROOT / "problems").glob("*.toml")}
+    assert set(examples()) == set(paths)
+    assert examples()["ep4"] == "EP4 of the chi_H = 1 bicycle"
+    assert all(examples().values())
+    assert all(example(name) == path.read_text(encoding="utf-8") for name, path in paths.items())
+    assert example("ep4.toml") == example("ep4")
+    with pytest.raises(tmsopt.InputError, match="did you mean 'ep4'"):
+        example("epp4")
+
+
+def test_the_examples_are_found_where_they_are_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the record of the distribution, at the place that pyproject.toml gives them in every installation."""
+    data = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["data-files"]
+    ((place, patterns),) = data.items()
+    assert sorted(path for pattern in patterns for path in ROOT.glob(pattern)) == sorted(
+        (ROOT / "problems").glob("*.toml")
+    )
+    site = tmp_path / "lib" / "site-packages"
+    (site / "tmsopt-1.dist-info").mkdir(parents=True)
+    (tmp_path / place).mkdir(parents=True)
+    (tmp_path / place / "mine.toml").write_text('title = "Mine"\n')
+    (site / "tmsopt-1.dist-info" / "METADATA").write_text("Name: tmsopt\nVersion: 1\n")
+    (site / "tmsopt-1.dist-info" / "RECORD").write_text(f"tmsopt/a.toml,,\n../../{place}/mine.toml,,\n")
+    room = import_module("tmsopt.guide.examples")
+    room._files.cache_clear()
+    with monkeypatch.context() as patched:
+        patched.setattr(room, "__file__", str(site / "tmsopt" / "guide" / "examples.py"))
+        patched.syspath_prepend(site)
+        assert examples() == {"mine": "Mine"}
+    room._files.cache_clear()
+    assert "ep4" in examples()
+
+
+def test_what_a_file_refers_to_comes_with_it() -> None:
+    assert set(companions(example("ep4"))) == {"tmsopt.schema.json"}
+    assert companions(example("study_built"))["ep4.toml"] == example("ep4")
+    for name in examples():
+        problem = tomllib.loads(example(name)).get("problem")
+        assert not isinstance(problem, str) or problem in companions(example(name))

@@ -1,0 +1,144 @@
+"""The JSON Schema: every file that is read fits it, and what it finds wrong no reader takes."""
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+import tmsopt
+from tmsopt.guide import SCHEMA_FILE, STARTS, new_problem, schema_text
+
+PROBLEMS = sorted(Path("problems").glob("*.toml"))
+SCHEMA = tmsopt.schema()
+VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
+
+
+def faults(text: str) -> list[str]:
+    """Where a file does not fit, each as keys joined by dots."""
+    return [".".join(map(str, e.absolute_path)) for e in VALIDATOR.iter_errors(tomllib.loads(text))]
+
+
+def test_it_is_a_schema_of_its_draft() -> None:
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    assert SCHEMA["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    assert json.loads(schema_text()) == SCHEMA
+
+
+def test_the_file_for_editors_is_the_schema() -> None:
+    """Where this fails: tmsopt schema > problems/tmsopt.schema.json"""
+    assert (Path("problems") / SCHEMA_FILE).read_text(encoding="utf-8") == schema_text()
+
+
+@pytest.mark.parametrize("path", PROBLEMS, ids=lambda p: p.stem)
+def test_every_example_refers_to_it_and_fits(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert text.startswith(f"#:schema ./{SCHEMA_FILE}\n")  # the directive of Taplo, a comment to TOML
+    assert faults(text) == []
+
+
+@pytest.mark.parametrize("kind", STARTS)
+def test_every_new_problem_fits(kind: str) -> None:
+    assert faults(new_problem(kind)) == []
+
+
+GOOD = """model = "tms"
+[parameters]
+w = "80 cm"
+v = { min = "1 m/s", max = 4, start = 2 }
+m_B = "20 kg"
+m_H = 3
+x_B = { min = "20 cm", max = 1 }
+z_B = "-30 cm"
+x_H = "70 cm"
+z_H = "-60 cm"
+lambda_s = { min = "-35 deg", max = "35 deg" }
+[objective]
+minimize = "abscissa"
+[constraints]
+arm = "u_H >= 0.02"
+[tolerances]
+x_B = "5 mm"
+"""
+STUDY = """problem = "ep4.toml"
+[study]
+method = "sobol"
+rows = 8
+[vary]
+mu = { min = 0.1, max = 1 }
+"""
+OWN = """[model]
+M = [[1]]
+K = [["k"]]
+[parameters]
+k = 1
+"""
+
+WRONG = {
+    "unknown section": (GOOD, "[tolerances]", "[tolerance]", ""),
+    "unknown key of an objective": (GOOD, "minimize", "minimise", "objective"),
+    "two senses": (GOOD, '"abscissa"', '"abscissa"\nmaximize = "v"', "objective"),
+    "strict comparison": (GOOD, "u_H >= 0.02", "u_H > 0.02", "constraints.arm"),
+    "signs the other way round": (GOOD, "u_H >= 0.02", "u_H => 0.02", "constraints.arm"),
+    "two comparisons": (GOOD, "u_H >= 0.02", "1 >= u_H >= 0.02", "constraints.arm"),
+    "a number for a limit": (GOOD, '"u_H >= 0.02"', "0.02", "constraints.arm"),
+    "unknown parameter": (GOOD, "m_H = 3", "m_H = 3\ntrail = 0.1", "parameters"),
+    "sets mixed": (GOOD, "m_H = 3", "m_H = 3\nmu = 0.1", "parameters"),
+    "degrees for radians": (GOOD, '"35 deg"', "35", "parameters.lambda_s.max"),
+    "height upward": (GOOD, '"-30 cm"', "0.3", "parameters.z_B"),
+    "no greatest value": (GOOD, "max = 4, ", "", "parameters.v"),
+    "misspelt start": (GOOD, "start", "strat", "parameters.v"),
+    "number in quotes": (GOOD, '"20 kg"', '"20"', "parameters.m_B"),
+    "list for a number": (GOOD, "m_H = 3", "m_H = [3]", "parameters.m_H"),
+    "unknown model": (GOOD, '"tms"', '"TMS"', "model"),
+    "unknown pattern": (GOOD, 'minimize = "abscissa"', 'locate = "EP1"', "objective.locate"),
+    "tolerance of nothing": (GOOD, 'x_B = "5 mm"', 'c = "5 mm"', "tolerances"),
+    "no parameters": ('title = "x"\n', "x", "y", ""),
+    "method misspelt": (STUDY, "sobol", "sobel", "study.method"),
+    "rows below 1": (STUDY, "rows = 8", "rows = 0", "study.rows"),
+    "nothing to vary over": (STUDY, "{ min = 0.1, max = 1 }", "3", "vary.mu"),
+    "study without problem": (STUDY, 'problem = "ep4.toml"\n', "", ""),
+    "objective beside a study": (STUDY, "[vary]", '[objective]\nminimize = "Fr"\n[vary]', ""),
+    "unknown matrix": (OWN, "M =", "Q =", "model"),
+    "matrix that is a row": (OWN, "M = [[1]]", "M = [1]", "model.M.0"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", [GOOD, STUDY, OWN])
+def test_what_they_are_made_from_fits(text: str) -> None:
+    assert faults(text) == []
+
+
+@pytest.mark.parametrize("kind", WRONG)
+def test_what_is_wrong_is_marked_where_it_stands_and_is_not_read(kind: str, tmp_path: Path) -> None:
+    text, old, new, place = WRONG[kind]
+    assert old in text
+    wrong = text.replace(old, new, 1)
+    assert place in faults(wrong)
+    file = tmp_path / "wrong.toml"
+    file.write_text(wrong, encoding="utf-8")
+    (tmp_path / "ep4.toml").write_text(Path("problems/ep4.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    with pytest.raises(tmsopt.InputError):
+        (tmsopt.load_study if text == STUDY else tmsopt.load)(file)
+
+
+def test_parameters_are_explained_by_their_meanings() -> None:
+    for name in ("tms", "whipple"):
+        explained: dict[str, Any] = SCHEMA["$defs"][f"parameters_{name}"]["properties"]
+        model = getattr(tmsopt.models, name)
+        assert set(explained) == {n for of in model.sets for n in of.names}
+        assert all(explained[p.name]["description"].startswith(p.meaning) for of in model.sets for p in of.parameters)
+
+
+def test_every_key_is_explained() -> None:
+    problem = SCHEMA["$defs"]["problem"]["properties"]
+    study = SCHEMA["$defs"]["study_file"]["properties"]
+    inner = (problem, study, problem["objective"]["properties"], study["study"]["properties"])
+    assert [key for keys in inner for key, found in keys.items() if not found.get("description")] == []
+
+
+def test_a_bicycle_of_its_own_file_needs_no_parameters() -> None:
+    assert faults('bicycle = "Browser.txt"\n[parameters]\nv = 5\n') == []
+    assert faults('bicycle = "Browser.txt"\n[parameters]\nFr = 5\n') == ["parameters"]

@@ -1,0 +1,86 @@
+"""The commands that write files to start from."""
+
+from pathlib import Path
+
+import click
+
+from tmsopt.cli.common import bad_input, check_output, saving, write_json
+
+_OF_NEW = """
+\b
+Examples:
+  tmsopt new robot.toml && tmsopt solve robot.toml
+  tmsopt new bicycle.toml --model whipple
+  tmsopt new absorber.toml --model own
+
+The file has a comment at each line and solves as it stands. tmsopt.schema.json is written beside it unless it is there:
+editors explain and complete by it, and it may be removed.
+
+Exit status: 0 done, 2 bad input, such as a FILE that is there already.
+"""
+
+_OF_EXAMPLE = """
+\b
+Examples:
+  tmsopt example
+  tmsopt example delivery_robot
+  tmsopt example ep4 --output ep4.toml
+
+What a file refers to is written beside it, unless it is there: tmsopt.schema.json for editors, the problem of a study.
+
+Exit status: 0 done, 2 bad input, such as a file that is there already.
+"""
+
+
+def write_new(option: str, path: Path, text: str) -> None:
+    """Write a file that is not there; where one is, or none can be, say so and end with exit status 2."""
+    with saving(option, path), path.open("x", encoding="utf-8", newline="\n") as file:
+        file.write(text)
+
+
+def _write_with_companions(option: str, path: Path, text: str) -> None:
+    from tmsopt.guide import companions
+
+    write_new(option, path, text)
+    for name, other in companions(text).items():
+        if not (beside := path.with_name(name)).exists():
+            write_new(option, beside, other)
+
+
+@click.command(epilog=_OF_NEW)
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--model", default="tms", show_default=True, metavar="[tms|whipple|own]", help="What it is about.")
+def new(file: Path, model: str) -> None:
+    """Write FILE, a commented problem to start from."""
+    with bad_input():
+        from tmsopt.guide import new_problem
+
+        check_output("FILE", file, ("toml",))
+        text = new_problem(model)
+    _write_with_companions("FILE", file, text)
+
+
+@click.command(epilog=_OF_EXAMPLE)
+@click.argument("name", required=False)
+@click.option("--output", "-o", type=click.Path(path_type=Path), help="Write a new file (toml). [default: stdout]")
+@click.option("--json", "as_json", is_flag=True, help="Write the list as JSON.")
+def example(name: str | None, output: Path | None, as_json: bool) -> None:
+    """Show the example NAME; without a name, list all that come with tmsopt."""
+    with bad_input():
+        from tmsopt import Fault, InputError
+        from tmsopt.guide import example as text_of, examples
+
+        check_output("--output", output, ("toml",))
+        if name is None and output is not None:
+            raise InputError([Fault("found no NAME; tmsopt example lists all", ("NAME",))])
+        text = None if name is None else text_of(name)
+    if text is not None and output is not None:
+        _write_with_companions("--output", output, text)
+    elif text is not None:
+        click.echo(text, nl=False)
+    elif as_json:
+        write_json(examples())
+    else:
+        listed = examples()
+        width = max(map(len, listed), default=0)
+        click.echo("\n".join(f"{name.ljust(width)}  {title}" for name, title in listed.items()))

@@ -1,0 +1,153 @@
+"""What a model, a problem or a file is made of, from the model's own tables."""
+
+import math
+from collections.abc import Iterator, Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from tmsopt.design import Band, Problem, Solution, load
+from tmsopt.design.advice.names import vocabulary
+from tmsopt.design.toml import read_page
+from tmsopt.errors import Fault, InputError, short
+from tmsopt.guide.description import Description, Word, Words
+from tmsopt.models import CONSTANTS, FUNCTIONS, MODELS, Model, Parameter, ParameterSet, Quantity, Range
+from tmsopt.records import Table
+from tmsopt.roots import pattern
+from tmsopt.roots.patterns.composed import pattern_names
+from tmsopt.studies import load_study
+
+Typed = Mapping[str, Any]
+"""The tables of a file as typed; empty for what is no file."""
+
+
+def describe(given: str | PathLike[str] | Model | Problem | Solution) -> Description:
+    """Words, units, signs and meanings of a model (by name too), a problem, a solution, or a problem or study file.
+
+    Raises:
+        InputError: for a file with faults, and for anything else.
+    """
+    if isinstance(given, Model):
+        return _described(given, None, {})
+    if isinstance(given, str) and given in MODELS:
+        return _described(MODELS[given], None, {})
+    if isinstance(given, Problem | Solution):
+        problem = given if isinstance(given, Problem) else given.problem
+        return _described(problem.model, problem, {})
+    if not isinstance(given, str | PathLike):
+        accepted = f"the name of a model ({', '.join(MODELS)}), the path of a file, a Model, a Problem, or a Solution"
+        raise InputError([Fault(f"found {short(given)}; accepted: {accepted}", ("given",))])
+    try:
+        problem, typed = _read(given)
+    except InputError as error:
+        raise _with_models(error, given) from None
+    return _described(problem.model, problem, typed)
+
+
+def _read(path: str | PathLike[str]) -> tuple[Problem, Typed]:
+    """The problem of a file, or the one that a study is of, with the tables in which it stands."""
+    data = read_page(path, "problem").data
+    if "parameters" in data or not {"problem", "study", "vary"} & set(data):
+        return load(path), data
+    inner = data.get("problem")
+    if isinstance(inner, str):
+        return _read(Path(path).parent / inner)
+    return load_study(path).problem, inner if isinstance(inner, dict) else {}
+
+
+def _with_models(error: InputError, given: str | PathLike[str]) -> InputError:
+    """Of a word that is no file, also which models there are."""
+    if "." in str(given) or len(error.faults) != 1:
+        return error
+    (fault,) = error.faults
+    return InputError([Fault(f"{fault.message}; models: {' '.join(MODELS)}", fault.key, fault.file, fault.line)])
+
+
+def _described(model: Model, problem: Problem | None, typed: Typed) -> Description:
+    names = pattern_names(model.degree)
+    return Description(
+        model=model.name, meaning=model.title, degree=model.degree, title=problem.title if problem else "",
+        sets=tuple(_words(model, of, problem, typed) for of in ([problem.parameter_set] if problem else model.sets)),
+        patterns=Table({name: pattern(name, model.degree).meaning for name in names}),
+        functions=(*FUNCTIONS, *CONSTANTS), conventions=model.conventions, sketch=model.sketch,
+        matrices=Table(dict(_matrices(model, typed))), asked=Table(_asked(problem, typed) if problem else {}),
+    )  # fmt: skip
+
+
+def _words(model: Model, of: ParameterSet, problem: Problem | None, typed: Typed) -> Words:
+    written = _written(typed).get("quantities", (model.statement or {}).get("quantities", {}))
+    quantities = [s for n, s in vocabulary(model, of).items() if n not in of.names]
+    return Words(
+        of.name, tuple(_parameter(p, problem, typed, model.statement is not None) for p in of.parameters),
+        tuple(_quantity(q, written.get(q.name, "")) for q in quantities),
+    )  # fmt: skip
+
+
+def _quantity(q: Parameter | Quantity, formula: str) -> Word:
+    return Word(q.name, q.unit, f"= {formula}" if formula else q.meaning)
+
+
+def _parameter(p: Parameter, problem: Problem | None, typed: Typed, of_user: bool) -> Word:
+    meaning = "" if of_user else p.meaning  # only its name is known
+    return Word(p.name, p.unit, meaning, _limits(p), _given(p, problem, typed))
+
+
+def _limits(p: Parameter) -> str:
+    """The physical range in words, angles in degrees."""
+    if p.range == Range():
+        return ""
+    if p.unit != "rad":
+        return str(p.range)
+    return f"{Range(math.degrees(p.range.lower), math.degrees(p.range.upper), p.range.closed)} deg"
+
+
+def _given(p: Parameter, problem: Problem | None, typed: Typed) -> str:
+    """What a parameter is, or may be, as typed in the file where it stands there."""
+    if problem is None:
+        return "" if p.default is None else f"{p.default:.12g} if left out"
+    own = typed.get("parameters", {}).get(p.name)
+    if p.name in problem.free:
+        low, high = (own["min"], own["max"]) if isinstance(own, dict) else problem.free[p.name]
+        return f"{_number(low, p.unit)} … {_number(high, p.unit)}"
+    return _number(problem.fixed[p.name] if own is None or isinstance(own, dict) else own, p.unit)
+
+
+def _number(value: Any, unit: str) -> str:
+    """A text as typed, or a number with its unit."""
+    return value if isinstance(value, str) else f"{value:.12g}" + ("" if unit == "1" else f" {unit}")
+
+
+def _written(typed: Typed) -> Mapping[str, Any]:
+    """The table [model] of a file."""
+    model = typed.get("model")
+    return model if isinstance(model, dict) else {}
+
+
+def _matrices(model: Model, typed: Typed) -> Iterator[tuple[str, tuple[tuple[str, ...], ...]]]:
+    for name, rows in (_written(typed) or model.statement or {}).items():
+        if isinstance(rows, list) and name not in ("parameters", "shared"):
+            listed = rows if all(isinstance(row, list) for row in rows) else [rows]
+            yield name, tuple(tuple(str(entry) for entry in row) for row in listed)
+
+
+def _asked(problem: Problem, typed: Typed) -> dict[str, Table[str]]:
+    """What a problem asks, section by section."""
+    if problem.pareto:
+        objective = {"pareto": ", ".join(problem.pareto)}
+    else:
+        senses = ("locate", "minimize", "maximize")
+        objective = {n: text for n in senses if (text := getattr(problem, n)) is not None}
+    found: dict[str, dict[str, str]] = {"objective": objective, "constraints": dict(problem.constraints)}
+    of = problem.parameter_set
+    for section in ("scenarios", "tolerances", "weights"):
+        own = typed.get(section, {})
+        found[section] = {n: _span(own.get(n, v), of[n].unit) for n, v in getattr(problem, section).items()}
+    return {section: Table(keys) for section, keys in found.items() if keys}
+
+
+def _span(value: Any, unit: str) -> str:
+    """A scenario, a tolerance or a weight."""
+    if isinstance(value, Band | dict):
+        low, high = (value["min"], value["max"]) if isinstance(value, dict) else (value.min, value.max)
+        return f"{_number(low, unit)} … {_number(high, unit)}"
+    return ", ".join(_number(v, unit) for v in value) if isinstance(value, list | tuple) else _number(value, unit)

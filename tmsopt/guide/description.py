@@ -1,0 +1,126 @@
+"""A description as data: the symbols of a model or problem, each with unit, meaning and range."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from tmsopt.guide.text import matrix, table, wrapped
+from tmsopt.records import SCHEMA, Table
+
+
+@dataclass(frozen=True)
+class Word:
+    """A parameter or quantity.
+
+    Attributes:
+        unit: of its numbers; empty where it has none.
+        range: physically possible values of a parameter, such as ``> 0``.
+        given: of a problem, the value or the bounds, as typed where that is known; of a model, the default.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    range: str = ""
+    given: str = ""
+
+
+@dataclass(frozen=True)
+class Words:
+    """What may be written in one of the ways to state a design.
+
+    Attributes:
+        name: e.g. ``SI``.
+        quantities: all that an expression may use beside the parameters.
+    """
+
+    name: str
+    parameters: tuple[Word, ...]
+    quantities: tuple[Word, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``."""
+        tables = {"parameters": self.parameters, "quantities": self.quantities}
+        return {"name": self.name} | {name: [asdict(w) for w in words] for name, words in tables.items()}
+
+
+@dataclass(frozen=True)
+class Description:
+    """What a model is made of, or a problem.
+
+    Attributes:
+        model: its name, and `meaning` what it is.
+        title: of a problem; else empty.
+        sets: of a problem, the one in which it is written.
+        patterns: name of a root pattern that can be located → meaning.
+        functions: of expressions.
+        conventions: sentences on signs.
+        sketch: side view of a bicycle; empty for other systems.
+        matrices: of a stated system, M, D, K, A or coefficients → rows of entries.
+        asked: of a problem, section → key → text.
+    """
+
+    model: str
+    meaning: str
+    degree: int
+    sets: tuple[Words, ...]
+    patterns: Mapping[str, str]
+    functions: tuple[str, ...]
+    conventions: tuple[str, ...] = ()
+    sketch: str = ""
+    title: str = ""
+    matrices: Mapping[str, tuple[tuple[str, ...], ...]] = Table()
+    asked: Mapping[str, Mapping[str, str]] = Table()
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``."""
+        return {
+            "schema": SCHEMA, "title": self.title, "model": self.model, "meaning": self.meaning, "degree": self.degree,
+            "sets": [of.to_json() for of in self.sets], "patterns": dict(self.patterns),
+            "functions": list(self.functions), "conventions": list(self.conventions), "sketch": self.sketch,
+            "matrices": {name: [list(row) for row in rows] for name, rows in self.matrices.items()},
+            "asked": {section: dict(keys) for section, keys in self.asked.items()},
+        }  # fmt: skip
+
+    def report(self, full: bool = False) -> str:
+        """The text that the command prints, at most 100 columns wide."""
+        return _text(self)
+
+    def __str__(self) -> str:
+        return self.report()
+
+    def __repr__(self) -> str:
+        count = sum(len(of.parameters) for of in self.sets)
+        return f"<Description of {self.model}: {count} parameters, degree {self.degree}>"
+
+
+def _text(found: Description) -> str:
+    """Title, sketch, signs, what is asked, symbols, patterns and functions."""
+    name = f"{found.title}\n{found.model}" if found.title else found.model
+    parts = [f"{name}: {found.meaning}, degree {found.degree}" if found.meaning != found.model else name]
+    if found.sketch:
+        parts.append(found.sketch.strip("\n"))
+    if found.conventions:
+        parts.append("\n".join(["signs", *wrapped(found.conventions)]))
+    if found.matrices:
+        parts.append("\n".join(line for n, rows in found.matrices.items() for line in matrix(n, rows)))
+    parts += ["\n".join([section, *table(list(keys.items()))]) for section, keys in found.asked.items()]
+    shown: set[str] = set()
+    for of in found.sets:
+        alone = "" if of.name == "stated" else f", {of.name}"
+        parts.append("\n".join([f"parameters{alone}", *_words(of.parameters)]))
+        new = [q for q in of.quantities if q.name not in shown and not _is_parameter(q, found)]
+        shown |= {q.name for q in new}
+        parts.append("\n".join([f"quantities{alone}", *_words(new)]))
+    parts.append("\n".join(["patterns of roots, for locate", *table(list(found.patterns.items()))]))
+    parts.append("\n".join(["expressions", *wrapped([f"+ - * / **   <= >= ==   {' '.join(found.functions)}"])]))
+    return "\n\n".join(parts)
+
+
+def _is_parameter(quantity: Word, found: Description) -> bool:
+    """Whether a quantity of one set, in a table of its own, is a parameter of another."""
+    return any(quantity.name == p.name for of in found.sets for p in of.parameters)
+
+
+def _words(words: Iterable[Word]) -> Iterator[str]:
+    return table([(w.name, "" if w.unit == "1" else w.unit, w.given, w.range, w.meaning) for w in words])

@@ -1,0 +1,81 @@
+"""Files to start from: the examples that come with tmsopt, and new problems with a comment at each line."""
+
+import json
+import tomllib
+from collections.abc import Mapping
+from functools import cache
+from importlib import metadata
+from importlib.resources import files
+from pathlib import Path
+
+from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.guide.schema import schema
+
+SCHEMA_FILE = "tmsopt.schema.json"
+"""What the first line of each file refers to, beside it."""
+
+_INSTALLED = "share/tmsopt/problems"  # as pyproject.toml says
+
+STARTS = {
+    "tms": "an engineer's bicycle or robot on two wheels, as two masses on skates, in SI units",
+    "whipple": "a bicycle with wheels and trail, in SI units",
+    "own": "a system of your own, by its matrices",
+}
+"""Models of new problems → what each is."""
+
+
+def new_problem(model: str = "tms") -> str:
+    """A problem file to start from, which solves as it stands.
+
+    Raises:
+        InputError: unless `model` is one of `STARTS`.
+    """
+    if model not in STARTS:
+        raise InputError([Fault(f"found '{model}'; {suggest(model, STARTS)}", ("model",))])
+    return (files("tmsopt.guide") / "templates" / f"{model}.toml").read_text(encoding="utf-8")
+
+
+def examples() -> dict[str, str]:
+    """The examples that come with tmsopt: name → title."""
+    return {
+        name: str(tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")) for name, path in _files().items()
+    }
+
+
+def example(name: str) -> str:
+    """The text of an example.
+
+    Raises:
+        InputError: for a name that is none.
+    """
+    stem = name.removesuffix(".toml")
+    if stem not in _files():
+        raise InputError([Fault(f"found '{name}'; {suggest(stem, _files())}", ("name",))])
+    return _files()[stem].read_text(encoding="utf-8")
+
+
+def companions(text: str) -> dict[str, str]:
+    """Files that belong beside a problem or study file: name → text; the schema, and a problem that a study names."""
+    problem = tomllib.loads(text).get("problem")
+    named = {problem: example(problem)} if isinstance(problem, str) else {}
+    return {SCHEMA_FILE: schema_text(), **named}
+
+
+def schema_text() -> str:
+    """The JSON Schema as it is written to files."""
+    return json.dumps(schema(), indent=1, ensure_ascii=False) + "\n"
+
+
+@cache
+def _files() -> Mapping[str, Path]:
+    """The files of the examples: those of a checkout, or those that were installed with the package."""
+    above = Path(__file__).parents[2]
+    checkout, beside = above / "problems", above / _INSTALLED
+    if (checkout / SCHEMA_FILE).is_file():
+        found = list(checkout.glob("*.toml"))
+    elif beside.is_dir():  # pip install --target
+        found = list(beside.glob("*.toml"))
+    else:
+        listed = metadata.files("tmsopt") or []
+        found = [Path(str(f.locate())) for f in listed if str(f.parent).endswith(_INSTALLED) and f.suffix == ".toml"]
+    return {path.stem: path for path in sorted(found)}
