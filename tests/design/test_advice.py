@@ -129,3 +129,21 @@ def test_degrees_are_offered_for_angles_alone() -> None:
         False,
         True,
     ]
+
+
+def test_a_file_with_anything_left_out_is_answered_in_words(tmp_path: Path) -> None:
+    """Every file with a piece cut away is read, or refused as bad input, with its lines."""
+    path = tmp_path / "robot.toml"
+    text = ROBOT.replace("LIMIT", "abs(u_H - 2*v) >= 0.02").replace('"robot"', '"""\na\n"""')
+    path.write_text(text, encoding="utf-8")
+    assert tmsopt.load(path).constraints
+    refused = 0
+    for size in (1, 3, 9):
+        for start in range(0, len(text), size):
+            path.write_text(text[:start] + text[start + size :], encoding="utf-8")
+            try:
+                tmsopt.load(path)
+            except tmsopt.InputError as error:
+                refused += 1
+                assert all(fault.line >= 1 and fault.message for fault in error.faults)
+    assert refused > 100

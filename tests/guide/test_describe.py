@@ -9,6 +9,7 @@ import casadi as ca
 import pytest
 
 import tmsopt
+from tmsopt.design import parse_value
 
 PROBLEMS = sorted(Path("problems").glob("*.toml"))
 BUILT_IN = ("tms", "whipple")
@@ -81,6 +82,16 @@ def test_a_system_of_ones_own_shows_its_matrices() -> None:
     assert stated.matrices["coefficients"] == (("m", "0", "k"),)
     (of,) = stated.sets
     assert {q.name: q.meaning for q in of.quantities}["ratio"] == "= (k / m)"
+
+
+def test_the_functions_are_those_of_expressions() -> None:
+    called = {
+        name: f"{name}(v, 1)" if name in ("min", "max") else f"{name}(v)" for name in tmsopt.describe("tms").functions
+    }
+    assert called.pop("pi")
+    assert {"sqrt", "atan", "abs"} <= set(called)
+    for text in called.values():
+        assert parse_value(text, ["v"]).names == ("v",)
 
 
 def test_the_patterns_are_those_that_a_problem_may_locate() -> None:

@@ -67,7 +67,7 @@ def read_page(path: str | PathLike[str], kind: str) -> Page:
     except tomllib.TOMLDecodeError as error:
         place = re.search(r"line (\d+)", str(error))
         line = _unclosed(text) or (int(place[1]) if place else text.count("\n") + 1)
-        written = text.splitlines()[line - 1] if text.strip() else ""
+        written = "".join(text.splitlines()[line - 1 : line])  # none where the end of the file is at fault
         raise InputError([Fault(f"not TOML: {error}{line_advice(written)}").at(file, line)]) from None
     except RecursionError:
         raise InputError([Fault("not TOML: nested too deeply", file=file)]) from None
