@@ -18,9 +18,9 @@ Number = StrictFloat | StrictInt | StrictStr
 
 
 class Section(BaseModel):
-    """A table of a file, in which no other key may stand; what stands below a key explains it in editors."""
+    """A table of a file, in which no other key may stand."""
 
-    model_config = ConfigDict(extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="forbid")
 
 
 S = TypeVar("S", bound=Section)

@@ -37,37 +37,35 @@ _ACCEPTED = {
 class _Options(Section):
     """How the rows of a study are made and solved."""
 
-    method: StrictStr = "grid"
-    """How rows are made of what varies."""
-    rows: StrictInt | None = None
-    """How many, of latin_hypercube, sobol and monte_carlo."""
-    csv: StrictStr | None = None
-    """A CSV file beside this one with a column for all that varies, of method = "csv"."""
-    distribution: StrictStr | None = None
-    """Of errors within the tolerances, of monte_carlo."""
-    seed: StrictInt = 0
-    """Other numbers draw other samples."""
-    starts: StrictInt = STARTS
-    """Of a row, at most."""
-    warm: StrictBool = False
-    """Whether neighbours start each other."""
-    report: list[StrictStr] = Field(default_factory=list)
-    """Expressions recorded for every row, such as ["nu_H", "2*Fr_c"]."""
+    method: StrictStr = Field(default="grid", description="How rows are made of what varies.")
+    rows: StrictInt | None = Field(default=None, description="How many, of latin_hypercube, sobol and monte_carlo.")
+    csv: StrictStr | None = Field(
+        default=None, description='A CSV file beside this one with a column for all that varies, of method = "csv".'
+    )
+    distribution: StrictStr | None = Field(default=None, description="Of errors within the tolerances, of monte_carlo.")
+    seed: StrictInt = Field(default=0, description="Other numbers draw other samples.")
+    starts: StrictInt = Field(default=STARTS, description="Of a row, at most.")
+    warm: StrictBool = Field(default=False, description="Whether neighbours start each other.")
+    report: list[StrictStr] = Field(
+        default_factory=list, description='Expressions recorded for every row, such as ["nu_H", "2*Fr_c"].'
+    )
 
 
 class _StudyFile(Section):
     """A study: one problem solved for every row of what varies."""
 
-    title: StrictStr = ""
-    """One line for reports."""
-    problem: StrictStr | dict[str, Any]
-    """A problem file beside this one, or its tables as [problem.parameters] and so on."""
-    study: _Options = Field(default_factory=_Options)
-    """How rows are made and solved."""
-    vary: dict[str, Any] = Field(default_factory=dict)
-    """What varies from row to row: mu, "lambda_s.max" of a free parameter, "trail.limit" of a constraint."""
-    tolerances: dict[str, Number] = Field(default_factory=dict)
-    """Errors that a Monte Carlo draws from, in place of those of the problem."""
+    title: StrictStr = Field(default="", description="One line for reports.")
+    problem: StrictStr | dict[str, Any] = Field(
+        description="A problem file beside this one, or its tables as [problem.parameters] and so on."
+    )
+    study: _Options = Field(default_factory=_Options, description="How rows are made and solved.")
+    vary: dict[str, Any] = Field(
+        default_factory=dict,
+        description='What varies from row to row: mu, "lambda_s.max" of a free one, "arm.limit" of a constraint.',
+    )
+    tolerances: dict[str, Number] = Field(
+        default_factory=dict, description="Errors that a Monte Carlo draws from, in place of those of the problem."
+    )
 
 
 SHAPE: type[Section] = _StudyFile
