@@ -103,6 +103,7 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "Domain": lambda: charted().domain,
     "Swallowtail": lambda: tmsopt.swallowtail(tailed(), rows=4, across=3, starts=4),
     "Ledger": lambda: tmsopt.verify(only=["lscf-*"]),
+    "Description": lambda: tmsopt.describe(plane()),
 }
 TITLED = {
     "Solution",
@@ -116,6 +117,7 @@ TITLED = {
     "Swallowtail",
     "Every",
     "Robustness",
+    "Description",
 }
 made = cache(lambda name: RESULTS[name]())
 each = pytest.mark.parametrize("name", RESULTS)
@@ -173,8 +175,8 @@ def test_its_text_is_its_report(name: str) -> None:
 @each
 def test_it_is_drawn_into_axes(name: str) -> None:
     result = made(name)
-    if name == "Branch":
-        with pytest.raises(tmsopt.InputError, match="no picture of a Branch alone"):
+    if name in ("Branch", "Description"):
+        with pytest.raises(tmsopt.InputError, match=f"no picture of a {name} alone"):
             result.plot()
         return
     draw = getattr(tmsopt.plots, WRITERS[type(result).__name__].picture, None)

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import casadi as ca
@@ -70,6 +71,15 @@ def test_a_problem_of_python_has_the_units_of_the_model() -> None:
     (of,) = found.sets
     assert {s.name: s.given for s in of.parameters}["lambda_s"] == "0.1 rad … 1 rad"
     assert found.asked == {"objective": {"minimize": "abscissa"}, "scenarios": {"mu": "0.1, 0.2"}}
+
+
+def test_a_problem_of_python_has_the_units_in_which_it_was_typed() -> None:
+    path = "problems/delivery_robot.toml"
+    assert tmsopt.describe(tmsopt.load(path)) == tmsopt.describe(path)
+    problem = replace(tmsopt.load(path), scenarios={"m_B": ("12 kg", "500 g")}, tolerances={"w": 0.005})
+    found = tmsopt.describe(problem)
+    assert found.asked["tolerances"] == {"w": "0.5 cm"}  # w was typed in cm
+    assert found.asked["scenarios"] == {"m_B": "12 kg, 0.5 kg"}
 
 
 def test_a_system_of_ones_own_shows_its_matrices() -> None:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from tmsopt.diagnosis import Diagnosis
     from tmsopt.explanation import Explanation, Optimality
     from tmsopt.fronts import Front
+    from tmsopt.guide import Description
     from tmsopt.margins import Nearest, Robustness
     from tmsopt.paper import Comparison, Ledger
     from tmsopt.proofs import Proof
@@ -167,6 +168,13 @@ def of_ledger(ledger: "Ledger") -> Words:
     for verdict, count in ledger.counts.items():
         if count:
             yield f"{count} {verdict}"
+
+
+def of_description(found: "Description") -> Words:
+    """The model, and of how many parameters."""
+    yield found.model
+    yield f"degree {found.degree}"
+    yield " or ".join(_count(len(of.parameters), "parameter") for of in found.sets)
 
 
 def _stable(stable: bool | None) -> Words:

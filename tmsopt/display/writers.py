@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from tmsopt import plots, report as texts
+from tmsopt import guide, plots, report as texts
 from tmsopt.display import headlines
 from tmsopt.errors import Fault, InputError
 
@@ -58,6 +58,7 @@ WRITERS: Mapping[str, Writer] = {
     "Domain": Writer(lambda x, full: texts.domain_table(x), headlines.of_domain, "draw_domain"),
     "Swallowtail": Writer(lambda x, full: texts.swallowtail_table(x), headlines.of_swallowtail, "draw_swallowtail"),
     "Ledger": Writer(lambda x, full: texts.ledger_table(x), headlines.of_ledger, "draw_ledger"),
+    "Description": Writer(lambda x, full: guide.description_text(x), headlines.of_description, ""),
 }
 """Class of a result → who shows it. By name, so that to show one loads no other."""
 
@@ -96,7 +97,8 @@ def drawn(result: Any, ax: "Axes | None" = None) -> "Axes":
     if not isinstance(ax, Axes | None):
         raise InputError([Fault(f"found {type(ax).__name__}; accepted: Axes of Matplotlib, or None", ("ax",))])
     if not (name := _writer(result).picture):
-        raise InputError([Fault(f"there is no picture of a {type(result).__name__} alone; plot what it is a part of")])
+        advice = "plot a solution of it, or what it is a part of"
+        raise InputError([Fault(f"there is no picture of a {type(result).__name__} alone; {advice}")])
     axes: Axes = getattr(plots, name)(result, ax=ax)
     return axes
 

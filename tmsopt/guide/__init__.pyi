@@ -1,5 +1,7 @@
 from .describe import describe as describe
-from .description import Description as Description, Word as Word, Words as Words
+from .description import (
+    Description as Description, Word as Word, Words as Words, description_text as description_text,
+)
 from .examples import (
     SCHEMA_FILE as SCHEMA_FILE, STARTS as STARTS, companions as companions, example as example, examples as examples,
     new_problem as new_problem, schema_text as schema_text,

@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from tmsopt.design import Band, Problem, Solution, load
+from tmsopt.design import Band, Problem, Solution, Unit, load, unit_of
 from tmsopt.design.advice.names import vocabulary
 from tmsopt.design.toml import read_page
 from tmsopt.errors import Fault, InputError, short
@@ -78,7 +78,7 @@ def _words(model: Model, of: ParameterSet, problem: Problem | None, typed: Typed
     written = _written(typed).get("quantities", (model.statement or {}).get("quantities", {}))
     quantities = [s for n, s in vocabulary(model, of).items() if n not in of.names]
     return Words(
-        of.name, tuple(_parameter(p, problem, typed, model.statement is not None) for p in of.parameters),
+        of.name, tuple(_parameter(p, problem, model.statement is not None) for p in of.parameters),
         tuple(_quantity(q, written.get(q.name, "")) for q in quantities),
     )  # fmt: skip
 
@@ -87,9 +87,9 @@ def _quantity(q: Parameter | Quantity, formula: str) -> Word:
     return Word(q.name, q.unit, f"= {formula}" if formula else q.meaning)
 
 
-def _parameter(p: Parameter, problem: Problem | None, typed: Typed, of_user: bool) -> Word:
+def _parameter(p: Parameter, problem: Problem | None, of_user: bool) -> Word:
     meaning = "" if of_user else p.meaning  # only its name is known
-    return Word(p.name, p.unit, meaning, _limits(p), _given(p, problem, typed))
+    return Word(p.name, p.unit, meaning, _limits(p), _given(p, problem))
 
 
 def _limits(p: Parameter) -> str:
@@ -101,20 +101,17 @@ def _limits(p: Parameter) -> str:
     return f"{Range(math.degrees(p.range.lower), math.degrees(p.range.upper), p.range.closed)} deg"
 
 
-def _given(p: Parameter, problem: Problem | None, typed: Typed) -> str:
-    """What a parameter is, or may be, as typed in the file where it stands there."""
+def _given(p: Parameter, problem: Problem | None) -> str:
+    """What a parameter is, or may be, in the unit in which it was typed."""
     if problem is None:
         return "" if p.default is None else f"{p.default:.12g} if left out"
-    own = typed.get("parameters", {}).get(p.name)
-    if p.name in problem.free:
-        low, high = (own["min"], own["max"]) if isinstance(own, dict) else problem.free[p.name]
-        return f"{_number(low, p.unit)} … {_number(high, p.unit)}"
-    return _number(problem.fixed[p.name] if own is None or isinstance(own, dict) else own, p.unit)
+    unit, free = unit_of(problem, p.name), problem.free.get(p.name)
+    return " … ".join(_number(x, unit) for x in free) if free else _number(problem.fixed[p.name], unit)
 
 
-def _number(value: Any, unit: str) -> str:
+def _number(value: Any, unit: Unit) -> str:
     """A text as typed, or a number with its unit."""
-    return value if isinstance(value, str) else f"{value:.12g}" + ("" if unit == "1" else f" {unit}")
+    return value if isinstance(value, str) else unit.show(value, 12)
 
 
 def _written(typed: Typed) -> Mapping[str, Any]:
@@ -138,14 +135,13 @@ def _asked(problem: Problem, typed: Typed) -> dict[str, Table[str]]:
         senses = ("locate", "minimize", "maximize")
         objective = {n: text for n in senses if (text := getattr(problem, n)) is not None}
     found: dict[str, dict[str, str]] = {"objective": objective, "constraints": dict(problem.constraints)}
-    of = problem.parameter_set
     for section in ("scenarios", "tolerances", "weights"):
         own = typed.get(section, {})
-        found[section] = {n: _span(own.get(n, v), of[n].unit) for n, v in getattr(problem, section).items()}
+        found[section] = {n: _span(own.get(n, v), unit_of(problem, n)) for n, v in getattr(problem, section).items()}
     return {section: Table(keys) for section, keys in found.items() if keys}
 
 
-def _span(value: Any, unit: str) -> str:
+def _span(value: Any, unit: Unit) -> str:
     """A scenario, a tolerance or a weight."""
     if isinstance(value, Band | dict):
         low, high = (value["min"], value["max"]) if isinstance(value, dict) else (value.min, value.max)

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from tmsopt.guide.text import matrix, table, wrapped
-from tmsopt.records import SCHEMA, Table
+from tmsopt.records import SCHEMA, Shown, Table
 
 
 @dataclass(frozen=True)
@@ -15,7 +15,7 @@ class Word:
     Attributes:
         unit: of its numbers; empty where it has none.
         range: physically possible values of a parameter, such as ``> 0``.
-        given: of a problem, the value or the bounds, as typed where that is known; of a model, the default.
+        given: of a problem, the value or the bounds, in the unit in which they were typed; of a model, the default.
     """
 
     name: str
@@ -44,8 +44,8 @@ class Words:
         return {"name": self.name} | {name: [asdict(w) for w in words] for name, words in tables.items()}
 
 
-@dataclass(frozen=True)
-class Description:
+@dataclass(frozen=True, repr=False)
+class Description(Shown):
     """What a model is made of, or a problem.
 
     Attributes:
@@ -82,20 +82,9 @@ class Description:
             "asked": {section: dict(keys) for section, keys in self.asked.items()},
         }  # fmt: skip
 
-    def report(self, full: bool = False) -> str:
-        """The text that the command prints, at most 100 columns wide."""
-        return _text(self)
 
-    def __str__(self) -> str:
-        return self.report()
-
-    def __repr__(self) -> str:
-        count = sum(len(of.parameters) for of in self.sets)
-        return f"<Description of {self.model}: {count} parameters, degree {self.degree}>"
-
-
-def _text(found: Description) -> str:
-    """Title, sketch, signs, what is asked, symbols, patterns and functions."""
+def description_text(found: Description) -> str:
+    """Title, sketch, signs, what is asked, symbols, patterns and functions, at most 100 columns wide."""
     name = f"{found.title}\n{found.model}" if found.title else found.model
     parts = [f"{name}: {found.meaning}, degree {found.degree}" if found.meaning != found.model else name]
     if found.sketch:
