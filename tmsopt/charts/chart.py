@@ -138,11 +138,12 @@ class Chart(Shown):
 
     def to_json(self) -> dict[str, Any]:
         """Summary, boundaries and corners; the arrays themselves go to a file."""
+        of = self.problem.parameter_set
         grid, counts, plane = Grid(self.axes, self.grid), self.counts, self.path is None and len(self.grid) == 2
         return {
             "schema": 1, "title": self.about["title"], "model": self.about["problem"]["model"],
             "axes": {
-                n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v)}
+                n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v), "unit": of[n].unit}
                 for n, v in zip(self.axes, self.grid, strict=True)
             },
             **({} if plane else {"layers": list(self.layers)}), "classes": counts.shares,

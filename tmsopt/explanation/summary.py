@@ -39,6 +39,7 @@ def warnings(solution: Solution) -> tuple[str, ...]:
     problem = solution.problem
     idle = {name: _idle(solution, name) for name in problem.free}
     return (
+        *_timeless(problem),
         *_leaning(solution, list(_leant_on(solution))),
         *(text for name in problem.free if (text := idle[name])),
         *(text for name in problem.free if not idle[name] for text in _touching(solution, name)),
@@ -71,6 +72,14 @@ def _quality(solution: Solution) -> str:
         )
     end = "greatest" if problem.sense == "maximize" else "least"
     return f"the {end} {text} found is {unit_of(problem, text).show(solution.value, 6)}, {tried}"
+
+
+def _timeless(problem: Problem) -> Iterator[str]:
+    """That an abscissa is counted in a unit of time that the search may change."""
+    free = [name for name in ("w", "g") if name in problem.free]
+    if free and problem.parameter_set.root_unit != "1/s" and "abscissa" in (problem.minimize or ""):
+        varies = " and ".join(free)
+        yield f'abscissa is counted per √(g/w), and {varies} may vary: the fastest decay in s is maximize = "decay_rate"'
 
 
 def _leant_on(solution: Solution) -> Iterator[str]:

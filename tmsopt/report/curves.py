@@ -1,15 +1,16 @@
 """Traces, charts and fronts as text: what is on them, and where their events are."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from tmsopt.charts.chart import Chart
-from tmsopt.design.unit_system import unit_of
+from tmsopt.design.problem import Problem
+from tmsopt.design.unit_system import Unit, unit_of
 from tmsopt.fronts.front import Front
-from tmsopt.models import Model, ParameterSet, in_words_of
-from tmsopt.report.text import HEIGHT, columns, number, screen, with_unit, yes_no
+from tmsopt.models import Model, in_words_of
+from tmsopt.report.text import HEIGHT, columns, screen, yes_no
 from tmsopt.roots import pattern
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
 from tmsopt.tracing.domain import Domain
@@ -21,9 +22,9 @@ _FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belon
 def chart_table(chart: Chart) -> str:
     """Shares of the classes, the best grid point, and the boundaries with their corners of a plane in memory."""
     data: dict[str, Any] = chart.to_json()
-    of, model = chart.problem.parameter_set, chart.problem.model
+    model = chart.problem.model
     if chart.path is not None or len(chart.axes) != 2:
-        return _summary_table(of, data, model)
+        return _summary_table(chart.problem, data)
     first, second = chart.axes
     size = f"{len(chart.grid[0])} × {len(chart.grid[1])}"
     lines = [chart.problem.title or "untitled problem", f"{size} designs over {first} and {second}", ""]
@@ -33,25 +34,26 @@ def chart_table(chart: Chart) -> str:
     for name in chart.left_aside:
         lines.append(f"  {name} is an equality, which holds on curves and not on a grid: left aside")
     if best := data["least_abscissa"]:
-        units = {n: "" if of[n].unit == "1" else f" {of[n].unit}" for n in (first, second)}
-        where = ", ".join(f"{n} = {best[n]:.6g}{unit}" for n, unit in units.items())
-        lines += ["", f"least abscissa on the grid: {best['value']:.6g} at {where}"]
+        lines += ["", _best(chart.problem, (first, second), best)]
     if chart.domain is not None:
-        lines += ["", domain_table(chart.domain, of, model)]
+        lines += ["", domain_table(chart.domain, chart.problem)]
     return "\n".join(line.rstrip() for line in lines)
 
 
-def domain_table(domain: Domain, of: ParameterSet | None = None, model: Model | None = None) -> str:
-    """What bounds stability and heavy damping, and the corners, with units where the parameters are known."""
-    lines = []
+def domain_table(domain: Domain, problem: Problem | None = None) -> str:
+    """What bounds stability and heavy damping, and the corners, in the units of the problem where it is known."""
+    lines, model = [], problem.model if problem else None
     for name, arcs in (("stability", domain.stability), ("heavy damping", domain.heavy_damping)):
         kinds = [f"{_said(model, arc.kind)} ({len(next(iter(arc.points.values())))} points)" for arc in arcs]
         lines.append(f"{name} is bounded by {', '.join(kinds) or 'nothing in the box'}")
     if domain.corners:
         names = list(domain.corners[0].parameters)
         names = [n for n in names if any(n in arc.points for arc in (*domain.stability, *domain.heavy_damping))]
-        rows = [("corner", *(with_unit(of, n) if of else n for n in names))]
-        rows += [(_said(model, c.name), *(number(c.parameters[n]) for n in names)) for c in domain.corners]
+        units = {n: unit_of(problem, n) if problem else Unit() for n in names}
+        rows = [("corner", *(f"{n} {u.text}".rstrip() for n, u in units.items()))]
+        rows += [
+            (_said(model, c.name), *(u.number(c.parameters[n], 12) for n, u in units.items())) for c in domain.corners
+        ]
         lines += ["", *columns(rows)]
     return "\n".join(line.rstrip() for line in lines)
 
@@ -75,19 +77,23 @@ def _said(model: Model | None, name: str) -> str:
     return in_words_of(model, name) if model else name
 
 
-def _summary_table(of: ParameterSet, data: Mapping[str, Any], model: Model) -> str:
+def _best(problem: Problem, names: Iterable[str], best: Mapping[str, float]) -> str:
+    """The best design of a grid."""
+    where = ", ".join(f"{n} = {unit_of(problem, n).show(best[n], 6)}" for n in names)
+    return f"least abscissa on the grid: {unit_of(problem, 'abscissa').show(best['value'], 6)} at {where}"
+
+
+def _summary_table(problem: Problem, data: Mapping[str, Any]) -> str:
     """A space, or a chart in a folder: shares of the classes, the best grid point, and how fast it was made."""
     axes = data["axes"]
     size = " × ".join(str(a["points"]) for a in axes.values())
     lines = [data["title"] or "untitled problem", f"{size} designs over {', '.join(axes)}", ""]
     if data["classes"]:
-        lines += columns([(in_words_of(model, n), f"{100 * x:.2f} %") for n, x in data["classes"].items() if x])
+        lines += columns([(in_words_of(problem.model, n), f"{100 * x:.2f} %") for n, x in data["classes"].items() if x])
     if data["satisfied"] is not None and data["satisfied"] < 1:
         lines.append(f"  the constraints hold on {100 * data['satisfied']:.2f} %")
     if best := data["least_abscissa"]:
-        units = {n: "" if of[n].unit == "1" else f" {of[n].unit}" for n in axes}
-        where = ", ".join(f"{n} = {best[n]:.6g}{unit}" for n, unit in units.items())
-        lines += ["", f"least abscissa on the grid: {best['value']:.6g} at {where}"]
+        lines += ["", _best(problem, axes, best)]
     if data.get("designs"):
         lines += ["", f"{data['per_second']:.3g} designs per second with {data['engine']}"]
     return "\n".join(line.rstrip() for line in lines)
@@ -128,11 +134,11 @@ def front_table(front: Front, full: bool = False) -> str:
 
 def trace_table(trace: Trace) -> str:
     """Branches with their events, one a row, in the free parameters."""
-    free, of = list(trace.problem.free), trace.problem.parameter_set
+    units = {n: unit_of(trace.problem, n) for n in (*trace.problem.free, "abscissa")}
     lines = [trace.problem.title or "untitled problem", trace_headline(trace)]
     for number_, branch in enumerate(trace.branches, start=1):
         lines += ["", f"branch {number_}: {_summary(branch, trace)}"]
-        lines += _event_rows(branch, {n: with_unit(of, n) for n in free}, trace.problem.model)
+        lines += _event_rows(branch, units, trace.problem.model)
     return "\n".join(line.rstrip() for line in lines)
 
 
@@ -149,16 +155,15 @@ def branch_table(branch: Branch) -> str:
     """One branch with its events, in the free parameters."""
     form = "closed" if branch.closed else "open"
     lines = [f"{branch.pattern}: {len(branch)} points, {form}, coefficients met to {branch.residual:.0e}"]
-    lines += _event_rows(branch, {n: n for n in branch.tangent})
+    lines += _event_rows(branch, dict.fromkeys((*branch.tangent, "abscissa"), Unit()))
     return "\n".join(line.rstrip() for line in lines)
 
 
-def _event_rows(branch: Branch, heads: Mapping[str, str], model: Model | None = None) -> list[str]:
-    rows = [("", *heads.values(), "abscissa", "")]
+def _event_rows(branch: Branch, units: Mapping[str, Unit], model: Model | None = None) -> list[str]:
+    rows = [("", *(f"{n} {unit.text}".rstrip() for n, unit in units.items()), "")]
     for event in branch.events:
-        values = (number(event.parameters[n]) for n in heads)
-        name = _said(model, event.name)
-        rows.append((name, *values, number(float(branch.abscissa[event.index])), event.detail))
+        found = {**event.parameters, "abscissa": float(branch.abscissa[event.index])}
+        rows.append((_said(model, event.name), *(u.number(found[n], 12) for n, u in units.items()), event.detail))
     return columns(rows)
 
 

@@ -3,33 +3,29 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from tmsopt.critical_speeds.crossings import Crossing
+from tmsopt.critical_speeds.crossings import Crossing, Stretch
 from tmsopt.critical_speeds.growth import Growth
 from tmsopt.critical_speeds.speeds import Speeds
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import unit_of
 from tmsopt.models import in_words_of
 from tmsopt.report.text import columns
-from tmsopt.units import reading
 
 _DIGITS = 15
 
 
 def speeds_table(found: Speeds) -> str:
     """Every speed with what happens there, then the stable and the heavily damped bands."""
-    unit = found.problem.parameter_set[found.parameter].unit
-    read = reading(1.0, unit)[1]
-    symbol = found.parameter + ("" if unit == "1" else f" {unit}")
-    end = f" < {found.upper:.6g}" if math.isfinite(found.upper) else ""
+    unit = unit_of(found.problem, found.parameter)
+    end = f" < {unit.number(found.upper, 6)}" if math.isfinite(found.upper) else ""
     lines = [
         found.problem.title or "untitled problem",
-        f"{found.lower:.6g} < {found.parameter}{end}, by exact root isolation for the numbers as stored",
+        f"{unit.number(found.lower, 6)} < {found.parameter}{end}, by exact root isolation for the numbers as stored",
         "",
     ]
-    rows: list[Sequence[str]] = [("", symbol, read if read != unit else "", "root", "")]
+    rows: list[Sequence[str]] = [("", f"{found.parameter} {unit.text}".rstrip(), "root", "")]
     for c in found.found:
-        other = f"{reading(c.at, unit)[0]:.8g}" if read != unit else ""
-        rows.append((in_words_of(found.problem.model, c.kind), f"{c.at:.{_DIGITS}g}", other, _root(c), _meaning(c)))
+        rows.append((in_words_of(found.problem.model, c.kind), unit.number(c.at, _DIGITS), _root(c), _meaning(c)))
     lines += [*columns(rows), ""] if found.found else [_nothing(found), ""]
     lines += list(_always(found))
     lines.append(f"stable: {_bands(found, found.stable)}")
@@ -97,33 +93,19 @@ def _meaning(c: Crossing) -> str:
     return "rightmost" if c.rightmost else ""
 
 
-def _bands(found: Speeds, bands: Sequence[tuple[float, float]]) -> str:
+def _bands(found: Speeds, bands: Sequence[Stretch], digits: int = 8) -> str:
     """Bands as a reader writes them."""
-    words = []
+    words, unit = [], unit_of(found.problem, found.parameter)
     for low, high in bands:
-        begin = "" if low == found.lower else f"from {low:.8g}"
-        end = "" if high == found.upper else f"to {high:.8g}"
+        begin = "" if low == found.lower else f"from {unit.number(low, digits)}"
+        end = "" if high == found.upper else f"to {unit.number(high, digits)}"
         words.append(" ".join(part for part in (begin, end) if part) or "everywhere")
-    unit = found.problem.parameter_set[found.parameter].unit
     text = ", ".join(words) or "nowhere"
-    return text if unit == "1" or text in ("nowhere", "everywhere") else f"{text} {unit}"
+    return text if text in ("nowhere", "everywhere") else f"{text} {unit.text}".rstrip()
 
 
 def range_line(found: Speeds, solution: Solution) -> str:
     """In one line: the range of speed in which a design is stable, and its own speed."""
     name = found.parameter
-    unit = unit_of(solution.problem, name)
-    bands = [
-        " ".join(
-            part
-            for part in (
-                f"from {unit.number(low)}" if low > found.lower else "",
-                f"to {unit.number(high)}" if high < found.upper else "",
-            )
-            if part
-        )
-        or "everywhere"
-        for low, high in found.stable
-    ]
-    where = f"{', '.join(bands)}{f' {unit.text}' if unit.text and bands != ['everywhere'] else ''}" or "nowhere"
-    return f"stable in {name}: {where or 'nowhere'}; this design at {unit.show(solution.parameters[name])}"
+    own = unit_of(solution.problem, name).show(solution.parameters[name])
+    return f"stable in {name}: {_bands(found, found.stable, 5)}; this design at {own}"

@@ -3,8 +3,6 @@
 import math
 from collections.abc import Collection, Sequence
 
-from tmsopt.models import ParameterSet
-
 WIDTH, HEIGHT = 100, 30
 """Columns of every line; lines of a report, if not full."""
 
@@ -17,12 +15,6 @@ def number(value: float) -> str:
 def yes_no(value: bool | None) -> str:
     """In a table; empty where it is not known."""
     return "" if value is None else "yes" if value else "no"
-
-
-def with_unit(of: ParameterSet, name: str) -> str:
-    """A parameter with the unit of its numbers, e.g. ``v m/s``."""
-    unit = of[name].unit
-    return name if unit == "1" else f"{name} {unit}"
 
 
 def screen(rows: Sequence[Sequence[str]], height: int, keep: Collection[int] = (), more: str = "--full") -> list[str]:
