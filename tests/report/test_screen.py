@@ -1,0 +1,132 @@
+"""What the report of every problem holds to: one screen, one unit per quantity, that of the file, and no noise."""
+
+import re
+from collections import defaultdict
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+import tmsopt
+from tmsopt.design import Solution, unit_of
+
+NUMBER = r"-?\d[\d.]*(?:e[+-]?\d+)?"
+QUICK = ("benchmark", "chocolate", "coupled_pair", "ep4", "pt_pair", "realistic", "workshop", "ziegler_undamped")
+FILES = sorted(p for p in Path("problems").glob("*.toml") if not re.match("study|chart|pareto", p.stem))
+LINES, COLUMNS = 30, 100
+
+
+def one_each(names: list[str], report: str) -> dict[str, set[str]]:
+    """Units that stand behind the numbers of each name: ``v  3.7 m/s``, ``v = 4 m/s``, ``v.max:  <= 4 m/s``."""
+    found = defaultdict(set)
+    for name in names:
+        value = rf"(?<![\w.]){name}(?:\.min|\.max)?(?::? +(?:[<>]?=)? *| at least | at most | found is )"
+        for unit in re.findall(rf"{value}{NUMBER}(?: ([^\W\d_][^\s,;:]*(?: m\^2)?)(?=[\s,;:]|$))?", report):
+            found[name].add(unit)
+    return found
+
+
+@pytest.mark.parametrize(
+    "file", [pytest.param(p, id=p.stem, marks=() if p.stem in QUICK else pytest.mark.slow) for p in FILES]
+)
+def test_it_fits_a_screen_in_one_unit_each(file: Path) -> None:
+    design = tmsopt.solve(tmsopt.load(file), throw=False)
+    report = str(design)
+    assert report == design.report()
+    lines = report.splitlines()
+    assert len(lines) <= LINES
+    assert max(map(len, lines)) <= COLUMNS
+    assert not re.search(r"(?<![\d.])-0(?![.\d])|e-1[3-9]|\bnan\b", report)
+    for name, units in one_each(list(design.parameters), report).items():
+        assert units <= {unit_of(design.problem, name).text}, name
+    full = design.report(full=True).splitlines() if file.stem in QUICK else []
+    headed = [name for name, below in pairwise(full) if below and set(below) == {"-"}]
+    order = [
+        "answer",
+        "conflict",
+        "design",
+        "motion",
+        "loads",
+        "cases",
+        "limits",
+        "warnings",
+        "robustness",
+        "rounding",
+        "proof",
+        "roots",
+        "search",
+    ]
+    assert headed == [name for name in order if name in headed]
+
+
+def test_the_reader_of_units_reads() -> None:
+    """So that nothing above passes because nothing was read."""
+    text = "  v   3.7 m/s\nfixed: w = 80 cm, z_B = 2\n  v.max:  <= 13 km/h  by\nneeds v at least 5 m/s\n I_Bxz = 2.4 kg m^2"
+    assert one_each(["v", "w", "z_B", "I_Bxz"], text) == {
+        "v": {"m/s", "km/h"},
+        "w": {"cm"},
+        "z_B": {""},
+        "I_Bxz": {"kg m^2"},
+    }
+
+
+@pytest.fixture(scope="module")
+def robot() -> Solution:
+    return tmsopt.solve(tmsopt.load("problems/benchmark.toml"))
+
+
+@pytest.mark.parametrize(("written", "shown"), [("km/h", "14.4 km/h"), ("m/s", "4 m/s"), ("cm/s", "400 cm/s")])
+def test_a_speed_is_shown_as_it_was_typed(robot: Solution, written: str, shown: str) -> None:
+    problem = replace(robot.problem, units={**robot.problem.units, "v": written})
+    assert f"v = {shown}" in str(tmsopt.solve(problem))
+
+
+def test_numbers_with_units_in_python_are_those_of_a_file() -> None:
+    """25 cm is 0.25 m, 18 km/h 5 m/s, 90 deg π/2, to the last bit; what is typed is how it is shown."""
+    typed = {"w": "80 cm", "v": "18 km/h", "m_B": "2e4 g", "x_B": 0.4, "z_B": "-40 cm", "m_H": 3.0, "x_H": 0.9}
+    problem = tmsopt.Problem(
+        tmsopt.models.tms, fixed=typed, free={"z_H": ("-60 cm", "-0.2 m"), "lambda_s": ("-30 deg", 0.5)},
+        minimize="abscissa", start={"z_H": "-300 mm"}, tolerances={"x_B": "5 mm"},
+    )  # fmt: skip
+    assert problem.fixed == {**problem.fixed, "w": 0.8, "v": 5.0, "m_B": 20.0, "x_B": 0.4, "z_B": -0.4}
+    assert problem.free == {"z_H": (-0.6, -0.2), "lambda_s": (-30 * 0.017453292519943295, 0.5)}
+    assert (problem.start, problem.tolerances) == ({"z_H": -0.3}, {"x_B": 0.005})
+    texts = ("v", "m_B", "x_B", "z_H", "lambda_s.min", "u_H", "N_R", "v_c", "w * m_B", "tan(lambda_s)", "v**2/w/g")
+    shown = [unit_of(problem, text).text for text in texts]
+    # u_H is a length, and two of the three lengths that were typed with a unit are in cm
+    assert shown == ["km/h", "g", "m", "cm", "deg", "cm", "N", "km/h", "kg m", "", ""]
+    with pytest.raises(tmsopt.InputError, match=r"parameters\.w: found the unit 'furlong/h'"):
+        tmsopt.Problem(tmsopt.models.tms, fixed={**typed, "w": "1 furlong/h"}, free=problem.free)
+
+
+def test_violations_are_in_their_own_units() -> None:
+    """The benchmark carries 127.7262 N on the front wheel (13.02 · 9.81), so 150 N are missed by 22.2738 N."""
+    problem = replace(tmsopt.load("problems/benchmark.toml"), constraints={"front": "N_F >= 150", "arm": "u_H >= 0.1"})
+    design = tmsopt.solve(problem, throw=False)
+    assert design.violations["front"] == pytest.approx(150 - 13.02 * 9.81, rel=1e-12)
+    assert design.violations["arm"] == pytest.approx(0.1 - design.quantities["u_H"], rel=1e-12)
+    assert design.to_json()["units"]["front"] == "N"
+    assert "violated: front (N_F >= 150 N) by 22.27 N" in str(design)
+
+
+@pytest.mark.parametrize(("sense", "expression"), [("maximize", "decay_rate"), ("minimize", "decay_time")])
+def test_the_fastest_decay_in_seconds(sense: str, expression: str) -> None:
+    """At fixed w it is the least abscissa: −1.880301546543197 √(g/w) of ep4.toml, for w = 1 m."""
+    ep4 = tmsopt.load("problems/ep4.toml")
+    si = {"w": 1.0, "m_B": 1.0, "m_H": 0.1, "x_H": 1.0, "z_H": -0.2, "z_B": -0.4}
+    free = {"v": (0.1, 30.0), "x_B": ep4.free["chi_B"], "lambda_s": ep4.free["lambda_s"]}
+    design = tmsopt.solve(tmsopt.Problem(tmsopt.models.tms, fixed=si, free=free, **{sense: expression}))
+    rate = 1.880301546543197 * 9.81**0.5
+    assert design.value == pytest.approx(rate if sense == "maximize" else 1 / rate, rel=1e-9)
+    assert design.quantities["decay_rate"] * design.quantities["decay_time"] == pytest.approx(1, rel=1e-14)
+    assert design.structure == "EP4"
+
+
+def test_who_may_vary_the_unit_of_time_is_warned() -> None:
+    problem = tmsopt.load("problems/delivery_robot.toml")
+    fixed = {n: v for n, v in problem.fixed.items() if n != "w"}
+    design = replace(tmsopt.solve(tmsopt.load("problems/benchmark.toml")), problem=replace(
+        problem, fixed=fixed, free={**problem.free, "w": (0.6, 1.0)}))  # fmt: skip
+    assert any("decay_rate" in w for w in tmsopt.explain(design, resolve=False).warnings)
+    assert not any("decay_rate" in w for w in tmsopt.explain(replace(design, problem=problem), resolve=False).warnings)
