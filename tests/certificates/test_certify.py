@@ -599,7 +599,7 @@ def run(*arguments: str | Path) -> tuple[int, str, str]:
 
 
 def test_command(file: Path, slow_plane: Solution) -> None:
-    code, out, _ = run("solve", file, "--starts", "8", "--json", "--brief", "--certify", "8")
+    code, out, _ = run("solve", file, "--starts", "8", "--json", "--certify", "8")
     assert code == 0
     bound = json.loads(out)["bound"]
     assert bound["proven"]

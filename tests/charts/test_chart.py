@@ -270,7 +270,7 @@ def test_trace_writes_table_csv_and_figure(tmp_path, capsys):
     with table.open(encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     columns = {
-        "branch", "arclength", "Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s", "d_Fr", "d_chi_B",
+        "branch", "arclength", "Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s (rad)", "d_Fr", "d_chi_B",
         "d_lambda_s", "b", "c", "abscissa", "kind", "stable", "heavily_damped", "constraints", "event",
     }  # fmt: skip
     assert set(rows[0]) == columns
@@ -334,7 +334,7 @@ def test_chart_json_is_finite(capsys):
     status, out, err = run(capsys, "chart", "problems/chart.toml", "--points", "30", "--no-boundaries", "--json")
     assert (status, err) == (0, "")
     data = json.loads(out, parse_constant=pytest.fail)
-    assert data["axes"]["Fr"] == {"min": 0.01, "max": 5.0, "points": 30}
+    assert data["axes"]["Fr"] == {"min": 0.01, "max": 5.0, "points": 30, "unit": "1"}
     assert sum(data["classes"].values()) == pytest.approx(1)
     assert data["boundaries"] is None
 

@@ -345,14 +345,14 @@ def test_a_solution_says_what_its_multiple_root_is() -> None:
 
 
 def test_the_command_shows_it() -> None:
-    printed = CliRunner().invoke(main, ["solve", "problems/ep4.toml", "--brief", "--diagnose"]).output
+    printed = CliRunner().invoke(main, ["solve", "problems/ep4.toml", "--full"]).output
     assert "4-fold root -1.8803015: defective" in printed
     assert "holds for ε > 0" in printed
-    data = json.loads(CliRunner().invoke(main, ["solve", "problems/ep4.toml", "--json"]).output)
+    data = json.loads(CliRunner().invoke(main, ["solve", "problems/ep4.toml", "--json", "--full"]).output)
     assert [(d["algebraic"], d["geometric"], d["partial"]) for d in data["diagnosis"]] == [(4, 1, [4])]
 
 
-def test_a_front_takes_no_diagnosis() -> None:
-    ended = CliRunner().invoke(main, ["solve", "problems/pareto.toml", "--diagnose"])
+def test_all_designs_take_no_diagnosis() -> None:
+    ended = CliRunner().invoke(main, ["solve", "problems/coupled_pair.toml", "--all", "--full"])
     assert ended.exit_code == 2
-    assert "--diagnose" in ended.output
+    assert "--full" in ended.output

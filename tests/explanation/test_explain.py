@@ -388,14 +388,15 @@ def test_the_command_says_what_it_means():
         assert done.exit_code == 0
         return done.stdout
 
-    meaning = json.loads(printed("--json"))["meaning"]
+    meaning = json.loads(printed("--json", "--full"))["meaning"]
     assert meaning["summary"].startswith("four roots meet in one (EP4)")
     assert [row["digits"] for row in meaning["precision"]] == [2, 3, 4, 6]
-    text = printed()
-    assert "meaning: four roots meet in one" in text
-    assert "lambda_s alone  23.5 deg" in text
-    assert "meaning" not in printed("--brief")
-    assert "meaning" not in json.loads(printed("--brief", "--json"))
+    assert "minimize abscissa = -1.8803015; four roots meet in one (EP4)" in printed()
+    assert "lambda_s alone  23.5 deg" in printed("--full")
+    contract = ["schema", "title", "model", "status", "objective", "parameters", "abscissa", "abscissa_realised", "roots", "structure", "active", "violations", "bound", "starts", "seconds", "stable", "units"]  # fmt: skip
+    data = json.loads(printed("--json"))
+    assert set(contract) <= data.keys() <= {*contract, "any_stable", "notes"}
+    assert data["units"]["lambda_s"] == "rad"
 
 
 def test_rounding_over_a_band_is_judged_between_its_speeds_too():

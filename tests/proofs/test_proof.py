@@ -635,7 +635,7 @@ def test_the_exit_status_of_the_command(tmp_path: Path) -> None:
     infeasible.write_text(text + '\n[constraints]\nfast = "abscissa <= -3"\n', encoding="utf-8")
     held = text.replace("{ min = 1.01, max = 5 }", "1.4142135623730951").replace("{ min = 0.01, max = 10 }",
                                                                                 "2.236317518367822")  # fmt: skip
-    none.write_text(held.replace("{ min = 0.02, max = 1.4 }", "0.4106775324124522").split("[objective]")[0])
+    none.write_text(held.replace('{ min = "1 deg", max = "80 deg" }', "0.4106775324124522").split("[objective]")[0])
     assert run(str(infeasible)).exit_code == 3
     refused = run(str(none))
     assert refused.exit_code == 4

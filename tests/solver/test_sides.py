@@ -45,7 +45,7 @@ def test_the_winner_is_named_and_each_side_is_its_own_problem(fixed, winner):
     (note,) = [n for n in design.notes if "both signs" in n]
     loser = BACKWARD if winner == FORWARD else FORWARD
     assert f"{winner} wins" in note
-    assert f"with {loser} is {design.sides[loser]:.9g}" in note
+    assert f"with {loser} is {design.sides[loser]:.6g}" in note
     shown = {side: float(f"{value:.9g}") for side, value in design.sides.items()}  # of designs that are not shown
     assert json.loads(json.dumps(design.to_json()))["sides"] == shown
 

@@ -47,11 +47,16 @@ def times(rate: Formula, written: str) -> tuple[Quantity, ...]:
     decay = f"-(abscissa*{written})"
     return (
         Quantity("decay_rate", "1/s", "how fast the slowest part of a disturbance dies out", r"-\alpha",
-            lambda v: -v["abscissa"] * rate(v), aside=True, stands_for=f"({decay})"),
+            lambda v: -_abscissa(v) * rate(v), aside=True, stands_for=f"({decay})"),
         Quantity("decay_time", "s", "in which the slowest part of a disturbance falls to 1/e", r"\tau",
-            lambda v: 1 / (-v["abscissa"] * rate(v)) if v["abscissa"] < 0 else math.nan, range=Range(lower=0.0),
+            lambda v: 1 / (-_abscissa(v) * rate(v)) if _abscissa(v) < 0 else math.nan, range=Range(lower=0.0),
             aside=True, stands_for=f"(1/max({decay}, 0))"),
         Quantity("frequency", "Hz", "of the fastest oscillation, 0 where nothing oscillates", "f",
             lambda v: max((r.im for r in v["structure"].roots), default=0.0) * rate(v) / (2 * math.pi),
             range=Range(lower=0.0), aside=True),
     )  # fmt: skip
+
+
+def _abscissa(v: Mapping[str, Any]) -> Any:
+    """Of the roots, where these are known; else nan."""
+    return v.get("abscissa", math.nan)

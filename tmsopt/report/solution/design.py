@@ -101,8 +101,8 @@ def _parts(solution: Solution, found: Findings, si: Mapping[str, float], beside:
     if solution.status == "infeasible":
         first = [f"{told}: {helps[0]}"] if helps and ": " not in told else [told, *helps[:1]]
         conflict = [*first, *helps[1:], *_violated(solution)]
-        rest = (*infeasible_lines(solution, full=True)[len(helps) :], *notes)
-        yield Block("conflict", [*conflict, f"nearest design: {asked}"], rest, least=3)
+        rest = tuple(infeasible_lines(solution, full=True)[len(helps) :])
+        yield Block("conflict", [*conflict, f"nearest design: {asked}", *notes], rest, least=3)
     else:
         yield Block("answer", [told, asked, *helps, *notes], least=2)
     yield Block("design", _design(solution, si if beside else None), tuple(columns(parameter_rows(solution, si))),
