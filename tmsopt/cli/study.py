@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tmsopt.cli.common import BAD_INPUT, INTERRUPTED, bad_input, check_output, saving, write_json
+from tmsopt.cli.common import BAD_INPUT, FIGURES, INTERRUPTED, bad_input, check_output, saving, write_json
 
 if TYPE_CHECKING:
     from tmsopt.studies import Results, Sampling, Study
@@ -19,6 +19,7 @@ Examples:
   tmsopt study problems/study_sway.toml
   tmsopt study problems/study_sway.toml --row 17
   tmsopt study problems/study_sway.toml --workers 4 --export rows.csv
+  tmsopt study problems/study_built.toml --plot built.png
   tmsopt study problems/study_built.toml --json
   tmsopt study problems/study_sway.toml --scheduler tcp://host:8786
 
@@ -57,16 +58,23 @@ Exit status: 0 done, failed rows included; 2 bad input; 130 stopped by Ctrl-C.
     "--export", "exports", type=click.Path(path_type=Path), multiple=True,
     help="Write all rows; the ending says how, as in rows.csv, rows.parquet, rows.nc. May be given again.",
 )  # fmt: skip
+@click.option(
+    "--plot", type=click.Path(path_type=Path),
+    help="Draw how the rows are distributed, or the objective over what varies (png, pdf, svg).",
+)  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
 def study(
     file: Path, store: Path | None, fresh: bool, row: int | None, workers: int | None, scheduler: str | None,
-    exports: tuple[Path, ...], as_json: bool,
+    exports: tuple[Path, ...], plot: Path | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Solve the problem of the study FILE for every row of what varies in it."""
     with bad_input():
         from tmsopt.studies import load_study
 
-        _check_together(row, scheduler, workers, {"--store": store, "--fresh": fresh, "--export": exports})
+        _check_together(
+            row, scheduler, workers, {"--store": store, "--fresh": fresh, "--export": exports, "--plot": plot}
+        )
+        check_output("--plot", plot, FIGURES)
         for target in exports:
             from tmsopt.studies import check_export
 
@@ -84,6 +92,11 @@ def study(
         for target in exports:
             with saving("--export", target):
                 results.export(target)
+        if plot is not None:
+            from tmsopt.plots import save
+
+            with saving("--plot", plot):
+                save(results.plot(), plot)
     if stopped:
         click.echo(f"stopped: the rows solved so far are in {path}; the same command goes on", err=True)
         sys.exit(INTERRUPTED)

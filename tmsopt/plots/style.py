@@ -2,14 +2,14 @@
 
 import io
 from collections.abc import Sequence
-from pathlib import Path
+from os import PathLike
 
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from tmsopt.disk import whole
+from tmsopt.disk import path_of, whole
 
 STABLE, HEAVY, LINE, MARK, CRITICAL = "#56B4E9", "#E69F00", "#000000", "#D55E00", "#0072B2"
 """Fills of stability and heavy damping, lines, marked points, the weave boundary (Okabe–Ito)."""
@@ -53,12 +53,15 @@ def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
         figure.legend(handles=list(once.values()), loc="outside lower center", ncols=beside, fontsize=8, frameon=False)
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure as a whole or not at all; the format is the ending of the name.
+def save(drawn_on: Figure | Axes, path: str | PathLike[str]) -> None:
+    """Write a figure, or that of Axes, as a whole or not at all; the format is the ending of the name.
 
     Raises:
         OSError: when the file cannot be written.
     """
+    path = path_of(path, "the file to write")
+    figure = drawn_on.get_figure(root=True) if isinstance(drawn_on, Axes) else drawn_on
+    assert figure is not None, "Axes without a figure"
     ending = path.suffix.lstrip(".").lower()
     path = path.resolve()  # a link stays one
     if path.exists() and not path.is_file():
