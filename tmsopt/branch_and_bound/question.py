@@ -12,11 +12,13 @@ from functools import partial
 import casadi as ca
 import numpy as np
 
+from tmsopt.arithmetic.walk import NotAccepted
 from tmsopt.branch_and_bound.half_planes import Frame, bound_unknowns, compact, half_planes, over, sectors
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import tempts
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import ANGULAR_FREQUENCY
 from tmsopt.formulation.formulate import Builder, Lifting
 from tmsopt.formulation.nlp import NLP
 from tmsopt.roots import Root
@@ -69,6 +71,8 @@ class Question:
     def program(self, sign: int, least: float = 0.0) -> NLP:
         """The question as data, for one sign of a0, which is not below `least` in size."""
         problem, signs = self.problem, self.signs()[sign]
+        if problem.asks(ANGULAR_FREQUENCY):
+            raise NotAccepted(ANGULAR_FREQUENCY)
         frame = Frame(problem.model, signs, self.unit, tempts(problem, "abscissa"), self.compact, least)
         carried = {"abscissa": partial(half_planes, frame), "damping_ratio": partial(sectors, frame)}
         lifts: Mapping[str, Lifting] = carried

@@ -17,7 +17,7 @@ from tmsopt.checks.recheck import Checked
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import varies
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import RADIUS
+from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.models import Values
 from tmsopt.records import Table
 from tmsopt.roots import Root, Structure
@@ -57,7 +57,8 @@ def certified(
         cases: those that the design was checked in; an objective that differs between them is the worst of all.
     """
     listed = [case for case in cases if not case.direction]
-    design = _Design(problem, parameters, checked, listed, _least(problem, parameters, checked))
+    least, fastest = (_structure(problem, parameters, checked, c) for c in (checked.least_damped, checked.fastest))
+    design = _Design(problem, parameters, checked, listed, least, fastest)
     known = _known(checked)
     numbers: dict[_Key, float] = {}
     for precision in _PRECISIONS:
@@ -85,11 +86,11 @@ def _known(checked: Checked) -> dict[_Key, float]:
     return found | {("dimensionless", n): v for n, v in checked.dimensionless.items()}
 
 
-def _least(problem: Problem, parameters: Mapping[str, float], checked: Checked) -> Structure:
-    """Structure of the roots in the case with the least damping ratio."""
-    if checked.least_damped == checked.worst:
+def _structure(problem: Problem, parameters: Mapping[str, float], checked: Checked, case: Case) -> Structure:
+    """Structure of the roots in a case."""
+    if case == checked.worst:
         return checked.structure
-    found = problem.values(checked.least_damped.applied(parameters))["structure"]
+    found = problem.values(case.applied(parameters))["structure"]
     assert isinstance(found, Structure)
     return found
 
@@ -105,11 +106,13 @@ class _Roots:
         stored: of the parameters as stored, in the case with the largest abscissa.
         ideal: there, of the nearest polynomial that has the structure.
         damped: likewise in the case with the least damping ratio.
+        fastest: likewise in the case with the greatest angular frequency.
     """
 
     stored: _Several
     ideal: _Several
     damped: _Several
+    fastest: _Several
 
 
 @dataclass(frozen=True)
@@ -121,6 +124,7 @@ class _Design:
     checked: Checked
     cases: Sequence[Case]
     least: Structure
+    fastest: Structure
 
     def balls(self, roots: "_Roots") -> Iterator[tuple[_Key, Any, int]]:
         """Every number as a ball at the working precision, with the decimal digits to round it to, 0 for a double."""
@@ -140,13 +144,18 @@ class _Design:
         if roots.damped:
             known["damping_ratio"] = reduce(lesser, (_ratio(r) for r in roots.damped))
             yield ("quantities", "damping_ratio"), known["damping_ratio"], 0
+        asked = ANGULAR_FREQUENCY in checked.quantities
+        if asked and roots.fastest:
+            known[ANGULAR_FREQUENCY] = reduce(greater, (root.im for root in roots.fastest))
+            yield ("quantities", ANGULAR_FREQUENCY), known[ANGULAR_FREQUENCY], 0
         of, own = self.problem.parameter_set, _exact(self.parameters)
         if of.rate is not None:
-            rates = frequencies(roots.ideal, of.rate(own), flint.arb.pi())
+            fastest = roots.fastest if asked else roots.ideal
+            rates = frequencies(fastest, of.rate(own), flint.arb.pi())
             nominal.define("frequency", reduce(greater, rates, flint.arb(0)))
         nominal.define("abscissa", known.get("abscissa", math.nan))
         for name in checked.quantities:
-            if name not in ("damping_ratio", RADIUS):
+            if name not in _ROOTS:
                 yield ("quantities", name), nominal[name], 0
         native = of.native(own)
         for name in checked.dimensionless:
@@ -170,9 +179,13 @@ class _Design:
         checked = self.checked
         stored = enclosed_roots(self.values(checked.worst).coefficients)
         ideal = self.ideal(checked.worst, checked.structure, stored)
-        damped = ideal if checked.least_damped == checked.worst else self.ideal(checked.least_damped, self.least, None)
-        if None not in (stored, ideal, damped) or last:
-            found = [_as_found(s) if r is None else r for r, s in ((ideal, checked.structure), (damped, self.least))]
+        damped, fastest = (
+            ideal if case == checked.worst else self.ideal(case, structure, None)
+            for case, structure in ((checked.least_damped, self.least), (checked.fastest, self.fastest))
+        )
+        if None not in (stored, ideal, damped, fastest) or last:
+            each = (ideal, checked.structure), (damped, self.least), (fastest, self.fastest)
+            found = [_as_found(s) if r is None else r for r, s in each]
             return _Roots(stored or (), *found)
         return None
 
@@ -205,7 +218,7 @@ class _Design:
         return reduce(lesser if self.problem.sense == "maximize" else greater, found)
 
 
-_ROOTS = ("abscissa", "damping_ratio", RADIUS)
+_ROOTS = ("abscissa", "damping_ratio", ANGULAR_FREQUENCY, RADIUS)
 
 
 def _exact(table: Mapping[str, float]) -> dict[str, Any]:

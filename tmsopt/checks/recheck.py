@@ -15,7 +15,7 @@ from tmsopt.design.cases import Case
 from tmsopt.design.dependence import varies
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import RADIUS, ROOT_NAMES
+from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES
 from tmsopt.margins.nearest import Robustness, robustness_at
 from tmsopt.models import Model, Values
 from tmsopt.records import Table
@@ -40,6 +40,7 @@ class Checked:
         amounts: the same in the units of the sides.
         worst: the case with the largest abscissa, of those looked at.
         least_damped: the case with the least damping ratio.
+        fastest: the case with the greatest angular frequency, where the problem asks for that.
         around: the boundaries nearest to the design, where the problem asks for the robustness radius.
     """
 
@@ -52,6 +53,7 @@ class Checked:
     dimensionless: Table[float]
     worst: Case = field(default_factory=Case)
     least_damped: Case = field(default_factory=Case)
+    fastest: Case = field(default_factory=Case)
     around: Robustness | None = None
 
 
@@ -88,6 +90,8 @@ def recheck(
     names = [n for n in (*problem.model.quantity_names(of), "damping_ratio") if n not in problem.model.sets[0].names]
     if around is not None:
         names.append(RADIUS)
+    if problem.asks(ANGULAR_FREQUENCY):
+        names.append(ANGULAR_FREQUENCY)
     if of.rate is not None and structure.roots:  # times and frequencies are those of the worst case
         nominal.define("abscissa", structure.abscissa)
         nominal.define("structure", structure)
@@ -101,6 +105,7 @@ def recheck(
         dimensionless=Table({n: float(v) for n, v in of.native(parameters).items()}),
         worst=listed[top] if listed else Case(),
         least_damped=listed[looked.least] if listed else Case(),
+        fastest=listed[looked.fastest] if listed else Case(),
         around=around,
     )
 
@@ -159,6 +164,7 @@ class _Look:
     Attributes:
         top: number of the case with the largest abscissa.
         least: number of the case with the least damping ratio.
+        fastest: number of the case with the greatest angular frequency, where that is asked for.
     """
 
     cases: list[Case]
@@ -166,6 +172,7 @@ class _Look:
     each: list[Values]
     top: int
     least: int
+    fastest: int
     around: Robustness | None
 
     def at(self, problem: Problem, condition: Expression) -> list[Values]:
@@ -179,10 +186,14 @@ def _look(
     listed = [case for case in cases if not case.direction]
     nominal = problem.values(parameters)
     each = [problem.values(case.applied(parameters)) for case in listed] or [nominal]
-    near_top, near_least = _candidates(each)
+    near_top, near_least, near_fastest = _candidates(each)
     top = max(near_top, key=lambda k: _or_infinite(each[k]["abscissa"]))
     least = min(near_least, key=lambda k: float(each[k]["damping_ratio"]))
     worst = {"abscissa": each[top]["abscissa"], "damping_ratio": each[least]["damping_ratio"]}
+    fastest = 0
+    if problem.asks(ANGULAR_FREQUENCY):
+        fastest = max(near_fastest, key=lambda k: _or_infinite(each[k][ANGULAR_FREQUENCY]))
+        worst[ANGULAR_FREQUENCY] = each[fastest][ANGULAR_FREQUENCY]
     if around is None and problem.asks_radius:
         around = robustness_at(problem, parameters)
     if around is not None:
@@ -190,19 +201,25 @@ def _look(
     for values in (nominal, *each):
         for name, value in worst.items():
             values.define(name, value)
-    return _Look(listed, nominal, each, top, least, around)
+    return _Look(listed, nominal, each, top, least, fastest, around)
 
 
-def _candidates(each: Sequence[Values]) -> tuple[list[int], list[int]]:
-    """Cases that may have the largest abscissa, and the least damping ratio: numeric roots are off by 4e-4 at most."""
+def _candidates(each: Sequence[Values]) -> tuple[list[int], list[int], list[int]]:
+    """Cases that may have the largest abscissa, the least damping ratio and the greatest angular frequency.
+
+    Numeric roots are off by 4e-4 at most.
+    """
     a = np.array([[float(c) for c in values.coefficients] for values in each])
     if len(each) == 1 or not np.all(np.isfinite(a)) or np.any(a[:, 0] == 0):
-        return list(range(len(each))), list(range(len(each)))
+        return list(range(len(each))), list(range(len(each))), list(range(len(each)))
     z = roots(a)
     size = np.abs(z).max(axis=1)
-    high, ratio = z.real.max(axis=1), np.min(-z.real / (np.abs(z) + 1e-300), axis=1)
-    top = np.flatnonzero(high + _SCATTER * size >= (high - _SCATTER * size).max())
-    return top.tolist(), np.flatnonzero(ratio <= ratio.min() + 2 * _SCATTER).tolist()
+    ratio = np.min(-z.real / (np.abs(z) + 1e-300), axis=1)
+    top, fastest = (
+        np.flatnonzero(high + _SCATTER * size >= (high - _SCATTER * size).max()).tolist()
+        for high in (z.real.max(axis=1), z.imag.max(axis=1))
+    )
+    return top, np.flatnonzero(ratio <= ratio.min() + 2 * _SCATTER).tolist(), fastest
 
 
 def _objective(problem: Problem, nominal: Values, each: Sequence[Values], cases: Sequence[Case]) -> float:

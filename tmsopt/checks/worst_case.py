@@ -11,7 +11,7 @@ import numpy as np
 
 from tmsopt.arithmetic.sequence import golden_steps
 from tmsopt.design.cases import Band, Case
-from tmsopt.design.dependence import varies
+from tmsopt.design.dependence import WORSE, varies
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES
@@ -44,7 +44,7 @@ class Worst:
     """The worst case for one thing that is asked of a design.
 
     Attributes:
-        value: ``abscissa``, ``damping_ratio``, objective or left minus right of a constraint, in the case.
+        value: of a root quantity, objective or left minus right of a constraint, in the case.
     """
 
     case: Case
@@ -55,8 +55,7 @@ def subjects(problem: Problem, cases: Sequence[Case]) -> dict[str, tuple[float, 
     """What may differ between cases: name → sign that makes the worst the greatest, and what it is."""
     found: dict[str, tuple[float, Expression | str]] = {"abscissa": (1.0, "abscissa")}
     asked = [e for e in (problem.objective, *problem.conditions.values()) if e]
-    if any("damping_ratio" in e.names for e in asked):
-        found["damping_ratio"] = (-1.0, "damping_ratio")
+    found |= {n: (sign, n) for n, sign in WORSE.items() if any(n in e.names for e in asked)}
     if problem.objective and varies(problem, problem.objective, cases):
         found["objective"] = (problem.sign, problem.objective)
     for name, condition in problem.conditions.items():

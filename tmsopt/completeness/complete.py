@@ -22,7 +22,7 @@ from tmsopt.completeness.statement import Completeness, Undecided
 from tmsopt.completeness.trees import ends, partial, tree
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import RADIUS
+from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.formulation.nlp import Scale, scale_of
 from tmsopt.models import Quantity, Values
 from tmsopt.models.exact import decimal, decimal_fraction
@@ -193,7 +193,7 @@ def _sheets(problem: Problem) -> Iterator[Sheet]:
 
     middle = {n: (lo + hi) / 2 for n, (lo, hi) in problem.free.items()}
     values = Values(problem.model, problem.parameter_set, problem.ordered(middle), lift=note)
-    for name in ("abscissa", "damping_ratio", RADIUS):
+    for name in ROOT_NAMES:
         values.define(name, math.nan)
     for equality in equalities:
         equality(values)

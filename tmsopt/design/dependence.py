@@ -10,8 +10,11 @@ import numpy as np
 from tmsopt.design.cases import Case
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTITIES
+from tmsopt.design.quantities import ANGULAR_FREQUENCY, NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTITIES
 from tmsopt.models import Model, Quantity, Values
+
+WORSE = {"abscissa": 1.0, "damping_ratio": -1.0, ANGULAR_FREQUENCY: 1.0}
+"""Direction in which a root quantity gets worse; its factors bound it from that side alone."""
 
 _DESIGNS = 32  # designs at which the direction of a root quantity is looked at
 _DECADES = 3.0  # from 1, up and down, over which values of a root quantity are drawn
@@ -33,10 +36,10 @@ def varies(problem: Problem, expression: Expression, cases: Sequence[Case]) -> b
 def overclaims(problem: Problem) -> bool:
     """Whether a bound on a root quantity, in place of the quantity, would make a problem easier than it is.
 
-    The factors bound the abscissa from above and the damping ratio from below; that is exact where the objective and
-    the constraints get no better as the abscissa grows or the ratio falls.
+    The factors bound the abscissa and the angular frequency from above and the damping ratio from below; that is exact
+    where the objective and the constraints get no better as those grow or the ratio falls.
     """
-    return tempts(problem, "abscissa") or tempts(problem, "damping_ratio", worse=-1.0)
+    return any(tempts(problem, name, worse) for name, worse in WORSE.items())
 
 
 def tempts(problem: Problem, name: str, worse: float = 1.0) -> bool:
@@ -65,8 +68,10 @@ def _falls(problem: Problem, sign: float, expression: Expression, name: str, wor
     ends = np.array([problem.free[n] for n in problem.free]).reshape(-1, 2)
     for _ in range(_DESIGNS):
         drawn = problem.ordered(dict(zip(problem.free, rng.uniform(*ends.T).tolist(), strict=True)))
-        found = {n: float(rng.choice((-1, 1)) * 10 ** rng.uniform(-_DECADES, _DECADES)) for n in ROOT_NAMES}
-        found |= {"damping_ratio": float(rng.uniform(-1, 1)), RADIUS: abs(found[RADIUS])}
+        drawn_of = [n for n in ROOT_NAMES if n != ANGULAR_FREQUENCY or n in expression.names]
+        found = {n: float(rng.choice((-1, 1)) * 10 ** rng.uniform(-_DECADES, _DECADES)) for n in drawn_of}
+        found |= {"damping_ratio": float(rng.uniform(-1, 1))}
+        found |= {n: abs(found[n]) for n in (ANGULAR_FREQUENCY, RADIUS) if n in found}
         if name not in found:
             found[name] = float(rng.uniform(0.1, 2.0))
         before, after = (

@@ -108,7 +108,11 @@ class Problem:
     @property
     def asks_radius(self) -> bool:
         """Whether the objective or a constraint names the robustness radius."""
-        return any(RADIUS in e.names for e in (self.objective, *self.objectives, *self.conditions.values()) if e)
+        return self.asks(RADIUS)
+
+    def asks(self, name: str) -> bool:
+        """Whether the objective or a constraint names a quantity."""
+        return any(name in e.names for e in (self.objective, *self.objectives, *self.conditions.values()) if e)
 
     def __getstate__(self) -> dict[str, Any]:
         """What was stated: what follows from it is found anew, and cannot always be pickled."""

@@ -33,9 +33,17 @@ def _damping_ratio(values: Mapping[str, Any]) -> float:
     return min(ratios, default=math.nan)
 
 
+def _angular_frequency(values: Mapping[str, Any]) -> float:
+    return max((abs(r.im) for r in values["structure"].roots), default=math.nan)
+
+
+ANGULAR_FREQUENCY = "angular_frequency"
+"""Of the fastest oscillation; 0 where all roots are real."""
+
 ROOT_QUANTITIES = (
     Quantity("abscissa", "1", "largest real part of the roots", r"\alpha", lambda v: float(v["structure"].abscissa)),
     Quantity("damping_ratio", "1", "least −Re s/|s| over the roots", r"\zeta", _damping_ratio),
+    Quantity(ANGULAR_FREQUENCY, "1", "greatest |Im s| over the roots", r"\omega", _angular_frequency),
 )
 """Quantities of the roots, each the worst over the cases that a problem lists."""
 
@@ -92,7 +100,16 @@ def _array_motion(values: Mapping[str, Any]) -> tuple[Array, Array]:
     return np.where(exist, found[0], np.nan), np.where(exist, found[1], np.nan)
 
 
-_ARRAY_FORMULAS = (lambda values: _array_motion(values)[0], lambda values: _array_motion(values)[1])
+def _array_frequency(values: Mapping[str, Any]) -> Array:
+    """Greatest imaginary part; nan likewise."""
+    assert isinstance(values, Values)
+    a = np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in values.coefficients)), axis=-1)
+    return np.where(np.all(np.isfinite(a), axis=-1), roots(regular(a)).imag.max(axis=-1), np.nan)
+
+
+_ARRAY_FORMULAS = (
+    lambda values: _array_motion(values)[0], lambda values: _array_motion(values)[1], _array_frequency,
+)  # fmt: skip
 
 ARRAY_ROOT_QUANTITIES = (
     *(replace(q, value=formula) for q, formula in zip(ROOT_QUANTITIES, _ARRAY_FORMULAS, strict=True)), NO_RADIUS,

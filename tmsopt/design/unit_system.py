@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from tmsopt.design.expression import Expression, dimension, parse_comparison, parse_value
 from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import ANGULAR_FREQUENCY
 from tmsopt.models import Parameter, Quantity
 from tmsopt.units import Dimension, factor
 
@@ -52,6 +53,7 @@ def si_units(problem: Problem) -> dict[str, str]:
     of = problem.parameter_set
     listed: tuple[Parameter | Quantity, ...] = (*problem.model.quantities, *of.quantities, *of.parameters)
     rates = {"abscissa": of.root_unit, "decay_rate": "1/s", "decay_time": "s", "frequency": "Hz"}
+    rates[ANGULAR_FREQUENCY] = of.root_unit
     return dict.fromkeys(problem.vocabulary, "1") | rates | {q.name: q.unit for q in listed}
 
 

@@ -238,9 +238,7 @@ def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
 
     def parsed(parse: Any, text: Any, *key: str) -> Iterator[Fault]:
         try:
-            if "frequency" in parse(text, accepted).names and "decay_time" in accepted:  # no name of the user's own
-                advice = "it is reported and can be recorded, not optimised; limit damping_ratio or decay_rate instead"
-                yield Fault(f"'{text}' uses frequency: {advice}", key)
+            parse(text, accepted)
         except UnknownName as error:
             yield Fault(f"{error.found}; {unknown(error.name, problem.model, of)}", key)
         except ExpressionError as error:

@@ -24,6 +24,7 @@ import casadi as ca
 import numpy as np
 
 from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import ANGULAR_FREQUENCY
 from tmsopt.design.solution import Solution
 from tmsopt.formulation.formulate import abscissa, variables_of
 from tmsopt.formulation.nlp import NLP
@@ -33,7 +34,7 @@ from tmsopt.roots import Root, product, shift
 _ACTIVE = 2e-9  # slack, relative to 1 + |limit|, up to which a constraint is held: twice what a feasible point may have
 _AT = 1e-12  # likewise of a bound, relative to its size and the width of its range
 _LINE = 1e-6  # relative difference of real parts on one vertical line, for roots of an exact structure
-_ROOT_ROWS = ("abscissa", "damping_ratio")  # rows of factors, which this program has of its own
+_ROOT_ROWS = ("abscissa", "damping_ratio", ANGULAR_FREQUENCY)  # rows of factors, which this program has of its own
 
 
 class NotCovered(ValueError):
@@ -123,6 +124,8 @@ def program(problem: Problem, solution: Solution) -> LocalProgram:
                     build.row(names[i], g[k], reached[k], nlp.row_lower[k], nlp.row_upper[k])
     if "damping_ratio" in needed:
         raise NotCovered("the damping ratio binds, which the conditions on the abscissa do not cover")
+    if ANGULAR_FREQUENCY in needed:
+        raise NotCovered("the angular frequency binds, which the conditions on the abscissa do not cover")
     if "abscissa" not in needed or not ca.depends_on(ca.vertcat(f, *build.rows), symbols[names.index("abscissa")]):
         raise NotCovered("the abscissa does not bind, so the roots have no part in this optimum")
     line, rest = on_the_line(solution)

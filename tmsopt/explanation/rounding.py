@@ -14,7 +14,7 @@ from tmsopt.checks.worst_case import worst_cases
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import varies
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import RADIUS
+from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import Unit, unit_of
 from tmsopt.models import Values
@@ -84,10 +84,13 @@ def rounded(solution: Solution, names: Iterable[str], digits: int) -> Rounded:
     realised = max(realised_abscissa(problem, c.applied({**solution.parameters, **exact})) for c in cases)
     each = [problem.values(case.applied(plain)) for case in cases]
     ratio = min(_damping_ratio([float(c) for c in values.coefficients]) for values in each)
+    fastest = max(values[ANGULAR_FREQUENCY] for values in each)
     values = problem.values(plain)
     for one in (values, *each):
         one.define("abscissa", realised)  # known already, and better than by fitting structures
         one.define("damping_ratio", ratio)
+        if problem.asks(ANGULAR_FREQUENCY):
+            one.define(ANGULAR_FREQUENCY, fastest)
     texts = Table({n: f"{text} {units[n].text}".rstrip() for n, text in written.items()})
     objective = float(problem.objective(values)) if problem.objective else math.nan
     violated = Table(_violations(problem, plain, [values, *each]))

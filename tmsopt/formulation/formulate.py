@@ -16,7 +16,7 @@ from tmsopt.design.cases import Case
 from tmsopt.design.dependence import demands_heavy_damping, overclaims, tempts, varies
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem, freedom
-from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_QUANTITIES
+from tmsopt.design.quantities import ANGULAR_FREQUENCY, NO_RADIUS, RADIUS, ROOT_QUANTITIES
 from tmsopt.formulation.flat import unflattened
 from tmsopt.formulation.kinks import unfolded
 from tmsopt.formulation.lifts import (
@@ -29,6 +29,7 @@ from tmsopt.formulation.lifts import (
     lift_real_roots,
 )
 from tmsopt.formulation.nlp import NLP, Factor, Lift, Touch, objective_size, objective_unit, scale_of, units_of
+from tmsopt.formulation.strips import lift_angular_frequency
 from tmsopt.models import Quantity, Values
 from tmsopt.roots import Pattern
 
@@ -215,6 +216,7 @@ class Builder:
         lifted = lift_real_roots(self, line)
         self.lifts.append(lifted.lift)
         self.take("damping_ratio", 1.0)
+        self.take(ANGULAR_FREQUENCY, 0.0)
         if line:
             self.touches["abscissa"] = lifted.touches
             self.shared["abscissa"] = lifted.symbol
@@ -327,7 +329,9 @@ class Builder:
         return symbol
 
 
-_LIFTED: Mapping[str, Lifting] = {"abscissa": lift_abscissa, "damping_ratio": lift_damping_ratio}
+_LIFTED: Mapping[str, Lifting] = {
+    "abscissa": lift_abscissa, "damping_ratio": lift_damping_ratio, ANGULAR_FREQUENCY: lift_angular_frequency,
+}  # fmt: skip
 
 
 def _worst_guess(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.design.dependence import WORSE
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES
@@ -50,9 +51,9 @@ def judged(problem: Problem, columns: Mapping[str, Array]) -> Judged:
     each = [values_of(problem, case.applied(nominal), shape) for case in listed] or [own]
     conditions = list(problem.conditions.values())
     asked = [e for e in (problem.objective, *conditions) if e]
-    for name, worst in (("abscissa", np.maximum), ("damping_ratio", np.minimum)):
+    for name, worst in WORSE.items():
         if len(each) > 1 and any(name in e.names for e in asked):
-            found = reduce(worst, [values[name] for values in each])
+            found = reduce(np.maximum if worst > 0 else np.minimum, [values[name] for values in each])
             for values in (own, *each):
                 values.define(name, found)
     moves = reduce(np.logical_and, [_moves(values, shape) for values in each])

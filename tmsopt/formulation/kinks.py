@@ -18,15 +18,13 @@ import numpy as np
 
 from tmsopt.arithmetic.intervals import INTERVALS, ball, interval, ranges
 from tmsopt.arithmetic.walk import NotAccepted, walk
+from tmsopt.design.dependence import WORSE
 from tmsopt.formulation.nlp import NLP, Greatest, Lift, Touch
 from tmsopt.models import Values
 from tmsopt.roots.patterns.pattern import Roots
 
 KINK = ".kink"
 """Name of the rows of kinks: no constraint has it."""
-
-_WORSE = {"abscissa": 1.0, "damping_ratio": -1.0}
-"""Direction in which a root quantity gets worse; its factors bound it from that side alone."""
 
 
 def unfolded(nlp: NLP, overclaims: bool) -> NLP:
@@ -71,7 +69,7 @@ def unfolded(nlp: NLP, overclaims: bool) -> NLP:
     for name, touches in nlp.touches.items():
         at = slopes(nlp.variables.index(name))
         among = {k: slope for k, slope in at.items() if k in rooted}
-        if overclaims or not _worsens(plain, among, _WORSE[name], equal):
+        if overclaims or not _worsens(plain, among, WORSE[name], equal):
             held[name] = touches
     return replace(plain, touches=held)
 

@@ -242,7 +242,7 @@ def quadratic_pairs(z: Roots) -> list[Roots]:
     return [*pairs, *([lone.astype(complex)] if len(lone) else [])]
 
 
-def _factors(z: Roots, gamma: float, lead: float = 1.0) -> list[float]:
+def factors_of(z: Roots, gamma: float, lead: float = 1.0) -> list[float]:
     """β and κ of the factors about the line Re s = γ; δ of a linear one.
 
     With a `lead` other than 1, that of the linear one, or else of the first, which then has the largest roots.
@@ -268,7 +268,7 @@ def _abscissa_guess(
     right, step = float(every.real.max()), 0.05 * float(np.abs(every).mean())
     gamma = right + (min(step, 0.1 * abs(right)) + 1e-6 if near else step + 1e-3)
     leads = [led * abs(float(values[case].coefficients[0])) if led else 1.0 for case in covered]
-    return [[gamma, *(c for case, a0 in zip(covered, leads, strict=True) for c in _factors(z[case], gamma, a0))]]
+    return [[gamma, *(c for case, a0 in zip(covered, leads, strict=True) for c in factors_of(z[case], gamma, a0))]]
 
 
 def _real_guess(covered: Sequence[int], line: bool, values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
@@ -287,7 +287,7 @@ def _damping_guess(
     found = [min(max(float(np.min(-every.real / (np.abs(every) + 1e-300))) - 0.05, -0.95), 0.95)]
     for case in covered:
         a0 = led * abs(float(values[case].coefficients[0])) if led else 1.0
-        factors = _factors(z[case], 0.0, a0)
+        factors = factors_of(z[case], 0.0, a0)
         roots = [np.sqrt(abs(c)) if k % 2 else c for k, c in enumerate(factors)]
         found += [*roots[:2], *([np.sqrt(a0)] if led and len(z[case]) % 2 == 0 else []), *roots[2:]]
     return [[float(x) for x in found]]
@@ -303,4 +303,4 @@ def _positive_guess(case: int, values: Sequence[Values], z: Sequence[Roots]) -> 
 def _radius_guess(directions: Sequence[int], values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
     """The radius at which the cases were evaluated, and their factors."""
     radius = float(values[0]["radius"])
-    return [[radius, *(max(c, 0.0) for case in directions for c in _factors(z[case], 0.0))]]
+    return [[radius, *(max(c, 0.0) for case in directions for c in factors_of(z[case], 0.0))]]

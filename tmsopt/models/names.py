@@ -13,7 +13,7 @@ FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "exp", "log", 
 CONSTANTS = ("pi",)
 """Names that mean the same in every expression."""
 
-TAKEN = ("abscissa", "damping_ratio", "radius", "structure", "objective", *CONSTANTS, *FUNCTIONS)
+TAKEN = ("abscissa", "damping_ratio", "angular_frequency", "radius", "structure", "objective", *CONSTANTS, *FUNCTIONS)
 """Names that an expression of a problem uses for something else."""
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")

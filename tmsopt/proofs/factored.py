@@ -49,6 +49,11 @@ class Factored:
         return None if any(ratio is None for ratio in ratios) else reduce(lambda a, b: a.min(b), ratios)
 
     @cached_property
+    def angular_frequency(self) -> Any:
+        """The greatest imaginary part; None where the balls cannot tell the roots apart."""
+        return reduce(lambda a, b: a.max(b), [z.im for z in self.roots]) if self.roots else None
+
+    @cached_property
     def stable(self) -> bool | None:
         """Whether all roots are left of the imaginary axis: Liénard–Chipart signs of each factor."""
         signs = [_all_positive(lienard_chipart([flint.arb(c) for c in factor])) for factor, _ in self.factors]

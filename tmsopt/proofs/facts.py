@@ -8,7 +8,7 @@ import flint
 from tmsopt.arithmetic.balls import largest_radius
 from tmsopt.arithmetic.elementary import rational
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import RADIUS
+from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.models import Values
 from tmsopt.models.exact import Written, decimal, decimal_fraction
 from tmsopt.proofs.existence import Existing, exact_coefficients
@@ -112,6 +112,7 @@ def limits(problem: Problem, found: Existing) -> dict[str, str]:
     for name, value in (
         ("abscissa", found.factored.abscissa),
         ("damping_ratio", found.factored.damping_ratio),
+        (ANGULAR_FREQUENCY, found.factored.angular_frequency),
         (RADIUS, None),
     ):
         values.define(name, nothing if value is None else value)

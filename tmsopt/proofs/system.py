@@ -11,7 +11,7 @@ from scipy.linalg import qr
 from tmsopt.arithmetic.krawczyk import Refused, slopes
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import RADIUS
+from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.models import Quantity, Values
 from tmsopt.models.exact import decimal_fraction
 from tmsopt.proofs.factored import abscissa_formula
@@ -81,7 +81,7 @@ def equations(problem: Problem, pattern: Pattern, parameters: Mapping[str, float
         Refused: for an equality that cannot be evaluated in balls.
     """
     equalities = tuple(c for c in problem.conditions.values() if c.equality)
-    beyond = [n for n in (RADIUS, "damping_ratio") if any(n in c.names for c in equalities)]
+    beyond = [n for n in (RADIUS, "damping_ratio", ANGULAR_FREQUENCY) if any(n in c.names for c in equalities)]
     if beyond:
         raise Refused(f"an == constraint uses {beyond[0]}, which has no equation in balls; drop it to prove the rest")
     met: dict[str, Quantity] = {}

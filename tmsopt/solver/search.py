@@ -10,6 +10,7 @@ from tmsopt.checks.bound import bounded
 from tmsopt.checks.recheck import FEASIBLE
 from tmsopt.checks.worst_case import worst_cases
 from tmsopt.design.cases import Case
+from tmsopt.design.dependence import WORSE
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
 from tmsopt.design.solution import Starts
@@ -108,7 +109,7 @@ def _left_of_the_axis(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
 def _wants_stability(problem: Problem, trial: Trial) -> bool:
     """Whether a design is unstable, and the objective or a constraint is about the roots."""
     asked = (problem.objective, *problem.conditions.values())
-    about = any({"abscissa", "damping_ratio"} & set(e.names) for e in asked if e)
+    about = any(set(WORSE) & set(e.names) for e in asked if e)
     return about and not trial.checked.structure.abscissa < 0
 
 
@@ -215,6 +216,8 @@ def _uncovered(problem: Problem, trial: Trial) -> list[Case]:
                 excess = worst.value - known.structure.abscissa
             case "damping_ratio":
                 excess = known.quantities["damping_ratio"] - worst.value
+            case "angular_frequency":
+                excess = worst.value - known.quantities["angular_frequency"]
             case "objective":
                 excess = abs(worst.value - known.objective)
             case _:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import NO_RADIUS, ROOT_QUANTITIES
+from tmsopt.design.quantities import ANGULAR_FREQUENCY, NO_RADIUS, ROOT_QUANTITIES
 from tmsopt.models import Values
 from tmsopt.records import Array, Complex, Truth
 from tmsopt.roots import Pattern, is_stable, lienard_chipart, roots
@@ -61,7 +61,10 @@ def values_of(problem: Problem, pattern: Pattern, columns: Mapping[str, Array], 
         z = factor_roots()
         return np.asarray(np.min(-z.real / (np.abs(z) + 1e-300), axis=-1))
 
-    formulas = {"abscissa": lambda _: np.asarray(factor_roots().real.max(axis=-1)), "damping_ratio": damping_ratio}
+    formulas = {
+        "abscissa": lambda _: np.asarray(factor_roots().real.max(axis=-1)), "damping_ratio": damping_ratio,
+        ANGULAR_FREQUENCY: lambda _: np.asarray(factor_roots().imag.max(axis=-1)),
+    }  # fmt: skip
     extra = [*(replace(q, value=formulas[q.name]) for q in ROOT_QUANTITIES), NO_RADIUS]
     return Values(problem.model, problem.parameter_set, columns, extra=extra)
 

@@ -52,8 +52,8 @@ def times(rate: Formula, written: str) -> tuple[Quantity, ...]:
             lambda v: 1 / (-_abscissa(v) * rate(v)) if _abscissa(v) < 0 else math.nan, range=Range(lower=0.0),
             aside=True, stands_for=f"(1/max({decay}, 0))"),
         Quantity("frequency", "Hz", "of the fastest oscillation, 0 where nothing oscillates", "f",
-            lambda v: max((r.im for r in v["structure"].roots), default=0.0) * rate(v) / (2 * math.pi),
-            range=Range(lower=0.0), aside=True),
+            lambda v: v["angular_frequency"] * rate(v) / (2 * math.pi), range=Range(lower=0.0), aside=True,
+            stands_for=f"(angular_frequency*{written}/(2*pi))"),
     )  # fmt: skip
 
 
