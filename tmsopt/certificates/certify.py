@@ -16,7 +16,8 @@ from tmsopt.checks.bound import instant_bound
 from tmsopt.checks.recheck import recheck
 from tmsopt.design.cases import Case
 from tmsopt.design.files import Given, question_of
-from tmsopt.design.quantities import ROOT_NAMES
+from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import ANGULAR_FREQUENCY, ROOT_NAMES
 from tmsopt.design.solution import Bound, Solution
 from tmsopt.errors import Fault, InputError
 from tmsopt.formulation.formulate import Builder
@@ -137,12 +138,21 @@ def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
 
 
 def _known(design: Solution) -> Bound:
-    """The bound there is without a search, found anew; a damping ratio is at most 1."""
+    """The bound there is without a search, found anew; a damping ratio is at most 1, a frequency at least 0."""
     if design.problem.sense == "maximize" and (design.problem.maximize or "").strip() == "damping_ratio":
         gap = max(1.0 - design.value, 0.0)
         return Bound(1.0, gap, gap == 0, "definition")
+    if _is_frequency(design.problem):
+        return Bound(0.0, design.value, design.value == 0, "definition")
     bound = instant_bound(design.problem, design.value)
     return bound if math.isfinite(bound.value) else _over_the_box(design)
+
+
+def _is_frequency(problem: Problem) -> bool:
+    """Whether the least frequency is asked for, which is no name of a model's own."""
+    found = problem.objective
+    named = (problem.minimize or "").strip() in (ANGULAR_FREQUENCY, "frequency")
+    return named and found is not None and ANGULAR_FREQUENCY in found.names
 
 
 def _over_the_box(design: Solution) -> Bound:

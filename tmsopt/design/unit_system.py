@@ -1,6 +1,7 @@
 """The units in which a problem was written: of parameters, of quantities, and of any expression in them."""
 
 import math
+import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -10,6 +11,8 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY
 from tmsopt.models import Parameter, Quantity
 from tmsopt.units import Dimension, factor
+
+_FREQUENCY, _HERTZ = "frequency", "Hz"  # which is a rate, and no 1/s to a reader
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,10 @@ def unit_of(problem: Problem, text: str) -> Unit:
     name = text.strip().removesuffix(".min").removesuffix(".max").removesuffix(".limit")
     if name in problem.parameter_set.names:
         return _typed(problem.units.get(name, ""), units[name])
+    if units.get(_FREQUENCY) == _HERTZ and set(re.findall(r"[A-Za-z_]\w*", problem.constraints.get(name, name))) == {
+        _FREQUENCY
+    }:
+        return Unit(_HERTZ)
     if name in units:
         return _of_kind(problem, Dimension.of(units[name]))
     return _of_kind(problem, dimension_of(problem, text, units))
@@ -52,7 +59,7 @@ def si_units(problem: Problem) -> dict[str, str]:
     """The unit in which each parameter, quantity and root quantity of a problem is computed; ``1`` without one."""
     of = problem.parameter_set
     listed: tuple[Parameter | Quantity, ...] = (*problem.model.quantities, *of.quantities, *of.parameters)
-    rates = {"abscissa": of.root_unit, "decay_rate": "1/s", "decay_time": "s", "frequency": "Hz"}
+    rates = {"abscissa": of.root_unit, "decay_rate": "1/s", "decay_time": "s", _FREQUENCY: _HERTZ}
     rates[ANGULAR_FREQUENCY] = of.root_unit
     return dict.fromkeys(problem.vocabulary, "1") | rates | {q.name: q.unit for q in listed}
 

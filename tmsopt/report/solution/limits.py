@@ -6,6 +6,7 @@ from tmsopt.design.cases import Case
 from tmsopt.design.expression import written_sides
 from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import ANGULAR_FREQUENCY
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import unit_of
 from tmsopt.report.text import number
@@ -61,11 +62,12 @@ def proof_line(solution: Solution) -> str:
     """Whether it is proved that none is better, in one line, and how to go on where it is not."""
     bound, problem = solution.bound, solution.problem
     text = (problem.minimize or problem.maximize or "").strip()
+    unjudged = "branch and bound does not judge frequencies" if problem.asks(ANGULAR_FREQUENCY) else ""
     if solution.status == "infeasible":
         return (
             "proof: no design in the box meets all limits"
             if bound.proven
-            else "proof: none that no design is feasible; --certify looks for one"
+            else f"proof: none that no design is feasible; {unjudged or '--certify looks for one'}"
         )
     if not problem.free:
         return "proof: nothing is free, so nothing to prove; tmsopt prove proves the roots"
@@ -84,8 +86,8 @@ def proof_line(solution: Solution) -> str:
         return f"proof: no design in the box {better}{by} ({bound.method})"
     if math.isfinite(bound.value):
         known = f"nothing {side} {unit.show(bound.value, 6)} ({bound.method})"
-        return f"proof: {known}, {unit.show(bound.gap, 2)} open; --certify closes it, or finds better"
-    return "proof: none that this is the best; --certify proves it, or finds better"
+        return f"proof: {known}, {unit.show(bound.gap, 2)} open; {unjudged or '--certify closes it, or finds better'}"
+    return f"proof: none that this is the best; {unjudged or '--certify proves it, or finds better'}"
 
 
 def case_lines(solution: Solution) -> list[str]:
