@@ -47,10 +47,11 @@ def judged(stated: tmsopt.Problem, drawn: list[dict[str, float]]) -> Any:
         {"minimize": "abscissa"},
         {"maximize": "damping_ratio - 0.1*Fr"},
         {"minimize": "abscissa + mu", "scenarios": {"Fr": [0.5, 1.5, 4.0]}, "drop": ("Fr",)},
+        {"minimize": "angular_frequency + mu", "scenarios": {"Fr": [0.5, 1.5, 4.0]}, "drop": ("Fr",)},
         {"maximize": "damping_ratio*mu + chi_B", "tolerances": {"chi_B": 0.1, "zeta_H": 0.005}},
         {"minimize": "Fr", "scenarios": {"Fr": [0.5, 4.0]}, "tolerances": {"chi_H": 0.1}, "drop": ("Fr",)},
     ],
-    ids=["abscissa", "damping", "scenarios", "tolerances", "both"],
+    ids=["abscissa", "damping", "scenarios", "frequency", "tolerances", "both"],
 )
 def test_the_recheck_says_the_same_of_each_design(asked: dict[str, Any]) -> None:
     stated, drawn = problem(**asked), designs(40, seed=3)

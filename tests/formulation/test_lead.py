@@ -19,7 +19,7 @@ def asked(degree: int, objective: str) -> tmsopt.Problem:
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize("objective", ["minimize abscissa", "maximize damping_ratio"])
+@pytest.mark.parametrize("objective", ["minimize abscissa", "maximize damping_ratio", "minimize angular_frequency"])
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 5])
 def test_any_design_has_such_factors(degree: int, objective: str, sign: int) -> None:
     """With a0 of either sign, small or not: a start meets all rows, and says of the roots what NumPy does."""
@@ -37,6 +37,8 @@ def test_any_design_has_such_factors(degree: int, objective: str, sign: int) -> 
         value = float(x[degree + 1 + names.index(objective.split(" ")[1])])
         if "abscissa" in objective:
             assert value * nlp.unit >= z.real.max()
+        elif "angular" in objective:
+            assert value * nlp.unit >= z.imag.max()
         else:
             assert value <= np.min(-z.real / np.abs(z)) + 1e-9
 

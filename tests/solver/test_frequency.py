@@ -1,0 +1,212 @@
+"""The greatest imaginary part of the roots, in objectives, constraints and cases: closed forms, and other computations.
+
+The oscillator s² + 2 z s + 1 has the angular frequency √(1 − z²) up to z = 1, and 0 beyond.
+"""
+
+import math
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+from helpers import hunt
+
+import tmsopt
+from tmsopt import laws
+from tmsopt.models import from_coefficients
+
+c, z = ca.SX.sym("c"), ca.SX.sym("z")
+OSCILLATOR = from_coefficients([1, 2 * z, 1])
+THIRD = from_coefficients([1, 2 * z + c, 1 + 2 * z * c, c])  # (s² + 2 z s + 1) (s + c)
+TWO = from_coefficients([1, 2 * z + 2 * c, 5 + 4 * z * c, 8 * z + 2 * c, 4])  # (s² + 2 z s + 1) (s² + 2 c s + 4)
+TOLERANCE = 1e-8
+SKATE = {"w": 1.0, "g": 9.81, "m_B": 10.0, "m_H": 1.0, "x_H": 1.0, "z_B": -0.4, "z_H": -0.2}
+BOX = {"v": (2.0, 5.0), "x_B": (1.05, 1.2), "lambda_s": (0.09, 0.7)}
+SLOW = {"slow": "decay_rate >= 1"}
+
+# The benchmark bicycle of Meijaard, Papadopoulos, Ruina and Schwab (2007), table 1, and table 2 at 5 m/s.
+BENCHMARK = {
+    "w": 1.02, "c": 0.08, "lambda_s": math.pi / 10, "g": 9.81, "v": 5.0, "r_R": 0.3, "m_R": 2.0, "I_Rxx": 0.0603,
+    "I_Ryy": 0.12, "x_B": 0.3, "z_B": -0.9, "m_B": 85.0, "I_Bxx": 9.2, "I_Bzz": 2.8, "I_Bxz": 2.4, "x_H": 0.9,
+    "z_H": -0.7, "m_H": 4.0, "I_Hxx": 0.05892, "I_Hzz": 0.00708, "I_Hxz": -0.00756, "r_F": 0.35, "m_F": 3.0,
+    "I_Fxx": 0.1405, "I_Fyy": 0.28,
+}  # fmt: skip
+WEAVE = 4.46486771378823
+
+# objective, constraints, optimum for z from 0.05 to 3
+MINIMA = (
+    ("angular_frequency", (), 0.0),
+    ("angular_frequency", ("z <= 0.6",), 0.8),
+    ("-angular_frequency", (), -math.sqrt(1 - 0.05**2)),
+    ("z", ("angular_frequency <= 0.6",), 0.8),
+    ("-z", ("angular_frequency >= 0.6",), -0.8),
+    ("z", ("angular_frequency == 0.6",), 0.8),
+    ("z", ("angular_frequency <= 0",), 1.0),
+    ("abs(angular_frequency - 0.6)", (), 0.0),
+    ("angular_frequency + abscissa", (), -1.0),
+    ("abscissa * angular_frequency", (), -0.5),  # −z √(1 − z²)
+    ("-abscissa", ("angular_frequency <= 0.6",), 3 - math.sqrt(8)),  # the slower of two real roots, at z = 3
+    ("angular_frequency / 2 - damping_ratio", (), -1.0),
+    ("abs(angular_frequency - 0.7) + abs(abscissa + 0.7)", (), math.sqrt(0.51) - 0.7),
+    ("z", ("max(angular_frequency, 0.3) <= 0.6",), 0.8),
+)
+
+
+@pytest.mark.parametrize(("objective", "constraints", "optimum"), MINIMA)
+def test_the_oscillator_in_closed_form(objective, constraints, optimum):
+    limits = {f"c{k}": text for k, text in enumerate(constraints)}
+    design = tmsopt.solve(tmsopt.Problem(OSCILLATOR, free={"z": (0.05, 3.0)}, minimize=objective, constraints=limits))
+    assert design.value == pytest.approx(optimum, abs=TOLERANCE)
+
+
+@pytest.mark.parametrize(
+    ("model", "most", "sense", "expression", "limit", "optimum"),
+    [
+        (THIRD, (0.6, 3.0), "minimize", "angular_frequency", "c >= 0.2", 0.8),
+        (THIRD, (3.0, 3.0), "minimize", "z - c/10", "angular_frequency <= 0.6", 0.8 - 0.3),
+        (TWO, (0.9, 1.9), "minimize", "angular_frequency", "c >= 0.2", math.sqrt(4 - 1.9**2)),  # of the second pair
+        (TWO, (0.9, 3.0), "minimize", "angular_frequency", "c >= 0.2", math.sqrt(1 - 0.9**2)),  # of the first
+        (TWO, (3.0, 3.0), "minimize", "z + c", "angular_frequency <= 0.5", math.sqrt(0.75) + math.sqrt(3.75)),
+        (TWO, (3.0, 3.0), "minimize", "z + c", "angular_frequency <= 0", 3.0),  # two double roots, −1 and −2
+        (TWO, (3.0, 3.0), "maximize", "z + c/2", "angular_frequency >= 0.5", 3 + math.sqrt(3.75) / 2),
+    ],
+)
+def test_several_factors_in_closed_form(model, most, sense, expression, limit, optimum):
+    free = {"z": (0.05, most[0]), "c": (0.1, most[1])}
+    design = tmsopt.solve(tmsopt.Problem(model, free=free, constraints={"limit": limit}, **{sense: expression}))
+    assert design.value == pytest.approx(optimum, abs=TOLERANCE)
+
+
+def test_the_greatest_over_cases_is_limited():
+    """With stiffness k the angular frequency is √(k − z²), greatest at the stiffest."""
+    k = ca.SX.sym("k")
+    model, limits = from_coefficients([1, 2 * z, k]), {"slow": "angular_frequency <= 0.5"}
+    asked = {"free": {"z": (0.05, 3.0)}, "minimize": "z", "constraints": limits}
+    for k_of in ((0.5, 2.0, 1.0), tmsopt.Band(0.5, 2.0, 2)):
+        design = tmsopt.solve(tmsopt.Problem(model, scenarios={"k": k_of}, **asked))
+        assert design.value == pytest.approx(math.sqrt(1.75), abs=TOLERANCE)
+        assert design.quantities["angular_frequency"] == pytest.approx(0.5, abs=TOLERANCE)
+    fixed = {"z": 0.5}
+    alone = tmsopt.Problem(model, fixed=fixed, free={"k": (1.0, 4.0)}, tolerances={"k": 0.5}, maximize="k")
+    design = tmsopt.solve(replace(alone, constraints={"slow": "angular_frequency <= 1.5"}))
+    assert design.parameters["k"] == pytest.approx(1.5**2 + 0.25 - 0.5, abs=TOLERANCE)
+
+
+def test_a_multiple_root_does_not_oscillate():
+    """The EP4 of the scaling law, whose eigenvalues as stored are a pair 1e-4 off the real axis or so."""
+    ep4 = laws.ep4_chi_H_1(-0.4, -0.2)
+    fixed = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}
+    fixed |= {n: float(getattr(ep4, n)) for n in ("Fr", "chi_B", "lambda_s")}
+    design = tmsopt.solve(tmsopt.Problem(tmsopt.models.tms, fixed=fixed, minimize="angular_frequency"))
+    assert (design.structure, design.value) == ("EP4", 0.0)
+
+
+def test_the_benchmark_bicycle():
+    """In Hz of its weave, Im s over 2π."""
+    problem = tmsopt.Problem(tmsopt.models.whipple, fixed=BENCHMARK, constraints={"f": "frequency <= 0.7"})
+    design = tmsopt.solve(replace(problem, minimize="frequency"), throw=False)
+    assert design.value == pytest.approx(WEAVE / (2 * math.pi), rel=1e-13)
+    assert design.quantities["frequency"] == design.value
+    assert design.quantities["angular_frequency"] == pytest.approx(WEAVE, rel=1e-13)
+    assert design.violations["f"] == pytest.approx(WEAVE / (2 * math.pi) - 0.7, rel=1e-10)
+    assert tmsopt.solve(replace(problem, constraints={"f": "frequency <= 0.7107"})).status == "optimal"
+
+
+def test_a_band_of_speeds_holds_at_every_speed_of_it():
+    fixed = {n: x for n, x in BENCHMARK.items() if n not in ("v", "w")}
+    asked = tmsopt.Problem(
+        tmsopt.models.whipple, fixed=fixed, free={"w": (0.9, 1.3)}, scenarios={"v": tmsopt.Band(4.5, 6.0, 3)},
+        maximize="w", constraints={"slow": "frequency <= 0.8"},
+    )  # fmt: skip
+    design = tmsopt.solve(asked)
+    speeds = np.linspace(4.5, 6.0, 1001)
+    each = [eigenvalues(asked, {**design.parameters, "v": v}).imag.max() / (2 * math.pi) for v in speeds]
+    assert max(each) == pytest.approx(0.8, abs=TOLERANCE)
+    assert design.quantities["frequency"] == pytest.approx(max(each), abs=TOLERANCE)
+
+
+def eigenvalues(problem, parameters):
+    a = problem.model.coefficients({n: parameters[n] for n in problem.parameter_set.names}, problem.parameter_set)
+    return np.roots([float(x) for x in a])
+
+
+def decay_and_frequency(design):
+    """1/s and Hz of two-mass skates, by eigenvalues of companion matrices."""
+    s = hunt.roots({**SKATE, **design}) * math.sqrt(SKATE["g"] / SKATE["w"])
+    return -s.real.max(axis=-1), s.imag.max(axis=-1) / (2 * math.pi)
+
+
+@pytest.mark.parametrize(
+    ("sense", "expression", "limits", "merit", "violation"),
+    [
+        ("minimize", "frequency", SLOW, lambda d, decay, f: f, lambda decay, f: 1 - decay),
+        ("maximize", "decay_rate", {"f": "frequency <= 0.24"}, lambda d, decay, f: -decay, lambda decay, f: f - 0.24),
+        ("minimize", "v", {"f": "frequency <= 0.3", "d": "decay_rate >= 0.5"},
+         lambda d, decay, f: d["v"], lambda decay, f: np.maximum(f - 0.3, 0.5 - decay)),
+        ("maximize", "frequency", {"d": "decay_rate >= 0.5"}, lambda d, decay, f: -f, lambda decay, f: 0.5 - decay),
+    ],
+    ids=["least", "limited", "with a decay", "greatest"],
+)  # fmt: skip
+def test_no_search_finds_a_better_skate(sense, expression, limits, merit, violation):
+    asked = tmsopt.Problem(tmsopt.models.tms, fixed=SKATE, free=BOX, constraints=limits, **{sense: expression})
+    design = tmsopt.solve(asked)
+    own = decay_and_frequency({n: np.asarray(design.parameters[n]) for n in BOX})
+    value = float(merit(design.parameters, *own))
+    assert value == pytest.approx(design.value if sense == "minimize" else -design.value, abs=TOLERANCE)
+    assert violation(*own) <= TOLERANCE
+    if "f" in limits:
+        assert design.active["f"] > 0
+        assert own[1] == pytest.approx(float(limits["f"].split()[-1]), abs=TOLERANCE)
+
+    def judged(d):
+        found = decay_and_frequency(d)
+        return merit(d, *found), violation(*found)
+
+    _, best = hunt.least(judged, SKATE, BOX, 1, 45, 6)
+    assert value <= best + 1e-7
+    assert value == pytest.approx(best, abs=1e-5 * (1 + abs(best)))  # so near the search came, too
+
+
+def test_what_does_not_judge_it_says_so():
+    pytest.importorskip("pyscipopt")
+    asked = tmsopt.Problem(tmsopt.models.tms, fixed=SKATE, free=BOX, constraints=SLOW, minimize="frequency")
+    design = tmsopt.certify(asked, seconds=5)
+    assert not math.isfinite(design.bound.value)
+    assert any("cannot take angular_frequency" in note for note in design.notes)
+    assert "does not judge frequencies" in design.report()
+    judged = tmsopt.optimality(design)
+    assert "the angular frequency binds" in judged.report()
+
+
+def test_a_frequency_of_0_is_the_least_there_is():
+    """Of two real roots, by definition."""
+    pytest.importorskip("pyscipopt")
+    design = tmsopt.certify(tmsopt.Problem(OSCILLATOR, free={"z": (0.05, 3.0)}, minimize="angular_frequency"))
+    assert design.bound.proven
+    assert (design.value, design.bound.value) == (0, 0)
+
+
+def test_a_chart_has_it():
+    free = {n: BOX[n] for n in ("v", "x_B")}
+    asked = tmsopt.Problem(tmsopt.models.tms, fixed={**SKATE, "lambda_s": 0.2}, free=free, constraints=SLOW)
+    chart = tmsopt.chart(asked, points=[7, 5], quantities={"f": "frequency"})
+    v, x_B = np.meshgrid(np.linspace(*BOX["v"], 7), np.linspace(*BOX["x_B"], 5))
+    assert chart.quantities["f"] == pytest.approx(
+        decay_and_frequency({"v": v, "x_B": x_B, "lambda_s": 0.2})[1], abs=TOLERANCE
+    )
+
+
+def test_an_equality_is_met_and_neither_proved_nor_counted():
+    free = {"v": (2.0, 8.0), "x_B": (1.05, 2.0)}
+    equal = tmsopt.Problem(
+        tmsopt.models.tms,
+        fixed={**SKATE, "lambda_s": 0.3},
+        free=free,
+        locate="EP2",
+        constraints={"f": "frequency == 0.3"},
+    )
+    with pytest.raises(tmsopt.InputError, match="the constraints use angular_frequency"):
+        tmsopt.solve_all(equal)
+    design = tmsopt.solve(equal)
+    assert eigenvalues(equal, design.parameters).imag.max() * math.sqrt(9.81) / (2 * math.pi) == pytest.approx(0.3)
+    assert "angular_frequency, which has no equation in balls" in tmsopt.prove(design).report()
