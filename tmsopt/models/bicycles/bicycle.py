@@ -47,16 +47,16 @@ def times(rate: Formula, written: str) -> tuple[Quantity, ...]:
     decay = f"-(abscissa*{written})"
     return (
         Quantity("decay_rate", "1/s", "how fast the slowest part of a disturbance dies out", r"-\alpha",
-            lambda v: -_abscissa(v) * rate(v), aside=True, stands_for=f"({decay})"),
+            lambda v: -_of_roots(v, "abscissa") * rate(v), aside=True, stands_for=f"({decay})"),
         Quantity("decay_time", "s", "in which the slowest part of a disturbance falls to 1/e", r"\tau",
-            lambda v: 1 / (-_abscissa(v) * rate(v)) if _abscissa(v) < 0 else math.nan, range=Range(lower=0.0),
+            lambda v: 1 / (-a * rate(v)) if (a := _of_roots(v, "abscissa")) < 0 else math.nan, range=Range(lower=0.0),
             aside=True, stands_for=f"(1/max({decay}, 0))"),
         Quantity("frequency", "Hz", "of the fastest oscillation, 0 where nothing oscillates", "f",
-            lambda v: v["angular_frequency"] * rate(v) / (2 * math.pi), range=Range(lower=0.0), aside=True,
+            lambda v: _of_roots(v, "angular_frequency") * rate(v) / (2 * math.pi), range=Range(lower=0.0), aside=True,
             stands_for=f"(angular_frequency*{written}/(2*pi))"),
     )  # fmt: skip
 
 
-def _abscissa(v: Mapping[str, Any]) -> Any:
-    """Of the roots, where these are known; else nan."""
-    return v.get("abscissa", math.nan)
+def _of_roots(v: Mapping[str, Any], name: str) -> Any:
+    """A quantity of the roots, where these are known; else nan."""
+    return v.get(name, math.nan)
