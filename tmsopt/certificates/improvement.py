@@ -10,6 +10,7 @@ from tmsopt.checks.recheck import excesses, recheck
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
+from tmsopt.design.unit_system import unit_of
 from tmsopt.solver.solve import solve, standing
 
 FLOOR = 0.1
@@ -45,7 +46,8 @@ def confirmed(design: Solution, cases: Sequence[Case], point: Mapping[str, float
         if feasible(found) and gained(problem, known, found.value) > _BETTER:
             words = "branch and bound found a feasible design that the search from many starts did not"
             if known is not None:
-                words = f"branch and bound found a better design than the search from many starts: {known:.9g} before"
+                before = unit_of(problem, problem.minimize or problem.maximize or "").show(known, 9)
+                words = f"branch and bound found a better design than the search from many starts: {before} before"
             words = next((note for note in design.notes if note.startswith("branch and bound found a ")), words)
             notes = (*found.notes, words)
             kept = replace(found, problem=problem, notes=notes, stable_elsewhere=design.stable_elsewhere)

@@ -200,6 +200,8 @@ def _number_faults(of: ParameterSet, name: str, value: Any, key: tuple[str, ...]
         yield Fault(f"found {value!r}; accepted: a finite number{unit and ' in' + unit}", key)
     elif number not in parameter.range:
         degrees = f'; write "{number:.6g} deg" for degrees' if parameter.unit == "rad" and abs(number) < 90 else ""
+        down = -number in parameter.range and parameter.meaning.endswith("downward")
+        degrees = f"; z points down: write {-number:.6g}{unit} for what is above the ground" if down else degrees
         found = f"{name} = {number:.6g}{unit} is not physical; {parameter.meaning} is {parameter.range}{unit}{degrees}"
         yield Fault(found, key)
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from tmsopt.design import unit_of
+from tmsopt.design import Unit, unit_of
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
@@ -71,14 +71,14 @@ def of_chart(chart: "Chart") -> Words:
 def of_speeds(speeds: "Speeds") -> Words:
     """Where the design is stable."""
     yield speeds.parameter
-    yield f"stable {_bands(speeds.stable)}"
+    yield f"stable {_bands(speeds.stable, unit_of(speeds.problem, speeds.parameter))}"
     yield _count(len(speeds.found), "critical value")
 
 
 def of_growth(growth: "Growth") -> Words:
     """Where the design is stable."""
     yield f"over {growth.over.name}"
-    yield f"stable {_bands(growth.stable)}"
+    yield f"stable {_bands(growth.stable, unit_of(growth.problem, growth.over.name))}"
     yield growth.structure
 
 
@@ -190,5 +190,6 @@ def _count(count: int, one: str, many: str = "") -> str:
     return f"{count} {one if count == 1 else many or one + 's'}"
 
 
-def _bands(bands: tuple[tuple[float, float], ...]) -> str:
-    return ", ".join(f"{low:.5g} to {high:.5g}" for low, high in bands) or "nowhere"
+def _bands(bands: tuple[tuple[float, float], ...], unit: Unit) -> str:
+    words = ", ".join(f"{unit.number(low)} to {unit.number(high)}" for low, high in bands)
+    return f"{words} {unit.text}".strip() if words else "nowhere"

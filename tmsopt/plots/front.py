@@ -98,7 +98,8 @@ def _ring_unstable(ax: Axes, front: Front, values: Array) -> None:
 
 
 def _names(points: tuple[FrontPoint, ...], values: Array) -> list[Name]:
-    words = [[w for w in p.label.split("; ") if w and not w.startswith("gap ")] for p in points]
+    """Of the ends, and of kinks at which the structure changes; limits that begin to bind stand in the table."""
+    words = [[w for w in p.label.split("; ") if "->" in w or w.startswith(("least", "greatest"))] for p in points]
     return [
         Name(", ".join(w).replace("->", "→"), *map(float, at[:2])) for w, at in zip(words, values, strict=True) if w
     ]

@@ -9,11 +9,12 @@ from matplotlib.ticker import MaxNLocator
 from tmsopt.design.unit_system import Unit
 from tmsopt.plots.labels import AxisScale, abscissa_label, finished, scale_of
 from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, STABLE, figure_of, on_axes
-from tmsopt.records import Array, Table
+from tmsopt.records import Array, Table, Truth
 from tmsopt.solver.solve import solve
 from tmsopt.studies import Results
 
 _BINS = 25
+_FAR = 6  # widths of the middle half of the values: farther ones are counted, not shown
 _PLAIN = Unit()
 
 
@@ -36,6 +37,8 @@ def _drawn_around(ax: Axes, data: Results) -> str:
     rate = problem.parameter_set.rate
     values = np.array([_shown(r.abscissa, r.parameters, rate) for r in rows])
     known = np.isfinite(values)
+    beyond = known & ~_near(values)
+    known &= ~beyond
     stable = np.array([bool(r.stable) for r in rows])
     nominal = solve(problem, throw=False, interruptible=False)
     edges = _edges(values[known])
@@ -49,14 +52,23 @@ def _drawn_around(ax: Axes, data: Results) -> str:
     at = _shown(nominal.abscissa, nominal.parameters, rate)
     ax.axvline(at, color=LINE, linestyle="--", linewidth=1.2, label=f"nominal design, {at:.4g}")
     ax.axvline(0, color=CAPSIZE, linewidth=1.4, label="0: neither decay nor growth")
-    ax.set(ylabel="designs", xlabel=abscissa_label(problem) if rate is None else "decay rate in 1/s, below 0 of growth")
-    left_out = f", {np.count_nonzero(~known)} without roots not shown" if not known.all() else ""
+    ax.set(ylabel="designs", xlabel=abscissa_label(problem) if rate is None else "decay rate in 1/s (negative: growth)")
+    counts = (beyond, "far beyond the axis"), (~known & ~beyond, "without roots")
+    left_out = "".join(f", {np.count_nonzero(which)} {where}" for which, where in counts if which.any())
     return f"{stable.sum()} of {len(rows)} stable ({100 * stable.mean():.3g} %){left_out}" if rows else "no rows"
 
 
 def _shown(abscissa: float, parameters: Table[float], rate: object) -> float:
     """The abscissa, or the decay rate in 1/s where there is a unit of time."""
     return -abscissa * float(rate(parameters)) if callable(rate) and math.isfinite(abscissa) else abscissa
+
+
+def _near(values: Array) -> Truth:
+    """Which values are not so far from the others that they would hide them."""
+    known = values[np.isfinite(values)]
+    low, high = np.percentile(known, (25, 75)) if known.size else (0.0, 0.0)
+    near: Truth = np.abs(values - (low + high) / 2) <= _FAR * (high - low) + 1e-9 * abs(high)
+    return near
 
 
 def _edges(values: Array) -> Array:

@@ -16,6 +16,7 @@ from tmsopt.tracing.branch import Branch, Trace, kinds_along
 from tmsopt.tracing.domain import Domain
 from tmsopt.tracing.swallowtail import Swallowtail
 
+_LABEL = 40  # characters of what happens at a point of a front, if not all is wanted
 _FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
 
 
@@ -120,11 +121,12 @@ def front_table(front: Front, full: bool = False) -> str:
     ]
     units, digits = {n: unit_of(problem, n) for n in (*texts, *free)}, 12 if full else 6
     heads = {n: f"{n} {units[n].text}".rstrip() for n in units}
-    rows = [(*(heads[t] for t in texts), "", "stable", *(heads[n] for n in free), "structure", "limits that bind")]
+    rows = [(*(heads[t] for t in texts), "stable", "", *(heads[n] for n in free), "structure", "limits that bind")]
     for p in front.points:
         numbers = [units[t].number(v, digits) for t, v in zip(texts, p.objectives, strict=True)]
         design = [units[n].number(p.solution.parameters[n], digits) for n in free]
-        rows.append((*numbers, p.label, yes_no(p.stable), *design, p.structure, ", ".join(p.limits)))
+        label = p.label if full or len(p.label) <= _LABEL else f"{p.label[: _LABEL - 1]}…"
+        rows.append((*numbers, yes_no(p.stable), label, *design, p.structure, ", ".join(p.limits)))
     remarks = [f"gap: {gap.reason}" for gap in front.gaps] + [f"note: {note}" for note in front.notes]
     labelled = [k for k, p in enumerate(front.points) if p.label]
     height = HEIGHT - len(lines) - len(remarks) - 2 * bool(remarks) - 3

@@ -18,12 +18,15 @@ def speeds_table(found: Speeds) -> str:
     """Every speed with what happens there, then the stable and the heavily damped bands."""
     unit = unit_of(found.problem, found.parameter)
     end = f" < {unit.number(found.upper, 6)}" if math.isfinite(found.upper) else ""
+    within = f" {unit.text}" if unit.text else ""
     lines = [
         found.problem.title or "untitled problem",
-        f"{unit.number(found.lower, 6)} < {found.parameter}{end}, by exact root isolation for the numbers as stored",
+        f"{unit.number(found.lower, 6)} < {found.parameter}{end}{within}, "
+        "by exact root isolation for the numbers as stored",
         "",
     ]
-    rows: list[Sequence[str]] = [("", f"{found.parameter} {unit.text}".rstrip(), "root", "")]
+    roots = f"root {unit_of(found.problem, 'abscissa').text}".rstrip()
+    rows: list[Sequence[str]] = [("", f"{found.parameter} {unit.text}".rstrip(), roots, "")]
     for c in found.found:
         rows.append((in_words_of(found.problem.model, c.kind), unit.number(c.at, _DIGITS), _root(c), _meaning(c)))
     lines += [*columns(rows), ""] if found.found else [_nothing(found), ""]
@@ -37,14 +40,14 @@ def speeds_table(found: Speeds) -> str:
 
 def growth_table(found: Growth) -> str:
     """Over what, where the design stands, and the stable and the heavily damped bands."""
-    unit = "" if found.over.unit == "1" else f" {found.over.unit}"
-    critical = f", critical value {found.critical:.8g}{unit}" if math.isfinite(found.critical) else ""
+    unit = unit_of(found.problem, found.over.name)
+    critical = f", critical value {unit.show(found.critical, 8)}" if math.isfinite(found.critical) else ""
     lines = [
-        f"roots over {found.over.name} from {found.values[0]:.6g} to {found.values[-1]:.6g}{unit}",
-        f"the design: {found.over.name} = {found.design:.8g}{unit}, structure {found.structure}{critical}",
+        f"roots over {found.over.name} from {unit.number(found.values[0], 6)} to {unit.show(found.values[-1], 6)}",
+        f"the design: {found.over.name} = {unit.show(found.design, 8)}, structure {found.structure}{critical}",
     ]
     for name, bands in (("stable", found.stable), ("heavily damped", found.heavily_damped)):
-        words = ", ".join(f"{low:.8g} to {high:.8g}{unit}" for low, high in bands)
+        words = ", ".join(f"{unit.number(low, 8)} to {unit.show(high, 8)}" for low, high in bands)
         lines.append(f"{name}: {words or 'nowhere'}")
     return "\n".join(lines)
 

@@ -65,7 +65,7 @@ def _row_cells(study: Study, rows: Sequence[Row]) -> list[tuple[str, ...]]:
     asked = [text] if text and text != "abscissa" and text not in free else []
     units = {n: f"{n} {unit_of(problem, n).text}".rstrip() for n in (*study.columns, *asked, *free, *_reports(study))}
     varied, objective, rest = ([units[n] for n in names] for names in (study.columns, asked, (*free, *_reports(study))))
-    heads = ["row", *varied, "status", *objective, "abscissa", "structure", "stable", *rest]
+    heads = ["row", "stable", *varied, "status", *objective, "abscissa", "structure", *rest]
     return [tuple(heads), *(_cells(study, row, asked, free) for row in rows)]
 
 
@@ -78,9 +78,10 @@ def _cells(study: Study, row: Row, asked: Sequence[str], free: Sequence[str]) ->
 
     found = (row.parameters, row.reports) if known else ({}, {})
     return (
-        str(row.number), *(shown(n, row.varied) for n in study.columns), _word(study, row.status),
+        str(row.number), yes_no(row.stable) if known else "", *(shown(n, row.varied) for n in study.columns),
+        _word(study, row.status),
         *(shown(n, {n: row.objective} if known else {}) for n in asked), _short(row.abscissa) if known else "",
-        row.structure if known else "", yes_no(row.stable) if known else "",
+        row.structure if known else "",
         *(shown(n, found[0]) for n in free), *(shown(n, found[1]) for n in _reports(study)),
     )  # fmt: skip
 
@@ -110,7 +111,8 @@ def _facts(study: Study, found: Summary) -> list[str]:
         for name in ("stable", "feasible", "good"):
             lines.append(f"{_SHARES[name]}: {_share(getattr(found.product, name))}")
         at = ", ".join(f"{100 * float(q):g} % {_short(value)}" for q, value in found.product.abscissa.items())
-        lines.append(f"abscissa at most, for a share of all rows: {at}")
+        unit = unit_of(study.problem, "abscissa").text
+        lines.append(f"abscissa{f' in {unit}' if unit else ''} at most, for a share of all rows: {at}")
     for cause, count in islice(found.causes.items(), _CAUSES):
         lines.append(f"{count} × {cause}")
     if len(found.causes) > _CAUSES:

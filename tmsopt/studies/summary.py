@@ -62,7 +62,7 @@ class Yield:
         return plain(self)
 
 
-_AMOUNT = re.compile(r" by [-+\d.e]+")
+_AMOUNT = re.compile(r" by [-+\d.e]+( [^\s,;]+)?")
 _NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")
 
 

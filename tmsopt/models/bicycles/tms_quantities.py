@@ -85,7 +85,7 @@ def _weight(v: Mapping[str, Any]) -> Any:
 
 SI_QUANTITIES = (
     Quantity("v_c", "m/s", "speed at the weave boundary", "v_c", lambda v: v["Fr_c"] * sqrt(v["g"] * v["w"])),
-    Quantity("u_H", "m", "distance of the front centre of mass from the steer axis", "u_H",
+    Quantity("u_H", "m", "distance of the front centre of mass from the steer axis, positive ahead of it", "u_H",
         lambda v: v["nu_H"] * v["w"]),
     Quantity("N_F", "N", "load on the front wheel at rest, negative where it lifts", "N_F",
         lambda v: v["load_front"] * _weight(v)),
@@ -101,8 +101,8 @@ SI_QUANTITIES = (
 _SI = {q.name: q for q in SI_QUANTITIES}
 
 NATIVE_QUANTITIES = (
-    Quantity("nu_H", "1", "distance of the front centre of mass from the steer axis", r"\nu_H", _nu_H,
-        counterpart=_SI["u_H"]),
+    Quantity("nu_H", "1", "distance of the front centre of mass from the steer axis, positive ahead of it", r"\nu_H",
+        _nu_H, counterpart=_SI["u_H"]),
     Quantity("omega0", "1", "−(a4/a0)^(1/4), the mean decay of the roots (equation w0)", r"\omega_0", omega0,
         equation=omega0_equation, range=_NOT_POSITIVE, aside=True),
     Quantity("Fr_c", "1", "Froude number at the weave boundary (equation flus)", r"\mathrm{Fr}_c", _Fr_c,

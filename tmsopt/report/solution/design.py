@@ -42,7 +42,6 @@ _ROWS = 8  # of free parameters one below the other
 _APART = ("design", "motion", "limits", "robustness")
 """Parts with an empty line before them, where there is room."""
 
-_MORE = "more: --full; then tmsopt prove, compare, speeds, chart, trace with the same file"
 _ASKED = {"a0": "must not be 0", "coefficients": "must have values"}
 
 
@@ -84,7 +83,7 @@ def design_report(
     room = HEIGHT - 2 - sum(map(len, blocks.values()))
     apart = [name for name in _APART if name in blocks][: max(room, 0)]
     lines = [line for name, block in blocks.items() for line in ([""] if name in apart else []) + block]
-    return "\n".join(line.rstrip() for line in [title, *lines, _MORE])
+    return "\n".join(line.rstrip() for line in [title, *lines, _more(solution, found)])
 
 
 def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> Mapping[str, float]:
@@ -115,7 +114,7 @@ def _parts(solution: Solution, found: Findings, si: Mapping[str, float], beside:
     yield Block("cases", case_lines(solution))
     explained = found.explanation
     if explained is not None and explained.levers:
-        head = "limits that bind, and what moving each a little further buys (first order):"
+        head = "limits that bind, and what a small move of each buys (to first order; --full solves again):"
         yield Block("limits", [head, *columns([_lever(solution, lever) for lever in explained.levers])],
                    tuple(lever.sentence for lever in explained.levers), least=3)  # fmt: skip
     if explained is not None:
@@ -158,7 +157,7 @@ def _ended(solution: Solution) -> str:
         return words[solution.status]
     if problem.objective is None:
         return "found" if problem.free else "as given"
-    return f"optimal{proved or f', the best of {solution.starts.tried} starts'}"
+    return f"optimal{proved or f', the best of {solution.starts.tried} starts, not proved'}"
 
 
 def stability(solution: Solution, on_edge: bool = False) -> str:
@@ -221,6 +220,12 @@ def _motion(solution: Solution, found: Findings) -> list[str]:
     return [*lines, f"roots: {roots}{f'  in {unit}' if unit else ''}"]
 
 
+def _more(solution: Solution, found: Findings) -> str:
+    """How to see more, and the commands that have something to say of the same file."""
+    others = ["prove", *(["compare"] if solution.problem.model is tms else []), *(["speeds"] if found.speeds else [])]
+    return f"more: --full; then tmsopt {', '.join([*others, 'chart', 'trace'])} with the same file"
+
+
 def _stored(solution: Solution) -> Iterator[str]:
     """To all digits: the abscissa, and that of the numbers as they are stored."""
     unit = unit_of(solution.problem, "abscissa")
@@ -263,7 +268,9 @@ def branch_lines(solution: Solution) -> list[str]:
 
 def _named(part: Block) -> list[str]:
     """A part of the full report, under its name."""
-    lines = ([] if part.replaces else part.lines) + list(part.rest)
+    lines = [] if part.replaces else _wrapped(part.lines)
+    for line in part.rest:
+        lines += [line] if line.startswith("  ") else _wrapped([line])
     return ["", part.name, "-" * len(part.name), *(line.rstrip() for line in lines)]
 
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from tmsopt.design.unit_system import unit_of
 from tmsopt.diagnosis.diagnosis import Diagnosis
 from tmsopt.diagnosis.splitting import DEVIATION, Law, Response
 from tmsopt.explanation.explain import Explanation
@@ -55,6 +56,8 @@ def rounding_line(explanation: Explanation) -> str:
     enough = next((row for row in rows if _kept(row, explanation)), None)
     three = next((row for row in rows if row.digits == ALONE), None)
     parts = []
+    if stable and three and three.realised < 0 and (enough is None or enough.digits > ALONE):
+        parts.append(f"{ALONE} digits {_lose(three, explanation)}")
     if stable and three and not three.realised < 0:
         alone = explanation.rounding.get(explanation.worst)
         worst = f" ({explanation.worst} alone: {alone.written[explanation.worst]})" if alone else ""
@@ -63,7 +66,8 @@ def rounding_line(explanation: Explanation) -> str:
         parts.append(f"{enough.digits} digits {_keep(enough, explanation)}")
     else:
         parts.append(f"{rows[-1].digits} digits {_lose(rows[-1], explanation)}")
-    needs = f"; {explanation.worst} needs the most" if explanation.worst and len(parts) == 1 else ""
+    told = "make it unstable" in parts[0]
+    needs = f"; {explanation.worst} needs the most" if explanation.worst and not told else ""
     return f"{'; '.join(parts)}{needs}"
 
 
@@ -128,7 +132,7 @@ def rounding_rows(explanation: Explanation) -> list[Sequence[str]]:
 
 
 def _row(what: str, to: str, row: Rounded) -> tuple[str, ...]:
-    violated = ", ".join(f"{name} by {value:.1g}" for name, value in row.violations.items())
+    violated = ", ".join(row.violations)
     ratio, loss = _seen(row.damping_ratio), _seen(row.loss)
     return (what, to, number(_seen(row.realised)), f"{loss:.2g}", f"{ratio:.4g}", violated)
 
@@ -238,12 +242,13 @@ def robustness_table(found: Robustness) -> str:
     for n in kinds:
         moves = _moves(n, found.relative) if n.found and n.distance else ["" for _ in names]
         rows.append((_robust_row(n, found), _distance(n, found), *moves))
-    rows.append(("weight", "", *(f"{found.weights[name]:.6g}" for name in names)))
+    units = {name: unit_of(found.problem, name) for name in names}
+    rows.append(("weight", "", *(units[name].show(found.weights[name], 6) for name in names)))
     for n in kinds:
         if n.found and n.distance > 0:
             at = "at" if n.kind == "infinity" else "with"
             word = in_words_of(found.problem.model, n.kind)
-            rows.append((f"{at} {word}", "", *(f"{n.parameters[name] + 0.0:.8g}" for name in names)))
+            rows.append((f"{at} {word}", "", *(units[name].show(n.parameters[name], 8) for name in names)))
     if len(names) > _WIDE:
         rows = list(zip(*rows, strict=True))
     return "\n".join(line.rstrip() for line in [f"robustness: {robustness_line(found)}", "", *columns(rows)])
