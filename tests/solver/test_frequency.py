@@ -92,6 +92,36 @@ def test_the_greatest_over_cases_is_limited():
     assert design.parameters["k"] == pytest.approx(1.5**2 + 0.25 - 0.5, abs=TOLERANCE)
 
 
+def test_the_fastest_case_may_be_another_than_the_worst():
+    """Slow, a skate swings fast; fast, it decays slowly."""
+    fixed = {"chi_H": 1.0, "zeta_H": -0.2, "zeta_B": -0.4, "mu": 0.1}
+    asked = tmsopt.Problem(
+        tmsopt.models.tms, fixed=fixed, free={"chi_B": (1.01, 1.3), "lambda_s": (0.05, 1.2)}, minimize="abscissa",
+        scenarios={"Fr": tmsopt.Band(1.2, 2.4, 3)}, constraints={"f": "angular_frequency <= 0.7"},
+    )  # fmt: skip
+    design = tmsopt.solve(asked)
+    each = {Fr: eigenvalues(asked, {**design.parameters, "Fr": Fr}) for Fr in np.linspace(1.2, 2.4, 501)}
+    assert max(s.imag.max() for s in each.values()) == pytest.approx(0.7, abs=TOLERANCE)
+    assert design.fastest.at["Fr"] == pytest.approx(max(each, key=lambda Fr: each[Fr].imag.max()), abs=0.003)
+    assert design.worst.at["Fr"] == pytest.approx(max(each, key=lambda Fr: each[Fr].real.max()), abs=0.003)
+    assert design.fastest != design.worst
+    assert f"fastest case: Fr = {design.fastest.at['Fr']:.4g}" in design.report()
+
+
+def test_units_of_the_roots_far_from_1():
+    """s² + 2 z s + 10⁶ k has the angular frequency √(10⁶ k − z²)."""
+    k = ca.SX.sym("k")
+    model, free = from_coefficients([1, 2 * z, 1e6 * k]), {"z": (10.0, 900.0), "k": (0.5, 2.0)}
+    least = tmsopt.Problem(model, free=free, minimize="angular_frequency", constraints={"k": "k >= 1"})
+    assert tmsopt.solve(least).value == pytest.approx(math.sqrt(1e6 - 900**2), rel=1e-9)
+    limits = {"f": "angular_frequency <= 500", "d": "abscissa <= -700"}
+    stiffest = tmsopt.Problem(model, free=free, maximize="k", constraints=limits)
+    assert tmsopt.solve(stiffest).value == pytest.approx((500**2 + 900**2) / 1e6, rel=1e-9)
+    loose = {"f": "angular_frequency <= 500", "k": "k >= 1"}  # does not bind: √(10⁶ k − 900²) is 436 at k = 1
+    judged = tmsopt.optimality(tmsopt.Problem(model, free=free, minimize="abscissa", constraints=loose))
+    assert "frequency" not in judged.report()
+
+
 def test_a_multiple_root_does_not_oscillate():
     """The EP4 of the scaling law, whose eigenvalues as stored are a pair 1e-4 off the real axis or so."""
     ep4 = laws.ep4_chi_H_1(-0.4, -0.2)

@@ -164,7 +164,7 @@ class _Look:
     Attributes:
         top: number of the case with the largest abscissa.
         least: number of the case with the least damping ratio.
-        fastest: number of the case with the greatest angular frequency, where that is asked for.
+        fastest: number of the case with the greatest angular frequency, where that is asked for, else `top`.
     """
 
     cases: list[Case]
@@ -190,7 +190,7 @@ def _look(
     top = max(near_top, key=lambda k: _or_infinite(each[k]["abscissa"]))
     least = min(near_least, key=lambda k: float(each[k]["damping_ratio"]))
     worst = {"abscissa": each[top]["abscissa"], "damping_ratio": each[least]["damping_ratio"]}
-    fastest = 0
+    fastest = top
     if problem.asks(ANGULAR_FREQUENCY):
         fastest = max(near_fastest, key=lambda k: _or_infinite(each[k][ANGULAR_FREQUENCY]))
         worst[ANGULAR_FREQUENCY] = each[fastest][ANGULAR_FREQUENCY]

@@ -158,6 +158,7 @@ class Solution(Shown):
         notes: sentences for the reader.
         worst: with scenarios or tolerances, the case with the largest abscissa, which is the one reported.
         least_damped: likewise, the case with the least damping ratio.
+        fastest: likewise, the case with the greatest angular frequency, where the problem asks for that.
         cover: what is known of every case together, proven or not.
         sides: part of the box, such as ``forward tilt`` → its best objective, nan where it has no feasible design.
         relaxation: of an infeasible problem, the smallest move of its limits that leaves a feasible design.
@@ -190,6 +191,7 @@ class Solution(Shown):
     notes: tuple[str, ...] = field(default=())
     worst: Case | None = None
     least_damped: Case | None = None
+    fastest: Case | None = None
     cover: Cover | None = None
     sides: Table[float] = field(default_factory=Table)
     relaxation: Relaxation | None = None
@@ -239,7 +241,7 @@ class Solution(Shown):
         """
         problem = self.problem
         text = problem.minimize or problem.maximize or problem.locate or "abscissa"
-        cases = {"worst_case": self.worst, "least_damped_case": self.least_damped}
+        cases = {"worst_case": self.worst, "least_damped_case": self.least_damped, "fastest_case": self.fastest}
         optional = {
             **{name: case and plain(case, "at offset") for name, case in cases.items()}, **plain(self, "cover"),
             "sides": plain(self.sides, digits=SIDE_DIGITS), **plain(self, "relaxation need interrupted si"),

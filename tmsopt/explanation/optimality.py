@@ -165,7 +165,9 @@ def _judged(solution: Solution) -> Problem:
         raise NotCovered("heavy damping is asked for, which holds the roots on the real line as well")
     nlp = formulate(problem)
     if set(nlp.touches) & set(ROOT_NAMES):
-        raise NotCovered("an objective or constraint asks for a large abscissa or a small damping ratio")
+        raise NotCovered(
+            "an objective or constraint asks for a large abscissa, a small damping ratio or a high frequency"
+        )
     x = complete(nlp, problem, solution.parameters)
     if "abscissa" in nlp.variables:
         x[nlp.variables.index("abscissa")] = solution.abscissa / nlp.unit

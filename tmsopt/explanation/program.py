@@ -103,9 +103,10 @@ def program(problem: Problem, solution: Solution) -> LocalProgram:
     point = dict(zip(problem.free, variables_of(problem, solution.parameters), strict=True))
     names = [*problem.free, *nlp.variables[len(problem.free) :]]
     known = {
-        n: point[n] if n in point else solution.abscissa / nlp.unit if n == "abscissa" else _value(values, n)
+        n: point[n] if n in point else solution.abscissa / nlp.unit if n == "abscissa"
+        else _value(values, n) / (nlp.unit if n == ANGULAR_FREQUENCY else 1)
         for n in names
-    }
+    }  # fmt: skip
     at = ca.Function("rows", [symbols], [g])
     reached = np.array(at([known[n] if np.isfinite(known[n]) else 0.0 for n in names])).ravel()
     steady = [i for i, name in enumerate(names) if _steady(nlp, name, reached)]

@@ -82,7 +82,7 @@ def lift_abscissa(build: Rows) -> Lifted:
                 factors.append(Factor(at, squared=False))
             beta, kappa = build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)
             monic.append([lead * a[0] if led else 1, beta, kappa])
-            if not led or len(a) <= _TWO_FACTORS:  # the largest roots do not stand on the line
+            if not led or len(a) <= TWO_FACTORS:  # the largest roots do not stand on the line
                 touches.append(Touch(partial(_pair_distance, at), variable=at))
                 touches.append(Touch(partial(_real_distance, at), variable=at + 1))
         if odd:
@@ -90,7 +90,7 @@ def lift_abscissa(build: Rows) -> Lifted:
             monic.append([lead * a[0] if lead else 1, build.variable(f"delta.{case}", 0.0)])
             if not lead:
                 factors.append(Factor(at, linear=True))
-            if not lead or len(a) <= _TWO_FACTORS // 2:
+            if not lead or len(a) <= TWO_FACTORS // 2:
                 touches.append(Touch(partial(_step_distance, at), variable=at))
         build.equal("abscissa", shift(a, gamma), [(lead or a[0]) * c for c in product(*monic)])
         products.append(tuple(factors))
@@ -125,7 +125,7 @@ def lift_damping_ratio(build: Rows) -> Lifted:
                 factors.append(Factor(at, squared=True))
             monic.append([m * m, p, w * w])
             build.row("damping_ratio", p - 2 * zeta * m * w, 0.0, np.inf)
-            if not led or len(a) <= _TWO_FACTORS:
+            if not led or len(a) <= TWO_FACTORS:
                 touches.append(Touch(partial(_sector_distance, at), row=build.size[1] - 1))
         if odd:
             if not lead:
@@ -190,7 +190,7 @@ def lift_quantity(build: Rows, name: str, case: int, ends: tuple[float, float]) 
     return symbol, Lift(name, 1, lambda values, z: [[_finite(values[case][name])]])
 
 
-_TWO_FACTORS = 4  # coefficients, beyond which there are two quadratic factors or more
+TWO_FACTORS = 4  # coefficients, beyond which there are two quadratic factors or more
 _DOUBLE = 1e-3  # of the largest root: distance of two real ones that may be meant to be one
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.formulation.lifts import Lifted, Rows, factors_of
+from tmsopt.formulation.lifts import TWO_FACTORS, Lifted, Rows, factors_of
 from tmsopt.formulation.nlp import Factor, Lift, Touch
 from tmsopt.models import Values
 from tmsopt.records import Array
@@ -38,6 +38,7 @@ def lift_angular_frequency(build: Rows) -> Lifted:
             build.row("angular_frequency", p * p + 4 * m * m * omega * omega - 4 * m * q, 0.0, np.inf)
             if not led:
                 factors.append(Factor(at))
+            if not led or len(a) <= TWO_FACTORS:
                 touches.append(Touch(partial(_strip_distance, at), row=build.size[1] - 1))
         if odd:
             if not lead:

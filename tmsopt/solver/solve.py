@@ -14,6 +14,7 @@ from tmsopt.checks.recheck import Checked, recheck
 from tmsopt.checks.worst_case import cover
 from tmsopt.design.files import Given, question_of
 from tmsopt.design.problem import Problem, freedom
+from tmsopt.design.quantities import ANGULAR_FREQUENCY
 from tmsopt.design.solution import Bound, NotSolved, Solution, Starts
 from tmsopt.design.unit_system import unit_of
 from tmsopt.errors import Fault, InputError, is_number, short, suggest
@@ -251,6 +252,7 @@ def _assembled(
         notes=(*finding.notes, *notes, *_stability_note(problem, checked, finding.parameters, optimal)),
         worst=checked.worst if listed else None,
         least_damped=checked.least_damped if listed else None,
+        fastest=checked.fastest if listed and problem.asks(ANGULAR_FREQUENCY) else None,
         cover=covered,
         sides=Table(sides),
         relaxation=finding.relaxation,

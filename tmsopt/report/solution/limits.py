@@ -101,6 +101,8 @@ def case_lines(solution: Solution) -> list[str]:
     lines = [f"worst case: {_place(of, solution.worst)}; motion and roots are those there, the rest nominal"]
     if solution.least_damped is not None and solution.least_damped != solution.worst:
         lines.append(f"least damped case: {_place(of, solution.least_damped)}; the damping ratio is that there")
+    if solution.fastest is not None and solution.fastest != solution.worst:
+        lines.append(f"fastest case: {_place(of, solution.fastest)}; limits on the frequency are on that there")
     cover = solution.cover
     if cover is not None:
         means = f"by interval arithmetic on {cover.boxes} boxes" if cover.proven else "looked for, not proven"
