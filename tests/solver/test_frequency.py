@@ -137,6 +137,8 @@ def test_the_benchmark_bicycle():
     design = tmsopt.solve(replace(problem, minimize="frequency"), throw=False)
     assert design.value == pytest.approx(WEAVE / (2 * math.pi), rel=1e-13)
     assert design.quantities["frequency"] == design.value
+    assert design.to_json()["units"]["frequency"] == "Hz"
+    assert "0.71060577 Hz" in design.report()
     assert design.quantities["angular_frequency"] == pytest.approx(WEAVE, rel=1e-13)
     assert design.violations["f"] == pytest.approx(WEAVE / (2 * math.pi) - 0.7, rel=1e-10)
     assert tmsopt.solve(replace(problem, constraints={"f": "frequency <= 0.7107"})).status == "optimal"

@@ -71,7 +71,10 @@ def units_of(problem: Problem, texts: Iterable[str] = ()) -> dict[str, str]:
         texts: expressions beside parameters, quantities and constraints.
     """
     units = si_units(problem)
-    asked = {text: dimension_of(problem, text, units).unit for text in (*problem.constraints, *texts)}
+    asked = {
+        text: dimension_of(problem, text, units).unit
+        for text in (*problem.constraints, *(t for t in texts if t not in units))
+    }
     return {name: unit for name, unit in {**units, **asked}.items() if unit != "1"}
 
 
