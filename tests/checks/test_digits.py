@@ -137,8 +137,9 @@ def roots_of(data: Mapping[str, Any], case: Mapping[str, Any] | None) -> tuple[l
     """Roots of the design in a case as stored, and of the ideal one."""
     coefficients = polynomial_60(**native_60(in_case(data["parameters"], case)))
     stored = roots_60(coefficients)
+    located = any(r["multiplicity"] > 1 for r in data["roots"])  # and not rightmost
     if data["structure"] in ("pair", "real", "undecided"):
-        return stored, stored
+        return stored, nearest_60(data["objective"]["locate"], coefficients, data["roots"]) if located else stored
     return stored, nearest_60(data["structure"], coefficients, data["roots"])
 
 

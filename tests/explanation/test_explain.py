@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 from importlib import import_module
 
@@ -418,7 +419,7 @@ def test_rounding_in_one_line_says_how_many_digits_are_enough():
     """By companion eigenvalues of the rounded designs: those with a simple rightmost root, which doubles resolve."""
     design = tmsopt.solve("problems/realistic.toml")
     told = rounding_line(tmsopt.explain(design, resolve=False))
-    digits, share = (int(told.split()[k]) for k in (0, 3))
+    digits, share = map(int, re.findall(r"(\d) digits keep (\d+) %", told)[0])
     kept = {}
     for n in (2, 3, 4, 6):
         one = {name: unit_of(design.problem, name).one for name in design.problem.free}
@@ -427,7 +428,8 @@ def test_rounding_in_one_line_says_how_many_digits_are_enough():
         kept[n] = np.roots(a).real.max() / design.abscissa
     assert digits == min(n for n in kept if kept[n] >= 0.95)
     assert share == int(100 * kept[digits])
-    assert f"digits keep {share} % of the decay; {tmsopt.explain(design).worst} needs the most" in told
+    assert told.endswith(f"digits keep {share} % of the decay; {tmsopt.explain(design).worst} needs the most")
+    assert told.startswith(f"3 digits lose {round(100 * (1 - kept[3]))} % of the decay; ")  # those of a workshop
 
 
 def test_rounding_that_makes_a_design_unstable_is_said_so():
