@@ -1,5 +1,6 @@
 """Whether a design is stable, and whether any is, as solutions and reports say it: s² + (x − 2) s + 1 is where x > 2."""
 
+import re
 import time
 from dataclasses import replace
 from importlib import import_module
@@ -31,7 +32,9 @@ def found(most: float, coefficients: Any = (1, X - 2, 1), stability: float = 10.
 
 def headline(design: tmsopt.Solution) -> list[str]:
     """How it ended, and what is said of stability."""
-    return [*design_report(design).splitlines()[1].split(": "), ""]
+    first = re.match(r"[^\n]*\n((?:[^\n]|\n  (?! ))*)", design_report(design))  # wrapped lines go on two columns in
+    assert first
+    return [*" ".join(first[1].split()).split(": "), ""]
 
 
 @pytest.mark.parametrize("x", [1.0, 2.0, 3.0])

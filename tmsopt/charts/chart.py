@@ -136,14 +136,22 @@ class Chart(Shown):
         made: Dataset = dataset(self.problem, Grid(self.axes, self.grid), self.layers)
         return made
 
+    def _units(self) -> dict[str, dict[str, str]]:
+        """Units of the axes; nothing of a chart in a folder that does not hold its model."""
+        try:
+            of = self.problem.parameter_set
+        except InputError:
+            return {}
+        return {n: {"unit": of[n].unit} for n in self.axes}
+
     def to_json(self) -> dict[str, Any]:
         """Summary, boundaries and corners; the arrays themselves go to a file."""
-        of = self.problem.parameter_set
+        units = self._units()
         grid, counts, plane = Grid(self.axes, self.grid), self.counts, self.path is None and len(self.grid) == 2
         return {
             "schema": 1, "title": self.about["title"], "model": self.about["problem"]["model"],
             "axes": {
-                n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v), "unit": of[n].unit}
+                n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v)} | units.get(n, {})
                 for n, v in zip(self.axes, self.grid, strict=True)
             },
             **({} if plane else {"layers": list(self.layers)}), "classes": counts.shares,
@@ -232,7 +240,6 @@ _MOST_WORKERS = 256
 def _about(work: Survey, tile: int) -> dict[str, Any]:
     """All that makes a chart another one, as plain data."""
     problem, grid = work.problem, work.grid
-    of = problem.parameter_set
     return {
         "schema": SCHEMA, "title": problem.title,
         "problem": {
@@ -242,7 +249,7 @@ def _about(work: Survey, tile: int) -> dict[str, Any]:
             "constraints": {n: t for n, t in problem.constraints.items() if not problem.conditions[n].equality},
         },
         "axes": {
-            n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v), "unit": of[n].unit}
+            n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v)}
             for n, v in zip(grid.axes, grid.values, strict=True)
         },
         "dimensions": list(grid.axes[::-1]), "shape": list(grid.shape),
