@@ -136,13 +136,13 @@ class Chart(Shown):
         made: Dataset = dataset(self.problem, Grid(self.axes, self.grid), self.layers)
         return made
 
-    def _units(self) -> dict[str, dict[str, str]]:
-        """Units of the axes; nothing of a chart in a folder that does not hold its model."""
+    def _units(self) -> dict[str, str]:
+        """Units of the axes; nothing of a chart in a folder that does not hold its model, a system without units."""
         try:
             of = self.problem.parameter_set
         except InputError:
             return {}
-        return {n: {"unit": of[n].unit} for n in self.axes}
+        return {n: of[n].unit for n in self.axes}
 
     def to_json(self) -> dict[str, Any]:
         """Summary, boundaries and corners; the arrays themselves go to a file."""
@@ -151,7 +151,7 @@ class Chart(Shown):
         return {
             "schema": 1, "title": self.about["title"], "model": self.about["problem"]["model"],
             "axes": {
-                n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v)} | units.get(n, {})
+                n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v)} | {"unit": units.get(n, "1")}
                 for n, v in zip(self.axes, self.grid, strict=True)
             },
             **({} if plane else {"layers": list(self.layers)}), "classes": counts.shares,
