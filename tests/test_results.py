@@ -190,6 +190,7 @@ def test_it_is_drawn_into_axes(name: str) -> None:
         result.plot(3)
 
 
+@pytest.mark.slow
 @each
 def test_its_page_is_whole_and_escaped(name: str) -> None:
     page = Page(made(name)._repr_html_())

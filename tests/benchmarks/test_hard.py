@@ -64,6 +64,7 @@ def test_the_search_knows_when_nothing_is_feasible() -> None:
     assert not best_known(replace(DAMPED, constraints={"c": "abscissa <= -1.01"})).feasible
 
 
+@pytest.mark.slow
 def test_verdicts_say_what_is_wrong() -> None:
     index = next(i for i in range(HARD_COUNT) if hard_family(i) == "unstable")
     known = Target(index, "unstable", math.nan, 1.0, {}, "nobody", 0.0)

@@ -32,6 +32,7 @@ def least_abscissa(terms: np.ndarray) -> float:
     return float(np.linalg.eigvals(companion).real.max(axis=1).min())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", [2, 3, 4, 5])
 def test_never_where_a_grid_has_a_stable_design(degree: int) -> None:
     """Random models whose coefficients mostly have one sign, or all but one of them: of either kind of answer many."""

@@ -161,6 +161,7 @@ def test_the_slowest_stable_speed(slowest: Solution) -> None:
     assert design.bound.value <= least <= design.value + 2 * (Fr[0, 1] - Fr[0, 0])
 
 
+@pytest.mark.slow
 def test_the_greatest_stable_tilt() -> None:
     """Likewise, maximised: none is above the bound."""
     fixed = {**HEIGHTS, "Fr": 2.5}
@@ -202,6 +203,7 @@ def test_a_damping_ratio_is_never_above_1() -> None:
     assert design.bound == Bound(1.0, 0.0, True, "definition")
 
 
+@pytest.mark.slow
 def test_the_slowest_ep4() -> None:
     """By the law of χ_H = 1: with r = √(ζ_B/ζ_H), h = √(ζ_B ζ_H), T = (r−1)(r²+6r+1)/(16h(r+1)), Fr = … 4√h (r+1).
 
@@ -221,6 +223,7 @@ def test_the_slowest_ep4() -> None:
     assert design.bound.value <= law(at)[1] <= design.value + 1e-9
 
 
+@pytest.mark.slow
 def test_over_a_band_of_speeds() -> None:
     """No design is better at its worst speed, which is one of a grid or worse."""
     asked = problem({"chi_B": (1.01, 3.0)}, minimize="abscissa", scenarios={"Fr": Band(1.5, 2.5)})
@@ -308,6 +311,7 @@ def test_a_forged_infeasibility_is_not_believed(slow_plane: Solution) -> None:
     assert is_closed(design)
 
 
+@pytest.mark.slow
 def test_a_singular_mass_matrix_within_the_box() -> None:
     """ν_H = (χ_H − 1) cos λ_s − ζ_H sin λ_s vanishes where χ_H = 1 + ζ_H tan λ_s = 0.9595, and a root is at infinity."""
     free = {"Fr": (0.5, 3.0), "chi_H": (0.9, 1.1)}

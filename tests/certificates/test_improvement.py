@@ -61,6 +61,7 @@ def test_where_the_solver_converges_the_optimum_is_the_answer() -> None:
     assert design.value == pytest.approx(-0.95, abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("lost")
 @pytest.mark.parametrize("status", ["infeasible", "not_converged"])
 def test_a_feasible_design_is_never_called_infeasible(status: str) -> None:
@@ -77,6 +78,7 @@ def test_a_feasible_design_is_never_called_infeasible(status: str) -> None:
     assert 3.6**0.5 * (1 - 2e-4) <= design.bound.value <= 3.6**0.5 <= design.value * (1 + 1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("off", [4e-10, 1e-8, 1e-6])
 def test_what_is_better_only_beyond_a_limit_is_no_alarm(off: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """x ≥ 1 is met to a tolerance, and 1 + 1000 (x − 1) is less by a thousand times that."""

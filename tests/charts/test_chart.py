@@ -314,6 +314,7 @@ def test_nothing_found_ends_with_3_and_says_so(tmp_path, capsys):
     assert json.loads(out)["branches"] == []
 
 
+@pytest.mark.slow
 def test_chart_writes_table_archive_and_figure(tmp_path):
     archive, figure = tmp_path / "chart.npz", tmp_path / "chart.png"
     done = tmsopt(

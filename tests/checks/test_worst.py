@@ -220,6 +220,7 @@ def test_a_constraint_holds_between_the_points_of_a_band():
     assert tmsopt.solve(stated).value == pytest.approx(1.5, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_the_damping_ratio_holds_at_corners_that_the_search_does_not_start_with():
     """Five tolerances have 32 corners, of which a search starts with two."""
     off = {"chi_B": 0.03, "lambda_s": 0.03, "zeta_B": 0.02, "zeta_H": 0.02, "mu": 0.01}

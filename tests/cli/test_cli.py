@@ -83,6 +83,7 @@ def test_benchmark_prints_the_published_critical_speed(capsys):
     assert "0.907064149551" in out
 
 
+@pytest.mark.slow
 def test_compare_shows_laws_and_formulations():
     done = tmsopt("compare", "problems/ep4.toml", "--json")
     assert (done.returncode, done.stderr) == (0, "")
@@ -162,6 +163,7 @@ def test_plot_that_cannot_be_written_leaves_nothing(tmp_path, capsys):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_the_script_in_problems_runs():
     done = subprocess.run(
         [sys.executable, "problems/heights.py"], capture_output=True, text=True, timeout=120, check=False

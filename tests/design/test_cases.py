@@ -199,6 +199,7 @@ def test_the_damping_ratio_and_constraints_hold_in_every_case():
     assert design.value == pytest.approx(best, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_a_scenario_of_a_mass_and_of_speeds_in_si():
     fixed = {"w": 1.0, "m_B": 10.0, "x_H": 1.05, "z_B": -0.4, "z_H": -0.2}
     free = {"x_B": (1.05, 2.0), "lambda_s": (0.05, 0.8)}
@@ -229,6 +230,7 @@ def in_box(d, offsets):
     return hunt.abscissa({**spread({n: v for n, v in d.items() if n not in OFF}), **shifted}).max(axis=-1)
 
 
+@pytest.mark.slow
 def test_the_worst_of_a_tolerance_box_is_least():
     free = {"chi_B": (1.1, 2.0), "lambda_s": (0.1, 0.8)}
     design = tmsopt.solve(problem({**FIXED, "Fr": 2.2}, free, tolerances=OFF))

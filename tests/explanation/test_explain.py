@@ -361,6 +361,7 @@ def test_located_only():
     assert all("decay" in row.violations for row in explanation.precision)  # an equality bears no rounding
 
 
+@pytest.mark.slow
 def test_infeasible():
     solution, explanation, levers = explained(
         fixed=CHI_H_1, free=BOX, minimize="abscissa", constraints={"fast": "abscissa <= -3"}
@@ -400,6 +401,7 @@ def test_the_command_says_what_it_means():
     assert data["units"]["lambda_s"] == "rad"
 
 
+@pytest.mark.slow
 def test_rounding_over_a_band_is_judged_between_its_speeds_too():
     """By NumPy's eigenvalues at 4 001 speeds: a rounded design has its worst speed where the design had none."""
     design = tmsopt.solve("problems/speed_band.toml")

@@ -209,6 +209,7 @@ def test_a_gap_is_reported_where_it_is():
     assert "gap ends" in found.points[1].label
 
 
+@pytest.mark.slow
 def test_what_is_not_solved_is_reported_as_a_gap(monkeypatch):
     """Sub-problems with a limit between 1.5 and 2.5 are made to fail; the front is the whole box, 0 to 4."""
 
@@ -244,6 +245,7 @@ def test_a_front_over_a_pattern_is_the_ep_set():
         assert p.objectives[1] == pytest.approx(float(epset_Fr(Z_B, Z_H, -p.objectives[0])), abs=1e-10)
 
 
+@pytest.mark.slow
 def test_an_end_at_a_bound_is_best_in_the_others_too():
     """At the greatest tilt the least abscissa is that of CEP2 (equation epset), however the tilt was reached."""
     found = tmsopt.pareto(problem(pareto=["abscissa", "Fr", "-lambda_s"]), 2, starts=0)

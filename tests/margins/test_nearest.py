@@ -367,6 +367,7 @@ def test_no_boundary_point_is_one_of_cancellation_alone():
     assert robustness_line(found) == "no change that was looked at makes it unstable"
 
 
+@pytest.mark.slow
 def test_beside_every_boundary_point_of_stable_designs_there_is_an_unstable_one():
     """By Hurwitz's conditions in fractions; corners are among the points, where ever more coefficients vanish."""
     rng = np.random.default_rng(7)

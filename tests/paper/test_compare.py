@@ -103,6 +103,7 @@ def test_heavily_damped_band_ends_on_the_ep_set():
     assert data.stable[0][0] == pytest.approx(float(laws.Fr_c(1.0, math.sqrt(2), 1.0, -0.4, -0.2, tilt)), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_figures_draw_the_data(ep4, tmp_path):
     data = growth(ep4)
     upper, lower = Figure().subplots(2, 1)

@@ -122,6 +122,7 @@ def test_a_name_stands_at_its_own_curve(whipple, part):
         )
 
 
+@pytest.mark.slow
 def test_what_meets_hands_its_name_on():
     """Capsize and castering of a child's bicycle meet in an EP2 (exact), and the pair that leaves it has both names."""
     data = tmsopt.growth(tmsopt.solve("problems/childs_bicycle.toml", throw=False))
@@ -184,6 +185,7 @@ def test_a_general_system_flutters():
     assert "weave" not in marked
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ep4", "delivery_robot", "whipple_ep4", "benchmark"])
 def test_every_event_is_in_sight(name):
     design = tmsopt.solve(f"problems/{name}.toml", throw=False)
@@ -194,6 +196,7 @@ def test_every_event_is_in_sight(name):
     assert ax.get_xlim()[1] > max(c.at for c in events) * unit
 
 
+@pytest.mark.slow
 def test_the_command_draws_over_what_is_asked(tmp_path):
     picture = tmp_path / "tilt.svg"
     done = CliRunner().invoke(main, ["solve", "problems/ep4.toml", "--plot", str(picture), "--over", "lambda_s"])
@@ -287,6 +290,7 @@ def test_a_trace_has_the_colours_of_its_abscissa():
 # Fronts and studies
 
 
+@pytest.mark.slow
 def test_the_unstable_part_of_a_front_is_dashed_and_hollow():
     """s² + (x − 2) s + 1 + y is stable where x > 2 alone."""
     x, y = ca.SX.sym("x"), ca.SX.sym("y")

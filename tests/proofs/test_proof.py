@@ -629,6 +629,7 @@ def test_the_command() -> None:
     assert "Examples" in run("--help").stdout
 
 
+@pytest.mark.slow
 def test_the_exit_status_of_the_command(tmp_path: Path) -> None:
     text = (PROBLEMS / "ep4.toml").read_text(encoding="utf-8")
     infeasible, none = tmp_path / "infeasible.toml", tmp_path / "none.toml"

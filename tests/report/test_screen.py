@@ -12,7 +12,7 @@ import tmsopt
 from tmsopt.design import Solution, unit_of
 
 NUMBER = r"-?\d[\d.]*(?:e[+-]?\d+)?"
-QUICK = ("benchmark", "chocolate", "coupled_pair", "ep4", "pt_pair", "realistic", "workshop", "ziegler_undamped")
+QUICK = ("coupled_pair", "ep4", "pt_pair", "realistic", "ziegler_undamped")
 FILES = sorted(p for p in Path("problems").glob("*.toml") if not re.match("study|chart|pareto", p.stem))
 LINES, COLUMNS = 30, 100
 

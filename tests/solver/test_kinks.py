@@ -126,6 +126,7 @@ def test_a_bicycle_with_a_wished_decay(asked, optimum):
         assert own == pytest.approx(-0.3, abs=1e-7)  # simple roots are right to 1e-13 or so
 
 
+@pytest.mark.slow
 def test_a_positive_real_root_has_a_damping_ratio_of_minus_1():
     """s² + 0.2 s + k is unstable for k < 0 alone, with the root −0.1 + √(0.01 − k), at most 0.4 as k ≥ −0.24."""
     k = ca.SX.sym("k")

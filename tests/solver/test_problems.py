@@ -312,6 +312,7 @@ def test_least_ballast_of_an_isospectral_family():
     assert design.parameters["lambda_s"] > pi / 180
 
 
+@pytest.mark.slow
 def test_isospectral_study_prints_the_closed_form(capsys):
     """The paper's optimised benchmark, mu = 20.84626701, is its first row."""
     runpy.run_path("problems/isospectral.py")

@@ -189,6 +189,7 @@ def test_a_limit_makes_it_an_optimum(coefficients: Any, asked: Any, best: float)
     assert design.value == pytest.approx(-1.9 if best < 0 else 0.47, abs=MET)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("coefficients", "free"),
     [

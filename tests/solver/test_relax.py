@@ -108,6 +108,7 @@ def moved(stated, amounts, share=1.0):
     return replace(stated, constraints=constraints, free=free)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", PROBLEMS)
 def test_moving_by_the_amounts_frees_the_problem_and_by_less_does_not(key):
     stated, relaxation = PROBLEMS[key], failed(key).relaxation
@@ -121,6 +122,7 @@ def violation(d, slow, decay):
     return np.maximum(abscissa(d) - decay, d["Fr"] - slow)
 
 
+@pytest.mark.slow
 def test_the_amount_of_one_limit_is_the_least_by_a_search():
     """The slowest design with abscissa <= −1, and the most stable one with Fr <= 1.2: what each limit needs alone."""
     relaxation = failed("slow and stable").relaxation
@@ -157,6 +159,7 @@ def test_a_bound_that_may_not_move_beyond_what_is_physical():
 # No stable design
 
 
+@pytest.mark.slow
 def test_without_a_stable_design_the_least_unstable_one_is_said_to_be_that():
     """At chi_H = 1 a forward tilt is stable only with chi_B > 1: by a grid of 60 steps each way, and a search."""
     box = {"chi_B": (0.5, 0.95)}
@@ -178,6 +181,7 @@ def test_a_solved_problem_has_no_relaxation():
     assert "relaxation" not in design.to_json()
 
 
+@pytest.mark.slow
 def test_what_starts_met_on_the_way_counts():
     """A damping ratio is 1 at most, and that where all roots are real; no start of the relaxation ends there."""
     box = {"mu": (0.034, 3.3), "chi_B": (0.904, 1.33), "zeta_B": (-1.08, -0.25), "zeta_H": (-0.407, -0.222)}

@@ -30,6 +30,7 @@ def on(side, stated):
     return replace(stated, free={**stated.free, "lambda_s": ends}, start={})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fixed", "winner"), [(FIXED, FORWARD), (SWAPPED, BACKWARD)])
 def test_the_winner_is_named_and_each_side_is_its_own_problem(fixed, winner):
     """Heights exchanged, the EP4 tilts the other way, by the law; its mirror is as stable."""
@@ -50,6 +51,7 @@ def test_the_winner_is_named_and_each_side_is_its_own_problem(fixed, winner):
     assert json.loads(json.dumps(design.to_json()))["sides"] == shown
 
 
+@pytest.mark.slow
 def test_the_dual_of_a_problem_has_the_dual_of_its_answer():
     """(ζ_B, ζ_H, χ_B, T, Fr) → (ζ_H, ζ_B, 1/χ_B, −T/χ_B², Fr/χ_B) keeps the spectrum: Fr becomes Fr/χ_B, and so back."""
     decay = {"decay": "abscissa <= -0.8"}
@@ -67,6 +69,7 @@ def test_the_dual_of_a_problem_has_the_dual_of_its_answer():
     assert apart[pairs].max() <= 1e-6
 
 
+@pytest.mark.slow
 def test_a_side_without_a_design_is_said_to_have_none():
     """With these heights no backward tilt is stable at chi_H = 1, by the law of the EP4: its dual has T > 0."""
     design = tmsopt.solve(problem(minimize="Fr", constraints={"decay": "abscissa <= -0.5"}))

@@ -110,6 +110,7 @@ def test_every_pattern_is_located(pattern):
     assert design.quantities["nu_H"] >= 0.02 - 1e-9
 
 
+@pytest.mark.slow
 def test_a_pattern_that_no_bicycle_has_is_infeasible():
     """A double imaginary pair needs a1 = a3 = 0, so chi_B = chi_H and zeta_B = zeta_H = -0.2. Then with mu = 2 and
     k = chi_H - 1, a2/a0 > 0 and a4/a0 > 0 ask for T > 10 k and k > 0.4 T and k > -0.2 T (or all reversed): never.
@@ -268,6 +269,7 @@ def test_infeasible_problem_names_the_violation():
     assert pickle.loads(pickle.dumps(caught.value)).solution.status == "infeasible"
 
 
+@pytest.mark.slow
 def test_no_stable_design_is_said():
     """chi_B < chi_H makes a3 and a1 of opposite sign or unstable for lambda_s > 0 (lscf): no stable design."""
     problem = ep4_problem(free={**BOX, "chi_B": (0.2, 0.9)})
@@ -407,6 +409,7 @@ def test_matching_counts_its_equations():
     assert backward_error([1.0, 4, 6, 4, 1], np.full(4, -1.0 + 0j)) == 0
 
 
+@pytest.mark.slow
 def test_two_limits_on_the_damping_ratio_both_hold_whichever_comes_first():
     """The weaker of two limits changes nothing; neither does the order in which they are written."""
     weak, strong, fast = (

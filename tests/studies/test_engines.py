@@ -98,6 +98,7 @@ class _Wrong(Fake):
 # Workers that end
 
 
+@pytest.mark.slow
 def test_killed_workers_cost_the_row_they_were_at(engine: Engine, tmp_path: Path) -> None:
     """Row 11 kills once and comes the second time, row 23 kills whenever it is tried; no other row is lost with them."""
     notes: list[str] = []

@@ -716,6 +716,7 @@ def test_what_study_built_promises():
     assert found.max() == pytest.approx(-1.1, abs=0.05)
 
 
+@pytest.mark.slow
 def test_what_study_sway_promises():
     study = load_study(hunt.PROBLEMS / "study_sway.toml")
     at = {(round(study.varied(k)["little_sway.limit"], 9), round(math.degrees(study.varied(k)["lambda_s.max"]))): k

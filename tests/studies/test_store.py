@@ -600,6 +600,7 @@ print(moment, added)
 """
 
 
+@pytest.mark.slow
 @posix
 @pytest.mark.parametrize("task", TASKS)
 def test_killed_at_every_step_of_moving_aside(path: Path, task: str) -> None:

@@ -87,6 +87,7 @@ def test_every_row_obeys_the_laws_of_ep4() -> None:
     assert found.solved == 6
 
 
+@pytest.mark.slow
 def test_rows_are_the_same_in_any_order_alone_and_by_processes(tmp_path: Path) -> None:
     here = identities(run_study(GRID, workers=1).rows)
     backwards = Solver(GRID)
@@ -121,6 +122,7 @@ def test_a_study_is_taken_up_where_it_was_left(tmp_path: Path, monkeypatch: pyte
     assert identities(resumed.rows) == identities(run_study(GRID, workers=1).rows)
 
 
+@pytest.mark.slow
 def test_a_store_of_another_study_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "s.sqlite"
     run_study(GRID, path, workers=1)
@@ -383,6 +385,7 @@ def test_the_command_solves_stores_and_shows_rows(file: Path) -> None:
     assert solved["solution"]["parameters"] == kept["parameters"]
 
 
+@pytest.mark.slow
 def test_the_command_refuses_what_it_cannot_do(file: Path) -> None:
     missing = command(file, "--row", 6)
     assert missing.exit_code == 2

@@ -386,6 +386,7 @@ def test_sections_beside_ep4_keep_their_events_apart(below):
         assert sorted(named) == [("2EP2", "")] * 2 + [("EP3", "beside an EP4; cusp")]
 
 
+@pytest.mark.slow
 def test_sections_above_ep4_have_no_ep3():
     for above in (1e-10, 1e-7, 1e-4):
         found = traced("EP2", BASE | {"Fr": FR_EP4 + above}, {"chi_B": (0.5, 3.0), "lambda_s": (0.01, 1.4)})
@@ -871,6 +872,7 @@ def test_a_box_one_rounding_wide_is_a_number():
         traced("EP2", fixed, free)
 
 
+@pytest.mark.slow
 def test_a_long_branch_that_the_first_starts_miss_is_found():
     """All three are met by 384 starts of any seed; the first 48 of seed 0 find the one of length 0.197."""
     fixed = {"Fr": 2.9237, "chi_B": 0.9004, "zeta_B": -0.2254, "zeta_H": -0.4156}

@@ -192,6 +192,7 @@ def made(family: str, n: int = COUNT) -> np.ndarray:
 # Roots
 
 
+@pytest.mark.slow
 @engines
 @pytest.mark.parametrize("family", FAMILIES)
 def test_the_factors_give_the_coefficients_back(family: str, compiled: bool) -> None:
