@@ -141,7 +141,7 @@ def _read(path: str | PathLike[str], faults_of: Callable[[Problem], list[Fault]]
         message = f"is a study of many designs, not one problem; run tmsopt study {page.file}, or give {own}"
         raise InputError([Fault(message, file=page.file)])
     faults, problem = posed(_with_bicycle(page.data, Path(page.file).parent), Path(page.file).stem)
-    if problem is not None:
+    if problem is not None and not faults:  # a misspelt [objective] asks something
         faults = [*faults, *faults_of(problem)]
     if problem is None or faults:
         raise page.error(faults)

@@ -6,7 +6,8 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
-from tmsopt.design.expression import Expression, dimension, parse_comparison, parse_value
+from tmsopt.design.expression import Expression, dimension, parse_comparison, parse_value, written_sides
+from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY
 from tmsopt.models import Parameter, Quantity
@@ -62,6 +63,33 @@ def si_units(problem: Problem) -> dict[str, str]:
     rates = {"abscissa": of.root_unit, "decay_rate": "1/s", "decay_time": "s", _FREQUENCY: _HERTZ}
     rates[ANGULAR_FREQUENCY] = of.root_unit
     return dict.fromkeys(problem.vocabulary, "1") | rates | {q.name: q.unit for q in listed}
+
+
+def limit_text(problem: Problem, name: str) -> str:
+    """A limit with its number in the unit in which the problem was written; empty for what is none."""
+    parameter, _, end = name.rpartition(".")
+    if name not in problem.constraints:
+        known = parameter in problem.free and end in ("min", "max")
+        return (
+            f"{'>=' if end == 'min' else '<='} {unit_of(problem, name).show(problem.free[parameter][end == 'max'], 6)}"
+            if known
+            else ""
+        )
+    text, unit = problem.constraints[name], unit_of(problem, name)
+    value = limit_of(text)
+    if value is None or not unit.text:
+        return text
+    left, sign, right = written_sides(text)
+    shown = unit.show(value, 9)
+    return f"{left} {sign} {shown}" if _is_number(right) else f"{shown} {sign} {right}"
+
+
+def _is_number(side: str) -> bool:
+    try:
+        float("".join(side.split()))
+    except ValueError:
+        return False
+    return True
 
 
 def units_of(problem: Problem, texts: Iterable[str] = ()) -> dict[str, str]:

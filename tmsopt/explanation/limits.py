@@ -8,7 +8,7 @@ from typing import Any
 from tmsopt.design.expression import written_sides
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
-from tmsopt.design.unit_system import Unit, dimension_of, unit_of
+from tmsopt.design.unit_system import Unit, dimension_of, limit_text, unit_of
 from tmsopt.errors import InputError
 from tmsopt.explanation.steps import natural_step, step_within
 from tmsopt.records import plain
@@ -127,13 +127,13 @@ def _of_bound(solution: Solution, bound: str) -> Lever:
 
 def _of_row(solution: Solution, name: str) -> Lever:
     problem = solution.problem
-    condition, text = problem.conditions[name], problem.constraints[name]
+    condition, text, shown = problem.conditions[name], problem.constraints[name], limit_text(problem, name)
     step = natural_step(unit_of(problem, name), dimension_of(problem, name).unit, _size(solution, text))
-    sign, words = condition.sign, f"relaxing {name} ({text}) by {step.text}"
+    sign, words = condition.sign, f"relaxing {name} ({shown}) by {step.text}"
     if condition.equality:  # the right-hand side moves to where the objective is better
         sign = math.copysign(1.0, -problem.sign * solution.active[name])
-        words = f"moving {name} ({text}) by {'' if sign > 0 else '-'}{step.text}"
-    return _lever(solution, name, "constraint", text, False, words, sign * step.size)
+        words = f"moving {name} ({shown}) by {'' if sign > 0 else '-'}{step.text}"
+    return _lever(solution, name, "constraint", shown, False, words, sign * step.size)
 
 
 def _lever(solution: Solution, name: str, kind: str, limit: str, physical: bool, move: str, step: float) -> Lever:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from tmsopt.design.solution import Solution
-from tmsopt.design.unit_system import unit_of
+from tmsopt.design.unit_system import limit_text, unit_of
 from tmsopt.explanation import Lever
 from tmsopt.models import GRAVITY, tms, to_si
 from tmsopt.report.solution.explanation import (
@@ -19,7 +19,7 @@ from tmsopt.report.solution.explanation import (
 )
 from tmsopt.report.solution.findings import Findings
 from tmsopt.report.solution.infeasible import infeasible_lines
-from tmsopt.report.solution.limits import bound_lines, case_lines, limit_text, proof_line
+from tmsopt.report.solution.limits import bound_lines, case_lines, proof_line
 from tmsopt.report.solution.rows import (
     ALL,
     NOTHING,

@@ -6,7 +6,7 @@ import re
 from tmsopt.design import Unit, unit_of
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Need, Relaxation, Solution
-from tmsopt.report.solution.limits import limit_text
+from tmsopt.design.unit_system import limit_text
 
 _SIGN = re.compile(r"<=|>=|==")
 _DIGITS = 5

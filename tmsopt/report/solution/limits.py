@@ -3,8 +3,6 @@
 import math
 
 from tmsopt.design.cases import Case
-from tmsopt.design.expression import written_sides
-from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY
 from tmsopt.design.solution import Solution
@@ -29,33 +27,6 @@ def bound_lines(solution: Solution) -> list[str]:
     elif bound.solver:
         lines.append(f"       {search} found none better in time")
     return lines
-
-
-def limit_text(problem: Problem, name: str) -> str:
-    """A limit with its number in the unit in which the problem was written; empty for what is none."""
-    parameter, _, end = name.rpartition(".")
-    if name not in problem.constraints:
-        known = parameter in problem.free and end in ("min", "max")
-        return (
-            f"{'>=' if end == 'min' else '<='} {unit_of(problem, name).show(problem.free[parameter][end == 'max'], 6)}"
-            if known
-            else ""
-        )
-    text, unit = problem.constraints[name], unit_of(problem, name)
-    value = limit_of(text)
-    if value is None or not unit.text:
-        return text
-    left, sign, right = written_sides(text)
-    shown = unit.show(value, 9)
-    return f"{left} {sign} {shown}" if _is_number(right) else f"{shown} {sign} {right}"
-
-
-def _is_number(side: str) -> bool:
-    try:
-        float("".join(side.split()))
-    except ValueError:
-        return False
-    return True
 
 
 def proof_line(solution: Solution) -> str:
