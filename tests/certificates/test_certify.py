@@ -454,6 +454,7 @@ def test_an_interrupt_keeps_the_design(slow_plane: Solution, children: list[Any]
     assert not design.bound.proven
 
 
+@pytest.mark.slow
 def test_a_process_that_crashes_costs_no_result(slow_plane: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
     """At once, every time: nothing is decided, in the time that was given and that of one process more."""
     crashed: list[Any] = []

@@ -256,6 +256,7 @@ def test_every_digit_of_the_problem_files(name: str) -> None:
     assert wrong_digits(printed(tmsopt.solve(tmsopt.load(PROBLEMS / f"{name}.toml")))) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("index", range(20))
 def test_every_digit_of_random_problems(index: int) -> None:
     """Whether or not they are solved: the numbers are those of the design that is shown."""

@@ -104,6 +104,7 @@ def hunted(name):
     return hunt.least(QUESTIONS[name][0], fixed, box, generations=60 if len(box) < 5 else 110, rounds=7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", QUESTIONS)
 def test_answer_is_attained_and_a_global_search_ends_there(name):
     merit, tolerance = QUESTIONS[name]

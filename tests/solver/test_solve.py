@@ -139,6 +139,7 @@ def test_pattern_with_an_objective_over_its_set():
     assert design.active["zeta_B.max"] == pytest.approx(abs(design.value) / (4 * 0.3), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_locate_alone_with_freedom_takes_the_design_nearest_the_start():
     problem = ep4_problem(minimize=None, locate="2EP2", start={"Fr": 2.3, "chi_B": 1.45, "lambda_s": 0.3})
     design = tmsopt.solve(problem, starts=16)
@@ -255,6 +256,7 @@ def test_damping_ratio_is_maximised_through_factors():
     assert design.quantities["damping_ratio"] == pytest.approx(1.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_infeasible_problem_names_the_violation():
     problem = ep4_problem(constraints={"low": "chi_B <= 1.2", "high": "chi_B >= 1.5"})
     with pytest.raises(tmsopt.NotSolved, match="infeasible") as caught:

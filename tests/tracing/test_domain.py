@@ -123,6 +123,7 @@ def planes():
     return {name: Plane(fixed, free, starts=8) for name, (fixed, free) in EVERY.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize(("which", "inside"), [("stability", stable), ("heavy_damping", damped)])
 def test_exactly_one_side_of_every_arc_is_inside(planes, name, which, inside):
