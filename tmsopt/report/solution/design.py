@@ -1,6 +1,7 @@
 """The report of a solution: the answer on one screen, and all the rest on request, in one order."""
 
 import math
+import re
 import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -281,7 +282,8 @@ def _wrapped(lines: list[str]) -> list[str]:
         if line.startswith("  "):
             found.append(line if len(line) <= WIDTH else f"{line[: WIDTH - 1]}…")
         else:
-            wrapped = textwrap.wrap(line, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+            whole = re.sub(r"(?<=\d) (?=[^\W\d_]|[√%])", _KEPT, line)  # a number stays with its unit
+            wrapped = textwrap.wrap(whole, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
             found += [part.replace(_KEPT, " ") for part in wrapped] or [""]
     return found
 
