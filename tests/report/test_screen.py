@@ -130,3 +130,18 @@ def test_who_may_vary_the_unit_of_time_is_warned() -> None:
         problem, fixed=fixed, free={**problem.free, "w": (0.6, 1.0)}))  # fmt: skip
     assert any("decay_rate" in w for w in tmsopt.explain(design, resolve=False).warnings)
     assert not any("decay_rate" in w for w in tmsopt.explain(replace(design, problem=problem), resolve=False).warnings)
+
+
+def test_the_stable_range_does_not_end_where_the_box_does() -> None:
+    """Fr from 2 to 2.5 lies inside what is stable, from Fr_c = 1.59308273713602 (equation flus) on: not "everywhere"."""
+    problem = tmsopt.load("problems/ep4.toml")
+    design = tmsopt.solve(replace(problem, free={**problem.free, "Fr": (2.0, 2.5)}))
+    assert "stable in Fr: from 1.5931; this design at 2.2363" in str(design)
+
+
+def test_a_proof_names_the_designs_that_it_is_about() -> None:
+    """Of those beyond a limit some are better: Fr = 1 is below any that decays at 0.5, and in the box."""
+    problem = replace(tmsopt.load("problems/ep4.toml"), minimize="Fr", constraints={"fast": "abscissa <= -0.5"})
+    design = tmsopt.solve(problem)
+    told = str(replace(design, bound=replace(design.bound, value=design.value, gap=0.0, proven=True)))
+    assert "proof: no design in the box within the limits has a lesser Fr" in told

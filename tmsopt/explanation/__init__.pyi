@@ -5,4 +5,5 @@ from .optimality import (
     Optimality as Optimality, optimality as optimality,
 )
 from .rounding import rounded as rounded
+from .summary import none_of as none_of
 from .steps import natural_step as natural_step, step_within as step_within

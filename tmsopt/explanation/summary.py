@@ -46,6 +46,12 @@ def warnings(solution: Solution) -> tuple[str, ...]:
     )
 
 
+def none_of(problem: Problem) -> str:
+    """Of whom it is said that none is better: the designs that a proof is about."""
+    located = f" with {problem.locate}" if problem.locate else ""
+    return f"no design{located} in the box{' within the limits' if problem.constraints else ''}"
+
+
 def _quality(solution: Solution) -> str:
     problem, bound = solution.problem, solution.bound
     text = (problem.minimize or problem.maximize or "").strip()
@@ -58,18 +64,14 @@ def _quality(solution: Solution) -> str:
         return f"a design with {problem.locate}, as asked{left}"
     by = f" by more than {bound.gap:.1e}" if bound.tolerance else ""
     if bound.proven and text == "abscissa":
-        return f"no design in the box {faster}{by} (proven)"
+        return f"{none_of(problem)} {faster}{by} (proven)"
     if bound.proven:
-        return (
-            f"no design in the box has a {'greater' if problem.sense == 'maximize' else 'lesser'} {text}{by} (proven)"
-        )
+        return f"{none_of(problem)} has a {'greater' if problem.sense == 'maximize' else 'lesser'} {text}{by} (proven)"
     tried = f"the best of {solution.starts.tried} starts, not proven"
     if math.isfinite(bound.value):
         side = "above" if problem.sense == "maximize" else "below"
         quantity = "an abscissa" if text == "abscissa" else f"a value of {text}"
-        return (
-            f"{tried}; no design in the box has {quantity} {side} {bound.value:.6g}, which leaves {bound.gap:.2g} open"
-        )
+        return f"{tried}; {none_of(problem)} has {quantity} {side} {bound.value:.6g}, which leaves {bound.gap:.2g} open"
     end = "greatest" if problem.sense == "maximize" else "least"
     return f"the {end} {text} found is {unit_of(problem, text).show(solution.value, 6)}, {tried}"
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
-from tmsopt.critical_speeds import Speeds, speeds
+from tmsopt.critical_speeds import Speeds, speed_of, speeds
 from tmsopt.design.solution import Solution
 from tmsopt.diagnosis import Diagnosis, diagnose
 from tmsopt.errors import InputError
@@ -41,9 +41,16 @@ def findings(solution: Solution, full: bool = False) -> Findings:
     return Findings(
         explain(solution, resolve=full),
         robustness(solution) if sought else None,
-        _unless_refused(lambda: speeds(solution)) if sought else None,
+        _unless_refused(lambda: _at_any_speed(solution)) if sought else None,
         diagnose(solution) if full and solution.status == "optimal" else (),
     )
+
+
+def _at_any_speed(solution: Solution) -> Speeds | None:
+    """Whatever the box of the speed is: where the design would be stable beyond it counts too."""
+    of = solution.problem.parameter_set
+    name = speed_of(of)
+    return speeds(solution, name, between=(of[name].range.lower, of[name].range.upper)) if name else None
 
 
 def _unless_refused(found: Callable[[], T]) -> T | None:

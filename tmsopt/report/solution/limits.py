@@ -7,6 +7,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import unit_of
+from tmsopt.explanation import none_of
 from tmsopt.report.text import number
 
 
@@ -21,7 +22,8 @@ def bound_lines(solution: Solution) -> list[str]:
     if not math.isfinite(bound.value):
         return [f"bound: none found in time ({search})"] if bound.solver else []
     side = "above" if solution.problem.sense == "maximize" else "below"
-    lines = [f"bound: no design in the box is {side} {number(bound.value)} ({bound.method}); gap {bound.gap:.1e}"]
+    which = f"{none_of(solution.problem)} is {side} {number(bound.value)}"
+    lines = [f"bound: {which} ({bound.method}); gap {bound.gap:.1e}"]
     if bound.method == bound.solver.lower():
         lines.append(f"       {search}; {kind}")
     elif bound.solver:
@@ -57,9 +59,9 @@ def proof_line(solution: Solution) -> str:
             if text == "abscissa" and problem.sense == "minimize"
             else f"has a {'greater' if side == 'above' else 'lesser'} {text}"
         )
-        return f"proof: no design in the box {better}{by} ({bound.method})"
+        return f"proof: {none_of(problem)} {better}{by} ({bound.method})"
     if math.isfinite(bound.value):
-        known = f"nothing {side} {unit.show(bound.value, 6)} ({bound.method})"
+        known = f"none allowed is {side} {unit.show(bound.value, 6)} ({bound.method})"
         return f"proof: {known}, {unit.show(bound.gap, 2)} open; {unjudged or '--certify closes it, or finds better'}"
     return f"proof: none that this is the best; {unjudged or '--certify proves it, or finds better'}"
 
