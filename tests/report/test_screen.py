@@ -145,3 +145,29 @@ def test_a_proof_names_the_designs_that_it_is_about() -> None:
     design = tmsopt.solve(problem)
     told = str(replace(design, bound=replace(design.bound, value=design.value, gap=0.0, proven=True)))
     assert "proof: no design in the box within the limits has a lesser Fr" in told
+
+
+def test_a_located_root_that_is_not_rightmost_is_one_root() -> None:
+    """(s + 2)² (s² + 0.2 s + 1): the double root stands left of the pair."""
+    model = tmsopt.models.from_coefficients(["1", "4.2", "5.8", "b", "c"])  # b = 4.8, c = 4
+    problem = tmsopt.Problem(model, free={"b": (4.5, 5.1), "c": (3.9, 4.1)}, locate="EP2", constraints={"c": "c == 4"})
+    design = tmsopt.solve(problem)
+    assert [(round(r.re, 6), r.multiplicity) for r in design.roots if r.im == 0] == [(-2.0, 2)]
+    assert "(2-fold)" in str(design)
+
+
+def test_a_design_on_the_axis_is_on_the_edge() -> None:
+    """s² + 1: neither decay nor growth, whatever rounding makes of the roots."""
+    told = str(tmsopt.solve(tmsopt.Problem(tmsopt.models.from_coefficients(["1", "d", "1"]), fixed={"d": 0.0})))
+    assert "on the edge of stability, as far as rounding tells" in told
+    assert "neither decay nor growth" in told
+
+
+def test_a_scale_is_refused_where_there_is_one() -> None:
+    from click.testing import CliRunner
+
+    from tmsopt.cli import main
+
+    ended = CliRunner().invoke(main, ["solve", "problems/benchmark.toml", "--wheelbase", "1 m"])
+    assert ended.exit_code == 2
+    assert "--wheelbase: scales a dimensionless bicycle" in ended.output

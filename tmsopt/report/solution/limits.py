@@ -62,7 +62,7 @@ def proof_line(solution: Solution) -> str:
         return f"proof: {none_of(problem)} {better}{by} ({bound.method})"
     if math.isfinite(bound.value):
         known = f"none allowed is {side} {unit.show(bound.value, 6)} ({bound.method})"
-        return f"proof: {known}, {unit.show(bound.gap, 2)} open; {unjudged or '--certify closes it, or finds better'}"
+        return f"proof: {known}, {unit.show(bound.gap, 2)} open; {unjudged or '--certify goes on'}"
     return f"proof: none that this is the best; {unjudged or '--certify proves it, or finds better'}"
 
 
