@@ -435,3 +435,10 @@ def test_every_picture_is_drawn_on_the_axes_given_or_on_its_own(results, name):
 def test_every_public_picture_is_tried_here_or_above():
     public = {name.removeprefix("draw_") for name in dir(plots) if name.startswith("draw_")}
     assert public == {*NAMES, "front", "histogram", "swallowtail", "distance"}
+
+
+def test_one_design_far_away_hides_no_other() -> None:
+    """Forty values within 1 of 3, one at −1700: that one is counted, not shown."""
+    near = import_module("tmsopt.plots.study")._near
+    values = np.append(np.linspace(2.0, 4.0, 40), (-1700.0, np.nan))
+    assert near(values).tolist() == [True] * 40 + [False, False]

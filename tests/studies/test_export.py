@@ -6,12 +6,14 @@ import math
 import struct
 import sys
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from tmsopt.disk import headed
 from tmsopt.errors import InputError
 from tmsopt.records import Table
 from tmsopt.studies import FORMATS, Row, check_export, columns, export
@@ -223,3 +225,11 @@ def test_a_file_is_replaced_as_a_whole_or_not_at_all(ending: str, tmp_path: Path
         export(interrupted(), path)
     assert path.read_text() == "before"
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+def test_heads_of_csv_name_units() -> None:
+    """Of a parameter, what varies, a report and a violation; of an end or a limit those of its name."""
+    bare = import_module("tmsopt.studies.export")._bare
+    names = ("v", "varied.lambda_s.max", "varied.arm.limit", "report.u_H", "violation.arm", "law.w0")
+    assert [bare(name) for name in names] == ["v", "lambda_s", "arm", "u_H", "arm", "law.w0"]
+    assert (headed("v", "m/s"), headed("mu", "")) == ("v (m/s)", "mu")
