@@ -85,20 +85,16 @@ def _common(command: Command) -> Command:
     return command
 
 
-class _Seconds(click.ParamType[float]):
+def _seconds(ctx: click.Context, param: click.Parameter, value: Any) -> float | None:
     """A time, or what was meant for another argument."""
-
-    name = "seconds"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """The number of seconds."""
-        try:
-            seconds = float(value)
-        except ValueError:
-            seconds = math.nan
-        if not 0 < seconds < math.inf:
-            self.fail(f"found {value!r}; accepted: a positive number of seconds, or none. Write FILE before --certify.")
+    try:
+        seconds = None if value is None else float(value)
+    except ValueError:
+        seconds = math.nan
+    if seconds is None or 0 < seconds < math.inf:
         return seconds
+    found = f"found {value!r}; accepted: a positive number of seconds, or none. Write FILE before --certify."
+    raise click.BadParameter(found)
 
 
 @click.command(epilog=_SOLVE_EXAMPLES)
@@ -122,7 +118,7 @@ class _Seconds(click.ParamType[float]):
     "rounding, robustness, how multiple roots split. JSON has everything then.",
 )  # fmt: skip
 @click.option(
-    "--certify", type=_Seconds(), is_flag=False, flag_value=60.0, default=None, metavar="[SECONDS]",
+    "--certify", callback=_seconds, is_flag=False, flag_value="60", default=None, metavar="[SECONDS]",
     help="Prove within SECONDS that nothing better exists, or find it (SCIP). Write it after FILE. [60 if left out]",
 )  # fmt: skip
 @click.option(

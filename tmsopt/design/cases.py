@@ -64,7 +64,9 @@ def weight_of(name: str, value: Any, weights: Mapping[str, float]) -> Any:
     """Weight of a parameter: the given one, else its own size, or 1 where it is fixed at 0."""
     if name in weights:
         return weights[name]
-    return 1.0 if isinstance(value, float | int) and value == 0 else abs(value)
+    if isinstance(value, float | int) and value == 0:
+        return 1.0
+    return value.fabs() if hasattr(value, "fabs") else abs(value)  # expressions know abs from CasADi 3.7 on
 
 
 def points_of(scenario: Scenario) -> tuple[float, ...]:

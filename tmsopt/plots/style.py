@@ -40,8 +40,7 @@ def on_axes(ax: Axes | None, width: float, height: float, title: str = "") -> Ax
 
 def figure_of(ax: Axes) -> Figure:
     """The whole figure that Axes stand in."""
-    figure = ax.get_figure(root=True)
-    assert figure is not None
+    figure: Figure = ax.figure.figure  # that of a part of a figure is the whole
     return figure
 
 
@@ -60,7 +59,7 @@ def save(drawn_on: Figure | Axes, path: str | PathLike[str]) -> None:
         OSError: when the file cannot be written.
     """
     path = path_of(path, "the file to write")
-    figure = drawn_on.get_figure(root=True) if isinstance(drawn_on, Axes) else drawn_on
+    figure = figure_of(drawn_on) if isinstance(drawn_on, Axes) else drawn_on
     assert figure is not None, "Axes without a figure"
     ending = path.suffix.lstrip(".").lower()
     path = path.resolve()  # a link stays one
