@@ -106,12 +106,15 @@ def test_bad_input_is_answered(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_examples_are_listed_shown_and_written(run: Run, tmp_path: Path) -> None:
+def test_examples_are_listed_and_written(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     status, out, _ = run("example")
     assert status == 0
     assert [line.split()[0] for line in out.splitlines()] == list(examples())
     assert json.loads(run("example", "--json")[1]) == examples()
-    assert run("example", "ep4") == (0, example("ep4"), "")
-    assert run("example", "study_built", "-o", tmp_path / "built.toml")[0] == 0
+    assert run("example", "ep4") == (0, "", "wrote ep4.toml\nwrote tmsopt.schema.json\n")
+    assert Path("ep4.toml").read_text(encoding="utf-8") == example("ep4")
+    assert run("example", "ep4.toml")[0] == 2  # never over a file that is there
+    assert run("example", "study_built", "-o", "built.toml") == (0, "", "wrote built.toml\n")
     assert {p.name for p in tmp_path.iterdir()} == {"built.toml", "ep4.toml", "tmsopt.schema.json"}
     assert isinstance(tmsopt.load_study(tmp_path / "built.toml"), tmsopt.Sampling)

@@ -23,8 +23,8 @@ _OF_EXAMPLE = """
 \b
 Examples:
   tmsopt example
-  tmsopt example delivery_robot
-  tmsopt example ep4 --output ep4.toml
+  tmsopt example ep4 && tmsopt solve ep4.toml
+  tmsopt example delivery_robot --output mine.toml
 
 What a file refers to is written beside it, unless it is there: tmsopt.schema.json for editors, the problem of a study.
 
@@ -41,10 +41,11 @@ def write_new(option: str, path: Path, text: str) -> None:
 def _write_with_companions(option: str, path: Path, text: str) -> None:
     from tmsopt.guide import companions
 
-    write_new(option, path, text)
-    for name, other in companions(text).items():
-        if not (beside := path.with_name(name)).exists():
-            write_new(option, beside, other)
+    written = {path: text}
+    written |= {path.with_name(name): other for name, other in companions(text).items()}
+    for file, content in written.items():
+        if file == path or not file.exists():
+            write_new(option, file, content)
 
 
 @click.command(epilog=_OF_NEW)
@@ -62,10 +63,10 @@ def new(file: Path, model: str) -> None:
 
 @click.command(epilog=_OF_EXAMPLE)
 @click.argument("name", required=False)
-@click.option("--output", "-o", type=click.Path(path_type=Path), help="Write a new file (toml). [default: stdout]")
+@click.option("--output", "-o", type=click.Path(path_type=Path), help="Another file (toml). [default: NAME.toml]")
 @click.option("--json", "as_json", is_flag=True, help="Write the list as JSON.")
 def example(name: str | None, output: Path | None, as_json: bool) -> None:
-    """Show the example NAME; without a name, list all that come with tmsopt."""
+    """Write the example NAME here; without a name, list all that come with tmsopt."""
     with bad_input():
         from tmsopt import Fault, InputError
         from tmsopt.guide import example as text_of, examples
@@ -74,10 +75,9 @@ def example(name: str | None, output: Path | None, as_json: bool) -> None:
         if name is None and output is not None:
             raise InputError([Fault("found no NAME; tmsopt example lists all", ("NAME",))])
         text = None if name is None else text_of(name)
-    if text is not None and output is not None:
-        _write_with_companions("--output", output, text)
-    elif text is not None:
-        click.echo(text, nl=False)
+    if name is not None and text is not None:
+        path = output or Path(f"{name.removesuffix('.toml')}.toml")
+        _write_with_companions("NAME" if output is None else "--output", path, text)
     elif as_json:
         write_json(examples())
     else:
