@@ -118,3 +118,26 @@ def test_examples_are_listed_and_written(run: Run, tmp_path: Path, monkeypatch: 
     assert run("example", "study_built", "-o", "built.toml") == (0, "", "wrote built.toml\n")
     assert {p.name for p in tmp_path.iterdir()} == {"built.toml", "ep4.toml", "tmsopt.schema.json"}
     assert isinstance(tmsopt.load_study(tmp_path / "built.toml"), tmsopt.Sampling)
+
+
+@pytest.mark.parametrize(
+    ("shell", "words", "expected"),
+    [
+        ("bash", "tmsopt example study_h", "plain,study_heights"),
+        ("zsh", "tmsopt example study_h", "plain\nstudy_heights\n_"),
+        ("fish", "tmsopt sol", "plain,solve"),
+        ("bash", "tmsopt solve --cert", "plain,--certify"),
+    ],
+)
+def test_shells_complete_as_the_documentation_says(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], shell: str, words: str, expected: str
+) -> None:
+    documented = (Path(__file__).parents[2] / "docs" / "command_line.md").read_text(encoding="utf-8")
+    assert f"_TMSOPT_COMPLETE={shell}_source tmsopt" in documented
+    last = words.split()[-1] if shell == "fish" else str(len(words.split()) - 1)
+    for name, value in {"_TMSOPT_COMPLETE": f"{shell}_complete", "COMP_WORDS": words, "COMP_CWORD": last}.items():
+        monkeypatch.setenv(name, value)
+    with pytest.raises(SystemExit) as stop:
+        main(prog_name="tmsopt")
+    assert stop.value.code in (0, None)
+    assert expected in capsys.readouterr().out

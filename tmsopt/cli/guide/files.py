@@ -61,8 +61,14 @@ def new(file: Path, model: str) -> None:
     _write_with_companions("FILE", file, text)
 
 
+def _names(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:
+    from tmsopt.guide import examples
+
+    return [name for name in examples() if name.startswith(incomplete)]
+
+
 @click.command(epilog=_OF_EXAMPLE)
-@click.argument("name", required=False)
+@click.argument("name", required=False, shell_complete=_names)
 @click.option("--output", "-o", type=click.Path(path_type=Path), help="Another file (toml). [default: NAME.toml]")
 @click.option("--json", "as_json", is_flag=True, help="Write the list as JSON.")
 def example(name: str | None, output: Path | None, as_json: bool) -> None:
