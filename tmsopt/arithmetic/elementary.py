@@ -140,11 +140,3 @@ def rational(x: Any, digits: int = DIGITS) -> flint.fmpq:
         return x.mid().fmpq()
     ratio = Fraction(x)
     return flint.fmpq(ratio.numerator, ratio.denominator)
-
-
-def nearest(x: flint.fmpq) -> float:
-    """The double nearest to a fraction."""
-    try:
-        return int(x.p) / int(x.q)  # rounded correctly, whatever the length of the two
-    except OverflowError:
-        return float("inf") if x > 0 else float("-inf")

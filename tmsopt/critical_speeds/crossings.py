@@ -12,7 +12,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.arithmetic.elementary import nearest, rational
+from tmsopt.arithmetic.elementary import rational
 from tmsopt.critical_speeds.parametric import (
     DIGITS,
     Lasting,
@@ -100,12 +100,12 @@ def crossings(
     states = [_state(value_at(a, middle)) for _, _, middle in cells]
     marginal = [split is not None and _marginal(split, middle) for _, _, middle in cells]
     kept = [stable or on for (stable, _), on in zip(states, marginal, strict=True)]
-    changed = {nearest(y): kept[k] != kept[k + 1] for k, y in enumerate(marks)}
+    changed = {float(y): kept[k] != kept[k + 1] for k, y in enumerate(marks)}
     always = {"infinity": len(a) < len(every)}
     if split:
         always |= {"capsize": split.zeros > 0, "weave": len(split.mirrored) > 1, "EP2": split.repeated}
     return Crossings(
-        tuple(Crossing(nearest(y), kind, root, first, changed[nearest(y)]) for y, kind, root, first in found),
+        tuple(Crossing(float(y), kind, root, first, changed[float(y)]) for y, kind, root, first in found),
         _bands(cells, [stable for stable, _ in states]),
         _bands(cells, [damped for _, damped in states]),
         tuple(kind for kind, holds in always.items() if holds),
@@ -212,9 +212,9 @@ def _cells(marks: Sequence[Any], lower: Any, upper: Any | None) -> Iterator[tupl
     ends = [lower, *marks]
     for low, high in zip(ends, [*marks, upper], strict=True):
         if high is None:
-            yield nearest(low), float("inf"), low + 1 + abs(low)
+            yield float(low), float("inf"), low + 1 + abs(low)
         else:
-            yield nearest(low), nearest(high), (low + high) / 2
+            yield float(low), float(high), (low + high) / 2
 
 
 def _bands(cells: Sequence[tuple[float, float, Any]], inside: Sequence[bool]) -> tuple[Stretch, ...]:

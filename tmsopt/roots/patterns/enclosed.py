@@ -12,7 +12,7 @@ from typing import Any
 import flint
 import numpy as np
 
-from tmsopt.arithmetic.elementary import as_ball, nearest, rational
+from tmsopt.arithmetic.elementary import as_ball, rational
 from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.patterns.composed import PATTERNS
 from tmsopt.roots.patterns.fitting import Form
@@ -137,7 +137,7 @@ def nearest_double(ball: Any) -> float | None:
     """The double that a ball rounds to; None where its ends round differently, nan where it is not finite."""
     if not _finite(ball):
         return float("nan")
-    ends = {nearest(end) for end in _ends(ball)}
+    ends = {_double(end) for end in _ends(ball)}
     return ends.pop() + 0.0 if len(ends) == 1 else None
 
 
@@ -160,6 +160,13 @@ def _ends(ball: Any) -> tuple[flint.fmpq, ...]:
         return (ball,)
     middle, radius = rational(ball.mid()), rational(ball.rad())
     return middle - radius, middle + radius
+
+
+def _double(x: flint.fmpq) -> float:
+    try:
+        return int(x.p) / int(x.q)  # rounded correctly, whatever the length of the two
+    except OverflowError:
+        return float("inf") if x > 0 else float("-inf")
 
 
 def _overlap(found: Sequence[Enclosed]) -> bool:
