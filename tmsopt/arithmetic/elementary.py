@@ -78,8 +78,9 @@ def quotient(a: Any, b: Any) -> Any:
 
 
 def power(a: Any, b: Any) -> Any:
-    """a to the power b for balls; nan for a negative a and a b that is not whole."""
-    if isinstance(b, flint.fmpq) and b.q == 1 and abs(b.p) <= _WHOLE:
+    """a to the power b for balls; nan for a negative a and a b that is not whole. A fraction of many bits is a ball."""
+    whole = isinstance(b, flint.fmpq) and b.q == 1 and abs(b.p) <= _WHOLE
+    if whole and not (isinstance(a, flint.fmpq) and a.height_bits() * abs(int(b.p)) > _BITS):
         try:
             return a ** int(b.p)
         except (ZeroDivisionError, ValueError):
@@ -116,7 +117,8 @@ def as_ball(x: Any) -> Any:
     return flint.arb(x) if isinstance(x, flint.fmpq) else x
 
 
-_WHOLE = 1000  # exponent up to which a power is a product
+_WHOLE = 1023  # exponent up to which a power is a product
+_BITS = 2**22  # of a fraction that is a power
 
 
 def _chosen(a: Any, b: Any, sign: int) -> Any:

@@ -3,8 +3,8 @@
 import ast
 import keyword
 import math
-import operator
 import re
+import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Mapping
@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
-import casadi as ca
-import flint
 import numpy as np
 
 from tmsopt.arithmetic import elementary
 from tmsopt.errors import suggest
 from tmsopt.models.advice import advice
+from tmsopt.models.arithmetics import BALLS, BINARY, DEGREES, NUMERIC, SYMBOLIC, Arithmetic
+from tmsopt.models.degree import Beyond, Degree
 from tmsopt.models.names import CONSTANTS, FUNCTIONS
 
 COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
@@ -27,51 +27,9 @@ _ALLOWED = {"<=": (-math.inf, 0.0), ">=": (0.0, math.inf), "==": (0.0, 0.0), "":
 
 _LONGEST = 2000  # characters; longer texts could exhaust the parser's stack
 _DEEPEST = 200
+_LEGIBLE = 60  # characters of a part at fault
 _LANGUAGE = f"numbers, names, + - * / **, parentheses and {' '.join(FUNCTIONS)}"
 _NOT_ACCEPTED = re.compile(r"[^ -~]|#")  # look-alike letters, line breaks and comments
-
-
-@dataclass(frozen=True)
-class Arithmetic:
-    """What the functions, operators and numbers of an expression mean for one kind of values."""
-
-    functions: Mapping[str, Callable[..., Any]]
-    number: Callable[[Any], Any]
-    operators: Mapping[type[ast.operator], Callable[[Any, Any], Any]]
-    pi: Any = lambda: math.pi
-
-
-def _as_array(value: Any) -> Any:
-    """Python floats as NumPy's, which give nan and inf where Python raises."""
-    return np.float64(value) if isinstance(value, float | int) else value
-
-
-def _method(name: str) -> Callable[[Any], Any]:
-    return lambda x: getattr(elementary.as_ball(x), name)()
-
-
-BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
-}  # fmt: skip
-_SYMBOLIC = Arithmetic(
-    {**{name: getattr(ca, name) for name in FUNCTIONS[:9]}, "abs": ca.fabs, "min": ca.fmin, "max": ca.fmax}, _as_array,
-    BINARY,
-)  # fmt: skip
-_NUMERIC = Arithmetic(
-    {
-        **{name: getattr(np, name) for name in ("sin", "cos", "tan", "sqrt", "exp", "log", "abs")},
-        **{"asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "min": np.minimum, "max": np.maximum},
-    },
-    _as_array, BINARY,
-)  # fmt: skip
-_BALLS = Arithmetic(
-    {
-        **{name: _method(name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "exp", "log")},
-        "sqrt": elementary.sqrt, "abs": elementary.magnitude, "min": elementary.lesser, "max": elementary.greater,
-    },
-    elementary.exact, {**BINARY, ast.Div: elementary.quotient, ast.Pow: elementary.power}, flint.arb.pi,
-)  # fmt: skip
 
 
 class ExpressionError(ValueError):
@@ -102,14 +60,14 @@ class Expression:
 
     def __call__(self, values: Mapping[str, Any]) -> Any:
         """Value for floats or arrays; of a comparison, left minus right."""
-        with np.errstate(all="ignore"):
-            return self.evaluate(values, _NUMERIC)
+        return self.evaluate(values, NUMERIC)
 
     def symbolic(self, values: Mapping[str, Any], limit: Any = None) -> Any:
         """CasADi expression; of a comparison, left minus right, with `limit` in place of the number on one side."""
         if limit is None:
-            return self.evaluate(values, _SYMBOLIC)
-        sides = [limit if _is_number(side) else _value(side, values, _SYMBOLIC) for side in self._sides()]
+            return self.evaluate(values, SYMBOLIC)
+        with np.errstate(all="ignore"):
+            sides = [limit if _is_number(side) else _value(side, values, SYMBOLIC) for side in self._sides()]
         return sides[0] - sides[1]
 
     def enclosure(self, values: Mapping[str, Any], number: Callable[[Any], Any] = elementary.exact) -> Any:
@@ -118,7 +76,7 @@ class Expression:
         A number in the text stands for the double nearest to it, unless `number` makes it another fraction, and pi for
         the number π. The ball is nan where the value does not exist, or may not.
         """
-        return self.evaluate(values, _BALLS if number is elementary.exact else replace(_BALLS, number=number))
+        return self.evaluate(values, BALLS if number is elementary.exact else replace(BALLS, number=number))
 
     def violation(self, values: Mapping[str, Any]) -> float:
         """By how much a numeric design violates a comparison, relative to the size of its sides; nan if undefined."""
@@ -153,7 +111,7 @@ class Expression:
     def sides(self, values: Mapping[str, Any]) -> tuple[float, float]:
         """Both sides of a comparison for a numeric design."""
         with np.errstate(all="ignore"):
-            left, right = (float(_value(side, values, _NUMERIC)) for side in self._sides())
+            left, right = (float(_value(side, values, NUMERIC)) for side in self._sides())
         return left, right
 
     def _sides(self) -> list[ast.expr]:
@@ -162,8 +120,9 @@ class Expression:
 
     def evaluate(self, values: Mapping[str, Any], arithmetic: Arithmetic) -> Any:
         """Value in any arithmetic; of a comparison, left minus right."""
-        sides = [arithmetic.number(_value(side, values, arithmetic)) for side in self._sides()]
-        return sides[0] - sides[1] if len(sides) == 2 else sides[0]
+        with np.errstate(all="ignore"):  # what has no value, or no double, is nan or inf
+            sides = [arithmetic.number(_value(side, values, arithmetic)) for side in self._sides()]
+            return sides[0] - sides[1] if len(sides) == 2 else sides[0]
 
 
 def parse_value(text: str, accepted: Iterable[str] | None, example: str = "abscissa") -> Expression:
@@ -175,7 +134,7 @@ def parse_value(text: str, accepted: Iterable[str] | None, example: str = "absci
     body = _parse(_text(text))
     if isinstance(body, ast.Compare):
         raise ExpressionError(f"'{text}' is a comparison; accepted: a value, such as '{example}'")
-    return Expression(text, _checked_names(body, text, None if accepted is None else list(accepted)))
+    return Expression(text, _checked(body, text, None if accepted is None else list(accepted)))
 
 
 def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
@@ -193,7 +152,7 @@ def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
     if symbol is None:
         raise ExpressionError(f"'{text}' compares with another sign than <=, >= or =={_advice(text)}")
     known = list(accepted)
-    left, right = _checked_names(body.left, text, known), _checked_names(body.comparators[0], text, known)
+    left, right = _checked(body.left, text, known), _checked(body.comparators[0], text, known)
     names = tuple(dict.fromkeys(left + right))
     if not names:
         raise ExpressionError(f"'{text}' uses no parameter or quantity, so nothing can satisfy or violate it")
@@ -254,6 +213,22 @@ def _advice(text: str) -> str:
             return False
 
     return advice(text, reads)
+
+
+def _checked(node: ast.expr, text: str, accepted: list[str] | None) -> tuple[str, ...]:
+    """Names that a value uses; raises where it is no accepted arithmetic, or too large to be computed exactly."""
+    names = _checked_names(node, text, accepted)
+    try:
+        DEGREES.number(_value(node, dict.fromkeys(names, Degree()), DEGREES))
+    except Beyond as error:
+        part = _source(error.part, text) if error.part else text
+        whole = "" if part == text.strip() else f"{_quoted(text)}: "
+        raise ExpressionError(f"{whole}{_quoted(part)} {error}") from None
+    return names
+
+
+def _quoted(text: str) -> str:
+    return f"'{text}'" if len(text) <= _LEGIBLE else f"'{text[: _LEGIBLE - 1]}…'"
 
 
 def _checked_names(  # noqa: PLR0912 - one case per kind of node
@@ -318,13 +293,23 @@ def _number(node: ast.Constant, text: str) -> float:
         number = float(value)
     except OverflowError:
         number = math.inf
-    if not math.isfinite(number):
-        raise ExpressionError(f"'{text}' contains a number beyond double precision")
+    lost = 0 < number < sys.float_info.min or (number == 0 and text and re.match(r"[0._]*[1-9]", _source(node, text)))
+    if not math.isfinite(number) or lost:
+        beyond = f"a number {'below' if lost else 'beyond'}"
+        raise ExpressionError(f"{_quoted(text)} contains {_source(node, text)[:_LEGIBLE]}, {beyond} double precision")
     return number
 
 
 def _value(node: ast.expr, values: Mapping[str, Any], arithmetic: Arithmetic) -> Any:
-    """Value of a checked tree."""
+    """Value of a checked tree; what is `Beyond` knows the innermost part that is."""
+    try:
+        return _computed(node, values, arithmetic)
+    except Beyond as error:
+        error.part = error.part or node
+        raise
+
+
+def _computed(node: ast.expr, values: Mapping[str, Any], arithmetic: Arithmetic) -> Any:
     number = arithmetic.number
     match node:
         case ast.Constant():

@@ -1,14 +1,19 @@
 """A stated system in text: its entries and quantities as expressions of shared symbols."""
 
 from collections.abc import Callable, Mapping
+from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
 import casadi as ca
-import numpy as np
 
 from tmsopt.models.expression import Expression, ExpressionError, parse_value
 from tmsopt.models.model import Matrix
 from tmsopt.models.names import unusable
+
+MOST_QUANTITIES = 500
+"""More take seconds to read."""
+
+_CIRCLES = 8  # that are listed
 
 
 class Texts:
@@ -28,6 +33,7 @@ class Texts:
         self.symbols = dict(symbols or {})
         self.known = dict(known or {})
         self.written: dict[str, Expression | None] = {}
+        self._order: tuple[str, ...] = ()
 
     def entry(self, text: str, key: str, where: str) -> Any:
         """One entry as an expression of CasADi; 0 for one with a fault."""
@@ -36,32 +42,34 @@ class Texts:
 
     def read_quantities(self, texts: Mapping[str, str]) -> None:
         """The formulas of the quantities, which may use one another, each to be had by `quantity`."""
+        if len(texts) > MOST_QUANTITIES:
+            self.fault(f"found {len(texts)} quantities; accepted: up to {MOST_QUANTITIES}", "quantities")
+            texts = {}
         for name, text in texts.items():
             if why := unusable(name):
                 self.fault(f"'{name}' {why}; give the quantity a name of its own", "quantities", str(name))
             else:
                 self.written[name] = self._parsed(text, ("quantities", name), "")
-        for name in list(self.written):
-            if circle := self._circle((name,)):
-                self.fault(f"uses itself: {' → '.join(circle)}; write it in parameters", "quantities", name)
-                self.written[name] = None
+        for _ in range(_CIRCLES):
+            uses = {n: [m for m in e.names if m in self.written] if e else [] for n, e in self.written.items()}
+            try:
+                self._order = tuple(TopologicalSorter(uses).static_order())
+                return
+            except CycleError as error:
+                circle = error.args[1][:0:-1]  # which lists what is used first
+                first = circle.index(next(n for n in self.written if n in circle))
+                circle = [*circle[first:], *circle[: first + 1]]
+                self.fault(f"uses itself: {' → '.join(circle)}; write it in parameters", "quantities", circle[0])
+                self.written[circle[0]] = None
+        self.written = dict.fromkeys(self.written)  # enough is known to be wrong
 
     def quantity(self, name: str) -> Any:
-        """A quantity as an expression of parameters."""
+        """A quantity as an expression of parameters, made with those that it uses, each of them once."""
         if name not in self.known:
-            expression = self.written[name]
-            self.known[name] = self._symbolic(expression) if expression else 0
+            for each in self._order or self.written:
+                expression = self.written[each]
+                self.known[each] = self._symbolic(expression) if expression else 0
         return self.known[name]
-
-    def _circle(self, path: tuple[str, ...]) -> tuple[str, ...]:
-        """How a quantity leads back to itself; empty where it does not."""
-        expression = self.written.get(path[-1])
-        for name in expression.names if expression else ():
-            if name == path[0]:
-                return (*path, name)
-            if name not in path and (found := self._circle((*path, name))):
-                return found
-        return ()
 
     def _symbolic(self, expression: Expression) -> Any:
         """An expression in symbols, made when first met."""
@@ -69,8 +77,7 @@ class Texts:
         for name in expression.names:
             derived = name in self.written or name in self.known
             values[name] = self.quantity(name) if derived else self.symbols.setdefault(name, ca.SX.sym(name))
-        with np.errstate(all="ignore"):  # what is not finite is found by the model
-            return expression.symbolic(values)
+        return expression.symbolic(values)  # what is not finite is found by the model
 
     def _parsed(self, text: str, key: tuple[str, ...], where: str) -> Expression | None:
         """An expression; None for one with a fault."""

@@ -16,8 +16,9 @@ from tmsopt.arithmetic.elementary import exact, is_ball
 from tmsopt.arithmetic.formulas import Formulas, formulas
 from tmsopt.arithmetic.identity import Field
 from tmsopt.arithmetic.operations import BALLS
-from tmsopt.arithmetic.walk import operation_name, steps, walk
+from tmsopt.arithmetic.walk import walk
 from tmsopt.models.built_in import MODELS
+from tmsopt.models.degree import faulty
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
 from tmsopt.models.names import latex, spelled, unusable
 from tmsopt.models.texts import untexted
@@ -129,14 +130,14 @@ def _made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) ->
     if not isinstance(quantities or {}, Mapping):
         raise Unfit("quantities", f"found {type(quantities).__name__}; accepted: a mapping of names to expressions")
     matrices, derived = untexted(matrices, quantities or {}, _unfit)
-    entries = [
-        scalar(n, f"entry {j}" if kind == "coefficients" else f"row {i}, column {j}", x)
+    given = {
+        (n, f"entry {j}" if kind == "coefficients" else f"row {i}, column {j}"): x
         for n, rows in matrices.items()
         for i, row in enumerate(rows, start=1)
         for j, x in enumerate(row, start=1)
-    ]
-    values = [scalar("quantities", str(n), x) for n, x in derived.items()]
-    symbols = ca.symvar(ca.vertcat(*entries, *values))
+    } | {("quantities", str(n)): x for n, x in derived.items()}
+    every = ca.vertcat(*(scalar(*place, x) for place, x in given.items()))
+    symbols = ca.symvar(every)
     names = tuple(x.name() for x in symbols)
     twice = {n for n in names if names.count(n) > 1}
     if twice:
@@ -150,7 +151,10 @@ def _made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) ->
         if why := "is the name of a parameter" if n in names else unusable(n):
             raise Unfit("quantities", f"{n!r} {why}; give the quantity a name of its own")
     shapes = tuple((n, len(rows), len(rows[0])) for n, rows in matrices.items())
-    function = ca.Function("stated", [ca.vertcat(*symbols)], [ca.densify(ca.vertcat(*entries, *values))])
+    function = ca.Function("stated", [ca.vertcat(*symbols)], [ca.densify(every)])
+    if wrong := faulty(function):
+        (key, where), why = list(given)[wrong[0]], wrong[1]
+        raise Unfit(key, f"{where}: {why}")
     return _rebuilt(kind, name.strip(), names, shapes, tuple(derived), function.serialize())
 
 
@@ -308,24 +312,15 @@ def scalar(key: str, where: str, value: Any) -> ca.SX:
     """An entry as an SX of one element.
 
     Raises:
-        Unfit: for what is no number or SX, is not finite, or uses a function that balls do not have.
+        Unfit: for what is no finite number or SX.
     """
     if isinstance(value, ca.MX):
         raise Unfit(key, f"{where}: is MX; make the symbols by ca.SX.sym")
     if isinstance(value, ca.SX | ca.DM):
         if value.numel() != 1:
             raise Unfit(key, f"{where}: is a matrix; accepted: scalar expressions")
-        entry = ca.densify(ca.SX(value))
-    else:
-        entry = ca.SX(_number(key, where, value))
-    symbols = ca.symvar(entry)
-    for step in steps(ca.Function("entry", [ca.vertcat(*symbols) if symbols else ca.SX(0, 1)], [entry])):
-        if step.operation == ca.OP_CONST and not math.isfinite(step.constant):
-            raise Unfit(key, f"{where}: contains {step.constant}, as of a division by 0; {_FINITE}")
-        if step.operation not in (*BALLS, ca.OP_INPUT, ca.OP_OUTPUT):
-            known = "sin cos tan asin acos atan sqrt exp log fabs fmin fmax"
-            raise Unfit(key, f"{where}: uses {operation_name(step.operation)}; accepted: + - * / ** and {known}")
-    return entry
+        return ca.densify(ca.SX(value))
+    return ca.SX(_number(key, where, value))
 
 
 def _number(key: str, where: str, value: Any) -> float:
