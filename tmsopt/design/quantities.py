@@ -15,11 +15,24 @@ from tmsopt.roots import Structure, abscissa_and_damping, roots, structure
 STRUCTURE_TOLERANCE = 1e-11
 """Relative change of a coefficient within which roots count as multiple: a polished optimum is within 1e-14."""
 
+_LARGEST = 1e50
+"""Of a root: products of a few larger ones are no doubles."""
+
+
+def _beyond(a: Array) -> Any:
+    """Whether the leading coefficient is 0, or so small that a root may be too large for doubles."""
+    ends = np.abs(a[..., 0]) * _LARGEST <= np.abs(a).max(axis=-1)
+    if ends.any():
+        with np.errstate(all="ignore"):
+            sizes = np.abs(a[..., 1:] / a[..., :1]) ** (1 / np.arange(1, a.shape[-1]))
+        ends &= ~(sizes.max(axis=-1) < _LARGEST)  # where all are 0, too
+    return ends
+
 
 def _structure(values: Mapping[str, Any]) -> Structure:
     assert isinstance(values, Values)
     a = [float(c) for c in values.coefficients]
-    if a[0] == 0 or not all(map(math.isfinite, a)):
+    if not all(map(math.isfinite, a)) or _beyond(np.array(a)):
         return Structure("undecided", (), math.inf)  # a singular mass matrix: a root is at infinity
     off = values.roundings()
     if abs(a[0]) <= off[0] < math.inf:
@@ -76,14 +89,14 @@ def spelled_out(text: str, of: ParameterSet) -> str:
 
 
 def regular(coefficients: Array) -> Array:
-    """Coefficients with a leading 0, of a singular mass matrix, moved a little off: one root at infinity.
+    """Coefficients with a leading 0, of a singular mass matrix, moved a little off: one root is far away.
 
     Those of a design at which one does not exist are those of sⁿ, so that a search may start there.
     """
     exist = np.all(np.isfinite(coefficients), axis=-1, keepdims=True)
     a = np.where(exist, coefficients, np.eye(coefficients.shape[-1])[0])
     size = np.abs(a).max(axis=-1, initial=0.0) + 1e-300
-    return np.concatenate([np.where(a[..., 0] == 0, 1e-12 * size, a[..., 0])[..., None], a[..., 1:]], axis=-1)
+    return np.concatenate([np.where(_beyond(a), 1e-12 * size, a[..., 0])[..., None], a[..., 1:]], axis=-1)
 
 
 def _array_motion(values: Mapping[str, Any]) -> tuple[Array, Array]:

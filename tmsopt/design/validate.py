@@ -16,6 +16,8 @@ from tmsopt.roots.patterns.composed import pattern_names
 VARIATIONS = ("scenarios", "tolerances", "weights")
 """Tables of a problem that name parameters beside those of `fixed` and `free`."""
 
+_SMALLEST = 1e-50  # size of a parameter but 0; its inverse is the largest
+
 MOST_TOLERANCES = 8
 """Parameters with a tolerance: a box has two corners for one, 256 for eight."""
 
@@ -186,7 +188,12 @@ def _is_size(value: Any, zero: bool) -> bool:
         number = math.nan if isinstance(value, bool | str) else float(value)
     except (TypeError, ValueError, OverflowError):
         return False
-    return math.isfinite(number) and (number >= 0 if zero else number > 0)
+    return _is_square(number) and (number >= 0 if zero else number > 0)
+
+
+def _is_square(number: float) -> bool:
+    """Whether a number is 0 or of a size whose products with a few others are doubles."""
+    return number == 0 or _SMALLEST <= abs(number) <= 1 / _SMALLEST
 
 
 def _number_faults(of: ParameterSet, name: str, value: Any, key: tuple[str, ...]) -> Iterator[Fault]:
@@ -198,6 +205,8 @@ def _number_faults(of: ParameterSet, name: str, value: Any, key: tuple[str, ...]
         number = math.nan
     if not math.isfinite(number):
         yield Fault(f"found {value!r}; accepted: a finite number{unit and ' in' + unit}", key)
+    elif not _is_square(number):
+        yield Fault(f"found {number:g}; accepted: 0, or a size from {_SMALLEST:g} to {1 / _SMALLEST:g}{unit}", key)
     elif number not in parameter.range:
         degrees = f'; write "{number:.6g} deg" for degrees' if parameter.unit == "rad" and abs(number) < 90 else ""
         down = -number in parameter.range and parameter.meaning.endswith("downward")

@@ -178,6 +178,7 @@ class _Conditions:
         return Point(x, objective, violation, float(slope), rows, bounds, _ROUNDINGS * terms)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # what overflows is not better
 def _polished(conditions: _Conditions, run: Run) -> Point:
     best = conditions.point(run.x, run.row_multipliers, run.bound_multipliers)
     for loose in (False, True):

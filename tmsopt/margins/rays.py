@@ -90,6 +90,9 @@ def directions(space: Space, seed: int) -> Array:
     near = space.coefficients(_STEP * np.concatenate([axes, -axes]))
     slopes = (_tests(near[: len(axes)]) - _tests(near[len(axes) :])).T
     slopes = slopes[np.all(np.isfinite(slopes), axis=1) & np.any(slopes != 0, axis=1)]
+    slopes = np.ldexp(
+        slopes, -np.frexp(np.abs(slopes).max(axis=1, keepdims=True, initial=0.0))[1]
+    )  # squares are doubles
     every = np.concatenate([axes, -axes, slopes, -slopes, random])
     return np.asarray(every / np.linalg.norm(every, axis=1, keepdims=True))
 

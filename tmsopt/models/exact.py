@@ -10,13 +10,17 @@ from typing import Any
 import flint
 
 from tmsopt.arithmetic.elementary import exact, rational
-from tmsopt.errors import Fault, InputError, suggest, table_faults
+from tmsopt.errors import Fault, InputError, short, suggest, table_faults
 from tmsopt.models.model import ParameterSet
 from tmsopt.records import Table
 
 SAME = 4e-15
 """Relative difference of an exact value from the design's double: a few roundings, of a tangent too."""
 
+MOST_DIGITS = 400
+"""Of an exact number: doubles end with those of 309."""
+
+_POWER_OF_TEN = re.compile(r"[eE]([+-]?[\d_]+)")
 _DEGREES = re.compile(r"(.*?)\s*(?:deg|°)")
 
 
@@ -41,8 +45,23 @@ class Exact:
 
 
 def decimal(x: Any) -> Fraction:
-    """A number as the user wrote it: a double stands for the shortest decimal that prints it, 0.1 for 1/10."""
-    return Fraction(repr(float(x))) if isinstance(x, float) else Fraction(x)
+    """A number as the user wrote it: a double stands for the shortest decimal that prints it, 0.1 for 1/10.
+
+    Raises:
+        ValueError: for what is no number, and for one of more digits than `MOST_DIGITS`.
+    """
+    if isinstance(x, str):
+        power = _POWER_OF_TEN.search(x[:MOST_DIGITS])
+        if len(x) > MOST_DIGITS or (power and abs(int(power[1])) > MOST_DIGITS):  # before it becomes a number
+            raise ValueError("too many digits")
+    found = Fraction(repr(float(x))) if isinstance(x, float) else Fraction(x)
+    if _is_long(found):
+        raise ValueError("too many digits")
+    return found
+
+
+def _is_long(x: Any) -> bool:
+    return isinstance(x, int | Fraction) and max(abs(x.numerator), x.denominator) >= 10**MOST_DIGITS
 
 
 def decimal_fraction(x: Any) -> Any:
@@ -148,7 +167,7 @@ def _parsed(given: Any, angle: bool) -> Exact | None:
     try:
         if isinstance(given, flint.fmpq | flint.fmpz):
             fraction = rational(given) if isinstance(given, flint.fmpq) else flint.fmpq(given)
-            return Exact(Fraction(int(fraction.p), int(fraction.q)))
+            given = Fraction(int(fraction.p), int(fraction.q))
         return Exact(decimal(degrees[1] if degrees else given), bool(degrees))
     except (ValueError, TypeError, ZeroDivisionError, OverflowError):
         return None
@@ -156,4 +175,7 @@ def _parsed(given: Any, angle: bool) -> Exact | None:
 
 def _accepted(given: Any, angle: bool) -> str:
     angles = ", or an angle such as '20 deg'" if angle else ""
-    return f"found {given!r}; accepted: an int, a Fraction, a decimal or fraction in quotes such as '-2/5'{angles}"
+    accepted = (
+        f"an int, a Fraction, a decimal or fraction in quotes such as '-2/5'{angles}, of up to {MOST_DIGITS} digits"
+    )
+    return f"found {'a number of more digits' if _is_long(given) else short(given)}; accepted: {accepted}"

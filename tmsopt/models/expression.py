@@ -4,7 +4,6 @@ import ast
 import keyword
 import math
 import re
-import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Mapping
@@ -293,10 +292,9 @@ def _number(node: ast.Constant, text: str) -> float:
         number = float(value)
     except OverflowError:
         number = math.inf
-    lost = 0 < number < sys.float_info.min or (number == 0 and text and re.match(r"[0._]*[1-9]", _source(node, text)))
-    if not math.isfinite(number) or lost:
-        beyond = f"a number {'below' if lost else 'beyond'}"
-        raise ExpressionError(f"{_quoted(text)} contains {_source(node, text)[:_LEGIBLE]}, {beyond} double precision")
+    if not math.isfinite(number) or (number == 0 and text and re.match(r"[0._]*[1-9]", _source(node, text))):
+        message = f"contains {_source(node, text)[:_LEGIBLE]}, a number beyond double precision"
+        raise ExpressionError(f"{_quoted(text)} {message}")
     return number
 
 

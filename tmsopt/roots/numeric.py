@@ -11,6 +11,7 @@ from tmsopt.records import Array
 from tmsopt.roots.exact import isolated_roots
 
 _POLISHED = 4e-15  # backward error below which more Newton steps are not worth their time
+_LEAST = 1e-300  # of the largest coefficient, for a leading one: the quotient of the two must be a double
 _STEPS = 6  # Newton doubles the digits at each step; companion eigenvalues start with 4 or more
 _JOINT = 1e-13  # backward error above which the roots are isolated exactly; seen for roots of very different size
 
@@ -29,11 +30,14 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
     if c.ndim == 0 or c.shape[-1] < 2 or not np.all(np.isfinite(c)) or np.any(c[..., 0] == 0):
         raise ValueError("roots takes finite coefficients, two or more, with a leading one other than 0")
     n = c.shape[-1] - 1
-    monic = (c / c[..., :1]).reshape(c[..., 0].size, n + 1)
-    scale = _scale(monic)
-    scaled = monic / scale[:, None] ** np.arange(n + 1)
-    factors = _factors(_companion_eigenvalues(scaled))
+    least = np.abs(c).max(axis=-1) * _LEAST  # else a root is beyond doubles: it is brought to their end
+    lead = np.copysign(np.maximum(np.abs(c[..., 0]), least), c[..., 0])
     with np.errstate(over="ignore", invalid="ignore"):  # roots 300 orders apart: what overflows is not an improvement
+        monic = (c / lead[..., None]).reshape(c[..., 0].size, n + 1)
+        monic[:, 0] = 1
+        scale = _scale(monic)
+        scaled = monic / scale[:, None] ** np.arange(n + 1)
+        factors = _factors(_companion_eigenvalues(scaled))
         found, error = _newton(factors, scaled)
         found = found * scale[:, None]
     for row in np.flatnonzero(error > _JOINT):

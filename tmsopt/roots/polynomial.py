@@ -8,9 +8,15 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+import numpy as np
+
 Coefficients = Sequence[Any]
 
+_OVERFLOWS = np.errstate(over="ignore", invalid="ignore")
+"""Of what is too large for doubles there is inf or nan, which its users know."""
 
+
+@_OVERFLOWS
 def product(*factors: Coefficients) -> list[Any]:
     """Coefficients of the product of polynomials given by their coefficients."""
     result: list[Any] = list(factors[0]) if factors else [1]

@@ -100,6 +100,7 @@ def _by_routh(c: Array, exact: bool) -> NDArray[np.bool_]:
     return np.asarray(stable.reshape(c.shape[:-1]))
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def discriminant(coefficients: Coefficients) -> Any:
     """Discriminant of a polynomial of degree 2 or more, any numbers: zero exactly where two roots coincide.
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from tmsopt.errors import Fault
 from tmsopt.models import ParameterSet
-from tmsopt.units.text import read
+from tmsopt.units.text import LONGEST, read
 
 TABLES = ("free", "fixed", "start", "scenarios", "tolerances", "weights")
 """Tables of a problem that hold numbers; a unit that is typed first stands."""
@@ -57,6 +57,8 @@ def numbers(tables: Mapping[str, Any], of: ParameterSet) -> tuple[dict[str, Any]
 
 def _meant(text: str) -> str:
     """The end of a sentence that says what to write for a text that is refused; empty where that is not known."""
+    if len(text) > LONGEST:
+        return ""
     if comma := re.fullmatch(r"\s*([+-]?\d+),(\d+.*)", text):
         return f'; write a decimal point: "{comma[1]}.{comma[2]}"'
     if share := re.fullmatch(r"\s*([+-]?\d+\.?\d*)\s*%\s*", text):

@@ -6,13 +6,16 @@ from fractions import Fraction
 from functools import cache
 from typing import Any
 
-_LONGEST = 80
+LONGEST = 80
+"""Characters of a number with its unit."""
+
 _LARGEST_DENOMINATOR = 10**6  # of a factor between units, such as 5/18
 _ROUNDED = 4e-16  # relative error of a factor in double precision
 _QUANTITY = re.compile(r"(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.+-].*)?", re.ASCII)
-_POWER = r"(?:\s*(?:\*\*|\^)\s*-?\d)?"
-_UNIT = re.compile(rf"[A-Za-zµμ°%]+{_POWER}(?:\s*[*/ ]\s*[A-Za-zµμ°%]+{_POWER})*", re.ASCII)
-"""Names with one-digit powers, joined by * / or a space: anything richer could keep a parser busy for ever."""
+_POWER = r"(?: ?(?:\*\*|\^) ?-?\d)?"
+_UNIT = re.compile(rf"[A-Za-zµμ°%]+{_POWER}(?:(?: ?[*/] ?| )[A-Za-zµμ°%]+{_POWER})*", re.ASCII)
+"""Names with one-digit powers, joined by * / or one blank, so that a text matches in one way at most: anything richer
+could keep a parser busy for ever."""
 
 _EXAMPLES = {
     "1": "a number", "rad": "'5 deg' or '0.1 rad'", "m": "'40 cm' or '1.2 m'", "kg": "'10 kg' or '500 g'",
@@ -38,29 +41,38 @@ def read(text: str, unit: str) -> tuple[float, str]:
     accepted = f"accepted: {_EXAMPLES.get(unit, unit)}"
     if unit != "1":
         accepted += f", or a number without quotes in {unit}"
-    parts = _QUANTITY.fullmatch(text.strip()) if len(text) <= _LONGEST else None
+    if len(text) > LONGEST:
+        raise ValueError(
+            f"found '{text[:LONGEST]}…', {len(text)} characters, and a number has up to {LONGEST}; {accepted}"
+        )
+    parts = _QUANTITY.fullmatch(text.strip())
     if parts is None:
-        raise ValueError(f"found '{text[:_LONGEST]}', not a number with a unit; {accepted}")
+        raise ValueError(f"found '{text}', not a number with a unit; {accepted}")
     number, written = float(parts["number"]), parts["unit"]
-    if not math.isfinite(number):
+    if not _is_double(number, parts["number"]):
         raise ValueError(f"found '{text}', a number beyond double precision; {accepted}")
     if not written:
         raise ValueError(f"found '{text}', a number in quotes without a unit; {accepted}")
     if unit == "1":
         raise ValueError(f"found '{text}', but the parameter is dimensionless; {accepted}")
-    written = written.replace("²", "^2").replace("³", "^3")
+    written = " ".join(written.replace("²", "^2").replace("³", "^3").split())
     if not _UNIT.fullmatch(written):
         raise ValueError(f"found the unit '{written}', which does not read as a unit; {accepted}")
     one = _factor(written.replace("°", "deg"), unit)
     if one is None:
         raise ValueError(f"found the unit '{written}', which is not known or not a unit of {unit}; {accepted}")
-    if not math.isfinite(number * one):
+    if not _is_double(number * one, parts["number"]):
         raise ValueError(f"found '{text}', a number beyond double precision; {accepted}")
     share = Fraction(one).limit_denominator(_LARGEST_DENOMINATOR)
-    if abs(share - Fraction(one)) > _ROUNDED * share:  # an angle
+    if number == 0 or abs(share - Fraction(one)) > _ROUNDED * share:  # an angle
         return number * one, written
     value = float(Fraction(parts["number"]) * share)  # the double nearest to what is written: 70 cm is 0.7 m
     return value, written
+
+
+def _is_double(number: float, written: str) -> bool:
+    """Whether a double is near what is written: finite, and 0 only for a nought."""
+    return math.isfinite(number) and (number != 0 or not re.search("[1-9]", re.split("[eE]", written)[0]))
 
 
 def factor(written: str, unit: str) -> float:
