@@ -3,10 +3,9 @@
 import ast
 from collections.abc import Mapping
 
+from tmsopt.models.arithmetics import BINARY, Arithmetic
 from tmsopt.models.expression import (
-    BINARY,
     COMPARISONS,
-    Arithmetic,
     Expression,
     ExpressionError,
     UnknownName,
