@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.arithmetic import elementary
-from tmsopt.errors import suggest
+from tmsopt.errors import short, suggest
 from tmsopt.models.advice import advice
 from tmsopt.models.arithmetics import BALLS, BINARY, DEGREES, NUMERIC, SYMBOLIC, Arithmetic
 from tmsopt.models.degree import Beyond, Degree
@@ -172,7 +172,7 @@ def written_sides(text: str) -> tuple[str, str, str]:
 
 def _text(given: object) -> str:
     if not isinstance(given, str):
-        raise ExpressionError(f"found {given!r}; accepted: an expression in quotes")
+        raise ExpressionError(f"found {short(given)}; accepted: an expression in quotes")
     return given
 
 

@@ -17,6 +17,7 @@ from tmsopt.arithmetic.formulas import Formulas, formulas
 from tmsopt.arithmetic.identity import Field
 from tmsopt.arithmetic.operations import BALLS
 from tmsopt.arithmetic.walk import walk
+from tmsopt.errors import short
 from tmsopt.models.built_in import MODELS
 from tmsopt.models.degree import faulty
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
@@ -332,6 +333,5 @@ def _number(key: str, where: str, value: Any) -> float:
     if known and not math.isfinite(number):
         raise Unfit(key, f"{where}: is {number}; {_FINITE}")
     if not known:
-        text = repr(value)
-        raise Unfit(key, f"{where}: found {text if len(text) <= 60 else text[:57] + '…'}; {_ACCEPTED}")
+        raise Unfit(key, f"{where}: found {short(value)}; {_ACCEPTED}")
     return number
