@@ -119,6 +119,7 @@ def as_ball(x: Any) -> Any:
 
 _WHOLE = 1023  # exponent up to which a power is a product
 _BITS = 2**22  # of a fraction that is a power
+_FARTHEST = 2**20  # exponent of two of a fraction made of a ball
 
 
 def _chosen(a: Any, b: Any, sign: int) -> Any:
@@ -135,10 +136,17 @@ def _chosen(a: Any, b: Any, sign: int) -> Any:
 
 
 def rational(x: Any, digits: int = DIGITS) -> flint.fmpq:
-    """A number as an exact fraction: floats and fractions unchanged, balls by their middle at `digits`."""
+    """A number as an exact fraction: floats and fractions unchanged, balls by their middle at `digits`.
+
+    A middle that would have millions of bits, as exp(1e300) and its inverse, is a power of two far beyond doubles.
+    """
     if isinstance(x, flint.fmpq):
         return x
     if isinstance(x, flint.arb):
-        return x.mid().fmpq()
+        figures, exponent = (int(part) for part in x.mid().man_exp())
+        if abs(exponent) <= _FARTHEST:
+            return x.mid().fmpq()
+        far = flint.fmpq(2) ** (_FARTHEST if exponent > 0 else -_FARTHEST)
+        return far if figures > 0 else -far
     ratio = Fraction(x)
     return flint.fmpq(ratio.numerator, ratio.denominator)

@@ -259,7 +259,8 @@ class Sampler:
         beyond = found.beyond.reshape(len(found.beyond), len(u), size + 1) / self.scales[:, None, None]
         violated = found.equal[:, None] | (beyond[:, :, 0] > 0)
         target = np.where(violated, beyond[:, :, 0], 0.0)
-        slopes = np.where(violated[:, :, None], (beyond[:, :, 1:] - beyond[:, :, :1]) / ahead, 0.0)
+        with np.errstate(over="ignore", invalid="ignore"):  # of limits without a value
+            slopes = np.where(violated[:, :, None], (beyond[:, :, 1:] - beyond[:, :, :1]) / ahead, 0.0)
         slopes, target = np.nan_to_num(slopes, posinf=0.0, neginf=0.0), np.nan_to_num(target)
         inverse = np.linalg.pinv(np.moveaxis(slopes, 0, 1), rcond=1e-10)
         return np.asarray(-np.einsum("rnm,mr->rn", inverse, target))
