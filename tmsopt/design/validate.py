@@ -7,7 +7,7 @@ from typing import Any
 from tmsopt.design.advice.names import unknown
 from tmsopt.design.cases import Band, points_of
 from tmsopt.design.expression import ExpressionError, UnknownName, parse_comparison, parse_value
-from tmsopt.design.quantities import ROOT_NAMES
+from tmsopt.design.quantities import ROOT_NAMES, spelled_out
 from tmsopt.errors import Fault, short, suggest, table_faults
 from tmsopt.models import Model, ParameterSet
 from tmsopt.roots import pattern
@@ -250,6 +250,7 @@ def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     def parsed(parse: Any, text: Any, *key: str) -> Iterator[Fault]:
         try:
             parse(text, accepted)
+            parse(spelled_out(text, of), accepted)  # which may be too long where the text is not
         except UnknownName as error:
             yield Fault(f"{error.found}; {unknown(error.name, problem.model, of)}", key)
         except ExpressionError as error:
