@@ -4,6 +4,7 @@ A function that is not rational is an unknown of its own, one for each argument,
 tan = sin/cos, √x² = x and |x|² = x². What vanishes for another reason is not seen to.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -13,9 +14,10 @@ from typing import Any
 import casadi as ca
 import flint
 
-from tmsopt.arithmetic.walk import Arithmetic, steps
+from tmsopt.arithmetic.walk import Arithmetic, NotAccepted, steps
 
 _WHOLE = 64  # exponent up to which a power is a product
+_MOST = 10**7  # products of two terms in one multiplication; more take minutes, and more memory than there is
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,17 +35,17 @@ class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap h
 
     def __add__(self, other: Any) -> "Quotient":
         o = self._other(other)
-        return Quotient(self.over * o.under + o.over * self.under, self.under * o.under)
+        return Quotient(_times(self.over, o.under) + _times(o.over, self.under), _times(self.under, o.under))
 
     def __mul__(self, other: Any) -> "Quotient":
         o = self._other(other)
-        return Quotient(self.over * o.over, self.under * o.under)
+        return Quotient(_times(self.over, o.over), _times(self.under, o.under))
 
     def __truediv__(self, other: Any) -> "Quotient":
         o = self._other(other)
         if o.over == 0:
             raise ZeroDivisionError("division by the zero quotient")
-        return Quotient(self.over * o.under, self.under * o.over)
+        return Quotient(_times(self.over, o.under), _times(self.under, o.over))
 
     def __neg__(self) -> "Quotient":
         return Quotient(-self.over, self.under)
@@ -58,7 +60,8 @@ class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap h
         return self._other(other) / self
 
     def __pow__(self, n: int) -> "Quotient":
-        return Quotient(self.over**n, self.under**n) if n >= 0 else Quotient(self.under**-n, self.over**-n)
+        over, under = (_power(x, abs(n)) for x in (self.over, self.under))
+        return Quotient(over, under) if n >= 0 else Quotient(under, over)
 
     def sqrt(self) -> "Quotient":
         """The square root of a square, with positive leading coefficients."""
@@ -69,12 +72,24 @@ class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap h
 
     def __eq__(self, other: object) -> bool:
         o = self._other(other)
-        return bool(self.over * o.under == o.over * self.under)
+        return bool(_times(self.over, o.under) == _times(o.over, self.under))
 
     def _other(self, other: Any) -> "Quotient":
         if isinstance(other, Quotient):
             return other
         return Quotient(self.under * 0 + other, self.under * 0 + 1)
+
+
+def _times(a: Any, b: Any) -> Any:
+    if len(a) * len(b) > _MOST:
+        raise NotAccepted(f"a formula of more than {_MOST} products")
+    return a * b
+
+
+def _power(a: Any, n: int) -> Any:
+    if len(a) > 1 and math.comb(len(a) + n - 1, n) > math.isqrt(_MOST) * 10:
+        raise NotAccepted(f"a formula of more than {_MOST} products")
+    return a**n
 
 
 class Field:

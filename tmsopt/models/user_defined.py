@@ -16,7 +16,7 @@ from tmsopt.arithmetic.elementary import exact, is_ball
 from tmsopt.arithmetic.formulas import Formulas, formulas
 from tmsopt.arithmetic.identity import Field
 from tmsopt.arithmetic.operations import BALLS
-from tmsopt.arithmetic.walk import walk
+from tmsopt.arithmetic.walk import NotAccepted, walk
 from tmsopt.errors import short
 from tmsopt.models.built_in import MODELS
 from tmsopt.models.degree import faulty
@@ -190,12 +190,12 @@ def _rebuilt(
         field = Field(entry.function)
         try:
             found = blocks(walk(entry.function, field.inputs, field.arithmetic())[0])
-        except ZeroDivisionError:
+            for n in ("D", "K")[max(leading - 1, 0) :] if "M" in found else ():  # without part in these coefficients
+                found[n] = [[0] * len(found["M"]) for _ in found["M"]]
+            row = _polynomial(kind, found)[:leading]
+            return next((k for k, c in enumerate(row) if not field.vanishes(c)), leading)
+        except (ZeroDivisionError, NotAccepted):  # or too large to tell
             return 0
-        for n in ("D", "K")[max(leading - 1, 0) :] if "M" in found else ():  # without part in these coefficients
-            found[n] = [[0] * len(found["M"]) for _ in found["M"]]
-        row = _polynomial(kind, found)[:leading]
-        return next((k for k, c in enumerate(row) if not field.vanishes(c)), leading)
 
     def alone(written: Any) -> Any:
         formula = formulas([written], names)
