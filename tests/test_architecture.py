@@ -313,7 +313,8 @@ def test_import_and_help_are_light(heavy: str, modules_loaded: set[str]) -> None
 
 
 @pytest.fixture(
-    scope="module", params=["import tmsopt", "from tmsopt.cli import main; main(['--help'], standalone_mode=False)"]
+    scope="module",
+    params=["import tmsopt", "from tmsopt.cli.commands import every; every(['--help'], standalone_mode=False)"],
 )
 def modules_loaded(request: pytest.FixtureRequest) -> set[str]:
     script = f"{request.param}; import sys; print(*sys.modules, file=sys.stderr)"

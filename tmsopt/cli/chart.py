@@ -13,15 +13,15 @@ import click
 
 from tmsopt.cli.common import (
     FIGURES,
-    INTERRUPTED,
+    answer,
     bad_input,
     check_output,
     nominal_of,
     plane,
     progress,
     saving,
-    write_json,
 )
+from tmsopt.cli.ending import INTERRUPTED
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
@@ -42,7 +42,7 @@ kind (0 undefined, 1 capsize, 2 weave, 3 stable, 4 heavily damped), abscissa, da
 memory. A name ending in chart is a folder of NumPy files for up to 1e9 designs: it is written in tiles, and the same
 command goes on where an earlier one was ended.
 
-Exit status: 0 done, 2 bad input, 130 stopped by Ctrl-C.
+Exit status: 0 done, 2 bad input.
 """
 
 _LAYERS = ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied", "margin")
@@ -129,10 +129,7 @@ def chart(
         if output is not None and folder is None:
             with saving("--output", output):
                 found.save(output, (*dict.fromkeys(kept), *quantities))
-    if as_json:
-        write_json(found.to_json())
-    else:
-        click.echo(tmsopt.report.chart_table(found))
+    answer(as_json, found.to_json, lambda: tmsopt.report.chart_table(found))
     if folder is not None:
         click.echo(f"wrote {folder}", err=True)
     if plot is not None:

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tmsopt.cli.ending import BAD_INPUT, answering
+
 if TYPE_CHECKING:
     from tmsopt import Problem
 
-DONE, BAD_INPUT, INFEASIBLE, NOT_CONVERGED = 0, 2, 3, 4
-"""Exit status."""
-
-INTERRUPTED = 130
-"""Exit status of long work that was stopped by Ctrl-C; what it has done is kept."""
+DONE, INFEASIBLE, NOT_CONVERGED = 0, 3, 4
+"""Exit status, beside those of `ending`."""
 
 FIGURES = ("png", "pdf", "svg")
 """Endings of figure files."""
@@ -88,7 +87,7 @@ def saving(option: str, path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         found = "is there already; give another name" if isinstance(error, FileExistsError) else (
-            f"cannot be written: {error.strerror}"
+            f"cannot be written: {error.strerror or error}"
         )  # fmt: skip
         click.echo(f"{option}: '{path}' {found}", err=True)
         sys.exit(BAD_INPUT)
@@ -128,3 +127,12 @@ def nominal_of(problem: "Problem") -> "Problem":
 
 def write_json(data: dict[str, Any]) -> None:
     click.echo(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def answer(as_json: bool, data: Callable[[], dict[str, Any]], text: Callable[[], str]) -> None:
+    """Write an answer that is in hand, as JSON or as text; a signal waits until it is written."""
+    with answering():
+        if as_json:
+            write_json(data())
+        else:
+            click.echo(text())

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tmsopt.cli.common import BAD_INPUT, FIGURES, bad_input, check_output, progress, write_json
+from tmsopt.cli.common import FIGURES, bad_input, check_output, progress, write_json
+from tmsopt.cli.ending import BAD_INPUT
 
 if TYPE_CHECKING:
     from tmsopt.plots.paper import Item
@@ -92,7 +93,7 @@ def _draw(wanted: "list[Item]", files: list[Path]) -> None:
             try:
                 save(item.make(), path)
             except OSError as error:
-                click.echo(f"--output: '{path}' cannot be written: {error.strerror}", err=True)
+                click.echo(f"--output: '{path}' cannot be written: {error.strerror or error}", err=True)
                 sys.exit(BAD_INPUT)
     for path in files:
         click.echo(f"wrote {path}", err=True)

@@ -3,9 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from tmsopt.cli.common import progress, saving, write_json
+from tmsopt.cli.common import answer, progress, saving
 
 if TYPE_CHECKING:
     from tmsopt import Problem
@@ -23,10 +21,7 @@ def write_front(
 
     with progress("sub-problem") as update:
         front = tmsopt.pareto(problem, progress=update, **asked)
-    if as_json:
-        write_json(front.to_json())
-    else:
-        click.echo(front.report(full))
+    answer(as_json, front.to_json, lambda: front.report(full))
     if csv_file is not None:
         with saving("--csv", csv_file):
             front.write_csv(csv_file)

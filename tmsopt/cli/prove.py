@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import DONE, INFEASIBLE, NOT_CONVERGED, bad_input, options, solving, write_json
+from tmsopt.cli.common import DONE, INFEASIBLE, NOT_CONVERGED, answer, bad_input, options, solving
 
 _EXAMPLES = """
 \b
@@ -48,10 +48,8 @@ def prove(file: Path, as_json: bool, digits: int, exact: tuple[str, ...], starts
             asked = options(starts=starts, seed=seed) | shown
             solution = tmsopt.solve(problem, throw=False, interruptible=False, **asked)
         proof = tmsopt.prove(solution, digits, exact=given)
-    if as_json:
-        write_json({"title": problem.title, "status": solution.status, **proof.to_json()})
-    else:
-        click.echo(tmsopt.report.proof_text(problem, proof))
+    heading = {"title": problem.title, "status": solution.status}
+    answer(as_json, lambda: heading | proof.to_json(), lambda: tmsopt.report.proof_text(problem, proof))
     sys.exit(DONE if proof.proved else NOT_CONVERGED if solution.status == "optimal" else INFEASIBLE)
 
 

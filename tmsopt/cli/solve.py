@@ -4,6 +4,7 @@ import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -13,8 +14,8 @@ from tmsopt.cli.common import (
     DONE,
     FIGURES,
     INFEASIBLE,
-    INTERRUPTED,
     NOT_CONVERGED,
+    answer,
     bad_input,
     check_output,
     nominal_of,
@@ -22,11 +23,12 @@ from tmsopt.cli.common import (
     progress,
     saving,
     solving,
-    write_json,
 )
+from tmsopt.cli.ending import INTERRUPTED
 
 if TYPE_CHECKING:
     from tmsopt import Problem, Solution
+    from tmsopt.report import Findings
 
 _EXIT = {"optimal": DONE, "infeasible": INFEASIBLE, "not_converged": NOT_CONVERGED}
 
@@ -51,8 +53,7 @@ Examples:
 A file with pareto = ["abscissa", "Fr"] under [objective] gives the front: two or three expressions, each minimised; a
 minus sign maximises, as in "-lambda_s".
 
-Exit status: 0 solved, 2 bad input, 3 infeasible, 4 not converged, 130 stopped by Ctrl-C: the answer is then the best
-design so far.
+Exit status: 0 solved, 2 bad input, 3 infeasible, 4 not converged.
 """
 
 _COMPARE_EXAMPLES = """
@@ -167,13 +168,17 @@ def solve(
             solution = tmsopt.solve(problem, throw=False, **shown, **asked)
         if certify and not solution.interrupted:
             solution = _certified(solution, certify)
-    if as_json:
-        write_json(_as_json(solution, full))
-    else:
-        si = tmsopt.report.si_parameters(solution, w, m_B) if wheelbase or rear_mass else None
+    try:
         with _explaining(full):
-            found = tmsopt.report.findings(solution, full)
-        click.echo(tmsopt.report.design_report(solution, found, full, si))
+            found = tmsopt.report.findings(solution, full) if full or not as_json else tmsopt.report.Findings()
+    except KeyboardInterrupt:
+        solution, found = replace(solution, interrupted=True), tmsopt.report.Findings()
+    si = tmsopt.report.si_parameters(solution, w, m_B) if wheelbase or rear_mass else None
+    answer(
+        as_json,
+        lambda: _as_json(solution, found, full),
+        lambda: tmsopt.report.design_report(solution, found, full, si),
+    )
     if plot is not None:
         _draw(solution, plot, over, w, m_B)
     sys.exit(INTERRUPTED if solution.interrupted else _EXIT[solution.status])
@@ -209,14 +214,11 @@ def _check_options(problem: "Problem", given: list[str], every: bool) -> None:
         raise InputError(faults)
 
 
-def _as_json(solution: "Solution", full: bool) -> dict[str, Any]:
+def _as_json(solution: "Solution", found: "Findings", full: bool) -> dict[str, Any]:
     """The keys of the contract; everything, and what was found out beside, where all is wanted."""
-    import tmsopt
-
     data = solution.to_json()
     if not full:
         return {name: value for name, value in data.items() if name in _CONTRACT}
-    found = tmsopt.report.findings(solution, full)
     meaning = {
         "meaning": found.explanation and found.explanation.to_json(),
         "robustness": found.robustness and found.robustness.to_json(),
@@ -242,10 +244,7 @@ def _solve_all(problem: "Problem", as_json: bool, asked: dict[str, Any]) -> NoRe
 
     with bad_input(), progress("step") as update:
         found = tmsopt.solve_all(problem, progress=update, **asked)
-    if as_json:
-        write_json(problem.heading | found.to_json())
-    else:
-        click.echo(tmsopt.report.every_table(found))
+    answer(as_json, lambda: problem.heading | found.to_json(), lambda: tmsopt.report.every_table(found))
     sys.exit(DONE if found.solutions else INFEASIBLE)
 
 
@@ -262,10 +261,7 @@ def compare(file: Path, as_json: bool, starts: int | None, seed: int, linear_sol
     with progress() as update:
         asked = options(starts=starts, seed=seed, linear_solver=linear_solver)
         comparison = tmsopt.compare(problem, progress=update, **asked)
-    if as_json:
-        write_json(comparison.to_json())
-    else:
-        click.echo(tmsopt.report.comparison_table(comparison))
+    answer(as_json, comparison.to_json, lambda: tmsopt.report.comparison_table(comparison))
     sys.exit(_EXIT[comparison.design.status])
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import INFEASIBLE, NOT_CONVERGED, bad_input, nominal_of, progress, write_json
+from tmsopt.cli.common import INFEASIBLE, NOT_CONVERGED, answer, bad_input, nominal_of, progress
 
 _EXAMPLES = """
 \b
@@ -49,7 +49,4 @@ def speeds(file: Path, parameter: str | None, between: tuple[float, float] | Non
             status = error.solution.status
             click.echo(f"{problem.title}: {status.replace('_', ' ')}; there is no design to look at", err=True)
             raise SystemExit(INFEASIBLE if status == "infeasible" else NOT_CONVERGED) from None
-    if as_json:
-        write_json(found.to_json())
-    else:
-        click.echo(tmsopt.report.speeds_table(found))
+    answer(as_json, found.to_json, lambda: tmsopt.report.speeds_table(found))

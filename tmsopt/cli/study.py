@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tmsopt.cli.common import BAD_INPUT, FIGURES, INTERRUPTED, bad_input, check_output, saving, write_json
+from tmsopt.cli.common import FIGURES, bad_input, check_output, saving, write_json
+from tmsopt.cli.ending import BAD_INPUT, INTERRUPTED, answering
 
 if TYPE_CHECKING:
     from tmsopt.studies import Results, Sampling, Study
@@ -38,7 +39,7 @@ and shows the rows that are there already. A row solved again, by --row or by an
 
 A Dask cluster needs the same tmsopt on every worker, and one thread each: dask worker HOST:8786 --nthreads 1.
 
-Exit status: 0 done, failed rows included; 2 bad input; 130 stopped by Ctrl-C.
+Exit status: 0 done, failed rows included; 2 bad input.
 """
 
 
@@ -88,7 +89,8 @@ def study(
             return
         path = path.resolve()
         results, stopped = _carried_out(asked, path, fresh, {"workers": workers, "scheduler": scheduler})
-        _show(results, path, stopped, as_json)
+        with answering():
+            _show(results, path, stopped, as_json)
         for target in exports:
             with saving("--export", target):
                 results.export(target)

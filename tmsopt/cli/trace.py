@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import FIGURES, bad_input, check_output, nominal_of, plane, progress, saving, write_json
+from tmsopt.cli.common import FIGURES, answer, bad_input, check_output, nominal_of, plane, progress, saving
 
 _EXAMPLES = """
 \b
@@ -54,10 +54,7 @@ def trace(
             plane(problem, axes)
         with progress() as update:
             found = tmsopt.trace(problem, pattern, step=step, starts=starts, seed=seed, progress=update)
-    if as_json:
-        write_json(found.to_json())
-    else:
-        click.echo(tmsopt.report.trace_table(found))
+    answer(as_json, found.to_json, lambda: tmsopt.report.trace_table(found))
     if not found.branches:
         click.echo(f"no {found.pattern} found in the box; widen it, or try more --starts", err=True)
         raise SystemExit(3)

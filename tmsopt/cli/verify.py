@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import DONE, bad_input, check_output, progress, saving, write_json
+from tmsopt.cli.common import DONE, answer, bad_input, check_output, progress, saving
 
 _EXAMPLES = """
 \b
@@ -31,10 +31,7 @@ def verify(as_json: bool, markdown: Path | None, only: tuple[str, ...]) -> None:
         check_output("--markdown", markdown, ("md",))
         with progress("claim") as update:
             ledger = tmsopt.verify(update, only)
-    if as_json:
-        write_json(ledger.to_json())
-    else:
-        click.echo(tmsopt.report.ledger_table(ledger))
+    answer(as_json, ledger.to_json, lambda: tmsopt.report.ledger_table(ledger))
     if markdown is not None:
         with saving("--markdown", markdown):
             markdown.write_text(tmsopt.report.ledger_page(ledger), encoding="utf-8")

@@ -5,7 +5,7 @@ Newton solves the optimality conditions of the active set that IPOPT found.
 
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -29,6 +29,7 @@ _NEAR = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-6, **_QUICK}
 _EXACT = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-4, **_QUICK}
 _SETTINGS: dict[str, dict[str, Any]] = {"far": _FAR, "exact": _EXACT, "near": _NEAR}
 
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _STEPS = 12
 _STALLED = 1e-14  # relative step of Newton's method, below which it ends once the steps no longer shrink
 _STATIONARY = 1e-9
@@ -133,22 +134,33 @@ def polisher(nlp: NLP) -> Callable[[Run, NLP], Point]:
 
 @contextmanager
 def _interruptible() -> Iterator[None]:
-    """Raise an interrupt once IPOPT is done: CasADi takes the exception for a failed evaluation and goes on.
+    """Call handlers of signals once IPOPT is done: CasADi takes what they raise for a failed evaluation and goes on.
 
-    Only in the main thread, and where the user has no handler of his own.
+    Only in the main thread, which alone hears signals.
     """
-    main = threading.current_thread() is threading.main_thread()
-    if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
     heard: list[int] = []
-    signal.signal(signal.SIGINT, lambda number, frame: heard.append(number))
+    found = ((number, signal.getsignal(number)) for number in _SIGNALS)
+    handlers = {int(number): handler for number, handler in found if callable(handler)}
+    for number in handlers:
+        signal.signal(number, lambda number, frame: heard.append(number))
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    _deliver(heard, handlers)
+
+
+def _deliver(heard: list[int], handlers: Mapping[int, Any]) -> None:
+    """The first one, and those after it whatever that raises."""
     if heard:
-        raise KeyboardInterrupt
+        try:
+            handlers[heard[0]](heard[0], None)
+        finally:
+            _deliver(heard[1:], handlers)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import bad_input, check_output, write_json
+from tmsopt.cli.common import answer, bad_input, check_output
 from tmsopt.cli.guide.files import write_new
 
 _EXAMPLES = """
@@ -42,10 +42,7 @@ def describe(what: str, as_json: bool) -> None:
         import tmsopt
 
         found = tmsopt.describe(what)
-    if as_json:
-        write_json(found.to_json())
-    else:
-        click.echo(found.report())
+    answer(as_json, found.to_json, found.report)
 
 
 @click.command(epilog=_OF_SCHEMA)

@@ -1,0 +1,75 @@
+"""The commands as one, and what all of their helps share."""
+
+from typing import Any
+
+import click
+
+from tmsopt import __version__
+from tmsopt.cli.chart import chart
+from tmsopt.cli.ending import STATUS, ended
+from tmsopt.cli.figure import figure
+from tmsopt.cli.guide.describe import describe, schema
+from tmsopt.cli.guide.files import example, new
+from tmsopt.cli.guide.import_ import convert
+from tmsopt.cli.prove import prove
+from tmsopt.cli.solve import compare, solve
+from tmsopt.cli.speeds import speeds
+from tmsopt.cli.study import study
+from tmsopt.cli.trace import trace
+from tmsopt.cli.verify import verify
+
+
+class _Commands(click.Group):
+    """Commands that end with words of ours where click has others, be it while words are read or at work."""
+
+    def make_context(self, *args: Any, **more: Any) -> click.Context:
+        """Read the words of the command line."""
+        with ended():
+            return super().make_context(*args, **more)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command."""
+        with ended():
+            return super().invoke(ctx)
+
+
+@click.group("tmsopt", cls=_Commands, epilog=STATUS, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="tmsopt")
+def every() -> None:
+    """Design self-stable bicycles under your own constraints, and localise exceptional points.
+
+    \b
+    Examples:
+      tmsopt new robot.toml
+      tmsopt describe tms
+      tmsopt solve problems/ep4.toml
+      tmsopt solve problems/pareto.toml --plot front.png
+      tmsopt compare problems/ep4.toml
+      tmsopt prove problems/ep4.toml
+      tmsopt speeds problems/whipple_benchmark.toml
+      tmsopt trace problems/ep_set.toml --plot ep_set.png
+      tmsopt chart problems/chart.toml --plot chart.png
+      tmsopt study problems/study_heights.toml
+      tmsopt figure all --output figures
+      tmsopt verify
+    """
+
+
+for _command in (
+    solve,
+    compare,
+    prove,
+    speeds,
+    trace,
+    chart,
+    study,
+    figure,
+    verify,
+    convert,
+    new,
+    example,
+    describe,
+    schema,
+):
+    _command.epilog = f"{_command.epilog}{STATUS}"
+    every.add_command(_command)
