@@ -6,10 +6,11 @@ stopped at any moment, and what it prints is not seen.
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from queue import Empty, SimpleQueue
 
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.branch_and_bound.tasks import INFEASIBLE, UNDECIDED, Decision, GlobalSolver, Task
+from tmsopt.branch_and_bound.tasks import INFEASIBLE, UNDECIDED, Decision, Failed, GlobalSolver, Task
 from tmsopt.processes import Inbox, Worker
 
 _TICK = 0.02  # seconds between looks
@@ -35,18 +36,19 @@ class Crew:
         """Start processes that will be needed."""
         while len(self._idle) < count:
             self._idle.append(Worker(self._inbox, apart=True))
-            self._idle[-1].send(self._solver.prepare)
+            self._idle[-1].send(_prepare, self._solver.prepare)
 
     def race(self, tasks: Sequence[Task], tick: Callable[[], None] = lambda: None) -> list[Decision]:
         """Decisions on tasks, run all at once, until one is shown to have no feasible point.
 
         Raises:
             NotAccepted: for operations or numbers that the solver cannot take, if no task can.
+            Failed: if the solver raised, and decided nothing.
             KeyboardInterrupt: when the user stops it; no process is left behind.
         """
         self.ahead(len(tasks))
         began = time.monotonic()
-        answers: list[Decision | NotAccepted] = [Decision(UNDECIDED) for _ in tasks]
+        answers: list[Decision | NotAccepted | Failed] = [Decision(UNDECIDED) for _ in tasks]
         running = {self._idle.pop(): number for number in range(len(tasks))}
         try:
             for worker, number in running.items():
@@ -73,14 +75,24 @@ class Crew:
         finally:
             for worker in running:
                 worker.end()
-        refused = [answer for answer in answers if isinstance(answer, NotAccepted)]
-        if refused and len(refused) == len(tasks):
-            raise refused[0]
-        return [answer for answer in answers if isinstance(answer, Decision)]
+        decisions = [answer for answer in answers if isinstance(answer, Decision)]
+        for answer in answers:
+            if isinstance(answer, Failed) and all(decision.verdict == UNDECIDED for decision in decisions):
+                raise answer
+            if isinstance(answer, NotAccepted) and not decisions:
+                raise answer
+        return decisions
 
 
-def _answer(decide: Callable[[Task], Decision], task: Task) -> Decision | NotAccepted:
+def _prepare(prepare: Callable[[], None]) -> None:
+    with suppress(Exception):  # it is raised again, and heard, where there is a task
+        prepare()
+
+
+def _answer(decide: Callable[[Task], Decision], task: Task) -> Decision | NotAccepted | Failed:
     try:
         return decide(task)
     except NotAccepted as error:
         return error
+    except Exception as error:  # of the solver; raised again where somebody hears it
+        return Failed(f"{type(error).__name__}: {' '.join(str(error).split())}")

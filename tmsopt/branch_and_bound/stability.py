@@ -9,7 +9,7 @@ from tmsopt.branch_and_bound.question import Question, unit_of
 from tmsopt.branch_and_bound.race import Crew
 from tmsopt.branch_and_bound.scip import SCIP
 from tmsopt.branch_and_bound.signs import none_stable
-from tmsopt.branch_and_bound.tasks import FOUND, INFEASIBLE
+from tmsopt.branch_and_bound.tasks import FOUND, INFEASIBLE, Failed
 from tmsopt.checks.recheck import Checked, recheck
 from tmsopt.design.problem import Problem
 from tmsopt.formulation.formulate import middle
@@ -29,11 +29,13 @@ class Stability:
         any: True where `design` is, by a recheck; False where it is proved that none is; None where it is not known.
         design: free parameters of a stable design, to be improved: it may be off in a limit by the solver's tolerance.
         proof: of what kind, in words.
+        failed: why the solver said nothing, where that is an error of its own.
     """
 
     any: bool | None = None
     design: Mapping[str, float] | None = None
     proof: str = ""
+    failed: str = ""
 
 
 def any_stable(
@@ -76,6 +78,8 @@ def any_stable(
                 told = answer(replace(at_axis, limit=-_MARGIN * unit), clock, 1.0, _any)
         except NotAccepted:
             return Stability()
+        except Failed as error:
+            return Stability(failed=f"{SOLVER.name} failed: {error}")
     if clock.interrupted:
         raise KeyboardInterrupt
     by = f"in floating-point arithmetic, by {SOLVER.name}, feasibility tolerance {SOLVER.tolerance:.0e}"

@@ -16,6 +16,10 @@ from tmsopt.formulation.nlp import NLP
 INFEASIBLE, FOUND, UNDECIDED = "infeasible", "found", "undecided"
 
 
+class Failed(RuntimeError):
+    """What a global solver raised, in one line: an error of the solver or of its installation, and no decision."""
+
+
 @dataclass(frozen=True)
 class Decision:
     """What branch and bound came to.

@@ -10,7 +10,7 @@ from tmsopt.branch_and_bound.half_planes import over
 from tmsopt.branch_and_bound.question import Question, unit_of
 from tmsopt.branch_and_bound.race import Crew
 from tmsopt.branch_and_bound.stability import SOLVER
-from tmsopt.branch_and_bound.tasks import INFEASIBLE
+from tmsopt.branch_and_bound.tasks import INFEASIBLE, Failed
 from tmsopt.certificates.improvement import FLOOR, confirmed, feasible
 from tmsopt.checks.bound import instant_bound
 from tmsopt.checks.recheck import recheck
@@ -67,6 +67,10 @@ def certify(design: Given, *, seconds: float = SECONDS, progress: SecondsPassed 
                 found, replaced = (_bounded if feasible(found) else _excluded)(found, clock)
         except NotAccepted as error:
             return _noted(found, f"branch and bound cannot take {error}, so there is no bound")
+        except Failed as error:
+            return _noted(found, f"{SOLVER.name} failed: {error}; so there is no bound")
+        except KeyboardInterrupt:
+            clock.interrupted = True
         return replace(_noted(found, "the proof was interrupted"), interrupted=True) if clock.interrupted else found
 
 

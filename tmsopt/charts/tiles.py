@@ -34,17 +34,16 @@ def computed(work: Survey, tiles: Sequence[range], workers: int = 1) -> Iterator
         return rows, layers, tally(layers, first, fallbacks, time.perf_counter() - began)
 
     ahead: deque[Future[Tile]] = deque()
-    with ThreadPoolExecutor(workers, thread_name_prefix="tmsopt-chart") as pool:
-        try:
-            for rows in tiles:
-                ahead.append(pool.submit(compute, rows))
-                if len(ahead) > workers + 1:
-                    yield ahead.popleft().result()
-            while ahead:
+    pool = ThreadPoolExecutor(workers, thread_name_prefix="tmsopt-chart")
+    try:
+        for rows in tiles:
+            ahead.append(pool.submit(compute, rows))
+            if len(ahead) > workers + 1:
                 yield ahead.popleft().result()
-        finally:
-            for future in ahead:
-                future.cancel()
+        while ahead:
+            yield ahead.popleft().result()
+    finally:  # what is computed, or compiled, by now is not waited for: Ctrl-C may have ended it
+        pool.shutdown(wait=False, cancel_futures=True)
 
 
 class Memory:

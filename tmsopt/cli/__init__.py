@@ -5,19 +5,25 @@ imports stand inside commands, and this face imports next to nothing: signals ar
 `common` first: what commands share; `ending` has what ends them from outside.
 """
 
+import signal
 import sys
-from collections.abc import Sequence
-from typing import NoReturn
 
-from tmsopt.cli.ending import ended, listening, streams
+TYPE_CHECKING = False  # typing takes as long to load as all else here
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import NoReturn
 
 
-def main(args: Sequence[str] | None = None, prog_name: str | None = None) -> NoReturn:
+def main(args: "Sequence[str] | None" = None, prog_name: str | None = None) -> "NoReturn":
     """Run a command and exit with its status, or with 128 and the number of the signal that stopped it.
 
     Args:
         args: words of the command line; by default those of this program, which then ends.
     """
+    if args is None and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the rest is loaded, as it is for SIGTERM
+    from tmsopt.cli.ending import ended, gone, listening, streams
+
     status: int | str | None = 0
     with listening(for_good=args is None) as heard:
         try:
@@ -29,4 +35,6 @@ def main(args: Sequence[str] | None = None, prog_name: str | None = None) -> NoR
             status = end.code
         if heard.number is not None:
             status = heard.status
+            if args is None:
+                gone(heard.status)
     sys.exit(status)

@@ -1,5 +1,7 @@
 """The commands as one, and what all of their helps share."""
 
+import logging
+import os
 from typing import Any
 
 import click
@@ -53,6 +55,8 @@ def every() -> None:
       tmsopt figure all --output figures
       tmsopt verify
     """
+    os.environ.pop("MPLBACKEND", None)  # figures are drawn into files, whatever windows the user's own have
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # that it finds no folder for its cache changes no figure
 
 
 for _command in (

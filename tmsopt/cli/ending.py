@@ -5,6 +5,7 @@ ends all of that, and what is left of this process a second later goes without a
 however the command would have ended.
 """
 
+import atexit
 import errno
 import os
 import signal
@@ -108,7 +109,7 @@ def listening(for_good: bool) -> Iterator[Heard]:
     """Hear signals, but for those that whoever started this program has it ignore.
 
     Args:
-        for_good: the process ends after it: whatever is heard then ends it at once.
+        for_good: the process ends after it: what is heard then comes too late to change its status.
     """
     _HEARD.forget()
     if threading.current_thread() is not threading.main_thread():
@@ -123,8 +124,15 @@ def listening(for_good: bool) -> Iterator[Heard]:
         yield _HEARD
     finally:
         for number, handler in before.items():
-            signal.signal(number, signal.SIG_DFL if for_good else handler)
+            signal.signal(number, signal.SIG_IGN if for_good else handler)
         sys.unraisablehook = hook
+
+
+def gone(status: int) -> None:
+    """End now where threads are still at work, such as a compiler, for which Python would wait."""
+    if any(not t.daemon and t is not threading.main_thread() for t in threading.enumerate()):
+        atexit._run_exitfuncs()
+        os._exit(status)
 
 
 @contextmanager

@@ -168,6 +168,10 @@ def _with_stability(solution: Solution, options: Options, family: Family | None,
             solution = replace(found, notes=(*found.notes, words))
     elif asked.any is False:
         solution = replace(solution, notes=(*solution.notes, f"that no design is stable is proved {asked.proof}"))
+    if asked.failed:
+        solution = replace(
+            solution, notes=(*solution.notes, f"whether any design is stable is not known: {asked.failed}")
+        )
     return replace(solution, stable_elsewhere=asked.any, seconds=time.perf_counter() - began)
 
 
