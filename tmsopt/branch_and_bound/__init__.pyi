@@ -6,6 +6,6 @@ from .race import Crew as Crew
 from .scip import SCIP as SCIP
 from .stability import Stability as Stability, any_stable as any_stable
 from .tasks import (
-    FOUND as FOUND, INFEASIBLE as INFEASIBLE, UNDECIDED as UNDECIDED, Decision as Decision,
+    FOUND as FOUND, INFEASIBLE as INFEASIBLE, UNDECIDED as UNDECIDED, Decision as Decision, Failed as Failed,
     GlobalSolver as GlobalSolver, Task as Task, task as task,
 )

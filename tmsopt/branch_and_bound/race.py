@@ -75,13 +75,17 @@ class Crew:
         finally:
             for worker in running:
                 worker.end()
-        decisions = [answer for answer in answers if isinstance(answer, Decision)]
-        for answer in answers:
-            if isinstance(answer, Failed) and all(decision.verdict == UNDECIDED for decision in decisions):
-                raise answer
-            if isinstance(answer, NotAccepted) and not decisions:
-                raise answer
-        return decisions
+        return _heard(answers)
+
+
+def _heard(answers: Sequence[Decision | NotAccepted | Failed]) -> list[Decision]:
+    decisions = [answer for answer in answers if isinstance(answer, Decision)]
+    for answer in answers:
+        if isinstance(answer, Failed) and all(decision.verdict == UNDECIDED for decision in decisions):
+            raise answer
+        if isinstance(answer, NotAccepted) and not decisions:
+            raise answer
+    return decisions
 
 
 def _prepare(prepare: Callable[[], None]) -> None:

@@ -126,7 +126,9 @@ def nominal_of(problem: "Problem") -> "Problem":
 
 
 def write_json(data: dict[str, Any]) -> None:
-    click.echo(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
+    """Write JSON to stdout; characters that it does not take are escaped."""
+    narrow = not (sys.stdout.encoding or "utf").lower().startswith("utf")
+    click.echo(json.dumps(data, indent=2, ensure_ascii=narrow, allow_nan=False))
 
 
 def answer(as_json: bool, data: Callable[[], dict[str, Any]], text: Callable[[], str]) -> None:

@@ -1,0 +1,396 @@
+"""What ends a command from outside: signals at any moment, streams that take no more, surroundings of every kind."""
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from tmsopt.branch_and_bound import SCIP
+from tmsopt.cli import main
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals and shells of POSIX")
+
+commands = import_module("tmsopt.cli.commands").every.commands
+ending = import_module("tmsopt.cli.ending")
+common = import_module("tmsopt.cli.common")
+
+STOPPED = "stopped; what was printed before stands\n"
+LONG = 20.0  # seconds, of which a test that passes waits for none
+SOON = 2.0  # seconds in which a command ends
+ONCE, TERM = [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)], (signal.SIGTERM, 143)
+
+BOX = """
+[parameters]
+Fr = { min = 0.1, max = 2 }
+mu = 0.1
+chi_B = 1.2
+chi_H = 1.0
+zeta_B = -0.4
+zeta_H = -0.2
+lambda_s = 0.4
+[objective]
+minimize = "(Fr - 1)**2"
+"""
+"""Solved at once, and with no bound in closed form."""
+
+Run = Callable[..., tuple[object, str, str]]
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], interruptible: None) -> Run:
+    """In this process: exit status, stdout, stderr."""
+
+    def run(*arguments: object) -> tuple[object, str, str]:
+        with pytest.raises(SystemExit) as stop:
+            main(args=[*map(str, arguments)], prog_name="tmsopt")
+        written = capsys.readouterr()
+        return stop.value.code, written.out, written.err
+
+    return run
+
+
+def at_work(monkeypatch: pytest.MonkeyPatch, work: Callable[..., Any]) -> None:
+    """Have `tmsopt schema` do this."""
+    monkeypatch.setattr(commands["schema"], "callback", lambda **_: work())
+
+
+def box(folder: Path) -> Path:
+    (folder / "box.toml").write_text(BOX, encoding="utf-8")
+    return folder / "box.toml"
+
+
+def press(number: int = signal.SIGINT) -> None:
+    os.kill(os.getpid(), number)
+
+
+@pytest.mark.parametrize("command", commands)
+def test_help_names_what_may_end_every_command(run: Run, command: str) -> None:
+    status, out, _ = run(command, "--help")
+    said = " ".join(out.split("Of every command:")[1].split())
+    assert status == 0
+    assert [said.index(f"{number} ") for number in (1, 2, 130, 143, 129, 141)] == sorted(
+        said.index(f"{number} ") for number in (1, 2, 130, 143, 129, 141)
+    )
+
+
+@pytest.mark.parametrize(("number", "status"), ONCE)
+def test_a_signal_ends_with_its_status(
+    run: Run, monkeypatch: pytest.MonkeyPatch, number: signal.Signals, status: int
+) -> None:
+    def work() -> None:
+        press(number)
+        time.sleep(LONG)
+
+    before = signal.getsignal(number)
+    at_work(monkeypatch, work)
+    assert run("schema") == (status, "", STOPPED)
+    assert signal.getsignal(number) is before
+
+
+def test_a_signal_that_is_ignored_stays_so(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As by nohup, and for what a script runs in the background."""
+    monkeypatch.setattr(commands["schema"], "callback", lambda **_: press(signal.SIGHUP))
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        assert run("schema") == (0, "", "")
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_the_status_is_that_of_the_signal_whatever_was_made_of_it(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def work() -> None:
+        try:
+            press()
+            time.sleep(LONG)
+        except KeyboardInterrupt:
+            sys.exit(3)
+
+    at_work(monkeypatch, work)
+    assert run("schema") == (130, "", "")
+
+
+def test_an_interrupt_that_would_be_lost_comes_again(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python reports what a destructor raises, and goes on."""
+
+    class Last:
+        def __del__(self) -> None:
+            press()
+            time.sleep(0)
+
+    def work() -> None:
+        Last()
+        time.sleep(LONG)
+
+    at_work(monkeypatch, work)
+    assert run("schema") == (130, "", STOPPED)
+
+
+def test_an_interrupt_waits_for_compiled_modules(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """While one is loaded it would come out as an ImportError."""
+
+    def create_module() -> None:
+        try:
+            press()
+            time.sleep(0.05)
+        except KeyboardInterrupt:
+            raise ImportError("initialization failed") from None
+
+    def work() -> None:
+        create_module()
+        time.sleep(LONG)
+
+    monkeypatch.setattr(ending, "_LOADING", {create_module.__code__})
+    at_work(monkeypatch, work)
+    assert run("schema") == (130, "", STOPPED)
+
+
+def test_a_second_one_ends_what_the_first_has_left(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    gone = []
+
+    def work() -> None:
+        try:
+            press()
+            time.sleep(LONG)
+        except KeyboardInterrupt:
+            try:
+                press(signal.SIGTERM)
+                time.sleep(LONG)
+            except KeyboardInterrupt:
+                pytest.fail("the second one is no invitation to leave something")
+
+    monkeypatch.setattr(ending.Heard, "_gone", lambda self: gone.append(self.status))
+    at_work(monkeypatch, work)
+    assert run("schema") == (130, "", "")
+    assert gone == [130]
+
+
+def test_an_answer_in_hand_is_written_as_a_whole(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def data() -> dict[str, Any]:
+        press()
+        return {"numbers": [*range(1000)]}
+
+    def work() -> None:
+        common.answer(True, data, str)
+        time.sleep(LONG)
+
+    at_work(monkeypatch, work)
+    status, out, err = run("schema")
+    assert (status, json.loads(out), err) == (130, {"numbers": [*range(1000)]}, STOPPED)
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), TERM])
+def test_proofs_leave_what_is_proved(run: Run, monkeypatch: pytest.MonkeyPatch, number: int, status: int) -> None:
+    """Of all designs; branch and prune is at its first box."""
+    pytest.importorskip("codac")
+    module = import_module("tmsopt.completeness.complete")
+    monkeypatch.setattr(module._Run, "asked", lambda *_: (press(number), time.sleep(LONG)))
+    ended, out, _ = run("solve", "problems/ep4_matching.toml", "--all", "--json")
+    assert (ended, json.loads(out)["completeness"]["complete"]) == (status, False)
+
+
+@pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
+@pytest.mark.parametrize("where", ["tmsopt.branch_and_bound.race Crew.race", "tmsopt.certificates.certify doubt"])
+def test_a_proof_that_is_stopped_leaves_the_design(
+    run: Run, monkeypatch: pytest.MonkeyPatch, where: str, tmp_path: Path
+) -> None:
+    """While SCIP is at work, and while a question to it is made."""
+    module, _, name = where.partition(" ")
+    at, _, last = name.rpartition(".")
+    owner = import_module(module)
+    monkeypatch.setattr(getattr(owner, at, owner), last, lambda *_: (press(), time.sleep(LONG)))
+    status, out, _ = run("solve", box(tmp_path), "--certify", "--json")
+    data = json.loads(out)
+    assert (status, data["interrupted"], data["status"]) == (130, True, "optimal")
+    assert "the proof was interrupted" in data["notes"]
+
+
+def test_what_is_said_beside_a_design_may_be_stopped(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        import_module("tmsopt.report.solution.findings"), "explain", lambda *_, **__: (press(), time.sleep(LONG))
+    )
+    status, out, err = run("solve", "problems/ep4.toml")
+    assert (status, err) == (130, "")
+    assert "four roots meet in one (EP4)" in out
+
+
+@pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
+def test_what_a_global_solver_raises_is_heard(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    race = import_module("tmsopt.branch_and_bound.race")
+    failed = race._answer(math.sqrt, SimpleNamespace())
+    assert str(failed) == "TypeError: must be real number, not types.SimpleNamespace"
+    monkeypatch.setattr(race.Crew, "race", lambda *_: race._heard([failed]))
+    status, out, _ = run("solve", box(tmp_path), "--certify")
+    assert status == 0
+    assert "note: SCIP failed: TypeError: must be real number" in " ".join(out.split())
+
+
+# Commands in processes of their own
+
+PROBLEMS = Path("problems").resolve()
+CHEAP = {"version": "--version", "help": "solve --help", "figures": "figure --list"}
+WORDS = CHEAP | {
+    "new": "new x.toml",
+    "example": "example ep4",
+    "describe": f"describe {PROBLEMS}/ep4.toml --json",
+    "schema": "schema",
+    "solve": f"solve {PROBLEMS}/ep4.toml --plot out/g.png",
+    "front": f"solve {PROBLEMS}/pareto.toml --points 3 --starts 1 --csv out/f.csv --plot out/f.svg",
+    "all": f"solve {PROBLEMS}/ep4_matching.toml --all --seconds 3 --json",
+    "compare": f"compare {PROBLEMS}/ep4.toml",
+    "prove": f"prove {PROBLEMS}/ep4.toml",
+    "speeds": f"speeds {PROBLEMS}/whipple_benchmark.toml",
+    "trace": f"trace {PROBLEMS}/off_law.toml --csv out/t.csv --plot out/t.pdf",
+    "chart": f"chart {PROBLEMS}/chart.toml --points 30x20 --plot out/c.png --output out/c.npz",
+    "folder": f"chart {PROBLEMS}/chart.toml --points 30x20 --output out/c.chart",
+    "study": f"study {PROBLEMS}/study_decay.toml --store out/s.sqlite --export out/r.csv --workers 2",
+    "figure": "figure root-locus --output out/r.png",
+    "verify": "verify --only 'tab1-*' --markdown out/v.md",
+}
+SILENT = {"new", "figure"}  # write nothing to stdout
+STREAMS = {
+    "full": (">/dev/full", 2), "closed": (">&-", 2), "nobody reads": ("| true", 141), "one line": ("| head -1", (0, 141)),
+    "no stdin": ("<&-", 0), "no stderr": ("2>&-", 0), "full stderr": ("2>/dev/full", 0), "only stdout": ("2>&- <&-", 0),
+}  # fmt: skip
+"""What follows a command in a shell, and its status then, if it writes to stdout."""
+
+SURROUNDINGS = {
+    "backend": {"MPLBACKEND": "nonsense"}, "no home": {"HOME": "/nonexistent", "MPLCONFIGDIR": "/dev/null/x"},
+    "no temporaries": {"TMPDIR": "/nonexistent"}, "plain": {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+    "ascii": {"PYTHONIOENCODING": "ascii"}, "narrow": {"COLUMNS": "1"}, "nonsense": {"COLUMNS": "x", "LINES": "-1"},
+    "dumb": {"TERM": "dumb", "NO_COLOR": "1"},
+}  # fmt: skip
+
+
+def shell(line: str, folder: Path, **variables: str) -> tuple[int, str, str]:
+    """Status of the first program of a pipe, stdout, stderr."""
+    (folder / "out").mkdir(exist_ok=True)
+    program = f'{sys.executable} -c "from tmsopt.cli import main; main()"'
+    text = f"{line.replace('tmsopt', program, 1)}\necho ${{PIPESTATUS[0]}} > '{folder}/status'"
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])} | variables
+    done = subprocess.run(
+        ["bash", "-c", text], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    left = [p.name for p in folder.rglob("*") if p.name.startswith(".tmsopt-") or p.suffix == ".lock"]
+    assert left == []
+    return int((folder / "status").read_text()), done.stdout, done.stderr
+
+
+def few(of: dict[str, Any]) -> list[Any]:
+    """Cheap commands at once, the others with the slow tests."""
+    return [pytest.param(name, marks=() if name in CHEAP else pytest.mark.slow) for name in of]
+
+
+@pytest.mark.parametrize("stream", STREAMS)
+@pytest.mark.parametrize("name", few(WORDS))
+def test_streams_that_take_nothing(name: str, stream: str, tmp_path: Path) -> None:
+    end, accepted = STREAMS[stream]
+    status, _, err = shell(f"tmsopt {WORDS[name]} {end}", tmp_path)
+    assert status in ((0,) if name in SILENT else accepted if isinstance(accepted, tuple) else (accepted,))
+    said = [line for line in err.splitlines() if not line.startswith("wrote ")]
+    assert len(said) == (1 if status == 2 else 0), err
+
+
+@pytest.mark.parametrize("where", SURROUNDINGS)
+@pytest.mark.parametrize("name", few(WORDS))
+def test_surroundings_of_every_kind(name: str, where: str, tmp_path: Path) -> None:
+    status, out, err = shell(f"tmsopt {WORDS[name]}", tmp_path, **SURROUNDINGS[where])
+    assert status == 0
+    assert bool(out) is (name not in SILENT)
+    assert [line for line in err.splitlines() if not line.startswith("wrote ")] == []
+    if "--json" in WORDS[name]:
+        json.loads(out)
+
+
+REFUSED = {
+    "a folder that is gone": "mkdir gone; cd gone; rmdir ../gone; tmsopt new x.toml",
+    "no folder for files": "tmsopt new /proc/x.toml",
+    "a figure": "tmsopt figure root-locus --output /proc/x.png",
+    "a chart": f"tmsopt chart {PROBLEMS}/chart.toml --points 9x9 --output /proc/c.chart",
+    "arrays": f"tmsopt chart {PROBLEMS}/chart.toml --points 9x9 --output /proc/c.npz",
+    "a store": f"tmsopt study {PROBLEMS}/study_decay.toml --store /proc/s.sqlite",
+    "a page": "tmsopt verify --only 'tab1-*' --markdown /proc/v.md",
+    "a table": f"tmsopt trace {PROBLEMS}/off_law.toml --csv /proc/t.csv",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="a folder that nobody may write to, not even root")
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_written_is_named(name: str, tmp_path: Path) -> None:
+    status, _, err = shell(REFUSED[name], tmp_path)
+    assert status == 2
+    assert len(err.splitlines()) == 1
+    assert REFUSED[name].split()[-1] in err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("files", [20, 9])
+@pytest.mark.parametrize("name", WORDS)
+def test_few_files_may_be_open(name: str, files: int, tmp_path: Path) -> None:
+    status, _, err = shell(f"ulimit -n {files}; tmsopt {WORDS[name]}", tmp_path)
+    assert status in (0, 2)
+    assert "Traceback" not in err
+    assert (status == 0) or err.strip()
+
+
+WORK = {
+    "solve": f"solve {PROBLEMS}/physical_machine.toml --json",
+    "certify": f"solve {PROBLEMS}/physical_machine.toml --certify 60 --json",
+    "front": f"solve {PROBLEMS}/pareto.toml --points 60 --json",
+    "compare": f"compare {PROBLEMS}/optimised_benchmark.toml --json",
+    "prove": f"prove {PROBLEMS}/optimised_benchmark.toml --digits 1000 --json",
+    "trace": f"trace {PROBLEMS}/ep_set.toml --step 0.0001 --json",
+    "chart": f"chart {PROBLEMS}/chart.toml --points 3000x3000 --json",
+    "folder": f"chart {PROBLEMS}/chart.toml --points 30000x30000 --output out/c.chart --workers 2 --json",
+    "study": f"study {PROBLEMS}/study_sway.toml --store out/s.sqlite --workers 2 --json",
+    "figure": "figure all --output out --json",
+    "verify": "verify --json",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("interruptible")
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), TERM])
+@pytest.mark.parametrize("seconds", [0.3, 1.6])
+@pytest.mark.parametrize("name", WORK)
+def test_every_command_ends_soon(
+    name: str, seconds: float, number: signal.Signals, status: int, tmp_path: Path
+) -> None:
+    (tmp_path / "out").mkdir()
+    group = f"TMSOPT_TEST={tmp_path}"
+    process = subprocess.Popen(
+        [sys.executable, "-c", "from tmsopt.cli import main; main()", *WORK[name].split()],
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2]), "TMSOPT_TEST": str(tmp_path)},
+    )  # fmt: skip
+    time.sleep(seconds)
+    process.send_signal(number)
+    began = time.perf_counter()
+    out, err = process.communicate(timeout=60)
+    assert time.perf_counter() - began < 2 * SOON  # other tests run beside it
+    assert process.returncode == status
+    assert "Traceback" not in err
+    assert len(err.splitlines()) <= 1
+    if out:
+        json.loads(out)
+    time.sleep(0.5)
+    assert [p for p in Path("/proc").glob("[0-9]*/environ") if group in _text(p)] == []
+    left = [p.name for p in tmp_path.rglob("*") if p.name.startswith(".tmsopt-") or p.suffix == ".lock"]
+    assert left == []
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_bytes().decode(errors="replace")
+    except OSError:
+        return ""
