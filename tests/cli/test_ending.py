@@ -234,6 +234,20 @@ def test_what_a_global_solver_raises_is_heard(run: Run, monkeypatch: pytest.Monk
     assert "note: SCIP failed: TypeError: must be real number" in " ".join(out.split())
 
 
+@pytest.mark.parametrize("word", ["a\0b.toml", "\ud800.toml"])
+@pytest.mark.parametrize("words", ["describe {}", "new {}", "study {}", "verify --markdown {}", "figure x --output {}"])
+def test_words_that_are_no_names_of_files(run: Run, words: str, word: str) -> None:
+    status, out, err = run(*(w.format(word) for w in words.split()))
+    assert (status, out) == (2, "")
+    assert f"found {word!r}; accepted: words without NUL" in err
+
+
+def test_a_figure_has_a_name(run: Run) -> None:
+    status, out, err = run("figure", "")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "missing; accepted: bicycle" in err
+
+
 # Commands in processes of their own
 
 PROBLEMS = Path("problems").resolve()

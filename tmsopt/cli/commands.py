@@ -24,15 +24,28 @@ from tmsopt.cli.verify import verify
 class _Commands(click.Group):
     """Commands that end with words of ours where click has others, be it while words are read or at work."""
 
-    def make_context(self, *args: Any, **more: Any) -> click.Context:
-        """Read the words of the command line."""
+    def make_context(self, info_name: str | None, args: list[str], *more: Any, **extra: Any) -> click.Context:
+        """Read the words of the command line; a shell gives none that could not be a file's name, a program may."""
         with ended():
-            return super().make_context(*args, **more)
+            for word in args:
+                if "\0" in word or _unknown(word):
+                    raise click.UsageError(
+                        f"found {word!r}; accepted: words without NUL, in the encoding of file names"
+                    )
+            return super().make_context(info_name, args, *more, **extra)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""
         with ended():
             return super().invoke(ctx)
+
+
+def _unknown(word: str) -> bool:
+    try:
+        os.fsencode(word)
+    except UnicodeEncodeError:
+        return True
+    return False
 
 
 @click.group("tmsopt", cls=_Commands, epilog=STATUS, context_settings={"help_option_names": ["-h", "--help"]})

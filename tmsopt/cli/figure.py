@@ -61,7 +61,7 @@ def _wanted(name: str | None) -> "list[Item]":
     from tmsopt import Fault, InputError
     from tmsopt.plots.paper import GALLERY, find
 
-    if name is None:
+    if not name:  # no label of the paper is one either
         raise InputError([Fault(f"missing; accepted: {' '.join(GALLERY)} all", ("NAME",))])
     return list(GALLERY.values()) if name == "all" else [find(name)]
 
