@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable
 from importlib import import_module
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -212,6 +213,24 @@ def test_a_proof_that_is_stopped_leaves_the_design(
     data = json.loads(out)
     assert (status, data["interrupted"], data["status"]) == (130, True, "optimal")
     assert "the proof was interrupted" in data["notes"]
+
+
+@pytest.mark.slow
+def test_a_front_that_is_stopped_leaves_what_is_known(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its two ends, and the points between them that were found before; none of them dominates another."""
+    curve = import_module("tmsopt.fronts.curve")
+    probe = curve._Search.probe
+
+    def third(search: Any, *words: Any, **more: Any) -> Any:
+        return probe(search, *words, **more) if len(search.probes) < 2 else (press(), time.sleep(LONG))
+
+    monkeypatch.setattr(curve._Search, "probe", third)
+    status, out, _ = run("solve", "problems/pareto.toml", "--starts", "1", "--json")
+    data = json.loads(out)
+    values = [p["objectives"] for p in data["points"]]
+    assert (status, data["interrupted"], data["solved"]) == (130, True, 4)
+    assert 2 <= len(values) <= 4
+    assert all(a[0] < b[0] and a[1] > b[1] for a, b in pairwise(values))
 
 
 def test_what_is_said_beside_a_design_may_be_stopped(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,9 +1,11 @@
 """The front of a file with several objectives, a part of `tmsopt solve`."""
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tmsopt.cli.common import answer, progress, saving
+from tmsopt.cli.ending import INTERRUPTED
 
 if TYPE_CHECKING:
     from tmsopt import Problem
@@ -28,3 +30,5 @@ def write_front(
     if plot is not None:
         with saving("--plot", plot):
             tmsopt.plots.save(tmsopt.plots.front_figure(front), plot)
+    if front.interrupted:
+        sys.exit(INTERRUPTED)

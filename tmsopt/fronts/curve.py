@@ -31,13 +31,16 @@ def curve(ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Progres
     Each new limit is set where neighbours are farthest apart, on the objective that changes more there; sweeps both
     ways then carry a better branch along the front.
     """
-    search = _Search(ask, ends, points, progress)
-    for _ in range(_ROUNDS):
-        search.fill()
-        if not search.sweep():
-            break
-    search.settle()
-    return _thinned(search)
+    search, interrupted = _Search(ask, ends, points, progress), False
+    try:
+        for _ in range(_ROUNDS):
+            search.fill()
+            if not search.sweep():
+                break
+        search.settle()
+    except KeyboardInterrupt:
+        interrupted = True
+    return replace(_thinned(search), interrupted=interrupted)
 
 
 @dataclass(frozen=True)

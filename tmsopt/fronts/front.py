@@ -85,6 +85,7 @@ class Front(Tabular):
         ideal, nadir: least and greatest value of each objective over the points.
         solved: sub-problems solved.
         notes: sentences for the reader.
+        interrupted: whether the user ended the search; the front is then what is known of it.
     """
 
     problem: Problem
@@ -95,6 +96,7 @@ class Front(Tabular):
     solved: int
     seconds: float
     notes: tuple[str, ...] = ()
+    interrupted: bool = False
 
     def __len__(self) -> int:
         return len(self.points)
@@ -145,6 +147,7 @@ class Front(Tabular):
             "units": units_of(self.problem, self.objectives),
             **plain(self, "ideal nadir points kinks gaps notes solved"),
             "seconds": round(self.seconds, 4),
+            **({"interrupted": True} if self.interrupted else {}),
         }
 
 

@@ -27,7 +27,8 @@ def pareto(problem: Given, points: int = POINTS, **options: Unpack[Asked]) -> Fr
 
     Two objectives: minimise one subject to the other ≤ eps, the next eps where neighbours are farthest apart and on
     the objective that changes more, then sweeps both ways that keep the better design. Three: a grid of eps over the
-    payoff table, at most 12 × 12. Gaps narrower than the spacing of the points may be missed.
+    payoff table, at most 12 × 12. Gaps narrower than the spacing of the points may be missed. Ctrl-C leaves what is
+    known of the front, once its ends are.
 
     Args:
         problem: with ``pareto``; ``locate`` and constraints narrow the designs.
@@ -61,8 +62,11 @@ def pareto(problem: Given, points: int = POINTS, **options: Unpack[Asked]) -> Fr
     elif n == 2:
         front = curve(ask, ends, points, progress)
     else:
-        found, gaps, solved = surface(ask, ends, points, progress)
-        front = replace(front, points=found, gaps=gaps, solved=solved)
+        found, gaps, solved, interrupted = surface(ask, ends, points, progress)
+        front = replace(front, points=found, gaps=gaps, solved=solved, interrupted=interrupted)
+    if front.interrupted:
+        words = f"the user stopped the search after {front.solved} sub-problems; this is what is known of the front"
+        front = replace(front, notes=(*front.notes, words))
     return replace(front, seconds=time.perf_counter() - began)
 
 

@@ -1,6 +1,7 @@
 """The front of three objectives: a grid of limits on two of them, over the payoff table."""
 
 from collections.abc import Sequence
+from itertools import product
 
 from tmsopt.design.solution import Solution
 from tmsopt.fronts.front import FrontPoint, Gap, efficient
@@ -15,8 +16,8 @@ _SAME = 1e-7  # of the range: a corner of the table is held with a slack of 1e-9
 
 def surface(
     ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Progress | None
-) -> tuple[tuple[FrontPoint, ...], tuple[Gap, ...], int]:
-    """Efficient points, sub-problems that failed, and the number of those solved.
+) -> tuple[tuple[FrontPoint, ...], tuple[Gap, ...], int, bool]:
+    """Efficient points, sub-problems that failed, the number of those solved, and whether the user ended it.
 
     Objective 0 is minimised with limits on 1 and 2, from loose to tight; the worst values in the payoff table
     stand for the nadir. A limit that no design meets ends its row, and every tighter one with it.
@@ -28,8 +29,9 @@ def surface(
     impossible: set[tuple[int, int]] = set()
     failed: list[str] = []
     count = 0
-    for i in range(side, 0, -1):
-        for j in range(side, 0, -1):
+    interrupted = False
+    try:
+        for i, j in product(range(side, 0, -1), repeat=2):
             looser = [(i + 1, j), (i, j + 1)]
             if any(cell in impossible for cell in looser):
                 impossible.add((i, j))
@@ -49,8 +51,10 @@ def surface(
             solved[i, j] = found
             if progress:
                 progress(count, side * side)
+    except KeyboardInterrupt:
+        interrupted = True
     every = [*ends, *(point(ask, s) for s in {id(s): s for s in solved.values() if s is not None}.values())]
     ranges = [h - b for b, h in zip(low, high, strict=True)]
     kept = efficient(every, [_SAME * r for r in ranges])
     gaps = tuple(Gap(f"not solved for {text}; try more starts", 0, True) for text in failed)
-    return tuple(kept), gaps, count + 3
+    return tuple(kept), gaps, count + 3, interrupted
