@@ -18,8 +18,19 @@ The public names stand in `__init__.pyi`, once; each is imported when it is firs
 wait for CasADi.
 """
 
-import lazy_loader
-
 __version__ = "0.1.0"
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+def __getattr__(name: str) -> object:
+    """A public name; what imports it is loaded first, so that a command hears signals before that."""
+    from importlib import import_module
+
+    import lazy_loader
+
+    found = lazy_loader.attach_stub(__name__, __file__)
+    globals().update(zip(("__getattr__", "__dir__", "__all__"), found, strict=True))
+    return getattr(import_module(__name__), name)
+
+
+def __dir__() -> list[str]:
+    return list(__getattr__("__all__"))
