@@ -23,7 +23,7 @@ from scipy.optimize import brentq  # type: ignore[import-untyped]
 from benchmarks.suites import REFERENCES, random_problem, references
 from tmsopt import InputError, Problem, Solution, certify, models, solve
 from tmsopt.branch_and_bound import SCIP, UNDECIDED, Crew, Decision, GlobalSolver, Task
-from tmsopt.cli import main
+from tmsopt.cli import every as main
 from tmsopt.design import Band, Bound
 from tmsopt.records import Array
 from tmsopt.report import design_report

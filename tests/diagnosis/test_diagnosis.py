@@ -18,7 +18,7 @@ from helpers.oracles import polynomial_60, roots_60
 from mpmath import mp
 
 import tmsopt
-from tmsopt.cli import main
+from tmsopt.cli import every as main
 from tmsopt.diagnosis import Diagnosis, Response, branches, diagnosed, is_regular, jordan
 from tmsopt.models import Model, from_coefficients, from_matrices, tms
 from tmsopt.report import diagnosis_lines

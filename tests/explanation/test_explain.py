@@ -15,7 +15,7 @@ from mpmath import mp
 
 import tmsopt
 from tmsopt import laws
-from tmsopt.cli import main
+from tmsopt.cli import every as main
 from tmsopt.design import Unit, unit_of
 from tmsopt.explanation import moved, natural_step, rounded, step_within
 from tmsopt.models import Range, from_coefficients, tms

@@ -11,7 +11,7 @@ from helpers.oracles import abscissa_60, polynomial_60
 from mpmath import mp
 
 import tmsopt
-from tmsopt.cli import main
+from tmsopt.cli import every as main
 from tmsopt.explanation import NOT_COVERED, NOT_MINIMAL, STRICT, UNDECIDED
 from tmsopt.models import tms
 from tmsopt.report import optimality_lines

@@ -17,7 +17,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 import tmsopt
 from tmsopt import InputError, NotSolved, Problem
-from tmsopt.cli import main
+from tmsopt.cli import every as main
 from tmsopt.models import from_coefficients, tms
 from tmsopt.solver import solved
 

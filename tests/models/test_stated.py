@@ -16,7 +16,7 @@ from scipy.optimize import differential_evolution
 
 import tmsopt
 from tmsopt.charts import Grid, save_layers
-from tmsopt.cli import main
+from tmsopt.cli import every as main
 from tmsopt.design import ROOT_NAMES
 from tmsopt.models import CONSTANTS, FUNCTIONS, TAKEN, Unfit, from_coefficients, from_matrices, latex
 from tmsopt.studies import definition

@@ -15,7 +15,7 @@ from mpmath import mp
 
 import tmsopt
 from tmsopt import laws
-from tmsopt.cli import main
+from tmsopt.cli import every as main
 from tmsopt.critical_speeds import crossings, interpolated
 from tmsopt.models import MODELS, Values, canonical, copo, problem_text, spin, tms, to_si, whipple
 from tmsopt.roots import exact_roots, quadratic_pencil

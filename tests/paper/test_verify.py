@@ -16,7 +16,7 @@ from helpers import oracles
 from mpmath import mp
 
 from tmsopt import laws
-from tmsopt.cli import main
+from tmsopt.cli import every as main
 from tmsopt.paper.ledger import (
     BACKWARD,
     VERDICTS,

@@ -16,7 +16,7 @@ from helpers.oracles import is_stable_60, polynomial_60, roots_60, weave_Fr_60
 from matplotlib.figure import Figure
 
 from tmsopt import laws
-from tmsopt.cli import main
+from tmsopt.cli import every as main
 from tmsopt.design import load
 from tmsopt.models import Model, Parameter, ParameterSet, tms
 from tmsopt.paper import (

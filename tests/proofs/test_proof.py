@@ -20,7 +20,7 @@ from mpmath import mp
 
 import tmsopt
 from tmsopt.arithmetic import Number, Refused, enclosed, number, refined
-from tmsopt.cli import main
+from tmsopt.cli import every as main
 from tmsopt.design import Case
 from tmsopt.models import decimal
 from tmsopt.proofs import Factored, Proof, prove_design

@@ -166,7 +166,7 @@ def test_a_design_on_the_axis_is_on_the_edge() -> None:
 def test_a_scale_is_refused_where_there_is_one() -> None:
     from click.testing import CliRunner
 
-    from tmsopt.cli import main
+    from tmsopt.cli import every as main
 
     ended = CliRunner().invoke(main, ["solve", "problems/benchmark.toml", "--wheelbase", "1 m"])
     assert ended.exit_code == 2

@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 import tmsopt
-from tmsopt.cli import main
+from tmsopt.cli import every as main
 from tmsopt.models import from_coefficients, from_matrices
 
 c1, c2 = ca.SX.sym("c1"), ca.SX.sym("c2")

@@ -20,7 +20,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from tmsopt import laws
 from tmsopt.checks import law_rows
-from tmsopt.cli import main
+from tmsopt.cli import every as main
 from tmsopt.design import Problem, load
 from tmsopt.errors import InputError
 from tmsopt.models import tms

@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 from flint import fmpq, fmpq_poly
 
-from tmsopt.cli import main
+from tmsopt.cli import every as main
 from tmsopt.design import Problem, load
 from tmsopt.errors import InputError
 from tmsopt.explanation import optimality

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import NoReturn
 
+    from tmsopt.cli.commands import every as every
+
 
 def main(args: "Sequence[str] | None" = None, prog_name: str | None = None) -> "NoReturn":
     """Run a command and exit with its status, or with 128 and the number of the signal that stopped it.
@@ -38,3 +40,12 @@ def main(args: "Sequence[str] | None" = None, prog_name: str | None = None) -> "
             if args is None:
                 gone(heard.status)
     sys.exit(status)
+
+
+def __getattr__(name: str) -> object:
+    """The commands as click knows them, ``every``, for programs that call them themselves."""
+    if name != "every":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from tmsopt.cli.commands import every
+
+    return every
