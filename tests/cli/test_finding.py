@@ -134,7 +134,7 @@ def test_shells_complete_as_the_documentation_says(
 ) -> None:
     documented = (Path(__file__).parents[2] / "docs" / "command_line.md").read_text(encoding="utf-8")
     assert f"_TMSOPT_COMPLETE={shell}_source tmsopt" in documented
-    last = words.split()[-1] if shell == "fish" else str(len(words.split()) - 1)
+    last = words.rsplit(maxsplit=1)[-1] if shell == "fish" else str(len(words.split()) - 1)
     for name, value in {"_TMSOPT_COMPLETE": f"{shell}_complete", "COMP_WORDS": words, "COMP_CWORD": last}.items():
         monkeypatch.setenv(name, value)
     with pytest.raises(SystemExit) as stop:
