@@ -8,6 +8,7 @@ import tempfile
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from itertools import islice
 from math import isnan
 from os import PathLike
 from pathlib import Path
@@ -23,6 +24,7 @@ LARGEST = 1_000_000
 
 _WIDTH = 80  # of a value in a message
 _TRIES = 20
+_NEIGHBOURS = 1000  # files of a folder that are looked at for one that was meant
 
 
 @contextmanager
@@ -200,7 +202,7 @@ def read_text(file: str, kind: str, largest: int = LARGEST) -> str:
             raise InputError([Fault(f"is a directory; accepted: a {kind}", file=file)])
         if not path.exists():
             others = path.parent.glob(f"*.{form.lower()}") if path.parent.is_dir() else ()
-            near = suggest(path.name, sorted(p.name for p in others))
+            near = suggest(path.name, sorted(p.name for p in islice(others, _NEIGHBOURS)))
             hint = f"; {near}" if "did you mean" in near else ""
             raise InputError([Fault(f"no such file{hint}", file=file)])
         if not path.is_file():

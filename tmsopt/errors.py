@@ -1,12 +1,24 @@
 """Bad input as data: every fault found, with its place, and one exception that carries them all."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from importlib import import_module
+from itertools import islice
 from numbers import Integral, Real
 from typing import Any
+
+LISTED = 50
+"""Faults that a message lists; the rest is counted."""
+
+_LONGEST = 4000  # characters of a message; the middle of a longer one is left out
+_WIDTH = 60  # of a value in a message
+_NAME = 80  # characters of a name for which a near one is looked for, which takes time by the square of them
+_NAMES = 200  # that are listed as accepted
+_UNSHOWABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+"""What a terminal obeys, what breaks a line or turns its order round, and halves of characters."""
 
 
 @dataclass(frozen=True)
@@ -30,15 +42,17 @@ class Fault:
 
     def __str__(self) -> str:
         place = f"{self.file}:{self.line}" if self.line else self.file
-        return ": ".join(part for part in (place, ".".join(map(str, self.key)), self.message) if part)
+        key, message = _cut(".".join(map(str, self.key)), 2 * _WIDTH), _cut(self.message, _LONGEST)
+        return visible(": ".join(part for part in (place, key, message) if part))
 
 
 class InputError(ValueError):
-    """A problem that is not well posed; `faults` lists everything found wrong with it."""
+    """A problem that is not well posed; `faults` has everything found wrong with it, the message the first `LISTED`."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         self.faults = tuple(faults)
-        super().__init__("\n".join(str(f) for f in self.faults))
+        more = len(self.faults) - LISTED
+        super().__init__("\n".join([*map(str, self.faults[:LISTED]), *([f"and {more} more"] if more > 0 else [])]))
 
     def __reduce__(self) -> tuple[type["InputError"], tuple[tuple[Fault, ...]]]:
         return InputError, (self.faults,)
@@ -77,19 +91,76 @@ def call_faults(name: str, value: Any) -> list[Fault]:
     return [] if value is None or callable(value) else [Fault(f"found {short(value)}; accepted: a function", (name,))]
 
 
+def text_faults(text: Any, *key: str) -> list[Fault]:
+    """What is wrong with a text that reports and tables show on one line."""
+    if not isinstance(text, str):
+        return [Fault(f"found {short(text)}; accepted: a text", key)]
+    return [Fault(f"{wrong}; accepted: a text of one line", key)] if (wrong := unshowable(text)) else []
+
+
+def unshowable(text: str, but: str = "") -> str:
+    """The first character of a text that is not shown, such as an escape sequence's, in words; empty for none.
+
+    Args:
+        but: characters that may stand in it.
+    """
+    found = next((c[0] for c in _UNSHOWABLE.finditer(text) if c[0] not in but), None)
+    return f"found the control character {visible(found)} in {short(text)}" if found else ""
+
+
+def visible(text: str) -> str:
+    """A text as it may stand on a terminal: control characters, line breaks and lone surrogates as escapes."""
+    return _UNSHOWABLE.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), text)
+
+
 def suggest(name: Any, accepted: Iterable[str]) -> str:
     """A sentence that offers the nearest accepted name, if one is near, and lists all of them."""
     names, name = list(accepted), str(name)
     by_case = [n for n in names if n.lower() == name.lower()]
-    near = by_case or get_close_matches(name, names, n=1, cutoff=0.5)
+    near = by_case or nearest(name, names)
     hint = f"did you mean '{near[0]}'? " if near else ""
-    return f"{hint}accepted: {' '.join(names)}"
+    more = f" and {len(names) - _NAMES} more" if len(names) > _NAMES else ""
+    return f"{hint}accepted: {' '.join(names[:_NAMES])}{more}"
+
+
+def nearest(name: str, names: Iterable[str], cutoff: float = 0.5) -> list[str]:
+    """The name that is nearest by spelling, if one is; none for a name of more than 80 characters."""
+    return [] if len(name) > _NAME else get_close_matches(name, islice(names, _NAMES), n=1, cutoff=cutoff)
+
+
+def at_first(advise: Callable[..., str]) -> Callable[..., str]:
+    """Advice for as many faults as are listed: what takes time is not looked for where it is only counted."""
+    left = iter(range(LISTED))
+    return lambda *about: advise(*about) if next(left, None) is not None else "accepted: as above"
 
 
 def short(value: Any) -> str:
-    """A value as found, cut where it is long."""
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "…"
+    """A value as found, cut where it is long, control characters as escapes."""
+    return _cut(visible(_text(value, _WIDTH)), _WIDTH)
+
+
+def _cut(text: str, most: int) -> str:
+    """The text; the middle of a long one is left out, of one to be short the end."""
+    if len(text) <= most:
+        return text
+    return f"{text[: most - 3]}…" if most <= _WIDTH else f"{text[: most // 2]} … {text[-most // 2 :]}"
+
+
+def _text(value: Any, room: int) -> str:
+    """What `repr` says, little more of it than is shown: a file may hold numbers and lists of any size and depth."""
+    if type(value) in (list, tuple, dict) and value:
+        entries = value.items() if isinstance(value, dict) else ((None, x) for x in value)
+        said = [_text(x, room // 4) if k is None else f"{_text(k, 0)}: {_text(x, room // 4)}" for k, x in
+                islice(entries, room)]  # fmt: skip
+        inner = ", ".join([*said, "…"] if len(value) > room else said)
+        if isinstance(value, dict):
+            return f"{{{inner}}}"
+        return f"[{inner}]" if isinstance(value, list) else f"({inner}{',' * (len(value) == 1)})"
+    if isinstance(value, str | bytes):
+        return repr(value[: _WIDTH + 1])
+    if isinstance(value, int) and value.bit_length() > 4 * _WIDTH:
+        return f"a whole number of about {round(value.bit_length() * math.log10(2))} digits"
+    return repr(value)
 
 
 def needed(module: str, otherwise: str = "") -> Any:

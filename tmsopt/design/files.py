@@ -15,7 +15,7 @@ from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.solution import Solution
 from tmsopt.design.toml import Number, Section, fitted, read_page
 from tmsopt.design.validate import VARIATIONS
-from tmsopt.errors import Fault, InputError, short, suggest
+from tmsopt.errors import Fault, InputError, short, suggest, visible
 from tmsopt.models import MODELS, Model
 from tmsopt.models.bicycle_files import read_bicycle
 
@@ -140,7 +140,7 @@ def _read(path: str | PathLike[str], faults_of: Callable[[Problem], list[Fault]]
         own = f"its problem, {written}" if isinstance(written, str) else "a file with its [problem] alone"
         message = f"is a study of many designs, not one problem; run tmsopt study {page.file}, or give {own}"
         raise InputError([Fault(message, file=page.file)])
-    faults, problem = posed(_with_bicycle(page.data, Path(page.file).parent), Path(page.file).stem)
+    faults, problem = posed(_with_bicycle(page.data, Path(page.file).parent), visible(Path(page.file).stem))
     if problem is not None and not faults:  # a misspelt [objective] asks something
         faults = [*faults, *faults_of(problem)]
     if problem is None or faults:
@@ -177,7 +177,7 @@ def posed(data: Mapping[str, Any], title: str) -> tuple[list[Fault], Problem | N
                 tables["fixed"][fault.key[1]] = math.nan  # known to be given, and already reported
         try:
             problem = Problem(
-                model=model, constraints=parsed.constraints, title=parsed.title or title, **tables,
+                model=model, constraints=parsed.constraints, title=parsed.title.strip() or title, **tables,
                 **vars(parsed.objective) | {"pareto": parsed.objective.pareto or ()},
             )  # fmt: skip
         except InputError as error:
@@ -194,7 +194,7 @@ def _model(written: Any) -> tuple[list[Fault], Model | None]:
     if not isinstance(written, str):
         return [], None  # a fault of shape
     model = MODELS.get(written)
-    unknown = f"unknown model '{written}'; {suggest(written, MODELS)}; your own goes in a table [model]"
+    unknown = f"unknown model {short(written)}; {suggest(written, MODELS)}; your own goes in a table [model]"
     return ([Fault(unknown, ("model",))] if model is None else []), model
 
 
@@ -204,22 +204,22 @@ def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault: 
     key = tuple(str(k) for k in where if k not in tags)
     match key:
         case (section,) if kind == "extra_forbidden":
-            return Fault(f"unknown key '{section}'; {unknown_key(section, _File.model_fields)}", key)
+            return Fault(f"unknown key {short(section)}; {unknown_key(section, _File.model_fields)}", key)
         case ("model",):
             return Fault(f"found {short(found)}; accepted: the name of a model in quotes, or a table [model]", key)
         case ("parameters",) if kind == "missing":
             return Fault(_NO_PARAMETERS, key)
         case ("parameters", name, end) if kind == "extra_forbidden":
-            return Fault(f"unknown key '{end}' of {name}; {suggest(end, _FreeParameter.model_fields)}", key)
+            return Fault(f"unknown key {short(end)} of {name}; {suggest(end, _FreeParameter.model_fields)}", key)
         case ("parameters", name, end) if kind == "missing":
             return Fault(f"missing {end} of {name}; write e.g. {name} = {{ min = 0.5, max = 2 }}", key)
         case ("parameters", _, *_):
             accepted = "a number, a text with a unit such as '5 deg', or { min = …, max = …, start = … }"
             return Fault(f"found {short(found)}; accepted: {accepted}", key[:3])
         case ("objective", sense, *_) if kind == "extra_forbidden":
-            return Fault(f"unknown key '{sense}'; {unknown_key(sense, _Objective.model_fields, 'objective')}", key)
+            return Fault(f"unknown key {short(sense)}; {unknown_key(sense, _Objective.model_fields, 'objective')}", key)
         case ("scenarios", name, end, *_) if kind == "extra_forbidden":
-            return Fault(f"unknown key '{end}' of {name}; {suggest(end, _Band.model_fields)}", key)
+            return Fault(f"unknown key {short(end)} of {name}; {suggest(end, _Band.model_fields)}", key)
         case ("scenarios", name, end) if kind == "missing":
             return Fault(f"missing {end} of {name}; write e.g. {name} = {{ min = 1, max = 2, points = 7 }}", key)
         case ("scenarios", _, *_):

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from tmsopt.errors import Fault, short, suggest
+from tmsopt.errors import Fault, at_first, short, suggest, text_faults
 from tmsopt.models import Model, Unfit, from_coefficients, from_matrices
 from tmsopt.models.texts import Texts
 
@@ -31,11 +31,12 @@ def stated_model(table: Mapping[str, Any]) -> tuple[list[Fault], Model | None]:
     """
     reader = _Reader(table)
     given = [key for key in (*_MATRICES, "coefficients") if key in table]
+    advice = at_first(suggest)
     for key in table:
         if key not in KEYS:
-            reader.fault(f"unknown key '{key}'; {suggest(key, KEYS)}", key)
+            reader.fault(f"unknown key {short(key)}; {advice(key, KEYS)}", key)
     name = table.get("name", "stated")
-    if not isinstance(name, str) or not name.strip() or not name.isprintable():
+    if text_faults(name) or not name.strip():
         reader.fault(f"found {short(name)}; accepted: a text of one line in quotes", "name")
     if not given:
         reader.fault(f"states no system; {_EXAMPLE}")

@@ -80,7 +80,9 @@ class Problem:
         kept = {"fixed": {**given, **pinned}, "tolerances": self.tolerances, "weights": self.weights}
         kept["start"] = {n: v for n, v in self.start.items() if n in ends}
         plain: dict[str, Any] = {table: {n: float(v) for n, v in values.items()} for table, values in kept.items()}
-        plain |= {"free": ends, "constraints": dict(self.constraints), "pareto": tuple(self.pareto)}
+        plain |= {"free": ends, "constraints": {n: text.strip() for n, text in self.constraints.items()}}
+        plain |= {"pareto": tuple(text.strip() for text in self.pareto)}  # reports show it on one line
+        plain |= {s: text and text.strip() for s, text in (("minimize", self.minimize), ("maximize", self.maximize))}
         for name, value in plain.items():
             object.__setattr__(self, name, value)
 

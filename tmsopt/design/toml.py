@@ -3,7 +3,7 @@
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import Any, TypeVar
 
@@ -11,7 +11,12 @@ from pydantic import BaseModel, ConfigDict, StrictFloat, StrictInt, StrictStr, V
 
 from tmsopt.design.advice.lines import line_advice
 from tmsopt.disk import path_of, read_text
-from tmsopt.errors import Fault, InputError
+from tmsopt.errors import LISTED, Fault, InputError, short
+
+MOST_PARTS, MOST_DEEP, LONGEST_WORD = 10, 50, 1000
+"""Parts of a dotted key; lists and tables one in another; characters of a number, or of a name without quotes."""
+
+_EXPLAINED = 10 * LISTED  # complaints, of which a key may have several
 
 Number = StrictFloat | StrictInt | StrictStr
 """A number, or a text with a unit."""
@@ -62,16 +67,17 @@ def read_page(path: str | PathLike[str], kind: str) -> Page:
     path_of(path, f"a {kind} file")
     file = str(path) or "."
     text = read_text(file, f"TOML {kind} file")
+    scan = _scanned(text)
+    if scan.fault:
+        raise InputError([scan.fault.at(file, scan.fault.line)])
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         place = re.search(r"line (\d+)", str(error))
-        line = _unclosed(text) or (int(place[1]) if place else text.count("\n") + 1)
-        written = "".join(text.splitlines()[line - 1 : line])  # none where the end of the file is at fault
+        line = scan.unclosed or (int(place[1]) if place else text.count("\n") + 1)
+        written = "".join(text.split("\n")[line - 1 : line])  # none where the end of the file is at fault
         raise InputError([Fault(f"not TOML: {error}{line_advice(written)}").at(file, line)]) from None
-    except RecursionError:
-        raise InputError([Fault("not TOML: nested too deeply", file=file)]) from None
-    return Page(file, data, _lines(text))
+    return Page(file, data, scan.lines)
 
 
 def fitted(
@@ -88,14 +94,23 @@ def fitted(
         try:
             return list(faults.values()), schema.model_validate(pruned)
         except ValidationError as error:
-            found = [explain(d["loc"], d["type"], d.get("input")) for d in error.errors(include_url=False)]
-            deepest = {f.key[:2]: max(len(g.key) for g in found if g.key[:2] == f.key[:2]) for f in found}
+            complaints = enumerate(error.errors(include_url=False, include_context=False))
+            found = [
+                explain(d["loc"], d["type"], d["input"]) if n < _EXPLAINED else _unexplained(d["loc"], d["input"])
+                for n, d in complaints
+            ]
+            deepest: dict[Key, int] = {}
+            for fault in found:
+                deepest[fault.key[:2]] = max(len(fault.key), deepest.get(fault.key[:2], 0))
             for fault in found:
                 if len(fault.key) == deepest[fault.key[:2]]:
                     faults.setdefault(fault.key, fault)
-        for key in faults:
-            pruned = _without(pruned, key[:2])
+        pruned = _without(pruned, {key[:2] for key in faults})
     return list(faults.values()), None
+
+
+def _unexplained(where: tuple[int | str, ...], found: Any) -> Fault:
+    return Fault(f"found {short(found)}; accepted: what the other faults say", tuple(map(str, where[:2])))
 
 
 def within(section: str, faults: Iterable[Fault]) -> list[Fault]:
@@ -103,67 +118,81 @@ def within(section: str, faults: Iterable[Fault]) -> list[Fault]:
     return [replace(f, key=(section, *f.key)) for f in faults]
 
 
-def _without(data: Mapping[str, Any], key: Key) -> dict[str, Any]:
-    inner = data.get(key[0])
-    if len(key) == 2 and isinstance(inner, dict):
-        return {**data, key[0]: {k: v for k, v in inner.items() if k != key[1]}}
-    return {k: v for k, v in data.items() if k != key[0]}
+def _without(data: Mapping[str, Any], keys: set[Key]) -> dict[str, Any]:
+    inner = {n: {k: v for k, v in t.items() if (n, k) not in keys} for n, t in data.items() if isinstance(t, dict)}
+    plain = {n for n, *rest in keys if not rest or n not in inner}
+    return {n: inner.get(n, value) for n, value in data.items() if n not in plain}
 
 
-_HEADER = re.compile(r"\s*\[+\s*([^\]]+?)\s*\]+")
-_KEY = re.compile(r"\s*([A-Za-z0-9_\-.\"' ]+?)\s*=")
-_SECTION = re.compile(r"\[[A-Za-z_][\w.]*\]\s*(#.*)?$")
-_LONG_QUOTES = ('"""', "'''")
-_TOKEN = re.compile(r"""\"{3}|'{3}|\"(?:[^\"\\]|\\.)*\"|'[^']*'|[][{}#]""")
-_PART = re.compile(r"\"[^\"]*\"|'[^']*'|[^.\"']+")
+_TOKEN = re.compile(
+    r"""\"{3}(?:[^"\\]++|\\.|"(?!""))*+(?:"{3,5})?|'{3}(?:[^']++|'(?!''))*+(?:'{3,5})?"""
+    r"""|\"(?:[^"\\\n]++|\\[^\n])*+"?|'[^'\n]*+'?|\#[^\n]*+|[\w+:-]++|[^ \t\r]""",
+    re.DOTALL,
+)
+"""Every character of a text is looked at once, whatever it holds: a text that is not closed ends with the file."""
+
+_MARKS = frozenset("[]{}=.,")
+_STATEMENT = re.compile(r"[ \t]*+(?:[\w.\-\"' \t]++=|\[[A-Za-z_][\w.]*+\][ \t]*+(?:\#[^\n]*+)?$)", re.MULTILINE)
 
 
-def _lines(text: str) -> dict[Key, int]:
-    """Line number of every section and key that begins a line, but for lines inside a list or a text of several."""
+@dataclass
+class _Scan:
+    """What a file says of its lines before it is read, and why it is not to be read at all.
+
+    Attributes:
+        lines: section or key that begins a line → number of that line, but for lines in a list or a text of several.
+        unclosed: line of a list that is still open where another key or section begins; 0 for none.
+    """
+
+    lines: dict[Key, int] = field(default_factory=dict)
+    unclosed: int = 0
+    fault: Fault | None = None
+
+
+def _scanned(text: str) -> _Scan:
+    """Where sections and keys are; stops at what would take the parser more time or memory than files need."""
+    found = _Scan()
     section: Key = ()
-    lines: dict[Key, int] = {}
-    depth, inside = 0, ""
-    for number, line in enumerate(text.splitlines(), start=1):
-        if depth == 0 and not inside:
-            if header := _HEADER.match(line):
-                section = _path(header[1])
-                lines.setdefault(section, number)
-                continue
-            if key := _KEY.match(line):
-                lines.setdefault((*section, *_path(key[1])), number)
-        depth, inside = _open(line, depth, inside)
-    return lines
-
-
-def _unclosed(text: str) -> int:
-    """Line of a list that is still open where another key or section begins; 0 for none."""
-    depth, inside, begun = 0, "", 0
-    for number, line in enumerate(text.splitlines(), start=1):
-        if depth == 0:
-            begun = number
-        elif not inside and (_KEY.match(line) or _SECTION.match(line)):
-            return begun
-        if depth > 0 or not _HEADER.match(line):
-            depth, inside = _open(line, depth, inside)
-    return begun if depth > 0 else 0
-
-
-def _open(line: str, depth: int, inside: str) -> tuple[int, str]:
-    """How many brackets are open after a line, and the quotes of a text that goes on."""
-    for token in _TOKEN.findall(line):
-        if inside:
-            inside = "" if token == inside else inside
-        elif token in _LONG_QUOTES:
-            inside = token
-        elif token == "#":
+    line, begun, depth, run = 1, 1, 0, 0
+    head: list[str] | None = []  # parts of the section or key that is being read; None in a value
+    end = after = "="  # of the head, "]" for a section; the token before this one
+    for match in _TOKEN.finditer(text):
+        token = match[0]
+        if token == "\n":
+            if depth == 0:
+                head, end, begun = [], "=", line + 1
+            elif not found.unclosed and _STATEMENT.match(text, match.end()):
+                found.unclosed = begun
+        elif token in _MARKS:
+            if head is None:
+                depth = max(0, depth + (token in "[{") - (token in "]}"))
+            elif token == "[" and not head:
+                end = "]"
+            elif token == end:
+                key = tuple(head)
+                section, key = (key, key) if end == "]" else (section, (*section, *key))
+                found.lines.setdefault(key, line)
+                head = None
+        elif token[0] != "#":
+            run = run + 1 if after == "." else 1
+            if head is not None:
+                head.append(token.strip("\"'"))
+        if wrong := _beyond(token, run, depth):
+            found.fault = Fault(wrong, line=line)
             break
-        elif token in "[{":
-            depth += 1
-        elif token in "]}":
-            depth -= 1
-    return depth, inside
+        line += token.count("\n")
+        after = token
+    found.unclosed = found.unclosed or (begun if depth else 0)
+    return found
 
 
-def _path(dotted: str) -> Key:
-    parts = (part.strip() for part in _PART.findall(dotted))
-    return tuple(part.strip("\"'") for part in parts if part)
+def _beyond(token: str, parts: int, depth: int) -> str:
+    """What is larger than files need; empty where nothing is."""
+    if parts > MOST_PARTS:
+        return f"found a key of more than {MOST_PARTS} parts; accepted: up to {MOST_PARTS}"
+    if depth > MOST_DEEP:
+        return f"found lists or tables more than {MOST_DEEP} deep; accepted: up to {MOST_DEEP}"
+    if len(token) > LONGEST_WORD and token[0] not in "\"'#":
+        accepted = f"numbers, and names without quotes, of up to {LONGEST_WORD}"
+        return f"found {len(token)} characters, {short(token)}; accepted: {accepted}"
+    return ""

@@ -8,7 +8,7 @@ from tmsopt.design.advice.names import unknown
 from tmsopt.design.cases import Band, points_of
 from tmsopt.design.expression import ExpressionError, UnknownName, parse_comparison, parse_value
 from tmsopt.design.quantities import ROOT_NAMES, spelled_out
-from tmsopt.errors import Fault, short, suggest, table_faults
+from tmsopt.errors import Fault, at_first, short, suggest, table_faults, text_faults
 from tmsopt.models import Model, ParameterSet
 from tmsopt.roots import pattern
 from tmsopt.roots.patterns.composed import pattern_names
@@ -21,6 +21,11 @@ _SMALLEST = 1e-50  # size of a parameter but 0; its inverse is the largest
 MOST_TOLERANCES = 8
 """Parameters with a tolerance: a box has two corners for one, 256 for eight."""
 
+
+MOST = {"constraints": 1000, "scenarios": 1000}
+"""Constraints of a problem, and values of a scenario."""
+
+_LONGEST = 200  # characters of the name of a pattern
 
 Stated = Any
 """A Problem as its author stated it: any field may be of any type."""
@@ -46,8 +51,19 @@ def shape_faults(problem: Stated) -> Iterator[Fault]:
         yield Fault(f"found {type(problem.model).__name__}; accepted: {accepted}", ("model",))
     for name, example in _TABLES.items():
         yield from table_faults(name, getattr(problem, name), example)
-    if not isinstance(problem.title, str):
-        yield Fault(f"found {short(problem.title)}; accepted: a text", ("title",))
+    if isinstance(problem.constraints, Mapping):
+        yield from _size_faults("constraints", problem.constraints, "constraints")
+        for name in (n for n in problem.constraints if isinstance(n, str)):
+            yield from text_faults(name, "constraints", name)
+    if isinstance(problem.scenarios, Mapping):
+        for name, values in problem.scenarios.items():
+            yield from _size_faults("scenarios", values, "scenarios", str(name))
+    yield from text_faults(problem.title, "title")
+
+
+def _size_faults(what: str, values: Any, *key: str) -> Iterator[Fault]:
+    if isinstance(values, Sequence | Mapping) and not isinstance(values, str) and len(values) > MOST[what]:
+        yield Fault(f"found {len(values)}; accepted: up to {MOST[what]}", key)
 
 
 def faults(problem: Stated) -> Iterator[Fault]:
@@ -65,6 +81,7 @@ def faults(problem: Stated) -> Iterator[Fault]:
 
 def _name_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     others = {n: s.name for s in problem.model.sets if s is not of for n in s.names}
+    advice = at_first(unknown)
     tables = {"parameters": {**problem.fixed, **problem.free}} | {t: getattr(problem, t) for t in VARIATIONS}
     for table, name in ((t, n) for t, names in tables.items() for n in names):
         if name in of.names:
@@ -76,7 +93,7 @@ def _name_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
                 (table, name),
             )
         else:
-            yield Fault(f"unknown parameter '{name}'; {unknown(name, problem.model, of, of.names)}", (table, name))
+            yield Fault(f"unknown parameter {short(name)}; {advice(name, problem.model, of, of.names)}", (table, name))
     for name in problem.fixed:
         if name in problem.free:
             yield Fault(f"'{name}' is both fixed and free; keep one", ("parameters", name))
@@ -98,7 +115,7 @@ def _value_faults(problem: Stated, of: ParameterSet, name: str) -> Iterator[Faul
     try:
         lower, upper = problem.free[name]
     except (TypeError, ValueError):
-        yield Fault(f"found {problem.free[name]!r}; accepted: a pair (least, greatest)", key)
+        yield Fault(f"found {short(problem.free[name])}; accepted: a pair (least, greatest)", key)
         return
     ends = {"min": lower, "max": upper}
     if name in problem.start:
@@ -141,7 +158,7 @@ def _variation_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     for table, needed in (("tolerances", "greater than 0"), ("weights", "0 or greater")):
         for name, value in getattr(problem, table).items():
             if name in of.names and not _is_size(value, zero=table == "weights"):
-                yield Fault(f"found {value!r}; accepted: a finite number {needed}", (table, name))
+                yield Fault(f"found {short(value)}; accepted: a finite number {needed}", (table, name))
             elif table == "tolerances" and name in of.names:
                 yield from _room_faults(problem, of, name, float(value))
     if len(problem.tolerances) > MOST_TOLERANCES:
@@ -159,9 +176,9 @@ def _scenario_faults(problem: Stated, of: ParameterSet, name: str, scenario: Any
         if not found and scenario.min >= scenario.max:
             yield Fault(f"min = {scenario.min:.6g} is not less than max = {scenario.max:.6g}", key)
         if isinstance(scenario.points, bool) or not isinstance(scenario.points, int) or not 2 <= scenario.points <= 99:
-            yield Fault(f"points = {scenario.points!r}; accepted: a whole number from 2 to 99", (*key, "points"))
+            yield Fault(f"points = {short(scenario.points)}; accepted: a whole number from 2 to 99", (*key, "points"))
     elif not isinstance(scenario, Sequence) or isinstance(scenario, str) or not scenario:
-        yield Fault(f"found {scenario!r}; accepted: {{ min = …, max = …, points = … }}, or a list of values", key)
+        yield Fault(f"found {short(scenario)}; accepted: {{ min = …, max = …, points = … }}, or a list of values", key)
     else:
         for value in scenario:
             yield from _number_faults(of, name, value, key)
@@ -204,7 +221,7 @@ def _number_faults(of: ParameterSet, name: str, value: Any, key: tuple[str, ...]
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not math.isfinite(number):
-        yield Fault(f"found {value!r}; accepted: a finite number{unit and ' in' + unit}", key)
+        yield Fault(f"found {short(value)}; accepted: a finite number{unit and ' in' + unit}", key)
     elif not _is_square(number):
         yield Fault(f"found {number:g}; accepted: 0, or a size from {_SMALLEST:g} to {1 / _SMALLEST:g}{unit}", key)
     elif number not in parameter.range:
@@ -230,7 +247,9 @@ def pattern_faults(name: Any, degree: int, key: tuple[str, ...]) -> Iterator[Fau
     """What is wrong with the name of a pattern for polynomials of a degree."""
     try:
         if not isinstance(name, str):
-            raise ValueError(f"{name!r} is no pattern")
+            raise ValueError(f"{short(name)} is no pattern")
+        if len(name) > _LONGEST:
+            raise ValueError(f"{short(name)} is no pattern")
         pattern(name, degree)
     except ValueError as error:
         joined = ", or several, joined by +" if degree > 4 else ""
@@ -241,18 +260,19 @@ def _pareto_faults(texts: Any) -> Iterator[Fault]:
     accepted = "accepted: two or three different expressions to minimise, such as ['abscissa', 'Fr', '-lambda_s']"
     listed = isinstance(texts, Sequence) and not isinstance(texts, str)
     if not listed or len(texts) not in (0, 2, 3) or len({str(t).strip() for t in texts}) < len(texts):
-        yield Fault(f"found {texts!r}; {accepted}, where a minus sign maximises", ("objective", "pareto"))
+        yield Fault(f"found {short(texts)}; {accepted}, where a minus sign maximises", ("objective", "pareto"))
 
 
 def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     accepted = (*of.names, *problem.model.quantity_names(of), *ROOT_NAMES)
+    advice = at_first(unknown)
 
     def parsed(parse: Any, text: Any, *key: str) -> Iterator[Fault]:
         try:
             parse(text, accepted)
             parse(spelled_out(text, of), accepted)  # which may be too long where the text is not
         except UnknownName as error:
-            yield Fault(f"{error.found}; {unknown(error.name, problem.model, of)}", key)
+            yield Fault(f"{error.found}; {advice(error.name, problem.model, of)}", key)
         except ExpressionError as error:
             yield Fault(str(error), key)
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from os import PathLike
 
 from tmsopt.disk import path_of, read_text
-from tmsopt.errors import Fault, InputError, suggest
+from tmsopt.errors import Fault, InputError, at_first, short, suggest, visible
 from tmsopt.models.bicycles.whipple import whipple
 from tmsopt.records import Table
 
@@ -27,7 +27,7 @@ _YAML = (".yml", ".yaml")
 _TEXT = (".txt", ".ini")
 _KINDS = ("benchmark", "meijaard2007")
 
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d++)?"
 _MEASURED = re.compile(
     rf"\(?\s*(?P<value>{_NUMBER})\s*(?:(?:\+/-|±)\s*(?P<off>{_NUMBER}))?\s*\)?(?P<power>[eE][+-]?\d+)?"
 )
@@ -67,18 +67,19 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
     text = read_text(str(path), f"{kind} file of bicycle parameters")
     entries = list(_yaml(text) if kind == "YAML" else _lines(text))
     faults, found, off, others = [], {}, {}, {}
+    advice = at_first(suggest)
     for number, name, written in entries:
         numbers = _numbers(written)
         if kind == "YAML" and name == "parameterization":
             if written.strip("'\" ").lower() not in _KINDS:
-                message = f"found the parameterization '{written}'; accepted: Meijaard2007 or benchmark"
+                message = f"found the parameterization {short(written)}; accepted: Meijaard2007 or benchmark"
                 faults.append(Fault(message).at(str(path), number))
         elif name not in _OWN and name not in _NO_PART:
-            message = f"unknown name '{name}'; {suggest(name, [*_OWN, *_NO_PART])}"
+            message = f"unknown name {short(name)}; {advice(name, [*_OWN, *_NO_PART])}"
             faults.append(Fault(message).at(str(path), number))
         elif numbers is None:
             message = (
-                f"{name}: found '{written}'; accepted: a number, with +/- its uncertainty, or several after commas"
+                f"{name}: found {short(written)}; accepted: a number, with +/- its uncertainty, or several after commas"
             )
             faults.append(Fault(message).at(str(path), number))
         elif name in _NO_PART:
@@ -94,7 +95,7 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
     if faults:
         raise InputError(faults)
     ordered = {n: found[n] for n in _OF.names if n in found}
-    return Bicycle(file.stem, Table(ordered), Table({n: off[n] for n in ordered if off[n] > 0}), Table(others))
+    return Bicycle(visible(file.stem), Table(ordered), Table({n: off[n] for n in ordered if off[n] > 0}), Table(others))
 
 
 def write_bicycle(bicycle: Bicycle | Mapping[str, float], path: str | PathLike[str]) -> None:
@@ -193,4 +194,4 @@ def _decimal(value: float) -> str:
 
 
 def _quoted(text: str) -> str:
-    return '"' + "".join(c for c in text if c.isprintable() and c not in '"\\') + '"'
+    return '"' + "".join(c for c in visible(text) if c not in '"\\') + '"'

@@ -5,10 +5,13 @@ import re
 _QUOTED = re.compile(r"\"(?:[^\"\\]|\\.)*\"|'[^']*'")
 _NUMBER = r"[+-]?\d[\d.]*(?:[eE][+-]?\d+)?"
 _PAIRS = {"[": "]", "{": "}"}
+_LONGEST = 1000  # characters of a line; how one is read takes time by the square of them
 
 
 def line_advice(line: str) -> str:  # noqa: PLR0911 - one per case
     """The end of a sentence that says what to write for a line that is refused; empty where that is not known."""
+    if len(line) > _LONGEST:
+        return ""
     bare = _QUOTED.sub('""', line).split("#")[0]  # nothing inside quotes is at fault
     key, _, value = bare.partition("=")
     if bare.count('"') % 2 or bare.count("'") % 2:

@@ -1,11 +1,10 @@
 """Every name that an expression may use, with its meaning, and what was meant by one that is not among them."""
 
 from collections.abc import Iterable, Mapping
-from difflib import get_close_matches
 from operator import itemgetter
 
 from tmsopt.design.quantities import NO_RADIUS, ROOT_NAMES, ROOT_QUANTITIES
-from tmsopt.errors import suggest
+from tmsopt.errors import nearest, suggest
 from tmsopt.models import Model, Parameter, ParameterSet, Quantity
 
 _NEAR = 0.7  # of a misspelt word; what is less alike is looked for among the meanings first
@@ -48,7 +47,7 @@ def unknown(name: str, model: Model, of: ParameterSet, accepted: Iterable[str] |
         return model.absent[name]
     known = vocabulary(model, of)
     names = list(known if accepted is None else accepted)
-    if not get_close_matches(name.lower(), [n.lower() for n in names], n=1, cutoff=_NEAR):
+    if not nearest(name.lower(), [n.lower() for n in names], _NEAR):
         words = name.lower().replace("_", " ")
         for n in names:
             meaning = known[n].meaning.lower()
