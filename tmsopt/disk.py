@@ -1,29 +1,33 @@
 """Files and folders: read, written as a whole or not at all, by one process at a time, compared and moved aside."""
 
 import csv
+import io
 import json
 import os
+import re
 import shutil
 import tempfile
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from itertools import islice
 from math import isnan
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from tmsopt.errors import Fault, InputError, short, suggest
 
 if TYPE_CHECKING:
     import sqlite3
 
-LARGEST = 1_000_000
+LARGEST = 500_000
 """Bytes; a longer file is not a problem file."""
 
 _WIDTH = 80  # of a value in a message
 _TRIES = 20
+_UNDECODED = re.compile("[\udc80-\udcff]")
 _NEIGHBOURS = 1000  # files of a folder that are looked at for one that was meant
 
 
@@ -196,6 +200,34 @@ def read_text(file: str, kind: str, largest: int = LARGEST) -> str:
     Raises:
         InputError: for a file that is not there, no file, too long, or no text.
     """
+    with _opened(file, kind, largest) as stream:
+        raw = stream.read(largest)
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise _not_text(file, kind, raw[error.start], raw[: error.start].count(b"\n") + 1) from None
+
+
+def read_lines(file: str, kind: str, largest: int, longest: int) -> Iterator[str]:
+    """The lines of such a file with their ends, one after the other, none of more than `longest` characters.
+
+    Raises:
+        InputError: likewise, when the line at fault is asked for.
+    """
+    with _opened(file, kind, largest) as stream:
+        text = io.TextIOWrapper(stream, encoding="utf-8-sig", errors="surrogateescape", newline="")
+        for number, line in enumerate(iter(partial(text.readline, longest + 1), ""), start=1):
+            if len(line) > longest:
+                message = f"is longer than {longest} characters; accepted: lines of up to {longest}"
+                raise InputError([Fault(f"the line {message}").at(file, number)])
+            if not line.isascii() and (wrong := _UNDECODED.search(line)):
+                raise _not_text(file, kind, ord(wrong[0]) - 0xDC00, number)
+            yield line
+
+
+@contextmanager
+def _opened(file: str, kind: str, largest: int) -> Iterator[BinaryIO]:
+    """A regular file of up to `largest` bytes; nothing else is opened, for a pipe or a device may have no end."""
     path, form = Path(file), kind.split(maxsplit=1)[0]
     try:
         if path.is_dir():
@@ -208,19 +240,19 @@ def read_text(file: str, kind: str, largest: int = LARGEST) -> str:
         if not path.is_file():
             raise InputError([Fault(f"is not a regular file; accepted: a {kind}", file=file)])
         with path.open("rb") as stream:
-            raw = stream.read(largest + 1)
+            if os.fstat(stream.fileno()).st_size > largest:
+                raise InputError([Fault(f"is larger than {largest} bytes; accepted: a {kind} of less", file=file)])
+            yield stream
     except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         if isinstance(error, InputError):
             raise
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise InputError([Fault(f"cannot be read: {reason}", file=file)]) from None
-    if len(raw) > largest:
-        raise InputError([Fault(f"is larger than {largest} bytes; accepted: a {kind} of less", file=file)])
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = raw[: error.start].count(b"\n") + 1
-        raise InputError([Fault(f"not {form}: byte {raw[error.start]:#x} is not UTF-8").at(file, line)]) from None
+
+
+def _not_text(file: str, kind: str, byte: int, line: int) -> InputError:
+    form = kind.split(maxsplit=1)[0]
+    return InputError([Fault(f"not {form}: byte {byte:#x} is not UTF-8").at(file, line)])
 
 
 def path_of(given: object, what: str) -> Path:

@@ -69,7 +69,10 @@ def count_faults(name: str, value: Any, least: int, most: int | None = None) -> 
 
 def is_number(value: Any) -> bool:
     """Whether a user gave a finite real number."""
-    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+    try:
+        return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:  # an integer of hundreds of digits
+        return False
 
 
 def table_faults(name: str, value: Any, example: str) -> list[Fault]:

@@ -1,10 +1,9 @@
 """The [model] table of a problem file: the user's own system, by matrices or coefficients written as expressions."""
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
-from tmsopt.errors import Fault, at_first, short, suggest, text_faults
+from tmsopt.errors import Fault, at_first, is_number, short, suggest, text_faults
 from tmsopt.models import Model, Unfit, from_coefficients, from_matrices
 from tmsopt.models.texts import Texts
 
@@ -89,7 +88,7 @@ class _Reader:
 
     def entry(self, entry: Any, key: str, where: str) -> Any:
         """One entry as a number or CasADi expression."""
-        if isinstance(entry, int | float) and not isinstance(entry, bool) and _is_finite(entry):
+        if is_number(entry):
             return entry
         if not isinstance(entry, str):
             self.fault(f"{where}: found {short(entry)}; accepted: a finite number, or an expression in quotes", key)
@@ -107,10 +106,3 @@ class _Reader:
                 accepted = "an expression in quotes, such as 'k1/k2'"
                 self.fault(f"found {short(text)}; accepted: {accepted}", "quantities", name)
         self.texts.read_quantities({n: text for n, text in written.items() if isinstance(text, str)})
-
-
-def _is_finite(number: float) -> bool:
-    try:
-        return math.isfinite(number)
-    except OverflowError:  # an integer of hundreds of digits
-        return False

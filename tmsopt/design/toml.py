@@ -94,11 +94,9 @@ def fitted(
         try:
             return list(faults.values()), schema.model_validate(pruned)
         except ValidationError as error:
-            complaints = enumerate(error.errors(include_url=False, include_context=False))
-            found = [
-                explain(d["loc"], d["type"], d["input"]) if n < _EXPLAINED else _unexplained(d["loc"], d["input"])
-                for n, d in complaints
-            ]
+            complaints = error.errors(include_url=False, include_context=False)
+            found = [explain(d["loc"], d["type"], d["input"]) for d in complaints[:_EXPLAINED]]
+            found += _unexplained(d["loc"] for d in complaints[_EXPLAINED:])
             deepest: dict[Key, int] = {}
             for fault in found:
                 deepest[fault.key[:2]] = max(len(fault.key), deepest.get(fault.key[:2], 0))
@@ -109,8 +107,9 @@ def fitted(
     return list(faults.values()), None
 
 
-def _unexplained(where: tuple[int | str, ...], found: Any) -> Fault:
-    return Fault(f"found {short(found)}; accepted: what the other faults say", tuple(map(str, where[:2])))
+def _unexplained(places: Iterable[tuple[int | str, ...]]) -> list[Fault]:
+    keys = dict.fromkeys(tuple(map(str, where[:2])) for where in places)
+    return [Fault("accepted: what the other faults say", key) for key in keys]
 
 
 def within(section: str, faults: Iterable[Fault]) -> list[Fault]:

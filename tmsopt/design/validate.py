@@ -22,7 +22,7 @@ MOST_TOLERANCES = 8
 """Parameters with a tolerance: a box has two corners for one, 256 for eight."""
 
 
-MOST = {"constraints": 1000, "scenarios": 1000}
+MOST = {"constraints": 1000, "scenarios": 100}
 """Constraints of a problem, and values of a scenario."""
 
 _LONGEST = 200  # characters of the name of a pattern

@@ -11,11 +11,11 @@ from pydantic import Field, StrictBool, StrictInt, StrictStr
 from tmsopt.design.files import posed, question_of
 from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.toml import Key, Number, Page, Section, fitted, read_page, within
-from tmsopt.errors import Fault, InputError, count_faults, short, suggest
+from tmsopt.errors import Fault, InputError, count_faults, short, suggest, visible
 from tmsopt.formulation.options import STARTS
 from tmsopt.studies.monte_carlo import DISTRIBUTIONS, Sampling
 from tmsopt.studies.study import Study
-from tmsopt.studies.validate import METHODS, MOST_ROWS, common_faults, name_fault
+from tmsopt.studies.validate import METHODS, MOST_ROWS, common_faults, name_faults
 from tmsopt.studies.vary import Varied, read_csv, unit_of, varied
 from tmsopt.units import with_unit
 
@@ -112,7 +112,7 @@ def load_study(path: str | PathLike[str]) -> Study | Sampling:
     if written is None or problem is None:
         raise page.error(faults)
     faults += [*_method_faults(written, {f.key for f in faults}), *within("study", _option_faults(written, problem))]
-    title = written.title or Path(page.file).stem
+    title = written.title.strip() or visible(Path(page.file).stem)
     if written.study.method == "monte_carlo":
         return _sampling(page, written, problem, title, faults)
     return _study(page, written, problem, title, faults)
@@ -142,7 +142,7 @@ def _problem(page: Page) -> tuple[list[Fault], Problem | None]:
     """The problem that a study is of, and what is wrong with it."""
     stated = page.data.get("problem")
     if isinstance(stated, dict):
-        faults, problem = posed(stated, str(page.data.get("title", "")) or Path(page.file).stem)
+        faults, problem = posed(stated, str(page.data.get("title", "")).strip() or visible(Path(page.file).stem))
         if problem is not None and not problem.pareto:
             faults += unasked(problem)
         faults = within("problem", faults)
@@ -167,7 +167,7 @@ def _method_faults(written: _StudyFile, reported: Set[Key]) -> Iterator[Fault]:
     """Keys and sections that do not go with the method, or that it needs."""
     options, method = written.study, written.study.method
     if method not in METHODS:
-        yield Fault(f"unknown method '{method}'; {suggest(method, METHODS)}", ("study", "method"))
+        yield Fault(f"unknown method {short(method)}; {suggest(method, METHODS)}", ("study", "method"))
         return
     for key in _NEEDED.get(method, ()):
         if getattr(options, key) is None and ("study", key) not in reported:
@@ -194,7 +194,7 @@ def _option_faults(written: _StudyFile, problem: Problem) -> Iterator[Fault]:
         yield from count_faults("rows", options.rows, 1, MOST_ROWS)
     if options.distribution is not None and options.distribution not in DISTRIBUTIONS:
         found = options.distribution
-        yield Fault(f"unknown distribution '{found}'; {suggest(found, DISTRIBUTIONS)}", ("distribution",))
+        yield Fault(f"unknown distribution {short(found)}; {suggest(found, DISTRIBUTIONS)}", ("distribution",))
     yield from common_faults(problem, options.seed, options.starts, options.report)
 
 
@@ -212,7 +212,8 @@ def _varied(page: Page, written: _StudyFile, problem: Problem) -> Varied:
         return Varied(
             [f if f.line else Fault(f"'{name}' {f.message}{message}", ("study", "csv")) for f in error.faults]
         )
-    unknown = {column: name_fault(problem, column) for column in columns}
+    wrong_with = name_faults(problem)
+    unknown = {column: wrong_with(column) for column in columns}
     return Varied([Fault(text, (column,)).at(file, 1) for column, text in unknown.items() if text], columns)
 
 
@@ -249,9 +250,9 @@ def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:
             message = f"belongs to the problem; write [problem.{section}], or name a problem file"
             return Fault(message, key)
         case (section,) if kind == "extra_forbidden":
-            return Fault(f"unknown key '{section}'; {suggest(section, _StudyFile.model_fields)}", key)
+            return Fault(f"unknown key {short(section)}; {suggest(section, _StudyFile.model_fields)}", key)
         case ("study", name) if kind == "extra_forbidden":
-            return Fault(f"unknown key '{name}'; {suggest(name, _Options.model_fields)}", key)
+            return Fault(f"unknown key {short(name)}; {suggest(name, _Options.model_fields)}", key)
         case ("problem",) if kind == "missing":
             return Fault('missing problem; write e.g. problem = "least_speed.toml", or a table [problem]', key)
         case _:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.solution import NotSolved, Solution
-from tmsopt.errors import Fault, InputError, count_faults, suggest
+from tmsopt.errors import Fault, InputError, at_first, count_faults, short, suggest, text_faults
 from tmsopt.formulation.options import STARTS
 from tmsopt.records import Column, Table
 from tmsopt.solver.solve import solve, solved
@@ -56,10 +56,11 @@ class Sampling:
         found += [
             *common_faults(problem, self.seed, self.starts, self.report), *_draw_faults(self.rows, self.distribution),
         ]  # fmt: skip
+        found += text_faults(self.title, "title")
         if found:
             raise InputError(found)
         object.__setattr__(self, "tolerances", Table({n: float(t) for n, t in self.tolerances.items()}))
-        object.__setattr__(self, "report", tuple(self.report))
+        object.__setattr__(self, "report", tuple(text.strip() for text in self.report))
 
 
 def planned(asked: Study | Sampling, progress: Callable[[int, int], None] | None = None) -> Study:
@@ -131,20 +132,20 @@ def _as_built(design: Solution) -> tuple[Problem, tuple[str, ...]]:
 def _tolerance_faults(problem: Problem, tolerances: Any) -> list[Fault]:
     """What is wrong with tolerances to draw from."""
     if not isinstance(tolerances, Mapping) or not tolerances:
-        found = f"found {tolerances!r}" if tolerances else "no tolerances"
+        found = f"found {short(tolerances)}" if tolerances else "no tolerances"
         accepted = "parameters and how far each may be off, such as lambda_s = 0.01"
         return [Fault(f"{found}; accepted: {accepted}", ("tolerances",))]
     names = problem.parameter_set.names
-    faults = []
+    faults, advice = [], at_first(suggest)
     for name, value in tolerances.items():
         key = ("tolerances", str(name))
         if name not in names:
-            faults.append(Fault(f"unknown parameter '{name}'; {suggest(str(name), names)}", key))
+            faults.append(Fault(f"unknown parameter {short(name)}; {advice(str(name), names)}", key))
         elif name in problem.scenarios:
             message = f"{name} has a scenario, which a drawn value would not change; leave out one of the two"
             faults.append(Fault(message, key))
         elif isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
-            faults.append(Fault(f"found {value!r}; accepted: a finite number greater than 0", key))
+            faults.append(Fault(f"found {short(value)}; accepted: a finite number greater than 0", key))
     return faults
 
 
@@ -162,7 +163,9 @@ def _room_faults(drawn: Problem, tolerances: Mapping[str, float]) -> list[Fault]
 def _draw_faults(rows: Any, distribution: Any) -> list[Fault]:
     found = [*count_faults("rows", rows, 1, MOST_ROWS)]
     if distribution not in DISTRIBUTIONS:
-        found.append(Fault(f"found {distribution!r}; {suggest(str(distribution), DISTRIBUTIONS)}", ("distribution",)))
+        found.append(
+            Fault(f"found {short(distribution)}; {suggest(str(distribution), DISTRIBUTIONS)}", ("distribution",))
+        )
     return found
 
 

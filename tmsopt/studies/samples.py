@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.errors import Fault, InputError, count_faults, table_faults
+from tmsopt.errors import Fault, InputError, count_faults, short, table_faults
 from tmsopt.records import Array, Column
-from tmsopt.studies.validate import MOST_ROWS
+from tmsopt.studies.validate import MOST_NUMBERS, MOST_ROWS
 
 _DIGITS = 15  # of a decimal number, all of which a double holds
 
@@ -99,9 +99,10 @@ def check_size(sizes: Sequence[int]) -> None:
     Raises:
         InputError: saying how many there would be.
     """
-    if math.prod(sizes) > MOST_ROWS:
+    most = min(MOST_ROWS, MOST_NUMBERS // max(1, len(sizes)))
+    if math.prod(sizes) > most:
         found = f"{' x '.join(map(str, sizes))} = {math.prod(sizes)} rows"
-        raise InputError([Fault(f"found {found}; accepted: up to {MOST_ROWS}; take fewer points", ("columns",))])
+        raise InputError([Fault(f"found {found}; accepted: up to {most}; take fewer points", ("columns",))])
 
 
 def span_faults(name: str, span: Span) -> Iterator[Fault]:
@@ -112,7 +113,7 @@ def span_faults(name: str, span: Span) -> Iterator[Fault]:
     except (TypeError, ValueError, OverflowError):
         low = high = math.nan
     if not (math.isfinite(low) and math.isfinite(high)):
-        yield Fault(f"found {span.low!r} to {span.high!r}; accepted: finite numbers", key)
+        yield Fault(f"found {short(span.low)} to {short(span.high)}; accepted: finite numbers", key)
     elif low > high:
         yield Fault(f"min = {low:.6g} is greater than max = {high:.6g}; swap them", key)
     elif span.log and not (low > 0 or high < 0):
@@ -127,7 +128,7 @@ def _axis(name: str, values: Any) -> Array:
     except (TypeError, ValueError, OverflowError):
         array = np.zeros((0, 0))
     if array.ndim != 1 or not array.size:
-        raise InputError([Fault(f"found {values!r}; accepted: a list of numbers, such as [0.1, 0.2]", (name,))])
+        raise InputError([Fault(f"found {short(values)}; accepted: a list of numbers, such as [0.1, 0.2]", (name,))])
     return array
 
 
@@ -141,10 +142,11 @@ def _spans(ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Span]:
             found += span_faults(name, spans[name])
         except TypeError:
             accepted = "(least, greatest), or a tmsopt.Span"
-            found.append(Fault(f"found {stated!r}; accepted: {accepted}", ("ranges", name)))
+            found.append(Fault(f"found {short(stated)}; accepted: {accepted}", ("ranges", name)))
     if not ranges:
         found.append(Fault("nothing varies; give a range", ("ranges",)))
-    found += [*count_faults("rows", rows, 1, MOST_ROWS), *count_faults("seed", seed, 0)]
+    most = min(MOST_ROWS, MOST_NUMBERS // max(1, len(ranges)))
+    found += [*count_faults("rows", rows, 1, most), *count_faults("seed", seed, 0)]
     if found:
         raise InputError(found)
     return spans

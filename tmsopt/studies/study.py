@@ -58,7 +58,7 @@ class Study:
             raise InputError(found)
         columns = {n: c if isinstance(c, Column) else Column(c) for n, c in self.columns.items()}
         object.__setattr__(self, "columns", Table(columns))
-        object.__setattr__(self, "report", tuple(dict.fromkeys(self.report)))
+        object.__setattr__(self, "report", tuple(dict.fromkeys(text.strip() for text in self.report)))
         object.__setattr__(self, "notes", tuple(self.notes))
         if self.grid_shape is not None:
             object.__setattr__(self, "grid_shape", Table(self.grid_shape))

@@ -1,7 +1,7 @@
 """Everything that can be wrong with a study, each fault with its place and the accepted values."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,10 +9,13 @@ import numpy as np
 from tmsopt.design.expression import ExpressionError
 from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Problem, unasked
-from tmsopt.errors import Fault, count_faults, list_faults, short, suggest
+from tmsopt.errors import Fault, at_first, count_faults, list_faults, short, suggest, text_faults
 
 MOST_ROWS = 10_000_000
 """Rows of a study; one with more is another kind of question, such as a chart."""
+
+MOST_NUMBERS, MOST_REPORTED = 40_000_000, 1000
+"""Numbers in all columns, which are held in memory; expressions recorded for every row."""
 
 METHODS = ("grid", "list", "latin_hypercube", "sobol", "csv", "monte_carlo")
 """How the rows of a study are made."""
@@ -24,7 +27,7 @@ Stated = Any
 def faults(study: Stated) -> Iterator[Fault]:
     """What is wrong with a study, everything at once."""
     if not isinstance(study.problem, Problem):
-        message = f"found {study.problem!r}; accepted: a Problem, such as tmsopt.load('problems/least_speed.toml')"
+        message = f"found {short(study.problem)}; accepted: a Problem, such as tmsopt.load('problems/least_speed.toml')"
         yield Fault(message, ("problem",))
         return
     yield from (Fault(f.message, ("problem", *f.key)) for f in unasked(study.problem))
@@ -32,7 +35,7 @@ def faults(study: Stated) -> Iterator[Fault]:
         yield from _column_faults(study)
     else:
         accepted = "what varies with its value in every row, such as {'mu': [0.1, 0.2]}"
-        yield Fault(f"found {study.columns!r}; accepted: {accepted}", ("columns",))
+        yield Fault(f"found {short(study.columns)}; accepted: {accepted}", ("columns",))
     yield from _option_faults(study)
 
 
@@ -44,22 +47,28 @@ def variable_names(problem: Problem) -> tuple[str, ...]:
     return fixed + ends + limits
 
 
-def name_fault(problem: Problem, name: str) -> str:
-    """Why a name cannot vary; empty where it can."""
-    accepted = variable_names(problem)
-    if name in accepted:
-        return ""
-    stem, _, end = str(name).rpartition(".")
-    if name in problem.free:
-        return f"{name} is free, so each row finds its own; fix it, or vary {name}.min or {name}.max"
-    if name in problem.scenarios:
-        return f"{name} has a scenario, which every row must do in; leave the scenario out to vary it from row to row"
-    if end in ("min", "max") and stem in problem.fixed:
-        return f"{stem} is fixed, so it has no {end}; vary {stem} itself, or free it"
-    if end == "limit" and stem in problem.constraints:
-        text = problem.constraints[stem]
-        return f"neither side of '{text}' is a number; write the constraint with a number alone on one side"
-    return f"unknown name '{name}'; {suggest(str(name), accepted)}"
+def name_faults(problem: Problem) -> Callable[[Any], str]:
+    """Says why a name cannot vary, one after the other; empty where it can."""
+    accepted, advice = variable_names(problem), at_first(suggest)
+
+    def wrong(name: Any) -> str:
+        if name in accepted:
+            return ""
+        stem, _, end = str(name).rpartition(".")
+        if name in problem.free:
+            return f"{name} is free, so each row finds its own; fix it, or vary {name}.min or {name}.max"
+        if name in problem.scenarios:
+            return (
+                f"{name} has a scenario, which every row must do in; leave the scenario out to vary it from row to row"
+            )
+        if end in ("min", "max") and stem in problem.fixed:
+            return f"{stem} is fixed, so it has no {end}; vary {stem} itself, or free it"
+        if end == "limit" and stem in problem.constraints:
+            text = problem.constraints[stem]
+            return f"neither side of '{text}' is a number; write the constraint with a number alone on one side"
+        return f"unknown name {short(name)}; {advice(str(name), accepted)}"
+
+    return wrong
 
 
 def _column_faults(study: Stated) -> Iterator[Fault]:
@@ -68,9 +77,10 @@ def _column_faults(study: Stated) -> Iterator[Fault]:
         accepted = " ".join(variable_names(study.problem))
         yield Fault(f"nothing varies; give at least one column, of: {accepted}", ("columns",))
     lengths: dict[str, int] = {}
+    wrong_with = name_faults(study.problem)
     for name, values in columns.items():
         key = ("columns", str(name))
-        if wrong := name_fault(study.problem, name):
+        if wrong := wrong_with(name):
             yield Fault(wrong, key)
         array = _numbers(values)
         if array is None:
@@ -110,7 +120,9 @@ def _shape_faults(study: Stated, rows: int) -> Iterator[Fault]:
     shape, key = study.grid_shape, ("grid_shape",)
     if not isinstance(shape, Mapping) or tuple(shape) != tuple(study.columns):
         found = tuple(shape) if isinstance(shape, Mapping) else shape
-        yield Fault(f"found {found!r}; accepted: an entry for each column in turn: {', '.join(study.columns)}", key)
+        yield Fault(
+            f"found {short(found)}; accepted: an entry for each column in turn: {', '.join(study.columns)}", key
+        )
         return
     sizes = tuple(shape.values())
     if any(count_faults("points", n, 1) for n in sizes) or math.prod(sizes) != rows:
@@ -123,13 +135,14 @@ def _shape_faults(study: Stated, rows: int) -> Iterator[Fault]:
 
 
 def _option_faults(study: Stated) -> Iterator[Fault]:
-    if not isinstance(study.title, str):
-        yield Fault(f"found {study.title!r}; accepted: a text", ("title",))
+    yield from text_faults(study.title, "title")
     if not isinstance(study.method, str) or study.method not in METHODS:
-        yield Fault(f"found {study.method!r}; {suggest(str(study.method), METHODS)}", ("method",))
+        yield Fault(f"found {short(study.method)}; {suggest(str(study.method), METHODS)}", ("method",))
     if not isinstance(study.warm, bool):
-        yield Fault(f"found {study.warm!r}; accepted: true or false", ("warm",))
-    yield from list_faults("notes", study.notes, "['left out: the lamp']")
+        yield Fault(f"found {short(study.warm)}; accepted: true or false", ("warm",))
+    yield from list_faults("notes", study.notes, "['left out: the lamp']") or (
+        fault for note in study.notes for fault in text_faults(note, "notes")
+    )
     yield from common_faults(study.problem, study.seed, study.starts, study.report)
 
 
@@ -138,7 +151,10 @@ def common_faults(problem: Problem, seed: Any, starts: Any, report: Any) -> Iter
     yield from count_faults("seed", seed, 0)
     yield from count_faults("starts", starts, 1)
     if isinstance(report, str) or not isinstance(report, Sequence):
-        yield Fault(f"found {report!r}; accepted: a list of expressions, such as ['nu_H', '2*Fr_c']", ("report",))
+        yield Fault(f"found {short(report)}; accepted: a list of expressions, such as ['nu_H', '2*Fr_c']", ("report",))
+        return
+    if len(report) > MOST_REPORTED:
+        yield Fault(f"found {len(report)} expressions; accepted: up to {MOST_REPORTED}", ("report",))
         return
     for text in report:
         try:

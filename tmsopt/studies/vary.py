@@ -1,24 +1,29 @@
 """The table [vary] of a study file: what varies, as the columns of a study."""
 
 import csv
-import io
 import math
+from array import array
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import Any
 
 from tmsopt.design.expression import written_sides
+from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Problem
-from tmsopt.disk import read_text
-from tmsopt.errors import Fault, InputError, count_faults, short, suggest
+from tmsopt.disk import read_lines
+from tmsopt.errors import LISTED, Fault, InputError, count_faults, is_number, short, suggest
 from tmsopt.records import Column
 from tmsopt.studies.samples import Span, check_size, grid, latin_hypercube, sobol, sobol_note, span_faults
-from tmsopt.studies.validate import MOST_ROWS, name_fault
+from tmsopt.studies.validate import MOST_NUMBERS, MOST_ROWS, name_faults
 from tmsopt.units import with_unit
 
 LARGEST = 1_000_000_000
-"""Bytes."""
+"""Bytes of a CSV file."""
+
+MOST_COLUMNS, LONGEST_LINE = 1000, 1_000_000
+"""Columns of a CSV file, and characters of a line of it."""
+
 _SHOWN = 20  # faults of cells; a file in another format has one in each
 _RANGE = "{ min = 0.1, max = 1 }"
 _AXIS = "{ min = 0.1, max = 1, points = 10 }"
@@ -55,8 +60,9 @@ def varied(problem: Problem, table: Mapping[str, Any], method: str, rows: int, s
         return Varied([Fault(message, ("vary",))])
     faults: list[Fault] = []
     read: dict[str, Any] = {}
+    wrong_with = name_faults(problem)
     for name, (key, spec) in entries.items():
-        if wrong := name_fault(problem, name):
+        if wrong := wrong_with(name):
             faults.append(Fault(wrong, key))
         else:
             read[name] = _VaryReader(problem, name, key, faults).read(spec, method)
@@ -91,7 +97,7 @@ def unit_of(problem: Problem, name: str) -> str:
     stem, _, end = name.rpartition(".")
     if end in ("min", "max") and stem in of.names:
         return of[stem].unit
-    if end == "limit" and not name_fault(problem, name):
+    if end == "limit" and limit_of(problem.constraints.get(stem, "")) is not None:
         left, _, right = written_sides(problem.constraints[stem])
         known = {p.name: p.unit for p in of.parameters}
         known |= {q.name: q.unit for q in (*problem.model.quantities, *of.quantities)}
@@ -141,7 +147,7 @@ class _VaryReader:
         accepted = ("min", "max", "points", "log") if points else ("min", "max", "log")
         for end in spec:
             if end not in accepted:
-                message = f"unknown key '{end}' of {self.name}; {suggest(end, accepted)}"
+                message = f"unknown key {short(end)} of {self.name}; {suggest(end, accepted)}"
                 if end == "points":
                     message = "points are those of a grid; a sample has rows, under [study]"
                 self.faults.append(Fault(message, (*self.key, end)))
@@ -164,15 +170,17 @@ class _VaryReader:
         return _Points(span, count) if points else span
 
     def _number(self, value: Any, key: Key) -> float:
-        if isinstance(value, str):
+        if isinstance(value, str) and len(self.faults) > LISTED:
+            self.faults.append(Fault("accepted: as above", key))  # no unit is looked up where it is only counted
+        elif isinstance(value, str):
             unit = unit_of(self.problem, self.name)
             try:
                 if not unit:
-                    raise ValueError(f"found '{value[:60]}'; accepted: a number without quotes, as in the constraint")
+                    raise ValueError(f"found {short(value)}; accepted: a number without quotes, as in the constraint")
                 return with_unit(value, unit)
             except ValueError as error:
                 self.faults.append(Fault(str(error), key))
-        elif isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < float("inf"):
+        elif not is_number(value):
             self.faults.append(Fault(f"found {short(value)}; accepted: a finite number", key))
         else:
             return float(value)
@@ -192,8 +200,8 @@ def read_csv(path: str | PathLike[str], unit_of: Callable[[str], str] | None = N
         InputError: listing every fault with file, line and column.
     """
     file = str(path)
-    text = read_text(file, "CSV file of numbers", LARGEST)
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True, skipinitialspace=True)
+    lines = read_lines(file, "CSV file of numbers", LARGEST, LONGEST_LINE)
+    reader = csv.reader(lines, strict=True, skipinitialspace=True)
     try:
         names = [name.strip() for name in next(reader, [])]
         if found := list(_header_faults(names)):
@@ -204,7 +212,7 @@ def read_csv(path: str | PathLike[str], unit_of: Callable[[str], str] | None = N
 
 
 def _header_faults(names: list[str]) -> Iterator[Fault]:
-    header = ",".join(names)
+    header, known = ",".join(names), set()
     example = "accepted: names of what varies, separated by commas, such as: mu,lambda_s.max"
     if not header:
         yield Fault(f"the first line is empty; {example}")
@@ -213,22 +221,26 @@ def _header_faults(names: list[str]) -> Iterator[Fault]:
         if mark in header:
             yield Fault(f"columns separated by {word}; separate them by commas, with decimal points in the numbers")
             return
+    if len(names) > MOST_COLUMNS:
+        yield Fault(f"found {len(names)} columns; accepted: up to {MOST_COLUMNS}")
+        return
     for number, name in enumerate(names, start=1):
         if not name:
             yield Fault(f"column {number} has no name; {example}")
         elif _number(name) is not None:
-            yield Fault(f"found the number {name} for the name of column {number}; {example}")
-        elif name in names[: number - 1]:
-            yield Fault(f"'{name}' names two columns; leave one out")
+            yield Fault(f"found the number {name[:60]} for the name of column {number}; {example}")
+        elif name in known:
+            yield Fault(f"{short(name)} names two columns; leave one out")
+        known.add(name)
 
 
 def _columns(
     file: str, reader: Iterator[list[str]], names: list[str], unit_of: Callable[[str], str] | None
 ) -> dict[str, Column]:
-    columns: list[list[float]] = [[] for _ in names]
+    columns = [array("d") for _ in names]
     units = ["" if unit_of is None else unit_of(name) for name in names]
     faults: list[Fault] = []
-    empty = 0
+    most, empty = min(MOST_ROWS, MOST_NUMBERS // len(names)), 0
     for cells in reader:
         line: int = reader.line_num  # type: ignore[attr-defined]
         if not cells:
@@ -246,6 +258,8 @@ def _columns(
                 if number is None:
                     number = _with_unit(cell, unit, Fault("", (name,)).at(file, line), faults)
                 column.append(number)
+            if len(columns[0]) > most:
+                raise InputError([Fault(f"more than {most} rows; accepted: up to {most}").at(file, line)])
         if len(faults) > _SHOWN:
             faults = [*faults[:_SHOWN], Fault("and more after these").at(file, line)]
             break
@@ -253,7 +267,7 @@ def _columns(
         faults.append(Fault("no rows below the names").at(file, 1))
     if faults:
         raise InputError(faults)
-    return {name: Column(column) for name, column in zip(names, columns, strict=True)}
+    return {name: Column(columns.pop(0)) for name in names}
 
 
 def _number(cell: str) -> float | None:
@@ -270,7 +284,7 @@ def _with_unit(cell: str, unit: str, place: Fault, faults: list[Fault]) -> float
     if not cell.strip():
         message = "an empty cell; accepted: a number in every cell"
     elif not unit:
-        message = f"found '{cell[:60]}'; accepted: a finite number"
+        message = f"found {short(cell)}; accepted: a finite number"
     else:
         try:
             return with_unit(cell, unit)
