@@ -232,6 +232,8 @@ def _opened(file: str, kind: str, largest: int) -> Iterator[BinaryIO]:
     try:
         if path.is_dir():
             raise InputError([Fault(f"is a directory; accepted: a {kind}", file=file)])
+        if path.is_symlink() and not path.exists():
+            raise InputError([Fault(f"is a link to no file; accepted: a {kind}", file=file)])
         if not path.exists():
             others = path.parent.glob(f"*.{form.lower()}") if path.parent.is_dir() else ()
             near = suggest(path.name, sorted(p.name for p in islice(others, _NEIGHBOURS)))

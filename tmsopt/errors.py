@@ -14,6 +14,7 @@ LISTED = 50
 """Faults that a message lists; the rest is counted."""
 
 _LONGEST = 4000  # characters of a message; the middle of a longer one is left out
+_PATH = 1000  # characters of a file's name
 _WIDTH = 60  # of a value in a message
 _NAME = 80  # characters of a name for which a near one is looked for, which takes time by the square of them
 _NAMES = 200  # that are listed as accepted
@@ -41,7 +42,7 @@ class Fault:
         return replace(self, file=file, line=line)
 
     def __str__(self) -> str:
-        place = f"{self.file}:{self.line}" if self.line else self.file
+        place = _cut(self.file, _PATH) + (f":{self.line}" if self.line else "")
         key, message = _cut(".".join(map(str, self.key)), 2 * _WIDTH), _cut(self.message, _LONGEST)
         return visible(": ".join(part for part in (place, key, message) if part))
 

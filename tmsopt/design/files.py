@@ -13,7 +13,7 @@ from tmsopt.design.cases import POINTS, Band
 from tmsopt.design.model_table import stated_model
 from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.solution import Solution
-from tmsopt.design.toml import Number, Section, fitted, read_page
+from tmsopt.design.toml import Number, Page, Section, fitted, read_page
 from tmsopt.design.validate import VARIATIONS
 from tmsopt.errors import Fault, InputError, short, suggest, visible
 from tmsopt.models import MODELS, Model
@@ -140,7 +140,7 @@ def _read(path: str | PathLike[str], faults_of: Callable[[Problem], list[Fault]]
         own = f"its problem, {written}" if isinstance(written, str) else "a file with its [problem] alone"
         message = f"is a study of many designs, not one problem; run tmsopt study {page.file}, or give {own}"
         raise InputError([Fault(message, file=page.file)])
-    faults, problem = posed(_with_bicycle(page.data, Path(page.file).parent), visible(Path(page.file).stem))
+    faults, problem = posed(_with_bicycle(page), visible(Path(page.file).stem))
     if problem is not None and not faults:  # a misspelt [objective] asks something
         faults = [*faults, *faults_of(problem)]
     if problem is None or faults:
@@ -148,13 +148,21 @@ def _read(path: str | PathLike[str], faults_of: Callable[[Problem], list[Fault]]
     return problem
 
 
-def _with_bicycle(data: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
+def _with_bicycle(page: Page) -> Mapping[str, Any]:
     """The tables with the parameters of the bicycle that they name, which those of the file itself go before."""
+    data = page.data
     named = data.get("bicycle")
     if not isinstance(named, str) or not isinstance(given := data.get("parameters", {}), dict):
         return data
+    try:
+        bicycle = read_bicycle(Path(page.file).parent / named)
+    except InputError as error:
+        raise page.error(
+            f if f.line else Fault(f"{short(named)} {f.message}; the name is relative to this file", ("bicycle",))
+            for f in error.faults
+        ) from None
     scenarios = data.get("scenarios", {})
-    measured = {n: v for n, v in read_bicycle(folder / named).parameters.items() if n not in scenarios}
+    measured = {n: v for n, v in bicycle.parameters.items() if n not in scenarios}
     return {"model": "whipple", **data, "parameters": {**measured, **given}}
 
 

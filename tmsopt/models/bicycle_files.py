@@ -29,7 +29,7 @@ _KINDS = ("benchmark", "meijaard2007")
 
 _NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d++)?"
 _MEASURED = re.compile(
-    rf"\(?\s*(?P<value>{_NUMBER})\s*(?:(?:\+/-|±)\s*(?P<off>{_NUMBER}))?\s*\)?(?P<power>[eE][+-]?\d+)?"
+    rf"\(?\s*+(?P<value>{_NUMBER})\s*+(?:(?:\+/-|±)\s*+(?P<off>{_NUMBER})\s*+)?\)?(?P<power>[eE][+-]?\d++)?"
 )
 
 

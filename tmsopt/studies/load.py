@@ -123,7 +123,7 @@ def _study(page: Page, written: _StudyFile, problem: Problem, title: str, faults
     options = written.study
     found = Varied()
     if not {("study", "method"), ("study", "csv"), ("vary",)} & {f.key for f in faults}:
-        found = _varied(page, written, problem)
+        found = _varied(page, written, problem, made=not faults)
     faults += found.faults
     if faults:
         raise page.error(faults)
@@ -198,11 +198,11 @@ def _option_faults(written: _StudyFile, problem: Problem) -> Iterator[Fault]:
     yield from common_faults(problem, options.seed, options.starts, options.report)
 
 
-def _varied(page: Page, written: _StudyFile, problem: Problem) -> Varied:
+def _varied(page: Page, written: _StudyFile, problem: Problem, made: bool) -> Varied:
     options = written.study
     if options.method != "csv":
         rows, seed = (max(1, min(options.rows or 1, MOST_ROWS)), max(0, options.seed))  # others are reported already
-        return varied(problem, written.vary, options.method, rows, seed)
+        return varied(problem, written.vary, options.method, rows, seed, made)
     name = options.csv or ""
     file = str(Path(page.file).parent / name)
     try:

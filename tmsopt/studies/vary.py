@@ -52,8 +52,8 @@ class Varied:
     notes: tuple[str, ...] = ()
 
 
-def varied(problem: Problem, table: Mapping[str, Any], method: str, rows: int, seed: int) -> Varied:
-    """The columns of a grid, a list or a sample."""
+def varied(problem: Problem, table: Mapping[str, Any], method: str, rows: int, seed: int, made: bool = True) -> Varied:
+    """The columns of a grid, a list or a sample; what is wrong with the table alone where none are to be `made`."""
     entries = _entries(table)
     if not entries:
         message = f"nothing varies; write what does under [vary], such as mu = {_ACCEPTED[method]}"
@@ -66,7 +66,7 @@ def varied(problem: Problem, table: Mapping[str, Any], method: str, rows: int, s
             faults.append(Fault(wrong, key))
         else:
             read[name] = _VaryReader(problem, name, key, faults).read(spec, method)
-    if faults:
+    if faults or not made:
         return Varied(faults)
     try:
         return _made(read, method, rows, seed)
