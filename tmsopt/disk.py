@@ -1,6 +1,7 @@
 """Files and folders: read, written as a whole or not at all, by one process at a time, compared and moved aside."""
 
 import csv
+import errno
 import io
 import json
 import os
@@ -25,6 +26,10 @@ if TYPE_CHECKING:
 LARGEST = 500_000
 """Bytes; a longer file is not a problem file."""
 
+LARGEST_JSON = 24_000_000
+"""Characters of JSON that is read, some 1 200 000 numbers."""
+
+_DEEPEST, _MARKS = 100, 1_000_000  # lists and tables inside each other; lists, tables, texts and keys of JSON in all
 _WIDTH = 80  # of a value in a message
 _TRIES = 20
 _UNDECODED = re.compile("[\udc80-\udcff]")
@@ -35,34 +40,54 @@ _NEIGHBOURS = 1000  # files of a folder that are looked at for one that was mean
 def whole(path: Path, *, locked: bool = False) -> Iterator[Path]:
     """The name of a temporary file or folder beside `path`, which takes its place if all went well; a link stays one.
 
+    A device or a pipe is given what is finished.
+
     Args:
         locked: nobody else writes here (see `lock`): the name is always the same, free, and what a killed process left
             under it is gone.
 
     Raises:
-        OSError: when it cannot be written.
+        OSError: with the name of `path`, when it cannot be written.
     """
-    path = path.resolve()
-    if locked:
-        temporary = path.with_name(f".{path.name}.unfinished")
-        _remove(temporary)
-    else:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".tmsopt-", suffix=path.suffix)
-        os.close(handle)
-        temporary = Path(name)
     try:
-        yield temporary
-        if not locked:  # a temporary file is for its owner alone
-            umask = os.umask(0)
-            os.umask(umask)
-            os.chmod(temporary, 0o666 & ~umask)
-        os.replace(temporary, path)
-    finally:
-        _remove(temporary)
+        target = path.resolve()
+        special = target.exists() and not (target.is_file() or target.is_dir())
+        if locked:
+            temporary = target.with_name(f".{target.name}.unfinished")
+            _remove(temporary)
+        else:
+            folder = None if special else target.parent
+            handle, name = tempfile.mkstemp(dir=folder, prefix=".tmsopt-", suffix=target.suffix)
+            os.close(handle)
+            temporary = Path(name)
+        try:
+            yield temporary
+            if special:
+                with temporary.open("rb") as source, target.open("wb") as sink:
+                    shutil.copyfileobj(source, sink)
+                return
+            if not locked:  # a temporary file is for its owner alone
+                umask = os.umask(0)
+                os.umask(umask)
+                os.chmod(temporary, 0o666 & ~umask)
+            os.replace(temporary, target)
+        finally:
+            _remove(temporary)
+    except OSError as error:  # some know no file, or only the temporary one
+        raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
+
+
+@contextmanager
+def netcdf_errors() -> Iterator[None]:
+    """What the HDF5 library says of a full disk, in a RuntimeError, as the OSError that it is."""
+    try:
+        yield
+    except RuntimeError as error:
+        raise OSError(errno.EIO, str(error)) from error
 
 
 def _remove(path: Path) -> None:
-    if path.is_dir():
+    if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)
     else:
         path.unlink(missing_ok=True)
@@ -89,10 +114,13 @@ def lock(path: Path) -> Lock | None:
 
     Raises:
         sqlite3.OperationalError: where no file can be written or the file system has no locks.
+        InputError: where a link has the name of the lock.
     """
     import sqlite3  # not for those who read a problem
 
     path = path.with_name(f"{path.name}.lock")
+    if path.is_symlink():
+        raise InputError([Fault("is a symbolic link, and tmsopt writes through none; remove it", file=str(path))])
     for _ in range(_TRIES):
         before = _identity(path)
         connection = sqlite3.connect(path, isolation_level=None, timeout=0, check_same_thread=False)
@@ -257,6 +285,25 @@ def _not_text(file: str, kind: str, byte: int, line: int) -> InputError:
     return InputError([Fault(f"not {form}: byte {byte:#x} is not UTF-8").at(file, line)])
 
 
+def from_json(text: str, largest: int = LARGEST_JSON) -> Any:
+    """What a text in JSON says, which may come from anybody: its length, depth and memory have limits.
+
+    Raises:
+        ValueError: for another text.
+    """
+    if len(text) > largest or sum(map(text.count, '[{:"')) > _MARKS:
+        raise ValueError(f"more than {largest} characters of JSON, or {_MARKS} lists, tables and texts")
+    with suppress(RecursionError):
+        made = json.loads(text)
+        level, depth = [made], 0
+        while depth <= _DEEPEST:
+            inner = [v.values() if isinstance(v, dict) else v for v in level if isinstance(v, dict | list)]
+            if not inner:
+                return made
+            level, depth = [value for values in inner for value in values], depth + 1
+    raise ValueError(f"lists and tables more than {_DEEPEST} deep")
+
+
 def path_of(given: object, what: str) -> Path:
     """The path of a file that a user names.
 
@@ -274,10 +321,32 @@ def write_csv(path: str | PathLike[str], rows: Sequence[Mapping[str, Any]], unit
     Raises:
         OSError: when the file cannot be written.
     """
-    with path_of(path, "the file to write").open("w", newline="", encoding="utf-8") as stream:
+    with whole(path_of(path, "the file to write")) as place, place.open("w", newline="", encoding="utf-8") as stream:
         names = list(rows[0]) if rows else []
-        csv.writer(stream).writerow(headed(n, units.get(n, "")) for n in names)
-        csv.DictWriter(stream, fieldnames=names).writerows(rows)
+        writer = csv.writer(stream)
+        writer.writerow(cell(headed(n, units.get(n, ""))) for n in names)
+        writer.writerows([cell(row[n]) for n in names] for row in rows)
+
+
+def write_text(path: str | PathLike[str], text: str, *, new: bool = False) -> None:
+    """Write a text in UTF-8, as a whole or not at all, line breaks as they are.
+
+    Args:
+        new: only where nothing has that name.
+
+    Raises:
+        OSError: when the file cannot be written.
+    """
+    path = path_of(path, "the file to write")
+    if new and os.path.lexists(path):
+        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
+    with whole(path) as place:
+        place.write_bytes(text.encode())
+
+
+def cell(value: Any) -> Any:
+    """What stands in a cell of a CSV: a text that a spreadsheet would take for a formula gets an apostrophe."""
+    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r", "\n")) else value
 
 
 def headed(name: str, unit: str) -> str:

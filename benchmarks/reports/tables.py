@@ -11,6 +11,7 @@ from pathlib import Path
 
 from benchmarks.suites import SEED
 from benchmarks.timing import quantile
+from tmsopt.disk import write_text
 
 RESULTS = Path("benchmarks/results.md")
 """The file that keeps the tables."""
@@ -74,7 +75,7 @@ def keep(path: Path, name: str, text: str) -> None:
     known = path.read_text(encoding="utf-8") if path.exists() else "# Benchmarks\n"
     before, found, rest = known.partition(first)
     after = rest.partition(last)[2] if found else ""
-    path.write_text(f"{before.rstrip()}\n\n{first}\n\n{text}\n{last}\n{after.lstrip(chr(10))}", encoding="utf-8")
+    write_text(path, f"{before.rstrip()}\n\n{first}\n\n{text}\n{last}\n{after.lstrip(chr(10))}")
 
 
 def table(header: Sequence[object], rows: Iterable[Sequence[object]], empty: str = "") -> str:

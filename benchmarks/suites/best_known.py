@@ -2,13 +2,13 @@
 
 import json
 import math
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from benchmarks.judges import same
+from tmsopt.disk import write_text
 
 REFERENCES = Path("benchmarks/suites/references.json")
 OSCILLATORS = Path("benchmarks/suites/oscillators.json")
@@ -120,9 +120,7 @@ def write(path: Path, head: Mapping[str, Any], name: str, rows: Iterable[Referen
     """One line per problem, in order; the old file stays until the new one is complete."""
     lines = ",\n".join(json.dumps(_row(one), allow_nan=False) for one in sorted(rows, key=lambda one: one.index))
     top = ",\n".join(f"{json.dumps(key)}: {json.dumps(value)}" for key, value in head.items())
-    draft = path.with_suffix(".part")
-    draft.write_text(f"{{\n{top},\n{json.dumps(name)}: [\n{lines}\n]\n}}\n", encoding="utf-8")
-    os.replace(draft, path)
+    write_text(path, f"{{\n{top},\n{json.dumps(name)}: [\n{lines}\n]\n}}\n")
 
 
 def _row(one: Reference | Known | Target) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tmsopt.charts.survey import Grid
 from tmsopt.design.problem import Problem
+from tmsopt.disk import netcdf_errors, whole
 from tmsopt.errors import Fault, InputError, needed
 from tmsopt.roots import CLASSES
 
@@ -30,11 +31,13 @@ def save_layers(problem: Problem, grid: Grid, layers: Mapping[str, NDArray[Any]]
     }  # fmt: skip
     if path.suffix.lower() == ".nc":
         check_netcdf()
-        dataset(problem, grid, layers).to_netcdf(path)
+        made = dataset(problem, grid, layers)
+        with whole(path) as place, netcdf_errors():
+            made.to_netcdf(place)
         return
     axes = {_axis(n, layers): values for n, values in zip(grid.axes, grid.values, strict=True)}
     arrays: dict[str, Any] = {**axes, **layers}
-    with path.open("wb") as stream:
+    with whole(path) as place, place.open("wb") as stream:
         np.savez_compressed(stream, about=np.array(json.dumps(about)), **arrays)
 
 

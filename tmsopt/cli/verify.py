@@ -6,6 +6,7 @@ from pathlib import Path
 import click
 
 from tmsopt.cli.common import DONE, answer, bad_input, check_output, progress, saving
+from tmsopt.disk import write_text
 
 _EXAMPLES = """
 \b
@@ -34,5 +35,5 @@ def verify(as_json: bool, markdown: Path | None, only: tuple[str, ...]) -> None:
     answer(as_json, ledger.to_json, lambda: tmsopt.report.ledger_table(ledger))
     if markdown is not None:
         with saving("--markdown", markdown):
-            markdown.write_text(tmsopt.report.ledger_page(ledger), encoding="utf-8")
+            write_text(markdown, tmsopt.report.ledger_page(ledger))
     sys.exit(DONE)

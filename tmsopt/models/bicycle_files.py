@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 
-from tmsopt.disk import path_of, read_text
+from tmsopt.disk import path_of, read_text, write_text
 from tmsopt.errors import Fault, InputError, at_first, short, suggest, visible
 from tmsopt.models.bicycles.whipple import whipple
 from tmsopt.records import Table
@@ -124,7 +124,7 @@ def write_bicycle(bicycle: Bicycle | Mapping[str, float], path: str | PathLike[s
     else:
         head = ["parameterization: Meijaard2007", f"parameters: {_quoted(own.name)}", "rider: null", "description: ''"]
         lines = [*head, "values:", *(f"  {n}: {_decimal(v)}" for n, (v, _) in sorted(rows.items()))]
-    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_text(file, "\n".join(lines) + "\n")
 
 
 def problem_text(bicycle: Bicycle, speed: float | None = None) -> str:

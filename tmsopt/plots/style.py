@@ -1,6 +1,5 @@
 """What all figures share: colours that the colour-blind can tell apart, sizes for print, and saving."""
 
-import io
 from collections.abc import Sequence
 from os import PathLike
 
@@ -62,11 +61,5 @@ def save(drawn_on: Figure | Axes, path: str | PathLike[str]) -> None:
     figure = figure_of(drawn_on) if isinstance(drawn_on, Axes) else drawn_on
     assert figure is not None, "Axes without a figure"
     ending = path.suffix.lstrip(".").lower()
-    path = path.resolve()  # a link stays one
-    if path.exists() and not path.is_file():
-        drawn = io.BytesIO()
-        figure.savefig(drawn, dpi=200, format=ending)
-        path.write_bytes(drawn.getvalue())
-        return
     with whole(path) as temporary:
         figure.savefig(temporary, dpi=200, format=ending)

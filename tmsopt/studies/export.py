@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.disk import headed, whole
+from tmsopt.disk import cell, headed, netcdf_errors, whole
 from tmsopt.errors import Fault, InputError, needed
 from tmsopt.records import Array
 from tmsopt.studies.row import Row
@@ -120,7 +120,7 @@ def _csv(table: Mapping[str, PartialColumn], path: Path, metadata: str) -> None:
     units = json.loads(metadata).get("units", {})
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(headed(name, units.get(_bare(name), "")) for name in table)
+        writer.writerow(cell(headed(name, units.get(_bare(name), ""))) for name in table)
         for first in range(0, len(next(iter(table.values())).values), _CHUNK):
             texts = [_texts(c.values[first : first + _CHUNK], c.present[first:]) for c in table.values()]
             writer.writerows(zip(*texts, strict=True))
@@ -138,7 +138,7 @@ def _texts(values: np.ndarray[Any, Any], present: NDArray[np.bool_]) -> list[str
         return [("true" if v else "false") if p else "" for v, p in zip(values.tolist(), present, strict=False)]
     if values.dtype == np.float64:
         return ["" if v != v else repr(v) for v in values.tolist()]  # noqa: PLR0124
-    return [str(v) for v in values.tolist()]
+    return [cell(v) if isinstance(v, str) else str(v) for v in values.tolist()]
 
 
 def _parquet(table: Mapping[str, PartialColumn], path: Path, metadata: str) -> None:
@@ -155,14 +155,12 @@ def _netcdf(table: Mapping[str, PartialColumn], path: Path, metadata: str) -> No
     xarray = needed("xarray")
     names = _names(table)
     over_rows = {names[n]: ("row", c.numbers, {"long_name": n}) for n, c in table.items()}
-    try:
-        made = xarray.Dataset(over_rows, {"row": table["number"].values}, {"tmsopt": metadata})
+    made = xarray.Dataset(over_rows, {"row": table["number"].values}, {"tmsopt": metadata})
+    with netcdf_errors():
         made.to_netcdf(path, engine="netcdf4", encoding={name: {"_FillValue": None} for name in made.variables})
         if (made := gridded(table)) is not None:
             encoding = {name: {"_FillValue": None} for name in made.variables}
             made.to_netcdf(path, mode="a", group="grid", engine="netcdf4", encoding=encoding)
-    except RuntimeError as error:  # what the HDF5 library says of a full disk
-        raise OSError(str(error)) from error
 
 
 def gridded(table: Mapping[str, PartialColumn]) -> Any:

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from tmsopt.cli.common import bad_input, check_output, saving, write_json
+from tmsopt.disk import write_text
 
 _OF_NEW = """
 \b
@@ -34,8 +35,8 @@ Exit status: 0 done, 2 bad input, such as a file that is there already.
 
 def write_new(option: str, path: Path, text: str) -> None:
     """Write a file that is not there; where one is, or none can be, say so and end with exit status 2."""
-    with saving(option, path), path.open("x", encoding="utf-8", newline="\n") as file:
-        file.write(text)
+    with saving(option, path):
+        write_text(path, text, new=True)
 
 
 def _write_with_companions(option: str, path: Path, text: str) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from tmsopt.cli.common import bad_input, check_output, saving
+from tmsopt.disk import write_text
 
 _EXAMPLES = """
 \b
@@ -36,4 +37,4 @@ def convert(file: Path, output: Path | None, speed: float | None) -> None:
         click.echo(text, nl=False)
         return
     with saving("--output", output):
-        output.write_text(text, encoding="utf-8")
+        write_text(output, text)
