@@ -7,6 +7,7 @@ import json
 import os
 import re
 import shutil
+import stat
 import tempfile
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
@@ -114,14 +115,15 @@ def lock(path: Path) -> Lock | None:
 
     Raises:
         sqlite3.OperationalError: where no file can be written or the file system has no locks.
-        InputError: where a link has the name of the lock.
+        InputError: where something else has the name of the lock, such as a link.
     """
     import sqlite3  # not for those who read a problem
 
     path = path.with_name(f"{path.name}.lock")
-    if path.is_symlink():
-        raise InputError([Fault("is a symbolic link, and tmsopt writes through none; remove it", file=str(path))])
     for _ in range(_TRIES):
+        with suppress(FileNotFoundError):
+            if not stat.S_ISREG((there := path.lstat()).st_mode) or there.st_size:
+                raise InputError([Fault("is no lock of tmsopt, which is an empty file; remove it", file=str(path))])
         before = _identity(path)
         connection = sqlite3.connect(path, isolation_level=None, timeout=0, check_same_thread=False)
         try:

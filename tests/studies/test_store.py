@@ -11,6 +11,8 @@ import subprocess
 import sys
 import tempfile
 import time
+import tracemalloc
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import replace
@@ -496,12 +498,10 @@ def read_all(path: Path) -> list[Row]:
         return list(opened.rows())
 
 
-@pytest.mark.parametrize("damage", ["DROP TABLE rows", "UPDATE rows SET status = CAST(x'ff' AS TEXT)"])
-def test_tables_that_are_gone_and_text_that_is_none(path: Path, damage: str) -> None:
+def test_text_that_is_none(path: Path) -> None:
     with open_store(path, STUDY) as opened:
         opened.add([row(0)])
-    with closing(sqlite3.connect(path)) as connection, connection:
-        connection.execute(damage)
+    spoil(path, "UPDATE rows SET status = CAST(x'ff' AS TEXT)")
     with read_store(path) as opened:
         assert "is damaged" in refusal(opened.counts)
         assert "is damaged" in refusal(lambda: list(opened.rows()))
@@ -509,9 +509,192 @@ def test_tables_that_are_gone_and_text_that_is_none(path: Path, damage: str) -> 
 
 def test_a_damaged_definition_is_said_to_be(path: Path) -> None:
     open_store(path, STUDY).close()
-    with closing(sqlite3.connect(path)) as connection, connection:
-        connection.execute("UPDATE columns SET doubles = x'00'")
+    spoil(path, "UPDATE columns SET doubles = x'00'")
     assert "definition of its study is damaged" in refusal(lambda: open_store(path, STUDY))
+
+
+# Stores from other people
+
+
+def spoil(path: Path, script: str, *values: Any) -> None:
+    """Change a store as any other program can."""
+    with closing(sqlite3.connect(path)) as connection, connection:
+        if values:
+            connection.execute(script, values)
+        else:
+            connection.executescript(script)
+
+
+def spoiled_row(**changes: Any) -> Callable[[Path], None]:
+    """A row with another content and a checksum that is right."""
+
+    def change(path: Path) -> None:
+        data = json.dumps(row(0).to_json() | changes)
+        checksum = zlib.crc32(f"0:optimal:{data}".encode())
+        spoil(path, "UPDATE rows SET data = ?, checksum = ? WHERE number = 0", data, checksum)
+
+    return change
+
+
+def bomb(path: Path) -> None:
+    """Where three numbers were, a few kilobytes that would become 128 MB, with a right checksum."""
+    squeezed = zlib.compressobj(9)
+    packed = b"".join(squeezed.compress(bytes(2**24)) for _ in range(8)) + squeezed.flush()
+    spoil(path, "UPDATE columns SET checksum = ?, doubles = ?", zlib.crc32(packed), packed)
+
+
+def byte(place: int, value: int) -> Callable[[Path], None]:
+    def change(path: Path) -> None:
+        with path.open("r+b") as stream:
+            stream.seek(place)
+            stream.write(bytes([value]))
+
+    return change
+
+
+def told(name: str, value: str) -> Callable[[Path], None]:
+    return lambda path: spoil(path, "UPDATE about SET value = ? WHERE name = ?", value, name)
+
+
+ENDLESS = "WITH RECURSIVE c(n) AS (SELECT 0 UNION ALL SELECT n + 1 FROM c) SELECT n AS number, 'optimal' AS status"
+SPOILED: dict[str, tuple[Callable[[Path], None], str]] = {
+    "no rows": (lambda p: spoil(p, "DROP TABLE rows"), "is damaged"),
+    "an endless view": (
+        lambda p: spoil(p, f"DROP TABLE rows; CREATE VIEW rows AS {ENDLESS}, 0 AS checksum, '{{}}' AS data FROM c"),
+        "view 'rows' is not that of a store",
+    ),
+    "a trigger": (
+        lambda p: spoil(p, "CREATE TRIGGER t AFTER INSERT ON sessions BEGIN DELETE FROM rows; END"),
+        "trigger 't' is not that of a store",
+    ),
+    "an index": (lambda p: spoil(p, "CREATE INDEX i ON rows (abs(checksum))"), "index 'i' is not that of a store"),
+    "a virtual table": (lambda p: spoil(p, "CREATE VIRTUAL TABLE v USING fts4(x)"), "is not that of a store"),
+    "a generated column": (
+        lambda p: spoil(p, "ALTER TABLE rows ADD COLUMN x AS (hex(zeroblob(1000000)))"),
+        "table 'rows' is not that of a store",
+    ),
+    "a page of two tables": (
+        lambda p: spoil(
+            p,
+            "PRAGMA writable_schema=ON; UPDATE sqlite_schema SET rootpage = (SELECT rootpage FROM sqlite_schema "
+            "WHERE name = 'rows') WHERE name = 'columns'",
+        ),
+        "is damaged",
+    ),
+    "another file format": (byte(19, 3), "is no store of tmsopt"),
+    "another schema format": (byte(47, 99), "is no store of tmsopt"),
+    "zeros": (bomb, "definition of its study is damaged"),
+    "a trillion numbers": (lambda p: spoil(p, f"UPDATE columns SET count = {10**12}"), "definition of its study"),
+    "a count below 0": (lambda p: spoil(p, "UPDATE columns SET count = -1"), "definition of its study is damaged"),
+    "a count that is none": (lambda p: spoil(p, "UPDATE columns SET count = 'x'"), "definition of its study"),
+    "a nested definition": (told("definition", "[" * 100_000 + "]" * 100_000), "more than 100 deep"),
+    "a definition 200 deep": (told("definition", "[" * 200 + "]" * 200), "more than 100 deep"),
+    "a definition of lists": (told("definition", f"[{'[],' * 1_000_001}0]"), "definition of its study is damaged"),
+    "a definition that is none": (told("definition", "[]"), "definition of its study is damaged"),
+    "no definition": (lambda p: spoil(p, "DELETE FROM about"), "definition of its study is damaged"),
+    "versions that are none": (lambda p: spoil(p, "UPDATE sessions SET versions = '[]'"), "the list of its writers"),
+    "a writer without a start": (lambda p: spoil(p, "UPDATE sessions SET started = x'00'"), "started is b'"),
+    "a row that is none": (lambda p: spoil(p, "UPDATE rows SET data = '[]'"), "row 0 is damaged"),
+    "a row of another number": (spoiled_row(number=7), "it says to be row 7"),
+    "parameters that are none": (spoiled_row(parameters=5), "parameters: found 5; accepted: names with numbers"),
+    "parameters that are texts": (spoiled_row(parameters={"a": "x"}), "parameters.a: found 'x'; accepted: a number"),
+    "no structure": (spoiled_row(structure=None), "structure: found None; accepted: str"),
+    "a huge number": (spoiled_row(abscissa=10**400), "abscissa: found 1000"),
+    "a truth for a number": (spoiled_row(abscissa=True), "abscissa: found True"),
+    "a nested row": (spoiled_row(laws=json.loads("[" * 200 + "]" * 200)), "row 0 is damaged"),
+    "a status of its own": (spoiled_row(status="fine"), "row 0 is damaged"),
+    "a status that is no text": (lambda p: spoil(p, "UPDATE rows SET status = x'00'"), "is damaged"),
+}
+
+
+def read_whole(path: Path) -> None:
+    """All that can be asked of a store."""
+    with read_store(path) as opened:
+        opened.definition(), opened.about(), opened.sessions(), opened.done(), opened.counts(), list(opened.rows())
+
+
+def continued(path: Path) -> None:
+    with open_store(path, STUDY) as opened:
+        list(opened.rows())
+        opened.counts()
+
+
+@pytest.mark.parametrize("name", SPOILED)
+def test_a_spoiled_store_is_refused_and_moved_aside_by_fresh(name: str, path: Path) -> None:
+    """Never run, never believed, in little memory; what its reader does not look at does not stop that reader."""
+    with open_store(path, STUDY) as opened:
+        opened.add([row(0)])
+    spoil_it, words = SPOILED[name]
+    spoil_it(path)
+    tracemalloc.start()
+    said = [refusal(lambda: read_whole(path)), refusal(lambda: continued(path))]
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert all(words in message and str(path) in message for message in said), said
+    assert peak < 100e6
+    before = path.read_bytes()
+    if "no store" not in words:
+        open_store(path, STUDY, fresh=True).close()
+        assert path.with_name("study.1.sqlite").read_bytes()[96:] == before[96:]  # the header says who wrote last
+    assert sorted(p.suffix for p in path.parent.iterdir()) == [".sqlite"] * (1 + ("no store" not in words))
+
+
+def test_a_tree_that_never_ends_is_damage(path: Path) -> None:
+    """Inner pages whose children are all one page: 20 of them would be walked 500²⁰ times."""
+    with open_store(path, STUDY) as opened:
+        opened.add([row(0)])
+    with closing(sqlite3.connect(path)) as connection:
+        ((root,),) = connection.execute("SELECT rootpage FROM sqlite_schema WHERE name = 'rows'")
+        ((pages,),) = connection.execute("PRAGMA page_count")
+    whole = bytearray(path.read_bytes())
+    leaf = whole[4096 * (root - 1) : 4096 * root]
+    for place in [root, *range(pages + 1, pages + 12)]:
+        child = pages + 1 if place == root else place + 1
+        cells = [struct.pack(">IB", child, 1 + n % 100) for n in range(100)]
+        body = b"".join(cells)
+        places = b"".join(struct.pack(">H", 4096 - len(body) + 5 * n) for n in range(100))
+        head = struct.pack(">BHHHBI", 5, 0, 100, 4096 - len(body), 0, child)
+        page = (head + places).ljust(4096 - len(body), b"\0") + body
+        whole[4096 * (place - 1) : 4096 * place] = page
+    whole += leaf
+    whole[28:32] = struct.pack(">I", len(whole) // 4096)
+    path.write_bytes(whole)
+    assert "is damaged" in refusal(lambda: read_store(path))
+    open_store(path, STUDY, fresh=True).close()
+
+
+@posix
+@pytest.mark.parametrize("ending", ["-journal", "-wal", "-shm", ".lock"])
+def test_links_beside_a_store_are_refused(ending: str, path: Path, tmp_path: Path) -> None:
+    with open_store(path, STUDY) as opened:
+        opened.add([row(0)])
+    victim, beside = tmp_path / "victim", Path(f"{path}{ending}")
+    victim.write_bytes(b"kept")
+    beside.symlink_to(victim)
+    calls = [lambda: open_store(path, STUDY), lambda: open_store(path, STUDY, fresh=True)]
+    for call in calls if ending == ".lock" else [*calls, lambda: read_store(path)]:
+        assert beside.name in refusal(call)
+    assert victim.read_bytes() == b"kept"
+    assert beside.is_symlink()
+
+
+@pytest.mark.parametrize("beside", ["study.sqlite-journal", "study.sqlite.lock"])
+def test_a_journal_that_names_another_file_removes_none(beside: str, path: Path, tmp_path: Path) -> None:
+    """SQLite removes what a journal of several databases names, once it has played it: any file of the reader's."""
+    with open_store(path, STUDY) as opened:
+        opened.add([row(0)])
+    victim, magic = tmp_path / "thesis.tex", bytes.fromhex("d9d505f920a163d7")
+    victim.write_bytes(b"kept")
+    if beside.endswith(".lock"):
+        path.with_name(beside).write_bytes(path.read_bytes())
+    name = str(victim).encode()
+    head = (magic + struct.pack(">5I", 0, 1, path.stat().st_size // 4096, 512, 4096)).ljust(512, b"\0")
+    tail = struct.pack(">I", 2**30 // 4096 + 1) + name + struct.pack(">2I", len(name), sum(name)) + magic
+    journal = path.with_name(beside if beside.endswith("-journal") else f"{beside}-journal")
+    journal.write_bytes(head + tail)
+    assert beside in refusal(lambda: open_store(path, STUDY))
+    assert beside in refusal(lambda: open_store(path, STUDY, fresh=True))
+    assert victim.read_bytes() == b"kept"
 
 
 @posix

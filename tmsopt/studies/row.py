@@ -3,9 +3,10 @@
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields
 from typing import Any
 
+from tmsopt.errors import short
 from tmsopt.records import Table
 
 STATUSES = ("optimal", "infeasible", "not_converged", "failed", "quarantined")
@@ -76,21 +77,24 @@ class Row:
         return data | {"stable": self.stable}
 
     @staticmethod
-    def from_json(data: Mapping[str, Any]) -> "Row":
-        """The row that `to_json` was made of, bit by bit."""
-        made: dict[str, Any] = {}
-        for f in _FIELDS:
-            if f.name not in data:
-                continue
-            value = data[f.name]
-            if isinstance(value, Mapping):
-                made[f.name] = Table({n: _number(v, math.nan) for n, v in value.items()})
-            else:
-                made[f.name] = _number(value, _ABSENT.get(f.name, math.nan)) if f.type is float else value
+    def from_json(data: Any) -> "Row":
+        """The row that `to_json` was made of, bit by bit.
+
+        Raises:
+            ValueError: for data that no row becomes.
+        """
+        if not isinstance(data, Mapping):
+            raise ValueError(f"found {short(data)}; accepted: a table")
+        if missing := [f.name for f in _FIELDS if f.default is f.default_factory is MISSING and f.name not in data]:
+            raise ValueError(f"it lacks {', '.join(missing)}")
+        made = {f.name: _read(f.name, data[f.name], f.type) for f in _FIELDS if f.name in data}
+        if made["status"] not in STATUSES:
+            raise ValueError(f"status: found {short(made['status'])}; accepted: {' '.join(STATUSES)}")
         return Row(**made)
 
 
 _FIELDS = fields(Row)
+_WHOLE = 2**1023  # a larger one is no double
 _ABSENT = {"bound": -math.inf, "gap": math.inf}
 
 
@@ -106,5 +110,26 @@ def _text(number: float, absent: float) -> str | None:
     return None if number == absent or (math.isnan(number) and math.isnan(absent)) else str(number)
 
 
-def _number(value: float | str | None, absent: float) -> float:
-    return absent if value is None else float(value)
+def _read(name: str, value: Any, kind: Any) -> Any:
+    """The value of a field.
+
+    Raises:
+        ValueError: for one of another kind.
+    """
+    if kind is float:
+        return _number(name, value, _ABSENT.get(name, math.nan))
+    if kind in (int, str, bool):
+        if type(value) is not kind:
+            raise ValueError(f"{name}: found {short(value)}; accepted: {kind.__name__}")
+        return value
+    if not isinstance(value, Mapping):
+        raise ValueError(f"{name}: found {short(value)}; accepted: names with numbers")
+    return Table({n: _number(f"{name}.{n}", v, math.nan) for n, v in value.items()})
+
+
+def _number(name: str, value: Any, absent: float) -> float:
+    if value is None:
+        return absent
+    if value in ("nan", "inf", "-inf") or type(value) is float or (type(value) is int and abs(value) <= _WHOLE):
+        return float(value)
+    raise ValueError(f"{name}: found {short(value)}; accepted: a number")

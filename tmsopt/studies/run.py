@@ -148,11 +148,13 @@ def run_study(
     with open_store(path_of(store, "an SQLite file"), definition(asked), fresh=fresh) as opened:
         for line in (*opened.warnings, *([f"moved the old store to {opened.moved}"] if opened.moved else [])):
             note(line)
-        found = len(opened.done())
-        if found:
+        there = _rows(asked, opened)  # damage is said before any work
+        if found := len(there):
             note(f"{found} of {len(asked)} rows are in {opened.path}")
+        if found < len(asked):
+            there = ()  # not in memory twice: they are read again with the others
         made = fill(asked, opened, workers=workers, scheduler=scheduler, progress=progress, note=note)
-        return Results(asked, tuple(opened.rows()), *made, found, opened.about())
+        return Results(asked, there or _rows(asked, opened), *made, found, opened.about())
 
 
 def stored(study: Study, store: str | PathLike[str]) -> Results:
@@ -162,8 +164,28 @@ def stored(study: Study, store: str | PathLike[str]) -> Results:
         InputError: where there is no store.
     """
     with read_store(path_of(store, "an SQLite file")) as opened:
-        rows = tuple(opened.rows())
+        rows = _rows(study, opened)
         return Results(study, rows, 0, 0.0, "", len(rows), opened.about())
+
+
+def _rows(study: Study, store: Store) -> tuple[Row, ...]:
+    """All rows of a store.
+
+    Raises:
+        InputError: for one that the study cannot have, or that is damaged.
+    """
+    number, rows = store.outside(len(study)), []
+    if number is None:
+        for row in store.rows():
+            rows.append(row)
+            if row.varied != study.varied(row.number):
+                number = row.number
+    if number is None:
+        return tuple(rows)
+    message = (
+        f"row {number} is not of this study; --fresh moves the store aside, Store.forget([{number}]) removes the row"
+    )
+    raise InputError([Fault(message, file=str(store.path))])
 
 
 def _faults(study: object, workers: object) -> Iterator[Fault]:

@@ -2,81 +2,25 @@
 
 import json
 import sqlite3
-import time
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Mapping
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
 from tmsopt import disk
 from tmsopt.errors import Fault, InputError
+from tmsopt.studies.store.asking import DAMAGED, PATIENCE, ask, code, explained, refuse
 from tmsopt.studies.store.definition import Definition, pack, unpack
 from tmsopt.studies.store.provenance import host, now
+from tmsopt.studies.store.received import COMPANIONS, TABLES, careful, companion_fault, content_fault
 
 APPLICATION = 0x746D736F
 """In the header of every store, where `file` and SQLite look for it: "tmso"."""
 
 SCHEMA = 1
 
-PATIENCE = 60.0
-"""Seconds to wait for somebody who reads or writes just now."""
-
-_TABLES = """
-CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL);
-CREATE TABLE columns (name TEXT PRIMARY KEY, count INTEGER NOT NULL, checksum INTEGER NOT NULL, doubles BLOB NOT NULL);
-CREATE TABLE sessions (id INTEGER PRIMARY KEY, started TEXT NOT NULL, ended TEXT, pid INTEGER NOT NULL,
-    host TEXT NOT NULL, versions TEXT NOT NULL, rows INTEGER NOT NULL DEFAULT 0);
-CREATE TABLE rows (number INTEGER PRIMARY KEY, status TEXT NOT NULL, checksum INTEGER NOT NULL, data TEXT NOT NULL);
-CREATE INDEX by_status ON rows (status);
-"""  # The index is a hundredth of the rows, and all that `done` and `counts` read.
-
-_PAUSE = 0.001  # seconds between two questions to a store that is locked
-
-_COMPANIONS = ("-journal", "-wal", "-shm")
-"""What SQLite keeps beside a store, the last two for one of an earlier version."""
-
-_MEANINGS = {
-    sqlite3.SQLITE_FULL: "the disk is full; make room and run the same command again, the rows in the store are safe",
-    sqlite3.SQLITE_IOERR: "reading or writing fails, or the disk is full; the rows in the store are safe",
-    sqlite3.SQLITE_READONLY: "cannot be written; give a place that can",
-    sqlite3.SQLITE_PERM: "cannot be written; give a place that can",
-    sqlite3.SQLITE_CANTOPEN: "cannot be opened or written here; give a file in a folder that can be written",
-    sqlite3.SQLITE_CORRUPT: "is damaged; --fresh moves it aside and starts a new store, or give another --store",
-    sqlite3.SQLITE_NOTADB: "is no store of tmsopt; give another file",
-    sqlite3.SQLITE_BUSY: f"another program kept it locked for {PATIENCE:g} s; end that and run the same command again",
-    sqlite3.SQLITE_PROTOCOL: "locks do not work on this file system; give a --store on another disk",
-    sqlite3.SQLITE_LOCKED: "another program keeps it locked; end that and run the same command again",
-}
-
-
-def refuse(path: Path, *lines: str) -> InputError:
-    """The error that says these lines about a store."""
-    return InputError([Fault(lines[0], file=str(path)), *(Fault(f"  {line}") for line in lines[1:])])
-
-
-@contextmanager
-def explained(path: Path) -> Iterator[None]:
-    """What SQLite complains of, in words of a store.
-
-    Raises:
-        InputError: for any error of the file or the place where it is; a fault of the program stays one.
-    """
-    try:
-        yield
-    except sqlite3.DatabaseError as error:
-        meaning = _MEANINGS.get(code(error))
-        if meaning is None:
-            raise
-        raise refuse(path, f"{meaning} ({error})") from error
-
-
-def code(error: sqlite3.Error) -> int:
-    """SQLite's number of an error; that of a damaged file where text is no text or a table is gone; 0 for others."""
-    found = getattr(error, "sqlite_errorcode", None)
-    if isinstance(error, sqlite3.OperationalError) and (found is None or "no such" in str(error)):
-        return sqlite3.SQLITE_CORRUPT  # Python gives no number to what it cannot decode
-    return (found or 0) & 0xFF
+_NUMBERS = 25_000_000  # read of a store, 200 MB, unless the study that is asked for has more
 
 
 def check(path: Path) -> None:
@@ -87,6 +31,8 @@ def check(path: Path) -> None:
     """
     if not path.is_file():
         raise refuse(path, "is no regular file; give the name of a store, such as study.sqlite")
+    if fault := companion_fault(path):
+        raise refuse(path, fault)
     with explained(path):
         application, schema = _header(path)
     if application != APPLICATION:
@@ -127,11 +73,14 @@ def create(path: Path, definition: Definition, versions: Mapping[str, str], plat
         "definition": json.dumps(definition.plain), "seed": json.dumps(definition.plain.get("seed")), "created": now(),
         "host": host(), "platform": platform, "versions": json.dumps(versions),
     }  # fmt: skip
+    if len(about["definition"]) > disk.LARGEST_JSON:
+        message = f"takes more than {disk.LARGEST_JSON} characters to define; give the values in a CSV file"
+        raise InputError([Fault(message, ("study",))])
     with disk.whole(path, locked=True) as place, closing(sqlite3.connect(place, isolation_level=None)) as connection:
         connection.execute("PRAGMA journal_mode=MEMORY")  # what is not finished is not kept
         connection.execute(f"PRAGMA application_id={APPLICATION}")
         connection.execute(f"PRAGMA user_version={SCHEMA}")
-        connection.executescript(f"BEGIN; {_TABLES}")
+        connection.executescript(f"BEGIN; {TABLES}")
         connection.executemany("INSERT INTO about VALUES (?, ?)", about.items())
         for name, values in definition.columns.items():
             packed = pack(values)
@@ -140,22 +89,57 @@ def create(path: Path, definition: Definition, versions: Mapping[str, str], plat
         connection.execute("COMMIT")
 
 
-def definition(connection: sqlite3.Connection, path: Path) -> Definition:
+def about(connection: sqlite3.Connection) -> dict[str, str]:
+    """Name → text of what a store says of itself; what is no such text is left out."""
+    found = ask(connection, f"SELECT name, substr(value, 1, {disk.LARGEST_JSON + 1}) FROM about ORDER BY rowid LIMIT 6")
+    return {name: value for name, value in found if isinstance(name, str) and isinstance(value, str)}
+
+
+_SESSION = {"started": str, "ended": str | None, "pid": int, "host": str, "versions": str, "rows": int}
+
+
+def sessions(connection: sqlite3.Connection) -> list[dict[str, Any]]:
+    """Every process that wrote, in order; of very many the last ones.
+
+    Raises:
+        ValueError: for a line that none wrote.
+    """
+    names = ", ".join(f"substr({name}, 1, 4000)" if kind is str else name for name, kind in _SESSION.items())
+    made = []
+    for line in ask(connection, f"SELECT {names} FROM sessions ORDER BY id DESC LIMIT 10000"):
+        for value, (name, kind) in zip(line, _SESSION.items(), strict=True):
+            if not isinstance(value, kind):
+                raise ValueError(f"{name} is {value!r:.60}")
+        versions = disk.from_json(line[4])
+        if not isinstance(versions, dict) or not all(isinstance(v, str) for v in versions.values()):
+            raise ValueError(f"versions are {line[4]:.60}")
+        made.append(dict(zip(_SESSION, line, strict=True)) | {"versions": versions})
+    return made[::-1]
+
+
+def definition(connection: sqlite3.Connection, path: Path, most: int = 0) -> Definition:
     """Of the study that a store was made for.
+
+    Args:
+        most: numbers in all columns that are read, or some millions where that is more.
 
     Raises:
         InputError: when it is damaged.
     """
     try:
-        (plain,) = ask(connection, "SELECT value FROM about WHERE name = 'definition'")[0]
-        columns = {}
-        for name, count, checksum, packed in ask(connection, "SELECT * FROM columns ORDER BY rowid"):
-            values = unpack(packed)
-            if zlib.crc32(packed) != checksum or len(values) != count:
-                raise ValueError(name)
-            columns[name] = values
-        return Definition(json.loads(plain), columns)
-    except (IndexError, TypeError, ValueError, zlib.error) as error:
+        plain = disk.from_json(about(connection)["definition"])
+        left, columns = max(_NUMBERS, most), {}
+        for place, name, count in ask(connection, "SELECT rowid, substr(name, 1, 1000), count FROM columns LIMIT 1000"):
+            if not isinstance(name, str) or not isinstance(count, int) or not 0 <= count <= left:
+                raise ValueError(f"{count!r:.20} numbers of {name!r:.60}")
+            ((packed, checksum),) = ask(connection, "SELECT doubles, checksum FROM columns WHERE rowid = ?", (place,))
+            if zlib.crc32(packed) != checksum:
+                raise ValueError(f"the checksum of {name}")
+            columns[name], left = unpack(packed, count), left - count
+        if not isinstance(plain, dict):
+            raise ValueError("no table")
+        return Definition(plain, columns)
+    except (KeyError, TypeError, ValueError, zlib.error) as error:
         message = "the definition of its study is damaged; --fresh moves it aside and starts a new store"
         raise refuse(path, f"{message} ({error})") from error
 
@@ -171,6 +155,7 @@ def connect_to_write(path: Path) -> sqlite3.Connection:
         with suppress(sqlite3.OperationalError):  # somebody reads a store of an earlier version by its write-ahead log
             connection.execute("PRAGMA journal_mode=DELETE").fetchone()
         connection.execute("PRAGMA synchronous=FULL")
+        careful(connection)
     except BaseException:
         connection.close()
         raise
@@ -189,7 +174,7 @@ def connect_to_read(path: Path) -> sqlite3.Connection:
         )
         try:
             connection.execute("PRAGMA query_only=ON")
-            ask(connection, "SELECT count(*) FROM sessions")
+            check_content(connection, path)
             return connection
         except sqlite3.OperationalError as error:
             connection.close()
@@ -202,20 +187,15 @@ def connect_to_read(path: Path) -> sqlite3.Connection:
     raise AssertionError("unreachable")
 
 
-def ask(connection: sqlite3.Connection, query: str, values: Sequence[Any] | Mapping[str, Any] = ()) -> list[Any]:
-    """All that a query finds. It asks often while the store is locked.
+def check_content(connection: sqlite3.Connection, path: Path) -> None:
+    """That a database has the tables of a store, whole, and nothing that a query would run.
 
-    SQLite asks ten times a second, and a writer with a rollback journal, who locks the store for most of the time while
-    he waits for the disk, would let a reader in once a minute.
+    Raises:
+        InputError: when it has not.
     """
-    end = time.monotonic() + PATIENCE
-    while True:
-        try:
-            return connection.execute(query, values).fetchall()
-        except sqlite3.OperationalError as error:
-            if code(error) != sqlite3.SQLITE_BUSY or time.monotonic() > end:
-                raise
-            time.sleep(_PAUSE)
+    careful(connection)
+    if fault := content_fault(connection, path.stat().st_size):
+        raise refuse(path, f"{DAMAGED} ({fault})")
 
 
 def aside(path: Path) -> Path:
@@ -225,14 +205,15 @@ def aside(path: Path) -> Path:
         OSError: when it cannot be moved, e.g. while somebody reads it on Windows.
     """
     if path.exists():
-        with suppress(sqlite3.Error), closing(connect_to_write(path)) as connection:  # a damaged one is moved as it is
-            ask(connection, "SELECT * FROM sessions")
+        # A damaged one is moved as it is.
+        with suppress(sqlite3.Error, InputError), closing(connect_to_write(path)) as connection:
+            check_content(connection, path)
             # A commit clears the journal that a killed writer left; an UPDATE that changes nothing would not be one.
             ((schema,),) = ask(connection, "PRAGMA user_version")
             connection.execute(f"PRAGMA user_version={schema}")
-    return disk.aside(path, _COMPANIONS)
+    return disk.aside(path, COMPANIONS)
 
 
 def leftovers(path: Path) -> bool:
     """Whether journals lie beside a store that is gone: SQLite would play them into a new one of that name."""
-    return any(Path(f"{path}{ending}").exists() for ending in _COMPANIONS)
+    return any(Path(f"{path}{ending}").exists() for ending in COMPANIONS)

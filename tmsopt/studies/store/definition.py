@@ -41,14 +41,16 @@ def pack(values: "array[float]") -> bytes:
     return zlib.compress(_little(values).tobytes(), 1)
 
 
-def unpack(packed: bytes) -> "array[float]":
-    """What `pack` made.
+def unpack(packed: bytes, count: int) -> "array[float]":
+    """What `pack` made of so many numbers; a few bytes may say that they are many more.
 
     Raises:
         ValueError, zlib.error: for bytes that are damaged.
     """
-    values = array("d")
-    values.frombytes(zlib.decompress(packed))
+    values, stream = array("d"), zlib.decompressobj()
+    values.frombytes(stream.decompress(packed, 8 * count + 1))
+    if len(values) != count or not stream.eof or stream.unused_data:
+        raise ValueError(f"no {count} numbers")
     return _little(values)
 
 

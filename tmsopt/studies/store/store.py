@@ -6,21 +6,21 @@ import platform
 import sqlite3
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from tmsopt.disk import Lock, differences, lock
+from tmsopt.disk import Lock, differences, from_json, lock
 from tmsopt.errors import InputError
 from tmsopt.studies.row import STATUSES, Row
 from tmsopt.studies.store import database
-from tmsopt.studies.store.database import ask, explained, refuse
+from tmsopt.studies.store.asking import DAMAGED, ask, explained, refuse
 from tmsopt.studies.store.definition import Definition
 from tmsopt.studies.store.packing import SELECT, packed, unpacked
 from tmsopt.studies.store.provenance import changed, host, now, versions
 
-_CHUNK = 500  # rows read at once: a reader that pauses between rows must not hold up the writer
+_CHUNK = 100  # rows read at once: a reader that pauses between rows must not hold up the writer; 100 MB at most
 _MOST = 20  # differences shown
 
 
@@ -108,8 +108,16 @@ class Store:
     def counts(self) -> dict[str, int]:
         """Status → rows that have it, in the order of `STATUSES`; none that no row has."""
         with explained(self.path):
-            found = dict(ask(self._connection, "SELECT status, count(*) FROM rows GROUP BY status"))
-        return {status: found[status] for status in (*STATUSES, *found) if status in found}
+            found = dict(ask(self._connection, "SELECT status, count(*) FROM rows GROUP BY status LIMIT 100"))
+        if unknown := [status for status in found if status not in STATUSES]:
+            raise refuse(self.path, f"{DAMAGED} (a row has the status {unknown[0]!r:.60})")
+        return {status: found[status] for status in STATUSES if status in found}
+
+    def outside(self, most: int) -> int | None:
+        """The number of a row that a study of so many rows cannot have; None where there is none."""
+        query = "SELECT number FROM rows WHERE number < 0 OR number >= ? LIMIT 1"
+        with explained(self.path):
+            return next((number for (number,) in ask(self._connection, query, (most,))), None)
 
     def row(self, number: int) -> Row:
         """One row.
@@ -149,17 +157,17 @@ class Store:
     def about(self) -> dict[str, Any]:
         """Schema, definition without its columns, seed, when, where and with which versions the store was made."""
         with explained(self.path):
-            found = dict(ask(self._connection, "SELECT name, value FROM about"))
+            found: dict[str, Any] = database.about(self._connection)
             ((schema,),) = ask(self._connection, "PRAGMA user_version")
-        plain = {name: json.loads(found[name]) for name in ("definition", "seed", "versions") if name in found}
-        return {"schema": schema} | found | plain
+        with _undamaged(self.path, "what it says of itself"):
+            for name in ("definition", "seed", "versions"):
+                found[name] = from_json(found[name])
+        return {"schema": schema} | found
 
     def sessions(self) -> list[dict[str, Any]]:
         """Every process that wrote, in order: started, ended (None where killed), pid, host, versions, rows added."""
-        names = ("started", "ended", "pid", "host", "versions", "rows")
-        with explained(self.path):
-            found = ask(self._connection, f"SELECT {', '.join(names)} FROM sessions ORDER BY id")
-        return [dict(zip(names, line, strict=True)) | {"versions": json.loads(line[4])} for line in found]
+        with explained(self.path), _undamaged(self.path, "the list of its writers"):
+            return database.sessions(self._connection)
 
     def forget(self, numbers: Iterable[int]) -> None:
         """Remove rows, such as damaged ones, so that they are solved again.
@@ -241,12 +249,13 @@ def _opened(path: Path, wanted: Definition, today: dict[str, str], fresh: bool, 
     if not _occupied(path):
         database.create(path, wanted, today, platform.platform())
     with closing(database.connect_to_read(path)) as connection:  # what is refused is not changed
-        known = database.definition(connection, path)
+        known = database.definition(connection, path, sum(map(len, wanted.columns.values())))
         found = list(differences(known.data, wanted.data, ("in the store", "in the file")))
-        earlier = ask(connection, "SELECT DISTINCT versions FROM sessions WHERE rows > 0 ORDER BY id")
+        with _undamaged(path, "the list of its writers"):
+            earlier = [session["versions"] for session in database.sessions(connection) if session["rows"] > 0]
     if found:
         raise refuse(path, *_changed_study(found))
-    warnings = list(dict.fromkeys(line for (then,) in earlier for line in changed(json.loads(then), today)))
+    warnings = list(dict.fromkeys(line for then in earlier for line in changed(then, today)))
     connection = database.connect_to_write(path)
     try:
         line = (now(), os.getpid(), host(), json.dumps(today))
@@ -256,6 +265,19 @@ def _opened(path: Path, wanted: Definition, today: dict[str, str], fresh: bool, 
     except BaseException:
         connection.close()
         raise
+
+
+@contextmanager
+def _undamaged(path: Path, what: str) -> Iterator[None]:
+    """What is read there can be read.
+
+    Raises:
+        InputError: when it cannot.
+    """
+    try:
+        yield
+    except (KeyError, ValueError) as error:
+        raise error if isinstance(error, InputError) else refuse(path, f"{DAMAGED} ({what}: {error})") from error
 
 
 def _placed(path: Path | str) -> Path:
