@@ -1,7 +1,10 @@
 """Folders of large charts: killed and resumed, refused, damaged, and from the command line."""
 
 import dataclasses
+import io
 import json
+import os
+import struct
 import subprocess
 import sys
 import tracemalloc
@@ -10,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.charts import EXTRA, PLANE, charted, files
+from helpers.charts import EXTRA, PLANE, SPACE, charted, files
 
 from tmsopt.charts import LAYERS, chart, open_chart
 from tmsopt.cli import main
@@ -18,7 +21,12 @@ from tmsopt.design import load
 from tmsopt.errors import InputError
 from tmsopt.plots import chart_figure
 
-folder = import_module("tmsopt.charts.folder")
+folder, received = import_module("tmsopt.charts.folder"), import_module("tmsopt.charts.received")
+
+
+def tiles(path):
+    """The recorded ones."""
+    return received.read_record(path, received.read_about(path))[0]
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +84,7 @@ def test_whatever_was_not_recorded_is_done_again(kept, whole, tmp_path):
     path = charted(tmp_path / "torn.chart", tile=97).path
     record = (path / "tiles.jsonl").read_bytes()
     (path / "tiles.jsonl").write_bytes(record[:kept])
-    done = folder.read_tiles(path)
+    done = tiles(path)
     for name in (*LAYERS, *EXTRA):
         array = np.load(path / "layers" / f"{name}.npy", mmap_mode="r+")
         for row in range(23):
@@ -86,7 +94,7 @@ def test_whatever_was_not_recorded_is_done_again(kept, whole, tmp_path):
     found = charted(path, tile=97)
     assert files(path) == files(whole.path)
     assert found.counts.designs == 851
-    assert len(folder.read_tiles(path)) == 12
+    assert len(tiles(path)) == 12
 
 
 def test_a_finished_chart_is_not_charted_again(tmp_path):
@@ -183,20 +191,53 @@ def _said(**changes):
     return change
 
 
+def _written(name, content):
+    return lambda p: (p / name).write_bytes(content)
+
+
+def _constrained(text):
+    def change(path):
+        about = json.loads((path / "about.json").read_text())
+        about["problem"]["constraints"]["trail"] = text
+        (path / "about.json").write_text(json.dumps(about))
+
+    return change
+
+
+def _headed(name, kind, shape):
+    """An array whose head says so, and 40 bytes."""
+    head = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}".encode().ljust(117) + b"\n"
+    return _written(name, b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head + bytes(40))
+
+
+def _told(**changes):
+    def change(path):
+        line = json.loads((path / "tiles.jsonl").read_text())
+        (path / "tiles.jsonl").write_text(json.dumps(line | changes) + "\n")
+
+    return change
+
+
+def zipped():
+    made = io.BytesIO()
+    np.savez(made, a=np.zeros(20, np.int8))
+    return made.getvalue()
+
+
 DAMAGE = {
     "no about": (lambda p: (p / "about.json").unlink(), "about.json cannot be read"),
     "no JSON": (_cut("about.json", 50), "about.json is not JSON"),
     "another schema": (_said(schema=7), "no schema 1"),
     "no list": (lambda p: (p / "about.json").write_text("[]"), "no schema 1"),
-    "no shape": (lambda p: (p / "about.json").write_text('{"schema": 1}'), "lacks shape"),
+    "no shape": (lambda p: (p / "about.json").write_text('{"schema": 1}'), "does not say what was charted (title"),
     "nothing said": (_said(title=None), "does not say what was charted"),
     "layers that are none": (_said(layers=["kind"]), "does not say what was charted"),
     "no tile": (_said(tile="large"), "does not say what was charted"),
     "no layer": (lambda p: (p / "layers" / "kind.npy").unlink(), "layers/kind.npy cannot be read"),
     "a short layer": (_cut("layers/abscissa.npy", 200), "layers/abscissa.npy"),
     "an empty layer": (_cut("layers/abscissa.npy", 0), "layers/abscissa.npy"),
-    "another layer": (lambda p: np.save(p / "layers" / "kind.npy", np.zeros((4, 5))), "not of shape"),
-    "another axis": (lambda p: np.save(p / "axes" / "Fr.npy", np.zeros(3)), "axes of shape"),
+    "another layer": (lambda p: np.save(p / "layers" / "kind.npy", np.zeros((4, 5))), "not an array of shape"),
+    "another axis": (lambda p: np.save(p / "axes" / "Fr.npy", np.zeros(3)), "not an array of shape (5,)"),
     "no axis": (lambda p: (p / "axes" / "Fr.npy").unlink(), "axes/Fr.npy cannot be read"),
     "no record": (lambda p: (p / "tiles.jsonl").unlink(), "tiles.jsonl cannot be read"),
     "another record": (lambda p: (p / "tiles.jsonl").write_text('{"row": 0}\n{}\n'), "line 1 of tiles.jsonl"),
@@ -204,8 +245,34 @@ DAMAGE = {
         lambda p: (p / "tiles.jsonl").write_text(
             (p / "tiles.jsonl").read_text().replace('"designs": 20', '"designs": 9')
         ),
-        "counts 9 of 20 designs",
+        "line 1 of tiles.jsonl is not a tile's (9 designs",
     ),
+    "a head in about": (_said(title="\x1b[31m"), "does not say what was charted (title"),
+    "nested": (lambda p: (p / "about.json").write_text("[" * 100_000 + "]" * 100_000), "more than 100 deep"),
+    "a long about": (lambda p: (p / "about.json").write_text(f"[{'0,' * 9_000_000}0]"), "more than 16000000 char"),
+    "an infinite tile": (_said(tile=float("inf")), "(tile"),
+    "a tile of nothing": (_said(tile=0), "(tile"),
+    "another shape": (_said(shape=[10**9, 10**9]), "(shape: found [1000000000, 1000000000]"),
+    "axes without an end": (_said(axes={"Fr": {"min": 0.0}, "mu": {}}), "(axes.Fr.max"),
+    "a layer elsewhere": (_said(layers={"../../kind": {"dtype": "|i1"}}), "(layers."),
+    "a layer of objects": (_said(layers={"kind": {"dtype": "|O"}}), "(layers.kind.dtype"),
+    "a constraint that is none": (_constrained("Fr <= <= 2"), "does not say what was charted ("),
+    "an archive": (_written("layers/kind.npy", zipped()), "layers/kind.npy is not an array"),
+    "a pickle": (_written("layers/kind.npy", b"cposix\nsystem\n(S'true'\ntR."), "layers/kind.npy is not an array"),
+    "an array below 0": (_headed("axes/Fr.npy", "<f8", "(-1,)"), "axes/Fr.npy is not an array"),
+    "an array of many": (_headed("axes/Fr.npy", "<f8", "(1000000000000000,)"), "axes/Fr.npy is not an array"),
+    "an array of objects": (_headed("axes/Fr.npy", "|O", "(5,)"), "axes/Fr.npy is not an array"),
+    "an array of an odd kind": (_headed("axes/Fr.npy", "<f3", "(5,)"), "axes/Fr.npy is not an array"),
+    "an axis of nan": (lambda p: np.save(p / "axes" / "Fr.npy", np.full(5, np.nan)), "does not go up"),
+    "an axis that stands": (lambda p: np.save(p / "axes" / "Fr.npy", np.ones(5)), "does not go up"),
+    "a tile's classes as texts": (_told(classes=["x"] * 5), "line 1 of tiles.jsonl is not a tile's (classes.0"),
+    "too many classes": (_told(classes=[20] * 5), "is not a tile's (5 classes"),
+    "a tile's designs as text": (_told(designs="x"), "is not a tile's (designs"),
+    "a tile of another row": (_told(row=3), "is not a tile's (20 designs of 4 rows from row 3)"),
+    "a least one elsewhere": (_told(place=10**9), "is not a tile's (least abscissa"),
+    "more satisfied than there are": (_told(satisfied=21), "is not a tile's (21 of 20 designs satisfied)"),
+    "a nested record": (lambda p: (p / "tiles.jsonl").write_text("[" * 9000 + "]" * 900 + "\n"), "is not a tile's"),
+    "a record without an end": (lambda p: (p / "tiles.jsonl").write_bytes(bytes(10**7)), "is not a tile's"),
     "no folder": (lambda p: p.rename(p.with_name("moved")), "is no chart"),
 }
 
@@ -218,6 +285,41 @@ def test_damage_is_seen_and_said(name, tmp_path):
     with pytest.raises(InputError) as seen:
         open_chart(path)
     assert words in str(seen.value)
+    if path.exists():
+        assert charted(path, points=(5, 4), fresh=True).counts.designs == 20
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links and pipes of POSIX")
+@pytest.mark.parametrize("make", ["link", "pipe"])
+@pytest.mark.parametrize(
+    "name", ["about.json", "tiles.jsonl", "axes", "axes/Fr.npy", "layers", "layers/kind.npy", "../.a.chart.unfinished"]
+)
+def test_nothing_is_written_through_a_link(name, make, tmp_path):
+    """Of a folder that is begun: what the link leads to stays as it is, and the link is named."""
+    path = charted(tmp_path / "a.chart", points=(5, 4)).path
+    record = path / "tiles.jsonl"
+    place, kept = path / name, tmp_path / "elsewhere"
+    record.write_bytes(b"")
+    if place.exists():
+        place.rename(kept)
+    else:
+        kept.mkdir()
+    if make == "link":
+        place.symlink_to(kept)
+    else:
+        os.mkfifo(place)
+    before = {p: p.read_bytes() for p in (kept, *kept.rglob("*")) if p.is_file()}
+    if name.startswith(".."):
+        charted(path, points=(5, 4), fresh=True)
+    else:
+        with pytest.raises(InputError, match=f"{name} is {'a symbolic link' if make == 'link' else 'no file'}"):
+            charted(path, points=(5, 4))
+    assert {p: p.read_bytes() for p in (kept, *kept.rglob("*")) if p.is_file()} == before
+
+
+def test_no_chart_has_more_tiles_than_are_read(tmp_path):
+    with pytest.raises(InputError, match="found 1, which makes 2000000 tiles; accepted: 1000000"):
+        charted(tmp_path / "a.chart", SPACE, points=(2, 2000, 1000), layers=("kind",), quantities={}, tile=1)
 
 
 @pytest.mark.parametrize(

@@ -12,17 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.charts.files import dataset, save_layers
-from tmsopt.charts.folder import (
+from tmsopt.charts.folder import Folder, complete, writing
+from tmsopt.charts.received import (
     ABOUT,
+    MOST_TILES,
     SCHEMA,
-    TILES,
-    Folder,
-    complete,
     damaged,
+    number_of_tiles,
     read_about,
-    read_array,
-    read_tiles,
-    writing,
+    read_axis,
+    read_layer,
+    read_record,
 )
 from tmsopt.charts.summary import Tally, total
 from tmsopt.charts.survey import LAYERS, USUAL, Grid, Survey, survey
@@ -200,6 +200,8 @@ def chart(
     if path is None and grid.size > LARGEST:
         message = f"{grid.size:.3g} designs do not fit into memory; give a folder, or {LARGEST:.0e} or less"
         raise InputError([Fault(message, ("points",))])
+    if path is not None and (tiles := number_of_tiles(grid.shape, tile)) > MOST_TILES:
+        raise InputError([Fault(f"found {tile}, which makes {tiles} tiles; accepted: {MOST_TILES}", ("tile",))])
     about = _about(work, (None if path is None else _kept_tile(path, fresh)) or tile)
     where: AbstractContextManager[Memory | Folder] = (
         nullcontext(Memory(grid, {n: work.dtype(n) for n in work.names})) if path is None
@@ -264,7 +266,10 @@ def _about(work: Survey, tile: int) -> dict[str, Any]:
 
 def _kept_tile(path: Path, fresh: bool) -> int | None:
     """The size of tiles of a chart that was begun; another one would change nothing but the record."""
-    return None if fresh or not path.exists() else int(read_about(path)["tile"])
+    if fresh or not path.exists():
+        return None
+    kept: int = read_about(path)["tile"]
+    return kept
 
 
 def _opened(
@@ -272,28 +277,16 @@ def _opened(
 ) -> Chart:
     about = read_about(path)
     try:
-        shape, names, tile = tuple(map(int, about["shape"])), tuple(map(str, about["axes"])), int(about["tile"])
-        dtypes = {str(n): np.dtype(layer["dtype"]) for n, layer in about["layers"].items()}
-        known = isinstance(about["title"], str) and isinstance(about["problem"]["model"], str)
         asked = asked or _posed(about)
-    except (KeyError, TypeError, ValueError, AttributeError):
-        known = False
-    if not known:
-        raise damaged(path, f"{ABOUT} does not say what was charted")
-    grid = Grid(names, tuple(np.asarray(read_array(path, "axes", n)) for n in names))
-    if grid.shape != shape:
-        raise damaged(path, f"axes of shape {grid.shape} for arrays of shape {shape}")
-    done = read_tiles(path)
+    except ValueError as error:
+        raise damaged(path, f"{ABOUT} does not say what was charted ({error})") from None
+    grid = Grid(tuple(about["axes"]), tuple(read_axis(path, n, axis) for n, axis in about["axes"].items()))
+    done, _ = read_record(path, about)
     counts = total(done.values())
-    if left := complete(done, grid.tiles(tile)):
+    if left := complete(done, grid.tiles(about["tile"])):
         message = f"'{path}' is not finished: {counts.designs} of {grid.size} designs; run its command again to go on"
         raise InputError([Fault(message + f" from row {left[0].start}")])
-    if counts.designs != grid.size:
-        raise damaged(path, f"{TILES} counts {counts.designs} of {grid.size} designs")
-    layers = {n: read_array(path, "layers", n) for n in dtypes}
-    for name, array in layers.items():
-        if array.shape != shape or array.dtype != dtypes[name]:
-            raise damaged(path, f"layers/{name}.npy is not of shape {shape} and type {dtypes[name]}")
+    layers = {n: read_layer(path, n, about) for n in about["layers"]}
     return Chart(about, grid.values, layers, counts, edges, path, run or {}, asked)
 
 

@@ -15,20 +15,17 @@ import sqlite3
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.charts.received import ABOUT, TILES, array_file, read_about, read_record
 from tmsopt.charts.summary import Tally
 from tmsopt.disk import Lock, aside, differences, lock, whole
 from tmsopt.errors import Fault, InputError
-
-SCHEMA = 1
-
-ABOUT, TILES = "about.json", "tiles.jsonl"
 
 _SYNC = 1.0  # seconds between two records of finished tiles
 
@@ -99,65 +96,20 @@ def writing(path: Path, about: Mapping[str, Any], axes: Mapping[str, NDArray[Any
             said = "; ".join(changed)
             message = f"holds another chart ({said}); give another name, or --fresh to move this one aside"
             raise InputError([Fault(message, (str(path),))])
-        read_tiles(path)  # so that a file that is missing is said to be
+        done, end = read_record(path, about)
+        places = {
+            n: array_file(path, f"layers/{n}.npy", about["shape"], layer["dtype"])
+            for n, layer in about["layers"].items()
+        }
         record = stack.enter_context((path / TILES).open("r+b"))
-        done, end = _read_record(path)
         record.truncate(end)
         record.seek(end)
-        offsets = {n: _offset(path, n, about) for n in about["layers"]}
-        layers = {n: (stack.enter_context(_layer(path, n).open("r+b")), at) for n, at in offsets.items()}
+        layers = {n: (stack.enter_context(place.open("r+b")), at) for n, (place, at) in places.items()}
         folder = Folder(path, int(about["shape"][-1]), done, layers, record)
         try:
             yield folder
         finally:
             folder.sync()
-
-
-def read_about(path: Path) -> dict[str, Any]:
-    """What a folder says that it is.
-
-    Raises:
-        InputError: where that is no folder of a chart.
-    """
-    try:
-        about = json.loads((path / ABOUT).read_text(encoding="utf-8"))
-    except OSError as error:
-        said = f"'{path}' is no chart: {ABOUT} cannot be read ({error.strerror})"
-        raise InputError([Fault(f"{said}; give the folder that tmsopt chart FILE --output NAME.chart wrote")]) from None
-    except ValueError:
-        raise damaged(path, f"{ABOUT} is not JSON") from None
-    if not isinstance(about, dict) or about.get("schema") != SCHEMA:
-        raise damaged(path, f"{ABOUT} has no schema {SCHEMA}")
-    if not {"shape", "layers", "axes", "tile"} <= set(about):
-        raise damaged(path, f"{ABOUT} lacks shape, layers, axes or tile")
-    return about
-
-
-def read_tiles(path: Path) -> dict[int, Tally]:
-    """First row → counts of the recorded tiles.
-
-    Raises:
-        InputError: for a damaged record.
-    """
-    return _read_record(path)[0]
-
-
-def read_array(path: Path, part: str, name: str) -> NDArray[Any]:
-    """An axis or a layer, as a memory map that is read when it is looked at.
-
-    Raises:
-        InputError: for a file that is missing or damaged.
-    """
-    file = path / part / f"{name}.npy"
-    try:
-        return np.asanyarray(np.load(file, mmap_mode="r", allow_pickle=False))
-    except (OSError, ValueError, EOFError) as error:
-        raise damaged(path, f"{part}/{name}.npy cannot be read ({error})") from None
-
-
-def damaged(path: Path, what: str) -> InputError:
-    """The fault of a folder that is not as it was written."""
-    return InputError([Fault(f"'{path}' is damaged: {what}; give --fresh to chart anew and move this one aside")])
 
 
 def _locked(path: Path) -> Lock:
@@ -192,7 +144,7 @@ def _create(path: Path, about: Mapping[str, Any], axes: Mapping[str, NDArray[Any
             shape = tuple(about["shape"])
             for name, layer in about["layers"].items():
                 dtype = np.dtype(layer["dtype"])
-                with _layer(new, name).open("wb") as stream:
+                with (new / "layers" / f"{name}.npy").open("wb") as stream:
                     header = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
                     np.lib.format.write_array_header_1_0(stream, header)
                     stream.truncate(stream.tell() + int(np.prod(shape)) * dtype.itemsize)
@@ -208,48 +160,6 @@ def _check_room(parent: Path, about: Mapping[str, Any]) -> None:
     if needed > free:
         message = f"takes {needed / 1e9:.1f} GB, and {free / 1e9:.1f} GB are free; ask for fewer layers or points"
         raise InputError([Fault(message, ("--output",))])
-
-
-def _layer(path: Path, name: str) -> Path:
-    return path / "layers" / f"{name}.npy"
-
-
-def _offset(path: Path, name: str, about: Mapping[str, Any]) -> int:
-    """Where the numbers of a layer begin.
-
-    Raises:
-        InputError: for a file that is not of the grid's shape, kind of number and length.
-    """
-    dtype, shape = np.dtype(about["layers"][name]["dtype"]), tuple(about["shape"])
-    try:
-        with _layer(path, name).open("rb") as stream:
-            version = np.lib.format.read_magic(stream)
-            header = np.lib.format.read_array_header_1_0(stream) if version == (1, 0) else None
-            begin, end = stream.tell(), stream.seek(0, os.SEEK_END)
-    except (OSError, ValueError) as error:
-        raise damaged(path, f"layers/{name}.npy cannot be read ({error})") from None
-    if header != (shape, False, dtype) or end - begin != int(np.prod(shape)) * dtype.itemsize:
-        raise damaged(path, f"layers/{name}.npy is not of shape {shape} and type {dtype}")
-    return begin
-
-
-def _read_record(path: Path) -> tuple[dict[int, Tally], int]:
-    """The recorded tiles, and where the record's last whole line ends."""
-    try:
-        lines = (path / TILES).read_bytes().split(b"\n")
-    except OSError as error:
-        raise damaged(path, f"{TILES} cannot be read ({error.strerror})") from None
-    done: dict[int, Tally] = {}
-    for number, line in enumerate(lines[:-1], 1):  # what follows the last line break was being written
-        try:
-            data = json.loads(line)
-            counts = {f.name: data[f.name] for f in fields(Tally)}
-            counts["classes"] = tuple(counts["classes"])
-            counts["least"] = float("nan") if counts["least"] is None else counts["least"]
-            done[int(data["row"])] = Tally(**counts)
-        except (ValueError, KeyError, TypeError):
-            raise damaged(path, f"line {number} of {TILES} is not a tile's") from None
-    return done, sum(len(line) + 1 for line in lines[:-1])
 
 
 def complete(done: Iterable[int], tiles: Iterable[range]) -> list[range]:
