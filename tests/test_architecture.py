@@ -182,6 +182,34 @@ def writes(source: str) -> list[int]:
     return calls(source, "print", "input") + streams
 
 
+WRITERS = ("write_text", "write_bytes", "savefig", "to_netcdf", "to_csv", "to_parquet", "write_table", "savez",
+    "savez_compressed", "savetxt", "tofile")  # fmt: skip
+
+
+def written(module: str, source: str) -> Iterator[str]:
+    """Functions that write a file but not to the place that `disk.whole` or `write_text` gives."""
+    for function in nodes(source):
+        if not isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
+            continue
+        safe = {
+            inner
+            for node in ast.walk(function)
+            if isinstance(node, ast.With) and any("whole(" in ast.unparse(item) for item in node.items)
+            for inner in ast.walk(node)
+        }
+        if any(isinstance(node, ast.Call) and node not in safe and _writes_file(node) for node in ast.walk(function)):
+            yield f"{module}.{function.name}"
+
+
+def _writes_file(call: ast.Call) -> bool:
+    name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
+    if name in ("open", "fdopen"):
+        given = [*call.args, *(k.value for k in call.keywords if k.arg == "mode")]
+        modes = [a.value for a in given if isinstance(a, ast.Constant) and isinstance(a.value, str)]
+        return any(len(mode) < 4 and set(mode) & set("wax+") for mode in modes)
+    return (name in WRITERS and isinstance(call.func, ast.Attribute)) or ast.unparse(call.func) == "np.save"
+
+
 def callers_of_ipopt(modules: Mapping[str, str]) -> list[str]:
     """Modules that build a solver: CasADi's nlpsol, by name or as text, or its Opti stack."""
     return [m for m, source in modules.items() if {"nlpsol", "Opti", "OptiAdvanced"} & set(names_called(source))]
@@ -292,6 +320,18 @@ def test_no_text_is_run_as_python() -> None:
     assert {m: found for m, s in SOURCES.items() if (found := calls(s, "eval", "exec", "compile", "__import__"))} == {}
 
 
+def test_files_are_written_whole() -> None:
+    """A full disk or Ctrl-C leaves the earlier file; each exception says why it may."""
+    found = {place for m, s in SOURCES.items() for place in written(m, s)}
+    assert found == {
+        "tmsopt.charts.folder.writing",  # tile by tile; what is recorded is right
+        "tmsopt.disk.whole",  # itself
+        "tmsopt.display.page._picture",  # in memory
+        "tmsopt.processes.serve",  # a pipe
+        "tmsopt.studies.export._csv", "tmsopt.studies.export._netcdf", "tmsopt.studies.export._parquet",  # by `export`
+    }  # fmt: skip
+
+
 def test_pint_is_named_in_one_module_and_inside_a_function() -> None:
     """Imported only when a unit is written; that it is not before is tested in a fresh process in test_units."""
     assert [m for m in SOURCES if "pint" in set(imports(m, SOURCES))] == ["tmsopt.units.text"]
@@ -388,6 +428,10 @@ def test_the_other_checks_see_what_they_look_for() -> None:
     assert writes("def f():\n    print(1)") == [2]
     assert writes("import sys\nsys.stderr.write('x')") == [2]
     assert writes("'print(1)'  # print(1)") == []
+    for call in ("p.open('wb')", "open(p, mode='a')", "p.write_text(t)", "figure.savefig(p)", "np.savez(p, a=a)"):
+        assert list(written("m", f"def f():\n    {call}")) == ["m.f"]
+        assert list(written("m", f"def f():\n    with whole(x) as p:\n        {call}")) == []
+    assert list(written("m", "def f():\n    p.open('rb')\n    open(p)\n    write_text(p, t)")) == []
     assert calls("eval('1')\nexec('1')\nmodel.eval()\nbuiltins.eval('1')", "eval", "exec") == [1, 2, 4]
     assert callers_of_ipopt({"a": "import casadi as ca\nca.nlpsol('s', 'ipopt', {})", "b": "x = 1"}) == ["a"]
     assert callers_of_ipopt({"a": "from casadi import nlpsol as n", "b": "import casadi\ncasadi.Opti()"}) == ["b"]

@@ -347,8 +347,15 @@ def write_text(path: str | PathLike[str], text: str, *, new: bool = False) -> No
 
 
 def cell(value: Any) -> Any:
-    """What stands in a cell of a CSV: a text that a spreadsheet would take for a formula gets an apostrophe."""
-    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r", "\n")) else value
+    """What stands in a cell of a CSV.
+
+    A text that a spreadsheet would take for a formula gets an apostrophe, and a carriage return, at which some begin
+    another row, becomes a line feed.
+    """
+    if not isinstance(value, str):
+        return value
+    text = value.replace("\r\n", "\n").replace("\r", "\n")
+    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\n")) else text
 
 
 def headed(name: str, unit: str) -> str:

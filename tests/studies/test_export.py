@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tmsopt.disk import headed
+from tmsopt.disk import headed, write_csv
 from tmsopt.errors import InputError
 from tmsopt.records import Table
 from tmsopt.studies import FORMATS, Row, check_export, columns, export
@@ -225,6 +225,22 @@ def test_a_file_is_replaced_as_a_whole_or_not_at_all(ending: str, tmp_path: Path
         export(interrupted(), path)
     assert path.read_text() == "before"
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+@pytest.mark.parametrize("first", ["=", "+", "-", "@", "\t", "\r", "\n"])
+def test_no_cell_of_a_csv_is_a_formula(first: str, tmp_path: Path) -> None:
+    """Texts get an apostrophe, heads too; numbers, negative ones first of all, stay numbers."""
+    name = f"{first}cmd|' /C calc'!A0"
+    one = Row(
+        0, -5, Table(), "failed", cause=name, structure=name, objective=-1.5, parameters=Table({name: -2.0}), host=name
+    )
+    export([one], tmp_path / "rows.csv")
+    found, quoted = read_csv(tmp_path / "rows.csv"), f"'{name}".replace("\r", "\n")
+    assert found[quoted] == ["-2.0"]
+    assert found["cause"] == found["structure"] == found["host"] == [quoted]
+    assert (found["objective"], found["seed"]) == (["-1.5"], ["-5"])
+    write_csv(tmp_path / "points.csv", [{name: -1.0, "label": name, "none": None}], {name: "m"})
+    assert read_csv(tmp_path / "points.csv") == {f"{quoted} (m)": ["-1.0"], "label": [quoted], "none": [""]}
 
 
 def test_heads_of_csv_name_units() -> None:

@@ -392,6 +392,7 @@ def test_fresh_leaves_no_journal_beside_what_it_moves(path: Path) -> None:
     with open_store(path, STUDY) as opened:
         opened.add([row(0)])
     path.with_name("study.sqlite-journal").write_bytes(bytes(1000))
+    path.with_name("study.sqlite-shm").write_bytes(bytes(1000))
     open_store(path, STUDY, fresh=True).close()
     assert sorted(p.name for p in path.parent.iterdir()) == ["study.1.sqlite", "study.sqlite"]
     assert len(read_all(path.with_name("study.1.sqlite"))) == 1

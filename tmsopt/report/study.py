@@ -37,7 +37,8 @@ def study_table(study: Study, found: Summary, rows: Iterable[Row], full: bool = 
         lines.append("")
     for fact in _facts(study, found):
         lines += [fact] if full else textwrap.wrap(fact, WIDTH, subsequent_indent="  ")
-    return "\n".join(line.rstrip() for line in (lines if full else lines[:HEIGHT])).rstrip()
+    text = "\n".join(line.rstrip() for line in (lines if full else lines[:HEIGHT])).rstrip()
+    return "".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in text)  # rows may come from anybody's store
 
 
 def row_lines(row: Row) -> str:

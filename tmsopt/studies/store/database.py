@@ -1,6 +1,7 @@
 """The file of a store: its tables, how it is made as a whole, recognised, opened and moved aside."""
 
 import json
+import os
 import sqlite3
 import zlib
 from collections.abc import Mapping
@@ -211,6 +212,8 @@ def aside(path: Path) -> Path:
             # A commit clears the journal that a killed writer left; an UPDATE that changes nothing would not be one.
             ((schema,),) = ask(connection, "PRAGMA user_version")
             connection.execute(f"PRAGMA user_version={schema}")
+    if not os.path.lexists(f"{path}-wal"):
+        Path(f"{path}-shm").unlink(missing_ok=True)  # an index of that log alone
     return disk.aside(path, COMPANIONS)
 
 

@@ -1,0 +1,153 @@
+"""Files are written as a whole or not at all, whoever writes them and whatever happens meanwhile."""
+
+import json
+import os
+import signal
+import stat
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import tmsopt
+from tmsopt.disk import from_json, whole, write_csv, write_text
+from tmsopt.errors import InputError
+from tmsopt.plots import chart_figure, save
+from tmsopt.records import Table
+from tmsopt.studies import FORMATS, Row, export
+
+posix = pytest.mark.skipif(os.name != "posix", reason="devices, pipes and limits of POSIX")
+
+
+@pytest.fixture(scope="module")
+def plane() -> Any:
+    return tmsopt.chart("problems/chart.toml", points=(60, 50), boundaries=False)
+
+
+ROWS = [Row(k, k, Table({"mu": 0.1 * k}), "failed", cause=f"{k} " * 500) for k in range(100)]
+WRITERS: dict[str, Callable[[Path, Any], None]] = {
+    "a.txt": lambda path, _: write_text(path, "a line\n" * 10_000),
+    "a.csv": lambda path, _: write_csv(path, [{"x": k, "y": 0.1} for k in range(10_000)], {"x": "m"}),
+    "a.npz": lambda path, plane: plane.save(path),
+    "a.nc": lambda path, plane: plane.save(path),
+    "a.png": lambda path, plane: save(chart_figure(plane), path),
+    **{f"rows.{ending}": lambda path, _: export(ROWS, path) for ending in FORMATS},
+}  # fmt: skip
+
+
+@pytest.fixture
+def little_room() -> Iterator[None]:
+    """No file may grow beyond some kilobytes, as on a full disk."""
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (5000, hard))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    signal.signal(signal.SIGXFSZ, before)
+
+
+@posix
+@pytest.mark.parametrize("name", WRITERS)
+def test_a_full_disk_leaves_the_earlier_file(name: str, plane: Any, tmp_path: Path, little_room: None) -> None:
+    """One error with the name of the file; nothing else stays there, no temporary one either."""
+    if name.endswith((".nc", ".parquet")):
+        pytest.importorskip("netCDF4"), pytest.importorskip("pyarrow")
+    path = tmp_path / name
+    path.write_text("before")
+    with pytest.raises((OSError, InputError)) as refused:
+        WRITERS[name](path, plane)
+    assert str(path) in str(refused.value)
+    assert not isinstance(refused.value, OSError) or refused.value.strerror
+    assert path.read_text() == "before"
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
+@posix
+@pytest.mark.parametrize("name", [name for name in WRITERS if not name.startswith("rows")])
+def test_a_device_without_room_is_named(name: str, plane: Any, tmp_path: Path) -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("no such device")
+    (tmp_path / name).symlink_to("/dev/full")
+    with pytest.raises(OSError, match="No space left") as refused:
+        WRITERS[name](tmp_path / name, plane)
+    assert refused.value.filename == str(tmp_path / name)
+
+
+def test_an_interruption_leaves_the_earlier_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("before")
+
+    class Rows(list[Any]):
+        def __iter__(self) -> Iterator[Any]:
+            yield self[0]
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_csv(path, Rows([{"x": 1}]), {})
+    assert path.read_text() == "before"
+    assert [p.name for p in tmp_path.iterdir()] == ["a.csv"]
+
+
+@posix
+def test_a_pipe_gets_what_is_finished(tmp_path: Path) -> None:
+    """The whole text, and the pipe stays one; a link to a file stays one too, and a new file is for all to read."""
+    os.mkfifo(tmp_path / "pipe")
+    reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    write_text(tmp_path / "pipe", "text\r\nas it is\n")
+    assert os.read(reader, 100) == b"text\r\nas it is\n"
+    os.close(reader)
+    assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
+    (tmp_path / "link").symlink_to(tmp_path / "file")
+    write_text(tmp_path / "link", "text")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "file").read_text() == "text"
+    umask = os.umask(0)
+    os.umask(umask)
+    assert stat.S_IMODE((tmp_path / "file").stat().st_mode) == 0o666 & ~umask
+
+
+@pytest.mark.parametrize("there", ["file", "link to nothing"])
+def test_a_new_file_takes_no_other_ones_place(there: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_text("mine") if there == "file" else path.symlink_to(tmp_path / "nothing")
+    with pytest.raises(FileExistsError) as refused:
+        write_text(path, "other", new=True)
+    assert refused.value.filename == str(path)
+    assert [p.name for p in tmp_path.iterdir()] == ["a.toml"]
+
+
+@posix
+def test_what_a_folder_is_made_under_is_no_link(tmp_path: Path) -> None:
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    (tmp_path / ".a.chart.unfinished").symlink_to(kept)
+    with whole(tmp_path / "a.chart", locked=True) as place:
+        place.mkdir(parents=True)
+        (place / "file").touch()
+    assert list(kept.iterdir()) == []
+    assert [p.name for p in (tmp_path / "a.chart").iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[" * 100_000 + "]" * 100_000, "more than 100 deep"),
+        ('{"a":' * 101 + "[]" + "}" * 101, "more than 100 deep"),
+        (f"[{'[],' * 10**6}0]", "1000000 lists, tables and texts"),
+        ("[" + "0," * 20 + "0]", "more than 40 characters"),
+        ("[1,", "Expecting value"),
+        ("1" * 5000, "integer string conversion"),
+    ],
+)
+def test_json_from_anybody_has_limits(text: str, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        from_json(text, 40) if "40" in words else from_json(text)
+
+
+def test_json_within_the_limits_is_read() -> None:
+    nested = json.loads("[" * 100 + "]" * 100)
+    assert from_json(json.dumps(nested)) == nested
+    assert from_json('{"a": [1, "x[[{", null, NaN]}')["a"][:3] == [1, "x[[{", None]
