@@ -574,6 +574,13 @@ SPOILED: dict[str, tuple[Callable[[Path], None], str]] = {
         lambda p: spoil(p, "ALTER TABLE rows ADD COLUMN x AS (hex(zeroblob(1000000)))"),
         "table 'rows' is not that of a store",
     ),
+    "a long schema": (
+        lambda p: spoil(
+            p,
+            "PRAGMA writable_schema=ON; UPDATE sqlite_schema SET sql = sql || hex(zeroblob(5000000)) WHERE name = 'rows'",
+        ),
+        "is damaged",
+    ),
     "a page of two tables": (
         lambda p: spoil(
             p,
@@ -632,6 +639,7 @@ def test_a_spoiled_store_is_refused_and_moved_aside_by_fresh(name: str, path: Pa
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert all(words in message and str(path) in message for message in said), said
+    assert max(map(len, said)) < 1000
     assert peak < 100e6
     before = path.read_bytes()
     if "no store" not in words:

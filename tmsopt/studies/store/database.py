@@ -153,10 +153,10 @@ def connect_to_write(path: Path) -> sqlite3.Connection:
     """
     connection = sqlite3.connect(path, isolation_level=None, timeout=PATIENCE, check_same_thread=False)
     try:
+        careful(connection)
         with suppress(sqlite3.OperationalError):  # somebody reads a store of an earlier version by its write-ahead log
             connection.execute("PRAGMA journal_mode=DELETE").fetchone()
         connection.execute("PRAGMA synchronous=FULL")
-        careful(connection)
     except BaseException:
         connection.close()
         raise

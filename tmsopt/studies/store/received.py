@@ -24,6 +24,7 @@ CREATE INDEX by_status ON rows (status);
 """  # The index is a hundredth of the rows, and all that `done` and `counts` read.
 
 _LARGEST = 2**27  # bytes of one value: more than the column of a study with the most rows takes
+_LONGEST = 10_000  # bytes of SQL: a schema is SQL too
 _SUPER = bytes.fromhex("d9d505f920a163d7")  # ends a journal that names another one, which SQLite would remove
 _STEPS = 100_000  # of SQLite's machine between two looks at how many there were
 _SCHEMA = "SELECT type, name, tbl_name, substr(sql, 1, 1000) FROM sqlite_schema LIMIT 20"
@@ -47,6 +48,7 @@ def companion_fault(path: Path) -> str:
 def careful(connection: sqlite3.Connection) -> None:
     """Let SQLite run nothing of what a schema says beside its tables, trust no page, and hold no enormous value."""
     connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LARGEST)
+    connection.setlimit(sqlite3.SQLITE_LIMIT_SQL_LENGTH, _LONGEST)
     connection.execute("PRAGMA trusted_schema=OFF")
     connection.execute("PRAGMA cell_size_check=ON")
 
