@@ -25,8 +25,9 @@ from tmsopt.design import Problem, load
 from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.records import Table
+from tmsopt.report import study_table
 from tmsopt.solver import solve
-from tmsopt.studies import Row, Solver, Study, alone, definition, monte_carlo, over_grid, run_study, summary
+from tmsopt.studies import Row, Solver, Study, alone, definition, monte_carlo, over_grid, run_study, stored, summary
 from tmsopt.studies.store import open_store, read_store
 
 EP4 = load("problems/ep4.toml")
@@ -448,3 +449,22 @@ def test_a_killed_command_goes_on(file: Path, ending: signal.Signals) -> None:
         rows = list(opened.rows())
     assert [row.number for row in rows] == list(range(72))
     assert all(rows[n] == row for n, row in before.items())  # seconds too: they were not solved again
+
+
+@pytest.mark.parametrize(
+    ("number", "varied"), [(0, {}), (0, {"mu": 0.3}), (0, {"mu": 0.1, "Fr": 1.0}), (2, {"mu": 0.1}), (-1, {"mu": 0.1})]
+)
+def test_rows_that_a_study_cannot_have_are_refused(number: int, varied: dict[str, float], tmp_path: Path) -> None:
+    """In a store from somebody else: before anything is solved, and where its rows are shown."""
+    study, path = over_grid("problems/ep4.toml", {"mu": [0.1, 0.2]}), tmp_path / "s.sqlite"
+    with open_store(path, definition(study)) as store:
+        store.add([Row(1, 1, Table({"mu": 0.2}), "failed"), Row(number, 1, Table(varied), "failed")])
+    for call in (lambda: stored(study, path), lambda: run_study(study, path, progress=pytest.fail)):
+        with pytest.raises(InputError, match=f"row {number} is not of this study"):
+            call()
+
+
+def test_what_a_row_says_is_printable(tmp_path: Path) -> None:
+    study = over_grid("problems/ep4.toml", {"mu": [0.1]})
+    rows = [Row(0, 1, Table({"mu": 0.1}), "failed", cause="\x1b[31mred\u202e")]
+    assert "\ufffd[31mred\ufffd" in study_table(study, summary(study, rows), rows)

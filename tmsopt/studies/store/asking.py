@@ -50,7 +50,7 @@ def explained(path: Path) -> Iterator[None]:
         meaning = _MEANINGS.get(code(error))
         if meaning is None:
             raise
-        raise refuse(path, f"{meaning} ({str(error):.200})") from error  # it may quote the file at length
+        raise refuse(path, f"{meaning} ({error!s:.200})") from error  # it may quote the file at length
 
 
 def code(error: sqlite3.Error) -> int:
