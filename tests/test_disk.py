@@ -120,6 +120,16 @@ def test_a_new_file_takes_no_other_ones_place(there: str, tmp_path: Path) -> Non
 
 
 @posix
+def test_links_in_a_circle_lead_nowhere(plane: Any, tmp_path: Path) -> None:
+    for name in ("a.npz", "a.chart"):
+        (tmp_path / name).symlink_to(name)
+    with pytest.raises(OSError, match=r"a\.npz"):
+        plane.save(tmp_path / "a.npz")
+    with pytest.raises(InputError, match=r"a\.chart"):
+        tmsopt.chart("problems/chart.toml", points=(4, 4), folder=tmp_path / "a.chart")
+
+
+@posix
 def test_what_a_folder_is_made_under_is_no_link(tmp_path: Path) -> None:
     kept = tmp_path / "kept"
     kept.mkdir()

@@ -51,7 +51,7 @@ def whole(path: Path, *, locked: bool = False) -> Iterator[Path]:
         OSError: with the name of `path`, when it cannot be written.
     """
     try:
-        target = path.resolve()
+        target = resolved(path)
         special = target.exists() and not (target.is_file() or target.is_dir())
         if locked:
             temporary = target.with_name(f".{target.name}.unfinished")
@@ -76,6 +76,18 @@ def whole(path: Path, *, locked: bool = False) -> Iterator[Path]:
             _remove(temporary)
     except OSError as error:  # some know no file, or only the temporary one
         raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
+
+
+def resolved(path: Path) -> Path:
+    """Where a path leads, all links followed.
+
+    Raises:
+        OSError: for links in a circle.
+    """
+    try:
+        return path.resolve()
+    except RuntimeError as error:
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path)) from error
 
 
 @contextmanager

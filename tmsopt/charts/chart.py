@@ -279,7 +279,7 @@ def _opened(
     try:
         asked = asked or _posed(about)
     except ValueError as error:
-        raise damaged(path, f"{ABOUT} does not say what was charted ({error})") from None
+        raise damaged(path, f"{ABOUT} does not say what was charted ({error!s:.300})") from None
     grid = Grid(tuple(about["axes"]), tuple(read_axis(path, n, axis) for n, axis in about["axes"].items()))
     done, _ = read_record(path, about)
     counts = total(done.values())

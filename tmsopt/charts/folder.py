@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from tmsopt.charts.received import ABOUT, TILES, array_file, read_about, read_record
 from tmsopt.charts.summary import Tally
-from tmsopt.disk import Lock, aside, differences, lock, whole
+from tmsopt.disk import Lock, aside, differences, lock, resolved, whole
 from tmsopt.errors import Fault, InputError
 
 _SYNC = 1.0  # seconds between two records of finished tiles
@@ -119,7 +119,7 @@ def _locked(path: Path) -> Lock:
         InputError: where another process has it, or nothing can be written.
     """
     try:
-        held = lock(path.resolve())
+        held = lock(resolved(path))
     except (OSError, sqlite3.Error) as error:
         raise _unwritten(path, error) from None
     if held is None:
