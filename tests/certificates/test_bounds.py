@@ -1,6 +1,7 @@
 """The parts of a proof by branch and bound: interlacing, ranges, arithmetic, what SCIP is told."""
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
@@ -414,6 +415,7 @@ def drawn_expression(rng: np.random.Generator, depth: int) -> str:
     if depth == 0 or rng.random() < 0.15:
         return str(rng.choice(["x", "y", "x", "y", f"{rng.uniform(-2, 2):.3g}"]))
     a, b = drawn_expression(rng, depth - 1), drawn_expression(rng, depth - 1)
+    a = a if re.search(r"\b[xy]\b", a) else "x"  # numbers alone may have no value, and are refused then
     one = [f"{f}({a})" for f in ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "exp", "log", "abs")]
     powers = [f"({a})**{n}" for n in (2, 3, -1, -2, 0.5, 2.5)]
     two = [f"({a}) {op} ({b})" for op in "+-*/"] * 2 + [f"min({a}, {b})", f"max({a}, {b})"]
