@@ -25,8 +25,8 @@ import pytest
 from helpers.rows import STUDY, row
 from hypothesis import given, settings, strategies as st
 
-from tmsopt.disk import lock
 from tmsopt.errors import InputError
+from tmsopt.locks import lock
 from tmsopt.records import Table
 from tmsopt.studies import Row
 from tmsopt.studies.store import open_store, read_store

@@ -24,8 +24,9 @@ from numpy.typing import NDArray
 
 from tmsopt.charts.received import ABOUT, TILES, array_file, read_about, read_record
 from tmsopt.charts.summary import Tally
-from tmsopt.disk import Lock, aside, differences, lock, resolved, whole
+from tmsopt.disk import aside, differences, resolved, whole
 from tmsopt.errors import Fault, InputError
+from tmsopt.locks import Lock, lock
 
 _SYNC = 1.0  # seconds between two records of finished tiles
 

@@ -11,8 +11,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from tmsopt.disk import Lock, differences, from_json, lock
+from tmsopt.disk import differences, from_json
 from tmsopt.errors import InputError
+from tmsopt.locks import Lock, lock
 from tmsopt.studies.row import STATUSES, Row
 from tmsopt.studies.store import database
 from tmsopt.studies.store.asking import DAMAGED, ask, explained, refuse
