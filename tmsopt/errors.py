@@ -18,6 +18,7 @@ _PATH = 1000  # characters of a file's name
 _WIDTH = 60  # of a value in a message
 _NAME = 80  # characters of a name for which a near one is looked for, which takes time by the square of them
 _NAMES = 200  # that are listed as accepted
+_NOT_ASCII = re.compile("[^ -~]")
 _UNSHOWABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 """What a terminal obeys, what breaks a line or turns its order round, and halves of characters."""
 
@@ -113,8 +114,8 @@ def unshowable(text: str, but: str = "") -> str:
 
 
 def visible(text: str) -> str:
-    """A text as it may stand on a terminal: control characters, line breaks and lone surrogates as escapes."""
-    return _UNSHOWABLE.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), text)
+    """A text as it may stand on a terminal: what has no picture there, such as line breaks, as escapes."""
+    return _NOT_ASCII.sub(lambda found: found[0] if found[0].isprintable() else repr(found[0])[1:-1], text)
 
 
 def suggest(name: Any, accepted: Iterable[str]) -> str:
