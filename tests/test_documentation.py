@@ -210,3 +210,25 @@ def test_the_first_python_example_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     assert isinstance(design, tmsopt.Solution)
     assert design.structure == "EP4"
     assert design.parameters["chi_B"] == pytest.approx(math.sqrt(2), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("line", "constants"),
+    [
+        ("problem, study and bicycle files", "disk.LARGEST design.toml.MOST_DEEP design.toml.MOST_PARTS"),
+        ("faults that are listed", "errors.LISTED"),
+        ("expressions", "models.expression._LONGEST models.expression._DEEPEST models.degree.LARGEST_EXPONENT models.degree.LARGEST_DEGREE"),
+        ("quantities of a model", "models.texts.MOST_QUANTITIES"),
+        ("numbers of parameters", "models.exact.MOST_DIGITS units.text.LONGEST"),
+        ("CSV files of rows", "studies.vary.LARGEST studies.vary.LONGEST_LINE studies.vary.MOST_COLUMNS studies.validate.MOST_ROWS studies.validate.MOST_NUMBERS"),
+        ("a store that is received", "studies.store.database._NUMBERS disk.LARGEST_JSON studies.store.packing.LONGEST"),
+        ("a chart", "charts.survey.MOST charts.received.MOST_TILES"),
+    ],
+)  # fmt: skip
+def test_limits_of_what_is_read_are_those_in_force(line: str, constants: str) -> None:
+    page = (ROOT / "SECURITY.md").read_text(encoding="utf-8")
+    (row,) = re.findall(rf"^\| {line}.*\|$", page, re.MULTILINE)
+    stated = {float(n) for n in NUMBER.findall(re.sub(r"(?<=\d) (?=\d{3})", "", row))}
+    for constant in constants.split():
+        module, _, name = f"tmsopt.{constant}".rpartition(".")
+        assert getattr(import_module(module), name) in stated, constant
