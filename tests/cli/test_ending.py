@@ -234,6 +234,7 @@ def test_a_front_that_is_stopped_leaves_what_is_known(run: Run, monkeypatch: pyt
     assert all(a[0] < b[0] and a[1] > b[1] for a, b in pairwise(values))
 
 
+@pytest.mark.slow
 def test_what_is_said_beside_a_design_may_be_stopped(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         import_module("tmsopt.report.solution.findings"), "explain", lambda *_, **__: (press(), time.sleep(LONG))
@@ -271,8 +272,10 @@ def test_a_figure_has_a_name(run: Run) -> None:
 # Commands in processes of their own
 
 PROBLEMS = Path("problems").resolve()
-CHEAP = {"version": "--version", "help": "solve --help", "figures": "figure --list"}
+CHEAP = {"figures": "figure --list"}
 WORDS = CHEAP | {
+    "version": "--version",
+    "help": "solve --help",
     "new": "new x.toml",
     "example": "example ep4",
     "describe": f"describe {PROBLEMS}/ep4.toml --json",
