@@ -12,20 +12,17 @@ import numpy as np
 
 Coefficients = Sequence[Any]
 
-_OVERFLOWS = np.errstate(over="ignore", invalid="ignore")
-"""Of what is too large for doubles there is inf or nan, which its users know."""
 
-
-@_OVERFLOWS
 def product(*factors: Coefficients) -> list[Any]:
     """Coefficients of the product of polynomials given by their coefficients."""
     result: list[Any] = list(factors[0]) if factors else [1]
-    for factor in factors[1:]:
-        terms: list[Any] = [0] * (len(result) + len(factor) - 1)
-        for i, a in enumerate(result):
-            for j, b in enumerate(factor):
-                terms[i + j] = terms[i + j] + a * b
-        result = terms
+    with np.errstate(over="ignore", invalid="ignore"):  # users know inf and nan; one of its own for each thread
+        for factor in factors[1:]:
+            terms: list[Any] = [0] * (len(result) + len(factor) - 1)
+            for i, a in enumerate(result):
+                for j, b in enumerate(factor):
+                    terms[i + j] = terms[i + j] + a * b
+            result = terms
     return result
 
 

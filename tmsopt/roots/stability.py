@@ -100,7 +100,6 @@ def _by_routh(c: Array, exact: bool) -> NDArray[np.bool_]:
     return np.asarray(stable.reshape(c.shape[:-1]))
 
 
-@np.errstate(over="ignore", invalid="ignore")
 def discriminant(coefficients: Coefficients) -> Any:
     """Discriminant of a polynomial of degree 2 or more, any numbers: zero exactly where two roots coincide.
 
@@ -111,7 +110,12 @@ def discriminant(coefficients: Coefficients) -> Any:
     Raises:
         ValueError: for degree 0 or 1.
     """
-    match list(coefficients):
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _discriminant(list(coefficients))
+
+
+def _discriminant(coefficients: list[Any]) -> Any:
+    match coefficients:
         case [a, b, c]:
             return b * b - 4 * a * c
         case [a, b, c, d]:
@@ -121,7 +125,7 @@ def discriminant(coefficients: Coefficients) -> Any:
             j = 72 * a * c * e + 9 * b * c * d - 27 * a * d * d - 27 * e * b * b - 2 * c * c * c
             return (4 * i * i * i - j * j) / 27
         case [_, _, _, *_]:
-            return _bezout_discriminant(list(coefficients))
+            return _bezout_discriminant(coefficients)
         case other:
             raise ValueError(f"discriminant takes a polynomial of degree 2 or more, not {len(other) - 1}")
 
