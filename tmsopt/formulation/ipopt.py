@@ -29,7 +29,7 @@ _NEAR = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-6, **_QUICK}
 _EXACT = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-4, **_QUICK}
 _SETTINGS: dict[str, dict[str, Any]] = {"far": _FAR, "exact": _EXACT, "near": _NEAR}
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_SIGNALS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP", "SIGALRM") if hasattr(signal, n)]
 _STEPS = 12
 _STALLED = 1e-14  # relative step of Newton's method, below which it ends once the steps no longer shrink
 _STATIONARY = 1e-9
@@ -127,7 +127,8 @@ def polisher(nlp: NLP) -> Callable[[Run, NLP], Point]:
 
     def polish(run: Run, limits: NLP) -> Point:
         ends = (np.array(e) for e in (limits.lower, limits.upper, limits.row_lower, limits.row_upper))
-        return _polished(_Conditions(expand, limits.settings, *ends), run)
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is not better
+            return _polished(_Conditions(expand, limits.settings, *ends), run)
 
     return polish
 
@@ -190,7 +191,6 @@ class _Conditions:
         return Point(x, objective, violation, float(slope), rows, bounds, _ROUNDINGS * terms)
 
 
-@np.errstate(over="ignore", invalid="ignore")  # what overflows is not better
 def _polished(conditions: _Conditions, run: Run) -> Point:
     best = conditions.point(run.x, run.row_multipliers, run.bound_multipliers)
     for loose in (False, True):
