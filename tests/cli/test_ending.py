@@ -99,6 +99,39 @@ def test_a_signal_ends_with_its_status(
     assert signal.getsignal(number) is before
 
 
+def test_an_exec_that_is_interrupted_changes_no_status(tmp_path: Path) -> None:
+    """Run by -m, Python ends by SIGINT after one, such as those of dataclasses, whatever was made of the interrupt."""
+    work = "import os, signal, time; os.kill(os.getpid(), signal.SIGTERM); time.sleep(9)"
+    program = f"""
+from importlib import import_module
+from tmsopt.cli import main
+import_module("tmsopt.cli.commands").every.commands["schema"].callback = lambda **_: exec({work!r})
+main()
+"""
+    (tmp_path / "program.py").write_text(program, encoding="utf-8")
+    path = os.pathsep.join([str(tmp_path), str(Path(__file__).parents[2])])
+    done = subprocess.run(
+        [sys.executable, "-m", "program", "schema"], env=os.environ | {"PYTHONPATH": path}, capture_output=True,
+        text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout, done.stderr) == (143, "", STOPPED)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGALRM])
+def test_handlers_wait_for_ipopt(number: signal.Signals) -> None:
+    """CasADi would take what they raise for a failed evaluation."""
+    heard = []
+    before = signal.signal(number, lambda *_: heard.append("handler"))
+    try:
+        with import_module("tmsopt.formulation.ipopt")._interruptible():
+            press(number)
+            time.sleep(0)
+            heard.append("solved")
+    finally:
+        signal.signal(number, before)
+    assert heard == ["solved", "handler"]
+
+
 def test_a_signal_that_is_ignored_stays_so(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     """As by nohup, and for what a script runs in the background."""
     monkeypatch.setattr(commands["schema"], "callback", lambda **_: press(signal.SIGHUP))

@@ -129,10 +129,10 @@ def listening(for_good: bool) -> Iterator[Heard]:
 
 
 def gone(status: int) -> None:
-    """End now where threads are still at work, such as a compiler, for which Python would wait."""
-    if any(not t.daemon and t is not threading.main_thread() for t in threading.enumerate()):
-        atexit._run_exitfuncs()
-        os._exit(status)
+    """End now: Python would wait for threads at work, such as a compiler, and where an exec was interrupted, as those
+    of dataclasses are while modules are loaded, it would end by SIGINT, whatever the signal and the status."""
+    atexit._run_exitfuncs()
+    os._exit(status)
 
 
 @contextmanager
