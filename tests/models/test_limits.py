@@ -100,12 +100,23 @@ def test_degrees_are_those_of_the_quotient_multiplied_out(written, found):
     assert (value.over, value.under) == found
 
 
-def test_degrees_of_symbols_of_casadi_are_limited_too():
-    k = ca.SX.sym("k")
-    for _ in range(20):
-        k = k * k  # degree 2^20
-    with pytest.raises(models.Unfit, match="entry 2: has the degree 16384"):
-        models.from_coefficients([1, k])
+@pytest.mark.parametrize("size", [4, 6])
+def test_what_a_program_builds_may_cancel(size):
+    """An inverse is of the degree of its matrix, and the steps to it sum up to more than 10 000."""
+    m, c = ca.SX.sym("m"), ca.SX.sym("c")
+    masses, springs = np.eye(size) + 1, 2 * np.eye(size) - np.eye(size, k=1) - np.eye(size, k=-1)
+
+    def matrix(numbers, m, c, inverse):
+        solved = inverse(numbers(masses) * m + numbers(np.diag(np.arange(size))) * m * m)
+        zero, one = numbers(np.zeros((size, size))), numbers(np.eye(size))
+        return [zero, one, -(solved @ numbers(springs)), -(solved @ numbers(springs + np.eye(size))) * c]
+
+    a, b, p, q = matrix(ca.SX, m, c, ca.inv)
+    model = models.from_matrices(A=ca.densify(ca.vertcat(ca.horzcat(a, b), ca.horzcat(p, q))))
+    a, b, p, q = matrix(np.array, 0.7, 0.3, np.linalg.inv)
+    assert [float(x) for x in model.coefficients({"m": 0.7, "c": 0.3})] == pytest.approx(
+        np.poly(np.block([[a, b], [p, q]])), rel=1e-9
+    )
 
 
 def layers(count, first, second):

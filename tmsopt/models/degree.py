@@ -119,14 +119,19 @@ OPERATIONS: Mapping[int, Callable[..., Degree]] = {
 
 
 def faulty(function: ca.Function) -> tuple[int, str] | None:
-    """The first entry of a function of vectors that is not computed, and why; every step is looked at once."""
+    """The first entry of a function of vectors that is not computed, and why; every step is looked at once.
+
+    Degrees are not summed up: in what a program built, such as an inverse of a matrix, most of them cancel. Those of
+    texts are known before there is a function, see `texts`.
+    """
     found: list[Degree | str] = []
     for step in steps(function):
         operands = [found[k] for k in step.operands]
         wrong = next((o for o in operands if isinstance(o, str)), None)
         if step.operation == ca.OP_OUTPUT and wrong:
             return step.place[1], wrong
-        found.append(wrong or _stepped(step, operands))
+        now = wrong or _stepped(step, operands)
+        found.append(now if isinstance(now, str) or now.number is not None else Degree())
     return None
 
 

@@ -6,6 +6,8 @@ from typing import Any
 
 import casadi as ca
 
+from tmsopt.models.arithmetics import DEGREES
+from tmsopt.models.degree import Beyond, Degree
 from tmsopt.models.expression import Expression, ExpressionError, parse_value
 from tmsopt.models.model import Matrix
 from tmsopt.models.names import unusable
@@ -33,12 +35,13 @@ class Texts:
         self.symbols = dict(symbols or {})
         self.known = dict(known or {})
         self.written: dict[str, Expression | None] = {}
+        self._degrees: dict[str, Degree] = {}
         self._order: tuple[str, ...] = ()
 
     def entry(self, text: str, key: str, where: str) -> Any:
         """One entry as an expression of CasADi; 0 for one with a fault."""
         expression = self._parsed(text, (key,), f"{where}: ")
-        return self._symbolic(expression) if expression else 0
+        return self._symbolic(expression, (key,), f"{where}: ")[0] if expression else 0
 
     def read_quantities(self, texts: Mapping[str, str]) -> None:
         """The formulas of the quantities, which may use one another, each to be had by `quantity`."""
@@ -68,16 +71,23 @@ class Texts:
         if name not in self.known:
             for each in self._order or self.written:
                 expression = self.written[each]
-                self.known[each] = self._symbolic(expression) if expression else 0
+                self.known[each], self._degrees[each] = (
+                    self._symbolic(expression, ("quantities", each), "") if expression else (0, Degree())
+                )
         return self.known[name]
 
-    def _symbolic(self, expression: Expression) -> Any:
-        """An expression in symbols, made when first met."""
+    def _symbolic(self, expression: Expression, key: tuple[str, ...], where: str) -> tuple[Any, Degree]:
+        """An expression in symbols, made when first met, and its degree with the quantities in it written out."""
         values = {}
         for name in expression.names:
             derived = name in self.written or name in self.known
             values[name] = self.quantity(name) if derived else self.symbols.setdefault(name, ca.SX.sym(name))
-        return expression.symbolic(values)  # what is not finite is found by the model
+        try:
+            degree = expression.evaluate({n: self._degrees.get(n, Degree()) for n in values}, DEGREES)
+        except Beyond as error:
+            self.fault(f"{where}{error}", *key)
+            return 0, Degree()
+        return expression.symbolic(values), degree
 
     def _parsed(self, text: str, key: tuple[str, ...], where: str) -> Expression | None:
         """An expression; None for one with a fault."""
