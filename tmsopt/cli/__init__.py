@@ -5,6 +5,7 @@ imports stand inside commands, and this face imports next to nothing: signals ar
 `common` first: what commands share; `ending` has what ends them from outside.
 """
 
+import os
 import signal
 import sys
 
@@ -22,6 +23,8 @@ def main(args: "Sequence[str] | None" = None, prog_name: str | None = None) -> "
     Args:
         args: words of the command line; by default those of this program, which then ends.
     """
+    if args is None:  # figures are drawn into files, whatever windows the user's own have; a notebook keeps its own
+        os.environ.pop("MPLBACKEND", None)
     if args is None and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the rest is loaded, as it is for SIGTERM
     from tmsopt.cli.ending import ended, gone, listening, streams

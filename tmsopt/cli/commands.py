@@ -68,7 +68,6 @@ def every() -> None:
       tmsopt figure all --output figures
       tmsopt verify
     """
-    os.environ.pop("MPLBACKEND", None)  # figures are drawn into files, whatever windows the user's own have
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # that it finds no folder for its cache changes no figure
 
 
