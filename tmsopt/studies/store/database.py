@@ -92,7 +92,9 @@ def create(path: Path, definition: Definition, versions: Mapping[str, str], plat
 
 def about(connection: sqlite3.Connection) -> dict[str, str]:
     """Name → text of what a store says of itself; what is no such text is left out."""
-    found = ask(connection, f"SELECT name, substr(value, 1, {disk.LARGEST_JSON + 1}) FROM about ORDER BY rowid LIMIT 6")
+    found = ask(
+        connection, f"SELECT name, substr(value, 1, {disk.LARGEST_JSON + 1}) FROM about ORDER BY rowid LIMIT 20"
+    )
     return {name: value for name, value in found if isinstance(name, str) and isinstance(value, str)}
 
 
