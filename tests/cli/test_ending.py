@@ -15,6 +15,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import casadi as ca
 import pytest
 
 from tmsopt.branch_and_bound import SCIP
@@ -186,6 +187,20 @@ def test_an_interrupt_waits_for_compiled_modules(run: Run, monkeypatch: pytest.M
 
     monkeypatch.setattr(ending, "_LOADING", {create_module.__code__})
     at_work(monkeypatch, work)
+    assert run("schema") == (130, "", STOPPED)
+
+
+def test_an_interrupt_is_not_lost_in_casadi(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its compiled code asks an argument what it is, and drops what is raised then."""
+
+    class Number:
+        presses = iter([press])
+
+        def __DM__(self) -> ca.DM:
+            next(self.presses, int)()
+            return ca.DM(1)
+
+    at_work(monkeypatch, lambda: (ca.DM(Number()), time.sleep(LONG)))
     assert run("schema") == (130, "", STOPPED)
 
 

@@ -28,6 +28,7 @@ Of every command: 1 a fault of tmsopt itself, 2 something cannot be written, 130
 
 _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _LOADING = {getattr(ExtensionFileLoader, name).__code__ for name in ("create_module", "exec_module")}
+_CASADI = "casadi.casadi"  # its wrappers in Python; what is raised in one that compiled code called is dropped there
 _NO_ROOM = {errno.ENOSPC, errno.EBADF, errno.EIO, errno.EFBIG}
 _SOON = 0.01  # seconds
 _LEFT = 1.0  # seconds for tidying up after a second signal
@@ -62,10 +63,10 @@ class Heard:
         self.raised(number, frame)
 
     def raised(self, _number: int, frame: FrameType | None) -> None:
-        """Raise what is due, now or soon: compiled modules that are being loaded make another error of it."""
+        """Raise what is due, now or soon: compiled modules being loaded make another error of it, CasADi loses it."""
         if not self._due or self._held:
             return
-        if _loading(frame) and hasattr(signal, "setitimer"):
+        if _deaf(frame) and hasattr(signal, "setitimer"):
             signal.signal(signal.SIGALRM, self.raised)
             signal.setitimer(signal.ITIMER_REAL, _SOON)
             return
@@ -206,9 +207,9 @@ def streams() -> Iterator[None]:
                     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-def _loading(frame: FrameType | None) -> bool:
+def _deaf(frame: FrameType | None) -> bool:
     while frame is not None:
-        if frame.f_code in _LOADING:
+        if frame.f_code in _LOADING or frame.f_globals.get("__name__") == _CASADI:
             return True
         frame = frame.f_back
     return False
