@@ -132,6 +132,13 @@ def test_who_may_vary_the_unit_of_time_is_warned() -> None:
     assert not any("decay_rate" in w for w in tmsopt.explain(replace(design, problem=problem), resolve=False).warnings)
 
 
+def test_a_parameter_of_ones_own_is_no_wheelbase() -> None:
+    """Called w, in a system whose roots have no unit."""
+    model = tmsopt.models.from_coefficients(["1", "c", "w"])
+    design = tmsopt.solve(tmsopt.Problem(model, fixed={"c": 2.0}, free={"w": (0.5, 2.0)}, minimize="abscissa"))
+    assert not any("√(g/w)" in w for w in tmsopt.explain(design, resolve=False).warnings)
+
+
 def test_the_stable_range_does_not_end_where_the_box_does() -> None:
     """Fr from 2 to 2.5 lies inside what is stable, from Fr_c = 1.59308273713602 (equation flus) on: not "everywhere"."""
     problem = tmsopt.load("problems/ep4.toml")

@@ -79,7 +79,7 @@ def _quality(solution: Solution) -> str:
 def _timeless(problem: Problem) -> Iterator[str]:
     """That an abscissa is counted in a unit of time that the search may change."""
     free = [name for name in ("w", "g") if name in problem.free]
-    if free and problem.parameter_set.root_unit != "1/s" and "abscissa" in (problem.minimize or ""):
+    if free and problem.parameter_set.root_unit == "√(g/w)" and "abscissa" in (problem.minimize or ""):
         advice = 'the fastest decay in seconds is maximize = "decay_rate"'
         yield f"abscissa is counted per √(g/w), and {' and '.join(free)} may vary: {advice}"
 
