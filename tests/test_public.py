@@ -90,7 +90,7 @@ def test_what_is_no_file_to_write_is_refused_in_words(wrong: Any) -> None:
 
 @pytest.mark.parametrize(
     ("name", "wrong"),
-    [("starts", 0), ("starts", "5"), ("starts", 2.5), ("starts", True), ("seed", -1), ("seed", "a"), ("near", 5)],
+    [("starts", x) for x in (0, "5", 2.5, True, 10**30)] + [("seed", -1), ("seed", "a"), ("near", 5)],
 )
 def test_an_option_says_what_it_accepts(name: str, wrong: object) -> None:
     with pytest.raises(tmsopt.InputError, match=f"{name}: found .*accepted: a"):

@@ -60,6 +60,9 @@ class InputError(ValueError):
         return InputError, (self.faults,)
 
 
+MOST_STARTS = 10**9  # of a search; what counts them takes no more than sys.maxsize
+
+
 def count_faults(name: str, value: Any, least: int, most: int | None = None) -> list[Fault]:
     """What is wrong with a whole number that a user gave."""
     whole = isinstance(value, Integral) and not isinstance(value, bool)

@@ -6,6 +6,7 @@ from pathlib import Path
 import click
 
 from tmsopt.cli.common import DONE, INFEASIBLE, NOT_CONVERGED, answer, bad_input, options, solving
+from tmsopt.errors import MOST_STARTS
 
 _EXAMPLES = """
 \b
@@ -34,7 +35,7 @@ Exit status: 0 proved, 2 bad input, 3 no design found, 4 not proved.
     "--digits", type=click.IntRange(min=1, max=1000), default=30, show_default=True, help="Of every number."
 )  # fmt: skip
 @click.option("--exact", multiple=True, metavar="NAME=VALUE", help="What a parameter is exactly, e.g. zeta_B=-1/3.")
-@click.option("--starts", type=click.IntRange(min=1), default=None, help="Starts tried at most. [default: 64]")
+@click.option("--starts", type=click.IntRange(1, MOST_STARTS), default=None, help="Starts tried at most. [default: 64]")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts.")
 def prove(file: Path, as_json: bool, digits: int, exact: tuple[str, ...], starts: int | None, seed: int) -> None:
     """Prove that the design which FILE asks for exists, and whether it is stable and heavily damped."""

@@ -25,6 +25,7 @@ from tmsopt.cli.common import (
     solving,
 )
 from tmsopt.cli.ending import INTERRUPTED
+from tmsopt.errors import MOST_STARTS
 
 if TYPE_CHECKING:
     from tmsopt import Problem, Solution
@@ -73,7 +74,7 @@ def _common(command: Command) -> Command:
     for option in (
         click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table."),
         click.option(
-            "--starts", type=click.IntRange(min=1), default=None,
+            "--starts", type=click.IntRange(1, MOST_STARTS), default=None,
             help="Starts tried at most; of a front, new ones per point. [default: 64, of a front 2]",
         ),
         click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts."),

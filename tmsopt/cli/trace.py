@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from tmsopt.cli.common import FIGURES, answer, bad_input, check_output, nominal_of, plane, progress, saving
+from tmsopt.errors import MOST_STARTS
 
 _EXAMPLES = """
 \b
@@ -34,7 +35,7 @@ Exit status: 0 traced, 2 bad input, 3 nothing of the pattern found in the box.
     help="Longest step, in widths of the box.",
 )  # fmt: skip
 @click.option(
-    "--starts", type=click.IntRange(min=1), default=48, show_default=True, help="Fruitless in a row, to stop."
+    "--starts", type=click.IntRange(1, MOST_STARTS), default=48, show_default=True, help="Fruitless in a row, to stop."
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts.")
 def trace(

@@ -158,7 +158,8 @@ def _variation_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     for table, needed in (("tolerances", "greater than 0"), ("weights", "0 or greater")):
         for name, value in getattr(problem, table).items():
             if name in of.names and not _is_size(value, zero=table == "weights"):
-                yield Fault(f"found {short(value)}; accepted: a finite number {needed}", (table, name))
+                sizes = f"a number {needed}, of a size from {_SMALLEST:g} to {1 / _SMALLEST:g}"
+                yield Fault(f"found {short(value)}; accepted: {sizes}", (table, name))
             elif table == "tolerances" and name in of.names:
                 yield from _room_faults(problem, of, name, float(value))
     if len(problem.tolerances) > MOST_TOLERANCES:

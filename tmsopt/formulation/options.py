@@ -5,7 +5,7 @@ from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypedDict, TypeVar
 
-from tmsopt.errors import Fault, InputError, call_faults, count_faults, is_number, short, suggest
+from tmsopt.errors import MOST_STARTS, Fault, InputError, call_faults, count_faults, is_number, short, suggest
 from tmsopt.records import Progress
 
 LINEAR_SOLVERS = ("mumps", "spral")
@@ -110,7 +110,7 @@ def options_of(
     for name in asked:
         if name not in accepted.__annotations__:
             raise TypeError(f"unknown option '{name}'; {suggest(name, accepted.__annotations__)}")
-    faults = [*count_faults("starts", given["starts"], fewest), *count_faults("seed", given["seed"], 0)]
+    faults = [*count_faults("starts", given["starts"], fewest, MOST_STARTS), *count_faults("seed", given["seed"], 0)]
     if not isinstance(given["near"], Mapping | None):
         faults.append(Fault(f"found {short(given['near'])}; accepted: a mapping of parameters to values", ("near",)))
     if not (is_number(given["stability"]) and given["stability"] >= 0):

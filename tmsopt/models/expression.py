@@ -264,7 +264,7 @@ def _checked_names(  # noqa: PLR0912 - one case per kind of node
         case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in FUNCTIONS:
             fewest, most = (2, 99) if name in ("min", "max") else (1, 1)
             if not fewest <= len(args) <= most:
-                wanted = "two or more arguments" if fewest == 2 else "one argument"
+                wanted = f"{fewest} to {most} arguments" if most > 1 else "one argument"
                 raise ExpressionError(f"'{text}' calls {name} with {len(args)} arguments; accepted: {wanted}")
             return names_in(*args)
         case ast.Call():

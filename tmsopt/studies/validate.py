@@ -9,7 +9,7 @@ import numpy as np
 from tmsopt.design.expression import ExpressionError
 from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Problem, unasked
-from tmsopt.errors import Fault, at_first, count_faults, list_faults, short, suggest, text_faults
+from tmsopt.errors import MOST_STARTS, Fault, at_first, count_faults, list_faults, short, suggest, text_faults
 
 MOST_ROWS = 10_000_000
 """Rows of a study; one with more is another kind of question, such as a chart."""
@@ -149,7 +149,7 @@ def _option_faults(study: Stated) -> Iterator[Fault]:
 def common_faults(problem: Problem, seed: Any, starts: Any, report: Any) -> Iterator[Fault]:
     """What is wrong with the seed, the starts and the report of a study."""
     yield from count_faults("seed", seed, 0)
-    yield from count_faults("starts", starts, 1)
+    yield from count_faults("starts", starts, 1, MOST_STARTS)
     if isinstance(report, str) or not isinstance(report, Sequence):
         yield Fault(f"found {short(report)}; accepted: a list of expressions, such as ['nu_H', '2*Fr_c']", ("report",))
         return

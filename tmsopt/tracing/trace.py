@@ -11,6 +11,7 @@ import numpy as np
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.errors import (
+    MOST_STARTS,
     Fault,
     InputError,
     call_faults,
@@ -140,7 +141,8 @@ def _check(
     problem: Problem, step: float, starts: int, seed: int, most: int, through: Sequence[Mapping[str, float]],
     progress: Report | None,
 ) -> None:  # fmt: skip
-    faults = [*count_faults("starts", starts, 0), *count_faults("seed", seed, 0), *count_faults("most", most, _FEWEST)]
+    faults = [*count_faults("starts", starts, 0, MOST_STARTS), *count_faults("seed", seed, 0)]
+    faults += count_faults("most", most, _FEWEST)
     faults += [*call_faults("progress", progress), *list_faults("through", through, "[{'Fr': 1.2, 'mu': 0.1}]")]
     if not is_number(step) or not STEPS[0] <= step <= STEPS[1]:
         faults.append(Fault(f"found {step!r}; accepted: a number from {STEPS[0]:g} to {STEPS[1]:g}", ("step",)))
