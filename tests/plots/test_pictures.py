@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from importlib import import_module
+from pathlib import Path
 
 import casadi as ca
 import matplotlib.colors as mcolors
@@ -442,3 +443,11 @@ def test_one_design_far_away_hides_no_other() -> None:
     near = import_module("tmsopt.plots.study")._near
     values = np.append(np.linspace(2.0, 4.0, 40), (-1700.0, np.nan))
     assert near(values).tolist() == [True] * 40 + [False, False]
+
+
+def test_letters_that_no_font_has_cost_no_warning(tmp_path: Path) -> None:
+    """Drawn as boxes; warnings are errors here."""
+    ax = tmsopt.plots.draw_growth(tmsopt.growth(Path(__file__).parents[2] / "problems" / "whipple_benchmark.toml"))
+    ax.set_title("自行车 \U0001f6b2")
+    tmsopt.plots.save(ax, tmp_path / "a.png")
+    assert (tmp_path / "a.png").stat().st_size > 1000

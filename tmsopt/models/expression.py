@@ -39,7 +39,7 @@ class UnknownName(ExpressionError):
     """An expression with a name that is not accepted."""
 
     def __init__(self, text: str, name: str, accepted: Iterable[str]) -> None:
-        self.found, self.name = f"'{text}' uses the unknown name '{name}'", name
+        self.found, self.name = f"{_quoted(text)} uses the unknown name '{name}'", name
         super().__init__(f"{self.found}; {suggest(name, accepted)}")
 
 
@@ -132,7 +132,7 @@ def parse_value(text: str, accepted: Iterable[str] | None, example: str = "absci
     """
     body = _parse(_text(text))
     if isinstance(body, ast.Compare):
-        raise ExpressionError(f"'{text}' is a comparison; accepted: a value, such as '{example}'")
+        raise ExpressionError(f"{_quoted(text)} is a comparison; accepted: a value, such as '{example}'")
     return Expression(text, _checked(body, text, None if accepted is None else list(accepted)))
 
 
@@ -144,17 +144,17 @@ def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
     """
     body = _parse(_text(text))
     if not isinstance(body, ast.Compare):
-        raise ExpressionError(f"'{text}' is not a comparison; write e.g. 'nu_H >= 0.02' with <=, >= or ==")
+        raise ExpressionError(f"{_quoted(text)} is not a comparison; write e.g. 'nu_H >= 0.02' with <=, >= or ==")
     if len(body.ops) > 1:
-        raise ExpressionError(f"'{text}' joins several comparisons; write one constraint for each")
+        raise ExpressionError(f"{_quoted(text)} joins several comparisons; write one constraint for each")
     symbol = COMPARISONS.get(type(body.ops[0]))
     if symbol is None:
-        raise ExpressionError(f"'{text}' compares with another sign than <=, >= or =={_advice(text)}")
+        raise ExpressionError(f"{_quoted(text)} compares with another sign than <=, >= or =={_advice(text)}")
     known = list(accepted)
     left, right = _checked(body.left, text, known), _checked(body.comparators[0], text, known)
     names = tuple(dict.fromkeys(left + right))
     if not names:
-        raise ExpressionError(f"'{text}' uses no parameter or quantity, so nothing can satisfy or violate it")
+        raise ExpressionError(f"{_quoted(text)} uses no parameter or quantity, so nothing can satisfy or violate it")
     return Expression(text, names, symbol)
 
 
@@ -166,7 +166,7 @@ def written_sides(text: str) -> tuple[str, str, str]:
     """
     body = _parse(text)
     if not isinstance(body, ast.Compare) or len(body.ops) > 1 or type(body.ops[0]) not in COMPARISONS:
-        raise ExpressionError(f"'{text}' is not a comparison by <=, >= or ==")
+        raise ExpressionError(f"{_quoted(text)} is not a comparison by <=, >= or ==")
     return _source(body.left, text), COMPARISONS[type(body.ops[0])], _source(body.comparators[0], text)
 
 
@@ -185,7 +185,9 @@ def _parse(text: str) -> ast.expr:
     if len(text) > _LONGEST:
         raise ExpressionError(f"expression of {len(text)} characters; accepted: up to {_LONGEST}")
     if strange := _NOT_ACCEPTED.search(text.strip()):
-        raise ExpressionError(f"'{text}' contains {strange[0]!r}{_advice(text)}; accepted: one line of {_LANGUAGE}")
+        raise ExpressionError(
+            f"{_quoted(text)} contains {strange[0]!r}{_advice(text)}; accepted: one line of {_LANGUAGE}"
+        )
     try:
         return _tree(text)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
@@ -193,7 +195,9 @@ def _parse(text: str) -> ast.expr:
         kept = next((word for word in re.findall(r"[A-Za-z_]\w*", text) if keyword.iskeyword(word)), None)
         own = f"; '{kept}' is a reserved word, write e.g. {kept}_" if kept else ""
         own += " (the tilt of a bicycle is lambda_s)" if kept == "lambda" else ""
-        raise ExpressionError(f"'{text}' does not parse{column}{own}{_advice(text)}; accepted: {_LANGUAGE}") from None
+        raise ExpressionError(
+            f"{_quoted(text)} does not parse{column}{own}{_advice(text)}; accepted: {_LANGUAGE}"
+        ) from None
 
 
 def _tree(text: str) -> ast.expr:
@@ -243,7 +247,7 @@ def _checked_names(  # noqa: PLR0912 - one case per kind of node
 
     match node:
         case ast.Constant(value=bool()):
-            raise ExpressionError(f"'{text}' uses {node.value!r}; accepted: numbers and names")
+            raise ExpressionError(f"{_quoted(text)} uses {node.value!r}; accepted: numbers and names")
         case ast.Constant(value=int() | float()):
             _number(node, text)
             return ()
@@ -251,7 +255,9 @@ def _checked_names(  # noqa: PLR0912 - one case per kind of node
             if name in CONSTANTS:
                 return ()
             if name in FUNCTIONS:
-                raise ExpressionError(f"'{text}' names the function {name} without its argument; write {name}(…)")
+                raise ExpressionError(
+                    f"{_quoted(text)} names the function {name} without its argument; write {name}(…)"
+                )
             if accepted is not None and name not in accepted:
                 raise UnknownName(text, name, accepted)
             return (name,)
@@ -259,20 +265,24 @@ def _checked_names(  # noqa: PLR0912 - one case per kind of node
             return names_in(operand)
         case ast.BinOp(left=left, op=op, right=right):
             if type(op) not in BINARY:
-                raise ExpressionError(f"'{text}' uses an operator other than + - * / **{_advice(text)}")
+                raise ExpressionError(f"{_quoted(text)} uses an operator other than + - * / **{_advice(text)}")
             return names_in(left, right)
         case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in FUNCTIONS:
             fewest, most = (2, 99) if name in ("min", "max") else (1, 1)
             if not fewest <= len(args) <= most:
                 wanted = f"{fewest} to {most} arguments" if most > 1 else "one argument"
-                raise ExpressionError(f"'{text}' calls {name} with {len(args)} arguments; accepted: {wanted}")
+                raise ExpressionError(f"{_quoted(text)} calls {name} with {len(args)} arguments; accepted: {wanted}")
             return names_in(*args)
         case ast.Call():
-            raise ExpressionError(f"'{text}' calls '{_source(node.func, text)}'; accepted: {' '.join(FUNCTIONS)}")
+            raise ExpressionError(
+                f"{_quoted(text)} calls '{_source(node.func, text)}'; accepted: {' '.join(FUNCTIONS)}"
+            )
         case ast.Attribute():
-            raise ExpressionError(f"'{text}' uses the attribute '{_source(node, text)}'; accepted: plain names")
+            raise ExpressionError(f"{_quoted(text)} uses the attribute '{_source(node, text)}'; accepted: plain names")
         case _:
-            raise ExpressionError(f"'{text}' contains '{_source(node, text)}'{_advice(text)}; accepted: {_LANGUAGE}")
+            raise ExpressionError(
+                f"{_quoted(text)} contains '{_source(node, text)}'{_advice(text)}; accepted: {_LANGUAGE}"
+            )
 
 
 def _is_number(node: ast.expr) -> bool:

@@ -1,5 +1,6 @@
 """What all figures share: colours that the colour-blind can tell apart, sizes for print, and saving."""
 
+import warnings
 from collections.abc import Sequence
 from os import PathLike
 
@@ -61,5 +62,6 @@ def save(drawn_on: Figure | Axes, path: str | PathLike[str]) -> None:
     figure = figure_of(drawn_on) if isinstance(drawn_on, Axes) else drawn_on
     assert figure is not None, "Axes without a figure"
     ending = path.suffix.lstrip(".").lower()
-    with whole(path) as temporary:
+    with whole(path) as temporary, warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph", UserWarning)  # of letters that no font here has: boxes show that
         figure.savefig(temporary, dpi=200, format=ending)
