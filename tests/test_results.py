@@ -220,6 +220,7 @@ def test_new_figures_are_shown_by_pyplot(monkeypatch: pytest.MonkeyPatch) -> Non
     plt.close(plt.gcf())
 
 
+@pytest.mark.slow
 def test_the_page_of_a_design_has_badges_and_parameters() -> None:
     said = Page(design()._repr_html_()).said
     assert {"optimal", "proved", "stable", "EP4"} <= set(said)

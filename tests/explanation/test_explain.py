@@ -98,6 +98,7 @@ def test_least_speed_of_an_ep4_beside_its_closed_form():
     assert not [w for w in explanation.warnings if "decay" in w]  # a named constraint is meant
 
 
+@pytest.mark.slow
 def test_most_tilt_at_a_given_decay_beside_the_ep_set():
     """chi_H = 1, chi_B = r, p = a0 (s² + 2x s + 1/h)²: matching a1 and a2 leaves one equation, linear in tan lambda_s."""
 
@@ -384,6 +385,7 @@ def test_every_structure_has_words():
     assert all(f"({name})" in words for name, words in STRUCTURES.items())
 
 
+@pytest.mark.slow
 def test_the_command_says_what_it_means():
     def printed(*options):
         done = CliRunner().invoke(main, ["solve", "problems/ep4.toml", *options])

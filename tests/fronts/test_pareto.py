@@ -190,6 +190,7 @@ WAVE = {"fixed": {**BASE, "lambda_s": 0.4, "Fr": 0.01}, "free": {"chi_B": (0.0, 
 """One free parameter x: a front of x and of a wave in x is known by hand. So slow, all roots are real: no kinks."""
 
 
+@pytest.mark.slow
 def test_a_gap_is_reported_where_it_is():
     """x against sin 2x − 0.3 x: efficient are 0, and from the zero at 1.36 to the minimum, where cos 2x = 0.15."""
     found = tmsopt.pareto(problem(**WAVE, pareto=["chi_B", "sin(2*chi_B) - 0.3*chi_B"]), 6)
@@ -379,6 +380,7 @@ def file(tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_the_command_writes_table_csv_and_plot(file, tmp_path):
     done = command("solve", file, "--points", 4, "--csv", tmp_path / "front.csv", "--plot", tmp_path / "front.png")
     assert done.exit_code == 0, done.output

@@ -92,6 +92,7 @@ def test_the_greatest_over_cases_is_limited():
     assert design.parameters["k"] == pytest.approx(1.5**2 + 0.25 - 0.5, abs=TOLERANCE)
 
 
+@pytest.mark.slow
 def test_the_fastest_case_may_be_another_than_the_worst():
     """Slow, a skate swings fast; fast, it decays slowly."""
     fixed = {"chi_H": 1.0, "zeta_H": -0.2, "zeta_B": -0.4, "mu": 0.1}

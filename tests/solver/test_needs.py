@@ -82,6 +82,7 @@ def test_a_speed_in_the_unit_in_which_it_was_typed(tmp_path):
     assert float(line.split()[-2]) == pytest.approx(3.6 * least_weave() * np.sqrt(9.81), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_the_speed_plays_no_part_where_the_loads_conflict_or_a_limit_is_about_it():
     """chi_T <= 1 asks chi_B <= 1 at chi_H = 1; the speed is in no coefficient of that."""
     loads = replace(SLOW, constraints={"load": "load_rear >= 0"})
@@ -99,6 +100,7 @@ def test_the_speed_plays_no_part_where_the_loads_conflict_or_a_limit_is_about_it
     assert change == "smallest change found: load_rear >= -0.009091 instead of 0 (load)"  # 1 − (1.01 + 0.1)/1.1
 
 
+@pytest.mark.slow
 def test_no_speed_helps_where_the_product_of_the_roots_forbids_it():
     """−omega0 = (0.08)^(-1/4) is the geometric mean of the roots at every speed."""
     design = tmsopt.solve(replace(SLOW, constraints={"decay": "abscissa <= -2"}), throw=False)

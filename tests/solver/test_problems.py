@@ -261,6 +261,7 @@ def test_ballast_costs_nearly_all_of_the_decay():
     assert centre(dict(solved("ballast_free").parameters)) == pytest.approx(1, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_band_is_held_at_every_speed_and_not_only_at_seven():
     design = solved("speed_band")
     value, _ = over_band({n: np.asarray(v) for n, v in design.parameters.items()}, FINE_SPEEDS)

@@ -23,6 +23,7 @@ def test_points_of_a_band_do_not_matter(points):
     assert found.value == pytest.approx(BAND_OPTIMUM, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_relaxation_over_a_band_holds_over_the_whole_band():
     problem = tmsopt.Problem(
         TMS,
@@ -63,6 +64,7 @@ def test_no_warning_where_a_start_runs_into_a_singular_mass_matrix():
     assert found.status == "optimal" or not any("wins" in note for note in found.notes)
 
 
+@pytest.mark.slow
 def test_a_relaxation_does_not_depend_on_the_objective():
     """Limits on nu_H that contradict, and an equality: the least move is 0.4877 of one of them, whatever is minimised.
 

@@ -906,6 +906,7 @@ def test_a_flat_minimum_is_a_fold():
     assert [e.parameters["Fr"] for e in folds] == pytest.approx([branch.parameters["Fr"][k]], abs=1e-12)
 
 
+@pytest.mark.slow
 def test_no_fold_where_a_parameter_runs_on():
     """Beside chi_B = chi_H = 1, lambda_s = 0 the equations are singular, and the tangent alone is noise."""
     fixed = {"Fr": 2.322, "mu": 0.0105, "chi_H": 1.0, "zeta_B": -0.5435, "zeta_H": -0.3305}
