@@ -229,6 +229,7 @@ def test_the_page_of_a_design_has_badges_and_parameters() -> None:
     assert "not stable" in Page(made("Solution, not stable")._repr_html_()).said
 
 
+@pytest.mark.slow
 def test_a_picture_that_fails_does_not_break_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(*_: object, **__: object) -> None:
         raise RuntimeError

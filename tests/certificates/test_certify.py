@@ -401,6 +401,7 @@ def test_hardly_any_room(slow_plane: Solution, width: float) -> None:
 # Better designs
 
 
+@pytest.mark.slow
 def test_a_better_design_takes_the_place_of_a_worse_one() -> None:
     """The optimum of a part of the plane, sold as that of all of it."""
     all_of_it = problem(minimize="abscissa")

@@ -238,6 +238,7 @@ def test_patterns_are_excluded_or_found_in_any_unit(most: float, told: str) -> N
     assert {SCIP.decide(task(Question(problem, unit=128.0).program(1), 20.0)).verdict} == {told}
 
 
+@pytest.mark.slow
 @scip
 def test_a_gap_is_closed_or_left_open_but_never_wrong() -> None:
     """Three equal masses in a chain with three dampers: in one second a bound, if any, that a grid does not beat."""

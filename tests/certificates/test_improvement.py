@@ -42,6 +42,7 @@ def worse(asked: tmsopt.Problem, **changed: Any) -> tmsopt.Solution:
     return replace(tmsopt.solve(replace(asked, free={"x": (1.0, 1.2)}), throw=False), problem=asked, **changed)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("lost")
 def test_a_better_design_is_the_answer_though_nothing_converges_from_it() -> None:
     """The least abscissa is −0.95. Found again and again, until none is better by a 1e-4 of it, and that is proved."""

@@ -149,7 +149,7 @@ def test_bad_usage_ends_a_process_with_2_and_no_traceback():
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("ending", ["png", "pdf", "svg"])
+@pytest.mark.parametrize("ending", ["png", *(pytest.param(e, marks=pytest.mark.slow) for e in ("pdf", "svg"))])
 def test_plot_is_written_whole(tmp_path, ending, capsys):
     path = tmp_path / f"growth.{ending}"
     assert run(capsys, "solve", "problems/ep4.toml", "--plot", path)[0] == 0
@@ -269,6 +269,7 @@ def test_a_second_one_or_an_early_one_ends_with_130(monkeypatch, capsys):
         assert (status, out, err) == (130, "", "stopped; what was printed before stands\n")
 
 
+@pytest.mark.slow
 def test_the_question_for_a_stable_design_is_shown(monkeypatch, tmp_path):
     """On a terminal, and its end is no end of the answer in hand."""
 

@@ -344,6 +344,7 @@ def test_a_solution_says_what_its_multiple_root_is() -> None:
     assert "ε^(1/4)" in splitting
 
 
+@pytest.mark.slow
 def test_the_command_shows_it() -> None:
     printed = CliRunner().invoke(main, ["solve", "problems/ep4.toml", "--full"]).output
     assert "4-fold root -1.8803015: defective" in printed

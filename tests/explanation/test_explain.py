@@ -49,6 +49,7 @@ def realistic():
 # Levers beside closed forms
 
 
+@pytest.mark.slow
 def test_height_of_the_front_mass_beside_the_law_of_omega0():
     """At chi_H = 1 the least abscissa is -(zeta_B zeta_H)^(-1/4), whatever else is free (equation w01)."""
     fixed = {n: v for n, v in CHI_H_1.items() if n != "zeta_H"}
@@ -419,6 +420,7 @@ def test_rounding_over_a_band_is_judged_between_its_speeds_too():
         assert row.loss >= -1e-9  # no design is better than the best
 
 
+@pytest.mark.slow
 def test_rounding_in_one_line_says_how_many_digits_are_enough():
     """By companion eigenvalues of the rounded designs: those with a simple rightmost root, which doubles resolve."""
     design = tmsopt.solve("problems/realistic.toml")

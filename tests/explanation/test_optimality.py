@@ -319,6 +319,7 @@ def test_a_parameter_without_effect_is_named():
     assert "without effect: mu" in found.reason
 
 
+@pytest.mark.slow
 def test_scale_and_speed_together_are_flat():
     """Wheelbase, speed and lengths that grow together keep the spectrum: no strict minimum may be claimed."""
     solution = solved(
@@ -387,6 +388,7 @@ def test_a_rounded_ep4_is_not_called_a_minimum(ep4):
     assert judged(replace(ep4, parameters=rounded)).verdict != STRICT
 
 
+@pytest.mark.slow
 def test_the_command_reports_it():
     printed = CliRunner().invoke(main, ["solve", "problems/ep4.toml", "--full"]).output
     assert "local optimality: this EP4 is a strict local minimum of abscissa" in printed

@@ -256,6 +256,7 @@ def test_an_end_at_a_bound_is_best_in_the_others_too():
     assert (end.structure, end.limits) == ("CEP2", ("lambda_s.max",))
 
 
+@pytest.mark.slow
 def test_three_objectives_on_a_sphere():
     """x² + y² + z² ≥ 1: the efficient designs are the sphere, which weighted sums of x, y, z would miss."""
     free = {"Fr": (0.1, 1.0), "chi_B": (0.1, 1.0), "mu": (0.1, 1.0)}
@@ -271,6 +272,7 @@ def test_three_objectives_on_a_sphere():
     assert found.to_json()["nadir"] == pytest.approx([max(p.objectives[k] for p in found.points) for k in range(3)])
 
 
+@pytest.mark.slow
 def test_constraints_of_the_user_keep_their_names():
     crowded = {"Fr <= eps": "chi_B >= 0.5", "chi_B <= eps": "chi_B <= 3.5"}
     found = tmsopt.pareto(problem(**{**WAVE, "constraints": crowded}, pareto=["chi_B", "-chi_B"]), 4)
@@ -399,6 +401,7 @@ def test_the_command_writes_table_csv_and_plot(file, tmp_path):
     assert (tmp_path / "front.png").read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.slow
 def test_the_command_writes_json(file):
     done = command("solve", file, "--points", 2, "--json")
     assert done.exit_code == 0, done.output

@@ -252,6 +252,7 @@ def test_units_do_not_matter(name):
         assert second.limit.direction[partner[n]] == pytest.approx(first.limit.direction[n], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_weights_are_units():
     """Twice the weights, half the distance; a weight 0 and a missing one hold a parameter."""
     weights = {n: abs(v) for n, v in OFF.items()}

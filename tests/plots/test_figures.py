@@ -555,6 +555,7 @@ def test_bad_input_of_figure(arguments, message, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_one_figure_is_written_whole(tmp_path):
     done = tmsopt("figure", "figTMS", "--format", "svg", "--json", cwd=tmp_path)
     assert done.returncode == 0

@@ -146,6 +146,7 @@ def test_modes_are_the_roots_and_nothing_is_left_out(whipple):
         assert np.abs(data.roots[k] - mode.roots[:, None]).min(axis=1).max() == 0
 
 
+@pytest.mark.slow
 def test_axes_of_a_problem_in_si(robot):
     """Speed in km/h as typed; the design's roots times √(g/w) stand on the curves at its own speed, in 1/s and Hz."""
     data = tmsopt.growth(robot)
@@ -177,6 +178,7 @@ def test_over_another_parameter_stability_ends_where_the_roots_say(robot):
     assert ax.get_xlabel() == r"$\lambda_s$ in deg"
 
 
+@pytest.mark.slow
 def test_a_general_system_flutters():
     """Ziegler (1952): p = 41/28 + b²/2."""
     ax = plots.draw_growth(tmsopt.solve("problems/ziegler.toml"), ax_of())
@@ -228,6 +230,7 @@ def test_colours_of_the_abscissa_are_centred_at_0(chart, robot):
     assert np.allclose(mesh.get_array(), chart.abscissa, equal_nan=True)
 
 
+@pytest.mark.slow
 def test_the_star_says_whether_it_is_the_optimum(chart, robot, robot_file, tmp_path):
     def star(found):
         ax = plots.draw_chart(found, ax_of(), "abscissa")
@@ -351,6 +354,7 @@ def roots_of(design, v):
     return roots_60(polynomial_60(**{**design.dimensionless, "Fr": v / math.sqrt(9.81 * 0.4)}))
 
 
+@pytest.mark.slow
 def test_another_study_is_drawn_over_what_varies():
     study = tmsopt.over_grid("problems/ep4.toml", {"zeta_H": [-0.3, -0.2, -0.1]})
     data = tmsopt.run_study(study, workers=1)

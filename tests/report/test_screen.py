@@ -146,6 +146,7 @@ def test_the_stable_range_does_not_end_where_the_box_does() -> None:
     assert "stable in Fr: from 1.5931; this design at 2.2363" in str(design)
 
 
+@pytest.mark.slow
 def test_a_proof_names_the_designs_that_it_is_about() -> None:
     """Of those beyond a limit some are better: Fr = 1 is below any that decays at 0.5, and in the box."""
     problem = replace(tmsopt.load("problems/ep4.toml"), minimize="Fr", constraints={"fast": "abscissa <= -0.5"})

@@ -219,6 +219,7 @@ def test_a_frequency_of_0_is_the_least_there_is():
     assert (design.value, design.bound.value) == (0, 0)
 
 
+@pytest.mark.slow
 def test_a_chart_has_it():
     free = {n: BOX[n] for n in ("v", "x_B")}
     asked = tmsopt.Problem(tmsopt.models.tms, fixed={**SKATE, "lambda_s": 0.2}, free=free, constraints=SLOW)

@@ -48,6 +48,7 @@ def test_the_least_speed_at_which_a_design_is_stable(slow):
     assert "no stable design" in infeasible_lines(slow)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [{"fixed": {**FIXED, "Fr": 1.0}}, {"free": {**SLOW.free, "Fr": (0.5, 1.5)}}])
 def test_the_least_speed_for_a_decay(speed):
     """Freed from the start, the speed is minimised (problems/least_speed.toml); a scan of eigenvalues finds none below."""

@@ -243,6 +243,7 @@ def test_robot_with_forward_tilt_does_not_balance_itself():
 # What the comments of the files promise
 
 
+@pytest.mark.slow
 def test_physical_machine_decays_faster_with_its_front_mass_moved_back():
     fixed, box = hunt.read("physical_machine")
     as_built = {name: box[name] for name in ("v", "lambda_s")}

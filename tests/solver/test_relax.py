@@ -72,6 +72,7 @@ def test_the_relaxed_design_is_the_ep4_where_nothing_decays_faster():
         assert relaxed[name] == pytest.approx(float(getattr(EP4, name)), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_conflicts_name_the_limits_that_hold_and_no_others():
     assert set(failed("two bounds").relaxation.conflict) == {"high", "low"}
     assert failed("faster than omega0").relaxation.conflict == ("decay",)  # no bound is near

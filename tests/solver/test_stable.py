@@ -52,6 +52,7 @@ def test_that_none_is_stable_is_proved() -> None:
     assert design.to_json()["any_stable"] is False
 
 
+@pytest.mark.slow
 @scip
 def test_limits_that_a_proof_rests_on_are_named() -> None:
     """Without the limit x = 3 would do; one on the roots themselves is none that it rests on."""

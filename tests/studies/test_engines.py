@@ -122,6 +122,7 @@ def test_finished_rows_of_a_killed_process_are_not_solved_again(tmp_path: Path) 
     ]
 
 
+@pytest.mark.slow
 def test_a_block_that_kills_is_taken_apart(tmp_path: Path) -> None:
     rows = list(processes(Fake(tmp_path, always=(23,)), BLOCKS, 2))
     assert Counter(row.number for row in rows) == Counter(range(60))

@@ -192,6 +192,7 @@ def test_a_summary_of_rows_is_what_its_numbers_are_by_definition() -> None:
     assert greatest.best is made[3]
 
 
+@pytest.mark.slow
 def test_results_are_columns_and_files(tmp_path: Path) -> None:
     found = run_study(GRID, workers=1)
     np.testing.assert_array_equal(found.column("varied.zeta_H"), [-0.2, -0.3, -0.35] * 2)
@@ -308,6 +309,7 @@ def test_a_block_stored_in_part_is_finished_and_only_what_lacks_is_added(tmp_pat
 # What a row is solved with, and what is said of all
 
 
+@pytest.mark.slow
 def test_a_row_is_solved_from_its_own_seed_with_the_starts_of_the_study_on_one_thread(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -354,6 +356,7 @@ def test_a_row_tells_how_far_its_design_is_from_the_laws() -> None:
 # The command
 
 
+@pytest.mark.slow
 def test_the_command_solves_stores_and_shows_rows(file: Path) -> None:
     first = command(file, "--workers", 1, "--json", "--export", "rows.csv")
     assert first.exit_code == 0
