@@ -26,7 +26,8 @@ FLOORS = (
     ("branch_and_bound",),
     ("solver",),
     ("certificates", "proofs", "explanation", "diagnosis", "fronts", "critical_speeds", "studies", "paper"),
-    ("report", "plots", "guide", "explorer"),
+    ("report", "plots", "guide"),
+    ("explorer",),
     ("display",),
     ("cli",),
 )  # fmt: skip

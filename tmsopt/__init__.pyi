@@ -2,6 +2,7 @@ from . import laws as laws, models as models, plots as plots, report as report, 
 from .certificates import certify as certify
 from .charts import Chart as Chart, chart as chart, open_chart as open_chart
 from .critical_speeds import Growth as Growth, Speeds as Speeds, growth as growth, speeds as speeds
+from .explorer import Explorer as Explorer, explore as explore
 from .design import (
     Band as Band, Bound as Bound, Case as Case, NotSolved as NotSolved, Problem as Problem, Solution as Solution,
     Starts as Starts, load as load,

@@ -1,0 +1,95 @@
+"""One page for a problem: solved where it asks something, with what is worth going to."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from html import escape
+from os import PathLike
+from typing import Any, Unpack
+
+from tmsopt.design import Given, Problem, Solution, problem_of
+from tmsopt.design.toml import read_page
+from tmsopt.disk import path_of, write_text
+from tmsopt.errors import Fault, InputError
+from tmsopt.explorer.known import known_designs
+from tmsopt.explorer.page import html_of
+from tmsopt.formulation.options import Asked
+from tmsopt.solver import solve
+
+_HEIGHT = 900  # pixels of the frame in a notebook: header and the first row of pictures
+_ENDINGS = (".html", ".htm")
+
+
+@dataclass(frozen=True, repr=False)
+class Explorer:
+    """A page for a browser, complete in itself.
+
+    Attributes:
+        problem: that the page is about.
+        solution: its optimum, None where nothing was asked.
+        html: the page, which asks nothing of any server.
+    """
+
+    problem: Problem
+    solution: Solution | None
+    html: str = field(compare=False)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the page, as a whole or not at all.
+
+        Raises:
+            InputError: for a name that does not end in html or htm.
+            OSError: when the file cannot be written.
+        """
+        path = path_of(path, "the file to write")
+        if path.suffix.lower() not in _ENDINGS:
+            raise InputError([Fault(f"found '{path}'; accepted: a file name ending in html, htm", ("path",))])
+        write_text(path, self.html)
+
+    def __repr__(self) -> str:
+        return f"Explorer({self.problem.title or self.problem.model.title}; {len(self.html.encode()) / 1000:.0f} kB)"
+
+    def _repr_html_(self) -> str:
+        return frame(self.html, self.problem.title)
+
+
+def explore(problem: Given, **options: Unpack[Asked]) -> Explorer:
+    """The page of a problem, which is solved if it asks something; of a solution, without solving it again.
+
+    The page shows one design at a time: of bands and tolerances the nominal one. Of a front the first objective is
+    minimised. A design that violates something, or did not converge, is shown as what it is.
+
+    Args:
+        problem: or the path of its file, or a solution.
+        options: ``starts``, ``seed``, ``linear_solver`` and ``progress``; see `tmsopt.Options`.
+
+    Raises:
+        InputError: for a file with faults, and for anything that is no problem.
+    """
+    if isinstance(problem, Solution):
+        return _explorer(problem.problem, problem, {})
+    typed = read_page(problem, "problem").data.get("model") if isinstance(problem, str | PathLike) else None
+    posed = problem_of(problem)
+    if posed.pareto:
+        posed = replace(posed, pareto=(), minimize=posed.pareto[0])
+    asked = posed.sense != "evaluate" or not posed.free
+    solution = solve(posed, throw=False, stability=0.0, **options) if asked else None
+    return _explorer(posed, solution, typed if isinstance(typed, dict) else {})
+
+
+def page_of(design: Problem | Solution) -> str:
+    """The page of a problem as it stands, or of a solution, as HTML; nothing is searched for it."""
+    problem, solution = (design, None) if isinstance(design, Problem) else (design.problem, design)
+    return html_of(problem, known_designs(problem, solution, search=False), {}, trace_curves=False)
+
+
+def frame(html: str, title: str) -> str:
+    """A page within another one, of which it can neither see nor change anything."""
+    return (
+        f'<iframe title="{escape(title or "explorer")}" sandbox="allow-scripts allow-downloads" '
+        f'style="width:100%;height:{_HEIGHT}px;border:0" srcdoc="{escape(html)}"></iframe>'
+    )
+
+
+def _explorer(problem: Problem, solution: Solution | None, model: Mapping[str, Any]) -> Explorer:
+    designs = known_designs(problem, solution, search=True)
+    return Explorer(problem, solution, html_of(problem, designs, model, trace_curves=True))

@@ -1,0 +1,69 @@
+"""The text of a problem file around its parameters, so that a design seen on a page can be solved and shared."""
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from tmsopt.design import Problem
+
+_SHARED = re.compile(r"\[(\d+)\]")
+
+
+def around(problem: Problem, model: Mapping[str, Any]) -> dict[str, str]:
+    """What stands before and after the lines of [parameters].
+
+    Args:
+        model: the table that states the model, as typed; without one it is written from the model itself.
+    """
+    before = [f"title = {_text(problem.title)}"]
+    if problem.model.statement is None:
+        before.append(f"model = {_text(problem.model.name)}")
+    else:
+        before += ["", *_model(model or _stated(problem))]
+    limits = [f"{_key(name)} = {_text(text)}" for name, text in problem.constraints.items()]
+    after = ["", "[constraints]", *limits] if limits else []
+    return {"before": "\n".join([*before, "", "[parameters]", ""]), "after": "\n".join([*after, ""])}
+
+
+def _model(table: Mapping[str, Any]) -> Iterator[str]:
+    yield "[model]"
+    inner = {n: v for n, v in table.items() if isinstance(v, Mapping)}
+    yield from (f"{_key(n)} = {_value(v)}" for n, v in table.items() if n not in inner)
+    for name, values in inner.items():
+        yield from ("", f"[model.{_key(name)}]", *(f"{_key(n)} = {_value(v)}" for n, v in values.items()))
+
+
+def _stated(problem: Problem) -> dict[str, Any]:
+    """The table of a model that was made in Python, with every shared part written out."""
+    said = dict(problem.model.statement or {})
+    shared, said["name"] = said.pop("shared"), problem.model.name
+    del said["parameters"]
+
+    def whole(text: str) -> str:
+        return _SHARED.sub(lambda found: whole(shared[int(found[1]) - 1]), text)
+
+    def spelled(value: Any) -> Any:
+        if isinstance(value, str):
+            return whole(value)
+        if isinstance(value, Mapping):
+            return {n: spelled(v) for n, v in value.items()}
+        return [spelled(v) for v in value]
+
+    found = {n: v if n == "name" else spelled(v) for n, v in said.items() if v}
+    return found | {n: rows[0] for n, rows in found.items() if n == "coefficients"}
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_value, value))}]"
+    return _text(value) if isinstance(value, str) else repr(value).lower() if isinstance(value, bool) else repr(value)
+
+
+def _text(text: str) -> str:
+    """A TOML text: JSON has the same escapes."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _text(name)

@@ -1,0 +1,101 @@
+"""Designs worth going to: the optimum, an exceptional point of the box, the published benchmark."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from tmsopt.design import Problem, Solution, freedom
+from tmsopt.design.files import posed
+from tmsopt.errors import InputError
+from tmsopt.guide import example
+from tmsopt.report.solution.limits import proof_line
+from tmsopt.roots import Structure
+from tmsopt.solver import solve
+
+_BENCHMARKS = {"tms": "benchmark", "whipple": "whipple_benchmark"}
+"""Models → the example with the published bicycle."""
+
+_STARTS = 6  # of the search for an exceptional point, of which there need be none
+
+
+@dataclass(frozen=True)
+class Known:
+    """A design with a name, and the structure of its roots, multiple ones recognised.
+
+    Attributes:
+        facts: what is known of it, a sentence each.
+        is_answer: whether it is what the problem asks for, or the nearest to it.
+    """
+
+    name: str
+    parameters: Mapping[str, float]
+    structure: Structure
+    facts: tuple[str, ...]
+    is_answer: bool = False
+
+
+def known_designs(problem: Problem, solution: Solution | None, search: bool) -> list[Known]:
+    """The designs that a page can go to, the one that it opens with first if a solution is given.
+
+    Args:
+        search: whether to look for an exceptional point, unless the optimum is one or no design is stable.
+    """
+    optimum = [_of_solution(solution)] if solution is not None else []
+    worth = solution is None or (solution.stable and "EP" not in solution.structure)
+    found = _exceptional(problem) if search and worth else None
+    return [k for k in (*optimum, found, _benchmark(problem)) if k is not None]
+
+
+def _of_solution(solution: Solution) -> Known:
+    """What was found, with how good it is known to be."""
+    problem = solution.problem
+    words = {"optimal": "optimum", "infeasible": "least infeasible", "not_converged": "best so far"}
+    facts = [solution.status.replace("_", " "), *solution.notes]
+    if problem.nominal is problem:
+        known = Structure(solution.structure, solution.roots, 0.0)
+    else:
+        known = _structure(problem, solution.parameters)
+        facts.insert(1, "the best over every case; the page shows the nominal one")
+    name = words[solution.status] if problem.free else "as given"
+    return Known(name, solution.parameters, known, (*facts, proof_line(solution)), True)
+
+
+def _benchmark(problem: Problem) -> Known | None:
+    """The published bicycle of the problem's model in its own parameters; None where there is none."""
+    of = problem.parameter_set
+    if problem.model.name not in _BENCHMARKS:
+        return None
+    try:
+        faults, found = posed(tomllib.loads(example(_BENCHMARKS[problem.model.name])), "")
+    except InputError:  # an installation without the examples
+        return None
+    if faults or found is None:
+        return None
+    values = found.values(found.fixed)
+    parameters = {n: float(values[n]) for n in of.names}
+    return Known("benchmark", parameters, _structure(problem, parameters), (found.title,))
+
+
+def _exceptional(problem: Problem) -> Known | None:
+    """The highest exceptional point that the freedom of a problem allows, limits left aside; None where none is found.
+
+    A k-fold root takes k − 1 free parameters.
+    """
+    order = min(problem.model.degree, len(problem.free) + 1)
+    if order < 2:
+        return None
+    asked = replace(
+        problem.nominal, locate=f"EP{order}", constraints={}, minimize=None, maximize=None, pareto=(), start={}
+    )
+    if freedom(asked).count < 0:
+        return None
+    found = solve(asked, throw=False, starts=_STARTS, stability=0.0, alone=False)
+    if found.status != "optimal":
+        return None
+    facts = ("limits left aside",) if problem.constraints else ()
+    return Known(f"EP{order}", found.parameters, Structure(found.structure, found.roots, 0.0), facts)
+
+
+def _structure(problem: Problem, parameters: Mapping[str, float]) -> Structure:
+    found: Structure = problem.nominal.values(parameters)["structure"]
+    return found

@@ -1,0 +1,59 @@
+"""The page as one file: what is the same in every page, with the formulas and the data of this one."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from html import escape
+from importlib.resources import files
+from typing import Any
+
+from tmsopt import __version__
+from tmsopt.design import Problem
+from tmsopt.explorer.javascript import model_script
+from tmsopt.explorer.kernel import kernel_script
+from tmsopt.explorer.known import Known
+from tmsopt.explorer.subject import subject
+
+_PARTS = "numerics state axes chart plane growth bicycle motion controls facts main"
+_QUARTIC = 4
+
+
+def html_of(problem: Problem, designs: Sequence[Known], model: Mapping[str, Any], trace_curves: bool) -> str:
+    """The page of a problem; arguments as of `subject`."""
+    script = model_script(problem)
+    data = subject(problem, designs, script, model, trace_curves) | {"version": __version__}
+    parts = [
+        script.text,
+        *([kernel_script()] if problem.model.degree == _QUARTIC else []),
+        f"const DATA = {_json(data)};",
+    ]
+    parts += [_read(f"{name}.js") for name in _PARTS.split()]
+    marks = {
+        "<!-- title -->": escape(problem.title or problem.model.title),
+        "/* style */": _read("page.css"),
+        "/* script */": "\n".join(parts),
+    }
+    page = _read("page.html")
+    for mark, text in marks.items():
+        page = page.replace(mark, text, 1)
+    return page
+
+
+def _read(name: str) -> str:
+    return (files("tmsopt.explorer") / "page" / name).read_text(encoding="utf-8")
+
+
+def _json(data: Any) -> str:
+    """JSON that no text in it can end or change a script with; a number that does not exist is null."""
+    text = json.dumps(_plain(data), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    for letter in "<>&\u2028\u2029":
+        text = text.replace(letter, f"\\u{ord(letter):04x}")
+    return text
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {n: _plain(v) for n, v in value.items()}
+    return [_plain(v) for v in value] if isinstance(value, list | tuple) else value

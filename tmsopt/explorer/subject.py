@@ -1,0 +1,154 @@
+"""What a page is about, as plain data: parameters with their ranges, limits, known designs, traced curves."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from tmsopt.checks.recheck import FEASIBLE
+from tmsopt.design import Problem, freedom, limit_of, unit_of
+from tmsopt.explorer.file_text import around
+from tmsopt.explorer.javascript import Script
+from tmsopt.explorer.known import Known
+from tmsopt.models import Parameter, words_of
+from tmsopt.records import Array
+from tmsopt.roots.patterns.descriptions import in_words
+from tmsopt.tracing import domain, trace
+
+_STARTS = 8  # of traced curves: the tracer's grid shows what they miss
+_DIGITS = 6  # of a traced point: a chart has some 400 pixels
+_SPEEDS, _TILT = ("v", "Fr"), "lambda_s"
+_USUAL = {"m": 0.5, "kg": 5.0, "kg m^2": 1.0, "rad": 0.5, "m/s": 5.0}
+"""How far the slider of a fixed parameter that is 0 reaches, by its unit; 1 for others."""
+
+_MIDDLE = "nothing was solved here, so the page opens in the middle of the box"
+
+
+def subject(
+    problem: Problem, designs: Sequence[Known], script: Script, model: Mapping[str, Any], trace_curves: bool
+) -> dict[str, Any]:
+    """The data of a page; numbers are those that the package computes with, in rad and SI.
+
+    Args:
+        designs: the first of them is where the page opens, if it is an answer; else it opens in the middle of the box.
+        script: the formulas of the page, which say which quantities and limits it can compute.
+        model: the table of the problem's file that states the model; empty without one.
+        trace_curves: whether to trace the boundaries of stability in the plane of the chart.
+    """
+    of, solved = problem.parameter_set, bool(designs) and designs[0].is_answer
+    start = {n: float(v) for n, v in (designs[0].parameters if solved else _middle(problem)).items()}
+    plane, quantities = _plane(problem), {q.name: q for q in (*problem.model.quantities, *of.quantities)}
+    asked = problem.minimize or problem.maximize or problem.locate or ""
+    return {
+        "title": problem.title, "model": problem.model.name, "modelTitle": problem.model.title,
+        "bicycle": problem.model.name if _TILT in of.names and problem.model.statement is None else None,
+        "words": dict(words_of(problem.model)), "rootUnit": unit_of(problem, "abscissa").text,
+        "parameters": [_parameter(problem, p, start[p.name]) for p in of.parameters],
+        "quantities": [
+            {"name": n, "meaning": quantities[n].meaning, "share": quantities[n].share, **_unit(problem, n)}
+            for n in script.quantities
+        ],
+        "constraints": [_constraint(problem, n) for n in script.constraints],
+        "objective": f"{problem.sense} {' '.join(asked.split())}" if asked else "",
+        "designs": [_design(problem, k) for k in designs],
+        "start": [start[n] for n in of.names], "held": [start[n] for n in of.names],
+        "plane": [of.names.index(n) for n in plane], "over": of.names.index(_over(problem)),
+        "curves": list(_curves(problem, plane, start)) if trace_curves else [],
+        "toml": around(problem, model),
+        "shown": [_MIDDLE] if problem.free and not solved else [],
+    }  # fmt: skip
+
+
+def _middle(problem: Problem) -> dict[str, float]:
+    return problem.ordered({n: problem.start.get(n, (low + high) / 2) for n, (low, high) in problem.free.items()})
+
+
+def _unit(problem: Problem, name: str) -> dict[str, Any]:
+    unit = unit_of(problem, name)
+    return {"unit": unit.text, "one": unit.one}
+
+
+def _parameter(problem: Problem, parameter: Parameter, value: float) -> dict[str, Any]:
+    low, high = problem.free.get(parameter.name) or _reach(parameter, value)
+    return {
+        "name": parameter.name, "meaning": parameter.meaning, **_unit(problem, parameter.name),
+        "free": parameter.name in problem.free, "low": low, "high": high, "value": value,
+    }  # fmt: skip
+
+
+def _reach(parameter: Parameter, value: float) -> tuple[float, float]:
+    """Where the slider of a fixed parameter goes: as far again on both sides, as far as that is possible."""
+    around = abs(value) or _USUAL.get(parameter.unit, 1.0)
+    room = parameter.range
+    inside = 0.0 if room.closed else 1e-3 * around
+    low, high = (min(max(end, room.lower + inside), room.upper - inside) for end in (value - around, value + around))
+    return low, high
+
+
+def _constraint(problem: Problem, name: str) -> dict[str, Any]:
+    condition = problem.conditions[name]
+    size = abs(limit_of(problem.constraints[name]) or 0.0) or 1.0
+    return {
+        "name": name, "text": problem.constraints[name], **_unit(problem, name), "equality": condition.equality,
+        "tolerance": FEASIBLE * size,
+    }  # fmt: skip
+
+
+def _design(problem: Problem, known: Known) -> dict[str, Any]:
+    structure = known.structure
+    return {
+        "name": known.name, "values": [float(known.parameters[n]) for n in problem.parameter_set.names],
+        "structure": in_words(structure.name, problem.model.degree) if structure.roots else "",
+        "abscissa": structure.abscissa, "roots": [[r.re, r.im, r.multiplicity] for r in structure.roots],
+        "facts": list(known.facts),
+    }  # fmt: skip
+
+
+def _by_interest(problem: Problem) -> list[str]:
+    """Parameters in the order in which one looks at them: free before fixed, the speed and the tilt before others."""
+    names = problem.parameter_set.names
+    rank = {**dict.fromkeys(_SPEEDS, 0), _TILT: 1}
+    return sorted(names, key=lambda n: (n not in problem.free, rank.get(n, 2)))
+
+
+def _plane(problem: Problem) -> list[str]:
+    return _by_interest(problem)[:2]
+
+
+def _over(problem: Problem) -> str:
+    """The speed of a bicycle, or else what comes first."""
+    return next((n for n in problem.parameter_set.names if n in _SPEEDS and problem.model.statement is None),
+                _by_interest(problem)[0])  # fmt: skip
+
+
+def _curves(problem: Problem, plane: Sequence[str], start: Mapping[str, float]) -> Iterator[dict[str, Any]]:
+    """Traced curves in the plane of the chart: the boundaries of both domains, and the set that the problem locates."""
+    names = problem.parameter_set.names
+    axes = [names.index(n) for n in plane]
+    if problem.locate and freedom(problem.nominal).count == 1 and set(plane) <= set(problem.free):
+        along = [names.index(n) for n in problem.free if n not in plane]
+        for branch in trace(problem.nominal, starts=_STARTS).branches:
+            yield {"kind": problem.locate, "set": "EP set", "axes": axes, "along": along} | _points(
+                branch.parameters, plane
+            )
+    if len(plane) < 2 or not set(plane) <= set(problem.free):
+        return
+    others = {n: v for n, v in start.items() if n not in plane}
+    flat = replace(
+        problem.nominal,
+        fixed=others,
+        free={n: problem.free[n] for n in plane},
+        locate=None,
+        minimize=None,
+        maximize=None,
+        pareto=(),
+        constraints={},
+        start={},
+    )
+    found = domain(flat, starts=_STARTS)
+    for title, arcs in (("stability", found.stability), ("heavy damping", found.heavy_damping)):
+        for arc in arcs:
+            yield {"kind": arc.kind, "set": title, "axes": axes, "along": []} | _points(arc.points, plane)
+
+
+def _points(columns: Mapping[str, Array], plane: Sequence[str]) -> dict[str, list[float]]:
+    return {axis: [float(f"{v:.{_DIGITS}g}") for v in columns[n].tolist()] for axis, n in zip("xy", plane, strict=True)}
