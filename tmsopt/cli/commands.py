@@ -9,6 +9,7 @@ import click
 from tmsopt import __version__
 from tmsopt.cli.chart import chart
 from tmsopt.cli.ending import STATUS, ended
+from tmsopt.cli.explore import explore
 from tmsopt.cli.figure import figure
 from tmsopt.cli.guide.describe import describe, schema
 from tmsopt.cli.guide.files import example, new
@@ -59,6 +60,7 @@ def every() -> None:
       tmsopt describe tms
       tmsopt solve problems/ep4.toml
       tmsopt solve problems/pareto.toml --plot front.png
+      tmsopt explore problems/ep4.toml --open
       tmsopt compare problems/ep4.toml
       tmsopt prove problems/ep4.toml
       tmsopt speeds problems/whipple_benchmark.toml
@@ -73,6 +75,7 @@ def every() -> None:
 
 for _command in (
     solve,
+    explore,
     compare,
     prove,
     speeds,

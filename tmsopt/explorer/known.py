@@ -15,7 +15,7 @@ from tmsopt.solver import solve
 _BENCHMARKS = {"tms": "benchmark", "whipple": "whipple_benchmark"}
 """Models → the example with the published bicycle."""
 
-_STARTS = 6  # of the search for an exceptional point, of which there need be none
+_STARTS = 2  # of the search for an exceptional point, of which there need be none
 
 
 @dataclass(frozen=True)
