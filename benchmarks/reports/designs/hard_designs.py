@@ -1,10 +1,9 @@
 """Hard problems: is what `solve` calls optimal the best known, and has what it calls infeasible no feasible design?"""
 
-import json
 import math
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing import get_context
 
@@ -14,7 +13,7 @@ from tqdm import tqdm
 from benchmarks.judges import SCALE, SOLVED, Designs, exactly
 from benchmarks.reports.designs.hard_references import path_of, run
 from benchmarks.reports.tables import Asked, facts, median, page, table
-from benchmarks.suites import HARD_COUNT, HARD_SEED, Target, hard_family, hard_problem, read, targets, write
+from benchmarks.suites import HARD_COUNT, HARD_SEED, Target, hard_family, hard_problem, targets
 from tmsopt import Problem, solve
 
 CLAIMED = 1e-8
@@ -150,26 +149,6 @@ def _each(indices: Sequence[int], seed: int, known: Mapping[int, Target], worker
 
 def _one(target: Target, seed: int) -> Verdict:
     return judged(target.index, seed, target)
-
-
-def improved(verdicts: Iterable[Verdict], seed: int) -> int:
-    """Keep the confirmed designs that beat their references; how many there were."""
-    path = path_of(seed)
-    head = {name: value for name, value in read(path).items() if name != "problems"}
-    found, count = targets(path), 0
-    for one in verdicts:
-        if one.better:
-            old = found[one.index]
-            least = min(e.violation for e in exactly(hard_problem(one.index, seed), one.design))
-            found[one.index] = replace(old, value=one.value, violation=least, design=one.design, how="tmsopt")
-            count += 1
-    write(path, head, "problems", found.values())
-    return count
-
-
-def as_json(verdicts: Iterable[Verdict]) -> str:
-    """All that is known, one line a problem."""
-    return "[\n" + ",\n".join(json.dumps(asdict(v)) for v in verdicts) + "\n]\n"
 
 
 def report(asked: Asked) -> str:
