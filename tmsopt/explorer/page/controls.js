@@ -1,0 +1,164 @@
+// Sliders, number fields and selects: all that changes the state but the pictures themselves.
+
+const SLIDER_STEPS = 1000;
+
+/** A parameter's name, with its meaning where it has one. */
+function nameOf({name, meaning}) {
+  return meaning ? `${name}, ${meaning}` : name;
+}
+
+/** A sentence for those who listen. */
+function say(text) {
+  document.getElementById("said").textContent = text;
+}
+
+/** A value in the unit of its parameter, as a field writes it and reads it again. */
+function fieldText(value) {
+  return String(Number(value.toPrecision(7)));
+}
+
+/** Native slider of a parameter; a drag, or a key held down, is one step of undo. */
+function parameterSlider(k) {
+  const {low, high, one, unit} = DATA.parameters[k];
+  const slider = element("input", {
+    type: "range", min: 0, max: SLIDER_STEPS, step: 1, disabled: !(high > low), "aria-label": nameOf(DATA.parameters[k]),
+  });
+  let held = false;
+  const release = () => {
+    held = false;
+    change({});
+  };
+  slider.addEventListener("input", () => {
+    const place = Number(slider.value) / SLIDER_STEPS;
+    change({x: [[k, place === 1 ? high : low + (high - low) * place]]}, false);
+  });
+  slider.addEventListener("change", () => held || change({}));
+  slider.addEventListener("keydown", (event) => {
+    const way = {ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1}[event.key];
+    held ||= !["Tab", "Shift", "Control"].includes(event.key);
+    if (!way || !event.shiftKey) return;
+    event.preventDefault();
+    const finer = state.x[k] + (way * (high - low)) / (10 * SLIDER_STEPS);
+    change({x: [[k, Math.min(high, Math.max(low, finer))]]}, false);
+  });
+  slider.addEventListener("keyup", () => held && release());
+  slider.addEventListener("blur", () => held && release());
+  const draw = (value) => {
+    slider.value = Math.round(((value - low) / (high - low)) * SLIDER_STEPS);
+    slider.setAttribute("aria-valuetext", withUnit(value / one, unit));
+  };
+  return {slider, draw};
+}
+
+/** Field for any possible value of a parameter; anything else is refused, with the reason in a message. */
+function parameterField(k, message) {
+  const parameter = DATA.parameters[k];
+  const {name, one, unit, low} = parameter;
+  const field = element("input", {
+    type: "text", inputMode: low < 0 ? "text" : "decimal", autocomplete: "off", spellcheck: false,
+    "aria-label": `${name}${unit ? ` in ${unit}` : ""}`, "aria-describedby": message.id,
+  });
+  const refuse = (reason) => {
+    message.textContent = reason;
+    field.setAttribute("aria-invalid", String(Boolean(reason)));
+    if (reason) say(`${name}: ${reason}`);
+  };
+  const draw = (value) => {
+    field.value = fieldText(value / one);
+    refuse("");
+  };
+  field.addEventListener("change", () => {
+    if (field.value.trim() === fieldText(state.x[k] / one)) return refuse("");
+    const value = numberOf(field.value) * one;
+    const reason = impossible(parameter, value);
+    refuse(reason);
+    if (!reason) change({x: [[k, value]]});
+  });
+  field.addEventListener("keydown", (event) => event.key === "Escape" && draw(state.x[k]));
+  return {field, draw};
+}
+
+/** One parameter: symbol, meaning, number, unit, slider between its ends, reset. */
+function parameterRow(k) {
+  const parameter = DATA.parameters[k];
+  const {name, meaning, unit, one, low, high} = parameter;
+  const message = element("p", {className: "message", id: `message-${k}`});
+  const {slider, draw: drawSlider} = parameterSlider(k);
+  const {field, draw: drawField} = parameterField(k, message);
+  const reset = element("button", {type: "button", className: "reset", title: `reset ${name}`, "aria-label": `reset ${name}`}, "↺");
+  reset.addEventListener("click", () => change({x: [[k, DATA.start[k]]]}));
+  const end = (value) => element("span", {className: "end"}, figure(value / one, 3));
+  const row = element("div", {className: "row", role: "group", "aria-label": nameOf(parameter)},
+    element("span", {className: "symbol", title: nameOf(parameter)}, element("b", {}, name), " ", element("small", {}, meaning)),
+    element("span", {className: "number"}, field, element("span", {className: "unit"}, unit), reset),
+    element("span", {className: "slide"}, end(low), slider, end(high)), message);
+  let shown = NaN;
+  const draw = () => {
+    const value = state.x[k];
+    if (value === shown) return;
+    shown = value;
+    drawSlider(value);
+    drawField(value);
+    reset.disabled = value === DATA.start[k];
+    row.classList.toggle("changed", !reset.disabled);
+    if (value < low || value > high) message.textContent = "beyond the range of the slider";
+  };
+  return {row, draw};
+}
+
+/** All parameters, the free ones first; returns what draws them. */
+function controlsPanel(host) {
+  const rows = DATA.parameters.map((parameter, k) => ({...parameterRow(k), free: parameter.free}));
+  const [free, fixed] = [rows.filter((r) => r.free), rows.filter((r) => !r.free)];
+  const sheet = element("button", {type: "button", id: "sheet", "aria-expanded": "true", "aria-controls": "sliders"}, "hide");
+  const sliders = element("div", {id: "sliders"}, ...free.map((r) => r.row));
+  sheet.addEventListener("click", () => {
+    const open = sheet.getAttribute("aria-expanded") !== "true";
+    sheet.setAttribute("aria-expanded", String(open));
+    sheet.textContent = open ? "hide" : "show";
+    sliders.hidden = !open;
+  });
+  if (fixed.length) {
+    const open = !free.length || matchMedia("(min-width: 60rem)").matches;
+    const words = `${free.length ? "fixed in the file" : "all fixed in the file"} (${fixed.length})`;
+    sliders.append(element("details", {open}, element("summary", {}, words), ...fixed.map((r) => r.row)));
+  }
+  host.querySelector("h2").append(" ", sheet);
+  host.append(sliders);
+  return () => rows.forEach((r) => r.draw());
+}
+
+/** A labelled select of keys, their words and titles; `read` gives the key of the state, `write` takes one. */
+function choice(words, options, read, write) {
+  const select = element("select", {}, ...options.map(([value, text, title = ""]) => element("option", {value, title}, text)));
+  select.addEventListener("change", () => write(select.value));
+  const draw = () => {
+    select.value = read();
+  };
+  return {label: element("label", {className: "choice"}, `${words} `, select), draw};
+}
+
+/** Selects of a panel below its title; returns what draws them. */
+function choices(panel, ...given) {
+  panel.querySelector("h2").after(element("div", {className: "choices"}, ...given.map((g) => g.label)));
+  return () => given.forEach((g) => g.draw());
+}
+
+/** Selects of the chart, of the roots and of the growth rates; returns what draws them all. */
+function choicePanels() {
+  const varied = [...DATA.parameters.entries()].filter(([, p]) => p.high > p.low).map(([k, p]) => [k, p.name, p.meaning]);
+  const axis = (words, side) => choice(words, varied, () => state.plane[side], (value) => {
+    const plane = [...state.plane];
+    if (plane[1 - side] === Number(value)) plane[1 - side] = plane[side];
+    plane[side] = Number(value);
+    change({plane});
+  });
+  const over = () => choice("over", varied, () => state.over, (value) => change({over: Number(value)}));
+  const panel = (id) => document.getElementById(id);
+  const drawn = [choices(panel("plane"), over()), choices(panel("growth"), over())];
+  if (state.plane.length === 2) {
+    const layer = choice("colours", Object.entries(LAYERS), () => state.layer, (value) => change({layer: value}));
+    drawn.push(choices(panel("chart"), axis("across", 0), axis("up", 1), layer));
+  }
+  return () => drawn.forEach((draw) => draw());
+}

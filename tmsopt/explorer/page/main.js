@@ -1,0 +1,196 @@
+// All together: buttons, redraws gathered in one frame, light and dark, what is said aloud.
+
+const QUICK = 60; // ms within which a picture is redrawn while something is dragged
+const REST = 150; // ms after which a slider rests
+const THEMES = ["auto", "dark", "light"];
+const KEYS = [
+  ["Tab, Shift+Tab", "to the next control, or back"],
+  ["Arrow keys", "on a slider a thousandth of its range; with Shift a tenth of that"],
+  ["Page Up, Page Down, Home, End", "on a slider in large steps and to its ends"],
+  ["Arrow keys", "on the chart move the design; with Shift ten times as far"],
+  ["Ctrl+Z", "undo; Ctrl+Shift+Z or Ctrl+Y: redo"],
+  ["Enter, Escape", "in a number field: take it, or leave it as it was"],
+];
+
+window.measured = {all: NaN};
+
+/** Pictures in their panels, and what draws them; one that fails says so in its own panel. */
+function pictures() {
+  const makers = {chart: chartPicture, plane: planePicture, growth: growthPicture, bicycle: bicyclePicture, motion: motionPicture};
+  return Object.entries(makers).map(([name, make]) => {
+    const panel = document.getElementById(name);
+    const host = panel.appendChild(element("div", {className: "body"}));
+    const fault = panel.appendChild(element("p", {className: "message", hidden: true}));
+    const guarded = (task) => {
+      try {
+        const done = task();
+        fault.hidden = true;
+        return done;
+      } catch (problem) {
+        fault.hidden = false;
+        fault.textContent = `This picture cannot be drawn: ${problem.message}`;
+        console.error(problem);
+        return null;
+      }
+    };
+    const made = guarded(() => make(host));
+    const draw = (drawing) => {
+      const before = performance.now();
+      if (made) guarded(() => made.draw(state, drawing));
+      window.measured[name] = performance.now() - before;
+    };
+    return {name, draw, cheap: made?.cheap ?? true};
+  });
+}
+
+/** Draws all that has changed once per frame; what is slow only when the slider rests. */
+function redrawer(parts) {
+  const drawn = pictures();
+  const verdict = verdictPanel(document.getElementById("verdict"));
+  let [queued, settled, timer, said] = [false, true, 0, ""];
+  const frame = () => {
+    queued = false;
+    const before = performance.now();
+    const drawing = {...drawingOf(), settled};
+    const text = verdict(drawing);
+    parts.forEach((draw) => draw(drawing));
+    const late = drawn.filter(({name, cheap, draw}) => {
+      const wait = !settled && !cheap && window.measured[name] > QUICK;
+      if (!wait) draw(drawing);
+      return wait;
+    });
+    window.measured.all = performance.now() - before;
+    clearTimeout(timer);
+    if (late.length) timer = setTimeout(() => late.forEach((picture) => picture.draw(drawing)), REST);
+    if (settled && said && text !== said) say(text);
+    if (settled) said = text;
+  };
+  return (isSettled) => {
+    settled = isSettled;
+    if (!queued) requestAnimationFrame(frame);
+    queued = true;
+  };
+}
+
+/** A button of a bar. */
+function button(host, text, title, press) {
+  const made = host.appendChild(element("button", {type: "button", title, "aria-label": /\w/.test(text) ? text : title}, text));
+  made.addEventListener("click", () => press(made));
+  return made;
+}
+
+/** A short word about what was done, seen and heard. */
+function note(text) {
+  document.getElementById("note").textContent = text;
+}
+
+/** Light or dark: that of the system, or the one chosen; returns what goes to the next choice. */
+function theme() {
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  let chosen = "auto";
+  const apply = (printed = false) => {
+    const auto = dark.matches ? "dark" : "light";
+    document.documentElement.dataset.theme = printed ? "light" : chosen === "auto" ? auto : chosen;
+  };
+  dark.addEventListener("change", () => apply());
+  addEventListener("beforeprint", () => {
+    apply(true);
+    repaints.forEach((repaint) => repaint()); // in a frame to come it would be too late
+  });
+  addEventListener("afterprint", () => apply());
+  apply();
+  return (made) => {
+    chosen = THEMES[(THEMES.indexOf(chosen) + 1) % THEMES.length];
+    made.textContent = `theme: ${chosen}`;
+    made.setAttribute("aria-label", made.textContent);
+    apply();
+  };
+}
+
+/** The link of the state to the clipboard; where that is refused, in a field to copy from. */
+async function copyLink() {
+  if (location.protocol === "about:") return note("This page has no address here: save the design instead.");
+  const address = `${location.href.split("#")[0]}#${fragmentOf(state)}`;
+  try {
+    await navigator.clipboard.writeText(address);
+    note("Link copied.");
+  } catch {
+    const field = element("input", {type: "text", readOnly: true, value: address, "aria-label": "link"});
+    openDialog("link", "Link to copy", field);
+    field.select();
+  }
+}
+
+/** A dialog with a title, content and a button that closes it. */
+function openDialog(id, title, ...content) {
+  const dialog = document.getElementById(id);
+  const close = element("button", {type: "button"}, "close");
+  close.addEventListener("click", () => dialog.close());
+  dialog.replaceChildren(element("h2", {id: `${id}-title`}, title), ...content, close);
+  dialog.showModal();
+}
+
+/** Buttons that go to designs; returns what marks the design shown. */
+function designButtons(host) {
+  const made = DATA.designs.map((design) => button(host, design.name, `go to ${design.name}`, () =>
+    change({x: [...design.values.entries()]})));
+  return ({known}) => made.forEach((b, k) => b.setAttribute("aria-pressed", String(DATA.designs[k] === known)));
+}
+
+/** Buttons of the page; returns what draws them. */
+function pageButtons(host, nextTheme) {
+  button(host, "start", "all as the page opened", () => change({...startingState(), x: [...DATA.start.entries()]}));
+  const back = button(host, "↶", "undo (Ctrl+Z)", undo);
+  const forth = button(host, "↷", "redo (Ctrl+Shift+Z)", redo);
+  button(host, "copy link", "a link to this page as it is now", copyLink);
+  button(host, "save design", "the design as a problem file for tmsopt solve", save);
+  button(host, "theme: auto", "light, dark, or as the system has it", nextTheme);
+  button(host, "?", "keys", () => openDialog("keys", "Keys", element("dl", {},
+    ...KEYS.flatMap(([key, words]) => [element("dt", {}, key), element("dd", {}, words)]))));
+  return () => {
+    back.disabled = !steps.past.length && steps.before === null;
+    forth.disabled = !steps.future.length;
+  };
+}
+
+/** Undo and redo by keys, left to a field while its text is being changed. */
+function listenToKeys() {
+  document.addEventListener("keydown", (event) => {
+    const key = event.key.toLowerCase();
+    const typing = event.target.matches("input") && event.target.dataset.typed;
+    if (!(event.ctrlKey || event.metaKey) || event.altKey || !["z", "y"].includes(key) || typing) return;
+    event.preventDefault();
+    if (key === "y" || event.shiftKey) redo();
+    else undo();
+  });
+  document.addEventListener("input", ({target}) => (target.dataset.typed = "yes"));
+  document.addEventListener("change", ({target}) => delete target.dataset.typed);
+}
+
+/** Says what of a link could not be understood. */
+function saidOfLink(ignored) {
+  if (ignored.length) note(`Ignored in the link: ${ignored.map(decode).join(", ")}`);
+}
+
+/** Builds the page and draws it. */
+function start() {
+  const by = (id) => document.getElementById(id);
+  by("title").textContent = DATA.title || DATA.modelTitle;
+  by("about").textContent = DATA.title ? DATA.modelTitle : "";
+  by("footer").textContent = [DATA.command, `tmsopt ${DATA.version}`].filter(Boolean).join(" · ");
+  const nextTheme = theme();
+  const parts = [
+    designButtons(by("designs")), pageButtons(by("tools"), nextTheme), controlsPanel(by("controls")), choicePanels(),
+    limitsPanel(by("limits")), quantitiesPanel(by("quantities")), knownPanel(by("known")),
+  ];
+  const redraw = redrawer(parts);
+  watchers.push(redraw);
+  listenToKeys();
+  addEventListener("hashchange", () => saidOfLink(visit()));
+  const {found, ignored} = stateOf(location.hash.slice(1));
+  Object.assign(state, found);
+  saidOfLink(ignored);
+  redraw(true);
+}
+
+start();

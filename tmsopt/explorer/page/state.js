@@ -1,0 +1,197 @@
+// The state: what the page shows now, how it changes, and how it is kept in steps, in a link and in a file.
+
+const LAYERS = {kind: "stability", abscissa: "abscissa", damping: "damping ratio"};
+const state = startingState();
+const steps = {past: [], future: [], before: null};
+const watchers = [];
+
+/** A new element with properties, or attributes where it has no such property; children are elements or text. */
+function element(tag, given = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(given)) {
+    if (name in made) made[name] = value;
+    else made.setAttribute(name, value);
+  }
+  made.append(...children);
+  return made;
+}
+
+/** A value and its unit to read. */
+function withUnit(value, unit, digits = 5) {
+  return unit && Number.isFinite(value) ? `${figure(value, digits)} ${unit}` : figure(value, digits);
+}
+
+/**
+ * The one way to change the state: x as pairs of index and value in SI, plane, over, layer. While something is
+ * dragged, settle is false: all until the next settled change is one step of undo.
+ */
+function change(wanted, settle = true) {
+  steps.before ??= fragmentOf(state);
+  for (const [index, value] of wanted.x ?? []) state.x[index] = value;
+  for (const name of ["plane", "over", "layer"]) if (name in wanted) state[name] = wanted[name];
+  if (settle) {
+    if (fragmentOf(state) !== steps.before) {
+      steps.past.push(steps.before);
+      steps.future = [];
+    }
+    steps.before = null;
+    keepInAddress();
+  }
+  watchers.forEach((watch) => watch(settle));
+}
+
+/** One step: from the steps on one side of now, to those on the other. */
+function stepBetween(from, to) {
+  change({}); // what is being dragged ends here
+  if (!from.length) return;
+  to.push(fragmentOf(state));
+  Object.assign(state, stateOf(from.pop()).found);
+  keepInAddress();
+  watchers.forEach((watch) => watch(true));
+}
+
+/** Take back the last change. */
+function undo() {
+  stepBetween(steps.past, steps.future);
+}
+
+/** Do again what was taken back. */
+function redo() {
+  stepBetween(steps.future, steps.past);
+}
+
+/** The state in which the page opened. */
+function startingState() {
+  return {x: Float64Array.from(DATA.start), plane: [...DATA.plane], over: DATA.over, layer: "kind"};
+}
+
+/** All that differs from the start as the fragment of a link; its numbers come back bit for bit. */
+function fragmentOf({x, plane, over, layer}) {
+  const name = (k) => encodeURIComponent(DATA.parameters[k].name);
+  const parts = [...x].flatMap((value, k) => (value === DATA.start[k] ? [] : [`${name(k)}=${value}`]));
+  if (plane.join() !== DATA.plane.join()) parts.push(`.axes=${plane.map(name)}`);
+  if (over !== DATA.over) parts.push(`.over=${name(over)}`);
+  if (layer !== "kind") parts.push(`.layer=${layer}`);
+  return parts.join("&");
+}
+
+/** The state that a fragment writes down, and those of its parts that say nothing here. */
+function stateOf(fragment) {
+  const [found, ignored] = [startingState(), []];
+  for (const part of fragment.split("&").filter(Boolean)) if (!takePart(found, part)) ignored.push(part);
+  return {found, ignored};
+}
+
+/** One part of a fragment into a state; whether it could be taken. */
+function takePart(found, part) {
+  const [key, ...rest] = part.split("=");
+  const indexOf = (text) => DATA.parameters.findIndex((p) => p.name === decode(text));
+  const value = rest.join("=");
+  if (key === ".axes") {
+    const axes = value.split(",").map(indexOf);
+    const fit = !axes.includes(-1) && axes.length === found.plane.length && new Set(axes).size === axes.length;
+    if (fit) found.plane = axes;
+    return fit;
+  }
+  if (key === ".layer") {
+    if (Object.hasOwn(LAYERS, value)) found.layer = value;
+    return Object.hasOwn(LAYERS, value);
+  }
+  const index = indexOf(key === ".over" ? value : key);
+  if (index < 0) return false;
+  if (key === ".over") found.over = index;
+  else if (impossible(DATA.parameters[index], numberOf(value))) return false;
+  else found.x[index] = numberOf(value);
+  return true;
+}
+
+/** A part of a link in plain letters; itself where it is not well written. */
+function decode(text) {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    return text;
+  }
+}
+
+/** The number that a text writes, NaN for any other text; a comma may stand for the point. */
+function numberOf(text) {
+  const plain = text.trim().replaceAll("−", "-").replace(",", ".");
+  return /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(plain) ? Number(plain) : NaN;
+}
+
+/** Why a parameter cannot have a value in SI; empty where it can. */
+function impossible(parameter, value) {
+  if (!Number.isFinite(value)) return "a number is wanted, such as 1.25 or −3e−4";
+  const [least, most] = [parameter.least ?? -Infinity, parameter.most ?? Infinity];
+  const out = parameter.open ? value <= least || value >= most : value < least || value > most;
+  if (!out) return "";
+  const said = (end, closed, open) => `${parameter.open ? open : closed} ${withUnit(end / parameter.one, parameter.unit)}`;
+  const ends = [];
+  if (least > -Infinity) ends.push(said(least, "at least", "above"));
+  if (most < Infinity) ends.push(said(most, "at most", "below"));
+  return `possible: ${ends.join(" and ")}`;
+}
+
+/** Keep the state in the address, where the page has one of its own. */
+function keepInAddress() {
+  try {
+    history.replaceState(null, "", `#${fragmentOf(state)}`);
+  } catch {
+    // a frame without an address: the link says so when it is asked for
+  }
+}
+
+/** Take over the state of the address, as one step; returns what of it was ignored. */
+function visit() {
+  const fragment = location.hash.slice(1);
+  if (fragment === fragmentOf(state)) return [];
+  const {found, ignored} = stateOf(fragment);
+  change({...found, x: [...found.x.entries()]});
+  return ignored;
+}
+
+/** The design as the text of a problem file, every parameter fixed, as exactly as doubles can. */
+function problemText() {
+  const lines = DATA.parameters.map(({name, unit, one}, k) => {
+    const number = String(state.x[k] / one);
+    return `${name} = ${unit ? JSON.stringify(`${number} ${unit}`) : number}\n`;
+  });
+  return DATA.toml.before + lines.join("") + DATA.toml.after;
+}
+
+/** Hand the design on as a file. */
+function save() {
+  const words = DATA.title.normalize("NFKD").toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-+|-+$/g, "");
+  const address = URL.createObjectURL(new Blob([problemText()], {type: "application/toml"}));
+  element("a", {href: address, download: `${words.slice(0, 60) || DATA.model}.toml`}).click();
+  setTimeout(() => URL.revokeObjectURL(address), 60000); // the download has begun by then
+}
+
+/** Roots of a known design with their multiplicity, as often as they count: computed ones scatter where roots meet. */
+function knownRoots(design) {
+  const all = design.roots.flatMap(([re, im, multiplicity]) =>
+    Array.from({length: multiplicity}, () => (im ? [[re, im], [re, -im]] : [[re, 0]])).flat());
+  return {re: Float64Array.from(all, (root) => root[0]), im: Float64Array.from(all, (root) => root[1]), error: 0};
+}
+
+/** Everything that follows from the state, once per change, for all pictures. */
+function drawingOf() {
+  const a = new Float64Array(MODEL.degree + 1);
+  const motion = new Float64Array(3);
+  const y = new Float64Array(DATA.quantities.length + DATA.constraints.length);
+  MODEL.coefficients(state.x, a);
+  const known = knownDesign(state.x);
+  const exact = known && known.roots.length > 0;
+  const roots = exact ? knownRoots(known) : rootsOf(a);
+  motionOf(a, motion);
+  if (exact) motion.set(motionOfRoots(roots, known.abscissa));
+  MODEL.derived(state.x, motion, y);
+  return {a, roots, motion, kind: kindOf(a), y, known};
+}
+
+/** Abscissa, least damping ratio and greatest angular frequency of given roots. */
+function motionOfRoots({re, im}, abscissa) {
+  const ratios = [...re].map((part, k) => (part || im[k] ? -part / Math.hypot(part, im[k]) : 0));
+  return [abscissa, Math.min(...ratios), Math.max(...im)];
+}
