@@ -1,0 +1,362 @@
+// What all pictures share: sharp canvases, the page's colours, numbers, ticks, axes, legends, pointer and keys.
+
+const COLOUR_NAMES = ["stable", "heavy", "weave", "capsize", "mark", "real", "complex", "line", "paper", "ink", "faint"];
+const PICTURE_FONT = "12px system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif";
+const DASHES = { whole: [], long: [9, 4], short: [4, 3], dots: [1.5, 3], mixed: [8, 3, 2, 3] };
+const repaints = [];
+
+const PICTURE_STYLE = `
+.picture { position: relative; min-width: 0; margin: 0; }
+.picture canvas { display: block; width: 100%; border-radius: 4px; }
+.picture canvas[tabindex] { cursor: crosshair; }
+.picture canvas:focus-visible { outline: 3px solid var(--weave); outline-offset: 1px; }
+.legend { display: flex; flex-wrap: wrap; gap: 2px 14px; margin: 4px 0 0; padding: 0; list-style: none; font-size: .8rem; }
+.legend li { display: flex; align-items: center; gap: 6px; }
+.legend canvas { flex: none; width: 30px; height: 14px; border-radius: 2px; }
+.reading { margin: 4px 0 0; min-height: 1.3em; font-size: .8rem; font-variant-numeric: tabular-nums; }
+.moves { display: flex; flex-wrap: wrap; align-items: center; gap: 6px 10px; margin: 6px 0 0; font-size: .85rem; }
+.moves label { display: flex; align-items: center; gap: 6px; }
+`;
+
+/** An element with attributes and text, appended to a parent. */
+function part(parent, tag, attributes = {}, text = "") {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+  made.textContent = text;
+  parent.append(made);
+  return made;
+}
+
+/** The colours of the page as they are now. */
+function coloursNow() {
+  const style = getComputedStyle(document.documentElement);
+  return Object.fromEntries(COLOUR_NAMES.map((name) => [name, style.getPropertyValue(`--${name}`).trim() || "#808080"]));
+}
+
+const colourReader = document.createElement("canvas").getContext("2d");
+
+/** Red, green, blue of a colour written in any way that CSS knows. */
+function rgbOf(colour) {
+  colourReader.fillStyle = colour;
+  const text = colourReader.fillStyle;
+  if (text[0] === "#") return [1, 3, 5].map((k) => parseInt(text.slice(k, k + 2), 16));
+  return text.match(/[\d.]+/g).slice(0, 3).map(Number);
+}
+
+/** A colour between two, `share` of the second. */
+function mixed(first, second, share) {
+  const [from, to] = [rgbOf(first), rgbOf(second)];
+  return `rgb(${from.map((value, k) => Math.round(value + share * (to[k] - value))).join(",")})`;
+}
+
+/** Fills of the classes, undefined to heavily damped: told apart by lightness too. */
+function classFills(colours) {
+  const { paper, ink, stable, heavy } = colours;
+  return [paper, mixed(paper, ink, 0.3), mixed(paper, ink, 0.11), mixed(paper, stable, 0.62), mixed(paper, heavy, 0.8)];
+}
+
+/** Words for a class code. */
+function classWords(kind) {
+  const { weave, capsize } = DATA.words;
+  return ["undefined", `unstable by ${capsize}`, `unstable by ${weave}`, "stable", "heavily damped (stable, nothing swings)"][kind];
+}
+
+/** A number for people: so many digits, a true minus, powers of ten in words of digits. */
+function figure(value, digits = 4) {
+  if (Number.isNaN(value)) return "none";
+  if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
+  const raised = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
+  const [digitsText, power] = String(Number(value.toPrecision(digits))).split("e");
+  const written = digitsText.replace("-", "−");
+  return power ? `${written}·10${[...power.replace("+", "")].map((c) => raised[c]).join("")}` : written;
+}
+
+/** A value of a parameter in its unit, with the unit. */
+function valueText(k, value, digits = 4) {
+  const { one, unit } = DATA.parameters[k];
+  return figure(value / one, digits) + (unit ? ` ${unit}` : "");
+}
+
+/** Round values between two, about so many. */
+function ticksBetween(low, high, about) {
+  const width = (high - low) / Math.max(about, 1);
+  if (!(width > 0) || !Number.isFinite(width)) return [];
+  const ten = 10 ** Math.floor(Math.log10(width));
+  const step = ten * [1, 2, 5, 10].find((k) => k * ten >= width * (1 - 1e-9));
+  const first = Math.ceil(low / step - 1e-9);
+  const count = Math.floor(high / step + 1e-9) - first;
+  return Array.from({ length: Math.max(0, count) + 1 }, (_, k) => Number(((first + k) * step).toPrecision(12)));
+}
+
+/** What to write along the axis of a parameter. */
+function parameterLabel(k, room) {
+  const { name, meaning, unit } = DATA.parameters[k];
+  const short = name + (unit ? ` in ${unit}` : "");
+  const first = meaning === "parameter" ? "" : String(meaning || "").split(/[,:;]/)[0];
+  const long = first ? `${first}, ${short}` : short;
+  return 6.6 * long.length < room ? long : short;
+}
+
+/** The limits of a parameter's axis; an empty range is widened around the value. */
+function rangeOf(k) {
+  const { low, high, value } = DATA.parameters[k];
+  if (high > low) return [low, high];
+  const room = Math.abs(value) / 2 || 1;
+  return [value - room, value + room];
+}
+
+/** A canvas as wide as its host and sharp on its screen; `paint(context, width, height)` draws all of it. */
+function canvasIn(host, heightOf, paint) {
+  const holder = part(host, "div", { class: "picture" });
+  const canvas = part(holder, "canvas", { role: "img" });
+  const context = canvas.getContext("2d");
+  const repaint = () => {
+    const width = holder.clientWidth;
+    if (!width) return;
+    const height = Math.round(heightOf(width));
+    const ratio = window.devicePixelRatio || 1;
+    const [across, down] = [Math.round(width * ratio), Math.round(height * ratio)];
+    if (canvas.width !== across || canvas.height !== down) {
+      Object.assign(canvas, { width: across, height: down });
+      canvas.style.height = `${height}px`;
+    }
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, width, height);
+    Object.assign(context, { font: PICTURE_FONT, lineJoin: "round", lineCap: "butt", textBaseline: "middle" });
+    paint(context, width, height);
+  };
+  new ResizeObserver(repaint).observe(holder);
+  repaints.push(repaint);
+  return { canvas, repaint };
+}
+
+/** Draw all again when the page turns dark or light, which no change of the state says. */
+function watchColours() {
+  const style = part(document.head, "style");
+  style.textContent = PICTURE_STYLE;
+  const again = () => requestAnimationFrame(() => repaints.forEach((repaint) => repaint()));
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
+  new MutationObserver(again).observe(document.documentElement, { attributes: true });
+}
+watchColours();
+
+/** Linear scales of a plot inside a box of a canvas, and the values at its points. */
+function plotIn(box, [left, right], [bottom, top]) {
+  const across = box.width / (right - left);
+  const up = box.height / (top - bottom);
+  return {
+    ...box, left, right, bottom, top,
+    x: (value) => box.x0 + (value - left) * across,
+    y: (value) => box.y0 + (top - value) * up,
+    valueX: (pixel) => left + (pixel - box.x0) / across,
+    valueY: (pixel) => top - (pixel - box.y0) / up,
+    holds: (px, py) => px > box.x0 - 1 && px < box.x0 + box.width + 1 && py > box.y0 - 1 && py < box.y0 + box.height + 1,
+  };
+}
+
+/** Draw with the plot's box as the limit of what is seen. */
+function clipped(context, plot, draw) {
+  context.save();
+  context.beginPath();
+  context.rect(plot.x0, plot.y0, plot.width, plot.height);
+  context.clip();
+  draw();
+  context.restore();
+}
+
+/** Frame, ticks, numbers and labels of a plot; `x` and `y` are {label, one}, without a label no numbers below. */
+function drawAxes(context, plot, x, y, colours) {
+  const { x0, y0, width, height } = plot;
+  Object.assign(context, { lineWidth: 1, fillStyle: colours.ink, strokeStyle: colours.faint });
+  const line = (...ends) => {
+    context.beginPath();
+    context.moveTo(ends[0], ends[1]);
+    context.lineTo(ends[2], ends[3]);
+    context.stroke();
+  };
+  context.textAlign = "center";
+  for (const tick of ticksBetween(plot.left / x.one, plot.right / x.one, width / 75)) {
+    const at = Math.round(plot.x(tick * x.one)) + 0.5;
+    line(at, y0 + height, at, y0 + height + 4);
+    if (x.label) context.fillText(figure(tick, 12), at, y0 + height + 13);
+  }
+  context.textAlign = "right";
+  for (const tick of ticksBetween(plot.bottom / y.one, plot.top / y.one, height / 45)) {
+    const at = Math.round(plot.y(tick * y.one)) + 0.5;
+    line(x0 - 4, at, x0, at);
+    context.fillText(figure(tick, 12), x0 - 7, at);
+  }
+  context.strokeRect(Math.round(x0) + 0.5, Math.round(y0) + 0.5, Math.round(width) - 1, Math.round(height) - 1);
+  context.textAlign = "center";
+  context.fillText(x.label, x0 + width / 2, y0 + height + 30);
+  context.save();
+  context.translate(x0 - 47, y0 + height / 2);
+  context.rotate(-Math.PI / 2);
+  context.fillText(y.label, 0, 0);
+  context.restore();
+}
+
+/** A line through points {x, y} in pixels, of a colour, width and dash. */
+function drawLine(context, points, colour, width = 1.5, dash = DASHES.whole, offset = 0) {
+  context.strokeStyle = colour;
+  context.lineWidth = width;
+  context.setLineDash(dash);
+  context.lineDashOffset = offset;
+  context.beginPath();
+  for (const [k, { x, y }] of points.entries()) {
+    if (k) context.lineTo(x, y);
+    else context.moveTo(x, y);
+  }
+  context.stroke();
+  context.setLineDash(DASHES.whole);
+}
+
+/** A circle, filled and outlined. */
+function drawDot(context, x, y, radius, fill, outline, width = 1.5) {
+  context.beginPath();
+  context.arc(x, y, radius, 0, 2 * Math.PI);
+  if (fill) {
+    context.fillStyle = fill;
+    context.fill();
+  }
+  if (outline) {
+    context.strokeStyle = outline;
+    context.lineWidth = width;
+    context.stroke();
+  }
+}
+
+/** Text that stands out from what is below it. */
+function drawText(context, text, x, y, colours, colour = colours.ink) {
+  context.strokeStyle = colours.paper;
+  context.lineWidth = 3.5;
+  context.strokeText(text, x, y);
+  context.fillStyle = colour;
+  context.fillText(text, x, y);
+}
+
+/** Fill a canvas rectangle with slanted lines: the sign of what is undefined. */
+function drawHatch(context, x, y, width, height, colour, apart = 6) {
+  context.save();
+  context.beginPath();
+  context.rect(x, y, width, height);
+  context.clip();
+  context.strokeStyle = colour;
+  context.lineWidth = 1;
+  context.beginPath();
+  for (let at = x - height; at < x + width; at += apart) {
+    context.moveTo(at, y + height);
+    context.lineTo(at + height, y);
+  }
+  context.stroke();
+  context.restore();
+}
+
+/** A list of swatches and words; built again only when the words or colours change. */
+function legendIn(host) {
+  const list = part(host, "ul", { class: "legend" });
+  let shown = "";
+  return (entries) => {
+    const ratio = window.devicePixelRatio || 1;
+    const now = JSON.stringify([entries.map(({ words, look }) => [words, look]), ratio]);
+    if (now === shown) return;
+    shown = now;
+    list.replaceChildren();
+    for (const { words, sign } of entries) {
+      const item = part(list, "li");
+      const swatch = part(item, "canvas", { "aria-hidden": "true" });
+      Object.assign(swatch, { width: 30 * ratio, height: 14 * ratio });
+      const context = swatch.getContext("2d");
+      context.scale(ratio, ratio);
+      sign(context);
+      part(item, "span", {}, words);
+    }
+  };
+}
+
+/** An entry of a legend: a filled box, hatched on request. */
+function boxEntry(words, colour, outline, hatch = "") {
+  const sign = (context) => {
+    context.fillStyle = colour;
+    context.fillRect(0, 0, 30, 14);
+    if (hatch) drawHatch(context, 0, 0, 30, 14, hatch, 5);
+    context.strokeStyle = outline;
+    context.strokeRect(0.5, 0.5, 29, 13);
+  };
+  return { words, look: [colour, outline, hatch], sign };
+}
+
+/** An entry of a legend: a line. */
+function lineEntry(words, colour, width, dash) {
+  const sign = (context) => drawLine(context, [{ x: 0, y: 7 }, { x: 30, y: 7 }], colour, width, dash);
+  return { words, look: [colour, width, dash], sign };
+}
+
+/** An entry of a legend: a dot. */
+function dotEntry(words, fill, outline) {
+  return { words, look: [fill, outline], sign: (context) => drawDot(context, 15, 7, 4.5, fill, outline) };
+}
+
+/** Say what a canvas shows once it has rested, so that a screen reader is not flooded. */
+function saysIn(canvas) {
+  let waiting = 0;
+  return (text) => {
+    clearTimeout(waiting);
+    waiting = setTimeout(() => canvas.setAttribute("aria-label", text), 400);
+    if (!canvas.hasAttribute("aria-label")) canvas.setAttribute("aria-label", text);
+  };
+}
+
+/** Let the pointer and the arrow keys move the design: `at(x, y)` and `step(dx, dy)` give [[index, value] ..]. */
+function movesDesign(canvas, at, step) {
+  const place = (event) => {
+    const box = canvas.getBoundingClientRect();
+    return at(event.clientX - box.left, event.clientY - box.top);
+  };
+  let held = false;
+  let keyed = null;
+  canvas.tabIndex = 0;
+  canvas.addEventListener("pointerdown", (event) => {
+    if (event.button !== 0) return;
+    held = true;
+    canvas.setPointerCapture(event.pointerId);
+    change({ x: place(event) }, false);
+  });
+  canvas.addEventListener("pointermove", (event) => held && change({ x: place(event) }, false));
+  canvas.addEventListener("pointerup", (event) => {
+    if (held) change({ x: place(event) });
+    held = false;
+  });
+  canvas.addEventListener("pointercancel", () => {
+    held = false;
+    change({});
+  });
+  const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+  canvas.addEventListener("keydown", (event) => {
+    const arrow = arrows[event.key];
+    keyed = arrow && !event.altKey && !event.ctrlKey && !event.metaKey ? step(...arrow.map((k) => k * (event.shiftKey ? 10 : 1))) : null;
+    if (!keyed) return;
+    event.preventDefault();
+    change({ x: keyed }, false);
+  });
+  const settle = () => {
+    if (keyed) change({ x: keyed });
+    keyed = null;
+  };
+  canvas.addEventListener("keyup", settle);
+  canvas.addEventListener("blur", settle);
+}
+
+/** The design of the file that the state is, digit for digit, or undefined. */
+function knownDesign(x) {
+  return DATA.designs.find(({ values }) => values.every((value, k) => value === x[k]));
+}
+
+/** The roots to draw, upper half: [re, im, multiplicity], those of a known design as they were proved. */
+function rootsToDraw(state, drawing) {
+  const known = knownDesign(state.x);
+  if (known && known.roots.length) return known.roots.filter(([, imaginary]) => imaginary >= 0);
+  const { re, im } = drawing.roots;
+  return Array.from(re, (value, k) => [value, im[k], 1])
+    .filter(([value, imaginary]) => Number.isFinite(value) && imaginary >= 0).sort((first, second) => second[0] - first[0]);
+}

@@ -1,0 +1,290 @@
+// The stability chart over two parameters, all others as they are now.
+
+const CHART_POINTS = 200;
+const CURVE_LOOKS = {
+  weave: ["whole", 2.4], capsize: ["mixed", 2.4], infinity: ["dots", 2.4], "heavy damping": ["long", 2], "EP set": ["short", 2.6],
+};
+
+/** Equally spaced values from one to another, both included. */
+function evenly([low, high], count) {
+  return Float64Array.from({ length: count }, (_, k) => low + ((high - low) * k) / (count - 1));
+}
+
+/** Whether two designs agree in all parameters but some. */
+function sameBeside(first, second, free, tolerance) {
+  return Array.from(first).every((value, k) =>
+    free.includes(k) || Math.abs(value - second[k]) <= tolerance * Math.max(Math.abs(value), Math.abs(second[k])));
+}
+
+/** The traced curves over the plane of the chart, turned where its axes are exchanged; empty where they do not hold. */
+function curvesIn(state) {
+  const [i, j] = state.plane;
+  return DATA.curves.flatMap((curve) => {
+    if (!sameBeside(state.x, DATA.held, [...curve.axes, ...(curve.along || [])], 1e-12)) return [];
+    if (curve.axes[0] === i && curve.axes[1] === j) return [curve];
+    return curve.axes[0] === j && curve.axes[1] === i ? [{ ...curve, x: curve.y, y: curve.x }] : [];
+  });
+}
+
+/** Bands of a layer of numbers: edges in steps of one round width below 0, of another above it. */
+function bandsOf(values) {
+  const known = values.filter(Number.isFinite).sort();
+  const low = known.length ? Math.min(0, known[0]) : 0;
+  // poles of the abscissa must not take all colours
+  const high = known.length ? Math.max(0, known[Math.floor(0.95 * (known.length - 1))]) : 0;
+  const step = (reach) => {
+    const [first, second] = ticksBetween(0, reach || 1, 6);
+    return second - first || 1;
+  };
+  const [down, up] = [step(-low), step(high)];
+  return { down, up, below: low < 0 ? Math.ceil(-low / down) : 0, above: high > 0 ? Math.ceil(high / up) : 0 };
+}
+
+/** The colour of each band from the lowest up: the deeper, the farther from 0; what is good is blue, what is bad orange. */
+function bandColours(bands, goodBelow, colours) {
+  const side = (count, good) => Array.from({ length: count }, (_, k) =>
+    mixed(colours.paper, good ? colours.weave : colours.mark, 0.14 + (0.86 * (k + 0.5)) / count));
+  return [...side(bands.below, goodBelow).reverse(), ...side(bands.above, !goodBelow)];
+}
+
+/** The band of a value, from the lowest up; what lies beyond belongs to the last. */
+function bandAt(value, { down, up, below, above }) {
+  const band = below + (value < 0 ? -Math.ceil(-value / down) : Math.floor(value / up));
+  return Math.max(0, Math.min(below + above - 1, band));
+}
+
+/** The chart as an image, a pixel per design, its first row at the top. */
+function chartImage(found, layer, colours) {
+  const size = CHART_POINTS;
+  const image = new ImageData(size, size);
+  const pixels = new Uint32Array(image.data.buffer);
+  const packed = (colour) => {
+    const [red, green, blue] = rgbOf(colour);
+    return (255 << 24) | (blue << 16) | (green << 8) | red; // little-endian, as all machines with browsers are
+  };
+  const values = layer === "kind" ? null : found[layer];
+  const bands = values && bandsOf(values);
+  const fills = classFills(colours).map(packed);
+  const shades = values && bandColours(bands, layer === "abscissa", colours).map(packed);
+  const hatch = packed(mixed(colours.paper, colours.ink, 0.45));
+  for (let row = 0; row < size; row += 1) {
+    for (let column = 0; column < size; column += 1) {
+      const k = (size - 1 - row) * size + column;
+      const kind = found.kind[k];
+      const known = values ? Number.isFinite(values[k]) : kind > 0;
+      if (!known) pixels[row * size + column] = (row + column) % 6 ? fills[0] : hatch;
+      else pixels[row * size + column] = values ? shades[bandAt(values[k], bands)] : fills[kind];
+    }
+  }
+  return { image, bands };
+}
+
+/** A bar of the bands with the numbers of their edges, 0 in bold. */
+function drawBar(context, x, y, width, bands, layer, colours) {
+  const shades = bandColours(bands, layer === "abscissa", colours);
+  const cell = width / shades.length;
+  shades.forEach((shade, k) => {
+    context.fillStyle = shade;
+    context.fillRect(x + k * cell, y, cell + 0.5, 12);
+  });
+  context.strokeStyle = colours.faint;
+  context.lineWidth = 1;
+  context.strokeRect(x + 0.5, y + 0.5, width - 1, 11);
+  context.textAlign = "center";
+  context.fillStyle = colours.ink;
+  let free = -Infinity;
+  const zero = x + bands.below * cell;
+  for (let edge = 0; edge <= shades.length; edge += 1) {
+    const value = edge < bands.below ? (edge - bands.below) * bands.down : (edge - bands.below) * bands.up;
+    const text = (edge === shades.length && value > 0 ? "≥ " : "") + figure(value, 12);
+    const [at, half] = [x + edge * cell, context.measureText(text).width / 2 + 5];
+    if (value !== 0 && (at - half < free || Math.abs(at - zero) < half + 8)) continue;
+    context.font = value === 0 ? `bold ${PICTURE_FONT}` : PICTURE_FONT;
+    context.fillText(text, Math.min(at, x + width - half + 12), y + 20);
+    free = at + half;
+  }
+  context.font = PICTURE_FONT;
+  drawLine(context, [{ x: zero, y: y - 3 }, { x: zero, y: y + 14 }], colours.ink, 2);
+}
+
+/** The stability chart: fills, exact curves, known designs, and the current one, which pointer and arrows move. */
+function chartPicture(host) {
+  let now = null;
+  let surveyed = { key: "" };
+  let plot = null;
+  let shaded = { key: "" };
+  const raster = document.createElement("canvas");
+  Object.assign(raster, { width: CHART_POINTS, height: CHART_POINTS });
+  const enough = DATA.parameters.length > 1;
+  if (!enough) {
+    part(host, "p", {}, "A chart needs two parameters; this model has one. The growth plot shows all there is over it.");
+    return { draw() {}, cheap: true };
+  }
+  const surface = canvasIn(host, (width) => Math.min(560, Math.max(300, 0.78 * width)), paint);
+  const reading = part(host, "p", { class: "reading" });
+  const legend = legendIn(host);
+  const says = saysIn(surface.canvas);
+  surface.canvas.style.touchAction = "none";
+
+  /** Classes and layers over the plane; the design's own place in it plays no part. */
+  function surveyOf(state) {
+    const [i, j] = state.plane;
+    const others = Array.from(state.x, (value, k) => (k === i || k === j ? 0 : value));
+    const key = `${state.plane} ${state.layer} ${others}`;
+    if (key !== surveyed.key) {
+      const [xs, ys] = [rangeOf(i), rangeOf(j)].map((ends) => evenly(ends, CHART_POINTS));
+      const found = survey(state.x, i, j, xs, ys, state.layer === "kind" ? [] : [state.layer]);
+      surveyed = { key, found, present: [0, 1, 2, 3, 4].filter((kind) => found.kind.includes(kind)) };
+    }
+    return surveyed;
+  }
+
+  function paint(context, width, height) {
+    if (!now) return;
+    const { state, drawing } = now;
+    const [i, j] = state.plane;
+    const colours = coloursNow();
+    const { found, present } = surveyOf(state);
+    const look = `${surveyed.key} ${Object.values(colours)}`;
+    if (look !== shaded.key) {
+      shaded = { key: look, ...chartImage(found, state.layer, colours) };
+      raster.getContext("2d").putImageData(shaded.image, 0, 0);
+    }
+    const { bands } = shaded;
+    const head = state.layer === "kind" ? 8 : 50;
+    plot = plotIn({ x0: 60, y0: head, width: width - 72, height: height - head - 42 }, rangeOf(i), rangeOf(j));
+    clipped(context, plot, () => {
+      // a design stands at the middle of its pixel: the first and the last reach half a pixel beyond the ends
+      const [dx, dy] = [plot.width / (CHART_POINTS - 1), plot.height / (CHART_POINTS - 1)];
+      context.imageSmoothingEnabled = false;
+      context.drawImage(raster, plot.x0 - dx / 2, plot.y0 - dy / 2, plot.width + dx, plot.height + dy);
+      drawCurves(context, state, colours);
+    });
+    if (bands) {
+      context.textAlign = "left";
+      context.fillStyle = colours.ink;
+      const unit = state.layer === "abscissa" && DATA.rootUnit ? ` in ${DATA.rootUnit}` : "";
+      const words = state.layer === "abscissa" ? `abscissa${unit}: below 0 decays` : "damping ratio: above 0 decays, 1 swings not at all";
+      context.fillText(words, plot.x0, 8);
+      drawBar(context, plot.x0, 18, plot.width, bands, state.layer, colours);
+    }
+    drawAxes(context, plot, { label: parameterLabel(i, plot.width), one: DATA.parameters[i].one },
+      { label: parameterLabel(j, plot.height), one: DATA.parameters[j].one }, colours);
+    drawDesigns(context, state, colours);
+    drawHere(context, plot.x(state.x[i]), plot.y(state.x[j]), colours);
+    legend(entriesOf(state, present, colours));
+    read(state, drawing.kind, drawing.motion[0]);
+  }
+
+  function drawCurves(context, state, colours) {
+    for (const curve of curvesIn(state)) {
+      const points = Array.from(curve.x, (value, k) => ({ x: plot.x(value), y: plot.y(curve.y[k]) }));
+      const { colour, width, dash } = lookOf(curve, colours);
+      drawLine(context, points, colours.paper, width + 2.4);
+      drawLine(context, points, colour, width, dash);
+    }
+  }
+
+  function drawDesigns(context, state, colours) {
+    const [i, j] = state.plane;
+    for (const { name, values } of DATA.designs) {
+      if (!sameBeside(values, state.x, state.plane, 1e-9)) continue;
+      const [x, y] = [plot.x(values[i]), plot.y(values[j])];
+      if (!plot.holds(x, y)) continue;
+      context.save();
+      context.translate(x, y);
+      context.rotate(Math.PI / 4);
+      Object.assign(context, { fillStyle: colours.mark, strokeStyle: colours.paper, lineWidth: 1.5 });
+      context.fillRect(-4.5, -4.5, 9, 9);
+      context.strokeRect(-4.5, -4.5, 9, 9);
+      context.restore();
+      const left = x > plot.x0 + 0.75 * plot.width;
+      context.textAlign = left ? "right" : "left";
+      drawText(context, name, x + (left ? -14 : 14), y + (y > plot.y0 + 24 ? -12 : 14), colours);
+    }
+  }
+
+  /** The current design: a ring with cross hairs, of which one may be in sight where the ring is not. */
+  function drawHere(context, x, y, colours) {
+    clipped(context, plot, () => {
+      for (const [colour, width, dash] of [[colours.paper, 3, DASHES.whole], [colours.ink, 1, DASHES.short]]) {
+        drawLine(context, [{ x, y: plot.y0 }, { x, y: y - 9 }], colour, width, dash);
+        drawLine(context, [{ x, y: y + 9 }, { x, y: plot.y0 + plot.height }], colour, width, dash);
+        drawLine(context, [{ x: plot.x0, y }, { x: x - 9, y }], colour, width, dash);
+        drawLine(context, [{ x: x + 9, y }, { x: plot.x0 + plot.width, y }], colour, width, dash);
+      }
+    });
+    if (!plot.holds(x, y)) return;
+    drawDot(context, x, y, 8, "", colours.paper, 5);
+    drawDot(context, x, y, 8, "", colours.ink, 2.2);
+  }
+
+  /** Colour, width, dash and words of a traced curve. */
+  function lookOf({ kind, set, along }, colours) {
+    const [dash, width] = CURVE_LOOKS[set === "stability" ? kind : set] || CURVE_LOOKS.weave;
+    const words = {
+      weave: `edge of stability: ${DATA.words.weave}`, capsize: `edge of stability: ${DATA.words.capsize}`, infinity: "a root at infinity",
+    }[kind];
+    const following = (along || []).map((k) => DATA.parameters[k].name).join(", ");
+    const points = `exceptional points (${kind})${following ? `, where ${following} follows` : ""}`;
+    const ofSet = { "heavy damping": ["edge of heavy damping", colours.ink], "EP set": [points, colours.mark] };
+    const [text, colour] = ofSet[set] || [words || `edge of stability: ${kind}`, kind === "weave" ? colours.weave : colours.ink];
+    return { colour, width, dash: DASHES[dash], words: text };
+  }
+
+  function entriesOf(state, present, colours) {
+    const fills = classFills(colours);
+    const classes = state.layer === "kind" ? present : present.filter((kind) => kind === 0);
+    const entries = classes.map((kind) =>
+      boxEntry(classWords(kind), fills[kind], colours.faint, kind ? "" : mixed(colours.paper, colours.ink, 0.45)));
+    const curves = curvesIn(state);
+    for (const look of curves.map((curve) => lookOf(curve, colours))) {
+      if (!entries.some(({ words }) => words === look.words)) entries.push(lineEntry(look.words, look.colour, look.width, look.dash));
+    }
+    entries.push(dotEntry("this design", "", colours.ink));
+    if (DATA.curves.length && !curves.length) {
+      entries.push({ words: "(the traced curves belong to the file's own values)", look: "", sign() {} });
+    }
+    return entries;
+  }
+
+  /** What is at a place of the chart, in words. */
+  function read(state, kind, abscissa, at = state.x) {
+    const where = state.plane.map((k) => `${DATA.parameters[k].name} = ${valueText(k, at[k])}`).join(", ");
+    const number = Number.isFinite(abscissa) ? `, abscissa ${figure(abscissa)}${DATA.rootUnit ? ` ${DATA.rootUnit}` : ""}` : "";
+    const inside = state.plane.every((k) => at[k] >= rangeOf(k)[0] && at[k] <= rangeOf(k)[1]);
+    reading.textContent = `${where}: ${classWords(kind)}${number}${inside ? "" : "; outside of this picture"}`;
+  }
+
+  const within = (k, value) => Math.min(rangeOf(k)[1], Math.max(rangeOf(k)[0], value));
+  movesDesign(
+    surface.canvas,
+    (px, py) => [[now.state.plane[0], within(now.state.plane[0], plot.valueX(px))], [now.state.plane[1], within(now.state.plane[1], plot.valueY(py))]],
+    (...steps) => now.state.plane.map((k, axis) => {
+      const [low, high] = rangeOf(k);
+      return [k, within(k, now.state.x[k] + (steps[axis] * (high - low)) / (CHART_POINTS - 1))];
+    }),
+  );
+  surface.canvas.addEventListener("pointermove", (event) => {
+    if (!plot || event.buttons || !plot.holds(event.offsetX, event.offsetY)) return;
+    const at = now.state.x.slice();
+    at[now.state.plane[0]] = plot.valueX(event.offsetX);
+    at[now.state.plane[1]] = plot.valueY(event.offsetY);
+    const [a, motion] = [new Float64Array(MODEL.degree + 1), new Float64Array(3)];
+    MODEL.coefficients(at, a);
+    motionOf(a, motion);
+    read(now.state, kindOf(a), motion[0], at);
+  });
+  surface.canvas.addEventListener("pointerleave", () => now && read(now.state, now.drawing.kind, now.drawing.motion[0]));
+
+  return {
+    cheap: false,
+    draw(state, drawing) {
+      now = { state, drawing };
+      surface.repaint();
+      const [first, second] = state.plane.map((k) => `${DATA.parameters[k].name} ${valueText(k, state.x[k], 3)}`);
+      const classes = (surveyed.present || []).map((kind) => classWords(kind)).join("; ");
+      says(`Stability chart: this design, ${first} and ${second}, is ${classWords(drawing.kind)}; in the picture are ${classes}. Arrow keys move the design.`);
+    },
+  };
+}

@@ -1,0 +1,371 @@
+// Growth rates and frequencies over one parameter, with what happens on the way; and the sweep that the root path shares.
+
+const SWEEP_POINTS = 301;
+let sweepKept = { key: "" };
+
+/** Coefficients of a design with parameter k at a value. */
+function coefficientsAt(x, k, value) {
+  const at = Float64Array.from(x);
+  at[k] = value;
+  const a = new Float64Array(MODEL.degree + 1);
+  MODEL.coefficients(at, a);
+  return a;
+}
+
+/** Where a function with few values changes between two ends, each within `width`: [just before, just after] by bisection. */
+function changesBetween(of, low, high, width) {
+  const last = of(high);
+  const found = [];
+  let [from, held] = [low, of(low)];
+  while (held !== last && found.length < 8) {
+    let [before, after] = [from, high];
+    while (after - before > width) {
+      const middle = (before + after) / 2;
+      if (middle <= before || middle >= after) break;
+      if (of(middle) === held) before = middle;
+      else after = middle;
+    }
+    found.push([before, after]);
+    [from, held] = [after, of(after)];
+  }
+  return found;
+}
+
+/** What a change of stability is: `weave`, `capsize` or `infinity`, by which coefficient passes 0. */
+function crossingKind(before, after) {
+  if (before[0] * after[0] <= 0) return "infinity";
+  const last = before.length - 1;
+  return before[last] * after[last] <= 0 ? "capsize" : "weave";
+}
+
+/** The roots of a sweep, upper half, and what they are joined to: points {at, re, im} in curves of pairs and of real roots. */
+function curvesOf(samples) {
+  const curves = [];
+  let open = [];
+  for (const { at, roots } of samples) {
+    const points = Array.from(roots.re, (re, k) => ({ at, re, im: roots.im[k] })).filter(({ re, im }) => Number.isFinite(re) && im >= 0);
+    const next = [];
+    for (const pairs of [false, true]) {
+      const fresh = points.filter(({ im }) => im > 0 === pairs);
+      const ends = open.filter(({ pair }) => pair === pairs);
+      const links = ends.flatMap((curve) => fresh.map((point) => {
+        const end = curve.points[curve.points.length - 1];
+        return { curve, point, apart: Math.hypot(point.re - end.re, point.im - end.im) };
+      }));
+      links.sort((first, second) => first.apart - second.apart);
+      const taken = new Set();
+      for (const { curve, point } of links) {
+        if (taken.has(curve) || taken.has(point)) continue;
+        taken.add(curve).add(point);
+        curve.points.push(point);
+        next.push(curve);
+      }
+      for (const point of fresh.filter((one) => !taken.has(one))) {
+        const curve = { pair: pairs, points: [point] };
+        curves.push(curve);
+        next.push(curve);
+      }
+    }
+    open = next;
+  }
+  return curves;
+}
+
+/** Runs of one answer along a sweep: [from, to] of samples where `of` holds. */
+function bandsAlong(samples, of) {
+  const bands = [];
+  samples.forEach((sample, k) => {
+    if (!of(sample)) return;
+    if (k && of(samples[k - 1])) bands[bands.length - 1][1] = sample.at;
+    else bands.push([sample.at, sample.at]);
+  });
+  return bands;
+}
+
+/** Values ever closer to another on both sides, for there roots move as its root. */
+function closingIn(centre, step, [low, high]) {
+  const apart = Array.from({ length: 14 }, (_, k) => step * 0.5 ** k);
+  return apart.flatMap((distance) => [centre - distance, centre + distance]).filter((at) => at > low && at < high);
+}
+
+/** Roots, classes, curves and events over the whole range of the parameter `state.over`; kept while nothing else moves. */
+function sweepOf(state) {
+  const k = state.over;
+  const key = `${k} ${Array.from(state.x, (value, index) => (index === k ? 0 : value))}`;
+  if (sweepKept.key === key) return sweepKept;
+  const ends = rangeOf(k);
+  const width = 1e-10 * (ends[1] - ends[0]);
+  const kindAt = (at) => kindOf(coefficientsAt(state.x, k, at));
+  const realAt = (at) => realRootsOf(coefficientsAt(state.x, k, at));
+  const sampleAt = (at) => {
+    const a = coefficientsAt(state.x, k, at);
+    return { at, a, kind: kindOf(a), real: realRootsOf(a), roots: rootsOf(a) };
+  };
+  const coarse = Array.from(evenly(ends, SWEEP_POINTS), sampleAt);
+  const events = [];
+  let samples = [];
+  coarse.forEach((sample, index) => {
+    if (index) {
+      const before = coarse[index - 1];
+      const kinds = before.kind === sample.kind ? [] : changesBetween(kindAt, before.at, sample.at, width);
+      const reals = before.real === sample.real ? [] : changesBetween(realAt, before.at, sample.at, width);
+      const near = [...kinds, ...reals].flat().sort((first, second) => first - second).map(sampleAt);
+      samples.push(...near.filter(({ at }) => at > before.at && at < sample.at));
+      for (const [low, high] of kinds) {
+        const [first, second] = [sampleAt(low), sampleAt(high)];
+        if (first.kind > 2 !== second.kind > 2) {
+          events.push({ kind: crossingKind(first.a, second.a), at: (low + high) / 2, gains: second.kind > 2 });
+        }
+      }
+      for (const [low, high] of reals) {
+        const met = meetingOf(sampleAt(low), sampleAt(high));
+        if (met) events.push({ kind: "meeting", at: (low + high) / 2, ...met });
+      }
+    }
+    samples.push(sample);
+  });
+  const known = DATA.designs.filter(({ values }) => sameBeside(values, state.x, [k], 0)).map(({ values }) => values[k]);
+  const step = (ends[1] - ends[0]) / (SWEEP_POINTS - 1);
+  const centres = new Set([...events.map(({ at }) => at), ...known]);
+  samples = samples.concat([...centres].flatMap((centre) => closingIn(centre, step, ends)).map(sampleAt));
+  samples.sort((first, second) => first.at - second.at);
+  sweepKept = {
+    key, ends, samples, events: events.sort((first, second) => first.at - second.at), curves: curvesOf(samples),
+    stable: bandsAlong(samples, ({ kind }) => kind > 2), heavy: bandsAlong(samples, ({ kind }) => kind === 4),
+  };
+  return sweepKept;
+}
+
+/** Where on the real axis roots meet between two designs that differ in the number of real roots, or null at infinity. */
+function meetingOf(first, second) {
+  if (first.a[0] * second.a[0] <= 0) return null;
+  const more = first.real > second.real ? first : second;
+  const reals = Array.from(more.roots.re).filter((_, k) => more.roots.im[k] === 0).sort((p, q) => p - q);
+  const gaps = reals.slice(1).map((re, k) => ({ apart: re - reals[k], re: (re + reals[k]) / 2 }));
+  const closest = gaps.sort((p, q) => p.apart - q.apart)[0];
+  // equal roots are counted once: where rounding left but one real root, the pair beside it is the place
+  const lone = Array.from(more.roots.re).find((_, k) => more.roots.im[k] >= 0);
+  const re = closest ? closest.re : lone;
+  return Number.isFinite(re) ? { re } : null;
+}
+
+/** What happens over the parameter `state.over`, in order: {kind, at} in SI, `meeting` where real roots become a pair. */
+function growthEvents(state) {
+  return sweepOf(state).events;
+}
+
+/** An event in words: "weave ends at v = 4.292 m/s". */
+function eventWords({ kind, at, gains }, over) {
+  const where = `at ${DATA.parameters[over].name} = ${valueText(over, at, 7)}`;
+  if (kind === "meeting") return `roots meet ${where}`;
+  if (kind === "infinity") return `a root passes infinity ${where}, ${gains ? "stable from there" : "unstable from there"}`;
+  return `${DATA.words[kind]} ${gains ? "ends" : "begins"} ${where}`;
+}
+
+/** Limits of an axis that show most values and 0, with some room. */
+function limitsOf(values) {
+  const sorted = values.filter(Number.isFinite).sort((first, second) => first - second);
+  if (!sorted.length) return [-1, 1];
+  const at = (share) => sorted[Math.round(share * (sorted.length - 1))];
+  const [low, high] = [Math.min(0, at(0.02)), Math.max(0, at(0.98))];
+  const room = 0.12 * (high - low) || 1;
+  return [low - room, high + room];
+}
+
+/** Limits of the growth rates: of the roots here and near, but none much deeper than most, which would hide what happens at 0. */
+function growthLimits(here, near) {
+  const sizes = here.map(Math.abs).sort((first, second) => first - second);
+  const typical = sizes[Math.floor((sizes.length - 1) / 2)] || 0;
+  const depth = Math.max(4 * typical, limitsOf(near)[1]);
+  const seen = here.filter((growth) => growth >= -depth);
+  const [low, high] = limitsOf([...near.filter((growth) => growth >= -depth), ...seen]);
+  const room = 0.06 * (high - low);
+  return [Math.min(low, ...seen.map((growth) => growth - room)), Math.max(high, ...seen.map((growth) => growth + room))];
+}
+
+/** Growth rates above frequencies over one parameter. */
+function growthPicture(host) {
+  let now = null;
+  let plots = null;
+  const surface = canvasIn(host, (width) => Math.min(640, Math.max(400, 0.95 * width)), paint);
+  const reading = part(host, "p", { class: "reading" });
+  const happens = part(host, "p", { class: "reading" });
+  const legend = legendIn(host);
+  const says = saysIn(surface.canvas);
+  surface.canvas.style.touchAction = "pan-y";
+
+  /** 1/s per unit of the roots at a value of the parameter, or 1 without a unit of time. */
+  function rateAt(state, value) {
+    const at = Float64Array.from(state.x);
+    at[state.over] = value;
+    const rate = MODEL.rate(at);
+    return Number.isFinite(rate) ? rate : 1;
+  }
+
+  function paint(context, width, height) {
+    if (!now) return;
+    const { state, drawing } = now;
+    const colours = coloursNow();
+    const sweep = sweepOf(state);
+    const timed = Number.isFinite(MODEL.rate(state.x));
+    const rates = new Map(sweep.samples.map(({ at }) => [at, rateAt(state, at)]));
+    const hertz = timed ? 2 * Math.PI : 1;
+    const points = sweep.curves.map(({ pair, points: along }) => ({
+      pair, along: along.map(({ at, re, im }) => ({ at, growth: re * rates.get(at), frequency: (im * rates.get(at)) / hertz })),
+    }));
+    const here = rootsToDraw(state, drawing).map(([re, im, times]) => {
+      const rate = rateAt(state, state.x[state.over]);
+      return { growth: re * rate, frequency: (im * rate) / hertz, pair: im > 0, times };
+    });
+    const room = 0.3 * (sweep.ends[1] - sweep.ends[0]);
+    const centres = [state.x[state.over], ...sweep.events.filter(({ kind }) => kind !== "meeting").map(({ at }) => at)];
+    const near = points.flatMap(({ along }) => along).filter(({ at }) => centres.some((centre) => Math.abs(at - centre) < room));
+    const inner = { x0: 60, width: width - 72 };
+    const upper = 0.52 * (height - 92);
+    const growths = growthLimits(here.map(({ growth }) => growth), near.map(({ growth }) => growth));
+    const highest = Math.max(limitsOf(near.map(({ frequency }) => frequency))[1], ...here.map(({ frequency }) => 1.1 * frequency));
+    plots = [
+      plotIn({ ...inner, y0: 36, height: upper }, sweep.ends, growths),
+      plotIn({ ...inner, y0: 36 + upper + 14, height: height - 92 - upper }, sweep.ends, [0, highest]),
+    ];
+    const events = sweep.events;
+    plots.forEach((plot, lower) => {
+      const value = (point) => (lower ? point.frequency : point.growth);
+      drawBands(context, plot, sweep, colours);
+      clipped(context, plot, () => {
+        if (!lower) drawLine(context, [{ x: plot.x0, y: plot.y(0) }, { x: plot.x0 + plot.width, y: plot.y(0) }], colours.ink, 1.5);
+        for (const { pair, along } of points) {
+          if (lower && !pair) continue;
+          const line = along.map((point) => ({ x: plot.x(point.at), y: plot.y(value(point)) }));
+          drawLine(context, line, colours[pair ? "weave" : "real"], 2.2, pair ? DASHES.whole : DASHES.long);
+        }
+        for (const event of events) drawEvent(context, plot, event, lower, rates, colours);
+        const x = plot.x(state.x[state.over]);
+        drawLine(context, [{ x, y: plot.y0 }, { x, y: plot.y0 + plot.height }], colours.paper, 4);
+        drawLine(context, [{ x, y: plot.y0 }, { x, y: plot.y0 + plot.height }], colours.mark, 1.6);
+        for (const point of here) {
+          if (lower && !point.pair) continue;
+          drawDot(context, x, plot.y(value(point)), point.times > 1 ? 6 : 4, colours.mark, colours.paper);
+          context.textAlign = x > plot.x0 + 0.8 * plot.width ? "right" : "left";
+          if (point.times > 1) drawText(context, `${point.times}-fold`, x + (context.textAlign === "left" ? 10 : -10), plot.y(value(point)) + 12, colours);
+        }
+      });
+      const unit = timed ? (lower ? "Hz" : "1/s") : DATA.rootUnit;
+      const label = (lower ? (timed ? "frequency" : "frequency |Im s|") : "growth rate Re s") + (unit ? ` in ${unit}` : "");
+      drawAxes(context, plot, { label: lower ? parameterLabel(state.over, plot.width) : "", one: DATA.parameters[state.over].one },
+        { label, one: 1 }, colours);
+    });
+    drawNames(context, plots[0], events, state, colours);
+    legend(entriesOf(sweep, colours, timed));
+    happens.textContent = events.length ? `${sentenceOf(events, state.over)}.` : "Nothing changes over this range: neither stability nor the number of real roots.";
+    read(state.x[state.over]);
+  }
+
+  /** The events of stability first, those where roots meet after; many are counted. */
+  function sentenceOf(events, over) {
+    const [crossings, meetings] = [true, false].map((crossing) => events.filter(({ kind }) => (kind !== "meeting") === crossing));
+    const unit = DATA.parameters[over].unit;
+    const meet = meetings.length
+      ? [`roots meet at ${meetings.slice(0, 4).map(({ at }) => figure(at / DATA.parameters[over].one, 5)).join(", ")}${meetings.length > 4 ? " and more" : ""}${unit ? ` ${unit}` : ""}`]
+      : [];
+    const text = [...crossings.map((event) => eventWords(event, over)), ...meet].join("; ");
+    return text[0].toUpperCase() + text.slice(1);
+  }
+
+  function drawBands(context, plot, sweep, colours) {
+    const fills = classFills(colours);
+    context.fillStyle = mixed(colours.paper, colours.ink, 0.05);
+    context.fillRect(plot.x0, plot.y0, plot.width, plot.height);
+    for (const [bands, fill] of [[sweep.stable, mixed(fills[3], colours.paper, 0.45)], [sweep.heavy, mixed(fills[4], colours.paper, 0.3)]]) {
+      context.fillStyle = fill;
+      for (const [from, to] of bands) context.fillRect(plot.x(from), plot.y0, Math.max(1, plot.x(to) - plot.x(from)), plot.height);
+    }
+    for (const [from, to] of bandsAlong(sweep.samples, ({ kind }) => kind === 0)) {
+      drawHatch(context, plot.x(from), plot.y0, Math.max(1, plot.x(to) - plot.x(from)), plot.height, colours.line);
+    }
+  }
+
+  function drawEvent(context, plot, { kind, at, re }, lower, rates, colours) {
+    if (kind !== "meeting") {
+      const dash = { weave: DASHES.short, capsize: DASHES.mixed, infinity: DASHES.dots }[kind];
+      drawLine(context, [{ x: plot.x(at), y: plot.y0 }, { x: plot.x(at), y: plot.y0 + plot.height }], colours.ink, 1.3, dash);
+      return;
+    }
+    const nearest = [...rates.keys()].reduce((best, one) => (Math.abs(one - at) < Math.abs(best - at) ? one : best));
+    drawDot(context, plot.x(at), plot.y(lower ? 0 : re * rates.get(nearest)), 4, colours.paper, colours.ink);
+  }
+
+  /** Values of the events above the plot, in two rows where they are close; the design's own always. */
+  function drawNames(context, plot, events, state, colours) {
+    const placed = [];
+    const place = (text, x, colour) => {
+      const half = context.measureText(text).width / 2 + 4;
+      const middle = Math.max(plot.x0 + half - 4, Math.min(plot.x0 + plot.width - half + 4, x));
+      const row = [26, 10].find((y) => !placed.some((other) => other.y === y && middle - half < other.to && middle + half > other.from));
+      if (!row) return;
+      placed.push({ y: row, from: middle - half, to: middle + half });
+      drawText(context, text, middle, row, colours, colour);
+    };
+    context.textAlign = "center";
+    const value = (at) => figure(at / DATA.parameters[state.over].one, 4);
+    const own = plot.x(state.x[state.over]);
+    if (own >= plot.x0 && own <= plot.x0 + plot.width) place(value(state.x[state.over]), own, colours.mark);
+    for (const { kind, at } of events.filter((event) => event.kind !== "meeting")) {
+      place(`${kind === "infinity" ? "infinity" : DATA.words[kind]} ${value(at)}`, plot.x(at), colours.ink);
+    }
+  }
+
+  function entriesOf(sweep, colours, timed) {
+    const fills = classFills(colours);
+    const has = (pair) => sweep.curves.some((curve) => curve.pair === pair);
+    const met = (kind) => sweep.events.some((event) => event.kind === kind);
+    return [
+      has(true) && lineEntry("a pair of roots, which swings", colours.weave, 2.2, DASHES.whole),
+      has(false) && lineEntry("a real root, which does not", colours.real, 2.2, DASHES.long),
+      sweep.stable.length && boxEntry("stable", mixed(fills[3], colours.paper, 0.45), colours.faint),
+      sweep.heavy.length && boxEntry("heavily damped", mixed(fills[4], colours.paper, 0.3), colours.faint),
+      met("weave") && lineEntry(DATA.words.weave, colours.ink, 1.3, DASHES.short),
+      met("capsize") && lineEntry(DATA.words.capsize, colours.ink, 1.3, DASHES.mixed),
+      met("infinity") && lineEntry("a root passes infinity", colours.ink, 1.3, DASHES.dots),
+      met("meeting") && dotEntry("roots meet", colours.paper, colours.ink),
+      lineEntry("this design: drag it", colours.mark, 1.6, DASHES.whole),
+    ].filter(Boolean);
+  }
+
+  /** The roots at a value of the parameter, in words. */
+  function read(value) {
+    const { state, drawing } = now;
+    const own = value === state.x[state.over];
+    const a = coefficientsAt(state.x, state.over, value);
+    const roots = rootsToDraw(own ? state : { x: [NaN] }, own ? drawing : { roots: rootsOf(a) });
+    const rate = rateAt(state, value);
+    const unit = Number.isFinite(MODEL.rate(state.x)) ? "1/s" : DATA.rootUnit;
+    const text = roots.map(([re, im, times]) =>
+      figure(re * rate, 4) + (im > 0 ? ` ± ${figure(im * rate, 4)}i` : "") + (times > 1 ? ` (${times}-fold)` : "")).join(", ");
+    reading.textContent = `${DATA.parameters[state.over].name} = ${valueText(state.over, value, 5)}: ${classWords(kindOf(a))}; roots ${text || "none"}${unit ? ` in ${unit}` : ""}`;
+  }
+
+  const within = (value) => Math.min(rangeOf(now.state.over)[1], Math.max(rangeOf(now.state.over)[0], value));
+  movesDesign(
+    surface.canvas,
+    (px) => [[now.state.over, within(plots[0].valueX(px))]],
+    (dx, dy) => {
+      const [low, high] = rangeOf(now.state.over);
+      return dy ? null : [[now.state.over, within(now.state.x[now.state.over] + (dx * (high - low)) / 200)]];
+    },
+  );
+  surface.canvas.addEventListener("pointermove", (event) => {
+    if (plots && !event.buttons) read(within(plots[0].valueX(event.offsetX)));
+  });
+  surface.canvas.addEventListener("pointerleave", () => now && read(now.state.x[now.state.over]));
+
+  return {
+    cheap: true,
+    draw(state, drawing) {
+      now = { state, drawing };
+      surface.repaint();
+      const { name } = DATA.parameters[state.over];
+      says(`Growth rates and frequencies over ${name}; this design at ${valueText(state.over, state.x[state.over])} is ${classWords(drawing.kind)}. ${happens.textContent} Left and right arrow keys move ${name}.`);
+    },
+  };
+}

@@ -1,0 +1,196 @@
+// What follows a push: the linear response, as curves over time, and the clock that the bicycle moves by.
+
+const PUSH_POINTS = 601;
+const LARGEST_ANGLE = Math.PI / 12;
+const clock = { time: 0, playing: false, slower: 1, pushed: 0, watchers: [] };
+let pushKept = { key: "" };
+
+/** Set the clock, in seconds of what is shown, and let all who show it draw. */
+function setClock(time) {
+  clock.time = time;
+  clock.watchers.forEach((watch) => watch());
+}
+
+/** 1/s per unit of the roots; of a bicycle without units, as if its wheelbase were 1 m. */
+function clockRate(x) {
+  const rate = MODEL.rate(x);
+  if (Number.isFinite(rate)) return rate;
+  return DATA.bicycle ? Math.sqrt(9.81) : NaN;
+}
+
+/** Names of the coordinates that a push moves. */
+function coordinateNames() {
+  if (DATA.bicycle) return ["lean", "steer"];
+  return Array.from({ length: MODEL.size }, (_, k) => `${MODEL.order === 2 ? "coordinate" : "state"} ${k + 1}`);
+}
+
+/** How long to look at most, in the model's own time: until a push has died out or grown large, but no endless swinging. */
+function pushLength(drawing, rate) {
+  const [abscissa, , frequency] = drawing.motion;
+  const fades = Math.abs(abscissa) > 0 ? (abscissa < 0 ? 16 : 3.5) / Math.abs(abscissa) : Infinity;
+  const swings = frequency > 0 ? (20 * 2 * Math.PI) / frequency : Infinity;
+  const length = Math.min(fades, swings, Number.isFinite(rate) ? 20 * rate : Infinity);
+  return Number.isFinite(length) && length > 0 ? length : 10;
+}
+
+/** The response to a push on coordinate `clock.pushed`, or null: {times, at(k, time), end, rate, peak, start}; angles of bicycles scaled to be seen. */
+function pushOf(state, drawing) {
+  const key = `${clock.pushed} ${Array.from(state.x)}`;
+  if (pushKept.key === key) return pushKept.found;
+  const rate = clockRate(state.x);
+  const states = MODEL.size * MODEL.order;
+  const start = new Float64Array(states);
+  start[MODEL.order === 2 ? MODEL.size + clock.pushed : clock.pushed] = 1;
+  let found = null;
+  let length = pushLength(drawing, rate);
+  // looked at twice: the second time only as long as there is something to see
+  for (let look = 0; look < 2 && drawing.kind; look += 1) {
+    const times = evenly([0, length], PUSH_POINTS);
+    const values = response(state.x, start, times);
+    found = values && values.every(Number.isFinite) ? scaledPush(values, times, states, rate) : null;
+    if (!found || drawing.motion[0] >= 0) break;
+    length *= Math.min(1, 1.1 * found.seen);
+  }
+  pushKept = { key, found };
+  return found;
+}
+
+/** The response in seconds where there are such, its largest angle made one that is seen. */
+function scaledPush(values, times, states, rate) {
+  const size = MODEL.size;
+  const peaks = Array.from({ length: size }, (_, k) => times.reduce((peak, _time, row) => Math.max(peak, Math.abs(values[row * states + k])), 0));
+  const scale = DATA.bicycle ? LARGEST_ANGLE / Math.max(...peaks, 1e-300) : 1;
+  const second = Number.isFinite(rate) ? rate : 1;
+  const end = times[PUSH_POINTS - 1] / second;
+  const at = (k, time) => {
+    const place = Math.max(0, Math.min(PUSH_POINTS - 1, (time / end) * (PUSH_POINTS - 1)));
+    const row = Math.min(PUSH_POINTS - 2, Math.floor(place));
+    const [before, after] = [values[row * states + k], values[(row + 1) * states + k]];
+    return scale * (before + (place - row) * (after - before));
+  };
+  const high = 0.02 * Math.max(...peaks);
+  const rows = Array.from(times.keys());
+  const last = rows.reverse().find((row) => peaks.some((_, k) => Math.abs(values[row * states + k]) > high)) || 1;
+  return {
+    at, end, rate: second, peaks: peaks.map((peak) => scale * peak), start: scale * second,
+    seconds: times.map((time) => time / second), seen: last / (PUSH_POINTS - 1),
+  };
+}
+
+/** Response after a push over time; its pointer moves the clock. */
+function motionPicture(host) {
+  if (!MODEL.pencil) {
+    const panel = host.closest("section") || host;
+    panel.hidden = true;
+    return { draw() {}, cheap: true };
+  }
+  const names = coordinateNames();
+  let now = null;
+  let plot = null;
+  const choice = part(host, "p", { class: "moves" });
+  const label = part(choice, "label", {}, "push on");
+  const pushed = part(label, "select");
+  names.forEach((name, k) => part(pushed, "option", { value: k }, name));
+  pushed.addEventListener("change", () => {
+    clock.pushed = Number(pushed.value);
+    clock.watchers.forEach((watch) => watch(true));
+  });
+  const surface = canvasIn(host, (width) => Math.min(340, Math.max(220, 0.5 * width)), paint);
+  const reading = part(host, "p", { class: "reading" });
+  const legend = legendIn(host);
+  const says = saysIn(surface.canvas);
+  surface.canvas.style.touchAction = "pan-y";
+  clock.watchers.push(() => surface.repaint());
+
+  const looks = (colours) => [
+    [colours.weave, DASHES.whole], [colours.mark, DASHES.long], [colours.real, DASHES.mixed], [colours.complex, DASHES.short], [colours.ink, DASHES.dots],
+  ];
+
+  function paint(context, width, height) {
+    if (!now) return;
+    const { state, drawing } = now;
+    const colours = coloursNow();
+    const push = pushOf(state, drawing);
+    if (!push) {
+      plot = null;
+      context.textAlign = "center";
+      context.fillStyle = colours.ink;
+      context.fillText("no response: this design has no equations of motion that can be solved", width / 2, height / 2);
+      legend([]);
+      reading.textContent = "";
+      return;
+    }
+    const one = DATA.bicycle ? Math.PI / 180 : 1;
+    const size = 1.12 * Math.max(...push.peaks, 1e-300);
+    plot = plotIn({ x0: 60, y0: 8, width: width - 72, height: height - 50 }, [0, push.end], [-size, size]);
+    clipped(context, plot, () => {
+      drawLine(context, [{ x: plot.x0, y: plot.y(0) }, { x: plot.x0 + plot.width, y: plot.y(0) }], colours.faint, 1);
+      drawEnvelope(context, push, drawing.motion[0], colours);
+      const rows = Array.from(push.seconds);
+      names.forEach((_, k) => {
+        const [colour, dash] = looks(colours)[k % 5];
+        drawLine(context, rows.map((time) => ({ x: plot.x(time), y: plot.y(push.at(k, time)) })), colour, 2.2, dash);
+      });
+      const x = plot.x(Math.min(clock.time, push.end));
+      if (DATA.bicycle) drawLine(context, [{ x, y: plot.y0 }, { x, y: plot.y0 + plot.height }], colours.ink, 1.4);
+    });
+    const timed = Number.isFinite(MODEL.rate(state.x));
+    const time = timed ? "time in s" : DATA.bicycle ? "time in s, for a wheelbase of 1 m" : `time${DATA.rootUnit ? ` in 1/(${DATA.rootUnit})` : ""}`;
+    drawAxes(context, plot, { label: time, one: 1 }, { label: DATA.bicycle ? "angle in degrees" : "displacement", one }, colours);
+    legend([
+      ...names.map((name, k) => lineEntry(name, looks(colours)[k % 5][0], 2.2, looks(colours)[k % 5][1])),
+      lineEntry("within a multiple of e^(abscissa · time)", colours.faint, 1, DASHES.dots),
+    ]);
+    read(push);
+  }
+
+  /** The least multiple of e^(abscissa t) that the curves stay within. */
+  function drawEnvelope(context, push, abscissa, colours) {
+    if (!Number.isFinite(abscissa)) return;
+    const rows = Array.from(push.seconds);
+    const pace = (time) => Math.exp(abscissa * push.rate * time);
+    const most = Math.max(...names.flatMap((_, k) => rows.map((time) => Math.abs(push.at(k, time)) / pace(time))));
+    const level = (time) => most * pace(time);
+    for (const side of [1, -1]) {
+      drawLine(context, rows.map((time) => ({ x: plot.x(time), y: plot.y(side * level(time)) })), colours.faint, 1, DASHES.dots);
+    }
+  }
+
+  /** What the coordinates are at the time of the clock. */
+  function read(push, time = Math.min(clock.time, push.end)) {
+    const degree = DATA.bicycle ? 180 / Math.PI : 1;
+    const values = names.map((name, k) => `${name} ${figure(Number((degree * push.at(k, time)).toPrecision(3)), 3)}${DATA.bicycle ? "°" : ""}`);
+    reading.textContent = `after ${figure(time, 3)}${Number.isFinite(clockRate(now.state.x)) ? " s" : ""}: ${values.join(", ")}`;
+  }
+
+  const toTime = (event) => {
+    clock.playing = false;
+    const push = pushOf(now.state, now.drawing);
+    if (push && plot) setClock(Math.max(0, Math.min(push.end, plot.valueX(event.offsetX))));
+  };
+  surface.canvas.tabIndex = 0;
+  surface.canvas.addEventListener("pointerdown", (event) => {
+    surface.canvas.setPointerCapture(event.pointerId);
+    toTime(event);
+  });
+  surface.canvas.addEventListener("pointermove", (event) => event.buttons && toTime(event));
+  surface.canvas.addEventListener("keydown", (event) => {
+    const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    const push = by && pushOf(now.state, now.drawing);
+    if (!push) return;
+    event.preventDefault();
+    clock.playing = false;
+    setClock(Math.max(0, Math.min(push.end, clock.time + (by * push.end) / (event.shiftKey ? 20 : 200))));
+  });
+
+  return {
+    cheap: true,
+    draw(state, drawing) {
+      now = { state, drawing };
+      surface.repaint();
+      const push = pushOf(state, drawing);
+      const fate = drawing.motion[0] < 0 ? "dies out" : "does not die out";
+      says(push ? `${names.join(" and ")} over time after a push on ${names[clock.pushed]}: the motion ${fate}. Arrow keys move the time.` : "No response to draw.");
+    },
+  };
+}

@@ -1,0 +1,127 @@
+// The roots in the complex plane, and the path that they take over one parameter.
+
+/** Limits of the plane that keep the current roots in sight: kept while they still serve, so that the picture stands still. */
+function planeReach(roots, path, kept) {
+  const sizes = roots.map(([re, im]) => Math.hypot(re, im)).sort((first, second) => first - second);
+  const middle = sizes[Math.floor((sizes.length - 1) / 2)] || sizes[sizes.length - 1] || 1;
+  const seen = roots.filter(([re, im]) => Math.hypot(re, im) <= 25 * middle);
+  const size = Math.max(1e-300, ...seen.map(([re, im]) => Math.hypot(re, im)));
+  const near = path.filter(({ re, im }) => Math.hypot(re, im) < 1.6 * size);
+  const points = [...seen.map(([re, im]) => ({ re, im })), ...near];
+  const need = {
+    left: Math.min(-0.25 * size, ...points.map(({ re }) => re)), right: Math.max(0.25 * size, ...points.map(({ re }) => re)),
+    top: Math.max(0.5 * size, ...points.map(({ im }) => im)),
+  };
+  const width = need.right - need.left;
+  const serves = kept && kept.left <= need.left && kept.right >= need.right && kept.top >= need.top &&
+    Math.max(width, need.top) > 0.45 * Math.max(kept.right - kept.left, kept.top);
+  const reach = serves ? kept : { left: need.left - 0.1 * width, right: need.right + 0.1 * width, top: 1.12 * need.top };
+  return { reach, far: roots.filter((root) => !seen.includes(root)) };
+}
+
+/** Roots in the complex plane. */
+function planePicture(host) {
+  let now = null;
+  let kept = null;
+  let far = [];
+  const surface = canvasIn(host, (width) => Math.min(520, Math.max(300, 0.8 * width)), paint);
+  const reading = part(host, "p", { class: "reading" });
+  const legend = legendIn(host);
+  const says = saysIn(surface.canvas);
+
+  /** Equal scales along both axes: the angle of a root is its damping. */
+  function plotOf(width, height, { left, right, top }) {
+    const box = { x0: 60, y0: 8, width: width - 72, height: height - 50 };
+    const scale = Math.max((right - left) / box.width, (2 * top) / box.height);
+    const [across, up] = [(scale * box.width - (right - left)) / 2, (scale * box.height) / 2];
+    return plotIn(box, [left - across, right + across], [-up, up]);
+  }
+
+  function paint(context, width, height) {
+    if (!now) return;
+    const { state, drawing } = now;
+    const colours = coloursNow();
+    const roots = rootsToDraw(state, drawing);
+    const sweep = sweepOf(state);
+    const value = state.x[state.over];
+    const reach = 0.15 * (sweep.ends[1] - sweep.ends[0]);
+    const path = sweep.curves.flatMap(({ points }) => points.filter(({ at }) => Math.abs(at - value) <= reach));
+    ({ reach: kept, far } = planeReach(roots, path, kept));
+    const plot = plotOf(width, height, kept);
+    const fills = classFills(colours);
+    clipped(context, plot, () => {
+      context.fillStyle = mixed(fills[3], colours.paper, 0.6);
+      context.fillRect(plot.x0, plot.y0, plot.x(0) - plot.x0, plot.height);
+      context.fillStyle = mixed(colours.paper, colours.ink, 0.05);
+      context.fillRect(plot.x(0), plot.y0, plot.width, plot.height);
+      drawLine(context, [{ x: plot.x0, y: plot.y(0) }, { x: plot.x0 + plot.width, y: plot.y(0) }], colours.faint, 1);
+      drawLine(context, [{ x: plot.x(0), y: plot.y0 }, { x: plot.x(0), y: plot.y0 + plot.height }], colours.ink, 2.4);
+      context.textAlign = "right";
+      drawText(context, "stable", plot.x(0) - 8, plot.y0 + 12, colours);
+      context.textAlign = "left";
+      drawText(context, "grows", plot.x(0) + 8, plot.y0 + 12, colours);
+      drawPath(context, plot, sweep, value, colours);
+      drawRoots(context, plot, roots, colours);
+    });
+    const unit = DATA.rootUnit ? ` in ${DATA.rootUnit}` : "";
+    drawAxes(context, plot, { label: `growth rate Re s${unit}`, one: 1 }, { label: `frequency Im s${unit}`, one: 1 }, colours);
+    describe(state, roots, colours);
+  }
+
+  /** The path: dotted at lower values, whole at higher ones, both fading with the distance from the design's own. */
+  function drawPath(context, plot, sweep, value, colours) {
+    const span = sweep.ends[1] - sweep.ends[0];
+    const shade = (at) => 0.18 + 0.82 * Math.max(0, 1 - Math.abs(at - value) / (0.45 * span));
+    for (const side of [1, -1]) {
+      for (const { points } of sweep.curves) {
+        const at = ({ re, im }) => ({ x: plot.x(re), y: plot.y(side * im) });
+        let gone = 0;
+        points.slice(1).forEach((point, k) => {
+          const ends = [at(points[k]), at(point)];
+          context.globalAlpha = shade(point.at);
+          if (points[k].at >= value) drawLine(context, ends, colours.real, 2.4);
+          else drawLine(context, ends, colours.complex, 3.2, DASHES.dots, gone);
+          gone += Math.hypot(ends[1].x - ends[0].x, ends[1].y - ends[0].y);
+        });
+      }
+    }
+    context.globalAlpha = 1;
+  }
+
+  function drawRoots(context, plot, roots, colours) {
+    for (const [re, im, times] of roots) {
+      for (const side of im > 0 ? [1, -1] : [1]) {
+        const [x, y] = [plot.x(re), plot.y(side * im)];
+        drawDot(context, x, y, times > 1 ? 7.5 : 5.5, colours.mark, colours.paper, 2);
+        if (times === 1) continue;
+        drawDot(context, x, y, 11, "", colours.mark, 1.5);
+        context.textAlign = "center";
+        drawText(context, `${times}-fold`, x, y + (y > plot.y0 + 40 ? -21 : 22), colours);
+      }
+    }
+  }
+
+  function describe(state, roots, colours) {
+    const { name } = DATA.parameters[state.over];
+    const [low, high] = rangeOf(state.over).map((end) => valueText(state.over, end));
+    legend([
+      dotEntry("roots of this design", colours.mark, colours.paper),
+      lineEntry(`at lower ${name}, from ${low}`, colours.complex, 3.2, DASHES.dots),
+      lineEntry(`at higher ${name}, to ${high}`, colours.real, 2.4, DASHES.whole),
+    ]);
+    const beyond = far.map(([re, im]) => figure(re, 3) + (im > 0 ? ` ± ${figure(im, 3)}i` : "")).join(", ");
+    reading.textContent = roots.length ? (beyond ? `Beyond the picture: ${beyond}` : "") : "This design has no roots: its leading coefficient is 0 or not a number.";
+    reading.hidden = !reading.textContent;
+  }
+
+  return {
+    cheap: true,
+    draw(state, drawing) {
+      now = { state, drawing };
+      surface.repaint();
+      const list = rootsToDraw(state, drawing).map(([re, im, times]) =>
+        figure(re, 4) + (im > 0 ? ` plus or minus ${figure(im, 4)} i` : "") + (times > 1 ? `, ${times}-fold` : "")).join("; ");
+      says(`Roots in the complex plane: ${list || "none"}; their path over ${DATA.parameters[state.over].name} is drawn.`);
+    },
+  };
+}
