@@ -8,6 +8,7 @@ from .design import (
     Starts as Starts, load as load,
 )
 from .diagnosis import Diagnosis as Diagnosis, diagnose as diagnose
+from .display import save_report as save_report
 from .errors import Fault as Fault, InputError as InputError
 from .explanation import (
     Explanation as Explanation, Optimality as Optimality, explain as explain, optimality as optimality,

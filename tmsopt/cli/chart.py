@@ -13,13 +13,16 @@ import click
 
 from tmsopt.cli.common import (
     FIGURES,
+    REPORTS,
     answer,
     bad_input,
     check_output,
     nominal_of,
     plane,
     progress,
+    report_option,
     saving,
+    write_report,
 )
 from tmsopt.cli.ending import INTERRUPTED
 
@@ -88,6 +91,7 @@ def _named(_context: click.Context, _option: click.Parameter, values: tuple[str,
     help="Threads; NumPy alone gains nothing by them.",
 )  # fmt: skip
 @click.option("--plot", type=click.Path(path_type=Path), help="Draw the chart (png, pdf, svg).")
+@report_option
 @click.option(
     "--layer", default="kind", show_default=True,
     help="What --plot shows: kind, abscissa, damping_ratio, real_roots or a quantity.",
@@ -100,7 +104,7 @@ def _named(_context: click.Context, _option: click.Parameter, values: tuple[str,
 def chart(
     file: Path, points: tuple[int, ...] | None, axes: str | None, as_json: bool, output: Path | None,
     layers: str | None, quantities: dict[str, str], single: bool, fresh: bool, engine: str, workers: int,
-    plot: Path | None, layer: str, cut: dict[str, str], boundaries: bool,
+    plot: Path | None, report: Path | None, layer: str, cut: dict[str, str], boundaries: bool,
 ) -> None:  # fmt: skip
     """Chart stability over the free parameters of FILE: capsize, weave, stable, heavily damped."""
     with bad_input(), _stopped(output):
@@ -108,6 +112,7 @@ def chart(
         from tmsopt.charts import USUAL, axes_of
 
         check_output("--plot", plot, FIGURES)
+        check_output("--report", report, REPORTS)
         check_output("--output", output, ("npz", "nc", "chart"), folders=("chart",))
         problem = nominal_of(tmsopt.load(file))
         free = axes_of(problem)
@@ -137,6 +142,7 @@ def chart(
             shown = found if whole else tmsopt.chart(**_shown(found, held), **how, boundaries=boundaries)
             with saving("--plot", plot):
                 tmsopt.plots.save(tmsopt.plots.chart_figure(shown, layer), plot)
+    write_report(found, report, file)
 
 
 @contextmanager

@@ -8,6 +8,7 @@ import click
 
 from tmsopt import __version__
 from tmsopt.cli.chart import chart
+from tmsopt.cli.common import TYPED
 from tmsopt.cli.ending import STATUS, ended
 from tmsopt.cli.explore import explore
 from tmsopt.cli.figure import figure
@@ -33,7 +34,10 @@ class _Commands(click.Group):
                     raise click.UsageError(
                         f"found {word!r}; accepted: words without NUL, in the encoding of file names"
                     )
-            return super().make_context(info_name, args, *more, **extra)
+            words = tuple(args)  # which are taken from the list as they are read
+            context = super().make_context(info_name, args, *more, **extra)
+            context.meta[TYPED] = words
+            return context
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""

@@ -1,6 +1,7 @@
 """What commands share: exit status, bad input, progress, files to write."""
 
 import json
+import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -19,6 +20,12 @@ DONE, INFEASIBLE, NOT_CONVERGED = 0, 3, 4
 
 FIGURES = ("png", "pdf", "svg")
 """Endings of figure files."""
+
+REPORTS = ("html", "htm")
+"""Endings of pages to hand on."""
+
+TYPED = "tmsopt.words"
+"""Where the words of the command line are kept, in what click hands from a command to the next."""
 
 
 @contextmanager
@@ -78,6 +85,31 @@ def check_output(option: str, path: Path | None, endings: Sequence[str], folders
         problem = f"is no name for a file here ({error.strerror})"
     if problem:
         raise InputError([Fault(f"'{path}' {problem}; give the path of a file to write", (option,))])
+
+
+def report_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The option of commands whose result can be handed on as one page."""
+    what = "Write one page to hand on, with pictures, tables and the explorer (html)."
+    return click.option("--report", type=click.Path(path_type=Path), help=what)(command)
+
+
+def write_report(result: Any, path: Path | None, *files: Path, **more: Any) -> None:
+    """Write the page of a result where one is asked for, with the words of the command and what they name.
+
+    Args:
+        files: by which the result was asked for.
+        more: for `tmsopt.save_report`.
+    """
+    if path is None:
+        return
+    import tmsopt
+    from tmsopt.disk import read_text
+
+    words = click.get_current_context().meta.get(TYPED, ())
+    with bad_input():
+        texts = {file.name: read_text(str(file), "TOML problem file") for file in files}
+        with saving("--report", path):
+            tmsopt.save_report(result, path, command=shlex.join(("tmsopt", *words)), files=texts, **more)
 
 
 @contextmanager

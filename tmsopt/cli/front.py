@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tmsopt.cli.common import answer, progress, saving
+from tmsopt.cli.common import answer, progress, saving, write_report
 from tmsopt.cli.ending import INTERRUPTED
 
 if TYPE_CHECKING:
@@ -12,7 +12,8 @@ if TYPE_CHECKING:
 
 
 def write_front(
-    problem: "Problem", asked: dict[str, Any], as_json: bool, plot: Path | None, csv_file: Path | None, full: bool
+    problem: "Problem", asked: dict[str, Any], as_json: bool, plot: Path | None, csv_file: Path | None, full: bool,
+    file: Path, report: Path | None,
 ) -> None:  # fmt: skip
     """Find the front and write it where it is asked for.
 
@@ -30,5 +31,6 @@ def write_front(
     if plot is not None:
         with saving("--plot", plot):
             tmsopt.plots.save(tmsopt.plots.front_figure(front), plot)
+    write_report(front, report, file, seed=asked["seed"], full=full)
     if front.interrupted:
         sys.exit(INTERRUPTED)

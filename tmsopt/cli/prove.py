@@ -5,7 +5,19 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import DONE, INFEASIBLE, NOT_CONVERGED, answer, bad_input, options, solving
+from tmsopt.cli.common import (
+    DONE,
+    INFEASIBLE,
+    NOT_CONVERGED,
+    REPORTS,
+    answer,
+    bad_input,
+    check_output,
+    options,
+    report_option,
+    solving,
+    write_report,
+)
 from tmsopt.errors import MOST_STARTS
 
 _EXAMPLES = """
@@ -14,6 +26,7 @@ Examples:
   tmsopt prove problems/ep4.toml
   tmsopt prove problems/optimised_benchmark.toml --digits 60
   tmsopt prove problems/ep_set.toml --json
+  tmsopt prove problems/ep4.toml --report proof.html
   tmsopt prove problems/heavily_damped.toml --exact "lambda_s=10 deg"
 
 The problem is solved first. An interval Newton test (Krawczyk) then proves that exactly one design with the root
@@ -37,12 +50,16 @@ Exit status: 0 proved, 2 bad input, 3 no design found, 4 not proved.
 @click.option("--exact", multiple=True, metavar="NAME=VALUE", help="What a parameter is exactly, e.g. zeta_B=-1/3.")
 @click.option("--starts", type=click.IntRange(1, MOST_STARTS), default=None, help="Starts tried at most. [default: 64]")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts.")
-def prove(file: Path, as_json: bool, digits: int, exact: tuple[str, ...], starts: int | None, seed: int) -> None:
+@report_option
+def prove(
+    file: Path, as_json: bool, digits: int, exact: tuple[str, ...], starts: int | None, seed: int, report: Path | None
+) -> None:
     """Prove that the design which FILE asks for exists, and whether it is stable and heavily damped."""
     with bad_input():
         import tmsopt
         from tmsopt.design import question_of
 
+        check_output("--report", report, REPORTS)
         given = _named(exact)
         problem = question_of(file)
         with solving() as shown:
@@ -51,6 +68,7 @@ def prove(file: Path, as_json: bool, digits: int, exact: tuple[str, ...], starts
         proof = tmsopt.prove(solution, digits, exact=given)
     heading = {"title": problem.title, "status": solution.status}
     answer(as_json, lambda: heading | proof.to_json(), lambda: tmsopt.report.proof_text(problem, proof))
+    write_report(proof, report, file, seed=seed, design=solution)
     sys.exit(DONE if proof.proved else NOT_CONVERGED if solution.status == "optimal" else INFEASIBLE)
 
 

@@ -15,14 +15,17 @@ from tmsopt.cli.common import (
     FIGURES,
     INFEASIBLE,
     NOT_CONVERGED,
+    REPORTS,
     answer,
     bad_input,
     check_output,
     nominal_of,
     options,
     progress,
+    report_option,
     saving,
     solving,
+    write_report,
 )
 from tmsopt.cli.ending import INTERRUPTED
 from tmsopt.errors import MOST_STARTS
@@ -46,6 +49,7 @@ Examples:
   tmsopt solve problems/ep4.toml
   tmsopt solve problems/realistic.toml --plot growth.png
   tmsopt solve problems/realistic.toml --full
+  tmsopt solve problems/realistic.toml --report design.html
   tmsopt solve problems/realistic.toml --certify 30
   tmsopt solve problems/benchmark.toml --json | python -m json.tool
   tmsopt solve problems/ep4_matching.toml --all
@@ -106,6 +110,7 @@ def _seconds(ctx: click.Context, param: click.Parameter, value: Any) -> float | 
     "--plot", type=click.Path(path_type=Path),
     help="Draw growth rates and frequencies over the speed, or the front (png, pdf, svg).",
 )  # fmt: skip
+@report_option
 @click.option("--over", help="What --plot draws over, e.g. lambda_s. [default: the speed, or the first free one]")
 @click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write the points of a front.")
 @click.option("--points", type=click.IntRange(min=2), default=None, help="Points of a front. [default: 25]")
@@ -137,8 +142,9 @@ def _seconds(ctx: click.Context, param: click.Parameter, value: Any) -> float | 
 @click.pass_context
 def solve(
     context: click.Context, file: Path, as_json: bool, starts: int | None, seed: int, linear_solver: str,
-    plot: Path | None, over: str | None, csv_file: Path | None, points: int | None, wheelbase: str | None,
-    rear_mass: str | None, full: bool, certify: float | None, every: bool, seconds: float | None,
+    plot: Path | None, report: Path | None, over: str | None, csv_file: Path | None, points: int | None,
+    wheelbase: str | None, rear_mass: str | None, full: bool, certify: float | None, every: bool,
+    seconds: float | None,
 ) -> None:  # fmt: skip
     """Find the best design that the problem FILE asks for, or the front of the best ones."""
     with bad_input():
@@ -149,6 +155,7 @@ def solve(
         w, m_B = _scale("--wheelbase", wheelbase or "1", "m"), _scale("--rear-mass", rear_mass or "1", "kg")
         check_output("--plot", plot, FIGURES)
         check_output("--csv", csv_file, ("csv",))
+        check_output("--report", report, REPORTS)
         problem = question_of(file, front=True)
         _check_options(problem, _given(context), every)
         if certify:
@@ -157,10 +164,10 @@ def solve(
             check_installed()
     asked = options(starts=starts, seed=seed, linear_solver=linear_solver)
     if every:
-        _solve_all(problem, as_json, asked | options(seconds=seconds))
+        _solve_all(problem, as_json, asked | options(seconds=seconds), file, report)
     if problem.pareto:
         try:
-            write_front(problem, asked | options(points=points), as_json, plot, csv_file, full)
+            write_front(problem, asked | options(points=points), as_json, plot, csv_file, full, file, report)
             return
         except tmsopt.NotSolved as error:
             solution, plot = error.solution, None
@@ -182,6 +189,7 @@ def solve(
     )
     if plot is not None:
         _draw(solution, plot, over, w, m_B)
+    write_report(solution, report, file, seed=seed, full=full)
     sys.exit(INTERRUPTED if solution.interrupted else _EXIT[solution.status])
 
 
@@ -239,13 +247,16 @@ def _explaining(full: bool) -> Iterator[None]:
         click.echo("\r\033[K", nl=False, err=True)
 
 
-def _solve_all(problem: "Problem", as_json: bool, asked: dict[str, Any]) -> NoReturn:
+def _solve_all(
+    problem: "Problem", as_json: bool, asked: dict[str, Any], file: Path, report: Path | None
+) -> NoReturn:  # fmt: skip
     """Write all designs with a pattern, and end."""
     import tmsopt
 
     with bad_input(), progress("step") as update:
         found = tmsopt.solve_all(problem, progress=update, **asked)
     answer(as_json, lambda: problem.heading | found.to_json(), lambda: tmsopt.report.every_table(found))
+    write_report(found, report, file, seed=asked["seed"])
     sys.exit(DONE if found.solutions else INFEASIBLE)
 
 

@@ -1,6 +1,7 @@
 """The command that solves a problem many times over."""
 
 import sys
+import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -8,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tmsopt.cli.common import FIGURES, bad_input, check_output, saving, write_json
+from tmsopt.cli.common import FIGURES, REPORTS, bad_input, check_output, report_option, saving, write_json, write_report
 from tmsopt.cli.ending import BAD_INPUT, INTERRUPTED, answering
+from tmsopt.disk import read_text
 
 if TYPE_CHECKING:
     from tmsopt.studies import Results, Sampling, Study
@@ -63,19 +65,20 @@ Exit status: 0 done, failed rows included; 2 bad input.
     "--plot", type=click.Path(path_type=Path),
     help="Draw how the rows are distributed, or the objective over what varies (png, pdf, svg).",
 )  # fmt: skip
+@report_option
 @click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
 def study(
     file: Path, store: Path | None, fresh: bool, row: int | None, workers: int | None, scheduler: str | None,
-    exports: tuple[Path, ...], plot: Path | None, as_json: bool,
+    exports: tuple[Path, ...], plot: Path | None, report: Path | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Solve the problem of the study FILE for every row of what varies in it."""
     with bad_input():
         from tmsopt.studies import load_study
 
-        _check_together(
-            row, scheduler, workers, {"--store": store, "--fresh": fresh, "--export": exports, "--plot": plot}
-        )
+        kept = {"--store": store, "--fresh": fresh, "--export": exports, "--plot": plot, "--report": report}
+        _check_together(row, scheduler, workers, kept)
         check_output("--plot", plot, FIGURES)
+        check_output("--report", report, REPORTS)
         for target in exports:
             from tmsopt.studies import check_export
 
@@ -99,9 +102,16 @@ def study(
 
             with saving("--plot", plot):
                 save(results.plot(), plot)
+        write_report(results, report, *_files(file))
     if stopped:
         click.echo(f"stopped: the rows solved so far are in {path}; the same command goes on", err=True)
         sys.exit(INTERRUPTED)
+
+
+def _files(file: Path) -> list[Path]:
+    """The study, and the problem where it names one."""
+    named = tomllib.loads(read_text(str(file), "TOML study file")).get("problem")
+    return [file, *([file.parent / named] if isinstance(named, str) else [])]
 
 
 def _check_together(row: int | None, scheduler: str | None, workers: int | None, kept: Mapping[str, object]) -> None:

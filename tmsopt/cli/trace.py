@@ -4,7 +4,19 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import FIGURES, answer, bad_input, check_output, nominal_of, plane, progress, saving
+from tmsopt.cli.common import (
+    FIGURES,
+    REPORTS,
+    answer,
+    bad_input,
+    check_output,
+    nominal_of,
+    plane,
+    progress,
+    report_option,
+    saving,
+    write_report,
+)
 from tmsopt.errors import MOST_STARTS
 
 _EXAMPLES = """
@@ -29,6 +41,7 @@ Exit status: 0 traced, 2 bad input, 3 nothing of the pattern found in the box.
 @click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
 @click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write every point of every branch.")
 @click.option("--plot", type=click.Path(path_type=Path), help="Draw the branches (png, pdf, svg).")
+@report_option
 @click.option("--axes", help="Two parameters to draw over, e.g. Fr,chi_B. [default: two that vary]")
 @click.option(
     "--step", type=click.FloatRange(min=1e-6, max=0.1), default=0.005, show_default=True,
@@ -39,8 +52,8 @@ Exit status: 0 traced, 2 bad input, 3 nothing of the pattern found in the box.
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts.")
 def trace(
-    file: Path, pattern: str | None, as_json: bool, csv_file: Path | None, plot: Path | None, axes: str | None,
-    step: float, starts: int, seed: int,
+    file: Path, pattern: str | None, as_json: bool, csv_file: Path | None, plot: Path | None,
+    report: Path | None, axes: str | None, step: float, starts: int, seed: int,
 ) -> None:  # fmt: skip
     """Trace a root pattern of FILE through parameter space, every branch in the box, with its events."""
     with bad_input():
@@ -48,6 +61,7 @@ def trace(
 
         check_output("--plot", plot, FIGURES)
         check_output("--csv", csv_file, ("csv",))
+        check_output("--report", report, REPORTS)
         problem = nominal_of(tmsopt.load(file))
         if plot is None and axes is not None:
             raise tmsopt.InputError([tmsopt.Fault("says what --plot draws; add --plot FILE", ("--axes",))])
@@ -56,6 +70,7 @@ def trace(
         with progress() as update:
             found = tmsopt.trace(problem, pattern, step=step, starts=starts, seed=seed, progress=update)
     answer(as_json, found.to_json, lambda: tmsopt.report.trace_table(found))
+    write_report(found, report, file, seed=seed)
     if not found.branches:
         click.echo(f"no {found.pattern} found in the box; widen it, or try more --starts", err=True)
         raise SystemExit(3)

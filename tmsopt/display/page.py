@@ -26,18 +26,23 @@ _MARKS = {
 
 def page(result: Any) -> str:
     """The whole fragment."""
-    words = [*WRITERS[type(result).__name__].words(result)]
-    if isinstance(seconds := getattr(result, "seconds", None), float):
-        words.append(f"{seconds:.2g} s")
     name, title, rows = type(result).__name__, title_of(result), _rows(result)
     parts = [
         f"<div><strong>{escape(title or name)}</strong>{f' <small>{name}</small>' if title else ''}</div>",
-        f'<div style="margin:.4em 0">{"".join(map(_badge, words))}</div>',
+        f'<div style="margin:.4em 0">{badges(result)}</div>',
         _table(rows),
         _picture(result),
         f"<details{'' if rows else ' open'}><summary>report</summary><pre>{escape(report(result))}</pre></details>",
     ]
     return f'<div class="tmsopt">{"".join(parts)}</div>'
+
+
+def badges(result: Any) -> str:
+    """What it is and how it ended, a mark for each word."""
+    words = [*WRITERS[type(result).__name__].words(result)]
+    if isinstance(seconds := getattr(result, "seconds", None), float):
+        words.append(f"{seconds:.2g} s")
+    return " ".join(map(_badge, words))
 
 
 def _badge(word: str) -> str:

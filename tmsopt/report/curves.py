@@ -48,15 +48,20 @@ def domain_table(domain: Domain, problem: Problem | None = None) -> str:
         kinds = [f"{_said(model, arc.kind)} ({len(next(iter(arc.points.values())))} points)" for arc in arcs]
         lines.append(f"{name} is bounded by {', '.join(kinds) or 'nothing in the box'}")
     if domain.corners:
-        names = list(domain.corners[0].parameters)
-        names = [n for n in names if any(n in arc.points for arc in (*domain.stability, *domain.heavy_damping))]
-        units = {n: unit_of(problem, n) if problem else Unit() for n in names}
-        rows = [("corner", *(f"{n} {u.text}".rstrip() for n, u in units.items()))]
-        rows += [
-            (_said(model, c.name), *(u.number(c.parameters[n], 12) for n, u in units.items())) for c in domain.corners
-        ]
-        lines += ["", *columns(rows)]
+        lines += ["", *columns(corner_rows(domain, problem))]
     return "\n".join(line.rstrip() for line in lines)
+
+
+def corner_rows(domain: Domain, problem: Problem | None = None) -> list[tuple[str, ...]]:
+    """Headings, and the cells of each corner, to all digits."""
+    model = problem.model if problem else None
+    names = list(domain.corners[0].parameters) if domain.corners else []
+    names = [n for n in names if any(n in arc.points for arc in (*domain.stability, *domain.heavy_damping))]
+    units = {n: unit_of(problem, n) if problem else Unit() for n in names}
+    rows = [("corner", *(f"{n} {u.text}".rstrip() for n, u in units.items()))]
+    return rows + [
+        (_said(model, c.name), *(u.number(c.parameters[n], 12) for n, u in units.items())) for c in domain.corners
+    ]
 
 
 def swallowtail_table(found: Swallowtail) -> str:
@@ -108,7 +113,6 @@ def front_table(front: Front, full: bool = False) -> str:
     """
     problem = front.problem
     texts = [t.strip() for t in front.objectives]
-    free = [n for n in problem.free if n not in texts]
     count = f"{len(front)} point" + ("s" if len(front) != 1 else "")
     where = f", designs with {problem.locate}" if problem.locate else ""
     special = ((len(front.kinks), "kink"), (len(front.gaps), "gap"))
@@ -119,7 +123,19 @@ def front_table(front: Front, full: bool = False) -> str:
         f"{front.solved} sub-problems; {front.seconds:.2f} s",
         "",
     ]
-    units, digits = {n: unit_of(problem, n) for n in (*texts, *free)}, 12 if full else 6
+    rows = front_rows(front, full)
+    remarks = [f"gap: {gap.reason}" for gap in front.gaps] + [f"note: {note}" for note in front.notes]
+    labelled = [k for k, p in enumerate(front.points) if p.label]
+    height = HEIGHT - len(lines) - len(remarks) - 2 * bool(remarks) - 3
+    lines += columns(rows) if full else screen(rows, height, labelled, "--full, --csv")
+    return "\n".join(line.rstrip() for line in [*lines, *([""] if remarks else []), *remarks])
+
+
+def front_rows(front: Front, full: bool = False) -> list[tuple[str, ...]]:
+    """Headings, and the cells of each point; all digits and whole labels where it is `full`."""
+    texts = [t.strip() for t in front.objectives]
+    free = [n for n in front.problem.free if n not in texts]
+    units, digits = {n: unit_of(front.problem, n) for n in (*texts, *free)}, 12 if full else 6
     heads = {n: f"{n} {units[n].text}".rstrip() for n in units}
     rows = [(*(heads[t] for t in texts), "stable", "", *(heads[n] for n in free), "structure", "limits that bind")]
     for p in front.points:
@@ -127,11 +143,7 @@ def front_table(front: Front, full: bool = False) -> str:
         design = [units[n].number(p.solution.parameters[n], digits) for n in free]
         label = p.label if full or len(p.label) <= _LABEL else f"{p.label[: _LABEL - 1]}…"
         rows.append((*numbers, yes_no(p.stable), label, *design, p.structure, ", ".join(p.limits)))
-    remarks = [f"gap: {gap.reason}" for gap in front.gaps] + [f"note: {note}" for note in front.notes]
-    labelled = [k for k, p in enumerate(front.points) if p.label]
-    height = HEIGHT - len(lines) - len(remarks) - 2 * bool(remarks) - 3
-    lines += columns(rows) if full else screen(rows, height, labelled, "--full, --csv")
-    return "\n".join(line.rstrip() for line in [*lines, *([""] if remarks else []), *remarks])
+    return rows
 
 
 def trace_table(trace: Trace) -> str:
@@ -140,7 +152,7 @@ def trace_table(trace: Trace) -> str:
     lines = [trace.problem.title or "untitled problem", trace_headline(trace)]
     for number_, branch in enumerate(trace.branches, start=1):
         lines += ["", f"branch {number_}: {_summary(branch, trace)}"]
-        lines += _event_rows(branch, units, trace.problem.model)
+        lines += columns(event_rows(branch, units, trace.problem.model))
     return "\n".join(line.rstrip() for line in lines)
 
 
@@ -157,16 +169,17 @@ def branch_table(branch: Branch) -> str:
     """One branch with its events, in the free parameters."""
     form = "closed" if branch.closed else "open"
     lines = [f"{branch.pattern}: {len(branch)} points, {form}, coefficients met to {branch.residual:.0e}"]
-    lines += _event_rows(branch, dict.fromkeys((*branch.tangent, "abscissa"), Unit()))
+    lines += columns(event_rows(branch, dict.fromkeys((*branch.tangent, "abscissa"), Unit())))
     return "\n".join(line.rstrip() for line in lines)
 
 
-def _event_rows(branch: Branch, units: Mapping[str, Unit], model: Model | None = None) -> list[str]:
+def event_rows(branch: Branch, units: Mapping[str, Unit], model: Model | None = None) -> list[tuple[str, ...]]:
+    """Headings, and the cells of each event, to all digits, in these units."""
     rows = [("", *(f"{n} {unit.text}".rstrip() for n, unit in units.items()), "")]
     for event in branch.events:
         found = {**event.parameters, "abscissa": float(branch.abscissa[event.index])}
         rows.append((_said(model, event.name), *(u.number(found[n], 12) for n, u in units.items()), event.detail))
-    return columns(rows)
+    return rows
 
 
 def _summary(branch: Branch, trace: Trace) -> str:

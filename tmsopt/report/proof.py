@@ -23,7 +23,14 @@ def proof_text(problem: Problem, proof: Proof) -> str:
 
 
 def _numbers(problem: Problem, proof: Proof) -> list[str]:
-    """What was solved for, and the roots."""
+    """What was solved for, and the roots, under a heading where they are the stored design's."""
+    rows = number_rows(problem, proof)
+    head = ["", "the design as stored:"] if proof.stored and proof.reason else [""]
+    return [*head, *columns(rows), ""] if rows else [""]
+
+
+def number_rows(problem: Problem, proof: Proof) -> list[tuple[str, str, str, str]]:
+    """What was solved for, and the roots: name, decimal, radius, unit."""
     rows = []
     for name in proof.moved:
         unit = problem.parameter_set[name].unit
@@ -40,8 +47,7 @@ def _numbers(problem: Problem, proof: Proof) -> list[str]:
             rows.append((f"root{times}", *_cells(root.re), ""))
         elif not root.im.value.startswith("-"):
             rows += [(f"pair{times}, re", *_cells(root.re), ""), ("  im ±", *_cells(root.im), "")]
-    head = ["", "the design as stored:"] if proof.stored and proof.reason else [""]
-    return [*head, *columns(rows), ""] if rows else [""]
+    return rows
 
 
 def _place(problem: Problem, proof: Proof) -> list[str]:

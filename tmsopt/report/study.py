@@ -31,7 +31,7 @@ def study_table(study: Study, found: Summary, rows: Iterable[Row], full: bool = 
     title = study.title or study.problem.title or "untitled study"
     lines = [*textwrap.wrap(title, WIDTH), *textwrap.wrap(_headline(study, found), WIDTH, subsequent_indent="  "), ""]
     if listed:
-        cells = _row_cells(study, listed)
+        cells = study_rows(study, listed)
         lines += columns(cells) if full else screen(cells, _FIRST, more="--export rows.csv")
         lines += [f"  … {found.rows} rows in all; --export rows.csv writes them"] if found.rows > len(listed) else []
         lines.append("")
@@ -59,7 +59,8 @@ def _headline(study: Study, found: Summary) -> str:
     return f"{made}; {ended or 'none solved'}" + (f", {missing} not yet solved" if missing else "")
 
 
-def _row_cells(study: Study, rows: Sequence[Row]) -> list[tuple[str, ...]]:
+def study_rows(study: Study, rows: Sequence[Row]) -> list[tuple[str, ...]]:
+    """Headings, and the cells of each row, in the units in which the problem was written."""
     problem = study.problem
     free = [name for name in problem.free if name not in study.columns]
     text = problem.minimize or problem.maximize

@@ -76,7 +76,7 @@ def design_report(
     """
     found = found or Findings()
     scaled = si or si_parameters(solution)
-    parts = [p for p in _parts(solution, found, scaled, beside=si is not None) if p.lines or (full and p.rest)]
+    parts = [p for p in design_parts(solution, found, scaled, beside=si is not None) if p.lines or (full and p.rest)]
     title = _wrapped([solution.problem.title or "untitled problem"])[0]
     if full:
         return "\n".join([title, *(line for part in parts for line in _named(part))])
@@ -93,8 +93,14 @@ def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float
     return solution.parameters if own else to_si(solution.dimensionless, w, m_B, g)
 
 
-def _parts(solution: Solution, found: Findings, si: Mapping[str, float], beside: bool) -> Iterator[Block]:
-    """In the order of the report."""
+def design_parts(
+    solution: Solution, found: Findings, si: Mapping[str, float], beside: bool = False
+) -> Iterator[Block]:  # fmt: skip
+    """The parts of a report, in its order.
+
+    Args:
+        si: as `si_parameters` gives; shown beside the design's own where asked for.
+    """
     edge = found.robustness is not None and bool(found.robustness.edges)
     told, asked = headline(solution, edge)
     helps, notes = infeasible_lines(solution), [f"note: {note}" for note in solution.notes]
@@ -116,7 +122,7 @@ def _parts(solution: Solution, found: Findings, si: Mapping[str, float], beside:
     explained = found.explanation
     if explained is not None and explained.levers:
         head = "limits that bind, and what a small move of each buys (to first order; --full solves again):"
-        yield Block("limits", [head, *columns([_lever(solution, lever) for lever in explained.levers])],
+        yield Block("limits", [head, *columns([lever_cells(solution, lever) for lever in explained.levers])],
                    tuple(lever.sentence for lever in explained.levers), least=3)  # fmt: skip
     if explained is not None:
         yield Block("warnings", [f"warning: {text}" for text in explained.warnings])
@@ -237,7 +243,8 @@ def _stored(solution: Solution) -> Iterator[str]:
     yield "roots: " + (", ".join(roots_of(solution.roots, ALL)) or "none")
 
 
-def _lever(solution: Solution, lever: Lever) -> tuple[str, ...]:
+def lever_cells(solution: Solution, lever: Lever) -> tuple[str, ...]:
+    """A limit that binds: its name, what it says, a small move of it, and what that buys to first order."""
     limit = limit_text(solution.problem, lever.name)
     if not lever.step:
         return f"{lever.name}:", limit, "a physical end", ""

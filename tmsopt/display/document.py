@@ -1,0 +1,154 @@
+"""A result as one file to hand on: it needs no network and no script, and whoever reads it has no tmsopt."""
+
+import platform
+from collections.abc import Callable, Iterator, Mapping
+from datetime import UTC, datetime
+from html import escape
+from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files as resources
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+from tmsopt.disk import path_of, write_text
+from tmsopt.display import document_parts as parts
+from tmsopt.display.markup import Section, facts, verbatim, words
+from tmsopt.display.page import badges
+from tmsopt.display.writers import WRITERS, report, title_of
+from tmsopt.errors import Fault, InputError, short
+
+if TYPE_CHECKING:
+    from tmsopt.design import Solution
+
+ENDINGS = ("html", "htm")
+"""Of the name of a document."""
+
+_PARTS: Mapping[str, Callable[[Any], Iterator[Section]]] = {
+    "Chart": parts.of_chart, "Trace": parts.of_trace, "Front": parts.of_front, "Results": parts.of_results,
+}  # fmt: skip
+_VERSIONS = ("tmsopt", "casadi", "numpy")
+_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+"""Nothing is asked of any server, whatever the page holds."""
+
+
+def save_report(
+    result: Any, path: str | PathLike[str], *, command: str = "", files: Mapping[str, str] | None = None,
+    seed: int | None = None, full: bool = False, design: "Solution | None" = None,
+) -> None:  # fmt: skip
+    """Write a result as one page: the answer, pictures, tables, the explorer, the report as text, and where it is from.
+
+    Args:
+        path: ends in html or htm.
+        command: that found it, as typed.
+        files: name → text of what it was asked by.
+        seed: of the starts.
+        full: all there is to say: gains of limits solved again, every number of the report.
+        design: of a proof, what it was proved of: for its pictures and the explorer.
+
+    Raises:
+        InputError: for what is no result, or another ending.
+        OSError: when the file cannot be written.
+    """
+    if type(result).__name__ not in WRITERS:
+        raise InputError([Fault(f"found {short(result)}; accepted: a result, such as a solution", ("result",))])
+    place = path_of(path, "the file to write")
+    if place.suffix.lstrip(".").lower() not in ENDINGS:
+        raise InputError([Fault(f"found '{place}'; accepted: a file name ending in {', '.join(ENDINGS)}", ("path",))])
+    write_text(place, _document(result, command, files or {}, seed, full, design))
+
+
+def _document(
+    result: Any, command: str, files: Mapping[str, str], seed: int | None, full: bool, design: "Solution | None"
+) -> str:  # fmt: skip
+    """The whole page."""
+    name, title = type(result).__name__, words(title_of(result) or "untitled")
+    sections = [part for part in _sections(result, command, files, seed, full, design) if part.body]
+    links = " ".join(f'<a href="#{part.name}">{words(part.heading)}</a>' for part in sections)
+    body = "\n".join(part.markup for part in sections)
+    style, script = (resources("tmsopt.display").joinpath("document", f"document.{ending}") for ending in ("css", "js"))
+    return f"""<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{_POLICY}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<title>{title}</title>
+<link rel="icon" href="data:,">
+<style>
+{style.read_text(encoding="utf-8")}</style>
+</head>
+<body>
+<header>
+<h1>{title}</h1>
+<p class="badges">{badges(result)}</p>
+<nav aria-label="Parts of this {name.lower()}">{links}</nav>
+</header>
+<main>
+{body}
+</main>
+<script>
+{script.read_text(encoding="utf-8")}</script>
+</body>
+</html>
+"""
+
+
+def _sections(
+    result: Any, command: str, files: Mapping[str, str], seed: int | None, full: bool, design: "Solution | None"
+) -> Iterator[Section]:  # fmt: skip
+    match type(result).__name__:
+        case "Solution":
+            yield from parts.of_solution(result, full)
+        case "Proof":
+            yield from parts.of_proof(result, design)
+        case name:
+            yield from _PARTS.get(name, parts.of_other)(result)
+    yield Section("explorer", "Explorer", _explorer(_explored(result, design)), "whole")
+    text = verbatim(report(result, full), "report as text")
+    yield Section("text", "As text", f"<details><summary>The report as text</summary>{text}</details>", "whole")
+    yield Section("origin", "Where it is from", _origin(result, command, files, seed), "whole")
+
+
+def _explored(result: Any, design: "Solution | None") -> Any:
+    """What the explorer opens with: a design, else the problem."""
+    if type(result).__name__ == "Solution":
+        return result
+    holder = getattr(result, "study", result)
+    return design or getattr(holder, "problem", None) or next(iter(getattr(result, "solutions", ())), None)
+
+
+def _explorer(of: Any) -> str:
+    """The page that moves the design, in a frame from which nothing gets out; empty for what has none."""
+    if of is None:
+        return ""
+    from importlib import import_module
+
+    page_of = getattr(import_module("tmsopt.explorer"), "page_of", None)
+    if page_of is None:
+        return ""
+    return (
+        "<p>Move the parameters and see what the roots do; what is left of the imaginary axis dies out.</p>\n"
+        '<iframe title="Explorer of this problem" sandbox="allow-scripts allow-downloads" loading="lazy" '
+        f'srcdoc="{escape(page_of(of))}"></iframe>\n'
+        '<p class="print">The explorer is in the file itself, not on paper.</p>'
+    )
+
+
+def _origin(result: Any, command: str, files: Mapping[str, str], seed: int | None) -> str:
+    """Versions, system, date, seed, command and files."""
+    seed = getattr(getattr(result, "study", None), "seed", seed)
+    listed = [*((name, _version(name)) for name in _VERSIONS), ("Python", platform.python_version())]
+    when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    about = facts((
+        *listed, ("system", f"{platform.system()} {platform.machine()}".strip()), ("date", when),
+        ("seed", "" if seed is None else str(seed)),
+    ))  # fmt: skip
+    texts = {"command": command} | dict(files)
+    return about + "\n".join(f"<h3>{words(n)}</h3>\n{verbatim(text, n)}" for n, text in texts.items() if text)
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:  # of a checkout that was not installed
+        return ""

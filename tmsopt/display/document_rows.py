@@ -1,0 +1,127 @@
+"""Tables of a document that no report has as a whole: limits, points of a branch, designs of a grid, records."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import islice
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from tmsopt.design import Problem, unit_of
+from tmsopt.design.unit_system import limit_text
+from tmsopt.display.markup import Rows, paragraphs
+from tmsopt.guide import describe
+from tmsopt.models import in_words_of
+from tmsopt.roots import CLASSES
+
+if TYPE_CHECKING:
+    from tmsopt.charts import Chart
+    from tmsopt.design import Solution
+    from tmsopt.tracing import Trace
+
+T = TypeVar("T")
+Row = tuple[str, ...]
+
+MOST = 2000
+"""Rows of a table in a document."""
+
+_DIGITS = 6
+
+
+def thinned(rows: Sequence[T], name: str, whole: str, keep: Iterable[int] = ()) -> tuple[list[T], str]:
+    """At most `MOST` rows, spread evenly, and a paragraph that says so where some are left out.
+
+    Args:
+        whole: where all of them are.
+        keep: numbers of rows that stay.
+    """
+    if len(rows) <= MOST:
+        return [*rows], ""
+    chosen = {*np.linspace(0, len(rows) - 1, MOST).astype(int).tolist(), *keep}
+    kept = [rows[k] for k in sorted(chosen)]
+    return kept, paragraphs([f"{len(kept)} of {len(rows)} {name}, spread evenly; {whole}."])
+
+
+def range_rows(problem: Problem) -> Rows:
+    """Parameters of a problem: value or range as typed, what is physically possible, and the meaning."""
+    given = [w for of in describe(problem).sets for w in of.parameters]
+    heads = [("parameter", "value or range", "", "possible", "meaning")]
+    return heads + [(w.name, w.given, "free" if w.name in problem.free else "fixed", w.range, w.meaning) for w in given]
+
+
+def limit_rows(solution: "Solution") -> list[Row]:
+    """Constraints, and what else is violated: what each says, and whether it holds, binds or is violated."""
+    problem = solution.problem
+    others = [name for name in solution.violations if name not in problem.constraints]
+    rows: list[Row] = [("limit", "says", "stands")]
+    for name in (*problem.constraints, *others):
+        said = limit_text(problem, name) or ("pattern" if name == problem.locate else "")
+        rows.append((name, said, _stands(solution, name)))
+    return rows
+
+
+def _stands(solution: "Solution", name: str) -> str:
+    if name in solution.violations:
+        by = solution.violations[name]
+        return f"violated by {unit_of(solution.problem, name).show(by, 4)}" if math.isfinite(by) else "has no value"
+    return "binds" if name in solution.active else "holds"
+
+
+def point_rows(trace: "Trace") -> tuple[list[Row], str]:
+    """Points of all branches with their events, in the units of the problem."""
+    units = {n: unit_of(trace.problem, n) for n in (*trace.problem.free, "abscissa")}
+    heads = ("branch", *(f"{n} {u.text}".rstrip() for n, u in units.items()))
+    facts = ("kind", "stable", "heavily damped", "constraints", "event")
+    records = [*trace.records()]
+    marked = [k for k, record in enumerate(records) if record["event"]]
+    kept, note = thinned(records, "points", "tmsopt trace FILE --csv curve.csv writes all", marked)
+    rows: list[Row] = [(*heads, *facts)]
+    for record in kept:
+        numbers = (unit.number(record[n], _DIGITS) for n, unit in units.items())
+        said = (_cell(record[fact.replace(" ", "_")]) for fact in facts)
+        rows.append((str(record["branch"] + 1), *numbers, *said))
+    return rows, note
+
+
+def chart_rows(chart: "Chart") -> tuple[list[Row], str]:
+    """Designs of the grid, every so many along each axis where they are too many."""
+    problem, sizes = chart.problem, [len(values) for values in chart.grid]
+    step = next(k for k in range(1, max(sizes) + 1) if math.prod(-(-size // k) for size in sizes) <= MOST)
+    units = {n: unit_of(problem, n) for n in (*chart.axes, "abscissa")}
+    grid = np.meshgrid(*(values[::step] for values in reversed(chart.grid)), indexing="ij")
+    columns: dict[str, list[str]] = {
+        f"{n} {units[n].text}".rstrip(): [units[n].number(x, _DIGITS) for x in values.ravel().tolist()]
+        for n, values in zip(chart.axes, reversed(grid), strict=True)
+    }
+    left_out = () if len(problem.constraints) > len(chart.left_aside) else ("satisfied", "margin")
+    for name, layer in ((n, layer) for n, layer in chart.layers.items() if n not in left_out):
+        values = np.asarray(layer[(slice(None, None, step),) * len(sizes)]).ravel().tolist()
+        if name == "kind":
+            columns["class"] = [in_words_of(problem.model, CLASSES[k]) for k in values]
+        elif name == "abscissa":
+            columns[f"abscissa {units[name].text}".rstrip()] = [units[name].number(x, _DIGITS) for x in values]
+        else:
+            columns[name.replace("_", " ")] = [_cell(x) for x in values]
+    rows: list[Row] = [tuple(columns), *zip(*columns.values(), strict=True)]
+    all_of_them = math.prod(sizes)
+    note = f"{len(rows) - 1} of {all_of_them} designs, every {step}th along each axis; --output writes all."
+    return rows, paragraphs([note]) if step > 1 else ""
+
+
+def record_rows(result: Any) -> tuple[list[Row], str]:
+    """Records of a result as they are, numbers in rad and SI."""
+    records: list[Mapping[str, Any]] = [*islice(result.records(), MOST + 1)]
+    heads = [tuple(records[0])] if records else [("",)]
+    note = f"the first {MOST} rows." if len(records) > MOST else ""
+    return heads + [tuple(_cell(record.get(n, "")) for n in heads[0]) for record in records[:MOST]], paragraphs([note])
+
+
+def _cell(value: Any) -> str:
+    match value:
+        case None:
+            return ""
+        case bool():
+            return "yes" if value else "no"
+        case float():
+            return f"{value + 0.0:.{_DIGITS}g}" if math.isfinite(value) else "none"
+    return str(value)
