@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
@@ -14,8 +15,8 @@ from tmsopt.explorer.kernel import kernel_script
 from tmsopt.explorer.known import Known
 from tmsopt.explorer.subject import subject
 
+_COMMENT = re.compile(r"//.*|/\*\*.*\*/")
 _PARTS = "numerics state axes chart plane growth bicycle motion controls facts main"
-_QUARTIC = 4
 
 
 def html_of(problem: Problem, designs: Sequence[Known], model: Mapping[str, Any], trace_curves: bool) -> str:
@@ -24,7 +25,7 @@ def html_of(problem: Problem, designs: Sequence[Known], model: Mapping[str, Any]
     data = subject(problem, designs, script, model, trace_curves) | {"version": __version__}
     parts = [
         script.text,
-        *([kernel_script()] if problem.model.degree == _QUARTIC else []),
+        kernel_script(problem.model.degree),
         f"const DATA = {_json(data)};",
     ]
     parts += [_read(f"{name}.js") for name in _PARTS.split()]
@@ -40,7 +41,9 @@ def html_of(problem: Problem, designs: Sequence[Known], model: Mapping[str, Any]
 
 
 def _read(name: str) -> str:
-    return (files("tmsopt.explorer") / "page" / name).read_text(encoding="utf-8")
+    """A file of the page without what only its readers need: indentation, and lines that are comments."""
+    text = (files("tmsopt.explorer") / "page" / name).read_text(encoding="utf-8")
+    return "\n".join(line for part in text.splitlines() if (line := part.strip()) and not _COMMENT.fullmatch(line))
 
 
 def _json(data: Any) -> str:

@@ -4,6 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from tmsopt.checks.recheck import FEASIBLE
 from tmsopt.design import Problem, freedom, limit_of, unit_of
 from tmsopt.explorer.file_text import around
@@ -15,7 +17,7 @@ from tmsopt.roots.patterns.descriptions import in_words
 from tmsopt.tracing import domain, trace
 
 _STARTS = 8  # of traced curves: the tracer's grid shows what they miss
-_DIGITS = 6  # of a traced point: a chart has some 400 pixels
+_DIGITS, _POINTS = 6, 100  # of a traced point, and at most of a curve: a chart has some 400 pixels
 _SPEEDS, _TILT = ("v", "Fr"), "lambda_s"
 _USUAL = {"m": 0.5, "kg": 5.0, "kg m^2": 1.0, "rad": 0.5, "m/s": 5.0}
 """How far the slider of a fixed parameter that is 0 reaches, by its unit; 1 for others."""
@@ -151,4 +153,10 @@ def _curves(problem: Problem, plane: Sequence[str], start: Mapping[str, float]) 
 
 
 def _points(columns: Mapping[str, Array], plane: Sequence[str]) -> dict[str, list[float]]:
-    return {axis: [float(f"{v:.{_DIGITS}g}") for v in columns[n].tolist()] for axis, n in zip("xy", plane, strict=True)}
+    """A curve by some of its points, both ends among them."""
+    count = len(columns[plane[0]])
+    some = np.unique(np.linspace(0, count - 1, min(count, _POINTS)).round().astype(int))
+    return {
+        axis: [float(f"{v:.{_DIGITS}g}") for v in columns[n][some].tolist()]
+        for axis, n in zip("xy", plane, strict=True)
+    }

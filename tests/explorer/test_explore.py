@@ -1,0 +1,186 @@
+"""What a page is about, read from the page itself: designs, ranges, curves, the file that it saves, and its text as text."""
+
+import json
+import math
+import re
+import tomllib
+import webbrowser
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import tmsopt
+from tmsopt import laws
+from tmsopt.cli import main
+from tmsopt.explorer import page_of
+from tmsopt.roots import hurwitz_minors
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+PLAIN = [p for p in sorted(PROBLEMS.glob("*.toml")) if not p.name.startswith("study_")]
+HOSTILE = "</script><script>alert(1)</script>&<b>"
+
+
+def data_of(html: str) -> dict[str, Any]:
+    """What the page says of itself."""
+    found = re.search(r"^const DATA = (.*);$", html, re.MULTILINE)
+    assert found is not None
+    data: dict[str, Any] = json.loads(found[1])
+    return data
+
+
+def design(data: dict[str, Any], name: str) -> tuple[dict[str, float], dict[str, Any]]:
+    known = next(d for d in data["designs"] if d["name"] == name)
+    return dict(zip((p["name"] for p in data["parameters"]), known["values"], strict=True)), known
+
+
+@pytest.fixture(scope="module")
+def ep4() -> tmsopt.Explorer:
+    return tmsopt.explore(PROBLEMS / "ep4.toml")
+
+
+def test_it_opens_at_the_optimum(ep4: tmsopt.Explorer) -> None:
+    data = data_of(ep4.html)
+    values, optimum = design(data, "optimum")
+    assert ep4.solution is not None
+    assert values == dict(ep4.solution.parameters)
+    assert data["start"] == optimum["values"]
+    point = laws.ep4_chi_H_1(values["zeta_B"], values["zeta_H"])
+    assert values["lambda_s"] == pytest.approx(float(point.lambda_s), abs=1e-12)
+    ((re, im, times),) = optimum["roots"]
+    assert (re, im, times) == (pytest.approx(float(point.omega0), abs=1e-12), 0, 4)
+    assert any(fact.startswith("proof: ") for fact in optimum["facts"])
+
+
+def test_its_curves_are_the_boundaries(ep4: tmsopt.Explorer) -> None:
+    data = data_of(ep4.html)
+    names = [p["name"] for p in data["parameters"]]
+    held = dict(zip(names, data["held"], strict=True))
+    found = [c for c in data["curves"] if c["kind"] == "weave"]
+    assert found
+    for curve in found:
+        i, j = curve["axes"]
+        held |= {names[i]: np.array(curve["x"]), names[j]: np.array(curve["y"])}
+        minors = hurwitz_minors(tmsopt.models.tms.coefficients(held))
+        beside = hurwitz_minors(tmsopt.models.tms.coefficients(held | {names[i]: 1.01 * np.array(curve["x"])}))
+        assert np.abs(minors[2]).max() < 1e-3 * np.abs(beside[2]).max()  # points have six digits
+
+
+def test_the_benchmark_is_the_published_one(ep4: tmsopt.Explorer) -> None:
+    values, known = design(data_of(ep4.html), "benchmark")
+    bench = laws.bench
+    assert values["chi_B"] == pytest.approx(bench["x_B"] / bench["w"])
+    assert values["mu"] == pytest.approx(bench["m_H"] / bench["m_B"])
+    assert values["lambda_s"] == pytest.approx(bench["lambda_s"])
+    assert "pair" in known["structure"]
+
+
+def test_an_exceptional_point_is_found_beside_an_optimum_that_is_none() -> None:
+    page = tmsopt.explore(PROBLEMS / "least_speed.toml")
+    data = data_of(page.html)
+    values, known = design(data, "EP4")
+    a = tmsopt.models.tms.coefficients(values)
+    r = known["roots"][0][0]
+    assert [c / a[0] for c in a] == pytest.approx([math.comb(4, k) * (-r) ** k for k in range(5)], rel=1e-11)
+    assert design(data, "optimum")[1]["structure"] != known["structure"]
+
+
+@pytest.mark.parametrize("path", PLAIN, ids=lambda p: p.stem)
+def test_what_it_saves_is_the_same_system(path: Path, tmp_path: Path) -> None:
+    problem = tmsopt.load(path)
+    data = data_of(page_of(problem))
+    values = {p["name"]: p["value"] for p in data["parameters"]}
+    lines = "".join(f"{name} = {value!r}\n" for name, value in values.items())
+    saved = tmp_path / "saved.toml"
+    saved.write_text(data["toml"]["before"] + lines + data["toml"]["after"])
+    again = tmsopt.load(saved)
+    assert again.title == problem.title
+    assert again.constraints == problem.constraints
+    assert dict(again.fixed) == values
+    assert [*map(float, again.values(values).coefficients)] == [*map(float, problem.values(values).coefficients)]
+
+
+@pytest.mark.parametrize("path", PLAIN, ids=lambda p: p.stem)
+def test_sliders_reach_what_is_possible(path: Path) -> None:
+    problem = tmsopt.load(path)
+    for p in data_of(page_of(problem))["parameters"]:
+        assert p["low"] < p["high"]
+        assert p["low"] <= p["value"] <= p["high"]
+        if p["free"]:
+            assert (p["low"], p["high"]) == problem.free[p["name"]]
+        else:
+            known = problem.parameter_set[p["name"]].range
+            assert known.lower <= p["low"]
+            assert p["high"] <= known.upper
+        assert p["one"] > 0
+
+
+def test_a_front_is_left_for_its_first_objective() -> None:
+    page = tmsopt.explore(PROBLEMS / "pareto.toml")
+    asked = tmsopt.load(PROBLEMS / "pareto.toml").pareto
+    assert data_of(page.html)["objective"] == f"minimize {asked[0]}"
+
+
+def test_a_problem_that_asks_nothing_opens_in_the_middle() -> None:
+    page = tmsopt.explore(PROBLEMS / "chart.toml")
+    data = data_of(page.html)
+    assert page.solution is None
+    assert {p["name"]: p["value"] for p in data["parameters"] if p["free"]} == {
+        name: (low + high) / 2 for name, (low, high) in page.problem.free.items()
+    }
+    assert data["shown"]
+
+
+def test_titles_and_names_are_text() -> None:
+    problem = replace(tmsopt.load(PROBLEMS / "chart.toml"), title=HOSTILE)
+    page = tmsopt.explore(problem)
+    assert "alert(1)" not in re.sub(r"^const DATA = .*;$|<title>.*?</title>", "", page.html, flags=re.MULTILINE)
+    assert HOSTILE not in page.html
+    assert data_of(page.html)["title"] == HOSTILE
+    inside = page._repr_html_()
+    assert inside.count("<") == 2  # an iframe, whose page is the text of an attribute
+    assert 'sandbox="allow-scripts allow-downloads"' in inside
+
+
+def test_it_is_saved_whole_under_a_name_of_a_page(ep4: tmsopt.Explorer, tmp_path: Path) -> None:
+    ep4.save(tmp_path / "page.html")
+    assert (tmp_path / "page.html").read_text(encoding="utf-8") == ep4.html
+    with pytest.raises(tmsopt.InputError, match="html"):
+        ep4.save(tmp_path / "page.png")
+    assert repr(ep4).startswith("Explorer(")
+
+
+def test_a_solution_is_not_solved_again(monkeypatch: pytest.MonkeyPatch, ep4: tmsopt.Explorer) -> None:
+    assert ep4.solution is not None
+    again = tmsopt.explore(ep4.solution)
+    assert again.solution is ep4.solution
+    assert data_of(again.html)["designs"] == data_of(ep4.html)["designs"]
+
+
+def test_the_command_writes_a_page_beside_you(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shown: list[str] = []
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(webbrowser, "open", lambda url: bool(shown.append(url)) or True)
+    with pytest.raises(SystemExit) as ended:
+        main(["explore", str(PROBLEMS / "chart.toml"), "--open"])
+    assert ended.value.code == 0
+    assert shown == [(tmp_path / "chart.html").as_uri()]
+    assert data_of((tmp_path / "chart.html").read_text(encoding="utf-8"))["model"] == "tms"
+    assert "wrote chart.html" in capsys.readouterr().err
+
+
+def test_the_command_refuses_what_is_no_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["explore", str(PROBLEMS / "chart.toml"), "--output", str(tmp_path / "page.pdf")])
+    assert ended.value.code == 2
+    assert "html" in capsys.readouterr().err
+
+
+def test_the_file_of_a_stated_model_is_kept_as_typed() -> None:
+    page = tmsopt.explore(PROBLEMS / "coupled_pair.toml")
+    typed = tomllib.loads((PROBLEMS / "coupled_pair.toml").read_text(encoding="utf-8"))["model"]
+    assert tomllib.loads(data_of(page.html)["toml"]["before"])["model"] == typed
