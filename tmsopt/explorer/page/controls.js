@@ -36,10 +36,10 @@ function parameterSlider(k) {
   slider.addEventListener("keydown", (event) => {
     const way = {ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1}[event.key];
     held ||= !["Tab", "Shift", "Control"].includes(event.key);
-    if (!way || !event.shiftKey) return;
+    if (!way) return;
     event.preventDefault();
-    const finer = state.x[k] + (way * (high - low)) / (10 * SLIDER_STEPS);
-    change({x: [[k, Math.min(high, Math.max(low, finer))]]}, false);
+    const next = state.x[k] + (way * (high - low)) / (SLIDER_STEPS * (event.shiftKey ? 10 : 1));
+    change({x: [[k, Math.min(high, Math.max(low, next))]]}, false);
   });
   slider.addEventListener("keyup", () => held && release());
   slider.addEventListener("blur", () => held && release());

@@ -3,7 +3,7 @@
 const CLASS_WORDS = ["undefined", DATA.words.capsize, DATA.words.weave, "stable", "heavily damped"];
 
 /** Whether a class is stable. */
-function isStable(kind) {
+function isStableKind(kind) {
   return kind >= 3;
 }
 
@@ -51,8 +51,8 @@ function verdictPanel(host) {
     const exponent = `${figure(rate, 4)} t`;
     const ends = [withUnit(motion[0], DATA.rootUnit), known ? `${known.name}: ${known.structure}` : "", limitsInWords(y)];
     const rest = [`abscissa ${ends[0]}`, ...ends.slice(1)].filter(Boolean).join(" · ");
-    const mark = isStable(kind) ? "✓" : kind ? "✗" : "?";
-    badge.textContent = `${mark} ${isStable(kind) || !kind ? CLASS_WORDS[kind] : "unstable"}`;
+    const mark = isStableKind(kind) ? "✓" : kind ? "✗" : "?";
+    badge.textContent = `${mark} ${isStableKind(kind) || !kind ? CLASS_WORDS[kind] : "unstable"}`;
     badge.dataset.kind = kind;
     sentence.replaceChildren(words, ...(Number.isNaN(rate) ? [] : ["e", element("sup", {}, exponent)]));
     more.textContent = rest;
@@ -92,7 +92,10 @@ function marginInWords({equality, tolerance, unit, one}, margin, holds) {
 
 /** Roots as text, conjugates and multiple ones together. */
 function rootTexts({roots, known}) {
-  if (known?.roots.length) return known.roots.map(([re, im, n]) => rootText(re, im) + (n > 1 ? ` (${n}-fold)` : ""));
+  if (known?.roots.length) {
+    const upper = known.roots.filter((root) => root[1] >= 0);
+    return upper.map(([re, im, n]) => rootText(re, im) + (n > 1 ? ` (${n}-fold)` : ""));
+  }
   return [...roots.re.entries()].filter(([k]) => roots.im[k] >= 0).sort((p, q) => q[1] - p[1]).map(([k, re]) => rootText(re, roots.im[k]));
 }
 

@@ -170,8 +170,8 @@ function save() {
 
 /** Roots of a known design with their multiplicity, as often as they count: computed ones scatter where roots meet. */
 function knownRoots(design) {
-  const all = design.roots.flatMap(([re, im, multiplicity]) =>
-    Array.from({length: multiplicity}, () => (im ? [[re, im], [re, -im]] : [[re, 0]])).flat());
+  const upper = design.roots.filter((root) => root[1] >= 0);
+  const all = upper.flatMap(([re, im, multiplicity]) => Array(multiplicity).fill(im ? [[re, im], [re, -im]] : [[re, 0]]).flat());
   return {re: Float64Array.from(all, (root) => root[0]), im: Float64Array.from(all, (root) => root[1]), error: 0};
 }
 

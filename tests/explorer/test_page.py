@@ -1,0 +1,476 @@
+"""The page in Chromium: what it says is what the package computes, it needs nothing, and everybody can use it."""
+
+import json
+import math
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.browser import chromium, drawn, opened
+
+import tmsopt
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+NAMES = ("ep4", "whipple_ep4", "delivery_robot", "pt_pair", "three_masses")
+MARKUP = "<script>alert(1)</script><b>"
+HOSTILE = f"""title = "{MARKUP} /* script */ <!-- title -->"
+[model]
+name = "{MARKUP}"
+coefficients = ["1", "c", "k"]
+[parameters]
+c = {{ min = -1, max = 3 }}
+k = 1
+[objective]
+minimize = "abscissa"
+"""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def explorers(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[tmsopt.Explorer, Path]]:
+    folder = tmp_path_factory.mktemp("pages")
+    made = {}
+    for name in NAMES:
+        made[name] = tmsopt.explore(PROBLEMS / f"{name}.toml"), folder / f"{name}.html"
+        made[name][0].save(made[name][1])
+    return made
+
+
+@pytest.fixture(params=NAMES)
+def explored(request: pytest.FixtureRequest, explorers: Any) -> tuple[tmsopt.Explorer, Path]:
+    found: tuple[tmsopt.Explorer, Path] = explorers[request.param]
+    return found
+
+
+@pytest.fixture
+def ep4(explorers: Any) -> Path:
+    path: Path = explorers["ep4"][1]
+    return path
+
+
+def values_of(page: Any) -> list[float]:
+    """The parameters that the page shows, in SI."""
+    found: list[float] = page.evaluate("[...state.x]")
+    return found
+
+
+def verdict(page: Any) -> str:
+    text: str = page.locator("#verdict").inner_text()
+    return " ".join(text.split())
+
+
+def press(page: Any, name: str) -> None:
+    page.get_by_role("button", name=name, exact=True).click()
+    drawn(page)
+
+
+def typed(page: Any, name: str, text: str) -> None:
+    """A number into the field of a parameter."""
+    field = page.get_by_role("textbox", name=re.compile(rf"^{re.escape(name)}( in .*)?$"))
+    field.fill(text)
+    field.press("Enter")
+
+
+def parameters(page: Any) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = page.evaluate("DATA.parameters")
+    return found
+
+
+def kind(roots: np.ndarray) -> int:
+    """The class by the roots themselves, for designs away from all boundaries."""
+    real = np.abs(roots.imag) == 0
+    if roots.real.max() < 0:
+        return 4 if real.all() else 3
+    return 1 if (roots[real].real >= 0).any() else 2
+
+
+@pytest.mark.slow
+def test_names_are_given_once(ep4: Path) -> None:
+    """In one classic script the later of two functions of a name silently replaces the earlier."""
+    names = re.findall(r"^(?:async )?function (\w+)", ep4.read_text(), re.MULTILINE)
+    assert len(names) > 50
+    assert [n for n in names if names.count(n) > 1] == []
+
+
+@pytest.mark.slow
+def test_it_opens_without_a_fault(browser: Any, explored: Any) -> None:
+    explorer, path = explored
+    with opened(browser, path) as page:
+        of = explorer.problem.parameter_set.names
+        assert values_of(page) == [explorer.solution.parameters[n] for n in of]
+        assert verdict(page).startswith("✓" if explorer.solution.abscissa < 0 else "✗")
+        assert page.locator(".picture canvas").count() > 0
+        assert page.title() == explorer.problem.title
+
+
+@pytest.mark.slow
+def test_a_state_is_what_the_package_computes(browser: Any, explored: Any) -> None:
+    """Random designs by the number fields, free and fixed parameters alike."""
+    explorer, path = explored
+    problem, random = explorer.problem, np.random.default_rng(19)
+    compared = 0
+    with opened(browser, path) as page:
+        known = parameters(page)
+        for _ in range(12):
+            texts = [repr(random.uniform(p["low"], p["high"]) / p["one"]) for p in known]
+            for p, text in zip(known, texts, strict=True):
+                typed(page, p["name"], text)
+            drawn(page)
+            values = {p["name"]: float(t) * p["one"] for p, t in zip(known, texts, strict=True)}
+            assert values_of(page) == list(values.values())
+            of_python = problem.values(values)["structure"]
+            if not of_python.roots:
+                continue
+            mine = np.array([complex(r.re, r.im) for r in of_python.roots for _ in range(r.multiplicity)])
+            shown = page.evaluate("(() => { const d = drawingOf(); return [[...d.roots.re], [...d.roots.im], d.motion[0], d.kind]; })()")
+            theirs = np.array(shown[0]) + 1j * np.array(shown[1])
+            size = np.abs(mine).max()
+            assert max(np.abs(theirs - root).min() for root in mine) <= 1e-9 * size
+            assert shown[2] == pytest.approx(of_python.abscissa, abs=1e-9 * size)
+            assert shown[3] == kind(mine)
+            assert verdict(page).startswith("✓" if shown[3] >= 3 else "✗")
+            compared += 1
+    assert compared >= 6  # some bicycles have no roots, but most do
+
+
+@pytest.mark.slow
+def test_sliders_move_the_design(browser: Any, ep4: Path) -> None:
+    with opened(browser, ep4) as page:
+        first = next(k for k, p in enumerate(parameters(page)) if p["name"] == "Fr")
+        low, high = (parameters(page)[first][end] for end in ("low", "high"))
+        before, said = values_of(page), verdict(page)
+        slider = page.get_by_role("slider", name=re.compile("^Fr, "))
+        slider.focus()
+        slider.press("ArrowRight")
+        drawn(page)
+        assert values_of(page)[first] - before[first] == pytest.approx((high - low) / 1000, rel=1e-9)
+        coarse = values_of(page)[first]
+        slider.press("Shift+ArrowRight")
+        assert values_of(page)[first] - coarse == pytest.approx((high - low) / 10000, rel=1e-9)
+        slider.press("Home")
+        drawn(page)
+        assert values_of(page)[first] == low
+        assert verdict(page).startswith("✗ unstable")  # a bicycle that stands falls over
+        slider.press("End")
+        assert values_of(page)[first] == high
+        for _ in range(4):
+            page.keyboard.press("Control+z")
+        drawn(page)
+        assert values_of(page) == before
+        assert verdict(page) == said
+
+
+@pytest.mark.slow
+def test_a_drag_is_one_step(browser: Any, ep4: Path) -> None:
+    with opened(browser, ep4) as page:
+        before = values_of(page)
+        box = page.get_by_role("slider", name=re.compile("^Fr, ")).bounding_box()
+        across, down = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        page.mouse.move(across, down)
+        page.mouse.down()
+        for k in range(10):
+            page.mouse.move(across + 5 * k, down)
+        drawn(page)
+        assert page.locator("#said").inner_text() == ""  # a screen reader is spared what passes by
+        page.mouse.up()
+        drawn(page)
+        after = values_of(page)
+        assert after != before
+        page.keyboard.press("Control+z")
+        assert values_of(page) == before
+        page.keyboard.press("Control+Shift+z")
+        assert values_of(page) == after
+        page.keyboard.press("Control+z")
+        page.keyboard.press("Control+y")
+        assert values_of(page) == after
+
+
+@pytest.mark.slow
+def test_it_says_the_verdict_when_it_changes(browser: Any, ep4: Path) -> None:
+    with opened(browser, ep4) as page:
+        typed(page, "Fr", "0.1")
+        drawn(page)
+        said = page.locator("#said")
+        assert said.inner_text().startswith("unstable: ")
+        assert said.get_attribute("aria-live") == "polite"
+
+
+@pytest.mark.slow
+def test_it_goes_to_known_designs(browser: Any, explored: Any) -> None:
+    """There the roots are those that were found, with their multiplicity; and back again."""
+    _, path = explored
+    with opened(browser, path) as page:
+        start = values_of(page)
+        for design in page.evaluate("DATA.designs"):
+            press(page, design["name"])
+            assert values_of(page) == design["values"]
+            assert design["structure"] in verdict(page)
+            assert page.evaluate("drawingOf().motion[0]") == design["abscissa"]
+            assert page.evaluate("drawingOf().roots.re.length") == page.evaluate("MODEL.degree")
+            multiple = [n for _, im, n in design["roots"] if n > 1 and im >= 0]
+            assert page.locator(".roots").inner_text().count("-fold") == len(multiple)
+        press(page, "start")
+        assert values_of(page) == start
+
+
+@pytest.mark.slow
+def test_a_number_field_refuses_nonsense(browser: Any, ep4: Path) -> None:
+    with opened(browser, ep4) as page:
+        before = values_of(page)
+        field = page.get_by_role("textbox", name="Fr", exact=True)
+        for text in ("abc", "", "1e", "0x10", "NaN", "Infinity", "1 2", "1e999"):
+            typed(page, "Fr", text)
+            assert values_of(page) == before
+            assert field.get_attribute("aria-invalid") == "true"
+            assert page.locator(f"#{field.get_attribute('aria-describedby')}").inner_text()
+        field.press("Escape")
+        assert field.get_attribute("aria-invalid") == "false"
+        typed(page, "Fr", "2,5")
+        drawn(page)
+        assert 2.5 in values_of(page)
+        assert field.get_attribute("aria-invalid") == "false"
+        typed(page, "Fr", "25")  # beyond the file's range, and possible
+        drawn(page)
+        assert 25 in values_of(page)
+        assert page.get_by_role("slider", name=re.compile("^Fr, ")).input_value() == "1000"
+        assert "beyond" in page.locator(f"#{field.get_attribute('aria-describedby')}").inner_text()
+
+
+@pytest.mark.slow
+def test_a_link_restores_the_state(browser: Any, explored: Any) -> None:
+    _, path = explored
+    saved = "JSON.stringify([[...state.x], state.plane, state.over, state.layer])"
+    with opened(browser, path) as page:
+        assert page.evaluate("location.hash") in ("", "#")
+        for p in parameters(page)[:2]:
+            typed(page, p["name"], repr((p["low"] + p["high"]) / 3 / p["one"]))
+        page.get_by_role("combobox", name="across").select_option(index=1)
+        page.get_by_role("combobox", name="colours").select_option("damping")
+        page.locator("#growth").get_by_role("combobox", name="over").select_option(index=1)
+        drawn(page)
+        state, link = page.evaluate(saved), page.evaluate("location.hash").removeprefix("#")
+    with opened(browser, path, link=link) as page:
+        assert page.evaluate(saved) == state
+        assert page.locator("#note").inner_text() == ""
+        page.evaluate("location.hash = ''")
+        drawn(page)
+        assert page.evaluate("fragmentOf(state)") == ""
+        page.keyboard.press("Control+z")
+        assert page.evaluate(saved) == state
+
+
+@pytest.mark.slow
+def test_what_a_link_says_wrongly_is_ignored_and_said(browser: Any, ep4: Path) -> None:
+    wrong = ["nobody=1", "Fr=abc", ".axes=Fr,Fr", ".axes=Fr", ".layer=toString", ".over=x", "%E0%A4%A=1", "<b>=1", "Fr=1e999"]
+    with opened(browser, ep4, link="&".join(["chi_B=1.75", *wrong, ".over=mu"])) as page:
+        start, names = page.evaluate("DATA.start"), [p["name"] for p in parameters(page)]
+        start[names.index("chi_B")] = 1.75
+        assert values_of(page) == start
+        assert page.evaluate("DATA.parameters[state.over].name") == "mu"
+        note = page.locator("#note").inner_text()
+        assert all(part.split("%")[0] in note for part in wrong)
+
+
+@pytest.mark.slow
+def test_the_link_is_copied_or_shown(browser: Any, ep4: Path) -> None:
+    with opened(browser, ep4) as page:
+        typed(page, "Fr", "3.25")
+        page.evaluate("Object.defineProperty(navigator, 'clipboard', {value: undefined, configurable: true})")
+        press(page, "copy link")
+        assert page.get_by_role("textbox", name="link").input_value() == f"{ep4.resolve().as_uri()}#Fr=3.25"
+        press(page, "close")
+        page.evaluate("Object.defineProperty(navigator, 'clipboard', {value: {writeText: async (text) => (window.copied = text)}})")
+        press(page, "copy link")
+        assert page.evaluate("copied").endswith("#Fr=3.25")
+        assert page.locator("#note").inner_text() == "Link copied."
+
+
+@pytest.mark.slow
+def test_a_saved_design_is_solved(browser: Any, explored: Any, tmp_path: Path) -> None:
+    """With the parameters of the page, to the last digit but one."""
+    _, path = explored
+    with opened(browser, path) as page:
+        for p in parameters(page)[:3]:
+            typed(page, p["name"], repr((p["low"] + 2 * p["high"]) / 3 / p["one"]))
+        drawn(page)
+        with page.expect_download() as waiting:
+            page.get_by_role("button", name="save design").click()
+        name, values = waiting.value.suggested_filename, values_of(page)
+        assert re.fullmatch(r"[a-z0-9-]+\.toml", name)
+        waiting.value.save_as(tmp_path / name)
+        names = [p["name"] for p in parameters(page)]
+    problem = tmsopt.load(tmp_path / name)
+    assert not problem.free
+    assert [problem.fixed[n] for n in names] == [pytest.approx(v, rel=1e-15, abs=0) for v in values]
+    command = [sys.executable, "-m", "tmsopt", "solve", str(tmp_path / name), "--json"]
+    solved = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert solved.returncode in (0, 3), solved.stderr  # 3: a limit is violated, which is an answer
+    assert json.loads(solved.stdout)
+
+
+@pytest.mark.slow
+def test_text_is_no_markup(browser: Any, tmp_path: Path) -> None:
+    (tmp_path / "hostile.toml").write_text(HOSTILE)
+    explorer = tmsopt.explore(tmp_path / "hostile.toml")
+    meaning = '"meaning":"\\u003cimg src=x onerror=alert(1)\\u003e"'
+    changed = explorer.html.replace('"meaning":"parameter"', meaning)
+    assert changed.count(meaning) == 2
+    (tmp_path / "hostile.html").write_text(changed)
+    with opened(browser, tmp_path / "hostile.html") as page:
+        assert page.locator("h1").inner_text() == f"{MARKUP} /* script */ <!-- title -->"
+        assert page.title() == f"{MARKUP} /* script */ <!-- title -->"
+        assert page.locator("#about").inner_text() == MARKUP
+        assert page.locator("img").count() == 0
+        assert "<img src=x onerror=alert(1)>" in page.locator("#controls").inner_text()
+        assert page.evaluate("document.querySelectorAll('script').length") == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [400, 1280])
+def test_it_is_accessible(browser: Any, explored: Any, scheme: str, width: int) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
+    _, path = explored
+    with opened(browser, path, width=width, color_scheme=scheme) as page:
+        typed_wrong = page.get_by_role("textbox").first
+        typed_wrong.fill("wrong")
+        typed_wrong.press("Enter")
+        found = axe.Axe().run(page, options={"runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"]})
+        assert [(v["id"], [n["target"] for n in v["nodes"]]) for v in found.response["violations"]] == []
+        assert len(found.response["passes"]) > 10
+
+
+@pytest.mark.slow
+def test_the_theme_is_that_of_the_system_until_one_is_chosen(browser: Any, ep4: Path) -> None:
+    with opened(browser, ep4, color_scheme="dark") as page:
+        ground = "getComputedStyle(document.body).backgroundColor"
+        dark = page.evaluate(ground)
+        page.emulate_media(color_scheme="light")
+        drawn(page)
+        light = page.evaluate(ground)
+        assert light != dark
+        press(page, "theme: auto")
+        assert page.evaluate(ground) == dark
+        press(page, "theme: dark")
+        assert page.evaluate(ground) == light
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [400, 1280, 2500])
+def test_nothing_needs_scrolling_sideways(browser: Any, explored: Any, width: int, tmp_path: Path) -> None:
+    explorer, path = explored
+    long = tmp_path / "long.html"
+    long.write_text(path.read_text().replace(f'"title":{json.dumps(explorer.problem.title, ensure_ascii=False)}', f'"title":"{"W" * 200}"'))
+    for shown in (path, long):
+        with opened(browser, shown, width=width) as page:
+            page.evaluate("document.querySelectorAll('details').forEach((d) => (d.open = true))")
+            drawn(page)
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+            slider = page.get_by_role("slider").first
+            slider.scroll_into_view_if_needed()
+            box = slider.bounding_box()
+            on_top = page.evaluate("([x, y]) => document.elementFromPoint(x, y).type", [box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
+            assert on_top == "range"  # nothing lies over it
+            page.screenshot(path=tmp_path / f"{width}.png", full_page=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [400, 1280])
+def test_targets_are_large_enough_for_fingers(browser: Any, ep4: Path, width: int) -> None:
+    with opened(browser, ep4, width=width, has_touch=True) as page:
+        boxes = page.evaluate(
+            "[...document.querySelectorAll('button, select, input, summary')].map((e) => [e.outerHTML, e.getBoundingClientRect()])"
+            ".filter(([, b]) => b.width).map(([text, b]) => [text, b.width, b.height])"
+        )
+        assert [b for b in boxes if min(b[1:]) < 24] == []
+        main = [b for b in boxes if re.search(r"undo|copy link|save design|go to ", b[0])]
+        assert len(main) >= 4
+        assert [b for b in main if min(b[1:]) < 44] == []
+
+
+@pytest.mark.slow
+def test_it_works_in_a_sandbox(browser: Any, explorers: Any, tmp_path: Path) -> None:
+    """As in a notebook, where it has no address, no storage and no history."""
+    explorer, _ = explorers["ep4"]
+    (tmp_path / "notebook.html").write_text(f"<!DOCTYPE html><title>notebook</title>{explorer._repr_html_()}")
+    with opened(browser, tmp_path / "notebook.html") as host:
+        frame = host.frames[1]
+        said = frame.locator("#verdict").inner_text()
+        frame.get_by_role("button", name="benchmark", exact=True).click()
+        drawn(frame)
+        assert frame.locator("#verdict").inner_text() != said
+        frame.get_by_role("button", name="undo (Ctrl+Z)").click()
+        drawn(frame)
+        assert frame.locator("#verdict").inner_text() == said
+        frame.get_by_role("button", name="copy link").click()
+        assert "no address" in frame.locator("#note").inner_text()
+        with host.expect_download() as waiting:
+            frame.get_by_role("button", name="save design").click()
+        assert tmsopt.load(waiting.value.path().rename(tmp_path / "saved.toml")).fixed == explorer.solution.parameters
+
+
+@pytest.mark.slow
+def test_a_picture_that_fails_says_so_alone(browser: Any, ep4: Path) -> None:
+    faults: list[str] = []
+    with opened(browser, ep4, faults=faults) as page:
+        page.evaluate("() => { survey = () => { throw new Error('out of paper'); }; }")
+        typed(page, "chi_B", "1.5")
+        drawn(page)
+        assert "out of paper" in page.locator("#chart .message").inner_text()
+        assert page.locator("#plane .message:visible").count() == 0
+        assert 1.5 in values_of(page)
+    assert len(faults) == 1
+    assert "out of paper" in faults[0]
+
+
+@pytest.mark.slow
+def test_limits_are_lit(browser: Any, explorers: Any) -> None:
+    """Sign, words and margin of each limit against the problem's own judgement."""
+    explorer, path = explorers["delivery_robot"]
+    problem, random = explorer.problem, np.random.default_rng(20)
+    with opened(browser, path) as page:
+        for _ in range(8):
+            values = dict(explorer.solution.parameters)
+            for p in parameters(page):
+                if p["free"]:
+                    values[p["name"]] = random.uniform(p["low"], p["high"])
+            page.evaluate("(x) => change({x: [...x.entries()]})", [values[p["name"]] for p in parameters(page)])
+            drawn(page)
+            read = problem.values(values)
+            margins = {"steer_arm": abs(read["u_H"]) - 0.02, "rear_wheel_holds": read["N_R"] - 20, "front_wheel_holds": read["N_F"] - 20}
+            for name, margin in margins.items():
+                row = page.locator("#limits li", has=page.get_by_text(name, exact=True))
+                assert row.get_attribute("class") == ("holds" if margin >= 0 else "broken")
+                shown = re.search(r"(holds|violated) by ([\d.]+)", row.inner_text().replace("·10", "e"))
+                assert shown is not None
+                scale = 100 if name == "steer_arm" else 1  # in cm, as the file has lengths
+                assert float(shown[2]) == pytest.approx(abs(margin) * scale, rel=1e-4)
+
+
+@pytest.mark.slow
+def test_quantities_are_those_of_the_package(browser: Any, explored: Any) -> None:
+    explorer, path = explored
+    with opened(browser, path) as page:
+        for p in parameters(page):
+            if p["free"]:
+                typed(page, p["name"], repr((2 * p["low"] + p["high"]) / 3 / p["one"]))
+        drawn(page)
+        names, values = [p["name"] for p in parameters(page)], values_of(page)
+        read = explorer.problem.values(dict(zip(names, values, strict=True)))
+        shown = page.evaluate("[...document.querySelectorAll('#quantities td.value')].map((cell) => cell.textContent)")
+        computed = page.evaluate("[...drawingOf().y].map(String)")[: len(shown)]
+        for quantity, value, text in zip(page.evaluate("DATA.quantities"), computed, shown, strict=True):
+            expected = float(read[quantity["name"]])
+            found = float(value.replace("Infinity", "inf"))
+            assert found == pytest.approx(expected, rel=1e-8, abs=1e-12, nan_ok=True), quantity["name"]
+            assert (text == "none") == math.isnan(expected)
