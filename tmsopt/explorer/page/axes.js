@@ -154,6 +154,11 @@ function plotIn(box, [left, right], [bottom, top]) {
   };
 }
 
+/** Where the plot of a canvas stands, in pixels of the page, for whoever looks from outside. */
+function tellPlot(canvas, { x0, y0, width, height }) {
+  canvas.dataset.plot = [x0, y0, width, height].join(" ");
+}
+
 /** Draw with the plot's box as the limit of what is seen. */
 function clipped(context, plot, draw) {
   context.save();
@@ -175,7 +180,7 @@ function drawAxes(context, plot, x, y, colours) {
     context.stroke();
   };
   context.textAlign = "center";
-  for (const tick of ticksBetween(plot.left / x.one, plot.right / x.one, width / 75)) {
+  for (const tick of ticksBetween(plot.left / x.one, plot.right / x.one, width / 60)) {
     const at = Math.round(plot.x(tick * x.one)) + 0.5;
     line(at, y0 + height, at, y0 + height + 4);
     if (x.label) context.fillText(figure(tick, 12), at, y0 + height + 13);

@@ -51,7 +51,7 @@ function bicycleLines(shape, travelled) {
     { front: true, kind: "fork", points: [front ? frontHub : contact, onAxis(alongAxis(front ? frontHub : contact)), onAxis(0.9 * tall)] },
     { front: true, kind: "fork", points: [onAxis(alongAxis(H)), H] },
     { front: true, kind: "fork", points: [-0.16, 0.16].map((side) => onAxis(0.9 * tall).map((value, k) => (k === 1 ? side * w : value))) },
-    { front: false, kind: "axis", points: [onAxis(-0.16 * w), onAxis(1.04 * tall)] },
+    { front: false, kind: "axis", points: [onAxis(-0.07 * w), onAxis(1.04 * tall)] },
   ];
   const wheels = [[hub, rear, false], [frontHub, front, true]];
   for (const [centre, radius, ofFront] of wheels) {
@@ -145,7 +145,7 @@ function bicyclePicture(host) {
     return {
       left: Math.min(-rear, B[0], H[0], over, -0.15 * w) - 0.08 * w,
       right: Math.max(w + front, B[0], H[0], meets[0], over, 1.15 * w) + 0.08 * w,
-      side: Math.max(0.36 * w, 0.45 * top), tallest: 1.16 * top + 0.1 * w,
+      side: Math.max(0.36 * w, 0.45 * top), tallest: 1.1 * top + 0.06 * w,
     };
   }
 

@@ -33,7 +33,7 @@ function bandsOf(values) {
   // poles of the abscissa must not take all colours
   const high = known.length ? Math.max(0, known[Math.floor(0.95 * (known.length - 1))]) : 0;
   const step = (reach) => {
-    const [first, second] = ticksBetween(0, reach || 1, 6);
+    const [first, second] = ticksBetween(0, reach || 1, 8);
     return second - first || 1;
   };
   const [down, up] = [step(-low), step(high)];
@@ -153,6 +153,7 @@ function chartPicture(host) {
     const { bands } = shaded;
     const head = state.layer === "kind" ? 8 : 50;
     plot = plotIn({ x0: 60, y0: head, width: width - 72, height: height - head - 42 }, rangeOf(i), rangeOf(j));
+    tellPlot(surface.canvas, plot);
     clipped(context, plot, () => {
       // a design stands at the middle of its pixel: the first and the last reach half a pixel beyond the ends
       const [dx, dy] = [plot.width / (CHART_POINTS - 1), plot.height / (CHART_POINTS - 1)];

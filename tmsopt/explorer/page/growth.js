@@ -228,6 +228,7 @@ function growthPicture(host) {
       plotIn({ ...inner, y0: 36, height: upper }, sweep.ends, growths),
       plotIn({ ...inner, y0: 36 + upper + 14, height: height - 92 - upper }, sweep.ends, [0, highest]),
     ];
+    tellPlot(surface.canvas, plots[0]);
     const events = sweep.events;
     plots.forEach((plot, lower) => {
       const value = (point) => (lower ? point.frequency : point.growth);

@@ -1,0 +1,267 @@
+"""The pictures of the page in Chromium: what they show is what the package computes, and hands can move it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.browser import chromium, drawn, opened
+
+import tmsopt
+
+pytestmark = pytest.mark.slow
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+GRID = 200
+
+POLE = """title = "A root at infinity"
+[model]
+coefficients = ["a", "1", "b"]
+[parameters]
+a = { min = -1, max = 1 }
+b = { min = -1, max = 1 }
+"""
+
+ALONE = """title = "One parameter"
+[model]
+coefficients = ["1", "b", "1"]
+[parameters]
+b = { min = -1, max = 3 }
+"""
+
+SWATCHES = """() => Object.fromEntries([...document.querySelectorAll("#chart .legend li")].map((item) => {
+  const canvas = item.querySelector("canvas");
+  const at = canvas.getContext("2d").getImageData(canvas.width / 2, canvas.height / 4, 1, 1).data;
+  return [[...at].slice(0, 3).join(), item.textContent];
+}))"""
+
+PIXELS = """(grid) => {
+  const canvas = document.querySelector("#chart canvas");
+  const [x0, y0, width, height] = canvas.dataset.plot.split(" ").map(Number);
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  return Array.from({ length: grid * grid }, (_, k) => {
+    const x = Math.floor(x0 + (width * (k % grid)) / (grid - 1));
+    const y = Math.floor(y0 + height - (height * Math.floor(k / grid)) / (grid - 1));
+    const at = 4 * (Math.min(y, canvas.height - 1) * canvas.width + x);
+    return [...data.slice(at, at + 3)].join();
+  });
+}"""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as started:
+        yield started
+
+
+def saved(problem: Any, tmp_path: Path) -> Path:
+    path = tmp_path / "page.html"
+    tmsopt.explore(problem).save(path)
+    return path
+
+
+def stated(text: str, tmp_path: Path) -> Path:
+    path = tmp_path / "stated.toml"
+    path.write_text(text)
+    return saved(path, tmp_path)
+
+
+def plot_of(page: Any, panel: str) -> tuple[Any, Any]:
+    """The corner and the size of a plot, in pixels of the window."""
+    canvas = page.locator(f"#{panel} canvas").first
+    canvas.scroll_into_view_if_needed()
+    box = canvas.bounding_box()
+    x0, y0, width, height = map(float, canvas.get_attribute("data-plot").split())
+    return np.array([box["x"] + x0, box["y"] + y0]), np.array([width, height])
+
+
+def wait_until(page: Any, condition: str) -> None:
+    """Ten seconds at most; the page forbids the text that Playwright's own way would run."""
+    for _ in range(200):
+        if page.evaluate(condition):
+            return
+        page.wait_for_timeout(50)
+    pytest.fail(f"never came: {condition}")
+
+
+def uniform(kind: Any) -> Any:
+    """Where a design of a grid is of one class with all eight around it."""
+    same = np.zeros(kind.shape, dtype=bool)
+    around = [kind[1 + i : kind.shape[0] - 1 + i, 1 + j : kind.shape[1] - 1 + j] for i in (-1, 0, 1) for j in (-1, 0, 1)]
+    same[1:-1, 1:-1] = np.all([part == around[4] for part in around], axis=0)
+    return same
+
+
+@pytest.mark.parametrize("name", ["chart", "ep_set"])
+def test_colours_of_the_chart_are_the_classes_of_the_same_designs(browser: Any, tmp_path: Path, name: str) -> None:
+    """What a reader takes from the picture and its legend, against `tmsopt.chart`; without what is drawn above."""
+    page_path = saved(PROBLEMS / f"{name}.toml", tmp_path)
+    with opened(browser, page_path) as page:
+        page.evaluate("DATA.curves.length = DATA.designs.length = 0; change({ x: state.plane.map((k) => [k, rangeOf(k)[0]]) })")
+        drawn(page)
+        words, pixels = page.evaluate(SWATCHES), page.evaluate(PIXELS, GRID)
+        start = dict(zip(*page.evaluate("[DATA.parameters.map(({ name }) => name), [...state.x]]"), strict=True))
+        axes = page.evaluate("state.plane.map((k) => DATA.parameters[k].name)")
+    problem = tmsopt.load(PROBLEMS / f"{name}.toml")
+    plane = tmsopt.Problem(
+        model=problem.model, fixed={n: v for n, v in start.items() if n not in axes},
+        free={n: problem.free[n] for n in axes},
+    )  # fmt: skip
+    found = tmsopt.chart(plane, axes, points=(GRID, GRID), layers=["kind"], boundaries=False)
+    codes = {"undefined": 0, "unstable by capsize": 1, "unstable by weave": 2, "stable": 3}
+    codes["heavily damped (stable, nothing swings)"] = 4
+    seen = np.array([codes.get(words.get(pixel, ""), -1) for pixel in pixels]).reshape(GRID, GRID)
+    inner = uniform(found.kind)
+    inner[:, :6] = inner[:6, :] = inner[:, -2:] = inner[-2:, :] = False  # the design's ring and the frame
+    assert inner.mean() > 0.85
+    assert len(np.unique(found.kind[inner])) >= 3
+    assert np.array_equal(seen[inner], found.kind[inner])
+
+
+def test_a_drag_on_the_chart_sets_the_parameters_of_its_place_in_one_step(browser: Any, tmp_path: Path) -> None:
+    with opened(browser, saved(PROBLEMS / "chart.toml", tmp_path)) as page:
+        before = page.evaluate("[...state.x]")
+        i, j = page.evaluate("state.plane")
+        (low_i, high_i), (low_j, high_j) = page.evaluate("state.plane.map(rangeOf)")
+        corner, size = plot_of(page, "chart")
+        for share in ([0.2, 0.3], [0.25, 0.5], [0.75, 0.4]):
+            page.mouse.move(*(corner + np.array(share) * size))
+            if share[0] == 0.2:
+                page.mouse.down()
+        page.mouse.up()
+        drawn(page)
+        after = page.evaluate("[...state.x]")
+        # a pointer stands on whole pixels, and there are more than 200 of them along each axis
+        assert after[i] == pytest.approx(low_i + 0.75 * (high_i - low_i), abs=0.005 * (high_i - low_i))
+        assert after[j] == pytest.approx(low_j + 0.6 * (high_j - low_j), abs=0.005 * (high_j - low_j))
+        assert [x for k, x in enumerate(after) if k not in (i, j)] == [x for k, x in enumerate(before) if k not in (i, j)]
+        page.evaluate("undo()")
+        assert page.evaluate("[...state.x]") == before
+
+
+def test_arrow_keys_move_the_design_over_the_grid(browser: Any, tmp_path: Path) -> None:
+    with opened(browser, saved(PROBLEMS / "chart.toml", tmp_path)) as page:
+        before = np.array(page.evaluate("state.plane.map((k) => state.x[k])"))
+        steps = np.array([(high - low) / (GRID - 1) for low, high in page.evaluate("state.plane.map(rangeOf)")])
+        page.locator("#chart canvas").first.focus()
+        for key in ("ArrowRight", "ArrowRight", "Shift+ArrowDown"):
+            page.keyboard.press(key)
+        after = np.array(page.evaluate("state.plane.map((k) => state.x[k])"))
+        np.testing.assert_allclose(after, before + [2, -10] * steps, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["whipple_benchmark", "ep4"])
+def test_events_are_the_speeds_of_the_package(browser: Any, tmp_path: Path, name: str) -> None:
+    """Bisected signs, against exact roots of polynomials in the speed; real roots that meet only, as the page marks them."""
+    explorer = tmsopt.explore(PROBLEMS / f"{name}.toml")
+    explorer.save(tmp_path / "page.html")
+    with opened(browser, tmp_path / "page.html") as page:
+        events = page.evaluate("growthEvents(state)")
+        over, low, high = page.evaluate("[DATA.parameters[state.over].name, ...rangeOf(state.over)]")
+    assert explorer.solution is not None
+    truth = tmsopt.speeds(explorer.solution, over, between=(low, high))
+    changes = [(c.kind, c.at) for c in truth.found if c.changes and c.kind in ("weave", "capsize")]
+    assert changes
+    found = [(e["kind"], e["at"]) for e in events if e["kind"] in ("weave", "capsize")]
+    assert [kind for kind, _ in found] == [kind for kind, _ in changes]
+    np.testing.assert_allclose([at for _, at in found], [at for _, at in changes], rtol=1e-6)
+    # at an EP4 of doubles the place of the meeting moves by the fourth root of a rounding
+    meetings = [c.at for c in truth.exceptional if c.root.im == 0]
+    np.testing.assert_allclose([e["at"] for e in events if e["kind"] == "meeting"], meetings, rtol=1e-3)
+
+
+def test_the_line_of_the_growth_plot_can_be_dragged_and_moved_by_keys(browser: Any, tmp_path: Path) -> None:
+    with opened(browser, saved(PROBLEMS / "whipple_benchmark.toml", tmp_path)) as page:
+        low, high = page.evaluate("rangeOf(state.over)")
+        corner, size = plot_of(page, "growth")
+        page.mouse.move(*(corner + [0.5, 0.5] * size))
+        page.mouse.down()
+        page.mouse.move(*(corner + [0.25, 0.5] * size))
+        page.mouse.up()
+        dragged = page.evaluate("state.x[state.over]")
+        assert dragged == pytest.approx(low + 0.25 * (high - low), abs=0.005 * (high - low))
+        page.locator("#growth canvas").first.focus()
+        page.keyboard.press("ArrowRight")
+        assert page.evaluate("state.x[state.over]") == pytest.approx(dragged + (high - low) / 200, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["ep4", "delivery_robot", "whipple_ep4"])
+def test_the_bicycle_is_to_scale_and_moves_as_a_body(browser: Any, tmp_path: Path, name: str) -> None:
+    """The distance of H from the drawn axis is the quantity of the model; leaning and steering keep all distances."""
+    explorer = tmsopt.explore(PROBLEMS / f"{name}.toml")
+    explorer.save(tmp_path / "page.html")
+    assert explorer.solution is not None
+    values = explorer.problem.values(explorer.solution.parameters)
+    with opened(browser, tmp_path / "page.html") as page:
+        H, foot, on_axis, moved, B, leaned = np.array(page.evaluate("""() => {
+            const shape = bicycleShape(state.x);
+            const [foot, axis] = [shape.onAxis(shape.alongAxis(shape.H)), shape.onAxis(0.3)];
+            return [shape.H, foot, axis, movedPoint(shape, axis, true, 0, 0.4), shape.B, movedPoint(shape, shape.B, false, 0.2, 0.4)];
+        }"""))  # fmt: skip
+        turned = np.array(page.evaluate("movedPoint(bicycleShape(state.x), bicycleShape(state.x).H, true, 0, 0.4)"))
+        wheel = np.array(page.evaluate("movedPoint(bicycleShape(state.x), [10, 0, 0], true, 0, 0.1)"))
+    arm = values["u_H" if "u_H" in values else "nu_H"]
+    assert np.linalg.norm(H - foot) == pytest.approx(abs(arm), rel=1e-12)
+    np.testing.assert_allclose(moved, on_axis, atol=1e-12)  # steering moves nothing on its axis
+    assert np.linalg.norm(turned - foot) == pytest.approx(abs(arm), rel=1e-12)
+    assert np.linalg.norm(leaned) == pytest.approx(np.linalg.norm(B), rel=1e-12)
+    assert leaned[1] > 0  # a lean to the right, of what stands above the ground
+    assert wheel[1] > 0  # a steer to the right
+
+
+def test_motion_waits_where_the_reader_wants_none(browser: Any, tmp_path: Path) -> None:
+    path = saved(PROBLEMS / "whipple_benchmark.toml", tmp_path)
+    with opened(browser, path, reduced_motion="reduce") as page:
+        page.wait_for_timeout(1200)
+        assert page.evaluate("clock.time") == 0
+        page.get_by_role("button", name="Play", exact=True).click()
+        wait_until(page, "clock.time > 0.2")
+        page.get_by_role("button", name="Pause", exact=True).click()
+        paused = page.evaluate("clock.time")
+        page.wait_for_timeout(200)
+        assert page.evaluate("clock.time") == paused
+    with opened(browser, path) as page:
+        wait_until(page, "clock.time > 0.2")
+
+
+def test_time_of_the_motion_is_real(browser: Any, tmp_path: Path) -> None:
+    """A tenth of slack for a busy machine; ten times slower is that."""
+    with opened(browser, saved(PROBLEMS / "whipple_benchmark.toml", tmp_path)) as page:
+        wait_until(page, "clock.time > 0.1")
+        watch = "async () => { const [t, c] = [performance.now(), clock.time]; await new Promise((f) => setTimeout(f, 1000));"
+        watch += " return 1000 * (clock.time - c) / (performance.now() - t); }"
+        assert page.evaluate(watch) == pytest.approx(1, abs=0.1)
+        page.locator("#bicycle select").last.select_option("10")
+        assert page.evaluate(watch) == pytest.approx(0.1, abs=0.01)
+
+
+@pytest.mark.parametrize("layer", ["kind", "abscissa", "damping"])
+def test_pictures_stand_undefined_designs(browser: Any, tmp_path: Path, layer: str) -> None:
+    """A leading coefficient 0: no roots, no class. A page with faults or errors in its console fails in `opened`."""
+    with opened(browser, stated(POLE, tmp_path)) as page:
+        page.evaluate(f"change({{x: [[0, 0]], layer: '{layer}'}})")
+        drawn(page)
+        page.wait_for_timeout(600)
+        assert not page.locator(".message:visible").count()
+        assert "undefined" in page.locator("#chart canvas").first.get_attribute("aria-label")
+        assert not page.locator("#bicycle").is_visible()
+
+
+def test_a_model_of_one_parameter_has_no_chart_and_says_so(browser: Any, tmp_path: Path) -> None:
+    with opened(browser, stated(ALONE, tmp_path)) as page:
+        assert "needs two parameters" in page.locator("#chart").inner_text()
+        assert page.locator("#growth canvas").first.is_visible()
+
+
+def test_pictures_say_what_they_show(browser: Any, tmp_path: Path) -> None:
+    with opened(browser, saved(PROBLEMS / "whipple_benchmark.toml", tmp_path)) as page:
+        pictures = page.locator("canvas[role=img]")
+        assert pictures.count() == 5
+        for k in range(5):
+            assert len(pictures.nth(k).get_attribute("aria-label")) > 40
+        assert "is stable" in page.locator("#chart canvas").first.get_attribute("aria-label")
+        page.evaluate("change({x: [[state.over, 3]]})")
+        page.wait_for_timeout(900)
+        assert "is unstable by weave" in page.locator("#chart canvas").first.get_attribute("aria-label")
+        assert "is unstable by weave" in page.locator("#growth canvas").first.get_attribute("aria-label")
