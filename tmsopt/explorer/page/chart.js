@@ -1,6 +1,9 @@
 // The stability chart over two parameters, all others as they are now.
 
 const CHART_POINTS = 200;
+const FINE_POINTS = 2 * CHART_POINTS - 1; // the same designs, and one between any two
+const SURVEY_MS = 35; // while something moves
+const FINE_MS = 100; // once it rests
 const CURVE_LOOKS = {
   weave: ["whole", 2.4], capsize: ["mixed", 2.4], infinity: ["dots", 2.4], "heavy damping": ["long", 2], "EP set": ["short", 2.6],
 };
@@ -54,8 +57,7 @@ function bandAt(value, { down, up, below, above }) {
 }
 
 /** The chart as an image, a pixel per design, its first row at the top. */
-function chartImage(found, layer, colours) {
-  const size = CHART_POINTS;
+function chartImage({ found, points: size }, layer, colours) {
   const image = new ImageData(size, size);
   const pixels = new Uint32Array(image.data.buffer);
   const packed = (colour) => {
@@ -72,7 +74,7 @@ function chartImage(found, layer, colours) {
       const k = (size - 1 - row) * size + column;
       const kind = found.kind[k];
       const known = values ? Number.isFinite(values[k]) : kind > 0;
-      if (!known) pixels[row * size + column] = (row + column) % 6 ? fills[0] : hatch;
+      if (!known) pixels[row * size + column] = Math.floor(((row + column) * CHART_POINTS) / size) % 6 ? fills[0] : hatch;
       else pixels[row * size + column] = values ? shades[bandAt(values[k], bands)] : fills[kind];
     }
   }
@@ -111,10 +113,11 @@ function drawBar(context, x, y, width, bands, layer, colours) {
 function chartPicture(host) {
   let now = null;
   let surveyed = { key: "" };
+  let refining = 0;
+  const pace = { kind: 0, abscissa: 0, damping: 0 }; // ms per design
   let plot = null;
   let shaded = { key: "" };
   const raster = document.createElement("canvas");
-  Object.assign(raster, { width: CHART_POINTS, height: CHART_POINTS });
   const enough = DATA.parameters.length > 1;
   if (!enough) {
     part(host, "p", {}, "A chart needs two parameters; this model has one. The growth plot shows all there is over it.");
@@ -126,16 +129,21 @@ function chartPicture(host) {
   const says = saysIn(surface.canvas);
   surface.canvas.style.touchAction = "none";
 
-  /** Classes and layers over the plane; the design's own place in it plays no part. */
-  function surveyOf(state) {
+  /** Classes and layers over the plane, where the design's own place plays no part; as fine as time allows. */
+  function surveyOf(state, fine = false) {
     const [i, j] = state.plane;
     const others = Array.from(state.x, (value, k) => (k === i || k === j ? 0 : value));
     const key = `${state.plane} ${state.layer} ${others}`;
-    if (key !== surveyed.key) {
-      const [xs, ys] = [rangeOf(i), rangeOf(j)].map((ends) => evenly(ends, CHART_POINTS));
-      const found = survey(state.x, i, j, xs, ys, state.layer === "kind" ? [] : [state.layer]);
-      surveyed = { key, found, present: [0, 1, 2, 3, 4].filter((kind) => found.kind.includes(kind)) };
-    }
+    if (key === surveyed.key && (!fine || surveyed.fine)) return surveyed;
+    const takes = (count) => pace[state.layer] * count * count;
+    const points = fine
+      ? (takes(FINE_POINTS) < FINE_MS ? FINE_POINTS : CHART_POINTS)
+      : [CHART_POINTS, 140, 100, 70].find((count) => takes(count) < SURVEY_MS) || 50;
+    const [xs, ys] = [rangeOf(i), rangeOf(j)].map((ends) => evenly(ends, points));
+    const before = performance.now();
+    const found = survey(state.x, i, j, xs, ys, state.layer === "kind" ? [] : [state.layer]);
+    pace[state.layer] = (performance.now() - before) / points ** 2;
+    surveyed = { key, fine, points, found, present: [0, 1, 2, 3, 4].filter((kind) => found.kind.includes(kind)) };
     return surveyed;
   }
 
@@ -144,10 +152,11 @@ function chartPicture(host) {
     const { state, drawing } = now;
     const [i, j] = state.plane;
     const colours = coloursNow();
-    const { found, present } = surveyOf(state);
-    const look = `${surveyed.key} ${Object.values(colours)}`;
+    const { points, present } = surveyOf(state);
+    const look = `${surveyed.key} ${points} ${Object.values(colours)}`;
     if (look !== shaded.key) {
-      shaded = { key: look, ...chartImage(found, state.layer, colours) };
+      shaded = { key: look, ...chartImage(surveyed, state.layer, colours) };
+      Object.assign(raster, { width: points, height: points });
       raster.getContext("2d").putImageData(shaded.image, 0, 0);
     }
     const { bands } = shaded;
@@ -156,7 +165,7 @@ function chartPicture(host) {
     tellPlot(surface.canvas, plot);
     clipped(context, plot, () => {
       // a design stands at the middle of its pixel: the first and the last reach half a pixel beyond the ends
-      const [dx, dy] = [plot.width / (CHART_POINTS - 1), plot.height / (CHART_POINTS - 1)];
+      const [dx, dy] = [plot.width / (points - 1), plot.height / (points - 1)];
       context.imageSmoothingEnabled = false;
       context.drawImage(raster, plot.x0 - dx / 2, plot.y0 - dy / 2, plot.width + dx, plot.height + dy);
       drawCurves(context, state, colours);
@@ -279,10 +288,15 @@ function chartPicture(host) {
   surface.canvas.addEventListener("pointerleave", () => now && read(now.state, now.drawing.kind, now.drawing.motion[0]));
 
   return {
-    cheap: false,
+    cheap: true,
     draw(state, drawing) {
       now = { state, drawing };
       surface.repaint();
+      clearTimeout(refining);
+      refining = setTimeout(() => {
+        surveyOf(state, true);
+        surface.repaint();
+      }, 150);
       const [first, second] = state.plane.map((k) => `${DATA.parameters[k].name} ${valueText(k, state.x[k], 3)}`);
       const classes = (surveyed.present || []).map((kind) => classWords(kind)).join("; ");
       says(`Stability chart: this design, ${first} and ${second}, is ${classWords(drawing.kind)}; in the picture are ${classes}. Arrow keys move the design.`);

@@ -217,7 +217,7 @@ function growthPicture(host) {
       const rate = rateAt(state, state.x[state.over]);
       return { growth: re * rate, frequency: (im * rate) / hertz, pair: im > 0, times };
     });
-    const room = 0.3 * (sweep.ends[1] - sweep.ends[0]);
+    const room = 0.15 * (sweep.ends[1] - sweep.ends[0]);
     const centres = [state.x[state.over], ...sweep.events.filter(({ kind }) => kind !== "meeting").map(({ at }) => at)];
     const near = points.flatMap(({ along }) => along).filter(({ at }) => centres.some((centre) => Math.abs(at - centre) < room));
     const inner = { x0: 60, width: width - 72 };

@@ -132,7 +132,7 @@ function motionPicture(host) {
         drawLine(context, rows.map((time) => ({ x: plot.x(time), y: plot.y(push.at(k, time)) })), colour, 2.2, dash);
       });
       const x = plot.x(Math.min(clock.time, push.end));
-      if (DATA.bicycle) drawLine(context, [{ x, y: plot.y0 }, { x, y: plot.y0 + plot.height }], colours.ink, 1.4);
+      drawLine(context, [{ x, y: plot.y0 }, { x, y: plot.y0 + plot.height }], colours.ink, 1.4);
     });
     const timed = Number.isFinite(MODEL.rate(state.x));
     const time = timed ? "time in s" : DATA.bicycle ? "time in s, for a wheelbase of 1 m" : `time${DATA.rootUnit ? ` in 1/(${DATA.rootUnit})` : ""}`;

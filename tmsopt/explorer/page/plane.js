@@ -56,13 +56,13 @@ function planePicture(host) {
       context.fillRect(plot.x(0), plot.y0, plot.width, plot.height);
       drawLine(context, [{ x: plot.x0, y: plot.y(0) }, { x: plot.x0 + plot.width, y: plot.y(0) }], colours.faint, 1);
       drawLine(context, [{ x: plot.x(0), y: plot.y0 }, { x: plot.x(0), y: plot.y0 + plot.height }], colours.ink, 2.4);
-      context.textAlign = "right";
-      drawText(context, "stable", plot.x(0) - 8, plot.y0 + 12, colours);
-      context.textAlign = "left";
-      drawText(context, "grows", plot.x(0) + 8, plot.y0 + 12, colours);
       drawPath(context, plot, sweep, value, colours);
       drawRoots(context, plot, roots, colours);
     });
+    context.textAlign = "left";
+    drawText(context, "decays", plot.x0 + 8, plot.y0 + 12, colours);
+    context.textAlign = "right";
+    drawText(context, "grows", plot.x0 + plot.width - 8, plot.y0 + 12, colours);
     const unit = DATA.rootUnit ? ` in ${DATA.rootUnit}` : "";
     drawAxes(context, plot, { label: `growth rate Re s${unit}`, one: 1 }, { label: `frequency Im s${unit}`, one: 1 }, colours);
     describe(state, roots, colours);
