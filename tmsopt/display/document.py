@@ -25,7 +25,7 @@ ENDINGS = ("html", "htm")
 _PARTS: Mapping[str, Callable[[Any], Iterator[Section]]] = {
     "Chart": parts.of_chart, "Trace": parts.of_trace, "Front": parts.of_front, "Results": parts.of_results,
 }  # fmt: skip
-_VERSIONS = ("tmsopt", "casadi", "numpy")
+_PACKAGES = ("tmsopt", "CasADi", "NumPy")
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 """Nothing is asked of any server, whatever the page holds."""
 
@@ -121,11 +121,8 @@ def _explorer(of: Any) -> str:
     """The page that moves the design, in a frame from which nothing gets out; empty for what has none."""
     if of is None:
         return ""
-    from importlib import import_module
+    from tmsopt.explorer import page_of
 
-    page_of = getattr(import_module("tmsopt.explorer"), "page_of", None)
-    if page_of is None:
-        return ""
     return (
         "<p>Move the parameters and see what the roots do; what is left of the imaginary axis dies out.</p>\n"
         '<iframe title="Explorer of this problem" sandbox="allow-scripts allow-downloads" loading="lazy" '
@@ -137,7 +134,7 @@ def _explorer(of: Any) -> str:
 def _origin(result: Any, command: str, files: Mapping[str, str], seed: int | None) -> str:
     """Versions, system, date, seed, command and files."""
     seed = getattr(getattr(result, "study", None), "seed", seed)
-    listed = [*((name, _version(name)) for name in _VERSIONS), ("Python", platform.python_version())]
+    listed = [*((name, _version(name)) for name in _PACKAGES), ("Python", platform.python_version())]
     when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     about = facts((
         *listed, ("system", f"{platform.system()} {platform.machine()}".strip()), ("date", when),
