@@ -65,7 +65,9 @@ def test_its_curves_are_the_boundaries(ep4: tmsopt.Explorer) -> None:
         held |= {names[i]: np.array(curve["x"]), names[j]: np.array(curve["y"])}
         minors = hurwitz_minors(tmsopt.models.tms.coefficients(held))
         beside = hurwitz_minors(tmsopt.models.tms.coefficients(held | {names[i]: 1.01 * np.array(curve["x"])}))
-        assert np.abs(minors[2]).max() < 1e-3 * np.abs(beside[2]).max()  # points have six digits
+        assert np.all(
+            np.abs(minors[2]) < 5e-3 * np.abs(beside[2])
+        )  # six digits, of which the tangent of 80 degrees takes one
 
 
 def test_the_benchmark_is_the_published_one(ep4: tmsopt.Explorer) -> None:
