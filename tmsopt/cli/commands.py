@@ -11,16 +11,16 @@ from tmsopt.cli.chart import chart
 from tmsopt.cli.common import TYPED
 from tmsopt.cli.ending import STATUS, ended
 from tmsopt.cli.explore import explore
-from tmsopt.cli.figure import figure
 from tmsopt.cli.guide.describe import describe, schema
 from tmsopt.cli.guide.files import example, new
 from tmsopt.cli.guide.import_ import convert
+from tmsopt.cli.paper.figure import figure
+from tmsopt.cli.paper.verify import verify
 from tmsopt.cli.prove import prove
 from tmsopt.cli.solve import compare, solve
 from tmsopt.cli.speeds import speeds
 from tmsopt.cli.study import study
 from tmsopt.cli.trace import trace
-from tmsopt.cli.verify import verify
 
 
 class _Commands(click.Group):

@@ -5,10 +5,10 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from html import escape
+from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
 
-from tmsopt import __version__
 from tmsopt.design import Problem
 from tmsopt.explorer.javascript import model_script
 from tmsopt.explorer.kernel import kernel_script
@@ -22,7 +22,7 @@ _PARTS = "numerics state axes chart plane growth bicycle motion controls facts m
 def html_of(problem: Problem, designs: Sequence[Known], model: Mapping[str, Any], trace_curves: bool) -> str:
     """The page of a problem; arguments as of `subject`."""
     script = model_script(problem)
-    data = subject(problem, designs, script, model, trace_curves) | {"version": __version__}
+    data = subject(problem, designs, script, model, trace_curves) | {"version": version("tmsopt")}
     parts = [
         script.text,
         kernel_script(problem.model.degree),
