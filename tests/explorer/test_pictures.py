@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.browser import chromium, drawn, opened
+from scipy.linalg import expm
 
 import tmsopt
 
@@ -87,9 +88,9 @@ def wait_until(page: Any, condition: str) -> None:
 
 def uniform(kind: Any) -> Any:
     """Where a design of a grid is of one class with all eight around it."""
+    around = np.lib.stride_tricks.sliding_window_view(kind, (3, 3))
     same = np.zeros(kind.shape, dtype=bool)
-    around = [kind[1 + i : kind.shape[0] - 1 + i, 1 + j : kind.shape[1] - 1 + j] for i in (-1, 0, 1) for j in (-1, 0, 1)]
-    same[1:-1, 1:-1] = np.all([part == around[4] for part in around], axis=0)
+    same[1:-1, 1:-1] = np.all(around == kind[1:-1, 1:-1, None, None], axis=(2, 3))
     return same
 
 
@@ -98,7 +99,8 @@ def test_colours_of_the_chart_are_the_classes_of_the_same_designs(browser: Any, 
     """What a reader takes from the picture and its legend, against `tmsopt.chart`; without what is drawn above."""
     page_path = saved(PROBLEMS / f"{name}.toml", tmp_path)
     with opened(browser, page_path) as page:
-        page.evaluate("DATA.curves.length = DATA.designs.length = 0; change({ x: state.plane.map((k) => [k, rangeOf(k)[0]]) })")
+        page.evaluate("DATA.curves.length = DATA.designs.length = 0")
+        page.evaluate("change({ x: state.plane.map((k) => [k, rangeOf(k)[0]]) })")
         drawn(page)
         words, pixels = page.evaluate(SWATCHES), page.evaluate(PIXELS, GRID)
         start = dict(zip(*page.evaluate("[DATA.parameters.map(({ name }) => name), [...state.x]]"), strict=True))
@@ -135,9 +137,21 @@ def test_a_drag_on_the_chart_sets_the_parameters_of_its_place_in_one_step(browse
         # a pointer stands on whole pixels, and there are more than 200 of them along each axis
         assert after[i] == pytest.approx(low_i + 0.75 * (high_i - low_i), abs=0.005 * (high_i - low_i))
         assert after[j] == pytest.approx(low_j + 0.6 * (high_j - low_j), abs=0.005 * (high_j - low_j))
-        assert [x for k, x in enumerate(after) if k not in (i, j)] == [x for k, x in enumerate(before) if k not in (i, j)]
+        assert {k for k, x in enumerate(after) if x != before[k]} == {i, j}
         page.evaluate("undo()")
         assert page.evaluate("[...state.x]") == before
+
+
+def test_a_finger_moves_the_design_too(browser: Any, tmp_path: Path) -> None:
+    with opened(browser, saved(PROBLEMS / "chart.toml", tmp_path), width=400, has_touch=True) as page:
+        page.evaluate("document.getElementById('controls').hidden = true")  # they cover the chart until folded up
+        low, high = page.evaluate("rangeOf(state.plane[0])")
+        corner, size = plot_of(page, "chart")
+        page.touchscreen.tap(*(corner + [0.75, 0.5] * size))
+        drawn(page)
+        touched = page.evaluate("state.x[state.plane[0]]")
+        assert touched == pytest.approx(low + 0.75 * (high - low), abs=0.005 * (high - low))
+        assert page.evaluate("document.documentElement.scrollWidth") <= 400
 
 
 def test_arrow_keys_move_the_design_over_the_grid(browser: Any, tmp_path: Path) -> None:
@@ -153,7 +167,7 @@ def test_arrow_keys_move_the_design_over_the_grid(browser: Any, tmp_path: Path) 
 
 @pytest.mark.parametrize("name", ["whipple_benchmark", "ep4"])
 def test_events_are_the_speeds_of_the_package(browser: Any, tmp_path: Path, name: str) -> None:
-    """Bisected signs, against exact roots of polynomials in the speed; real roots that meet only, as the page marks them."""
+    """Bisected signs, against exact roots of polynomials in the speed; of meetings those on the real axis."""
     explorer = tmsopt.explore(PROBLEMS / f"{name}.toml")
     explorer.save(tmp_path / "page.html")
     with opened(browser, tmp_path / "page.html") as page:
@@ -194,20 +208,45 @@ def test_the_bicycle_is_to_scale_and_moves_as_a_body(browser: Any, tmp_path: Pat
     assert explorer.solution is not None
     values = explorer.problem.values(explorer.solution.parameters)
     with opened(browser, tmp_path / "page.html") as page:
-        H, foot, on_axis, moved, B, leaned = np.array(page.evaluate("""() => {
+        H, turned, foot, on_axis, moved, B, leaned, ahead = np.array(page.evaluate("""() => {
             const shape = bicycleShape(state.x);
-            const [foot, axis] = [shape.onAxis(shape.alongAxis(shape.H)), shape.onAxis(0.3)];
-            return [shape.H, foot, axis, movedPoint(shape, axis, true, 0, 0.4), shape.B, movedPoint(shape, shape.B, false, 0.2, 0.4)];
+            const { H, B } = shape;
+            const [foot, axis] = [shape.onAxis(shape.alongAxis(H)), shape.onAxis(0.3)];
+            const [turned, moved, ahead] = [H, axis, [10, 0, 0]].map((point) => movedPoint(shape, point, true, 0, 0.4));
+            return [H, turned, foot, axis, moved, B, movedPoint(shape, B, false, 0.2, 0.4), ahead];
         }"""))  # fmt: skip
-        turned = np.array(page.evaluate("movedPoint(bicycleShape(state.x), bicycleShape(state.x).H, true, 0, 0.4)"))
-        wheel = np.array(page.evaluate("movedPoint(bicycleShape(state.x), [10, 0, 0], true, 0, 0.1)"))
     arm = values["u_H" if "u_H" in values else "nu_H"]
     assert np.linalg.norm(H - foot) == pytest.approx(abs(arm), rel=1e-12)
     np.testing.assert_allclose(moved, on_axis, atol=1e-12)  # steering moves nothing on its axis
     assert np.linalg.norm(turned - foot) == pytest.approx(abs(arm), rel=1e-12)
     assert np.linalg.norm(leaned) == pytest.approx(np.linalg.norm(B), rel=1e-12)
     assert leaned[1] > 0  # a lean to the right, of what stands above the ground
-    assert wheel[1] > 0  # a steer to the right
+    assert ahead[1] > 0  # a steer to the right
+
+
+@pytest.mark.parametrize("name", ["whipple_benchmark", "delivery_robot", "ep4"])
+def test_a_push_is_followed_by_the_matrix_exponential_in_seconds(browser: Any, tmp_path: Path, name: str) -> None:
+    """1e-9 of the largest angle: a step by a rounded exponential is repeated 600 times."""
+    explorer = tmsopt.explore(PROBLEMS / f"{name}.toml")
+    explorer.save(tmp_path / "page.html")
+    with opened(browser, tmp_path / "page.html") as page:
+        found = page.evaluate("""() => {
+            const push = pushOf(state, drawingOf());
+            const rows = [0, 40, 150, 300, 600].map((row) => push.seconds[row]);
+            return { start: push.start, seconds: rows, angles: rows.map((time) => [push.at(0, time), push.at(1, time)]) };
+        }""")
+    assert explorer.solution is not None
+    of = explorer.problem.parameter_set
+    parameters = dict(explorer.solution.parameters)
+    # without units the page tells the time for a wheelbase of 1 m
+    rate = float(of.rate(parameters)) if of.rate else np.sqrt(9.81)
+    assert explorer.problem.model.pencil is not None
+    M, D, K = (np.array(m, dtype=float) for m in explorer.problem.model.pencil(of.native(parameters)))
+    blocks = [[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(M, K) * rate**2, -np.linalg.solve(M, D) * rate]]
+    pushed = np.array([0, 0, found["start"], 0])
+    truth = np.array([(expm(np.block(blocks) * t) @ pushed)[:2] for t in found["seconds"]])
+    np.testing.assert_allclose(found["angles"], truth, atol=1e-9 * np.abs(truth).max())
+    assert np.abs(truth).max() <= np.pi / 12
 
 
 def test_motion_waits_where_the_reader_wants_none(browser: Any, tmp_path: Path) -> None:
@@ -229,8 +268,11 @@ def test_time_of_the_motion_is_real(browser: Any, tmp_path: Path) -> None:
     """A tenth of slack for a busy machine; ten times slower is that."""
     with opened(browser, saved(PROBLEMS / "whipple_benchmark.toml", tmp_path)) as page:
         wait_until(page, "clock.time > 0.1")
-        watch = "async () => { const [t, c] = [performance.now(), clock.time]; await new Promise((f) => setTimeout(f, 1000));"
-        watch += " return 1000 * (clock.time - c) / (performance.now() - t); }"
+        watch = """async () => {
+            const [moment, time] = [performance.now(), clock.time];
+            await new Promise((done) => setTimeout(done, 1000));
+            return (1000 * (clock.time - time)) / (performance.now() - moment);
+        }"""
         assert page.evaluate(watch) == pytest.approx(1, abs=0.1)
         page.locator("#bicycle select").last.select_option("10")
         assert page.evaluate(watch) == pytest.approx(0.1, abs=0.01)

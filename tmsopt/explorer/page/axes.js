@@ -319,11 +319,13 @@ function movesDesign(canvas, at, step) {
     return at(event.clientX - box.left, event.clientY - box.top);
   };
   let held = false;
+  let before = [];
   let keyed = null;
   canvas.tabIndex = 0;
   canvas.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
     held = true;
+    before = place(event).map(([k]) => [k, state.x[k]]);
     canvas.setPointerCapture(event.pointerId);
     change({ x: place(event) }, false);
   });
@@ -333,16 +335,17 @@ function movesDesign(canvas, at, step) {
     held = false;
   });
   canvas.addEventListener("pointercancel", () => {
+    if (held) change({ x: before }); // the finger was to scroll the page
     held = false;
-    change({});
   });
   const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
   canvas.addEventListener("keydown", (event) => {
     const arrow = arrows[event.key];
-    keyed = arrow && !event.altKey && !event.ctrlKey && !event.metaKey ? step(...arrow.map((k) => k * (event.shiftKey ? 10 : 1))) : null;
-    if (!keyed) return;
+    const moved = arrow && !event.altKey && !event.ctrlKey && !event.metaKey && step(...arrow.map((k) => k * (event.shiftKey ? 10 : 1)));
+    if (!moved) return;
+    keyed = moved;
     event.preventDefault();
-    change({ x: keyed }, false);
+    change({ x: moved }, false);
   });
   const settle = () => {
     if (keyed) change({ x: keyed });
@@ -350,6 +353,12 @@ function movesDesign(canvas, at, step) {
   };
   canvas.addEventListener("keyup", settle);
   canvas.addEventListener("blur", settle);
+}
+
+/** The lower middle of the sizes of roots, each as often as it counts: that of most, however far the others are. */
+function typicalSize(roots, sizeOf) {
+  const sizes = roots.flatMap((root) => Array(root[2] * (root[1] > 0 ? 2 : 1)).fill(sizeOf(root)));
+  return sizes.sort((first, second) => first - second)[Math.floor((sizes.length - 1) / 2)] || 0;
 }
 
 /** The design of the file that the state is, digit for digit, or undefined. */

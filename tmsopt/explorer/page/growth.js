@@ -173,9 +173,7 @@ function limitsOf(values) {
 }
 
 /** Limits of the growth rates: of the roots here and near, but none much deeper than most, which would hide what happens at 0. */
-function growthLimits(here, near) {
-  const sizes = here.map(Math.abs).sort((first, second) => first - second);
-  const typical = sizes[Math.floor((sizes.length - 1) / 2)] || 0;
+function growthLimits(here, near, typical) {
   const depth = Math.max(4 * typical, limitsOf(near)[1]);
   const seen = here.filter((growth) => growth >= -depth);
   const [low, high] = limitsOf([...near.filter((growth) => growth >= -depth), ...seen]);
@@ -213,16 +211,15 @@ function growthPicture(host) {
     const points = sweep.curves.map(({ pair, points: along }) => ({
       pair, along: along.map(({ at, re, im }) => ({ at, growth: re * rates.get(at), frequency: (im * rates.get(at)) / hertz })),
     }));
-    const here = rootsToDraw(state, drawing).map(([re, im, times]) => {
-      const rate = rateAt(state, state.x[state.over]);
-      return { growth: re * rate, frequency: (im * rate) / hertz, pair: im > 0, times };
-    });
+    const roots = rootsToDraw(state, drawing);
+    const rate = rateAt(state, state.x[state.over]);
+    const here = roots.map(([re, im, times]) => ({ growth: re * rate, frequency: (im * rate) / hertz, pair: im > 0, times }));
     const room = 0.15 * (sweep.ends[1] - sweep.ends[0]);
     const centres = [state.x[state.over], ...sweep.events.filter(({ kind }) => kind !== "meeting").map(({ at }) => at)];
     const near = points.flatMap(({ along }) => along).filter(({ at }) => centres.some((centre) => Math.abs(at - centre) < room));
     const inner = { x0: 60, width: width - 72 };
     const upper = 0.52 * (height - 92);
-    const growths = growthLimits(here.map(({ growth }) => growth), near.map(({ growth }) => growth));
+    const growths = growthLimits(here.map(({ growth }) => growth), near.map(({ growth }) => growth), rate * typicalSize(roots, ([re]) => Math.abs(re)));
     const highest = Math.max(limitsOf(near.map(({ frequency }) => frequency))[1], ...here.map(({ frequency }) => 1.1 * frequency));
     plots = [
       plotIn({ ...inner, y0: 36, height: upper }, sweep.ends, growths),
@@ -301,11 +298,14 @@ function growthPicture(host) {
     const placed = [];
     const place = (text, x, colour) => {
       const half = context.measureText(text).width / 2 + 4;
-      const middle = Math.max(plot.x0 + half - 4, Math.min(plot.x0 + plot.width - half + 4, x));
-      const row = [26, 10].find((y) => !placed.some((other) => other.y === y && middle - half < other.to && middle + half > other.from));
-      if (!row) return;
-      placed.push({ y: row, from: middle - half, to: middle + half });
-      drawText(context, text, middle, row, colours, colour);
+      const fits = ({ y, middle }) => !placed.some((other) => other.y === y && Math.abs(middle - other.middle) < half + other.half);
+      const found = [0, 0.5, -0.5, 0.9, -0.9].flatMap((aside) => {
+        const middle = Math.max(plot.x0 + half - 4, Math.min(plot.x0 + plot.width - half + 4, x + aside * half));
+        return [{ y: 26, middle, half }, { y: 10, middle, half }];
+      }).find(fits);
+      if (!found) return;
+      placed.push(found);
+      drawText(context, text, found.middle, found.y, colours, colour);
     };
     context.textAlign = "center";
     const value = (at) => figure(at / DATA.parameters[state.over].one, 4);

@@ -102,8 +102,10 @@ function motionPicture(host) {
   surface.canvas.style.touchAction = "pan-y";
   clock.watchers.push(() => surface.repaint());
 
-  const looks = (colours) => [
-    [colours.weave, DASHES.whole], [colours.mark, DASHES.long], [colours.real, DASHES.mixed], [colours.complex, DASHES.short], [colours.ink, DASHES.dots],
+  /** Colour and dash of a coordinate, of the first 25 no two alike. */
+  const lookOf = (k, colours) => [
+    [colours.weave, colours.mark, colours.real, colours.complex, colours.ink][k % 5],
+    [DASHES.whole, DASHES.long, DASHES.mixed, DASHES.short, DASHES.dots][(k + Math.floor(k / 5)) % 5],
   ];
 
   function paint(context, width, height) {
@@ -128,7 +130,7 @@ function motionPicture(host) {
       drawEnvelope(context, push, drawing.motion[0], colours);
       const rows = Array.from(push.seconds);
       names.forEach((_, k) => {
-        const [colour, dash] = looks(colours)[k % 5];
+        const [colour, dash] = lookOf(k, colours);
         drawLine(context, rows.map((time) => ({ x: plot.x(time), y: plot.y(push.at(k, time)) })), colour, 2.2, dash);
       });
       const x = plot.x(Math.min(clock.time, push.end));
@@ -138,7 +140,7 @@ function motionPicture(host) {
     const time = timed ? "time in s" : DATA.bicycle ? "time in s, for a wheelbase of 1 m" : `time${DATA.rootUnit ? ` in 1/(${DATA.rootUnit})` : ""}`;
     drawAxes(context, plot, { label: time, one: 1 }, { label: DATA.bicycle ? "angle in degrees" : "displacement", one }, colours);
     legend([
-      ...names.map((name, k) => lineEntry(name, looks(colours)[k % 5][0], 2.2, looks(colours)[k % 5][1])),
+      ...names.map((name, k) => lineEntry(name, lookOf(k, colours)[0], 2.2, lookOf(k, colours)[1])),
       lineEntry("within a multiple of e^(abscissa · time)", colours.faint, 1, DASHES.dots),
     ]);
     read(push);
@@ -159,7 +161,7 @@ function motionPicture(host) {
   /** What the coordinates are at the time of the clock. */
   function read(push, time = Math.min(clock.time, push.end)) {
     const degree = DATA.bicycle ? 180 / Math.PI : 1;
-    const values = names.map((name, k) => `${name} ${figure(Number((degree * push.at(k, time)).toPrecision(3)), 3)}${DATA.bicycle ? "°" : ""}`);
+    const values = names.map((name, k) => `${name} = ${figure(Number((degree * push.at(k, time)).toPrecision(3)), 3)}${DATA.bicycle ? "°" : ""}`);
     reading.textContent = `after ${figure(time, 3)}${Number.isFinite(clockRate(now.state.x)) ? " s" : ""}: ${values.join(", ")}`;
   }
 

@@ -2,9 +2,8 @@
 
 /** Limits of the plane that keep the current roots in sight: kept while they still serve, so that the picture stands still. */
 function planeReach(roots, path, kept) {
-  const sizes = roots.map(([re, im]) => Math.hypot(re, im)).sort((first, second) => first - second);
-  const middle = sizes[Math.floor((sizes.length - 1) / 2)] || sizes[sizes.length - 1] || 1;
-  const seen = roots.filter(([re, im]) => Math.hypot(re, im) <= 25 * middle);
+  const middle = typicalSize(roots, ([re, im]) => Math.hypot(re, im)) || Infinity;
+  const seen = roots.filter(([re, im]) => Math.hypot(re, im) <= 10 * middle);
   const size = Math.max(1e-300, ...seen.map(([re, im]) => Math.hypot(re, im)));
   const near = path.filter(({ re, im }) => Math.hypot(re, im) < 1.6 * size);
   const points = [...seen.map(([re, im]) => ({ re, im })), ...near];
