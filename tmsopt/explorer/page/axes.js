@@ -2,6 +2,7 @@
 
 const COLOUR_NAMES = ["stable", "heavy", "weave", "capsize", "mark", "real", "complex", "line", "paper", "ink", "faint"];
 const PICTURE_FONT = "12px system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif";
+const PLOT_LEFT = 68; // pixels for the numbers and the label of a vertical axis
 const DASHES = { whole: [], long: [9, 4], short: [4, 3], dots: [1.5, 3], mixed: [8, 3, 2, 3] };
 const repaints = [];
 
@@ -195,7 +196,7 @@ function drawAxes(context, plot, x, y, colours) {
   context.textAlign = "center";
   context.fillText(x.label, x0 + width / 2, y0 + height + 30);
   context.save();
-  context.translate(x0 - 47, y0 + height / 2);
+  context.translate(9, y0 + height / 2);
   context.rotate(-Math.PI / 2);
   context.fillText(y.label, 0, 0);
   context.restore();

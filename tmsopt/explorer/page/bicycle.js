@@ -215,7 +215,7 @@ function bicyclePicture(host) {
     const [rate, unit] = [figure((180 / Math.PI) * (push ? push.start : 0), 3), Number.isFinite(MODEL.rate(now.state.x)) ? "" : ", for a wheelbase of 1 m"];
     const enlarged = enlargement(push);
     reading.textContent = push
-      ? `A push to the right gives it ${rate}°/s of ${coordinateNames()[clock.pushed]}. After ${time.toFixed(2)} s of ${figure(push.end, 3)} s${unit}: lean ${degrees(lean)}, steer ${degrees(steer)}${enlarged > 1 ? ` (lean drawn ${enlarged} times)` : ""}.`
+      ? `A push to the right gives it ${rate}°/s of ${coordinateNames()[clock.pushed]}. After ${time.toFixed(push.end < 1 ? 3 : 2)} s of ${figure(push.end, 3)} s${unit}: lean ${degrees(lean)}, steer ${degrees(steer)}${enlarged > 1 ? ` (lean drawn ${enlarged} times)` : ""}.`
       : "No motion to show: this design has no equations of motion that can be solved.";
     play.textContent = clock.playing ? "Pause" : "Play";
   }

@@ -30,7 +30,8 @@ function curvesIn(state) {
 }
 
 /** Bands of a layer of numbers: edges in steps of one round width below 0, of another above it. */
-function bandsOf(values) {
+function bandsOf(values, layer) {
+  if (layer === "damping") return { down: 0.2, up: 0.2, below: 5, above: 5 };
   const known = values.filter(Number.isFinite).sort();
   const low = known.length ? Math.min(0, known[0]) : 0;
   // poles of the abscissa must not take all colours
@@ -65,7 +66,7 @@ function chartImage({ found, points: size }, layer, colours) {
     return (255 << 24) | (blue << 16) | (green << 8) | red; // little-endian, as all machines with browsers are
   };
   const values = layer === "kind" ? null : found[layer];
-  const bands = values && bandsOf(values);
+  const bands = values && bandsOf(values, layer);
   const fills = classFills(colours).map(packed);
   const shades = values && bandColours(bands, layer === "abscissa", colours).map(packed);
   const hatch = packed(mixed(colours.paper, colours.ink, 0.45));
@@ -98,11 +99,12 @@ function drawBar(context, x, y, width, bands, layer, colours) {
   const zero = x + bands.below * cell;
   for (let edge = 0; edge <= shades.length; edge += 1) {
     const value = edge < bands.below ? (edge - bands.below) * bands.down : (edge - bands.below) * bands.up;
-    const text = (edge === shades.length && value > 0 ? "≥ " : "") + figure(value, 12);
+    const beyond = { 0: "≤ ", [shades.length]: "≥ " }[edge]; // the last bands hold all that the bar does not
+    const text = (value !== 0 && beyond && layer === "abscissa" ? beyond : "") + figure(value, 12);
     const [at, half] = [x + edge * cell, context.measureText(text).width / 2 + 5];
     if (value !== 0 && (at - half < free || Math.abs(at - zero) < half + 8)) continue;
     context.font = value === 0 ? `bold ${PICTURE_FONT}` : PICTURE_FONT;
-    context.fillText(text, Math.min(at, x + width - half + 12), y + 20);
+    context.fillText(text, Math.max(x + half - 12, Math.min(at, x + width - half + 12)), y + 20);
     free = at + half;
   }
   context.font = PICTURE_FONT;
@@ -161,7 +163,7 @@ function chartPicture(host) {
     }
     const { bands } = shaded;
     const head = state.layer === "kind" ? 8 : 50;
-    plot = plotIn({ x0: 60, y0: head, width: width - 72, height: height - head - 42 }, rangeOf(i), rangeOf(j));
+    plot = plotIn({ x0: PLOT_LEFT, y0: head, width: width - PLOT_LEFT - 12, height: height - head - 42 }, rangeOf(i), rangeOf(j));
     tellPlot(surface.canvas, plot);
     clipped(context, plot, () => {
       // a design stands at the middle of its pixel: the first and the last reach half a pixel beyond the ends
@@ -253,7 +255,9 @@ function chartPicture(host) {
     }
     entries.push(dotEntry("this design", "", colours.ink));
     if (DATA.curves.length && !curves.length) {
-      entries.push({ words: "(the traced curves belong to the file's own values)", look: "", sign() {} });
+      const [across, up] = DATA.curves[0].axes.map((k) => DATA.parameters[k].name);
+      const words = `the traced curves, of ${across} and ${up} at the file's own values, do not belong here`;
+      entries.push(lineEntry(words, colours.paper, 0, DASHES.whole));
     }
     return entries;
   }

@@ -217,7 +217,7 @@ function growthPicture(host) {
     const room = 0.15 * (sweep.ends[1] - sweep.ends[0]);
     const centres = [state.x[state.over], ...sweep.events.filter(({ kind }) => kind !== "meeting").map(({ at }) => at)];
     const near = points.flatMap(({ along }) => along).filter(({ at }) => centres.some((centre) => Math.abs(at - centre) < room));
-    const inner = { x0: 60, width: width - 72 };
+    const inner = { x0: PLOT_LEFT, width: width - PLOT_LEFT - 12 };
     const upper = 0.52 * (height - 92);
     const growths = growthLimits(here.map(({ growth }) => growth), near.map(({ growth }) => growth), rate * typicalSize(roots, ([re]) => Math.abs(re)));
     const highest = Math.max(limitsOf(near.map(({ frequency }) => frequency))[1], ...here.map(({ frequency }) => 1.1 * frequency));

@@ -124,7 +124,7 @@ function motionPicture(host) {
     }
     const one = DATA.bicycle ? Math.PI / 180 : 1;
     const size = 1.12 * Math.max(...push.peaks, 1e-300);
-    plot = plotIn({ x0: 60, y0: 8, width: width - 72, height: height - 50 }, [0, push.end], [-size, size]);
+    plot = plotIn({ x0: PLOT_LEFT, y0: 8, width: width - PLOT_LEFT - 12, height: height - 50 }, [0, push.end], [-size, size]);
     clipped(context, plot, () => {
       drawLine(context, [{ x: plot.x0, y: plot.y(0) }, { x: plot.x0 + plot.width, y: plot.y(0) }], colours.faint, 1);
       drawEnvelope(context, push, drawing.motion[0], colours);

@@ -30,7 +30,7 @@ function planePicture(host) {
 
   /** Equal scales along both axes: the angle of a root is its damping. */
   function plotOf(width, height, { left, right, top }) {
-    const box = { x0: 60, y0: 8, width: width - 72, height: height - 50 };
+    const box = { x0: PLOT_LEFT, y0: 8, width: width - PLOT_LEFT - 12, height: height - 50 };
     const scale = Math.max((right - left) / box.width, (2 * top) / box.height);
     const [across, up] = [(scale * box.width - (right - left)) / 2, (scale * box.height) / 2];
     return plotIn(box, [left - across, right + across], [-up, up]);
