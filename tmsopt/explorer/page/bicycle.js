@@ -223,7 +223,7 @@ function bicyclePicture(host) {
   function step(moment) {
     const push = clock.playing && now && pushOf(now.state, now.drawing);
     if (!push) return;
-    setClock(Math.min(push.end, clock.time + Math.min(0.1, (moment - last) / 1000) / clock.slower));
+    setClock(Math.min(push.end, clock.time + Math.min(0.5, (moment - last) / 1000) / clock.slower));
     last = moment;
     if (clock.time < push.end) requestAnimationFrame(step);
     else stop();
