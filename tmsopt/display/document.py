@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from tmsopt.disk import path_of, write_text
 from tmsopt.display import document_parts as parts
-from tmsopt.display.markup import Section, facts, verbatim, words
+from tmsopt.display.markup import Chapter, facts, verbatim, words
 from tmsopt.display.page import badges
 from tmsopt.display.writers import WRITERS, report, title_of
 from tmsopt.errors import Fault, InputError, short
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 ENDINGS = ("html", "htm")
 """Of the name of a document."""
 
-_PARTS: Mapping[str, Callable[[Any], Iterator[Section]]] = {
+_PARTS: Mapping[str, Callable[[Any], Iterator[Chapter]]] = {
     "Chart": parts.of_chart, "Trace": parts.of_trace, "Front": parts.of_front, "Results": parts.of_results,
 }  # fmt: skip
 _PACKAGES = ("tmsopt", "CasADi", "NumPy")
@@ -95,7 +95,7 @@ def _document(
 
 def _sections(
     result: Any, command: str, files: Mapping[str, str], seed: int | None, full: bool, design: "Solution | None"
-) -> Iterator[Section]:  # fmt: skip
+) -> Iterator[Chapter]:  # fmt: skip
     match type(result).__name__:
         case "Solution":
             yield from parts.of_solution(result, full)
@@ -103,10 +103,10 @@ def _sections(
             yield from parts.of_proof(result, design)
         case name:
             yield from _PARTS.get(name, parts.of_other)(result)
-    yield Section("explorer", "Explorer", _explorer(_explored(result, design)), "whole")
+    yield Chapter("explorer", "Explorer", _explorer(_explored(result, design)), "whole")
     text = verbatim(report(result, full), "report as text")
-    yield Section("text", "As text", f"<details><summary>The report as text</summary>{text}</details>", "whole")
-    yield Section("origin", "Where it is from", _origin(result, command, files, seed), "whole")
+    yield Chapter("text", "As text", f"<details><summary>The report as text</summary>{text}</details>", "whole")
+    yield Chapter("origin", "Where it is from", _origin(result, command, files, seed), "whole")
 
 
 def _explored(result: Any, design: "Solution | None") -> Any:
@@ -124,7 +124,8 @@ def _explorer(of: Any) -> str:
     from tmsopt.explorer import page_of
 
     return (
-        "<p>Move the parameters and see what the roots do; what is left of the imaginary axis dies out.</p>\n"
+        "<p>Move a parameter, and see the roots move: disturbances die out where all are left of "
+        "the imaginary axis.</p>\n"
         '<iframe title="Explorer of this problem" sandbox="allow-scripts allow-downloads" loading="lazy" '
         f'srcdoc="{escape(page_of(of))}"></iframe>\n'
         '<p class="print">The explorer is in the file itself, not on paper.</p>'

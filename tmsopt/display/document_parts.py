@@ -12,9 +12,10 @@ from tmsopt.display.document_rows import (
     point_rows,
     range_rows,
     record_rows,
+    spread,
     thinned,
 )
-from tmsopt.display.markup import Rows, Section, facts, paragraphs, table, verbatim, words
+from tmsopt.display.markup import Chapter, Rows, facts, paragraphs, table, verbatim, words
 from tmsopt.display.pictures import picture, untitled
 from tmsopt.display.writers import drawn, report
 from tmsopt.guide import describe
@@ -28,13 +29,15 @@ if TYPE_CHECKING:
     from tmsopt.studies import Results
     from tmsopt.tracing import Trace
 
-Sections = Iterator[Section]
+Chapters = Iterator[Chapter]
+
+_POINTS = 800 * 800  # of a chart that a picture shows
 
 _TOLD = ("motion", "loads", "cases", "warnings", "robustness", "rounding", "proof", "search")
 """Parts of the report of a design that stand beside the answer."""
 
 
-def of_solution(solution: "Solution", full: bool) -> Sections:
+def of_solution(solution: "Solution", full: bool) -> Chapters:
     """A design: the answer, what it looks like, its parameters, motion, limits, proof, quantities."""
     found = texts.findings(solution, full)
     si = texts.si_parameters(solution)
@@ -42,97 +45,97 @@ def of_solution(solution: "Solution", full: bool) -> Sections:
     first = parts.get("answer") or parts["conflict"]
     told = [(n, "; ".join(line.removeprefix(f"{n}: ").removeprefix("warning: ") for line in (p.lines or p.rest)))
             for n in _TOLD if (p := parts.get(n))]  # fmt: skip
-    yield Section("answer", "Answer", _lead(first.lines) + facts((n, said.removeprefix(f"{n}: ")) for n, said in told))
+    yield Chapter("answer", "Answer", _lead(first.lines) + facts((n, said.removeprefix(f"{n}: ")) for n, said in told))
     yield from _looks(solution)
-    yield Section("parameters", "Parameters", table("Parameters of the design", _parameter_rows(solution, si)), "wide")
+    yield Chapter("parameters", "Parameters", table("Parameters of the design", _parameter_rows(solution, si)), "wide")
     yield from _growth(solution)
-    yield Section("limits", "Limits", _limits(solution, found))
-    yield Section("proof", "Proof", _bound(solution) + paragraphs(parts["proof"].rest))
+    yield Chapter("limits", "Limits", _limits(solution, found))
+    yield Chapter("proof", "Proof", _bound(solution) + paragraphs(parts["proof"].rest))
     rows = [(*row[:3], row[-1]) for row in texts.quantity_rows(solution, si)]
     body = table("Quantities of the design", [("quantity", "value", "unit", "meaning"), *rows])
-    yield Section("quantities", "Derived quantities", body, "wide")
+    yield Chapter("quantities", "Derived quantities", body, "wide")
 
 
-def of_proof(proof: "Proof", design: "Solution | None") -> Sections:
+def of_proof(proof: "Proof", design: "Solution | None") -> Chapters:
     """What is proved, every digit, and of the design that it was proved of its pictures."""
     problem = proof.problem
     if problem is None:
         yield from of_other(proof)
         return
-    yield Section("answer", "Answer", _opening(proof))
+    yield Chapter("answer", "Answer", _opening(proof))
     digits = [("number", "decimal", "radius", "unit"), *texts.number_rows(problem, proof)]
-    yield Section("digits", "Digits", table(f"Numbers that were proved, to {proof.digits} digits", digits), "wide")
-    yield Section("roots", "Roots", picture(lambda: plots.draw_roots(untitled(proof)), "Roots in the complex plane"))
+    yield Chapter("digits", "Digits", table(f"Numbers that were proved, to {proof.digits} digits", digits), "wide")
+    yield Chapter("roots", "Roots", picture(lambda: plots.draw_roots(untitled(proof)), "Roots in the complex plane"))
     if design is not None:
         si = texts.si_parameters(design)
         yield from _looks(design)
         body = table("Parameters of the design as stored", _parameter_rows(design, si))
-        yield Section("parameters", "Parameters", body, "wide")
+        yield Chapter("parameters", "Parameters", body, "wide")
         yield from _growth(design)
     else:
         yield _asked(problem)
 
 
-def of_chart(chart: "Chart") -> Sections:
+def of_chart(chart: "Chart") -> Chapters:
     """The classes with their shares, the plane, its corners, and designs of the grid."""
-    yield Section("answer", "Answer", _opening(chart))
+    yield Chapter("answer", "Answer", _opening(chart))
     met = {in_words_of(chart.problem.model, name): share for name, share in chart.shares.items() if share}
     shares = [("class", "share in %"), *((name, f"{100 * share:.2f}") for name, share in met.items())]
     corners = [("corner",)] if chart.domain is None else texts.corner_rows(chart.domain, chart.problem)
-    yield Section("classes", "Classes", table("Share of each class", shares) + table("Corners of the domains", corners))
-    plain = untitled(chart)
-    yield Section("picture", "Chart", _pictures(
+    yield Chapter("classes", "Classes", table("Share of each class", shares) + table("Corners of the domains", corners))
+    plain = spread(untitled(chart), _POINTS)
+    yield Chapter("picture", "Chart", _pictures(
         (lambda: plots.chart_figure(plain), f"Stability over {' and '.join(chart.axes)}"),
         (lambda: plots.chart_figure(plain, "abscissa"), f"Spectral abscissa over {' and '.join(chart.axes)}"),
     ), "wide")  # fmt: skip
     yield _asked(chart.problem)
     rows, note = chart_rows(chart)
-    yield Section("rows", "Designs", note + table("Designs of the grid", rows), "whole")
+    yield Chapter("rows", "Designs", note + table("Designs of the grid", rows), "whole")
 
 
-def of_trace(trace: "Trace") -> Sections:
+def of_trace(trace: "Trace") -> Chapters:
     """The branches, their events, the picture, and points along them."""
-    yield Section("answer", "Answer", _opening(trace))
+    yield Chapter("answer", "Answer", _opening(trace))
     caption = f"Branches of {in_words_of(trace.problem.model, trace.pattern)}"
-    yield Section("picture", "Branches", picture(lambda: drawn(untitled(trace)), caption))
+    yield Chapter("picture", "Branches", picture(lambda: drawn(untitled(trace)), caption))
     units = {n: unit_of(trace.problem, n) for n in (*trace.problem.free, "abscissa")}
     listed = [texts.event_rows(branch, units, trace.problem.model) for branch in trace.branches]
     rows = [("branch", "event", *listed[0][0][1:])] if listed else [("branch",)]
     rows += [(str(k), *row) for k, found in enumerate(listed, start=1) for row in found[1:]]
-    yield Section("events", "Events", table("Events along the branches, to all digits", rows), "whole")
+    yield Chapter("events", "Events", table("Events along the branches, to all digits", rows), "whole")
     yield _asked(trace.problem)
     rows, note = point_rows(trace)
-    yield Section("rows", "Points", note + table("Points of the branches", rows), "whole")
+    yield Chapter("rows", "Points", note + table("Points of the branches", rows), "whole")
 
 
-def of_front(front: "Front") -> Sections:
+def of_front(front: "Front") -> Chapters:
     """The front, its points with all digits, gaps and notes."""
-    yield Section("answer", "Answer", _opening(front))
+    yield Chapter("answer", "Answer", _opening(front))
     caption = f"Front of {', '.join(front.objectives)}"
-    yield Section("picture", "Front", picture(lambda: plots.front_figure(untitled(front)), caption))
+    yield Chapter("picture", "Front", picture(lambda: plots.front_figure(untitled(front)), caption))
     yield _asked(front.problem)
-    yield Section("rows", "Points", table("Points of the front", texts.front_rows(front, full=True)), "whole")
+    yield Chapter("rows", "Points", table("Points of the front", texts.front_rows(front, full=True)), "whole")
 
 
-def of_results(results: "Results") -> Sections:
+def of_results(results: "Results") -> Chapters:
     """What the rows say together, how they are distributed, and the rows."""
     study = results.study
-    yield Section("answer", "Answer", _opening(results))
+    yield Chapter("answer", "Answer", _opening(results))
     caption = "How the designs are distributed" if study.method == "monte_carlo" else "The objective over what varies"
-    yield Section("picture", "Rows together", picture(lambda: drawn(untitled(results)), caption))
+    yield Chapter("picture", "Rows together", picture(lambda: drawn(untitled(results)), caption))
     yield _asked(study.problem)
     rows, note = thinned(results.rows, "rows", "tmsopt study FILE --export rows.csv writes all")
-    yield Section("rows", "Rows", note + table("Rows of the study", texts.study_rows(study, rows)), "whole")
+    yield Chapter("rows", "Rows", note + table("Rows of the study", texts.study_rows(study, rows)), "whole")
 
 
-def of_other(result: Any) -> Sections:
+def of_other(result: Any) -> Chapters:
     """Any other result: its text begins the page, its picture and its table follow."""
-    yield Section("answer", "Answer", _opening(result))
+    yield Chapter("answer", "Answer", _opening(result))
     name = type(result).__name__
-    yield Section("picture", "Picture", picture(lambda: drawn(result), name))
+    yield Chapter("picture", "Picture", picture(lambda: drawn(result), name))
     if hasattr(result, "records"):
         rows, note = record_rows(result)
-        yield Section("rows", "Rows", note + table(name, rows), "whole")
+        yield Chapter("rows", "Rows", note + table(name, rows), "whole")
 
 
 def _lead(lines: Iterable[str]) -> str:
@@ -147,24 +150,24 @@ def _opening(result: Any) -> str:
     return _lead([line for line in lines if line.strip() and not line.startswith("  ")])
 
 
-def _asked(problem: Problem) -> Section:
+def _asked(problem: Problem) -> Chapter:
     """What was asked: parameters, values and ranges with their meaning, objective and limits."""
     asked = describe(problem).asked.items()
     said = ((part, "; ".join(f"{name}: {text}" for name, text in keys.items())) for part, keys in asked)
     body = table("Parameters, with values and ranges", range_rows(problem), "free or fixed") + facts(said)
-    return Section("parameters", "Parameters", body, "wide")
+    return Chapter("parameters", "Parameters", body, "wide")
 
 
-def _looks(solution: "Solution") -> Sections:
+def _looks(solution: "Solution") -> Chapters:
     """The bicycle to scale, or the sketch that its model has."""
     if solution.problem.model is tms:
         caption = "The bicycle from its right side, to scale, in wheelbases; z points down"
-        yield Section("bicycle", "Bicycle", picture(lambda: plots.draw_bicycle(solution), caption))
+        yield Chapter("bicycle", "Bicycle", picture(lambda: plots.draw_bicycle(solution), caption))
     elif sketch := describe(solution).sketch:
-        yield Section("bicycle", "Bicycle", verbatim(sketch.strip("\n"), "sketch of the model, not to scale"))
+        yield Chapter("bicycle", "Bicycle", verbatim(sketch.strip("\n"), "sketch of the model, not to scale"))
 
 
-def _growth(solution: "Solution") -> Sections:
+def _growth(solution: "Solution") -> Chapters:
     """Growth rates and frequencies over the speed, or the first parameter."""
     from tmsopt.critical_speeds import growth
 
@@ -173,7 +176,7 @@ def _growth(solution: "Solution") -> Sections:
     except Exception:  # a root at infinity, or nothing that could vary: nothing to draw
         return
     caption = f"Growth rates and frequencies over {found.over.name}; stable where it is shaded"
-    yield Section("growth", "Growth and frequencies", picture(lambda: plots.growth_figure(found), caption))
+    yield Chapter("growth", "Growth and frequencies", picture(lambda: plots.growth_figure(found), caption))
 
 
 def _limits(solution: "Solution", found: "texts.Findings") -> str:

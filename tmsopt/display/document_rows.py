@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -85,17 +86,16 @@ def point_rows(trace: "Trace") -> tuple[list[Row], str]:
 
 def chart_rows(chart: "Chart") -> tuple[list[Row], str]:
     """Designs of the grid, every so many along each axis where they are too many."""
-    problem, sizes = chart.problem, [len(values) for values in chart.grid]
-    step = next(k for k in range(1, max(sizes) + 1) if math.prod(-(-size // k) for size in sizes) <= MOST)
+    problem, shown = chart.problem, spread(chart, MOST)
     units = {n: unit_of(problem, n) for n in (*chart.axes, "abscissa")}
-    grid = np.meshgrid(*(values[::step] for values in reversed(chart.grid)), indexing="ij")
+    grid = np.meshgrid(*reversed(shown.grid), indexing="ij")
     columns: dict[str, list[str]] = {
         f"{n} {units[n].text}".rstrip(): [units[n].number(x, _DIGITS) for x in values.ravel().tolist()]
         for n, values in zip(chart.axes, reversed(grid), strict=True)
     }
     left_out = () if len(problem.constraints) > len(chart.left_aside) else ("satisfied", "margin")
-    for name, layer in ((n, layer) for n, layer in chart.layers.items() if n not in left_out):
-        values = np.asarray(layer[(slice(None, None, step),) * len(sizes)]).ravel().tolist()
+    for name, layer in ((n, layer) for n, layer in shown.layers.items() if n not in left_out):
+        values = np.asarray(layer).ravel().tolist()
         if name == "kind":
             columns["class"] = [in_words_of(problem.model, CLASSES[k]) for k in values]
         elif name == "abscissa":
@@ -103,9 +103,19 @@ def chart_rows(chart: "Chart") -> tuple[list[Row], str]:
         else:
             columns[name.replace("_", " ")] = [_cell(x) for x in values]
     rows: list[Row] = [tuple(columns), *zip(*columns.values(), strict=True)]
-    all_of_them = math.prod(sizes)
-    note = f"{len(rows) - 1} of {all_of_them} designs, every {step}th along each axis; --output writes all."
-    return rows, paragraphs([note]) if step > 1 else ""
+    left = math.prod(map(len, chart.grid))
+    note = f"{len(rows) - 1} of {left} designs, spread evenly over each axis; --output writes all."
+    return rows, paragraphs([note]) if len(rows) <= left else ""
+
+
+def spread(chart: "Chart", most: int) -> "Chart":
+    """A chart with one in so many designs along each axis that there are no more than `most`."""
+    sizes = [len(values) for values in chart.grid]
+    step = next(k for k in range(1, max(sizes) + 1) if math.prod(-(-size // k) for size in sizes) <= most)
+    if step == 1:
+        return chart
+    layers = {n: layer[(slice(None, None, step),) * len(sizes)] for n, layer in chart.layers.items()}
+    return replace(chart, grid=tuple(values[::step] for values in chart.grid), layers=layers)
 
 
 def record_rows(result: Any) -> tuple[list[Row], str]:

@@ -15,7 +15,7 @@ Rows = Sequence[Sequence[str]]
 
 
 @dataclass(frozen=True)
-class Section:
+class Chapter:
     """A part of a page.
 
     Attributes:
