@@ -149,16 +149,23 @@ def test_quantities_and_margins_are_those_of_ball_arithmetic(name):
     x = designs(problem, FEW, seed=1)
     alpha, ratio = classify(python_coefficients(problem, x))[2:]
     frequency = roots(python_coefficients(problem, x)).imag.max(axis=1)
-    of_roots = np.stack([alpha, ratio, frequency], axis=1)
-    found = np.array(run([page_script(problem)], DERIVED, list(zip(x.tolist(), of_roots.tolist(), strict=True))), float)
+    motion = np.stack([alpha, ratio, frequency], axis=1)
+    found = np.array(run([page_script(problem)], DERIVED, list(zip(x.tolist(), motion.tolist(), strict=True))), float)
     known = 0
     with flint.ctx.workprec(106):
-        for row, r, y in zip(x, of_roots, found, strict=True):
-            values = balls(problem, row, zip(("abscissa", "damping_ratio", "angular_frequency"), r, strict=True))
+        for row, r, y in zip(x, motion, found, strict=True):
+            of_roots = dict(zip(("abscissa", "damping_ratio", "angular_frequency"), r, strict=True))
+            values = balls(problem, row, of_roots.items())
+            numbers = problem.values(dict(zip(problem.parameter_set.names, row.tolist(), strict=True)))
+            for root, value in of_roots.items():
+                numbers.define(root, value)
             for k, n in enumerate(script.quantities):
                 expected = problem.read(n).enclosure(values, exact)
                 known += bool(flint.arb(expected).is_finite())
                 assert agree(y[k], expected), n
+                plain = problem.read(n)(numbers)
+                assert math.isnan(y[k]) == math.isnan(plain), n
+                assert math.isinf(y[k]) == math.isinf(plain), n
             for k, n in enumerate(script.constraints, start=len(script.quantities)):
                 condition = problem.conditions[n]
                 sign = -1 if condition.comparison == "<=" else 1  # the margin is what is left of a limit
@@ -265,6 +272,46 @@ def test_exact_exceptional_points_have_their_class_and_all_their_roots():
         assert z["error"] <= JOINT
         assert np.allclose(np.sort_complex(got), np.sort_complex(np.array(expected, dtype=complex)), atol=near)
         assert abs(got.sum() - sum(expected)) < 1e-14
+
+
+MEETINGS = "(rows) => rows.map((a) => meetingsOf(rootsOf(Float64Array.from(a))))"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("roots_of", "expected"),
+    [
+        ([-1] * 4, [[-1, 0, 4]]), ([1j, 1j, -1j, -1j], [[0, 1, 2]]), ([-1, -1, -3, -3], [[-1, 0, 2], [-3, 0, 2]]),
+        ([0, 0, -1, -2], [[0, 0, 2], [-1, 0, 1], [-2, 0, 1]]), ([-2] * 6, [[-2, 0, 6]]), ([-3], [[-3, 0, 1]]),
+        ([*[-1 + 2j, -1 - 2j] * 3, -4], [[-1, 2, 3], [-4, 0, 1]]), ([*[-1 + 1j, -1 - 1j] * 2, -2, -2, -2], [[-1, 1, 2], [-2, 0, 3]]),
+        ([1000] * 3 + [-0.5, -0.5], [[1000, 0, 3], [-0.5, 0, 2]]), ([-1] * 12, [[-1, 0, 12]]),
+        ([-1, -1 - 2.0**-10, -5], [[-1, 0, 1], [-1 - 2.0**-10, 0, 1], [-5, 0, 1]]),
+    ],
+)  # fmt: skip
+def test_roots_that_meet_are_one_with_a_multiplicity(roots_of, expected):
+    c = np.poly(roots_of).real  # rounded, by which a multiple root comes apart
+    scaled = c * 2.0 ** (7 * np.arange(len(c)) - 30)
+    for row, unit in ((c, 1.0), (scaled, 2.0**7)):
+        (found,) = run([page_script(polynomials(len(c) - 1))], MEETINGS, [row.tolist()])
+        assert [m[2] for m in found] == [m[2] for m in expected]
+        size = np.abs(roots_of).max()
+        off = np.array(found)[:, :2] / unit - np.array(expected)[:, :2]
+        assert np.max(np.abs(off)) < 1e-9 * max(
+            size, 1
+        )  # first order in the rounding: the mean of a cluster is well known
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("degree", range(2, 13))
+def test_roots_that_do_not_meet_stay_apart(degree):
+    rng = np.random.default_rng(degree)
+    rows = rng.normal(size=(FEW, degree + 1))
+    found = run([page_script(polynomials(degree))], MEETINGS, rows.tolist())
+    for row, meetings in zip(rows, found, strict=True):
+        z = np.array([complex(m[0], m[1]) for m in meetings])
+        assert all(m[2] == 1 for m in meetings)
+        own = roots(row)
+        assert np.allclose(np.sort_complex(z), np.sort_complex(own[own.imag >= 0]), rtol=1e-9)
 
 
 @pytest.mark.slow
@@ -392,6 +439,43 @@ def test_hostile_names_and_every_function_of_the_language():
     assert (script.quantities, script.constraints) == (("alert", "eval"), ("</script>",))
     assert not any(n in script.text for n in ("constructor", "window", "script", "alert", "eval"))
     assert script.text.count("MODEL") == 1
+
+
+@pytest.mark.slow
+def test_random_expressions_have_the_values_that_python_computes():
+    rng = np.random.default_rng(7)
+
+    def written(depth):
+        if depth == 0:
+            return str(rng.choice(["u", "v", "w", "2", "0.5", "3.25", "1e-3"]))
+        sides = written(depth - 1), written(int(rng.integers(depth)))
+        unary = ["-({0})", "abs({0})", "sqrt(abs({0}))", "sin({0})", "cos({0})", "atan({0})", "exp(-abs({0}))", "({0})**2",
+                 "({0})**3", "({0})**(-1)", "abs({0})**1.5", "log(1 + abs({0}))", "tan(sin({0}))", "asin(sin({0}))"]  # fmt: skip
+        binary = ["({0}) + ({1})", "({0}) - ({1})", "({0}) * ({1})", "({0}) / ({1})", "min({0}, {1})", "max({0}, {1})"]
+        return str(rng.choice(binary + unary if rng.random() < 0.6 else binary)).format(*sides)
+
+    texts = {f"q{k}": f"{written(5)} + 0*u" for k in range(FEW)}
+    model = from_coefficients(["1", "u + v", "w"], quantities=texts)
+    problem = Problem(model, free=dict.fromkeys("uvw", (-2.0, 2.0)))
+    x = designs(problem, 20)
+    script = model_script(problem)
+    assert script.quantities == tuple(texts)
+    answer = DERIVED.replace("100", str(FEW))
+    found = np.array(run([page_script(problem)], answer, [[row, [0, 0, 0]] for row in x.tolist()]), dtype=float)
+    with np.errstate(all="ignore"):
+        values = dict(zip(problem.parameter_set.names, x.T, strict=True))
+        moved = {n: c * (1 + 2.0**-50) for n, c in values.items()}
+        expected, near = (
+            np.stack(np.broadcast_arrays(*(problem.read(t)(v) for t in texts.values())), axis=1)
+            for v in (values, moved)
+        )
+    found, expected, near = (np.where(np.isfinite(y), y, np.nan) for y in (found, expected, near))
+    # By as much as a change of the last digits of the parameters moves them, where that is the condition.
+    off = 1e-12 * np.abs(expected) + 1e3 * np.abs(near - expected)
+    both = np.isfinite(expected) & np.isfinite(near)
+    assert np.mean(both) > 0.9
+    assert np.all(np.abs(found - expected)[both] <= off[both])
+    assert np.array_equal(np.isfinite(found), np.isfinite(expected))
 
 
 def test_sizes():

@@ -18,7 +18,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS, ROOT_QUANTITIES
 
 
-class Form(NamedTuple):
+class Spelling(NamedTuple):
     """How an operation is written.
 
     Attributes:
@@ -39,7 +39,7 @@ class Form(NamedTuple):
 class Step(NamedTuple):
     """One operation, and the numbers of the steps whose results it takes."""
 
-    form: Form
+    spelling: Spelling
     operands: tuple[int, ...] = ()
 
 
@@ -97,43 +97,43 @@ def function(
     return "\n".join([f"{name}({', '.join(arguments)}) {{", *lines, *ends, "}"])
 
 
-def number(value: float) -> Form:
+def number(value: float) -> Spelling:
     """A double, to the last bit."""
     if math.isnan(value) or math.isinf(value):
         text = "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
     else:
         text = repr(float(value)).removesuffix(".0")
-    return Form(text, 8 if text.startswith("-") else 9)
+    return Spelling(text, 8 if text.startswith("-") else 9)
 
 
-def call(name: str, count: int = 1) -> Form:
+def call(name: str, count: int = 1) -> Spelling:
     """A function of JavaScript's Math."""
-    return Form(f"Math.{name}({', '.join(f'{{{k}}}' for k in range(count))})")
+    return Spelling(f"Math.{name}({', '.join(f'{{{k}}}' for k in range(count))})")
 
 
-ADD, SUBTRACT = Form("{0}+{1}", 6, (6, 7)), Form("{0}-{1}", 6, (6, 7))
-MULTIPLY, DIVIDE, NEGATE = Form("{0}*{1}", 7, (7, 8)), Form("{0}/{1}", 7, (7, 8)), Form("-{0}", 8, (9,))
-LESS, AT_MOST = Form("{0}<{1}", 5, (6, 6), truth=True), Form("{0}<={1}", 5, (6, 6), truth=True)
-EQUAL, UNEQUAL = Form("{0}==={1}", 4, (6, 6), truth=True), Form("{0}!=={1}", 4, (6, 6), truth=True)
+ADD, SUBTRACT = Spelling("{0}+{1}", 6, (6, 7)), Spelling("{0}-{1}", 6, (6, 7))
+MULTIPLY, DIVIDE, NEGATE = Spelling("{0}*{1}", 7, (7, 8)), Spelling("{0}/{1}", 7, (7, 8)), Spelling("-{0}", 8, (9,))
+LESS, AT_MOST = Spelling("{0}<{1}", 5, (6, 6), truth=True), Spelling("{0}<={1}", 5, (6, 6), truth=True)
+EQUAL, UNEQUAL = Spelling("{0}==={1}", 4, (6, 6), truth=True), Spelling("{0}!=={1}", 4, (6, 6), truth=True)
 SAME, DIFFERENT = EQUAL._replace(truths=(0, 1)), UNEQUAL._replace(truths=(0, 1))
-AND, OR = Form("{0}&&{1}", 3, (3, 4), True, (0, 1)), Form("{0}||{1}", 2, (2, 3), True, (0, 1))
-NOT, CHOOSE = Form("!{0}", 8, (9,), True, (0,)), Form("{0}?{1}:{2}", 1, (2, 1, 1), truths=(0,))
+AND, OR = Spelling("{0}&&{1}", 3, (3, 4), True, (0, 1)), Spelling("{0}||{1}", 2, (2, 3), True, (0, 1))
+NOT, CHOOSE = Spelling("!{0}", 8, (9,), True, (0,)), Spelling("{0}?{1}:{2}", 1, (2, 1, 1), truths=(0,))
 
 _POWERS = {
-    -1.0: Form("1/{0}", 7, (8,)), 0.5: call("sqrt"), 1.0: Form("{0}", 1, (1,)), 2.0: Form("{0}*{0}", 7, (8,)),
-    3.0: Form("{0}*{0}*{0}", 7, (8,)), 4.0: Form("{0}*{0}*({0}*{0})", 7, (8,)),
+    -1.0: Spelling("1/{0}", 7, (8,)), 0.5: call("sqrt"), 1.0: Spelling("{0}", 1, (1,)), 2.0: Spelling("{0}*{0}", 7, (8,)),
+    3.0: Spelling("{0}*{0}*{0}", 7, (8,)), 4.0: Spelling("{0}*{0}*({0}*{0})", 7, (8,)),
 }  # fmt: skip
 """Small powers, as `tmsopt.arithmetic.arrays` has them."""
 
-_OPERATIONS: Mapping[int, Form] = {
+_OPERATIONS: Mapping[int, Spelling] = {
     ca.OP_ASSIGN: _POWERS[1.0], ca.OP_ADD: ADD, ca.OP_SUB: SUBTRACT, ca.OP_MUL: MULTIPLY, ca.OP_DIV: DIVIDE,
-    ca.OP_NEG: NEGATE, ca.OP_SQ: _POWERS[2.0], ca.OP_TWICE: Form("2*{0}", 7, (8,)), ca.OP_INV: _POWERS[-1.0],
+    ca.OP_NEG: NEGATE, ca.OP_SQ: _POWERS[2.0], ca.OP_TWICE: Spelling("2*{0}", 7, (8,)), ca.OP_INV: _POWERS[-1.0],
     ca.OP_LT: LESS, ca.OP_LE: AT_MOST, ca.OP_EQ: EQUAL, ca.OP_NE: UNEQUAL, ca.OP_NOT: NOT, ca.OP_AND: AND,
-    ca.OP_OR: OR, ca.OP_IF_ELSE_ZERO: Form("{0}?{1}:0", 1, (2, 1), truths=(0,)),
+    ca.OP_OR: OR, ca.OP_IF_ELSE_ZERO: Spelling("{0}?{1}:0", 1, (2, 1), truths=(0,)),
     ca.OP_FMIN: call("min", 2), ca.OP_FMAX: call("max", 2),  # NaN where either is, as in `ARRAYS`
     ca.OP_FABS: call("abs"), ca.OP_POW: call("pow", 2), ca.OP_CONSTPOW: call("pow", 2), ca.OP_ATAN2: call("atan2", 2),
-    ca.OP_HYPOT: call("hypot", 2), ca.OP_FMOD: Form("{0}%{1}", 7, (7, 8)),
-    ca.OP_COPYSIGN: Form("Math.abs({0})*((1/{1}||{1})<0?-1:1)", 7, (0, 9)),
+    ca.OP_HYPOT: call("hypot", 2), ca.OP_FMOD: Spelling("{0}%{1}", 7, (7, 8)),
+    ca.OP_COPYSIGN: Spelling("Math.abs({0})*((1/{1}||{1})<0?-1:1)", 7, (0, 9)),
     **{
         getattr(ca, f"OP_{name.upper()}"): call(name)
         for name in ("sqrt", "sign", "floor", "ceil", "exp", "log", "log1p", "expm1", "sin", "cos", "tan", "asin",
@@ -189,23 +189,23 @@ def _steps(taken: Program, entries: Sequence[str], turned: Container[int] = ()) 
         operands = instruction.operands
         match instruction.operation:
             case ca.OP_INPUT:
-                form = Form(entries[instruction.place[1]])
+                spelling = Spelling(entries[instruction.place[1]])
             case ca.OP_CONST:
-                form = number(instruction.constant)
+                spelling = number(instruction.constant)
             case ca.OP_OUTPUT:
-                n, form = instruction.place[1], NEGATE
+                n, spelling = instruction.place[1], NEGATE
                 outputs[n] = k if n in turned else operands[0]
             case ca.OP_POW | ca.OP_CONSTPOW if (small := _small_power(taken, operands[1])) is not None:
-                form, operands = small, operands[:1]
+                spelling, operands = small, operands[:1]
             case operation if operation in _OPERATIONS:
-                form = _OPERATIONS[operation]
+                spelling = _OPERATIONS[operation]
             case operation:
                 raise NotAccepted(operation_name(operation))
-        steps.append(Step(form, operands))
+        steps.append(Step(spelling, operands))
     return steps, [outputs[n] for n in sorted(outputs)]
 
 
-def _small_power(taken: Program, exponent: int) -> Form | None:
+def _small_power(taken: Program, exponent: int) -> Spelling | None:
     step = taken.steps[exponent]
     return _POWERS.get(step.constant) if step.operation == ca.OP_CONST else None
 
@@ -216,34 +216,34 @@ def _written(steps: Sequence[Step], results: Sequence[int]) -> tuple[list[str], 
     for k in range(len(steps) - 1, -1, -1):
         if uses[k]:
             for place, operand in enumerate(steps[k].operands):
-                uses[operand] += steps[k].form.template.count(f"{{{place}}}")
+                uses[operand] += steps[k].spelling.template.count(f"{{{place}}}")
     lines: list[str] = []
-    found: dict[int, Form] = {}
+    found: dict[int, Spelling] = {}
     for k, step in enumerate(steps):
         if not uses[k]:
             continue
-        form = step.form
-        texts = [_operand(form, place, found[o]) for place, o in enumerate(step.operands)]
-        text = form.template.format(*texts)
-        if step.operands and ((uses[k] > 1 and form.template != "{0}") or len(text) > _LONGEST):
+        spelling = step.spelling
+        texts = [_operand(spelling, place, found[o]) for place, o in enumerate(step.operands)]
+        text = spelling.template.format(*texts)
+        if step.operands and ((uses[k] > 1 and spelling.template != "{0}") or len(text) > _LONGEST):
             lines.append(f"const t{len(lines)}={text};")
-            found[k] = Form(f"t{len(lines) - 1}", truth=form.truth)
+            found[k] = Spelling(f"t{len(lines) - 1}", truth=spelling.truth)
         else:
-            found[k] = Form(text, form.binding, truth=form.truth)
+            found[k] = Spelling(text, spelling.binding, truth=spelling.truth)
     return lines, [_as_number(found[k]).template for k in results]
 
 
-def _operand(form: Form, place: int, given: Form) -> str:
+def _operand(spelling: Spelling, place: int, given: Spelling) -> str:
     """The text of an operand, in parentheses where it binds less than it must."""
-    taken = _as_truth(given) if place in form.truths else _as_number(given)
-    minus_minus = form is SUBTRACT and place == 1 and taken.template.startswith("-")
-    return f"({taken.template})" if taken.binding < form.operands[place] or minus_minus else taken.template
+    taken = _as_truth(given) if place in spelling.truths else _as_number(given)
+    minus_minus = spelling is SUBTRACT and place == 1 and taken.template.startswith("-")
+    return f"({taken.template})" if taken.binding < spelling.operands[place] or minus_minus else taken.template
 
 
-def _as_truth(given: Form) -> Form:
+def _as_truth(given: Spelling) -> Spelling:
     text = given.template if given.binding > UNEQUAL.binding else f"({given.template})"
-    return given if given.truth else Form(f"{text}!==0", UNEQUAL.binding, truth=True)
+    return given if given.truth else Spelling(f"{text}!==0", UNEQUAL.binding, truth=True)
 
 
-def _as_number(given: Form) -> Form:
-    return Form(f"{given.template}?1:0", 1) if given.truth else given
+def _as_number(given: Spelling) -> Spelling:
+    return Spelling(f"{given.template}?1:0", 1) if given.truth else given

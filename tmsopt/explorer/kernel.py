@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.explorer import javascript as js
-from tmsopt.explorer.javascript import Form, Step
+from tmsopt.explorer.javascript import Spelling, Step
 from tmsopt.roots import lienard_chipart
 from tmsopt.roots.quartics import degenerate, factors, signs
 
@@ -53,28 +53,28 @@ class _Tape:
     steps: list[Step] = field(default_factory=list)
     places: dict[Step, int] = field(default_factory=dict)
 
-    def add(self, form: Form, *operands: "_Traced | float") -> "_Traced":
-        step = Step(form, tuple(self.constant(o).place for o in operands))
+    def add(self, spelling: Spelling, *operands: "_Traced | float") -> "_Traced":
+        step = Step(spelling, tuple(self.constant(o).place for o in operands))
         if step not in self.places:
             self.places[step] = len(self.steps)
             self.steps.append(step)
-        return _Traced(self, self.places[step], form.truth)
+        return _Traced(self, self.places[step], spelling.truth)
 
     def constant(self, value: "_Traced | float") -> "_Traced":
         return value if isinstance(value, _Traced) else self.add(js.number(float(value)))
 
 
-def _binary(form: Form, truths: Form | None = None) -> Any:
+def _binary(spelling: Spelling, truths: Spelling | None = None) -> Any:
     def forward(self: "_Traced", other: Any) -> Any:
         if isinstance(other, _Pair):
             return NotImplemented
-        return self.tape.add(truths if truths and self.truth else form, self, other)
+        return self.tape.add(truths if truths and self.truth else spelling, self, other)
 
     return forward
 
 
-def _reflected(form: Form) -> Any:
-    return lambda self, other: self.tape.add(form, other, self)
+def _reflected(spelling: Spelling) -> Any:
+    return lambda self, other: self.tape.add(spelling, other, self)
 
 
 _FUNCTIONS = {
@@ -197,7 +197,7 @@ def _stable(c: Sequence[Any]) -> Any:
 
 def _traced(name: str, arguments: Sequence[str], formula: Callable[..., list[Any]], into: str = "") -> str:
     tape = _Tape()
-    results = formula(*(tape.add(Form(n)) for n in arguments))
+    results = formula(*(tape.add(Spelling(n)) for n in arguments))
     places = [tape.constant(r).place for r in results]
     taken = [*arguments, into] if into else arguments
     return js.function(f"function {name}", taken, tape.steps, places, fills=bool(into))

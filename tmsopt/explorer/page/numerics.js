@@ -4,7 +4,7 @@
 const IS_QUARTIC = MODEL.degree === 4;
 const GOOD = 4e-15, ACCEPTED = 5e-14; // backward errors: not worth a step, worth another start
 
-// ---- powers of two -------------------------------------------------------------------------------------------------
+// ---- powers of two ------------------------------------------------------------------------------
 
 const BITS = new DataView(new ArrayBuffer(8));
 
@@ -23,15 +23,18 @@ function scaledBy(x, k) {
   return x * BITS.getFloat64(0);
 }
 
-// ---- roots: real factors, all improved at once -----------------------------------------------------------------------
+// ---- roots: real factors, all improved at once --------------------------------------------------
 
-// Factors s² + p s + q, then one s + lone for odd degrees, then so many roots at 0; in units of 2^unit, judged by error.
-const FOUND = { p: new Float64Array(6), q: new Float64Array(6), lone: 0, pairs: 0, odd: 0, zeros: 0, unit: 0, error: NaN };
+// Factors s² + p s + q, then one s + lone for odd degrees, then so many roots at 0; in units of 2^unit.
+const FOUND = {
+  p: new Float64Array(6), q: new Float64Array(6), lone: 0, pairs: 0, odd: 0, zeros: 0, unit: 0, error: NaN,
+};
 const BEST = { p: new Float64Array(6), q: new Float64Array(6), lone: 0 };
 const MONIC = new Float64Array(13), REBUILT = new Float64Array(13), TERMS = new Float64Array(13);
 const RE = new Float64Array(12), IM = new Float64Array(12);
 const PAIR = new Float64Array(4), RADIUS = new Float64Array(12);
-const START = new Float64Array(9), LATER = new Float64Array(5), LATER_P = new Float64Array(6), LATER_Q = new Float64Array(6);
+const START = new Float64Array(9), LATER = new Float64Array(5);
+const LATER_P = new Float64Array(6), LATER_Q = new Float64Array(6);
 const GOLDEN = 0.6180339887498949;
 
 /** Whether a polynomial has roots: finite coefficients and a leading one other than 0. */
@@ -219,7 +222,7 @@ function rebuild(n) {
   return error;
 }
 
-/** One step of Newton's method on all factors at once: each solves (change) × (product of the others) ≡ what is left. */
+/** A step of Newton's method on all factors at once: each solves (change) × (product of the others) ≡ what is left. */
 function correct(n) {
   const { p, q, pairs, lone } = FOUND;
   let slope = 0, value = 1;
@@ -292,7 +295,7 @@ function refine(n) {
   improve(n, 0);
 }
 
-// ---- signs: exact where rounding could change one ---------------------------------------------------------------------
+// ---- signs: exact where rounding could change one -----------------------------------------------
 
 /** A double as an integer times a power of two. */
 function wholeOf(x) {
@@ -332,7 +335,7 @@ function realRootsOf(a) {
   return COUNT.negative + COUNT.positive + (a[a.length - 1] === 0 ? 1 : 0);
 }
 
-/** Whether all real parts are negative: up to degree 4 by the rounded conditions, as the package has it, above exactly. */
+/** Whether all real parts are negative: up to degree 4 by the rounded conditions, as in the package, above exactly. */
 function isStable(a) {
   if (a.length <= 5) return stableBySigns(a[0], a[1], a[2], a[3], a[4]);
   const n = a.length - 1, up = a[0] > 0, f = CHAIN[0], g = CHAIN[1];
@@ -446,7 +449,7 @@ function signChanges(n) {
   }
 }
 
-/** Counts roots by discs around computed ones, each of which holds one root; false where they touch, or 0 or both sides. */
+/** Counts roots by discs that hold one root each; false where they touch one another, 0 or both sides of the axis. */
 function discs(a) {
   factorAny(a, true);
   const n = 2 * FOUND.pairs + FOUND.odd;
@@ -466,7 +469,8 @@ function discs(a) {
       size = size * modulus + Math.abs(MONIC[i]);
     }
     for (let j = 0; j < n; j++) if (j !== k) others *= Math.hypot(x - RE[j], y - IM[j]);
-    RADIUS[k] = (1.001 * n * (Math.hypot(u, v) + 8 * n * 2 ** -52 * size)) / others; // with the rounding of Horner's rule
+    const rounding = 8 * n * 2 ** -52 * size; // of Horner's rule, with room
+    RADIUS[k] = (1.001 * n * (Math.hypot(u, v) + rounding)) / others;
     if (!((y === 0 ? Math.abs(x) : Math.abs(y)) > RADIUS[k])) return false;
     for (let j = 0; j < k; j++) {
       if (!(Math.hypot(x - RE[j], y - IM[j]) > 1.001 * (RADIUS[k] + RADIUS[j]))) return false;
@@ -508,7 +512,7 @@ function exactSignChanges(p, q) {
   [CHANGES.left, CHANGES.middle, CHANGES.right] = turns;
 }
 
-// ---- what is asked of a design ------------------------------------------------------------------------------------------
+// ---- what is asked of a design ------------------------------------------------------------------
 
 /** All roots, rightmost first, conjugates exact and side by side, and the error of the coefficients they give back. */
 function rootsOf(a) {
@@ -522,12 +526,58 @@ function rootsOf(a) {
   }
   if (FOUND.odd) found.push([-FOUND.lone, 0]);
   for (let k = 0; k < FOUND.zeros; k++) found.push([0, 0]);
-  found.sort((u, v) => v[0] - u[0] || Math.abs(v[1]) - Math.abs(u[1]) || v[1] - u[1]);
+  found.sort((u, v) => v[0] - u[0] || Math.abs(v[1]) - Math.abs(u[1])); // stable: conjugates stay together
   found.forEach(([x, y], k) => {
     re[k] = scaledBy(x, FOUND.unit);
     im[k] = scaledBy(y, FOUND.unit);
   });
   return { re, im, error: FOUND.error };
+}
+
+/** Real coefficients of the monic polynomial with roots x + i y, conjugates among them. */
+function expanded(x, y) {
+  const re = new Float64Array(x.length + 1), im = new Float64Array(x.length + 1);
+  re[0] = 1;
+  x.forEach((_, k) => {
+    for (let i = k + 1; i > 0; i--) {
+      re[i] -= x[k] * re[i - 1] - y[k] * im[i - 1];
+      im[i] -= x[k] * im[i - 1] + y[k] * re[i - 1];
+    }
+  });
+  return re;
+}
+
+/**
+ * Roots as [re, im, multiplicity], those with im ≥ 0, rightmost first: nearest ones taken for one where that changes no
+ * coefficient by more than 1e-11 of its terms, as the package has it.
+ */
+function meetingsOf({ re, im }) {
+  const n = re.length, all = [...re.keys()], unit = Math.max(...all.map((k) => Math.hypot(re[k], im[k]))) || 1;
+  const x = re.map((u) => u / unit), y = im.map((v) => v / unit), size = x.map((u, k) => Math.hypot(u, y[k]));
+  const whole = expanded(x, y), terms = expanded(size.map((r) => -r), new Float64Array(n));
+  const group = all.slice(), partner = all.map((k) => (im[k] > 0 ? k + 1 : im[k] < 0 ? k - 1 : k));
+  const far = (i, j) => Math.hypot(x[i] - x[j], y[i] - y[j]) / (size[i] + size[j] || 1);
+  const pairs = all.flatMap((i) => all.slice(i + 1).map((j) => [far(i, j), i, j]));
+  pairs.sort((u, v) => u[0] - v[0]);
+  const mean = (values, k) => {
+    const members = all.filter((i) => group[i] === group[k]);
+    return members.reduce((sum, i) => sum + values[i], 0) / members.length;
+  };
+  let best = group.slice();
+  pairs.forEach(([distance, i, j], place) => {
+    const [from, into] = [group[j], group[i]];
+    all.forEach((k) => (group[k] = group[k] === from ? into : group[k]));
+    if (place + 1 < pairs.length && pairs[place + 1][0] <= distance * (1 + 1e-9)) return; // the conjugates first
+    const met = expanded(all.map((k) => mean(x, k)), all.map((k) => mean(y, k)));
+    if (met.every((c, k) => Math.abs(c - whole[k]) <= 1e-11 * terms[k])) best = group.slice();
+  });
+  all.forEach((k) => (group[k] = best[k]));
+  const first = all.filter((k) => group.indexOf(group[k]) === k);
+  const found = first.map((k) => {
+    const real = group[partner[k]] === group[k];
+    return [mean(re, k), real ? 0 : mean(im, k), group.filter((g) => g === group[k]).length];
+  });
+  return found.filter((z) => z[1] >= 0).sort((u, v) => v[0] - u[0] || v[1] - u[1]);
 }
 
 /** Abscissa, damping ratio and angular frequency into `out`; NaN where there are no roots. */
@@ -579,7 +629,7 @@ function survey(x, i, j, xs, ys, want) {
   return found;
 }
 
-// ---- responses -----------------------------------------------------------------------------------------------------------
+// ---- responses ----------------------------------------------------------------------------------
 
 /** Product of square matrices of n rows, row by row. */
 function matrixProduct(A, B, n) {
@@ -592,7 +642,9 @@ function matrixProduct(A, B, n) {
 /** Exponential of a square matrix: Taylor's series of a 2^-k-th of it, squared k times. */
 function exponential(A, n) {
   let norm = 0;
-  for (let i = 0; i < n; i++) norm = Math.max(norm, A.subarray(i * n, i * n + n).reduce((sum, x) => sum + Math.abs(x), 0));
+  for (let i = 0; i < n; i++) {
+    norm = Math.max(norm, A.subarray(i * n, i * n + n).reduce((sum, x) => sum + Math.abs(x), 0));
+  }
   const halvings = norm < Infinity ? Math.max(0, exponentOf(norm) + 3) : 0;
   const part = A.map((x) => scaledBy(x, -halvings));
   let term = Float64Array.from(A, (_, k) => (k % (n + 1) ? 0 : 1)), sum = term.slice();
@@ -618,7 +670,7 @@ function firstOrder(x) {
     }
     rows.push(row);
   }
-  const largest = Math.max(...rows.map((row) => row.subarray(0, n).reduce((most, e) => Math.max(most, Math.abs(e)), 0)));
+  const largest = Math.max(...rows.flatMap((row) => Array.from(row.subarray(0, n), Math.abs)));
   for (let c = 0; c < n; c++) {
     const best = rows.slice(c).reduce((most, row, k) => (Math.abs(row[c]) > Math.abs(rows[most][c]) ? c + k : most), c);
     if (!(Math.abs(rows[best][c]) > 1e-14 * largest)) return null;
