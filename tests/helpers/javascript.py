@@ -23,7 +23,7 @@ const plain = (key, x) => {
 };
 fs.writeFileSync(process.argv[3], JSON.stringify(answer(given), plain));
 """
-"""What a browser would not have is outside the strict scripts under test, but in the same file."""
+"""Reads what is given and writes the answer, after the scripts under test."""
 
 
 def page_script(problem: Any) -> str:
