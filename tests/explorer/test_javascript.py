@@ -16,8 +16,7 @@ from helpers.oracles import routh_exact
 from tmsopt.arithmetic import exact
 from tmsopt.charts import classified, classify
 from tmsopt.design import Problem, load
-from tmsopt.explorer.javascript import model_script
-from tmsopt.explorer.kernel import kernel_script
+from tmsopt.explorer import kernel_script, model_script
 from tmsopt.models import Values, from_coefficients, from_matrices
 from tmsopt.roots import backward_error, quartic_classes, roots
 

@@ -139,7 +139,9 @@ def test_a_state_is_what_the_package_computes(browser: Any, explored: Any) -> No
             if not of_python.roots:
                 continue
             mine = np.array([complex(r.re, r.im) for r in of_python.roots for _ in range(r.multiplicity)])
-            shown = page.evaluate("(() => { const d = drawingOf(); return [[...d.roots.re], [...d.roots.im], d.motion[0], d.kind]; })()")
+            shown = page.evaluate(
+                "(() => { const d = drawingOf(); return [[...d.roots.re], [...d.roots.im], d.motion[0], d.kind]; })()"
+            )
             theirs = np.array(shown[0]) + 1j * np.array(shown[1])
             size = np.abs(mine).max()
             assert max(np.abs(theirs - root).min() for root in mine) <= 1e-9 * size
@@ -284,7 +286,17 @@ def test_a_link_restores_the_state(browser: Any, explored: Any) -> None:
 
 @pytest.mark.slow
 def test_what_a_link_says_wrongly_is_ignored_and_said(browser: Any, ep4: Path) -> None:
-    wrong = ["nobody=1", "Fr=abc", ".axes=Fr,Fr", ".axes=Fr", ".layer=toString", ".over=x", "%E0%A4%A=1", "<b>=1", "Fr=1e999"]
+    wrong = [
+        "nobody=1",
+        "Fr=abc",
+        ".axes=Fr,Fr",
+        ".axes=Fr",
+        ".layer=toString",
+        ".over=x",
+        "%E0%A4%A=1",
+        "<b>=1",
+        "Fr=1e999",
+    ]
     with opened(browser, ep4, link="&".join(["chi_B=1.75", *wrong, ".over=mu"])) as page:
         start, names = page.evaluate("DATA.start"), [p["name"] for p in parameters(page)]
         start[names.index("chi_B")] = 1.75
@@ -302,7 +314,9 @@ def test_the_link_is_copied_or_shown(browser: Any, ep4: Path) -> None:
         press(page, "copy link")
         assert page.get_by_role("textbox", name="link").input_value() == f"{ep4.resolve().as_uri()}#Fr=3.25"
         press(page, "close")
-        page.evaluate("Object.defineProperty(navigator, 'clipboard', {value: {writeText: async (text) => (window.copied = text)}})")
+        page.evaluate(
+            "Object.defineProperty(navigator, 'clipboard', {value: {writeText: async (text) => (window.copied = text)}})"
+        )
         press(page, "copy link")
         assert page.evaluate("copied").endswith("#Fr=3.25")
         assert page.locator("#note").inner_text() == "Link copied."
@@ -383,7 +397,11 @@ def test_the_theme_is_that_of_the_system_until_one_is_chosen(browser: Any, ep4: 
 def test_nothing_needs_scrolling_sideways(browser: Any, explored: Any, width: int, tmp_path: Path) -> None:
     explorer, path = explored
     long = tmp_path / "long.html"
-    long.write_text(path.read_text().replace(f'"title":{json.dumps(explorer.problem.title, ensure_ascii=False)}', f'"title":"{"W" * 200}"'))
+    long.write_text(
+        path.read_text().replace(
+            f'"title":{json.dumps(explorer.problem.title, ensure_ascii=False)}', f'"title":"{"W" * 200}"'
+        )
+    )
     for shown in (path, long):
         with opened(browser, shown, width=width) as page:
             page.evaluate("document.querySelectorAll('details').forEach((d) => (d.open = true))")
@@ -392,7 +410,10 @@ def test_nothing_needs_scrolling_sideways(browser: Any, explored: Any, width: in
             slider = page.get_by_role("slider").first
             slider.scroll_into_view_if_needed()
             box = slider.bounding_box()
-            on_top = page.evaluate("([x, y]) => document.elementFromPoint(x, y).type", [box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
+            on_top = page.evaluate(
+                "([x, y]) => document.elementFromPoint(x, y).type",
+                [box["x"] + box["width"] / 2, box["y"] + box["height"] / 2],
+            )
             assert on_top == "range"  # nothing lies over it
             page.screenshot(path=tmp_path / f"{width}.png", full_page=True)
 
@@ -460,7 +481,11 @@ def test_limits_are_lit(browser: Any, explorers: Any) -> None:
             page.evaluate("(x) => change({x: [...x.entries()]})", [values[p["name"]] for p in parameters(page)])
             drawn(page)
             read = problem.values(values)
-            margins = {"steer_arm": abs(read["u_H"]) - 0.02, "rear_wheel_holds": read["N_R"] - 20, "front_wheel_holds": read["N_F"] - 20}
+            margins = {
+                "steer_arm": abs(read["u_H"]) - 0.02,
+                "rear_wheel_holds": read["N_R"] - 20,
+                "front_wheel_holds": read["N_F"] - 20,
+            }
             for name, margin in margins.items():
                 row = page.locator("#limits li", has=page.get_by_text(name, exact=True))
                 assert row.get_attribute("class") == ("holds" if margin >= 0 else "broken")

@@ -68,4 +68,6 @@ def opened(browser: Any, path: Path, *, width: int = 1280, height: int = 900, li
 
 def drawn(page: Any) -> None:
     """Wait until all that was asked for is drawn."""
-    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))))")
+    page.evaluate(
+        "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))))"
+    )

@@ -10,8 +10,7 @@ from typing import Any
 
 import pytest
 
-from tmsopt.explorer.javascript import model_script
-from tmsopt.explorer.kernel import kernel_script
+from tmsopt.explorer import kernel_script, model_script
 
 _FRAME = """
 const fs = require("fs");
