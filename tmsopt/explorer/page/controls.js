@@ -14,7 +14,7 @@ function say(text) {
 
 /** A value in the unit of its parameter, as a field writes it and reads it again. */
 function fieldText(value) {
-  return String(Number(value.toPrecision(7)));
+  return String(Number(value.toPrecision(6)));
 }
 
 /** Native slider of a parameter; a drag, or a key held down, is one step of undo. */

@@ -52,7 +52,8 @@ function verdictPanel(host) {
     const ends = [withUnit(motion[0], DATA.rootUnit), known ? `${known.name}: ${known.structure}` : "", limitsInWords(y)];
     const rest = [`abscissa ${ends[0]}`, ...ends.slice(1)].filter(Boolean).join(" · ");
     const mark = isStableKind(kind) ? "✓" : kind ? "✗" : "?";
-    badge.textContent = `${mark} ${isStableKind(kind) || !kind ? CLASS_WORDS[kind] : "unstable"}`;
+    const unstable = Number.isNaN(rate) ? "not stable" : "unstable";
+    badge.textContent = `${mark} ${isStableKind(kind) || !kind ? CLASS_WORDS[kind] : unstable}`;
     badge.dataset.kind = kind;
     sentence.replaceChildren(words, ...(Number.isNaN(rate) ? [] : ["e", element("sup", {}, exponent)]));
     more.textContent = rest;
@@ -118,7 +119,7 @@ function quantitiesPanel(host) {
   return (drawing) => {
     roots.textContent = `roots${DATA.rootUnit ? ` in ${DATA.rootUnit}` : ""}: ${rootTexts(drawing).join(", ")}`;
     origin.textContent = drawing.known?.roots.length
-      ? `Those of ${drawing.known.name} as they were found: where roots meet, computed ones scatter.`
+      ? `As they were found (${drawing.known.name}): where roots meet, computed ones scatter.`
       : `Computed; the polynomial rebuilt from them differs by ${figure(drawing.roots.error, 2)} of its coefficients.`;
     DATA.quantities.forEach(({one, share}, k) => {
       cells[k].textContent = figure((drawing.y[k] / one) * (share ? 100 : 1), 5);
@@ -138,7 +139,7 @@ function knownPanel(host) {
   return ({known}) => {
     articles.forEach((article, k) => article.classList.toggle("now", DATA.designs[k] === known));
     now.textContent = known
-      ? `Shown now: ${known.name}. Its multiple roots were recognised from its parameters, never judged by computed roots.`
+      ? `Shown now: ${known.name}. Which of its roots meet was found out before, with multiplicities; computed roots do not judge it.`
       : "The design shown now is none of these: its class is judged by signs of its coefficients, its roots are computed.";
     now.hidden = !DATA.designs.length;
   };
