@@ -95,6 +95,7 @@ function theme() {
   dark.addEventListener("change", () => apply());
   addEventListener("beforeprint", () => {
     apply(true);
+    document.querySelectorAll("details").forEach((details) => (details.open = true));
     repaints.forEach((repaint) => repaint()); // in a frame to come it would be too late
   });
   addEventListener("afterprint", () => apply());
