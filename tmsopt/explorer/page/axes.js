@@ -1,6 +1,18 @@
 // What all pictures share: sharp canvases, the page's colours, numbers, ticks, axes, legends, pointer and keys.
 
-const COLOUR_NAMES = ["stable", "heavy", "weave", "capsize", "mark", "real", "complex", "line", "paper", "ink", "faint"];
+const COLOUR_NAMES = [
+  "stable",
+  "heavy",
+  "weave",
+  "capsize",
+  "mark",
+  "real",
+  "complex",
+  "line",
+  "paper",
+  "ink",
+  "faint",
+];
 const PICTURE_FONT = "12px system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif";
 const PLOT_LEFT = 68; // pixels for the numbers and the label of a vertical axis
 const DASHES = { whole: [], long: [9, 4], short: [4, 3], dots: [1.5, 3], mixed: [8, 3, 2, 3] };
@@ -11,7 +23,8 @@ const PICTURE_STYLE = `
 .picture canvas { display: block; width: 100%; border-radius: 4px; }
 .picture canvas[tabindex] { cursor: crosshair; }
 .picture canvas:focus-visible { outline: 3px solid var(--weave); outline-offset: 1px; }
-.legend { display: flex; flex-wrap: wrap; gap: 2px 14px; margin: 4px 0 0; padding: 0; list-style: none; font-size: .8rem; }
+.legend { display: flex; flex-wrap: wrap; gap: 2px 14px; margin: 4px 0 0; padding: 0; font-size: .8rem; }
+.legend { list-style: none; }
 .legend li { display: flex; align-items: center; gap: 6px; }
 .legend canvas { flex: none; width: 30px; height: 14px; border-radius: 2px; }
 .reading { margin: 4px 0 0; min-height: 1.3em; font-size: .8rem; font-variant-numeric: tabular-nums; }
@@ -31,7 +44,9 @@ function part(parent, tag, attributes = {}, text = "") {
 /** The colours of the page as they are now. */
 function coloursNow() {
   const style = getComputedStyle(document.documentElement);
-  return Object.fromEntries(COLOUR_NAMES.map((name) => [name, style.getPropertyValue(`--${name}`).trim() || "#808080"]));
+  return Object.fromEntries(
+    COLOUR_NAMES.map((name) => [name, style.getPropertyValue(`--${name}`).trim() || "#808080"]),
+  );
 }
 
 const colourReader = document.createElement("canvas").getContext("2d");
@@ -41,7 +56,10 @@ function rgbOf(colour) {
   colourReader.fillStyle = colour;
   const text = colourReader.fillStyle;
   if (text[0] === "#") return [1, 3, 5].map((k) => parseInt(text.slice(k, k + 2), 16));
-  return text.match(/[\d.]+/g).slice(0, 3).map(Number);
+  return text
+    .match(/[\d.]+/g)
+    .slice(0, 3)
+    .map(Number);
 }
 
 /** A colour between two, `share` of the second. */
@@ -59,17 +77,24 @@ function classFills(colours) {
 /** Words for a class code. */
 function classWords(kind) {
   const { weave, capsize } = DATA.words;
-  return ["undefined", `unstable by ${capsize}`, `unstable by ${weave}`, "stable", "heavily damped (stable, nothing swings)"][kind];
+  return [
+    "undefined",
+    `unstable by ${capsize}`,
+    `unstable by ${weave}`,
+    "stable",
+    "heavily damped (stable, nothing swings)",
+  ][kind];
 }
 
 /** A number for people: so many digits, a true minus, powers of ten in words of digits. */
 function figure(value, digits = 4) {
   if (Number.isNaN(value)) return "none";
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
-  const raised = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
   const [digitsText, power] = String(Number(value.toPrecision(digits))).split("e");
   const written = digitsText.replace("-", "−");
-  return power ? `${written}·10${[...power.replace("+", "")].map((c) => raised[c]).join("")}` : written;
+  return power
+    ? `${written}·10${[...power.replace("+", "")].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c])).join("")}`
+    : written;
 }
 
 /** A value of a parameter in its unit, with the unit. */
@@ -146,12 +171,17 @@ function plotIn(box, [left, right], [bottom, top]) {
   const across = box.width / (right - left);
   const up = box.height / (top - bottom);
   return {
-    ...box, left, right, bottom, top,
+    ...box,
+    left,
+    right,
+    bottom,
+    top,
     x: (value) => box.x0 + (value - left) * across,
     y: (value) => box.y0 + (top - value) * up,
     valueX: (pixel) => left + (pixel - box.x0) / across,
     valueY: (pixel) => top - (pixel - box.y0) / up,
-    holds: (px, py) => px > box.x0 - 1 && px < box.x0 + box.width + 1 && py > box.y0 - 1 && py < box.y0 + box.height + 1,
+    holds: (px, py) =>
+      px > box.x0 - 1 && px < box.x0 + box.width + 1 && py > box.y0 - 1 && py < box.y0 + box.height + 1,
   };
 }
 
@@ -215,6 +245,25 @@ function drawLine(context, points, colour, width = 1.5, dash = DASHES.whole, off
   }
   context.stroke();
   context.setLineDash(DASHES.whole);
+}
+
+/** A straight line between two points in pixels. */
+function drawStraight(context, [x, y], [toX, toY], ...look) {
+  const points = [
+    [x, y],
+    [toX, toY],
+  ].map((point) => ({ x: point[0], y: point[1] }));
+  drawLine(context, points, ...look);
+}
+
+/** An upright line across a plot at a pixel. */
+function drawUpright(context, plot, x, ...look) {
+  drawStraight(context, [x, plot.y0], [x, plot.y0 + plot.height], ...look);
+}
+
+/** A level line across a plot at a pixel. */
+function drawLevel(context, plot, y, ...look) {
+  drawStraight(context, [plot.x0, y], [plot.x0 + plot.width, y], ...look);
 }
 
 /** A circle, filled and outlined. */
@@ -294,7 +343,7 @@ function boxEntry(words, colour, outline, hatch = "") {
 
 /** An entry of a legend: a line. */
 function lineEntry(words, colour, width, dash) {
-  const sign = (context) => drawLine(context, [{ x: 0, y: 7 }, { x: 30, y: 7 }], colour, width, dash);
+  const sign = (context) => drawStraight(context, [0, 7], [30, 7], colour, width, dash);
   return { words, look: [colour, width, dash], sign };
 }
 
@@ -342,7 +391,12 @@ function movesDesign(canvas, at, step) {
   const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
   canvas.addEventListener("keydown", (event) => {
     const arrow = arrows[event.key];
-    const moved = arrow && !event.altKey && !event.ctrlKey && !event.metaKey && step(...arrow.map((k) => k * (event.shiftKey ? 10 : 1)));
+    const moved =
+      arrow &&
+      !event.altKey &&
+      !event.ctrlKey &&
+      !event.metaKey &&
+      step(...arrow.map((k) => k * (event.shiftKey ? 10 : 1)));
     if (!moved) return;
     keyed = moved;
     event.preventDefault();
@@ -373,5 +427,6 @@ function rootsToDraw(state, drawing) {
   if (known && known.roots.length) return known.roots.filter(([, imaginary]) => imaginary >= 0);
   const { re, im } = drawing.roots;
   return Array.from(re, (value, k) => [value, im[k], 1])
-    .filter(([value, imaginary]) => Number.isFinite(value) && imaginary >= 0).sort((first, second) => second[0] - first[0]);
+    .filter(([value, imaginary]) => Number.isFinite(value) && imaginary >= 0)
+    .sort((first, second) => second[0] - first[0]);
 }

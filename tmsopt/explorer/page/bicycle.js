@@ -1,6 +1,12 @@
 // The bicycle to scale, from the right side and from behind, as it leans and steers after a push.
 
-const SLOWNESS = [[1, "in real time"], [2, "2 times slower"], [5, "5 times slower"], [10, "10 times slower"], [50, "50 times slower"]];
+const SLOWNESS = [
+  [1, "in real time"],
+  [2, "2 times slower"],
+  [5, "5 times slower"],
+  [10, "10 times slower"],
+  [50, "50 times slower"],
+];
 
 /** The bicycle of a design: lengths in m, or in wheelbases where the model has no units; x forward, y right, z down. */
 function bicycleShape(x) {
@@ -19,8 +25,21 @@ function bicycleShape(x) {
   const tall = top / Math.max(Math.cos(tilt), 0.35);
   const speed = named.v ?? (named.Fr ?? 0) * Math.sqrt(9.81 * w);
   return {
-    w, front, rear, B, H, meets, up, top, onAxis, alongAxis, tall, speed,
-    heavy: of("m_H", "mu", 0) / of("m_B", "", 1), trail: of("c", ""), contact: [w, 0, 0],
+    w,
+    front,
+    rear,
+    B,
+    H,
+    meets,
+    up,
+    top,
+    onAxis,
+    alongAxis,
+    tall,
+    speed,
+    heavy: of("m_H", "mu", 0) / of("m_B", "", 1),
+    trail: of("c", ""),
+    contact: [w, 0, 0],
   };
 }
 
@@ -33,7 +52,11 @@ function movedPoint(shape, point, ofFront, lean, steer) {
     const arm = [x - shape.meets[0], y - shape.meets[1], z - shape.meets[2]];
     const [cosine, sine] = [Math.cos(steer), Math.sin(steer)];
     const along = (1 - cosine) * arm.reduce((sum, value, k) => sum + value * axis[k], 0);
-    const cross = [axis[1] * arm[2] - axis[2] * arm[1], axis[2] * arm[0] - axis[0] * arm[2], axis[0] * arm[1] - axis[1] * arm[0]];
+    const cross = [
+      axis[1] * arm[2] - axis[2] * arm[1],
+      axis[2] * arm[0] - axis[0] * arm[2],
+      axis[0] * arm[1] - axis[1] * arm[0],
+    ];
     [x, y, z] = arm.map((value, k) => shape.meets[k] + cosine * value + sine * cross[k] + along * axis[k]);
   }
   return [x, y * Math.cos(lean) - z * Math.sin(lean), y * Math.sin(lean) + z * Math.cos(lean)];
@@ -48,22 +71,47 @@ function bicycleLines(shape, travelled) {
   const lines = [
     { front: false, kind: "frame", points: [hub, B, head] },
     { front: false, kind: "frame", points: [hub, head] },
-    { front: true, kind: "fork", points: [front ? frontHub : contact, onAxis(alongAxis(front ? frontHub : contact)), onAxis(0.9 * tall)] },
+    {
+      front: true,
+      kind: "fork",
+      points: [front ? frontHub : contact, onAxis(alongAxis(front ? frontHub : contact)), onAxis(0.9 * tall)],
+    },
     { front: true, kind: "fork", points: [onAxis(alongAxis(H)), H] },
-    { front: true, kind: "fork", points: [-0.16, 0.16].map((side) => onAxis(0.9 * tall).map((value, k) => (k === 1 ? side * w : value))) },
+    {
+      front: true,
+      kind: "fork",
+      points: [-0.16, 0.16].map((side) => onAxis(0.9 * tall).map((value, k) => (k === 1 ? side * w : value))),
+    },
     { front: false, kind: "axis", points: [onAxis(-0.07 * w), onAxis(1.04 * tall)] },
   ];
-  const wheels = [[hub, rear, false], [frontHub, front, true]];
+  const wheels = [
+    [hub, rear, false],
+    [frontHub, front, true],
+  ];
   for (const [centre, radius, ofFront] of wheels) {
     if (radius > 0) {
-      const rim = (angle, part) => [centre[0] + part * radius * Math.cos(angle), 0, centre[2] + part * radius * Math.sin(angle)];
+      const rim = (angle, part) => [
+        centre[0] + part * radius * Math.cos(angle),
+        0,
+        centre[2] + part * radius * Math.sin(angle),
+      ];
       const turned = travelled / radius;
-      lines.push({ front: ofFront, kind: "wheel", points: Array.from({ length: 49 }, (_, k) => rim((k * Math.PI) / 24, 1)) });
+      lines.push({
+        front: ofFront,
+        kind: "wheel",
+        points: Array.from({ length: 49 }, (_, k) => rim((k * Math.PI) / 24, 1)),
+      });
       for (let spoke = 0; spoke < 5; spoke += 1) {
         lines.push({ front: ofFront, kind: "spoke", points: [centre, rim(turned + (spoke * 2 * Math.PI) / 5, 0.97)] });
       }
     } else {
-      const skate = [[-0.06, -0.03], [0.06, -0.03], [0.035, 0], [-0.035, 0], [-0.06, -0.03]];
+      const skate = [
+        [-0.06, -0.03],
+        [0.06, -0.03],
+        [0.035, 0],
+        [-0.035, 0],
+        [-0.06, -0.03],
+      ];
       lines.push({ front: ofFront, kind: "skate", points: skate.map(([x, z]) => [centre[0] + x * w, 0, z * w]) });
     }
   }
@@ -112,7 +160,12 @@ function bicyclePicture(host) {
     const spare = width - scale * (right - left + 2 * side);
     const views = [
       { name: "from the right", x: (point) => spare / 3 + (point[0] - left) * scale, from: left, to: right },
-      { name: "from behind", x: (point) => (2 * spare) / 3 + (right - left + side + point[1]) * scale, from: -side, to: side },
+      {
+        name: "from behind",
+        x: (point) => (2 * spare) / 3 + (right - left + side + point[1]) * scale,
+        from: -side,
+        to: side,
+      },
     ];
     views.forEach((view, behind) => {
       const at = (point, ofFront) => {
@@ -121,12 +174,35 @@ function bicyclePicture(host) {
       };
       const ends = behind ? [view.x([0, view.from]), view.x([0, view.to])] : [view.x([view.from]), view.x([view.to])];
       drawGround(context, ends, ground, behind ? 0 : shape.speed * time * scale, colours);
-      if (behind) drawLine(context, [{ x: view.x([0, 0]), y: ground }, { x: view.x([0, 0]), y: ground - 1.08 * shape.top * scale }], colours.faint, 1, DASHES.dots);
+      if (behind) {
+        const middle = view.x([0, 0]);
+        drawStraight(
+          context,
+          [middle, ground],
+          [middle, ground - 1.08 * shape.top * scale],
+          colours.faint,
+          1,
+          DASHES.dots,
+        );
+      }
       for (const { front, kind, points } of bicycleLines(shape, shape.speed * time)) {
-        drawPart(context, points.map((point) => at(point, front)), kind, front, colours);
+        drawPart(
+          context,
+          points.map((point) => at(point, front)),
+          kind,
+          front,
+          colours,
+        );
       }
       drawMass(context, at(shape.B, false), 0.055 * shape.w * scale, "B", colours.weave, colours);
-      drawMass(context, at(shape.H, true), 0.055 * shape.w * scale * Math.min(1.2, Math.max(0.45, Math.cbrt(shape.heavy))), "H", colours.mark, colours);
+      drawMass(
+        context,
+        at(shape.H, true),
+        0.055 * shape.w * scale * Math.min(1.2, Math.max(0.45, Math.cbrt(shape.heavy))),
+        "H",
+        colours.mark,
+        colours,
+      );
       if (!behind && shape.trail) drawTrail(context, at(shape.contact), at(shape.meets), colours);
       context.textAlign = "center";
       context.fillStyle = colours.ink;
@@ -134,7 +210,8 @@ function bicyclePicture(host) {
     });
     tell(push, time, lean, steer);
     legend([
-      lineEntry("rear frame, centre of mass B", colours.weave, 4, DASHES.whole), lineEntry("front assembly, centre of mass H", colours.mark, 3, DASHES.whole),
+      lineEntry("rear frame, centre of mass B", colours.weave, 4, DASHES.whole),
+      lineEntry("front assembly, centre of mass H", colours.mark, 3, DASHES.whole),
       lineEntry("steer axis", colours.ink, 1.2, DASHES.mixed),
     ]);
   }
@@ -145,7 +222,8 @@ function bicyclePicture(host) {
     return {
       left: Math.min(-rear, B[0], H[0], over, -0.15 * w) - 0.08 * w,
       right: Math.max(w + front, B[0], H[0], meets[0], over, 1.15 * w) + 0.08 * w,
-      side: Math.max(0.36 * w, 0.45 * top), tallest: 1.1 * top + 0.06 * w,
+      side: Math.max(0.36 * w, 0.45 * top),
+      tallest: 1.1 * top + 0.06 * w,
     };
   }
 
@@ -164,12 +242,13 @@ function bicyclePicture(host) {
   }
 
   function drawGround(context, [from, to], y, shift, colours) {
-    drawLine(context, [{ x: from, y }, { x: to, y }], colours.faint, 1.5);
+    drawStraight(context, [from, y], [to, y], colours.faint, 1.5);
     context.save();
     context.beginPath();
     context.rect(from, y, to - from, 7);
     context.clip();
-    for (let x = from - (shift % 14) - 14; x < to + 14; x += 14) drawLine(context, [{ x: x + 6, y }, { x, y: y + 6 }], colours.faint, 1);
+    for (let x = from - (shift % 14) - 14; x < to + 14; x += 14)
+      drawStraight(context, [x + 6, y], [x, y + 6], colours.faint, 1);
     context.restore();
   }
 
@@ -211,11 +290,20 @@ function bicyclePicture(host) {
   }
 
   function tell(push, time, lean, steer) {
-    const degrees = (angle) => `${((180 / Math.PI) * angle).toFixed(1).replace("-", "−").replace(/^−(0\.0)$/, "$1")}°`;
-    const [rate, unit] = [figure((180 / Math.PI) * (push ? push.start : 0), 3), Number.isFinite(MODEL.rate(now.state.x)) ? "" : ", for a wheelbase of 1 m"];
+    const degrees = (angle) =>
+      `${((180 / Math.PI) * angle)
+        .toFixed(1)
+        .replace("-", "−")
+        .replace(/^−(0\.0)$/, "$1")}°`;
+    const [rate, unit] = [
+      figure((180 / Math.PI) * (push ? push.start : 0), 3),
+      Number.isFinite(MODEL.rate(now.state.x)) ? "" : ", for a wheelbase of 1 m",
+    ];
     const enlarged = enlargement(push);
     reading.textContent = push
-      ? `A push to the right gives it ${rate}°/s of ${coordinateNames()[clock.pushed]}. After ${time.toFixed(push.end < 1 ? 3 : 2)} s of ${figure(push.end, 3)} s${unit}: lean ${degrees(lean)}, steer ${degrees(steer)}${enlarged > 1 ? ` (lean drawn ${enlarged} times)` : ""}.`
+      ? `A push to the right gives it ${rate}°/s of ${coordinateNames()[clock.pushed]}. ` +
+        `After ${time.toFixed(push.end < 1 ? 3 : 2)} s of ${figure(push.end, 3)} s${unit}: lean ${degrees(lean)}, ` +
+        `steer ${degrees(steer)}${enlarged > 1 ? ` (lean drawn ${enlarged} times)` : ""}.`
       : "No motion to show: this design has no equations of motion that can be solved.";
     play.textContent = clock.playing ? "Pause" : "Play";
   }

@@ -5,7 +5,11 @@ const FINE_POINTS = 2 * CHART_POINTS - 1; // the same designs, and one between a
 const SURVEY_MS = 35; // while something moves
 const FINE_MS = 100; // once it rests
 const CURVE_LOOKS = {
-  weave: ["whole", 2.4], capsize: ["mixed", 2.4], infinity: ["dots", 2.4], "heavy damping": ["long", 2], "EP set": ["short", 2.6],
+  weave: ["whole", 2.4],
+  capsize: ["mixed", 2.4],
+  infinity: ["dots", 2.4],
+  "heavy damping": ["long", 2],
+  "EP set": ["short", 2.6],
 };
 
 /** Equally spaced values from one to another, both included. */
@@ -15,8 +19,10 @@ function evenly([low, high], count) {
 
 /** Whether two designs agree in all parameters but some. */
 function sameBeside(first, second, free, tolerance) {
-  return Array.from(first).every((value, k) =>
-    free.includes(k) || Math.abs(value - second[k]) <= tolerance * Math.max(Math.abs(value), Math.abs(second[k])));
+  return Array.from(first).every(
+    (value, k) =>
+      free.includes(k) || Math.abs(value - second[k]) <= tolerance * Math.max(Math.abs(value), Math.abs(second[k])),
+  );
 }
 
 /** The traced curves over the plane of the chart, turned where its axes are exchanged; empty where they do not hold. */
@@ -44,10 +50,12 @@ function bandsOf(values, layer) {
   return { down, up, below: low < 0 ? Math.ceil(-low / down) : 0, above: high > 0 ? Math.ceil(high / up) : 0 };
 }
 
-/** The colour of each band from the lowest up: the deeper, the farther from 0; what is good is blue, what is bad orange. */
+/** The colour of each band from the lowest up: deeper farther from 0; what is good is blue, what is bad orange. */
 function bandColours(bands, goodBelow, colours) {
-  const side = (count, good) => Array.from({ length: count }, (_, k) =>
-    mixed(colours.paper, good ? colours.weave : colours.mark, 0.14 + (0.86 * (k + 0.5)) / count));
+  const side = (count, good) =>
+    Array.from({ length: count }, (_, k) =>
+      mixed(colours.paper, good ? colours.weave : colours.mark, 0.14 + (0.86 * (k + 0.5)) / count),
+    );
   return [...side(bands.below, goodBelow).reverse(), ...side(bands.above, !goodBelow)];
 }
 
@@ -75,7 +83,8 @@ function chartImage({ found, points: size }, layer, colours) {
       const k = (size - 1 - row) * size + column;
       const kind = found.kind[k];
       const known = values ? Number.isFinite(values[k]) : kind > 0;
-      if (!known) pixels[row * size + column] = Math.floor(((row + column) * CHART_POINTS) / size) % 6 ? fills[0] : hatch;
+      if (!known)
+        pixels[row * size + column] = Math.floor(((row + column) * CHART_POINTS) / size) % 6 ? fills[0] : hatch;
       else pixels[row * size + column] = values ? shades[bandAt(values[k], bands)] : fills[kind];
     }
   }
@@ -108,7 +117,7 @@ function drawBar(context, x, y, width, bands, layer, colours) {
     free = at + half;
   }
   context.font = PICTURE_FONT;
-  drawLine(context, [{ x: zero, y: y - 3 }, { x: zero, y: y + 14 }], colours.ink, 2);
+  drawStraight(context, [zero, y - 3], [zero, y + 14], colours.ink, 2);
 }
 
 /** The stability chart: fills, exact curves, known designs, and the current one, which pointer and arrows move. */
@@ -122,7 +131,12 @@ function chartPicture(host) {
   const raster = document.createElement("canvas");
   const enough = DATA.parameters.length > 1;
   if (!enough) {
-    part(host, "p", {}, "A chart needs two parameters; this model has one. The growth plot shows all there is over it.");
+    part(
+      host,
+      "p",
+      {},
+      "A chart needs two parameters; this model has one. The growth plot shows all there is over it.",
+    );
     return { draw() {}, cheap: true };
   }
   const surface = canvasIn(host, (width) => Math.min(560, Math.max(300, 0.78 * width)), paint);
@@ -137,10 +151,9 @@ function chartPicture(host) {
     const others = Array.from(state.x, (value, k) => (k === i || k === j ? 0 : value));
     const key = `${state.plane} ${state.layer} ${others}`;
     if (key === surveyed.key && (!fine || surveyed.fine)) return surveyed;
-    const takes = (count) => pace[state.layer] * count * count;
-    const points = fine
-      ? (takes(FINE_POINTS) < FINE_MS ? FINE_POINTS : CHART_POINTS)
-      : [CHART_POINTS, 140, 100, 70].find((count) => takes(count) < SURVEY_MS) || 50;
+    const sizes = fine ? [FINE_POINTS, CHART_POINTS] : [CHART_POINTS, 140, 100, 70, 50];
+    const quick = (count) => pace[state.layer] * count ** 2 < (fine ? FINE_MS : SURVEY_MS);
+    const points = sizes.find(quick) || sizes[sizes.length - 1];
     const [xs, ys] = [rangeOf(i), rangeOf(j)].map((ends) => evenly(ends, points));
     const before = performance.now();
     const found = survey(state.x, i, j, xs, ys, state.layer === "kind" ? [] : [state.layer]);
@@ -163,7 +176,11 @@ function chartPicture(host) {
     }
     const { bands } = shaded;
     const head = state.layer === "kind" ? 8 : 50;
-    plot = plotIn({ x0: PLOT_LEFT, y0: head, width: width - PLOT_LEFT - 12, height: height - head - 42 }, rangeOf(i), rangeOf(j));
+    plot = plotIn(
+      { x0: PLOT_LEFT, y0: head, width: width - PLOT_LEFT - 12, height: height - head - 42 },
+      rangeOf(i),
+      rangeOf(j),
+    );
     tellPlot(surface.canvas, plot);
     clipped(context, plot, () => {
       // a design stands at the middle of its pixel: the first and the last reach half a pixel beyond the ends
@@ -171,17 +188,26 @@ function chartPicture(host) {
       context.imageSmoothingEnabled = false;
       context.drawImage(raster, plot.x0 - dx / 2, plot.y0 - dy / 2, plot.width + dx, plot.height + dy);
       drawCurves(context, state, colours);
+      drawHairs(context, plot.x(state.x[i]), plot.y(state.x[j]), colours);
     });
     if (bands) {
       context.textAlign = "left";
       context.fillStyle = colours.ink;
       const unit = state.layer === "abscissa" && DATA.rootUnit ? ` in ${DATA.rootUnit}` : "";
-      const words = state.layer === "abscissa" ? `abscissa${unit}: below 0 decays` : "damping ratio: above 0 decays, 1 swings not at all";
+      const words =
+        state.layer === "abscissa"
+          ? `abscissa${unit}: below 0 decays`
+          : "damping ratio: above 0 decays, 1 swings not at all";
       context.fillText(words, plot.x0, 8);
       drawBar(context, plot.x0, 18, plot.width, bands, state.layer, colours);
     }
-    drawAxes(context, plot, { label: parameterLabel(i, plot.width), one: DATA.parameters[i].one },
-      { label: parameterLabel(j, plot.height), one: DATA.parameters[j].one }, colours);
+    drawAxes(
+      context,
+      plot,
+      { label: parameterLabel(i, plot.width), one: DATA.parameters[i].one },
+      { label: parameterLabel(j, plot.height), one: DATA.parameters[j].one },
+      colours,
+    );
     drawDesigns(context, state, colours);
     drawHere(context, plot.x(state.x[i]), plot.y(state.x[j]), colours);
     legend(entriesOf(state, present, colours));
@@ -216,16 +242,19 @@ function chartPicture(host) {
     }
   }
 
-  /** The current design: a ring with cross hairs, of which one may be in sight where the ring is not. */
+  /** Cross hairs at the current design, of which one may be in sight where the other is not. */
+  function drawHairs(context, x, y, colours) {
+    for (const look of [
+      [colours.paper, 3, DASHES.whole],
+      [colours.ink, 1, DASHES.short],
+    ]) {
+      drawUpright(context, plot, x, ...look);
+      drawLevel(context, plot, y, ...look);
+    }
+  }
+
+  /** The current design: a ring. */
   function drawHere(context, x, y, colours) {
-    clipped(context, plot, () => {
-      for (const [colour, width, dash] of [[colours.paper, 3, DASHES.whole], [colours.ink, 1, DASHES.short]]) {
-        drawLine(context, [{ x, y: plot.y0 }, { x, y: y - 9 }], colour, width, dash);
-        drawLine(context, [{ x, y: y + 9 }, { x, y: plot.y0 + plot.height }], colour, width, dash);
-        drawLine(context, [{ x: plot.x0, y }, { x: x - 9, y }], colour, width, dash);
-        drawLine(context, [{ x: x + 9, y }, { x: plot.x0 + plot.width, y }], colour, width, dash);
-      }
-    });
     if (!plot.holds(x, y)) return;
     drawDot(context, x, y, 8, "", colours.paper, 5);
     drawDot(context, x, y, 8, "", colours.ink, 2.2);
@@ -235,12 +264,17 @@ function chartPicture(host) {
   function lookOf({ kind, set, along }, colours) {
     const [dash, width] = CURVE_LOOKS[set === "stability" ? kind : set] || CURVE_LOOKS.weave;
     const words = {
-      weave: `edge of stability: ${DATA.words.weave}`, capsize: `edge of stability: ${DATA.words.capsize}`, infinity: "a root at infinity",
+      weave: `edge of stability: ${DATA.words.weave}`,
+      capsize: `edge of stability: ${DATA.words.capsize}`,
+      infinity: "a root at infinity",
     }[kind];
     const following = (along || []).map((k) => DATA.parameters[k].name).join(", ");
     const points = `exceptional points (${kind})${following ? `, where ${following} follows` : ""}`;
     const ofSet = { "heavy damping": ["edge of heavy damping", colours.ink], "EP set": [points, colours.mark] };
-    const [text, colour] = ofSet[set] || [words || `edge of stability: ${kind}`, kind === "weave" ? colours.weave : colours.ink];
+    const [text, colour] = ofSet[set] || [
+      words || `edge of stability: ${kind}`,
+      kind === "weave" ? colours.weave : colours.ink,
+    ];
     return { colour, width, dash: DASHES[dash], words: text };
   }
 
@@ -248,10 +282,12 @@ function chartPicture(host) {
     const fills = classFills(colours);
     const classes = state.layer === "kind" ? present : present.filter((kind) => kind === 0);
     const entries = classes.map((kind) =>
-      boxEntry(classWords(kind), fills[kind], colours.faint, kind ? "" : mixed(colours.paper, colours.ink, 0.45)));
+      boxEntry(classWords(kind), fills[kind], colours.faint, kind ? "" : mixed(colours.paper, colours.ink, 0.45)),
+    );
     const curves = curvesIn(state);
     for (const look of curves.map((curve) => lookOf(curve, colours))) {
-      if (!entries.some(({ words }) => words === look.words)) entries.push(lineEntry(look.words, look.colour, look.width, look.dash));
+      if (!entries.some(({ words }) => words === look.words))
+        entries.push(lineEntry(look.words, look.colour, look.width, look.dash));
     }
     entries.push(dotEntry("this design", "", colours.ink));
     if (DATA.curves.length && !curves.length) {
@@ -265,7 +301,9 @@ function chartPicture(host) {
   /** What is at a place of the chart, in words. */
   function read(state, kind, abscissa, at = state.x) {
     const where = state.plane.map((k) => `${DATA.parameters[k].name} = ${valueText(k, at[k])}`).join(", ");
-    const number = Number.isFinite(abscissa) ? `, abscissa ${figure(abscissa)}${DATA.rootUnit ? ` ${DATA.rootUnit}` : ""}` : "";
+    const number = Number.isFinite(abscissa)
+      ? `, abscissa ${figure(abscissa)}${DATA.rootUnit ? ` ${DATA.rootUnit}` : ""}`
+      : "";
     const inside = state.plane.every((k) => at[k] >= rangeOf(k)[0] && at[k] <= rangeOf(k)[1]);
     reading.textContent = `${where}: ${classWords(kind)}${number}${inside ? "" : "; outside of this picture"}`;
   }
@@ -273,11 +311,15 @@ function chartPicture(host) {
   const within = (k, value) => Math.min(rangeOf(k)[1], Math.max(rangeOf(k)[0], value));
   movesDesign(
     surface.canvas,
-    (px, py) => [[now.state.plane[0], within(now.state.plane[0], plot.valueX(px))], [now.state.plane[1], within(now.state.plane[1], plot.valueY(py))]],
-    (...steps) => now.state.plane.map((k, axis) => {
-      const [low, high] = rangeOf(k);
-      return [k, within(k, now.state.x[k] + (steps[axis] * (high - low)) / (CHART_POINTS - 1))];
-    }),
+    (px, py) => [
+      [now.state.plane[0], within(now.state.plane[0], plot.valueX(px))],
+      [now.state.plane[1], within(now.state.plane[1], plot.valueY(py))],
+    ],
+    (...steps) =>
+      now.state.plane.map((k, axis) => {
+        const [low, high] = rangeOf(k);
+        return [k, within(k, now.state.x[k] + (steps[axis] * (high - low)) / (CHART_POINTS - 1))];
+      }),
   );
   surface.canvas.addEventListener("pointermove", (event) => {
     if (!plot || event.buttons || !plot.holds(event.offsetX, event.offsetY)) return;
@@ -289,7 +331,10 @@ function chartPicture(host) {
     motionOf(a, motion);
     read(now.state, kindOf(a), motion[0], at);
   });
-  surface.canvas.addEventListener("pointerleave", () => now && read(now.state, now.drawing.kind, now.drawing.motion[0]));
+  surface.canvas.addEventListener(
+    "pointerleave",
+    () => now && read(now.state, now.drawing.kind, now.drawing.motion[0]),
+  );
 
   return {
     cheap: true,
@@ -303,7 +348,10 @@ function chartPicture(host) {
       }, 150);
       const [first, second] = state.plane.map((k) => `${DATA.parameters[k].name} ${valueText(k, state.x[k], 3)}`);
       const classes = (surveyed.present || []).map((kind) => classWords(kind)).join("; ");
-      says(`Stability chart: this design, ${first} and ${second}, is ${classWords(drawing.kind)}; in the picture are ${classes}. Arrow keys move the design.`);
+      says(
+        `Stability chart: this design, ${first} and ${second}, is ${classWords(drawing.kind)}; ` +
+          `in the picture are ${classes}. Arrow keys move the design.`,
+      );
     },
   };
 }

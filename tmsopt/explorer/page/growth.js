@@ -1,4 +1,4 @@
-// Growth rates and frequencies over one parameter, with what happens on the way; and the sweep that the root path shares.
+// Growth rates and frequencies over one parameter, with what happens on the way; the root path shares the sweep.
 
 const SWEEP_POINTS = 301;
 let sweepKept = { key: "" };
@@ -12,7 +12,7 @@ function coefficientsAt(x, k, value) {
   return a;
 }
 
-/** Where a function with few values changes between two ends, each within `width`: [just before, just after] by bisection. */
+/** Where a function with few values changes between two ends: [before, after], `width` apart, by bisection. */
 function changesBetween(of, low, high, width) {
   const last = of(high);
   const found = [];
@@ -38,20 +38,24 @@ function crossingKind(before, after) {
   return before[last] * after[last] <= 0 ? "capsize" : "weave";
 }
 
-/** The roots of a sweep, upper half, and what they are joined to: points {at, re, im} in curves of pairs and of real roots. */
+/** The roots of a sweep, upper half, joined to curves of pairs and of real roots: {pair, points: [{at, re, im} ..]}. */
 function curvesOf(samples) {
   const curves = [];
   let open = [];
   for (const { at, roots } of samples) {
-    const points = Array.from(roots.re, (re, k) => ({ at, re, im: roots.im[k] })).filter(({ re, im }) => Number.isFinite(re) && im >= 0);
+    const points = Array.from(roots.re, (re, k) => ({ at, re, im: roots.im[k] })).filter(
+      ({ re, im }) => Number.isFinite(re) && im >= 0,
+    );
     const next = [];
     for (const pairs of [false, true]) {
       const fresh = points.filter(({ im }) => im > 0 === pairs);
       const ends = open.filter(({ pair }) => pair === pairs);
-      const links = ends.flatMap((curve) => fresh.map((point) => {
-        const end = curve.points[curve.points.length - 1];
-        return { curve, point, apart: Math.hypot(point.re - end.re, point.im - end.im) };
-      }));
+      const links = ends.flatMap((curve) =>
+        fresh.map((point) => {
+          const end = curve.points[curve.points.length - 1];
+          return { curve, point, apart: Math.hypot(point.re - end.re, point.im - end.im) };
+        }),
+      );
       links.sort((first, second) => first.apart - second.apart);
       const taken = new Set();
       for (const { curve, point } of links) {
@@ -88,7 +92,7 @@ function closingIn(centre, step, [low, high]) {
   return apart.flatMap((distance) => [centre - distance, centre + distance]).filter((at) => at > low && at < high);
 }
 
-/** Roots, classes, curves and events over the whole range of the parameter `state.over`; kept while nothing else moves. */
+/** Roots, classes, curves and events over the range of the parameter `state.over`; kept while nothing else moves. */
 function sweepOf(state) {
   const k = state.over;
   const key = `${k} ${Array.from(state.x, (value, index) => (index === k ? 0 : value))}`;
@@ -109,7 +113,10 @@ function sweepOf(state) {
       const before = coarse[index - 1];
       const kinds = before.kind === sample.kind ? [] : changesBetween(kindAt, before.at, sample.at, width);
       const reals = before.real === sample.real ? [] : changesBetween(realAt, before.at, sample.at, width);
-      const near = [...kinds, ...reals].flat().sort((first, second) => first - second).map(sampleAt);
+      const near = [...kinds, ...reals]
+        .flat()
+        .sort((first, second) => first - second)
+        .map(sampleAt);
       samples.push(...near.filter(({ at }) => at > before.at && at < sample.at));
       for (const [low, high] of kinds) {
         const [first, second] = [sampleAt(low), sampleAt(high)];
@@ -119,7 +126,7 @@ function sweepOf(state) {
       }
       for (const [low, high] of reals) {
         const met = meetingOf(sampleAt(low), sampleAt(high));
-        if (met) events.push({ kind: "meeting", at: (low + high) / 2, ...met });
+        if (met) events.push({ kind: "meeting", at: (low + high) / 2, re: met.re });
       }
     }
     samples.push(sample);
@@ -130,26 +137,27 @@ function sweepOf(state) {
   samples = samples.concat([...centres].flatMap((centre) => closingIn(centre, step, ends)).map(sampleAt));
   samples.sort((first, second) => first.at - second.at);
   sweepKept = {
-    key, ends, samples, events: events.sort((first, second) => first.at - second.at), curves: curvesOf(samples),
-    stable: bandsAlong(samples, ({ kind }) => kind > 2), heavy: bandsAlong(samples, ({ kind }) => kind === 4),
+    key,
+    ends,
+    samples,
+    events: events.sort((first, second) => first.at - second.at),
+    curves: curvesOf(samples),
+    stable: bandsAlong(samples, ({ kind }) => kind > 2),
+    heavy: bandsAlong(samples, ({ kind }) => kind === 4),
   };
   return sweepKept;
 }
 
-/** Where on the real axis roots meet between two designs that differ in the number of real roots, or null at infinity. */
+/** Where on the real axis roots meet, between designs with other numbers of real roots; null where one is infinite. */
 function meetingOf(first, second) {
   if (first.a[0] * second.a[0] <= 0) return null;
-  const more = first.real > second.real ? first : second;
-  const reals = Array.from(more.roots.re).filter((_, k) => more.roots.im[k] === 0).sort((p, q) => p - q);
-  const gaps = reals.slice(1).map((re, k) => ({ apart: re - reals[k], re: (re + reals[k]) / 2 }));
-  const closest = gaps.sort((p, q) => p.apart - q.apart)[0];
-  // equal roots are counted once: where rounding left but one real root, the pair beside it is the place
-  const lone = Array.from(more.roots.re).find((_, k) => more.roots.im[k] >= 0);
-  const re = closest ? closest.re : lone;
-  return Number.isFinite(re) ? { re } : null;
+  const { re, im } = (first.real > second.real ? first : second).roots;
+  const reals = re.filter((_, k) => im[k] === 0).sort();
+  const gaps = Array.from(reals.subarray(1), (root, k) => ({ apart: root - reals[k], re: (root + reals[k]) / 2 }));
+  return gaps.sort((one, other) => one.apart - other.apart)[0] ?? { re: NaN };
 }
 
-/** What happens over the parameter `state.over`, in order: {kind, at} in SI, `meeting` where real roots become a pair. */
+/** What happens over the parameter `state.over`, in order: {kind, at} in SI; `meeting`: real roots become a pair. */
 function growthEvents(state) {
   return sweepOf(state).events;
 }
@@ -157,8 +165,7 @@ function growthEvents(state) {
 /** An event in words: "weave ends at v = 4.292 m/s". */
 function eventWords({ kind, at, gains }, over) {
   const where = `at ${DATA.parameters[over].name} = ${valueText(over, at, 7)}`;
-  if (kind === "meeting") return `roots meet ${where}`;
-  if (kind === "infinity") return `a root passes infinity ${where}, ${gains ? "stable from there" : "unstable from there"}`;
+  if (kind === "infinity") return `a root passes infinity ${where}, ${gains ? "" : "un"}stable from there`;
   return `${DATA.words[kind]} ${gains ? "ends" : "begins"} ${where}`;
 }
 
@@ -172,13 +179,16 @@ function limitsOf(values) {
   return [low - room, high + room];
 }
 
-/** Limits of the growth rates: of the roots here and near, but none much deeper than most, which would hide what happens at 0. */
+/** Limits of the growth rates of roots here and near, but for those so deep that they would hide what happens at 0. */
 function growthLimits(here, near, typical) {
   const depth = Math.max(4 * typical, limitsOf(near)[1]);
   const seen = here.filter((growth) => growth >= -depth);
   const [low, high] = limitsOf([...near.filter((growth) => growth >= -depth), ...seen]);
   const room = 0.06 * (high - low);
-  return [Math.min(low, ...seen.map((growth) => growth - room)), Math.max(high, ...seen.map((growth) => growth + room))];
+  return [
+    Math.min(low, ...seen.map((growth) => growth - room)),
+    Math.max(high, ...seen.map((growth) => growth + room)),
+  ];
 }
 
 /** Growth rates above frequencies over one parameter. */
@@ -200,73 +210,97 @@ function growthPicture(host) {
     return Number.isFinite(rate) ? rate : 1;
   }
 
+  /** Growth rates and frequencies of the curves and of the design, [growth, frequency] in their units, and limits. */
+  function motionsOf(state, drawing, sweep, timed) {
+    const scaled = ([re, im], at) => {
+      const rate = rateAt(state, at);
+      return [re * rate, (im * rate) / (timed ? 2 * Math.PI : 1)];
+    };
+    const curves = sweep.curves.map(({ pair, points }) => ({
+      pair,
+      along: points.map(({ at, re, im }) => ({ at, values: scaled([re, im], at) })),
+    }));
+    const value = state.x[state.over];
+    const roots = rootsToDraw(state, drawing);
+    const here = roots.map((root) => ({ pair: root[1] > 0, times: root[2], values: scaled(root, value) }));
+    const room = 0.15 * (sweep.ends[1] - sweep.ends[0]);
+    const centres = [value, ...sweep.events.filter(({ kind }) => kind !== "meeting").map(({ at }) => at)];
+    const near = curves.flatMap(({ along }) => along.filter(({ at }) => centres.some((c) => Math.abs(at - c) < room)));
+    const part = (list, k) => list.map(({ values }) => values[k]);
+    const typical = rateAt(state, value) * typicalSize(roots, ([re]) => Math.abs(re));
+    return {
+      curves,
+      here,
+      growths: growthLimits(part(here, 0), part(near, 0), typical),
+      highest: Math.max(limitsOf(part(near, 1))[1], 1.1 * Math.max(0, ...part(here, 1))),
+    };
+  }
+
+  function drawCurves(context, plot, curves, lower, colours) {
+    for (const { pair, along } of curves) {
+      if (lower && !pair) continue;
+      const line = along.map(({ at, values }) => ({ x: plot.x(at), y: plot.y(values[lower]) }));
+      drawLine(context, line, colours[pair ? "weave" : "real"], 2.2, pair ? DASHES.whole : DASHES.long);
+    }
+  }
+
+  function drawDesign(context, plot, x, here, lower, colours) {
+    drawUpright(context, plot, x, colours.paper, 4);
+    drawUpright(context, plot, x, colours.mark, 1.6);
+    const left = x > plot.x0 + 0.8 * plot.width;
+    context.textAlign = left ? "right" : "left";
+    for (const { pair, times, values } of here) {
+      if (lower && !pair) continue;
+      const y = plot.y(values[lower]);
+      drawDot(context, x, y, times > 1 ? 6 : 4, colours.mark, colours.paper);
+      if (times > 1) drawText(context, `${times}-fold`, x + (left ? -10 : 10), y + 12, colours);
+    }
+  }
+
   function paint(context, width, height) {
     if (!now) return;
     const { state, drawing } = now;
     const colours = coloursNow();
     const sweep = sweepOf(state);
     const timed = Number.isFinite(MODEL.rate(state.x));
-    const rates = new Map(sweep.samples.map(({ at }) => [at, rateAt(state, at)]));
-    const hertz = timed ? 2 * Math.PI : 1;
-    const points = sweep.curves.map(({ pair, points: along }) => ({
-      pair, along: along.map(({ at, re, im }) => ({ at, growth: re * rates.get(at), frequency: (im * rates.get(at)) / hertz })),
-    }));
-    const roots = rootsToDraw(state, drawing);
-    const rate = rateAt(state, state.x[state.over]);
-    const here = roots.map(([re, im, times]) => ({ growth: re * rate, frequency: (im * rate) / hertz, pair: im > 0, times }));
-    const room = 0.15 * (sweep.ends[1] - sweep.ends[0]);
-    const centres = [state.x[state.over], ...sweep.events.filter(({ kind }) => kind !== "meeting").map(({ at }) => at)];
-    const near = points.flatMap(({ along }) => along).filter(({ at }) => centres.some((centre) => Math.abs(at - centre) < room));
-    const inner = { x0: PLOT_LEFT, width: width - PLOT_LEFT - 12 };
+    const { curves, here, growths, highest } = motionsOf(state, drawing, sweep, timed);
+    const box = { x0: PLOT_LEFT, width: width - PLOT_LEFT - 12 };
     const upper = 0.52 * (height - 92);
-    const growths = growthLimits(here.map(({ growth }) => growth), near.map(({ growth }) => growth), rate * typicalSize(roots, ([re]) => Math.abs(re)));
-    const highest = Math.max(limitsOf(near.map(({ frequency }) => frequency))[1], ...here.map(({ frequency }) => 1.1 * frequency));
     plots = [
-      plotIn({ ...inner, y0: 36, height: upper }, sweep.ends, growths),
-      plotIn({ ...inner, y0: 36 + upper + 14, height: height - 92 - upper }, sweep.ends, [0, highest]),
+      plotIn({ ...box, y0: 36, height: upper }, sweep.ends, growths),
+      plotIn({ ...box, y0: 50 + upper, height: height - 92 - upper }, sweep.ends, [0, highest]),
     ];
     tellPlot(surface.canvas, plots[0]);
-    const events = sweep.events;
     plots.forEach((plot, lower) => {
-      const value = (point) => (lower ? point.frequency : point.growth);
       drawBands(context, plot, sweep, colours);
       clipped(context, plot, () => {
-        if (!lower) drawLine(context, [{ x: plot.x0, y: plot.y(0) }, { x: plot.x0 + plot.width, y: plot.y(0) }], colours.ink, 1.5);
-        for (const { pair, along } of points) {
-          if (lower && !pair) continue;
-          const line = along.map((point) => ({ x: plot.x(point.at), y: plot.y(value(point)) }));
-          drawLine(context, line, colours[pair ? "weave" : "real"], 2.2, pair ? DASHES.whole : DASHES.long);
-        }
-        for (const event of events) drawEvent(context, plot, event, lower, rates, colours);
-        const x = plot.x(state.x[state.over]);
-        drawLine(context, [{ x, y: plot.y0 }, { x, y: plot.y0 + plot.height }], colours.paper, 4);
-        drawLine(context, [{ x, y: plot.y0 }, { x, y: plot.y0 + plot.height }], colours.mark, 1.6);
-        for (const point of here) {
-          if (lower && !point.pair) continue;
-          drawDot(context, x, plot.y(value(point)), point.times > 1 ? 6 : 4, colours.mark, colours.paper);
-          context.textAlign = x > plot.x0 + 0.8 * plot.width ? "right" : "left";
-          if (point.times > 1) drawText(context, `${point.times}-fold`, x + (context.textAlign === "left" ? 10 : -10), plot.y(value(point)) + 12, colours);
-        }
+        if (!lower) drawLevel(context, plot, plot.y(0), colours.ink, 1.5);
+        drawCurves(context, plot, curves, lower, colours);
+        for (const event of sweep.events) drawEvent(context, plot, event, lower, colours);
+        drawDesign(context, plot, plot.x(state.x[state.over]), here, lower, colours);
       });
       const unit = timed ? (lower ? "Hz" : "1/s") : DATA.rootUnit;
-      const label = (lower ? (timed ? "frequency" : "frequency |Im s|") : "growth rate Re s") + (unit ? ` in ${unit}` : "");
-      drawAxes(context, plot, { label: lower ? parameterLabel(state.over, plot.width) : "", one: DATA.parameters[state.over].one },
-        { label, one: 1 }, colours);
+      const label = (lower ? `frequency${timed ? "" : " |Im s|"}` : "growth rate Re s") + (unit ? ` in ${unit}` : "");
+      const { one } = DATA.parameters[state.over];
+      const below = lower ? parameterLabel(state.over, plot.width) : "";
+      drawAxes(context, plot, { label: below, one }, { label, one: 1 }, colours);
     });
-    drawNames(context, plots[0], events, state, colours);
-    legend(entriesOf(sweep, colours, timed));
-    happens.textContent = events.length ? `${sentenceOf(events, state.over)}.` : "Nothing changes over this range: neither stability nor the number of real roots.";
+    drawNames(context, plots[0], sweep.events, state, colours);
+    legend(entriesOf(sweep, colours));
+    happens.textContent = sweep.events.length
+      ? `${sentenceOf(sweep.events, state.over)}.`
+      : "Nothing changes over this range: neither stability nor the number of real roots.";
     read(state.x[state.over]);
   }
 
-  /** The events of stability first, those where roots meet after; many are counted. */
+  /** The events of stability first, then where roots meet; of many of these only some. */
   function sentenceOf(events, over) {
-    const [crossings, meetings] = [true, false].map((crossing) => events.filter(({ kind }) => (kind !== "meeting") === crossing));
-    const unit = DATA.parameters[over].unit;
-    const meet = meetings.length
-      ? [`roots meet at ${meetings.slice(0, 4).map(({ at }) => figure(at / DATA.parameters[over].one, 5)).join(", ")}${meetings.length > 4 ? " and more" : ""}${unit ? ` ${unit}` : ""}`]
-      : [];
-    const text = [...crossings.map((event) => eventWords(event, over)), ...meet].join("; ");
+    const { one, unit } = DATA.parameters[over];
+    const texts = events.filter(({ kind }) => kind !== "meeting").map((event) => eventWords(event, over));
+    const met = events.filter(({ kind }) => kind === "meeting").map(({ at }) => figure(at / one, 5));
+    const places = `${met.slice(0, 4).join(", ")}${met.length > 4 ? " and more" : ""}${unit ? ` ${unit}` : ""}`;
+    if (met.length) texts.push(`roots meet at ${places}`);
+    const text = texts.join("; ");
     return text[0].toUpperCase() + text.slice(1);
   }
 
@@ -274,23 +308,23 @@ function growthPicture(host) {
     const fills = classFills(colours);
     context.fillStyle = mixed(colours.paper, colours.ink, 0.05);
     context.fillRect(plot.x0, plot.y0, plot.width, plot.height);
-    for (const [bands, fill] of [[sweep.stable, mixed(fills[3], colours.paper, 0.45)], [sweep.heavy, mixed(fills[4], colours.paper, 0.3)]]) {
+    for (const [bands, fill] of [
+      [sweep.stable, mixed(fills[3], colours.paper, 0.45)],
+      [sweep.heavy, mixed(fills[4], colours.paper, 0.3)],
+    ]) {
       context.fillStyle = fill;
-      for (const [from, to] of bands) context.fillRect(plot.x(from), plot.y0, Math.max(1, plot.x(to) - plot.x(from)), plot.height);
+      for (const [from, to] of bands)
+        context.fillRect(plot.x(from), plot.y0, Math.max(1, plot.x(to) - plot.x(from)), plot.height);
     }
     for (const [from, to] of bandsAlong(sweep.samples, ({ kind }) => kind === 0)) {
       drawHatch(context, plot.x(from), plot.y0, Math.max(1, plot.x(to) - plot.x(from)), plot.height, colours.line);
     }
   }
 
-  function drawEvent(context, plot, { kind, at, re }, lower, rates, colours) {
-    if (kind !== "meeting") {
-      const dash = { weave: DASHES.short, capsize: DASHES.mixed, infinity: DASHES.dots }[kind];
-      drawLine(context, [{ x: plot.x(at), y: plot.y0 }, { x: plot.x(at), y: plot.y0 + plot.height }], colours.ink, 1.3, dash);
-      return;
-    }
-    const nearest = [...rates.keys()].reduce((best, one) => (Math.abs(one - at) < Math.abs(best - at) ? one : best));
-    drawDot(context, plot.x(at), plot.y(lower ? 0 : re * rates.get(nearest)), 4, colours.paper, colours.ink);
+  function drawEvent(context, plot, { kind, at, re }, lower, colours) {
+    const dash = { weave: DASHES.short, capsize: DASHES.mixed, infinity: DASHES.dots }[kind];
+    if (dash) drawUpright(context, plot, plot.x(at), colours.ink, 1.3, dash);
+    else drawDot(context, plot.x(at), plot.y(lower ? 0 : re * rateAt(now.state, at)), 4, colours.paper, colours.ink);
   }
 
   /** Values of the events above the plot, in two rows where they are close; the design's own always. */
@@ -298,11 +332,17 @@ function growthPicture(host) {
     const placed = [];
     const place = (text, x, colour) => {
       const half = context.measureText(text).width / 2 + 4;
-      const fits = ({ y, middle }) => !placed.some((other) => other.y === y && Math.abs(middle - other.middle) < half + other.half);
-      const found = [0, 0.5, -0.5, 0.9, -0.9].flatMap((aside) => {
-        const middle = Math.max(plot.x0 + half - 4, Math.min(plot.x0 + plot.width - half + 4, x + aside * half));
-        return [{ y: 26, middle, half }, { y: 10, middle, half }];
-      }).find(fits);
+      const fits = ({ y, middle }) =>
+        !placed.some((other) => other.y === y && Math.abs(middle - other.middle) < half + other.half);
+      const found = [0, 0.5, -0.5, 0.9, -0.9]
+        .flatMap((aside) => {
+          const middle = Math.max(plot.x0 + half - 4, Math.min(plot.x0 + plot.width - half + 4, x + aside * half));
+          return [
+            { y: 26, middle, half },
+            { y: 10, middle, half },
+          ];
+        })
+        .find(fits);
       if (!found) return;
       placed.push(found);
       drawText(context, text, found.middle, found.y, colours, colour);
@@ -316,7 +356,7 @@ function growthPicture(host) {
     }
   }
 
-  function entriesOf(sweep, colours, timed) {
+  function entriesOf(sweep, colours) {
     const fills = classFills(colours);
     const has = (pair) => sweep.curves.some((curve) => curve.pair === pair);
     const met = (kind) => sweep.events.some((event) => event.kind === kind);
@@ -341,9 +381,14 @@ function growthPicture(host) {
     const roots = rootsToDraw(own ? state : { x: [NaN] }, own ? drawing : { roots: rootsOf(a) });
     const rate = rateAt(state, value);
     const unit = Number.isFinite(MODEL.rate(state.x)) ? "1/s" : DATA.rootUnit;
-    const text = roots.map(([re, im, times]) =>
-      figure(re * rate, 4) + (im > 0 ? ` ± ${figure(im * rate, 4)}i` : "") + (times > 1 ? ` (${times}-fold)` : "")).join(", ");
-    reading.textContent = `${DATA.parameters[state.over].name} = ${valueText(state.over, value, 5)}: ${classWords(kindOf(a))}; roots ${text || "none"}${unit ? ` in ${unit}` : ""}`;
+    const text = roots
+      .map(
+        ([re, im, times]) =>
+          figure(re * rate, 4) + (im > 0 ? ` ± ${figure(im * rate, 4)}i` : "") + (times > 1 ? ` (${times}-fold)` : ""),
+      )
+      .join(", ");
+    const where = `${DATA.parameters[state.over].name} = ${valueText(state.over, value, 5)}`;
+    reading.textContent = `${where}: ${classWords(kindOf(a))}; roots ${text || "none"}${unit ? ` in ${unit}` : ""}`;
   }
 
   const within = (value) => Math.min(rangeOf(now.state.over)[1], Math.max(rangeOf(now.state.over)[0], value));
@@ -366,7 +411,10 @@ function growthPicture(host) {
       now = { state, drawing };
       surface.repaint();
       const { name } = DATA.parameters[state.over];
-      says(`Growth rates and frequencies over ${name}; this design at ${valueText(state.over, state.x[state.over])} is ${classWords(drawing.kind)}. ${happens.textContent} Left and right arrow keys move ${name}.`);
+      says(
+        `Growth rates and frequencies over ${name}; this design at ${valueText(state.over, state.x[state.over])} is ` +
+          `${classWords(drawing.kind)}. ${happens.textContent} Left and right arrow keys move ${name}.`,
+      );
     },
   };
 }

@@ -24,7 +24,7 @@ function coordinateNames() {
   return Array.from({ length: MODEL.size }, (_, k) => `${MODEL.order === 2 ? "coordinate" : "state"} ${k + 1}`);
 }
 
-/** How long to look at most, in the model's own time: until a push has died out or grown large, but no endless swinging. */
+/** How long to look at most, in the model's time: until a push has died out or grown large, not for endless swings. */
 function pushLength(drawing, rate) {
   const [abscissa, , frequency] = drawing.motion;
   const fades = Math.abs(abscissa) > 0 ? (abscissa < 0 ? 16 : 3.5) / Math.abs(abscissa) : Infinity;
@@ -33,7 +33,7 @@ function pushLength(drawing, rate) {
   return Number.isFinite(length) && length > 0 ? length : 10;
 }
 
-/** The response to a push on coordinate `clock.pushed`, or null: {times, at(k, time), end, rate, peak, start}; angles of bicycles scaled to be seen. */
+/** The response to a push on coordinate `clock.pushed`, kept while the design stays, or null; see `scaledPush`. */
 function pushOf(state, drawing) {
   const key = `${clock.pushed} ${Array.from(state.x)}`;
   if (pushKept.key === key) return pushKept.found;
@@ -55,10 +55,12 @@ function pushOf(state, drawing) {
   return found;
 }
 
-/** The response in seconds where there are such, its largest angle made one that is seen. */
+/** The response by seconds, where there are such: {at(k, time), seconds, end, rate, peaks, start}; angles made to be seen. */
 function scaledPush(values, times, states, rate) {
   const size = MODEL.size;
-  const peaks = Array.from({ length: size }, (_, k) => times.reduce((peak, _time, row) => Math.max(peak, Math.abs(values[row * states + k])), 0));
+  const peaks = Array.from({ length: size }, (_, k) =>
+    times.reduce((peak, _time, row) => Math.max(peak, Math.abs(values[row * states + k])), 0),
+  );
   const scale = DATA.bicycle ? LARGEST_ANGLE / Math.max(...peaks, 1e-300) : 1;
   const second = Number.isFinite(rate) ? rate : 1;
   const end = times[PUSH_POINTS - 1] / second;
@@ -72,8 +74,13 @@ function scaledPush(values, times, states, rate) {
   const rows = Array.from(times.keys());
   const last = rows.reverse().find((row) => peaks.some((_, k) => Math.abs(values[row * states + k]) > high)) || 1;
   return {
-    at, end, rate: second, peaks: peaks.map((peak) => scale * peak), start: scale * second,
-    seconds: times.map((time) => time / second), seen: last / (PUSH_POINTS - 1),
+    at,
+    end,
+    rate: second,
+    peaks: peaks.map((peak) => scale * peak),
+    start: scale * second,
+    seconds: times.map((time) => time / second),
+    seen: last / (PUSH_POINTS - 1),
   };
 }
 
@@ -124,21 +131,41 @@ function motionPicture(host) {
     }
     const one = DATA.bicycle ? Math.PI / 180 : 1;
     const size = 1.12 * Math.max(...push.peaks, 1e-300);
-    plot = plotIn({ x0: PLOT_LEFT, y0: 8, width: width - PLOT_LEFT - 12, height: height - 50 }, [0, push.end], [-size, size]);
+    plot = plotIn(
+      { x0: PLOT_LEFT, y0: 8, width: width - PLOT_LEFT - 12, height: height - 50 },
+      [0, push.end],
+      [-size, size],
+    );
     clipped(context, plot, () => {
-      drawLine(context, [{ x: plot.x0, y: plot.y(0) }, { x: plot.x0 + plot.width, y: plot.y(0) }], colours.faint, 1);
+      drawLevel(context, plot, plot.y(0), colours.faint, 1);
       drawEnvelope(context, push, drawing.motion[0], colours);
       const rows = Array.from(push.seconds);
       names.forEach((_, k) => {
         const [colour, dash] = lookOf(k, colours);
-        drawLine(context, rows.map((time) => ({ x: plot.x(time), y: plot.y(push.at(k, time)) })), colour, 2.2, dash);
+        drawLine(
+          context,
+          rows.map((time) => ({ x: plot.x(time), y: plot.y(push.at(k, time)) })),
+          colour,
+          2.2,
+          dash,
+        );
       });
       const x = plot.x(Math.min(clock.time, push.end));
-      drawLine(context, [{ x, y: plot.y0 }, { x, y: plot.y0 + plot.height }], colours.ink, 1.4);
+      drawUpright(context, plot, x, colours.ink, 1.4);
     });
     const timed = Number.isFinite(MODEL.rate(state.x));
-    const time = timed ? "time in s" : DATA.bicycle ? "time in s, for a wheelbase of 1 m" : `time${DATA.rootUnit ? ` in 1/(${DATA.rootUnit})` : ""}`;
-    drawAxes(context, plot, { label: time, one: 1 }, { label: DATA.bicycle ? "angle in degrees" : "displacement", one }, colours);
+    const time = timed
+      ? "time in s"
+      : DATA.bicycle
+        ? "time in s, for a wheelbase of 1 m"
+        : `time${DATA.rootUnit ? ` in 1/(${DATA.rootUnit})` : ""}`;
+    drawAxes(
+      context,
+      plot,
+      { label: time, one: 1 },
+      { label: DATA.bicycle ? "angle in degrees" : "displacement", one },
+      colours,
+    );
     legend([
       ...names.map((name, k) => lineEntry(name, lookOf(k, colours)[0], 2.2, lookOf(k, colours)[1])),
       lineEntry("within a multiple of e^(abscissa · time)", colours.faint, 1, DASHES.dots),
@@ -154,15 +181,25 @@ function motionPicture(host) {
     const most = Math.max(...names.flatMap((_, k) => rows.map((time) => Math.abs(push.at(k, time)) / pace(time))));
     const level = (time) => most * pace(time);
     for (const side of [1, -1]) {
-      drawLine(context, rows.map((time) => ({ x: plot.x(time), y: plot.y(side * level(time)) })), colours.faint, 1, DASHES.dots);
+      drawLine(
+        context,
+        rows.map((time) => ({ x: plot.x(time), y: plot.y(side * level(time)) })),
+        colours.faint,
+        1,
+        DASHES.dots,
+      );
     }
   }
 
   /** What the coordinates are at the time of the clock. */
   function read(push, time = Math.min(clock.time, push.end)) {
     const degree = DATA.bicycle ? 180 / Math.PI : 1;
-    const values = names.map((name, k) => `${name} = ${figure(Number((degree * push.at(k, time)).toPrecision(3)), 3)}${DATA.bicycle ? "°" : ""}`);
-    reading.textContent = `after ${figure(time, 3)}${Number.isFinite(clockRate(now.state.x)) ? " s" : ""}: ${values.join(", ")}`;
+    const values = names.map(
+      (name, k) =>
+        `${name} = ${figure(Number((degree * push.at(k, time)).toPrecision(3)), 3)}${DATA.bicycle ? "°" : ""}`,
+    );
+    const second = Number.isFinite(clockRate(now.state.x)) ? " s" : "";
+    reading.textContent = `after ${figure(time, 3)}${second}: ${values.join(", ")}`;
   }
 
   const toTime = (event) => {
@@ -192,7 +229,11 @@ function motionPicture(host) {
       surface.repaint();
       const push = pushOf(state, drawing);
       const fate = drawing.motion[0] < 0 ? "dies out" : "does not die out";
-      says(push ? `${names.join(" and ")} over time after a push on ${names[clock.pushed]}: the motion ${fate}. Arrow keys move the time.` : "No response to draw.");
+      says(
+        push
+          ? `${names.join(" and ")} over time after a push on ${names[clock.pushed]}: the motion ${fate}. Arrow keys move the time.`
+          : "No response to draw.",
+      );
     },
   };
 }

@@ -1,6 +1,6 @@
 // The roots in the complex plane, and the path that they take over one parameter.
 
-/** Limits of the plane that keep the current roots in sight: kept while they still serve, so that the picture stands still. */
+/** Limits of the plane that keep the current roots in sight: kept while they serve, for a picture that stands still. */
 function planeReach(roots, path, kept) {
   const middle = typicalSize(roots, ([re, im]) => Math.hypot(re, im)) || Infinity;
   const seen = roots.filter(([re, im]) => Math.hypot(re, im) <= 10 * middle);
@@ -8,13 +8,20 @@ function planeReach(roots, path, kept) {
   const near = path.filter(({ re, im }) => Math.hypot(re, im) < 1.6 * size);
   const points = [...seen.map(([re, im]) => ({ re, im })), ...near];
   const need = {
-    left: Math.min(-0.25 * size, ...points.map(({ re }) => re)), right: Math.max(0.25 * size, ...points.map(({ re }) => re)),
+    left: Math.min(-0.25 * size, ...points.map(({ re }) => re)),
+    right: Math.max(0.25 * size, ...points.map(({ re }) => re)),
     top: Math.max(0.5 * size, ...points.map(({ im }) => im)),
   };
   const width = need.right - need.left;
-  const serves = kept && kept.left <= need.left && kept.right >= need.right && kept.top >= need.top &&
+  const serves =
+    kept &&
+    kept.left <= need.left &&
+    kept.right >= need.right &&
+    kept.top >= need.top &&
     Math.max(width, need.top) > 0.45 * Math.max(kept.right - kept.left, kept.top);
-  const reach = serves ? kept : { left: need.left - 0.1 * width, right: need.right + 0.1 * width, top: 1.12 * need.top };
+  const reach = serves
+    ? kept
+    : { left: need.left - 0.1 * width, right: need.right + 0.1 * width, top: 1.12 * need.top };
   return { reach, far: roots.filter((root) => !seen.includes(root)) };
 }
 
@@ -53,8 +60,8 @@ function planePicture(host) {
       context.fillRect(plot.x0, plot.y0, plot.x(0) - plot.x0, plot.height);
       context.fillStyle = mixed(colours.paper, colours.ink, 0.05);
       context.fillRect(plot.x(0), plot.y0, plot.width, plot.height);
-      drawLine(context, [{ x: plot.x0, y: plot.y(0) }, { x: plot.x0 + plot.width, y: plot.y(0) }], colours.faint, 1);
-      drawLine(context, [{ x: plot.x(0), y: plot.y0 }, { x: plot.x(0), y: plot.y0 + plot.height }], colours.ink, 2.4);
+      drawLevel(context, plot, plot.y(0), colours.faint, 1);
+      drawUpright(context, plot, plot.x(0), colours.ink, 2.4);
       drawPath(context, plot, sweep, value, colours);
       drawRoots(context, plot, roots, colours);
     });
@@ -63,7 +70,13 @@ function planePicture(host) {
     context.textAlign = "right";
     drawText(context, "grows", plot.x0 + plot.width - 8, plot.y0 + 12, colours);
     const unit = DATA.rootUnit ? ` in ${DATA.rootUnit}` : "";
-    drawAxes(context, plot, { label: `growth rate Re s${unit}`, one: 1 }, { label: `frequency Im s${unit}`, one: 1 }, colours);
+    drawAxes(
+      context,
+      plot,
+      { label: `growth rate Re s${unit}`, one: 1 },
+      { label: `frequency Im s${unit}`, one: 1 },
+      colours,
+    );
     describe(state, roots, colours);
   }
 
@@ -109,7 +122,11 @@ function planePicture(host) {
       lineEntry(`at higher ${name}, to ${high}`, colours.real, 2.4, DASHES.whole),
     ]);
     const beyond = far.map(([re, im]) => figure(re, 3) + (im > 0 ? ` ± ${figure(im, 3)}i` : "")).join(", ");
-    reading.textContent = roots.length ? (beyond ? `Beyond the picture: ${beyond}` : "") : "This design has no roots: its leading coefficient is 0 or not a number.";
+    reading.textContent = roots.length
+      ? beyond
+        ? `Beyond the picture: ${beyond}`
+        : ""
+      : "This design has no roots: its leading coefficient is 0 or not a number.";
     reading.hidden = !reading.textContent;
   }
 
@@ -118,9 +135,15 @@ function planePicture(host) {
     draw(state, drawing) {
       now = { state, drawing };
       surface.repaint();
-      const list = rootsToDraw(state, drawing).map(([re, im, times]) =>
-        figure(re, 4) + (im > 0 ? ` plus or minus ${figure(im, 4)} i` : "") + (times > 1 ? `, ${times}-fold` : "")).join("; ");
-      says(`Roots in the complex plane: ${list || "none"}; their path over ${DATA.parameters[state.over].name} is drawn.`);
+      const list = rootsToDraw(state, drawing)
+        .map(
+          ([re, im, times]) =>
+            figure(re, 4) + (im > 0 ? ` plus or minus ${figure(im, 4)} i` : "") + (times > 1 ? `, ${times}-fold` : ""),
+        )
+        .join("; ");
+      says(
+        `Roots in the complex plane: ${list || "none"}; their path over ${DATA.parameters[state.over].name} is drawn.`,
+      );
     },
   };
 }
