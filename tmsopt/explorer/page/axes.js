@@ -14,7 +14,8 @@ const COLOUR_NAMES = [
   "faint",
 ];
 const PICTURE_FONT = "12px system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif";
-const PLOT_LEFT = 68; // pixels for the numbers and the label of a vertical axis
+// pixels for the numbers and the label of a vertical axis
+const PLOT_LEFT = 68;
 const DASHES = { whole: [], long: [9, 4], short: [4, 3], dots: [1.5, 3], mixed: [8, 3, 2, 3] };
 const repaints = [];
 
@@ -93,7 +94,7 @@ function figure(value, digits = 4) {
   const [digitsText, power] = String(Number(value.toPrecision(digits))).split("e");
   const written = digitsText.replace("-", "−");
   return power
-    ? `${written}·10${[...power.replace("+", "")].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c])).join("")}`
+    ? `${written}·10${[...power].map((c) => ({ "-": "⁻", "+": "" })[c] ?? "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]).join("")}`
     : written;
 }
 
@@ -101,6 +102,26 @@ function figure(value, digits = 4) {
 function valueText(k, value, digits = 4) {
   const { one, unit } = DATA.parameters[k];
   return figure(value / one, digits) + (unit ? ` ${unit}` : "");
+}
+
+/** Roots [re, im, multiplicity] in words. */
+function rootsInWords(roots, digits = 4, rate = 1) {
+  const words = ([re, im, times]) =>
+    figure(re * rate, digits) +
+    (im > 0 ? ` ± ${figure(im * rate, digits)}i` : "") +
+    (times > 1 ? ` (${times}-fold)` : "");
+  return roots.map(words).join(", ");
+}
+
+/** A label with its unit, if there is one. */
+function withLabelUnit(label, unit) {
+  return unit ? `${label} in ${unit}` : label;
+}
+
+/** A value of a parameter, or the end of its range that is nearest. */
+function withinRange(k, value) {
+  const [low, high] = rangeOf(k);
+  return Math.min(high, Math.max(low, value));
 }
 
 /** Round values between two, about so many. */
@@ -117,7 +138,7 @@ function ticksBetween(low, high, about) {
 /** What to write along the axis of a parameter. */
 function parameterLabel(k, room) {
   const { name, meaning, unit } = DATA.parameters[k];
-  const short = name + (unit ? ` in ${unit}` : "");
+  const short = withLabelUnit(name, unit);
   const first = meaning === "parameter" ? "" : String(meaning || "").split(/[,:;]/)[0];
   const long = first ? `${first}, ${short}` : short;
   return 6.6 * long.length < room ? long : short;
@@ -385,7 +406,8 @@ function movesDesign(canvas, at, step) {
     held = false;
   });
   canvas.addEventListener("pointercancel", () => {
-    if (held) change({ x: before }); // the finger was to scroll the page
+    // the finger was to scroll the page
+    if (held) change({ x: before });
     held = false;
   });
   const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };

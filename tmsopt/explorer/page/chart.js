@@ -1,9 +1,10 @@
 // The stability chart over two parameters, all others as they are now.
 
 const CHART_POINTS = 200;
-const FINE_POINTS = 2 * CHART_POINTS - 1; // the same designs, and one between any two
-const SURVEY_MS = 35; // while something moves
-const FINE_MS = 100; // once it rests
+// the same designs, and one between any two
+const FINE_POINTS = 2 * CHART_POINTS - 1;
+// how long a survey may take while something moves, and once it rests
+const [SURVEY_MS, FINE_MS] = [35, 100];
 const CURVE_LOOKS = {
   weave: ["whole", 2.4],
   capsize: ["mixed", 2.4],
@@ -71,7 +72,8 @@ function chartImage({ found, points: size }, layer, colours) {
   const pixels = new Uint32Array(image.data.buffer);
   const packed = (colour) => {
     const [red, green, blue] = rgbOf(colour);
-    return (255 << 24) | (blue << 16) | (green << 8) | red; // little-endian, as all machines with browsers are
+    // little-endian, as all machines with browsers are
+    return (255 << 24) | (blue << 16) | (green << 8) | red;
   };
   const values = layer === "kind" ? null : found[layer];
   const bands = values && bandsOf(values, layer);
@@ -108,7 +110,8 @@ function drawBar(context, x, y, width, bands, layer, colours) {
   const zero = x + bands.below * cell;
   for (let edge = 0; edge <= shades.length; edge += 1) {
     const value = edge < bands.below ? (edge - bands.below) * bands.down : (edge - bands.below) * bands.up;
-    const beyond = { 0: "≤ ", [shades.length]: "≥ " }[edge]; // the last bands hold all that the bar does not
+    // the last bands hold all that the bar does not
+    const beyond = { 0: "≤ ", [shades.length]: "≥ " }[edge];
     const text = (value !== 0 && beyond && layer === "abscissa" ? beyond : "") + figure(value, 12);
     const [at, half] = [x + edge * cell, context.measureText(text).width / 2 + 5];
     if (value !== 0 && (at - half < free || Math.abs(at - zero) < half + 8)) continue;
@@ -125,7 +128,8 @@ function chartPicture(host) {
   let now = null;
   let surveyed = { key: "" };
   let refining = 0;
-  const pace = { kind: 0, abscissa: 0, damping: 0 }; // ms per design
+  // ms per design
+  const pace = { kind: 0, abscissa: 0, damping: 0 };
   let plot = null;
   let shaded = { key: "" };
   const raster = document.createElement("canvas");
@@ -193,10 +197,9 @@ function chartPicture(host) {
     if (bands) {
       context.textAlign = "left";
       context.fillStyle = colours.ink;
-      const unit = state.layer === "abscissa" && DATA.rootUnit ? ` in ${DATA.rootUnit}` : "";
       const words =
         state.layer === "abscissa"
-          ? `abscissa${unit}: below 0 decays`
+          ? `${withLabelUnit("abscissa", DATA.rootUnit)}: below 0 decays`
           : "damping ratio: above 0 decays, 1 swings not at all";
       context.fillText(words, plot.x0, 8);
       drawBar(context, plot.x0, 18, plot.width, bands, state.layer, colours);
@@ -308,17 +311,16 @@ function chartPicture(host) {
     reading.textContent = `${where}: ${classWords(kind)}${number}${inside ? "" : "; outside of this picture"}`;
   }
 
-  const within = (k, value) => Math.min(rangeOf(k)[1], Math.max(rangeOf(k)[0], value));
   movesDesign(
     surface.canvas,
     (px, py) => [
-      [now.state.plane[0], within(now.state.plane[0], plot.valueX(px))],
-      [now.state.plane[1], within(now.state.plane[1], plot.valueY(py))],
+      [now.state.plane[0], withinRange(now.state.plane[0], plot.valueX(px))],
+      [now.state.plane[1], withinRange(now.state.plane[1], plot.valueY(py))],
     ],
     (...steps) =>
       now.state.plane.map((k, axis) => {
         const [low, high] = rangeOf(k);
-        return [k, within(k, now.state.x[k] + (steps[axis] * (high - low)) / (CHART_POINTS - 1))];
+        return [k, withinRange(k, now.state.x[k] + (steps[axis] * (high - low)) / (CHART_POINTS - 1))];
       }),
   );
   surface.canvas.addEventListener("pointermove", (event) => {

@@ -280,7 +280,7 @@ function growthPicture(host) {
         drawDesign(context, plot, plot.x(state.x[state.over]), here, lower, colours);
       });
       const unit = timed ? (lower ? "Hz" : "1/s") : DATA.rootUnit;
-      const label = (lower ? `frequency${timed ? "" : " |Im s|"}` : "growth rate Re s") + (unit ? ` in ${unit}` : "");
+      const label = withLabelUnit(lower ? `frequency${timed ? "" : " |Im s|"}` : "growth rate Re s", unit);
       const { one } = DATA.parameters[state.over];
       const below = lower ? parameterLabel(state.over, plot.width) : "";
       drawAxes(context, plot, { label: below, one }, { label, one: 1 }, colours);
@@ -381,17 +381,12 @@ function growthPicture(host) {
     const roots = rootsToDraw(own ? state : { x: [NaN] }, own ? drawing : { roots: rootsOf(a) });
     const rate = rateAt(state, value);
     const unit = Number.isFinite(MODEL.rate(state.x)) ? "1/s" : DATA.rootUnit;
-    const text = roots
-      .map(
-        ([re, im, times]) =>
-          figure(re * rate, 4) + (im > 0 ? ` ± ${figure(im * rate, 4)}i` : "") + (times > 1 ? ` (${times}-fold)` : ""),
-      )
-      .join(", ");
+    const text = rootsInWords(roots, 4, rate);
     const where = `${DATA.parameters[state.over].name} = ${valueText(state.over, value, 5)}`;
-    reading.textContent = `${where}: ${classWords(kindOf(a))}; roots ${text || "none"}${unit ? ` in ${unit}` : ""}`;
+    reading.textContent = `${where}: ${classWords(kindOf(a))}; roots ${withLabelUnit(text || "none", unit)}`;
   }
 
-  const within = (value) => Math.min(rangeOf(now.state.over)[1], Math.max(rangeOf(now.state.over)[0], value));
+  const within = (value) => withinRange(now.state.over, value);
   movesDesign(
     surface.canvas,
     (px) => [[now.state.over, within(plots[0].valueX(px))]],

@@ -55,7 +55,7 @@ function pushOf(state, drawing) {
   return found;
 }
 
-/** The response by seconds, where there are such: {at(k, time), seconds, end, rate, peaks, start}; angles made to be seen. */
+/** The response by seconds, where there are such: {at(k, time), seconds, end, rate, peaks, start}; angles to be seen. */
 function scaledPush(values, times, states, rate) {
   const size = MODEL.size;
   const peaks = Array.from({ length: size }, (_, k) =>
@@ -231,7 +231,8 @@ function motionPicture(host) {
       const fate = drawing.motion[0] < 0 ? "dies out" : "does not die out";
       says(
         push
-          ? `${names.join(" and ")} over time after a push on ${names[clock.pushed]}: the motion ${fate}. Arrow keys move the time.`
+          ? `${names.join(" and ")} over time after a push on ${names[clock.pushed]}: ` +
+              `the motion ${fate}. Arrow keys move the time.`
           : "No response to draw.",
       );
     },

@@ -69,12 +69,11 @@ function planePicture(host) {
     drawText(context, "decays", plot.x0 + 8, plot.y0 + 12, colours);
     context.textAlign = "right";
     drawText(context, "grows", plot.x0 + plot.width - 8, plot.y0 + 12, colours);
-    const unit = DATA.rootUnit ? ` in ${DATA.rootUnit}` : "";
     drawAxes(
       context,
       plot,
-      { label: `growth rate Re s${unit}`, one: 1 },
-      { label: `frequency Im s${unit}`, one: 1 },
+      { label: withLabelUnit("growth rate Re s", DATA.rootUnit), one: 1 },
+      { label: withLabelUnit("frequency Im s", DATA.rootUnit), one: 1 },
       colours,
     );
     describe(state, roots, colours);
@@ -121,7 +120,7 @@ function planePicture(host) {
       lineEntry(`at lower ${name}, from ${low}`, colours.complex, 3.2, DASHES.dots),
       lineEntry(`at higher ${name}, to ${high}`, colours.real, 2.4, DASHES.whole),
     ]);
-    const beyond = far.map(([re, im]) => figure(re, 3) + (im > 0 ? ` ± ${figure(im, 3)}i` : "")).join(", ");
+    const beyond = rootsInWords(far, 3);
     reading.textContent = roots.length
       ? beyond
         ? `Beyond the picture: ${beyond}`
@@ -135,12 +134,7 @@ function planePicture(host) {
     draw(state, drawing) {
       now = { state, drawing };
       surface.repaint();
-      const list = rootsToDraw(state, drawing)
-        .map(
-          ([re, im, times]) =>
-            figure(re, 4) + (im > 0 ? ` plus or minus ${figure(im, 4)} i` : "") + (times > 1 ? `, ${times}-fold` : ""),
-        )
-        .join("; ");
+      const list = rootsInWords(rootsToDraw(state, drawing));
       says(
         `Roots in the complex plane: ${list || "none"}; their path over ${DATA.parameters[state.over].name} is drawn.`,
       );
