@@ -1,12 +1,6 @@
 // The bicycle to scale, from the right side and from behind, as it leans and steers after a push.
 
-const SLOWNESS = [
-  [1, "in real time"],
-  [2, "2 times slower"],
-  [5, "5 times slower"],
-  [10, "10 times slower"],
-  [50, "50 times slower"],
-];
+const SLOWNESS = [1, 2, 5, 10, 50];
 
 /** The bicycle of a design: lengths in m, or in wheelbases where the model has no units; x forward, y right, z down. */
 function bicycleShape(x) {
@@ -137,7 +131,7 @@ function bicyclePicture(host) {
   const play = part(moves, "button", { type: "button" }, "Play");
   const again = part(moves, "button", { type: "button" }, "Push again");
   const slower = part(part(moves, "label", {}, "shown"), "select");
-  for (const [value, words] of SLOWNESS) part(slower, "option", { value }, words);
+  for (const value of SLOWNESS) part(slower, "option", { value }, value > 1 ? `${value} times slower` : "in real time");
   const legend = legendIn(host);
   const says = saysIn(surface.canvas);
   clock.watchers.push((pushed) => {
@@ -186,13 +180,8 @@ function bicyclePicture(host) {
         );
       }
       for (const { front, kind, points } of bicycleLines(shape, shape.speed * time)) {
-        drawPart(
-          context,
-          points.map((point) => at(point, front)),
-          kind,
-          front,
-          colours,
-        );
+        const placed = points.map((point) => at(point, front));
+        drawPart(context, placed, kind, front, colours);
       }
       drawMass(context, at(shape.B, false), 0.055 * shape.w * scale, "B", colours.weave, colours);
       drawMass(
@@ -290,11 +279,7 @@ function bicyclePicture(host) {
   }
 
   function tell(push, time, lean, steer) {
-    const degrees = (angle) =>
-      `${((180 / Math.PI) * angle)
-        .toFixed(1)
-        .replace("-", "−")
-        .replace(/^−(0\.0)$/, "$1")}°`;
+    const degrees = (angle) => `${figure(Number(((180 / Math.PI) * angle).toFixed(1)))}°`;
     const [rate, unit] = [
       figure((180 / Math.PI) * (push ? push.start : 0), 3),
       Number.isFinite(MODEL.rate(now.state.x)) ? "" : ", for a wheelbase of 1 m",
@@ -304,7 +289,7 @@ function bicyclePicture(host) {
       ? `A push to the right gives it ${rate}°/s of ${coordinateNames()[clock.pushed]}. ` +
         `After ${time.toFixed(push.end < 1 ? 3 : 2)} s of ${figure(push.end, 3)} s${unit}: lean ${degrees(lean)}, ` +
         `steer ${degrees(steer)}${enlarged > 1 ? ` (lean drawn ${enlarged} times)` : ""}.`
-      : "No motion to show: this design has no equations of motion that can be solved.";
+      : NO_MOTION;
     play.textContent = clock.playing ? "Pause" : "Play";
   }
 

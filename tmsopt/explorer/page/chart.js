@@ -133,14 +133,8 @@ function chartPicture(host) {
   let plot = null;
   let shaded = { key: "" };
   const raster = document.createElement("canvas");
-  const enough = DATA.parameters.length > 1;
-  if (!enough) {
-    part(
-      host,
-      "p",
-      {},
-      "A chart needs two parameters; this model has one. The growth plot shows all there is over it.",
-    );
+  if (DATA.parameters.length < 2) {
+    part(host, "p", {}, "A chart needs two parameters; this model has one.");
     return { draw() {}, cheap: true };
   }
   const surface = canvasIn(host, (width) => Math.min(560, Math.max(300, 0.78 * width)), paint);
@@ -311,23 +305,18 @@ function chartPicture(host) {
     reading.textContent = `${where}: ${classWords(kind)}${number}${inside ? "" : "; outside of this picture"}`;
   }
 
-  movesDesign(
-    surface.canvas,
-    (px, py) => [
-      [now.state.plane[0], withinRange(now.state.plane[0], plot.valueX(px))],
-      [now.state.plane[1], withinRange(now.state.plane[1], plot.valueY(py))],
-    ],
-    (...steps) =>
-      now.state.plane.map((k, axis) => {
-        const [low, high] = rangeOf(k);
-        return [k, withinRange(k, now.state.x[k] + (steps[axis] * (high - low)) / (CHART_POINTS - 1))];
-      }),
+  const placeAt = (px, py) =>
+    now.state.plane.map((k, up) => [k, withinRange(k, up ? plot.valueY(py) : plot.valueX(px))]);
+  movesDesign(surface.canvas, placeAt, (...steps) =>
+    now.state.plane.map((k, up) => {
+      const [low, high] = rangeOf(k);
+      return [k, withinRange(k, now.state.x[k] + (steps[up] * (high - low)) / (CHART_POINTS - 1))];
+    }),
   );
   surface.canvas.addEventListener("pointermove", (event) => {
     if (!plot || event.buttons || !plot.holds(event.offsetX, event.offsetY)) return;
     const at = now.state.x.slice();
-    at[now.state.plane[0]] = plot.valueX(event.offsetX);
-    at[now.state.plane[1]] = plot.valueY(event.offsetY);
+    for (const [k, value] of placeAt(event.offsetX, event.offsetY)) at[k] = value;
     const [a, motion] = [new Float64Array(MODEL.degree + 1), new Float64Array(3)];
     MODEL.coefficients(at, a);
     motionOf(a, motion);

@@ -1,6 +1,7 @@
 // What follows a push: the linear response, as curves over time, and the clock that the bicycle moves by.
 
 const PUSH_POINTS = 601;
+const NO_MOTION = "No motion to show: the equations of this design cannot be solved.";
 const LARGEST_ANGLE = Math.PI / 12;
 const clock = { time: 0, playing: false, slower: 1, pushed: 0, watchers: [] };
 let pushKept = { key: "" };
@@ -124,7 +125,7 @@ function motionPicture(host) {
       plot = null;
       context.textAlign = "center";
       context.fillStyle = colours.ink;
-      context.fillText("no response: this design has no equations of motion that can be solved", width / 2, height / 2);
+      context.fillText(NO_MOTION, width / 2, height / 2);
       legend([]);
       reading.textContent = "";
       return;
@@ -233,7 +234,7 @@ function motionPicture(host) {
         push
           ? `${names.join(" and ")} over time after a push on ${names[clock.pushed]}: ` +
               `the motion ${fate}. Arrow keys move the time.`
-          : "No response to draw.",
+          : NO_MOTION,
       );
     },
   };
