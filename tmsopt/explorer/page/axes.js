@@ -13,23 +13,22 @@ const COLOUR_NAMES = [
   "ink",
   "faint",
 ];
-const PICTURE_FONT = "12px system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif";
+const PICTURE_FONT = "12px system-ui, sans-serif";
 // pixels for the numbers and the label of a vertical axis
 const PLOT_LEFT = 68;
 const DASHES = { whole: [], long: [9, 4], short: [4, 3], dots: [1.5, 3], mixed: [8, 3, 2, 3] };
 const repaints = [];
 
 const PICTURE_STYLE = `
-.picture { position: relative; min-width: 0; margin: 0; }
+.picture { min-width: 0; }
 .picture canvas { display: block; width: 100%; border-radius: 4px; }
 .picture canvas[tabindex] { cursor: crosshair; }
 .picture canvas:focus-visible { outline: 3px solid var(--weave); outline-offset: 1px; }
-.legend { display: flex; flex-wrap: wrap; gap: 2px 14px; margin: 4px 0 0; padding: 0; font-size: .8rem; }
-.legend { list-style: none; }
+.legend, .moves { display: flex; flex-wrap: wrap; gap: 4px 14px; margin: 4px 0 0; padding: 0; font-size: .8rem; }
 .legend li { display: flex; align-items: center; gap: 6px; }
 .legend canvas { flex: none; width: 30px; height: 14px; border-radius: 2px; }
 .reading { margin: 4px 0 0; min-height: 1.3em; font-size: .8rem; font-variant-numeric: tabular-nums; }
-.moves { display: flex; flex-wrap: wrap; align-items: center; gap: 6px 10px; margin: 6px 0 0; font-size: .85rem; }
+.moves { align-items: center; }
 .moves label { display: flex; align-items: center; gap: 6px; }
 `;
 
