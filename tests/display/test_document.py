@@ -546,17 +546,19 @@ def test_without_scripts_the_page_is_all_there(browser: Any, tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-def test_the_page_prints(browser: Any, tmp_path: Path) -> None:
-    """On A4; what is folded is open, what moves is left out, nothing is cut at the right."""
+@pytest.mark.parametrize("name", ["design", "chart"])
+def test_the_page_prints(browser: Any, tmp_path: Path, name: str) -> None:
+    """On A4; what is folded is open, what moves is left out, nothing is cut at the right; 100 rows of 400."""
     from helpers.browser import opened
 
-    (tmp_path / "p.html").write_text(written("design"), encoding="utf-8")
+    (tmp_path / "p.html").write_text(written(name), encoding="utf-8")
     with opened(browser, tmp_path / "p.html") as page:
         sheets = page.pdf(format="A4", print_background=True)
         assert 2 <= len(re.findall(rb"/Type\s*/Page\b", sheets)) <= 8
         page.emulate_media(media="print")
         page.set_viewport_size({"width": 688, "height": 1000})  # of A4 less its margins, in CSS pixels
         assert not page.locator("iframe").is_visible()
+        assert name == "design" or page.locator("#rows tbody tr:visible").count() == 100
         assert page.evaluate("document.documentElement.scrollWidth") <= 688
         page.evaluate("dispatchEvent(new Event('beforeprint'))")
         assert page.locator("details[open] pre").is_visible()

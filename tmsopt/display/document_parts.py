@@ -49,8 +49,8 @@ def of_solution(solution: "Solution", full: bool) -> Chapters:
     yield from _looks(solution)
     yield Chapter("parameters", "Parameters", table("Parameters of the design", _parameter_rows(solution, si)), "wide")
     yield from _growth(solution)
-    yield Chapter("limits", "Limits", _limits(solution, found))
     yield Chapter("proof", "Proof", _bound(solution) + paragraphs(parts["proof"].rest))
+    yield Chapter("limits", "Limits", _limits(solution, found), "wide")
     rows = [(*row[:3], row[-1]) for row in texts.quantity_rows(solution, si)]
     body = table("Quantities of the design", [("quantity", "value", "unit", "meaning"), *rows])
     yield Chapter("quantities", "Derived quantities", body, "wide")
@@ -188,7 +188,7 @@ def _limits(solution: "Solution", found: "texts.Findings") -> str:
              for name, at, by, buys in (texts.lever_cells(solution, v) for v in levers)]  # fmt: skip
     worth = table("What the limits that bind are worth", rows)
     again = [lever.sentence for lever in levers if math.isfinite(lever.resolved)]
-    return held + worth + paragraphs(again)
+    return (f'<div class="beside">\n{held}\n{worth}\n</div>' if held or worth else "") + paragraphs(again)
 
 
 def _bound(solution: "Solution") -> str:
@@ -220,4 +220,4 @@ def _parameter_rows(solution: "Solution", si: Mapping[str, float]) -> Rows:
 
 def _pictures(*listed: tuple[Callable[[], Any], str]) -> str:
     drawn = "\n".join(filter(None, (picture(draw, caption) for draw, caption in listed)))
-    return f'<div class="pictures">\n{drawn}\n</div>' if drawn else ""
+    return f'<div class="beside">\n{drawn}\n</div>' if drawn else ""

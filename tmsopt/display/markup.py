@@ -9,6 +9,7 @@ _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$|none$")
 _UNSHOWN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 _LONG = 24  # characters of a cell in a column that stays wide
 _FILTERED = 12  # rows from which a table has a field that filters them
+_ON_PAPER = 100  # rows of a table at most, in document.css too
 
 Rows = Sequence[Sequence[str]]
 """Headings, then rows of cells."""
@@ -77,10 +78,12 @@ def table(caption: str, rows: Rows, blank: str = "remark") -> str:
     body = [*zip(*(column[1:] for column in columns), strict=True)]
     lines = "\n".join(f"<tr>{_cells(row, kinds)}</tr>" for row in body)
     kind = "sortable filterable" if len(body) >= _FILTERED else "sortable"
+    said = f"On paper are the first {_ON_PAPER} of the rows that are shown."
+    paper = f'\n<p class="print">{said}</p>' if len(body) > _ON_PAPER else ""
     return (
         f'<div class="rows" role="group" tabindex="0" aria-label="{words(caption)}"><table class="{kind}">\n'
         f"<caption>{words(caption)}</caption>\n<thead><tr>{heads}</tr></thead>\n<tbody>\n{lines}\n</tbody>\n"
-        "</table></div>"
+        f"</table></div>{paper}"
     )
 
 
