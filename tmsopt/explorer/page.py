@@ -15,7 +15,7 @@ from tmsopt.explorer.kernel import kernel_script
 from tmsopt.explorer.known import Known
 from tmsopt.explorer.subject import subject
 
-_COMMENT = re.compile(r"//.*|/\*\*.*\*/")
+_COMMENT = re.compile(r"^//.*$|/\*\*.*?\*/", re.MULTILINE | re.DOTALL)
 _PARTS = "numerics state axes chart plane growth bicycle motion controls facts main"
 
 
@@ -34,16 +34,15 @@ def html_of(problem: Problem, designs: Sequence[Known], model: Mapping[str, Any]
         "/* style */": _read("page.css"),
         "/* script */": "\n".join(parts),
     }
-    page = _read("page.html")
-    for mark, text in marks.items():
-        page = page.replace(mark, text, 1)
-    return page
+    either = "|".join(map(re.escape, marks))
+    return re.sub(either, lambda mark: marks[mark[0]], _read("page.html"))  # at once: a title may look like a mark
 
 
 def _read(name: str) -> str:
-    """A file of the page without what only its readers need: indentation, and lines that are comments."""
+    """A file of the page without what only its readers need: indentation, and comments that begin a line."""
     text = (files("tmsopt.explorer") / "page" / name).read_text(encoding="utf-8")
-    return "\n".join(line for part in text.splitlines() if (line := part.strip()) and not _COMMENT.fullmatch(line))
+    lines = [line.strip() for line in text.splitlines()]
+    return re.sub(r"\n{2,}", "\n", _COMMENT.sub("", "\n".join(lines))).strip()
 
 
 def _json(data: Any) -> str:

@@ -71,9 +71,11 @@ def _unit(problem: Problem, name: str) -> dict[str, Any]:
 
 def _parameter(problem: Problem, parameter: Parameter, value: float) -> dict[str, Any]:
     low, high = problem.free.get(parameter.name) or _reach(parameter, value)
+    room = parameter.range
     return {
         "name": parameter.name, "meaning": parameter.meaning, **_unit(problem, parameter.name),
         "free": parameter.name in problem.free, "low": low, "high": high, "value": value,
+        "least": room.lower, "most": room.upper, "open": not room.closed,
     }  # fmt: skip
 
 
@@ -100,7 +102,7 @@ def _design(problem: Problem, known: Known) -> dict[str, Any]:
     return {
         "name": known.name, "values": [float(known.parameters[n]) for n in problem.parameter_set.names],
         "structure": in_words(structure.name, problem.model.degree) if structure.roots else "",
-        "abscissa": structure.abscissa, "roots": [[r.re, r.im, r.multiplicity] for r in structure.roots],
+        "abscissa": structure.abscissa, "roots": [[r.re, r.im, r.multiplicity] for r in structure.roots if r.im >= 0],
         "facts": list(known.facts),
     }  # fmt: skip
 
