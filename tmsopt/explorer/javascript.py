@@ -120,8 +120,8 @@ AND, OR = Spelling("{0}&&{1}", 3, (3, 4), True, (0, 1)), Spelling("{0}||{1}", 2,
 NOT, CHOOSE = Spelling("!{0}", 8, (9,), True, (0,)), Spelling("{0}?{1}:{2}", 1, (2, 1, 1), truths=(0,))
 
 _POWERS = {
-    -1.0: Spelling("1/{0}", 7, (8,)), 0.5: call("sqrt"), 1.0: Spelling("{0}", 1, (1,)), 2.0: Spelling("{0}*{0}", 7, (8,)),
-    3.0: Spelling("{0}*{0}*{0}", 7, (8,)), 4.0: Spelling("{0}*{0}*({0}*{0})", 7, (8,)),
+    -1.0: Spelling("1/{0}", 7, (8,)), 0.5: call("sqrt"), 1.0: Spelling("{0}", 1, (1,)),
+    2.0: Spelling("{0}*{0}", 7, (8,)), 3.0: Spelling("{0}*{0}*{0}", 7, (8,)), 4.0: Spelling("{0}*{0}*({0}*{0})", 7, (8,)),
 }  # fmt: skip
 """Small powers, as `tmsopt.arithmetic.arrays` has them."""
 

@@ -15,7 +15,7 @@ from tmsopt.explorer.kernel import kernel_script
 from tmsopt.explorer.known import Known
 from tmsopt.explorer.subject import subject
 
-_COMMENT = re.compile(r"^//.*$|/\*\*.*?\*/", re.MULTILINE | re.DOTALL)
+_COMMENT = re.compile(r"^//.*$|^/\*\*[\s\S]*?\*/$", re.MULTILINE)
 _PARTS = "numerics state axes chart plane growth bicycle motion controls facts main"
 
 
