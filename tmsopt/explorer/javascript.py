@@ -121,7 +121,8 @@ NOT, CHOOSE = Spelling("!{0}", 8, (9,), True, (0,)), Spelling("{0}?{1}:{2}", 1, 
 
 _POWERS = {
     -1.0: Spelling("1/{0}", 7, (8,)), 0.5: call("sqrt"), 1.0: Spelling("{0}", 1, (1,)),
-    2.0: Spelling("{0}*{0}", 7, (8,)), 3.0: Spelling("{0}*{0}*{0}", 7, (8,)), 4.0: Spelling("{0}*{0}*({0}*{0})", 7, (8,)),
+    2.0: Spelling("{0}*{0}", 7, (8,)), 3.0: Spelling("{0}*{0}*{0}", 7, (8,)),
+    4.0: Spelling("{0}*{0}*({0}*{0})", 7, (8,)),
 }  # fmt: skip
 """Small powers, as `tmsopt.arithmetic.arrays` has them."""
 

@@ -16,6 +16,7 @@ from tmsopt.explorer.known import Known
 from tmsopt.explorer.subject import subject
 
 _COMMENT = re.compile(r"^//.*$|^/\*\*[\s\S]*?\*/$", re.MULTILINE)
+_BLANKS = re.compile(r"\s*([{};,])\s*|(:)\s+")  # that mean nothing in a style
 _PARTS = "numerics state axes chart plane growth bicycle motion controls facts main"
 
 
@@ -31,7 +32,7 @@ def html_of(problem: Problem, designs: Sequence[Known], model: Mapping[str, Any]
     parts += [_read(f"{name}.js") for name in _PARTS.split()]
     marks = {
         "<!-- title -->": escape(problem.title or problem.model.title),
-        "/* style */": _read("page.css"),
+        "/* style */": _BLANKS.sub(r"\1\2", _read("page.css")),
         "/* script */": "\n".join(parts),
     }
     either = "|".join(map(re.escape, marks))

@@ -441,13 +441,3 @@ function typicalSize(roots, sizeOf) {
 function knownDesign(x) {
   return DATA.designs.find(({ values }) => values.every((value, k) => value === x[k]));
 }
-
-/** The roots to draw, upper half: [re, im, multiplicity], those of a known design as they were proved. */
-function rootsToDraw(state, drawing) {
-  const known = knownDesign(state.x);
-  if (known && known.roots.length) return known.roots.filter(([, imaginary]) => imaginary >= 0);
-  const { re, im } = drawing.roots;
-  return Array.from(re, (value, k) => [value, im[k], 1])
-    .filter(([value, imaginary]) => Number.isFinite(value) && imaginary >= 0)
-    .sort((first, second) => second[0] - first[0]);
-}

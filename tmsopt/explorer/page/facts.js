@@ -8,10 +8,10 @@ function isStableKind(kind) {
 }
 
 /** Words before the rate of the verdict, and the rate itself; NaN where no rate is to be named. */
-function verdictOf({kind, motion, roots}) {
+function verdictOf({kind, motion, meetings}) {
   const [abscissa] = motion;
-  const size = Math.max(...roots.re.map((re, k) => Math.hypot(re, roots.im[k])));
-  const swings = [...roots.re].some((re, k) => roots.im[k] && re >= abscissa);
+  const size = Math.max(...meetings.map(([re, im]) => Math.hypot(re, im)));
+  const swings = meetings.some(([re, im]) => im && re >= abscissa);
   if (kind === 0) return ["No verdict: a coefficient of the characteristic polynomial is no number, or the leading one is 0", NaN];
   if (kind === 4) return ["Every disturbance dies out and nothing swings, slowest as ", abscissa];
   if (kind === 3) return ["Every disturbance dies out, slowest as ", abscissa];
@@ -92,12 +92,8 @@ function marginInWords({equality, tolerance, unit, one}, margin, holds) {
 }
 
 /** Roots as text, conjugates and multiple ones together. */
-function rootTexts({roots, known}) {
-  if (known?.roots.length) {
-    const upper = known.roots.filter((root) => root[1] >= 0);
-    return upper.map(([re, im, n]) => rootText(re, im) + (n > 1 ? ` (${n}-fold)` : ""));
-  }
-  return [...roots.re.entries()].filter(([k]) => roots.im[k] >= 0).sort((p, q) => q[1] - p[1]).map(([k, re]) => rootText(re, roots.im[k]));
+function rootTexts({meetings}) {
+  return meetings.map(([re, im, times]) => rootText(re, im) + (times > 1 ? ` (${times}-fold)` : ""));
 }
 
 /** A real root, or a conjugate pair. */
@@ -117,10 +113,10 @@ function quantitiesPanel(host) {
   host.append(roots, origin);
   if (rows.length) host.append(element("table", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows)));
   return (drawing) => {
-    roots.textContent = `roots${DATA.rootUnit ? ` in ${DATA.rootUnit}` : ""}: ${rootTexts(drawing).join(", ")}`;
+    roots.textContent = `roots${DATA.rootUnit ? ` in ${DATA.rootUnit}` : ""}: ${rootTexts(drawing).join(", ") || "none"}`;
     origin.textContent = drawing.known?.roots.length
       ? `As they were found (${drawing.known.name}): where roots meet, computed ones scatter.`
-      : `Computed; the polynomial rebuilt from them differs by ${figure(drawing.roots.error, 2)} of its coefficients.`;
+      : "Computed; those that rounding alone keeps apart are taken for one.";
     DATA.quantities.forEach(({one, share}, k) => {
       cells[k].textContent = figure((drawing.y[k] / one) * (share ? 100 : 1), 5);
     });

@@ -221,7 +221,7 @@ function growthPicture(host) {
       along: points.map(({ at, re, im }) => ({ at, values: scaled([re, im], at) })),
     }));
     const value = state.x[state.over];
-    const roots = rootsToDraw(state, drawing);
+    const roots = drawing.meetings;
     const here = roots.map((root) => ({ pair: root[1] > 0, times: root[2], values: scaled(root, value) }));
     const room = 0.15 * (sweep.ends[1] - sweep.ends[0]);
     const centres = [value, ...sweep.events.filter(({ kind }) => kind !== "meeting").map(({ at }) => at)];
@@ -378,7 +378,7 @@ function growthPicture(host) {
     const { state, drawing } = now;
     const own = value === state.x[state.over];
     const a = coefficientsAt(state.x, state.over, value);
-    const roots = rootsToDraw(own ? state : { x: [NaN] }, own ? drawing : { roots: rootsOf(a) });
+    const roots = own ? drawing.meetings : meetingsAt(a);
     const rate = rateAt(state, value);
     const unit = Number.isFinite(MODEL.rate(state.x)) ? "1/s" : DATA.rootUnit;
     const text = rootsInWords(roots, 4, rate);

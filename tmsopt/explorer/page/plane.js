@@ -47,7 +47,7 @@ function planePicture(host) {
     if (!now) return;
     const { state, drawing } = now;
     const colours = coloursNow();
-    const roots = rootsToDraw(state, drawing);
+    const roots = drawing.meetings;
     const sweep = sweepOf(state);
     const value = state.x[state.over];
     const reach = 0.15 * (sweep.ends[1] - sweep.ends[0]);
@@ -134,7 +134,7 @@ function planePicture(host) {
     draw(state, drawing) {
       now = { state, drawing };
       surface.repaint();
-      const list = rootsInWords(rootsToDraw(state, drawing));
+      const list = rootsInWords(drawing.meetings);
       says(
         `Roots in the complex plane: ${list || "none"}; their path over ${DATA.parameters[state.over].name} is drawn.`,
       );

@@ -168,11 +168,15 @@ function save() {
   setTimeout(() => URL.revokeObjectURL(address), 60000); // the download has begun by then
 }
 
-/** Roots of a known design with their multiplicity, as often as they count: computed ones scatter where roots meet. */
-function knownRoots(design) {
-  const upper = design.roots.filter((root) => root[1] >= 0);
-  const all = upper.flatMap(([re, im, multiplicity]) => Array(multiplicity).fill(im ? [[re, im], [re, -im]] : [[re, 0]]).flat());
-  return {re: Float64Array.from(all, (root) => root[0]), im: Float64Array.from(all, (root) => root[1]), error: 0};
+/** Roots given as [re, im >= 0, multiplicity], each as often as it counts, conjugates too. */
+function allRoots(meetings) {
+  const all = meetings.flatMap(([re, im, times]) => Array(times).fill(im ? [[re, im], [re, -im]] : [[re, 0]]).flat());
+  return {re: Float64Array.from(all, (root) => root[0]), im: Float64Array.from(all, (root) => root[1])};
+}
+
+/** Roots as [re, im >= 0, multiplicity], rightmost first: those that rounding alone keeps apart are one. */
+function meetingsAt(a) {
+  return meetingsOf(rootsOf(a)).filter(([re]) => Number.isFinite(re));
 }
 
 /** Everything that follows from the state, once per change, for all pictures. */
@@ -182,16 +186,15 @@ function drawingOf() {
   const y = new Float64Array(DATA.quantities.length + DATA.constraints.length);
   MODEL.coefficients(state.x, a);
   const known = knownDesign(state.x);
-  const exact = known && known.roots.length > 0;
-  const roots = exact ? knownRoots(known) : rootsOf(a);
+  const meetings = known?.roots.length ? known.roots : meetingsAt(a);
   motionOf(a, motion);
-  if (exact) motion.set(motionOfRoots(roots, known.abscissa));
+  if (meetings.some((root) => root[2] > 1) || known?.roots.length) motion.set(motionOfRoots(allRoots(meetings)));
   MODEL.derived(state.x, motion, y);
-  return {a, roots, motion, kind: kindOf(a), y, known};
+  return {a, meetings, motion, kind: kindOf(a), y, known};
 }
 
 /** Abscissa, least damping ratio and greatest angular frequency of given roots. */
-function motionOfRoots({re, im}, abscissa) {
+function motionOfRoots({re, im}) {
   const ratios = [...re].map((part, k) => (part || im[k] ? -part / Math.hypot(part, im[k]) : 0));
-  return [abscissa, Math.min(...ratios), Math.max(...im)];
+  return [Math.max(...re), Math.min(...ratios), Math.max(...im)];
 }
