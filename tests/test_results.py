@@ -151,8 +151,9 @@ class Page(HTMLParser):
 
 
 def test_every_result_is_here() -> None:
-    """Every public class that shows itself, and no writer without a class."""
+    """Every public class that shows itself, and no writer without a class; an Explorer is a page already."""
     shown = {n for n in tmsopt.__all__ if inspect.isclass(c := getattr(tmsopt, n)) and hasattr(c, "_repr_html_")}
+    shown -= {"Explorer"}
     assert shown == set(WRITERS) == {type(made(name)).__name__ for name in RESULTS}
 
 
