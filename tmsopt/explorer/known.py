@@ -25,6 +25,7 @@ class Known:
     Attributes:
         facts: what is known of it, a sentence each.
         is_answer: whether it is what the problem asks for, or the nearest to it.
+        proved: what is proved of it, in one line; empty without a proof.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Known:
     structure: Structure
     facts: tuple[str, ...]
     is_answer: bool = False
+    proved: str = ""
 
 
 def known_designs(problem: Problem, solution: Solution | None, search: bool) -> list[Known]:
@@ -50,14 +52,16 @@ def _of_solution(solution: Solution) -> Known:
     """What was found, with how good it is known to be."""
     problem = solution.problem
     words = {"optimal": "optimum", "infeasible": "least infeasible", "not_converged": "best so far"}
-    facts = [solution.status.replace("_", " "), *solution.notes]
+    facts, proof = [solution.status.replace("_", " "), *solution.notes], proof_line(solution)
     if problem.nominal is problem:
         known = Structure(solution.structure, solution.roots, 0.0)
     else:
         known = _structure(problem, solution.parameters)
         facts.insert(1, "the best over every case; the page shows the nominal one")
     name = words[solution.status] if problem.free else "as given"
-    return Known(name, solution.parameters, known, (*facts, proof_line(solution)), True)
+    if problem.sense == "locate" and solution.status == "optimal":
+        name = str(problem.locate)
+    return Known(name, solution.parameters, known, (*facts, proof), True, proof if solution.bound.proven else "")
 
 
 def _benchmark(problem: Problem) -> Known | None:

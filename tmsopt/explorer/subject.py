@@ -103,7 +103,7 @@ def _design(problem: Problem, known: Known) -> dict[str, Any]:
         "name": known.name, "values": [float(known.parameters[n]) for n in problem.parameter_set.names],
         "structure": in_words(structure.name, problem.model.degree) if structure.roots else "",
         "abscissa": structure.abscissa, "roots": [[r.re, r.im, r.multiplicity] for r in structure.roots if r.im >= 0],
-        "facts": list(known.facts),
+        "facts": list(known.facts), "proved": known.proved,
     }  # fmt: skip
 
 

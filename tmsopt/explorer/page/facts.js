@@ -57,7 +57,7 @@ function verdictPanel(host) {
     badge.dataset.kind = kind;
     sentence.replaceChildren(words, ...(Number.isNaN(rate) ? [] : ["e", element("sup", {}, exponent)]));
     more.textContent = rest;
-    const proof = known?.facts.find((fact) => /^proof/i.test(fact));
+    const proof = known?.proved;
     facts.textContent = proof ? ` · ${proof}` : "";
     return `${badge.textContent.slice(2)}: ${words}${Number.isNaN(rate) ? "" : `e^(${exponent})`}; ${rest}`;
   };
