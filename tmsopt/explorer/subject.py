@@ -80,11 +80,15 @@ def _parameter(problem: Problem, parameter: Parameter, value: float) -> dict[str
 
 
 def _reach(parameter: Parameter, value: float) -> tuple[float, float]:
-    """Where the slider of a fixed parameter goes: as far again on both sides, as far as that is possible."""
-    around = abs(value) or _USUAL.get(parameter.unit, 1.0)
+    """Where the slider of a fixed parameter goes: from a fifth of its value to twice that, as far as it is possible.
+
+    Not from 0, where many a system has no mass.
+    """
+    usual = _USUAL.get(parameter.unit, 1.0)
+    ends = sorted((0.2 * value, 2 * value)) if value else (-usual, usual)
     room = parameter.range
-    inside = 0.0 if room.closed else 1e-3 * around
-    low, high = (min(max(end, room.lower + inside), room.upper - inside) for end in (value - around, value + around))
+    inside = 0.0 if room.closed else 1e-3 * abs(value)
+    low, high = (min(max(end, room.lower + inside), room.upper - inside) for end in ends)
     return low, high
 
 
