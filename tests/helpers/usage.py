@@ -52,6 +52,7 @@ absorber = tmsopt.models.from_matrices(
 )
 best = tmsopt.solve(tmsopt.Problem(absorber, {"mu": 0.1}, {"w": (0.5, 2), "c": (0, 1)}, minimize="abscissa"))
 assert_type(best.abscissa, float)
+print(len(assert_type(tmsopt.explore(best), tmsopt.Explorer).html))
 
 
 def pictures() -> Axes:
