@@ -16,7 +16,7 @@ const COLOUR_NAMES = [
 const PICTURE_FONT = "12px system-ui, sans-serif";
 // pixels for the numbers and the label of a vertical axis
 const PLOT_LEFT = 68;
-const DASHES = { whole: [], long: [9, 4], short: [4, 3], dots: [1.5, 3], mixed: [8, 3, 2, 3] };
+const DASHES = {whole: [], long: [9, 4], short: [4, 3], dots: [1.5, 3], mixed: [8, 3, 2, 3]};
 const repaints = [];
 
 const PICTURE_STYLE = `
@@ -70,13 +70,13 @@ function mixed(first, second, share) {
 
 /** Fills of the classes, undefined to heavily damped: told apart by lightness too. */
 function classFills(colours) {
-  const { paper, ink, stable, heavy } = colours;
-  return [paper, mixed(paper, ink, 0.3), mixed(paper, ink, 0.11), mixed(paper, stable, 0.62), mixed(paper, heavy, 0.8)];
+  const {paper, ink, stable, heavy} = colours;
+  return [paper, mixed(paper, ink, 0.38), mixed(paper, ink, 0.1), mixed(paper, stable, 0.62), mixed(paper, heavy, 0.8)];
 }
 
 /** Words for a class code. */
 function classWords(kind) {
-  const { weave, capsize } = DATA.words;
+  const {weave, capsize} = DATA.words;
   return [
     "undefined",
     `unstable by ${capsize}`,
@@ -86,6 +86,25 @@ function classWords(kind) {
   ][kind];
 }
 
+/** Whether the rightmost of roots [re, im, multiplicity] that meet, which come first, is alone. */
+function isAlone(roots) {
+  const size = Math.max(...roots.map(([re, im]) => Math.hypot(re, im)));
+  return roots.every(([re, , times]) => times === 1 || re < roots[0][0] - 1e-9 * size);
+}
+
+/** Whether roots [re, im, multiplicity] have some on the imaginary axis and none to its right, as far as can be computed. */
+function isMarginal(roots) {
+  const size = Math.max(...roots.map(([re, im]) => Math.hypot(re, im)));
+  return roots.length > 0 && Math.abs(roots[0][0]) <= 1e-9 * size;
+}
+
+/** Words for a design with such roots: its class, and what of the boundaries it stands on. */
+function designWords(kind, roots) {
+  if (kind > 2 && roots.every(([, im]) => im === 0) && roots.some((root) => root[2] > 1))
+    return "stable, on the edge of heavy damping: nothing swings";
+  return kind && kind < 3 && isMarginal(roots) ? "marginal: roots on the imaginary axis, none beyond" : classWords(kind);
+}
+
 /** A number for people: so many digits, a true minus, powers of ten in words of digits. */
 function figure(value, digits = 4) {
   if (Number.isNaN(value)) return "none";
@@ -93,13 +112,13 @@ function figure(value, digits = 4) {
   const [digitsText, power] = String(Number(value.toPrecision(digits))).split("e");
   const written = digitsText.replace("-", "−");
   return power
-    ? `${written}·10${[...power].map((c) => ({ "-": "⁻", "+": "" })[c] ?? "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]).join("")}`
+    ? `${written}·10${[...power].map((c) => ({"-": "⁻", "+": ""})[c] ?? "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]).join("")}`
     : written;
 }
 
 /** A value of a parameter in its unit, with the unit. */
 function valueText(k, value, digits = 4) {
-  const { one, unit } = DATA.parameters[k];
+  const {one, unit} = DATA.parameters[k];
   return figure(value / one, digits) + (unit ? ` ${unit}` : "");
 }
 
@@ -131,12 +150,12 @@ function ticksBetween(low, high, about) {
   const step = ten * [1, 2, 5, 10].find((k) => k * ten >= width * (1 - 1e-9));
   const first = Math.ceil(low / step - 1e-9);
   const count = Math.floor(high / step + 1e-9) - first;
-  return Array.from({ length: Math.max(0, count) + 1 }, (_, k) => Number(((first + k) * step).toPrecision(12)));
+  return Array.from({length: Math.max(0, count) + 1}, (_, k) => Number(((first + k) * step).toPrecision(12)));
 }
 
 /** What to write along the axis of a parameter. */
 function parameterLabel(k, room) {
-  const { name, meaning, unit } = DATA.parameters[k];
+  const {name, meaning, unit} = DATA.parameters[k];
   const short = withLabelUnit(name, unit);
   const first = meaning === "parameter" ? "" : String(meaning || "").split(/[,:;]/)[0];
   const long = first ? `${first}, ${short}` : short;
@@ -145,7 +164,7 @@ function parameterLabel(k, room) {
 
 /** The limits of a parameter's axis; an empty range is widened around the value. */
 function rangeOf(k) {
-  const { low, high, value } = DATA.parameters[k];
+  const {low, high, value} = DATA.parameters[k];
   if (high > low) return [low, high];
   const room = Math.abs(value) / 2 || 1;
   return [value - room, value + room];
@@ -153,8 +172,8 @@ function rangeOf(k) {
 
 /** A canvas as wide as its host and sharp on its screen; `paint(context, width, height)` draws all of it. */
 function canvasIn(host, heightOf, paint) {
-  const holder = part(host, "div", { class: "picture" });
-  const canvas = part(holder, "canvas", { role: "img" });
+  const holder = part(host, "div", {class: "picture"});
+  const canvas = part(holder, "canvas", {role: "img"});
   const context = canvas.getContext("2d");
   const repaint = () => {
     const width = holder.clientWidth;
@@ -163,17 +182,17 @@ function canvasIn(host, heightOf, paint) {
     const ratio = window.devicePixelRatio || 1;
     const [across, down] = [Math.round(width * ratio), Math.round(height * ratio)];
     if (canvas.width !== across || canvas.height !== down) {
-      Object.assign(canvas, { width: across, height: down });
+      Object.assign(canvas, {width: across, height: down});
       canvas.style.height = `${height}px`;
     }
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
-    Object.assign(context, { font: PICTURE_FONT, lineJoin: "round", lineCap: "butt", textBaseline: "middle" });
+    Object.assign(context, {font: PICTURE_FONT, lineJoin: "round", lineCap: "butt", textBaseline: "middle"});
     paint(context, width, height);
   };
   new ResizeObserver(repaint).observe(holder);
   repaints.push(repaint);
-  return { canvas, repaint };
+  return {canvas, repaint};
 }
 
 /** Draw all again when the page turns dark or light, which no change of the state says. */
@@ -182,7 +201,7 @@ function watchColours() {
   style.textContent = PICTURE_STYLE;
   const again = () => requestAnimationFrame(() => repaints.forEach((repaint) => repaint()));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
-  new MutationObserver(again).observe(document.documentElement, { attributes: true });
+  new MutationObserver(again).observe(document.documentElement, {attributes: true});
 }
 watchColours();
 
@@ -206,7 +225,7 @@ function plotIn(box, [left, right], [bottom, top]) {
 }
 
 /** Where the plot of a canvas stands, in pixels of the page, for whoever looks from outside. */
-function tellPlot(canvas, { x0, y0, width, height }) {
+function tellPlot(canvas, {x0, y0, width, height}) {
   canvas.dataset.plot = [x0, y0, width, height].join(" ");
 }
 
@@ -222,8 +241,8 @@ function clipped(context, plot, draw) {
 
 /** Frame, ticks, numbers and labels of a plot; `x` and `y` are {label, one}, without a label no numbers below. */
 function drawAxes(context, plot, x, y, colours) {
-  const { x0, y0, width, height } = plot;
-  Object.assign(context, { lineWidth: 1, fillStyle: colours.ink, strokeStyle: colours.faint });
+  const {x0, y0, width, height} = plot;
+  Object.assign(context, {lineWidth: 1, fillStyle: colours.ink, strokeStyle: colours.faint});
   const line = (...ends) => {
     context.beginPath();
     context.moveTo(ends[0], ends[1]);
@@ -234,7 +253,10 @@ function drawAxes(context, plot, x, y, colours) {
   for (const tick of ticksBetween(plot.left / x.one, plot.right / x.one, width / 60)) {
     const at = Math.round(plot.x(tick * x.one)) + 0.5;
     line(at, y0 + height, at, y0 + height + 4);
-    if (x.label) context.fillText(figure(tick, 12), at, y0 + height + 13);
+    const text = figure(tick, 12);
+    // the last must not leave the canvas, beyond whose plot 12 pixels remain
+    const rightmost = x0 + width + 11 - context.measureText(text).width / 2;
+    if (x.label) context.fillText(text, Math.min(at, rightmost), y0 + height + 13);
   }
   context.textAlign = "right";
   for (const tick of ticksBetween(plot.bottom / y.one, plot.top / y.one, height / 45)) {
@@ -259,7 +281,7 @@ function drawLine(context, points, colour, width = 1.5, dash = DASHES.whole, off
   context.setLineDash(dash);
   context.lineDashOffset = offset;
   context.beginPath();
-  for (const [k, { x, y }] of points.entries()) {
+  for (const [k, {x, y}] of points.entries()) {
     if (k) context.lineTo(x, y);
     else context.moveTo(x, y);
   }
@@ -272,7 +294,7 @@ function drawStraight(context, [x, y], [toX, toY], ...look) {
   const points = [
     [x, y],
     [toX, toY],
-  ].map((point) => ({ x: point[0], y: point[1] }));
+  ].map((point) => ({x: point[0], y: point[1]}));
   drawLine(context, points, ...look);
 }
 
@@ -329,18 +351,18 @@ function drawHatch(context, x, y, width, height, colour, apart = 6) {
 
 /** A list of swatches and words; built again only when the words or colours change. */
 function legendIn(host) {
-  const list = part(host, "ul", { class: "legend" });
+  const list = part(host, "ul", {class: "legend"});
   let shown = "";
   return (entries) => {
     const ratio = window.devicePixelRatio || 1;
-    const now = JSON.stringify([entries.map(({ words, look }) => [words, look]), ratio]);
+    const now = JSON.stringify([entries.map(({words, look}) => [words, look]), ratio]);
     if (now === shown) return;
     shown = now;
     list.replaceChildren();
-    for (const { words, sign } of entries) {
+    for (const {words, sign} of entries) {
       const item = part(list, "li");
-      const swatch = part(item, "canvas", { "aria-hidden": "true" });
-      Object.assign(swatch, { width: 30 * ratio, height: 14 * ratio });
+      const swatch = part(item, "canvas", {"aria-hidden": "true"});
+      Object.assign(swatch, {width: 30 * ratio, height: 14 * ratio});
       const context = swatch.getContext("2d");
       context.scale(ratio, ratio);
       sign(context);
@@ -358,18 +380,18 @@ function boxEntry(words, colour, outline, hatch = "") {
     context.strokeStyle = outline;
     context.strokeRect(0.5, 0.5, 29, 13);
   };
-  return { words, look: [colour, outline, hatch], sign };
+  return {words, look: [colour, outline, hatch], sign};
 }
 
 /** An entry of a legend: a line. */
 function lineEntry(words, colour, width, dash) {
   const sign = (context) => drawStraight(context, [0, 7], [30, 7], colour, width, dash);
-  return { words, look: [colour, width, dash], sign };
+  return {words, look: [colour, width, dash], sign};
 }
 
 /** An entry of a legend: a dot. */
 function dotEntry(words, fill, outline) {
-  return { words, look: [fill, outline], sign: (context) => drawDot(context, 15, 7, 4.5, fill, outline) };
+  return {words, look: [fill, outline], sign: (context) => drawDot(context, 15, 7, 4.5, fill, outline)};
 }
 
 /** Say what a canvas shows once it has rested, so that a screen reader is not flooded. */
@@ -382,6 +404,13 @@ function saysIn(canvas) {
   };
 }
 
+/** Let a picture have the keyboard, which a screen reader keeps from mere images. */
+function takesKeys(canvas) {
+  canvas.tabIndex = 0;
+  canvas.setAttribute("role", "application");
+  canvas.setAttribute("aria-roledescription", "picture with arrow keys");
+}
+
 /** Let the pointer and the arrow keys move the design: `at(x, y)` and `step(dx, dy)` give [[index, value] ..]. */
 function movesDesign(canvas, at, step) {
   const place = (event) => {
@@ -391,25 +420,25 @@ function movesDesign(canvas, at, step) {
   let held = false;
   let before = [];
   let keyed = null;
-  canvas.tabIndex = 0;
+  takesKeys(canvas);
   canvas.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
     held = true;
     before = place(event).map(([k]) => [k, state.x[k]]);
     canvas.setPointerCapture(event.pointerId);
-    change({ x: place(event) }, false);
+    change({x: place(event)}, false);
   });
-  canvas.addEventListener("pointermove", (event) => held && change({ x: place(event) }, false));
+  canvas.addEventListener("pointermove", (event) => held && change({x: place(event)}, false));
   canvas.addEventListener("pointerup", (event) => {
-    if (held) change({ x: place(event) });
+    if (held) change({x: place(event)});
     held = false;
   });
   canvas.addEventListener("pointercancel", () => {
     // the finger was to scroll the page
-    if (held) change({ x: before });
+    if (held) change({x: before});
     held = false;
   });
-  const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+  const arrows = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]};
   canvas.addEventListener("keydown", (event) => {
     const arrow = arrows[event.key];
     const moved =
@@ -421,10 +450,10 @@ function movesDesign(canvas, at, step) {
     if (!moved) return;
     keyed = moved;
     event.preventDefault();
-    change({ x: moved }, false);
+    change({x: moved}, false);
   });
   const settle = () => {
-    if (keyed) change({ x: keyed });
+    if (keyed) change({x: keyed});
     keyed = null;
   };
   canvas.addEventListener("keyup", settle);
@@ -439,5 +468,5 @@ function typicalSize(roots, sizeOf) {
 
 /** The design of the file that the state is, digit for digit, or undefined. */
 function knownDesign(x) {
-  return DATA.designs.find(({ values }) => values.every((value, k) => value === x[k]));
+  return DATA.designs.find(({values}) => values.every((value, k) => value === x[k]));
 }

@@ -4,7 +4,7 @@ const SLOWNESS = [1, 2, 5, 10, 50];
 
 /** The bicycle of a design: lengths in m, or in wheelbases where the model has no units; x forward, y right, z down. */
 function bicycleShape(x) {
-  const named = Object.fromEntries(DATA.parameters.map(({ name }, k) => [name, x[k]]));
+  const named = Object.fromEntries(DATA.parameters.map(({name}, k) => [name, x[k]]));
   const of = (name, other, instead = 0) => named[name] ?? named[other] ?? instead;
   const w = of("w", "", 1);
   const [front, rear] = [of("r_F", ""), of("r_R", "")];
@@ -58,25 +58,29 @@ function movedPoint(shape, point, ofFront, lean, steer) {
 
 /** The lines of the bicycle: {front, points, kind} in its upright place. */
 function bicycleLines(shape, travelled) {
-  const { w, rear, front, B, H, onAxis, alongAxis, tall, contact } = shape;
+  const {w, rear, front, B, H, onAxis, alongAxis, tall, contact} = shape;
   const hub = [0, 0, -rear];
   const frontHub = [w, 0, -front];
   const head = onAxis(0.62 * tall);
+  // where the front assembly is joined, between the ground and the handlebar
+  const joined = (point) => onAxis(Math.min(0.9 * tall, Math.max(0.04 * tall, alongAxis(point))));
+  const lowest = [front ? frontHub : contact, H].map(joined).sort((one, other) => other[2] - one[2])[0];
   const lines = [
-    { front: false, kind: "frame", points: [hub, B, head] },
-    { front: false, kind: "frame", points: [hub, head] },
+    {front: false, kind: "frame", points: [hub, B, head]},
+    {front: false, kind: "frame", points: [hub, head]},
     {
       front: true,
       kind: "fork",
-      points: [front ? frontHub : contact, onAxis(alongAxis(front ? frontHub : contact)), onAxis(0.9 * tall)],
+      points: [front ? frontHub : contact, joined(front ? frontHub : contact)],
     },
-    { front: true, kind: "fork", points: [onAxis(alongAxis(H)), H] },
+    {front: true, kind: "fork", points: [lowest, onAxis(0.9 * tall)]},
+    {front: true, kind: "fork", points: [joined(H), H]},
     {
       front: true,
       kind: "fork",
       points: [-0.16, 0.16].map((side) => onAxis(0.9 * tall).map((value, k) => (k === 1 ? side * w : value))),
     },
-    { front: false, kind: "axis", points: [onAxis(-0.07 * w), onAxis(1.04 * tall)] },
+    {front: false, kind: "axis", points: [onAxis(-0.07 * w), onAxis(1.04 * tall)]},
   ];
   const wheels = [
     [hub, rear, false],
@@ -93,10 +97,10 @@ function bicycleLines(shape, travelled) {
       lines.push({
         front: ofFront,
         kind: "wheel",
-        points: Array.from({ length: 49 }, (_, k) => rim((k * Math.PI) / 24, 1)),
+        points: Array.from({length: 49}, (_, k) => rim((k * Math.PI) / 24, 1)),
       });
       for (let spoke = 0; spoke < 5; spoke += 1) {
-        lines.push({ front: ofFront, kind: "spoke", points: [centre, rim(turned + (spoke * 2 * Math.PI) / 5, 0.97)] });
+        lines.push({front: ofFront, kind: "spoke", points: [centre, rim(turned + (spoke * 2 * Math.PI) / 5, 0.97)]});
       }
     } else {
       const skate = [
@@ -106,7 +110,7 @@ function bicycleLines(shape, travelled) {
         [-0.035, 0],
         [-0.06, -0.03],
       ];
-      lines.push({ front: ofFront, kind: "skate", points: skate.map(([x, z]) => [centre[0] + x * w, 0, z * w]) });
+      lines.push({front: ofFront, kind: "skate", points: skate.map(([x, z]) => [centre[0] + x * w, 0, z * w])});
     }
   }
   return lines;
@@ -117,7 +121,7 @@ function bicyclePicture(host) {
   if (!DATA.bicycle) {
     const panel = host.closest("section") || host;
     panel.hidden = true;
-    return { draw() {}, cheap: true };
+    return {draw() {}, cheap: true};
   }
   const calm = matchMedia("(prefers-reduced-motion: reduce)");
   let now = null;
@@ -126,12 +130,12 @@ function bicyclePicture(host) {
   let resting = 0;
   let moved = "";
   const surface = canvasIn(host, heightOf, paint);
-  const reading = part(host, "p", { class: "reading" });
-  const moves = part(host, "div", { class: "moves" });
-  const play = part(moves, "button", { type: "button" }, "Play");
-  const again = part(moves, "button", { type: "button" }, "Push again");
+  const reading = part(host, "p", {class: "reading"});
+  const moves = part(host, "div", {class: "moves"});
+  const play = part(moves, "button", {type: "button"}, "Play");
+  const again = part(moves, "button", {type: "button"}, "Push again");
   const slower = part(part(moves, "label", {}, "shown"), "select");
-  for (const value of SLOWNESS) part(slower, "option", { value }, value > 1 ? `${value} times slower` : "in real time");
+  for (const value of SLOWNESS) part(slower, "option", {value}, value > 1 ? `${value} times slower` : "in real time");
   const legend = legendIn(host);
   const says = saysIn(surface.canvas);
   clock.watchers.push((pushed) => {
@@ -148,12 +152,12 @@ function bicyclePicture(host) {
     const shape = bicycleShape(now.state.x);
     if (![...shape.B, ...shape.H, ...shape.up, shape.w, shape.trail].every(Number.isFinite)) return;
     const drawn = lean * enlargement(push);
-    const { left, right, side, tallest } = boundsOf(shape);
+    const {left, right, side, tallest} = boundsOf(shape);
     const scale = Math.min((width - 24) / (right - left + 2 * side), (height - 46) / tallest);
     const ground = height - 34;
     const spare = width - scale * (right - left + 2 * side);
     const views = [
-      { name: "from the right", x: (point) => spare / 3 + (point[0] - left) * scale, from: left, to: right },
+      {name: "from the right", x: (point) => spare / 3 + (point[0] - left) * scale, from: left, to: right},
       {
         name: "from behind",
         x: (point) => (2 * spare) / 3 + (right - left + side + point[1]) * scale,
@@ -164,7 +168,7 @@ function bicyclePicture(host) {
     views.forEach((view, behind) => {
       const at = (point, ofFront) => {
         const place = movedPoint(shape, point, ofFront, drawn, steer);
-        return { x: view.x(place), y: ground + place[2] * scale };
+        return {x: view.x(place), y: ground + place[2] * scale};
       };
       const ends = behind ? [view.x([0, view.from]), view.x([0, view.to])] : [view.x([view.from]), view.x([view.to])];
       drawGround(context, ends, ground, behind ? 0 : shape.speed * time * scale, colours);
@@ -179,18 +183,20 @@ function bicyclePicture(host) {
           DASHES.dots,
         );
       }
-      for (const { front, kind, points } of bicycleLines(shape, shape.speed * time)) {
+      for (const {front, kind, points} of bicycleLines(shape, shape.speed * time)) {
         const placed = points.map((point) => at(point, front));
         drawPart(context, placed, kind, front, colours);
       }
-      drawMass(context, at(shape.B, false), 0.055 * shape.w * scale, "B", colours.weave, colours);
+      const [B, H] = [at(shape.B, false), at(shape.H, true)];
+      drawMass(context, B, 0.055 * shape.w * scale, "B", colours.weave, colours);
       drawMass(
         context,
-        at(shape.H, true),
+        H,
         0.055 * shape.w * scale * Math.min(1.2, Math.max(0.45, Math.cbrt(shape.heavy))),
         "H",
         colours.mark,
         colours,
+        Math.hypot(B.x - H.x, B.y - H.y) < 22,
       );
       if (!behind && shape.trail) drawTrail(context, at(shape.contact), at(shape.meets), colours);
       context.textAlign = "center";
@@ -206,7 +212,7 @@ function bicyclePicture(host) {
   }
 
   /** What both views must hold: from left to right, to each side, and up. */
-  function boundsOf({ w, front, rear, B, H, meets, onAxis, tall, top }) {
+  function boundsOf({w, front, rear, B, H, meets, onAxis, tall, top}) {
     const over = onAxis(1.04 * tall)[0];
     return {
       left: Math.min(-rear, B[0], H[0], over, -0.15 * w) - 0.08 * w,
@@ -218,7 +224,7 @@ function bicyclePicture(host) {
 
   /** As high as the bicycle asks for, in steps, so that the page stands still while a slider moves. */
   function heightOf(width) {
-    const { left, right, side, tallest } = boundsOf(bicycleShape(now ? now.state.x : DATA.start));
+    const {left, right, side, tallest} = boundsOf(bicycleShape(now ? now.state.x : DATA.start));
     const wanted = 46 + (tallest * (width - 24)) / (right - left + 2 * side);
     return Math.min(420, Math.max(180, 40 * Math.ceil((wanted || 0) / 40)));
   }
@@ -258,7 +264,7 @@ function bicyclePicture(host) {
   }
 
   /** A centre of mass: a circle in quarters. */
-  function drawMass(context, { x, y }, radius, name, colour, colours) {
+  function drawMass(context, {x, y}, radius, name, colour, colours, left = false) {
     const size = Math.max(5, radius);
     drawDot(context, x, y, size, colours.paper, colours.ink, 1.5);
     context.fillStyle = colour;
@@ -268,14 +274,14 @@ function bicyclePicture(host) {
       context.arc(x, y, size - 0.7, turn, turn + Math.PI / 2);
       context.fill();
     }
-    context.textAlign = "left";
-    drawText(context, name, x + size + 4, y - size - 2, colours);
+    context.textAlign = left ? "right" : "left";
+    drawText(context, name, x + (left ? -1 : 1) * (size + 4), y - size - 2, colours);
   }
 
   function drawTrail(context, contact, meets, colours) {
     drawLine(context, [contact, meets], colours.real, 5);
     context.textAlign = "left";
-    drawText(context, "trail", Math.max(contact.x, meets.x) + 5, contact.y - 9, colours);
+    drawText(context, "trail", Math.max(contact.x, meets.x) + 5, contact.y - 12, colours);
   }
 
   function tell(push, time, lean, steer) {
@@ -286,7 +292,7 @@ function bicyclePicture(host) {
     ];
     const enlarged = enlargement(push);
     reading.textContent = push
-      ? `A push to the right gives it ${rate}°/s of ${coordinateNames()[clock.pushed]}. ` +
+      ? `A push to the right, scaled so that the largest angle is 15° (${rate}°/s of ${coordinateNames()[clock.pushed]}). ` +
         `After ${time.toFixed(push.end < 1 ? 3 : 2)} s of ${figure(push.end, 3)} s${unit}: lean ${degrees(lean)}, ` +
         `steer ${degrees(steer)}${enlarged > 1 ? ` (lean drawn ${enlarged} times)` : ""}.`
       : NO_MOTION;
@@ -333,7 +339,7 @@ function bicyclePicture(host) {
   return {
     cheap: true,
     draw(state, drawing) {
-      now = { state, drawing };
+      now = {state, drawing};
       const design = Array.from(state.x).join(" ");
       if (design !== moved) {
         // a push follows every change of the design once it has rested, unless the reader wants no motion

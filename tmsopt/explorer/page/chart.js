@@ -9,13 +9,13 @@ const CURVE_LOOKS = {
   weave: ["whole", 2.4],
   capsize: ["mixed", 2.4],
   infinity: ["dots", 2.4],
-  "heavy damping": ["long", 2],
+  "heavy damping": ["long", 1.3],
   "EP set": ["short", 2.6],
 };
 
 /** Equally spaced values from one to another, both included. */
 function evenly([low, high], count) {
-  return Float64Array.from({ length: count }, (_, k) => low + ((high - low) * k) / (count - 1));
+  return Float64Array.from({length: count}, (_, k) => low + ((high - low) * k) / (count - 1));
 }
 
 /** Whether two designs agree in all parameters but some. */
@@ -32,13 +32,13 @@ function curvesIn(state) {
   return DATA.curves.flatMap((curve) => {
     if (!sameBeside(state.x, DATA.held, [...curve.axes, ...(curve.along || [])], 1e-12)) return [];
     if (curve.axes[0] === i && curve.axes[1] === j) return [curve];
-    return curve.axes[0] === j && curve.axes[1] === i ? [{ ...curve, x: curve.y, y: curve.x }] : [];
+    return curve.axes[0] === j && curve.axes[1] === i ? [{...curve, x: curve.y, y: curve.x}] : [];
   });
 }
 
 /** Bands of a layer of numbers: edges in steps of one round width below 0, of another above it. */
 function bandsOf(values, layer) {
-  if (layer === "damping") return { down: 0.2, up: 0.2, below: 5, above: 5 };
+  if (layer === "damping") return {down: 0.2, up: 0.2, below: 5, above: 5};
   const known = values.filter(Number.isFinite).sort();
   const low = known.length ? Math.min(0, known[0]) : 0;
   // poles of the abscissa must not take all colours
@@ -48,26 +48,26 @@ function bandsOf(values, layer) {
     return second - first || 1;
   };
   const [down, up] = [step(-low), step(high)];
-  return { down, up, below: low < 0 ? Math.ceil(-low / down) : 0, above: high > 0 ? Math.ceil(high / up) : 0 };
+  return {down, up, below: low < 0 ? Math.ceil(-low / down) : 0, above: high > 0 ? Math.ceil(high / up) : 0};
 }
 
 /** The colour of each band from the lowest up: deeper farther from 0; what is good is blue, what is bad orange. */
 function bandColours(bands, goodBelow, colours) {
   const side = (count, good) =>
-    Array.from({ length: count }, (_, k) =>
+    Array.from({length: count}, (_, k) =>
       mixed(colours.paper, good ? colours.weave : colours.mark, 0.14 + (0.86 * (k + 0.5)) / count),
     );
   return [...side(bands.below, goodBelow).reverse(), ...side(bands.above, !goodBelow)];
 }
 
 /** The band of a value, from the lowest up; what lies beyond belongs to the last. */
-function bandAt(value, { down, up, below, above }) {
+function bandAt(value, {down, up, below, above}) {
   const band = below + (value < 0 ? -Math.ceil(-value / down) : Math.floor(value / up));
   return Math.max(0, Math.min(below + above - 1, band));
 }
 
 /** The chart as an image, a pixel per design, its first row at the top. */
-function chartImage({ found, points: size }, layer, colours) {
+function chartImage({found, points: size}, layer, colours) {
   const image = new ImageData(size, size);
   const pixels = new Uint32Array(image.data.buffer);
   const packed = (colour) => {
@@ -90,7 +90,7 @@ function chartImage({ found, points: size }, layer, colours) {
       else pixels[row * size + column] = values ? shades[bandAt(values[k], bands)] : fills[kind];
     }
   }
-  return { image, bands };
+  return {image, bands};
 }
 
 /** A bar of the bands with the numbers of their edges, 0 in bold. */
@@ -111,7 +111,7 @@ function drawBar(context, x, y, width, bands, layer, colours) {
   for (let edge = 0; edge <= shades.length; edge += 1) {
     const value = edge < bands.below ? (edge - bands.below) * bands.down : (edge - bands.below) * bands.up;
     // the last bands hold all that the bar does not
-    const beyond = { 0: "≤ ", [shades.length]: "≥ " }[edge];
+    const beyond = {0: "≤ ", [shades.length]: "≥ "}[edge];
     const text = (value !== 0 && beyond && layer === "abscissa" ? beyond : "") + figure(value, 12);
     const [at, half] = [x + edge * cell, context.measureText(text).width / 2 + 5];
     if (value !== 0 && (at - half < free || Math.abs(at - zero) < half + 8)) continue;
@@ -126,19 +126,19 @@ function drawBar(context, x, y, width, bands, layer, colours) {
 /** The stability chart: fills, exact curves, known designs, and the current one, which pointer and arrows move. */
 function chartPicture(host) {
   let now = null;
-  let surveyed = { key: "" };
+  let surveyed = {key: ""};
   let refining = 0;
   // ms per design
-  const pace = { kind: 0, abscissa: 0, damping: 0 };
+  const pace = {kind: 0, abscissa: 0, damping: 0};
   let plot = null;
-  let shaded = { key: "" };
+  let shaded = {key: ""};
   const raster = document.createElement("canvas");
   if (DATA.parameters.length < 2) {
     part(host, "p", {}, "A chart needs two parameters; this model has one.");
-    return { draw() {}, cheap: true };
+    return {draw() {}, cheap: true};
   }
   const surface = canvasIn(host, (width) => Math.min(560, Math.max(300, 0.78 * width)), paint);
-  const reading = part(host, "p", { class: "reading" });
+  const reading = part(host, "p", {class: "reading"});
   const legend = legendIn(host);
   const says = saysIn(surface.canvas);
   surface.canvas.style.touchAction = "none";
@@ -156,26 +156,26 @@ function chartPicture(host) {
     const before = performance.now();
     const found = survey(state.x, i, j, xs, ys, state.layer === "kind" ? [] : [state.layer]);
     pace[state.layer] = (performance.now() - before) / points ** 2;
-    surveyed = { key, fine, points, found, present: [0, 1, 2, 3, 4].filter((kind) => found.kind.includes(kind)) };
+    surveyed = {key, fine, points, found, present: [0, 1, 2, 3, 4].filter((kind) => found.kind.includes(kind))};
     return surveyed;
   }
 
   function paint(context, width, height) {
     if (!now) return;
-    const { state, drawing } = now;
+    const {state, drawing} = now;
     const [i, j] = state.plane;
     const colours = coloursNow();
-    const { points, present } = surveyOf(state);
+    const {points, present} = surveyOf(state);
     const look = `${surveyed.key} ${points} ${Object.values(colours)}`;
     if (look !== shaded.key) {
-      shaded = { key: look, ...chartImage(surveyed, state.layer, colours) };
-      Object.assign(raster, { width: points, height: points });
+      shaded = {key: look, ...chartImage(surveyed, state.layer, colours)};
+      Object.assign(raster, {width: points, height: points});
       raster.getContext("2d").putImageData(shaded.image, 0, 0);
     }
-    const { bands } = shaded;
+    const {bands} = shaded;
     const head = state.layer === "kind" ? 8 : 50;
     plot = plotIn(
-      { x0: PLOT_LEFT, y0: head, width: width - PLOT_LEFT - 12, height: height - head - 42 },
+      {x0: PLOT_LEFT, y0: head, width: width - PLOT_LEFT - 12, height: height - head - 42},
       rangeOf(i),
       rangeOf(j),
     );
@@ -201,35 +201,36 @@ function chartPicture(host) {
     drawAxes(
       context,
       plot,
-      { label: parameterLabel(i, plot.width), one: DATA.parameters[i].one },
-      { label: parameterLabel(j, plot.height), one: DATA.parameters[j].one },
+      {label: parameterLabel(i, plot.width), one: DATA.parameters[i].one},
+      {label: parameterLabel(j, plot.height), one: DATA.parameters[j].one},
       colours,
     );
     drawDesigns(context, state, colours);
     drawHere(context, plot.x(state.x[i]), plot.y(state.x[j]), colours);
     legend(entriesOf(state, present, colours));
-    read(state, drawing.kind, drawing.motion[0]);
+    readOwn();
   }
 
   function drawCurves(context, state, colours) {
     for (const curve of curvesIn(state)) {
-      const points = Array.from(curve.x, (value, k) => ({ x: plot.x(value), y: plot.y(curve.y[k]) }));
-      const { colour, width, dash } = lookOf(curve, colours);
-      drawLine(context, points, colours.paper, width + 2.4);
+      const points = Array.from(curve.x, (value, k) => ({x: plot.x(value), y: plot.y(curve.y[k])}));
+      const {colour, width, dash} = lookOf(curve, colours);
+      // between two curves of it a sliver is to be seen
+      if (curve.set !== "heavy damping") drawLine(context, points, colours.paper, width + 0.8);
       drawLine(context, points, colour, width, dash);
     }
   }
 
   function drawDesigns(context, state, colours) {
     const [i, j] = state.plane;
-    for (const { name, values } of DATA.designs) {
+    for (const {name, values} of DATA.designs) {
       if (!sameBeside(values, state.x, state.plane, 1e-9)) continue;
       const [x, y] = [plot.x(values[i]), plot.y(values[j])];
       if (!plot.holds(x, y)) continue;
       context.save();
       context.translate(x, y);
       context.rotate(Math.PI / 4);
-      Object.assign(context, { fillStyle: colours.mark, strokeStyle: colours.paper, lineWidth: 1.5 });
+      Object.assign(context, {fillStyle: colours.mark, strokeStyle: colours.paper, lineWidth: 1.5});
       context.fillRect(-4.5, -4.5, 9, 9);
       context.strokeRect(-4.5, -4.5, 9, 9);
       context.restore();
@@ -241,13 +242,10 @@ function chartPicture(host) {
 
   /** Cross hairs at the current design, of which one may be in sight where the other is not. */
   function drawHairs(context, x, y, colours) {
-    for (const look of [
-      [colours.paper, 3, DASHES.whole],
-      [colours.ink, 1, DASHES.short],
-    ]) {
-      drawUpright(context, plot, x, ...look);
-      drawLevel(context, plot, y, ...look);
-    }
+    context.globalAlpha = 0.55;
+    drawUpright(context, plot, x, colours.ink, 1);
+    drawLevel(context, plot, y, colours.ink, 1);
+    context.globalAlpha = 1;
   }
 
   /** The current design: a ring. */
@@ -258,7 +256,7 @@ function chartPicture(host) {
   }
 
   /** Colour, width, dash and words of a traced curve. */
-  function lookOf({ kind, set, along }, colours) {
+  function lookOf({kind, set, along}, colours) {
     const [dash, width] = CURVE_LOOKS[set === "stability" ? kind : set] || CURVE_LOOKS.weave;
     const words = {
       weave: `edge of stability: ${DATA.words.weave}`,
@@ -267,12 +265,12 @@ function chartPicture(host) {
     }[kind];
     const following = (along || []).map((k) => DATA.parameters[k].name).join(", ");
     const points = `exceptional points (${kind})${following ? `, where ${following} follows` : ""}`;
-    const ofSet = { "heavy damping": ["edge of heavy damping", colours.ink], "EP set": [points, colours.mark] };
+    const ofSet = {"heavy damping": ["edge of heavy damping", colours.ink], "EP set": [points, colours.mark]};
     const [text, colour] = ofSet[set] || [
       words || `edge of stability: ${kind}`,
       kind === "weave" ? colours.weave : colours.ink,
     ];
-    return { colour, width, dash: DASHES[dash], words: text };
+    return {colour, width, dash: DASHES[dash], words: text};
   }
 
   function entriesOf(state, present, colours) {
@@ -282,27 +280,33 @@ function chartPicture(host) {
       boxEntry(classWords(kind), fills[kind], colours.faint, kind ? "" : mixed(colours.paper, colours.ink, 0.45)),
     );
     const curves = curvesIn(state);
-    for (const look of curves.map((curve) => lookOf(curve, colours))) {
-      if (!entries.some(({ words }) => words === look.words))
+    const inSight = ({x, y}) => x.some((value, k) => plot.holds(plot.x(value), plot.y(y[k])));
+    for (const look of curves.filter(inSight).map((curve) => lookOf(curve, colours))) {
+      if (!entries.some(({words}) => words === look.words))
         entries.push(lineEntry(look.words, look.colour, look.width, look.dash));
     }
     entries.push(dotEntry("this design", "", colours.ink));
     if (DATA.curves.length && !curves.length) {
-      const [across, up] = DATA.curves[0].axes.map((k) => DATA.parameters[k].name);
-      const words = `the traced curves, of ${across} and ${up} at the file's own values, do not belong here`;
-      entries.push(lineEntry(words, colours.paper, 0, DASHES.whole));
+      const {axes, along = []} = DATA.curves[0];
+      const others = sameBeside(now.state.x, DATA.held, [...axes, ...along], 1e-12) ? "axes" : "values";
+      entries.push(lineEntry(`exact edges are hidden: other ${others} are set`, colours.paper, 0, DASHES.whole));
     }
     return entries;
   }
 
   /** What is at a place of the chart, in words. */
-  function read(state, kind, abscissa, at = state.x) {
+  function read(state, words, abscissa, at = state.x) {
     const where = state.plane.map((k) => `${DATA.parameters[k].name} = ${valueText(k, at[k])}`).join(", ");
     const number = Number.isFinite(abscissa)
       ? `, abscissa ${figure(abscissa)}${DATA.rootUnit ? ` ${DATA.rootUnit}` : ""}`
       : "";
     const inside = state.plane.every((k) => at[k] >= rangeOf(k)[0] && at[k] <= rangeOf(k)[1]);
-    reading.textContent = `${where}: ${classWords(kind)}${number}${inside ? "" : "; outside of this picture"}`;
+    reading.textContent = `${where}: ${words}${number}${inside ? "" : "; outside of this picture"}`;
+  }
+
+  function readOwn() {
+    const {state, drawing} = now;
+    read(state, designWords(drawing.kind, drawing.meetings), drawing.motion[0]);
   }
 
   const placeAt = (px, py) =>
@@ -320,17 +324,14 @@ function chartPicture(host) {
     const [a, motion] = [new Float64Array(MODEL.degree + 1), new Float64Array(3)];
     MODEL.coefficients(at, a);
     motionOf(a, motion);
-    read(now.state, kindOf(a), motion[0], at);
+    read(now.state, classWords(kindOf(a)), motion[0], at);
   });
-  surface.canvas.addEventListener(
-    "pointerleave",
-    () => now && read(now.state, now.drawing.kind, now.drawing.motion[0]),
-  );
+  surface.canvas.addEventListener("pointerleave", () => now && readOwn());
 
   return {
     cheap: true,
     draw(state, drawing) {
-      now = { state, drawing };
+      now = {state, drawing};
       surface.repaint();
       clearTimeout(refining);
       refining = setTimeout(() => {
@@ -340,7 +341,7 @@ function chartPicture(host) {
       const [first, second] = state.plane.map((k) => `${DATA.parameters[k].name} ${valueText(k, state.x[k], 3)}`);
       const classes = (surveyed.present || []).map((kind) => classWords(kind)).join("; ");
       says(
-        `Stability chart: this design, ${first} and ${second}, is ${classWords(drawing.kind)}; ` +
+        `Stability chart: this design, ${first} and ${second}, is ${designWords(drawing.kind, drawing.meetings)}; ` +
           `in the picture are ${classes}. Arrow keys move the design.`,
       );
     },

@@ -1,7 +1,7 @@
 // Growth rates and frequencies over one parameter, with what happens on the way; the root path shares the sweep.
 
 const SWEEP_POINTS = 301;
-let sweepKept = { key: "" };
+let sweepKept = {key: ""};
 
 /** Coefficients of a design with parameter k at a value. */
 function coefficientsAt(x, k, value) {
@@ -42,30 +42,30 @@ function crossingKind(before, after) {
 function curvesOf(samples) {
   const curves = [];
   let open = [];
-  for (const { at, roots } of samples) {
-    const points = Array.from(roots.re, (re, k) => ({ at, re, im: roots.im[k] })).filter(
-      ({ re, im }) => Number.isFinite(re) && im >= 0,
+  for (const {at, roots} of samples) {
+    const points = Array.from(roots.re, (re, k) => ({at, re, im: roots.im[k]})).filter(
+      ({re, im}) => Number.isFinite(re) && im >= 0,
     );
     const next = [];
     for (const pairs of [false, true]) {
-      const fresh = points.filter(({ im }) => im > 0 === pairs);
-      const ends = open.filter(({ pair }) => pair === pairs);
+      const fresh = points.filter(({im}) => im > 0 === pairs);
+      const ends = open.filter(({pair}) => pair === pairs);
       const links = ends.flatMap((curve) =>
         fresh.map((point) => {
           const end = curve.points[curve.points.length - 1];
-          return { curve, point, apart: Math.hypot(point.re - end.re, point.im - end.im) };
+          return {curve, point, apart: Math.hypot(point.re - end.re, point.im - end.im)};
         }),
       );
       links.sort((first, second) => first.apart - second.apart);
       const taken = new Set();
-      for (const { curve, point } of links) {
+      for (const {curve, point} of links) {
         if (taken.has(curve) || taken.has(point)) continue;
         taken.add(curve).add(point);
         curve.points.push(point);
         next.push(curve);
       }
       for (const point of fresh.filter((one) => !taken.has(one))) {
-        const curve = { pair: pairs, points: [point] };
+        const curve = {pair: pairs, points: [point]};
         curves.push(curve);
         next.push(curve);
       }
@@ -73,6 +73,12 @@ function curvesOf(samples) {
     open = next;
   }
   return curves;
+}
+
+/** How many roots grow, but for those on the imaginary axis as far as can be computed. */
+function growingOf({re, im}) {
+  const sizes = re.map((part, k) => Math.hypot(part, im[k])).sort();
+  return re.filter((part) => part > 1e-7 * sizes[re.length >> 1]).length;
 }
 
 /** Runs of one answer along a sweep: [from, to] of samples where `of` holds. */
@@ -88,7 +94,7 @@ function bandsAlong(samples, of) {
 
 /** Values ever closer to another on both sides, for there roots move as its root. */
 function closingIn(centre, step, [low, high]) {
-  const apart = Array.from({ length: 14 }, (_, k) => step * 0.5 ** k);
+  const apart = Array.from({length: 14}, (_, k) => step * 0.5 ** k);
   return apart.flatMap((distance) => [centre - distance, centre + distance]).filter((at) => at > low && at < high);
 }
 
@@ -103,9 +109,18 @@ function sweepOf(state) {
   const realAt = (at) => realRootsOf(coefficientsAt(state.x, k, at));
   const sampleAt = (at) => {
     const a = coefficientsAt(state.x, k, at);
-    return { at, a, kind: kindOf(a), real: realRootsOf(a), roots: rootsOf(a) };
+    const roots = rootsOf(a);
+    return {at, a, kind: kindOf(a), real: realRootsOf(a), roots, growing: growingOf(roots)};
   };
-  const coarse = Array.from(evenly(ends, SWEEP_POINTS), sampleAt);
+  // a pole between two samples is seen as one, not as two ends of what is undefined
+  const coarse = Array.from(evenly(ends, SWEEP_POINTS), sampleAt).filter(
+    ({kind}, index, all) => kind || !all[index - 1]?.kind || !all[index + 1]?.kind,
+  );
+  const inside = ({kind, at}) => {
+    // crossings come from computed roots
+    const edge = kind === "crossing" ? 1e4 * width : 10 * width;
+    return at > ends[0] + edge && at < ends[1] - edge;
+  };
   const events = [];
   let samples = [];
   coarse.forEach((sample, index) => {
@@ -117,33 +132,43 @@ function sweepOf(state) {
         .flat()
         .sort((first, second) => first - second)
         .map(sampleAt);
-      samples.push(...near.filter(({ at }) => at > before.at && at < sample.at));
+      samples.push(...near.filter(({at}) => at > before.at && at < sample.at));
       for (const [low, high] of kinds) {
-        const [first, second] = [sampleAt(low), sampleAt(high)];
+        const first = sampleAt(low);
+        const second = [high, high + width].map(sampleAt).find(({kind}) => kind);
+        if (!first.kind || !second) continue;
         if (first.kind > 2 !== second.kind > 2) {
-          events.push({ kind: crossingKind(first.a, second.a), at: (low + high) / 2, gains: second.kind > 2 });
+          events.push({kind: crossingKind(first.a, second.a), at: (low + high) / 2, gains: second.kind > 2});
         }
+      }
+      const both = [before, sample].every(({kind}) => kind === 1 || kind === 2);
+      const growing = (at) => growingOf(rootsOf(coefficientsAt(state.x, k, at)));
+      const crossed = both && before.growing !== sample.growing && kinds.length < 2;
+      for (const [low, high] of crossed ? changesBetween(growing, before.at, sample.at, width) : []) {
+        const roots = Math.abs(growing(high) - growing(low));
+        events.push({kind: "crossing", at: (low + high) / 2, roots});
       }
       for (const [low, high] of reals) {
         const met = meetingOf(sampleAt(low), sampleAt(high));
-        if (met) events.push({ kind: "meeting", at: (low + high) / 2, re: met.re });
+        if (met) events.push({kind: "meeting", at: (low + high) / 2, re: met.re});
       }
     }
     samples.push(sample);
   });
-  const known = DATA.designs.filter(({ values }) => sameBeside(values, state.x, [k], 0)).map(({ values }) => values[k]);
+  const known = DATA.designs.filter(({values}) => sameBeside(values, state.x, [k], 0));
   const step = (ends[1] - ends[0]) / (SWEEP_POINTS - 1);
-  const centres = new Set([...events.map(({ at }) => at), ...known]);
+  const centres = new Set([...events.map(({at}) => at), ...known.map(({values}) => values[k])]);
   samples = samples.concat([...centres].flatMap((centre) => closingIn(centre, step, ends)).map(sampleAt));
   samples.sort((first, second) => first.at - second.at);
   sweepKept = {
     key,
     ends,
     samples,
-    events: events.sort((first, second) => first.at - second.at),
+    known: known.map(({name, values, roots}) => ({name, at: values[k], roots})),
+    events: events.filter(inside).sort((first, second) => first.at - second.at),
     curves: curvesOf(samples),
-    stable: bandsAlong(samples, ({ kind }) => kind > 2),
-    heavy: bandsAlong(samples, ({ kind }) => kind === 4),
+    stable: bandsAlong(samples, ({kind}) => kind > 2),
+    heavy: bandsAlong(samples, ({kind}) => kind === 4),
   };
   return sweepKept;
 }
@@ -151,21 +176,22 @@ function sweepOf(state) {
 /** Where on the real axis roots meet, between designs with other numbers of real roots; null where one is infinite. */
 function meetingOf(first, second) {
   if (first.a[0] * second.a[0] <= 0) return null;
-  const { re, im } = (first.real > second.real ? first : second).roots;
+  const {re, im} = (first.real > second.real ? first : second).roots;
   const reals = re.filter((_, k) => im[k] === 0).sort();
-  const gaps = Array.from(reals.subarray(1), (root, k) => ({ apart: root - reals[k], re: (root + reals[k]) / 2 }));
-  return gaps.sort((one, other) => one.apart - other.apart)[0] ?? { re: NaN };
+  const gaps = Array.from(reals.subarray(1), (root, k) => ({apart: root - reals[k], re: (root + reals[k]) / 2}));
+  return gaps.sort((one, other) => one.apart - other.apart)[0] ?? {re: NaN};
 }
 
-/** What happens over the parameter `state.over`, in order: {kind, at} in SI; `meeting`: real roots become a pair. */
+/** What happens over the parameter `state.over`, in order: {kind, at} in SI; `meeting`: real roots become a pair; `crossing`: unstable before and after. */
 function growthEvents(state) {
   return sweepOf(state).events;
 }
 
 /** An event in words: "weave ends at v = 4.292 m/s". */
-function eventWords({ kind, at, gains }, over) {
+function eventWords({kind, at, gains, roots}, over) {
   const where = `at ${DATA.parameters[over].name} = ${valueText(over, at, 7)}`;
   if (kind === "infinity") return `a root passes infinity ${where}, ${gains ? "" : "un"}stable from there`;
+  if (kind === "crossing") return `${roots === 2 ? "a pair of roots" : roots === 1 ? "a real root" : `${roots} roots`} crosses 0 ${where}`;
   return `${DATA.words[kind]} ${gains ? "ends" : "begins"} ${where}`;
 }
 
@@ -179,11 +205,12 @@ function limitsOf(values) {
   return [low - room, high + room];
 }
 
-/** Limits of the growth rates of roots here and near, but for those so deep that they would hide what happens at 0. */
+/** Limits of the growth rates of roots here and near, but for those so far that they would hide what happens at 0. */
 function growthLimits(here, near, typical) {
-  const depth = Math.max(4 * typical, limitsOf(near)[1]);
-  const seen = here.filter((growth) => growth >= -depth);
-  const [low, high] = limitsOf([...near.filter((growth) => growth >= -depth), ...seen]);
+  const sizes = near.filter(Number.isFinite).map(Math.abs).sort((first, second) => first - second);
+  const far = 4 * Math.max(typical, sizes[sizes.length >> 1] || 0);
+  const seen = here.filter((growth) => growth >= -far);
+  const [low, high] = limitsOf([...near.filter((growth) => Math.abs(growth) <= far), ...seen]);
   const room = 0.06 * (high - low);
   return [
     Math.min(low, ...seen.map((growth) => growth - room)),
@@ -196,8 +223,8 @@ function growthPicture(host) {
   let now = null;
   let plots = null;
   const surface = canvasIn(host, (width) => Math.min(640, Math.max(400, 0.95 * width)), paint);
-  const reading = part(host, "p", { class: "reading" });
-  const happens = part(host, "p", { class: "reading" });
+  const reading = part(host, "p", {class: "reading"});
+  const happens = part(host, "p", {class: "reading"});
   const legend = legendIn(host);
   const says = saysIn(surface.canvas);
   surface.canvas.style.touchAction = "pan-y";
@@ -216,17 +243,17 @@ function growthPicture(host) {
       const rate = rateAt(state, at);
       return [re * rate, (im * rate) / (timed ? 2 * Math.PI : 1)];
     };
-    const curves = sweep.curves.map(({ pair, points }) => ({
+    const curves = sweep.curves.map(({pair, points}) => ({
       pair,
-      along: points.map(({ at, re, im }) => ({ at, values: scaled([re, im], at) })),
+      along: points.map(({at, re, im}) => ({at, values: scaled([re, im], at)})),
     }));
     const value = state.x[state.over];
     const roots = drawing.meetings;
-    const here = roots.map((root) => ({ pair: root[1] > 0, times: root[2], values: scaled(root, value) }));
+    const here = roots.map((root) => ({pair: root[1] > 0, times: root[2], values: scaled(root, value)}));
     const room = 0.15 * (sweep.ends[1] - sweep.ends[0]);
-    const centres = [value, ...sweep.events.filter(({ kind }) => kind !== "meeting").map(({ at }) => at)];
-    const near = curves.flatMap(({ along }) => along.filter(({ at }) => centres.some((c) => Math.abs(at - c) < room)));
-    const part = (list, k) => list.map(({ values }) => values[k]);
+    const centres = [value, ...sweep.events.filter(({kind}) => kind !== "meeting").map(({at}) => at)];
+    const near = curves.flatMap(({along}) => along.filter(({at}) => centres.some((c) => Math.abs(at - c) < room)));
+    const part = (list, k) => list.map(({values}) => values[k]);
     const typical = rateAt(state, value) * typicalSize(roots, ([re]) => Math.abs(re));
     return {
       curves,
@@ -237,9 +264,9 @@ function growthPicture(host) {
   }
 
   function drawCurves(context, plot, curves, lower, colours) {
-    for (const { pair, along } of curves) {
+    for (const {pair, along} of curves) {
       if (lower && !pair) continue;
-      const line = along.map(({ at, values }) => ({ x: plot.x(at), y: plot.y(values[lower]) }));
+      const line = along.map(({at, values}) => ({x: plot.x(at), y: plot.y(values[lower])}));
       drawLine(context, line, colours[pair ? "weave" : "real"], 2.2, pair ? DASHES.whole : DASHES.long);
     }
   }
@@ -249,7 +276,7 @@ function growthPicture(host) {
     drawUpright(context, plot, x, colours.mark, 1.6);
     const left = x > plot.x0 + 0.8 * plot.width;
     context.textAlign = left ? "right" : "left";
-    for (const { pair, times, values } of here) {
+    for (const {pair, times, values} of here) {
       if (lower && !pair) continue;
       const y = plot.y(values[lower]);
       drawDot(context, x, y, times > 1 ? 6 : 4, colours.mark, colours.paper);
@@ -259,16 +286,16 @@ function growthPicture(host) {
 
   function paint(context, width, height) {
     if (!now) return;
-    const { state, drawing } = now;
+    const {state, drawing} = now;
     const colours = coloursNow();
     const sweep = sweepOf(state);
     const timed = Number.isFinite(MODEL.rate(state.x));
-    const { curves, here, growths, highest } = motionsOf(state, drawing, sweep, timed);
-    const box = { x0: PLOT_LEFT, width: width - PLOT_LEFT - 12 };
+    const {curves, here, growths, highest} = motionsOf(state, drawing, sweep, timed);
+    const box = {x0: PLOT_LEFT, width: width - PLOT_LEFT - 12};
     const upper = 0.52 * (height - 92);
     plots = [
-      plotIn({ ...box, y0: 36, height: upper }, sweep.ends, growths),
-      plotIn({ ...box, y0: 50 + upper, height: height - 92 - upper }, sweep.ends, [0, highest]),
+      plotIn({...box, y0: 36, height: upper}, sweep.ends, growths),
+      plotIn({...box, y0: 50 + upper, height: height - 92 - upper}, sweep.ends, [0, highest]),
     ];
     tellPlot(surface.canvas, plots[0]);
     plots.forEach((plot, lower) => {
@@ -281,27 +308,39 @@ function growthPicture(host) {
       });
       const unit = timed ? (lower ? "Hz" : "1/s") : DATA.rootUnit;
       const label = withLabelUnit(lower ? `frequency${timed ? "" : " |Im s|"}` : "growth rate Re s", unit);
-      const { one } = DATA.parameters[state.over];
+      const {one} = DATA.parameters[state.over];
       const below = lower ? parameterLabel(state.over, plot.width) : "";
-      drawAxes(context, plot, { label: below, one }, { label, one: 1 }, colours);
+      drawAxes(context, plot, {label: below, one}, {label, one: 1}, colours);
     });
     drawNames(context, plots[0], sweep.events, state, colours);
     legend(entriesOf(sweep, colours));
-    happens.textContent = sweep.events.length
-      ? `${sentenceOf(sweep.events, state.over)}.`
-      : "Nothing changes over this range: neither stability nor the number of real roots.";
+    happens.textContent = sentenceOf(sweep, state, drawing);
     read(state.x[state.over]);
   }
 
-  /** The events of stability first, then where roots meet; of many of these only some. */
-  function sentenceOf(events, over) {
-    const { one, unit } = DATA.parameters[over];
-    const texts = events.filter(({ kind }) => kind !== "meeting").map((event) => eventWords(event, over));
-    const met = events.filter(({ kind }) => kind === "meeting").map(({ at }) => figure(at / one, 5));
+  /** What is so all the way, the events of stability, then where roots meet; of many of these only some. */
+  function sentenceOf({ends, events, samples, known}, state, drawing) {
+    const over = state.over;
+    const {one, unit} = DATA.parameters[over];
+    const fate = ({kind, growing}) =>
+      kind > 2 ? "stable" : !kind ? "undefined" : growing ? "unstable" : "neither stable nor growing";
+    const fates = new Set(samples.filter(({kind, at}) => kind || !ends.includes(at)).map(fate));
+    const texts = fates.size > 1 ? [] : [`${[...fates][0]} throughout`];
+    texts.push(...events.filter(({kind}) => kind !== "meeting").map((event) => eventWords(event, over)));
+    // several roots meet where no sweep hits them exactly, but where they are known to
+    const own = {name: "this design", at: state.x[over], roots: drawing.meetings};
+    const exact = [...known.filter(({at}) => at !== own.at), own].flatMap(({name, at, roots}) =>
+      roots.filter((root) => root[2] > 1 && at >= ends[0] && at <= ends[1]).map((root) => ({name, at, root})),
+    );
+    const apart = ({at}) => exact.every((other) => Math.abs(at - other.at) > 1e-3 * (ends[1] - ends[0]));
+    const met = events.filter((event) => event.kind === "meeting" && apart(event)).map(({at}) => figure(at / one, 5));
     const places = `${met.slice(0, 4).join(", ")}${met.length > 4 ? " and more" : ""}${unit ? ` ${unit}` : ""}`;
     if (met.length) texts.push(`roots meet at ${places}`);
+    for (const {name, at, root} of exact)
+      texts.push(`a ${root[2]}-fold ${root[1] ? "pair" : "root"} at ${valueText(over, at, 5)} (${name})`);
+    if (!texts.length) texts.push("no root crosses 0 or meets another");
     const text = texts.join("; ");
-    return text[0].toUpperCase() + text.slice(1);
+    return `${text[0].toUpperCase() + text.slice(1)}.`;
   }
 
   function drawBands(context, plot, sweep, colours) {
@@ -316,14 +355,14 @@ function growthPicture(host) {
       for (const [from, to] of bands)
         context.fillRect(plot.x(from), plot.y0, Math.max(1, plot.x(to) - plot.x(from)), plot.height);
     }
-    for (const [from, to] of bandsAlong(sweep.samples, ({ kind }) => kind === 0)) {
+    for (const [from, to] of bandsAlong(sweep.samples, ({kind}) => kind === 0)) {
       drawHatch(context, plot.x(from), plot.y0, Math.max(1, plot.x(to) - plot.x(from)), plot.height, colours.line);
     }
   }
 
-  function drawEvent(context, plot, { kind, at, re }, lower, colours) {
-    const dash = { weave: DASHES.short, capsize: DASHES.mixed, infinity: DASHES.dots }[kind];
-    if (dash) drawUpright(context, plot, plot.x(at), colours.ink, 1.3, dash);
+  function drawEvent(context, plot, {kind, at, re}, lower, colours) {
+    const dash = {weave: DASHES.short, capsize: DASHES.mixed, infinity: DASHES.dots, crossing: DASHES.dots}[kind];
+    if (dash) drawUpright(context, plot, plot.x(at), colours[kind === "crossing" ? "faint" : "ink"], 1.3, dash);
     else drawDot(context, plot.x(at), plot.y(lower ? 0 : re * rateAt(now.state, at)), 4, colours.paper, colours.ink);
   }
 
@@ -332,14 +371,14 @@ function growthPicture(host) {
     const placed = [];
     const place = (text, x, colour) => {
       const half = context.measureText(text).width / 2 + 4;
-      const fits = ({ y, middle }) =>
+      const fits = ({y, middle}) =>
         !placed.some((other) => other.y === y && Math.abs(middle - other.middle) < half + other.half);
       const found = [0, 0.5, -0.5, 0.9, -0.9]
         .flatMap((aside) => {
           const middle = Math.max(plot.x0 + half - 4, Math.min(plot.x0 + plot.width - half + 4, x + aside * half));
           return [
-            { y: 26, middle, half },
-            { y: 10, middle, half },
+            {y: 26, middle, half},
+            {y: 10, middle, half},
           ];
         })
         .find(fits);
@@ -351,7 +390,7 @@ function growthPicture(host) {
     const value = (at) => figure(at / DATA.parameters[state.over].one, 4);
     const own = plot.x(state.x[state.over]);
     if (own >= plot.x0 && own <= plot.x0 + plot.width) place(value(state.x[state.over]), own, colours.mark);
-    for (const { kind, at } of events.filter((event) => event.kind !== "meeting")) {
+    for (const {kind, at} of events.filter((event) => DATA.words[event.kind] || event.kind === "infinity")) {
       place(`${kind === "infinity" ? "infinity" : DATA.words[kind]} ${value(at)}`, plot.x(at), colours.ink);
     }
   }
@@ -368,14 +407,17 @@ function growthPicture(host) {
       met("weave") && lineEntry(DATA.words.weave, colours.ink, 1.3, DASHES.short),
       met("capsize") && lineEntry(DATA.words.capsize, colours.ink, 1.3, DASHES.mixed),
       met("infinity") && lineEntry("a root passes infinity", colours.ink, 1.3, DASHES.dots),
+      met("crossing") && lineEntry("a root crosses 0, unstable before and after", colours.faint, 1.3, DASHES.dots),
       met("meeting") && dotEntry("roots meet", colours.paper, colours.ink),
-      lineEntry("this design: drag it", colours.mark, 1.6, DASHES.whole),
+      now.state.x[now.state.over] === withinRange(now.state.over, now.state.x[now.state.over])
+        ? lineEntry("this design: drag it", colours.mark, 1.6, DASHES.whole)
+        : lineEntry("this design is outside of this range", colours.paper, 0, DASHES.whole),
     ].filter(Boolean);
   }
 
   /** The roots at a value of the parameter, in words. */
   function read(value) {
-    const { state, drawing } = now;
+    const {state, drawing} = now;
     const own = value === state.x[state.over];
     const a = coefficientsAt(state.x, state.over, value);
     const roots = own ? drawing.meetings : meetingsAt(a);
@@ -383,7 +425,7 @@ function growthPicture(host) {
     const unit = Number.isFinite(MODEL.rate(state.x)) ? "1/s" : DATA.rootUnit;
     const text = rootsInWords(roots, 4, rate);
     const where = `${DATA.parameters[state.over].name} = ${valueText(state.over, value, 5)}`;
-    reading.textContent = `${where}: ${classWords(kindOf(a))}; roots ${withLabelUnit(text || "none", unit)}`;
+    reading.textContent = `${where}: ${designWords(kindOf(a), roots)}; roots ${withLabelUnit(text || "none", unit)}`;
   }
 
   const within = (value) => withinRange(now.state.over, value);
@@ -403,12 +445,12 @@ function growthPicture(host) {
   return {
     cheap: true,
     draw(state, drawing) {
-      now = { state, drawing };
+      now = {state, drawing};
       surface.repaint();
-      const { name } = DATA.parameters[state.over];
+      const {name} = DATA.parameters[state.over];
       says(
         `Growth rates and frequencies over ${name}; this design at ${valueText(state.over, state.x[state.over])} is ` +
-          `${classWords(drawing.kind)}. ${happens.textContent} Left and right arrow keys move ${name}.`,
+          `${designWords(drawing.kind, drawing.meetings)}. ${happens.textContent} Left and right arrow keys move ${name}.`,
       );
     },
   };

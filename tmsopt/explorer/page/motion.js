@@ -3,8 +3,8 @@
 const PUSH_POINTS = 601;
 const NO_MOTION = "No motion to show: the equations of this design cannot be solved.";
 const LARGEST_ANGLE = Math.PI / 12;
-const clock = { time: 0, playing: false, slower: 1, pushed: 0, watchers: [] };
-let pushKept = { key: "" };
+const clock = {time: 0, playing: false, slower: 1, pushed: 0, watchers: []};
+let pushKept = {key: ""};
 
 /** Set the clock, in seconds of what is shown, and let all who show it draw. */
 function setClock(time) {
@@ -22,7 +22,7 @@ function clockRate(x) {
 /** Names of the coordinates that a push moves. */
 function coordinateNames() {
   if (DATA.bicycle) return ["lean", "steer"];
-  return Array.from({ length: MODEL.size }, (_, k) => `${MODEL.order === 2 ? "coordinate" : "state"} ${k + 1}`);
+  return Array.from({length: MODEL.size}, (_, k) => `${MODEL.order === 2 ? "coordinate" : "state"} ${k + 1}`);
 }
 
 /** How long to look at most, in the model's time: until a push has died out or grown large, not for endless swings. */
@@ -52,14 +52,14 @@ function pushOf(state, drawing) {
     if (!found || drawing.motion[0] >= 0) break;
     length *= Math.min(1, 1.1 * found.seen);
   }
-  pushKept = { key, found };
+  pushKept = {key, found};
   return found;
 }
 
 /** The response by seconds, where there are such: {at(k, time), seconds, end, rate, peaks, start}; angles to be seen. */
 function scaledPush(values, times, states, rate) {
   const size = MODEL.size;
-  const peaks = Array.from({ length: size }, (_, k) =>
+  const peaks = Array.from({length: size}, (_, k) =>
     times.reduce((peak, _time, row) => Math.max(peak, Math.abs(values[row * states + k])), 0),
   );
   const scale = DATA.bicycle ? LARGEST_ANGLE / Math.max(...peaks, 1e-300) : 1;
@@ -90,21 +90,21 @@ function motionPicture(host) {
   if (!MODEL.pencil) {
     const panel = host.closest("section") || host;
     panel.hidden = true;
-    return { draw() {}, cheap: true };
+    return {draw() {}, cheap: true};
   }
   const names = coordinateNames();
   let now = null;
   let plot = null;
-  const choice = part(host, "p", { class: "moves" });
+  const choice = part(host, "p", {class: "moves"});
   const label = part(choice, "label", {}, "push on");
   const pushed = part(label, "select");
-  names.forEach((name, k) => part(pushed, "option", { value: k }, name));
+  names.forEach((name, k) => part(pushed, "option", {value: k}, name));
   pushed.addEventListener("change", () => {
     clock.pushed = Number(pushed.value);
     clock.watchers.forEach((watch) => watch(true));
   });
   const surface = canvasIn(host, (width) => Math.min(340, Math.max(220, 0.5 * width)), paint);
-  const reading = part(host, "p", { class: "reading" });
+  const reading = part(host, "p", {class: "reading"});
   const legend = legendIn(host);
   const says = saysIn(surface.canvas);
   surface.canvas.style.touchAction = "pan-y";
@@ -118,7 +118,7 @@ function motionPicture(host) {
 
   function paint(context, width, height) {
     if (!now) return;
-    const { state, drawing } = now;
+    const {state, drawing} = now;
     const colours = coloursNow();
     const push = pushOf(state, drawing);
     if (!push) {
@@ -133,19 +133,21 @@ function motionPicture(host) {
     const one = DATA.bicycle ? Math.PI / 180 : 1;
     const size = 1.12 * Math.max(...push.peaks, 1e-300);
     plot = plotIn(
-      { x0: PLOT_LEFT, y0: 8, width: width - PLOT_LEFT - 12, height: height - 50 },
+      {x0: PLOT_LEFT, y0: 8, width: width - PLOT_LEFT - 12, height: height - 50},
       [0, push.end],
       [-size, size],
     );
+    // a push follows e^(abscissa t) in the end where one root is rightmost, not where some meet there
+    const bounded = isAlone(drawing.meetings) && !isMarginal(drawing.meetings);
     clipped(context, plot, () => {
       drawLevel(context, plot, plot.y(0), colours.faint, 1);
-      drawEnvelope(context, push, drawing.motion[0], colours);
+      if (bounded) drawEnvelope(context, push, drawing.motion[0], colours);
       const rows = Array.from(push.seconds);
       names.forEach((_, k) => {
         const [colour, dash] = lookOf(k, colours);
         drawLine(
           context,
-          rows.map((time) => ({ x: plot.x(time), y: plot.y(push.at(k, time)) })),
+          rows.map((time) => ({x: plot.x(time), y: plot.y(push.at(k, time))})),
           colour,
           2.2,
           dash,
@@ -163,14 +165,14 @@ function motionPicture(host) {
     drawAxes(
       context,
       plot,
-      { label: time, one: 1 },
-      { label: DATA.bicycle ? "angle in degrees" : "displacement", one },
+      {label: time, one: 1},
+      {label: DATA.bicycle ? "angle in degrees" : "displacement", one},
       colours,
     );
     legend([
       ...names.map((name, k) => lineEntry(name, lookOf(k, colours)[0], 2.2, lookOf(k, colours)[1])),
-      lineEntry("within a multiple of e^(abscissa · time)", colours.faint, 1, DASHES.dots),
-    ]);
+      bounded && lineEntry("within a multiple of e^(abscissa · time)", colours.faint, 1, DASHES.dots),
+    ].filter(Boolean));
     read(push);
   }
 
@@ -184,7 +186,7 @@ function motionPicture(host) {
     for (const side of [1, -1]) {
       drawLine(
         context,
-        rows.map((time) => ({ x: plot.x(time), y: plot.y(side * level(time)) })),
+        rows.map((time) => ({x: plot.x(time), y: plot.y(side * level(time))})),
         colours.faint,
         1,
         DASHES.dots,
@@ -208,14 +210,14 @@ function motionPicture(host) {
     const push = pushOf(now.state, now.drawing);
     if (push && plot) setClock(Math.max(0, Math.min(push.end, plot.valueX(event.offsetX))));
   };
-  surface.canvas.tabIndex = 0;
+  takesKeys(surface.canvas);
   surface.canvas.addEventListener("pointerdown", (event) => {
     surface.canvas.setPointerCapture(event.pointerId);
     toTime(event);
   });
   surface.canvas.addEventListener("pointermove", (event) => event.buttons && toTime(event));
   surface.canvas.addEventListener("keydown", (event) => {
-    const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    const by = {ArrowLeft: -1, ArrowRight: 1}[event.key];
     const push = by && pushOf(now.state, now.drawing);
     if (!push) return;
     event.preventDefault();
@@ -226,7 +228,7 @@ function motionPicture(host) {
   return {
     cheap: true,
     draw(state, drawing) {
-      now = { state, drawing };
+      now = {state, drawing};
       surface.repaint();
       const push = pushOf(state, drawing);
       const fate = drawing.motion[0] < 0 ? "dies out" : "does not die out";

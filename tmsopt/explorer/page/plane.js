@@ -5,12 +5,12 @@ function planeReach(roots, path, kept) {
   const middle = typicalSize(roots, ([re, im]) => Math.hypot(re, im)) || Infinity;
   const seen = roots.filter(([re, im]) => Math.hypot(re, im) <= 10 * middle);
   const size = Math.max(1e-300, ...seen.map(([re, im]) => Math.hypot(re, im)));
-  const near = path.filter(({ re, im }) => Math.hypot(re, im) < 1.6 * size);
-  const points = [...seen.map(([re, im]) => ({ re, im })), ...near];
+  const near = path.filter(({re, im}) => Math.hypot(re, im) < 1.6 * size);
+  const points = [...seen.map(([re, im]) => ({re, im})), ...near];
   const need = {
-    left: Math.min(-0.25 * size, ...points.map(({ re }) => re)),
-    right: Math.max(0.25 * size, ...points.map(({ re }) => re)),
-    top: Math.max(0.5 * size, ...points.map(({ im }) => im)),
+    left: Math.min(-0.25 * size, ...points.map(({re}) => re)),
+    right: Math.max(0.25 * size, ...points.map(({re}) => re)),
+    top: Math.max(0.5 * size, ...points.map(({im}) => im)),
   };
   const width = need.right - need.left;
   const serves =
@@ -21,8 +21,8 @@ function planeReach(roots, path, kept) {
     Math.max(width, need.top) > 0.45 * Math.max(kept.right - kept.left, kept.top);
   const reach = serves
     ? kept
-    : { left: need.left - 0.1 * width, right: need.right + 0.1 * width, top: 1.12 * need.top };
-  return { reach, far: roots.filter((root) => !seen.includes(root)) };
+    : {left: need.left - 0.1 * width, right: need.right + 0.1 * width, top: 1.12 * need.top};
+  return {reach, far: roots.filter((root) => !seen.includes(root))};
 }
 
 /** Roots in the complex plane. */
@@ -31,13 +31,13 @@ function planePicture(host) {
   let kept = null;
   let far = [];
   const surface = canvasIn(host, (width) => Math.min(520, Math.max(300, 0.8 * width)), paint);
-  const reading = part(host, "p", { class: "reading" });
+  const reading = part(host, "p", {class: "reading"});
   const legend = legendIn(host);
   const says = saysIn(surface.canvas);
 
   /** Equal scales along both axes: the angle of a root is its damping. */
-  function plotOf(width, height, { left, right, top }) {
-    const box = { x0: PLOT_LEFT, y0: 8, width: width - PLOT_LEFT - 12, height: height - 50 };
+  function plotOf(width, height, {left, right, top}) {
+    const box = {x0: PLOT_LEFT, y0: 8, width: width - PLOT_LEFT - 12, height: height - 50};
     const scale = Math.max((right - left) / box.width, (2 * top) / box.height);
     const [across, up] = [(scale * box.width - (right - left)) / 2, (scale * box.height) / 2];
     return plotIn(box, [left - across, right + across], [-up, up]);
@@ -45,14 +45,14 @@ function planePicture(host) {
 
   function paint(context, width, height) {
     if (!now) return;
-    const { state, drawing } = now;
+    const {state, drawing} = now;
     const colours = coloursNow();
     const roots = drawing.meetings;
     const sweep = sweepOf(state);
     const value = state.x[state.over];
     const reach = 0.15 * (sweep.ends[1] - sweep.ends[0]);
-    const path = sweep.curves.flatMap(({ points }) => points.filter(({ at }) => Math.abs(at - value) <= reach));
-    ({ reach: kept, far } = planeReach(roots, path, kept));
+    const path = sweep.curves.flatMap(({points}) => points.filter(({at}) => Math.abs(at - value) <= reach));
+    ({reach: kept, far} = planeReach(roots, path, kept));
     const plot = plotOf(width, height, kept);
     const fills = classFills(colours);
     clipped(context, plot, () => {
@@ -72,8 +72,8 @@ function planePicture(host) {
     drawAxes(
       context,
       plot,
-      { label: withLabelUnit("growth rate Re s", DATA.rootUnit), one: 1 },
-      { label: withLabelUnit("frequency Im s", DATA.rootUnit), one: 1 },
+      {label: withLabelUnit("growth rate Re s", DATA.rootUnit), one: 1},
+      {label: withLabelUnit("frequency Im s", DATA.rootUnit), one: 1},
       colours,
     );
     describe(state, roots, colours);
@@ -84,8 +84,8 @@ function planePicture(host) {
     const span = sweep.ends[1] - sweep.ends[0];
     const shade = (at) => 0.18 + 0.82 * Math.max(0, 1 - Math.abs(at - value) / (0.45 * span));
     for (const side of [1, -1]) {
-      for (const { points } of sweep.curves) {
-        const at = ({ re, im }) => ({ x: plot.x(re), y: plot.y(side * im) });
+      for (const {points} of sweep.curves) {
+        const at = ({re, im}) => ({x: plot.x(re), y: plot.y(side * im)});
         let gone = 0;
         points.slice(1).forEach((point, k) => {
           const ends = [at(points[k]), at(point)];
@@ -113,7 +113,7 @@ function planePicture(host) {
   }
 
   function describe(state, roots, colours) {
-    const { name } = DATA.parameters[state.over];
+    const {name} = DATA.parameters[state.over];
     const [low, high] = rangeOf(state.over).map((end) => valueText(state.over, end));
     legend([
       dotEntry("roots of this design", colours.mark, colours.paper),
@@ -132,7 +132,7 @@ function planePicture(host) {
   return {
     cheap: true,
     draw(state, drawing) {
-      now = { state, drawing };
+      now = {state, drawing};
       surface.repaint();
       const list = rootsInWords(drawing.meetings);
       says(
