@@ -31,6 +31,19 @@ coefficients = ["1", "b", "1"]
 b = { min = -1, max = 3 }
 """
 
+CAR = """title = "A quarter of a car"
+[model]
+M = [["ms", 0], [0, 40]]
+D = [["c", "-c"], ["-c", "c"]]
+K = [["k", "-k"], ["-k", "k + 180000"]]
+[parameters]
+ms = 250
+c = { min = 0, max = 6000 }
+k = { min = 5000, max = 40000 }
+[objective]
+minimize = "abscissa"
+"""
+
 SWATCHES = """() => Object.fromEntries([...document.querySelectorAll("#chart .legend li")].map((item) => {
   const canvas = item.querySelector("canvas");
   const at = canvas.getContext("2d").getImageData(canvas.width / 2, canvas.height / 4, 1, 1).data;
@@ -303,7 +316,7 @@ def test_a_model_of_one_parameter_has_no_chart_and_says_so(browser: Any, tmp_pat
 
 def test_pictures_say_what_they_show(browser: Any, tmp_path: Path) -> None:
     with opened(browser, saved(PROBLEMS / "whipple_benchmark.toml", tmp_path)) as page:
-        pictures = page.locator("canvas[role=img]")
+        pictures = page.locator("canvas[aria-label]")
         assert pictures.count() == 5
         for k in range(5):
             assert len(pictures.nth(k).get_attribute("aria-label")) > 40
@@ -312,3 +325,80 @@ def test_pictures_say_what_they_show(browser: Any, tmp_path: Path) -> None:
         page.wait_for_timeout(900)
         assert "is unstable by weave" in page.locator("#chart canvas").first.get_attribute("aria-label")
         assert "is unstable by weave" in page.locator("#growth canvas").first.get_attribute("aria-label")
+
+
+def growth_sentence(page: Any, change: str = "{}") -> str:
+    page.evaluate(f"change({change})")
+    drawn(page)
+    return str(page.locator("#growth .reading").nth(1).inner_text())
+
+
+def test_what_happens_on_the_way_is_said_without_what_the_ends_pretend(browser: Any, tmp_path: Path) -> None:
+    """A mass from 0 on, where its matrix is singular; the three roots that meet at the optimum; an undamped car."""
+    index = "DATA.parameters.findIndex(({ name }) => name === '%s')"
+    with opened(browser, stated(CAR, tmp_path)) as page:
+        over_mass = growth_sentence(page, f"{{over: {index % 'ms'}}}")
+        assert over_mass.startswith("Stable throughout")
+        assert "a 3-fold root at 250 (this design)" in over_mass
+        assert "edge of heavy damping" in page.locator("#chart .reading").inner_text()
+        growth_sentence(page, f"{{x: [[{index % 'c'}, 0]]}}")
+        assert "marginal" in page.locator("#chart .reading").inner_text()
+        assert "within a multiple" not in page.locator("#motion").inner_text()
+
+
+def test_roots_that_cross_0_are_told_where_all_is_unstable(browser: Any, tmp_path: Path) -> None:
+    """The number of growing roots, by NumPy, changes there by as many as are said to cross."""
+    with opened(browser, saved(PROBLEMS / "whipple_benchmark.toml", tmp_path)) as page:
+        tilt = "DATA.parameters.findIndex(({ name }) => name === 'lambda_s')"
+        assert growth_sentence(page, f"{{x: [[{tilt}, -0.3]]}}").startswith("Unstable throughout; ")
+        events = page.evaluate("""growthEvents(state).filter(({ kind }) => kind === "crossing").map(({ at, roots }) => ({
+            roots, around: [-1e-4, 1e-4].map((step) => [...coefficientsAt(state.x, state.over, at + step)]) }))""")
+    assert events
+    for event in events:
+        before, after = (np.count_nonzero(np.roots(a).real > 0) for a in event["around"])
+        assert abs(after - before) == event["roots"]
+
+
+def test_an_envelope_is_drawn_where_it_is_one(browser: Any, tmp_path: Path) -> None:
+    """Where four roots meet a push goes as t^3 e^(abscissa t), which no multiple of e^(abscissa t) bounds."""
+    with opened(browser, saved(PROBLEMS / "ep4.toml", tmp_path)) as page:
+        assert "within a multiple" not in page.locator("#motion").inner_text()
+        page.get_by_role("button", name="benchmark").click()
+        drawn(page)
+        assert "within a multiple" in page.locator("#motion").inner_text()
+
+
+def test_one_pole_does_not_set_the_scale_of_the_growth_rates(browser: Any, tmp_path: Path) -> None:
+    """Robot, wheelbase: a root passes infinity beside the optimum, whose roots are at -11 1/s."""
+    with opened(browser, saved(PROBLEMS / "delivery_robot.toml", tmp_path)) as page:
+        wheelbase = page.evaluate("DATA.parameters.findIndex(({ name }) => name === 'w')")
+        low, high = page.evaluate(f"""() => {{
+            change({{ over: {wheelbase} }});
+            const curves = sweepOf(state).curves.flatMap(({{ points }}) => points.map(({{ re }}) => re));
+            return growthLimits([-11, -11, -11, -11], [...curves, 1e5, -1e5], 11);
+        }}""")
+        assert low >= -60
+        assert high <= 60
+        page.evaluate(f"change({{ x: [[{wheelbase}, 10]] }})")
+        drawn(page)
+        assert "exact edges are hidden: other values are set" in page.locator("#chart .legend").inner_text()
+        fork = page.evaluate("""bicycleLines(bicycleShape(state.x), 0).filter(({ kind }) => kind === "fork")
+            .flatMap(({ points }) => points.map((point) => point[2]))""")
+        assert max(fork) <= 0  # none of it in the ground
+
+
+def test_unstable_classes_are_told_apart_in_the_dark(browser: Any, tmp_path: Path) -> None:
+    """Relative luminance of the swatches, as WCAG has it: twice as bright at least."""
+    with opened(browser, saved(PROBLEMS / "ep4.toml", tmp_path), color_scheme="dark") as page:
+        colours = {
+            words: np.array(colour.split(","), dtype=float) / 255 for colour, words in page.evaluate(SWATCHES).items()
+        }
+    linear = {words: np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4) for words, c in colours.items()}
+    weave, capsize = (linear[f"unstable by {kind}"] @ [0.2126, 0.7152, 0.0722] + 0.05 for kind in ("weave", "capsize"))
+    assert capsize >= 2 * weave
+
+
+def test_pictures_with_keys_are_no_mere_images(browser: Any, tmp_path: Path) -> None:
+    with opened(browser, saved(PROBLEMS / "ep4.toml", tmp_path)) as page:
+        roles = page.evaluate("[...document.querySelectorAll('canvas[aria-label]')].map((c) => [c.tabIndex, c.role])")
+        assert sorted(roles) == [[-1, "img"]] * 2 + [[0, "application"]] * 3

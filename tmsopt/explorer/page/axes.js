@@ -54,12 +54,8 @@ const colourReader = document.createElement("canvas").getContext("2d");
 /** Red, green, blue of a colour written in any way that CSS knows. */
 function rgbOf(colour) {
   colourReader.fillStyle = colour;
-  const text = colourReader.fillStyle;
-  if (text[0] === "#") return [1, 3, 5].map((k) => parseInt(text.slice(k, k + 2), 16));
-  return text
-    .match(/[\d.]+/g)
-    .slice(0, 3)
-    .map(Number);
+  // an opaque one is always read as #rrggbb
+  return [1, 3, 5].map((k) => parseInt(colourReader.fillStyle.slice(k, k + 2), 16));
 }
 
 /** A colour between two, `share` of the second. */
@@ -86,23 +82,26 @@ function classWords(kind) {
   ][kind];
 }
 
-/** Whether the rightmost of roots [re, im, multiplicity] that meet, which come first, is alone. */
-function isAlone(roots) {
-  const size = Math.max(...roots.map(([re, im]) => Math.hypot(re, im)));
-  return roots.every(([re, , times]) => times === 1 || re < roots[0][0] - 1e-9 * size);
+/** How far from the imaginary axis roots [re, im, multiplicity] cannot be told to stand. */
+function roundingOf(roots) {
+  return 1e-9 * Math.max(0, ...roots.map(([re, im]) => Math.hypot(re, im)));
+}
+
+/** The largest real part of roots. */
+function rightmostOf(roots) {
+  return Math.max(...roots.map(([re]) => re));
 }
 
 /** Whether roots [re, im, multiplicity] have some on the imaginary axis and none to its right, as far as can be computed. */
 function isMarginal(roots) {
-  const size = Math.max(...roots.map(([re, im]) => Math.hypot(re, im)));
-  return roots.length > 0 && Math.abs(roots[0][0]) <= 1e-9 * size;
+  return Math.abs(rightmostOf(roots)) <= roundingOf(roots);
 }
 
 /** Words for a design with such roots: its class, and what of the boundaries it stands on. */
 function designWords(kind, roots) {
   if (kind > 2 && roots.every(([, im]) => im === 0) && roots.some((root) => root[2] > 1))
     return "stable, on the edge of heavy damping: nothing swings";
-  return kind && kind < 3 && isMarginal(roots) ? "marginal: roots on the imaginary axis, none beyond" : classWords(kind);
+  return kind && kind < 3 && isMarginal(roots) ? "marginal: roots on the imaginary axis, as far as can be computed" : classWords(kind);
 }
 
 /** A number for people: so many digits, a true minus, powers of ten in words of digits. */
@@ -114,6 +113,16 @@ function figure(value, digits = 4) {
   return power
     ? `${written}·10${[...power].map((c) => ({"-": "⁻", "+": ""})[c] ?? "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]).join("")}`
     : written;
+}
+
+/** The name of a parameter. */
+function symbolOf(k) {
+  return DATA.parameters[k].name;
+}
+
+/** A value, or the end of a range that is nearest. */
+function clamp(low, value, high) {
+  return Math.min(high, Math.max(low, value));
 }
 
 /** A value of a parameter in its unit, with the unit. */
@@ -139,7 +148,7 @@ function withLabelUnit(label, unit) {
 /** A value of a parameter, or the end of its range that is nearest. */
 function withinRange(k, value) {
   const [low, high] = rangeOf(k);
-  return Math.min(high, Math.max(low, value));
+  return clamp(low, value, high);
 }
 
 /** Round values between two, about so many. */
@@ -243,16 +252,10 @@ function clipped(context, plot, draw) {
 function drawAxes(context, plot, x, y, colours) {
   const {x0, y0, width, height} = plot;
   Object.assign(context, {lineWidth: 1, fillStyle: colours.ink, strokeStyle: colours.faint});
-  const line = (...ends) => {
-    context.beginPath();
-    context.moveTo(ends[0], ends[1]);
-    context.lineTo(ends[2], ends[3]);
-    context.stroke();
-  };
   context.textAlign = "center";
   for (const tick of ticksBetween(plot.left / x.one, plot.right / x.one, width / 60)) {
     const at = Math.round(plot.x(tick * x.one)) + 0.5;
-    line(at, y0 + height, at, y0 + height + 4);
+    drawStraight(context, [at, y0 + height], [at, y0 + height + 4], colours.faint, 1);
     const text = figure(tick, 12);
     // the last must not leave the canvas, beyond whose plot 12 pixels remain
     const rightmost = x0 + width + 11 - context.measureText(text).width / 2;
@@ -261,7 +264,7 @@ function drawAxes(context, plot, x, y, colours) {
   context.textAlign = "right";
   for (const tick of ticksBetween(plot.bottom / y.one, plot.top / y.one, height / 45)) {
     const at = Math.round(plot.y(tick * y.one)) + 0.5;
-    line(x0 - 4, at, x0, at);
+    drawStraight(context, [x0 - 4, at], [x0, at], colours.faint, 1);
     context.fillText(figure(tick, 12), x0 - 7, at);
   }
   context.strokeRect(Math.round(x0) + 0.5, Math.round(y0) + 0.5, Math.round(width) - 1, Math.round(height) - 1);
@@ -281,21 +284,14 @@ function drawLine(context, points, colour, width = 1.5, dash = DASHES.whole, off
   context.setLineDash(dash);
   context.lineDashOffset = offset;
   context.beginPath();
-  for (const [k, {x, y}] of points.entries()) {
-    if (k) context.lineTo(x, y);
-    else context.moveTo(x, y);
-  }
+  for (const {x, y} of points) context.lineTo(x, y); // the first begins the path
   context.stroke();
   context.setLineDash(DASHES.whole);
 }
 
 /** A straight line between two points in pixels. */
 function drawStraight(context, [x, y], [toX, toY], ...look) {
-  const points = [
-    [x, y],
-    [toX, toY],
-  ].map((point) => ({x: point[0], y: point[1]}));
-  drawLine(context, points, ...look);
+  drawLine(context, [{x, y}, {x: toX, y: toY}], ...look);
 }
 
 /** An upright line across a plot at a pixel. */
@@ -332,21 +328,18 @@ function drawText(context, text, x, y, colours, colour = colours.ink) {
   context.fillText(text, x, y);
 }
 
+/** Fill a canvas rectangle with a colour. */
+function drawBox(context, x, y, width, height, colour) {
+  context.fillStyle = colour;
+  context.fillRect(x, y, width, height);
+}
+
 /** Fill a canvas rectangle with slanted lines: the sign of what is undefined. */
 function drawHatch(context, x, y, width, height, colour, apart = 6) {
-  context.save();
-  context.beginPath();
-  context.rect(x, y, width, height);
-  context.clip();
-  context.strokeStyle = colour;
-  context.lineWidth = 1;
-  context.beginPath();
-  for (let at = x - height; at < x + width; at += apart) {
-    context.moveTo(at, y + height);
-    context.lineTo(at + height, y);
-  }
-  context.stroke();
-  context.restore();
+  clipped(context, {x0: x, y0: y, width, height}, () => {
+    for (let at = x - height; at < x + width; at += apart)
+      drawStraight(context, [at, y + height], [at + height, y], colour, 1);
+  });
 }
 
 /** A list of swatches and words; built again only when the words or colours change. */
@@ -374,8 +367,7 @@ function legendIn(host) {
 /** An entry of a legend: a filled box, hatched on request. */
 function boxEntry(words, colour, outline, hatch = "") {
   const sign = (context) => {
-    context.fillStyle = colour;
-    context.fillRect(0, 0, 30, 14);
+    drawBox(context, 0, 0, 30, 14, colour);
     if (hatch) drawHatch(context, 0, 0, 30, 14, hatch, 5);
     context.strokeStyle = outline;
     context.strokeRect(0.5, 0.5, 29, 13);

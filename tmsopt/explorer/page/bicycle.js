@@ -63,7 +63,7 @@ function bicycleLines(shape, travelled) {
   const frontHub = [w, 0, -front];
   const head = onAxis(0.62 * tall);
   // where the front assembly is joined, between the ground and the handlebar
-  const joined = (point) => onAxis(Math.min(0.9 * tall, Math.max(0.04 * tall, alongAxis(point))));
+  const joined = (point) => onAxis(clamp(0.04 * tall, alongAxis(point), 0.9 * tall));
   const lowest = [front ? frontHub : contact, H].map(joined).sort((one, other) => other[2] - one[2])[0];
   const lines = [
     {front: false, kind: "frame", points: [hub, B, head]},
@@ -103,14 +103,9 @@ function bicycleLines(shape, travelled) {
         lines.push({front: ofFront, kind: "spoke", points: [centre, rim(turned + (spoke * 2 * Math.PI) / 5, 0.97)]});
       }
     } else {
-      const skate = [
-        [-0.06, -0.03],
-        [0.06, -0.03],
-        [0.035, 0],
-        [-0.035, 0],
-        [-0.06, -0.03],
-      ];
-      lines.push({front: ofFront, kind: "skate", points: skate.map(([x, z]) => [centre[0] + x * w, 0, z * w])});
+      const skate = [-0.06, 0.06, 0.035, -0.035, -0.06];
+      const points = skate.map((x) => [centre[0] + x * w, 0, Math.abs(x) > 0.05 ? -0.03 * w : 0]);
+      lines.push({front: ofFront, kind: "skate", points});
     }
   }
   return lines;
@@ -192,7 +187,7 @@ function bicyclePicture(host) {
       drawMass(
         context,
         H,
-        0.055 * shape.w * scale * Math.min(1.2, Math.max(0.45, Math.cbrt(shape.heavy))),
+        0.055 * shape.w * scale * clamp(0.45, Math.cbrt(shape.heavy), 1.2),
         "H",
         colours.mark,
         colours,
@@ -226,7 +221,7 @@ function bicyclePicture(host) {
   function heightOf(width) {
     const {left, right, side, tallest} = boundsOf(bicycleShape(now ? now.state.x : DATA.start));
     const wanted = 46 + (tallest * (width - 24)) / (right - left + 2 * side);
-    return Math.min(420, Math.max(180, 40 * Math.ceil((wanted || 0) / 40)));
+    return clamp(140, 40 * Math.ceil((wanted || 0) / 40), 420);
   }
 
   /** By how much the lean is drawn larger than it is, where steering hides it. */
@@ -238,13 +233,10 @@ function bicyclePicture(host) {
 
   function drawGround(context, [from, to], y, shift, colours) {
     drawStraight(context, [from, y], [to, y], colours.faint, 1.5);
-    context.save();
-    context.beginPath();
-    context.rect(from, y, to - from, 7);
-    context.clip();
-    for (let x = from - (shift % 14) - 14; x < to + 14; x += 14)
-      drawStraight(context, [x + 6, y], [x, y + 6], colours.faint, 1);
-    context.restore();
+    clipped(context, {x0: from, y0: y, width: to - from, height: 7}, () => {
+      for (let x = from - (shift % 14) - 14; x < to + 14; x += 14)
+        drawStraight(context, [x + 6, y], [x, y + 6], colours.faint, 1);
+    });
   }
 
   function drawPart(context, points, kind, front, colours) {

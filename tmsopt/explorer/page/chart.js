@@ -63,7 +63,7 @@ function bandColours(bands, goodBelow, colours) {
 /** The band of a value, from the lowest up; what lies beyond belongs to the last. */
 function bandAt(value, {down, up, below, above}) {
   const band = below + (value < 0 ? -Math.ceil(-value / down) : Math.floor(value / up));
-  return Math.max(0, Math.min(below + above - 1, band));
+  return clamp(0, band, below + above - 1);
 }
 
 /** The chart as an image, a pixel per design, its first row at the top. */
@@ -98,8 +98,7 @@ function drawBar(context, x, y, width, bands, layer, colours) {
   const shades = bandColours(bands, layer === "abscissa", colours);
   const cell = width / shades.length;
   shades.forEach((shade, k) => {
-    context.fillStyle = shade;
-    context.fillRect(x + k * cell, y, cell + 0.5, 12);
+    drawBox(context, x + k * cell, y, cell + 0.5, 12, shade);
   });
   context.strokeStyle = colours.faint;
   context.lineWidth = 1;
@@ -137,7 +136,7 @@ function chartPicture(host) {
     part(host, "p", {}, "A chart needs two parameters; this model has one.");
     return {draw() {}, cheap: true};
   }
-  const surface = canvasIn(host, (width) => Math.min(560, Math.max(300, 0.78 * width)), paint);
+  const surface = canvasIn(host, (width) => clamp(300, 0.78 * width, 560), paint);
   const reading = part(host, "p", {class: "reading"});
   const legend = legendIn(host);
   const says = saysIn(surface.canvas);
@@ -227,13 +226,7 @@ function chartPicture(host) {
       if (!sameBeside(values, state.x, state.plane, 1e-9)) continue;
       const [x, y] = [plot.x(values[i]), plot.y(values[j])];
       if (!plot.holds(x, y)) continue;
-      context.save();
-      context.translate(x, y);
-      context.rotate(Math.PI / 4);
-      Object.assign(context, {fillStyle: colours.mark, strokeStyle: colours.paper, lineWidth: 1.5});
-      context.fillRect(-4.5, -4.5, 9, 9);
-      context.strokeRect(-4.5, -4.5, 9, 9);
-      context.restore();
+      drawDot(context, x, y, 5, colours.mark, colours.paper);
       const left = x > plot.x0 + 0.75 * plot.width;
       context.textAlign = left ? "right" : "left";
       drawText(context, name, x + (left ? -14 : 14), y + (y > plot.y0 + 24 ? -12 : 14), colours);
@@ -263,7 +256,7 @@ function chartPicture(host) {
       capsize: `edge of stability: ${DATA.words.capsize}`,
       infinity: "a root at infinity",
     }[kind];
-    const following = (along || []).map((k) => DATA.parameters[k].name).join(", ");
+    const following = (along || []).map((k) => symbolOf(k)).join(", ");
     const points = `exceptional points (${kind})${following ? `, where ${following} follows` : ""}`;
     const ofSet = {"heavy damping": ["edge of heavy damping", colours.ink], "EP set": [points, colours.mark]};
     const [text, colour] = ofSet[set] || [
@@ -296,7 +289,7 @@ function chartPicture(host) {
 
   /** What is at a place of the chart, in words. */
   function read(state, words, abscissa, at = state.x) {
-    const where = state.plane.map((k) => `${DATA.parameters[k].name} = ${valueText(k, at[k])}`).join(", ");
+    const where = state.plane.map((k) => `${symbolOf(k)} = ${valueText(k, at[k])}`).join(", ");
     const number = Number.isFinite(abscissa)
       ? `, abscissa ${figure(abscissa)}${DATA.rootUnit ? ` ${DATA.rootUnit}` : ""}`
       : "";
@@ -338,7 +331,7 @@ function chartPicture(host) {
         surveyOf(state, true);
         surface.repaint();
       }, 150);
-      const [first, second] = state.plane.map((k) => `${DATA.parameters[k].name} ${valueText(k, state.x[k], 3)}`);
+      const [first, second] = state.plane.map((k) => `${symbolOf(k)} ${valueText(k, state.x[k], 3)}`);
       const classes = (surveyed.present || []).map((kind) => classWords(kind)).join("; ");
       says(
         `Stability chart: this design, ${first} and ${second}, is ${designWords(drawing.kind, drawing.meetings)}; ` +

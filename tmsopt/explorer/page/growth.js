@@ -189,7 +189,7 @@ function growthEvents(state) {
 
 /** An event in words: "weave ends at v = 4.292 m/s". */
 function eventWords({kind, at, gains, roots}, over) {
-  const where = `at ${DATA.parameters[over].name} = ${valueText(over, at, 7)}`;
+  const where = `at ${symbolOf(over)} = ${valueText(over, at, 7)}`;
   if (kind === "infinity") return `a root passes infinity ${where}, ${gains ? "" : "un"}stable from there`;
   if (kind === "crossing") return `${roots === 2 ? "a pair of roots" : roots === 1 ? "a real root" : `${roots} roots`} crosses 0 ${where}`;
   return `${DATA.words[kind]} ${gains ? "ends" : "begins"} ${where}`;
@@ -218,11 +218,17 @@ function growthLimits(here, near, typical) {
   ];
 }
 
+/** Fills of stable and of heavily damped bands, which curves stand out from. */
+function bandFills(colours) {
+  const fills = classFills(colours);
+  return [mixed(fills[3], colours.paper, 0.45), mixed(fills[4], colours.paper, 0.3)];
+}
+
 /** Growth rates above frequencies over one parameter. */
 function growthPicture(host) {
   let now = null;
   let plots = null;
-  const surface = canvasIn(host, (width) => Math.min(640, Math.max(400, 0.95 * width)), paint);
+  const surface = canvasIn(host, (width) => clamp(400, 0.95 * width, 640), paint);
   const reading = part(host, "p", {class: "reading"});
   const happens = part(host, "p", {class: "reading"});
   const legend = legendIn(host);
@@ -233,8 +239,7 @@ function growthPicture(host) {
   function rateAt(state, value) {
     const at = Float64Array.from(state.x);
     at[state.over] = value;
-    const rate = MODEL.rate(at);
-    return Number.isFinite(rate) ? rate : 1;
+    return MODEL.rate(at) || 1;
   }
 
   /** Growth rates and frequencies of the curves and of the design, [growth, frequency] in their units, and limits. */
@@ -324,7 +329,8 @@ function growthPicture(host) {
     const {one, unit} = DATA.parameters[over];
     const fate = ({kind, growing}) =>
       kind > 2 ? "stable" : !kind ? "undefined" : growing ? "unstable" : "neither stable nor growing";
-    const fates = new Set(samples.filter(({kind, at}) => kind || !ends.includes(at)).map(fate));
+    const edge = 1e-6 * (ends[1] - ends[0]);
+    const fates = new Set(samples.filter(({at}) => at > ends[0] + edge && at < ends[1] - edge).map(fate));
     const texts = fates.size > 1 ? [] : [`${[...fates][0]} throughout`];
     texts.push(...events.filter(({kind}) => kind !== "meeting").map((event) => eventWords(event, over)));
     // several roots meet where no sweep hits them exactly, but where they are known to
@@ -344,20 +350,16 @@ function growthPicture(host) {
   }
 
   function drawBands(context, plot, sweep, colours) {
-    const fills = classFills(colours);
-    context.fillStyle = mixed(colours.paper, colours.ink, 0.05);
-    context.fillRect(plot.x0, plot.y0, plot.width, plot.height);
-    for (const [bands, fill] of [
-      [sweep.stable, mixed(fills[3], colours.paper, 0.45)],
-      [sweep.heavy, mixed(fills[4], colours.paper, 0.3)],
-    ]) {
-      context.fillStyle = fill;
+    const [stable, heavy] = bandFills(colours);
+    const undefineds = bandsAlong(sweep.samples, ({kind}) => kind === 0);
+    for (const [bands, fill, draw] of [
+      [[sweep.ends], mixed(colours.paper, colours.ink, 0.05), drawBox],
+      [sweep.stable, stable, drawBox],
+      [sweep.heavy, heavy, drawBox],
+      [undefineds, colours.line, drawHatch],
+    ])
       for (const [from, to] of bands)
-        context.fillRect(plot.x(from), plot.y0, Math.max(1, plot.x(to) - plot.x(from)), plot.height);
-    }
-    for (const [from, to] of bandsAlong(sweep.samples, ({kind}) => kind === 0)) {
-      drawHatch(context, plot.x(from), plot.y0, Math.max(1, plot.x(to) - plot.x(from)), plot.height, colours.line);
-    }
+        draw(context, plot.x(from), plot.y0, Math.max(1, plot.x(to) - plot.x(from)), plot.height, fill);
   }
 
   function drawEvent(context, plot, {kind, at, re}, lower, colours) {
@@ -375,11 +377,8 @@ function growthPicture(host) {
         !placed.some((other) => other.y === y && Math.abs(middle - other.middle) < half + other.half);
       const found = [0, 0.5, -0.5, 0.9, -0.9]
         .flatMap((aside) => {
-          const middle = Math.max(plot.x0 + half - 4, Math.min(plot.x0 + plot.width - half + 4, x + aside * half));
-          return [
-            {y: 26, middle, half},
-            {y: 10, middle, half},
-          ];
+          const middle = clamp(plot.x0 + half - 4, x + aside * half, plot.x0 + plot.width - half + 4);
+          return [26, 10].map((y) => ({y, middle, half}));
         })
         .find(fits);
       if (!found) return;
@@ -396,14 +395,14 @@ function growthPicture(host) {
   }
 
   function entriesOf(sweep, colours) {
-    const fills = classFills(colours);
+    const [stable, heavy] = bandFills(colours);
     const has = (pair) => sweep.curves.some((curve) => curve.pair === pair);
     const met = (kind) => sweep.events.some((event) => event.kind === kind);
     return [
       has(true) && lineEntry("a pair of roots, which swings", colours.weave, 2.2, DASHES.whole),
       has(false) && lineEntry("a real root, which does not", colours.real, 2.2, DASHES.long),
-      sweep.stable.length && boxEntry("stable", mixed(fills[3], colours.paper, 0.45), colours.faint),
-      sweep.heavy.length && boxEntry("heavily damped", mixed(fills[4], colours.paper, 0.3), colours.faint),
+      sweep.stable.length && boxEntry("stable", stable, colours.faint),
+      sweep.heavy.length && boxEntry("heavily damped", heavy, colours.faint),
       met("weave") && lineEntry(DATA.words.weave, colours.ink, 1.3, DASHES.short),
       met("capsize") && lineEntry(DATA.words.capsize, colours.ink, 1.3, DASHES.mixed),
       met("infinity") && lineEntry("a root passes infinity", colours.ink, 1.3, DASHES.dots),
@@ -424,7 +423,7 @@ function growthPicture(host) {
     const rate = rateAt(state, value);
     const unit = Number.isFinite(MODEL.rate(state.x)) ? "1/s" : DATA.rootUnit;
     const text = rootsInWords(roots, 4, rate);
-    const where = `${DATA.parameters[state.over].name} = ${valueText(state.over, value, 5)}`;
+    const where = `${symbolOf(state.over)} = ${valueText(state.over, value, 5)}`;
     reading.textContent = `${where}: ${designWords(kindOf(a), roots)}; roots ${withLabelUnit(text || "none", unit)}`;
   }
 

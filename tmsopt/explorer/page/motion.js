@@ -66,7 +66,7 @@ function scaledPush(values, times, states, rate) {
   const second = Number.isFinite(rate) ? rate : 1;
   const end = times[PUSH_POINTS - 1] / second;
   const at = (k, time) => {
-    const place = Math.max(0, Math.min(PUSH_POINTS - 1, (time / end) * (PUSH_POINTS - 1)));
+    const place = clamp(0, (time / end) * (PUSH_POINTS - 1), PUSH_POINTS - 1);
     const row = Math.min(PUSH_POINTS - 2, Math.floor(place));
     const [before, after] = [values[row * states + k], values[(row + 1) * states + k]];
     return scale * (before + (place - row) * (after - before));
@@ -103,7 +103,7 @@ function motionPicture(host) {
     clock.pushed = Number(pushed.value);
     clock.watchers.forEach((watch) => watch(true));
   });
-  const surface = canvasIn(host, (width) => Math.min(340, Math.max(220, 0.5 * width)), paint);
+  const surface = canvasIn(host, (width) => clamp(220, 0.5 * width, 340), paint);
   const reading = part(host, "p", {class: "reading"});
   const legend = legendIn(host);
   const says = saysIn(surface.canvas);
@@ -138,7 +138,8 @@ function motionPicture(host) {
       [-size, size],
     );
     // a push follows e^(abscissa t) in the end where one root is rightmost, not where some meet there
-    const bounded = isAlone(drawing.meetings) && !isMarginal(drawing.meetings);
+    const last = rightmostOf(drawing.meetings) - roundingOf(drawing.meetings);
+    const bounded = !isMarginal(drawing.meetings) && drawing.meetings.every(([re, , times]) => times === 1 || re < last);
     clipped(context, plot, () => {
       drawLevel(context, plot, plot.y(0), colours.faint, 1);
       if (bounded) drawEnvelope(context, push, drawing.motion[0], colours);
@@ -208,7 +209,7 @@ function motionPicture(host) {
   const toTime = (event) => {
     clock.playing = false;
     const push = pushOf(now.state, now.drawing);
-    if (push && plot) setClock(Math.max(0, Math.min(push.end, plot.valueX(event.offsetX))));
+    if (push && plot) setClock(clamp(0, plot.valueX(event.offsetX), push.end));
   };
   takesKeys(surface.canvas);
   surface.canvas.addEventListener("pointerdown", (event) => {
@@ -222,7 +223,7 @@ function motionPicture(host) {
     if (!push) return;
     event.preventDefault();
     clock.playing = false;
-    setClock(Math.max(0, Math.min(push.end, clock.time + (by * push.end) / (event.shiftKey ? 20 : 200))));
+    setClock(clamp(0, clock.time + (by * push.end) / (event.shiftKey ? 20 : 200), push.end));
   });
 
   return {

@@ -30,7 +30,7 @@ function planePicture(host) {
   let now = null;
   let kept = null;
   let far = [];
-  const surface = canvasIn(host, (width) => Math.min(520, Math.max(300, 0.8 * width)), paint);
+  const surface = canvasIn(host, (width) => clamp(300, 0.8 * width, 520), paint);
   const reading = part(host, "p", {class: "reading"});
   const legend = legendIn(host);
   const says = saysIn(surface.canvas);
@@ -56,10 +56,8 @@ function planePicture(host) {
     const plot = plotOf(width, height, kept);
     const fills = classFills(colours);
     clipped(context, plot, () => {
-      context.fillStyle = mixed(fills[3], colours.paper, 0.6);
-      context.fillRect(plot.x0, plot.y0, plot.x(0) - plot.x0, plot.height);
-      context.fillStyle = mixed(colours.paper, colours.ink, 0.05);
-      context.fillRect(plot.x(0), plot.y0, plot.width, plot.height);
+      drawBox(context, plot.x0, plot.y0, plot.x(0) - plot.x0, plot.height, mixed(fills[3], colours.paper, 0.6));
+      drawBox(context, plot.x(0), plot.y0, plot.width, plot.height, mixed(colours.paper, colours.ink, 0.05));
       drawLevel(context, plot, plot.y(0), colours.faint, 1);
       drawUpright(context, plot, plot.x(0), colours.ink, 2.4);
       drawPath(context, plot, sweep, value, colours);
@@ -136,7 +134,7 @@ function planePicture(host) {
       surface.repaint();
       const list = rootsInWords(drawing.meetings);
       says(
-        `Roots in the complex plane: ${list || "none"}; their path over ${DATA.parameters[state.over].name} is drawn.`,
+        `Roots in the complex plane: ${list || "none"}; their path over ${symbolOf(state.over)} is drawn.`,
       );
     },
   };
