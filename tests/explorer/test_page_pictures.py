@@ -351,8 +351,10 @@ def test_roots_that_cross_0_are_told_where_all_is_unstable(browser: Any, tmp_pat
     with opened(browser, saved(PROBLEMS / "whipple_benchmark.toml", tmp_path)) as page:
         tilt = "DATA.parameters.findIndex(({ name }) => name === 'lambda_s')"
         assert growth_sentence(page, f"{{x: [[{tilt}, -0.3]]}}").startswith("Unstable throughout; ")
-        events = page.evaluate("""growthEvents(state).filter(({ kind }) => kind === "crossing").map(({ at, roots }) => ({
-            roots, around: [-1e-4, 1e-4].map((step) => [...coefficientsAt(state.x, state.over, at + step)]) }))""")
+        events = page.evaluate("""growthEvents(state).filter(({ kind }) => kind === "crossing")
+            .map(({ at, roots }) => ({
+            roots,
+            around: [-1e-4, 1e-4].map((step) => [...coefficientsAt(state.x, state.over, at + step)]) }))""")
     assert events
     for event in events:
         before, after = (np.count_nonzero(np.roots(a).real > 0) for a in event["around"])

@@ -92,7 +92,7 @@ function rightmostOf(roots) {
   return Math.max(...roots.map(([re]) => re));
 }
 
-/** Whether roots [re, im, multiplicity] have some on the imaginary axis and none to its right, as far as can be computed. */
+/** Whether roots stand on the imaginary axis and none to its right, as far as can be computed. */
 function isMarginal(roots) {
   return Math.abs(rightmostOf(roots)) <= roundingOf(roots);
 }
@@ -101,7 +101,8 @@ function isMarginal(roots) {
 function designWords(kind, roots) {
   if (kind > 2 && roots.every(([, im]) => im === 0) && roots.some((root) => root[2] > 1))
     return "stable, on the edge of heavy damping: nothing swings";
-  return kind && kind < 3 && isMarginal(roots) ? "marginal: roots on the imaginary axis, as far as can be computed" : classWords(kind);
+  if (!kind || kind > 2 || !isMarginal(roots)) return classWords(kind);
+  return "marginal: roots on the imaginary axis, as far as can be computed";
 }
 
 /** A number for people: so many digits, a true minus, powers of ten in words of digits. */

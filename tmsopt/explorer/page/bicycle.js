@@ -284,7 +284,8 @@ function bicyclePicture(host) {
     ];
     const enlarged = enlargement(push);
     reading.textContent = push
-      ? `A push to the right, scaled so that the largest angle is 15° (${rate}°/s of ${coordinateNames()[clock.pushed]}). ` +
+      ? "A push to the right, scaled so that the largest angle is 15° " +
+        `(${rate}°/s of ${coordinateNames()[clock.pushed]}). ` +
         `After ${time.toFixed(push.end < 1 ? 3 : 2)} s of ${figure(push.end, 3)} s${unit}: lean ${degrees(lean)}, ` +
         `steer ${degrees(steer)}${enlarged > 1 ? ` (lean drawn ${enlarged} times)` : ""}.`
       : NO_MOTION;

@@ -146,7 +146,8 @@ function sweepOf(state) {
       const crossed = both && before.growing !== sample.growing && kinds.length < 2;
       for (const [low, high] of crossed ? changesBetween(growing, before.at, sample.at, width) : []) {
         const roots = Math.abs(growing(high) - growing(low));
-        events.push({kind: "crossing", at: (low + high) / 2, roots});
+        const far = sampleAt(low).a[0] * sampleAt(high).a[0] <= 0;
+        events.push({kind: "crossing", at: (low + high) / 2, roots, far});
       }
       for (const [low, high] of reals) {
         const met = meetingOf(sampleAt(low), sampleAt(high));
@@ -182,16 +183,18 @@ function meetingOf(first, second) {
   return gaps.sort((one, other) => one.apart - other.apart)[0] ?? {re: NaN};
 }
 
-/** What happens over the parameter `state.over`, in order: {kind, at} in SI; `meeting`: real roots become a pair; `crossing`: unstable before and after. */
+/** What happens over the parameter `state.over`, in order: {kind, at} in SI; `meeting`: real roots
+ * become a pair; `crossing`: roots pass 0, or infinity, unstable before and after. */
 function growthEvents(state) {
   return sweepOf(state).events;
 }
 
 /** An event in words: "weave ends at v = 4.292 m/s". */
-function eventWords({kind, at, gains, roots}, over) {
+function eventWords({kind, at, gains, roots, far}, over) {
   const where = `at ${symbolOf(over)} = ${valueText(over, at, 7)}`;
   if (kind === "infinity") return `a root passes infinity ${where}, ${gains ? "" : "un"}stable from there`;
-  if (kind === "crossing") return `${roots === 2 ? "a pair of roots" : roots === 1 ? "a real root" : `${roots} roots`} crosses 0 ${where}`;
+  const many = ["a real root crosses", "a pair of roots crosses"][roots - 1] ?? `${roots} roots cross`;
+  if (kind === "crossing") return `${many} ${far ? "infinity" : "0"} ${where}`;
   return `${DATA.words[kind]} ${gains ? "ends" : "begins"} ${where}`;
 }
 
@@ -406,7 +409,7 @@ function growthPicture(host) {
       met("weave") && lineEntry(DATA.words.weave, colours.ink, 1.3, DASHES.short),
       met("capsize") && lineEntry(DATA.words.capsize, colours.ink, 1.3, DASHES.mixed),
       met("infinity") && lineEntry("a root passes infinity", colours.ink, 1.3, DASHES.dots),
-      met("crossing") && lineEntry("a root crosses 0, unstable before and after", colours.faint, 1.3, DASHES.dots),
+      met("crossing") && lineEntry("a root crosses 0 or infinity, unstable before and after", colours.faint, 1.3, DASHES.dots),
       met("meeting") && dotEntry("roots meet", colours.paper, colours.ink),
       now.state.x[now.state.over] === withinRange(now.state.over, now.state.x[now.state.over])
         ? lineEntry("this design: drag it", colours.mark, 1.6, DASHES.whole)
@@ -449,7 +452,8 @@ function growthPicture(host) {
       const {name} = DATA.parameters[state.over];
       says(
         `Growth rates and frequencies over ${name}; this design at ${valueText(state.over, state.x[state.over])} is ` +
-          `${designWords(drawing.kind, drawing.meetings)}. ${happens.textContent} Left and right arrow keys move ${name}.`,
+          `${designWords(drawing.kind, drawing.meetings)}. ${happens.textContent} ` +
+          `Left and right arrow keys move ${name}.`,
       );
     },
   };

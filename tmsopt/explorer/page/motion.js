@@ -139,7 +139,8 @@ function motionPicture(host) {
     );
     // a push follows e^(abscissa t) in the end where one root is rightmost, not where some meet there
     const last = rightmostOf(drawing.meetings) - roundingOf(drawing.meetings);
-    const bounded = !isMarginal(drawing.meetings) && drawing.meetings.every(([re, , times]) => times === 1 || re < last);
+    const lone = drawing.meetings.every(([re, , times]) => times === 1 || re < last);
+    const bounded = lone && !isMarginal(drawing.meetings);
     clipped(context, plot, () => {
       drawLevel(context, plot, plot.y(0), colours.faint, 1);
       if (bounded) drawEnvelope(context, push, drawing.motion[0], colours);
