@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from tmsopt.disk import path_of, write_text
 from tmsopt.display import document_parts as parts
+from tmsopt.display.document_designs import explored
 from tmsopt.display.markup import Chapter, facts, verbatim, words
 from tmsopt.display.page import badges
 from tmsopt.display.writers import WRITERS, report, title_of
@@ -103,22 +104,15 @@ def _sections(
             yield from parts.of_proof(result, design)
         case name:
             yield from _PARTS.get(name, parts.of_other)(result)
-    yield Chapter("explorer", "Explorer", _explorer(_explored(result, design)), "whole")
+    yield Chapter("explorer", "Explorer", _explorer(result, design), "whole")
     text = verbatim(report(result, full), "report as text")
     yield Chapter("text", "As text", f"<details><summary>The report as text</summary>{text}</details>", "whole")
     yield Chapter("origin", "Where it is from", _origin(result, command, files, seed), "whole")
 
 
-def _explored(result: Any, design: "Solution | None") -> Any:
-    """What the explorer opens with: a design, else the problem."""
-    if type(result).__name__ == "Solution":
-        return result
-    holder = getattr(result, "study", result)
-    return design or getattr(holder, "problem", None) or next(iter(getattr(result, "solutions", ())), None)
-
-
-def _explorer(of: Any) -> str:
+def _explorer(result: Any, design: "Solution | None") -> str:
     """The page that moves the design, in a frame from which nothing gets out; empty for what has none."""
+    of, designs = explored(result, design)
     if of is None:
         return ""
     from tmsopt.explorer import page_of
@@ -127,7 +121,7 @@ def _explorer(of: Any) -> str:
         "<p>Move a parameter, and see the roots move: disturbances die out where all are left of "
         "the imaginary axis.</p>\n"
         '<iframe title="Explorer of this problem" sandbox="allow-scripts allow-downloads" loading="lazy" '
-        f'srcdoc="{escape(page_of(of))}"></iframe>\n'
+        f'srcdoc="{escape(page_of(of, designs, trace_curves=True))}"></iframe>\n'
         '<p class="print">The explorer is in the file itself, not on paper.</p>'
     )
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from tmsopt.design import Problem, unit_of
+from tmsopt.design import NO_RADIUS, Case, Problem, Unit, unit_of
 from tmsopt.design.unit_system import limit_text
 from tmsopt.display.markup import Rows, paragraphs
 from tmsopt.guide import describe
@@ -65,7 +65,26 @@ def _stands(solution: "Solution", name: str) -> str:
     if name in solution.violations:
         by = solution.violations[name]
         return f"violated by {unit_of(solution.problem, name).show(by, 4)}" if math.isfinite(by) else "has no value"
-    return "binds" if name in solution.active else "holds"
+    return "binds" if name in solution.active else f"holds{_margin(solution, name)}"
+
+
+def _margin(solution: "Solution", name: str) -> str:
+    """By how much an inequality holds, the least over the cases of the design; empty where that is no number."""
+    problem, condition = solution.problem, solution.problem.conditions[name]
+    if condition.equality:
+        return ""
+    cases = [case for case in problem.cases if not case.direction]
+    cases += [case for case in (solution.worst, solution.least_damped, solution.fastest) if case is not None]
+    left = math.inf
+    for case in cases or [Case()]:
+        values = problem.values(case.applied(solution.parameters))
+        if (radius := solution.quantities.get(NO_RADIUS.name)) is not None:  # of which the search is over
+            values.define(NO_RADIUS.name, radius)
+        left = min(left, -condition.sign * float(condition(values)))
+    shares = {q.name for q in (*problem.model.quantities, *problem.parameter_set.quantities) if q.share}
+    unit = unit_of(problem, name)
+    unit = Unit("%", 0.01) if not unit.text and shares & {*condition.names} else unit
+    return f" by {unit.show(left, 4)}" if math.isfinite(left) else ""
 
 
 def point_rows(trace: "Trace") -> tuple[list[Row], str]:

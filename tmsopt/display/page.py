@@ -41,7 +41,7 @@ def badges(result: Any) -> str:
     """What it is and how it ended, a mark for each word."""
     words = [*WRITERS[type(result).__name__].words(result)]
     if isinstance(seconds := getattr(result, "seconds", None), float):
-        words.append(f"{seconds:.2g} s")
+        words.append(f"{float(f'{seconds:.2g}'):g} s")  # never 1.1e+02
     return " ".join(map(_badge, words))
 
 

@@ -1,6 +1,6 @@
 """One page for a problem: solved where it asks something, with what is worth going to."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from html import escape
 from os import PathLike
@@ -76,10 +76,17 @@ def explore(problem: Given, **options: Unpack[Asked]) -> Explorer:
     return _explorer(posed, solution, typed if isinstance(typed, dict) else {})
 
 
-def page_of(design: Problem | Solution) -> str:
-    """The page of a problem as it stands, or of a solution, as HTML; nothing is searched for it."""
+def page_of(
+    design: Problem | Solution, others: Sequence[tuple[str, Mapping[str, float]]] = (), *, trace_curves: bool = False
+) -> str:
+    """The page of a problem as it stands, or of a solution, as HTML; nothing is searched for it.
+
+    Args:
+        others: names and parameters of more designs to go to; of a problem the page opens at the first.
+        trace_curves: whether to trace what bounds stability around the design that the page opens at.
+    """
     problem, solution = (design, None) if isinstance(design, Problem) else (design.problem, design)
-    return html_of(problem, known_designs(problem, solution, search=False), {}, trace_curves=False)
+    return html_of(problem, known_designs(problem, solution, search=False, others=others), {}, trace_curves)
 
 
 def frame(html: str, title: str) -> str:

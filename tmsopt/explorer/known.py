@@ -1,7 +1,7 @@
 """Designs worth going to: the optimum, an exceptional point of the box, the published benchmark."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from tmsopt.design import Problem, Solution, freedom
@@ -36,16 +36,23 @@ class Known:
     proved: str = ""
 
 
-def known_designs(problem: Problem, solution: Solution | None, search: bool) -> list[Known]:
+def known_designs(
+    problem: Problem,
+    solution: Solution | None,
+    search: bool,
+    others: Sequence[tuple[str, Mapping[str, float]]] = (),
+) -> list[Known]:
     """The designs that a page can go to, the one that it opens with first if a solution is given.
 
     Args:
         search: whether to look for an exceptional point, unless the optimum is one or no design is stable.
+        others: names and parameters of designs that were found otherwise, which are answers too.
     """
     optimum = [_of_solution(solution)] if solution is not None else []
     worth = solution is None or (solution.stable and "EP" not in solution.structure)
     found = _exceptional(problem) if search and worth else None
-    return [k for k in (*optimum, found, _benchmark(problem)) if k is not None]
+    named = [Known(name, values, _structure(problem, values), (), True) for name, values in others]
+    return [k for k in (*optimum, *named, found, _benchmark(problem)) if k is not None]
 
 
 def _of_solution(solution: Solution) -> Known:

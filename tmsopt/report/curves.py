@@ -1,6 +1,6 @@
 """Traces, charts and fronts as text: what is on them, and where their events are."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -45,11 +45,18 @@ def domain_table(domain: Domain, problem: Problem | None = None) -> str:
     """What bounds stability and heavy damping, and the corners, in the units of the problem where it is known."""
     lines, model = [], problem.model if problem else None
     for name, arcs in (("stability", domain.stability), ("heavy damping", domain.heavy_damping)):
-        kinds = [f"{_said(model, arc.kind)} ({len(next(iter(arc.points.values())))} points)" for arc in arcs]
+        points: dict[str, list[int]] = {}
+        for arc in arcs:
+            points.setdefault(_said(model, arc.kind), []).append(len(next(iter(arc.points.values()))))
+        kinds = [f"{kind} ({_curves(sizes)}{sum(sizes)} points)" for kind, sizes in points.items()]
         lines.append(f"{name} is bounded by {', '.join(kinds) or 'nothing in the box'}")
     if domain.corners:
         lines += ["", *columns(corner_rows(domain, problem))]
     return "\n".join(line.rstrip() for line in lines)
+
+
+def _curves(sizes: Sequence[int]) -> str:
+    return f"{len(sizes)} curves, " if len(sizes) > 1 else ""
 
 
 def corner_rows(domain: Domain, problem: Problem | None = None) -> list[tuple[str, ...]]:
