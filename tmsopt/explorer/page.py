@@ -40,10 +40,11 @@ def html_of(problem: Problem, designs: Sequence[Known], model: Mapping[str, Any]
 
 
 def _read(name: str) -> str:
-    """A file of the page without what only its readers need: indentation, and comments that begin a line."""
+    """A file of the page without what only its readers need: indentation, comments, ends of lines in brackets."""
     text = (files("tmsopt.explorer") / "page" / name).read_text(encoding="utf-8")
     lines = [line.strip() for line in text.splitlines()]
-    return re.sub(r"\n{2,}", "\n", _COMMENT.sub("", "\n".join(lines))).strip()
+    plain = re.sub(r" // .*", "", _COMMENT.sub("", "\n".join(lines)))
+    return re.sub(r",?\n+(?=[)}\]])|(?<=[,;({\[])\n+", "", re.sub(r"\n{2,}", "\n", plain)).strip()
 
 
 def _json(data: Any) -> str:
