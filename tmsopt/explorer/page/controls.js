@@ -2,19 +2,25 @@
 
 const SLIDER_STEPS = 1000;
 
+/** What a parameter or quantity means, where it is known, without the names of equations. */
+function meaningOf({meaning}) {
+  return meaning === "parameter" ? "" : meaning.replace(/ \(equation \w+\)/, "");
+}
+
 /** A parameter's name, with its meaning where it has one. */
-function nameOf({name, meaning}) {
-  return meaning ? `${name}, ${meaning}` : name;
+function nameOf(parameter) {
+  return [parameter.name, meaningOf(parameter)].filter(Boolean).join(", ");
 }
 
 /** A sentence for those who listen. */
 function say(text) {
-  document.getElementById("said").textContent = text;
+  by("said").textContent = text;
 }
 
-/** A value in the unit of its parameter, as a field writes it and reads it again. */
-function fieldText(value) {
-  return String(Number(value.toPrecision(6)));
+/** A value in its unit as a field writes it: to read, and, while one writes there, so that the value comes back. */
+function fieldTexts(value, one) {
+  const digits = [9, 15, 16, 17].map((n) => Number((value / one).toPrecision(n)));
+  return [String(digits[0]).replaceAll("-", "−"), String(digits.find((number) => number * one === value) ?? value / one)];
 }
 
 /** Native slider of a parameter; a drag, or a key held down, is one step of undo. */
@@ -28,12 +34,12 @@ function parameterSlider(k) {
     held = false;
     change({});
   };
-  slider.addEventListener("input", () => {
+  on(slider, "input", () => {
     const place = Number(slider.value) / SLIDER_STEPS;
     change({x: [[k, place === 1 ? high : low + (high - low) * place]]}, false);
   });
-  slider.addEventListener("change", () => held || change({}));
-  slider.addEventListener("keydown", (event) => {
+  on(slider, "change", () => held || change({}));
+  on(slider, "keydown", (event) => {
     const way = {ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1}[event.key];
     held ||= !["Tab", "Shift", "Control"].includes(event.key);
     if (!way) return;
@@ -41,8 +47,8 @@ function parameterSlider(k) {
     const next = state.x[k] + (way * (high - low)) / (SLIDER_STEPS * (event.shiftKey ? 10 : 1));
     change({x: [[k, Math.min(high, Math.max(low, next))]]}, false);
   });
-  slider.addEventListener("keyup", () => held && release());
-  slider.addEventListener("blur", () => held && release());
+  on(slider, "keyup", () => held && release());
+  on(slider, "blur", () => held && release());
   const draw = (value) => {
     slider.value = Math.round(((value - low) / (high - low)) * SLIDER_STEPS);
     slider.setAttribute("aria-valuetext", withUnit(value / one, unit));
@@ -63,42 +69,51 @@ function parameterField(k, message) {
     field.setAttribute("aria-invalid", String(Boolean(reason)));
     if (reason) say(`${name}: ${reason}`);
   };
-  const draw = (value) => {
-    field.value = fieldText(value / one);
+  const write = () => {
+    field.value = fieldTexts(state.x[k], one)[Number(document.activeElement === field)];
+  };
+  const draw = () => {
+    write();
     refuse("");
   };
-  field.addEventListener("change", () => {
-    if (field.value.trim() === fieldText(state.x[k] / one)) return refuse("");
-    const value = numberOf(field.value) * one;
+  for (const moment of ["focus", "blur"]) {
+    on(field, moment, () => {
+      if (field.getAttribute("aria-invalid") !== "true") write();
+      if (moment === "focus") field.select();
+    });
+  }
+  on(field, "change", () => {
+    if (fieldTexts(state.x[k], one).includes(field.value.trim())) return refuse("");
+    const value = numberOf(field.value, unit) * one;
     const reason = impossible(parameter, value);
     refuse(reason);
     if (!reason) change({x: [[k, value]]});
   });
-  field.addEventListener("keydown", (event) => event.key === "Escape" && draw(state.x[k]));
+  on(field, "keydown", (event) => event.key === "Escape" && draw());
   return {field, draw};
 }
 
 /** One parameter: symbol, meaning, number, unit, slider between its ends, reset. */
 function parameterRow(k) {
   const parameter = DATA.parameters[k];
-  const {name, meaning, unit, one, low, high} = parameter;
+  const {name, unit, one, low, high} = parameter;
   const message = element("p", {className: "message", id: `message-${k}`});
   const {slider, draw: drawSlider} = parameterSlider(k);
   const {field, draw: drawField} = parameterField(k, message);
   const reset = element("button", {type: "button", className: "reset", title: `reset ${name}`, "aria-label": `reset ${name}`}, "↺");
-  reset.addEventListener("click", () => change({x: [[k, DATA.start[k]]]}));
-  const end = (value) => element("span", {className: "end"}, figure(value / one, 3));
+  on(reset, "click", () => change({x: [[k, DATA.start[k]]]}));
+  const end = (value) => span("end", figure(value / one, 3));
   const row = element("div", {className: "row", role: "group", "aria-label": nameOf(parameter)},
-    element("span", {className: "symbol", title: nameOf(parameter)}, element("b", {}, name), " ", element("small", {}, meaning)),
-    element("span", {className: "number"}, field, element("span", {className: "unit"}, unit), reset),
-    element("span", {className: "slide"}, end(low), slider, end(high)), message);
+    element("span", {className: "symbol", title: nameOf(parameter)}, element("b", {}, name), " ", element("small", {}, meaningOf(parameter))),
+    span("number", field, span("unit", unit), reset),
+    span("slide", end(low), slider, end(high)), message);
   let shown = NaN;
   const draw = () => {
     const value = state.x[k];
     if (value === shown) return;
     shown = value;
     drawSlider(value);
-    drawField(value);
+    drawField();
     reset.disabled = value === DATA.start[k];
     row.classList.toggle("changed", !reset.disabled);
     if (value < low || value > high) message.textContent = "beyond the range of the slider";
@@ -110,14 +125,15 @@ function parameterRow(k) {
 function controlsPanel(host) {
   const rows = DATA.parameters.map((parameter, k) => ({...parameterRow(k), free: parameter.free}));
   const [free, fixed] = [rows.filter((r) => r.free), rows.filter((r) => !r.free)];
-  const sheet = element("button", {type: "button", id: "sheet", "aria-expanded": "true", "aria-controls": "sliders"}, "hide");
+  const sheet = element("button", {type: "button", id: "sheet", "aria-controls": "sliders"});
   const sliders = element("div", {id: "sliders"}, ...free.map((r) => r.row));
-  sheet.addEventListener("click", () => {
-    const open = sheet.getAttribute("aria-expanded") !== "true";
+  const show = (open) => {
     sheet.setAttribute("aria-expanded", String(open));
     sheet.textContent = open ? "hide" : "show";
-    sliders.hidden = !open;
-  });
+    host.classList.toggle("closed", !open);
+  };
+  on(sheet, "click", () => show(host.classList.contains("closed")));
+  show(!matchMedia("(max-width: 30rem)").matches);
   if (fixed.length) {
     const open = !free.length || matchMedia("(min-width: 60rem)").matches;
     const words = `${free.length ? "fixed in the file" : "all fixed in the file"} (${fixed.length})`;
@@ -131,7 +147,7 @@ function controlsPanel(host) {
 /** A labelled select of keys, their words and titles; `read` gives the key of the state, `write` takes one. */
 function choice(words, options, read, write) {
   const select = element("select", {}, ...options.map(([value, text, title = ""]) => element("option", {value, title}, text)));
-  select.addEventListener("change", () => write(select.value));
+  on(select, "change", () => write(select.value));
   const draw = () => {
     select.value = read();
   };
@@ -146,7 +162,7 @@ function choices(panel, ...given) {
 
 /** Selects of the chart, of the roots and of the growth rates; returns what draws them all. */
 function choicePanels() {
-  const varied = [...DATA.parameters.entries()].filter(([, p]) => p.high > p.low).map(([k, p]) => [k, p.name, p.meaning]);
+  const varied = [...DATA.parameters.entries()].filter(([, p]) => p.high > p.low).map(([k, p]) => [k, p.name, meaningOf(p)]);
   const axis = (words, side) => choice(words, varied, () => state.plane[side], (value) => {
     const plane = [...state.plane];
     if (plane[1 - side] === Number(value)) plane[1 - side] = plane[side];
@@ -154,11 +170,10 @@ function choicePanels() {
     change({plane});
   });
   const over = () => choice("over", varied, () => state.over, (value) => change({over: Number(value)}));
-  const panel = (id) => document.getElementById(id);
-  const drawn = [choices(panel("plane"), over()), choices(panel("growth"), over())];
+  const drawn = [choices(by("plane"), over()), choices(by("growth"), over())];
   if (state.plane.length === 2) {
     const layer = choice("colours", Object.entries(LAYERS), () => state.layer, (value) => change({layer: value}));
-    drawn.push(choices(panel("chart"), axis("across", 0), axis("up", 1), layer));
+    drawn.push(choices(by("chart"), axis("across", 0), axis("up", 1), layer));
   }
   return () => drawn.forEach((draw) => draw());
 }

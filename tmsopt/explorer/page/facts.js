@@ -2,29 +2,67 @@
 
 const CLASS_WORDS = ["undefined", DATA.words.capsize, DATA.words.weave, "stable", "heavily damped"];
 
-/** Whether a class is stable. */
-function isStableKind(kind) {
-  return kind >= 3;
+// of the largest root
+const ON_AXIS = 1e-9;
+// units of time, by that of the roots
+const TIMES = {"√(g/w)": "√(w/g)", "1/s": "s"};
+const MARKS = {undefined: "?", marginal: "≈", unstable: "✗"};
+
+/** How near the axis rounding does not tell, and how many roots at most meet where the slowest part is. */
+function slowestOf({motion, meetings}) {
+  const near = ON_AXIS * Math.max(0, ...meetings.map(([re, im]) => Math.hypot(re, im)));
+  return {near, times: Math.max(1, ...meetings.filter(([re]) => re >= motion[0] - near).map((root) => root[2]))};
 }
 
-/** Words before the rate of the verdict, and the rate itself; NaN where no rate is to be named. */
-function verdictOf({kind, motion, meetings}) {
+/** The verdict in a word and in a sentence, with powers as ^3 and ^(−2 t). */
+function verdictOf(drawing) {
+  const {kind, motion, meetings} = drawing;
   const [abscissa] = motion;
-  const size = Math.max(...meetings.map(([re, im]) => Math.hypot(re, im)));
-  const swings = meetings.some(([re, im]) => im && re >= abscissa);
-  if (kind === 0) return ["No verdict: a coefficient of the characteristic polynomial is no number, or the leading one is 0", NaN];
-  if (kind === 4) return ["Every disturbance dies out and nothing swings, slowest as ", abscissa];
-  if (kind === 3) return ["Every disturbance dies out, slowest as ", abscissa];
-  const words = kind === 1 && swings ? `${CLASS_WORDS[1]} and ${CLASS_WORDS[2]}` : CLASS_WORDS[kind];
-  const word = words[0].toUpperCase() + words.slice(1);
-  // what stands on the boundary is computed with an error of either sign
-  return abscissa > 1e-6 * size ? [`${word}: a disturbance grows as `, abscissa] : [`${word}: a disturbance does not die out`, NaN];
+  const {near, times} = slowestOf(drawing);
+  const power = times > 1 ? `t${times > 2 ? `^${times - 1}` : ""}` : "";
+  if (!kind) return ["undefined", "No verdict: of the characteristic polynomial a coefficient is no number, or the first is 0"];
+  if (abscissa <= near && (kind < 3 || abscissa >= 0)) {
+    const where = "on the imaginary axis, as far as can be computed";
+    const fate = power ? `can grow as ${power}: roots meet` : "neither grows nor dies out: the rightmost roots are";
+    return ["marginal", `A disturbance ${fate} ${where}`];
+  }
+  const rate = MODEL.rate(state.x);
+  const unit = Number.isFinite(rate) ? "s" : TIMES[DATA.rootUnit];
+  const term = `${power} e^(${figure(abscissa * (rate || 1))} t)${unit ? `, t in ${unit}` : ""}`.trim();
+  if (kind < 3) {
+    const both = kind === 1 && meetings.some(([re, im]) => im && re > near);
+    const words = both ? CLASS_WORDS.slice(1, 3).join(" and ") : CLASS_WORDS[kind];
+    return ["unstable", `${words[0].toUpperCase()}${words.slice(1)}: a disturbance grows as ${term}`];
+  }
+  const edge = meetings.every(([, im]) => !im) && hasMeeting(meetings);
+  const still = edge ? " and nothing swings, on the edge of heavy damping" : kind === 4 ? " and nothing swings" : "";
+  return [edge ? "stable" : CLASS_WORDS[kind], `Every disturbance dies out${still}, slowest as ${term}`];
+}
+
+/** A bicycle's wheels that no weight holds down. */
+function liftsOf(y) {
+  return ["front", "rear"].flatMap((wheel) => {
+    const load = y[DATA.quantities.findIndex(({name}) => DATA.bicycle && name === `load_${wheel}`)];
+    return load < 0 ? [`the ${wheel} wheel would lift (load ${figure(100 * load, 2)} %)`] : [];
+  });
+}
+
+/** The known design that is shown, or one so close that only its roots tell them apart. */
+function nearnessOf(known) {
+  if (known) return `${known.name}: ${known.structure}`;
+  const near = DATA.designs.find(({values}) => sameBeside(state.x, values, [], 1e-5));
+  return near ? `close to ${near.name}${hasMeeting(near.roots) ? ", whose roots are sensitive" : ""}: its button goes there` : "";
+}
+
+/** Whether some roots meet. */
+function hasMeeting(roots) {
+  return roots.some((root) => root[2] > 1);
 }
 
 /** How many limits hold, in words; empty where there are none. */
-function limitsInWords(y) {
+function limitsInWords({kind, y}) {
   const broken = DATA.constraints.filter((constraint, k) => !limitHolds(constraint, marginOf(y, k)));
-  if (!DATA.constraints.length) return "";
+  if (!DATA.constraints.length || !kind) return "";
   return broken.length ? `violated: ${broken.map((c) => c.name).join(", ")}` : "all limits hold";
 }
 
@@ -38,28 +76,30 @@ function limitHolds({equality, tolerance}, margin) {
   return equality ? Math.abs(margin) <= tolerance : margin >= -tolerance;
 }
 
+/** Text with powers as ^3 and ^(−2 t), set as such. */
+function typeset(text) {
+  return text.split(/\^(\d+|\(.+?\))/).map((piece, k) => (k % 2 ? element("sup", {}, piece.replace(/[()]/g, "")) : piece));
+}
+
 /** The verdict: class, sentence, abscissa, the known design; returns what draws it and gives its text. */
 function verdictPanel(host) {
   const badge = element("strong", {className: "badge"});
-  const sentence = element("span", {className: "sentence"});
-  const more = element("span", {className: "more"});
-  const facts = element("span", {className: "more facts"});
-  host.append(badge, " ", sentence, " ", more, facts);
+  const sentence = span("sentence");
+  const lifts = span("lifts");
+  const more = span("more");
+  const facts = span("more facts");
+  host.append(badge, " ", sentence, " ", lifts, " ", more, facts);
   return (drawing) => {
-    const {kind, motion, known, y} = drawing;
-    const [words, rate] = verdictOf(drawing);
-    const exponent = `${figure(rate, 4)} t`;
-    const ends = [withUnit(motion[0], DATA.rootUnit), known ? `${known.name}: ${known.structure}` : "", limitsInWords(y)];
-    const rest = [`abscissa ${ends[0]}`, ...ends.slice(1)].filter(Boolean).join(" · ");
-    const mark = isStableKind(kind) ? "✓" : kind ? "✗" : "?";
-    const unstable = Number.isNaN(rate) ? "not stable" : "unstable";
-    badge.textContent = `${mark} ${isStableKind(kind) || !kind ? CLASS_WORDS[kind] : unstable}`;
-    badge.dataset.kind = kind;
-    sentence.replaceChildren(words, ...(Number.isNaN(rate) ? [] : ["e", element("sup", {}, exponent)]));
-    more.textContent = rest;
-    const proof = known?.proved;
-    facts.textContent = proof ? ` · ${proof}` : "";
-    return `${badge.textContent.slice(2)}: ${words}${Number.isNaN(rate) ? "" : `e^(${exponent})`}; ${rest}`;
+    const {motion, known, y} = drawing;
+    const [word, words] = verdictOf(drawing);
+    const abscissa = `abscissa ${withUnit(motion[0], DATA.rootUnit)}`;
+    badge.dataset.is = MARKS[word] ?? "✓";
+    badge.textContent = `${badge.dataset.is} ${word}`;
+    sentence.replaceChildren(...typeset(words));
+    lifts.textContent = liftsOf(y).map((text) => `· ${text}`).join(" ");
+    more.textContent = [abscissa, nearnessOf(known), limitsInWords(drawing)].filter(Boolean).join(" · ");
+    facts.textContent = known?.proved ? ` · ${factText(known.proved, true)}` : "";
+    return `${word}: ${words}; ${[...liftsOf(y), more.textContent].join("; ")}`;
   };
 }
 
@@ -67,7 +107,7 @@ function verdictPanel(host) {
 function limitsPanel(host) {
   host.hidden = !DATA.constraints.length;
   const rows = DATA.constraints.map((constraint) => {
-    const words = element("span", {className: "margin"});
+    const words = span("margin");
     const sign = element("span", {className: "sign", "aria-hidden": "true"});
     const row = element("li", {}, sign, element("span", {}, element("b", {}, constraint.name), " ", element("code", {}, constraint.text)), words);
     return {constraint, row, sign, words};
@@ -82,13 +122,21 @@ function limitsPanel(host) {
   });
 }
 
-/** A margin in words. */
-function marginInWords({equality, tolerance, unit, one}, margin, holds) {
-  const size = withUnit(Math.abs(margin) / one, unit);
-  if (Number.isNaN(margin)) return "undefined here";
+/** A margin in words; that of a share in percent. */
+function marginInWords({text, equality, tolerance, unit, one}, margin, holds) {
+  const share = DATA.quantities.some((q) => q.share && text.split(/[<>=]+/).some((side) => side.trim() === q.name));
+  const size = share ? `${figure(100 * Math.abs(margin))} %` : withUnit(Math.abs(margin) / one, unit);
+  if (Number.isNaN(margin)) return "not defined here";
   if (Math.abs(margin) <= tolerance) return equality ? "holds" : "holds, and binds";
-  if (equality) return `off by ${size}`;
-  return holds ? `holds by ${size}` : `violated by ${size}`;
+  const word = equality ? "off" : holds ? "holds" : "violated";
+  return Number.isFinite(margin) ? `${word} by ${size}` : word;
+}
+
+/** What a rate or time of decay leaves open. */
+function remarkOf(name, value, drawing) {
+  const {times} = slowestOf(drawing);
+  if (name === "decay_rate" && value <= 0) return "it does not die out";
+  return name === "decay_time" && value < Infinity && times > 1 ? `first it grows: the rightmost root is ${times}-fold` : "";
 }
 
 /** Roots as text, conjugates and multiple ones together. */
@@ -107,20 +155,30 @@ function quantitiesPanel(host) {
   const roots = element("p", {className: "roots"});
   const origin = element("p", {className: "faint"});
   const cells = DATA.quantities.map(() => element("td", {className: "value"}));
-  const rows = DATA.quantities.map(({name, unit, meaning, share}, k) => element("tr", {},
-    element("th", {scope: "row"}, name, element("small", {}, meaning)), cells[k], element("td", {}, share ? "%" : unit)));
+  const remarks = DATA.quantities.map(() => element("small", {className: "remark"}));
+  const rows = DATA.quantities.map((quantity, k) => element("tr", {}, element("th", {scope: "row"}, quantity.name,
+    element("small", {}, meaningOf(quantity)), remarks[k]), cells[k], element("td", {}, quantity.share ? "%" : quantity.unit)));
   const heads = ["quantity", "value", "unit"].map((word) => element("th", {scope: "col"}, word));
   host.append(roots, origin);
   if (rows.length) host.append(element("table", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows)));
   return (drawing) => {
     roots.textContent = `roots${DATA.rootUnit ? ` in ${DATA.rootUnit}` : ""}: ${rootTexts(drawing).join(", ") || "none"}`;
+    origin.hidden = !hasMeeting(drawing.meetings);
     origin.textContent = drawing.known?.roots.length
-      ? `As they were found (${drawing.known.name}): where roots meet, computed ones scatter.`
-      : "Computed; those that rounding alone keeps apart are taken for one.";
-    DATA.quantities.forEach(({one, share}, k) => {
-      cells[k].textContent = figure((drawing.y[k] / one) * (share ? 100 : 1), 5);
+      ? "As they were found: where roots meet, computed ones scatter." : "Those that rounding alone keeps apart are taken for one.";
+    DATA.quantities.forEach(({name, one, share}, k) => {
+      const value = drawing.y[k];
+      const never = name === "decay_time" && value === Infinity ? "never" : figure((value / one) * (share ? 100 : 1), 5);
+      cells[k].textContent = Number.isNaN(value) ? "not defined here" : never;
+      remarks[k].textContent = remarkOf(name, value, drawing);
     });
   };
+}
+
+/** A fact for those who have the page only: how to go on, and by which method, is not their matter. */
+function factText(fact, proved) {
+  if (!fact.startsWith("proof: ")) return fact.replace(/(^|[\s(])-(?=\d)/g, "$1−");
+  return proved ? fact.replace(/ \(\w+\)/g, "") : "not proved";
 }
 
 /** What was found out before the page was made; returns what marks the design shown. */
@@ -129,14 +187,11 @@ function knownPanel(host) {
   const articles = DATA.designs.map((design) => element("article", {},
     element("h3", {}, design.name),
     element("p", {}, [design.structure, `abscissa ${withUnit(design.abscissa, DATA.rootUnit)}`].filter(Boolean).join(", ")),
-    element("ul", {}, ...design.facts.map((fact) => element("li", {}, fact)))));
-  const now = element("p", {className: "faint"});
-  host.append(...articles, ...DATA.shown.map((sentence) => element("p", {}, sentence)), now);
+    element("ul", {}, ...design.facts.map((fact) => element("li", {}, factText(fact, design.proved))))));
+  const now = element("p", {className: "faint", hidden: !DATA.designs.length});
+  host.append(element("div", {className: "designs"}, ...articles), ...DATA.shown.map((sentence) => element("p", {}, sentence)), now);
   return ({known}) => {
     articles.forEach((article, k) => article.classList.toggle("now", DATA.designs[k] === known));
-    now.textContent = known
-      ? `Shown now: ${known.name}. Which of its roots meet was found out before, with multiplicities; computed roots do not judge it.`
-      : "The design shown now is none of these: its class is judged by signs of its coefficients, its roots are computed.";
-    now.hidden = !DATA.designs.length;
+    now.textContent = known ? `Shown now: ${known.name}.` : "The design shown now is none of these.";
   };
 }

@@ -1,15 +1,16 @@
 // All together: buttons, redraws gathered in one frame, light and dark, what is said aloud.
 
-const QUICK = 60; // ms within which a picture is redrawn while something is dragged
-const REST = 150; // ms after which a slider rests
+// ms within which a picture is redrawn while something is dragged
+const QUICK = 60;
+// ms after which a slider rests
+const REST = 150;
 const THEMES = ["auto", "dark", "light"];
 const KEYS = [
   ["Tab, Shift+Tab", "to the next control, or back"],
-  ["Arrow keys", "on a slider a thousandth of its range; with Shift a tenth of that"],
-  ["Page Up, Page Down, Home, End", "on a slider in large steps and to its ends"],
-  ["Arrow keys", "on the chart move the design; with Shift ten times as far"],
+  ["Arrow keys", "slider: a thousandth of its range, with Shift a tenth of that; chart: move the design, with Shift ten times as far"],
+  ["Page Up, Page Down, Home, End", "slider: large steps, ends"],
   ["Ctrl+Z", "undo; Ctrl+Shift+Z or Ctrl+Y: redo"],
-  ["Enter, Escape", "in a number field: take it, or leave it as it was"],
+  ["Enter, Escape", "number field: take it, leave it"],
 ];
 
 window.measured = {all: NaN};
@@ -18,7 +19,7 @@ window.measured = {all: NaN};
 function pictures() {
   const makers = {chart: chartPicture, plane: planePicture, growth: growthPicture, bicycle: bicyclePicture, motion: motionPicture};
   return Object.entries(makers).map(([name, make]) => {
-    const panel = document.getElementById(name);
+    const panel = by(name);
     const host = panel.appendChild(element("div", {className: "body"}));
     const fault = panel.appendChild(element("p", {className: "message", hidden: true}));
     const guarded = (task) => {
@@ -46,7 +47,7 @@ function pictures() {
 /** Draws all that has changed once per frame; what is slow only when the slider rests. */
 function redrawer(parts) {
   const drawn = pictures();
-  const verdict = verdictPanel(document.getElementById("verdict"));
+  const verdict = verdictPanel(by("verdict"));
   let [queued, settled, timer, said] = [false, true, 0, ""];
   const frame = () => {
     queued = false;
@@ -75,13 +76,13 @@ function redrawer(parts) {
 /** A button of a bar. */
 function button(host, text, title, press) {
   const made = host.appendChild(element("button", {type: "button", title, "aria-label": /\w/.test(text) ? text : title}, text));
-  made.addEventListener("click", () => press(made));
+  on(made, "click", () => press(made));
   return made;
 }
 
 /** A short word about what was done, seen and heard. */
 function note(text) {
-  document.getElementById("note").textContent = text;
+  by("note").textContent = text;
 }
 
 /** Light or dark: that of the system, or the one chosen; returns what goes to the next choice. */
@@ -92,13 +93,14 @@ function theme() {
     const auto = dark.matches ? "dark" : "light";
     document.documentElement.dataset.theme = printed ? "light" : chosen === "auto" ? auto : chosen;
   };
-  dark.addEventListener("change", () => apply());
-  addEventListener("beforeprint", () => {
+  on(dark, "change", () => apply());
+  on(window, "beforeprint", () => {
     apply(true);
     document.querySelectorAll("details").forEach((details) => (details.open = true));
-    repaints.forEach((repaint) => repaint()); // in a frame to come it would be too late
+    // in a frame to come it would be too late
+    repaints.forEach((repaint) => repaint());
   });
-  addEventListener("afterprint", () => apply());
+  on(window, "afterprint", () => apply());
   apply();
   return (made) => {
     chosen = THEMES[(THEMES.indexOf(chosen) + 1) % THEMES.length];
@@ -124,9 +126,9 @@ async function copyLink() {
 
 /** A dialog with a title, content and a button that closes it. */
 function openDialog(id, title, ...content) {
-  const dialog = document.getElementById(id);
+  const dialog = by(id);
   const close = element("button", {type: "button"}, "close");
-  close.addEventListener("click", () => dialog.close());
+  on(close, "click", () => dialog.close());
   dialog.replaceChildren(element("h2", {id: `${id}-title`}, title), ...content, close);
   dialog.showModal();
 }
@@ -140,7 +142,7 @@ function designButtons(host) {
 
 /** Buttons of the page; returns what draws them. */
 function pageButtons(host, nextTheme) {
-  button(host, "start", "all as the page opened", () => change({...startingState(), x: [...DATA.start.entries()]}));
+  if (!knownDesign(DATA.start)) button(host, "start", "all as the page opened", () => change({...startingState(), x: [...DATA.start.entries()]}));
   const back = button(host, "↶", "undo (Ctrl+Z)", undo);
   const forth = button(host, "↷", "redo (Ctrl+Shift+Z)", redo);
   button(host, "copy link", "a link to this page as it is now", copyLink);
@@ -156,7 +158,7 @@ function pageButtons(host, nextTheme) {
 
 /** Undo and redo by keys, left to a field while its text is being changed. */
 function listenToKeys() {
-  document.addEventListener("keydown", (event) => {
+  on(document, "keydown", (event) => {
     const key = event.key.toLowerCase();
     const typing = event.target.matches("input") && event.target.dataset.typed;
     if (!(event.ctrlKey || event.metaKey) || event.altKey || !["z", "y"].includes(key) || typing) return;
@@ -164,8 +166,8 @@ function listenToKeys() {
     if (key === "y" || event.shiftKey) redo();
     else undo();
   });
-  document.addEventListener("input", ({target}) => (target.dataset.typed = "yes"));
-  document.addEventListener("change", ({target}) => delete target.dataset.typed);
+  on(document, "input", ({target}) => (target.dataset.typed = "yes"));
+  on(document, "change", ({target}) => delete target.dataset.typed);
 }
 
 /** Says what of a link could not be understood. */
@@ -175,7 +177,6 @@ function saidOfLink(ignored) {
 
 /** Builds the page and draws it. */
 function start() {
-  const by = (id) => document.getElementById(id);
   by("title").textContent = DATA.title || DATA.modelTitle;
   by("about").textContent = DATA.title ? DATA.modelTitle : "";
   by("footer").textContent = [DATA.command, `tmsopt ${DATA.version}`].filter(Boolean).join(" · ");
@@ -187,7 +188,7 @@ function start() {
   const redraw = redrawer(parts);
   watchers.push(redraw);
   listenToKeys();
-  addEventListener("hashchange", () => saidOfLink(visit()));
+  on(window, "hashchange", () => saidOfLink(visit()));
   const {found, ignored} = stateOf(location.hash.slice(1));
   Object.assign(state, found);
   saidOfLink(ignored);

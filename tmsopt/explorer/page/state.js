@@ -16,6 +16,21 @@ function element(tag, given = {}, ...children) {
   return made;
 }
 
+/** The element of the page by its id. */
+function by(id) {
+  return document.getElementById(id);
+}
+
+/** A new span of a class. */
+function span(className, ...children) {
+  return element("span", {className}, ...children);
+}
+
+/** Listen to a kind of event. */
+function on(target, type, listener) {
+  target.addEventListener(type, listener);
+}
+
 /** A value and its unit to read. */
 function withUnit(value, unit, digits = 5) {
   return unit && Number.isFinite(value) ? `${figure(value, digits)} ${unit}` : figure(value, digits);
@@ -42,7 +57,8 @@ function change(wanted, settle = true) {
 
 /** One step: from the steps on one side of now, to those on the other. */
 function stepBetween(from, to) {
-  change({}); // what is being dragged ends here
+  // what is being dragged ends here
+  change({});
   if (!from.length) return;
   to.push(fragmentOf(state));
   Object.assign(state, stateOf(from.pop()).found);
@@ -114,15 +130,17 @@ function decode(text) {
   }
 }
 
-/** The number that a text writes, NaN for any other text; a comma may stand for the point. */
-function numberOf(text) {
-  const plain = text.trim().replaceAll("−", "-").replace(",", ".");
+/** The number that a text writes, perhaps with its unit, NaN for any other text; a comma may stand for the point. */
+function numberOf(text, unit = "") {
+  const bare = (unit && text.trim().endsWith(unit) ? text.trim().slice(0, -unit.length) : text).trim();
+  const joined = /^\D?\d{1,3}(\s\d{3})+([.,]\d*)?$/.test(bare) ? bare.replace(/\s/g, "") : bare;
+  const plain = joined.replaceAll("−", "-").replace(",", ".");
   return /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(plain) ? Number(plain) : NaN;
 }
 
 /** Why a parameter cannot have a value in SI; empty where it can. */
 function impossible(parameter, value) {
-  if (!Number.isFinite(value)) return "a number is wanted, such as 1.25 or −3e−4";
+  if (!Number.isFinite(value)) return `${withLabelUnit("a number", parameter.unit)} is wanted, such as 1.25 or −3e−4`;
   const [least, most] = [parameter.least ?? -Infinity, parameter.most ?? Infinity];
   const out = parameter.open ? value <= least || value >= most : value < least || value > most;
   if (!out) return "";
@@ -165,7 +183,8 @@ function save() {
   const words = DATA.title.normalize("NFKD").toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-+|-+$/g, "");
   const address = URL.createObjectURL(new Blob([problemText()], {type: "application/toml"}));
   element("a", {href: address, download: `${words.slice(0, 60) || DATA.model}.toml`}).click();
-  setTimeout(() => URL.revokeObjectURL(address), 60000); // the download has begun by then
+  // the download has begun by then
+  setTimeout(() => URL.revokeObjectURL(address), 60000);
 }
 
 /** Roots given as [re, im >= 0, multiplicity], each as often as it counts, conjugates too. */
