@@ -67,7 +67,7 @@ def test_its_curves_are_the_boundaries(ep4: tmsopt.Explorer) -> None:
         beside = hurwitz_minors(tmsopt.models.tms.coefficients(held | {names[i]: 1.01 * np.array(curve["x"])}))
         assert np.all(
             np.abs(minors[2]) < 5e-3 * np.abs(beside[2])
-        )  # six digits, of which the tangent of 80 degrees takes one
+        )  # five digits, of which the tangent of 80 degrees takes one
 
 
 def test_the_benchmark_is_the_published_one(ep4: tmsopt.Explorer) -> None:

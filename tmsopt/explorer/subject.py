@@ -17,7 +17,7 @@ from tmsopt.roots.patterns.descriptions import in_words
 from tmsopt.tracing import domain, trace
 
 _STARTS = 8  # of traced curves: the tracer's grid shows what they miss
-_DIGITS, _POINTS = 6, 100  # of a traced point, and at most of a curve: a chart has some 400 pixels
+_DIGITS, _POINTS = 5, 80  # of a traced point, and at most of a curve: a chart has some 400 pixels
 _SPEEDS, _TILT = ("v", "Fr"), "lambda_s"
 _USUAL = {"m": 0.5, "kg": 5.0, "kg m^2": 1.0, "rad": 0.5, "m/s": 5.0}
 """How far the slider of a fixed parameter that is 0 reaches, by its unit; 1 for others."""
