@@ -91,7 +91,8 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "study": studied,
     "built": built,
 }
-each = pytest.mark.parametrize("name", RESULTS)
+LONG = ("robot", "infeasible", "proof", "study")  # to make, or to write
+each = pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in RESULTS])
 
 
 class Page(HTMLParser):
@@ -218,7 +219,7 @@ def test_the_page_says_where_it_is_from(name: str) -> None:
     assert f"<dt>seed</dt><dd>{0 if name in ('study', 'built') else 3}</dd>" in written(name)
 
 
-@pytest.mark.parametrize("name", ["chart", "front"])
+@pytest.mark.parametrize("name", [pytest.param("chart", marks=pytest.mark.slow), "front"])
 def test_the_same_result_has_the_same_page(name: str, tmp_path: Path) -> None:
     """But for the date."""
     for file in ("one.html", "two.htm"):
@@ -230,7 +231,9 @@ def test_the_same_result_has_the_same_page(name: str, tmp_path: Path) -> None:
     assert one == two
 
 
-@pytest.mark.parametrize("name", ["design", "robot", "infeasible"])
+@pytest.mark.parametrize(
+    "name", ["design", *(pytest.param(n, marks=pytest.mark.slow) for n in ("robot", "infeasible"))]
+)
 def test_a_design_has_its_status_and_its_parameters(name: str) -> None:
     solution, read = RESULTS[name](), page(name)
     data = solution.to_json()
@@ -250,6 +253,7 @@ def test_a_design_has_its_status_and_its_parameters(name: str) -> None:
         assert [end.split()[0] for end in row["range"].split(" … ") if end] == ends
 
 
+@pytest.mark.slow
 def test_quantities_are_those_of_the_design() -> None:
     solution = robot()
     head, *rows = page("robot").tables["Quantities of the design"]
@@ -260,6 +264,7 @@ def test_quantities_are_those_of_the_design() -> None:
         assert float(value) == pytest.approx(solution.quantities[name] / one, rel=1e-5, abs=1e-9), name
 
 
+@pytest.mark.slow
 def test_what_limits_are_worth() -> None:
     """As the explanation has it, the most valuable first."""
     solution, tables = robot(), page("robot").tables
@@ -270,9 +275,11 @@ def test_what_limits_are_worth() -> None:
         assert float(row[-1].split()[0]) == pytest.approx(lever.predicted / lever.gained.one, rel=5e-3)
     stands = {row[0]: row[-1] for row in tables["Limits, and how they stand"][1:]}
     assert stands["steer_arm"] == "binds"
+    assert stands["rear_wheel_holds"] == f"holds by {solution.quantities['N_R'] - 20:.4g} N"
     assert set(stands) == set(solution.problem.constraints)
 
 
+@pytest.mark.slow
 def test_an_infeasible_page_says_what_is_violated_and_what_to_try() -> None:
     solution, text = infeasible(), written("infeasible")
     assert solution.status == "infeasible"
@@ -283,6 +290,7 @@ def test_an_infeasible_page_says_what_is_violated_and_what_to_try() -> None:
     assert "<p>smallest change found: " in text
 
 
+@pytest.mark.slow
 def test_a_title_is_text() -> None:
     """In the head, the heading, the report and the explorer, whatever is in it."""
     read = page("infeasible")
@@ -294,6 +302,7 @@ def test_a_title_is_text() -> None:
     assert Page(inner).tags.count("h1") == 1
 
 
+@pytest.mark.slow
 def test_every_proved_digit_is_there() -> None:
     proof, read = RESULTS["proof"](), page("proof")
     digits = {row[0]: row[1:3] for row in read.tables["Numbers that were proved, to 30 digits"][1:]}
@@ -312,6 +321,37 @@ def test_a_proved_bound_is_given_to_all_digits() -> None:
     assert bound.proven
     found = re.findall(r"<dt>bound</dt><dd>([^<]*)</dd>", written("design"))
     assert found == [f"{bound.value:.12g}"]
+
+
+def inner(name: str) -> dict[str, Any]:
+    """What the explorer of a page says of itself."""
+    (frame,) = page(name).frames
+    data: dict[str, Any] = json.loads(re.findall(r"^const DATA = (.*);$", frame, re.MULTILINE)[0])
+    return data
+
+
+@pytest.mark.parametrize("name", ["design", "chart", "trace", "front", "built"])
+def test_the_explorer_opens_at_what_was_found(name: str) -> None:
+    """With the edges of stability around it, where there are two axes for them."""
+    data = inner(name)
+    opened = data["designs"][0]
+    assert data["start"] == opened["values"]
+    assert bool(data["curves"]) is (name in ("design", "chart", "trace"))
+    if name == "trace":
+        assert (opened["name"], opened["roots"][0][2]) == ("EP4", 4)
+    if name == "front":
+        assert opened["values"] == [1.5]
+        assert opened["abscissa"] == pytest.approx(-0.75, abs=1e-12)
+        assert {d["name"] for d in data["designs"]} >= {"least abscissa", "least c"}
+    if name == "chart":
+        assert opened["abscissa"] == pytest.approx(float(np.nanmin(charted().abscissa)), rel=1e-6)
+    if name == "built":
+        assert opened["abscissa"] == pytest.approx(min(row.abscissa for row in built().rows), rel=1e-9)
+
+
+def test_how_good_a_design_is_begins_with_the_proof() -> None:
+    (good,) = re.findall(r'<section id="good".*?</section>', written("design"), re.DOTALL)
+    assert re.findall('class="lead">([^<]*)', good)[0].startswith("proof: no design in the box decays faster")
 
 
 def test_designs_of_a_chart() -> None:
@@ -369,7 +409,7 @@ def test_points_of_a_front() -> None:
     ]
 
 
-@pytest.mark.parametrize("name", ["study", "built"])
+@pytest.mark.parametrize("name", [pytest.param("study", marks=pytest.mark.slow), "built"])
 def test_rows_of_a_study(name: str) -> None:
     results, read = RESULTS[name](), page(name)
     head, *rows = read.tables["Rows of the study"]
@@ -420,7 +460,8 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[pytest.mark.slow] if n in ("front", "all") else []) for n in COMMANDS]
+    "name",
+    [pytest.param(n, marks=[pytest.mark.slow] if n in ("solve", "prove", "front", "all") else []) for n in COMMANDS],
 )
 def test_a_command_writes_its_page(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -468,6 +509,7 @@ def test_an_infeasible_problem_has_a_page(tmp_path: Path, capsys: pytest.Capture
     capsys.readouterr()
 
 
+@pytest.mark.slow
 def test_a_design_so_far_has_a_page(tmp_path: Path) -> None:
     tmsopt.save_report(replace(design(), interrupted=True), tmp_path / "p.html")
     assert "stopped before the end, the best design so far" in (tmp_path / "p.html").read_text(encoding="utf-8")

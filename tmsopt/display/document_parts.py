@@ -49,8 +49,7 @@ def of_solution(solution: "Solution", full: bool) -> Chapters:
     yield from _looks(solution)
     yield Chapter("parameters", "Parameters", table("Parameters of the design", _parameter_rows(solution, si)), "wide")
     yield from _growth(solution)
-    good = [line.removeprefix("proof: ") for line in parts["proof"].lines]
-    body = _lead(good) + _bound(solution) + paragraphs(parts["proof"].rest)
+    body = _lead(parts["proof"].lines) + _bound(solution) + paragraphs(parts["proof"].rest)
     yield Chapter("good", "How good it is", body)
     yield Chapter("limits", "Limits", _limits(solution, found), "wide")
     rows = [(*row[:3], row[-1]) for row in texts.quantity_rows(solution, si)]

@@ -66,6 +66,17 @@ function makeFilterable(table, number) {
   table.parentElement.before(line);
 }
 
+/** A line above a table says so while it is wider than the page. */
+function sayWider(frame) {
+  const line = document.createElement("p");
+  line.className = "more";
+  line.textContent = "More columns to the right: scroll, or use the arrow keys in the table.";
+  frame.before(line);
+  new ResizeObserver(() => {
+    line.hidden = frame.scrollWidth <= frame.clientWidth;
+  }).observe(frame);
+}
+
 /** On paper, what is folded is open. */
 function openForPrint() {
   const folded = [...document.querySelectorAll("details:not([open])")];
@@ -75,4 +86,5 @@ function openForPrint() {
 
 document.querySelectorAll("table.sortable").forEach(makeSortable);
 document.querySelectorAll("table.filterable").forEach(makeFilterable);
+document.querySelectorAll(".rows").forEach(sayWider);
 window.addEventListener("beforeprint", openForPrint);
