@@ -22,7 +22,11 @@ def around(problem: Problem, model: Mapping[str, Any]) -> dict[str, str]:
     else:
         before += ["", *_model(model or _stated(problem))]
     limits = [f"{_key(name)} = {_text(text)}" for name, text in problem.constraints.items()]
+    weights = [f"{_key(name)} = {weight!r}" for name, weight in problem.weights.items()]
     after = ["", "[constraints]", *limits] if limits else []
+    after += ["", "[weights]", *weights] if weights else []
+    if problem.nominal is not problem:
+        before.append("# one design, at its nominal values: bands and tolerances are left out")
     return {"before": "\n".join([*before, "", "[parameters]", ""]), "after": "\n".join([*after, ""])}
 
 

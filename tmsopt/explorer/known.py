@@ -15,7 +15,7 @@ from tmsopt.solver import solve
 _BENCHMARKS = {"tms": "benchmark", "whipple": "whipple_benchmark"}
 """Models → the example with the published bicycle."""
 
-_STARTS = 2  # of the search for an exceptional point, of which there need be none
+_STARTS, _ORDER = 2, 4  # of the search for an exceptional point, of which there need be none: starts, roots that meet
 
 
 @dataclass(frozen=True)
@@ -60,15 +60,16 @@ def _of_solution(solution: Solution) -> Known:
     problem = solution.problem
     words = {"optimal": "optimum", "infeasible": "least infeasible", "not_converged": "best so far"}
     facts, proof = [solution.status.replace("_", " "), *solution.notes], proof_line(solution)
+    proved = proof if solution.bound.proven else ""
     if problem.nominal is problem:
         known = Structure(solution.structure, solution.roots, 0.0)
-    else:
-        known = _structure(problem, solution.parameters)
-        facts.insert(1, "the best over every case; the page shows the nominal one")
+    else:  # what is proved is proved of every case, and the page shows one
+        known, proved = _structure(problem, solution.parameters), ""
+        facts[0] += " over every case of its bands and tolerances"
     name = words[solution.status] if problem.free else "as given"
     if problem.sense == "locate" and solution.status == "optimal":
         name = str(problem.locate)
-    return Known(name, solution.parameters, known, (*facts, proof), True, proof if solution.bound.proven else "")
+    return Known(name, solution.parameters, known, (*facts, proof), True, proved)
 
 
 def _benchmark(problem: Problem) -> Known | None:
@@ -92,7 +93,7 @@ def _exceptional(problem: Problem) -> Known | None:
 
     A k-fold root takes k − 1 free parameters.
     """
-    order = min(problem.model.degree, len(problem.free) + 1)
+    order = min(problem.model.degree, len(problem.free) + 1, _ORDER)
     if order < 2:
         return None
     asked = replace(
@@ -101,10 +102,10 @@ def _exceptional(problem: Problem) -> Known | None:
     if freedom(asked).count < 0:
         return None
     found = solve(asked, throw=False, starts=_STARTS, stability=0.0, alone=False)
-    if found.status != "optimal":
+    if found.status != "optimal" or "EP" not in found.structure:
         return None
     facts = ("limits left aside",) if problem.constraints else ()
-    return Known(f"EP{order}", found.parameters, Structure(found.structure, found.roots, 0.0), facts)
+    return Known(found.structure, found.parameters, Structure(found.structure, found.roots, 0.0), facts)
 
 
 def _structure(problem: Problem, parameters: Mapping[str, float]) -> Structure:

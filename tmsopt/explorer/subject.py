@@ -1,5 +1,6 @@
 """What a page is about, as plain data: parameters with their ranges, limits, known designs, traced curves."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -56,6 +57,8 @@ def subject(
         "plane": [of.names.index(n) for n in plane], "over": of.names.index(_over(problem)),
         "curves": list(_curves(problem, plane, start)) if trace_curves else [],
         "toml": around(problem, model),
+        "others": [n for n in problem.conditions if n not in script.constraints],
+        "nominal": problem.nominal is not problem,
         "shown": [_MIDDLE] if problem.free and not solved else [],
     }  # fmt: skip
 
@@ -72,11 +75,11 @@ def _unit(problem: Problem, name: str) -> dict[str, Any]:
 def _parameter(problem: Problem, parameter: Parameter, value: float) -> dict[str, Any]:
     low, high = problem.free.get(parameter.name) or _reach(parameter, value)
     room = parameter.range
+    ends = {"least": room.lower, "most": room.upper, "open": not room.closed}
     return {
         "name": parameter.name, "meaning": parameter.meaning, **_unit(problem, parameter.name),
         "free": parameter.name in problem.free, "low": low, "high": high, "value": value,
-        "least": room.lower, "most": room.upper, "open": not room.closed,
-    }  # fmt: skip
+    } | {n: end for n, end in ends.items() if end is not False and math.isfinite(end)}  # fmt: skip
 
 
 def _reach(parameter: Parameter, value: float) -> tuple[float, float]:
@@ -94,7 +97,7 @@ def _reach(parameter: Parameter, value: float) -> tuple[float, float]:
 
 def _constraint(problem: Problem, name: str) -> dict[str, Any]:
     condition = problem.conditions[name]
-    size = abs(limit_of(problem.constraints[name]) or 0.0) or 1.0
+    size = max(1.0, abs(limit_of(problem.constraints[name]) or 0.0))  # of the sides where they are equal
     return {
         "name": name, "text": problem.constraints[name], **_unit(problem, name), "equality": condition.equality,
         "tolerance": FEASIBLE * size,

@@ -84,7 +84,7 @@ function classWords(kind) {
 
 /** How far from the imaginary axis roots [re, im, multiplicity] cannot be told to stand. */
 function roundingOf(roots) {
-  return 1e-9 * Math.max(0, ...roots.map(([re, im]) => Math.hypot(re, im)));
+  return 1e-12 * Math.max(0, ...roots.map(([re, im]) => Math.hypot(re, im)));
 }
 
 /** The largest real part of roots. */

@@ -2,15 +2,13 @@
 
 const CLASS_WORDS = ["undefined", DATA.words.capsize, DATA.words.weave, "stable", "heavily damped"];
 
-// of the largest root
-const ON_AXIS = 1e-9;
 // units of time, by that of the roots
 const TIMES = {"√(g/w)": "√(w/g)", "1/s": "s"};
 const MARKS = {undefined: "?", marginal: "≈", unstable: "✗"};
 
 /** How near the axis rounding does not tell, and how many roots at most meet where the slowest part is. */
 function slowestOf({motion, meetings}) {
-  const near = ON_AXIS * Math.max(0, ...meetings.map(([re, im]) => Math.hypot(re, im)));
+  const near = roundingOf(meetings);
   return {near, times: Math.max(1, ...meetings.filter(([re]) => re >= motion[0] - near).map((root) => root[2]))};
 }
 
@@ -21,7 +19,7 @@ function verdictOf(drawing) {
   const {near, times} = slowestOf(drawing);
   const power = times > 1 ? `t${times > 2 ? `^${times - 1}` : ""}` : "";
   if (!kind) return ["undefined", "No verdict: of the characteristic polynomial a coefficient is no number, or the first is 0"];
-  if (abscissa <= near && (kind < 3 || abscissa >= 0)) {
+  if (kind < 3 && abscissa <= near) {
     const where = "on the imaginary axis, as far as can be computed";
     const fate = power ? `can grow as ${power}: roots meet` : "neither grows nor dies out: the rightmost roots are";
     return ["marginal", `A disturbance ${fate} ${where}`];
@@ -35,6 +33,7 @@ function verdictOf(drawing) {
     return ["unstable", `${words[0].toUpperCase()}${words.slice(1)}: a disturbance grows as ${term}`];
   }
   const edge = meetings.every(([, im]) => !im) && hasMeeting(meetings);
+  if (abscissa >= -near) return [CLASS_WORDS[kind], "Every disturbance dies out, more slowly than can be computed"];
   const still = edge ? " and nothing swings, on the edge of heavy damping" : kind === 4 ? " and nothing swings" : "";
   return [edge ? "stable" : CLASS_WORDS[kind], `Every disturbance dies out${still}, slowest as ${term}`];
 }
@@ -63,7 +62,8 @@ function hasMeeting(roots) {
 function limitsInWords({kind, y}) {
   const broken = DATA.constraints.filter((constraint, k) => !limitHolds(constraint, marginOf(y, k)));
   if (!DATA.constraints.length || !kind) return "";
-  return broken.length ? `violated: ${broken.map((c) => c.name).join(", ")}` : "all limits hold";
+  const held = `all limits ${DATA.others.length ? "shown " : ""}hold${DATA.nominal ? " in the nominal case" : ""}`;
+  return broken.length ? `violated: ${broken.map((c) => c.name).join(", ")}` : held;
 }
 
 /** Margin of a limit in SI: at least 0 where it holds; of an equality the difference. */
@@ -105,7 +105,7 @@ function verdictPanel(host) {
 
 /** Limits with their sign and margin; returns what draws them. */
 function limitsPanel(host) {
-  host.hidden = !DATA.constraints.length;
+  host.hidden = !DATA.constraints.length && !DATA.others.length;
   const rows = DATA.constraints.map((constraint) => {
     const words = span("margin");
     const sign = element("span", {className: "sign", "aria-hidden": "true"});
@@ -113,6 +113,8 @@ function limitsPanel(host) {
     return {constraint, row, sign, words};
   });
   host.append(element("ul", {className: "limits"}, ...rows.map((r) => r.row)));
+  if (DATA.others.length) host.append(element("p", {}, `Not computed on this page: ${DATA.others.join(", ")}.`));
+  if (DATA.nominal) host.append(element("p", {}, "Of bands and tolerances this is the nominal case alone."));
   return ({y}) => rows.forEach(({constraint, row, sign, words}, k) => {
     const margin = marginOf(y, k);
     const holds = limitHolds(constraint, margin);

@@ -35,34 +35,27 @@ function pictures() {
       }
     };
     const made = guarded(() => make(host));
-    const draw = (drawing) => {
+    return (drawing) => {
       const before = performance.now();
       if (made) guarded(() => made.draw(state, drawing));
       window.measured[name] = performance.now() - before;
     };
-    return {name, draw, cheap: made?.cheap ?? true};
   });
 }
 
-/** Draws all that has changed once per frame; what is slow only when the slider rests. */
+/** Draws all that has changed once per frame; what is slow draws coarsely until the slider rests. */
 function redrawer(parts) {
   const drawn = pictures();
   const verdict = verdictPanel(by("verdict"));
-  let [queued, settled, timer, said] = [false, true, 0, ""];
+  let [queued, settled, said] = [false, true, ""];
   const frame = () => {
     queued = false;
     const before = performance.now();
     const drawing = {...drawingOf(), settled};
     const text = verdict(drawing);
     parts.forEach((draw) => draw(drawing));
-    const late = drawn.filter(({name, cheap, draw}) => {
-      const wait = !settled && !cheap && window.measured[name] > QUICK;
-      if (!wait) draw(drawing);
-      return wait;
-    });
+    drawn.forEach((draw) => draw(drawing));
     window.measured.all = performance.now() - before;
-    clearTimeout(timer);
-    if (late.length) timer = setTimeout(() => late.forEach((picture) => picture.draw(drawing)), REST);
     if (settled && said && text !== said) say(text);
     if (settled) said = text;
   };
@@ -179,7 +172,7 @@ function saidOfLink(ignored) {
 function start() {
   by("title").textContent = DATA.title || DATA.modelTitle;
   by("about").textContent = DATA.title ? DATA.modelTitle : "";
-  by("footer").textContent = [DATA.command, `tmsopt ${DATA.version}`].filter(Boolean).join(" · ");
+  by("footer").textContent = `tmsopt ${DATA.version}`;
   const nextTheme = theme();
   const parts = [
     designButtons(by("designs")), pageButtons(by("tools"), nextTheme), controlsPanel(by("controls")), choicePanels(),
