@@ -44,6 +44,13 @@ k = { min = 5000, max = 40000 }
 minimize = "abscissa"
 """
 
+WINDOW = """title = "A narrow window"
+[model]
+coefficients = ["1", "1e-8 - (b - 1/3 - 1/1000)**2", "1"]
+[parameters]
+b = { min = 0, max = 1 }
+"""
+
 SWATCHES = """() => Object.fromEntries([...document.querySelectorAll("#chart .legend li")].map((item) => {
   const canvas = item.querySelector("canvas");
   const at = canvas.getContext("2d").getImageData(canvas.width / 2, canvas.height / 4, 1, 1).data;
@@ -176,6 +183,10 @@ def test_arrow_keys_move_the_design_over_the_grid(browser: Any, tmp_path: Path) 
             page.keyboard.press(key)
         after = np.array(page.evaluate("state.plane.map((k) => state.x[k])"))
         np.testing.assert_allclose(after, before + [2, -10] * steps, rtol=1e-12)
+        outside = page.evaluate("rangeOf(state.plane[1])[1] + 1")
+        page.evaluate(f"change({{ x: [[state.plane[1], {outside}]] }})")
+        page.keyboard.press("ArrowRight")
+        assert page.evaluate("state.x[state.plane[1]]") == outside
 
 
 @pytest.mark.parametrize("name", ["whipple_benchmark", "ep4"])
@@ -184,7 +195,7 @@ def test_events_are_the_speeds_of_the_package(browser: Any, tmp_path: Path, name
     explorer = tmsopt.explore(PROBLEMS / f"{name}.toml")
     explorer.save(tmp_path / "page.html")
     with opened(browser, tmp_path / "page.html") as page:
-        events = page.evaluate("growthEvents(state)")
+        events = page.evaluate("sweepOf(state).events")
         over, low, high = page.evaluate("[DATA.parameters[state.over].name, ...rangeOf(state.over)]")
     assert explorer.solution is not None
     truth = tmsopt.speeds(explorer.solution, over, between=(low, high))
@@ -196,6 +207,30 @@ def test_events_are_the_speeds_of_the_package(browser: Any, tmp_path: Path, name
     # at an EP4 of doubles the place of the meeting moves by the fourth root of a rounding
     meetings = [c.at for c in truth.exceptional if c.root.im == 0]
     np.testing.assert_allclose([e["at"] for e in events if e["kind"] == "meeting"], meetings, rtol=1e-3)
+
+
+def test_a_window_that_the_design_stands_in_is_found(browser: Any, tmp_path: Path) -> None:
+    """Of s² + ((1e-4)² - (b - 1/3 - 1/1000)²) s + 1, where damping is positive for 2e-4 of the range."""
+    with opened(browser, stated(WINDOW, tmp_path)) as page:
+        middle = 1 / 3 + 1e-3
+        assert growth_sentence(page) == "Unstable throughout; no crossing was found at 301 values."
+        page.evaluate(f"change({{ x: [[0, {middle!r}]] }})")
+        drawn(page)
+        found = [(e["kind"], e["gains"], e["at"]) for e in page.evaluate("sweepOf(state).events")]
+        assert [one[:2] for one in found] == [("weave", True), ("weave", False)]
+        np.testing.assert_allclose([at for _, _, at in found], [middle - 1e-4, middle + 1e-4], atol=2e-10)
+
+
+def test_tiny_numbers_are_told_from_0(browser: Any, tmp_path: Path) -> None:
+    """Their products underflow; one of two masses may be 1e-15 of the other."""
+    with opened(browser, stated(CAR, tmp_path)) as page:
+        assert page.evaluate("[[1e-170, 1e-170, 1e-170], [1e-170, -1e-170, 1e-170]]"
+                             ".map((a) => crossingKind([1e-170, 1e-170, 1e-170], a))") == ["weave", "weave"]  # fmt: skip
+        assert page.evaluate("crossingKind([1e-170, 1, 1e-170], [1e-170, 1, -1e-170])") == "capsize"
+    light = '[model]\nM = [["1", "0"], ["0", "m"]]\nK = [["1", "0"], ["0", "1e-15"]]\n[parameters]\nm = 1e-15\n'
+    with opened(browser, stated(light, tmp_path)) as page:
+        end = page.evaluate("[...response(state.x, [1, 1, 0, 0], [Math.PI])]")
+        np.testing.assert_allclose(end, [-1, -1, 0, 0], atol=1e-10)
 
 
 def test_the_line_of_the_growth_plot_can_be_dragged_and_moved_by_keys(browser: Any, tmp_path: Path) -> None:
@@ -351,7 +386,7 @@ def test_roots_that_cross_0_are_told_where_all_is_unstable(browser: Any, tmp_pat
     with opened(browser, saved(PROBLEMS / "whipple_benchmark.toml", tmp_path)) as page:
         tilt = "DATA.parameters.findIndex(({ name }) => name === 'lambda_s')"
         assert growth_sentence(page, f"{{x: [[{tilt}, -0.3]]}}").startswith("Unstable throughout; ")
-        events = page.evaluate("""growthEvents(state).filter(({ kind }) => kind === "crossing")
+        events = page.evaluate("""sweepOf(state).events.filter(({ kind }) => kind === "crossing")
             .map(({ at, roots }) => ({
             roots,
             around: [-1e-4, 1e-4].map((step) => [...coefficientsAt(state.x, state.over, at + step)]) }))""")

@@ -343,8 +343,8 @@ function bicyclePicture(host) {
         resting = setTimeout(() => !stopped && !calm.matches && start(0), 600);
       }
       surface.repaint();
-      const fate = drawing.motion[0] < 0 ? "the motion dies out" : "the motion does not die out";
-      says(`The bicycle to scale, from the right side and from behind, leaning and steering after a push: ${fate}.`);
+      const fate = drawing.kind ? `: the motion ${drawing.kind > 2 ? "dies out" : "does not die out"}` : "";
+      says(`The bicycle to scale, from the right side and from behind, leaning and steering after a push${fate}.`);
     },
   };
 }

@@ -305,10 +305,12 @@ function chartPicture(host) {
   const placeAt = (px, py) =>
     now.state.plane.map((k, up) => [k, withinRange(k, up ? plot.valueY(py) : plot.valueX(px))]);
   movesDesign(surface.canvas, placeAt, (...steps) =>
-    now.state.plane.map((k, up) => {
-      const [low, high] = rangeOf(k);
-      return [k, withinRange(k, now.state.x[k] + (steps[up] * (high - low)) / (CHART_POINTS - 1))];
-    }),
+    now.state.plane
+      .map((k, up) => {
+        const [low, high] = rangeOf(k);
+        return [k, withinRange(k, now.state.x[k] + (steps[up] * (high - low)) / (CHART_POINTS - 1))];
+      })
+      .filter((_, up) => steps[up]),
   );
   surface.canvas.addEventListener("pointermove", (event) => {
     if (!plot || event.buttons || !plot.holds(event.offsetX, event.offsetY)) return;

@@ -31,11 +31,11 @@ function changesBetween(of, low, high, width) {
   return found;
 }
 
-/** What a change of stability is: `weave`, `capsize` or `infinity`, by which coefficient passes 0. */
+/** What a change of stability is: `weave`, `capsize` or `infinity`, by which coefficient passes 0; products may underflow. */
 function crossingKind(before, after) {
-  if (before[0] * after[0] <= 0) return "infinity";
+  if (Math.sign(before[0]) !== Math.sign(after[0])) return "infinity";
   const last = before.length - 1;
-  return before[last] * after[last] <= 0 ? "capsize" : "weave";
+  return Math.sign(before[last]) !== Math.sign(after[last]) ? "capsize" : "weave";
 }
 
 /** The roots of a sweep, upper half, joined to curves of pairs and of real roots: {pair, points: [{at, re, im} ..]}. */
@@ -98,55 +98,70 @@ function closingIn(centre, step, [low, high]) {
   return apart.flatMap((distance) => [centre - distance, centre + distance]).filter((at) => at > low && at < high);
 }
 
-/** Roots, classes, curves and events over the range of the parameter `state.over`; kept while nothing else moves. */
+/** The order of samples and events. */
+const byPlace = (x, y) => x.at - y.at;
+
+/** Whether samples in order miss a window of stability, or a gap in it, that another stands in. */
+function misses(samples, {at, kind}) {
+  const next = samples.findIndex((one) => one.at >= at);
+  return kind && next > 0 && [next - 1, next].every((k) => samples[k].kind > 2 !== kind > 2);
+}
+
+/**
+ * Roots, classes, curves and events over the range of the parameter `state.over`; kept while nothing else moves. Events
+ * are in order, {kind, at} in SI; `meeting`: real roots become a pair; `crossing`: roots pass 0, or infinity, unstable
+ * before and after.
+ */
 function sweepOf(state) {
   const k = state.over;
   const key = `${k} ${Array.from(state.x, (value, index) => (index === k ? 0 : value))}`;
-  if (sweepKept.key === key) return sweepKept;
-  const ends = rangeOf(k);
-  const width = 1e-10 * (ends[1] - ends[0]);
-  const kindAt = (at) => kindOf(coefficientsAt(state.x, k, at));
-  const realAt = (at) => realRootsOf(coefficientsAt(state.x, k, at));
+  const of = (at) => coefficientsAt(state.x, k, at);
   const sampleAt = (at) => {
-    const a = coefficientsAt(state.x, k, at);
-    const roots = rootsOf(a);
+    const a = of(at);
+    const roots = rootsOf(a, true);
     return {at, a, kind: kindOf(a), real: realRootsOf(a), roots, growing: growingOf(roots)};
   };
+  const own = sampleAt(state.x[k]);
+  if (sweepKept.key === key && !misses(sweepKept.coarse, own)) return sweepKept;
+  const ends = rangeOf(k);
+  const width = 1e-10 * (ends[1] - ends[0]);
   // a pole between two samples is seen as one, not as two ends of what is undefined
-  const coarse = Array.from(evenly(ends, SWEEP_POINTS), sampleAt).filter(
+  const even = Array.from(evenly(ends, SWEEP_POINTS), sampleAt).filter(
     ({kind}, index, all) => kind || !all[index - 1]?.kind || !all[index + 1]?.kind,
   );
+  const known = DATA.designs
+    .filter(({values}) => sameBeside(values, state.x, [k], 0))
+    .map((design) => ({...design, at: design.values[k]}));
+  const missed = [own, ...known.map(({at}) => sampleAt(at))].filter((one) => misses(even, one));
+  const coarse = [...even, ...missed].sort(byPlace);
   const inside = ({kind, at}) => {
     // crossings come from computed roots
     const edge = kind === "crossing" ? 1e4 * width : 10 * width;
     return at > ends[0] + edge && at < ends[1] - edge;
   };
   const events = [];
-  let samples = [];
+  const samples = [];
   coarse.forEach((sample, index) => {
     if (index) {
       const before = coarse[index - 1];
-      const kinds = before.kind === sample.kind ? [] : changesBetween(kindAt, before.at, sample.at, width);
-      const reals = before.real === sample.real ? [] : changesBetween(realAt, before.at, sample.at, width);
-      const near = [...kinds, ...reals]
-        .flat()
-        .sort((first, second) => first - second)
-        .map(sampleAt);
+      const changes = (answer) => changesBetween((at) => answer(of(at)), before.at, sample.at, width);
+      const kinds = before.kind === sample.kind ? [] : changes(kindOf);
+      const reals = before.real === sample.real ? [] : changes(realRootsOf);
+      const near = [...kinds, ...reals].flat().map(sampleAt).sort(byPlace);
       samples.push(...near.filter(({at}) => at > before.at && at < sample.at));
       for (const [low, high] of kinds) {
         const first = sampleAt(low);
         const second = [high, high + width].map(sampleAt).find(({kind}) => kind);
-        if (!first.kind || !second) continue;
-        if (first.kind > 2 !== second.kind > 2) {
+        if (first.kind && second && first.kind > 2 !== second.kind > 2) {
           events.push({kind: crossingKind(first.a, second.a), at: (low + high) / 2, gains: second.kind > 2});
         }
       }
-      const both = [before, sample].every(({kind}) => kind === 1 || kind === 2);
-      const growing = (at) => growingOf(rootsOf(coefficientsAt(state.x, k, at)));
+      const both = [before, sample].every(({kind}) => kind && kind < 3);
+      const growing = (a) => growingOf(rootsOf(a, true));
       const crossed = both && before.growing !== sample.growing && kinds.length < 2;
-      for (const [low, high] of crossed ? changesBetween(growing, before.at, sample.at, width) : []) {
-        const roots = Math.abs(growing(high) - growing(low));
-        const far = sampleAt(low).a[0] * sampleAt(high).a[0] <= 0;
+      for (const [low, high] of crossed ? changes(growing) : []) {
+        const roots = Math.abs(growing(of(high)) - growing(of(low)));
+        const far = of(low)[0] > 0 !== of(high)[0] > 0;
         events.push({kind: "crossing", at: (low + high) / 2, roots, far});
       }
       for (const [low, high] of reals) {
@@ -156,17 +171,17 @@ function sweepOf(state) {
     }
     samples.push(sample);
   });
-  const known = DATA.designs.filter(({values}) => sameBeside(values, state.x, [k], 0));
   const step = (ends[1] - ends[0]) / (SWEEP_POINTS - 1);
-  const centres = new Set([...events.map(({at}) => at), ...known.map(({values}) => values[k])]);
-  samples = samples.concat([...centres].flatMap((centre) => closingIn(centre, step, ends)).map(sampleAt));
-  samples.sort((first, second) => first.at - second.at);
+  const centres = new Set([...events, ...known].map(({at}) => at));
+  samples.push(...[...centres].flatMap((centre) => closingIn(centre, step, ends)).map(sampleAt));
+  samples.sort(byPlace);
   sweepKept = {
     key,
     ends,
     samples,
-    known: known.map(({name, values, roots}) => ({name, at: values[k], roots})),
-    events: events.filter(inside).sort((first, second) => first.at - second.at),
+    known,
+    coarse,
+    events: events.filter(inside).sort(byPlace),
     curves: curvesOf(samples),
     stable: bandsAlong(samples, ({kind}) => kind > 2),
     heavy: bandsAlong(samples, ({kind}) => kind === 4),
@@ -176,17 +191,11 @@ function sweepOf(state) {
 
 /** Where on the real axis roots meet, between designs with other numbers of real roots; null where one is infinite. */
 function meetingOf(first, second) {
-  if (first.a[0] * second.a[0] <= 0) return null;
+  if (Math.sign(first.a[0]) !== Math.sign(second.a[0])) return null;
   const {re, im} = (first.real > second.real ? first : second).roots;
   const reals = re.filter((_, k) => im[k] === 0).sort();
   const gaps = Array.from(reals.subarray(1), (root, k) => ({apart: root - reals[k], re: (root + reals[k]) / 2}));
   return gaps.sort((one, other) => one.apart - other.apart)[0] ?? {re: NaN};
-}
-
-/** What happens over the parameter `state.over`, in order: {kind, at} in SI; `meeting`: real roots
- * become a pair; `crossing`: roots pass 0, or infinity, unstable before and after. */
-function growthEvents(state) {
-  return sweepOf(state).events;
 }
 
 /** An event in words: "weave ends at v = 4.292 m/s". */
@@ -347,7 +356,7 @@ function growthPicture(host) {
     if (met.length) texts.push(`roots meet at ${places}`);
     for (const {name, at, root} of exact)
       texts.push(`a ${root[2]}-fold ${root[1] ? "pair" : "root"} at ${valueText(over, at, 5)} (${name})`);
-    if (!texts.length) texts.push("no root crosses 0 or meets another");
+    if (!events.length) texts.push(`no crossing was found at ${SWEEP_POINTS} values`);
     const text = texts.join("; ");
     return `${text[0].toUpperCase() + text.slice(1)}.`;
   }

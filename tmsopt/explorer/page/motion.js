@@ -233,7 +233,7 @@ function motionPicture(host) {
       now = {state, drawing};
       surface.repaint();
       const push = pushOf(state, drawing);
-      const fate = drawing.motion[0] < 0 ? "dies out" : "does not die out";
+      const fate = drawing.kind > 2 ? "dies out" : "does not die out"; // of an undefined design there is no push
       says(
         push
           ? `${names.join(" and ")} over time after a push on ${names[clock.pushed]}: ` +

@@ -514,11 +514,14 @@ function exactSignChanges(p, q) {
 
 // ---- what is asked of a design ------------------------------------------------------------------
 
-/** All roots, rightmost first, conjugates exact and side by side, and the error of the coefficients they give back. */
-function rootsOf(a) {
+/**
+ * All roots, rightmost first, conjugates exact and side by side, and the error of the coefficients they give back;
+ * `quick` as of `factor`.
+ */
+function rootsOf(a, quick) {
   const n = a.length - 1, re = new Float64Array(n).fill(NaN), im = new Float64Array(n).fill(NaN);
   if (!isRegular(a)) return { re, im, error: NaN };
-  factor(a, false);
+  factor(a, quick);
   const z = new Float64Array(4), found = [];
   for (let k = 0; k < FOUND.pairs; k++) {
     factorRoots(FOUND.p[k], FOUND.q[k], z);
@@ -548,8 +551,8 @@ function expanded(x, y) {
 }
 
 /**
- * Roots as [re, im, multiplicity], those with im ≥ 0, rightmost first: nearest ones taken for one where that changes no
- * coefficient by more than 1e-11 of its terms, as the package has it.
+ * Roots as [re, im, multiplicity], those with im ≥ 0, rightmost first. Roots are joined greedily, the nearest first; of
+ * these groups the last whose means change no coefficient by more than 1e-11 of its terms are taken for one root each.
  */
 function meetingsOf({ re, im }) {
   const n = re.length, all = [...re.keys()], unit = Math.max(...all.map((k) => Math.hypot(re[k], im[k]))) || 1;
@@ -668,12 +671,12 @@ function firstOrder(x) {
       row[j] = entries[i * n + j];
       for (let k = 1; k <= MODEL.order; k++) row[(MODEL.order + 1 - k) * n + j] = -entries[(k * n + i) * n + j];
     }
-    rows.push(row);
+    const size = exponentOf(Math.max(...row.subarray(0, n).map(Math.abs)));
+    rows.push(row.map((x) => scaledBy(x, -size))); // a mass may be tiny beside another
   }
-  const largest = Math.max(...rows.flatMap((row) => Array.from(row.subarray(0, n), Math.abs)));
   for (let c = 0; c < n; c++) {
     const best = rows.slice(c).reduce((most, row, k) => (Math.abs(row[c]) > Math.abs(rows[most][c]) ? c + k : most), c);
-    if (!(Math.abs(rows[best][c]) > 1e-14 * largest)) return null;
+    if (!(Math.abs(rows[best][c]) > 1e-14)) return null;
     [rows[c], rows[best]] = [rows[best], rows[c]];
     for (let i = 0; i < n; i++) {
       if (i === c) continue;
