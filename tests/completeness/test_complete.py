@@ -21,7 +21,7 @@ DIGITS = mpmath.mpf(10) ** -22  # of 25 that are given
 
 x, y, z = (ca.SX.sym(n) for n in "xyz")
 
-pytestmark = pytest.mark.skipif(not available(), reason="codac is not installed")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not available(), reason="codac is not installed")]
 
 
 def of_file(name: str, **changes: Any) -> Completeness:

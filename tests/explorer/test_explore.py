@@ -57,7 +57,7 @@ def test_it_opens_at_the_optimum(ep4: tmsopt.Explorer) -> None:
 def test_its_curves_are_the_boundaries(ep4: tmsopt.Explorer) -> None:
     data = data_of(ep4.html)
     names = [p["name"] for p in data["parameters"]]
-    held = dict(zip(names, data["held"], strict=True))
+    held = dict(zip(names, data["start"], strict=True))
     found = [c for c in data["curves"] if c["kind"] == "weave"]
     assert found
     for curve in found:

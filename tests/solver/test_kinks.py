@@ -14,6 +14,8 @@ from tmsopt.formulation import abscissa as abscissa_nlp, formulate
 from tmsopt.models import from_coefficients, tms
 from tmsopt.solver import Family, solve
 
+pytestmark = pytest.mark.slow
+
 b, c, z = (ca.SX.sym(n) for n in "bcz")
 OSCILLATOR = from_coefficients([1, 2 * z, 1])
 STIFF = from_coefficients([1, 2 * z, 16])  # abscissa −z up to z = 4

@@ -21,6 +21,8 @@ from scipy.optimize import differential_evolution
 
 import tmsopt
 
+pytestmark = pytest.mark.slow
+
 PROBLEMS = Path(__file__).parents[2] / "problems"
 s = sp.Symbol("s")
 TENTH = sp.Rational(1, 10)

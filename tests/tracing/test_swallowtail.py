@@ -13,6 +13,8 @@ from tmsopt.plots import new_figure
 from tmsopt.plots.paper import draw_swallowtail, planes_figure, quadrilaterals
 from tmsopt.tracing import swallowtail
 
+pytestmark = pytest.mark.slow
+
 planes = import_module("tmsopt.paper.planes")
 
 FIXED = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}

@@ -53,7 +53,7 @@ def subject(
         "constraints": [_constraint(problem, n) for n in script.constraints],
         "objective": f"{problem.sense} {' '.join(asked.split())}" if asked else "",
         "designs": [_design(problem, k) for k in designs],
-        "start": [start[n] for n in of.names], "held": [start[n] for n in of.names],
+        "start": [start[n] for n in of.names],
         "plane": [of.names.index(n) for n in plane], "over": of.names.index(_over(problem)),
         "curves": list(_curves(problem, plane, start)) if trace_curves else [],
         "toml": around(problem, model),

@@ -116,7 +116,7 @@ function bicyclePicture(host) {
   if (!DATA.bicycle) {
     const panel = host.closest("section") || host;
     panel.hidden = true;
-    return {draw() {}, cheap: true};
+    return {draw() {}};
   }
   const calm = matchMedia("(prefers-reduced-motion: reduce)");
   let now = null;
@@ -330,7 +330,6 @@ function bicyclePicture(host) {
   });
 
   return {
-    cheap: true,
     draw(state, drawing) {
       now = {state, drawing};
       const design = Array.from(state.x).join(" ");

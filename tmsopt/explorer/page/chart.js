@@ -30,7 +30,7 @@ function sameBeside(first, second, free, tolerance) {
 function curvesIn(state) {
   const [i, j] = state.plane;
   return DATA.curves.flatMap((curve) => {
-    if (!sameBeside(state.x, DATA.held, [...curve.axes, ...(curve.along || [])], 1e-12)) return [];
+    if (!sameBeside(state.x, DATA.start, [...curve.axes, ...(curve.along || [])], 1e-12)) return [];
     if (curve.axes[0] === i && curve.axes[1] === j) return [curve];
     return curve.axes[0] === j && curve.axes[1] === i ? [{...curve, x: curve.y, y: curve.x}] : [];
   });
@@ -134,7 +134,7 @@ function chartPicture(host) {
   const raster = document.createElement("canvas");
   if (DATA.parameters.length < 2) {
     part(host, "p", {}, "A chart needs two parameters; this model has one.");
-    return {draw() {}, cheap: true};
+    return {draw() {}};
   }
   const surface = canvasIn(host, (width) => clamp(300, 0.78 * width, 560), paint);
   const reading = part(host, "p", {class: "reading"});
@@ -281,7 +281,7 @@ function chartPicture(host) {
     entries.push(dotEntry("this design", "", colours.ink));
     if (DATA.curves.length && !curves.length) {
       const {axes, along = []} = DATA.curves[0];
-      const others = sameBeside(now.state.x, DATA.held, [...axes, ...along], 1e-12) ? "axes" : "values";
+      const others = sameBeside(now.state.x, DATA.start, [...axes, ...along], 1e-12) ? "axes" : "values";
       entries.push(lineEntry(`exact edges are hidden: other ${others} are set`, colours.paper, 0, DASHES.whole));
     }
     return entries;
@@ -324,7 +324,6 @@ function chartPicture(host) {
   surface.canvas.addEventListener("pointerleave", () => now && readOwn());
 
   return {
-    cheap: true,
     draw(state, drawing) {
       now = {state, drawing};
       surface.repaint();

@@ -454,7 +454,6 @@ function growthPicture(host) {
   surface.canvas.addEventListener("pointerleave", () => now && read(now.state.x[now.state.over]));
 
   return {
-    cheap: true,
     draw(state, drawing) {
       now = {state, drawing};
       surface.repaint();

@@ -90,7 +90,7 @@ function motionPicture(host) {
   if (!MODEL.pencil) {
     const panel = host.closest("section") || host;
     panel.hidden = true;
-    return {draw() {}, cheap: true};
+    return {draw() {}};
   }
   const names = coordinateNames();
   let now = null;
@@ -228,7 +228,6 @@ function motionPicture(host) {
   });
 
   return {
-    cheap: true,
     draw(state, drawing) {
       now = {state, drawing};
       surface.repaint();

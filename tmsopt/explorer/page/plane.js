@@ -128,7 +128,6 @@ function planePicture(host) {
   }
 
   return {
-    cheap: true,
     draw(state, drawing) {
       now = {state, drawing};
       surface.repaint();
