@@ -15,6 +15,8 @@ import tmsopt
 from tmsopt import laws
 from tmsopt.models import from_coefficients
 
+pytestmark = pytest.mark.slow
+
 c, z = ca.SX.sym("c"), ca.SX.sym("z")
 OSCILLATOR = from_coefficients([1, 2 * z, 1])
 THIRD = from_coefficients([1, 2 * z + c, 1 + 2 * z * c, c])  # (s² + 2 z s + 1) (s + c)

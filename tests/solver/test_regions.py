@@ -16,6 +16,8 @@ import tmsopt
 from tmsopt import laws
 from tmsopt.formulation import NLP, Factor
 
+pytestmark = pytest.mark.slow
+
 TMS = tmsopt.models.tms
 FIXED = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}
 BOX = {"Fr": (0.5, 4.0), "chi_B": (1.05, 3.0), "lambda_s": (0.05, 1.2)}
