@@ -1,5 +1,7 @@
 """Every digit that ``solve --json`` prints of a design, from the printed parameters alone: another way, 60 digits.
 
+pytestmark = pytest.mark.slow
+
 Nothing here uses a formula of the package. The polynomial is the determinant of the paper's matrices in mpmath, roots
 are mpmath's, mass margins are eigenvalues, and the weave speed is where the Hurwitz determinant changes sign. The
 numbers compared are equal as doubles, ``==``: the printed one is the double nearest to the 60-digit one.

@@ -20,6 +20,8 @@ from tmsopt.models import from_coefficients, from_matrices, tms, to_si
 from tmsopt.report import robustness_line, robustness_table
 from tmsopt.roots import real_roots, roots
 
+pytestmark = pytest.mark.slow
+
 NAMES = ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")
 KINDS = ("weave", "capsize", "infinity", "heavy damping")
 

@@ -15,6 +15,8 @@ import tmsopt
 from tmsopt.cli import every as main
 from tmsopt.models import from_coefficients, from_matrices
 
+pytestmark = pytest.mark.slow
+
 c1, c2 = ca.SX.sym("c1"), ca.SX.sym("c2")
 
 

@@ -17,6 +17,8 @@ from tmsopt.design import Problem
 from tmsopt.models import Model, Parameter, ParameterSet, tms
 from tmsopt.tracing import domain
 
+pytestmark = pytest.mark.slow
+
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 SQRT2 = math.sqrt(2)
 TAN_EP4 = 15 / 4 - 75 * SQRT2 / 32  # Table 1

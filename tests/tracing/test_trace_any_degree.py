@@ -24,6 +24,8 @@ from tmsopt.roots.patterns import in_words
 from tmsopt.solver import solve
 from tmsopt.tracing import domain, swallowtail, trace
 
+pytestmark = pytest.mark.slow
+
 EXACT = 1e-12
 """Points and events: a few roundings of a Newton step whose condition is below 1e3."""
 
