@@ -3,7 +3,6 @@
 import platform
 from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
-from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files as resources
 from os import PathLike
@@ -115,13 +114,11 @@ def _explorer(result: Any, design: "Solution | None") -> str:
     of, designs = explored(result, design)
     if of is None:
         return ""
-    from tmsopt.explorer import page_of
+    from tmsopt.explorer import frame, page_of
 
     return (
         "<p>Move a parameter, and see the roots move: disturbances die out where all are left of "
-        "the imaginary axis.</p>\n"
-        '<iframe title="Explorer of this problem" sandbox="allow-scripts allow-downloads" loading="lazy" '
-        f'srcdoc="{escape(page_of(of, designs, trace_curves=True))}"></iframe>\n'
+        f"the imaginary axis.</p>\n{frame(page_of(of, designs, trace_curves=True), 'Explorer of this problem')}\n"
         '<p class="print">The explorer is in the file itself, not on paper.</p>'
     )
 

@@ -1,9 +1,5 @@
 // All together: buttons, redraws gathered in one frame, light and dark, what is said aloud.
 
-// ms within which a picture is redrawn while something is dragged
-const QUICK = 60;
-// ms after which a slider rests
-const REST = 150;
 const THEMES = ["auto", "dark", "light"];
 const KEYS = [
   ["Tab, Shift+Tab", "to the next control, or back"],
