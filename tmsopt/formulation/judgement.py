@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -46,23 +45,24 @@ def judged(problem: Problem, columns: Mapping[str, Array]) -> Judged:
     """
     shape = next(iter(columns.values())).shape
     nominal = problem.ordered(columns)
-    listed = [case for case in problem.cases if not case.direction]
-    own = values_of(problem, nominal, shape)
-    each = [values_of(problem, case.applied(nominal), shape) for case in listed] or [own]
+    applied = [case.applied(nominal) for case in problem.cases if not case.direction]
+    own, every = values_of(problem, nominal, shape), (len(applied) or 1, *shape)
+    stacked = {n: np.stack([np.broadcast_to(p[n], shape) for p in applied or [nominal]]) for n in nominal}
+    values = values_of(problem, stacked, every)  # all cases at once: one by one takes as often the time of small arrays
     conditions = list(problem.conditions.values())
     asked = [e for e in (problem.objective, *conditions) if e]
     for name, worst in WORSE.items():
-        if len(each) > 1 and any(name in e.names for e in asked):
-            found = reduce(np.maximum if worst > 0 else np.minimum, [values[name] for values in each])
-            for values in (own, *each):
-                values.define(name, found)
-    moves = reduce(np.logical_and, [_moves(values, shape) for values in each])
+        if len(applied) > 1 and any(name in e.names for e in asked):
+            found = values[name].max(axis=0) if worst > 0 else values[name].min(axis=0)
+            own.define(name, found)
+            values.define(name, np.broadcast_to(found, every))
+    moves = _moves(values, every).all(axis=0)
     worth = None
     if problem.objective is not None:
-        every = [problem.sign * _evaluated(problem.objective, values, shape) for values in each]
-        worth = np.where(moves, reduce(np.maximum, every), np.nan)
+        goal = problem.sign * _evaluated(problem.objective, values, every)
+        worth = np.where(moves, goal.max(axis=0), np.nan)
     beyond = [  # an equality is one of the nominal design
-        reduce(np.maximum, [c.sign * _evaluated(c, values, shape) for values in ([own] if c.equality else each)])
+        c.sign * _evaluated(c, own, shape) if c.equality else (c.sign * _evaluated(c, values, every)).max(axis=0)
         for c in conditions
     ]
     equal = np.array([c.equality for c in conditions], dtype=bool)

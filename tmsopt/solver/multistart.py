@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice, pairwise
+from itertools import islice, pairwise, zip_longest
 
 import numpy as np
 
@@ -25,6 +25,7 @@ _ENOUGH_SAMPLED, _ENOUGH_NARROW, _AGREE_SAMPLED, _HOPELESS_SAMPLED = 3, 8, 2, 8
 """The same where the starts come from a sample of the box: so many for each optimum met, more where little is feasible.
 """
 
+_HOPELESS_AFAR = 3  # the same where no design of the sample comes near to meeting all limits
 _FEW = 2  # optima met, beyond which there may be many
 _MET = 1e-14  # sum of squares of coefficients at which more conditions than parameters are met
 _SAME = 1e-7  # relative difference of objectives that counts as the same
@@ -32,6 +33,7 @@ _FEASIBLE = 1e-6  # of the rows, before polishing; the recheck has the last word
 _SCATTER = 0.01  # of the size of the roots: in double precision those beside a 4-fold one are off by 4e-4
 _RESIDUAL = 1e-11  # of the equations: an n-fold root is off by its n-th root
 _LEADS = 3  # designs with one root, and with one pair, that are started from
+_LEADLESS = 8  # starts that led to none, after which no more are tried
 _PAIRED = range(4, 13, 2)  # degrees at which one pair may be all roots
 _RESCUES = 4  # starts from abscissa optima, for a pattern that no start reached
 
@@ -139,7 +141,7 @@ class Runner:
         for again in range(_AGAIN):
             if best.feasible and best.run.status == _SUCCESS and not best.nlp.tangled(best.run.x):
                 break
-            if not best.feasible and again >= (_AGAIN if hopeful else _AGAIN_HOPELESS):
+            if not best.feasible and again >= (_AGAIN if hopeful else 0 if _afar(self.work) else _AGAIN_HOPELESS):
                 break
             if not np.all(np.isfinite(best.run.x)):
                 break
@@ -238,7 +240,7 @@ def _settled(work: Workspace, candidates: list[Candidate]) -> bool:
     feasible = [c for c in candidates if c.feasible]
     failed = len(candidates) - len(feasible)
     if not feasible:
-        return failed >= (_HOPELESS_SAMPLED if sampled else _HOPELESS)
+        return failed >= (_HOPELESS_AFAR if _afar(work) else _HOPELESS_SAMPLED if sampled else _HOPELESS)
     best = min(c.objective for c in feasible)
     record = candidates[-1].feasible and all(candidates[-1].objective < c.objective for c in feasible[:-1])
     if record and _proven(problem, candidates[-1]):
@@ -257,6 +259,11 @@ def _settled(work: Workspace, candidates: list[Candidate]) -> bool:
         return len(candidates) >= each * w and agreeing >= _AGREE_SAMPLED
     seen = n > w + 2 and w * (n - 1) <= (w + 0.5) * (n - w - 2)
     return len(candidates) >= _ENOUGH and agreeing >= _AGREE and seen
+
+
+def _afar(work: Workspace) -> bool:
+    """Whether no design that was looked at comes near to meeting all limits."""
+    return work.sample is not None and work.sample.far_off
 
 
 def _proven(problem: Problem, candidate: Candidate) -> bool:
@@ -295,9 +302,11 @@ def exceptional(work: Workspace) -> list[dict[str, float]]:
             continue
         leading = matching(asked)
         lead, ended = ipopt(leading, work.options), list[Candidate]()
-        for seen in (sample.boldest, sample.refined):
-            starts = (complete(leading, asked, sampler.design(seen, k)) for k in range(len(seen)))
-            ended += [_candidate(asked, leading, lead(x)) for x in starts]
+        turns = zip_longest(*([(seen, k) for k in range(len(seen))] for seen in (sample.boldest, sample.refined)))
+        for seen, k in (turn for pair in turns for turn in pair if turn):
+            ended.append(_candidate(asked, leading, lead(complete(leading, asked, sampler.design(seen, k)))))
+            if len(ended) >= (_HOPELESS_AFAR if sample.far_off else _LEADLESS) and not any(c.feasible for c in ended):
+                break
         found += distinct(ended, found)[:_LEADS]
     return [work.design_at(c.run.x) for c in found]
 

@@ -16,16 +16,16 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Relaxation
 from tmsopt.formulation.formulate import design_of, formulate
 from tmsopt.formulation.nlp import NLP, Lift
-from tmsopt.formulation.starts import designs
 from tmsopt.models import Values
 from tmsopt.records import Table
 from tmsopt.solver.multistart import Runner, same, starting
 from tmsopt.solver.outcome import Trial, survivor
+from tmsopt.solver.sample import Looked, Sampler, excluded
 from tmsopt.solver.workspace import Candidate, Workspace, workspace
 
 _ROUNDS = 12  # times that cases are added
 _TRIED = 8  # starts of a relaxation at most
-_FEW = 3  # starts for one limit alone, besides the relaxed design
+_LED = 2  # starts for one limit alone
 _AGREE = 3  # of them at the best value that end it
 _TIE = 1e-3  # of a scale, by which equal limits differ: one moved is easier to read than two moved by halves
 _WIDER = 3.0  # widths of the box by which its bounds may give way
@@ -147,15 +147,14 @@ def _least_covered(work: Workspace, limits: Sequence[Limit], listed: Sequence[Ca
     trial, nlp = _least(work, limits, listed)
     movable = [limit for limit in limits if not limit.parameter]
     if trial is not None and trial.point.objective > _NOTHING and len(movable) > 1:
+        run, sampler = Runner(work, nlp), _sampler(work)
+        drawn = sampler.draw()
         for limit in movable:
-            single = _least(work, [limit], listed, few=True)
-            if single[0] is not None and single[0].point.objective < trial.point.objective * (1 - _TIE):
-                elastic = _elastic(work.problem, listed, limits)
-                ended = Runner(work, elastic).ended(single[0].parameters, near=True)
-                again = survivor(_unlimited(work, limits), elastic, [ended])
-                less = again is not None and again.point.objective < trial.point.objective
-                if again is not None and less and not again.checked.violations:
-                    trial, nlp = again, elastic
+            ended = [run.ended(design, near=True) for design in _leads(sampler, limit.name, drawn)]
+            again = survivor(_unlimited(work, limits), nlp, ended)
+            less = again is not None and again.point.objective < trial.point.objective * (1 - _TIE)
+            if again is not None and less and not again.checked.violations:
+                trial = again
     for _ in range(_ROUNDS if listed else 0):
         if trial is None or not (more := _beyond(work.problem, limits, trial, nlp.cases)):
             break
@@ -164,16 +163,37 @@ def _least_covered(work: Workspace, limits: Sequence[Limit], listed: Sequence[Ca
 
 
 def _least(
-    work: Workspace, limits: Sequence[Limit], cases: Sequence[Case], before: Trial | None = None, few: bool = False
+    work: Workspace, limits: Sequence[Limit], cases: Sequence[Case], before: Trial | None = None
 ) -> tuple[Trial | None, NLP]:
     """The design with the least weighted sum of amounts that a few starts reach, or the one `before` leads to."""
     nlp = _elastic(work.problem, cases, limits)
     run = Runner(work, nlp)
     candidates = [] if before is None else [run.ended(before.parameters, near=True)]
     if not any(c.feasible for c in candidates):
-        candidates = _ends(run, 2 * _FEW if few else _TRIED)
+        candidates = _ends(run, _TRIED)
     trial = survivor(_unlimited(work, limits), nlp, candidates)
     return (trial if trial is not None and not trial.checked.violations else None), nlp
+
+
+def _sampler(work: Workspace, extended: Limit | None = None) -> Sampler:
+    """Looks at designs for their limits alone, and for how far one end of the box must be moved.
+
+    What is asked of the roots of a pattern is left aside.
+    """
+    part = work.part
+    gone = part.asked_of_roots if part.pattern else ()
+    kept = {name: text for name, text in part.constraints.items() if name not in gone}
+    asked = replace(part, locate=None, constraints=kept)
+    if extended and extended.parameter:
+        most = extended.name.endswith(".max")
+        asked = replace(asked, **{"minimize" if most else "maximize": extended.parameter})
+    return Sampler(asked, work.options.seed)
+
+
+def _leads(sampler: Sampler, name: str, drawn: Looked) -> list[dict[str, float]]:
+    """Designs that may do with one limit moved, as far as it takes; none where the others exclude each other."""
+    found = sampler.without(name, drawn)
+    return [] if excluded(found) else [sampler.design(found, k) for k in range(min(len(found), _LED))]
 
 
 def _ends(run: Runner, most: int) -> list[Candidate]:
@@ -240,10 +260,14 @@ def _alone(work: Workspace, conflict: Sequence[str], trial: Trial, cases: Sequen
     found: dict[str, float] = {}
     for limit in (limits[name] for name in conflict):
         wide = _widened(problem, [limit.parameter] if limit.parameter else [])
-        nlp, widened = _elastic(wide, cases, [limit]), workspace(wide, work.options)
+        widened = workspace(wide, work.options)
+        sampler = _sampler(widened, limit)
+        if not (led := _leads(sampler, limit.name, sampler.draw())):
+            continue
+        nlp = _elastic(wide, cases, [limit])
         run = Runner(widened, nlp)
         here = {n: min(max(trial.parameters[n], lo), hi) for n, (lo, hi) in wide.free.items()}
-        candidates = [run.ended(here, near=True), *(run.ended(d, hopeful=False) for d in designs(wide, 0, _FEW))]
+        candidates = [run.ended(design, near=True, hopeful=False) for design in (here, *led)]
         ended = survivor(_unlimited(widened, [limit]), nlp, candidates)
         if ended is not None and not ended.checked.violations:
             found |= _amounts(wide, [limit], ended.parameters, nlp.cases)

@@ -1,6 +1,7 @@
 """A quasi-random sample of the whole box, judged by arrays and refined: where to start, and the referee of claims."""
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -37,6 +38,8 @@ _NEAR = 0.01  # of the box: distance of designs about one that count as differen
 
 _VANISHING = 1e-2  # of its usual size: a leading coefficient that may come to 0
 
+_FAR_OFF = 1e-3  # of their scales, in sum: limits that refined designs violate by more exclude each other, it seems
+_NO_LIMIT = 1e300  # a scale by which nothing that exists counts
 _MET = 1e-10  # of its scale: excess up to which a limit counts as met by numeric roots
 _STEPS = 12  # of Newton's method towards what violated limits allow
 _STEP = 1e-7  # of the box, for differences
@@ -142,6 +145,11 @@ class Sample:
     spread: float
     singular: bool
 
+    @property
+    def far_off(self) -> bool:
+        """Whether all designs stay away from what the limits allow: refined, they are met where they can be met."""
+        return excluded(self.refined)
+
 
 class Sampler:
     """Looks at designs of one box, and counts them.
@@ -183,6 +191,15 @@ class Sampler:
         a0 = self._leading(ranked.u)
         singular = bool(a0.min() <= 0 <= a0.max() or np.abs(a0).min() < _VANISHING * np.median(np.abs(a0)))
         return Sample(refined.take(refined.ranked), bold.take(apart(bold, _BOLD)), met, len(drawn), spread, singular)
+
+    def without(self, limit: str, drawn: Looked) -> Looked:
+        """Designs far from each other that violate the other limits least, refined; all of them count for no limit."""
+        others, names = copy(self), list(self.problem.conditions)
+        others.scales = np.where([name == limit for name in names], _NO_LIMIT, self.scales)
+        seen = others.look(drawn.u)
+        ranked = seen.take(seen.ranked[:_RANKED])
+        found = others.refined(others.nearer(ranked.take(apart(ranked, _LEADERS))))
+        return found.take(found.ranked)
 
     def draw(self) -> Looked:
         """Corners, a quasi-random sequence, and some of it moved to faces."""
@@ -281,6 +298,11 @@ class Sampler:
         excess = found.excess / self.scales[:, None]
         violation = np.where(excess <= _MET, 0.0, excess).sum(axis=0)
         return Looked(u, np.where(np.isfinite(worth), worth, np.inf), violation)
+
+
+def excluded(refined: Looked) -> bool:
+    """Whether limits seem to exclude each other: where they can be met, some refined design meets them."""
+    return bool(np.all(refined.violation > _FAR_OFF))
 
 
 def _spread(found: Looked, most: int) -> NDArray[np.int_]:
