@@ -39,6 +39,7 @@ _RESCUES = 4  # starts from abscissa optima, for a pattern that no start reached
 
 _AGAIN = 4  # times that a start is taken up again where it ended badly
 _AGAIN_HOPELESS = 1  # the same where rows are violated and no start has satisfied them yet
+_NOWHERE = 4  # starts of which none satisfied all rows, after which none is taken up again
 _WAYS = 3  # in which root quantities and kinks are held from one start
 _CROSSINGS = 4  # times that an end may turn out to be one of another way
 _MEETS = 1e-5  # difference of distances at which two ways meet
@@ -64,7 +65,7 @@ def search(work: Workspace, nlp: NLP, most: int | None = None) -> list[Candidate
             if work.sample is None:
                 candidates += _beside(run, candidates, starts - len(candidates))
             break
-    if part.pattern is not None and not any(c.feasible for c in candidates):
+    if part.pattern is not None and most is None and not any(c.feasible for c in candidates):
         candidates += _rescued(work, nlp)
     return candidates
 
@@ -141,7 +142,7 @@ class Runner:
         for again in range(_AGAIN):
             if best.feasible and best.run.status == _SUCCESS and not best.nlp.tangled(best.run.x):
                 break
-            if not best.feasible and again >= (_AGAIN if hopeful else 0 if _afar(self.work) else _AGAIN_HOPELESS):
+            if not best.feasible and again >= (_AGAIN if hopeful else 0 if self._hopeless else _AGAIN_HOPELESS):
                 break
             if not np.all(np.isfinite(best.run.x)):
                 break
@@ -154,6 +155,13 @@ class Runner:
             best = self._no_worse(best, design, "far" if near else "near")
         self.work.met.append((self.nlp, best))
         return best
+
+    @property
+    def _hopeless(self) -> bool:
+        """Whether nothing speaks for a feasible end: neither the sample nor, without one, where other starts ended."""
+        if self.work.sample is not None:
+            return self.work.sample.far_off
+        return len(self.work.met) >= _NOWHERE and not any(c.feasible for _, c in self.work.met)
 
     def _no_worse(self, best: Candidate, design: Mapping[str, float], start: str) -> Candidate:
         """Where it ended, or where a start that was better than that ends if IPOPT keeps to it, or does not."""
@@ -240,7 +248,9 @@ def _settled(work: Workspace, candidates: list[Candidate]) -> bool:
     feasible = [c for c in candidates if c.feasible]
     failed = len(candidates) - len(feasible)
     if not feasible:
-        return failed >= (_HOPELESS_AFAR if _afar(work) else _HOPELESS_SAMPLED if sampled else _HOPELESS)
+        if work.sample is None:
+            return failed >= _HOPELESS
+        return failed >= (_HOPELESS_AFAR if work.sample.far_off else _HOPELESS_SAMPLED)
     best = min(c.objective for c in feasible)
     record = candidates[-1].feasible and all(candidates[-1].objective < c.objective for c in feasible[:-1])
     if record and _proven(problem, candidates[-1]):
@@ -259,11 +269,6 @@ def _settled(work: Workspace, candidates: list[Candidate]) -> bool:
         return len(candidates) >= each * w and agreeing >= _AGREE_SAMPLED
     seen = n > w + 2 and w * (n - 1) <= (w + 0.5) * (n - w - 2)
     return len(candidates) >= _ENOUGH and agreeing >= _AGREE and seen
-
-
-def _afar(work: Workspace) -> bool:
-    """Whether no design that was looked at comes near to meeting all limits."""
-    return work.sample is not None and work.sample.far_off
 
 
 def _proven(problem: Problem, candidate: Candidate) -> bool:
