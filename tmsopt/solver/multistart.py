@@ -248,9 +248,8 @@ def _settled(work: Workspace, candidates: list[Candidate]) -> bool:
     feasible = [c for c in candidates if c.feasible]
     failed = len(candidates) - len(feasible)
     if not feasible:
-        if work.sample is None:
-            return failed >= _HOPELESS
-        return failed >= (_HOPELESS_AFAR if work.sample.far_off else _HOPELESS_SAMPLED)
+        afar = work.sample is not None and work.sample.far_off
+        return failed >= (_HOPELESS_AFAR if afar else _HOPELESS_SAMPLED if sampled else _HOPELESS)
     best = min(c.objective for c in feasible)
     record = candidates[-1].feasible and all(candidates[-1].objective < c.objective for c in feasible[:-1])
     if record and _proven(problem, candidates[-1]):
