@@ -14,13 +14,13 @@ x = ca.SX.sym("x")
 PLAIN = tmsopt.Problem(from_coefficients([1, 2 + x]), free={"x": (0.0, 1.0)}, minimize="x")
 
 
-def settled(ends: list[float | None], share: float) -> bool:
+def settled(ends: list[float | None], share: float, far_off: bool = False) -> bool:
     """Of starts that ended at these objectives, None where at nothing feasible."""
     nlp = SimpleNamespace(size=1.0)
     candidates: list[Any] = [
         SimpleNamespace(objective=1.0 if e is None else e, feasible=e is not None, nlp=nlp) for e in ends
     ]
-    sample = SimpleNamespace(met=round(share * 1000), size=1000)
+    sample = SimpleNamespace(met=round(share * 1000), size=1000, far_off=far_off)
     return bool(
         import_module("tmsopt.solver.multistart")._settled(SimpleNamespace(part=PLAIN, sample=sample), candidates)
     )
@@ -48,3 +48,8 @@ def test_a_search_ends_with_so_many_starts_and_not_before(share: float, ends: li
 def test_the_best_must_be_met_twice() -> None:
     assert not settled([1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0], 0.5)
     assert settled([1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 1.0], 0.5)
+
+
+def test_three_starts_are_enough_where_no_design_of_the_sample_comes_near_the_limits() -> None:
+    assert settled([None] * 3, 0.0, far_off=True)
+    assert not settled([None] * 2, 0.0, far_off=True)
