@@ -334,7 +334,7 @@ def test_files_are_written_whole() -> None:
 
 
 def test_pint_is_named_in_one_module_and_inside_a_function() -> None:
-    """Imported only when a unit is written; that it is not before is tested in a fresh process in test_units."""
+    """Imported only when an unusual unit is written; that it is not before is tested in a fresh process in test_units."""
     assert [m for m in SOURCES if "pint" in set(imports(m, SOURCES))] == ["tmsopt.units.text"]
     top = ast.parse(SOURCES["tmsopt.units.text"]).body
     assert not any("pint" in ast.unparse(n) for n in top if isinstance(n, ast.Import | ast.ImportFrom))

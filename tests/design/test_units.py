@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from tmsopt.units import with_unit
+from tmsopt.units import USUAL, by_pint, factor, read, with_unit
 
 AT_ONCE = 1.0
 """Seconds; pint needs a third of one to start."""
@@ -42,7 +42,7 @@ def at_once() -> Iterator[None]:
 
 @pytest.fixture(autouse=True, scope="module")
 def _pint_is_warm() -> None:
-    with_unit("1 m", "m")
+    by_pint("m", "m")
 
 
 @pytest.mark.parametrize(
@@ -87,6 +87,15 @@ def test_units_by_their_definitions(text: str, unit: str, value: float) -> None:
 def test_the_parameters_own_unit_changes_nothing(number: float) -> None:
     for unit in ("m", "kg", "m/s", "m/s^2", "rad"):
         assert with_unit(f"{number!r} {unit}", unit) == number
+
+
+@pytest.mark.parametrize(("written", "unit"), [(written, unit) for unit, table in USUAL.items() for written in table])
+def test_usual_units_are_as_pint_has_them(written: str, unit: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the last bit of what is read and shown, for every one of the table that spares loading pint."""
+    texts = [f"{number} {written}" for number in ("1", "-0.7", "3.1e5", "12.345678", "1e-9", "0")]
+    own = [read(text, unit) for text in texts], factor(written, unit)
+    monkeypatch.setattr("tmsopt.units.text._factor", by_pint)
+    assert own == ([read(text, unit) for text in texts], factor(written, unit))
 
 
 REFUSED = {
@@ -203,8 +212,10 @@ lambda_s = {tilt}
 """
 
 
-@pytest.mark.parametrize(("tilt", "needed"), [("0.0872664625997165", False), ('"5 deg"', True)])
-def test_pint_is_imported_only_when_a_unit_is_written(tmp_path: Path, tilt: str, needed: bool) -> None:
+@pytest.mark.parametrize(
+    ("tilt", "needed"), [("0.0872664625997165", False), ('"5 deg"', False), ('"300 arcmin"', True)]
+)
+def test_pint_is_imported_only_when_an_unusual_unit_is_written(tmp_path: Path, tilt: str, needed: bool) -> None:
     file = tmp_path / "problem.toml"
     file.write_text(PROBLEM.format(tilt=tilt), encoding="utf-8")
     script = "import sys, tmsopt; p = tmsopt.load(sys.argv[1]); print('pint' in sys.modules, p.fixed['lambda_s'])"
@@ -215,3 +226,11 @@ def test_pint_is_imported_only_when_a_unit_is_written(tmp_path: Path, tilt: str,
     imported, value = ended.stdout.split()
     assert imported == str(needed)
     assert float(value) == pytest.approx(math.radians(5), rel=1e-15)
+
+
+def test_no_problem_that_comes_along_needs_pint() -> None:
+    root = Path(__file__).parents[2]
+    files = [f for f in sorted((root / "problems").glob("*.toml")) if not f.name.startswith("study_")]
+    script = "import sys, tmsopt; [tmsopt.load(f) for f in sys.argv[1:]]; print('pint' in sys.modules)"
+    ended = subprocess.run([sys.executable, "-c", script, *files], capture_output=True, text=True, cwd=root, check=True)
+    assert ended.stdout.split() == ["False"]

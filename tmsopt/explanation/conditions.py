@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import null_space
-from scipy.optimize import lsq_linear
 
 from tmsopt.explanation.program import LocalProgram
 from tmsopt.records import Array
@@ -59,6 +57,8 @@ def conditions(program: LocalProgram) -> Conditions:
     y = np.linalg.lstsq(unit.T, target, rcond=_RANK)[0]
     downhill = np.zeros_like(slope)
     if not independent or np.any(y[signed] < -POSITIVE) or np.linalg.norm(target - unit.T @ y) > STATIONARY:
+        from scipy.optimize import lsq_linear  # a quarter of a second, paid only where multipliers are in question
+
         least = np.where(signed, 0.0, -np.inf)
         allowed = lsq_linear(unit.T, target, bounds=(least, np.full(len(least), np.inf)), method="bvls", tol=1e-14).x
         left = target - unit.T @ allowed
@@ -86,9 +86,15 @@ def curved(curvature: float) -> int:
 
 def _curvature(program: LocalProgram, multipliers: Array, firm: Array, steepness: float) -> tuple[float, Array]:
     """Least curvature along what is held firmly, relative to the largest or the slope, and its direction."""
-    free = null_space(firm, rcond=_RANK) if len(firm) else np.eye(len(program.x))
+    free = _null_space(firm) if len(firm) else np.eye(len(program.x))
     if not free.shape[1]:
         return np.nan, np.zeros(len(program.x))
     hessian = program.at(program.x, multipliers)[4] * np.outer(program.sizes, program.sizes)
     values, vectors = np.linalg.eigh(free.T @ hessian @ free)
     return float(values[0] / max(np.abs(values).max(), steepness)), free @ vectors[:, 0]
+
+
+def _null_space(rows: Array) -> Array:
+    """Orthonormal directions, as columns, that no row changes."""
+    _, lengths, directions = np.linalg.svd(rows)
+    return directions[np.sum(lengths > _RANK * lengths.max()) :].T

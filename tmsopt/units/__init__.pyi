@@ -4,4 +4,6 @@ from .readings import (
     reading as reading, readings as readings,
 )
 from .tables import TABLES as TABLES, numbers as numbers
-from .text import factor as factor, read as read, with_unit as with_unit
+from .text import (
+    USUAL as USUAL, by_pint as by_pint, factor as factor, read as read, with_unit as with_unit,
+)

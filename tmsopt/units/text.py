@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Mapping
 from fractions import Fraction
 from functools import cache
 from typing import Any
@@ -21,6 +22,16 @@ _EXAMPLES = {
     "1": "a number", "rad": "'5 deg' or '0.1 rad'", "m": "'40 cm' or '1.2 m'", "kg": "'10 kg' or '500 g'",
     "m/s": "'15 km/h' or '4 m/s'", "m/s^2": "'9.81 m/s^2'",
 }  # fmt: skip
+
+USUAL: Mapping[str, Mapping[str, float]] = {
+    "m": {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "in": 0.0254, "inch": 0.0254, "ft": 0.3048},
+    "kg": {"kg": 1.0, "g": 0.001, "t": 1000.0, "lb": 0.4535923700000001},  # as pint has it
+    "m/s": {"m/s": 1.0, "km/h": 5 / 18, "cm/s": 0.01, "ft/s": 0.3048, "mph": 0.44704},
+    "m/s^2": dict.fromkeys(("m/s^2", "m/s**2"), 1.0) | {"cm/s^2": 0.01},
+    "rad": {"rad": 1.0, "mrad": 0.001} | dict.fromkeys(("deg", "degree", "degrees"), math.pi / 180),
+    "kg m^2": {"kg m^2": 1.0, "kg*m^2": 1.0, "kg cm^2": 0.0001},
+}  # fmt: skip
+"""By unit, how many of it one of another is: those that are written every day, for which pint need not be loaded."""
 
 
 def with_unit(text: str, unit: str) -> float:
@@ -86,6 +97,11 @@ def factor(written: str, unit: str) -> float:
 @cache
 def _factor(written: str, unit: str) -> float | None:
     """How many `unit` one written unit is, or None where it is not one."""
+    return USUAL.get(unit, {}).get(written) or by_pint(written, unit)
+
+
+def by_pint(written: str, unit: str) -> float | None:
+    """The same, of any unit that pint knows."""
     registry = _registry()
     try:
         # Angles carry no dimension for pint, so their power is compared by name.
@@ -102,6 +118,6 @@ def _factor(written: str, unit: str) -> float | None:
 
 @cache
 def _registry() -> Any:
-    import pint  # a third of a second, paid only where a unit is written
+    import pint  # a third of a second, paid only where an unusual unit is written
 
     return pint.UnitRegistry()
