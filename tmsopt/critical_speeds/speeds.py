@@ -132,6 +132,23 @@ def speeds(
     return Speeds(asked, name, Table(own), float(lower), float(upper), **vars(met))
 
 
+def stable_speeds(design: Solution) -> tuple[Stretch, ...] | None:
+    """The bands of its speed in which a design is stable, whatever the box of that is; None without a speed.
+
+    What happens at their ends, which takes most of the time of `speeds`, is not looked at.
+
+    Raises:
+        InputError: where the speed does not enter as a polynomial, or the design has none of its own.
+    """
+    asked = design.problem.nominal
+    of, name = asked.parameter_set, speed_of(asked.parameter_set)
+    if name is None or not math.isfinite(of[name].range.lower):
+        return None
+    a, ends = coefficients_over(asked.model, of, design.parameters, name), of[name].range
+    upper = exact(ends.upper) if math.isfinite(ends.upper) else None
+    return crossings(a, exact(ends.lower), upper, bands_alone=True).stable
+
+
 def speed_of(of: ParameterSet) -> str | None:
     """The parameter of a set that is a speed: in m/s, or the Froude number."""
     return next((p.name for p in of.parameters if p.unit == "m/s" or p.name == "Fr"), None)

@@ -84,13 +84,13 @@ def rounded(solution: Solution, names: Iterable[str], digits: int) -> Rounded:
     realised = max(realised_abscissa(problem, c.applied({**solution.parameters, **exact})) for c in cases)
     each = [problem.values(case.applied(plain)) for case in cases]
     ratio = min(_damping_ratio([float(c) for c in values.coefficients]) for values in each)
-    fastest = max(values[ANGULAR_FREQUENCY] for values in each)
+    known = {"abscissa": realised, "damping_ratio": ratio}  # and better than by fitting structures
+    if problem.asks(ANGULAR_FREQUENCY):
+        known[ANGULAR_FREQUENCY] = max(values[ANGULAR_FREQUENCY] for values in each)
     values = problem.values(plain)
     for one in (values, *each):
-        one.define("abscissa", realised)  # known already, and better than by fitting structures
-        one.define("damping_ratio", ratio)
-        if problem.asks(ANGULAR_FREQUENCY):
-            one.define(ANGULAR_FREQUENCY, fastest)
+        for name, number in known.items():
+            one.define(name, number)
     texts = Table({n: f"{text} {units[n].text}".rstrip() for n, text in written.items()})
     objective = float(problem.objective(values)) if problem.objective else math.nan
     violated = Table(_violations(problem, plain, [values, *each]))

@@ -5,9 +5,9 @@ from collections.abc import Iterator, Sequence
 
 from tmsopt.critical_speeds.crossings import Crossing, Stretch
 from tmsopt.critical_speeds.growth import Growth
-from tmsopt.critical_speeds.speeds import Speeds
+from tmsopt.critical_speeds.speeds import Speeds, speed_of
 from tmsopt.design.solution import Solution
-from tmsopt.design.unit_system import unit_of
+from tmsopt.design.unit_system import Unit, unit_of
 from tmsopt.models import in_words_of
 from tmsopt.report.text import columns
 
@@ -96,19 +96,26 @@ def _meaning(c: Crossing) -> str:
     return "rightmost" if c.rightmost else ""
 
 
-def _bands(found: Speeds, bands: Sequence[Stretch], digits: int = 8) -> str:
+def _bands(found: Speeds, bands: Sequence[Stretch]) -> str:
+    return _written(bands, (found.lower, found.upper), unit_of(found.problem, found.parameter))
+
+
+def _written(bands: Sequence[Stretch], within: Stretch, unit: Unit, digits: int = 8) -> str:
     """Bands as a reader writes them."""
-    words, unit = [], unit_of(found.problem, found.parameter)
+    words = []
     for low, high in bands:
-        begin = "" if low == found.lower else f"from {unit.number(low, digits)}"
-        end = "" if high == found.upper else f"to {unit.number(high, digits)}"
+        begin = "" if low == within[0] else f"from {unit.number(low, digits)}"
+        end = "" if high == within[1] else f"to {unit.number(high, digits)}"
         words.append(" ".join(part for part in (begin, end) if part) or "everywhere")
     text = ", ".join(words) or "nowhere"
     return text if text in ("nowhere", "everywhere") else f"{text} {unit.text}".rstrip()
 
 
-def range_line(found: Speeds, solution: Solution) -> str:
-    """In one line: the range of speed in which a design is stable, and its own speed."""
-    name = found.parameter
-    own = unit_of(solution.problem, name).show(solution.parameters[name])
-    return f"stable in {name}: {_bands(found, found.stable, 5)}; this design at {own}"
+def range_line(stable: Sequence[Stretch], solution: Solution) -> str:
+    """In one line: the bands of its speed in which a design is stable, and its own speed."""
+    of = solution.problem.parameter_set
+    name = speed_of(of)
+    assert name is not None
+    unit, ends = unit_of(solution.problem, name), of[name].range
+    bands = _written(stable, (ends.lower, ends.upper), unit, 5)
+    return f"stable in {name}: {bands}; this design at {unit.show(solution.parameters[name])}"

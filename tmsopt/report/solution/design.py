@@ -222,14 +222,15 @@ def _motion(solution: Solution, found: Findings) -> list[str]:
     lines = [motion(solution, bool(on_edge))]
     roots = ", ".join(roots_of(solution.roots, _DIGITS)) or "none"
     unit = unit_of(solution.problem, "abscissa").text
-    if found.speeds is not None:
-        lines.append(range_line(found.speeds, solution))
+    if found.stable is not None:
+        lines.append(range_line(found.stable, solution))
     return [*lines, f"roots: {roots}{f'  in {unit}' if unit else ''}"]
 
 
 def _more(solution: Solution, found: Findings) -> str:
     """How to see more, and the commands that have something to say of the same file."""
-    others = ["prove", *(["compare"] if solution.problem.model is tms else []), *(["speeds"] if found.speeds else [])]
+    speeds = ["speeds"] if found.stable is not None else []
+    others = ["prove", *(["compare"] if solution.problem.model is tms else []), *speeds]
     return f"more: --full; then tmsopt {', '.join([*others, 'chart', 'trace'])} with the same file"
 
 

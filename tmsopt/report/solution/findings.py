@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
-from tmsopt.critical_speeds import Speeds, speed_of, speeds
+from tmsopt.critical_speeds import stable_speeds
 from tmsopt.design.solution import Solution
 from tmsopt.diagnosis import Diagnosis, diagnose
 from tmsopt.errors import InputError
@@ -22,13 +22,13 @@ class Findings:
     Attributes:
         explanation: limits and what they are worth, warnings, rounding, local optimality.
         robustness: the nearest boundaries.
-        speeds: where the design is stable, and what happens at the ends.
+        stable: bands of its speed in which the design is stable.
         diagnoses: how its multiple roots split.
     """
 
     explanation: Explanation | None = None
     robustness: Robustness | None = None
-    speeds: Speeds | None = None
+    stable: tuple[tuple[float, float], ...] | None = None
     diagnoses: tuple[Diagnosis, ...] = ()
 
 
@@ -41,20 +41,13 @@ def findings(solution: Solution, full: bool = False) -> Findings:
     return Findings(
         explain(solution, resolve=full),
         robustness(solution) if sought else None,
-        _unless_refused(lambda: _at_any_speed(solution)) if sought else None,
+        _unless_refused(lambda: stable_speeds(solution)) if sought else None,
         diagnose(solution) if full and solution.status == "optimal" else (),
     )
 
 
-def _at_any_speed(solution: Solution) -> Speeds | None:
-    """Whatever the box of the speed is: where the design would be stable beyond it counts too."""
-    of = solution.problem.parameter_set
-    name = speed_of(of)
-    return speeds(solution, name, between=(of[name].range.lower, of[name].range.upper)) if name else None
-
-
 def _unless_refused(found: Callable[[], T]) -> T | None:
-    """None for a model without a speed, and for a design with scenarios, which has no speed of its own."""
+    """None for a design with scenarios, which has no speed of its own."""
     try:
         return found()
     except InputError:
