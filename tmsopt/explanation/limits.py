@@ -166,14 +166,14 @@ def moved(problem: Problem, name: str, step: float) -> Problem:
 def _resolved(solution: Solution, lever: Lever) -> Lever:
     """A lever with the gain found by solving again from the optimum."""
     problem = solution.problem
-    start = {name: solution.parameters[name] for name in problem.free}
+    near = {name: solution.parameters[name] for name in problem.free}
     try:
-        asked = replace(moved(problem, lever.name, lever.step), start=start)
+        asked = moved(problem, lever.name, lever.step)
     except InputError:
         return replace(lever, reason="the moved problem cannot be written down")
     gain, found = math.nan, None
     for starts in (1, _RETRY):
-        again = solve(asked, starts=starts, throw=False, stability=0.0, interruptible=False)
+        again = solve(asked, starts=starts, near=near, throw=False, stability=0.0, interruptible=False)
         better = -problem.sign * (again.value - solution.value)
         if again.status == "optimal" and not better <= gain:
             gain, found = better, again
