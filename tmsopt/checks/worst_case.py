@@ -127,20 +127,17 @@ class _Space:
         u = _grid(size)
         high = badness(u)
         step = 1 / (_LINE - 1) if size == 1 else 0.5 * len(u) ** (-1 / size)
-        rng = np.random.default_rng(0)
-        for k in _apart(u, high, 4 * step):
-            best, value, reach = u[k], high[k], step
-            for _ in range(_LOOKS):
-                moves = reach * rng.uniform(-1, 1, (_AROUND, size))
-                side = rng.integers(0, size, (len(moves[::2]), 1))
-                moves[::2] *= np.arange(size) == side  # along one side: edges stay
-                around = np.clip(best + moves, 0, 1)
-                trial = badness(around)
-                top = int(np.argmax(trial))
-                if trial[top] > value:
-                    best, value = around[top], trial[top]
-                reach *= _SHRINK if size == 1 else _SHRINK ** (1 / 2)
-            yield self.case(best)
+        chosen, rng = _apart(u, high, 4 * step), np.random.default_rng(0)
+        best, value, rows = u[chosen], high[chosen], np.arange(len(chosen))
+        looks = np.array([[_moves(rng, size) for _ in range(_LOOKS)] for _ in chosen])
+        for moves in np.moveaxis(looks, 1, 0):
+            around = np.clip(best[:, None] + step * moves, 0, 1)
+            trial = badness(around.reshape(-1, size)).reshape(around.shape[:2])
+            top = trial.argmax(axis=1)
+            higher = trial[rows, top] > value
+            best[higher], value[higher] = around[rows, top][higher], trial[rows, top][higher]
+            step *= _SHRINK if size == 1 else _SHRINK ** (1 / 2)
+        yield from map(self.case, best)
 
     def _columns(self, u: Array) -> tuple[dict[str, Array], dict[str, Array]]:
         columns = list(np.moveaxis(u, -1, 0))
@@ -182,6 +179,13 @@ def _grid(size: int) -> Array:
     middles = np.array(list(product((0.0, 0.5, 1.0), repeat=size))) if size <= 5 else corners
     steps = np.arange(1, _PLANE + 1)[:, None] * golden_steps(size)
     return np.concatenate([corners, middles, *edges, (0.5 + steps) % 1.0])
+
+
+def _moves(rng: np.random.Generator, size: int) -> Array:
+    """Random steps, every other one along one side: edges stay."""
+    moves = rng.uniform(-1, 1, (_AROUND, size))
+    moves[::2] *= np.arange(size) == rng.integers(0, size, (len(moves[::2]), 1))
+    return moves
 
 
 def _apart(u: Array, high: Array, distance: float) -> list[int]:
