@@ -1,19 +1,17 @@
 """The nearest point of a boundary: by how much a design may change before it is unstable, or heavily damped no more."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest, table_faults
-from tmsopt.formulation.ipopt import ipopt, polisher
-from tmsopt.formulation.nlp import NLP
+from tmsopt.margins.approach import ALIKE, Approach, approach
 from tmsopt.margins.boundaries import KINDS, Edge, edges, lies_on
 from tmsopt.margins.rays import RayCrossing, between, most_damped, ray_crossings
 from tmsopt.margins.surroundings import Place, placed
@@ -23,13 +21,7 @@ from tmsopt.records import Array, Shown, Table, plain
 STABILITY = ("weave", "capsize", "infinity")
 """The boundaries of stability: a pair on the imaginary axis, a root 0, a root through infinity."""
 
-_ALIKE = 1e-9
-"""Relative difference of distances that is no difference."""
-
 _ROUNDS = 3
-_ITERATIONS = 200
-_FEASIBLE = 1e-10  # violation of scaled coefficients, up to which a point counts as on the edge
-_STATIONARY = 1e-8
 _NOTHING, _SHIFT = 1e-12, 1e-3  # of a weight: what is 0 but for rounding; how far it is moved to see what it does
 
 
@@ -91,7 +83,7 @@ class Robustness(Shown):
     weave: Nearest
     capsize: Nearest
     infinity: Nearest
-    heavy_damping: Nearest
+    heavy_damping: Nearest = field(default_factory=lambda: Nearest("heavy damping"))
 
     @property
     def limit(self) -> Nearest:
@@ -122,19 +114,6 @@ class Robustness(Shown):
             **plain(self, "parameters weights"),
             "nearest": {n.kind: n.to_json() for n in (self.weave, self.capsize, self.infinity, self.heavy_damping)},
         }
-
-
-@dataclass(frozen=True)
-class _Approach:
-    """Where one run ended, in weights; `refined` where the conditions of a nearest point hold to rounding."""
-
-    u: Array = field(default_factory=lambda: np.zeros(0))
-    refined: bool = False
-
-    @property
-    def distance(self) -> float:
-        """√Σ u²; inf for no point."""
-        return float(np.linalg.norm(self.u)) if self.u.size else math.inf
 
 
 def nearest(
@@ -174,18 +153,19 @@ def robustness(
 
 
 def robustness_at(problem: Problem, parameters: Mapping[str, float]) -> Robustness:
-    """The same for the parameters of a design, with the weights of its problem."""
-    return _surveyed(placed(problem, parameters, problem.weights or None))
+    """The same for the boundaries of stability alone, with the weights of the problem."""
+    return _surveyed(placed(problem, parameters, problem.weights or None), STABILITY)
 
 
-def _surveyed(place: Place) -> Robustness:
-    seen = ray_crossings(place.space)
-    found = [_nearest(place, seen, kind) for kind in KINDS]
+def _surveyed(place: Place, kinds: Sequence[str] = tuple(KINDS)) -> Robustness:
+    damped = "heavy damping" in kinds
+    seen = ray_crossings(place.space, damped=damped)
+    found = [_nearest(place, seen, kind) for kind in kinds]
     limit = min((n for n in found if n.kind in STABILITY), key=lambda n: n.distance)
     if limit.found and not limit.direct:  # another boundary is nearer, and no ray met it
         u = np.array([limit.direction[n] for n in place.weights])
-        seen = sorted([*seen, *between(place.space, u)], key=lambda c: c.distance)
-        found = [_nearest(place, seen, kind) for kind in KINDS]
+        seen = sorted([*seen, *between(place.space, u, damped)], key=lambda c: c.distance)
+        found = [_nearest(place, seen, kind) for kind in kinds]
     stable = place.stable and not place.stands_on
     own = Table(place.parameters), Table(place.weights)
     zeros = _zeros(place) if place.stands_on else ()
@@ -222,15 +202,15 @@ def _nearest(place: Place, seen: list[RayCrossing], kind: str) -> Nearest:
         zero = dict.fromkeys(place.weights, 0.0)
         return Nearest(kind, 0.0, Table(place.parameters), Table(zero), refined=True, direct=True)
     mine = [s for s in seen if s.edge in KINDS[kind]]
-    best = _Approach()
+    best = Approach()
     pieces = edges(place.problem.model.degree)
     for edge, sign, starts in _pieces(place, mine, kind):
         best = min(best, _best(place, pieces[edge], sign, starts), key=lambda found: found.distance)
-    if mine and mine[0].distance < best.distance * (1 - _ALIKE):
-        best = _Approach(mine[0].u, False)
+    if mine and mine[0].distance < best.distance * (1 - ALIKE):
+        best = Approach(mine[0].u, False)
     if not best.u.size or not is_boundary(place, best.u, kind == "heavy damping"):
         return Nearest(kind)
-    direct = not any(kind == "heavy damping" or c.edge in STABILITY for c in between(place.space, best.u))
+    direct = not between(place.space, best.u, kind == "heavy damping")
     direction = Table(dict(zip(place.weights, best.u.tolist(), strict=True)))
     there = {n: 0.0 if abs(x) <= _NOTHING * place.weights.get(n, 0.0) else x for n, x in place.design(best.u).items()}
     return Nearest(kind, best.distance, Table(there), direction, best.refined, direct)
@@ -248,11 +228,11 @@ def _pieces(place: Place, seen: list[RayCrossing], kind: str) -> Iterator[tuple[
         yield edge, sign, points
 
 
-def _best(place: Place, edge: Edge, sign: float, starts: list[Array]) -> _Approach:
+def _best(place: Place, edge: Edge, sign: float, starts: list[Array]) -> Approach:
     """The nearest of where the starts lead; what is crossed on the way there is started from too."""
-    best = _Approach()
+    best = Approach()
     size = min((float(np.linalg.norm(u)) for u in starts if u.any()), default=1.0)
-    run = _approach(place, edge, sign, size)
+    run = approach(place, edge, sign, size)
     for _ in range(_ROUNDS):
         for u in starts:
             found = run(u, best.distance)
@@ -260,55 +240,8 @@ def _best(place: Place, edge: Edge, sign: float, starts: list[Array]) -> _Approa
                 best = found
         if not best.u.size:
             break
-        starts = [c.u for c in between(place.space, best.u) if (c.edge, c.sign) == (edge.name, sign)]
+        met = between(place.space, best.u, edge.name not in STABILITY)
+        starts = [c.u for c in met if (c.edge, c.sign) == (edge.name, sign)]
         if not starts:
             break
     return best
-
-
-def _approach(place: Place, edge: Edge, sign: float, size: float) -> Callable[[Array, float], _Approach | None]:
-    """A function from a start, and a distance to beat, to a nearest point of an edge; None where it ends elsewhere.
-
-    Args:
-        sign: sign of a0 on the side of the edge that is stable or heavily damped.
-        size: distance to expect, the unit in which the NLP measures.
-    """
-    nlp = _nlp(place, edge, sign, size)
-    run, polish = ipopt(nlp, max_iterations=_ITERATIONS), polisher(nlp)
-    n = len(place.weights)
-
-    def from_start(u: Array, below: float) -> _Approach | None:
-        c = sign * place.space.coefficients(u)
-        if not (np.all(np.isfinite(c)) and c.any()):
-            return None
-        raw = run(np.concatenate([u / size, edge.guess(c)]))
-        if float(np.linalg.norm(raw.x[:n])) * size >= below * (1 - _ALIKE):
-            return None
-        point = polish(raw, nlp)
-        if not point.violation <= _FEASIBLE:
-            return None
-        u_found = np.clip(point.x[:n] * size, place.space.lower, place.space.upper)
-        return _Approach(u_found, point.stationarity <= _STATIONARY)
-
-    return from_start
-
-
-def _nlp(place: Place, edge: Edge, sign: float, size: float) -> NLP:
-    """Minimise y·y, y = u/size, over displacements and the unknowns of the edge."""
-    n, extra = len(place.weights), len(edge.unknowns)
-    x = ca.SX.sym("x", n + extra)
-    y, unknowns = [x[k] for k in range(n)], [x[n + k] for k in range(extra)]
-    c = ca.vertsplit(sign * place.symbolic(size * x[:n]))
-    equations = [e / place.sizes[k] for e, k in zip(edge.equations(c, unknowns), edge.powers, strict=True)]
-    others = edge.nonnegative(c, unknowns)
-    f, g = sum(v * v for v in y), ca.vertcat(*equations, *others)
-    return NLP(
-        formulation="nearest",
-        variables=(*place.weights, *edge.unknowns),
-        functions=ca.Function("nlp", [x], [f, g]),
-        lower=(*(place.space.lower / size).tolist(), *[0.0] * extra),
-        upper=(*(place.space.upper / size).tolist(), *edge.upper),
-        rows=(*[edge.name] * len(equations), *["others"] * len(others)),
-        row_lower=(0.0,) * (len(equations) + len(others)),
-        row_upper=(*[0.0] * len(equations), *[np.inf] * len(others)),
-    )

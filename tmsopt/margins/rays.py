@@ -53,22 +53,26 @@ class RayCrossing:
     distance: float
 
 
-def ray_crossings(space: Space, seed: int = 0) -> list[RayCrossing]:
-    """The nearest few crossings of each edge in different directions, nearest first."""
+def ray_crossings(space: Space, seed: int = 0, damped: bool = True) -> list[RayCrossing]:
+    """The nearest few crossings of each edge in different directions, nearest first.
+
+    Args:
+        damped: whether the edges of heavy damping are looked for too.
+    """
     rays = directions(space, seed)
-    return along(space, rays, np.broadcast_to(_RADII, (len(rays), len(_RADII))))
+    return along(space, rays, np.broadcast_to(_RADII, (len(rays), len(_RADII))), damped)
 
 
-def between(space: Space, u: Array) -> list[RayCrossing]:
+def between(space: Space, u: Array, damped: bool = True) -> list[RayCrossing]:
     """Crossings on the straight way to u, short of its end."""
-    return along(space, u[None, :], np.linspace(0.0, 1.0, _POINTS)[None, :-1])
+    return along(space, u[None, :], np.linspace(0.0, 1.0, _POINTS)[None, :-1], damped)
 
 
-def along(space: Space, rays: Array, t: Array) -> list[RayCrossing]:
+def along(space: Space, rays: Array, t: Array, damped: bool = True) -> list[RayCrossing]:
     """Crossings between displacements t · ray, t of shape (rays, steps)."""
     c = space.coefficients(space.along(rays[:, None, :], t))
     found: list[RayCrossing] = []
-    for heavy, test in ((False, _stable), (True, heavily_damped)):
+    for heavy, test in ((False, _stable), (True, heavily_damped))[: 1 + damped]:
         inside = test(c)
         ray, step = np.nonzero(inside[:, 1:] != inside[:, :-1])
         if not ray.size:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from tmsopt.design.problem import Problem
@@ -53,19 +52,13 @@ class Place:
     def scaled(self, parameters: Mapping[str, Any]) -> list[Any]:
         """Coefficients in the unit of time and the size in which the design's own are near 1."""
         a = self.problem.model.coefficients(parameters, self.problem.parameter_set)
-        return [c / s for c, s in zip(a, self._scale, strict=True)]
+        return [c / s for c, s in zip(a, self.scale, strict=True)]
 
     @cached_property
     def space(self) -> Space:
         """The polynomials around the design."""
         ends = [_ends(self.problem.parameter_set[n].range, self.parameters[n], w) for n, w in self.weights.items()]
         return Space(self._coefficients, np.array([lo for lo, _ in ends]), np.array([hi for _, hi in ends]))
-
-    @cached_property
-    def symbolic(self) -> ca.Function:
-        """Displacement → scaled coefficients, for CasADi: built once for all edges."""
-        u = ca.SX.sym("u", len(self.weights))
-        return ca.Function("coefficients", [u], [ca.vertcat(*self.scaled(self.displaced(ca.vertsplit(u))))])
 
     @cached_property
     def stable(self) -> bool:
@@ -101,7 +94,8 @@ class Place:
         return np.array([float(c) for c in self.scaled(self.parameters)])
 
     @cached_property
-    def _scale(self) -> Array:
+    def scale(self) -> Array:
+        """Size of each coefficient in that unit of time."""
         a = np.array(self.problem.model.coefficients(self.parameters, self.problem.parameter_set), dtype=float)
         unit = abs(a[-1] / a[0]) ** (1 / (len(a) - 1)) if a[0] and a[-1] else 1.0
         powers = unit ** np.arange(len(a))

@@ -1,0 +1,126 @@
+"""From starts to the nearest point of one edge: IPOPT, with solvers that serve every design of a model."""
+
+import math
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field, replace
+
+import casadi as ca
+import numpy as np
+
+from tmsopt.formulation.ipopt import Point, Run, ipopt, polisher
+from tmsopt.formulation.nlp import NLP
+from tmsopt.margins.boundaries import Edge
+from tmsopt.margins.surroundings import Place
+from tmsopt.records import Array
+
+ALIKE = 1e-9
+"""Relative difference of distances that is no difference."""
+
+_ITERATIONS = 200
+_FEASIBLE = 1e-10  # violation of scaled coefficients, up to which a point counts as on the edge
+_STATIONARY = 1e-8
+_KEPT = 64  # solvers, of so many edges and models
+
+
+@dataclass(frozen=True)
+class Approach:
+    """Where one run ended, in weights; `refined` where the conditions of a nearest point hold to rounding."""
+
+    u: Array = field(default_factory=lambda: np.zeros(0))
+    refined: bool = False
+
+    @property
+    def distance(self) -> float:
+        """√Σ u²; inf for no point."""
+        return float(np.linalg.norm(self.u)) if self.u.size else math.inf
+
+
+def approach(place: Place, edge: Edge, sign: float, size: float) -> Callable[[Array, float], Approach | None]:
+    """A function from a start, and a distance to beat, to a nearest point of an edge; None where it ends elsewhere.
+
+    Args:
+        sign: sign of a0 on the side of the edge that is stable or heavily damped.
+        size: distance to expect, the unit in which the NLP measures.
+    """
+    solver, n = _solver(place, edge), len(place.weights)
+    numbers = (place.parameters[name] for name in place.problem.parameter_set.names)
+    nlp = replace(
+        solver.nlp,
+        lower=(*(place.space.lower / size).tolist(), *solver.nlp.lower[n:]),
+        upper=(*(place.space.upper / size).tolist(), *solver.nlp.upper[n:]),
+        settings=(*numbers, *place.weights.values(), *place.scale.tolist(), *place.sizes.tolist(), sign, size),
+    )
+
+    def from_start(u: Array, below: float) -> Approach | None:
+        c = sign * place.space.coefficients(u)
+        if not (np.all(np.isfinite(c)) and c.any()):
+            return None
+        raw = solver.run(np.concatenate([u / size, edge.guess(c)]), nlp)
+        if float(np.linalg.norm(raw.x[:n])) * size >= below * (1 - ALIKE):
+            return None
+        point = solver.polish(raw, nlp)
+        if not point.violation <= _FEASIBLE:
+            return None
+        u_found = np.clip(point.x[:n] * size, place.space.lower, place.space.upper)
+        return Approach(u_found, point.stationarity <= _STATIONARY)
+
+    return from_start
+
+
+@dataclass(frozen=True)
+class _Solver:
+    """What finds nearest points of one edge, for every design of a model."""
+
+    nlp: NLP
+    run: Callable[[Array, NLP], Run]
+    polish: Callable[[Run, NLP], Point]
+
+
+_BUILT = threading.local()  # a solver belongs to one thread
+
+
+def _solver(place: Place, edge: Edge) -> _Solver:
+    """The solver for an edge, kept: what differs between designs are parameters of the NLP."""
+    known: OrderedDict[Hashable, _Solver] = vars(_BUILT).setdefault("solvers", OrderedDict())
+    key = (place.problem.model, place.problem.parameter_set.name, tuple(place.weights), edge.name)
+    if key not in known:
+        nlp = _nlp(place, edge)
+        known[key] = _Solver(nlp, ipopt(nlp, max_iterations=_ITERATIONS), polisher(nlp))
+        if len(known) > _KEPT:
+            known.popitem(last=False)
+    known.move_to_end(key)
+    return known[key]
+
+
+def _nlp(place: Place, edge: Edge) -> NLP:
+    """Minimise y·y, y = u/size, over displacements and the unknowns of the edge.
+
+    Its settings are the parameters, the weights, scales and sizes of the coefficients, the sign of a0, and the size.
+    """
+    model, of = place.problem.model, place.problem.parameter_set
+    n, extra = len(place.weights), len(edge.unknowns)
+    parts = (len(of.names), n, model.degree + 1, model.degree + 1, 2)
+    x, p = ca.SX.sym("x", n + extra), ca.SX.sym("p", sum(parts))
+    columns = iter(ca.vertsplit(p))
+    numbers, weights, scale, sizes, (sign, size) = ([next(columns) for _ in range(count)] for count in parts)
+    y, unknowns = [x[k] for k in range(n)], [x[n + k] for k in range(extra)]
+    parameters = dict(zip(of.names, numbers, strict=True))
+    moved = {name: parameters[name] + weights[k] * size * y[k] for k, name in enumerate(place.weights)}
+    a = model.coefficients({**parameters, **moved}, of)
+    c = [sign * coefficient / unit for coefficient, unit in zip(a, scale, strict=True)]
+    equations = [e / sizes[k] for e, k in zip(edge.equations(c, unknowns), edge.powers, strict=True)]
+    others = edge.nonnegative(c, unknowns)
+    f, g = sum(v * v for v in y), ca.vertcat(*equations, *others)
+    return NLP(
+        formulation="nearest",
+        variables=(*place.weights, *edge.unknowns),
+        functions=ca.Function("nlp", [x, p], [f, g]),
+        lower=(-np.inf,) * n + (0.0,) * extra,
+        upper=(np.inf,) * n + edge.upper,
+        rows=(*[edge.name] * len(equations), *["others"] * len(others)),
+        row_lower=(0.0,) * (len(equations) + len(others)),
+        row_upper=(*[0.0] * len(equations), *[np.inf] * len(others)),
+        settings=(np.nan,) * sum(parts),
+    )
