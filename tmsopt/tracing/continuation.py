@@ -11,6 +11,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 from scipy.optimize import brentq
+from scipy.spatial.distance import cdist
 
 from tmsopt.records import Array
 
@@ -139,27 +140,41 @@ def project(system: ca.Function, y: Array, held: int | None = None, steps: int =
 
     `system` gives the equations, any number of them, and their Jacobian.
     """
-    moving = [k for k in range(y.size) if k != held]
-    value, jacobian = _evaluate(system, y)
+    found = projected(system, y[None], [held], steps)[0]
+    return None if np.isnan(found[0]) else found
+
+
+def projected(system: ca.Function, y: Array, held: Sequence[int | None], steps: int = 40) -> Array:
+    """`project` of every row of y, each on its own, all at once; rows of nan where nothing is found."""
+    found = np.full(y.shape, np.nan)
+    moving = np.array([[k != h for k in range(y.shape[1])] for h in held], dtype=float)
+    rows, (value, jacobian) = np.arange(len(y)), _evaluate(system, y)
     for _ in range(steps):
-        if not (np.all(np.isfinite(value)) and np.all(np.isfinite(jacobian))):
-            return None
-        size = float(np.abs(value).max())
-        step = np.zeros(y.size)
-        step[moving] = np.linalg.lstsq(jacobian[:, moving], -value, rcond=1e-12)[0]
-        if np.abs(step).max() <= 1e-13 * (1 + np.abs(y).max()):
-            solved = size <= _SOLVED * float(np.abs(jacobian).max()) * (1 + float(np.abs(y).max()))
-            return y + step if solved else None
-        damping = 1.0
-        while damping > 1e-3:
-            trial, slope = _evaluate(system, y + damping * step)
-            if np.all(np.isfinite(trial)) and np.abs(trial).max() < size:
-                break
-            damping /= 2
-        else:
-            return y if size <= 1e-13 else None
-        y, value, jacobian = y + damping * step, trial, slope
-    return None
+        proper = np.all(np.isfinite(value), axis=1) & np.all(np.isfinite(jacobian), axis=(1, 2))
+        rows, y, value, jacobian = (part[proper] for part in (rows, y, value, jacobian))
+        if not rows.size:
+            break
+        size = np.abs(value).max(axis=1)
+        step = -np.linalg.pinv(jacobian * moving[rows, None], rcond=1e-12) @ value[..., None]
+        step, most = step[..., 0] * moving[rows], np.abs(y).max(axis=1)
+        ended = np.abs(step).max(axis=1) <= 1e-13 * (1 + most)
+        solved = ended & (size <= _SOLVED * np.abs(jacobian).max(axis=(1, 2)) * (1 + most))
+        found[rows[solved]] = (y + step)[solved]
+        rows, y, size, step = (part[~ended] for part in (rows, y, size, step))
+        trial, damping, left = y.copy(), 1.0, np.arange(len(y))
+        value, jacobian = value[~ended], jacobian[~ended]
+        before = value.copy()
+        while left.size and damping > 1e-3:
+            trial[left] = y[left] + damping * step[left]
+            value[left], jacobian[left] = _evaluate(system, trial[left])
+            lower = np.all(np.isfinite(trial[left]), axis=1) & (np.abs(value[left]).max(axis=1) < size[left])
+            left, damping = left[~lower], damping / 2
+        there = left[size[left] <= 1e-13]
+        found[rows[there]] = y[there]
+        better = np.ones(len(rows), dtype=bool)
+        better[left] = False
+        rows, y, value, jacobian = (part[better] for part in (rows, trial, value, jacobian))
+    return found
 
 
 def walk(on: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
@@ -211,15 +226,20 @@ def between(on: Curve, y: Array, t: Array, s: float) -> tuple[Array, Array]:
     return new, tangent
 
 
-def contains(on: Curve, walked: Walk, y: Array) -> bool:
-    """Whether a point lies on a curve already walked."""
-    distance = np.linalg.norm(walked.y - y, axis=1)
-    k = int(np.argmin(distance))
+def contains(on: Curve, walked: Walk, y: Array) -> Any:
+    """Whether a point lies on a curve already walked; which of several do, if y has shape (points, n + 1)."""
+    points = np.atleast_2d(y)
+    apart = cdist(points, walked.y)
+    k = np.argmin(apart, axis=1)
     gaps = np.linalg.norm(np.diff(walked.y, axis=0), axis=1)
-    if distance[k] > 2 * gaps[max(k - 1, 0) : k + 1].max():
-        return False
-    new, _ = between(on, walked.y[k], walked.t[k], float(walked.t[k] @ (y - walked.y[k])))
-    return bool(np.abs(new - y).max() <= _SAME * (1 + np.abs(y).max()))
+    gaps = np.maximum(np.append(gaps, 0.0)[k], np.insert(gaps, 0, 0.0)[k])
+    near = np.flatnonzero(apart[np.arange(len(k)), k] <= 2 * gaps)
+    k, there = k[near], np.zeros(len(points), dtype=bool)
+    if near.size:
+        s = np.sum(walked.t[k] * (points[near] - walked.y[k]), axis=1)
+        new = np.array(on.advance(walked.y[k].T, walked.t[k].T, s[None], walked.y[k].T)[0]).T
+        there[near] = np.abs(new - points[near]).max(axis=1) <= _SAME * (1 + np.abs(points[near]).max(axis=1))
+    return there if y.ndim > 1 else bool(there[0])
 
 
 def same(one: Walk, other: Walk) -> bool:
@@ -272,8 +292,9 @@ class _Advance:
 
 
 def _evaluate(system: ca.Function, y: Array) -> tuple[Array, Array]:
-    value, jacobian = system(y)
-    return np.array(value).ravel(), np.array(jacobian)
+    """Equations and Jacobians at the rows of y, shapes (rows, m) and (rows, m, n)."""
+    value, jacobian = (np.array(part) for part in system(y.T))
+    return value.T, jacobian.reshape(len(jacobian), *y.shape).transpose(1, 0, 2)
 
 
 def _reach(on: Curve, y: Array, t: Array) -> float:

@@ -1,6 +1,6 @@
 """How large the coefficients of a problem are over its box, so that no unit of time or mass matters."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
@@ -13,7 +13,8 @@ from tmsopt.errors import Fault, InputError
 from tmsopt.formulation.formulate import matching, variables_of
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import spread
-from tmsopt.records import Array
+from tmsopt.models import Values
+from tmsopt.records import Array, Complex, Truth
 from tmsopt.roots import Pattern, pattern as pattern_of, roots
 from tmsopt.tracing.continuation import Curve, curve
 
@@ -27,11 +28,11 @@ class Sizes:
 
     of: Array
 
-    def leads(self, a: Array) -> bool:
-        """Whether a0 is there at all, beside the others: at a0 = a1 = … = 0 any factors fit."""
+    def leads(self, a: Array) -> Truth:
+        """Whether a0 is there at all, beside the others: at a0 = a1 = … = 0 any factors fit; a of shape (…, n + 1)."""
         known = self.of > 0
-        share = np.abs(a[known]) / self.of[known]
-        return bool(abs(a[0]) > _VANISHED * self.of[0] * share.max(initial=0.0))
+        share = np.abs(a[..., known]) / self.of[known]
+        return np.asarray(np.abs(a[..., 0]) > _VANISHED * self.of[0] * share.max(axis=-1, initial=0.0))
 
 
 def sizes(problem: Problem) -> Sizes:
@@ -82,7 +83,7 @@ def prepare(problem: Problem) -> Traced:
             lower[free + k] = 0.0
     scale = unit.copy()
     scale[:free] = upper[:free] - lower[:free]
-    sample = [starting_points(nlp, problem, d, 1) for d, _ in zip(spread(problem, 0), range(_SAMPLE), strict=False)]
+    sample = starting_points(nlp, problem, list(islice(spread(problem, 0), _SAMPLE)), 1)
     known = np.array([s[0] for s in sample if s]).reshape(-1, len(nlp.variables))
     if known.size:
         scale[free:] = np.clip(np.median(np.abs(known[:, free:]), axis=0), 0.1 * unit[free:], 1e3 * unit[free:])
@@ -96,18 +97,25 @@ def design_at(problem: Problem, x: Array) -> dict[str, Any]:
     return {n: np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, x.T, strict=False)}
 
 
-def starting_points(nlp: NLP, problem: Problem, design: Mapping[str, float], count: int | None) -> list[Array]:
-    """All variables for a design, for the first guesses of the pattern's unknowns, as many as asked for, or all."""
-    values = problem.values(problem.ordered(design))
-    a = np.array([float(c) for c in values.coefficients])
-    if a[0] == 0 or not np.all(np.isfinite(a)):
-        return []
-    z = roots(a)
+def starting_points(
+    nlp: NLP, problem: Problem, designs: Sequence[Mapping[str, float]], count: int | None = None
+) -> list[list[Array]]:
+    """All variables for each design, for the first guesses of the pattern's unknowns, as many as asked for, or all."""
+    values = [problem.values(problem.ordered(d)) for d in designs]
+    a = np.array([[float(c) for c in v.coefficients] for v in values]).reshape(len(values), problem.model.degree + 1)
+    proper = np.all(np.isfinite(a), axis=1) & (a[:, 0] != 0)
+    found = iter(roots(a[proper]) if np.any(proper) else ())
+    return [
+        _guessed(nlp, variables_of(problem, d), v, next(found), count) if there else []
+        for d, v, there in zip(designs, values, proper, strict=True)
+    ]
+
+
+def _guessed(nlp: NLP, x: Sequence[float], values: Values, z: Complex, count: int | None) -> list[Array]:
     guesses = [
         lift.guess([values], [z / nlp.unit if k else z]) for k, lift in enumerate(nlp.lifts)
     ]  # those in its unit
     if not all(guesses):
         return []
     others = [c for guess in guesses[1:] for c in guess[0]]
-    x = variables_of(problem, design)
     return [np.array([*x, *first, *others]) for first in guesses[0][:count]]

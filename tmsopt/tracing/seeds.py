@@ -1,6 +1,7 @@
 """A coarse grid over the plane of two free parameters, to see where branches of a pattern may be missing."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import cycle, islice
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.formulation.starts import spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots.meetings import CLOSED
-from tmsopt.tracing.continuation import INFINITE, Walk, project
+from tmsopt.tracing.continuation import INFINITE, Walk, projected
 from tmsopt.tracing.equations import Traced, design_at, starting_points
 
 _BACK = 300.0  # size of an unknown from which a curve is looked for on the other side of infinity
@@ -123,17 +124,18 @@ def seeds(
     problem = ready.problem
     free = len(problem.free)
     given = [*through, *([problem.start] if set(problem.start) == set(problem.free) else [])]
-    for design in given:
-        for guess in range(_GUESSES):
-            yield 0, _seed(ready, design, guess, None)
-    vain, known = 0, len(lines)
-    for count, design in enumerate(spread(problem, seed)):
-        if vain >= starts or count >= _ROUNDS * starts or (count >= starts and _swept(ready)):
-            return
-        held = [None, *range(free)][count % (free + 1)]
-        for guess in range(_GUESSES):
-            yield count + 1, _seed(ready, design, guess, held)
-        vain, known = (vain + 1 if len(lines) == known else 0), len(lines)
+    for found in _seeds(ready, given, [None] * len(given)):
+        yield from ((0, y) for y in found)
+    vain, known, count = 0, len(lines), 0
+    ways = cycle([None, *range(free)])
+    designs = spread(problem, seed)
+    while count < (starts if _swept(ready) else _ROUNDS * starts):
+        for found in _seeds(ready, list(islice(designs, starts)), list(islice(ways, starts))):
+            if vain >= starts:
+                return
+            count += 1
+            yield from ((count, y) for y in found)
+            vain, known = (vain + 1 if len(lines) == known else 0), len(lines)
 
 
 def _swept(ready: Traced) -> bool:
@@ -145,7 +147,7 @@ def missed(ready: Traced, lines: Sequence[Mapping[str, Array]]) -> Iterator[tupl
     """Points of the curve where a test function of the pattern changes sign over a grid, off the lines so far."""
     if ready.pattern.test is not None and _swept(ready):
         for design in unexplained(ready.problem, ready.pattern.test, lines):
-            yield 0, _seed(ready, design, None, None)
+            yield 0, _nearest(ready, design)
 
 
 def beyond_infinity(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int, Array | None]]:
@@ -165,22 +167,37 @@ def beyond_infinity(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int,
                 (here, far), weight = (y[begin, :free], y[-1, :free]), size[begin] / size[-1]
                 limit = (far - weight * here) / (1 - weight)
                 x = (2 * limit - here) * ready.on.scale[:free]
-                yield 0, _seed(ready, {n: float(v) for n, v in design_at(ready.problem, x).items()}, None, None)
+                yield 0, _nearest(ready, {n: float(v) for n, v in design_at(ready.problem, x).items()})
 
 
-def _seed(ready: Traced, design: Mapping[str, float], guess: int | None, held: int | None) -> Array | None:
-    """A point of the curve near a design, from a guess of that number, or the best guess."""
+def _seeds(
+    ready: Traced, designs: Sequence[Mapping[str, float]], held: Sequence[int | None]
+) -> list[list[Array | None]]:
+    """Points of the curve near each design, one for each of the first guesses, with one variable held."""
+    tried = starting_points(ready.nlp, ready.problem, designs, _GUESSES)
+    every = [(x, h) for each, h in zip(tried, held, strict=True) for x in each]
+    found = iter(_on_curve(ready, [x for x, _ in every], [h for _, h in every]))
+    return [[next(found) for _ in each] or [None] for each in tried]
+
+
+def _nearest(ready: Traced, design: Mapping[str, float]) -> Array | None:
+    """A point of the curve near a design, from the best guess."""
+    (tried,) = starting_points(ready.nlp, ready.problem, [design])
+    if not tried:
+        return None
+    mismatch = np.abs(np.array(ready.on.evaluate(np.array(tried).T / ready.on.scale[:, None])[0])).max(axis=0)
+    return _on_curve(ready, [tried[int(np.argmin(mismatch))]], [None])[0]
+
+
+def _on_curve(ready: Traced, x: Sequence[Array], held: Sequence[int | None]) -> list[Array | None]:
+    """The points of the curve that the variables x lead to; None where they lead to none in the box, or too far."""
+    if not x:
+        return []
     on, free = ready.on, len(ready.problem.free)
-    tried = starting_points(ready.nlp, ready.problem, design, None if guess is None else guess + 1)
-    if guess is None:
-        x = min(tried, key=lambda t: float(np.abs(np.array(on.evaluate(t / on.scale)[0])).max()), default=None)
-    else:
-        x = next(iter(tried[guess:]), None)
-    if x is None:
-        return None
-    y = project(on.evaluate, x / on.scale, held)
-    if y is None or not np.all((y >= on.lower - 1e-12) & (y <= on.upper + 1e-12)) or np.abs(y[free:]).max() > _FAR:
-        return None
+    y = projected(on.evaluate, np.array(x) / on.scale, held)
+    inside = np.all((y >= on.lower - 1e-12) & (y <= on.upper + 1e-12), axis=1)  # not where it is nan
+    inside &= np.abs(y[:, free:]).max(axis=1) <= _FAR
     y = np.clip(y, on.lower, on.upper)
-    a = ready.problem.values(ready.problem.ordered(design_at(ready.problem, y * on.scale))).coefficients
-    return y if ready.size.leads(np.array([float(c) for c in a])) else None
+    a = coefficients(ready.problem, design_at(ready.problem, y[inside] * on.scale))
+    inside[inside] = ready.size.leads(a)
+    return [point if there else None for point, there in zip(y, inside, strict=True)]
