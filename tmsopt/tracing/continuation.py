@@ -4,16 +4,16 @@ Keller's method: predict along the tangent, correct by Newton's method on F = 0 
 three corrections and the new tangent are one CasADi function of scalar operations, so that a point costs one call.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import brentq
 from scipy.spatial.distance import cdist
 
-from tmsopt.records import Array
+from tmsopt.records import Array, Truth
+from tmsopt.tracing.solving import crossing, evaluated, rows_of
 
 _CONVERGED = 1e-8  # last Newton step, relative to the point: the error left is its square
 _CONTRACTION = 0.1  # of the second Newton step against the first: slower means that the prediction was too far
@@ -22,8 +22,6 @@ _SMALLEST = 1e-12
 _GROWTH = 1.5
 _ROOM = 4.0  # steps of variables without a box, against those with one: nobody looks at their spacing
 _REMOTE = 100.0  # units of the scale beyond which points lie ever further apart, towards infinity
-_SOLVED = 1e-10  # residual, relative to the terms, of a solution: a stationary point of the residual is none
-_FINE = 1e-17
 _FAR = 1e6  # in units of the scale; further out the equations lose their digits
 _FADING = 1e5  # there a step that fails has lost them already: which one does is up to rounding, the limit is not
 _SAME = 1e-7
@@ -83,7 +81,7 @@ def curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> C
 
     def scaled(at: Any) -> tuple[Any, Any]:
         value, jacobian = system(at * unit)
-        return value, ca.densify(jacobian) @ ca.diag(unit)
+        return ca.densify(value), ca.densify(ca.densify(jacobian) @ ca.diag(unit))
 
     z, sizes = y + s * t, []
     for _ in range(3):
@@ -121,7 +119,7 @@ def tangent_at(on: Curve, y: Array) -> Array:
     Raises:
         ValueError: where the equations do not determine a direction.
     """
-    jacobian = np.array(on.evaluate(y)[1])
+    jacobian = evaluated(on.evaluate, y[None])[1][0]
     singular = np.linalg.svd(_even(_even(jacobian, 0), 1), compute_uv=False)
     rows = np.linalg.svd(jacobian)[2]
     if singular[-1] <= _ISOLATED * singular[0]:
@@ -133,48 +131,6 @@ def _even(matrix: Array, axis: int) -> Array:
     """Columns or rows of norm 1, so that units, which differ by much beside infinity, do not make it look singular."""
     norm = np.linalg.norm(matrix, axis=axis, keepdims=True)
     return np.asarray(matrix / np.where(norm > 0, norm, 1.0))
-
-
-def project(system: ca.Function, y: Array, held: int | None = None, steps: int = 40) -> Array | None:
-    """A solution near y by damped Gauss–Newton, optionally with one variable held; None if not found.
-
-    `system` gives the equations, any number of them, and their Jacobian.
-    """
-    found = projected(system, y[None], [held], steps)[0]
-    return None if np.isnan(found[0]) else found
-
-
-def projected(system: ca.Function, y: Array, held: Sequence[int | None], steps: int = 40) -> Array:
-    """`project` of every row of y, each on its own, all at once; rows of nan where nothing is found."""
-    found = np.full(y.shape, np.nan)
-    moving = np.array([[k != h for k in range(y.shape[1])] for h in held], dtype=float)
-    rows, (value, jacobian) = np.arange(len(y)), _evaluate(system, y)
-    for _ in range(steps):
-        proper = np.all(np.isfinite(value), axis=1) & np.all(np.isfinite(jacobian), axis=(1, 2))
-        rows, y, value, jacobian = (part[proper] for part in (rows, y, value, jacobian))
-        if not rows.size:
-            break
-        size = np.abs(value).max(axis=1)
-        step = -np.linalg.pinv(jacobian * moving[rows, None], rcond=1e-12) @ value[..., None]
-        step, most = step[..., 0] * moving[rows], np.abs(y).max(axis=1)
-        ended = np.abs(step).max(axis=1) <= 1e-13 * (1 + most)
-        solved = ended & (size <= _SOLVED * np.abs(jacobian).max(axis=(1, 2)) * (1 + most))
-        found[rows[solved]] = (y + step)[solved]
-        rows, y, size, step = (part[~ended] for part in (rows, y, size, step))
-        trial, damping, left = y.copy(), 1.0, np.arange(len(y))
-        value, jacobian = value[~ended], jacobian[~ended]
-        before = value.copy()
-        while left.size and damping > 1e-3:
-            trial[left] = y[left] + damping * step[left]
-            value[left], jacobian[left] = _evaluate(system, trial[left])
-            lower = np.all(np.isfinite(trial[left]), axis=1) & (np.abs(value[left]).max(axis=1) < size[left])
-            left, damping = left[~lower], damping / 2
-        there = left[size[left] <= 1e-13]
-        found[rows[there]] = y[there]
-        better = np.ones(len(rows), dtype=bool)
-        better[left] = False
-        rows, y, value, jacobian = (part[better] for part in (rows, trial, value, jacobian))
-    return found
 
 
 def walk(on: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
@@ -220,26 +176,24 @@ def both_ways(on: Curve, y: Array, step: float, most: int) -> Walk | None:
     return Walk(points, tangents, (back.ends[1], ahead.ends[1]))
 
 
-def between(on: Curve, y: Array, t: Array, s: float) -> tuple[Array, Array]:
-    """The point and tangent at arclength s beyond a point of the curve, s no more than a step."""
-    new, tangent, _ = (np.array(part).ravel() for part in on.advance(y, t, s, y))
+def between(on: Curve, y: Array, t: Array, s: Array) -> tuple[Array, Array]:
+    """Points and tangents at arclengths s beyond points of the curve, a row each, s no more than a step."""
+    new, tangent, _ = rows_of(on.advance, y, t, s[:, None], y)
     return new, tangent
 
 
-def contains(on: Curve, walked: Walk, y: Array) -> Any:
-    """Whether a point lies on a curve already walked; which of several do, if y has shape (points, n + 1)."""
-    points = np.atleast_2d(y)
-    apart = cdist(points, walked.y)
+def contains(on: Curve, walked: Walk, y: Array) -> Truth:
+    """Which of some points, shape (points, n + 1), lie on a curve already walked."""
+    apart = cdist(y, walked.y)
     k = np.argmin(apart, axis=1)
     gaps = np.linalg.norm(np.diff(walked.y, axis=0), axis=1)
     gaps = np.maximum(np.append(gaps, 0.0)[k], np.insert(gaps, 0, 0.0)[k])
-    near = np.flatnonzero(apart[np.arange(len(k)), k] <= 2 * gaps)
-    k, there = k[near], np.zeros(len(points), dtype=bool)
-    if near.size:
-        s = np.sum(walked.t[k] * (points[near] - walked.y[k]), axis=1)
-        new = np.array(on.advance(walked.y[k].T, walked.t[k].T, s[None], walked.y[k].T)[0]).T
-        there[near] = np.abs(new - points[near]).max(axis=1) <= _SAME * (1 + np.abs(points[near]).max(axis=1))
-    return there if y.ndim > 1 else bool(there[0])
+    there = apart[np.arange(len(k)), k] <= 2 * gaps
+    if np.any(there):
+        k, y = k[there], y[there]
+        new, _ = between(on, walked.y[k], walked.t[k], np.sum(walked.t[k] * (y - walked.y[k]), axis=1))
+        there[there] = np.abs(new - y).max(axis=1) <= _SAME * (1 + np.abs(y).max(axis=1))
+    return np.asarray(there)
 
 
 def same(one: Walk, other: Walk) -> bool:
@@ -252,16 +206,6 @@ def same(one: Walk, other: Walk) -> bool:
         return any(abs(one.t[row] @ other.t[k]) >= _COSINE for k in near)
 
     return shared(0) and shared(-1)
-
-
-def crossing(function: Callable[[float], float], end: float) -> float:
-    """Where a function that changes sign on [0, end] is 0."""
-    if function(0.0) == 0:
-        return 0.0
-    if function(end) == 0:
-        return end
-    # a zero at 0 up to rounding has no relative accuracy: that of the whole step is enough
-    return float(brentq(function, 0.0, end, xtol=_FINE * abs(end), rtol=4 * np.finfo(float).eps, disp=False))
 
 
 class _Advance:
@@ -289,12 +233,6 @@ class _Advance:
         """Whether the curve, followed from y by s, meets the origin."""
         new = self(y, t, s)[0]
         return bool(np.abs(new - self._arguments[3]).max() <= _SAME * (1 + np.abs(new).max()))
-
-
-def _evaluate(system: ca.Function, y: Array) -> tuple[Array, Array]:
-    """Equations and Jacobians at the rows of y, shapes (rows, m) and (rows, m, n)."""
-    value, jacobian = (np.array(part) for part in system(y.T))
-    return value.T, jacobian.reshape(len(jacobian), *y.shape).transpose(1, 0, 2)
 
 
 def _reach(on: Curve, y: Array, t: Array) -> float:

@@ -14,8 +14,9 @@ from tmsopt.records import Array, Table
 from tmsopt.roots import Pattern, pattern as pattern_of, roots
 from tmsopt.roots.patterns.pattern import mean_size
 from tmsopt.tracing.branch import Branch, Event
-from tmsopt.tracing.continuation import CLOSED, Curve, End, Walk, project
+from tmsopt.tracing.continuation import CLOSED, Curve, End, Walk
 from tmsopt.tracing.monitors import all_real, parameters_of, satisfied, stability, values_of, vanishes
+from tmsopt.tracing.solving import project
 from tmsopt.tracing.zeros import TOGETHER, Found, located, refined
 
 _NEAR = 1e-3  # distance within which an EP4 is looked for beside an EP3 and a 2EP2
@@ -239,7 +240,7 @@ def _exact_EP4(problem: Problem, pattern: Pattern, on: Curve, event: Found) -> F
     terms = [(ca.fabs(p) + ca.fabs(q)) / size**k for k, (p, q) in enumerate(zip(a, matched, strict=True))][1:]
     equations = ca.vertcat(*rows)
     mismatch = ca.Function("mismatch", [y], [equations / ca.vertcat(*terms)])
-    system = ca.Function("EP4", [y], [equations, ca.densify(ca.jacobian(equations, y))])
+    system = ca.Function("EP4", [y], [ca.densify(equations), ca.densify(ca.jacobian(equations, y))])
     end = project(system, np.array([*start[:free], *guess]) / scale)
     if end is None or np.abs(end[:free] - event.y[:free]).max() > _NEAR:
         return None

@@ -4,7 +4,7 @@ On one side of such a curve a large root is negative, on the other positive: it 
 roots are stable, and heavy damping where they are real and negative.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, islice
 
@@ -17,10 +17,11 @@ from tmsopt.models import Values
 from tmsopt.records import Array, Truth
 from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.meetings import meeting
-from tmsopt.tracing.continuation import Curve, Walk, between, both_ways, contains, crossing, curve, project
+from tmsopt.tracing.continuation import Curve, Walk, between, both_ways, contains, curve
 from tmsopt.tracing.equations import design_at, sizes
 from tmsopt.tracing.monitors import margins, sign_changes
 from tmsopt.tracing.seeds import unexplained
+from tmsopt.tracing.solving import crossing, projected, rows_of
 
 _NOTHING = 1e-12  # of its size over the box: a constant term this small all along the curve vanishes with a0
 _MOST = 10**6
@@ -57,7 +58,7 @@ def through_infinity(problem: Problem, step: float, starts: int, seed: int) -> I
     lower, upper = np.array(ends).T
     on = curve(x, ca.SX(a[0]), upper - lower, lower, upper)
     along = ca.dot(ca.gradient(a[0], x), ca.gradient(ca.SX(a[-1]), x))
-    rest = ca.Function("rest", [x], [ca.vertcat(*a[1:], along)])
+    rest = ca.Function("rest", [x], [ca.densify(ca.vertcat(*a[1:], along))])
     usual = float(sizes(problem).of[-1])
     for walked in _walks(problem, on, step, starts, seed):
         x_on, bounds, changes = _judged(on, walked, rest, usual)
@@ -68,11 +69,17 @@ def _walks(problem: Problem, on: Curve, step: float, starts: int, seed: int) -> 
     of = problem.parameter_set
     walks: list[Walk] = []
     lines: list[dict[str, Array]] = []
-    spots = chain(islice(spread(problem, seed), starts), unexplained(problem, lambda a: a[0], lines))
-    for count, design in enumerate(spots):
-        start = np.array([np.tan(v) if of[n].tangent else v for n, v in design.items()]) / on.scale
-        y = project(on.evaluate, start, held=count % 2)
-        if y is None or np.any(y < on.lower) or np.any(y > on.upper) or any(contains(on, w, y) for w in walks):
+
+
+    def found(designs: Sequence[Mapping[str, float]], first: int) -> Array:
+        at = [[np.tan(v) if of[n].tangent else v for n, v in d.items()] for d in designs]
+        return projected(on.evaluate, np.array(at) / on.scale, [(first + k) % 2 for k in range(len(designs))])
+
+    spots = list(islice(spread(problem, seed), starts))
+    missed = (found([d], k)[0] for k, d in enumerate(unexplained(problem, lambda a: a[0], lines), starts))
+    for y in chain(found(spots, 0) if spots else (), missed):
+        inside = np.all((on.lower <= y) & (y <= on.upper))  # not where it is nan
+        if not inside or any(contains(on, w, y[None])[0] for w in walks):
             continue
         walked = both_ways(on, y, step, _MOST)
         if walked is not None:
@@ -87,7 +94,7 @@ def _judged(
     """Points with every change among them, and what each segment between them bounds."""
 
     def values(y: Array) -> Array:
-        return np.array(rest.map(len(y))((y * on.scale).T)).T
+        return rows_of(rest, y * on.scale)[0]
 
     known = values(walked.y)
     vanishing = bool(np.all(np.abs(known[:, -2]) <= _NOTHING * usual))
@@ -103,13 +110,16 @@ def _judged(
             named.append((v[:, -1], "capsize"))
         return np.stack([q for q, _ in named], axis=-1), [name for _, name in named]
 
+    def beyond(i: int, s: float) -> Array:
+        return between(on, walked.y[[i]], walked.t[[i]], np.array([s]))[0]
+
     columns, names = quantities(known)
     found: list[tuple[int, float, str]] = []
     for k, name in enumerate(names):
         for i in np.flatnonzero(sign_changes(columns[:, k])):
 
             def at(s: float, i: int = int(i), k: int = k) -> float:
-                return float(quantities(values(between(on, walked.y[i], walked.t[i], s)[0][None]))[0][0, k])
+                return float(quantities(values(beyond(i, s)))[0][0, k])
 
             end = float(walked.t[i] @ (walked.y[i + 1] - walked.y[i]))
             if at(0.0) * at(end) <= 0:
@@ -120,7 +130,7 @@ def _judged(
     for before, s, name in sorted(found):
         if s > 0:
             shift += 1
-            y.insert(before + shift, between(on, walked.y[before], walked.t[before], s)[0])
+            y.insert(before + shift, beyond(before, s)[0])
         rows[before + shift] = name
     points = np.array(y)
     bounds = _classes(values((points[1:] + points[:-1]) / 2), vanishing)

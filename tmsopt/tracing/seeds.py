@@ -10,8 +10,9 @@ from tmsopt.design.problem import Problem
 from tmsopt.formulation.starts import spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots.meetings import CLOSED
-from tmsopt.tracing.continuation import INFINITE, Walk, projected
+from tmsopt.tracing.continuation import INFINITE, Walk
 from tmsopt.tracing.equations import Traced, design_at, starting_points
+from tmsopt.tracing.solving import projected, rows_of
 
 _BACK = 300.0  # size of an unknown from which a curve is looked for on the other side of infinity
 _FAR = 1e5  # unknowns of a seed, in units of their scale: beyond, a0 all but vanishes
@@ -185,7 +186,7 @@ def _nearest(ready: Traced, design: Mapping[str, float]) -> Array | None:
     (tried,) = starting_points(ready.nlp, ready.problem, [design])
     if not tried:
         return None
-    mismatch = np.abs(np.array(ready.on.evaluate(np.array(tried).T / ready.on.scale[:, None])[0])).max(axis=0)
+    mismatch = np.abs(rows_of(ready.on.evaluate, np.array(tried) / ready.on.scale)[0]).max(axis=1)
     return _on_curve(ready, [tried[int(np.argmin(mismatch))]], [None])[0]
 
 

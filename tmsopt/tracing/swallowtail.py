@@ -19,8 +19,8 @@ from tmsopt.errors import Fault, InputError
 from tmsopt.records import Array, Shown, plain
 from tmsopt.roots import determinant, is_stable, real_roots
 from tmsopt.tracing.branch import Trace
-from tmsopt.tracing.continuation import project
 from tmsopt.tracing.equations import Traced, prepare
+from tmsopt.tracing.solving import project
 from tmsopt.tracing.trace import STARTS, trace
 
 Cut = tuple[float, str]

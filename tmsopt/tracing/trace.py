@@ -69,7 +69,7 @@ def trace(
         tried = max(tried, count)
         if progress:
             progress(tried, max(tried, starts))
-        if y is None or any(contains(ready.on, w, y) for w in walks):
+        if y is None or any(contains(ready.on, w, y[None])[0] for w in walks):
             continue
         before = time.perf_counter()
         found = both_ways(ready.on, y, step, most)

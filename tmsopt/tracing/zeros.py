@@ -9,8 +9,9 @@ from scipy.optimize import minimize_scalar
 from tmsopt.design.problem import Problem
 from tmsopt.records import Array
 from tmsopt.roots import Pattern
-from tmsopt.tracing.continuation import Curve, Walk, between, crossing
+from tmsopt.tracing.continuation import Curve, Walk, between
 from tmsopt.tracing.monitors import CHANGES, NOTHING, Mark, marks, sign_changes, stability, vanishes
+from tmsopt.tracing.solving import crossings
 
 TOGETHER = 1e-6
 """Distance, in units of the scale, within which events are one: each is located to 1e-12 or better."""
@@ -48,11 +49,11 @@ def refined(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walk
         for k in (np.flatnonzero(dips & (here > 0)) + 1).tolist():
 
             def height(s: float, k: int = k, mark: Mark = mark, sign: float = float(side[k - 1])) -> float:
-                return sign * _at(on, walked, k, mark, s)
+                return sign * float(_at(on, mark, walked.y[[k]], walked.t[[k]], np.array([s]))[0])
 
             ends = (-steps[k - 1], steps[k])
             s = float(minimize_scalar(height, bounds=ends, method="bounded", options={"xatol": 1e-14}).x)
-            y, t = between(on, walked.y[k], walked.t[k], s)
+            (y,), (t,) = between(on, walked.y[[k]], walked.t[[k]], np.array([s]))
             if np.abs(y - walked.y[k]).max() <= _ASTRAY * abs(s) and t @ walked.t[k] > 0:
                 added[(k, s) if s >= 0 else (k - 1, steps[k - 1] + s)] = y, t
     ys, ts = list(walked.y), list(walked.t)
@@ -68,23 +69,29 @@ def located(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walk
     u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]
     stable = stability(pattern.remaining(u), len(x))
     for mark, value in _live(problem, pattern, unknowns, x, walked.t):
-        for i in np.flatnonzero(sign_changes(value)):
-            if mark.detail == CHANGES and stable[i] == stable[i + 1]:
-                continue
-            end = float(walked.t[i] @ (walked.y[i + 1] - walked.y[i]))
+        rows = np.flatnonzero(sign_changes(value))
+        if mark.detail == CHANGES:
+            rows = rows[stable[rows] != stable[rows + 1]]
+        here, along = walked.y[rows], walked.t[rows]
 
-            def at(s: float, i: int = int(i), mark: Mark = mark) -> float:
-                return _at(on, walked, i, mark, s)
+        def at(s: Array, k: Array, mark: Mark = mark, here: Array = here, along: Array = along) -> Array:
+            return _at(on, mark, here[k], along[k], s)
 
-            if not np.sign(at(0.0)) * np.sign(at(end)) <= 0:  # of signs: the product of tiny numbers is 0
-                continue  # a jump through infinity, noise, or nan
-            s = crossing(at, end)
-            y, t = between(on, walked.y[i], walked.t[i], s)
-            if not np.abs(y - walked.y[i]).max() <= _ASTRAY * s + TOGETHER:
-                continue
-            if mark.name == "fold" and not _turns(walked, int(i), y, list(problem.free).index(mark.detail)):
-                continue
-            yield Found(mark.name, mark.detail, y, t, int(i), s)
+        if rows.size:
+            s = crossings(at, np.sum(along * (walked.y[rows + 1] - here), axis=1))
+            real = np.isfinite(s)  # else a jump through infinity, noise, or nan
+            yield from _true(problem, walked, mark, rows[real], s[real], *between(on, here[real], along[real], s[real]))
+
+
+def _true(
+    problem: Problem, walked: Walk, mark: Mark, rows: Array, s: Array, y: Array, t: Array
+) -> Iterator[Found]:
+    """Zeros of a mark without those that lie on another curve, and folds that are none."""
+    astray = np.abs(y - walked.y[rows]).max(axis=1) > _ASTRAY * s + TOGETHER
+    for k in np.flatnonzero(~astray):
+        i = int(rows[k])
+        if mark.name != "fold" or _turns(walked, i, y[k], list(problem.free).index(mark.detail)):
+            yield Found(mark.name, mark.detail, y[k], t[k], i, float(s[k]))
 
 
 def _live(problem: Problem, pattern: Pattern, unknowns: slice, x: Array, t: Array) -> Iterator[tuple[Mark, Array]]:
@@ -97,10 +104,10 @@ def _live(problem: Problem, pattern: Pattern, unknowns: slice, x: Array, t: Arra
             yield mark, value
 
 
-def _at(on: Curve, walked: Walk, k: int, mark: Mark, s: float) -> float:
-    """A mark at arclength s from a row of the walk."""
-    y, t = between(on, walked.y[k], walked.t[k], s)
-    return float(np.broadcast_to(mark.value((y * on.scale)[None], t[None]), 1)[0])
+def _at(on: Curve, mark: Mark, y: Array, t: Array, s: Array) -> Array:
+    """A mark at arclengths s from points of the curve."""
+    new, tangent = between(on, y, t, s)
+    return np.array(np.broadcast_to(mark.value(new * on.scale, tangent), len(s)))
 
 
 def _parabola(left: Array, here: Array, right: Array, before: Array, after: Array) -> tuple[Array, Array]:

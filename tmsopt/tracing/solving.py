@@ -1,0 +1,131 @@
+"""Where equations and functions vanish: many starts at once, each row of an array on its own."""
+
+from collections.abc import Callable, Sequence
+
+import casadi as ca
+import numpy as np
+from scipy.optimize import brentq
+
+from tmsopt.records import Array, Truth
+
+_SOLVED = 1e-10  # residual, relative to the terms, of a solution: a stationary point of the residual is none
+_DAMPING = 0.5 ** np.arange(1, 10)  # of a Gauss–Newton step that does not help
+_FINE = 1e-17
+_EPS = 4 * np.finfo(float).eps
+_HALVINGS = 100  # steps towards a zero, as many as `brentq` takes at most
+
+
+def project(system: ca.Function, y: Array, held: int | None = None, steps: int = 40) -> Array | None:
+    """A solution near y by damped Gauss–Newton, optionally with one variable held; None if not found.
+
+    `system` gives the equations, any number of them, and their Jacobian.
+    """
+    found = projected(system, y[None], [held], steps)[0]
+    return None if np.isnan(found[0]) else found
+
+
+def projected(system: ca.Function, y: Array, held: Sequence[int | None], steps: int = 40) -> Array:
+    """`project` of every row of y, each on its own, all at once; rows of nan where nothing is found."""
+    found = np.full(y.shape, np.nan)
+    moving = np.array([[k != h for k in range(y.shape[1])] for h in held], dtype=float)
+    rows, (value, jacobian) = np.arange(len(y)), evaluated(system, y)
+    for _ in range(steps):
+        proper = np.all(np.isfinite(value), axis=1) & np.all(np.isfinite(jacobian), axis=(1, 2))
+        rows, y, value, jacobian = (part[proper] for part in (rows, y, value, jacobian))
+        if not rows.size:
+            break
+        size = np.abs(value).max(axis=1)
+        step = -np.linalg.pinv(jacobian * moving[rows, None], rcond=1e-12) @ value[..., None]
+        step, most = step[..., 0] * moving[rows], np.abs(y).max(axis=1)
+        ended = np.abs(step).max(axis=1) <= 1e-13 * (1 + most)
+        solved = ended & (size <= _SOLVED * np.abs(jacobian).max(axis=(1, 2)) * (1 + most))
+        found[rows[solved]] = (y + step)[solved]
+        rows, y, size, step = (part[~ended] for part in (rows, y, size, step))
+        if not rows.size:
+            break
+        trial, value, jacobian = y + step, *evaluated(system, y + step)
+        left = np.flatnonzero(~_lower(trial, value, size))
+        if left.size:  # the longest shorter step that helps: all are tried at once
+            tried = y[left] + _DAMPING[:, None, None] * step[left]
+            values, jacobians = evaluated(system, tried.reshape(-1, y.shape[1]))
+            lower = _lower(tried, values.reshape(*tried.shape[:2], -1), size[left])
+            pick = np.argmax(lower, axis=0) * len(left) + np.arange(len(left))
+            trial[left], value[left], jacobian[left] = (
+                part[pick] for part in (tried.reshape(-1, y.shape[1]), values, jacobians)
+            )
+            left = left[~np.any(lower, axis=0)]
+        there = left[size[left] <= 1e-13]
+        found[rows[there]] = y[there]
+        better = np.ones(len(rows), dtype=bool)
+        better[left] = False
+        rows, y, value, jacobian = (part[better] for part in (rows, trial, value, jacobian))
+    return found
+
+
+def _lower(y: Array, value: Array, size: Array) -> Truth:
+    """Where trials are finite and their mismatch is less than before."""
+    return np.asarray(np.all(np.isfinite(y), axis=-1) & (np.abs(value).max(axis=-1) < size))
+
+
+def crossing(function: Callable[[float], float], end: float) -> float:
+    """Where a function that changes sign on [0, end] is 0."""
+    if function(0.0) == 0:
+        return 0.0
+    if function(end) == 0:
+        return end
+    # a zero at 0 up to rounding has no relative accuracy: that of the whole step is enough
+    return float(brentq(function, 0.0, end, xtol=_FINE * abs(end), rtol=4 * np.finfo(float).eps, disp=False))
+
+
+def crossings(function: Callable[[Array, Array], Array], ends: Array) -> Array:
+    """`crossing` on many intervals [0, end] at once, by Chandrupatla's method; nan where the sign does not change.
+
+    Args:
+        function: of the places and of the rows that they belong to.
+    """
+    every = np.arange(len(ends))
+    a, b = ends.astype(float), np.zeros(len(ends))
+    fa, fb = function(a, every), function(b, every)
+    found = np.where(fb == 0, b, np.where(fa == 0, a, np.nan))
+    rows = np.flatnonzero(np.sign(fa) * np.sign(fb) < 0)
+    a, b, fa, fb, least, share = a[rows], b[rows], fa[rows], fb[rows], _FINE * np.abs(ends[rows]), np.full(len(rows), 0.5)
+    for _ in range(_HALVINGS):
+        if not rows.size:
+            break
+        x = a + share * (b - a)
+        fx = function(x, rows)
+        kept = np.sign(fx) == np.sign(fa)  # the sign of which end; a is the newest place, c the one before it
+        c, fc = np.where(kept, a, b), np.where(kept, fa, fb)
+        b, fb = np.where(kept, b, a), np.where(kept, fb, fa)
+        a, fa = x, fx
+        best = np.where(np.abs(fa) < np.abs(fb), a, b)
+        found[rows] = best
+        with np.errstate(all="ignore"):
+            limit = (least + _EPS * np.abs(best)) / (2 * np.abs(b - a))
+            xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
+            inverse = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+            share = np.where((phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi), inverse, 0.5)
+        share = np.clip(share, limit, 1 - limit)
+        open_ = (limit <= 0.5) & (fa != 0) & (fb != 0) & np.isfinite(share)
+        a, b, fa, fb, least, share, rows = (part[open_] for part in (a, b, fa, fb, least, share, rows))
+    return found
+
+
+def evaluated(system: ca.Function, y: Array) -> tuple[Array, Array]:
+    """Equations and Jacobians at the rows of y, shapes (rows, m) and (rows, m, n)."""
+    value, jacobian = rows_of(system, y)
+    return value, jacobian.reshape(*y.shape, -1).transpose(0, 2, 1)
+
+
+def rows_of(function: ca.Function, *arguments: Array) -> list[Array]:
+    """A function of dense columns at every row of its arguments, without the cost of converting them."""
+    count = len(arguments[0])
+    buffer, trigger = (function if count == 1 else function.map(count)).buffer()
+    taken = [np.ascontiguousarray(a, dtype=float) for a in arguments]
+    given = [np.empty((count, function.numel_out(k))) for k in range(function.n_out())]
+    for k, a in enumerate(taken):
+        buffer.set_arg(k, memoryview(a.data))
+    for k, g in enumerate(given):
+        buffer.set_res(k, memoryview(g.data))
+    trigger()
+    return given
