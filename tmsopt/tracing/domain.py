@@ -160,10 +160,10 @@ def _near(problem: Problem, event: Event, corners: Sequence[Corner]) -> list[Cor
 def _parts(branch: Branch) -> Truth:
     """Where one side has a positive real root and the other, unstable too, has none."""
     rest = _rest(branch)
-    alone = np.ones(len(branch), dtype=bool)
-    if len(rest) > 1:
-        alone = real_roots(np.stack(np.broadcast_arrays(*rest), axis=-1))[1] == 0
-    return np.asarray(alone & (branch.unknowns["r"] > 0 if branch.pattern == "EP2" else ~branch.stable))
+    found = branch.unknowns["r"] > 0 if branch.pattern == "EP2" else ~branch.stable
+    if len(rest) > 1 and np.any(found):
+        found[found] = real_roots(np.stack(np.broadcast_arrays(*rest), axis=-1)[found])[1] == 0
+    return np.asarray(found)
 
 
 def _rest(branch: Branch) -> list[Any]:

@@ -13,7 +13,6 @@ from tmsopt.errors import Fault, InputError
 from tmsopt.formulation.formulate import matching, variables_of
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import spread
-from tmsopt.models import Values
 from tmsopt.records import Array, Complex, Truth
 from tmsopt.roots import Pattern, pattern as pattern_of, roots
 from tmsopt.tracing.continuation import Curve, curve
@@ -37,10 +36,22 @@ class Sizes:
 
 def sizes(problem: Problem) -> Sizes:
     """Sizes of the coefficients over the box of the free parameters."""
-    designs = islice(spread(problem, 0), _SAMPLE)
-    a = np.array([[float(c) for c in problem.values(problem.ordered(d)).coefficients] for d in designs])
+    a = _coefficients(problem, list(islice(spread(problem, 0), _SAMPLE)))
     a = np.abs(a[np.all(np.isfinite(a), axis=1)])
     return Sizes(np.median(a, axis=0) if len(a) else np.zeros(problem.model.degree + 1))
+
+
+def coefficients(problem: Problem, columns: Mapping[str, Array]) -> Array:
+    """Coefficients of the designs given by columns of the free parameters, shape (designs, n + 1)."""
+    a = problem.model.coefficients(problem.ordered(columns), problem.parameter_set)
+    shape = np.shape(next(iter(columns.values())))
+    return np.stack([np.broadcast_to(np.asarray(c, dtype=float), shape) for c in a], axis=-1)
+
+
+def _coefficients(problem: Problem, designs: Sequence[Mapping[str, float]]) -> Array:
+    """Likewise of a list of designs, with a parameter or more."""
+    with np.errstate(all="ignore"):
+        return coefficients(problem, {n: np.array([d[n] for d in designs]) for n in problem.free})
 
 
 @dataclass(frozen=True)
@@ -101,21 +112,17 @@ def starting_points(
     nlp: NLP, problem: Problem, designs: Sequence[Mapping[str, float]], count: int | None = None
 ) -> list[list[Array]]:
     """All variables for each design, for the first guesses of the pattern's unknowns, as many as asked for, or all."""
-    values = [problem.values(problem.ordered(d)) for d in designs]
-    a = np.array([[float(c) for c in v.coefficients] for v in values]).reshape(len(values), problem.model.degree + 1)
+    a = _coefficients(problem, designs)
     proper = np.all(np.isfinite(a), axis=1) & (a[:, 0] != 0)
     found = iter(roots(a[proper]) if np.any(proper) else ())
-    return [
-        _guessed(nlp, variables_of(problem, d), v, next(found), count) if there else []
-        for d, v, there in zip(designs, values, proper, strict=True)
-    ]
+    known = zip(designs, proper, strict=True)
+    return [_guessed(nlp, problem, d, next(found), count) if there else [] for d, there in known]
 
 
-def _guessed(nlp: NLP, x: Sequence[float], values: Values, z: Complex, count: int | None) -> list[Array]:
-    guesses = [
-        lift.guess([values], [z / nlp.unit if k else z]) for k, lift in enumerate(nlp.lifts)
-    ]  # those in its unit
+def _guessed(nlp: NLP, problem: Problem, design: Mapping[str, float], z: Complex, count: int | None) -> list[Array]:
+    values = [problem.values(problem.ordered(design))] if len(nlp.lifts) > 1 else []  # the pattern's takes the roots
+    guesses = [lift.guess(values, [z / nlp.unit if k else z]) for k, lift in enumerate(nlp.lifts)]  # those in its unit
     if not all(guesses):
         return []
-    others = [c for guess in guesses[1:] for c in guess[0]]
+    x, others = variables_of(problem, design), [c for guess in guesses[1:] for c in guess[0]]
     return [np.array([*x, *first, *others]) for first in guesses[0][:count]]

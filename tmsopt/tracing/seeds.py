@@ -1,7 +1,7 @@
 """A coarse grid over the plane of two free parameters, to see where branches of a pattern may be missing."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import cycle, islice
+from itertools import cycle, islice, pairwise
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from tmsopt.formulation.starts import spread
 from tmsopt.records import Array, Truth
 from tmsopt.roots.meetings import CLOSED
 from tmsopt.tracing.continuation import INFINITE, Walk
-from tmsopt.tracing.equations import Traced, design_at, starting_points
+from tmsopt.tracing.equations import Traced, coefficients, design_at, starting_points
 from tmsopt.tracing.solving import projected, rows_of
 
 _BACK = 300.0  # size of an unknown from which a curve is looked for on the other side of infinity
@@ -27,13 +27,6 @@ FEWER = 96
 
 _PATIENCE = 32  # designs in a row that lead to nothing new
 _BLOCK = 256  # points whose distances from a line are found at once
-
-
-def coefficients(problem: Problem, columns: Mapping[str, Array]) -> Array:
-    """Coefficients of the designs given by columns of the free parameters, shape (designs, n + 1)."""
-    a = problem.model.coefficients(problem.ordered(columns), problem.parameter_set)
-    shape = np.shape(next(iter(columns.values())))
-    return np.stack([np.broadcast_to(np.asarray(c, dtype=float), shape) for c in a], axis=-1)
 
 
 def unexplained(
@@ -116,8 +109,8 @@ def apart(points: Array, line: Array, distance: float) -> Truth:
 
 def seeds(
     ready: Traced, starts: int, seed: int, through: Sequence[Mapping[str, float]], lines: Sequence[Mapping[str, Array]]
-) -> Iterator[tuple[int, Array | None]]:
-    """Points of the pattern's curve in the box, found from many designs, and the number of these; None where one fails.
+) -> Iterator[tuple[int, Array]]:
+    """Points of the pattern's curve in the box, found from each of many designs, and the number of these.
 
     Where no grid shows what they missed, the search goes on until as many starts in a row find nothing new: `lines`
     grows meanwhile.
@@ -125,8 +118,7 @@ def seeds(
     problem = ready.problem
     free = len(problem.free)
     given = [*through, *([problem.start] if set(problem.start) == set(problem.free) else [])]
-    for found in _seeds(ready, given, [None] * len(given)):
-        yield from ((0, y) for y in found)
+    yield from ((0, found) for found in _seeds(ready, given, [None] * len(given)))
     vain, known, count = 0, len(lines), 0
     ways = cycle([None, *range(free)])
     designs = spread(problem, seed)
@@ -135,7 +127,7 @@ def seeds(
             if vain >= starts:
                 return
             count += 1
-            yield from ((count, y) for y in found)
+            yield count, found
             vain, known = (vain + 1 if len(lines) == known else 0), len(lines)
 
 
@@ -144,14 +136,14 @@ def _swept(ready: Traced) -> bool:
     return ready.pattern.test is not None and len(ready.problem.free) == 2
 
 
-def missed(ready: Traced, lines: Sequence[Mapping[str, Array]]) -> Iterator[tuple[int, Array | None]]:
+def missed(ready: Traced, lines: Sequence[Mapping[str, Array]]) -> Iterator[tuple[int, Array]]:
     """Points of the curve where a test function of the pattern changes sign over a grid, off the lines so far."""
     if ready.pattern.test is not None and _swept(ready):
         for design in unexplained(ready.problem, ready.pattern.test, lines):
             yield 0, _nearest(ready, design)
 
 
-def beyond_infinity(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int, Array | None]]:
+def beyond_infinity(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int, Array]]:
     """Points where a curve may come back from infinity: there a root changes sides, and the parameters go on.
 
     They approach a0 = 0 with the inverse of the unknown that grows, so two points give the limit, and a point beyond
@@ -171,34 +163,34 @@ def beyond_infinity(ready: Traced, walks: Sequence[Walk]) -> Iterator[tuple[int,
                 yield 0, _nearest(ready, {n: float(v) for n, v in design_at(ready.problem, x).items()})
 
 
-def _seeds(
-    ready: Traced, designs: Sequence[Mapping[str, float]], held: Sequence[int | None]
-) -> list[list[Array | None]]:
-    """Points of the curve near each design, one for each of the first guesses, with one variable held."""
+def _seeds(ready: Traced, designs: Sequence[Mapping[str, float]], held: Sequence[int | None]) -> list[Array]:
+    """Points of the curve near each design, from the first guesses, with one variable held."""
     tried = starting_points(ready.nlp, ready.problem, designs, _GUESSES)
     every = [(x, h) for each, h in zip(tried, held, strict=True) for x in each]
-    found = iter(_on_curve(ready, [x for x, _ in every], [h for _, h in every]))
-    return [[next(found) for _ in each] or [None] for each in tried]
+    y, found = _on_curve(ready, [x for x, _ in every], [h for _, h in every])
+    ends = np.cumsum([0, *map(len, tried)])
+    return [y[i:j][found[i:j]] for i, j in pairwise(ends)]
 
 
-def _nearest(ready: Traced, design: Mapping[str, float]) -> Array | None:
-    """A point of the curve near a design, from the best guess."""
+def _nearest(ready: Traced, design: Mapping[str, float]) -> Array:
+    """A point of the curve near a design, from the best guess, or none."""
     (tried,) = starting_points(ready.nlp, ready.problem, [design])
-    if not tried:
-        return None
-    mismatch = np.abs(rows_of(ready.on.evaluate, np.array(tried) / ready.on.scale)[0]).max(axis=1)
-    return _on_curve(ready, [tried[int(np.argmin(mismatch))]], [None])[0]
+    if tried:
+        mismatch = np.abs(rows_of(ready.on.evaluate, np.array(tried) / ready.on.scale)[0]).max(axis=1)
+        tried = [tried[int(np.argmin(mismatch))]]
+    y, found = _on_curve(ready, tried, [None] * len(tried))
+    return y[found]
 
 
-def _on_curve(ready: Traced, x: Sequence[Array], held: Sequence[int | None]) -> list[Array | None]:
-    """The points of the curve that the variables x lead to; None where they lead to none in the box, or too far."""
-    if not x:
-        return []
+def _on_curve(ready: Traced, x: Sequence[Array], held: Sequence[int | None]) -> tuple[Array, Truth]:
+    """Where the variables x lead to, and whether that is a point of the curve in the box, not too far out."""
     on, free = ready.on, len(ready.problem.free)
-    y = projected(on.evaluate, np.array(x) / on.scale, held)
+    y = np.array(x).reshape(-1, len(on.scale)) / on.scale
+    if not len(y):
+        return y, np.zeros(0, dtype=bool)
+    y = projected(on.evaluate, y, held)
     inside = np.all((y >= on.lower - 1e-12) & (y <= on.upper + 1e-12), axis=1)  # not where it is nan
     inside &= np.abs(y[:, free:]).max(axis=1) <= _FAR
     y = np.clip(y, on.lower, on.upper)
-    a = coefficients(ready.problem, design_at(ready.problem, y[inside] * on.scale))
-    inside[inside] = ready.size.leads(a)
-    return [point if there else None for point, there in zip(y, inside, strict=True)]
+    inside[inside] = ready.size.leads(coefficients(ready.problem, design_at(ready.problem, y[inside] * on.scale)))
+    return y, inside

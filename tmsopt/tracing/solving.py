@@ -1,9 +1,12 @@
 """Where equations and functions vanish: many starts at once, each row of an array on its own."""
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from tmsopt.records import Array, Truth
@@ -28,10 +31,11 @@ def projected(system: ca.Function, y: Array, held: Sequence[int | None], steps: 
     """`project` of every row of y, each on its own, all at once; rows of nan where nothing is found."""
     found = np.full(y.shape, np.nan)
     moving = np.array([[k != h for k in range(y.shape[1])] for h in held], dtype=float)
-    rows, (value, jacobian) = np.arange(len(y)), evaluated(system, y)
+    rows: NDArray[np.intp] = np.arange(len(y))
+    value, jacobian = evaluated(system, y)
     for _ in range(steps):
         proper = np.all(np.isfinite(value), axis=1) & np.all(np.isfinite(jacobian), axis=(1, 2))
-        rows, y, value, jacobian = (part[proper] for part in (rows, y, value, jacobian))
+        rows, y, value, jacobian = rows[proper], y[proper], value[proper], jacobian[proper]
         if not rows.size:
             break
         size = np.abs(value).max(axis=1)
@@ -40,7 +44,7 @@ def projected(system: ca.Function, y: Array, held: Sequence[int | None], steps: 
         ended = np.abs(step).max(axis=1) <= 1e-13 * (1 + most)
         solved = ended & (size <= _SOLVED * np.abs(jacobian).max(axis=(1, 2)) * (1 + most))
         found[rows[solved]] = (y + step)[solved]
-        rows, y, size, step = (part[~ended] for part in (rows, y, size, step))
+        rows, y, size, step = rows[~ended], y[~ended], size[~ended], step[~ended]
         if not rows.size:
             break
         trial, value, jacobian = y + step, *evaluated(system, y + step)
@@ -58,7 +62,7 @@ def projected(system: ca.Function, y: Array, held: Sequence[int | None], steps: 
         found[rows[there]] = y[there]
         better = np.ones(len(rows), dtype=bool)
         better[left] = False
-        rows, y, value, jacobian = (part[better] for part in (rows, trial, value, jacobian))
+        rows, y, value, jacobian = rows[better], trial[better], value[better], jacobian[better]
     return found
 
 
@@ -77,18 +81,19 @@ def crossing(function: Callable[[float], float], end: float) -> float:
     return float(brentq(function, 0.0, end, xtol=_FINE * abs(end), rtol=4 * np.finfo(float).eps, disp=False))
 
 
-def crossings(function: Callable[[Array, Array], Array], ends: Array) -> Array:
+def crossings(function: Callable[[Array, NDArray[np.intp]], Array], ends: Array) -> Array:
     """`crossing` on many intervals [0, end] at once, by Chandrupatla's method; nan where the sign does not change.
 
     Args:
         function: of the places and of the rows that they belong to.
     """
-    every = np.arange(len(ends))
+    every: NDArray[np.intp] = np.arange(len(ends))
     a, b = ends.astype(float), np.zeros(len(ends))
     fa, fb = function(a, every), function(b, every)
     found = np.where(fb == 0, b, np.where(fa == 0, a, np.nan))
     rows = np.flatnonzero(np.sign(fa) * np.sign(fb) < 0)
-    a, b, fa, fb, least, share = a[rows], b[rows], fa[rows], fb[rows], _FINE * np.abs(ends[rows]), np.full(len(rows), 0.5)
+    a, b, fa, fb, least = a[rows], b[rows], fa[rows], fb[rows], _FINE * np.abs(ends[rows])
+    share = np.full(len(rows), 0.5)
     for _ in range(_HALVINGS):
         if not rows.size:
             break
@@ -107,25 +112,34 @@ def crossings(function: Callable[[Array, Array], Array], ends: Array) -> Array:
             share = np.where((phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi), inverse, 0.5)
         share = np.clip(share, limit, 1 - limit)
         open_ = (limit <= 0.5) & (fa != 0) & (fb != 0) & np.isfinite(share)
-        a, b, fa, fb, least, share, rows = (part[open_] for part in (a, b, fa, fb, least, share, rows))
+        a, b, fa, fb, least, share = (part[open_] for part in (a, b, fa, fb, least, share))
+        rows = rows[open_]
     return found
 
 
 def evaluated(system: ca.Function, y: Array) -> tuple[Array, Array]:
     """Equations and Jacobians at the rows of y, shapes (rows, m) and (rows, m, n)."""
     value, jacobian = rows_of(system, y)
-    return value, jacobian.reshape(*y.shape, -1).transpose(0, 2, 1)
+    return value, jacobian.reshape(*y.shape, value.shape[1]).transpose(0, 2, 1)
 
 
 def rows_of(function: ca.Function, *arguments: Array) -> list[Array]:
     """A function of dense columns at every row of its arguments, without the cost of converting them."""
     count = len(arguments[0])
-    buffer, trigger = (function if count == 1 else function.map(count)).buffer()
-    taken = [np.ascontiguousarray(a, dtype=float) for a in arguments]
-    given = [np.empty((count, function.numel_out(k))) for k in range(function.n_out())]
-    for k, a in enumerate(taken):
-        buffer.set_arg(k, memoryview(a.data))
-    for k, g in enumerate(given):
-        buffer.set_res(k, memoryview(g.data))
+    room = 1 << max(count - 1, 0).bit_length()  # few sizes, for a map costs more to make than to call
+    buffer: Any
+    buffer, trigger = _mapped(function, room).buffer()
+    taken = [np.zeros((room, a.shape[1])) for a in arguments]
+    given = [np.empty((room, function.numel_out(k))) for k in range(function.n_out())]
+    for k, (memory, a) in enumerate(zip(taken, arguments, strict=True)):
+        memory[:count] = a
+        buffer.set_arg(k, memoryview(memory.data))
+    for k, memory in enumerate(given):
+        buffer.set_res(k, memoryview(memory.data))
     trigger()
-    return given
+    return [memory[:count] for memory in given]
+
+
+@lru_cache(maxsize=64)
+def _mapped(function: ca.Function, count: int) -> ca.Function:
+    return function.map(count) if count > 1 else function

@@ -65,18 +65,22 @@ def trace(
     lines: list[dict[str, Array]] = []
     walking, tried = 0.0, 0
     sources = (seeds(ready, starts, seed, through, lines), missed(ready, lines), beyond_infinity(ready, walks))
-    for count, y in chain.from_iterable(sources):
+    for count, points in chain.from_iterable(sources):
         tried = max(tried, count)
         if progress:
             progress(tried, max(tried, starts))
-        if y is None or any(contains(ready.on, w, y[None])[0] for w in walks):
-            continue
-        before = time.perf_counter()
-        found = both_ways(ready.on, y, step, most)
-        walking += time.perf_counter() - before
-        if found is not None and not any(same(found, w) for w in walks):
-            walks.append(found)
-            lines.append(design_at(problem, found.y * ready.on.scale))
+        left = points
+        for known in walks:
+            left = left[~contains(ready.on, known, left)]
+        while len(left):
+            before = time.perf_counter()
+            found = both_ways(ready.on, left[0], step, most)
+            walking += time.perf_counter() - before
+            left = left[1:]
+            if found is not None and not any(same(found, w) for w in walks):
+                walks.append(found)
+                lines.append(design_at(problem, found.y * ready.on.scale))
+                left = left[~contains(ready.on, found, left)]
     branches = (b for b in (branch_of(ready, w) for w in walks) if b.residual <= _MET)  # not where it is nan
     ordered = _meeting(sorted(branches, key=lambda b: -float(b.arclength[-1])), problem)
     return Trace(problem, str(problem.locate), ordered, tried, time.perf_counter() - began, walking)

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from tmsopt.design.problem import Problem
@@ -74,7 +75,7 @@ def located(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walk
             rows = rows[stable[rows] != stable[rows + 1]]
         here, along = walked.y[rows], walked.t[rows]
 
-        def at(s: Array, k: Array, mark: Mark = mark, here: Array = here, along: Array = along) -> Array:
+        def at(s: Array, k: NDArray[np.intp], mark: Mark = mark, here: Array = here, along: Array = along) -> Array:
             return _at(on, mark, here[k], along[k], s)
 
         if rows.size:
@@ -84,7 +85,7 @@ def located(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walk
 
 
 def _true(
-    problem: Problem, walked: Walk, mark: Mark, rows: Array, s: Array, y: Array, t: Array
+    problem: Problem, walked: Walk, mark: Mark, rows: NDArray[np.intp], s: Array, y: Array, t: Array
 ) -> Iterator[Found]:
     """Zeros of a mark without those that lie on another curve, and folds that are none."""
     astray = np.abs(y - walked.y[rows]).max(axis=1) > _ASTRAY * s + TOGETHER
