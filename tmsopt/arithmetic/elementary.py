@@ -1,7 +1,7 @@
 """Elementary functions of whatever number a formula is given: floats, arrays, CasADi expressions, balls.
 
-A ball is an exact fraction (`flint.fmpq`), an interval with a middle and a radius (`flint.arb`), or a power series of
-these (`flint.arb_series`). A value that does not exist, or that the balls are too wide to tell, is a ball nan.
+A ball is an exact fraction (`flint.fmpq`), an interval with a middle and a radius (`flint.arb`), a power series of
+these (`flint.arb_series`), or an array of intervals (`Twofold`). A value that does not exist, or that the balls are too wide to tell, is a ball nan.
 """
 
 from fractions import Fraction
@@ -12,6 +12,7 @@ import flint
 import numpy as np
 
 from tmsopt.arithmetic.formal import Formal
+from tmsopt.arithmetic.twofold import Twofold
 
 DIGITS = 60
 
@@ -102,7 +103,7 @@ def is_symbolic(x: Any) -> bool:
 
 def is_ball(x: Any) -> bool:
     """Whether x is a number of ball arithmetic, exact fractions and formulas of these among them."""
-    return isinstance(x, flint.fmpq | flint.arb | flint.arb_series | Formal)
+    return isinstance(x, flint.fmpq | flint.arb | flint.arb_series | Formal | Twofold)
 
 
 def exact(x: Any) -> Any:

@@ -12,7 +12,7 @@ is reached where the parameters give that polynomial (Blondel, Gürbüzbalaban, 
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
@@ -23,6 +23,7 @@ import flint
 import numpy as np
 
 from tmsopt.arithmetic.elementary import as_ball, exact, quotient
+from tmsopt.arithmetic.twofold import Twofold
 from tmsopt.arithmetic.walk import steps
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Bound
@@ -77,6 +78,30 @@ def omega0_bound(problem: Problem, value: float) -> Bound:
     """
     largest = _largest_product(_one_case(problem)) if bounded(problem) else math.inf
     return _bound(-(largest ** (1 / problem.model.degree)) * (1 + _ROUNDING), value, "omega0", objective_size(problem))
+
+
+def fixed_bound(problem: Problem, coefficients: Sequence[Twofold], settled: Callable[[Twofold], Array]) -> Array:
+    """The bound of `instant_bound` for many designs in which nothing is free; −inf where there is none.
+
+    Every relation of the coefficients is one of two of them then: C(n, j) zʲ = aⱼ/a0, and C(n, j) zⁿ⁻ʲ aₙ⁻¹ likewise.
+
+    Args:
+        settled: rounds numbers to doubles, and notes where that is not certain.
+    """
+    model, of, n = problem.model, problem.parameter_set, problem.model.degree
+    quotients = settled(abs(coefficients[-1] / coefficients[0]))
+    known = np.array([-(q ** (1 / n)) * (1 + _ROUNDING) for q in quotients.tolist()])
+    if any(p.tangent for p in of.parameters) or not is_rational(model, of):
+        return known
+    least = np.full(len(known), np.inf)
+    for j in range(n + 1):
+        up, down = coefficients[j] / coefficients[0] / math.comb(n, j), coefficients[n] / coefficients[j]
+        for power, ratio, linear in ((j, up, j == 1), (n - j, down * math.comb(n, j), n == 1)):
+            if power:
+                zero = settled(ratio.root(power))
+                least = np.minimum(least, zero if linear else np.maximum(zero, 0.0))  # 0 is one of a derivative
+    other = np.nextafter(-least, -np.inf)
+    return np.where(other > known, other, known)
 
 
 def _one_case(problem: Problem) -> Problem:

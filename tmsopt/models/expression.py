@@ -113,6 +113,11 @@ class Expression:
             left, right = (float(_value(side, values, NUMERIC)) for side in self._sides())
         return left, right
 
+    def each(self, values: Mapping[str, Any]) -> list[Any]:
+        """Both sides of a comparison for arrays."""
+        with np.errstate(all="ignore"):
+            return [_value(side, values, NUMERIC) for side in self._sides()]
+
     def _sides(self) -> list[ast.expr]:
         body = _parse(self.text)
         return [body.left, *body.comparators] if isinstance(body, ast.Compare) else [body]

@@ -1,0 +1,190 @@
+"""Many designs of one problem at once, in which nothing is free: what `recheck` and `certified` say of each.
+
+The same doubles, by arrays of numbers with twice the digits and error bounds. What these leave in doubt is left to
+them: a nearly multiple root, a limit missed by no more than tolerance, a coefficient that does not exist.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tmsopt import laws
+from tmsopt.arithmetic.twofold import Twofold, twofold
+from tmsopt.checks.bound import PROVEN, bounded, fixed_bound
+from tmsopt.checks.law_rows import SAME_LAW
+from tmsopt.checks.recheck import FEASIBLE
+from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import ANGULAR_FREQUENCY, ARRAY_ROOT_QUANTITIES, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE
+from tmsopt.models import Values, tms
+from tmsopt.records import Array, Truth
+from tmsopt.roots import is_stable
+from tmsopt.roots.isolated import Motions, motions
+
+BLOCK = 8192
+"""Designs at once: their numbers stay in the cache. No bit of an answer depends on it."""
+
+_UNIT = 2.0**-53  # relative rounding of a parameter
+_DOUBT = 2.0  # tolerances within which a limit is left to the recheck
+_UNUSED = (TypeError, ValueError, AttributeError, NotImplementedError, ArithmeticError, KeyError)
+"""What a formula may raise that does not take arrays."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Designs as columns, one value for each.
+
+    Attributes:
+        certain: whether the other values are known; of the others they mean nothing.
+        objective, abscissa, damping_ratio: as in `Solution`; the abscissa is also that of the parameters as stored.
+        oscillates: whether the structure is ``pair``; else it is ``real``.
+        violations: name of a constraint → by how much it is violated, nan where it is not.
+        bound, gap, proven: of the feasible ones.
+        laws: label → relative residual, nan where the law does not apply.
+        reports: expression → its value.
+    """
+
+    certain: Truth
+    objective: Array
+    abscissa: Array
+    damping_ratio: Array
+    oscillates: Truth
+    violations: Mapping[str, Array]
+    bound: Array
+    gap: Array
+    laws: Mapping[str, Array]
+    reports: Mapping[str, Array]
+
+
+def judgeable(problem: Problem) -> bool:
+    """Whether designs of a problem may be judged at once: nothing is free, listed, located or searched for."""
+    listed = problem.free or problem.variations or problem.tolerances
+    return not (listed or problem.pattern or problem.asks(RADIUS) or problem.asks(ANGULAR_FREQUENCY))
+
+
+def judge(problem: Problem, columns: Mapping[str, Array], reports: Sequence[str] = ()) -> Judged | None:
+    """The designs that differ from a problem's in some of its fixed parameters; None where formulas take no arrays.
+
+    Args:
+        columns: parameter → its value in every design, at least one.
+        reports: expressions.
+    """
+    try:
+        with np.errstate(all="ignore"):
+            return _judged(problem, columns, reports)
+    except _UNUSED:
+        return None
+
+
+def _judged(problem: Problem, columns: Mapping[str, Array], reports: Sequence[str]) -> Judged:
+    model, of = problem.model, problem.parameter_set
+    given = {n: np.float64(v) for n, v in problem.ordered({}).items()} | dict(columns)
+    m = len(next(iter(columns.values())))
+    wide = Values(model, of, {n: Twofold(x) for n, x in given.items()})
+    off = model.coefficients({n: Twofold(x, 0.0, np.abs(x) * _UNIT) for n, x in given.items()}, of)
+    coefficients = [_full(c, m) for c in wide.coefficients]
+    found = motions(coefficients, [_full(c, m).off for c in off], STRUCTURE_TOLERANCE)
+    certain = found.simple & _possible(problem, given)
+
+    def settled(number: Any) -> Array:
+        nonlocal certain
+        double, sure = _full(number, m).nearest()
+        certain = certain & sure
+        return double
+
+    known = {"abscissa": found.abscissa, "damping_ratio": found.damping_ratio}
+    doubles = {name: settled(number) for name, number in known.items()}
+    for name, number in known.items():
+        wide.define(name, number)
+    objective = np.full(m, np.nan) if problem.objective is None else settled(problem.objective.enclosure(wide))
+    plain = Values(model, of, {n: np.asarray(x) for n, x in given.items()}, extra=ARRAY_ROOT_QUANTITIES)
+    for name, column in (doubles | {ANGULAR_FREQUENCY: found.frequency}).items():
+        plain.define(name, column)
+    violations, doubt = _violations(problem, plain, found)
+    certain &= ~doubt & (np.abs(doubles["abscissa"]) > found.scatter)
+    feasible = np.logical_and.reduce([np.isnan(v) for v in violations.values()], initial=True) & np.ones(m, dtype=bool)
+    bound = np.full(m, -np.inf)
+    if bounded(problem):
+        bound = np.where(feasible, fixed_bound(problem, coefficients, settled), -np.inf)
+        certain &= ~(np.isfinite(bound) & (objective - bound <= _DOUBT * PROVEN * (1.0 + np.abs(bound))))
+    said = _laws(wide, plain, coefficients, feasible, settled) if model is tms else {}
+    return Judged(
+        certain, objective, doubles["abscissa"], doubles["damping_ratio"], found.oscillates, violations, bound,
+        np.where(np.isfinite(bound), np.maximum(objective - bound, 0.0), np.inf), said,
+        {text: _column(problem.read(text)(plain), m) for text in reports},
+    )  # fmt: skip
+
+
+def _full(number: Any, m: int) -> Twofold:
+    """One number of each design."""
+    wide = twofold(number)
+    return Twofold(*(np.ascontiguousarray(np.broadcast_to(x, m), dtype=float) for x in (wide.high, wide.low, wide.off)))
+
+
+def _column(number: Any, m: int) -> Array:
+    return np.ascontiguousarray(np.broadcast_to(np.asarray(number, dtype=float), m))
+
+
+def _possible(problem: Problem, given: Mapping[str, Any]) -> Truth:
+    """Whether a design may be posed: parameters within their ranges, no angle 0, which rational bounds ask for."""
+    of, possible = problem.parameter_set, np.True_
+    for p in of.parameters:
+        x, inside = given[p.name], p.range
+        low, high = (x >= inside.lower, x <= inside.upper) if inside.closed else (x > inside.lower, x < inside.upper)
+        possible = possible & low & high & ~(p.tangent & (x == 0))
+    for name, (other, _) in of.needs.items():
+        possible = possible & ((given[name] == 0) | (given[other] > 0))
+    return np.asarray(possible)
+
+
+def _violations(problem: Problem, values: Values, found: Motions) -> tuple[dict[str, Array], Truth]:
+    """By how much each constraint is violated, and which designs are too close to a limit to be told here."""
+    m = len(found.simple)
+    amounts, doubt = {}, np.zeros(m, dtype=bool)
+    for name, condition in problem.conditions.items():
+        left, right = (_column(side, m) for side in condition.each(values))
+        difference = left - right
+        excess, size = condition.excess(difference), np.maximum(1.0, np.maximum(np.abs(left), np.abs(right)))
+        relative = excess / size
+        doubt |= ~np.isfinite(difference) | ((relative > 0) & (relative <= _DOUBT * FEASIBLE))
+        if set(condition.names) & set(ROOT_NAMES):  # of numeric roots in the recheck
+            doubt |= np.abs(difference) <= (_DOUBT * FEASIBLE + found.scatter) * size
+        amounts[name] = np.where(relative > FEASIBLE, excess, np.nan)
+    return amounts, doubt
+
+
+def _laws(
+    wide: Values, values: Values, coefficients: Sequence[Twofold], feasible: Truth, settled: Callable[[Any], Array]
+) -> dict[str, Array]:
+    """Relative residual of the laws that apply to a feasible design without a multiple root; see `law_rows`."""
+    m = len(feasible)
+    names = ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")
+    p = {n: settled(wide[n]) for n in names}
+    shape = {n: p[n] for n in names[1:]}
+    heights, tilt = {k: p[k] for k in ("zeta_B", "zeta_H")}, {"lambda_s": p["lambda_s"]}
+    number = _full(wide["Fr_c"], m)
+    exists = np.isfinite(number.high)
+    critical = np.where(exists, settled(number.where(exists, Twofold(np.ones(m)))), np.nan)
+
+    def relative(numeric: Any, law: Any, applies: Any) -> Array:
+        law = _column(law, m)
+        residual = (numeric - law) / np.where(law == 0, 1.0, np.abs(law))
+        settled(Twofold(np.where(feasible & applies, residual, 0.0)))  # a law without a value
+        return np.where(feasible & applies, residual, np.nan)
+
+    stable = is_stable(np.stack([settled(c) for c in coefficients], axis=-1))
+    printed = np.all(laws.lscf(p["Fr"], **shape), axis=0)
+    one = p["chi_H"] == 1
+    first = np.sqrt(np.maximum(np.nan_to_num(laws.Frc1(p["chi_B"], **heights, **tilt)), 0.0))
+    best = laws.chibm(**heights)
+    optimal = np.abs(p["chi_B"] - best) <= SAME_LAW * np.maximum(np.abs(p["chi_B"]), np.abs(best))
+    return {
+        "lscf": relative(1.0 * stable, 1.0 * printed, (p["lambda_s"] > 0) & (p["chi_H"] >= 1)),
+        "flus": relative(critical, laws.Fr_c(**shape), exists),
+        "Frc1": relative(critical, first, one & exists),
+        "frm": relative(critical, laws.frm(**heights, **tilt), one & exists & optimal),
+    }
+
+
