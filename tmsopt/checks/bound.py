@@ -30,7 +30,7 @@ from tmsopt.design.solution import Bound
 from tmsopt.formulation.nlp import objective_size
 from tmsopt.models import Model, ParameterSet
 from tmsopt.models.exact import Tilt
-from tmsopt.records import Array
+from tmsopt.records import Array, Truth
 
 PROVEN = 1e-9
 """Gap, relative to the size of the roots and of the bound, below which a design counts as proven optimal."""
@@ -80,8 +80,10 @@ def omega0_bound(problem: Problem, value: float) -> Bound:
     return _bound(-(largest ** (1 / problem.model.degree)) * (1 + _ROUNDING), value, "omega0", objective_size(problem))
 
 
-def fixed_bound(problem: Problem, coefficients: Sequence[Twofold], settled: Callable[[Twofold], Array]) -> Array:
-    """The bound of `instant_bound` for many designs in which nothing is free; −inf where there is none.
+def fixed_bound(
+    problem: Problem, coefficients: Sequence[Twofold], settled: Callable[[Twofold], Array]
+) -> tuple[Array, Truth]:
+    """The bound of `instant_bound` for many designs in which nothing is free, and where it is one by relations.
 
     Every relation of the coefficients is one of two of them then: C(n, j) zʲ = aⱼ/a0, and C(n, j) zⁿ⁻ʲ aₙ⁻¹ likewise.
 
@@ -92,7 +94,7 @@ def fixed_bound(problem: Problem, coefficients: Sequence[Twofold], settled: Call
     quotients = settled(abs(coefficients[-1] / coefficients[0]))
     known = np.array([-(q ** (1 / n)) * (1 + _ROUNDING) for q in quotients.tolist()])
     if any(p.tangent for p in of.parameters) or not is_rational(model, of):
-        return known
+        return known, np.zeros(len(known), dtype=bool)
     least = np.full(len(known), np.inf)
     for j in range(n + 1):
         up, down = coefficients[j] / coefficients[0] / math.comb(n, j), coefficients[n] / coefficients[j]
@@ -101,7 +103,7 @@ def fixed_bound(problem: Problem, coefficients: Sequence[Twofold], settled: Call
                 zero = settled(ratio.root(power))
                 least = np.minimum(least, zero if linear else np.maximum(zero, 0.0))  # 0 is one of a derivative
     other = np.nextafter(-least, -np.inf)
-    return np.where(other > known, other, known)
+    return np.maximum(other, known), other > known
 
 
 def _one_case(problem: Problem) -> Problem:

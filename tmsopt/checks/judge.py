@@ -41,7 +41,8 @@ class Judged:
         objective, abscissa, damping_ratio: as in `Solution`; the abscissa is also that of the parameters as stored.
         oscillates: whether the structure is ``pair``; else it is ``real``.
         violations: name of a constraint → by how much it is violated, nan where it is not.
-        bound, gap, proven: of the feasible ones.
+        bound, gap: of the feasible ones; no gap is closed.
+        by_relation: whether the bound is one by relations of the coefficients.
         laws: label → relative residual, nan where the law does not apply.
         reports: expression → its value.
     """
@@ -54,6 +55,7 @@ class Judged:
     violations: Mapping[str, Array]
     bound: Array
     gap: Array
+    by_relation: Truth
     laws: Mapping[str, Array]
     reports: Mapping[str, Array]
 
@@ -105,14 +107,15 @@ def _judged(problem: Problem, columns: Mapping[str, Array], reports: Sequence[st
     violations, doubt = _violations(problem, plain, found)
     certain &= ~doubt & (np.abs(doubles["abscissa"]) > found.scatter)
     feasible = np.logical_and.reduce([np.isnan(v) for v in violations.values()], initial=True) & np.ones(m, dtype=bool)
-    bound = np.full(m, -np.inf)
+    bound, related = np.full(m, -np.inf), np.zeros(m, dtype=bool)
     if bounded(problem):
-        bound = np.where(feasible, fixed_bound(problem, coefficients, settled), -np.inf)
+        bound, related = fixed_bound(problem, coefficients, settled)
+        bound = np.where(feasible, bound, -np.inf)
         certain &= ~(np.isfinite(bound) & (objective - bound <= _DOUBT * PROVEN * (1.0 + np.abs(bound))))
     said = _laws(wide, plain, coefficients, feasible, settled) if model is tms else {}
     return Judged(
         certain, objective, doubles["abscissa"], doubles["damping_ratio"], found.oscillates, violations, bound,
-        np.where(np.isfinite(bound), np.maximum(objective - bound, 0.0), np.inf), said,
+        np.where(np.isfinite(bound), np.maximum(objective - bound, 0.0), np.inf), related, said,
         {text: _column(problem.read(text)(plain), m) for text in reports},
     )  # fmt: skip
 

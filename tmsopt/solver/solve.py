@@ -29,6 +29,9 @@ from tmsopt.solver.outcome import UNCLEAR, Finding, better, counted, evaluated, 
 from tmsopt.solver.search import Explored, evaluated_cases, explore, without_any
 from tmsopt.solver.workspace import Family, Workspace, workspace
 
+UNSTABLE = "no stable design was found that meets the other limits; this is the least unstable one"
+"""Of a design that is not stable though a limit asks for it."""
+
 _ASKING = replace(DEFAULTS, stability=5.0, interruptible=True)
 _WAIT = 1.0  # seconds after an interrupt in which the best of where starts ended is looked for
 _SEEN, _SAME = 3, 1e-9  # designs of a sample that may be the best then; what an end must promise more than the best has
@@ -273,7 +276,7 @@ def _stability_note(
         return (f"the mass matrix is singular (a0 = 0), so a root is at infinity; {mass_advice(problem)}",)
     asked = [n for n, c in problem.conditions.items() if n in checked.violations and "abscissa" in c.names]
     if asked and checked.structure.abscissa >= 0:
-        return ("no stable design was found that meets the other limits; this is the least unstable one",)
+        return (UNSTABLE,)
     if not optimal or checked.structure.abscissa < 0:
         return ()
     if problem.free and (problem.minimize or "").strip() == "abscissa":

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tmsopt.disk import cell, headed, netcdf_errors, whole
 from tmsopt.errors import Fault, InputError, needed
 from tmsopt.records import Array
+from tmsopt.studies.judging import Rows, table
 from tmsopt.studies.row import Row
 
 PREFIXES = {"varied": "varied.", "parameters": "", "reports": "report.", "laws": "law.", "violations": "violation."}
@@ -201,8 +202,42 @@ FORMATS: Mapping[str, Format] = {
 """Ending → format; another one is added here."""
 
 
-def columns(rows: Iterable[Row]) -> dict[str, PartialColumn]:
+def columns(rows: Iterable[Row]) -> Mapping[str, PartialColumn]:
     """Header → column, in the order of the fields of a row; 8 bytes per number while they are collected."""
+    return _of_blocks(rows) if isinstance(rows, Rows) else _of_each(rows)
+
+
+def _of_blocks(rows: Rows) -> Mapping[str, PartialColumn]:
+    """Columns made when they are asked for."""
+    single, count = _of_each(rows.singles), len(rows.singles)
+    absent = PartialColumn(np.full(count, np.nan), np.zeros(count, dtype=bool))
+
+    def made(of: Callable[..., Any], *names: str, header: str) -> Callable[[], PartialColumn]:
+        alone = single.get(header, absent)
+        return lambda: PartialColumn(*of(rows, *names, (alone.values, alone.present)))
+
+    found: dict[str, Callable[[], PartialColumn]] = {}
+    for name in _FIELDS:
+        if name not in PREFIXES:
+            found[name] = made(table.field, name, header=name)
+            continue
+        starts = {key: c.present for h, c in single.items() if (key := _key(name, h)) is not None}
+        for key in table.keys(rows, name, starts):
+            found[header(name, key)] = made(table.keyed, name, key, header=header(name, key))
+    return table.Lazily(found)
+
+
+def _key(of: str, head: str) -> str | None:
+    """The name in a table of the rows that a header is of; None of another one's."""
+    others = (*(p for p in PREFIXES.values() if p), "parameter.")
+    if of != "parameters":
+        return head.removeprefix(PREFIXES[of]) if head.startswith(PREFIXES[of]) else None
+    if head.startswith("parameter.") and head.removeprefix("parameter.") in _FIELDS:
+        return head.removeprefix("parameter.")
+    return None if head in _FIELDS or head.startswith(others) else head
+
+
+def _of_each(rows: Iterable[Row]) -> dict[str, PartialColumn]:
     plain: dict[str, list[Any] | array[float]] = {
         name: array("d") if kind is float else [] for name, kind in _FIELDS.items() if name not in PREFIXES
     }

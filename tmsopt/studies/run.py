@@ -1,21 +1,23 @@
 """A study carried out: rows by an engine, into a store."""
 
 import time
-from collections.abc import Generator, Iterable, Iterator, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.design.unit_system import units_of
 from tmsopt.disk import path_of
 from tmsopt.errors import Fault, InputError, count_faults, short, suggest
-from tmsopt.records import SCHEMA, Progress, Shown, frame
+from tmsopt.records import SCHEMA, Progress, Shown, Truth, frame
 from tmsopt.studies.engines import Note, Unit, cluster, cores, in_process, processes
 from tmsopt.studies.engines.work import silent
 from tmsopt.studies.export import columns, export, gridded
+from tmsopt.studies.judging import Block, applies, frame_of, gathered, judged
 from tmsopt.studies.load import load_study
 from tmsopt.studies.monte_carlo import Sampling, planned
 from tmsopt.studies.neighbours import blocks
@@ -49,7 +51,7 @@ class Results(Shown):
     """
 
     study: Study
-    rows: tuple[Row, ...] = field(repr=False)
+    rows: Sequence[Row] = field(repr=False)
     solved: int
     seconds: float
     engine: str
@@ -136,25 +138,17 @@ def run_study(
         raise InputError(faults)
     asked = planned(stated)
     if store is None:
-        kept: list[Row] = []
-        began, engine, solved = time.perf_counter(), "", 0
-        rows, engine = _solved(asked, set(), workers, scheduler, note)
-        with closing(rows):
-            for row in _counted(rows, 0, len(asked), progress):
-                kept.append(row)
-                solved += 1
-        kept.sort(key=lambda row: row.number)
-        return Results(asked, tuple(kept), solved, time.perf_counter() - began, engine)
+        found, seconds, engine = _carried_out(asked, _none(asked), workers, scheduler, note, progress)
+        return Results(asked, gathered(found.blocks, found.rows), found.count, seconds, engine)
     with open_store(path_of(store, "an SQLite file"), definition(asked), fresh=fresh) as opened:
         for line in (*opened.warnings, *([f"moved the old store to {opened.moved}"] if opened.moved else [])):
             note(line)
-        there = _rows(asked, opened)  # damage is said before any work
-        if found := len(there):
-            note(f"{found} of {len(asked)} rows are in {opened.path}")
-        if found < len(asked):
-            there = ()  # not in memory twice: they are read again with the others
-        made = fill(asked, opened, workers=workers, scheduler=scheduler, progress=progress, note=note)
-        return Results(asked, there or _rows(asked, opened), *made, found, opened.about())
+        there = _held(asked, opened)  # damage is said before any work
+        if there.count:
+            note(f"{there.count} of {len(asked)} rows are in {opened.path}")
+        made, seconds, engine = _carried_out(asked, there.done(asked), workers, scheduler, note, progress, opened)
+        rows = gathered([*there.blocks, *made.blocks], [*there.rows, *made.rows])
+        return Results(asked, rows, made.count, seconds, engine, there.count, opened.about())
 
 
 def stored(study: Study, store: str | PathLike[str]) -> Results:
@@ -164,28 +158,63 @@ def stored(study: Study, store: str | PathLike[str]) -> Results:
         InputError: where there is no store.
     """
     with read_store(path_of(store, "an SQLite file")) as opened:
-        rows = _rows(study, opened)
-        return Results(study, rows, 0, 0.0, "", len(rows), opened.about())
+        held = _held(study, opened)
+        return Results(study, gathered(held.blocks, held.rows), 0, 0.0, "", held.count, opened.about())
 
 
-def _rows(study: Study, store: Store) -> tuple[Row, ...]:
+@dataclass
+class _Held:
+    """Rows of a study in memory."""
+
+    blocks: list[Block] = field(default_factory=list)
+    rows: list[Row] = field(default_factory=list)
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return sum(map(len, self.blocks)) + len(self.rows)
+
+    def done(self, study: Study) -> Truth:
+        """Of each row of the study, whether it is here."""
+        found = _none(study)
+        for block in self.blocks:
+            found[block.numbers] = True
+        found[[row.number for row in self.rows]] = True
+        return found
+
+
+def _none(study: Study) -> Truth:
+    return np.zeros(len(study), dtype=bool)
+
+
+def _held(study: Study, store: Store) -> _Held:
     """All rows of a store.
 
     Raises:
         InputError: for one that the study cannot have, or that is damaged.
     """
-    number, rows = store.outside(len(study)), []
+    number, held = store.outside(len(study)), _Held()
     if number is None:
-        for row in store.rows():
-            rows.append(row)
-            if row.varied != study.varied(row.number):
-                number = row.number
+        held = _Held(list(store.blocks()), list(store.singles()))
+        wrong = [row.number for row in held.rows if row.varied != study.varied(row.number)]
+        wrong += [n for block in held.blocks if (n := _unlike(study, block)) is not None]
+        number = wrong[-1] if wrong else None
     if number is None:
-        return tuple(rows)
+        return held
     message = (
         f"row {number} is not of this study; --fresh moves the store aside, Store.forget([{number}]) removes the row"
     )
     raise InputError([Fault(message, file=str(store.path))])
+
+
+def _unlike(study: Study, block: Block) -> int | None:
+    """The number of a row that the study gave other values; None where there is none."""
+    if block.frame != frame_of(study) or block.named("varied") != list(study.columns):
+        return int(block.numbers[0])
+    wrong = np.zeros(len(block), dtype=bool)
+    for name, column in study.columns.items():
+        wrong |= np.asarray(column)[block.numbers] != block.columns[f"varied.{name}"]
+    return int(block.numbers[wrong.argmax()]) if wrong.any() else None
 
 
 def _faults(study: object, workers: object) -> Iterator[Fault]:
@@ -202,55 +231,72 @@ def fill(
     progress: Progress | None = None, note: Note = silent,
 ) -> tuple[int, float, str]:  # fmt: skip
     """Solve the rows that an open store lacks; how many, in how many seconds, and by which engine."""
-    began = time.perf_counter()
-    done = store.done()
-    if len(done) == len(study):
-        return 0, 0.0, ""
-    rows, engine = _solved(study, done, workers, scheduler, note)
-    fresh: list[Row] = []
-    solved, last = 0, began
+    done = _none(study)
+    done[list(store.done())] = True
+    made, seconds, engine = _carried_out(study, done, workers, scheduler, note, progress, store)
+    return made.count, seconds, engine
+
+
+def _carried_out(
+    study: Study, done: Truth, workers: int | None, scheduler: str | None, note: Note, progress: Progress | None,
+    store: Store | None = None,
+) -> tuple[_Held, float, str]:  # fmt: skip
+    """The rows that are not done, in how many seconds, and by which engine; kept in a store as they come."""
+    began = last = time.perf_counter()
+    made, fresh = _Held(), list[Row]()
+    if done.all():
+        return made, 0.0, ""
+    before, most, engine, left = int(done.sum()), len(study), "", np.flatnonzero(~done)
+    if progress:
+        progress(before, most)
+    if applies(study):
+        engine, remaining = "in process", [left[:0]]
+        for block, some in judged(study, left):
+            if store is not None and len(block):
+                store.add_block(block)
+            made.blocks.append(block)
+            remaining.append(some)
+            if progress:
+                progress(before + made.count, most)
+        left = np.concatenate(remaining)
+    if not left.size:
+        return made, time.perf_counter() - began, engine
+    wanted = set(left.tolist())
+    rows, engine = _solved(study, wanted, workers, scheduler, note)
     with closing(rows):
         try:
-            for row in _counted(rows, len(done), len(study), progress):
-                if row.number in done:
+            for row in rows:
+                if row.number not in wanted:
                     continue  # of a block that had been stored in part
+                made.rows.append(row)
                 fresh.append(row)
-                solved += 1
-                if time.perf_counter() - last >= _COMMIT:
+                if store is not None and time.perf_counter() - last >= _COMMIT:
                     store.add(fresh)
                     fresh, last = [], time.perf_counter()
+                if progress:
+                    progress(before + made.count, most)
         finally:
-            store.add(fresh)  # interrupted or not, what was solved is kept
-    return solved, time.perf_counter() - began, engine
+            if store is not None:
+                store.add(fresh)  # interrupted or not, what was solved is kept
+    return made, time.perf_counter() - began, engine
 
 
 def _solved(
-    study: Study, done: set[int], workers: int | None, scheduler: str | None, note: Note
+    study: Study, left: set[int], workers: int | None, scheduler: str | None, note: Note
 ) -> tuple[Generator[Row], str]:
     """Rows as they come, and the name of the engine."""
-    units = list(_units(study, done))
+    units = list(_units(study, left))
     work = Solver(study)
     if scheduler is not None:
         return cluster(work, units, scheduler, note), scheduler
-    missing = len(study) - len(done)
-    count = workers or (1 if missing <= _FEW else cores())
+    count = workers or (1 if len(left) <= _FEW else cores())
     if count == 1:
         return in_process(work, units, note), "in process"
     return processes(work, units, count, note), f"{count} processes"
 
 
-def _units(study: Study, done: set[int]) -> Iterable[Unit]:
+def _units(study: Study, left: set[int]) -> Iterable[Unit]:
     """What is left to be solved; a block of neighbours as a whole."""
     if study.warm:
-        return (block for block in blocks(study) if not done.issuperset(block))
-    return ((number,) for number in range(len(study)) if number not in done)
-
-
-def _counted(rows: Iterable[Row], done: int, most: int, progress: Progress | None) -> Iterator[Row]:
-    if progress:
-        progress(done, most)
-    for row in rows:
-        yield row
-        done += 1
-        if progress:
-            progress(min(done, most), most)
+        return (block for block in blocks(study) if not left.isdisjoint(block))
+    return ((number,) for number in sorted(left))

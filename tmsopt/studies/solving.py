@@ -18,6 +18,7 @@ from tmsopt.records import Table
 from tmsopt.solver.multistart import same
 from tmsopt.solver.solve import solve
 from tmsopt.solver.workspace import Family
+from tmsopt.studies.judging import judged_alone
 from tmsopt.studies.neighbours import blocks
 from tmsopt.studies.row import Row
 from tmsopt.studies.study import Study
@@ -43,7 +44,8 @@ def alone(study: Study, number: int) -> SolvedRow:
     study.varied(number)
     solver = Solver(study)
     unit = next((block for block in blocks(study) if number in block), ()) if study.warm else (number,)
-    return next(answer for answer in solver.answers(unit) if answer.row.number == number)
+    answer = next(answer for answer in solver.answers(unit) if answer.row.number == number)
+    return replace(answer, row=judged_alone(study, number) or answer.row)
 
 
 @dataclass(frozen=True)

@@ -3,16 +3,19 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from statistics import median
 from typing import Any
 
-from tmsopt.records import Table, plain
+import numpy as np
+
+from tmsopt.records import Array, Table, Truth, plain
+from tmsopt.studies.export import PREFIXES, PartialColumn, columns
 from tmsopt.studies.row import STATUSES, Row
 from tmsopt.studies.study import Study
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+LAW = PREFIXES["laws"]
 _Z = 1.959963984540054  # of the normal distribution, 97.5 % below
 
 
@@ -109,30 +112,38 @@ class Summary:
 
 def summary(study: Study, rows: Iterable[Row]) -> Summary:
     """The rows of a study, read once."""
-    known = list(rows)
-    optimal = [row for row in known if row.status == "optimal"]
-    counts = Counter(row.status for row in known)
-    sign = study.problem.sign
-    ranked = [row for row in optimal if math.isfinite(row.objective)]
-    laws: dict[str, float] = {}
-    for row in known:
-        for label, residual in row.laws.items():
-            laws[label] = max(laws.get(label, 0.0), abs(residual))
+    known = rows if isinstance(rows, Sequence) else list(rows)
+    table = columns(known)
+    values = {name: table[name].values for name in ("status", "objective", "abscissa", "structure", "proven", "warm")}
+    status, objective = values["status"], values["objective"]
+    counts, optimal = Counter(status.tolist()), status == "optimal"
+    ranked = np.flatnonzero(optimal & np.isfinite(objective))
+    best = ranked[np.argmin(study.problem.sign * objective[ranked])] if ranked.size else None
+    laws = {
+        name.removeprefix(LAW): float(np.fmax.reduce(np.abs(column.values[column.present]), initial=0.0))
+        for name, column in table.items() if name.startswith(LAW)
+    }  # fmt: skip
     return Summary(
         rows=len(study), counts=Table({status: counts[status] for status in STATUSES if counts[status]}),
-        best=min(ranked, key=lambda row: sign * row.objective, default=None),
-        causes=_causes(row for row in known if row.status != "optimal"),
-        spread=Table({name: ends for name in ("objective", "abscissa") if (ends := _ends(name, optimal))}),
-        stable=sum(row.stable is True for row in known), structures=_ranked(row.structure for row in optimal),
-        proven=sum(row.proven for row in known), warm=sum(row.warm for row in known), laws=Table(laws),
-        seconds=sum(row.seconds for row in known), product=yield_of(known) if study.method == "monte_carlo" else None,
+        best=None if best is None else known[int(best)],
+        causes=_causes([] if optimal.all() else table["cause"].values[~optimal].tolist()),
+        spread=Table({n: ends for n in ("objective", "abscissa") if (ends := _ends(values[n][optimal]))}),
+        stable=int(_stable(table).sum()), structures=_ranked(values["structure"][optimal].tolist()),
+        proven=int(values["proven"].sum()), warm=int(values["warm"].sum()), laws=Table(laws),
+        seconds=float(table["seconds"].values.sum()),
+        product=yield_of(known) if study.method == "monte_carlo" else None,
     )  # fmt: skip
 
 
-def _causes(rows: Iterable[Row]) -> Table[int]:
+def _stable(table: Mapping[str, PartialColumn]) -> Truth:
+    column = table["stable"]
+    return np.asarray(column.values.astype(bool) & column.present)
+
+
+def _causes(texts: Iterable[str]) -> Table[int]:
     alike: dict[str, list[str]] = {}
-    for row in rows:
-        alike.setdefault(_NUMBER.sub("#", row.cause), []).append(row.cause)
+    for text in texts:
+        alike.setdefault(_NUMBER.sub("#", text), []).append(text)
     ranked = sorted(alike.values(), key=len, reverse=True)
     return Table({causes[0] if len(causes) == 1 else _AMOUNT.sub("", causes[0]): len(causes) for causes in ranked})
 
@@ -141,26 +152,22 @@ def _ranked(names: Iterable[str]) -> Table[int]:
     return Table(dict(Counter(names).most_common()))
 
 
-def _ends(name: str, rows: Iterable[Row]) -> tuple[float, float, float] | None:
-    values = sorted(v for v in (getattr(row, name) for row in rows) if math.isfinite(v))
-    return (values[0], median(values), values[-1]) if values else None
+def _ends(values: Array) -> tuple[float, float, float] | None:
+    known = np.sort(values[np.isfinite(values)])
+    return (float(known[0]), float(np.median(known)), float(known[-1])) if known.size else None
 
 
 def yield_of(rows: Iterable[Row]) -> Yield:
     """Shares of stable and feasible rows, and quantiles of their abscissa."""
-    answered, failed, stable, feasible, good = [], 0, 0, 0, 0
-    for row in rows:
-        if row.status not in ("optimal", "infeasible"):
-            failed += 1
-            continue
-        answered.append(math.inf if math.isnan(row.abscissa) else row.abscissa)
-        stable += row.stable is True
-        feasible += row.status == "optimal"
-        good += row.stable is True and row.status == "optimal"
-    answered.sort()
-    most = len(answered)
-    at = {f"{q:g}": answered[max(math.ceil(q * most) - 1, 0)] for q in QUANTILES if most}
-    return Yield(Share(stable, most), Share(feasible, most), Share(good, most), failed, Table(at))
+    table = columns(rows)
+    status, abscissa, stable = table["status"].values, table["abscissa"].values, _stable(table)
+    feasible = status == "optimal"
+    answered = feasible | (status == "infeasible")
+    known = np.sort(np.where(np.isnan(abscissa), np.inf, abscissa)[answered])
+    most = len(known)
+    at = {f"{q:g}": float(known[max(math.ceil(q * most) - 1, 0)]) for q in QUANTILES if most}
+    counts = ((of & answered).sum() for of in (stable, feasible, stable & feasible))
+    return Yield(*(Share(int(count), most) for count in counts), len(status) - most, Table(at))
 
 
 def wilson(count: int, of: int, z: float = _Z) -> tuple[float, float]:

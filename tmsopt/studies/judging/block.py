@@ -1,0 +1,132 @@
+"""Rows of a study as columns."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.design.unit_system import Unit
+from tmsopt.records import Array, Table, Truth
+from tmsopt.solver.solve import UNSTABLE
+from tmsopt.studies.row import Row
+
+STATUS = np.array(["optimal", "infeasible"], dtype=object)
+"""Of a row in a block, by whether it violates anything."""
+
+METHODS = np.array(["none", "omega0", "relation"], dtype=object)
+"""How the bound of a row was found."""
+
+STRUCTURES = np.array(["real", "pair"], dtype=object)
+"""Of a row, by whether it oscillates."""
+
+NUMBERS = ("objective", "abscissa", "damping_ratio", "oscillates", "bound", "gap", "by_relation")
+"""Columns of every block, beside ``varied.…``, ``violation.…``, ``law.…`` and ``report.…``."""
+
+_BIT = np.uint32
+_SEEDS = 2**31
+_MULTIPLIER, _START = 0x931E8875, 0x43B0D7E5  # NumPy's SeedSequence
+_LEFT, _RIGHT = 0xCA01F9DD, 0x4973F715
+_LAST, _LAST_MULTIPLIER = 0x8B51F9DD, 0x58F38DED
+_POOL = 4
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What all rows of a block share.
+
+    Attributes:
+        seed: of the study.
+        fixed: every parameter, those that vary too.
+        units: constraint → the unit in which the problem was written.
+        of_abscissa: constraints that name it.
+    """
+
+    seed: int
+    fixed: Mapping[str, float]
+    units: Mapping[str, tuple[str, float]]
+    of_abscissa: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Block:
+    """Rows with ascending numbers, each of them judged without a solver.
+
+    Attributes:
+        columns: those of `NUMBERS`, and the others by their headers; a violation or a law is nan where there is none.
+        seconds: that each row took.
+    """
+
+    frame: Frame
+    numbers: NDArray[np.int64]
+    columns: Mapping[str, Array] = field(repr=False)
+    seconds: float = 0.0
+    host: str = ""
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def __iter__(self) -> Iterator[Row]:
+        return (self.row(k) for k in range(len(self)))
+
+    @cached_property
+    def infeasible(self) -> Truth:
+        """Whether a row violates anything."""
+        found = np.zeros(len(self), dtype=bool)
+        for name, column in self.columns.items():
+            if name.startswith("violation."):
+                found |= ~np.isnan(column)
+        return found
+
+    def named(self, table: str) -> list[str]:
+        """Names in one table of the rows, such as ``law``."""
+        return [name[len(table) + 1 :] for name in self.columns if name.startswith(f"{table}.")]
+
+    def row(self, k: int) -> Row:
+        """The row at a place."""
+        at = {name: float(self.columns[name][k]) for name in NUMBERS}
+        tables = {
+            table: {n: x for n in self.named(table) if not math.isnan(x := float(self.columns[f"{table}.{n}"][k]))}
+            for table in ("law", "violation")
+        }
+        varied = {n: float(self.columns[f"varied.{n}"][k]) for n in self.named("varied")}
+        return Row(
+            number=int(self.numbers[k]), seed=int(seeds(self.frame.seed, self.numbers[k : k + 1])[0]),
+            varied=Table(varied), status=str(STATUS[int(self.infeasible[k])]), cause=self.cause(k),
+            objective=at["objective"], abscissa=at["abscissa"], abscissa_realised=at["abscissa"],
+            damping_ratio=at["damping_ratio"], structure=str(STRUCTURES[int(at["oscillates"])]),
+            parameters=Table({**self.frame.fixed, **varied}),
+            reports=Table({n: float(self.columns[f"report.{n}"][k]) for n in self.named("report")}),
+            bound=at["bound"], gap=at["gap"], proven=False, method=str(METHODS[self.methods[k]]),
+            laws=Table(tables["law"]), violations=Table(tables["violation"]), seconds=self.seconds, host=self.host,
+        )  # fmt: skip
+
+    @cached_property
+    def methods(self) -> NDArray[np.int64]:
+        """Place in `METHODS` of how each bound was found."""
+        known = np.isfinite(self.columns["bound"])
+        return np.where(known, 1 + (self.columns["by_relation"] > 0), 0)
+
+    def cause(self, k: int) -> str:
+        """Why the row at a place is infeasible; empty where it is not."""
+        amounts = {n: float(self.columns[f"violation.{n}"][k]) for n in self.named("violation")}
+        violated = [f"{n} by {Unit(*self.frame.units[n]).show(x, 3)}" for n, x in amounts.items() if not math.isnan(x)]
+        if not violated:
+            return ""
+        asked = any(not math.isnan(amounts[n]) for n in self.frame.of_abscissa)
+        note = f"; {UNSTABLE}" if asked and self.columns["abscissa"][k] >= 0 else ""
+        return f"violated: {', '.join(violated)}{note}"
+
+
+def seeds(seed: int, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+    """`Study.seed_of` of many rows: the last step of NumPy's SeedSequence for a spawn key of one number."""
+    words = max(_POOL, -(-seed.bit_length() // 32))
+    once = _START * pow(_MULTIPLIER, _POOL * words, 2**32) % 2**32
+    pool = int(np.random.SeedSequence(seed).pool[0])
+    with np.errstate(over="ignore"):
+        x = (numbers.astype(_BIT) ^ _BIT(once)) * _BIT(once * _MULTIPLIER % 2**32)
+        x = _BIT(_LEFT * pool % 2**32) - _BIT(_RIGHT) * (x ^ (x >> _BIT(16)))
+        x = ((x ^ (x >> _BIT(16))) ^ _BIT(_LAST)) * _BIT(_LAST * _LAST_MULTIPLIER % 2**32)
+    return np.asarray((x ^ (x >> _BIT(16))).astype(np.int64) % _SEEDS)

@@ -1,0 +1,94 @@
+"""The columns of rows of which most are in blocks, each made when it is asked for."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tmsopt.records import Truth
+from tmsopt.studies.judging.block import METHODS, STATUS, STRUCTURES, Block, seeds
+from tmsopt.studies.judging.rows import Rows
+
+TABLES = {"varied": "varied", "parameters": "parameters", "reports": "report", "laws": "law", "violations": "violation"}
+"""Table of a row → what its columns begin with in a block."""
+
+_Part = tuple[NDArray[Any], Truth]
+_FIELDS: Mapping[str, Callable[[Block], Any]] = {
+    "number": lambda b: b.numbers, "seed": lambda b: seeds(b.frame.seed, b.numbers),
+    "status": lambda b: STATUS[b.infeasible.astype(int)],
+    "cause": lambda b: np.array([b.cause(k) if bad else "" for k, bad in enumerate(b.infeasible)], dtype=object),
+    "abscissa_realised": lambda b: b.columns["abscissa"], "stable": lambda b: b.columns["abscissa"] < 0,
+    "structure": lambda b: STRUCTURES[b.columns["oscillates"].astype(int)], "proven": lambda b: False,
+    "method": lambda b: METHODS[b.methods], "starts": lambda b: 0, "warm": lambda b: False,
+    "seconds": lambda b: b.seconds, "host": lambda b: np.array([b.host], dtype=object),
+}  # fmt: skip
+"""Of a row → its values in a block; the others are columns there."""
+
+
+def field(rows: Rows, name: str, single: _Part) -> _Part:
+    """Values of one field of all rows, and which rows have one.
+
+    Args:
+        single: those of the rows in no block.
+    """
+    made = _FIELDS.get(name, lambda b: b.columns[name])
+    return _ordered(rows, [(np.broadcast_to(made(b), len(b)), np.True_) for b in rows.blocks], single)
+
+
+def keyed(rows: Rows, table: str, key: str, single: _Part) -> _Part:
+    """Likewise the values of one name in a table of the rows."""
+    return _ordered(rows, [_keyed(b, table, key) for b in rows.blocks], single)
+
+
+def keys(rows: Rows, table: str, singles: Mapping[str, Truth]) -> list[str]:
+    """The names in a table of the rows, in the order in which the rows have them.
+
+    Args:
+        singles: name → which of the rows in no block have it.
+    """
+    known = dict.fromkeys(name for b in rows.blocks for name in _names(b, table))
+    nothing = np.zeros(len(rows.singles), dtype=bool)
+    first = {}
+    for key in known | dict.fromkeys(singles):
+        _, present = keyed(rows, table, key, (np.zeros(len(nothing)), singles.get(key, nothing)))
+        if present.any():
+            first[key] = int(present.argmax())
+    return sorted(first, key=first.__getitem__)
+
+
+def _names(block: Block, table: str) -> list[str]:
+    return list(block.frame.fixed) if table == "parameters" else block.named(TABLES[table])
+
+
+def _keyed(block: Block, table: str, key: str) -> tuple[Any, Any]:
+    name = f"varied.{key}" if table == "parameters" else f"{TABLES[table]}.{key}"
+    column = block.columns.get(name)
+    if column is None and table == "parameters":
+        column = np.full(len(block), block.frame.fixed.get(key, np.nan))
+    if column is None:
+        return np.full(len(block), np.nan), np.False_
+    return column, ~np.isnan(column) if table in ("laws", "violations") else np.True_
+
+
+def _ordered(rows: Rows, parts: list[tuple[Any, Any]], single: _Part) -> _Part:
+    values = np.concatenate([*(values for values, _ in parts), single[0]])
+    present = [np.broadcast_to(there, len(values)) for values, there in parts]
+    return values[rows.order], np.concatenate([*present, single[1]])[rows.order]
+
+
+@dataclass(frozen=True)
+class Lazily(Mapping[str, Any]):
+    """A table whose entries are made each time they are asked for."""
+
+    made: Mapping[str, Callable[[], Any]]
+
+    def __getitem__(self, name: str) -> Any:
+        return self.made[name]()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.made)
+
+    def __len__(self) -> int:
+        return len(self.made)
