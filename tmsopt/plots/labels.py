@@ -1,12 +1,16 @@
 """Names of marked points, units and labels of axes, words for modes, and legends."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 import textalloc
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import PlaceHolderLayoutEngine
+from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike
 
@@ -107,16 +111,44 @@ def place_names(ax: Axes, names: Sequence[Name]) -> None:
             near[0][1].append(name.text)
     if not merged:
         return
-    figure_of(ax).draw_without_rendering()  # settles the layout, and with it how large a text is in the axes
-    curves = [np.asarray(line.get_xydata(), dtype=float) for line in ax.get_lines()]
-    curves = [xy[np.isfinite(xy).all(axis=1)] for xy in curves]
     places = np.array([place for place, _ in merged])
-    textalloc.allocate(
-        ax, places[:, 0], places[:, 1], [", ".join(words) for _, words in merged], x_scatter=places[:, 0],
-        y_scatter=places[:, 1], x_lines=[xy[:, 0] for xy in curves if len(xy) > 1],
-        y_lines=[xy[:, 1] for xy in curves if len(xy) > 1], textsize=_SIZE, linecolor="0.4", linewidth=0.6, zorder=7,
-        path_effects=[withStroke(linewidth=2.5, foreground="white")],
-    )  # fmt: skip
+    with settled(figure_of(ax)):
+        curves = [xy for line in ax.get_lines() for xy in _seen(ax, line.get_xydata())]
+        textalloc.allocate(
+            ax, places[:, 0], places[:, 1], [", ".join(words) for _, words in merged], x_scatter=places[:, 0],
+            y_scatter=places[:, 1], x_lines=[xy[:, 0] for xy in curves], y_lines=[xy[:, 1] for xy in curves],
+            textsize=_SIZE, linecolor="0.4", linewidth=0.6, zorder=7,
+            path_effects=[withStroke(linewidth=2.5, foreground="white")],
+        )  # fmt: skip
+
+
+@contextmanager
+def settled(figure: Figure) -> Iterator[None]:
+    """The layout as it is when drawn, and with it how large a text is in the axes; drawn again, it is not sought anew.
+
+    Inside another of these nothing is left to do.
+    """
+    engine = figure.get_layout_engine()
+    if isinstance(engine, PlaceHolderLayoutEngine):
+        yield
+        return
+    figure.draw_without_rendering()
+    if engine is None:
+        yield
+        return
+    figure.set_layout_engine("none")
+    try:
+        yield
+    finally:
+        figure.set_layout_engine(engine)
+
+
+def _seen(ax: Axes, xy: ArrayLike) -> list[Array]:
+    """The pieces of a curve inside the figure, by as few points as show it to a tenth of a pixel."""
+    width, height = figure_of(ax).canvas.get_width_height(physical=True)
+    drawn = Path(np.asarray(xy, dtype=float)).to_polygons(ax.transData, width, height, closed_only=False)
+    pieces = (np.asarray(piece, dtype=float) for piece in drawn)
+    return [np.asarray(ax.transData.inverted().transform(piece)) for piece in pieces if len(piece) > 1]
 
 
 def axis_label(parameter: Parameter) -> str:
