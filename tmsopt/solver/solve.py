@@ -7,7 +7,6 @@ from dataclasses import replace
 from functools import partial
 from typing import Unpack
 
-from tmsopt.branch_and_bound.stability import any_stable
 from tmsopt.checks.bound import instant_bound
 from tmsopt.checks.digits import certified
 from tmsopt.checks.recheck import Checked, recheck
@@ -161,6 +160,8 @@ def _with_stability(solution: Solution, options: Options, family: Family | None,
     problem = solution.problem
     if solution.stable is not False or solution.any_stable is False or not solution.stability_sought:
         return solution
+    from tmsopt.branch_and_bound.stability import any_stable  # a tenth of all imports, which few problems need
+
     asked = any_stable(problem, options.stability, solution.parameters, options.asking)
     if asked.design is not None:
         few = replace(options, starts=min(options.starts, _NEAR), stability=0.0, alone=False, interruptible=False)
