@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import qr
 
 from tmsopt.arithmetic.krawczyk import Refused, slopes
 from tmsopt.design.expression import Expression
@@ -15,6 +14,7 @@ from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.models import Quantity, Values
 from tmsopt.models.exact import decimal_fraction
 from tmsopt.proofs.factored import abscissa_formula
+from tmsopt.records import Array
 from tmsopt.roots import Pattern
 
 ROUNDINGS = 64
@@ -133,20 +133,32 @@ def choose(system: Equations, at: Mapping[str, Any], among: Sequence[str]) -> Ch
     free = [names.index(n) for n in among]
     basis = np.linalg.qr(scaled[:, outside], mode="complete")[0][:, len(outside) :] if outside else np.eye(len(scaled))
     reduced = basis.T @ scaled[:, free]
-    _, triangle, order = qr(reduced, pivoting=True, mode="economic")
-    pivots = np.abs(np.diag(triangle)[:count])
+    order, pivots = _pivoted(reduced, count)
     if count and not pivots[-1] > _DEPENDENT * max(pivots[0], 1e-3):
         idle = [n for n, column in zip(among, reduced.T, strict=True) if not np.abs(column).max() > _DEPENDENT]
         why = f"; they do not depend on {', '.join(idle)}" if idle else ""
         raise Refused(
             f"the equations are (nearly) singular in the free parameters {', '.join(among)}{why}; free another one"
         )
-    moved = tuple(sorted((among[k] for k in order[:count]), key=of.names.index))
+    moved = tuple(sorted((among[k] for k in order), key=of.names.index))
     square = jacobian[:, [names.index(n) for n in (*moved, *system.unknowns)]]
     effect = np.abs(np.linalg.pinv(square)) @ rounding * (ROUNDINGS * _EPS)
     floors = {n: _NOTHING * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
     solved = zip((*moved, *system.unknowns), effect, strict=True)
     return Chosen(moved, {n: float(e) + 2 * _EPS * abs(float(at[n])) + floors.get(n, 0.0) for n, e in solved})
+
+
+def _pivoted(columns: Array, count: int) -> tuple[list[int], list[float]]:
+    """Columns that add most to those before them, and how much: QR with pivoting, and nothing of SciPy to load."""
+    left, order, adds = columns, list[int](), list[float]()
+    for _ in range(count):
+        lengths = np.linalg.norm(left, axis=0)
+        order.append(int(lengths.argmax()))
+        adds.append(float(lengths.max()))
+        unit = left[:, order[-1]] / (adds[-1] or 1.0)
+        left = left - np.outer(unit, unit @ left)
+        left[:, order] = 0.0
+    return order, adds
 
 
 def _many(count: int, noun: str) -> str:
