@@ -32,7 +32,7 @@ from tmsopt.studies import Row
 from tmsopt.studies.store import open_store, read_store
 
 database = import_module("tmsopt.studies.store.database")
-store = import_module("tmsopt.studies.store.store")
+store = import_module("tmsopt.studies.store.opening")
 
 TASKS = ("write", "log")
 """Of a process: write, and write with the write-ahead log that earlier versions had."""
@@ -72,7 +72,7 @@ import os, random, sys, time
 from pathlib import Path
 sys.path.insert(0, str(Path("tests").resolve()))
 from helpers.rows import STUDY, row
-from tmsopt.studies.store import store
+from tmsopt.studies.store import opening as store
 path, task = sys.argv[1:]
 with store.open_store(path, STUDY) as opened:
     print(os.getpid(), flush=True)
@@ -761,7 +761,7 @@ import os, signal, sys
 from pathlib import Path
 sys.path.insert(0, str(Path("tests").resolve()))
 from helpers.rows import STUDY, row
-from tmsopt.studies.store import store
+from tmsopt.studies.store import opening as store
 
 def killed_after(events):
     def hook(event, given):

@@ -1,7 +1,8 @@
 """Elementary functions of whatever number a formula is given: floats, arrays, CasADi expressions, balls.
 
 A ball is an exact fraction (`flint.fmpq`), an interval with a middle and a radius (`flint.arb`), a power series of
-these (`flint.arb_series`), or an array of intervals (`Twofold`). A value that does not exist, or that the balls are too wide to tell, is a ball nan.
+these (`flint.arb_series`), or an array of intervals (`Twofold`). A value that does not exist, or that the balls are too
+wide to tell, is a ball nan.
 """
 
 from fractions import Fraction

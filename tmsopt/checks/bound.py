@@ -12,7 +12,7 @@ is reached where the parameters give that polynomial (Blondel, Gürbüzbalaban, 
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
@@ -23,19 +23,18 @@ import flint
 import numpy as np
 
 from tmsopt.arithmetic.elementary import as_ball, exact, quotient
-from tmsopt.arithmetic.twofold import Twofold
 from tmsopt.arithmetic.walk import steps
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Bound
 from tmsopt.formulation.nlp import objective_size
 from tmsopt.models import Model, ParameterSet
 from tmsopt.models.exact import Tilt
-from tmsopt.records import Array, Truth
+from tmsopt.records import Array
 
 PROVEN = 1e-9
 """Gap, relative to the size of the roots and of the bound, below which a design counts as proven optimal."""
 
-_ROUNDING = 1e-15  # of the quotient to a double, and of its root
+ROUNDING = 1e-15  # of the quotient to a double, and of its root
 _NODES = np.linspace(-1, 1, 9)
 _BITS = 212  # the parameters of a set are doubles, so exact; what follows from them is right far beyond the answer
 _DEGREE = 4  # in any one parameter; nine nodes fit it
@@ -77,33 +76,7 @@ def omega0_bound(problem: Problem, value: float) -> Bound:
     With scenarios, that of the first of them: the worst is no better.
     """
     largest = _largest_product(_one_case(problem)) if bounded(problem) else math.inf
-    return _bound(-(largest ** (1 / problem.model.degree)) * (1 + _ROUNDING), value, "omega0", objective_size(problem))
-
-
-def fixed_bound(
-    problem: Problem, coefficients: Sequence[Twofold], settled: Callable[[Twofold], Array]
-) -> tuple[Array, Truth]:
-    """The bound of `instant_bound` for many designs in which nothing is free, and where it is one by relations.
-
-    Every relation of the coefficients is one of two of them then: C(n, j) zʲ = aⱼ/a0, and C(n, j) zⁿ⁻ʲ aₙ⁻¹ likewise.
-
-    Args:
-        settled: rounds numbers to doubles, and notes where that is not certain.
-    """
-    model, of, n = problem.model, problem.parameter_set, problem.model.degree
-    quotients = settled(abs(coefficients[-1] / coefficients[0]))
-    known = np.array([-(q ** (1 / n)) * (1 + _ROUNDING) for q in quotients.tolist()])
-    if any(p.tangent for p in of.parameters) or not is_rational(model, of):
-        return known, np.zeros(len(known), dtype=bool)
-    least = np.full(len(known), np.inf)
-    for j in range(n + 1):
-        up, down = coefficients[j] / coefficients[0] / math.comb(n, j), coefficients[n] / coefficients[j]
-        for power, ratio, linear in ((j, up, j == 1), (n - j, down * math.comb(n, j), n == 1)):
-            if power:
-                zero = settled(ratio.root(power))
-                least = np.minimum(least, zero if linear else np.maximum(zero, 0.0))  # 0 is one of a derivative
-    other = np.nextafter(-least, -np.inf)
-    return np.maximum(other, known), other > known
+    return _bound(-(largest ** (1 / problem.model.degree)) * (1 + ROUNDING), value, "omega0", objective_size(problem))
 
 
 def _one_case(problem: Problem) -> Problem:

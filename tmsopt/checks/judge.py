@@ -13,7 +13,7 @@ import numpy as np
 
 from tmsopt import laws
 from tmsopt.arithmetic.twofold import Twofold, twofold
-from tmsopt.checks.bound import PROVEN, bounded, fixed_bound
+from tmsopt.checks.bound import PROVEN, ROUNDING, bounded, is_rational
 from tmsopt.checks.law_rows import SAME_LAW
 from tmsopt.checks.recheck import FEASIBLE
 from tmsopt.design.problem import Problem
@@ -33,7 +33,7 @@ _UNUSED = (TypeError, ValueError, AttributeError, NotImplementedError, Arithmeti
 
 
 @dataclass(frozen=True)
-class Judged:
+class Verdicts:
     """Designs as columns, one value for each.
 
     Attributes:
@@ -66,7 +66,7 @@ def judgeable(problem: Problem) -> bool:
     return not (listed or problem.pattern or problem.asks(RADIUS) or problem.asks(ANGULAR_FREQUENCY))
 
 
-def judge(problem: Problem, columns: Mapping[str, Array], reports: Sequence[str] = ()) -> Judged | None:
+def judge(problem: Problem, columns: Mapping[str, Array], reports: Sequence[str] = ()) -> Verdicts | None:
     """The designs that differ from a problem's in some of its fixed parameters; None where formulas take no arrays.
 
     Args:
@@ -80,7 +80,7 @@ def judge(problem: Problem, columns: Mapping[str, Array], reports: Sequence[str]
         return None
 
 
-def _judged(problem: Problem, columns: Mapping[str, Array], reports: Sequence[str]) -> Judged:
+def _judged(problem: Problem, columns: Mapping[str, Array], reports: Sequence[str]) -> Verdicts:
     model, of = problem.model, problem.parameter_set
     given = {n: np.float64(v) for n, v in problem.ordered({}).items()} | dict(columns)
     m = len(next(iter(columns.values())))
@@ -109,11 +109,11 @@ def _judged(problem: Problem, columns: Mapping[str, Array], reports: Sequence[st
     feasible = np.logical_and.reduce([np.isnan(v) for v in violations.values()], initial=True) & np.ones(m, dtype=bool)
     bound, related = np.full(m, -np.inf), np.zeros(m, dtype=bool)
     if bounded(problem):
-        bound, related = fixed_bound(problem, coefficients, settled)
+        bound, related = _bounds(problem, coefficients, settled)
         bound = np.where(feasible, bound, -np.inf)
         certain &= ~(np.isfinite(bound) & (objective - bound <= _DOUBT * PROVEN * (1.0 + np.abs(bound))))
     said = _laws(wide, plain, coefficients, feasible, settled) if model is tms else {}
-    return Judged(
+    return Verdicts(
         certain, objective, doubles["abscissa"], doubles["damping_ratio"], found.oscillates, violations, bound,
         np.where(np.isfinite(bound), np.maximum(objective - bound, 0.0), np.inf), related, said,
         {text: _column(problem.read(text)(plain), m) for text in reports},
@@ -158,6 +158,32 @@ def _violations(problem: Problem, values: Values, found: Motions) -> tuple[dict[
     return amounts, doubt
 
 
+def _bounds(
+    problem: Problem, coefficients: Sequence[Twofold], settled: Callable[[Twofold], Array]
+) -> tuple[Array, Truth]:
+    """The bound of `instant_bound` on the abscissa of each design, and where it is one by relations.
+
+    Coefficients that do not vary have relations of two: with a0, where aⱼ/a0 = C(n, j) zʲ gives the bound, and with aₙ.
+
+    Args:
+        settled: rounds numbers to doubles, and notes where that is not certain.
+    """
+    model, of, n = problem.model, problem.parameter_set, problem.model.degree
+    quotients = settled(abs(coefficients[-1] / coefficients[0]))
+    known = np.array([-(q ** (1 / n)) * (1 + ROUNDING) for q in quotients.tolist()])
+    if any(p.tangent for p in of.parameters) or not is_rational(model, of):
+        return known, np.zeros(len(known), dtype=bool)
+    least = np.full(len(known), np.inf)
+    for j in range(n + 1):
+        up, down = coefficients[j] / coefficients[0] / math.comb(n, j), coefficients[n] / coefficients[j]
+        for power, ratio, linear in ((j, up, j == 1), (n - j, down * math.comb(n, j), n == 1)):
+            if power:
+                zero = settled(ratio.root(power))
+                least = np.minimum(least, zero if linear else np.maximum(zero, 0.0))  # 0 is one of a derivative
+    other = np.nextafter(-least, -np.inf)
+    return np.maximum(other, known), other > known
+
+
 def _laws(
     wide: Values, values: Values, coefficients: Sequence[Twofold], feasible: Truth, settled: Callable[[Any], Array]
 ) -> dict[str, Array]:
@@ -189,5 +215,3 @@ def _laws(
         "Frc1": relative(critical, first, one & exists),
         "frm": relative(critical, laws.frm(**heights, **tilt), one & exists & optimal),
     }
-
-

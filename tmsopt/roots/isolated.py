@@ -102,7 +102,7 @@ def _numeric(a: Array) -> Complex:
 
 
 def _least_damped(z: Complex, exact: Array, size: Array) -> tuple[Array, Array, Truth]:
-    """Root with the least damping ratio; the ratio where it is that of a real root, 1 or −1, else 0; whether certain."""
+    """Root with the least damping ratio; the ratio where that is of a real root, 1 or −1, else 0; whether certain."""
     real = z.imag == 0
     ratio = np.where(real, np.inf, -z.real / np.where(size > 0, size, 1.0))
     error = 2 * exact / np.where(size > 0, size, 1.0)

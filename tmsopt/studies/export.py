@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tmsopt.disk import cell, headed, netcdf_errors, whole
 from tmsopt.errors import Fault, InputError, needed
 from tmsopt.records import Array
-from tmsopt.studies.judging import Rows, table
+from tmsopt.studies.judging import RowsInBlocks, table
 from tmsopt.studies.row import Row
 
 PREFIXES = {"varied": "varied.", "parameters": "", "reports": "report.", "laws": "law.", "violations": "violation."}
@@ -204,10 +204,10 @@ FORMATS: Mapping[str, Format] = {
 
 def columns(rows: Iterable[Row]) -> Mapping[str, PartialColumn]:
     """Header → column, in the order of the fields of a row; 8 bytes per number while they are collected."""
-    return _of_blocks(rows) if isinstance(rows, Rows) else _of_each(rows)
+    return _of_blocks(rows) if isinstance(rows, RowsInBlocks) else _of_each(rows)
 
 
-def _of_blocks(rows: Rows) -> Mapping[str, PartialColumn]:
+def _of_blocks(rows: RowsInBlocks) -> Mapping[str, PartialColumn]:
     """Columns made when they are asked for."""
     single, count = _of_each(rows.singles), len(rows.singles)
     absent = PartialColumn(np.full(count, np.nan), np.zeros(count, dtype=bool))

@@ -1,7 +1,7 @@
 """A study carried out: rows by an engine, into a store."""
 
 import time
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from os import PathLike
@@ -17,13 +17,14 @@ from tmsopt.records import SCHEMA, Progress, Shown, Truth, frame
 from tmsopt.studies.engines import Note, Unit, cluster, cores, in_process, processes
 from tmsopt.studies.engines.work import silent
 from tmsopt.studies.export import columns, export, gridded
-from tmsopt.studies.judging import Block, applies, frame_of, gathered, judged
+from tmsopt.studies.judging import RowBlock, applies, gathered, judged, shared_by
 from tmsopt.studies.load import load_study
 from tmsopt.studies.monte_carlo import Sampling, planned
 from tmsopt.studies.neighbours import blocks
 from tmsopt.studies.row import Row
 from tmsopt.studies.solving import Solver
-from tmsopt.studies.store.store import Store, open_store, read_store
+from tmsopt.studies.store.opening import open_store, read_store
+from tmsopt.studies.store.store import Store
 from tmsopt.studies.study import Study, definition
 from tmsopt.studies.summary import Summary, summary
 
@@ -166,7 +167,7 @@ def stored(study: Study, store: str | PathLike[str]) -> Results:
 class _Held:
     """Rows of a study in memory."""
 
-    blocks: list[Block] = field(default_factory=list)
+    blocks: list[RowBlock] = field(default_factory=list)
     rows: list[Row] = field(default_factory=list)
 
     @property
@@ -207,9 +208,9 @@ def _held(study: Study, store: Store) -> _Held:
     raise InputError([Fault(message, file=str(store.path))])
 
 
-def _unlike(study: Study, block: Block) -> int | None:
+def _unlike(study: Study, block: RowBlock) -> int | None:
     """The number of a row that the study gave other values; None where there is none."""
-    if block.frame != frame_of(study) or block.named("varied") != list(study.columns):
+    if block.shared != shared_by(study) or block.named("varied") != list(study.columns):
         return int(block.numbers[0])
     wrong = np.zeros(len(block), dtype=bool)
     for name, column in study.columns.items():
@@ -242,43 +243,53 @@ def _carried_out(
     store: Store | None = None,
 ) -> tuple[_Held, float, str]:  # fmt: skip
     """The rows that are not done, in how many seconds, and by which engine; kept in a store as they come."""
-    began = last = time.perf_counter()
-    made, fresh = _Held(), list[Row]()
-    if done.all():
-        return made, 0.0, ""
-    before, most, engine, left = int(done.sum()), len(study), "", np.flatnonzero(~done)
-    if progress:
-        progress(before, most)
-    if applies(study):
-        engine, remaining = "in process", [left[:0]]
-        for block, some in judged(study, left):
-            if store is not None and len(block):
-                store.add_block(block)
-            made.blocks.append(block)
-            remaining.append(some)
-            if progress:
-                progress(before + made.count, most)
-        left = np.concatenate(remaining)
-    if not left.size:
-        return made, time.perf_counter() - began, engine
-    wanted = set(left.tolist())
-    rows, engine = _solved(study, wanted, workers, scheduler, note)
-    with closing(rows):
-        try:
-            for row in rows:
-                if row.number not in wanted:
-                    continue  # of a block that had been stored in part
-                made.rows.append(row)
-                fresh.append(row)
-                if store is not None and time.perf_counter() - last >= _COMMIT:
-                    store.add(fresh)
-                    fresh, last = [], time.perf_counter()
-                if progress:
-                    progress(before + made.count, most)
-        finally:
-            if store is not None:
-                store.add(fresh)  # interrupted or not, what was solved is kept
-    return made, time.perf_counter() - began, engine
+    began = time.perf_counter()
+    made, engine, left, before = _Held(), "", np.flatnonzero(~done), int(done.sum())
+
+    def told() -> None:
+        if progress:
+            progress(before + made.count, len(study))
+
+    if left.size:
+        told()
+    if left.size and applies(study):
+        engine, left = "in process", _judged(study, left, made, store, told)
+    if left.size:
+        wanted = set(left.tolist())
+        rows, engine = _solved(study, wanted, workers, scheduler, note)
+        with closing(rows):
+            _kept((row for row in rows if row.number in wanted), made, store, told)  # a block may be stored in part
+    return made, time.perf_counter() - began if engine else 0.0, engine
+
+
+def _judged(
+    study: Study, left: NDArray[np.int64], made: _Held, store: Store | None, told: Callable[[], None]
+) -> NDArray[np.int64]:
+    """Judge rows in blocks; the numbers of those that are still left."""
+    remaining = []
+    for block, some in judged(study, left):
+        if store is not None and len(block):
+            store.add_block(block)
+        made.blocks.append(block)
+        remaining.append(some)
+        told()
+    return np.concatenate(remaining)
+
+
+def _kept(rows: Iterable[Row], made: _Held, store: Store | None, told: Callable[[], None]) -> None:
+    """Take rows as they come, into a store once in a while."""
+    fresh, last = list[Row](), time.perf_counter()
+    try:
+        for row in rows:
+            made.rows.append(row)
+            fresh.append(row)
+            told()
+            if store is not None and time.perf_counter() - last >= _COMMIT:
+                store.add(fresh)
+                fresh, last = [], time.perf_counter()
+    finally:
+        if store is not None:
+            store.add(fresh)  # interrupted or not, what was solved is kept
 
 
 def _solved(

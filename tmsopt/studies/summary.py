@@ -166,8 +166,8 @@ def yield_of(rows: Iterable[Row]) -> Yield:
     known = np.sort(np.where(np.isnan(abscissa), np.inf, abscissa)[answered])
     most = len(known)
     at = {f"{q:g}": float(known[max(math.ceil(q * most) - 1, 0)]) for q in QUANTILES if most}
-    counts = ((of & answered).sum() for of in (stable, feasible, stable & feasible))
-    return Yield(*(Share(int(count), most) for count in counts), len(status) - most, Table(at))
+    shares = [Share(int((of & answered).sum()), most) for of in (stable, feasible, stable & feasible)]
+    return Yield(shares[0], shares[1], shares[2], len(status) - most, Table(at))
 
 
 def wilson(count: int, of: int, z: float = _Z) -> tuple[float, float]:

@@ -1,6 +1,7 @@
 """Sums of two doubles by error-free transformations (Dekker, Numer. Math. 18, 224, 1971), with running error bounds."""
 
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 import flint
@@ -13,6 +14,10 @@ _ROUNDING = 2.0**-101
 
 _LEAST = 1e-290  # of a product: below it the rounding of a product may itself be rounded
 _SPLIT = 2.0**27 + 1
+_BITS = 160
+_PARTS = 16  # of π, between which sine and cosine are tabulated
+_FARTHEST = 1e4  # argument of a sine; beyond it the bound on the error is lost
+_TRUNCATED = 1e-27  # relative: the fourth terms and those after them are doubles, 2.4e-13 of the sum at most
 _MARGIN = 1 + 1e-9  # of a bound, itself a sum of doubles none of which is negative
 
 
@@ -74,10 +79,10 @@ class Twofold:
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> "Twofold":
-        return self + -twofold(other)
+        return self.__add__(-twofold(other))
 
     def __rsub__(self, other: Any) -> "Twofold":
-        return -self + other
+        return (-self).__add__(other)
 
     def __mul__(self, other: Any) -> "Twofold":
         b = twofold(other)
@@ -100,20 +105,18 @@ class Twofold:
         return Twofold(high, second - (high - first), off + _ROUNDING * abs(first) + _LEAST)
 
     def __rtruediv__(self, other: Any) -> "Twofold":
-        return twofold(other) / self
+        return twofold(other).__truediv__(self)
 
-    def __pow__(self, power: Any) -> "Twofold":
+    def __pow__(self, power: Any) -> Any:
         if power == Fraction(1, 2):
             return self.sqrt()
         if int(power) != power:
             return NotImplemented
-        if power < 0:
-            return 1 / self**-power
-        found, square, left = twofold(1.0), self, int(power)
+        found, square, left = twofold(1.0), self, abs(int(power))
         while left:
             found = found * square if left & 1 else found
             square, left = square * square, left >> 1
-        return found
+        return found if power > 0 else 1 / found
 
     def sqrt(self) -> "Twofold":
         """Square root; nan where the number is negative, without an error bound where it may be 0."""
@@ -140,20 +143,20 @@ class Twofold:
 
     def sin(self) -> "Twofold":
         """Sine."""
-        return _functions().sine_cosine(self)[0]
+        return _sine_cosine(self)[0]
 
     def cos(self) -> "Twofold":
         """Cosine."""
-        return _functions().sine_cosine(self)[1]
+        return _sine_cosine(self)[1]
 
     def tan(self) -> "Twofold":
         """Tangent."""
-        sine, cosine = _functions().sine_cosine(self)
+        sine, cosine = _sine_cosine(self)
         return sine / cosine
 
     def __getattr__(self, name: str) -> Any:
         if name in ("asin", "acos", "atan", "exp", "log"):
-            return lambda: _functions().by_balls(name, self)
+            return lambda: _by_balls(name, self)
         raise AttributeError(name)
 
 
@@ -169,7 +172,63 @@ def twofold(x: Any) -> Twofold:
     return Twofold(x)
 
 
-def _functions() -> Any:
-    from tmsopt.arithmetic.twofold import functions
+def _sine_cosine(x: Twofold) -> tuple[Twofold, Twofold]:
+    """Sine and cosine: by tables at the nearest sixteenth of π, and power series of what is left."""
+    step, sines, cosines = _tables()
+    near = np.abs(x.high) < _FARTHEST
+    turns = np.rint(np.where(near, x.high, 0.0) * (_PARTS / np.pi))[()]
+    place = turns.astype(np.int64) % (2 * _PARTS)
+    t = x - step * turns
+    square = t * t
+    u = square.high
+    last = u * u * u * u
+    tail = last * (1 / 362880 - u * (1 / 39916800 - u * (1 / 6227020800 - u / 1307674368000)))
+    sine = t + t * (square * (square * (square * _SERIES[7] + _SERIES[5]) + _SERIES[3]) + tail)
+    tail = last * (1 / 40320 - u * (1 / 3628800 - u * (1 / 479001600 - u / 87178291200)))
+    cosine = square * (square * (square * _SERIES[6] + _SERIES[4]) + _SERIES[2]) + tail + 1
+    at, along = sines[place], cosines[place]
+    lost = np.where(near, _TRUNCATED, np.inf)[()]
+    found = [(at * cosine + along * sine, at), (along * cosine - at * sine, along)]
+    one, other = (Twofold(f.high, f.low, f.off + lost * (abs(of.high) + abs(sine.high))) for f, of in found)
+    return one, other
 
-    return functions
+
+def _by_balls(name: str, x: Twofold) -> Twofold:
+    """A function of each number by ball arithmetic, one after the other."""
+    high, low, off = (np.asarray(a, dtype=float) for a in np.broadcast_arrays(x.high, x.low, x.off))
+    found = np.empty((3, high.size))
+    with flint.ctx.workprec(_BITS):
+        for k, (h, rest, r) in enumerate(zip(high.ravel(), low.ravel(), off.ravel(), strict=True)):
+            found[:, k] = _split(getattr(flint.arb(float(h)) + flint.arb(float(rest), float(r)), name)())
+    return Twofold(*(part.reshape(high.shape)[()] for part in found))
+
+
+def _split(ball: Any) -> tuple[float, float, float]:
+    if not ball.is_finite():
+        return np.nan, np.nan, np.inf
+    high = float(ball.mid())
+    rest = ball - flint.arb(high)
+    low = float(rest.mid())
+    return high, low, float((rest - flint.arb(low)).abs_upper())
+
+
+@cache
+def _tables() -> tuple[Twofold, Twofold, Twofold]:
+    """π/16, and sine and cosine of its multiples."""
+    with flint.ctx.workprec(_BITS):
+        step = flint.arb.pi() / _PARTS
+        angles = [step * k for k in range(2 * _PARTS)]
+        each = [[_split(a.sin()) for a in angles], [_split(a.cos()) for a in angles]]
+        sines, cosines = (Twofold(*np.array(rows).T) for rows in each)
+        return Twofold(*_split(step)), sines, cosines
+
+
+def _inverse_factorials() -> dict[int, Twofold]:
+    found, product = {}, 1
+    for k in range(2, 8):
+        product *= k
+        found[k] = twofold(flint.fmpq((-1) ** (k // 2), product))
+    return found
+
+
+_SERIES: dict[int, Twofold] = _inverse_factorials()

@@ -1,15 +1,24 @@
 """Rows that solve nothing, thousands at once: judged in blocks, kept as columns, made into rows when asked for.
 
-In: a study in which nothing is free. Out: `Block`, columns of rows; `Rows`, blocks and single rows in one order. Open
-`judging` first.
+In: a study in which nothing is free. Out: `RowBlock`, columns of rows; `RowsInBlocks`, these and single
+rows in one order. Open `judging` first.
 """
 
 from tmsopt.studies.judging import table
-from tmsopt.studies.judging.block import Block
-from tmsopt.studies.judging.judging import applies, frame_of, judged, judged_alone
+from tmsopt.studies.judging.block import RowBlock
+from tmsopt.studies.judging.judging import applies, judged, judged_alone, shared_by
 from tmsopt.studies.judging.packing import packed_block, unpacked_block
-from tmsopt.studies.judging.rows import Rows, gathered
+from tmsopt.studies.judging.rows import RowsInBlocks, gathered
 
 __all__ = [
-    "Block", "Rows", "applies", "frame_of", "gathered", "judged", "judged_alone", "packed_block", "table", "unpacked_block",
+    "RowBlock",
+    "RowsInBlocks",
+    "applies",
+    "gathered",
+    "judged",
+    "judged_alone",
+    "packed_block",
+    "shared_by",
+    "table",
+    "unpacked_block",
 ]  # fmt: skip

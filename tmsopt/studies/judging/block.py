@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -34,7 +34,7 @@ _POOL = 4
 
 
 @dataclass(frozen=True)
-class Frame:
+class Shared:
     """What all rows of a block share.
 
     Attributes:
@@ -51,7 +51,7 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class Block:
+class RowBlock:
     """Rows with ascending numbers, each of them judged without a solver.
 
     Attributes:
@@ -59,7 +59,7 @@ class Block:
         seconds: that each row took.
     """
 
-    frame: Frame
+    shared: Shared
     numbers: NDArray[np.int64]
     columns: Mapping[str, Array] = field(repr=False)
     seconds: float = 0.0
@@ -84,6 +84,15 @@ class Block:
         """Names in one table of the rows, such as ``law``."""
         return [name[len(table) + 1 :] for name in self.columns if name.startswith(f"{table}.")]
 
+    def some(self, places: NDArray[np.int64]) -> "RowBlock":
+        """The rows at some places."""
+        return replace(self, numbers=self.numbers[places], columns={n: c[places] for n, c in self.columns.items()})
+
+    def find(self, number: int) -> Row | None:
+        """The row of a number, if it is here."""
+        place = int(np.searchsorted(self.numbers, number))
+        return self.row(place) if place < len(self) and self.numbers[place] == number else None
+
     def row(self, k: int) -> Row:
         """The row at a place."""
         at = {name: float(self.columns[name][k]) for name in NUMBERS}
@@ -93,11 +102,11 @@ class Block:
         }
         varied = {n: float(self.columns[f"varied.{n}"][k]) for n in self.named("varied")}
         return Row(
-            number=int(self.numbers[k]), seed=int(seeds(self.frame.seed, self.numbers[k : k + 1])[0]),
+            number=int(self.numbers[k]), seed=int(seeds(self.shared.seed, self.numbers[k : k + 1])[0]),
             varied=Table(varied), status=str(STATUS[int(self.infeasible[k])]), cause=self.cause(k),
             objective=at["objective"], abscissa=at["abscissa"], abscissa_realised=at["abscissa"],
             damping_ratio=at["damping_ratio"], structure=str(STRUCTURES[int(at["oscillates"])]),
-            parameters=Table({**self.frame.fixed, **varied}),
+            parameters=Table({**self.shared.fixed, **varied}),
             reports=Table({n: float(self.columns[f"report.{n}"][k]) for n in self.named("report")}),
             bound=at["bound"], gap=at["gap"], proven=False, method=str(METHODS[self.methods[k]]),
             laws=Table(tables["law"]), violations=Table(tables["violation"]), seconds=self.seconds, host=self.host,
@@ -112,10 +121,10 @@ class Block:
     def cause(self, k: int) -> str:
         """Why the row at a place is infeasible; empty where it is not."""
         amounts = {n: float(self.columns[f"violation.{n}"][k]) for n in self.named("violation")}
-        violated = [f"{n} by {Unit(*self.frame.units[n]).show(x, 3)}" for n, x in amounts.items() if not math.isnan(x)]
+        violated = [f"{n} by {Unit(*self.shared.units[n]).show(x, 3)}" for n, x in amounts.items() if not math.isnan(x)]
         if not violated:
             return ""
-        asked = any(not math.isnan(amounts[n]) for n in self.frame.of_abscissa)
+        asked = any(not math.isnan(amounts[n]) for n in self.shared.of_abscissa)
         note = f"; {UNSTABLE}" if asked and self.columns["abscissa"][k] >= 0 else ""
         return f"violated: {', '.join(violated)}{note}"
 

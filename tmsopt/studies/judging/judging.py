@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.checks.judge import BLOCK, Judged, judge, judgeable
+from tmsopt.checks.judge import BLOCK, Verdicts, judge, judgeable
 from tmsopt.design.unit_system import unit_of
 from tmsopt.records import Array
-from tmsopt.studies.judging.block import NUMBERS, Block, Frame
+from tmsopt.studies.judging.block import NUMBERS, RowBlock, Shared
 from tmsopt.studies.row import Row
 from tmsopt.studies.study import Study
 
@@ -25,18 +25,18 @@ def applies(study: Study) -> bool:
     return not study.warm and judgeable(study.problem) and all(name in names for name in study.columns)
 
 
-def judged(study: Study, numbers: NDArray[np.int64]) -> Iterator[tuple[Block, NDArray[np.int64]]]:
+def judged(study: Study, numbers: NDArray[np.int64]) -> Iterator[tuple[RowBlock, NDArray[np.int64]]]:
     """Blocks of rows, and the numbers of those beside them that are left to be looked at one by one.
 
     Args:
         numbers: of the rows, ascending.
     """
-    frame = frame_of(study)
+    shared = shared_by(study)
     width = len(study.columns) + len(NUMBERS) + len(study.problem.conditions) + len(study.report) + 4
     size = max(BLOCK, min(_ROWS, _NUMBERS // width // BLOCK * BLOCK))
     given = {name: np.asarray(column, dtype=float) for name, column in study.columns.items()}
     for first in range(0, len(numbers), size):
-        yield _block(study, frame, given, numbers[first : first + size])
+        yield _block(study, shared, given, numbers[first : first + size])
 
 
 def judged_alone(study: Study, number: int) -> Row | None:
@@ -47,11 +47,11 @@ def judged_alone(study: Study, number: int) -> Row | None:
     return next(iter(block), None)
 
 
-def frame_of(study: Study) -> Frame:
+def shared_by(study: Study) -> Shared:
     """What the rows of a study share."""
     problem = study.problem
     units = {name: unit_of(problem, name) for name in problem.constraints}
-    return Frame(
+    return Shared(
         seed=int(study.seed), fixed={n: float(x) for n, x in problem.ordered({}).items()},
         units={name: (unit.text, float(unit.one)) for name, unit in units.items()},
         of_abscissa=tuple(n for n, c in problem.conditions.items() if "abscissa" in c.names),
@@ -59,8 +59,8 @@ def frame_of(study: Study) -> Frame:
 
 
 def _block(
-    study: Study, frame: Frame, given: Mapping[str, Array], numbers: NDArray[np.int64]
-) -> tuple[Block, NDArray[np.int64]]:
+    study: Study, shared: Shared, given: Mapping[str, Array], numbers: NDArray[np.int64]
+) -> tuple[RowBlock, NDArray[np.int64]]:
     began = time.perf_counter()
     parts: list[tuple[NDArray[np.int64], dict[str, Array]]] = []
     for first in range(0, len(numbers), BLOCK):
@@ -76,10 +76,10 @@ def _block(
     inside = np.concatenate([some for some, _ in parts])
     whole = {name: np.concatenate([columns[name] for _, columns in parts]) for name in parts[0][1]}
     seconds = (time.perf_counter() - began) / max(len(numbers), 1)
-    return Block(frame, inside, whole, seconds, platform.node()), np.setdiff1d(numbers, inside, assume_unique=True)
+    return RowBlock(shared, inside, whole, seconds, platform.node()), np.setdiff1d(numbers, inside, assume_unique=True)
 
 
-def _columns(found: Judged) -> dict[str, Array]:
+def _columns(found: Verdicts) -> dict[str, Array]:
     tables = {"violation": found.violations, "law": found.laws, "report": found.reports}
     plain = {name: np.asarray(getattr(found, name), dtype=float) for name in NUMBERS}
     return plain | {f"{table}.{n}": column for table, named in tables.items() for n, column in named.items()}

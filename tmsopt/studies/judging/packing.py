@@ -7,23 +7,23 @@ from typing import Any
 import numpy as np
 
 from tmsopt.disk import from_json
-from tmsopt.studies.judging.block import NUMBERS, Block, Frame
+from tmsopt.studies.judging.block import NUMBERS, RowBlock, Shared
 
 _LONGEST = 1_000_000  # characters of the line
 _TABLES = ("varied.", "violation.", "law.", "report.")
 
 
-def packed_block(block: Block) -> bytes:
+def packed_block(block: RowBlock) -> bytes:
     """All of a block."""
     head = {
-        "frame": asdict(block.frame), "columns": list(block.columns), "rows": len(block), "seconds": block.seconds,
+        "shared": asdict(block.shared), "columns": list(block.columns), "rows": len(block), "seconds": block.seconds,
         "host": block.host,
     }  # fmt: skip
     arrays = [block.numbers.astype("<i8"), *(column.astype("<f8") for column in block.columns.values())]
     return b"".join([json.dumps(head).encode(), b"\n", *(array.tobytes() for array in arrays)])
 
 
-def unpacked_block(data: bytes) -> Block:
+def unpacked_block(data: bytes) -> RowBlock:
     """What `packed_block` was given.
 
     Raises:
@@ -31,18 +31,20 @@ def unpacked_block(data: bytes) -> Block:
     """
     line, found, rest = data.partition(b"\n")
     head = from_json(line.decode(), _LONGEST)
-    if not found or not isinstance(head, dict) or set(head) != {"frame", "columns", "rows", "seconds", "host"}:
+    if not found or not isinstance(head, dict) or set(head) != {"shared", "columns", "rows", "seconds", "host"}:
         raise ValueError("it begins with no such line")
     names, count = _names(head["columns"]), head["rows"]
     if type(count) is not int or count < 1 or len(rest) != 8 * count * (1 + len(names)):
         raise ValueError(f"no {count!r:.20} rows")
     numbers = np.frombuffer(rest, "<i8", count).astype(np.int64)
     whole = np.frombuffer(rest, "<f8", offset=8 * count).reshape(len(names), count).astype(float)
-    if np.any(np.diff(numbers) <= 0) or numbers[0] < 0 or not set(np.unique(whole[names.index("oscillates")])) <= {0, 1}:
+    truths = np.isin(whole[names.index("oscillates")], (0, 1)).all()
+    if np.any(np.diff(numbers) <= 0) or numbers[0] < 0 or not truths:
         raise ValueError("its rows are in no order")
     if not isinstance(head["host"], str) or type(head["seconds"]) is not float:
         raise ValueError("seconds or host")
-    return Block(_frame(head["frame"], names), numbers, dict(zip(names, whole, strict=True)), head["seconds"], head["host"])
+    columns = dict(zip(names, whole, strict=True))
+    return RowBlock(_shared(head["shared"], names), numbers, columns, head["seconds"], head["host"])
 
 
 def _names(found: Any) -> list[str]:
@@ -54,11 +56,11 @@ def _names(found: Any) -> list[str]:
     return list(found)
 
 
-def _frame(found: Any, names: list[str]) -> Frame:
+def _shared(found: Any, names: list[str]) -> Shared:
     limits = {name.removeprefix("violation.") for name in names if name.startswith("violation.")}
     try:
         seed, fixed, units, of_abscissa = (found[k] for k in ("seed", "fixed", "units", "of_abscissa"))
-        made = Frame(
+        made = Shared(
             seed, {n: float(x) for n, x in fixed.items()}, {n: (text, float(one)) for n, (text, one) in units.items()},
             tuple(of_abscissa),
         )  # fmt: skip

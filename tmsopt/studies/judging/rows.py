@@ -6,11 +6,11 @@ from typing import overload
 
 import numpy as np
 
-from tmsopt.studies.judging.block import Block
+from tmsopt.studies.judging.block import RowBlock
 from tmsopt.studies.row import Row
 
 
-class Rows(Sequence[Row]):
+class RowsInBlocks(Sequence[Row]):
     """Rows by ascending number; those of blocks are made each time they are asked for.
 
     Attributes:
@@ -19,7 +19,7 @@ class Rows(Sequence[Row]):
         order: place of each row in the chain of all blocks and the single ones.
     """
 
-    def __init__(self, blocks: Iterable[Block], singles: Iterable[Row]) -> None:
+    def __init__(self, blocks: Iterable[RowBlock], singles: Iterable[Row]) -> None:
         self.blocks, self.singles = tuple(blocks), tuple(singles)
         single = np.array([row.number for row in self.singles], dtype=np.int64)
         numbers = np.concatenate([*(block.numbers for block in self.blocks), single])
@@ -44,13 +44,13 @@ class Rows(Sequence[Row]):
         return (self._at(int(k)) for k in self.order)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Rows | tuple) and len(self) == len(other) and all(map(_same, self, other))
+        return isinstance(other, RowsInBlocks | tuple) and len(self) == len(other) and all(map(_same, self, other))
 
     def __hash__(self) -> int:
         return hash(len(self))
 
     def __repr__(self) -> str:
-        return f"Rows({len(self)})"
+        return f"RowsInBlocks({len(self)})"
 
     def _at(self, place: int) -> Row:
         which = int(np.searchsorted(self._ends, place, side="right"))
@@ -63,8 +63,8 @@ def _same(one: Row, other: object) -> bool:
     return one == other
 
 
-def gathered(blocks: Sequence[Block], singles: Iterable[Row]) -> Sequence[Row]:
+def gathered(blocks: Sequence[RowBlock], singles: Iterable[Row]) -> Sequence[Row]:
     """Rows in the order of their numbers: a tuple where none are in blocks."""
     if any(len(block) for block in blocks):
-        return Rows([block for block in blocks if len(block)], singles)
+        return RowsInBlocks([block for block in blocks if len(block)], singles)
     return tuple(sorted(chain(singles), key=lambda row: row.number))

@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.records import Truth
-from tmsopt.studies.judging.block import METHODS, STATUS, STRUCTURES, Block, seeds
-from tmsopt.studies.judging.rows import Rows
+from tmsopt.studies.judging.block import METHODS, STATUS, STRUCTURES, RowBlock, seeds
+from tmsopt.studies.judging.rows import RowsInBlocks
 
 TABLES = {"varied": "varied", "parameters": "parameters", "reports": "report", "laws": "law", "violations": "violation"}
 """Table of a row → what its columns begin with in a block."""
 
 _Part = tuple[NDArray[Any], Truth]
-_FIELDS: Mapping[str, Callable[[Block], Any]] = {
-    "number": lambda b: b.numbers, "seed": lambda b: seeds(b.frame.seed, b.numbers),
+_FIELDS: Mapping[str, Callable[[RowBlock], Any]] = {
+    "number": lambda b: b.numbers, "seed": lambda b: seeds(b.shared.seed, b.numbers),
     "status": lambda b: STATUS[b.infeasible.astype(int)],
     "cause": lambda b: np.array([b.cause(k) if bad else "" for k, bad in enumerate(b.infeasible)], dtype=object),
     "abscissa_realised": lambda b: b.columns["abscissa"], "stable": lambda b: b.columns["abscissa"] < 0,
@@ -27,22 +27,24 @@ _FIELDS: Mapping[str, Callable[[Block], Any]] = {
 """Of a row → its values in a block; the others are columns there."""
 
 
-def field(rows: Rows, name: str, single: _Part) -> _Part:
+def field(rows: RowsInBlocks, name: str, single: _Part) -> _Part:
     """Values of one field of all rows, and which rows have one.
 
     Args:
         single: those of the rows in no block.
     """
-    made = _FIELDS.get(name, lambda b: b.columns[name])
-    return _ordered(rows, [(np.broadcast_to(made(b), len(b)), np.True_) for b in rows.blocks], single)
+    made = _FIELDS.get(name)
+    each = [b.columns[name] if made is None else made(b) for b in rows.blocks]
+    parts = [(np.broadcast_to(x, len(b)), np.True_) for x, b in zip(each, rows.blocks, strict=True)]
+    return _ordered(rows, parts, single)
 
 
-def keyed(rows: Rows, table: str, key: str, single: _Part) -> _Part:
+def keyed(rows: RowsInBlocks, table: str, key: str, single: _Part) -> _Part:
     """Likewise the values of one name in a table of the rows."""
     return _ordered(rows, [_keyed(b, table, key) for b in rows.blocks], single)
 
 
-def keys(rows: Rows, table: str, singles: Mapping[str, Truth]) -> list[str]:
+def keys(rows: RowsInBlocks, table: str, singles: Mapping[str, Truth]) -> list[str]:
     """The names in a table of the rows, in the order in which the rows have them.
 
     Args:
@@ -58,21 +60,21 @@ def keys(rows: Rows, table: str, singles: Mapping[str, Truth]) -> list[str]:
     return sorted(first, key=first.__getitem__)
 
 
-def _names(block: Block, table: str) -> list[str]:
-    return list(block.frame.fixed) if table == "parameters" else block.named(TABLES[table])
+def _names(block: RowBlock, table: str) -> list[str]:
+    return list(block.shared.fixed) if table == "parameters" else block.named(TABLES[table])
 
 
-def _keyed(block: Block, table: str, key: str) -> tuple[Any, Any]:
+def _keyed(block: RowBlock, table: str, key: str) -> tuple[Any, Any]:
     name = f"varied.{key}" if table == "parameters" else f"{TABLES[table]}.{key}"
     column = block.columns.get(name)
     if column is None and table == "parameters":
-        column = np.full(len(block), block.frame.fixed.get(key, np.nan))
+        column = np.full(len(block), block.shared.fixed.get(key, np.nan))
     if column is None:
         return np.full(len(block), np.nan), np.False_
     return column, ~np.isnan(column) if table in ("laws", "violations") else np.True_
 
 
-def _ordered(rows: Rows, parts: list[tuple[Any, Any]], single: _Part) -> _Part:
+def _ordered(rows: RowsInBlocks, parts: list[tuple[Any, Any]], single: _Part) -> _Part:
     values = np.concatenate([*(values for values, _ in parts), single[0]])
     present = [np.broadcast_to(there, len(values)) for values, there in parts]
     return values[rows.order], np.concatenate([*present, single[1]])[rows.order]

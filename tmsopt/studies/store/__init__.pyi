@@ -1,1 +1,2 @@
-from .store import Store as Store, open_store as open_store, read_store as read_store
+from .opening import open_store as open_store, read_store as read_store
+from .store import Store as Store

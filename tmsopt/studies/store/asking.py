@@ -77,3 +77,16 @@ def ask(connection: sqlite3.Connection, query: str, values: Sequence[Any] | Mapp
             if code(error) != sqlite3.SQLITE_BUSY or time.monotonic() > end:
                 raise
             time.sleep(_PAUSE)
+
+
+@contextmanager
+def undamaged(path: Path, what: str) -> Iterator[None]:
+    """What is read there can be read.
+
+    Raises:
+        InputError: when it cannot.
+    """
+    try:
+        yield
+    except (KeyError, ValueError) as error:
+        raise error if isinstance(error, InputError) else refuse(path, f"{DAMAGED} ({what}: {error})") from error

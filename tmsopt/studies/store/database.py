@@ -14,12 +14,22 @@ from tmsopt.errors import Fault, InputError
 from tmsopt.studies.store.asking import DAMAGED, PATIENCE, ask, code, explained, refuse
 from tmsopt.studies.store.definition import Definition, pack, unpack
 from tmsopt.studies.store.provenance import host, now
-from tmsopt.studies.store.received import COMPANIONS, TABLES, careful, companion_fault, content_fault
+from tmsopt.studies.store.received import (
+    COMPANIONS,
+    SCHEMA_OF_BLOCKS,
+    TABLES,
+    careful,
+    companion_fault,
+    content_fault,
+)  # fmt: skip
 
 APPLICATION = 0x746D736F
 """In the header of every store, where `file` and SQLite look for it: "tmso"."""
 
-SCHEMA = 1
+SCHEMA = SCHEMA_OF_BLOCKS
+"""The newest that is read."""
+
+_FIRST = 1  # of a store as it is made: with its first block of rows it becomes the newest
 
 _NUMBERS = 25_000_000  # read of a store, 200 MB, unless the study that is asked for has more
 
@@ -80,7 +90,7 @@ def create(path: Path, definition: Definition, versions: Mapping[str, str], plat
     with disk.whole(path, locked=True) as place, closing(sqlite3.connect(place, isolation_level=None)) as connection:
         connection.execute("PRAGMA journal_mode=MEMORY")  # what is not finished is not kept
         connection.execute(f"PRAGMA application_id={APPLICATION}")
-        connection.execute(f"PRAGMA user_version={SCHEMA}")
+        connection.execute(f"PRAGMA user_version={_FIRST}")
         connection.executescript(f"BEGIN; {TABLES}")
         connection.executemany("INSERT INTO about VALUES (?, ?)", about.items())
         for name, values in definition.columns.items():

@@ -23,6 +23,13 @@ CREATE TABLE rows (number INTEGER PRIMARY KEY, status TEXT NOT NULL, checksum IN
 CREATE INDEX by_status ON rows (status);
 """  # The index is a hundredth of the rows, and all that `done` and `counts` read.
 
+BLOCKS = (
+    "CREATE TABLE blocks (first INTEGER PRIMARY KEY, last INTEGER NOT NULL, optimal INTEGER NOT NULL, "
+    "infeasible INTEGER NOT NULL, checksum INTEGER NOT NULL, data BLOB NOT NULL)"
+)
+"""Made with the first block of rows, when the schema becomes this one; other stores are those of earlier versions."""
+SCHEMA_OF_BLOCKS = 2
+
 _LARGEST = 2**27  # bytes of one value: more than the column of a study with the most rows takes
 _LONGEST = 10_000  # bytes of SQL: a schema is SQL too
 _SUPER = bytes.fromhex("d9d505f920a163d7")  # ends a journal that names another one, which SQLite would remove
@@ -72,7 +79,8 @@ def content_fault(connection: sqlite3.Connection, size: int) -> str:
     connection.set_progress_handler(spent, _STEPS)
     try:
         found = set(_listed(ask(connection, _SCHEMA)))
-        if other := sorted(found - _expected()) or sorted(_expected() - found):
+        expected = _expected("blocks" in {name for _, name, *_ in found})
+        if other := sorted(found - expected) or sorted(expected - found):
             kind, name = other[0][:2]
             return f"its {kind} '{name[:60]}' is not that of a store"
         ((whole,),) = ask(connection, "PRAGMA quick_check(1)")
@@ -82,9 +90,9 @@ def content_fault(connection: sqlite3.Connection, size: int) -> str:
 
 
 @cache
-def _expected() -> frozenset[tuple[str, ...]]:
+def _expected(blocks: bool) -> frozenset[tuple[str, ...]]:
     with closing(sqlite3.connect(":memory:")) as connection:
-        connection.executescript(TABLES)
+        connection.executescript(TABLES + (BLOCKS if blocks else ""))
         return frozenset(_listed(ask(connection, _SCHEMA)))
 
 
