@@ -1,6 +1,8 @@
 """The rows of a study: a histogram of what was built, or the objective over what varies."""
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,9 +11,9 @@ from matplotlib.ticker import MaxNLocator
 from tmsopt.design.unit_system import Unit
 from tmsopt.plots.labels import AxisScale, abscissa_label, finished, scale_of
 from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, STABLE, figure_of, on_axes
-from tmsopt.records import Array, Table, Truth
+from tmsopt.records import Array, Truth
 from tmsopt.solver.solve import solve
-from tmsopt.studies import Results
+from tmsopt.studies import Results, columns, header
 
 _BINS = 25
 _FAR = 6  # widths of the middle half of the values: farther ones are counted, not shown
@@ -33,13 +35,15 @@ def draw_histogram(data: Results, ax: Axes | None = None) -> Axes:
 
 
 def _drawn_around(ax: Axes, data: Results) -> str:
-    problem, rows = data.study.problem, data.rows
-    rate = problem.parameter_set.rate
-    values = np.array([_shown(r.abscissa, r.parameters, rate) for r in rows])
+    problem, rows = data.study.problem, columns(data.rows)
+    rate, names = problem.parameter_set.rate, problem.parameter_set.names
+    values = rows["abscissa"].values
+    if rate is not None and np.isfinite(values).any():  # then rows have parameters
+        values = _shown(values, {n: rows[header("parameters", n)].values for n in names}, rate)
     known = np.isfinite(values)
     beyond = known & ~_near(values)
     known &= ~beyond
-    stable = np.array([bool(r.stable) for r in rows])
+    stable = rows["stable"].present & rows["stable"].values.astype(bool)
     nominal = solve(problem, throw=False, interruptible=False)
     edges = _edges(values[known])
     for chosen, colour, hatch, label in (
@@ -49,18 +53,19 @@ def _drawn_around(ax: Axes, data: Results) -> str:
             ax.hist(
                 values[chosen], edges.tolist(), color=colour, edgecolor="white", hatch=hatch, linewidth=0.5, label=label
             )
-    at = _shown(nominal.abscissa, nominal.parameters, rate)
+    at = float(_shown(np.float64(nominal.abscissa), nominal.parameters, rate))
     ax.axvline(at, color=LINE, linestyle="--", linewidth=1.2, label=f"nominal design, {at:.4g}")
     ax.axvline(0, color=CAPSIZE, linewidth=1.4, label="0: neither decay nor growth")
     ax.set(ylabel="designs", xlabel=abscissa_label(problem) if rate is None else "decay rate in 1/s (negative: growth)")
     counts = (beyond, "far beyond the axis"), (~known & ~beyond, "without roots")
     left_out = "".join(f", {np.count_nonzero(which)} {where}" for which, where in counts if which.any())
-    return f"{stable.sum()} of {len(rows)} stable ({100 * stable.mean():.3g} %){left_out}" if rows else "no rows"
+    share = f"{stable.sum()} of {len(stable)} stable ({100 * stable.mean():.3g} %)" if len(stable) else "no rows"
+    return share + left_out
 
 
-def _shown(abscissa: float, parameters: Table[float], rate: object) -> float:
+def _shown(abscissa: Any, parameters: Mapping[str, Any], rate: object) -> Any:
     """The abscissa, or the decay rate in 1/s where there is a unit of time."""
-    return -abscissa * float(rate(parameters)) if callable(rate) and math.isfinite(abscissa) else abscissa
+    return np.where(np.isfinite(abscissa), -abscissa * rate(parameters), abscissa) if callable(rate) else abscissa
 
 
 def _near(values: Array) -> Truth:
@@ -82,20 +87,24 @@ def _edges(values: Array) -> Array:
 
 
 def _over_what_varies(ax: Axes, data: Results) -> str:
-    study, rows = data.study, data.rows
+    study, rows = data.study, columns(data.rows)
     first, second = [*study.columns, None, None][:2]
     sense = study.problem.minimize or study.problem.maximize
-    found = [r for r in rows if r.status == "optimal"]
+    found = rows["status"].values == "optimal"
     scale = scale_of(study.problem, sense) if sense else AxisScale("abscissa", abscissa_label(study.problem), _PLAIN)
-    y = scale.of([r.objective if sense else r.abscissa for r in found])
+    y = scale.of(rows["objective" if sense else "abscissa"].values[found])
+
+    def varied(name: str) -> Array:
+        return np.asarray(rows[header("varied", name)].values[found]) if found.any() else np.empty(0)
+
     across = scale_of(study.problem, first) if first else None
-    x = across.of([r.varied[across.name] for r in found]) if across else np.array([r.number for r in found])
-    if second is None or not found:
+    x = across.of(varied(across.name)) if across else rows["number"].values[found]
+    if second is None or not found.any():
         ax.plot(x, y, "o-" if study.method == "grid" else "o", color=CRITICAL, markersize=3.5, linewidth=0.8)
     else:
         aside = scale_of(study.problem, second)
-        drawn = ax.scatter(x, y, c=aside.of([r.varied[second] for r in found]), s=26, cmap="cividis", edgecolors="0.3")
+        drawn = ax.scatter(x, y, c=aside.of(varied(second)), s=26, cmap="cividis", edgecolors="0.3")
         figure_of(ax).colorbar(drawn, ax=ax, label=aside.label)
     ax.set(xlabel=across.label if across else "row", ylabel=scale.label)
     ax.xaxis.set_major_locator(MaxNLocator(6))
-    return f"{len(found)} of {len(rows)} rows optimal"
+    return f"{np.count_nonzero(found)} of {len(found)} rows optimal"

@@ -1,4 +1,6 @@
-from .export import FORMATS as FORMATS, check_export as check_export, columns as columns, export as export
+from .export import (
+    FORMATS as FORMATS, check_export as check_export, columns as columns, export as export, header as header,
+)
 from .load import load_study as load_study
 from .monte_carlo import Sampling as Sampling, monte_carlo as monte_carlo, planned as planned
 from .neighbours import blocks as blocks

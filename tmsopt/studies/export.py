@@ -119,12 +119,14 @@ def _ending(path: Path) -> str:
 
 def _csv(table: Mapping[str, PartialColumn], path: Path, metadata: str) -> None:
     units = json.loads(metadata).get("units", {})
+    columns = list(table.values())
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(cell(headed(name, units.get(_bare(name), ""))) for name in table)
-        for first in range(0, len(next(iter(table.values())).values), _CHUNK):
-            texts = [_texts(c.values[first : first + _CHUNK], c.present[first:]) for c in table.values()]
-            writer.writerows(zip(*texts, strict=True))
+        for first in range(0, len(columns[0].values), _CHUNK):
+            known: dict[bytes, list[str]] = {}  # columns may be equal, as the abscissa and the objective are
+            some = [(c.values[first : first + _CHUNK], c.present[first : first + _CHUNK]) for c in columns]
+            writer.writerows(zip(*(_texts(*part, known) for part in some), strict=True))
 
 
 def _bare(header: str) -> str:
@@ -134,12 +136,18 @@ def _bare(header: str) -> str:
     return re.sub(r"\.(min|max|limit)$", "", header)
 
 
-def _texts(values: np.ndarray[Any, Any], present: NDArray[np.bool_]) -> list[str]:
+def _texts(values: NDArray[Any], present: NDArray[np.bool_], known: dict[bytes, list[str]]) -> list[str]:
     if values.dtype == np.bool_:
-        return [("true" if v else "false") if p else "" for v, p in zip(values.tolist(), present, strict=False)]
-    if values.dtype == np.float64:
-        return ["" if v != v else repr(v) for v in values.tolist()]  # noqa: PLR0124
-    return [cell(v) if isinstance(v, str) else str(v) for v in values.tolist()]
+        return [("true" if v else "false") if p else "" for v, p in zip(values.tolist(), present.tolist(), strict=True)]
+    if values.dtype != np.float64:
+        cells = {v: cell(v) if isinstance(v, str) else str(v) for v in set(values.tolist())}
+        return [cells[v] for v in values.tolist()]
+    if (key := values.tobytes()) not in known:
+        same = len(values) > 0 and key == key[:8] * len(values)
+        some = values[:1] if same else values
+        texts = ["" if v != v else repr(v) for v in some.tolist()]  # noqa: PLR0124
+        known[key] = texts * len(values) if same else texts
+    return known[key]
 
 
 def _parquet(table: Mapping[str, PartialColumn], path: Path, metadata: str) -> None:
