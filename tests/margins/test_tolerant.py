@@ -99,14 +99,13 @@ def test_search_finds_none_more_tolerant():
     assert -found == pytest.approx(BEST, abs=1e-7)  # around it
 
 
-@pytest.mark.slow
 def test_solver_finds_the_most_tolerant_design():
-    design = tmsopt.solve(tmsopt.load("problems/tolerant.toml"), starts=6)
+    design = tmsopt.solve(tmsopt.load("problems/tolerant.toml"))
     assert design.status == "optimal"
     parameters = dict(design.parameters)
     assert hunt.abscissa(parameters) <= -0.5 + 1e-7
     assert float(radius(parameters, starts=8)[0]) == pytest.approx(design.value, rel=1e-6)  # as claimed
-    assert design.value == pytest.approx(BEST, abs=1e-7)  # and none better is known
+    assert design.value == pytest.approx(BEST, abs=2e-9)  # and none better is known
     assert parameters["lambda_s"] == pytest.approx(AT["lambda_s"], abs=1e-4)
     for name in ("chi_B", "Fr"):  # 1e-5 off, the radius falls by less than 1e-8 along the ridge
         assert parameters[name] == pytest.approx(AT[name], abs=1e-3)

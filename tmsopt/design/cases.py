@@ -42,11 +42,13 @@ class Case:
         at: parameter → value in place of the nominal one, from a scenario.
         offset: parameter → what is added, from a tolerance.
         direction: parameter → change per unit of the robustness radius, in units of its weight.
+        edge: the boundary of stability whose nearest point is meant, sought from `direction` as it is.
     """
 
     at: Mapping[str, float] = Table()
     offset: Mapping[str, float] = Table()
     direction: Mapping[str, float] = Table()
+    edge: str = ""
 
     def applied(
         self, parameters: Mapping[str, Any], radius: Any = 0.0, weights: Mapping[str, float] | None = None
@@ -55,8 +57,9 @@ class Case:
         varied = {**parameters, **self.at}
         for name, change in self.offset.items():
             varied[name] = varied[name] + change
+        reach = 1.0 if self.edge else radius
         for name, share in self.direction.items():
-            varied[name] = varied[name] + radius * share * weight_of(name, parameters[name], weights or {})
+            varied[name] = varied[name] + reach * share * weight_of(name, parameters[name], weights or {})
         return varied
 
 

@@ -6,6 +6,7 @@ must stand up to has factors of its own, and shares the design and the root quan
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -17,6 +18,7 @@ from tmsopt.design.dependence import demands_heavy_damping, overclaims, tempts, 
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, NO_RADIUS, RADIUS, ROOT_QUANTITIES
+from tmsopt.formulation.feet import lift_displacements, lift_feet
 from tmsopt.formulation.flat import unflattened
 from tmsopt.formulation.kinks import unfolded
 from tmsopt.formulation.lifts import (
@@ -27,6 +29,7 @@ from tmsopt.formulation.lifts import (
     lift_quantity,
     lift_radius,
     lift_real_roots,
+    worst_guess,
 )
 from tmsopt.formulation.nlp import NLP, Factor, Lift, Touch, objective_size, objective_unit, scale_of, units_of
 from tmsopt.formulation.strips import lift_angular_frequency
@@ -156,14 +159,22 @@ class Builder:
         nominal = problem.ordered({**self.design, **given})
         directed = [k for k, case in enumerate(self.cases, start=1) if case.direction]
         radius = self.variable(RADIUS, 0.0) if directed else ca.SX(0)
-        varied = [case.applied(nominal, radius, problem.weights) for case in self.cases]
+        edges = {k: case.edge for k, case in enumerate(self.cases, start=1) if case.edge}
+        feet = {k: {n: self.variable(f"{n}.{k}") for n in self.cases[k - 1].direction} for k in edges}
+        moved = [replace(case, direction=feet.get(k, case.direction)) for k, case in enumerate(self.cases, start=1)]
+        varied = [case.applied(nominal, radius, problem.weights) for case in moved]
         self.values = [self.derived(k, parameters) for k, parameters in enumerate([nominal, *varied])]
         self.scale = scale_of(problem)
         self.a = self.polynomial(0)
         self.covered = [k for k, case in enumerate(self.cases, start=1) if not case.direction] or [0]
         if directed:
-            self.lifts.append(lift_radius(self, directed))
+            self.lifts.append(lift_displacements(problem.weights, feet))
+            self.lifts.append(lift_radius(self, [k for k in directed if k not in feet]))
             self.shared[RADIUS] = radius
+        if feet:
+            given = ca.vertcat(*self.x[: len(problem.free)], *self.settings.values())
+            known = partial(_known, problem, tuple(self.settings))
+            self.lifts.append(lift_feet(self, radius, feet, edges, given, known, problem.weights))
 
     @property
     def unit(self) -> float:
@@ -246,7 +257,7 @@ class Builder:
         self.objective = values[0]
         if len(values) > 1:
             self.objective = self.variable("objective")
-            worst = partial(_worst_guess, sign, expression, tuple(self.covered))
+            worst = partial(worst_guess, sign, expression, tuple(self.covered))
             self.lifts.append(Lift("objective", 1, worst))
             for value in values:
                 self.row("objective", value - self.objective, -np.inf, 0.0)
@@ -334,8 +345,6 @@ _LIFTED: Mapping[str, Lifting] = {
 }  # fmt: skip
 
 
-def _worst_guess(
-    sign: float, expression: Expression, covered: Sequence[int], values: Sequence[Values], z: Sequence[Any]
-) -> list[list[float]]:
-    found = [sign * float(expression(values[k])) for k in covered]
-    return [[max((v for v in found if np.isfinite(v)), default=0.0)]]
+def _known(problem: Problem, settings: Sequence[str], values: Values) -> list[float]:
+    """The first variables and the settings of a numeric design; no polynomial depends on a limit."""
+    return [*variables_of(problem, values), *(0.0 if n.endswith(LIMIT) else float(values[n]) for n in settings)]

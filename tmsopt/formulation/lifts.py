@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from tmsopt.design.expression import Expression
 from tmsopt.formulation.nlp import Factor, Lift, Touch
 from tmsopt.models import Values
 from tmsopt.records import Array
@@ -181,13 +182,21 @@ def lift_radius(build: Rows, directions: Sequence[int]) -> Lift:
         size += len(a) - 1
         build.row("radius", a[0] * build.polynomial(0)[0], 0.0, np.inf)
         build.equal("radius", a, [a[0] * c for c in product(*monic)])
-    return Lift("radius", 1 + size, partial(_radius_guess, directions))
+    return Lift("directions", size, partial(_radius_guess, directions))
 
 
 def lift_quantity(build: Rows, name: str, case: int, ends: tuple[float, float]) -> tuple[Any, Lift]:
     """A derived quantity as a variable, to be tied by its division-free equation."""
     symbol = build.variable(name if case == 0 else f"{name}.{case}", *ends)
     return symbol, Lift(name, 1, lambda values, z: [[_finite(values[case][name])]])
+
+
+def worst_guess(
+    sign: float, expression: Expression, covered: Sequence[int], values: Sequence[Values], z: Sequence[Any]
+) -> list[list[float]]:
+    """The worst value over the cases, where it exists."""
+    found = [sign * float(expression(values[k])) for k in covered]
+    return [[max((v for v in found if np.isfinite(v)), default=0.0)]]
 
 
 TWO_FACTORS = 4  # coefficients, beyond which there are two quadratic factors or more
@@ -301,6 +310,5 @@ def _positive_guess(case: int, values: Sequence[Values], z: Sequence[Roots]) -> 
 
 
 def _radius_guess(directions: Sequence[int], values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
-    """The radius at which the cases were evaluated, and their factors."""
-    radius = float(values[0]["radius"])
-    return [[radius, *(max(c, 0.0) for case in directions for c in factors_of(z[case], 0.0))]]
+    """The factors at the radius at which the cases were evaluated."""
+    return [[max(c, 0.0) for case in directions for c in factors_of(z[case], 0.0)]]

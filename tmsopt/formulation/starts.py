@@ -53,8 +53,12 @@ def designs(problem: Problem, seed: int, count: int) -> Iterator[dict[str, float
 
 def _stable_radius(nlp: NLP, problem: Problem, nominal: Mapping[str, float]) -> float:
     """A radius at which the design is stable in all directions of an NLP; small where there is none."""
-    directed = [case for case in nlp.cases if case.direction]
-    for radius in _RADII if directed else ():
+    directed = [case for case in nlp.cases if case.direction and not case.edge]
+    feet = (float(np.linalg.norm(list(case.direction.values()))) for case in nlp.cases if case.edge)
+    most = min(feet, default=np.inf)
+    if not directed and np.isfinite(most):
+        return most
+    for radius in (r for r in _RADII if directed and r <= most):
         at = [case.applied(nominal, radius, problem.weights) for case in directed]
         if np.all(is_stable([[float(c) for c in problem.values(p).coefficients] for p in at])):
             return radius

@@ -22,6 +22,7 @@ from tmsopt.solver.outcome import Finding, Trial, ahead, counted, found, mass_ad
 from tmsopt.solver.referee import held, ideal, outdone, refereed
 from tmsopt.solver.relaxation import relax
 from tmsopt.solver.sample import Sampler
+from tmsopt.solver.tolerant import climbed, promising
 from tmsopt.solver.workspace import Candidate, Workspace
 
 _ROUNDS, _FAR_ROUNDS = 12, 40
@@ -55,7 +56,10 @@ def explore(work: Workspace, insist: bool = True) -> Explored:
     """
     if best := ideal(work):
         return Explored(work.name, (), best)
-    cases = work.problem.cases
+    cases, about = work.problem.cases, work.problem.objective.names if work.problem.objective else ()
+    if RADIUS in about and work.problem.pattern is None and (led := climbed(work, promising(work))):
+        starts = counted(led.candidates, led.trial.candidate.objective)
+        return Explored(work.name, led.candidates, _covered(work, led.nlp, led.candidates, led.trial, starts))
     nlp = work.formulate(cases)
     mixed = {"abscissa", "damping_ratio"} <= set(nlp.variables)
     needles = bool(work.sample and work.sample.singular and "abscissa" in nlp.variables)
@@ -164,7 +168,11 @@ def _covered(
     work: Workspace, nlp: NLP, candidates: Sequence[Candidate], trial: Trial | None, starts: Starts
 ) -> Finding | None:
     """The best design once cases have been added until none between them is worse."""
-    problem, best = work.problem, trial
+    problem = work.problem
+    if trial is not None and problem.asks_radius and not any(case.edge for case in nlp.cases):
+        led = climbed(work, [trial.parameters, *_leaders(work, candidates)])
+        nlp, candidates, trial = (led.nlp, led.candidates, led.trial) if led else (nlp, candidates, trial)
+    best = trial
     for _ in range(_FAR_ROUNDS if problem.asks_radius else _ROUNDS):
         if trial is None or best is None:
             return None
