@@ -9,6 +9,7 @@ import numpy as np
 
 from tmsopt.design.cases import Case
 from tmsopt.design.expression import Expression
+from tmsopt.design.limit import limit_side
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTITIES
 from tmsopt.models import Model, Quantity, Values
@@ -64,6 +65,8 @@ def _falls(problem: Problem, sign: float, expression: Expression, name: str, wor
         return False
     if expression.text.strip() == name:  # the commonest question needs no numbers
         return sign * worse < 0
+    if side := limit_side(expression.text, name):
+        return expression.equality or sign * worse * side < 0
     rng = np.random.default_rng(0)
     ends = np.array([problem.free[n] for n in problem.free]).reshape(-1, 2)
     for _ in range(_DESIGNS):

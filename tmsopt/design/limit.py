@@ -5,6 +5,7 @@ import re
 from tmsopt.design.expression import written_sides
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_SIGN = re.compile("<=|>=|==")
 
 
 def limit_of(text: str) -> float | None:
@@ -15,6 +16,18 @@ def limit_of(text: str) -> float | None:
     """
     left, _, right = written_sides(text)
     return next((float(_close(side)) for side in (left, right) if _NUMBER.fullmatch(_close(side))), None)
+
+
+def limit_side(text: str, name: str) -> int:
+    """What a comparison of nothing but a quantity with a number makes of it: 1 where it stands left, −1 right; else 0.
+
+    Its parts alone are read: ``(abscissa) <= -0.3``.
+    """
+    sides = [_close(side).strip("()") for side in _SIGN.split(text)]
+    if len(sides) != 2 or name not in sides:
+        return 0
+    left = sides[0] == name
+    return (1 if left else -1) if _NUMBER.fullmatch(sides[left]) else 0
 
 
 def with_limit(text: str, value: float) -> str:
