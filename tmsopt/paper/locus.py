@@ -87,12 +87,17 @@ def locus(
 
     values = np.linspace(*ends, 201)
     found = roots(coefficients(values))
+    fine = _fine(found[:-1], found[1:], resolution)
     for _ in range(_ROUNDS):
-        coarse = np.flatnonzero(~_fine(found, resolution) & (np.diff(values) > 1e-13 * np.abs(ends).max()))[:_MOST]
+        coarse = np.flatnonzero(~fine & (np.diff(values) > 1e-13 * np.abs(ends).max()))[:_MOST]
         if not coarse.size:
             break
         middle = (values[coarse] + values[coarse + 1]) / 2
-        found = np.insert(found, coarse + 1, roots(coefficients(middle)), axis=0)
+        between = roots(coefficients(middle))
+        halves = [_fine(found[coarse], between, resolution), _fine(between, found[coarse + 1], resolution)]
+        fine[coarse] = halves[0]
+        fine = np.insert(fine, coarse + 1, halves[1])
+        found = np.insert(found, coarse + 1, between, axis=0)
         values = np.insert(values, coarse + 1, middle)
     path = universal_path(model, of, parameters, sweep, values)
     pairs = [DoubleRoots(e.name, e.value, _double_roots(e.name, e.A, e.omega0)) for e in path.events if "EP" in e.name]
@@ -129,29 +134,32 @@ def _row(name: str, Fr_max: float) -> LocusRow:
     return LocusRow(name, bicycle.parameters["lambda_s"], bicycle.omega0, chi_B, offset, (law, below, above))
 
 
-def _fine(found: Complex, resolution: float) -> NDArray[np.bool_]:
-    certain, step, _ = _matching(found)
+def _fine(before: Complex, after: Complex, resolution: float) -> NDArray[np.bool_]:
+    certain, step, _ = _matching(before, after)
     return certain & (step <= resolution)
 
 
-def _matching(found: Complex) -> tuple[NDArray[np.bool_], Array, NDArray[np.intp]]:
+def _matching(before: Complex, after: Complex) -> tuple[NDArray[np.bool_], Array, NDArray[np.intp]]:
     """For each step: whether its reading is certain, the longest move, and the order that the next roots take.
 
     Of all 24 readings the one with the shortest longest move is taken. It is certain if that move is short
     against the distance between any two roots at either end.
     """
-    moves = np.abs(found[:-1, None, :] - found[1:][:, _ORDERS]).max(axis=-1)
+    moves = np.abs(before[:, None, :] - after[:, _ORDERS]).max(axis=-1)
     best = np.argmin(moves, axis=-1)
     step = moves[np.arange(len(best)), best]
-    gap = np.abs(found[:, :, None] - found[:, None, :])
-    gap[:, np.arange(4), np.arange(4)] = np.inf
-    nearest = gap.min(axis=(1, 2))
-    return step <= _CERTAIN * np.minimum(nearest[:-1], nearest[1:]), step, _ORDERS[best]
+    return step <= _CERTAIN * np.minimum(_nearest(before), _nearest(after)), step, _ORDERS[best]
+
+
+def _nearest(found: Complex) -> Array:
+    """The least distance between two of the roots, in each row."""
+    first, second = np.triu_indices(4, 1)
+    return np.asarray(np.abs(found[:, first] - found[:, second]).min(axis=1))
 
 
 def _tracks(values: Array, found: Complex) -> list[Track]:
     """Roots joined along each run of certain steps."""
-    certain, _, orders = _matching(found)
+    certain, _, orders = _matching(found[:-1], found[1:])
     breaks = [-1, *np.flatnonzero(~certain), len(values) - 1]
     tracks = []
     for before, last in pairwise(breaks):
