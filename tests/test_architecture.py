@@ -327,7 +327,7 @@ def test_files_are_written_whole() -> None:
     assert found == {
         "tmsopt.charts.folder.writing",  # tile by tile; what is recorded is right
         "tmsopt.disk.whole",  # itself
-        "tmsopt.display.page._picture", "tmsopt.display.pictures._image",  # in memory
+        "tmsopt.display.page._picture", "tmsopt.display.pictures._image", "tmsopt.plots.style.rendered",  # in memory
         "tmsopt.processes.serve",  # a pipe
         "tmsopt.studies.export._csv", "tmsopt.studies.export._netcdf", "tmsopt.studies.export._parquet",  # by `export`
     }  # fmt: skip

@@ -48,7 +48,7 @@ def ep4() -> Table[float]:
 
 
 def tilt_plane(chi_B_offset: float = 0.0, points: tuple[int, int] = (320, 240), boundaries: bool = True) -> Plane:
-    """(Fr, λ_s) at a distance from the law `chib1`; with the EP set where it lies in the plane."""
+    """(Fr, λ_s) at a distance from the law `chib1`; with the EP set where it lies there, unless without curves."""
     at = ep4()
     chi_B = at["chi_B"] + chi_B_offset
     problem = bicycle({"chi_B": chi_B}, {"Fr": FR, "lambda_s": TILT})
@@ -59,7 +59,8 @@ def tilt_plane(chi_B_offset: float = 0.0, points: tuple[int, int] = (320, 240), 
     curves["epset"] = (np.asarray(laws.epset(ZETA_B, ZETA_H, tilt)), tilt)
     curves["tls"] = (np.array(FR), np.full(2, at["lambda_s"]))
     marked = {"EP4": (at["Fr"], at["lambda_s"])}
-    return Plane(chart(problem, points=points, boundaries=boundaries), ep_set(), curves, marked)
+    traced = ep_set() if boundaries else None
+    return Plane(chart(problem, points=points, boundaries=boundaries), traced, curves, marked)
 
 
 def chi_B_plane(tilt_offset: float = 0.0, points: tuple[int, int] = (320, 240), boundaries: bool = True) -> Plane:

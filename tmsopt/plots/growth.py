@@ -10,7 +10,7 @@ from matplotlib.typing import LineStyleType
 from tmsopt.critical_speeds.growth import SPEEDS, Growth, growth
 from tmsopt.critical_speeds.modes import Mode
 from tmsopt.design.solution import Solution
-from tmsopt.plots.labels import AxisScale, Name, events_of, finished, place_names, scale_over, settled
+from tmsopt.plots.labels import AxisScale, Name, events_of, finished, place_all, scale_over
 from tmsopt.plots.style import (
     CAPSIZE,
     COMPLEX,
@@ -75,9 +75,7 @@ def growth_figure(data: Growth | Solution, title: str = "", metres_per_second: f
         speed.set_xlabel("speed $v$ in m/s")
     figure.suptitle(title or data.problem.title, fontsize=11)
     legend_below(figure, upper.get_legend_handles_labels()[0])
-    with settled(figure):
-        for ax, found in zip((upper, lower), names, strict=True):
-            place_names(ax, found)
+    place_all(list(zip((upper, lower), names, strict=True)))
     return figure
 
 

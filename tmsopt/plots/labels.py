@@ -122,6 +122,13 @@ def place_names(ax: Axes, names: Sequence[Name]) -> None:
         )  # fmt: skip
 
 
+def place_all(found: Sequence[tuple[Axes, Sequence[Name]]]) -> None:
+    """The same in several Axes of one figure."""
+    with settled(figure_of(found[0][0])):
+        for ax, names in found:
+            place_names(ax, names)
+
+
 @contextmanager
 def settled(figure: Figure) -> Iterator[None]:
     """The layout as it is when drawn, and with it how large a text is in the axes; drawn again, it is not sought anew.

@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Sequence
+from io import BytesIO
 from os import PathLike
 
 from matplotlib.artist import Artist
@@ -62,6 +63,14 @@ def save(drawn_on: Figure | Axes, path: str | PathLike[str]) -> None:
     figure = figure_of(drawn_on) if isinstance(drawn_on, Axes) else drawn_on
     assert figure is not None, "Axes without a figure"
     ending = path.suffix.lstrip(".").lower()
-    with whole(path) as temporary, warnings.catch_warnings():
+    with whole(path) as temporary:
+        temporary.write_bytes(rendered(figure, ending))
+
+
+def rendered(figure: Figure, ending: str) -> bytes:
+    """A figure as what a file of that ending holds."""
+    sink = BytesIO()
+    with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph", UserWarning)  # of letters that no font here has: boxes show that
-        figure.savefig(temporary, dpi=200, format=ending)
+        figure.savefig(sink, dpi=200, format=ending)
+    return sink.getvalue()

@@ -10,7 +10,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from scipy.spatial.distance import cdist
 
 from tmsopt.records import Array, Truth
 from tmsopt.tracing.solving import crossing, evaluated, rows_of
@@ -184,7 +183,7 @@ def between(on: Curve, y: Array, t: Array, s: Array) -> tuple[Array, Array]:
 
 def contains(on: Curve, walked: Walk, y: Array) -> Truth:
     """Which of some points, shape (points, n + 1), lie on a curve already walked."""
-    apart = cdist(y, walked.y)
+    apart = np.linalg.norm(y[:, None] - walked.y, axis=2)
     k = np.argmin(apart, axis=1)
     gaps = np.linalg.norm(np.diff(walked.y, axis=0), axis=1)
     gaps = np.maximum(np.append(gaps, 0.0)[k], np.insert(gaps, 0, 0.0)[k])

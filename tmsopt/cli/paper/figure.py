@@ -1,6 +1,7 @@
 """Command that draws the figures of the paper."""
 
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,7 @@ Examples:
   tmsopt figure fig3 --output locus.pdf
   tmsopt figure all --output figures --format svg
 
-'all' takes half a minute or so.
+'all' takes ten seconds or so.
 
 Exit status: 0 drawn, 2 bad input.
 """
@@ -85,15 +86,18 @@ def _files(wanted: "list[Item]", every: bool, output: Path | None, ending: str |
 
 
 def _draw(wanted: "list[Item]", files: list[Path]) -> None:
-    from tmsopt.plots import save
+    from tmsopt.disk import whole
+    from tmsopt.plots.paper import pictures
 
-    with progress("figure") as update:
-        for done, (item, path) in enumerate(zip(wanted, files, strict=True)):
+    with progress("figure") as update, closing(pictures(wanted, [path.suffix[1:].lower() for path in files])) as drawn:
+        update(0, len(wanted))
+        for done, (k, picture) in enumerate(drawn, start=1):
             update(done, len(wanted))
             try:
-                save(item.make(), path)
+                with whole(files[k]) as temporary:
+                    temporary.write_bytes(picture)
             except OSError as error:
-                click.echo(f"--output: '{path}' cannot be written: {error.strerror or error}", err=True)
+                click.echo(f"--output: '{files[k]}' cannot be written: {error.strerror or error}", err=True)
                 sys.exit(BAD_INPUT)
     for path in files:
         click.echo(f"wrote {path}", err=True)

@@ -4,10 +4,12 @@ To add one, write a function that takes nothing and returns a Figure, and an Ite
 functions, so that listing the figures loads nothing heavy.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
+from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
+from tmsopt.processes import Inbox, Worker
 from tmsopt.records import Table
 
 if TYPE_CHECKING:
@@ -209,3 +211,59 @@ _ITEMS = (
 
 GALLERY = Table({item.name: item for item in _ITEMS})
 """Figures by name, in the order of the list."""
+
+
+def pictures(items: Sequence[Item], endings: Sequence[str]) -> Generator[tuple[int, bytes]]:
+    """What the files of figures hold, each with its place, as they are finished.
+
+    Several are drawn by processes of their own, as many as are of use; what one of them fails at is drawn here.
+    """
+    from tmsopt.studies.engines import cores
+
+    left = list(range(len(items)))
+    workers = min(cores(), len(items)) if len(items) > 1 else 0
+    if workers < 2:
+        yield from ((k, _picture(items[k], endings[k])) for k in left)
+        return
+    inbox: Inbox = SimpleQueue()
+    busy: dict[Worker, int] = {}
+    crew = [Worker(inbox) for _ in range(workers)]
+    try:
+        idle = list(crew)
+        while left or busy:
+            while idle and left:
+                busy[worker := idle.pop()] = k = left.pop(0)
+                worker.send(_attempt, items[k].name, endings[k])
+            try:
+                worker, picture = inbox.get(timeout=_LOOK)
+            except Empty:
+                continue
+            if worker not in busy:  # it has ended, with nothing to do
+                continue
+            k = busy.pop(worker)
+            if picture is not None:
+                idle.append(worker)
+            elif not idle and not busy and left:
+                idle.append(Worker(inbox))
+                crew += idle
+            yield k, picture or _picture(items[k], endings[k])
+    finally:
+        for worker in crew:
+            worker.end()
+
+
+def _attempt(name: str, ending: str) -> bytes:
+    """A picture, empty where it cannot be drawn."""
+    try:
+        return _picture(GALLERY[name], ending)
+    except Exception:
+        return b""
+
+
+def _picture(item: Item, ending: str) -> bytes:
+    from tmsopt.plots.style import rendered
+
+    return rendered(item.make(), ending)
+
+
+_LOOK = 1.0  # s; some systems do not hear Ctrl-C while they wait

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from tmsopt.paper.planes import Plane
 from tmsopt.plots.chart import class_handles, domain_curves, domain_handles, fill_classes, frame, plane_of
-from tmsopt.plots.labels import Name, place_names
+from tmsopt.plots.labels import Name, place_all, place_names
 from tmsopt.plots.style import COMPLEX, CRITICAL, LINE, MARK, REAL, legend_below, new_figure
 from tmsopt.plots.trace import draw_branch
 
@@ -84,8 +84,7 @@ def planes_figure(planes: Sequence[Plane], titles: Sequence[str]) -> Figure:
         names.append(draw_plane(ax, plane))
         ax.set_title(title, fontsize=10)
     legend_below(figure, [h for plane in planes for h in plane_handles(plane)])
-    for ax, found in zip(panels, names, strict=True):
-        place_names(ax, found)
+    place_all(list(zip(panels, names, strict=True)))
     return figure
 
 

@@ -11,7 +11,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 from mpl_toolkits.mplot3d.axes3d import Axes3D  # type: ignore[import-untyped]
 
 from tmsopt.paper.planes import Plane
-from tmsopt.plots.labels import place_names
+from tmsopt.plots.labels import place_all
 from tmsopt.plots.paper.planes import draw_plane, plane_handles
 from tmsopt.plots.style import COMPLEX, HEAVY, LINE, MARK, REAL, STABLE, legend_below, new_figure
 from tmsopt.records import Array
@@ -95,8 +95,7 @@ def swallowtail_figure(data: Swallowtail, sections: Sequence[Plane], titles: Seq
         names.append((flat, draw_plane(flat, plane)))
         flat.set_title(title, fontsize=10)
     legend_below(figure, [h for plane in sections for h in plane_handles(plane)])
-    for flat, found in names:
-        place_names(flat, found)
+    place_all(names)
     return figure
 
 
