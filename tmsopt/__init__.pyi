@@ -19,6 +19,7 @@ from .guide import Description as Description, describe as describe, schema as s
 from .margins import Nearest as Nearest, Robustness as Robustness, nearest as nearest, robustness as robustness
 from .models import Bicycle as Bicycle, read_bicycle as read_bicycle, write_bicycle as write_bicycle
 from .paper import Comparison as Comparison, Ledger as Ledger, compare as compare, verify as verify
+from .progress import Progress as Progress
 from .proofs import Proof as Proof, prove as prove
 from .solver import Every as Every, solve as solve, solve_all as solve_all
 from .studies import (

@@ -445,7 +445,7 @@ def test_no_process_is_left(slow_plane: Solution, children: list[Any]) -> None:
 
 
 def test_an_interrupt_keeps_the_design(slow_plane: Solution, children: list[Any]) -> None:
-    def stop(done: float, most: float) -> None:
+    def stop(told: Progress) -> None:
         raise KeyboardInterrupt
 
     design = certify(slow_plane, seconds=SECONDS, progress=stop)
@@ -501,10 +501,15 @@ def test_hardly_any_time(slow_plane: Solution) -> None:
 
 
 def test_progress_is_told(slow_plane: Solution) -> None:
-    told: list[tuple[float, float]] = []
-    certify(slow_plane, seconds=SECONDS, progress=lambda done, most: told.append((done, most)))
-    assert told == sorted(told)
-    assert all(0 <= done <= most == SECONDS for done, most in told)
+    """Seconds, and the gap as it closes."""
+    told: list[Progress] = []
+    certify(slow_plane, seconds=SECONDS, progress=told.append)
+    assert {t.what for t in told} == {"bounding the optimum"}
+    assert [t.done for t in told] == sorted(t.done for t in told)
+    assert all(0 <= t.done <= t.most == SECONDS and t.left == t.most - t.done for t in told[1:])
+    gaps = [float(t.note.split()[1]) for t in told if t.note]
+    assert gaps == sorted(gaps, reverse=True)
+    assert gaps[-1] < gaps[0]
 
 
 def test_a_crew_is_closed_whatever_happens(children: list[Any]) -> None:

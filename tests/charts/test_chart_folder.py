@@ -70,8 +70,8 @@ def test_a_killed_process_loses_no_recorded_tile(whole, tmp_path):
         assert len(lines) > len(recorded)
         recorded = lines
     seen = []
-    found = charted(path, tile=97, progress=lambda done, most: seen.append(done))
-    assert seen[0] == 74 * len(recorded)  # from where it was left
+    found = charted(path, tile=97, progress=lambda told: seen.append(told.done))
+    assert seen[1] == 74 * len(recorded)  # from where it was left
     assert (path / "tiles.jsonl").read_bytes().splitlines()[: len(recorded)] == recorded
     assert files(path) == files(whole.path)
     assert found.counts.designs == 851

@@ -68,9 +68,12 @@ def test_json_is_finite_and_round_trips(ledger) -> None:
     assert json.loads(json.dumps(data, allow_nan=False)) == data
 
 
-def test_progress_counts_up() -> None:
+def test_progress_counts_up(monkeypatch) -> None:
+    monkeypatch.setattr("tmsopt.progress.PAUSE", 0.0)
     seen = []
-    verify(lambda done, most: seen.append((done, most)), only=["tab1-*"])
+    verify(lambda told: seen.append((told.done, told.most)), only=["tab1-*"])
+    begun, *seen = seen
+    assert begun[0] == 0
     assert seen == [(k, len(seen)) for k in range(1, len(seen) + 1)]
     assert len(seen) == len(matching(["tab1-*"])) > 5
 

@@ -38,13 +38,18 @@ def stop(*_: Any) -> Any:
     raise KeyboardInterrupt
 
 
-def third(done: int, most: int) -> bool:
+def third(done: float, most: float) -> bool:
     return done == 3
 
 
-def when(chosen: Callable[[int, int], bool], how: Callable[[], Any] = stop) -> Any:
+def when(chosen: Callable[[float, float], bool], how: Callable[[], Any] = stop) -> Any:
     """A progress callback by which the user stops a search."""
-    return lambda done, most: how() if chosen(done, most) else None
+    return lambda told: how() if told.unit == "start" and chosen(told.done, told.most) else None
+
+
+@pytest.fixture(autouse=True)
+def _every_step_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tmsopt.progress.PAUSE", 0.0)
 
 
 def pressed() -> None:
@@ -84,11 +89,9 @@ def test_a_part_of_the_box_that_was_done_counts() -> None:
     """EP4 of the paper (Table 1) has a forward tilt; the search is stopped at the first start with a backward one."""
     ep4 = tmsopt.load("problems/ep4.toml")
     free = {**ep4.free, "lambda_s": (-1.4, 1.4)}
-    told: list[int] = []
 
-    def again(done: int, most: int) -> None:
-        told.append(done)
-        if told.count(1) == 2:
+    def again(told: tmsopt.Progress) -> None:
+        if told.note.endswith("backward tilt"):
             raise KeyboardInterrupt
 
     found = tmsopt.solve(replace(ep4, free=free), throw=False, progress=again)
@@ -98,7 +101,7 @@ def test_a_part_of_the_box_that_was_done_counts() -> None:
 
 
 @pytest.mark.parametrize("chosen", [third, lambda done, most: most < 64])
-def test_of_an_infeasible_problem_the_least_violating_design_is_left(chosen: Callable[[int, int], bool]) -> None:
+def test_of_an_infeasible_problem_the_least_violating_design_is_left(chosen: Callable[[float, float], bool]) -> None:
     """While it is searched, or relaxed."""
     asked = problem("x >= 10")
     found = tmsopt.solve(asked, throw=False, progress=when(chosen))
@@ -112,17 +115,19 @@ def test_the_question_for_a_stable_design_is_shown_and_can_be_stopped(monkeypatc
     """s² + (x − 2) s + 1, stable where x > 2: at x = 1 the roots are 1/2 ± i √3/2."""
     monkeypatch.setattr(asking, "none_stable", lambda problem: False)
     asked = tmsopt.Problem(from_coefficients([1, x - 2, 1]), free={"x": (0, 1)}, minimize="abscissa")
-    told: list[tuple[float, float]] = []
-    done = tmsopt.solve(asked, asking=lambda passed, most: told.append((passed, most)))
+    told: list[tmsopt.Progress] = []
+    done = tmsopt.solve(asked, progress=told.append)
     assert (done.any_stable, done.interrupted) == (False, False)
-    assert told == sorted(told)
-    assert {most for _, most in told} == {5.0}
-    found = tmsopt.solve(asked, asking=stop)
+    passed = [t for t in told if t.what == "looking for a stable design"]
+    assert [t.done for t in passed] == sorted(t.done for t in passed)
+    assert {t.most for t in passed[1:]} == {5.0}
+    asking = {"progress": lambda t: stop() if t.unit == "s" else None}
+    found = tmsopt.solve(asked, **asking)
     assert (found.status, found.interrupted, found.any_stable) == ("optimal", True, None)
     assert found.value == pytest.approx(0.5, abs=1e-12)
     assert "the user stopped the question whether any design is stable" in found.notes
     with pytest.raises(KeyboardInterrupt):
-        tmsopt.solve(asked, asking=stop, interruptible=False)
+        tmsopt.solve(asked, **asking, interruptible=False)
 
 
 def test_with_nothing_in_hand_there_is_nothing_to_leave(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -107,10 +107,11 @@ def test_a_study_is_taken_up_where_it_was_left(tmp_path: Path, monkeypatch: pyte
         tried.extend(numbers)
         return original(self, numbers)
 
-    def interrupt(done: int, most: int) -> None:
-        if done == 3:
+    def interrupt(told: tmsopt.Progress) -> None:
+        if told.done == 3:
             raise KeyboardInterrupt
 
+    monkeypatch.setattr("tmsopt.progress.PAUSE", 0.0)
     monkeypatch.setattr(Solver, "answers", counting)
     with pytest.raises(KeyboardInterrupt):
         run_study(GRID, path, workers=1, progress=interrupt)

@@ -16,6 +16,7 @@ from tmsopt.branch_and_bound.tasks import FOUND, INFEASIBLE, UNDECIDED, Decision
 from tmsopt.design.solution import Solution
 from tmsopt.formulation.formulate import design_of, variables_of
 from tmsopt.formulation.starts import complete
+from tmsopt.progress import Counts
 
 _HOLDS = 1e-6  # of a row, relative to its range: SCIP itself asks for 1e-9, and multiple roots have half the digits
 
@@ -26,16 +27,18 @@ _FIRST = 2.0  # seconds for the first turn, twice as many for each that follows
 _WAYS = (((1.0, False), (1.0, True)), ((4.0, False), (0.25, False)), ((16.0, False), (4.0, True)))
 """Turns: units, as multiples of the usual one, and whether compact."""
 
-SecondsPassed = Callable[[float, float], None]
-
 
 class Clock:
-    """Time and nodes that a proof has used."""
+    """Time and nodes that a proof has used.
 
-    def __init__(self, seconds: float, crew: Crew, progress: SecondsPassed | None = None) -> None:
+    Attributes:
+        note: what is known meanwhile, for who listens.
+    """
+
+    def __init__(self, seconds: float, crew: Crew, progress: Counts | None = None) -> None:
         self.seconds, self.crew, self.progress = seconds, crew, progress
         self.began = time.perf_counter()
-        self.nodes = 0
+        self.nodes, self.note = 0, ""
         self.interrupted = False
 
     @property
@@ -61,7 +64,7 @@ class Clock:
     def tick(self) -> None:
         """Tell the reader how far it is."""
         if self.progress:
-            self.progress(min(self.used, self.seconds), self.seconds)
+            self.progress(min(self.used, self.seconds), self.seconds, self.note)
 
 
 @dataclass(frozen=True)

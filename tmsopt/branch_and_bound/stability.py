@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.branch_and_bound.answer import Answer, Clock, SecondsPassed, answer, contradicted, doubt
+from tmsopt.branch_and_bound.answer import Answer, Clock, answer, contradicted, doubt
 from tmsopt.branch_and_bound.question import Question, unit_of
 from tmsopt.branch_and_bound.race import Crew
 from tmsopt.branch_and_bound.scip import SCIP
@@ -13,6 +13,7 @@ from tmsopt.branch_and_bound.tasks import FOUND, INFEASIBLE, Failed
 from tmsopt.checks.recheck import Checked, recheck
 from tmsopt.design.problem import Problem
 from tmsopt.formulation.formulate import middle
+from tmsopt.progress import Counts
 
 SOLVER = SCIP
 """Who is asked, here and for certificates."""
@@ -42,7 +43,7 @@ def any_stable(
     problem: Problem,
     seconds: float,
     known: Mapping[str, float] | None = None,
-    progress: SecondsPassed | None = None,
+    progress: Counts | None = None,
 ) -> Stability:
     """Whether any design in the box has all its roots left of the axis, in every case that the problem lists.
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import partial
 
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.branch_and_bound.answer import Clock, SecondsPassed, answer, contradicted, doubt
+from tmsopt.branch_and_bound.answer import Clock, answer, contradicted, doubt
 from tmsopt.branch_and_bound.half_planes import over
 from tmsopt.branch_and_bound.question import Question, unit_of
 from tmsopt.branch_and_bound.race import Crew
@@ -21,7 +21,8 @@ from tmsopt.design.quantities import ANGULAR_FREQUENCY, ROOT_NAMES
 from tmsopt.design.solution import Bound, Solution
 from tmsopt.errors import Fault, InputError
 from tmsopt.formulation.formulate import Builder
-from tmsopt.solver.solve import solved
+from tmsopt.progress import Listener, begin, heard
+from tmsopt.solver.solve import solved_first
 
 SECONDS = 60.0
 """Time for a proof, by default."""
@@ -36,7 +37,7 @@ _CLOSE = 1.5  # ratio of a gap proved and one not proved that is not worth narro
 _SHARE = 0.6  # of the time that is left, for a gap that is not the last one to be tried
 
 
-def certify(design: Given, *, seconds: float = SECONDS, progress: SecondsPassed | None = None) -> Solution:
+def certify(design: Given, *, seconds: float = SECONDS, progress: Listener | None = None) -> Solution:
     """The same design with a bound that no design of the box can beat; or a better design, where one is found.
 
     SCIP is asked whether any design does better than this one by a gap; the answer no is the bound. It is a proof in
@@ -45,7 +46,7 @@ def certify(design: Given, *, seconds: float = SECONDS, progress: SecondsPassed 
     Args:
         design: what `solve` found, with throw=False where that is no optimum; or a problem or its file, solved first.
         seconds: for the whole proof.
-        progress: called with the seconds that passed and those there are.
+        progress: called with a `tmsopt.Progress` now and then, its note the best value and the gap that is proved.
 
     Raises:
         InputError: where SCIP is not installed, for a time that is not positive, or for a problem that asks nothing.
@@ -53,15 +54,17 @@ def certify(design: Given, *, seconds: float = SECONDS, progress: SecondsPassed 
     check_installed()
     if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0 < seconds < math.inf:
         raise InputError([Fault(f"found {seconds!r}; accepted: a positive number of seconds", ("seconds",))])
-    found = solved(design)
+    found = solved_first(design, progress)
     problem = question_of(found)
     if not problem.free:
         return _noted(found, "nothing is free, so there is nothing to bound")
     if problem.objective is None and feasible(found):
         return _noted(found, "nothing is minimised or maximised, so there is nothing to bound")
     with Crew(SOLVER) as crew:
-        clock = Clock(seconds, crew, progress)
+        steps = heard(progress)
+        clock = Clock(seconds, crew, steps)
         try:
+            begin(steps, "bounding the optimum", "s")
             replaced = True
             while replaced and not (problem.objective is None and feasible(found)):
                 found, replaced = (_bounded if feasible(found) else _excluded)(found, clock)
@@ -98,6 +101,7 @@ def _bounded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     converged = design.status == "optimal"
     while (level := _next(proved, failed, converged)) is not None and clock.left > 0:
         share = 1.0 if level in (_FINER, _COARSER[-1]) else _SHARE
+        clock.note = _told(design, min(known.gap, _gap(design.value, proved)), level)
         answered = answer(_question(design, level), clock, share, partial(confirmed, design, _cases(design)))
         if answered.better is not None:
             return answered.better, True
@@ -106,6 +110,12 @@ def _bounded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
         else:
             failed = level
     return replace(design, bound=_stronger(design, known, _bound(design, proved, clock))), False
+
+
+def _told(design: Solution, gap: float, level: float) -> str:
+    """How good the design is known to be, and what is asked next."""
+    bound = f"{design.value - design.problem.sign * gap:.6g}" if math.isfinite(gap) else "none"
+    return f"gap {gap:.2g} (best {design.value:.6g}, bound {bound}), asking for {_gap(design.value, level):.2g}"
 
 
 def _next(proved: float, failed: float, converged: bool) -> float | None:
@@ -126,6 +136,7 @@ def _next(proved: float, failed: float, converged: bool) -> float | None:
 
 def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     """No design was found: the proof that there is none, or one after all."""
+    clock.note = "whether there is any design"
     anything = Question(design.problem, _cases(design), None, unit_of(design.roots))
     answered = answer(anything, clock, 1.0, partial(confirmed, design, _cases(design)))
     if answered.better is not None:

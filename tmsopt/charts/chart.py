@@ -32,7 +32,8 @@ from tmsopt.design.problem import Problem
 from tmsopt.disk import path_of
 from tmsopt.errors import Fault, InputError, call_faults, count_faults, list_faults, short, suggest
 from tmsopt.models import MODELS
-from tmsopt.records import Array, Progress, Shown
+from tmsopt.progress import Listener, counted
+from tmsopt.records import Array, Shown
 from tmsopt.roots import CLASSES
 from tmsopt.tracing.domain import Domain, domain
 
@@ -166,7 +167,7 @@ def chart(
     problem: Given, axes: Sequence[str] | None = None, *, folder: str | Path | None = None,
     points: Sequence[int] | None = None, layers: Sequence[str] | None = None,
     quantities: Mapping[str, str] | None = None, single: bool = False, engine: str = "auto", workers: int = 1,
-    fresh: bool = False, tile: int = TILE, boundaries: bool = True, progress: Progress | None = None,
+    fresh: bool = False, tile: int = TILE, boundaries: bool = True, progress: Listener | None = None,
 ) -> Chart:  # fmt: skip
     """Classify every design of a grid over the two or three free parameters; the others must be fixed.
 
@@ -185,7 +186,7 @@ def chart(
         fresh: move a folder of that name aside.
         tile: designs computed at a time by a worker.
         boundaries: also trace the exact boundary curves over a plane.
-        progress: called with the number of designs done and in all.
+        progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
         InputError: for bad input; for a folder that holds another chart, with the differences, or is damaged.
@@ -194,6 +195,7 @@ def chart(
     if faults := [*count_faults("workers", workers, 1, _MOST_WORKERS), *count_faults("tile", tile, 1),
                   *call_faults("progress", progress)]:  # fmt: skip
         raise InputError(faults)
+    steps = counted(progress, "charting", "design")
     wanted = layers if layers is not None else tuple(LAYERS) if folder is None else USUAL
     work = survey(problem, axes, points, wanted, quantities, engine, single)
     path, grid = None if folder is None else path_of(folder, "a folder"), work.grid
@@ -211,17 +213,17 @@ def chart(
     with where as target:
         left = complete(target.done, grid.tiles(about["tile"]))
         before = done = sum(t.designs for t in target.done.values())
-        if progress:
-            progress(done, grid.size)
+        if steps:
+            steps(done, grid.size)
         for rows, arrays, counts in computed(work, left, workers):
             target.write(rows, arrays, counts)
             done += counts.designs
-            if progress:
-                progress(done, grid.size)
+            if steps:
+                steps(done, grid.size)
     seconds = time.perf_counter() - began
     run: dict[str, Any] = {"engine": work.engine} | ({} if path is None else {"designs": done - before})
     run |= {"seconds": seconds, "per_second": (done - before) / seconds}
-    edges = domain(work.problem) if boundaries and len(grid.axes) == 2 else None
+    edges = domain(work.problem, progress=progress) if boundaries and len(grid.axes) == 2 else None
     if isinstance(target, Folder):
         return _opened(target.path, run, edges, work.problem)
     return Chart(about, grid.values, target.layers, total(target.done.values()), edges, None, run, work.problem)

@@ -19,12 +19,12 @@ from tmsopt.cli.common import (
     check_output,
     nominal_of,
     plane,
-    progress,
     report_option,
     saving,
     write_report,
 )
 from tmsopt.cli.ending import INTERRUPTED
+from tmsopt.cli.terminal import shown
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
@@ -126,10 +126,10 @@ def chart(
         sizes = _sizes(points, len(free))
         if folder is None:
             _check_memory(sizes, output)
-        with progress("design", scaled=True) as update, _moved_aside(folder):
+        with _moved_aside(folder):
             found = tmsopt.chart(
                 problem, names, folder=folder, points=sizes, layers=(*_LAYERS, *kept) if whole else kept, **how,
-                workers=workers, fresh=fresh, boundaries=boundaries and whole, progress=update,
+                workers=workers, fresh=fresh, boundaries=boundaries and whole, progress=shown(),
             )  # fmt: skip
         if output is not None and folder is None:
             with saving("--output", output):
@@ -139,9 +139,10 @@ def chart(
         click.echo(f"wrote {folder}", err=True)
     if plot is not None:
         with bad_input():
-            shown = found if whole else tmsopt.chart(**_shown(found, held), **how, boundaries=boundaries)
+            how |= {"boundaries": boundaries, "progress": shown()}
+            drawn = found if whole else tmsopt.chart(**_shown(found, held), **how)
             with saving("--plot", plot):
-                tmsopt.plots.save(tmsopt.plots.chart_figure(shown, layer), plot)
+                tmsopt.plots.save(tmsopt.plots.chart_figure(drawn, layer), plot)
     write_report(found, report, file)
 
 

@@ -1,4 +1,4 @@
-"""What commands share: exit status, bad input, progress, files to write."""
+"""What commands share: exit status, bad input, files to write."""
 
 import json
 import shlex
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tmsopt.cli.ending import BAD_INPUT, answering
+from tmsopt.cli.terminal import doing, quiet, shown
 
 if TYPE_CHECKING:
     from tmsopt import Problem
@@ -38,35 +39,6 @@ def bad_input() -> Iterator[None]:
     except InputError as error:
         click.echo(str(error), err=True)
         sys.exit(BAD_INPUT)
-
-
-@contextmanager
-def progress(what: str = "start", scaled: bool = False, shown: str | None = None) -> Iterator[Callable[..., None]]:
-    """A progress bar on stderr, shown on a terminal when the work takes longer than a second.
-
-    Args:
-        scaled: write large numbers as 12.3M; the first call says what was done before.
-        shown: how, in place of a bar.
-    """
-    from tqdm import tqdm
-
-    options: dict[str, Any] = {"unit_scale": scaled, "delay": 1, "disable": None, "leave": False, "file": sys.stderr}
-    with tqdm(desc=f"{what}s", unit=what, bar_format=shown, **options) as bar:
-
-        def update(done: float, most: float) -> None:
-            if scaled and bar.total is None:
-                bar.initial = bar.n = done
-            bar.total = round(most)
-            bar.update(round(done) - bar.n)
-
-        yield update
-
-
-@contextmanager
-def solving() -> Iterator[dict[str, Any]]:
-    """Options of `solve` by which it shows how far it is."""
-    with progress() as update, progress("second", shown="looking for a stable design: second {n} of {total}") as ask:
-        yield {"progress": update, "asking": ask}
 
 
 def check_output(option: str, path: Path | None, endings: Sequence[str], folders: Sequence[str] = ()) -> None:
@@ -109,12 +81,14 @@ def write_report(result: Any, path: Path | None, *files: Path, **more: Any) -> N
     with bad_input():
         texts = {file.name: read_text(str(file), "TOML problem file") for file in files}
         with saving("--report", path):
-            tmsopt.save_report(result, path, command=shlex.join(("tmsopt", *words)), files=texts, **more)
+            command = shlex.join(("tmsopt", *words))
+            tmsopt.save_report(result, path, command=command, files=texts, progress=shown(), **more)
 
 
 @contextmanager
 def saving(option: str, path: Path) -> Iterator[None]:
     """Say that a file was written, or why it could not be, with exit status 2."""
+    doing(f"writing what {option} asks for")
     try:
         yield
     except OSError as error:
@@ -160,13 +134,18 @@ def nominal_of(problem: "Problem") -> "Problem":
 def write_json(data: dict[str, Any]) -> None:
     """Write JSON to stdout; characters that it does not take are escaped."""
     narrow = not (sys.stdout.encoding or "utf").lower().startswith("utf")
-    click.echo(json.dumps(data, indent=2, ensure_ascii=narrow, allow_nan=False))
+    said = json.dumps(data, indent=2, ensure_ascii=narrow, allow_nan=False)
+    with quiet():
+        click.echo(said)
 
 
 def answer(as_json: bool, data: Callable[[], dict[str, Any]], text: Callable[[], str]) -> None:
     """Write an answer that is in hand, as JSON or as text; a signal waits until it is written."""
+    doing("writing the answer")
     with answering():
         if as_json:
             write_json(data())
         else:
-            click.echo(text())
+            said = text()
+            with quiet():
+                click.echo(said)

@@ -17,6 +17,8 @@ from importlib.machinery import ExtensionFileLoader
 from types import FrameType
 from typing import Any, TextIO, cast
 
+from tmsopt.cli.terminal import quiet
+
 BAD_INPUT, INTERRUPTED, UNREAD = 2, 130, 141
 """Exit status: what cannot be written, Ctrl-C, a reader who has gone; as a shell tells it of programs."""
 
@@ -162,21 +164,21 @@ class _Diagnostics:
     """A stream on which nothing fails: what cannot be said must not become of more weight than the answer."""
 
     def __init__(self, stream: Any) -> None:
-        self._stream = stream
+        self.beneath = stream
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self._stream, name)
+        return getattr(self.beneath, name)
 
     def write(self, text: str) -> int:
-        """Write, if anybody takes it."""
-        with suppress(OSError, ValueError):
-            self._stream.write(text)
+        """Write, if anybody takes it, where progress is shown before."""
+        with quiet(), suppress(OSError, ValueError):
+            self.beneath.write(text)
         return len(text)
 
     def flush(self) -> None:
         """Likewise."""
         with suppress(OSError, ValueError):
-            self._stream.flush()
+            self.beneath.flush()
 
 
 @contextmanager

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import bad_input, check_output, options, progress, saving
+from tmsopt.cli.common import bad_input, check_output, options, saving
 from tmsopt.cli.ending import answering
+from tmsopt.cli.terminal import shown
 from tmsopt.errors import MOST_STARTS
 
 _EXAMPLES = """
@@ -41,8 +42,7 @@ def explore(file: Path, output: Path | None, opened: bool, starts: int | None, s
 
         path = Path(f"{file.stem}.html") if output is None else output
         check_output("--output", path, ("html", "htm"))
-        with progress() as update:
-            page = tmsopt.explore(file, progress=update, **options(starts=starts, seed=seed))
+        page = tmsopt.explore(file, progress=shown(), **options(starts=starts, seed=seed))
     with answering(), saving("--output", path):
         page.save(path)
     solution = page.solution

@@ -4,8 +4,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tmsopt.cli.common import answer, progress, saving, write_report
+from tmsopt.cli.common import answer, saving, write_report
 from tmsopt.cli.ending import INTERRUPTED
+from tmsopt.cli.terminal import shown
 
 if TYPE_CHECKING:
     from tmsopt import Problem
@@ -22,8 +23,7 @@ def write_front(
     """
     import tmsopt
 
-    with progress("sub-problem") as update:
-        front = tmsopt.pareto(problem, progress=update, **asked)
+    front = tmsopt.pareto(problem, progress=shown(), **asked)
     answer(as_json, front.to_json, lambda: front.report(full))
     if csv_file is not None:
         with saving("--csv", csv_file):

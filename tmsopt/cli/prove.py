@@ -15,9 +15,9 @@ from tmsopt.cli.common import (
     check_output,
     options,
     report_option,
-    solving,
     write_report,
 )
+from tmsopt.cli.terminal import shown
 from tmsopt.errors import MOST_STARTS
 
 _EXAMPLES = """
@@ -62,10 +62,9 @@ def prove(
         check_output("--report", report, REPORTS)
         given = _named(exact)
         problem = question_of(file)
-        with solving() as shown:
-            asked = options(starts=starts, seed=seed) | shown
-            solution = tmsopt.solve(problem, throw=False, interruptible=False, **asked)
-        proof = tmsopt.prove(solution, digits, exact=given)
+        asked = options(starts=starts, seed=seed)
+        solution = tmsopt.solve(problem, throw=False, interruptible=False, progress=shown(), **asked)
+        proof = tmsopt.prove(solution, digits, exact=given, progress=shown())
     heading = {"title": problem.title, "status": solution.status}
     answer(as_json, lambda: heading | proof.to_json(), lambda: tmsopt.report.proof_text(problem, proof))
     write_report(proof, report, file, seed=seed, design=solution)

@@ -2,8 +2,7 @@
 
 import math
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -21,13 +20,12 @@ from tmsopt.cli.common import (
     check_output,
     nominal_of,
     options,
-    progress,
     report_option,
     saving,
-    solving,
     write_report,
 )
 from tmsopt.cli.ending import INTERRUPTED
+from tmsopt.cli.terminal import shown
 from tmsopt.errors import MOST_STARTS
 
 if TYPE_CHECKING:
@@ -172,13 +170,12 @@ def solve(
         except tmsopt.NotSolved as error:
             solution, plot = error.solution, None
     else:
-        with solving() as shown:
-            solution = tmsopt.solve(problem, throw=False, **shown, **asked)
+        solution = tmsopt.solve(problem, throw=False, progress=shown(), **asked)
         if certify and not solution.interrupted:
-            solution = _certified(solution, certify)
+            solution = tmsopt.certify(solution, seconds=certify, progress=shown())
     try:
-        with _explaining(full):
-            found = tmsopt.report.findings(solution, full) if full or not as_json else tmsopt.report.Findings()
+        wanted = full or not as_json
+        found = tmsopt.report.findings(solution, full, shown()) if wanted else tmsopt.report.Findings()
     except KeyboardInterrupt:
         solution, found = replace(solution, interrupted=True), tmsopt.report.Findings()
     si = tmsopt.report.si_parameters(solution, w, m_B) if wheelbase or rear_mass else None
@@ -236,25 +233,14 @@ def _as_json(solution: "Solution", found: "Findings", full: bool) -> dict[str, A
     return data | {name: value for name, value in meaning.items() if value}
 
 
-@contextmanager
-def _explaining(full: bool) -> Iterator[None]:
-    """Say what is being done, on a terminal: limits that are moved are solved for again."""
-    shown = full and sys.stderr.isatty()
-    if shown:
-        click.echo("moving each limit that binds, and solving again …", nl=False, err=True)
-    yield
-    if shown:
-        click.echo("\r\033[K", nl=False, err=True)
-
-
 def _solve_all(
     problem: "Problem", as_json: bool, asked: dict[str, Any], file: Path, report: Path | None
 ) -> NoReturn:  # fmt: skip
     """Write all designs with a pattern, and end."""
     import tmsopt
 
-    with bad_input(), progress("step") as update:
-        found = tmsopt.solve_all(problem, progress=update, **asked)
+    with bad_input():
+        found = tmsopt.solve_all(problem, progress=shown(), **asked)
     answer(as_json, lambda: problem.heading | found.to_json(), lambda: tmsopt.report.every_table(found))
     write_report(found, report, file, seed=asked["seed"])
     sys.exit(DONE if found.solutions else INFEASIBLE)
@@ -270,19 +256,10 @@ def compare(file: Path, as_json: bool, starts: int | None, seed: int, linear_sol
         from tmsopt.design import question_of
 
         problem = nominal_of(question_of(file))
-    with progress() as update:
-        asked = options(starts=starts, seed=seed, linear_solver=linear_solver)
-        comparison = tmsopt.compare(problem, progress=update, **asked)
+    asked = options(starts=starts, seed=seed, linear_solver=linear_solver)
+    comparison = tmsopt.compare(problem, progress=shown(), **asked)
     answer(as_json, comparison.to_json, lambda: tmsopt.report.comparison_table(comparison))
     sys.exit(_EXIT[comparison.design.status])
-
-
-def _certified(solution: "Solution", seconds: float) -> "Solution":
-    """The solution with its bound, within seconds."""
-    import tmsopt
-
-    with progress("second") as update:
-        return tmsopt.certify(solution, seconds=seconds, progress=update)
 
 
 def _given(context: click.Context) -> list[str]:
@@ -320,6 +297,6 @@ def _draw(solution: "Solution", path: Path, over: str | None, w: float, m_B: flo
         si = tmsopt.report.si_parameters(solution, w, m_B)
         unit = (si["g"] * si["w"]) ** 0.5
     with bad_input():
-        drawn = tmsopt.growth(solution, over=over)
+        drawn = tmsopt.growth(solution, over=over, progress=shown())
     with saving("--plot", path):
         tmsopt.plots.save(tmsopt.plots.growth_figure(drawn, solution.problem.title, unit), path)

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import INFEASIBLE, NOT_CONVERGED, answer, bad_input, nominal_of, progress
+from tmsopt.cli.common import INFEASIBLE, NOT_CONVERGED, answer, bad_input, nominal_of
+from tmsopt.cli.terminal import shown
 
 _EXAMPLES = """
 \b
@@ -43,8 +44,7 @@ def speeds(file: Path, parameter: str | None, between: tuple[float, float] | Non
 
         problem = nominal_of(tmsopt.load(file))
         try:
-            with progress() as update:
-                found = tmsopt.speeds(problem, parameter, between=between, progress=update)
+            found = tmsopt.speeds(problem, parameter, between=between, progress=shown())
         except tmsopt.NotSolved as error:
             status = error.solution.status
             click.echo(f"{problem.title}: {status.replace('_', ' ')}; there is no design to look at", err=True)

@@ -1,5 +1,6 @@
 """The command that solves a problem many times over."""
 
+import math
 import sys
 import tomllib
 from collections.abc import Mapping
@@ -11,7 +12,9 @@ import click
 
 from tmsopt.cli.common import FIGURES, REPORTS, bad_input, check_output, report_option, saving, write_json, write_report
 from tmsopt.cli.ending import BAD_INPUT, INTERRUPTED, answering
+from tmsopt.cli.terminal import doing, quiet, shown
 from tmsopt.disk import read_text
+from tmsopt.progress import Progress
 
 if TYPE_CHECKING:
     from tmsopt.studies import Results, Sampling, Study
@@ -92,7 +95,7 @@ def study(
             return
         path = path.resolve()
         results, stopped = _carried_out(asked, path, fresh, {"workers": workers, "scheduler": scheduler})
-        with answering():
+        with answering(), quiet():
             _show(results, path, stopped, as_json)
         for target in exports:
             with saving("--export", target):
@@ -133,45 +136,40 @@ def _planned(asked: "Study | Sampling") -> "Study":
     from tmsopt.studies import planned
 
     try:
-        return planned(asked)
+        return planned(asked, shown())
     except NotSolved as error:
         click.echo(f"there is no design to draw around: {error}", err=True)
         sys.exit(BAD_INPUT)
 
 
 def _carried_out(asked: "Study", path: Path, fresh: bool, where: Mapping[str, Any]) -> "tuple[Results, bool]":
-    """The study with its rows, solved with a progress bar, and whether it was stopped on the way."""
-    from tqdm import tqdm
-
+    """The study with its rows, and whether it was stopped on the way."""
     from tmsopt import run_study
     from tmsopt.studies import stored
     from tmsopt.studies.engines import EngineError
 
-    shown = sys.stderr.isatty()
-    pace = {"delay": 1, "mininterval": 0.1} if shown else {"delay": 10, "mininterval": 10}
-    with tqdm(desc="rows", unit="row", leave=False, file=sys.stderr, **pace) as bar:
+    there: list[float] = []  # rows, when it began
 
-        def update(done: int, most: int) -> None:
-            if bar.total is None:
-                bar.initial = bar.n = done
-            bar.total = most
-            bar.update(done - bar.n)
+    def told(now: Progress) -> None:
+        if now.unit == "row" and math.isfinite(now.most):
+            there.append(now.done)
+        if listener:
+            listener(now)
 
-        def note(line: str) -> None:
-            if bar.total is None:  # nothing is drawn yet
-                click.echo(line, err=True)
-            else:
-                bar.write(line, file=sys.stderr)
+    listener = shown()
+    try:
+        return run_study(asked, path, fresh=fresh, progress=told, note=_said, **where), False
+    except KeyboardInterrupt:
+        if not there:  # before the first row
+            raise
+        return replace(stored(asked, path), found=int(there[0])), True
+    except EngineError as error:
+        click.echo(f"{error}; the rows solved so far are in {path}", err=True)
+        sys.exit(BAD_INPUT)
 
-        try:
-            return run_study(asked, path, fresh=fresh, progress=update, note=note, **where), False
-        except KeyboardInterrupt:
-            if bar.total is None:  # before the first row
-                raise
-            return replace(stored(asked, path), found=int(bar.initial)), True
-        except EngineError as error:
-            click.echo(f"{error}; the rows solved so far are in {path}", err=True)
-            sys.exit(BAD_INPUT)
+
+def _said(line: str) -> None:
+    click.echo(line, err=True)
 
 
 def _show(results: "Results", path: Path, stopped: bool, as_json: bool) -> None:
@@ -196,6 +194,7 @@ def _show_row(asked: "Study", number: int, as_json: bool) -> None:
     """One row, solved alone."""
     from tmsopt.studies import alone
 
+    doing("solving the row")
     solved = alone(asked, number)
     if as_json:
         solution = {} if solved.solution is None else {"solution": solved.solution.to_json()}
@@ -203,6 +202,8 @@ def _show_row(asked: "Study", number: int, as_json: bool) -> None:
         return
     from tmsopt.report import design_report, row_lines
 
-    click.echo(row_lines(solved.row))
+    said = [row_lines(solved.row)]
     if solved.solution is not None:
-        click.echo("\n" + design_report(solved.solution))
+        said.append(design_report(solved.solution))
+    with quiet():
+        click.echo("\n\n".join(said))

@@ -12,11 +12,11 @@ from tmsopt.cli.common import (
     check_output,
     nominal_of,
     plane,
-    progress,
     report_option,
     saving,
     write_report,
 )
+from tmsopt.cli.terminal import shown
 from tmsopt.errors import MOST_STARTS
 
 _EXAMPLES = """
@@ -67,8 +67,7 @@ def trace(
             raise tmsopt.InputError([tmsopt.Fault("says what --plot draws; add --plot FILE", ("--axes",))])
         if axes is not None:
             plane(problem, axes)
-        with progress() as update:
-            found = tmsopt.trace(problem, pattern, step=step, starts=starts, seed=seed, progress=update)
+        found = tmsopt.trace(problem, pattern, step=step, starts=starts, seed=seed, progress=shown())
     answer(as_json, found.to_json, lambda: tmsopt.report.trace_table(found))
     write_report(found, report, file, seed=seed)
     if not found.branches:

@@ -27,7 +27,8 @@ from tmsopt.formulation.nlp import Scale, scale_of
 from tmsopt.models import Quantity, Values
 from tmsopt.models.exact import decimal, decimal_fraction
 from tmsopt.processes import Inbox, Worker
-from tmsopt.records import Progress, Table
+from tmsopt.progress import Counts
+from tmsopt.records import Table
 
 SECONDS = 60.0
 """Time for a proof, by default."""
@@ -49,7 +50,7 @@ def available() -> bool:
     return importlib.util.find_spec("codac") is not None
 
 
-def completeness(problem: Problem, seconds: float = SECONDS, progress: Progress | None = None) -> Completeness:
+def completeness(problem: Problem, seconds: float = SECONDS, progress: Counts | None = None) -> Completeness:
     """Every design in the box of a problem with its pattern, and whether that is proved.
 
     Boxes in the parameters and the unknowns of the pattern are contracted and split until interval arithmetic shows
@@ -98,7 +99,7 @@ class _Run:
 
     end: float
     seconds: float
-    progress: Progress | None
+    progress: Counts | None
     inbox: Inbox = field(default_factory=SimpleQueue)
     boxes: int = 0
     stopped: str = ""
@@ -140,11 +141,14 @@ class _Run:
         self.left += [(sheet, box, _SINGULAR) for box in small]
         self.left += [(sheet, box, self.stopped or _SINGULAR) for box in waiting]
 
+    def _found(self) -> str:
+        return f"{self.boxes:,} boxes" if self.boxes else ""
+
     def asked(self, puzzle: Puzzle, boxes: Sequence[Box], proved: Sequence[Box], most: int, least: float) -> Pruned:
         """What a worker makes of boxes; these again where time is over."""
         left = self.end - time.perf_counter()
         if self.progress:
-            self.progress(round(min(self.seconds - left, self.seconds)), round(self.seconds))
+            self.progress(min(self.seconds - left, self.seconds), self.seconds, self._found())
         if left > 0:
             self.worker.send(prune, puzzle, boxes, proved, min(_TURN, left), most, least)
             try:

@@ -17,9 +17,10 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, is_number, short, suggest
 from tmsopt.models import Model, Parameter, ParameterSet, Values
+from tmsopt.progress import Listener, counted
 from tmsopt.records import Array, Tabular, Truth, plain
 from tmsopt.roots import Root, is_stable, roots
-from tmsopt.solver.solve import solved
+from tmsopt.solver.solve import solved_first
 
 SPEEDS = ("Fr", "v")
 """Parameters that are speeds."""
@@ -79,7 +80,9 @@ class Growth(Tabular):
         )
 
 
-def growth(design: Given, end: float | None = None, over: str | None = None) -> Growth:
+def growth(
+    design: Given, end: float | None = None, over: str | None = None, *, progress: Listener | None = None
+) -> Growth:
     """Roots over a parameter, all else as designed.
 
     Points crowd around the design and where roots meet: there they move like a fractional power of the parameter.
@@ -90,11 +93,13 @@ def growth(design: Given, end: float | None = None, over: str | None = None) -> 
             roots (one that is farther than 3 times all else is left out), or for another parameter its box if it is
             free, and else up to twice the design's value.
         over: a parameter of the problem or a native one; by default the speed, or the first free one.
+        progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
         InputError: for an unknown parameter.
     """
-    design = solved(design)
+    design = solved_first(design, progress)
+    counted(progress, "following the roots")
     if not (end is None or (is_number(end) and end != 0)):
         raise InputError([Fault(f"found {short(end)}; accepted: a number other than 0", ("end",))])
     of, parameters, name = _written(design, over)

@@ -16,7 +16,8 @@ from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, short, suggest
 from tmsopt.margins.surroundings import parameter_faults
 from tmsopt.models import Model, ParameterSet
-from tmsopt.records import Progress, Table, Tabular, plain
+from tmsopt.progress import Listener, counted
+from tmsopt.records import Table, Tabular, plain
 from tmsopt.solver.solve import solve
 
 _DIGITS = 120  # of what is no fraction, such as the tangent of an angle
@@ -91,7 +92,7 @@ class Speeds(Tabular):
 
 def speeds(
     design: Given | Mapping[str, float], parameter: str | None = None, *, between: Stretch | None = None,
-    problem: Given | None = None, progress: Progress | None = None,
+    problem: Given | None = None, progress: Listener | None = None,
 ) -> Speeds:  # fmt: skip
     """Every weave and capsize speed of a design and every speed at which roots meet, by exact root isolation.
 
@@ -101,7 +102,7 @@ def speeds(
         design: a solution, a problem or its file, or the parameters of a design of `problem`. A problem that frees
             more than this parameter is solved first.
         parameter: what varies, by default the speed; any parameter that the coefficients are polynomials in.
-        progress: called with the starts done and in all, where the problem is solved first.
+        progress: called with a `tmsopt.Progress` now and then.
         between: the range to look through; by default the parameter's box, or all of its physical range.
 
     Raises:
@@ -118,6 +119,7 @@ def speeds(
     if name not in of.names:
         raise InputError([Fault(f"unknown parameter '{name}'; {suggest(name, of.names)}", ("parameter",))])
     own = _parameters(design, asked, name, progress)
+    counted(progress, "isolating speeds")
     allowed = of[name].range
     try:
         lower, upper = map(float, asked.free.get(name, (allowed.lower, allowed.upper)) if between is None else between)
@@ -167,7 +169,7 @@ def coefficients_over(model: Model, of: ParameterSet, own: Mapping[str, float], 
     return a
 
 
-def _parameters(design: Any, asked: Problem, name: str, progress: Progress | None) -> dict[str, float]:
+def _parameters(design: Any, asked: Problem, name: str, progress: Listener | None) -> dict[str, float]:
     """The parameters of the design; that of a problem which frees more than the one that varies is found first."""
     if isinstance(design, Solution):
         return dict(design.parameters)

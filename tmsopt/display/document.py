@@ -15,6 +15,7 @@ from tmsopt.display.markup import Chapter, facts, verbatim, words
 from tmsopt.display.page import badges
 from tmsopt.display.writers import WRITERS, report, title_of
 from tmsopt.errors import Fault, InputError, short
+from tmsopt.progress import Listener, counted
 
 if TYPE_CHECKING:
     from tmsopt.design import Solution
@@ -33,6 +34,7 @@ _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inl
 def save_report(
     result: Any, path: str | PathLike[str], *, command: str = "", files: Mapping[str, str] | None = None,
     seed: int | None = None, full: bool = False, design: "Solution | None" = None,
+    progress: Listener | None = None,
 ) -> None:  # fmt: skip
     """Write a result as one page: the answer, pictures, tables, the explorer, the report as text, and where it is from.
 
@@ -43,6 +45,7 @@ def save_report(
         seed: of the starts.
         full: all there is to say: gains of limits solved again, every number of the report.
         design: of a proof, what it was proved of: for its pictures and the explorer.
+        progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
         InputError: for what is no result, or another ending.
@@ -53,6 +56,7 @@ def save_report(
     place = path_of(path, "the file to write")
     if place.suffix.lstrip(".").lower() not in ENDINGS:
         raise InputError([Fault(f"found '{place}'; accepted: a file name ending in {', '.join(ENDINGS)}", ("path",))])
+    counted(progress, "writing the page")
     write_text(place, _document(result, command, files or {}, seed, full, design))
 
 

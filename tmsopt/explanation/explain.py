@@ -11,8 +11,9 @@ from tmsopt.explanation.limits import Lever, levers
 from tmsopt.explanation.optimality import Optimality, optimality
 from tmsopt.explanation.rounding import Rounded, rounded_alone, rounded_together, worst
 from tmsopt.explanation.summary import summary, warnings
+from tmsopt.progress import Listener, counted
 from tmsopt.records import Table, Tabular, plain
-from tmsopt.solver.solve import solved
+from tmsopt.solver.solve import solved_first
 
 
 @dataclass(frozen=True, repr=False)
@@ -56,13 +57,15 @@ class Explanation(Tabular):
         return found | {"worst": self.worst or None}
 
 
-def explain(design: Given, *, resolve: bool = True) -> Explanation:
+def explain(design: Given, *, resolve: bool = True, progress: Listener | None = None) -> Explanation:
     """Say what a solution means; of one that is not optimal, what can be said.
 
     Args:
         resolve: check each multiplier by solving again with its limit moved, from the optimum; 30 ms or so each.
+        progress: called with a `tmsopt.Progress` now and then.
     """
-    solution = solved(design)
+    solution = solved_first(design, progress)
+    steps = counted(progress, "moving limits" if resolve else "weighing limits", "limit")
     problem = solution.problem
     feasible = not solution.violations
     alone = rounded_alone(solution) if feasible else Table[Rounded]()
@@ -71,7 +74,7 @@ def explain(design: Given, *, resolve: bool = True) -> Explanation:
         structure=solution.structure,
         bound=solution.bound,
         optimality=optimality(solution),
-        levers=levers(solution, resolve),
+        levers=levers(solution, resolve, steps),
         rounding=alone,
         worst=worst(alone),
         precision=rounded_together(solution) if feasible else (),

@@ -11,6 +11,7 @@ from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import Unit, dimension_of, limit_text, unit_of
 from tmsopt.errors import InputError
 from tmsopt.explanation.steps import natural_step, step_within
+from tmsopt.progress import Counts
 from tmsopt.records import plain
 from tmsopt.solver.solve import solve
 
@@ -88,13 +89,17 @@ class Lever:
         return self.gained.show(value, 3)
 
 
-def levers(solution: Solution, resolve: bool = True) -> tuple[Lever, ...]:
+def levers(solution: Solution, resolve: bool = True, progress: Counts | None = None) -> tuple[Lever, ...]:
     """One lever per limit that binds at an optimum, the most valuable step first."""
     if solution.status != "optimal":
         return ()
     found = (_of_bound(solution, name) if _is_bound(solution, name) else _of_row(solution, name)
              for name in solution.active)  # fmt: skip
-    checked = [_resolved(solution, lever) if resolve and lever.step else lever for lever in found]
+    checked = []
+    for lever in found:
+        checked.append(_resolved(solution, lever) if resolve and lever.step else lever)
+        if progress:
+            progress(len(checked), len(solution.active))
     return tuple(sorted(checked, key=lambda v: -(v.resolved if math.isfinite(v.resolved) else v.predicted)))
 
 

@@ -13,6 +13,7 @@ from tmsopt.errors import Fault, InputError
 from tmsopt.explorer.known import known_designs
 from tmsopt.explorer.page import html_of
 from tmsopt.formulation.options import Asked
+from tmsopt.progress import Listener, counted
 from tmsopt.solver import solve
 
 _HEIGHT = 900  # pixels of the frame in a notebook: header and the first row of pictures
@@ -65,15 +66,16 @@ def explore(problem: Given, **options: Unpack[Asked]) -> Explorer:
     Raises:
         InputError: for a file with faults, and for anything that is no problem.
     """
+    told = options.get("progress")
     if isinstance(problem, Solution):
-        return _explorer(problem.problem, problem, {})
+        return _explorer(problem.problem, problem, {}, told)
     typed = read_page(problem, "problem").data.get("model") if isinstance(problem, str | PathLike) else None
     posed = problem_of(problem)
     if posed.pareto:
         posed = replace(posed, pareto=(), minimize=posed.pareto[0])
     asked = posed.sense != "evaluate" or not posed.free
     solution = solve(posed, throw=False, stability=0.0, **options) if asked else None
-    return _explorer(posed, solution, typed if isinstance(typed, dict) else {})
+    return _explorer(posed, solution, typed if isinstance(typed, dict) else {}, told)
 
 
 def page_of(
@@ -97,6 +99,10 @@ def frame(html: str, title: str) -> str:
     )
 
 
-def _explorer(problem: Problem, solution: Solution | None, model: Mapping[str, Any]) -> Explorer:
+def _explorer(
+    problem: Problem, solution: Solution | None, model: Mapping[str, Any], told: Listener | None
+) -> Explorer:
+    counted(told, "looking for designs worth going to")
     designs = known_designs(problem, solution, search=True)
+    counted(told, "writing the page")
     return Explorer(problem, solution, html_of(problem, designs, model, trace_curves=True))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, TypedDict, TypeVar
 
 from tmsopt.errors import MOST_STARTS, Fault, InputError, call_faults, count_faults, is_number, short, suggest
-from tmsopt.records import Progress
+from tmsopt.progress import Listener, Steps, heard
 
 LINEAR_SOLVERS = ("mumps", "spral")
 """Inside IPOPT: those in the CasADi wheel; any other name fails there without an error."""
@@ -21,7 +21,7 @@ class Asked(TypedDict, total=False):
     starts: int
     seed: int
     linear_solver: str
-    progress: Progress | None
+    progress: Listener | None
 
 
 class AskedOfSolve(Asked, total=False):
@@ -31,7 +31,6 @@ class AskedOfSolve(Asked, total=False):
     near: Mapping[str, float] | None
     alone: bool
     stability: float
-    asking: Callable[[float, float], None] | None
     interruptible: bool
 
 
@@ -43,14 +42,13 @@ class Options:
         starts: starts tried at most; the search ends early when several agree or optimality is proven.
         seed: of the quasi-random starting designs.
         linear_solver: ``mumps`` or ``spral``.
-        progress: called with (starts done, starts at most).
+        progress: called with a `tmsopt.Progress` now and then: what is being done, how far it is.
         exhaustive: try all the starts, even when several agree.
         near: a design that may be close to the optimum, tried first; where both signs of a parameter are searched,
             only its own is.
         alone: of an infeasible problem, also find how far each limit in conflict would have to give alone.
         stability: where a stable design was looked for and none was found, seconds for branch and bound to look for one
             or to prove that there is none; 0 to do without. `solve` gives it 5, where SCIP is installed.
-        asking: called meanwhile, with the seconds that passed and those there are.
         interruptible: whether Ctrl-C ends the search with the best design so far, as `solve` has it; else it goes on to
             whoever called, as it always does where no design is in hand yet.
     """
@@ -58,12 +56,11 @@ class Options:
     starts: int = STARTS
     seed: int = 0
     linear_solver: str = "mumps"
-    progress: Progress | None = None
+    progress: Steps | None = None
     exhaustive: bool = False
     near: Mapping[str, float] | None = None
     alone: bool = True
     stability: float = 0.0
-    asking: Callable[[float, float], None] | None = None
     interruptible: bool = False
 
     @property
@@ -118,7 +115,6 @@ def options_of(
     if given["linear_solver"] not in LINEAR_SOLVERS:
         message = f"found {short(given['linear_solver'])}; accepted: {' '.join(LINEAR_SOLVERS)}"
         faults.append(Fault(message, ("linear_solver",)))
-    faults += [*call_faults("progress", given["progress"]), *call_faults("asking", given["asking"])]
-    if faults:
+    if faults := [*faults, *call_faults("progress", given["progress"])]:
         raise InputError(faults)
-    return Options(**given)
+    return Options(**given | {"progress": heard(given["progress"])})

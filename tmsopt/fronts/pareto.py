@@ -12,6 +12,7 @@ from tmsopt.fronts.curve import curve
 from tmsopt.fronts.front import Front, FrontPoint
 from tmsopt.fronts.subproblems import Asker, best_first, point
 from tmsopt.fronts.surface import surface
+from tmsopt.progress import begin
 
 POINTS = 25
 STARTS = 2
@@ -34,7 +35,7 @@ def pareto(problem: Given, points: int = POINTS, **options: Unpack[Asked]) -> Fr
         problem: with ``pareto``; ``locate`` and constraints narrow the designs.
         points: asked for along the front; kinks and ends of gaps come on top.
         options: ``starts`` per sub-problem beside the designs of the neighbours, 2 by default, ``seed`` and
-            ``linear_solver`` as of `solve`, and ``progress``, called with (sub-problems solved, about how many in all).
+            ``linear_solver`` and ``progress`` as of `solve`.
 
     Raises:
         NotSolved: when an objective has no optimum, carrying the best point found.
@@ -49,6 +50,7 @@ def pareto(problem: Given, points: int = POINTS, **options: Unpack[Asked]) -> Fr
         raise InputError(faults)
     began = time.perf_counter()
     progress, ask = how.progress, Asker(problem, replace(how, progress=None))
+    begin(progress, "following the front", "sub-problem")
     n = len(ask.texts)
     ends = tuple(_end(ask, k) for k in range(n))
     front = Front(problem, ask.texts, ends[:1], (), (), n, 0.0)

@@ -16,6 +16,7 @@ from tmsopt.margins.boundaries import KINDS, Edge, edges, lies_on
 from tmsopt.margins.rays import RayCrossing, between, most_damped, ray_crossings
 from tmsopt.margins.surroundings import Place, placed
 from tmsopt.margins.witness import exactly_stable, is_boundary
+from tmsopt.progress import Listener, counted
 from tmsopt.records import Array, Shown, Table, plain
 
 STABILITY = ("weave", "capsize", "infinity")
@@ -118,7 +119,7 @@ class Robustness(Shown):
 
 def nearest(
     design: Given, pattern: str, *, parameters: Mapping[str, float] | None = None,
-    weights: Mapping[str, float] | None = None,
+    weights: Mapping[str, float] | None = None, progress: Listener | None = None,
 ) -> Nearest:  # fmt: skip
     """The nearest point of one boundary: ``weave``, ``capsize``, ``infinity`` or ``heavy damping``.
 
@@ -132,6 +133,7 @@ def nearest(
         weights: parameter → change that counts as 1; by default those of the problem, or else |x0| for every
             parameter, fixed ones too, except those with a default value (g), so that distances are relative. Where
             x0 = 0 it is 1, or for a parameter with a unit the largest of the same unit.
+        progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
         InputError: for another pattern, or parameters or weights that are not accepted.
@@ -139,17 +141,21 @@ def nearest(
     if pattern not in tuple(KINDS):
         raise InputError([Fault(f"unknown boundary {pattern!r}; {suggest(pattern, KINDS)}", ("pattern",))])
     place = _place(design, parameters, weights)
+    counted(progress, f"looking for the nearest {pattern}")
     return _nearest(place, ray_crossings(place.space), pattern)
 
 
 def robustness(
-    design: Given, *, parameters: Mapping[str, float] | None = None, weights: Mapping[str, float] | None = None
-) -> Robustness:
+    design: Given, *, parameters: Mapping[str, float] | None = None, weights: Mapping[str, float] | None = None,
+    progress: Listener | None = None,
+) -> Robustness:  # fmt: skip
     """The nearest points of all boundaries, and the radius within which a design stays stable.
 
     Arguments, distances and exceptions are those of `nearest`.
     """
-    return _surveyed(_place(design, parameters, weights))
+    place = _place(design, parameters, weights)
+    counted(progress, "looking for the nearest boundaries")
+    return _surveyed(place)
 
 
 def robustness_at(problem: Problem, parameters: Mapping[str, float]) -> Robustness:

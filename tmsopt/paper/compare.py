@@ -9,6 +9,7 @@ from tmsopt.design.files import Given, question_of
 from tmsopt.design.solution import Solution
 from tmsopt.formulation.options import Asked, Options, options_of, taking
 from tmsopt.models import tms
+from tmsopt.progress import begin
 from tmsopt.records import SCHEMA, Tabular, plain
 from tmsopt.roots import PATTERNS
 from tmsopt.solver.solve import solved
@@ -63,6 +64,7 @@ def compare(design: Given, **options: Unpack[Asked]) -> Comparison:
     one = isinstance(design, Solution) and not (problem.scenarios or problem.tolerances)
     found = solved(design if one else problem.nominal, how)
     other, reason = _other_formulation(found, how)
+    begin(how.progress, "comparing")
     return Comparison(found, tuple(law_rows(found)) if found.problem.model is tms else (), other, reason)
 
 

@@ -7,6 +7,7 @@ from tmsopt.design.files import Given
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError
 from tmsopt.formulation.options import AskedOfSolve, options_of, taking
+from tmsopt.progress import begin
 from tmsopt.proofs.proof import DIGITS, Proof, prove_design
 from tmsopt.solver.solve import solved
 
@@ -26,19 +27,22 @@ def prove(
         digits: that every number is given to.
         exact: parameter, or ``tan(lambda_s)`` → the number that it is exactly: an int, a Fraction, a ``flint.fmpq``,
             text such as ``"-2/5"`` or ``"20 deg"``. Other numbers stand for the shortest decimals that print them.
-        options: of `solve`, e.g. ``starts``.
+        options: of `solve`, e.g. ``starts``; of a solution ``progress`` alone.
 
     Raises:
         InputError: for a problem that asks nothing, options beside a solution, digits out of range, or exact numbers
             that are not the design's.
     """
-    if isinstance(design, Solution) and options:
-        message = f"found {', '.join(options)}; options are for solving, and this is solved: give the problem instead"
+    wrong = [name for name in options if name != "progress"]
+    if isinstance(design, Solution) and wrong:
+        message = f"found {', '.join(wrong)}; options are for solving, and this is solved: give the problem instead"
         raise InputError([Fault(message, ("options",))])
-    found = solved(design, options_of(options, AskedOfSolve))
+    how = options_of(options, AskedOfSolve)
+    found = solved(design, how)
     problem = found.problem
     if found.status != "optimal":
         reason = f"the problem is not solved ({found.status}): there is no design to prove"
         claim = f"a design of '{problem.title or 'the problem'}' exists"
         return Proof(claim, False, reason, digits=digits, problem=problem)
+    begin(how.progress, f"proving to {digits} digits")
     return prove_design(problem, found.parameters, found.structure, digits, exact, found.worst, found.roots)

@@ -19,6 +19,7 @@ from tmsopt.formulation.formulate import design_of, matching
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.options import Asked, Options, options_of, taking
 from tmsopt.formulation.starts import completions, spread
+from tmsopt.progress import begin
 from tmsopt.records import Array, Tabular, plain
 from tmsopt.solver.multistart import Runner
 from tmsopt.solver.newton import newton, square_system
@@ -104,8 +105,8 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Ask
 
     Args:
         seconds: for the proof at most; 0 for the search alone.
-        options: ``starts`` at most, `MOST` by default, ``seed``, ``linear_solver`` and ``progress``, called with
-            seconds of the proof and then with starts; see `tmsopt.Options`.
+        options: ``starts`` at most, `MOST` by default, ``seed``, ``linear_solver`` and ``progress``; see
+            `tmsopt.Options`.
 
     Raises:
         InputError: for a problem that locates no pattern, leaves freedom, or constrains a quantity without a formula.
@@ -115,6 +116,7 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Ask
         raise InputError([Fault(f"found {short(seconds)}; accepted: a number of seconds", ("seconds",))])
     nlp = _posed(problem)
     work = workspace(problem, options_of(options, defaults=_DEFAULTS))
+    begin(work.options.progress, "proving that no design is missed", "s")
     proof = completeness(problem, seconds, work.options.progress) if seconds > 0 else None
     proved = [] if proof is None else [_clipped(problem, design) for design in proof.designs]
     found, coverage = ([], None) if proof and (proof.complete or proof.stopped) else _search(problem, nlp, work)
@@ -130,6 +132,7 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Ask
 def _search(problem: Problem, nlp: NLP, work: Workspace) -> tuple[list[Array], Coverage]:
     """Solutions that many starts lead to, those met most often first."""
     starts, progress = work.options.starts, work.options.progress
+    begin(progress, "searching", "start")
     system = square_system(nlp)
     assert system is not None  # as many conditions as parameters
     runner = Runner(work, nlp)

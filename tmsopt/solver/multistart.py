@@ -13,6 +13,7 @@ from tmsopt.formulation.formulate import abscissa, design_of, matching, middle
 from tmsopt.formulation.ipopt import Run, ipopt
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import complete, designs, opposite, worth
+from tmsopt.progress import begin
 from tmsopt.records import Array
 from tmsopt.roots import roots
 from tmsopt.solver.sample import NARROW
@@ -50,6 +51,7 @@ def search(work: Workspace, nlp: NLP, most: int | None = None) -> list[Candidate
     """Where every start ended that was tried, in order; a design near the optimum, where one is given, before all."""
     run, part, options = Runner(work, nlp), work.part, work.options
     starts, candidates = min(options.starts, most or options.starts), list[Candidate]()
+    begin(options.progress, "searching", "start")
     if options.near:
         candidates.append(run.ended({**middle(part), **options.near}, near=True))
         if not options.exhaustive and _settled(work, candidates):
@@ -60,7 +62,7 @@ def search(work: Workspace, nlp: NLP, most: int | None = None) -> list[Candidate
         hopeful = work.sample is None and any(c.feasible for c in candidates)
         candidates.append(_otherwise(run, design, run.ended(design, near, hopeful)))
         if options.progress:
-            options.progress(len(candidates), starts)
+            options.progress(len(candidates), starts, _best(work, candidates))
         if not options.exhaustive and _settled(work, candidates):
             if work.sample is None:
                 candidates += _beside(run, candidates, starts - len(candidates))
@@ -68,6 +70,14 @@ def search(work: Workspace, nlp: NLP, most: int | None = None) -> list[Candidate
     if part.pattern is not None and most is None and not any(c.feasible for c in candidates):
         candidates += _rescued(work, nlp)
     return candidates
+
+
+def _best(work: Workspace, candidates: Sequence[Candidate]) -> str:
+    """How good the best is so far, in words."""
+    best = min((c.objective for c in candidates if c.feasible), default=math.inf)
+    if work.problem.objective is None or not math.isfinite(best):
+        return work.name
+    return ", ".join([f"best {work.problem.sign * best:.6g}", *([work.name] if work.name else [])])
 
 
 def _otherwise(run: "Runner", design: Mapping[str, float], ended: Candidate) -> Candidate:
@@ -86,7 +96,7 @@ def further(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
     for design, near in islice(starting(work), tried, work.options.starts):
         found.append(run.ended(design, near, hopeful=False))
         if work.options.progress:
-            work.options.progress(tried + len(found), work.options.starts)
+            work.options.progress(tried + len(found), work.options.starts, _best(work, found))
         left = bounded(work.part) and found[-1].feasible and found[-1].objective < 0
         if left or sum(not c.feasible for c in found) >= _HOPELESS:
             break

@@ -16,6 +16,7 @@ from tmsopt.design.quantities import RADIUS
 from tmsopt.design.solution import Starts
 from tmsopt.formulation.formulate import design_of, formulate, middle
 from tmsopt.formulation.nlp import NLP
+from tmsopt.progress import begin
 from tmsopt.records import Table
 from tmsopt.solver.multistart import Runner, distinct, exceptional, further, same, search
 from tmsopt.solver.outcome import Finding, Trial, ahead, counted, found, mass_advice, survivor
@@ -54,6 +55,7 @@ def explore(work: Workspace, insist: bool = True) -> Explored:
     Args:
         insist: on a stable design; another part of the box may have one.
     """
+    begin(work.options.progress, "looking at designs")
     if best := ideal(work):
         return Explored(work.name, (), best)
     cases, about = work.problem.cases, work.problem.objective.names if work.problem.objective else ()
@@ -121,6 +123,7 @@ def without_any(work: Workspace, tried: int) -> Finding:
     """No start ended feasible: the least-violating design, and what can be reached from it if it violates nothing."""
     problem = work.problem
     nlp = formulate(problem, problem.cases)
+    begin(work.options.progress, "searching for the least that limits must give", "start")
     relaxation = relax(work)
     free = relaxation.parameters if relaxation else middle(problem)
     design = {n: min(max(free[n], lo), hi) for n, (lo, hi) in problem.free.items()}

@@ -21,6 +21,7 @@ from tmsopt.formulation.formulate import design_of
 from tmsopt.formulation.nlp import objective_size
 from tmsopt.formulation.options import DEFAULTS, AskedOfSolve, Options, options_of, taking
 from tmsopt.margins import edges_at
+from tmsopt.progress import Listener, begin, heard
 from tmsopt.records import Table
 from tmsopt.solver.multistart import rank, same
 from tmsopt.solver.needs import with_need
@@ -51,7 +52,7 @@ def solve(
         throw: raise NotSolved unless the status is ``optimal``; otherwise return the best point with its status.
         family: what was built for other problems that differ in numbers alone, to be used again.
         options: ``starts``, ``seed``, ``exhaustive``, ``linear_solver``, ``progress``, ``near``, ``alone``,
-            ``stability``, ``asking`` and ``interruptible``; see `tmsopt.Options`.
+            ``stability`` and ``interruptible``; see `tmsopt.Options`.
 
     Raises:
         NotSolved: carrying the best point found, when `throw`.
@@ -111,6 +112,11 @@ def solved(design: Given, options: Options = DEFAULTS, family: Family | None = N
         return replace(solution, interrupted=True, notes=(*solution.notes, words))
 
 
+def solved_first(design: Given, progress: Listener | None) -> Solution:
+    """The same for a verb that takes no options but its listener."""
+    return solved(design, replace(DEFAULTS, progress=heard(progress)))
+
+
 def standing(problem: Problem, design: Mapping[str, float], note: str) -> Solution:
     """A design as it is, whoever found it: ``not_converged``, or ``infeasible`` where it violates something."""
     began = time.perf_counter()
@@ -162,7 +168,8 @@ def _with_stability(solution: Solution, options: Options, family: Family | None,
         return solution
     from tmsopt.branch_and_bound.stability import any_stable  # a tenth of all imports, which few problems need
 
-    asked = any_stable(problem, options.stability, solution.parameters, options.asking)
+    begin(options.progress, "looking for a stable design", "s")
+    asked = any_stable(problem, options.stability, solution.parameters, options.progress)
     if asked.design is not None:
         few = replace(options, starts=min(options.starts, _NEAR), stability=0.0, alone=False, interruptible=False)
         found = solved(problem, replace(few, near=asked.design), family)

@@ -1,7 +1,7 @@
 """Monte Carlo over tolerances: a design built many times, each time a little off."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.solution import NotSolved, Solution
 from tmsopt.errors import Fault, InputError, at_first, count_faults, short, suggest, text_faults
 from tmsopt.formulation.options import STARTS
+from tmsopt.progress import Listener
 from tmsopt.records import Column, Table
 from tmsopt.solver.solve import solve, solved
 from tmsopt.studies.study import Study
@@ -63,7 +64,7 @@ class Sampling:
         object.__setattr__(self, "report", tuple(text.strip() for text in self.report))
 
 
-def planned(asked: Study | Sampling, progress: Callable[[int, int], None] | None = None) -> Study:
+def planned(asked: Study | Sampling, progress: Listener | None = None) -> Study:
     """The study with all its rows: of a Monte Carlo study, once its nominal design is solved.
 
     Raises:

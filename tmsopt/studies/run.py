@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from tmsopt.design.unit_system import units_of
 from tmsopt.disk import path_of
-from tmsopt.errors import Fault, InputError, count_faults, short, suggest
-from tmsopt.records import SCHEMA, Progress, Shown, Truth, frame
+from tmsopt.errors import Fault, InputError, call_faults, count_faults, short, suggest
+from tmsopt.progress import Listener, counted
+from tmsopt.records import SCHEMA, Shown, Truth, frame
 from tmsopt.studies.engines import Note, Unit, cluster, cores, in_process, processes
 from tmsopt.studies.engines.work import silent
 from tmsopt.studies.export import columns, export, gridded
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 _COMMIT = 1.0
 """s of rows in one transaction: what a kill may cost, and some 30 times what a transaction takes."""
 
+_WHAT = "solving rows"
 _FEW = 32  # rows for which no workers are started unless asked for: they take seconds to come up
 
 
@@ -113,7 +115,7 @@ class Results(Shown):
 
 def run_study(
     study: Study | Sampling | str | PathLike[str], store: str | PathLike[str] | None = None, *,
-    workers: int | None = None, scheduler: str | None = None, fresh: bool = False, progress: Progress | None = None,
+    workers: int | None = None, scheduler: str | None = None, fresh: bool = False, progress: Listener | None = None,
     note: Note = silent,
 ) -> Results:  # fmt: skip
     """Solve every row of a study that its store does not have yet.
@@ -127,7 +129,7 @@ def run_study(
         workers: processes of this machine; 1 solves in this one. By default as many as cores, or 1 for few rows.
         scheduler: address of a Dask scheduler, such as ``tcp://host:8786``, in place of workers.
         fresh: move a store that is there aside, and start anew.
-        progress: called with rows done and in all, first with those found.
+        progress: called with a `tmsopt.Progress` now and then; of rows, first with those found.
         note: called with a line about the store, and about workers that end.
 
     Raises:
@@ -135,9 +137,9 @@ def run_study(
         NotSolved: where a Monte Carlo study has no design to draw around.
     """
     stated = load_study(study) if isinstance(study, str | PathLike) else study
-    if faults := list(_faults(stated, workers)):
+    if faults := list(_faults(stated, workers, progress)):
         raise InputError(faults)
-    asked = planned(stated)
+    asked = planned(stated, progress)
     if store is None:
         found, seconds, engine = _carried_out(asked, _none(asked), workers, scheduler, note, progress)
         return Results(asked, gathered(found.blocks, found.rows), found.count, seconds, engine)
@@ -218,18 +220,19 @@ def _unlike(study: Study, block: RowBlock) -> int | None:
     return int(block.numbers[wrong.argmax()]) if wrong.any() else None
 
 
-def _faults(study: object, workers: object) -> Iterator[Fault]:
+def _faults(study: object, workers: object, progress: object) -> Iterator[Fault]:
     """What is wrong with the call."""
     if not isinstance(study, Study | Sampling):
         message = f"found {short(study)}; accepted: a Study, as of tmsopt.over_grid, or the path of a study file"
         yield Fault(message, ("study",))
     if workers is not None:
         yield from count_faults("workers", workers, 1)
+    yield from call_faults("progress", progress)
 
 
 def fill(
     study: Study, store: Store, *, workers: int | None = None, scheduler: str | None = None,
-    progress: Progress | None = None, note: Note = silent,
+    progress: Listener | None = None, note: Note = silent,
 ) -> tuple[int, float, str]:  # fmt: skip
     """Solve the rows that an open store lacks; how many, in how many seconds, and by which engine."""
     done = _none(study)
@@ -239,16 +242,17 @@ def fill(
 
 
 def _carried_out(
-    study: Study, done: Truth, workers: int | None, scheduler: str | None, note: Note, progress: Progress | None,
+    study: Study, done: Truth, workers: int | None, scheduler: str | None, note: Note, progress: Listener | None,
     store: Store | None = None,
 ) -> tuple[_Held, float, str]:  # fmt: skip
     """The rows that are not done, in how many seconds, and by which engine; kept in a store as they come."""
     began = time.perf_counter()
     made, engine, left, before = _Held(), "", np.flatnonzero(~done), int(done.sum())
+    steps = counted(progress, _WHAT, "row")
 
     def told() -> None:
-        if progress:
-            progress(before + made.count, len(study))
+        if steps:
+            steps(before + made.count, len(study))
 
     if left.size:
         told()

@@ -12,6 +12,7 @@ import numpy as np
 
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
+from tmsopt.progress import Listener, counted
 from tmsopt.records import Array, Shown, Truth, plain
 from tmsopt.roots import pattern, real_roots
 from tmsopt.roots.meetings import nearest_two
@@ -75,17 +76,21 @@ class Domain(Shown):
         return plain(self, "stability heavy_damping parting") | {"corners": corners}
 
 
-def domain(problem: Given, *, step: float = STEP, starts: int = STARTS, seed: int = 0) -> Domain:
+def domain(
+    problem: Given, *, step: float = STEP, starts: int = STARTS, seed: int = 0, progress: Listener | None = None
+) -> Domain:
     """Boundaries of stability and of heavy damping in the plane of the two free parameters.
 
-    Constraints of the problem are left aside. `step`, `starts` and `seed` are those of `trace`.
+    Constraints of the problem are left aside. `step`, `starts`, `seed` and `progress` are those of `trace`.
     """
     plane = replace(problem_of(problem), constraints={}, minimize=None, maximize=None, locate=None)
+    how: dict[str, Any] = {"step": step, "starts": starts, "seed": seed, "progress": progress}
     found = {
-        name: [b for b in trace(plane, name, step=step, starts=starts, seed=seed).branches if not _in_edge(b, plane)]
+        name: [b for b in trace(plane, name, **how).branches if not _in_edge(b, plane)]
         for name in ("weave", "capsize", "EP2")
     }
     unstable_beyond = [b for name in ("weave", "capsize") for b in found[name]]
+    counted(progress, "looking for corners")
     infinite = list(through_infinity(plane, step, starts, seed))
     at_infinity = [c for curve in infinite for c in _changes(curve)]
     stability = [arc for b in unstable_beyond for arc in _pieces(b, b.stable, plane, at_infinity)]

@@ -16,6 +16,7 @@ from scipy.optimize import brentq
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
+from tmsopt.progress import Listener, counted
 from tmsopt.records import Array, Shown, plain
 from tmsopt.roots import determinant, is_stable, real_roots
 from tmsopt.tracing.branch import Trace
@@ -69,7 +70,9 @@ class Swallowtail(Shown):
         return self.problem.heading | plain(self, "axes patches cusps crossing")
 
 
-def swallowtail(problem: Given, rows: int = 48, across: int = 24, starts: int = STARTS) -> Swallowtail:
+def swallowtail(
+    problem: Given, rows: int = 48, across: int = 24, starts: int = STARTS, *, progress: Listener | None = None
+) -> Swallowtail:
     """The surface of real negative double roots in the box of three free parameters: one, and an affine pair.
 
     Args:
@@ -77,6 +80,7 @@ def swallowtail(problem: Given, rows: int = 48, across: int = 24, starts: int = 
             are affine in the last two (their tangents, for angles).
         rows, across: points along the first parameter, and along r between two edges.
         starts: of the traces of its edges; see `trace`.
+        progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
         InputError: for another number of free parameters, coefficients that are not affine in two of them, or a
@@ -96,8 +100,8 @@ def swallowtail(problem: Given, rows: int = 48, across: int = 24, starts: int = 
     names = list(plain.free)
     axes = (names[0], names[1], names[2])
     affine = _Affine(plain, axes)
-    cusps = trace(plain, "EP3", starts=starts)
-    crossing = trace(plain, "2EP2", starts=starts)
+    cusps = trace(plain, "EP3", starts=starts, progress=progress)
+    crossing = trace(plain, "2EP2", starts=starts, progress=progress)
     events = [*cusps.events, *crossing.events]
     # The number of edges in a row changes at EP4, and at folds of the edges.
     changes = [e for e in events if e.name == "EP4" or (e.name == "fold" and axes[0] in e.detail)]
@@ -106,8 +110,11 @@ def swallowtail(problem: Given, rows: int = 48, across: int = 24, starts: int = 
         np.concatenate([np.linspace(low, high, rows), *(e.parameters[axes[0]] + _AROUND for e in changes)])
     )
     grid = grid[(grid >= low) & (grid <= high)]
-    ready = prepare(crossing.problem)
-    cuts = [_cuts(affine, float(value), crossing, ready) for value in grid]
+    ready, cuts, steps = prepare(crossing.problem), [], counted(progress, "cutting the surface", "row")
+    for done, value in enumerate(grid, 1):
+        cuts.append(_cuts(affine, float(value), crossing, ready))
+        if steps:
+            steps(done, len(grid))
     patches = []
     # Neighbouring rows with the same cuts in the same order belong to one set of patches.
     for _, run in groupby(range(len(grid)), key=lambda k: [[kind for _, kind in interval] for interval in cuts[k]]):

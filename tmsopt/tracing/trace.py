@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 
@@ -22,6 +22,7 @@ from tmsopt.errors import (
     suggest,
     table_faults,
 )
+from tmsopt.progress import Listener, counted
 from tmsopt.records import Array
 from tmsopt.roots import pattern as pattern_of
 from tmsopt.roots.patterns.composed import pattern_names
@@ -31,8 +32,6 @@ from tmsopt.tracing.equations import Traced, design_at, prepare
 from tmsopt.tracing.events import describe
 from tmsopt.tracing.seeds import beyond_infinity, missed, seeds
 
-Report = Callable[[int, int], None]
-
 STARTS = 48
 STEP = 0.005
 MOST = 200_000
@@ -40,7 +39,7 @@ MOST = 200_000
 
 def trace(
     problem: Given, pattern: str | None = None, *, step: float = STEP, starts: int = STARTS, seed: int = 0,
-    most: int = MOST, through: Sequence[Mapping[str, float]] = (), progress: Report | None = None,
+    most: int = MOST, through: Sequence[Mapping[str, float]] = (), progress: Listener | None = None,
 ) -> Trace:  # fmt: skip
     """Every branch of a pattern in the box of the free parameters, one more of which is free than the pattern ties.
 
@@ -52,7 +51,7 @@ def trace(
             search ends when so many in a row find nothing new, and a branch far from all of them can be missed.
         most: points of a branch in one direction.
         through: designs (values of every free parameter, in the box) to begin at, before the others.
-        progress: called with the number of starts done and in all.
+        progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
         InputError: for an unknown pattern, when the equations do not leave a curve, or for options out of range.
@@ -60,6 +59,7 @@ def trace(
     began = time.perf_counter()
     problem = _asked(problem_of(problem), pattern)
     _check(problem, step, starts, seed, most, through, progress)
+    steps = counted(progress, f"tracing {problem.locate}", "start")
     ready = prepare(problem)
     walks: list[Walk] = []
     lines: list[dict[str, Array]] = []
@@ -67,8 +67,8 @@ def trace(
     sources = (seeds(ready, starts, seed, through, lines), missed(ready, lines), beyond_infinity(ready, walks))
     for count, points in chain.from_iterable(sources):
         tried = max(tried, count)
-        if progress:
-            progress(tried, max(tried, starts))
+        if steps:
+            steps(tried, max(tried, starts), f"{len(walks)} branch{'es' * (len(walks) != 1)}")
         left = points
         for known in walks:
             left = left[~contains(ready.on, known, left)]
@@ -143,7 +143,7 @@ def _asked(problem: Problem, name: str | None) -> Problem:
 
 def _check(
     problem: Problem, step: float, starts: int, seed: int, most: int, through: Sequence[Mapping[str, float]],
-    progress: Report | None,
+    progress: Listener | None,
 ) -> None:  # fmt: skip
     faults = [*count_faults("starts", starts, 0, MOST_STARTS), *count_faults("seed", seed, 0)]
     faults += count_faults("most", most, _FEWEST)

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tmsopt.cli.common import FIGURES, bad_input, check_output, progress, write_json
+from tmsopt.cli.common import FIGURES, bad_input, check_output, write_json
 from tmsopt.cli.ending import BAD_INPUT
+from tmsopt.cli.terminal import shown
+from tmsopt.progress import counted
 
 if TYPE_CHECKING:
     from tmsopt.plots.paper import Item
@@ -89,10 +91,11 @@ def _draw(wanted: "list[Item]", files: list[Path]) -> None:
     from tmsopt.disk import whole
     from tmsopt.plots.paper import pictures
 
-    with progress("figure") as update, closing(pictures(wanted, [path.suffix[1:].lower() for path in files])) as drawn:
-        update(0, len(wanted))
+    steps = counted(shown(), "drawing", "figure")
+    with closing(pictures(wanted, [path.suffix[1:].lower() for path in files])) as drawn:
         for done, (k, picture) in enumerate(drawn, start=1):
-            update(done, len(wanted))
+            if steps:
+                steps(done, len(wanted), wanted[k].name)
             try:
                 with whole(files[k]) as temporary:
                     temporary.write_bytes(picture)

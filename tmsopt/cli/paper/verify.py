@@ -5,7 +5,8 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import DONE, answer, bad_input, check_output, progress, saving
+from tmsopt.cli.common import DONE, answer, bad_input, check_output, saving
+from tmsopt.cli.terminal import shown
 from tmsopt.disk import write_text
 
 _EXAMPLES = """
@@ -30,8 +31,7 @@ def verify(as_json: bool, markdown: Path | None, only: tuple[str, ...]) -> None:
         import tmsopt
 
         check_output("--markdown", markdown, ("md",))
-        with progress("claim") as update:
-            ledger = tmsopt.verify(update, only)
+        ledger = tmsopt.verify(shown(), only)
     answer(as_json, ledger.to_json, lambda: tmsopt.report.ledger_table(ledger))
     if markdown is not None:
         with saving("--markdown", markdown):

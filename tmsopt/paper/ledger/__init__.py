@@ -26,7 +26,7 @@ from tmsopt.paper.ledger import (
 from tmsopt.paper.ledger.algebra import PRECISION
 from tmsopt.paper.ledger.entry import VERDICTS, Claim, Entry, Ledger, decimal, entry_of, proof, universal
 from tmsopt.paper.ledger.stability import BACKWARD, WITNESS
-from tmsopt.records import Progress
+from tmsopt.progress import Listener, counted
 
 __all__ = [
     "BACKWARD", "CLAIMS", "VERDICTS", "WITNESS", "Claim", "Entry", "Ledger", "decimal", "matching", "proof",
@@ -47,8 +47,12 @@ def matching(only: Sequence[str] = ()) -> tuple[Claim, ...]:
     return tuple(c for c in CLAIMS if not only or any(fnmatchcase(c.key, pattern) for pattern in only))
 
 
-def verify(progress: Progress | None = None, only: Sequence[str] = ()) -> Ledger:
+def verify(progress: Listener | None = None, only: Sequence[str] = ()) -> Ledger:
     """Compute the ledger, or the entries whose keys match one of the given patterns.
+
+    Args:
+        progress: called with a `tmsopt.Progress` now and then.
+        only: keys, or patterns with * and ?.
 
     Raises:
         InputError: for a pattern that no key matches.
@@ -58,11 +62,11 @@ def verify(progress: Progress | None = None, only: Sequence[str] = ()) -> Ledger
     for pattern in map(str, only):
         if not matching([pattern]):
             raise InputError([Fault(f"found '{pattern}'; accepted: a key of the ledger, or a pattern", ("--only",))])
-    chosen = matching(only)
+    chosen, steps = matching(only), counted(progress, "recomputing claims", "claim")
     entries = []
     for done, claim in enumerate(chosen, 1):
         with flint.ctx.workdps(PRECISION):
             entries.append(entry_of(claim))
-        if progress:
-            progress(done, len(chosen))
+        if steps:
+            steps(done, len(chosen))
     return Ledger(SOURCE, tuple(entries))

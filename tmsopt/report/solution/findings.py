@@ -11,6 +11,7 @@ from tmsopt.diagnosis import Diagnosis, diagnose
 from tmsopt.errors import InputError
 from tmsopt.explanation import Explanation, explain
 from tmsopt.margins import Robustness, robustness
+from tmsopt.progress import Listener
 
 T = TypeVar("T")
 
@@ -32,15 +33,15 @@ class Findings:
     diagnoses: tuple[Diagnosis, ...] = ()
 
 
-def findings(solution: Solution, full: bool = False) -> Findings:
+def findings(solution: Solution, full: bool = False, progress: Listener | None = None) -> Findings:
     """Of a solution; with gains of limits that are solved again, and how roots split, where all is wanted."""
     if solution.interrupted:
         return Findings()
     finite = math.isfinite(solution.abscissa)
     sought = finite and solution.status != "infeasible"
     return Findings(
-        explain(solution, resolve=full),
-        robustness(solution) if sought else None,
+        explain(solution, resolve=full, progress=progress),
+        robustness(solution, progress=progress) if sought else None,
         _unless_refused(lambda: stable_speeds(solution)) if sought else None,
         diagnose(solution) if full and solution.status == "optimal" else (),
     )
