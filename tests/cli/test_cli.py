@@ -242,7 +242,7 @@ def test_ctrl_c_leaves_the_best_so_far_once_progress_shows(tmp_path):
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=follower, text=True)
     os.close(follower)
     shown = b""
-    while b"starts:" not in shown:
+    while b" starts" not in shown:
         shown += os.read(leader, 1000)
     process.send_signal(signal.SIGINT)
     answer = process.communicate(timeout=60)[0]
@@ -278,8 +278,9 @@ def test_the_question_for_a_stable_design_is_shown(monkeypatch, tmp_path):
             return True
 
     def asked(problem, seconds, known, progress):
-        time.sleep(1.0)  # before which nothing is shown
+        time.sleep(1.0)  # by when the line is shown
         progress(2.2, seconds)
+        time.sleep(0.2)
         raise KeyboardInterrupt
 
     path = tmp_path / "box.toml"
@@ -290,5 +291,5 @@ def test_the_question_for_a_stable_design_is_shown(monkeypatch, tmp_path):
     with pytest.raises(SystemExit) as stop:
         main(args=["solve", str(path)], prog_name="tmsopt")
     assert stop.value.code == 130
-    assert "looking for a stable design: second 2 of 5" in sys.stderr.getvalue()
+    assert "looking for a stable design: 2 of 5 s" in sys.stderr.getvalue()
     assert "the user stopped the question whether any design is stable" in sys.stdout.getvalue()

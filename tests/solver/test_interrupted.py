@@ -121,13 +121,17 @@ def test_the_question_for_a_stable_design_is_shown_and_can_be_stopped(monkeypatc
     passed = [t for t in told if t.what == "looking for a stable design"]
     assert [t.done for t in passed] == sorted(t.done for t in passed)
     assert {t.most for t in passed[1:]} == {5.0}
-    asking = {"progress": lambda t: stop() if t.unit == "s" else None}
-    found = tmsopt.solve(asked, **asking)
+
+    def meanwhile(told: tmsopt.Progress) -> None:
+        if told.unit == "s":
+            stop()
+
+    found = tmsopt.solve(asked, progress=meanwhile)
     assert (found.status, found.interrupted, found.any_stable) == ("optimal", True, None)
     assert found.value == pytest.approx(0.5, abs=1e-12)
     assert "the user stopped the question whether any design is stable" in found.notes
     with pytest.raises(KeyboardInterrupt):
-        tmsopt.solve(asked, **asking, interruptible=False)
+        tmsopt.solve(asked, progress=meanwhile, interruptible=False)
 
 
 def test_with_nothing_in_hand_there_is_nothing_to_leave(monkeypatch: pytest.MonkeyPatch) -> None:

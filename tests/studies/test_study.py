@@ -18,7 +18,7 @@ import pytest
 from click.testing import CliRunner, Result
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from tmsopt import laws
+from tmsopt import Progress, laws
 from tmsopt.checks import law_rows
 from tmsopt.cli import every as main
 from tmsopt.design import Problem, load
@@ -107,7 +107,7 @@ def test_a_study_is_taken_up_where_it_was_left(tmp_path: Path, monkeypatch: pyte
         tried.extend(numbers)
         return original(self, numbers)
 
-    def interrupt(told: tmsopt.Progress) -> None:
+    def interrupt(told: Progress) -> None:
         if told.done == 3:
             raise KeyboardInterrupt
 
