@@ -12,10 +12,11 @@ from tmsopt.design.files import Given
 from tmsopt.diagnosis.jordan import Jordan, is_regular, jordan
 from tmsopt.diagnosis.splitting import DEVIATION, Ideal, Law, Response, response
 from tmsopt.models import Model, ParameterSet
+from tmsopt.progress import Listener, counted
 from tmsopt.records import Shown, plain
 from tmsopt.roots import Root, Structure
 from tmsopt.roots.patterns.enclosed import nearest_roots
-from tmsopt.solver.solve import solved
+from tmsopt.solver.solve import solved_first
 
 _BITS = 424  # 127 digits: changes down to 1e-16 are differences of coefficients
 _RANK = 1e-7  # relative singular value that counts as 0; of a nearly semisimple root it is the root of the distance
@@ -62,15 +63,20 @@ class Diagnosis(Shown):
         }
 
 
-def diagnose(design: Given) -> tuple[Diagnosis, ...]:
+def diagnose(design: Given, *, progress: Listener | None = None) -> tuple[Diagnosis, ...]:
     """Diagnosis of every multiple root of a design, rightmost first; none if all roots are simple.
 
     The algebraic multiplicity is that of the solution's structure. The geometric and partial multiplicities are ranks
     of the model's matrices at the root of the nearest polynomial with that structure. How the root splits follows from
     that polynomial with the exact changes of the coefficients that a parameter makes: c = −k! ∂p/∂θ / p⁽ᵏ⁾ of
     s = s0 + (c ε)^(1/k), or Newton's polygon where that vanishes; the law is then set beside the roots themselves.
+
+    Args:
+        design: a solution; or a problem or its file, solved first.
+        progress: called with a `tmsopt.Progress` now and then.
     """
-    solution = solved(design)
+    solution = solved_first(design, progress)
+    counted(progress, "splitting roots")
     problem = solution.problem
     parameters = solution.worst.applied(solution.parameters) if solution.worst else dict(solution.parameters)
     found = problem.values(parameters)["structure"]

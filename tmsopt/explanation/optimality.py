@@ -31,8 +31,9 @@ from tmsopt.explanation.descent import Better, better
 from tmsopt.explanation.program import LocalProgram, NotCovered, program
 from tmsopt.formulation.formulate import formulate
 from tmsopt.formulation.starts import complete
+from tmsopt.progress import Listener, counted
 from tmsopt.records import Shown, Table, plain
-from tmsopt.solver.solve import solved
+from tmsopt.solver.solve import solved_first
 
 STRICT, NOT_MINIMAL, UNDECIDED, NOT_COVERED = "strict minimum", "not minimal", "undecided", "not covered"
 
@@ -104,12 +105,17 @@ class Optimality(Shown):
         return found if self.better else {n: x for n, x in found.items() if n not in ("better", "better_value")}
 
 
-def optimality(design: Given) -> Optimality:
+def optimality(design: Given, *, progress: Listener | None = None) -> Optimality:
     """Judge a design by the first- and, where needed, second-order conditions on its factors.
 
     Of a pattern that was located without an objective the abscissa is judged, within the box and the constraints.
+
+    Args:
+        design: a solution; or a problem or its file, solved first.
+        progress: called with a `tmsopt.Progress` now and then.
     """
-    solution = solved(design)
+    solution = solved_first(design, progress)
+    counted(progress, "judging the optimum")
     try:
         problem = _judged(solution)
         around = program(problem, solution)

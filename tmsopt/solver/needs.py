@@ -8,6 +8,7 @@ from dataclasses import replace
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Need, Solution
 from tmsopt.formulation.options import Options
+from tmsopt.progress import begin
 from tmsopt.records import Table
 from tmsopt.solver.multistart import search
 from tmsopt.solver.outcome import Trial, survivor
@@ -26,6 +27,7 @@ def with_need(solution: Solution, options: Options) -> Solution:
     limits = {} if set(problem.asked_of_roots) or problem.pattern else {_STABLE: "abscissa <= 0"}
     few = replace(options, starts=_STARTS, stability=0.0, alone=False, progress=None, near=None)
     began, looked = time.perf_counter(), list[float]()
+    begin(options.progress, f"looking for the {name} that it takes")
     for most, ends in _ranges(problem, name):
         freed = {**problem.free, name: ends}
         asked = replace(

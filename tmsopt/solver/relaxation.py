@@ -184,9 +184,10 @@ def _sampler(work: Workspace, extended: Limit | None = None) -> Sampler:
     gone = part.asked_of_roots if part.pattern else ()
     kept = {name: text for name, text in part.constraints.items() if name not in gone}
     asked = replace(part, locate=None, constraints=kept)
-    if extended and extended.parameter:
-        most = extended.name.endswith(".max")
-        asked = replace(asked, **{"minimize" if most else "maximize": extended.parameter})
+    if extended and extended.parameter and extended.name.endswith(".max"):
+        asked = replace(asked, minimize=extended.parameter)
+    elif extended and extended.parameter:
+        asked = replace(asked, maximize=extended.parameter)
     return Sampler(asked, work.options.seed)
 
 

@@ -13,9 +13,9 @@ from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.solution import NotSolved, Solution
 from tmsopt.errors import Fault, InputError, at_first, count_faults, short, suggest, text_faults
 from tmsopt.formulation.options import STARTS
-from tmsopt.progress import Listener
+from tmsopt.progress import Listener, counted
 from tmsopt.records import Column, Table
-from tmsopt.solver.solve import solve, solved
+from tmsopt.solver.solve import solve, solved_first
 from tmsopt.studies.study import Study
 from tmsopt.studies.validate import MOST_ROWS, common_faults
 
@@ -83,6 +83,7 @@ def planned(asked: Study | Sampling, progress: Listener | None = None) -> Study:
 def monte_carlo(
     design: Given, rows: int, seed: int = 0, distribution: str = "uniform",
     tolerances: Mapping[str, float] | None = None, *, title: str = "", report: Sequence[str] = (),
+    progress: Listener | None = None,
 ) -> Study:  # fmt: skip
     """The study of `rows` designs drawn around one, in which nothing is free.
 
@@ -93,12 +94,14 @@ def monte_carlo(
     Args:
         design: a solution; or a problem or its file, solved first.
         tolerances: parameter → how far it may be off either way; those of the design's problem where None.
+        progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
         NotSolved: for a design that is not optimal.
         InputError: listing everything else that is wrong.
     """
-    solution = solved(design)
+    solution = solved_first(design, progress)
+    counted(progress, "drawing designs")
     if solution.status != "optimal":
         raise NotSolved(solution)
     stated = solution.problem.tolerances if tolerances is None else tolerances

@@ -43,7 +43,7 @@ def findings(solution: Solution, full: bool = False, progress: Listener | None =
         explain(solution, resolve=full, progress=progress),
         robustness(solution, progress=progress) if sought else None,
         _unless_refused(lambda: stable_speeds(solution)) if sought else None,
-        diagnose(solution) if full and solution.status == "optimal" else (),
+        diagnose(solution, progress=progress) if full and solution.status == "optimal" else (),
     )
 
 

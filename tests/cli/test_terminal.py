@@ -1,0 +1,256 @@
+"""What a terminal shows while commands work, and what a pipe does not."""
+
+import os
+import re
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from tmsopt import Progress
+from tmsopt.cli.terminal import words
+
+if os.name == "posix":
+    import fcntl
+    import pty
+    import struct
+    import termios
+
+ROOT = Path(__file__).resolve().parents[2]
+PROBLEMS = ROOT / "problems"
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="terminals of POSIX")
+
+SLOW_TO_LOAD = """
+import sys, time
+class Slow:
+    def find_spec(self, name, *_):
+        if name == "casadi":
+            time.sleep(1.5)
+sys.meta_path.insert(0, Slow())
+from tmsopt.cli import main
+main(prog_name="tmsopt")
+"""
+"""The command where CasADi takes long to load."""
+
+SLOW_AT_WORK = """
+import time
+from tmsopt import progress
+begin = progress.Steps.begin
+def slowly(self, *about):
+    begin(self, *about)
+    time.sleep(0.8)
+progress.Steps.begin = slowly
+from tmsopt.cli import main
+main(prog_name="tmsopt")
+"""
+"""The command where every piece of work that is told of takes long."""
+
+COMMANDS: dict[str, tuple[str, set[str]]] = {
+    "solve": ("solve {p}/realistic.toml", {"looking at designs", "searching", "looking for the nearest boundaries"}),
+    "certify": ("solve {p}/realistic.toml --json --certify 2", {"searching", "bounding the optimum"}),
+    "full": ("solve {p}/realistic.toml --full", {"moving limits", "splitting roots"}),
+    "plot": ("solve {p}/ep4.toml --plot growth.png", {"following the roots", "writing what --plot asks for"}),
+    "report": ("solve {p}/ep4.toml --report page.html", {"writing what --report asks for", "writing the page"}),
+    "all": ("solve {p}/ep4_matching.toml --all", {"proving that no design is missed"}),
+    "infeasible": ("solve infeasible.toml --starts 4", {"searching for the least that limits must give"}),
+    "front": ("solve {p}/pareto.toml --points 3", {"following the front"}),
+    "chart": ("chart {p}/chart.toml --points 60x50", {"charting", "tracing weave", "tracing capsize", "tracing EP2"}),
+    "trace": ("trace {p}/ep_set.toml", {"tracing 2EP2"}),
+    "study": ("study study.toml", {"solving rows"}),
+    "monte carlo": ("study built.toml", {"searching", "solving rows"}),
+    "figure": ("figure growth --output growth.png", {"drawing"}),
+    "prove": ("prove {p}/ep4.toml", {"searching", "proving to 30 digits"}),
+    "explore": ("explore {p}/ep4.toml -o page.html", {"looking for designs worth going to", "writing the page"}),
+    "compare": ("compare {p}/ep4.toml", {"searching", "comparing"}),
+    "speeds": ("speeds {p}/realistic.toml", {"searching", "isolating speeds"}),
+    "verify": ("verify --only tab1-*", {"recomputing claims"}),
+}
+"""Words of the command line, and what a terminal is to show of it."""
+
+FILES = {
+    "study": 'problem = "{p}/ep4.toml"\n[vary]\nmu = [0.1, 0.2, 0.3]\n',
+    "built": 'problem = "{p}/ep4.toml"\n[study]\nmethod = "monte_carlo"\nrows = 20\n[tolerances]\nmu = 0.01\n',
+    "infeasible": """
+model = "tms"
+[parameters]
+Fr = { min = 0.1, max = 5 }
+mu = 0.1
+chi_B = { min = 1.01, max = 5 }
+chi_H = 1.0
+zeta_B = -0.4
+zeta_H = -0.2
+lambda_s = 0.4
+[objective]
+minimize = "abscissa"
+[constraints]
+decay = "abscissa <= -100"
+""",
+}
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a command did with a terminal as its stderr: its status, its answer, and what was written when."""
+
+    status: int
+    answer: str
+    written: list[tuple[float, str]]
+    seconds: float
+
+    @property
+    def lines(self) -> list[tuple[float, str]]:
+        """Every line of progress that was drawn, and when."""
+        drawn = [(at, part) for at, text in self.written for part in re.findall(r"\r([^\r\n\033]+)\033\[K", text)]
+        return [(at, line) for at, line in drawn if line]
+
+    @property
+    def screen(self) -> str:
+        """What stands there in the end."""
+        left, line, column = [], "", 0
+        for character in re.findall(r"\033\[K|.|\n", "".join(text for _, text in self.written).replace("\r\n", "\n")):
+            if character == "\n":
+                left.append(line)
+                line, column = "", 0
+            elif character == "\r":
+                column = 0
+            elif character == "\033[K":
+                line = line[:column]
+            else:
+                line, column = line[:column] + character + line[column + 1 :], column + 1
+        return "".join(f"{one}\n" for one in left) + line
+
+
+def command(how: str, args: Sequence[str]) -> list[str]:
+    return [sys.executable, *(["-c", how] if how else ["-m", "tmsopt"]), *args]
+
+
+def on_a_terminal(args: Sequence[str], folder: Path, how: str = "", columns: int = 80, stop: str = "") -> Seen:
+    """Run a command; with Ctrl-C once `stop` is shown."""
+    leader, follower = pty.openpty()
+    fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("4H", 24, columns, 0, 0))
+    written: list[tuple[float, str]] = []
+    began = time.monotonic()
+    with open(folder / "answer", "w+", encoding="utf-8") as out:
+        process = subprocess.Popen(command(how, args), cwd=folder, env=_named(), stdout=out, stderr=follower)
+        os.close(follower)
+        while process.poll() is None or select.select([leader], [], [], 0)[0]:
+            if not select.select([leader], [], [], 0.02)[0]:
+                continue
+            try:
+                text = os.read(leader, 100_000).decode()
+            except OSError:  # as Linux says that nobody writes any more
+                break
+            written.append((time.monotonic() - began, text))
+            if stop and stop in text:
+                process.send_signal(signal.SIGINT)
+                stop = ""
+        status = process.wait()
+        out.seek(0)
+        answer = out.read()
+    os.close(leader)
+    return Seen(status, answer, written, time.monotonic() - began)
+
+
+def into_pipes(args: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command("", args), cwd=folder, env=_named(), capture_output=True, text=True, check=False)
+
+
+def _named() -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm"}
+
+
+def _loaded(folder: Path) -> float:
+    """Seconds that a command takes to begin, on this machine at this moment."""
+    began = time.monotonic()
+    into_pipes(["--version"], folder)
+    return time.monotonic() - began
+
+
+def _steady(answer: str) -> list[str]:
+    """An answer without what no two runs have alike."""
+    return [line for line in answer.splitlines() if "second" not in line and " s" not in line]
+
+
+def test_something_is_shown_within_a_second_whatever_takes_long(tmp_path: Path) -> None:
+    """Here the modules to be loaded: 1.5 s."""
+    seen = on_a_terminal(["solve", str(PROBLEMS / "ep4.toml")], tmp_path, SLOW_TO_LOAD)
+    at, line = seen.lines[0]
+    assert line == "starting"
+    assert at <= 1.0 + _loaded(tmp_path)
+    assert seen.seconds > 1.5
+    assert (seen.status, seen.screen) == (0, "")
+    assert "EP4" in seen.answer
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", COMMANDS)
+def test_long_commands_say_what_they_do_and_leave_nothing(name: str, tmp_path: Path) -> None:
+    """The same is written as into pipes, but for the line that is gone in the end."""
+    text, whats = COMMANDS[name]
+    for file, content in FILES.items():
+        (tmp_path / f"{file}.toml").write_text(content.replace("{p}", str(PROBLEMS)))
+    args = text.format(p=PROBLEMS).split()
+    loaded = _loaded(tmp_path)
+    seen = on_a_terminal(args, tmp_path, SLOW_AT_WORK)
+    shown = [line for _, line in seen.lines]
+    assert not [what for what in whats if not any(line.startswith(what) for line in shown)], shown
+    assert seen.lines[0][0] <= 1.0 + loaded
+    gaps = [b - a for (a, _), (b, _) in zip(seen.lines, seen.lines[1:], strict=False)]
+    assert max(gaps) < 2.0 + loaded  # it goes on to show that it is alive
+    assert "\r" not in seen.answer
+    assert "\033" not in seen.answer
+    for written in tmp_path.glob("*.sqlite"):
+        written.unlink()
+    piped = into_pipes(args, tmp_path)
+    assert piped.stderr == seen.screen
+    assert piped.returncode == seen.status
+    if name != "certify":  # what is proved depends on the time that the machine has
+        assert _steady(piped.stdout) == _steady(seen.answer)
+
+
+@pytest.mark.slow
+def test_a_narrow_terminal_has_one_line_of_it(tmp_path: Path) -> None:
+    seen = on_a_terminal(["solve", str(PROBLEMS / "realistic.toml")], tmp_path, SLOW_AT_WORK, columns=20)
+    assert max(len(line) for _, line in seen.lines) == 19
+    assert seen.screen == ""
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("interruptible")
+@pytest.mark.parametrize("text", ["compare {p}/ep4.toml", "prove {p}/ep4.toml", "trace {p}/ep_set.toml", "verify"])
+def test_ctrl_c_is_answered_with_a_line(text: str, tmp_path: Path) -> None:
+    """The line of progress is gone, and one says that the command was stopped."""
+    what = {"trace": "tracing", "verify": "recomputing"}.get(text.split(maxsplit=1)[0], "looking at designs")
+    seen = on_a_terminal(text.format(p=PROBLEMS).split(), tmp_path, SLOW_AT_WORK, stop=what)
+    assert seen.status == 130
+    assert seen.screen == "stopped; what was printed before stands\n"
+
+
+@pytest.mark.slow
+def test_a_terminal_that_cannot_erase_shows_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(globals(), "_named", lambda: {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "dumb"})
+    seen = on_a_terminal(["compare", str(PROBLEMS / "ep4.toml")], tmp_path, SLOW_AT_WORK)
+    assert (seen.status, seen.written) == (0, [])
+
+
+@pytest.mark.parametrize(
+    ("told", "since", "line"),
+    [
+        (Progress("starting"), 0.2, "starting"),
+        (Progress("starting"), 3.4, "starting (3 s)"),
+        (Progress("searching", 0, unit="start"), 0.5, "searching: 0 starts"),
+        (Progress("drawing", 0, 1, "figure", note="growth"), 2.0, "drawing: 0 of 1 figure; growth (2 s)"),
+        (Progress("searching", 3, 64, "start", 2, 40, "best -1"), 1, "searching: 3 of 64 starts, about 39 s left; best -1 (3 s)"),
+        (Progress("charting", 12e6, 1e9, "design", 60, 7260), 60, "charting: 12,000,000 of 1,000,000,000 designs, about 2 h 0 min left (2 min 0 s)"),
+        (Progress("bounding the optimum", 2, 60, "s", 2, 58, "gap 0.1"), 1, "bounding the optimum: 3 of 60 s; gap 0.1"),
+        (Progress("bounding the optimum", 60, 60, "s", 60, 0), 9, "bounding the optimum: 60 of 60 s"),
+    ],
+)  # fmt: skip
+def test_a_record_in_words(told: Progress, since: float, line: str) -> None:
+    assert words(told, since) == line

@@ -1,0 +1,171 @@
+"""Progress of long work: the same record from every verb."""
+
+import math
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import tmsopt
+from tmsopt.progress import Steps, counted
+from tmsopt.studies import planned
+
+PLANE = tmsopt.load("problems/chart.toml")
+EP4 = tmsopt.load("problems/ep4.toml")
+STUDY = tmsopt.over_grid(EP4, {"mu": [0.1, 0.2, 0.3]})
+DRAWN = tmsopt.Sampling(EP4, 20, tolerances={"mu": 0.01})
+
+VERBS: list[tuple[str, Callable[..., Any]]] = [
+    ("searching", lambda **told: tmsopt.solve(EP4, **told)),
+    ("searching", lambda **told: tmsopt.solve_all("problems/ep4_matching.toml", seconds=0, **told)),
+    ("proving that no design is missed", lambda **told: tmsopt.solve_all("problems/ep4_matching.toml", **told)),
+    ("bounding the optimum", lambda **told: tmsopt.certify("problems/realistic.toml", seconds=1.0, **told)),
+    ("proving to 30 digits", lambda **told: tmsopt.prove(EP4, **told)),
+    ("proving to 30 digits", lambda **told: tmsopt.prove(optimum(), **told)),
+    ("comparing", lambda **told: tmsopt.compare(EP4, **told)),
+    ("isolating speeds", lambda **told: tmsopt.speeds(optimum(), **told)),
+    ("searching", lambda **told: tmsopt.speeds("problems/realistic.toml", **told)),
+    ("following the roots", lambda **told: tmsopt.growth(EP4, **told)),
+    ("looking for the nearest boundaries", lambda **told: tmsopt.robustness(optimum(), **told)),
+    ("looking for the nearest weave", lambda **told: tmsopt.nearest(optimum(), "weave", **told)),
+    ("tracing EP2", lambda **told: tmsopt.trace(PLANE, "EP2", **told)),
+    ("tracing weave", lambda **told: tmsopt.domain(PLANE, **told)),
+    ("cutting the surface", lambda **told: tmsopt.swallowtail(_space(), rows=6, across=4, starts=4, **told)),
+    ("charting", lambda **told: tmsopt.chart(PLANE, points=(40, 30), tile=100, **told)),
+    ("tracing capsize", lambda **told: tmsopt.chart(PLANE, points=(40, 30), **told)),
+    ("following the front", lambda **told: tmsopt.pareto("problems/pareto.toml", points=2, **told)),
+    ("solving rows", lambda **told: tmsopt.run_study(STUDY, **told)),
+    ("solving rows", lambda **told: tmsopt.run_study(DRAWN, **told)),
+    ("searching", lambda **told: planned(DRAWN, **told)),
+    ("drawing designs", lambda **told: tmsopt.monte_carlo(optimum(), 20, tolerances={"mu": 0.01}, **told)),
+    ("moving limits", lambda **told: tmsopt.explain("problems/realistic.toml", **told)),
+    ("judging the optimum", lambda **told: tmsopt.optimality(optimum(), **told)),
+    ("splitting roots", lambda **told: tmsopt.diagnose(optimum(), **told)),
+    ("writing the page", lambda **told: tmsopt.explore(EP4, **told)),
+    ("recomputing claims", lambda **told: tmsopt.verify(only=["tab1-*"], **told)),
+]
+
+
+@cache
+def optimum() -> tmsopt.Solution:
+    return tmsopt.solve(EP4)
+
+
+def _space() -> tmsopt.Problem:
+    return tmsopt.Problem(
+        model=tmsopt.models.tms,
+        fixed={"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1},
+        free={"Fr": (2.0, 2.5), "chi_B": (1.3, 1.5), "lambda_s": (0.4, 0.6)},
+    )
+
+
+@pytest.mark.parametrize(("what", "verb"), VERBS, ids=[f"{k}-{what}" for k, (what, _) in enumerate(VERBS)])
+def test_every_verb_tells_the_same_content(
+    what: str, verb: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tmsopt.progress.PAUSE", 0.0)
+    told: list[tmsopt.Progress] = []
+    verb(progress=told.append)
+    assert what in {t.what for t in told}
+    assert all(t.what and t.seconds >= 0 for t in told)
+    assert all(math.isnan(t.done) and math.isnan(t.most) for t in told if not t.unit)
+    for piece in {t.what for t in told if t.unit}:
+        of_it = [t for t in told if t.what == piece]
+        assert len({t.unit for t in of_it}) == 1
+        assert [t.done for t in of_it] == sorted(t.done for t in of_it)
+        assert not of_it[-1].done > of_it[-1].most
+        assert all(t.left >= 0 for t in of_it if not math.isnan(t.left))
+        later = [t for t in of_it if t.unit == "s" or t.done > of_it[0].done + 1]
+        assert len(of_it) < 6 or any(math.isfinite(t.left) for t in later)
+
+
+@pytest.mark.parametrize(("what", "verb"), VERBS, ids=[f"{k}-{what}" for k, (what, _) in enumerate(VERBS)])
+def test_what_cannot_be_called_is_refused(what: str, verb: Callable[..., Any]) -> None:
+    with pytest.raises(tmsopt.InputError, match="progress: found 3; accepted: a function"):
+        verb(progress=3)
+
+
+def test_a_page_is_told_of(tmp_path: Path) -> None:
+    told: list[tmsopt.Progress] = []
+    tmsopt.save_report(optimum(), tmp_path / "design.html", progress=told.append)
+    assert "writing the page" in {t.what for t in told}
+
+
+def test_an_infeasible_problem_tells_of_its_limits() -> None:
+    told: list[tmsopt.Progress] = []
+    asked = tmsopt.Problem(
+        model=EP4.model, fixed=EP4.fixed, free=EP4.free, constraints={"no": "abscissa <= -100"}, minimize="Fr"
+    )
+    assert tmsopt.solve(asked, throw=False, starts=4, progress=told.append).status == "infeasible"
+    assert "searching for the least that limits must give" in {t.what for t in told}
+
+
+class Clock:
+    """A clock that is set by hand."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def perf_counter(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    made = Clock()
+    monkeypatch.setattr("tmsopt.progress.time", made)
+    return made
+
+
+def test_time_left_is_that_of_the_rate_since_the_first_count(clock: Clock) -> None:
+    """40 rows of 100 were there; 20 more took 4 s, so the other 40 take 8."""
+    told: list[tmsopt.Progress] = []
+    steps = counted(told.append, "solving rows", "row")
+    assert steps is not None
+    steps(40, 100)
+    clock.now += 4.0
+    steps(60, 100, "all well")
+    begun, first, last = told
+    assert (begun.done, begun.seconds) == (0.0, 0.0)
+    assert math.isnan(begun.most)
+    assert (first.done, first.most) == (40, 100)
+    assert math.isnan(first.left)
+    assert last == tmsopt.Progress("solving rows", 60, 100, "row", 4.0, 8.0, "all well")
+
+
+def test_of_work_that_ends_with_its_time_the_rest_of_it_is_left(clock: Clock) -> None:
+    told: list[tmsopt.Progress] = []
+    steps = counted(told.append, "bounding the optimum", "s")
+    assert steps is not None
+    steps(2.0, 60.0)
+    assert told[-1].left == 58.0
+
+
+def test_nobody_is_told_oftener_than_he_can_read(clock: Clock) -> None:
+    """A million rows in a second, and a callback every 50 ms; the first and the last are told whenever they are."""
+    told: list[tmsopt.Progress] = []
+    steps = counted(told.append, "solving rows", "row")
+    assert steps is not None
+    for done in range(1, 1001):
+        clock.now += 1e-3
+        steps(done, 1000)
+    assert (told[1].done, told[-1].done) == (1, 1000)
+    assert 15 <= len(told) <= 25
+
+
+def test_work_that_is_begun_anew_goes_on_counting(clock: Clock) -> None:
+    """12 of 64 starts on one side of the box, then 3 of 64 on the other; and after another piece of work, 5 of 8."""
+    told: list[tmsopt.Progress] = []
+    steps = Steps(told.append)
+    steps.begin("searching", "start")
+    for done, most in ((1, 64), (12, 64), (1, 64), (3, 64)):
+        clock.now += 1.0
+        steps(done, most)
+    assert (told[-1].done, told[-1].most) == (15, 76)
+    steps.begin("looking at designs")
+    assert math.isnan(told[-1].done)
+    steps.begin("searching", "start")
+    steps(5, 8)
+    assert (told[-1].done, told[-1].most) == (20, 23)
