@@ -61,6 +61,7 @@ class InputError(ValueError):
 
 
 MOST_STARTS = 10**9  # of a search; what counts them takes no more than sys.maxsize
+MOST_POINTS = 10_000  # of a front, a problem to be solved for each
 
 
 def count_faults(name: str, value: Any, least: int, most: int | None = None) -> list[Fault]:

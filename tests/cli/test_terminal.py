@@ -9,12 +9,12 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 from tmsopt import Progress
-from tmsopt.cli.terminal import words
 
 if os.name == "posix":
     import fcntl
@@ -253,4 +253,4 @@ def test_a_terminal_that_cannot_erase_shows_nothing(tmp_path: Path, monkeypatch:
     ],
 )  # fmt: skip
 def test_a_record_in_words(told: Progress, since: float, line: str) -> None:
-    assert words(told, since) == line
+    assert import_module("tmsopt.cli.terminal").words(told, since) == line

@@ -26,7 +26,7 @@ from tmsopt.cli.common import (
 )
 from tmsopt.cli.ending import INTERRUPTED
 from tmsopt.cli.terminal import shown
-from tmsopt.errors import MOST_STARTS
+from tmsopt.errors import MOST_POINTS, MOST_STARTS
 
 if TYPE_CHECKING:
     from tmsopt import Problem, Solution
@@ -111,7 +111,7 @@ def _seconds(ctx: click.Context, param: click.Parameter, value: Any) -> float | 
 @report_option
 @click.option("--over", help="What --plot draws over, e.g. lambda_s. [default: the speed, or the first free one]")
 @click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write the points of a front.")
-@click.option("--points", type=click.IntRange(min=2), default=None, help="Points of a front. [default: 25]")
+@click.option("--points", type=click.IntRange(2, MOST_POINTS), default=None, help="Points of a front. [default: 25]")
 @click.option(
     "--wheelbase", default=None,
     help="Of a dimensionless bicycle (tms): show SI beside, for this wheelbase in m or with a unit. [1 if left out]",
@@ -205,9 +205,11 @@ def _check_options(problem: "Problem", given: list[str], every: bool) -> None:
         wrong |= dict.fromkeys((*alone, *scaled, "--plot"), message)
     else:
         wrong["--seconds"] = "is for the proof of --all; write --all too, or leave it out"
+    if "--plot" not in given:
+        wrong["--over"] = "says what --plot draws over; add --plot FILE, or leave it out"
     if problem.pareto:
         message = "is for one design, and the file asks for a front; write minimize with one of the expressions"
-        wrong["--certify"] = message
+        wrong |= dict.fromkeys(("--certify", "--over"), message)
         message = "scales one design, and the file asks for a front; write the problem in SI instead"
         wrong |= dict.fromkeys(scaled, message)
     else:

@@ -118,11 +118,7 @@ def quiet() -> Iterator[None]:
 
 
 def words(told: Progress, since: float = 0.0) -> str:
-    """A record as one line, some seconds after it was told.
-
-    >>> words(Progress("searching", 3, 64, "start", 2.0, 40.0, "best -0.52"), 1.0)
-    'searching: 3 of 64 starts, about 39 s left; best -0.52 (3 s)'
-    """
+    """A record as one line, some seconds after it was told."""
     seconds, text = told.seconds + since, told.what
     if told.unit == "s" and math.isfinite(told.most):
         text += f": {min(told.done + since, told.most):.0f} of {told.most:.0f} s"

@@ -6,7 +6,7 @@ from typing import Unpack
 
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.solution import NotSolved
-from tmsopt.errors import Fault, InputError, count_faults
+from tmsopt.errors import MOST_POINTS, Fault, InputError, count_faults
 from tmsopt.formulation.options import Asked, Options, options_of, taking
 from tmsopt.fronts.curve import curve
 from tmsopt.fronts.front import Front, FrontPoint
@@ -39,14 +39,14 @@ def pareto(problem: Given, points: int = POINTS, **options: Unpack[Asked]) -> Fr
 
     Raises:
         NotSolved: when an objective has no optimum, carrying the best point found.
-        InputError: for a problem without ``pareto``, or fewer than 2 points.
+        InputError: for a problem without ``pareto``, or fewer than 2 points or more than 10000.
     """
     problem = problem_of(problem)
     if not problem.pareto:
         message = 'no front is asked for; write e.g. pareto = ["abscissa", "Fr"], or use tmsopt.solve'
         raise InputError([Fault(message, ("objective",))])
     how = options_of(options, defaults=_DEFAULTS, fewest=0)
-    if faults := count_faults("points", points, 2):
+    if faults := count_faults("points", points, 2, MOST_POINTS):
         raise InputError(faults)
     began = time.perf_counter()
     progress, ask = how.progress, Asker(problem, replace(how, progress=None))

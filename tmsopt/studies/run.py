@@ -143,9 +143,11 @@ def run_study(
     if store is None:
         found, seconds, engine = _carried_out(asked, _none(asked), workers, scheduler, note, progress)
         return Results(asked, gathered(found.blocks, found.rows), found.count, seconds, engine)
+    counted(progress, "waiting for the store")
     with open_store(path_of(store, "an SQLite file"), definition(asked), fresh=fresh) as opened:
         for line in (*opened.warnings, *([f"moved the old store to {opened.moved}"] if opened.moved else [])):
             note(line)
+        counted(progress, "reading the store")
         there = _held(asked, opened)  # damage is said before any work
         if there.count:
             note(f"{there.count} of {len(asked)} rows are in {opened.path}")
