@@ -11,6 +11,8 @@ import numpy as np
 
 from tmsopt.records import Array, Table, Truth, plain
 from tmsopt.studies.export import PREFIXES, PartialColumn, columns
+from tmsopt.studies.judging import RowsInBlocks
+from tmsopt.studies.judging.table import causes
 from tmsopt.studies.row import STATUSES, Row
 from tmsopt.studies.study import Study
 
@@ -126,7 +128,7 @@ def summary(study: Study, rows: Iterable[Row]) -> Summary:
     return Summary(
         rows=len(study), counts=Table({status: counts[status] for status in STATUSES if counts[status]}),
         best=None if best is None else known[int(best)],
-        causes=_causes([] if optimal.all() else table["cause"].values[~optimal].tolist()),
+        causes=_causes(known),
         spread=Table({n: ends for n in ("objective", "abscissa") if (ends := _ends(values[n][optimal]))}),
         stable=int(_stable(table).sum()), structures=_ranked(values["structure"][optimal].tolist()),
         proven=int(values["proven"].sum()), warm=int(values["warm"].sum()), laws=Table(laws),
@@ -140,12 +142,14 @@ def _stable(table: Mapping[str, PartialColumn]) -> Truth:
     return np.asarray(column.values.astype(bool) & column.present)
 
 
-def _causes(texts: Iterable[str]) -> Table[int]:
-    alike: dict[str, list[str]] = {}
-    for text in texts:
-        alike.setdefault(_NUMBER.sub("#", text), []).append(text)
-    ranked = sorted(alike.values(), key=len, reverse=True)
-    return Table({causes[0] if len(causes) == 1 else _AMOUNT.sub("", causes[0]): len(causes) for causes in ranked})
+def _causes(rows: Sequence[Row]) -> Table[int]:
+    each = ((row.cause, 1) for row in rows if row.status != "optimal")
+    alike: dict[str, list[tuple[str, int]]] = {}
+    for text, count in causes(rows) if isinstance(rows, RowsInBlocks) else each:
+        alike.setdefault(_NUMBER.sub("#", text), []).append((text, count))
+    counted = [(same[0][0], sum(count for _, count in same)) for same in alike.values()]
+    ranked = sorted(counted, key=lambda pair: pair[1], reverse=True)
+    return Table({text if count == 1 else _AMOUNT.sub("", text): count for text, count in ranked})
 
 
 def _ranked(names: Iterable[str]) -> Table[int]:

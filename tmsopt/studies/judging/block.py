@@ -118,15 +118,23 @@ class RowBlock:
         known = np.isfinite(self.columns["bound"])
         return np.where(known, 1 + (self.columns["by_relation"] > 0), 0)
 
+    def causes(self) -> list[str]:
+        """Why each row is infeasible; empty where it is not."""
+        texts = [""] * len(self)
+        for name in self.named("violation"):
+            unit, column = Unit(*self.shared.units[name]), self.columns[f"violation.{name}"]
+            for k in np.flatnonzero(~np.isnan(column)).tolist():
+                texts[k] += f"{', ' if texts[k] else 'violated: '}{name} by {unit.show(float(column[k]), 3)}"
+        asked = np.zeros(len(self), dtype=bool)
+        for name in self.shared.of_abscissa:
+            asked |= ~np.isnan(self.columns[f"violation.{name}"])
+        for k in np.flatnonzero(asked & (self.columns["abscissa"] >= 0)).tolist():
+            texts[k] += f"; {UNSTABLE}"
+        return texts
+
     def cause(self, k: int) -> str:
         """Why the row at a place is infeasible; empty where it is not."""
-        amounts = {n: float(self.columns[f"violation.{n}"][k]) for n in self.named("violation")}
-        violated = [f"{n} by {Unit(*self.shared.units[n]).show(x, 3)}" for n, x in amounts.items() if not math.isnan(x)]
-        if not violated:
-            return ""
-        asked = any(not math.isnan(amounts[n]) for n in self.shared.of_abscissa)
-        note = f"; {UNSTABLE}" if asked and self.columns["abscissa"][k] >= 0 else ""
-        return f"violated: {', '.join(violated)}{note}"
+        return self.some(np.array([k])).causes()[0] if self.infeasible[k] else ""
 
 
 def seeds(seed: int, numbers: NDArray[np.int64]) -> NDArray[np.int64]:

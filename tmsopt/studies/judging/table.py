@@ -18,7 +18,7 @@ _Part = tuple[NDArray[Any], Truth]
 _FIELDS: Mapping[str, Callable[[RowBlock], Any]] = {
     "number": lambda b: b.numbers, "seed": lambda b: seeds(b.shared.seed, b.numbers),
     "status": lambda b: STATUS[b.infeasible.astype(int)],
-    "cause": lambda b: np.array([b.cause(k) if bad else "" for k, bad in enumerate(b.infeasible)], dtype=object),
+    "cause": lambda b: np.array(b.causes(), dtype=object),
     "abscissa_realised": lambda b: b.columns["abscissa"], "stable": lambda b: b.columns["abscissa"] < 0,
     "structure": lambda b: STRUCTURES[b.columns["oscillates"].astype(int)], "proven": lambda b: False,
     "method": lambda b: METHODS[b.methods], "starts": lambda b: 0, "warm": lambda b: False,
@@ -78,6 +78,20 @@ def _ordered(rows: RowsInBlocks, parts: list[tuple[Any, Any]], single: _Part) ->
     values = np.concatenate([*(values for values, _ in parts), single[0]])
     present = [np.broadcast_to(there, len(values)) for values, there in parts]
     return values[rows.order], np.concatenate([*present, single[1]])[rows.order]
+
+
+def causes(rows: RowsInBlocks) -> list[tuple[str, int]]:
+    """Why rows are not optimal, and how many there are, the first one first: one text for all that violate the same."""
+    found = [(row.number, row.cause, 1) for row in rows.singles if row.status != STATUS[0]]
+    for block in rows.blocks:
+        kinds = np.zeros(len(block), dtype=np.int64)
+        limits = (np.isnan(block.columns[f"violation.{name}"]) for name in block.named("violation"))
+        for truth in (block.columns["abscissa"] < 0, *limits):
+            kinds = np.unique(2 * kinds + truth, return_inverse=True)[1]
+        first, counts = np.unique(kinds, return_index=True, return_counts=True)[1:]
+        places = zip(first.tolist(), counts.tolist(), strict=True)
+        found += [(int(block.numbers[k]), block.cause(k), count) for k, count in places if block.infeasible[k]]
+    return [(cause, count) for _, cause, count in sorted(found)]
 
 
 @dataclass(frozen=True)

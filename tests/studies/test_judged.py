@@ -1,0 +1,209 @@
+"""Rows that solve nothing: judged at once they are those of one by one, whatever block they are in."""
+
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing, suppress
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tmsopt import Problem, Study, models, monte_carlo, run_study, solve
+from tmsopt.checks import judge as together
+from tmsopt.errors import InputError
+from tmsopt.studies import Row, alone, columns, summary
+from tmsopt.studies.judging import RowsInBlocks, applies, judged
+from tmsopt.studies.solving import Solver
+from tmsopt.studies.store import open_store, read_store
+from tmsopt.studies.study import definition
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+SPREAD = {"chi_B": 0.005, "lambda_s": 0.0087, "Fr": 0.02}
+OWN = models.from_coefficients(["m", "a", "b + 0.1", "c*a", "d/k"], name="own quartic")
+FIXED = {"m": 1.0, "a": 4.0, "b": 6.0, "c": 1.0, "d": 1.0, "k": 1.0}
+RATIO = 1e-12
+"""Relative: numeric roots of quartics whose roots are apart have a dozen digits, and rows by themselves report them."""
+
+
+def built(rows: int, share: float = 1.0, **more: Any) -> Study:
+    return monte_carlo(PROBLEMS / "ep4.toml", rows, 1, "normal", {n: share * x for n, x in SPREAD.items()}, **more)
+
+
+def whipple() -> Study:
+    design = solve(PROBLEMS / "whipple_ep4.toml")
+    return monte_carlo(design, 40, 2, tolerances={n: abs(x) / 100 for n, x in design.parameters.items() if x})
+
+
+def limited() -> Study:
+    problem = solve(PROBLEMS / "realistic.toml").problem
+    design = solve(problem)
+    return monte_carlo(design, 60, 3, tolerances={n: abs(x) / 500 for n, x in design.parameters.items() if x})
+
+
+def own(limits: dict[str, str] | None = None, **asked: Any) -> Study:
+    rng = np.random.default_rng(4)
+    problem = Problem(model=OWN, fixed=FIXED, constraints=limits or {}, **(asked or {"minimize": "abscissa"}))
+    drawn = {n: x * (1 + 0.3 * rng.uniform(-1, 1, 60)) for n, x in FIXED.items()}
+    drawn["k"][:3], drawn["m"][3:5], drawn["d"][5] = 0.0, 0.0, 0.0  # no coefficient, no root, a root at 0
+    drawn["a"][6:9], drawn["b"][6:9], drawn["c"][6:9], drawn["d"][6:9] = 4, 5.9, 1, 1  # EP4, and beside it
+    drawn["m"][6:9], drawn["k"][6:9] = (1, 1 + 1e-13, 1 + 1e-9), 1
+    return Study(problem, drawn)
+
+
+STUDIES = {
+    "EP4 as built": lambda: built(60), "very near EP4": lambda: built(40, 1e-6), "wheels": whipple, "limits": limited,
+    "own": own, "own, stable": lambda: own({"decay": "abscissa <= -0.3", "size": "a*b >= 20"}),
+    "own, another objective": lambda: own(maximize="damping_ratio**2 + sin(a)/3 - exp(-b)"),
+    "own, nothing asked": lambda: own({"size": "a*b/k <= 30"}, minimize=None),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_rows_judged_at_once_are_those_of_one_by_one(name: str) -> None:
+    study = STUDIES[name]()
+    assert applies(study)
+    solver, found = Solver(study), run_study(study, workers=1).rows
+    assert isinstance(found, RowsInBlocks)
+    assert len(found) == len(study)
+    assert len(found.singles) < 0.6 * len(study)
+    for row in found:
+        one = solver((row.number,))[0]
+        amounts = dict(one.violations)
+        assert set(row.violations) == set(amounts)
+        for name, amount in amounts.items():
+            assert row.violations[name] == pytest.approx(amount, rel=RATIO, abs=RATIO, nan_ok=True)
+        assert replace(row, violations=one.violations).identity == one.identity
+
+
+def test_no_bit_depends_on_the_other_rows() -> None:
+    """The functions of NumPy are other programs at the ends of an array, on some machines."""
+    study = replace(built(300), report=["sin(Fr) + exp(chi_B)/tan(lambda_s)", "Fr**0.3", "abscissa*log(Fr)"])
+    whole = run_study(study).rows
+    for size in (1, 7, 64):
+        for first in range(0, 300, 100 if size == 1 else size):
+            block, _ = next(judged(study, np.arange(first, min(first + size, 300))))
+            for row in block:
+                assert row.identity == whole[row.number].identity
+    assert alone(study, 17).row.identity == whole[17].identity
+
+
+def test_what_is_searched_or_listed_is_not_judged_at_once() -> None:
+    study = built(2)
+    for problem in (
+        replace(study.problem, scenarios={"mu": (0.1, 0.2)}, fixed={n: x for n, x in study.problem.fixed.items() if n != "mu"}),
+        replace(study.problem, tolerances={"mu": 0.01}), replace(study.problem, minimize=None, maximize="radius"),
+    ):  # fmt: skip
+        assert not applies(Study(problem, {"Fr": [2.0, 2.1]}))
+    assert together.judge(study.problem, {"Fr": np.array([2.0])}) is not None
+
+
+def test_columns_and_summary_are_those_of_the_rows() -> None:
+    for study in (own({"decay": "abscissa <= -0.3", "size": "a*b >= 20"}), built(50, report=["Fr_c"])):
+        rows = run_study(study).rows
+        assert isinstance(rows, RowsInBlocks)
+        quick, slow = columns(rows), columns(tuple(rows))
+        assert list(quick) == list(slow)
+        for name, column in slow.items():
+            np.testing.assert_array_equal(quick[name].present, column.present, name)
+            np.testing.assert_array_equal(quick[name].values[column.present], column.values[column.present], name)
+            assert quick[name].values.dtype == column.values.dtype
+        for part in ("counts", "best", "causes", "spread", "stable", "structures", "laws", "product"):
+            assert str(getattr(summary(study, rows), part)) == str(getattr(summary(study, tuple(rows)), part))
+        assert rows == tuple(rows)
+        assert rows[3:5] == (rows[3], rows[4])
+        assert rows[-1].number == len(study) - 1
+
+
+def test_a_store_of_blocks_gives_back_the_same_rows(tmp_path: Path) -> None:
+    study, path = own({"decay": "abscissa <= -0.3"}), tmp_path / "own.sqlite"
+    kept, plain = run_study(study, path, workers=1), run_study(study, workers=1)
+    again = run_study(study, path)
+    assert (kept.solved, again.solved, again.found) == (60, 0, 60)
+    for rows in (kept.rows, again.rows):
+        assert [row.identity for row in rows] == [row.identity for row in plain.rows]
+    with read_store(path) as store:
+        assert store.done() == set(range(60))
+        assert store.counts() == dict(kept.summary.counts)
+        assert [row.number for row in store.rows("infeasible")] == [r.number for r in kept.rows if r.status == "infeasible"]
+        assert store.row(20).identity == plain.rows[20].identity
+        assert store.about()["schema"] == 2
+        assert sum(session["rows"] for session in store.sessions()) == 60
+    with pytest.raises(InputError, match="another study"):
+        run_study(replace(study, seed=5), path)
+
+
+def test_rows_are_forgotten_and_judged_again(tmp_path: Path) -> None:
+    study, path = built(30), tmp_path / "built.sqlite"
+    before = run_study(study, path).rows
+    with open_store(path, definition(study)) as store:
+        store.forget([3, 4])
+        assert store.done() == set(range(30)) - {3, 4}
+        store.add([before[4]])
+        store.add([before[4], before[7]])  # both are there
+        with pytest.raises(InputError, match="row 7 is there already and differs"):
+            store.add([replace(before[7], abscissa=0.0)])
+    again = run_study(study, path)
+    assert (again.found, again.solved) == (29, 1)
+    assert [row.identity for row in again.rows] == [row.identity for row in before]
+
+
+def test_a_damaged_block_is_said_and_can_be_removed(tmp_path: Path) -> None:
+    study, path = built(30), tmp_path / "built.sqlite"
+    before = run_study(study, path).rows
+    with closing(sqlite3.connect(path)) as connection:
+        ((data,),) = connection.execute("SELECT data FROM blocks").fetchall()
+        connection.execute("UPDATE blocks SET data = ?", (data[:-3] + b"\1" + data[-2:],))
+        connection.commit()
+    with pytest.raises(InputError, match=r"rows 0 to 29 are damaged .*Store.forget\(\[0\]\)"):
+        run_study(study, path)
+    with open_store(path, definition(study)) as store:
+        store.forget([0])
+    assert [row.identity for row in run_study(study, path).rows] == [row.identity for row in before]
+
+
+ENDLESS = """
+import sys
+from pathlib import Path
+from tmsopt import monte_carlo, run_study
+study = monte_carlo(Path(sys.argv[1]), 600_000, 1, "normal", {"chi_B": 0.005, "lambda_s": 0.0087, "Fr": 0.02})
+run_study(study, sys.argv[2], progress=lambda done, most: print(done, flush=True))
+"""
+
+
+@pytest.mark.slow
+def test_kill_9_loses_no_block_and_doubles_none(tmp_path: Path) -> None:
+    study, path = built(600_000), tmp_path / "built.sqlite"
+    whole = run_study(study).rows
+    had = [0]
+    for _ in range(4):
+        command = [sys.executable, "-c", ENDLESS, str(PROBLEMS / "ep4.toml"), str(path)]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        assert process.stdout is not None
+        lines = [process.stdout.readline() for _ in range(3)]
+        with suppress(ProcessLookupError):
+            os.kill(process.pid, signal.SIGKILL)
+        process.communicate()
+        with read_store(path) as store:
+            done = store.done()
+        assert len(done) >= int(lines[-1] or 0)
+        had.append(len(done))
+    assert all(later >= earlier for earlier, later in pairwise(had))
+    last = run_study(study, path)
+    assert last.found + last.solved == len(study) == len(last.rows)
+    assert isinstance(whole, RowsInBlocks)
+    for name in ("objective", "damping_ratio", "number", "seed", "status"):
+        np.testing.assert_array_equal(last.column(name), columns(whole)[name].values)
+
+
+def test_seeds_are_those_of_numpy() -> None:
+    for seed in (0, 1, 12345, 2**40, 2**130 + 5):
+        study = Study(built(2).problem, {"Fr": np.linspace(2, 2.1, 5)}, seed=seed)
+        rows = run_study(study).rows
+        assert [row.seed for row in rows] == [study.seed_of(row.number) for row in rows]
+        assert isinstance(rows[0], Row)
