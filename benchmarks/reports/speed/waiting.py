@@ -21,6 +21,7 @@ from tqdm import tqdm
 from benchmarks.reports.tables import Asked, duration, page, table, times
 
 _ROUNDS = 5
+_FEW = 8  # every so manieth, where it is only to be seen that all runs
 _HERE = Path(__file__).parents[3]
 
 _START = """
@@ -39,10 +40,38 @@ def needed(problem):
     return sum(tmsopt.solve(problem, throw=False).relaxation.amounts.values())
 """
 
+_COUNTED = """
+import casadi
+made, ran, spent = casadi.nlpsol, [], dict(solver=0.0, building=0.0, built=0)
+class Counted:
+    def __init__(self, *given):
+        began = time.perf_counter()
+        self.solver = made(*given)
+        spent["building"] += time.perf_counter() - began
+        spent["built"] += 1
+    def __call__(self, **given):
+        began = time.perf_counter()
+        answer = self.solver(**given)
+        spent["solver"] += time.perf_counter() - began
+        ran.append(self.solver.stats()["iter_count"])
+        return answer
+    def __getattr__(self, name):
+        return getattr(self.solver, name)
+casadi.nlpsol = Counted
+"""
+
 _END = """
 began = time.perf_counter()
 value = work()
 print(json.dumps([time.perf_counter() - began, float(value)]))
+"""
+
+_SHARES = """
+ran.clear()
+spent = dict(solver=0.0, building=0.0, built=0)
+began = time.perf_counter()
+work()
+print(json.dumps([time.perf_counter() - began, spent["solver"], spent["building"], spent["built"], len(ran), sum(ran)]))
 """
 
 WORKS: Mapping[str, str] = {
@@ -109,6 +138,12 @@ def warm(work: str, tree: Path) -> tuple[float, float]:
     return seconds, value
 
 
+def shares(work: str, tree: Path) -> list[float]:
+    """Seconds of a work, in IPOPT and in building solvers; solvers built, runs and iterations; of one process."""
+    found: list[float] = json.loads(_run(tree, "-c", f"{_COUNTED}{_START}{work}{_SHARES}").splitlines()[-1])
+    return found
+
+
 def cold(words: tuple[str, ...], tree: Path) -> tuple[float, float]:
     """Seconds of a command from start to end, and 0."""
     with TemporaryDirectory() as folder:
@@ -138,7 +173,7 @@ def report(asked: Asked) -> str:
         *((f"`{name}`", partial(cold, words)) for name, words in COLD.items()),
     ]
     rows = []
-    for name, work in tqdm(works[:: 8 if asked.quick else 1], desc="waiting"):
+    for name, work in tqdm(works[:: _FEW if asked.quick else 1], desc="waiting"):
         found = [[work(tree) for tree in trees] for _ in range(1 if asked.quick else _ROUNDS)]  # by turns
         seconds = [statistics.median(one[k][0] for one in found) for k in range(len(trees))]
         apart = max(abs(one[0][1] - one[-1][1]) / max(1.0, abs(one[0][1])) for one in found)
@@ -149,4 +184,13 @@ def report(asked: Asked) -> str:
         f"Medians of {_ROUNDS} rounds by turns, each in a process of its own; of commands with its start, of the "
         "others without start, imports and a first solve."
     )
-    return page("Waiting", asked, table(header, rows), note)
+    profiled = list(WORKS.items())[:: _FEW if asked.quick else 1]
+    parts = [_parts(name, work, tree, tree is not _HERE) for name, work in profiled for tree in trees]
+    columns = ("what", "which", "time", "in IPOPT", "building solvers", "the rest", "solvers", "runs", "iterations")
+    return page("Waiting", asked, table(header, rows), note, "### Where the time goes", table(columns, parts))
+
+
+def _parts(name: str, work: str, tree: Path, before: bool) -> tuple[object, ...]:
+    whole, solver, building, *counts = shares(work, tree)
+    rest = (solver / whole, building / whole, 1 - (solver + building) / whole)
+    return (name, "before" if before else "now", duration(whole), *(f"{part:.0%}" for part in rest), *map(int, counts))
