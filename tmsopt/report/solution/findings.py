@@ -10,8 +10,8 @@ from tmsopt.design.solution import Solution
 from tmsopt.diagnosis import Diagnosis, diagnose
 from tmsopt.errors import InputError
 from tmsopt.explanation import Explanation, explain
-from tmsopt.margins import Robustness, robustness
-from tmsopt.progress import Listener
+from tmsopt.margins import Robustness, robustness, robustness_at
+from tmsopt.progress import Listener, counted
 
 T = TypeVar("T")
 
@@ -22,7 +22,7 @@ class Findings:
 
     Attributes:
         explanation: limits and what they are worth, warnings, rounding, local optimality.
-        robustness: the nearest boundaries.
+        robustness: the nearest boundaries, of stability and where all is wanted of heavy damping.
         stable: bands of its speed in which the design is stable.
         diagnoses: how its multiple roots split.
     """
@@ -41,10 +41,18 @@ def findings(solution: Solution, full: bool = False, progress: Listener | None =
     sought = finite and solution.status != "infeasible"
     return Findings(
         explain(solution, resolve=full, progress=progress),
-        robustness(solution, progress=progress) if sought else None,
+        _around(solution, full, progress) if sought else None,
         _unless_refused(lambda: stable_speeds(solution)) if sought else None,
         diagnose(solution, progress=progress) if full and solution.status == "optimal" else (),
     )
+
+
+def _around(solution: Solution, full: bool, progress: Listener | None) -> Robustness:
+    """The nearest boundaries; that of heavy damping, which a screen has no line for, where all is wanted."""
+    if full:
+        return robustness(solution, progress=progress)
+    counted(progress, "looking for the nearest boundaries")
+    return robustness_at(solution.problem, solution.parameters)
 
 
 def _unless_refused(found: Callable[[], T]) -> T | None:
