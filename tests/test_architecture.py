@@ -363,6 +363,18 @@ def modules_loaded(request: pytest.FixtureRequest) -> set[str]:
     return set(ended.stderr.split())
 
 
+@pytest.mark.parametrize("command", ["solve", "prove", "compare", "speeds"])
+def test_everyday_commands_load_what_they_need_alone(command: str) -> None:
+    """Half a second: pint reads unusual units, SciPy decides what few problems ask, branch and bound what is not known."""
+    words = [command, "problems/ep4.toml"]
+    script = f"from tmsopt.cli.commands import every; every({words!r}, standalone_mode=False)"
+    loaded = f"import sys\ntry:\n    {script}\nfinally:\n    print(*sys.modules, file=sys.stderr)"
+    ended = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, cwd=ROOT, check=False)
+    modules = set(ended.stderr.split())
+    assert {"casadi", "tmsopt.solver.solve"} <= modules
+    assert not {"pint", "scipy", "matplotlib", "pandas", "tmsopt.branch_and_bound.stability"} & modules
+
+
 @pytest.mark.parametrize(
     "name", ["laws", "models", "roots", "Problem", "load", "solve", "Solution", "NotSolved", "InputError"]
 )

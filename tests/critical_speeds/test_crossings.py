@@ -6,7 +6,7 @@ import re
 import pytest
 
 import tmsopt
-from tmsopt.critical_speeds import crossings
+from tmsopt.critical_speeds import crossings, stable_speeds
 from tmsopt.models import from_matrices
 from tmsopt.report import speeds_table
 
@@ -94,3 +94,18 @@ def test_what_is_said_of_roots_that_stay_on_the_axis():
     assert masses.to_json()["zeros"] == 2
     with pytest.raises(tmsopt.InputError, match="--parameter NAME"):
         tmsopt.speeds(masses.problem)
+
+
+@pytest.mark.parametrize("file", ["benchmark", "negative_tilt", "whipple_benchmark", "whipple_trail"])
+def test_bands_of_speed_are_the_same_without_what_happens_at_their_ends(file):
+    """The box of the speed plays no part in them."""
+    design = tmsopt.solve(f"problems/{file}.toml")
+    name = tmsopt.speeds(design).parameter
+    allowed = design.problem.parameter_set[name].range
+    assert stable_speeds(design) == tmsopt.speeds(design, between=(allowed.lower, allowed.upper)).stable != ()
+
+
+def test_a_model_without_a_speed_has_no_bands_of_it():
+    assert stable_speeds(tmsopt.solve("problems/two_mass_spring.toml")) is None
+    model = tmsopt.models.from_coefficients([1.0, "Fr", 1.0])  # a name alone makes no speed: this may be negative
+    assert stable_speeds(tmsopt.solve(tmsopt.Problem(model, free={"Fr": (0.5, 1)}, minimize="abscissa"))) is None

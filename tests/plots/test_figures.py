@@ -13,6 +13,7 @@ import pytest
 import sympy
 from click.testing import CliRunner
 from helpers.oracles import is_stable_60, polynomial_60, roots_60, weave_Fr_60
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from tmsopt import laws
@@ -609,6 +610,17 @@ def test_points_that_fall_together_share_a_label():
     assert [t.get_text() for t in ax.texts] == ["EP4, 2EP2"]
     place_names(ax, [])
     assert len(ax.texts) == 1
+
+
+def test_names_leave_the_layout_to_whoever_chose_it():
+    for layout in (None, "tight", "constrained"):
+        figure = Figure(layout=layout)
+        FigureCanvasAgg(figure)
+        engine, ax = figure.get_layout_engine(), figure.subplots()
+        ax.plot([0, 1], [0, 1])
+        place_names(ax, [Name("EP4", 0.5, 0.5)])
+        assert figure.get_layout_engine() is engine
+        assert [t.get_text() for t in ax.texts] == ["EP4"]
 
 
 def test_a_parameter_that_stays_the_same_is_no_axis():
