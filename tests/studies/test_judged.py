@@ -15,13 +15,11 @@ import numpy as np
 import pytest
 
 from tmsopt import Problem, Study, models, monte_carlo, run_study, solve
-from tmsopt.checks import judge as together
+from tmsopt.checks import verdicts
 from tmsopt.errors import InputError
-from tmsopt.studies import Row, alone, columns, summary
+from tmsopt.studies import Row, Solver, alone, columns, definition, summary
 from tmsopt.studies.judging import RowsInBlocks, applies, judged
-from tmsopt.studies.solving import Solver
 from tmsopt.studies.store import open_store, read_store
-from tmsopt.studies.study import definition
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 SPREAD = {"chi_B": 0.005, "lambda_s": 0.0087, "Fr": 0.02}
@@ -76,8 +74,8 @@ def test_rows_judged_at_once_are_those_of_one_by_one(name: str) -> None:
         one = solver((row.number,))[0]
         amounts = dict(one.violations)
         assert set(row.violations) == set(amounts)
-        for name, amount in amounts.items():
-            assert row.violations[name] == pytest.approx(amount, rel=RATIO, abs=RATIO, nan_ok=True)
+        for limit, amount in amounts.items():
+            assert row.violations[limit] == pytest.approx(amount, rel=RATIO, abs=RATIO, nan_ok=True)
         assert replace(row, violations=one.violations).identity == one.identity
 
 
@@ -100,7 +98,7 @@ def test_what_is_searched_or_listed_is_not_judged_at_once() -> None:
         replace(study.problem, tolerances={"mu": 0.01}), replace(study.problem, minimize=None, maximize="radius"),
     ):  # fmt: skip
         assert not applies(Study(problem, {"Fr": [2.0, 2.1]}))
-    assert together.judge(study.problem, {"Fr": np.array([2.0])}) is not None
+    assert verdicts(study.problem, {"Fr": np.array([2.0])}) is not None
 
 
 def test_columns_and_summary_are_those_of_the_rows() -> None:

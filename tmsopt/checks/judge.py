@@ -66,7 +66,7 @@ def judgeable(problem: Problem) -> bool:
     return not (listed or problem.pattern or problem.asks(RADIUS) or problem.asks(ANGULAR_FREQUENCY))
 
 
-def judge(problem: Problem, columns: Mapping[str, Array], reports: Sequence[str] = ()) -> Verdicts | None:
+def verdicts(problem: Problem, columns: Mapping[str, Array], reports: Sequence[str] = ()) -> Verdicts | None:
     """The designs that differ from a problem's in some of its fixed parameters; None where formulas take no arrays.
 
     Args:

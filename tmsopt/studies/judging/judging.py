@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.checks.judge import BLOCK, Verdicts, judge, judgeable
+from tmsopt.checks.judge import BLOCK, Verdicts, judgeable, verdicts
 from tmsopt.design.unit_system import unit_of
 from tmsopt.records import Array
 from tmsopt.studies.judging.block import NUMBERS, RowBlock, Shared
@@ -66,7 +66,7 @@ def _block(
     for first in range(0, len(numbers), BLOCK):
         some = numbers[first : first + BLOCK]
         columns = {name: column[some] for name, column in given.items()}
-        found = judge(study.problem, columns, study.report)
+        found = verdicts(study.problem, columns, study.report)
         if found is None:
             parts = [(numbers[:0], {name: np.empty(0) for name in (*NUMBERS, *map("varied.{}".format, given))})]
             break
