@@ -1,15 +1,17 @@
 """Sub-problems of a Pareto front: one objective minimised, the others held below a value (eps-constraints)."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from tmsopt.checks.recheck import recheck
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
+from tmsopt.formulation.formulate import LIMIT
 from tmsopt.formulation.options import STARTS, Options
 from tmsopt.fronts.front import FrontPoint
 from tmsopt.solver.solve import solved
+from tmsopt.solver.workspace import Family
 
 _RETRY = 16  # starts for a sub-problem that the neighbours' designs and a few starts did not solve
 _SLACK = 1e-9  # of a best value held while the next is minimised: what the recheck of a constraint forgives
@@ -25,15 +27,25 @@ class Asker:
         problem: with `pareto`.
         options: how to solve each, with so many new starts, against branches that the neighbours do not lead to.
         ranges: of the objectives over the front, once its ends are known.
+        families: what was built for sub-problems that differ in their limits alone.
     """
 
     problem: Problem
     options: Options
     ranges: tuple[float, ...] = ()
+    families: dict[Hashable, Family] = field(default_factory=dict, compare=False)
 
-    def solve(self, problem: Problem, starts: int) -> Solution:
-        """The rechecked solution of a sub-problem, whatever its status."""
-        return solved(problem, replace(self.options, starts=starts))
+    def solve(
+        self, problem: Problem, starts: int, near: Sequence[Solution] = (), blind: bool = False
+    ) -> Solution:
+        """The rechecked solution of a sub-problem, whatever its status, from designs near by and so many new starts."""
+        limits = [n for n in eps_names(self) if n in problem.constraints]
+        family = self.families.setdefault(
+            (problem.minimize, *limits, *problem.fixed.items()), Family([n + LIMIT for n in limits], memory=True)
+        )
+        beside = [_inside(problem, n) for n in near]
+        options = replace(self.options, starts=starts + len(beside) + bool(problem.start))
+        return solved(problem, options, family, beside, blind)
 
     def later(self, count: int) -> "Asker":
         """The same with other starts."""
@@ -81,10 +93,7 @@ def least(
     asked = subproblem(ask, k, limits)
     if pin is not None and near:
         asked = _pinned(ask, asked, pin, near[0])
-    trials = [(_started(asked, n), 1 if few or m else 1 + ask.options.starts) for m, n in enumerate(near)] or [
-        (asked, _RETRY)
-    ]
-    ended = [ask.solve(problem, starts) for problem, starts in trials]
+    ended = [ask.solve(asked, (0 if few else ask.options.starts) if near else _RETRY, near, blind=few)]
     if not few and all(s.status != "optimal" for s in ended):
         ended.append(ask.later(1).solve(asked, _RETRY))
     found = min((s for s in ended if s.status == "optimal"), key=lambda s: s.value, default=None)
@@ -146,14 +155,13 @@ def _tightened(ask: Asker, k: int, limits: Mapping[int, float], found: Solution)
     held = {**limits, k: values[k] + _SLACK * (1 + abs(values[k]))}
     rest = " + ".join(f"({ask.texts[j]}) / {ask.ranges[j]!r}" for j in loose)
     asked = _pinned(ask, replace(subproblem(ask, k, held), minimize=rest), k, found)
-    better = ask.solve(_started(asked, found), 1 + ask.options.starts)
+    better = ask.solve(asked, ask.options.starts, [found])
     gain = sum((values[j] - b) / ask.ranges[j] for j, b in enumerate(objectives(ask, better)) if j in loose)
     return better if better.status == "optimal" and gain > _WORTH else found
 
 
-def _started(problem: Problem, near: Solution) -> Problem:
-    ends = {n: (lo, hi, near.parameters[n]) for n, (lo, hi) in problem.free.items()}
-    return replace(problem, start={n: min(max(v, lo), hi) for n, (lo, hi, v) in ends.items()})
+def _inside(problem: Problem, near: Solution) -> dict[str, float]:
+    return {n: min(max(near.parameters[n], lo), hi) for n, (lo, hi) in problem.free.items()}
 
 
 def _pinned(ask: Asker, asked: Problem, k: int, best: Solution) -> Problem:

@@ -58,6 +58,7 @@ def search(work: Workspace, nlp: NLP, most: int | None = None) -> list[Candidate
             return candidates
     if part.start and len(candidates) < starts:  # the user's own
         candidates.append(run.ended(middle(part), near=True))
+    candidates += [run.ended(design, near=True) for design in work.beside if work.holds(design)]
     for design, near in islice(starting(work, candidates), max(starts - len(candidates), 0)):
         hopeful = work.sample is None and any(c.feasible for c in candidates)
         candidates.append(_otherwise(run, design, run.ended(design, near, hopeful)))

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.arithmetic.sequence import golden_steps
+from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Problem
 from tmsopt.formulation.judgement import Judged, judged
 from tmsopt.records import Array
@@ -28,7 +29,9 @@ _APART = 0.15  # of the box: distance of designs that may lie in different basin
 _RANKED = 1024  # first ones of an order among which those apart are chosen
 _LEADERS, _BOLD = 8, 8  # designs to start from, of either kind
 _CELL = 0.05  # of the box
-_SOUGHT = 256  # designs from which limits are approached
+_SOUGHT, _SOUGHT_AGAIN = 256, 32  # designs from which limits are approached; beside those that are remembered
+_REMEMBERED = 256  # refined ones
+_NO_ROWS = np.arange(0)
 NARROW = 0.02  # share of designs that meet all limits, below which little is feasible
 _LOCAL = 40  # designs looked at around each that is refined, in each round
 _REACHES = (0.1, 0.03, 0.008, 2e-3, 4e-4)  # of the box, round after round
@@ -151,17 +154,44 @@ class Sample:
         return excluded(self.refined)
 
 
+@dataclass
+class Remembered:
+    """What was seen of one box, for problems that differ in the numbers of their limits alone.
+
+    Attributes:
+        u: designs that were refined for another of them.
+        drawn: the first designs, what they are, and the limits that this was said of.
+    """
+
+    u: Array | None = None
+    drawn: tuple[Array, Judged, Array] | None = None
+
+    def recall(self, limits: Array) -> tuple[Array, Judged] | None:
+        """The first designs, judged by other limits."""
+        if self.drawn is None:
+            return None
+        u, found, old = self.drawn
+        return u, replace(found, beyond=found.beyond + (old - limits)[:, None])
+
+    def keep(self, u: Array) -> None:
+        """Remember designs, the latest ones."""
+        self.u = u if self.u is None else np.concatenate([u, self.u])[:_REMEMBERED]
+
+
 class Sampler:
     """Looks at designs of one box, and counts them.
+
+    Args:
+        memory: of the same box under other limits.
 
     Attributes:
         scales: of each limit's excess.
         count: of designs looked at.
     """
 
-    def __init__(self, problem: Problem, seed: int) -> None:
+    def __init__(self, problem: Problem, seed: int, memory: Remembered | None = None) -> None:
         self.space, self.rng = Cube(problem), np.random.default_rng([seed, 16])
-        self.count = 0
+        self.count, self.memory = 0, memory
         self.scales = np.ones(len(problem.conditions))
         self._offset = np.random.default_rng(seed).random(self.space.size)
 
@@ -180,10 +210,15 @@ class Sampler:
         ranked = drawn.take(drawn.ranked[:_RANKED])
         leaders = ranked.take(apart(ranked, _LEADERS))
         if np.sum(drawn.violation == 0) < NARROW * len(drawn):
-            sought = self.nearer(ranked.take(_spread(ranked, _SOUGHT)))
+            sought = self.look(self.memory.u) if self.memory and self.memory.u is not None else drawn.take(_NO_ROWS)
+            if np.sum(sought.violation == 0) < _LEADERS:
+                few = _spread(ranked, _SOUGHT_AGAIN if len(sought) else _SOUGHT)
+                sought = self.nearer(ranked.take(few)).joined(sought)
             sought = sought.take(sought.ranked)
             leaders = sought.take(apart(sought, 2 * _LEADERS))
         refined = self.refined(leaders)
+        if self.memory:
+            self.memory.keep(refined.u)
         bold = drawn.take(np.argsort(drawn.worth, kind="stable")[:_RANKED])
         known = drawn.worth[np.isfinite(drawn.worth)]
         spread = float(np.subtract(*np.percentile(known, [75, 25]))) if known.size else 0.0
@@ -203,6 +238,17 @@ class Sampler:
 
     def draw(self) -> Looked:
         """Corners, a quasi-random sequence, and some of it moved to faces."""
+        limits = np.array([limit_of(text) or 0.0 for text in self.problem.constraints.values()])
+        recalled = self.memory.recall(limits) if self.memory else None
+        u, found = recalled or self._first()
+        if self.memory and recalled is None:
+            self.memory.drawn = u, found, limits
+        for k, beyond in enumerate(found.beyond):
+            known = np.abs(beyond[np.isfinite(beyond)])
+            self.scales[k] = float(np.median(known)) if known.size and np.median(known) > 0 else 1.0
+        return self._standing(u, found)
+
+    def _first(self) -> tuple[Array, Judged]:
         size = self.space.size
         cost = max(1, len(self.problem.cases)) * (1 if self.problem.model.degree <= _QUICK else _SLOWER)
         count = max(min(_FIRST * _EACH ** min(size, _MANY), _MOST) // cost, _LEAST)
@@ -210,11 +256,7 @@ class Sampler:
         u[::_FACES] = np.clip(3 * u[::_FACES] - 1, 0.0, 1.0)
         corners = np.array(list(product((0.0, 1.0), repeat=size))) if size <= _CORNERS else np.empty((0, size))
         u = np.concatenate([np.full((1, size), 0.5), corners, u])
-        found = self._judged(u)
-        for k, beyond in enumerate(found.beyond):
-            known = np.abs(beyond[np.isfinite(beyond)])
-            self.scales[k] = float(np.median(known)) if known.size and np.median(known) > 0 else 1.0
-        return self._standing(u, found)
+        return u, self._judged(u)
 
     def refined(self, start: Looked, reaches: Sequence[float] = _REACHES) -> Looked:
         """Each design improved by random steps that become shorter, limits first."""

@@ -66,8 +66,16 @@ def solve(
     return solution
 
 
-def solved(design: Given, options: Options = DEFAULTS, family: Family | None = None) -> Solution:
-    """A solution as it is; of a problem, or of a file, what `solve` finds, whatever its status."""
+def solved(
+    design: Given, options: Options = DEFAULTS, family: Family | None = None,
+    beside: Sequence[Mapping[str, float]] = (), blind: bool = False,
+) -> Solution:  # fmt: skip
+    """A solution as it is; of a problem, or of a file, what `solve` finds, whatever its status.
+
+    Args:
+        beside: designs that may be close to the optimum, to be started from.
+        blind: search from these and the problem's start alone, without a look at the box.
+    """
     if isinstance(design, Solution):
         return design
     problem = question_of(design)
@@ -80,7 +88,7 @@ def solved(design: Given, options: Options = DEFAULTS, family: Family | None = N
             _check_near(problem, options.near)
             near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items() if n in options.near}
             options = replace(options, near=near)
-        work = workspace(problem, options, family)
+        work = workspace(problem, options, family, beside, blind)
         parts = [part for part in work.parts() if not options.near or part.holds(options.near)]
         explored: list[Explored] = []
         try:

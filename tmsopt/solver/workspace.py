@@ -22,7 +22,7 @@ from tmsopt.formulation.options import DEFAULTS, Options
 from tmsopt.margins.nearest import Robustness, robustness_at
 from tmsopt.models import Quantity, Values
 from tmsopt.records import Array
-from tmsopt.solver.sample import Sample, Sampler
+from tmsopt.solver.sample import Remembered, Sample, Sampler
 
 _KEPT = 32
 """NLPs kept, with three solvers each: where cases are added row by row, most are not met again."""
@@ -41,10 +41,12 @@ class Family:
     Args:
         varied: names of the numbers that differ: fixed parameters, and ``trail.limit`` for the number that the
             constraint ``trail`` compares with. They are parameters of the NLPs; the box may differ too.
+        memory: of what was seen of the box, where it and all but limits are the same.
     """
 
-    def __init__(self, varied: Collection[str] = ()) -> None:
+    def __init__(self, varied: Collection[str] = (), memory: bool = False) -> None:
         self.varied = tuple(varied)
+        self._memories: OrderedDict[Hashable, Remembered] | None = OrderedDict() if memory else None
         self._nlps: OrderedDict[Hashable, NLP] = OrderedDict()
         self._made: OrderedDict[Hashable, tuple[ca.Function, Any]] = OrderedDict()
         self._around: OrderedDict[Hashable, Robustness] = OrderedDict()
@@ -78,6 +80,10 @@ class Family:
         key = (tuple(parameters.items()), tuple(problem.weights.items()))
         return _kept(self._around, key, lambda: robustness_at(problem, parameters))
 
+    def memory(self, part: Problem) -> Remembered | None:
+        """What was seen of a part of the box."""
+        return None if self._memories is None else _kept(self._memories, tuple(part.free.items()), Remembered)
+
     def _of(self, nlp: NLP, options: Hashable, make: Callable[[], T]) -> T:
         """Something made of an NLP's functions, which are kept with it lest another gets their address."""
         made: T = _kept(self._made, (id(nlp.functions), options), lambda: (nlp.functions, make()), 3 * _KEPT)[1]
@@ -108,6 +114,8 @@ class Workspace:
         part: the problem on the part of the box that designs are drawn from, e.g. one sign of one parameter.
         name: of the part, e.g. ``forward tilt``; empty for the whole box.
         family: that the problem is one of.
+        beside: designs that may be close to the optimum, to be started from.
+        blind: whether to do without a sample.
         met: where starts ended in any part of the box, each with the NLP that it was started in.
     """
 
@@ -116,6 +124,8 @@ class Workspace:
     options: Options
     family: Family
     name: str = ""
+    beside: tuple[Mapping[str, float], ...] = ()
+    blind: bool = False
     met: list[tuple[NLP, Candidate]] = field(default_factory=list, compare=False)
 
     @cached_property
@@ -126,8 +136,8 @@ class Workspace:
     @cached_property
     def sampler(self) -> Sampler | None:
         """Looks at designs of this part; None where arrays cannot tell what is asked of them."""
-        told = self.part.pattern is None and not self.part.asks_radius
-        return Sampler(self.part, self.options.seed) if told else None
+        told = self.part.pattern is None and not self.part.asks_radius and not self.blind
+        return Sampler(self.part, self.options.seed, self.family.memory(self.part)) if told else None
 
     @cached_property
     def sample(self) -> Sample | None:
@@ -171,9 +181,12 @@ class Workspace:
         return all(lower <= design.get(n, lower) <= upper for n, (lower, upper) in self.part.free.items())
 
 
-def workspace(problem: Problem, options: Options = DEFAULTS, family: Family | None = None) -> Workspace:
+def workspace(
+    problem: Problem, options: Options = DEFAULTS, family: Family | None = None,
+    beside: Sequence[Mapping[str, float]] = (), blind: bool = False,
+) -> Workspace:  # fmt: skip
     """The workspace of a problem in its whole box."""
-    return Workspace(problem, problem, options, family or Family())
+    return Workspace(problem, problem, options, family or Family(), beside=tuple(beside), blind=blind)
 
 
 def _on(problem: Problem, name: str, ends: tuple[float, float]) -> Problem:
