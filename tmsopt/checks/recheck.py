@@ -8,6 +8,7 @@ from functools import lru_cache
 import casadi as ca
 import flint
 import numpy as np
+from numpy.typing import NDArray
 
 from tmsopt.arithmetic.intervals import ranges
 from tmsopt.arithmetic.walk import NotAccepted
@@ -15,10 +16,10 @@ from tmsopt.design.cases import Case
 from tmsopt.design.dependence import varies
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES
+from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE
 from tmsopt.margins.nearest import Robustness, robustness_at
 from tmsopt.models import Model, Values
-from tmsopt.records import Table
+from tmsopt.records import Array, Table
 from tmsopt.roots import Structure, exact_abscissa, pattern_distance, roots
 
 FEASIBLE = 1e-9
@@ -28,6 +29,7 @@ MATCHED = 1e-10
 """Relative change of a coefficient up to which a pattern counts as located."""
 
 _SCATTER = 2e-3  # of the largest root: five times what numeric roots beside a 4-fold one are off
+_TAKEN = 10 * STRUCTURE_TOLERANCE  # of the terms of a polynomial, more than those are off that are taken for multiple
 _DIGITS = 120  # products of five doubles are exact, and the tangent is right far beyond the answer
 
 
@@ -207,19 +209,31 @@ def _look(
 def _candidates(each: Sequence[Values]) -> tuple[list[int], list[int], list[int]]:
     """Cases that may have the largest abscissa, the least damping ratio and the greatest angular frequency.
 
-    Numeric roots are off by 4e-4 at most.
+    Numeric roots are off by 4e-4 at most, simple ones by far less.
     """
     a = np.array([[float(c) for c in values.coefficients] for values in each])
     if len(each) == 1 or not np.all(np.isfinite(a)) or np.any(a[:, 0] == 0):
         return list(range(len(each))), list(range(len(each))), list(range(len(each)))
     z = roots(a)
-    size = np.abs(z).max(axis=1)
+    off = _off(a, z)
     ratio = np.min(-z.real / (np.abs(z) + 1e-300), axis=1)
+    off_ratio = np.minimum(_SCATTER, np.max(off / (np.abs(z) + 1e-300), axis=1))
     top, fastest = (
-        np.flatnonzero(high + _SCATTER * size >= (high - _SCATTER * size).max()).tolist()
-        for high in (z.real.max(axis=1), z.imag.max(axis=1))
+        np.flatnonzero((part + off).max(axis=1) >= (part - off).max(axis=1).max()).tolist() for part in (z.real, z.imag)
     )
-    return top, np.flatnonzero(ratio <= ratio.min() + 2 * _SCATTER).tolist(), fastest
+    least = np.flatnonzero(ratio - 2 * off_ratio <= (ratio + 2 * off_ratio).min()).tolist()
+    return top, least, fastest
+
+
+def _off(a: Array, z: NDArray[np.complex128]) -> Array:
+    """How far numeric roots may be off: by what the polynomial is off over its slope, at most as multiple ones are."""
+    size = np.abs(z)
+    powers = np.arange(a.shape[1] - 1, -1, -1)
+    terms = (np.abs(a)[:, None] * size[..., None] ** powers).sum(axis=-1)
+    slope = np.abs((a[:, None, :-1] * powers[:-1] * z[..., None] ** (powers[:-1] - 1)).sum(axis=-1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first = np.nan_to_num(_TAKEN * terms / slope, nan=np.inf)
+    return np.asarray(np.minimum(first, _SCATTER * size.max(axis=1, keepdims=True)))
 
 
 def _objective(problem: Problem, nominal: Values, each: Sequence[Values], cases: Sequence[Case]) -> float:

@@ -3,6 +3,7 @@
 import heapq
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import count, product
 from typing import Any
 
@@ -127,16 +128,18 @@ class _Space:
         u = _grid(size)
         high = badness(u)
         step = 1 / (_LINE - 1) if size == 1 else 0.5 * len(u) ** (-1 / size)
-        chosen, rng = _apart(u, high, 4 * step), np.random.default_rng(0)
-        best, value, rows = u[chosen], high[chosen], np.arange(len(chosen))
-        looks = np.array([[_moves(rng, size) for _ in range(_LOOKS)] for _ in chosen])
-        for moves in np.moveaxis(looks, 1, 0):
-            around = np.clip(best[:, None] + step * moves, 0, 1)
-            trial = badness(around.reshape(-1, size)).reshape(around.shape[:2])
-            top = trial.argmax(axis=1)
-            higher = trial[rows, top] > value
-            best[higher], value[higher] = around[rows, top][higher], trial[rows, top][higher]
-            step *= _SHRINK if size == 1 else _SHRINK ** (1 / 2)
+        rows = _apart(u, high, 4 * step)
+        best, value = u[rows], high[rows]
+        every = _moves(len(rows), size)
+        for look in range(_LOOKS):  # all peaks at once: calls cost more than points
+            reach = step * (_SHRINK if size == 1 else _SHRINK ** (1 / 2)) ** look
+            around = np.clip(best[:, None] + reach * every[:, look], 0, 1)
+            trial = badness(around.reshape(-1, size)).reshape(len(rows), _AROUND)
+            top = np.argmax(trial, axis=1)
+            peak = np.arange(len(rows))
+            higher = trial[peak, top] > value
+            best = np.where(higher[:, None], around[peak, top], best)
+            value = np.where(higher, trial[peak, top], value)
         yield from map(self.case, best)
 
     def _columns(self, u: Array) -> tuple[dict[str, Array], dict[str, Array]]:
@@ -181,11 +184,16 @@ def _grid(size: int) -> Array:
     return np.concatenate([corners, middles, *edges, (0.5 + steps) % 1.0])
 
 
-def _moves(rng: np.random.Generator, size: int) -> Array:
-    """Random steps, every other one along one side: edges stay."""
-    moves = rng.uniform(-1, 1, (_AROUND, size))
-    moves[::2] *= np.arange(size) == rng.integers(0, size, (len(moves[::2]), 1))
-    return moves
+@lru_cache(maxsize=64)
+def _moves(peaks: int, size: int) -> Array:
+    """Steps about each of some points in look after look, every other one along one side: edges stay."""
+    rng = np.random.default_rng(0)
+    every = np.empty((peaks, _LOOKS, _AROUND, size))
+    for moves in every.reshape(-1, _AROUND, size):
+        moves[:] = rng.uniform(-1, 1, (_AROUND, size))
+        moves[::2] *= np.arange(size) == rng.integers(0, size, (len(moves[::2]), 1))
+    every.flags.writeable = False
+    return every
 
 
 def _apart(u: Array, high: Array, distance: float) -> list[int]:
