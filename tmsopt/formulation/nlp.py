@@ -118,6 +118,7 @@ class NLP:
         size: of the objective, as far as it is known beforehand.
         units: of the first variables, the free parameters, in which a solver of absolute tolerances moves them.
         objective_unit: likewise, of the objective where it is small.
+        hessian: (x, p, λ of f, λ of g) → that of the Lagrangian, its upper half, where it need not be derived.
     """
 
     formulation: str
@@ -139,6 +140,7 @@ class NLP:
     size: float = 1.0
     units: tuple[float, ...] = ()
     objective_unit: float = 1.0
+    hessian: ca.Function | None = field(repr=False, default=None)
 
     def at(self, x: Any, settings: Any = None) -> Any:
         """f and g for numbers or CasADi expressions; with the NLP's own settings unless others are given."""
@@ -153,7 +155,9 @@ class NLP:
         x, p = ca.SX.sym("x", len(self.variables)), ca.SX.sym("p", len(self.settings))
         function = ca.Function("nlp", [x, p], self.at(x, p), ["x", "p"], ["f", "g"])
         first = {of: function.factory("d" + of, ["x", "p"], [of, d]) for of, d in _FIRST.items()}
-        second = function.factory("dd", ["x", "p", "lam:f", "lam:g"], ["triu:hess:gamma:x:x"], {"gamma": ["f", "g"]})
+        second = self.hessian or function.factory(
+            "dd", ["x", "p", "lam:f", "lam:g"], ["triu:hess:gamma:x:x"], {"gamma": ["f", "g"]}
+        )
         return function, {"grad_f": first["f"], "jac_g": first["g"], "hess_lag": second}
 
     @property

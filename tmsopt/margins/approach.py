@@ -12,6 +12,7 @@ import numpy as np
 from tmsopt.formulation.ipopt import Point, Run, ipopt, polisher
 from tmsopt.formulation.nlp import NLP
 from tmsopt.margins.boundaries import Edge
+from tmsopt.margins.curvature import curvature
 from tmsopt.margins.surroundings import Place
 from tmsopt.records import Array
 
@@ -113,6 +114,7 @@ def _nlp(place: Place, edge: Edge) -> NLP:
     equations = [e / sizes[k] for e, k in zip(edge.equations(c, unknowns), edge.powers, strict=True)]
     others = edge.nonnegative(c, unknowns)
     f, g = sum(v * v for v in y), ca.vertcat(*equations, *others)
+    operations = ca.Function("coefficients", [x, p], [ca.vertcat(*c)]).n_instructions()
     return NLP(
         formulation="nearest",
         variables=(*place.weights, *edge.unknowns),
@@ -123,4 +125,5 @@ def _nlp(place: Place, edge: Edge) -> NLP:
         row_lower=(0.0,) * (len(equations) + len(others)),
         row_upper=(*[0.0] * len(equations), *[np.inf] * len(others)),
         settings=(np.nan,) * sum(parts),
+        hessian=curvature(model, of, tuple(place.weights), edge, operations),
     )
