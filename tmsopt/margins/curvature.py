@@ -20,7 +20,7 @@ _WORTH = 50_000
 """Operations of the coefficients, times parameters that move, from which this is faster than an expression."""
 
 
-class Curvature(ca.Callback):  # type: ignore[misc]
+class Curvature(ca.Callback):
     """The upper Hessian of the Lagrangian of a nearest point, for CasADi: (x, p, λ of the objective, λ of the rows)."""
 
     def __init__(self, edge: ca.Function, pencil: "_Pencil", parts: tuple[int, ...]) -> None:

@@ -4,7 +4,7 @@ In: coefficients, highest power first. Out: roots, verdicts on stability, counts
 first; `patterns` says which roots meet, `quartics` takes millions at once.
 """
 
-from tmsopt.roots.count import real_roots
+from tmsopt.roots.count import may_be_real, real_roots
 from tmsopt.roots.exact import exact_abscissa, exact_roots
 from tmsopt.roots.numeric import abscissa, backward_error, rebuilt, roots
 from tmsopt.roots.patterns.composed import PATTERNS, composition, pattern
@@ -19,7 +19,7 @@ from tmsopt.roots.stability import discriminant, hurwitz_minors, is_stable, lien
 __all__ = [
     "CLASSES", "PATTERNS", "Classes", "Factors", "Motion", "Pattern", "Root", "Structure", "abscissa",
     "abscissa_and_damping", "backward_error", "composition", "determinant", "discriminant", "evaluate",
-    "exact_abscissa", "exact_roots", "hurwitz_minors", "is_stable", "lienard_chipart", "multiple_real_roots",
+    "exact_abscissa", "exact_roots", "hurwitz_minors", "is_stable", "lienard_chipart", "may_be_real", "multiple_real_roots",
     "pattern", "pattern_distance", "product", "quadratic_pencil", "quartic_classes", "quartic_factors",
     "quartic_is_stable", "real_roots", "rebuilt", "roots", "routh", "shift", "structure",
 ]  # fmt: skip

@@ -45,6 +45,27 @@ def real_roots(coefficients: ArrayLike, exact: bool = True) -> tuple[Counts, Cou
     return negative.reshape(c.shape[:-1]), positive.reshape(c.shape[:-1])
 
 
+def may_be_real(coefficients: Array) -> NDArray[np.bool_]:
+    """Where all roots may be real: a sequence of Sturm's that surely turns its sign shows that some are not.
+
+    Args:
+        coefficients: shape (rows, n + 1), finite, with leading ones other than 0.
+    """
+    c = _scaled(coefficients)
+    n = c.value.shape[1] - 1
+    power = np.arange(n, 0, -1.0)
+    before, here = c, rounded(c.value[:, :-1] * power, c.error[:, :-1] * power)
+    sign, left = np.sign(c.value[:, 0]), np.arange(len(c.value))
+    with np.errstate(all="ignore"):
+        for _ in range(n - 1):
+            before, here = here, _next(before, here)
+            kept = ~(here.value[:, 0] * sign[left] < -here.error[:, 0])
+            before, here, left = before[kept], here[kept], left[kept]
+    possible = np.zeros(len(c.value), dtype=bool)
+    possible[left] = True
+    return possible
+
+
 def _scaled(c: Array) -> Bounded:
     """In units near the largest term of the Fujiwara bound, a leading one near 1: powers of 2, so without rounding."""
     n = np.arange(c.shape[1])
