@@ -1,5 +1,6 @@
 from .axis import edges_at as edges_at
 from .boundaries import edges as edges, heavily_damped as heavily_damped
+from .curvature import curvature as curvature
 from .nearest import (
     Nearest as Nearest, Robustness as Robustness, nearest as nearest, robustness as robustness,
     robustness_at as robustness_at,

@@ -55,7 +55,8 @@ class Curvature(ca.Callback):
         y, unknowns = x[: self._n], x[self._n :]
         numbers, weights, scale, sizes, (sign, size) = np.split(p, self._ends)
         by_coefficient, own = (part.full() for part in self._edge(unknowns, sizes, rows))
-        moved = self._pencil.hessian(numbers, weights * size * y, sign * by_coefficient.ravel() / scale, scale)
+        with np.errstate(all="ignore"):  # far out in a line search: what is not finite is turned down
+            moved = self._pencil.hessian(numbers, weights * size * y, sign * by_coefficient.ravel() / scale, scale)
         found = np.zeros((len(x), len(x)))
         found[: self._n, : self._n] = size**2 * np.outer(weights, weights) * moved + 2 * objective * np.eye(self._n)
         found[self._n :, self._n :] = own
@@ -76,7 +77,7 @@ class _Pencil:
         bend = ca.hessian(ca.dot(w, entries), steps)[0]
         self._entries = ca.Function("entries", [symbols], [ca.densify(entries)])
         self._slope = ca.Function("slope", [symbols], [slope])
-        self._straight = None if bend.nnz() else self._slope(0).full()
+        self._straight = None if ca.depends_on(slope, symbols) else self._slope(0).full()  # on those that stay too
         self._bend = ca.Function("bend", [symbols, w], [bend])
 
     def hessian(self, numbers: Array, displacement: Array, by_coefficient: Array, scale: Array) -> Array:
