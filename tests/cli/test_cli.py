@@ -183,6 +183,20 @@ def test_an_answer_that_cannot_be_written_is_no_traceback():
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["ep4.toml", "--over", "Fr"], "--over: says what --plot draws over; add --plot FILE, or leave it out\n"),
+        (["pareto.toml", "--over", "Fr", "--plot", "front.png"], "--over: is for one design, and the file asks for a front"),
+        (["pareto.toml", "--points", "9999999999"], "9999999999 is not in the range 2<=x<=10000"),
+    ],
+)
+def test_what_would_have_no_effect_or_no_end_is_refused(capsys, words, said):
+    status, out, err = run(capsys, "solve", f"problems/{words[0]}", *words[1:])
+    assert (status, out) == (2, "")
+    assert said in err
+
+
 @pytest.mark.parametrize("option", ["--certify", "--full", "--plot=all.png", "--wheelbase=2", "--rear-mass=3"])
 def test_all_designs_are_not_one(capsys, option):
     code, out, err = run(capsys, "solve", "problems/ep4_matching.toml", "--all", option)

@@ -126,7 +126,8 @@ def words(told: Progress, since: float = 0.0) -> str:
         known = math.isfinite(told.most)
         text += f": {told.done:,.0f}{f' of {told.most:,.0f}' * known} {told.unit}"
         text += "" if (told.most if known else told.done) == 1 else "s"
-        text += f", about {_time(max(math.ceil(told.left - since), 1))} left" if math.isfinite(told.left) else ""
+        left = told.left - since  # below 0 it was estimated too short
+        text += f", about {_time(math.ceil(left))} left" if left > 0 else ""
     text += f"; {told.note}" if told.note else ""
     return text if told.unit == "s" or seconds < 1 else f"{text} ({_time(seconds)})"
 

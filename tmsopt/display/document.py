@@ -1,5 +1,6 @@
 """A result as one file to hand on: it needs no network and no script, and whoever reads it has no tmsopt."""
 
+import math
 import platform
 from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
@@ -15,7 +16,7 @@ from tmsopt.display.markup import Chapter, facts, verbatim, words
 from tmsopt.display.page import badges
 from tmsopt.display.writers import WRITERS, report, title_of
 from tmsopt.errors import Fault, InputError, short
-from tmsopt.progress import Listener, counted
+from tmsopt.progress import Counts, Listener, counted
 
 if TYPE_CHECKING:
     from tmsopt.design import Solution
@@ -56,16 +57,21 @@ def save_report(
     place = path_of(path, "the file to write")
     if place.suffix.lstrip(".").lower() not in ENDINGS:
         raise InputError([Fault(f"found '{place}'; accepted: a file name ending in {', '.join(ENDINGS)}", ("path",))])
-    counted(progress, "writing the page")
-    write_text(place, _document(result, command, files or {}, seed, full, design))
+    steps = counted(progress, "writing the page", "part")
+    write_text(place, _document(result, command, files or {}, seed, full, design, steps))
 
 
 def _document(
-    result: Any, command: str, files: Mapping[str, str], seed: int | None, full: bool, design: "Solution | None"
+    result: Any, command: str, files: Mapping[str, str], seed: int | None, full: bool, design: "Solution | None",
+    progress: Counts | None,
 ) -> str:  # fmt: skip
     """The whole page."""
     name, title = type(result).__name__, words(title_of(result) or "untitled")
-    sections = [part for part in _sections(result, command, files, seed, full, design) if part.body]
+    sections = []
+    for done, part in enumerate(_sections(result, command, files, seed, full, design), 1):
+        sections += [part] if part.body else []
+        if progress:
+            progress(done, math.nan, f"{part.heading} done")
     links = " ".join(f'<a href="#{part.name}">{words(part.heading)}</a>' for part in sections)
     body = "\n".join(part.markup for part in sections)
     style, script = (resources("tmsopt.display").joinpath("document", f"document.{ending}") for ending in ("css", "js"))
