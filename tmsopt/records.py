@@ -1,7 +1,7 @@
 """What records are made of, what results show of themselves, and records as plain data."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
@@ -23,9 +23,6 @@ SCHEMA = 1
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Truth = NDArray[np.bool_]
-
-Progress = Callable[[int, int], None]
-"""Called with what is done and what there is at most."""
 
 
 class Shown(Protocol):

@@ -8,7 +8,7 @@ from itertools import pairwise
 from tmsopt.design.solution import Solution
 from tmsopt.fronts.front import Front, FrontPoint, Gap, Kink, efficient
 from tmsopt.fronts.subproblems import Asker, least, point
-from tmsopt.records import Progress
+from tmsopt.progress import Counts
 
 Objectives = tuple[float, ...]
 
@@ -25,7 +25,7 @@ _MOST = 8  # sub-problems per point asked for, at most
 _CLOSE = 0.3  # of the mean spacing: unlabelled points closer than this to another are left out
 
 
-def curve(ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Progress | None) -> Front:
+def curve(ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Counts | None) -> Front:
     """The front between its two ends, with kinks and gaps.
 
     Each new limit is set where neighbours are farthest apart, on the objective that changes more there; sweeps both
@@ -93,7 +93,7 @@ class _Stretch:
 class _Search:
     """The probes made so far; the front is always read from them afresh."""
 
-    def __init__(self, ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Progress | None) -> None:
+    def __init__(self, ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Counts | None) -> None:
         self.ask, self.ends, self.points, self.progress = ask, tuple(ends), points, progress
         self.probes: list[_Probe] = []
         self.range = tuple(abs(ends[0].objectives[k] - ends[1].objectives[k]) for k in (0, 1))

@@ -6,7 +6,7 @@ from itertools import product
 from tmsopt.design.solution import Solution
 from tmsopt.fronts.front import FrontPoint, Gap, efficient
 from tmsopt.fronts.subproblems import Asker, least, point, solvable
-from tmsopt.records import Progress
+from tmsopt.progress import Counts
 
 MOST = 12
 """Limits per objective at most, so 144 sub-problems."""
@@ -15,7 +15,7 @@ _SAME = 1e-7  # of the range: a corner of the table is held with a slack of 1e-9
 
 
 def surface(
-    ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Progress | None
+    ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Counts | None
 ) -> tuple[tuple[FrontPoint, ...], tuple[Gap, ...], int, bool]:
     """Efficient points, sub-problems that failed, the number of those solved, and whether the user ended it.
 
