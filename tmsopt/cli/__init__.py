@@ -28,11 +28,12 @@ def main(args: "Sequence[str] | None" = None, prog_name: str | None = None) -> "
     if args is None and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the rest is loaded, as it is for SIGTERM
     from tmsopt.cli.ending import ended, gone, listening, streams
+    from tmsopt.cli.terminal import showing
 
     status: int | str | None = 0
     with listening(for_good=args is None) as heard:
         try:
-            with streams(), ended():
+            with streams() as terminal, ended(), showing(terminal):
                 from tmsopt.cli.commands import every
 
                 every.main(args, prog_name)

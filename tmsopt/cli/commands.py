@@ -2,7 +2,6 @@
 
 import logging
 import os
-import sys
 from typing import Any
 
 import click
@@ -21,7 +20,6 @@ from tmsopt.cli.prove import prove
 from tmsopt.cli.solve import compare, solve
 from tmsopt.cli.speeds import speeds
 from tmsopt.cli.study import study
-from tmsopt.cli.terminal import showing
 from tmsopt.cli.trace import trace
 
 
@@ -42,8 +40,8 @@ class _Commands(click.Group):
             return context
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command, with progress shown on a terminal."""
-        with ended(), showing(getattr(sys.stderr, "beneath", sys.stderr)):
+        """Run a command."""
+        with ended():
             return super().invoke(ctx)
 
 

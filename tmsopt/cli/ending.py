@@ -164,26 +164,26 @@ class _Diagnostics:
     """A stream on which nothing fails: what cannot be said must not become of more weight than the answer."""
 
     def __init__(self, stream: Any) -> None:
-        self.beneath = stream
+        self._stream = stream
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self.beneath, name)
+        return getattr(self._stream, name)
 
     def write(self, text: str) -> int:
         """Write, if anybody takes it, where progress is shown before."""
         with quiet(), suppress(OSError, ValueError):
-            self.beneath.write(text)
+            self._stream.write(text)
         return len(text)
 
     def flush(self) -> None:
         """Likewise."""
         with suppress(OSError, ValueError):
-            self.beneath.flush()
+            self._stream.flush()
 
 
 @contextmanager
-def streams() -> Iterator[None]:
-    """Streams that are there and take every character; what one does not take in the end goes nowhere.
+def streams() -> Iterator[TextIO]:
+    """Streams that are there and take every character, stderr as it was; what one does not take in the end goes nowhere.
 
     What was closed when the program began reads as empty, hears what is said, and refuses an answer. Otherwise the next
     file that is opened would stand in its place, and be written into.
@@ -198,7 +198,7 @@ def streams() -> Iterator[None]:
     out, err = sys.stdout, sys.stderr
     sys.stderr = cast(TextIO, _Diagnostics(err))
     try:
-        yield
+        yield err
     finally:
         sys.stderr = err
         for stream in (out, err):
