@@ -183,7 +183,7 @@ class _Diagnostics:
 
 @contextmanager
 def streams() -> Iterator[TextIO]:
-    """Streams that are there and take every character, stderr as it was; what one does not take in the end goes nowhere.
+    """Streams that are there and take every character, and stderr itself; what one takes not in the end goes nowhere.
 
     What was closed when the program began reads as empty, hears what is said, and refuses an answer. Otherwise the next
     file that is opened would stand in its place, and be written into.
