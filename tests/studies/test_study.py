@@ -463,9 +463,11 @@ def test_rows_that_a_study_cannot_have_are_refused(number: int, varied: dict[str
     study, path = over_grid("problems/ep4.toml", {"mu": [0.1, 0.2]}), tmp_path / "s.sqlite"
     with open_store(path, definition(study)) as store:
         store.add([Row(1, 1, Table({"mu": 0.2}), "failed"), Row(number, 1, Table(varied), "failed")])
-    for call in (lambda: stored(study, path), lambda: run_study(study, path, progress=pytest.fail)):
+    told: list[Progress] = []
+    for call in (lambda: stored(study, path), lambda: run_study(study, path, progress=told.append)):
         with pytest.raises(InputError, match=f"row {number} is not of this study"):
             call()
+    assert {t.what for t in told} == {"waiting for the store", "reading the store"}
 
 
 def test_what_a_row_says_is_printable(tmp_path: Path) -> None:

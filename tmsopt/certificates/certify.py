@@ -115,7 +115,7 @@ def _bounded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
 def _told(design: Solution, gap: float, level: float) -> str:
     """How good the design is known to be, and what is asked next."""
     known = f"gap {gap:.2g}, bound {design.value - design.problem.sign * gap:.6g}" if math.isfinite(gap) else "no bound"
-    return f"{known}, best {design.value:.6g}; asking for a gap of {_gap(design.value, level):.2g}"
+    return f"{known}, best {design.value:.6g}; asking for {_gap(design.value, level):.2g}"
 
 
 def _next(proved: float, failed: float, converged: bool) -> float | None:
