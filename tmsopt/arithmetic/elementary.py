@@ -127,6 +127,8 @@ _FARTHEST = 2**20  # exponent of two of a fraction made of a ball
 def _chosen(a: Any, b: Any, sign: int) -> Any:
     """(a + b + sign |a − b|)/2, and exactly one of the two where it is certain which."""
     difference = a - b
+    if isinstance(difference, Twofold):
+        return difference.chosen(sign, a, b)
     constant = difference[0] if isinstance(difference, flint.arb_series) else difference
     if sign * constant >= 0:
         return a

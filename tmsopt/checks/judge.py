@@ -18,6 +18,7 @@ from tmsopt.checks.law_rows import SAME_LAW
 from tmsopt.checks.recheck import FEASIBLE
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, ARRAY_ROOT_QUANTITIES, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE
+from tmsopt.design.validate import SMALLEST
 from tmsopt.models import Values, tms
 from tmsopt.records import Array, Truth
 from tmsopt.roots import is_stable
@@ -28,8 +29,6 @@ BLOCK = 8192
 
 _UNIT = 2.0**-53  # relative rounding of a parameter
 _DOUBT = 2.0  # tolerances within which a limit is left to the recheck
-_UNUSED = (TypeError, ValueError, AttributeError, NotImplementedError, ArithmeticError, KeyError)
-"""What a formula may raise that does not take arrays."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +75,7 @@ def verdicts(problem: Problem, columns: Mapping[str, Array], reports: Sequence[s
     try:
         with np.errstate(all="ignore"):
             return _judged(problem, columns, reports)
-    except _UNUSED:
+    except Exception:  # of a formula that does not take arrays, or has no value: each design will tell by itself
         return None
 
 
@@ -136,7 +135,9 @@ def _possible(problem: Problem, given: Mapping[str, Any]) -> Truth:
     for p in of.parameters:
         x, inside = given[p.name], p.range
         low, high = (x >= inside.lower, x <= inside.upper) if inside.closed else (x > inside.lower, x < inside.upper)
-        possible = possible & low & high & ~(p.tangent & (x == 0))
+        size = np.abs(x)
+        possible = possible & low & high & (((size >= SMALLEST) & (size <= 1 / SMALLEST)) | (x == 0))
+        possible = possible & ~(p.tangent & (x == 0))
     for name, (other, _) in of.needs.items():
         possible = possible & ((given[name] == 0) | (given[other] > 0))
     return np.asarray(possible)

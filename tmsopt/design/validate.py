@@ -16,7 +16,8 @@ from tmsopt.roots.patterns.composed import pattern_names
 VARIATIONS = ("scenarios", "tolerances", "weights")
 """Tables of a problem that name parameters beside those of `fixed` and `free`."""
 
-_SMALLEST = 1e-50  # size of a parameter but 0; its inverse is the largest
+SMALLEST = 1e-50
+"""Size of a parameter but 0; its inverse is the largest."""
 
 MOST_TOLERANCES = 8
 """Parameters with a tolerance: a box has two corners for one, 256 for eight."""
@@ -158,7 +159,7 @@ def _variation_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     for table, needed in (("tolerances", "greater than 0"), ("weights", "0 or greater")):
         for name, value in getattr(problem, table).items():
             if name in of.names and not _is_size(value, zero=table == "weights"):
-                sizes = f"a number {needed}, of a size from {_SMALLEST:g} to {1 / _SMALLEST:g}"
+                sizes = f"a number {needed}, of a size from {SMALLEST:g} to {1 / SMALLEST:g}"
                 yield Fault(f"found {short(value)}; accepted: {sizes}", (table, name))
             elif table == "tolerances" and name in of.names:
                 yield from _room_faults(problem, of, name, float(value))
@@ -211,7 +212,7 @@ def _is_size(value: Any, zero: bool) -> bool:
 
 def _is_square(number: float) -> bool:
     """Whether a number is 0 or of a size whose products with a few others are doubles."""
-    return number == 0 or _SMALLEST <= abs(number) <= 1 / _SMALLEST
+    return number == 0 or SMALLEST <= abs(number) <= 1 / SMALLEST
 
 
 def _number_faults(of: ParameterSet, name: str, value: Any, key: tuple[str, ...]) -> Iterator[Fault]:
@@ -224,7 +225,7 @@ def _number_faults(of: ParameterSet, name: str, value: Any, key: tuple[str, ...]
     if not math.isfinite(number):
         yield Fault(f"found {short(value)}; accepted: a finite number{unit and ' in' + unit}", key)
     elif not _is_square(number):
-        yield Fault(f"found {number:g}; accepted: 0, or a size from {_SMALLEST:g} to {1 / _SMALLEST:g}{unit}", key)
+        yield Fault(f"found {number:g}; accepted: 0, or a size from {SMALLEST:g} to {1 / SMALLEST:g}{unit}", key)
     elif number not in parameter.range:
         degrees = f'; write "{number:.6g} deg" for degrees' if parameter.unit == "rad" and abs(number) < 90 else ""
         down = -number in parameter.range and parameter.meaning.endswith("downward")

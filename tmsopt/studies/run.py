@@ -24,6 +24,7 @@ from tmsopt.studies.monte_carlo import Sampling, planned
 from tmsopt.studies.neighbours import blocks
 from tmsopt.studies.row import Row
 from tmsopt.studies.solving import Solver
+from tmsopt.studies.store.definition import doubles
 from tmsopt.studies.store.opening import open_store, read_store
 from tmsopt.studies.store.store import Store
 from tmsopt.studies.study import Study, definition
@@ -143,8 +144,9 @@ def run_study(
     if store is None:
         found, seconds, engine = _carried_out(asked, _none(asked), workers, scheduler, note, progress)
         return Results(asked, gathered(found.blocks, found.rows), found.count, seconds, engine)
+    stated_as = definition(asked, doubles)
     counted(progress, "waiting for the store")
-    with open_store(path_of(store, "an SQLite file"), definition(asked), fresh=fresh) as opened:
+    with open_store(path_of(store, "an SQLite file"), stated_as, fresh=fresh) as opened:
         for line in (*opened.warnings, *([f"moved the old store to {opened.moved}"] if opened.moved else [])):
             note(line)
         counted(progress, "reading the store")

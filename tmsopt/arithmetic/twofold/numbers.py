@@ -54,6 +54,12 @@ class Twofold:
         pairs = (self.high, other.high), (self.low, other.low), (self.off, other.off)
         return Twofold(*(np.where(condition, a, b) for a, b in pairs))
 
+    def chosen(self, sign: int, a: Any, b: Any) -> "Twofold":
+        """Of a difference a − b: a where it has the sign, else b; as far off as the other where that is not certain."""
+        found = twofold(a).where(sign * self.high >= 0, twofold(b))
+        either = np.abs(self.high) <= 2 * self.off
+        return Twofold(found.high, found.low, found.off + np.where(either, np.abs(self.high) + self.off, 0.0))
+
     def __getitem__(self, rows: Any) -> "Twofold":
         return Twofold(*(x[rows] if np.ndim(x) else x for x in (self.high, self.low, self.off)))
 

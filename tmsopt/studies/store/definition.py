@@ -4,9 +4,11 @@ import json
 import sys
 import zlib
 from array import array
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 COLUMNS = "columns"
 """The key of a definition that holds name → one number per row."""
@@ -24,7 +26,7 @@ class Definition:
         """From plain data; tuples become lists, and whole numbers in columns doubles."""
         columns = data.get(COLUMNS, {})
         plain = {name: value for name, value in data.items() if name != COLUMNS}
-        return Definition(json.loads(json.dumps(plain)), {name: array("d", values) for name, values in columns.items()})
+        return Definition(json.loads(json.dumps(plain)), {name: v if isinstance(v, array) else array("d", v) for name, v in columns.items()})
 
     @property
     def data(self) -> dict[str, Any]:
@@ -34,6 +36,11 @@ class Definition:
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``, columns as lists."""
         return self.plain | {COLUMNS: {name: values.tolist() for name, values in self.columns.items()}}
+
+
+def doubles(values: Sequence[float]) -> "array[float]":
+    """Numbers as a column of a definition."""
+    return array("d", np.asarray(values, dtype=np.float64).tobytes())
 
 
 def pack(values: "array[float]") -> bytes:
