@@ -139,8 +139,8 @@ def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) ->
         column: what is made of a column that is no axis of a grid; lists take four times the memory.
     """
     return {
-        "problem": _problem(study.problem), **_columns(study, column), "seed": int(study.seed), "starts": int(study.starts),
-        "warm": study.warm, "report": list(study.report),
+        "problem": _problem(study.problem), **_columns(study, column), "seed": int(study.seed),
+        "starts": int(study.starts), "warm": study.warm, "report": list(study.report),
     }  # fmt: skip
 
 

@@ -26,7 +26,8 @@ class Definition:
         """From plain data; tuples become lists, and whole numbers in columns doubles."""
         columns = data.get(COLUMNS, {})
         plain = {name: value for name, value in data.items() if name != COLUMNS}
-        return Definition(json.loads(json.dumps(plain)), {name: v if isinstance(v, array) else array("d", v) for name, v in columns.items()})
+        made = {name: v if isinstance(v, array) else array("d", v) for name, v in columns.items()}
+        return Definition(json.loads(json.dumps(plain)), made)
 
     @property
     def data(self) -> dict[str, Any]:
