@@ -72,7 +72,7 @@ def relax(work: Workspace) -> Relaxation | None:
         ended = [_least_covered(side, limits, listed) for side in sides]
         reached = [(trial, nlp) for trial, nlp in ended if trial is not None]
         trial, nlp = min(reached, key=lambda found: found[0].point.objective, default=(None, None))
-        met = [] if listed else [found for side in sides for found in _met(work, side, limits)]
+        met = [] if listed else [found for side in sides for found in islice(_met(work, side, limits), 1)]
         least, seen = min(met, key=lambda found: found[0], default=(np.inf, None))
         if seen and (trial is None or least < trial.point.objective * (1 - _TIE)):
             return seen
@@ -87,17 +87,21 @@ def relax(work: Workspace) -> Relaxation | None:
 
 
 def _met(work: Workspace, side: Workspace, limits: Sequence[Limit]) -> Iterator[tuple[float, Relaxation]]:
-    """What designs need that were met on the way: the least violating one looked at, and where starts ended."""
+    """What designs need that were met on the way: the least violating one looked at, and where starts ended.
+
+    Those that need least come first.
+    """
     designs = [design_of(work.problem, end.run.x.tolist()) for _, end in work.met if np.all(np.isfinite(end.run.x))]
     unlimited = _unlimited(side, limits)
     if side.sampler and side.sample:
         refined = side.sampler.refined(side.sample.refined.take(np.arange(1)), _FINEST)
         designs.append(side.sampler.design(refined, 0))
-    for parameters in map(side.problem.ordered, designs):
+    needs = [(p, _amounts(side.problem, limits, p, ())) for p in map(side.problem.ordered, designs)]
+    totals = [sum(abs(amounts.get(limit.name, 0.0)) / limit.scale for limit in limits) for _, amounts in needs]
+    for row in np.argsort(totals, kind="stable").tolist():
+        parameters, amounts = needs[row]
         if not unlimited.recheck(parameters, ()).violations:
-            amounts = _amounts(side.problem, limits, parameters, ())
-            total = sum(abs(amounts.get(limit.name, 0.0)) / limit.scale for limit in limits)
-            yield total, Relaxation(Table(parameters), Table(amounts), tuple(amounts))
+            yield totals[row], Relaxation(Table(parameters), Table(amounts), tuple(amounts))
 
 
 def _stages(problem: Problem) -> Iterator[tuple[Problem, list[Limit]]]:

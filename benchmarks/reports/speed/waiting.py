@@ -90,7 +90,16 @@ work = lambda: tmsopt.solve(problem, throw=False).value""",
     "2 000 built bicycles judged": """
 study = tmsopt.monte_carlo(tmsopt.solve("problems/ep4.toml"), 2000, tolerances={"chi_B": 0.005, "Fr": 0.02})
 work = lambda: tmsopt.run_study(study, workers=1).summary.stable""",
-    "chart of 400 × 300 with its boundaries": "work = lambda: tmsopt.chart('problems/chart.toml').abscissa.min()",
+    "chart of 400 × 300 with its boundaries": """
+tmsopt.chart("problems/chart.toml", boundaries=False)
+work = lambda: tmsopt.chart("problems/chart.toml").abscissa.min()""",
+    "robustness of a 12 × 12 matrix with 144 parameters": """
+import numpy as np
+drawn = np.random.default_rng(0).normal(size=(12, 12)) - 6 * np.eye(12)
+names = [[f"p{i}{k}" for k in "abcdefghijkl"] for i in "abcdefghijkl"]
+model = tmsopt.models.from_state_matrix(names)
+problem = tmsopt.Problem(model, fixed=dict(zip(sum(names, []), drawn.ravel().tolist())))
+work = lambda: tmsopt.robustness(problem).radius""",
     "default report of realistic.toml": """
 solution = solved("realistic")
 work = lambda: len(tmsopt.report.design_report(solution, tmsopt.report.findings(solution)))""",
