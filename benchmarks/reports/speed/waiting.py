@@ -97,7 +97,7 @@ work = lambda: tmsopt.chart("problems/chart.toml").abscissa.min()""",
 import numpy as np
 drawn = np.random.default_rng(0).normal(size=(12, 12)) - 6 * np.eye(12)
 names = [[f"p{i}{k}" for k in "abcdefghijkl"] for i in "abcdefghijkl"]
-model = tmsopt.models.from_state_matrix(names)
+model = tmsopt.models.from_matrices(A=names)
 problem = tmsopt.Problem(model, fixed=dict(zip(sum(names, []), drawn.ravel().tolist())))
 work = lambda: tmsopt.robustness(problem).radius""",
     "default report of realistic.toml": """
