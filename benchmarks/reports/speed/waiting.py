@@ -20,7 +20,7 @@ from tqdm import tqdm
 
 from benchmarks.reports.tables import Asked, duration, page, table, times
 
-_ROUNDS = 5
+_ROUNDS, _LONG = 5, 20.0  # s of a round, beyond which there are three, and one beyond three times as many
 _FEW = 8  # every so manieth, where it is only to be seen that all runs
 _HERE = Path(__file__).parents[3]
 
@@ -61,28 +61,23 @@ casadi.nlpsol = Counted
 """
 
 _END = """
-began = time.perf_counter()
-value = work()
-print(json.dumps([time.perf_counter() - began, float(value)]))
-"""
-
-_SHARES = """
 ran.clear()
 spent = dict(solver=0.0, building=0.0, built=0)
 began = time.perf_counter()
-work()
-print(json.dumps([time.perf_counter() - began, spent["solver"], spent["building"], spent["built"], len(ran), sum(ran)]))
+value = float(work())
+seconds = time.perf_counter() - began
+print(json.dumps([seconds, value, spent["solver"], spent["building"], spent["built"], len(ran), sum(ran)]))
 """
 
 WORKS: Mapping[str, str] = {
     "the most tolerant design": "work = lambda: solved('tolerant').value",
     "front of 25 designs": "work = lambda: ends(tmsopt.pareto('problems/pareto.toml'))",
-    "front of 7 robots, decay against speed": """
+    "front of 5 robots, decay against speed": """
 problem = robot(minimize=None, pareto=("abscissa", "v"))
-work = lambda: ends(tmsopt.pareto(problem, points=7))""",
-    "front of 7 over a band of speeds": """
+work = lambda: ends(tmsopt.pareto(problem, points=5))""",
+    "front of 5 over a band of speeds": """
 problem = replace(tmsopt.load("problems/speed_band.toml"), minimize=None, pareto=("abscissa", "chi_B"))
-work = lambda: ends(tmsopt.pareto(problem, points=7))""",
+work = lambda: ends(tmsopt.pareto(problem, points=5))""",
     "best over a band of speeds": "work = lambda: solved('speed_band').value",
     "a robot with tolerances": """
 problem = robot(tolerances={"x_B": 0.01, "z_B": 0.01, "lambda_s": 0.0175})
@@ -140,25 +135,18 @@ COLD: Mapping[str, tuple[str, ...]] = {
 """Commands in a process of their own; ``{}`` is a folder that is empty at first."""
 
 
-def warm(work: str, tree: Path) -> tuple[float, float]:
-    """Seconds that a work takes in a checkout once the package is imported, and its number."""
-    done = _run(tree, "-c", f"{_START}{work}{_END}")
-    seconds, value = json.loads(done.splitlines()[-1])
-    return seconds, value
-
-
-def shares(work: str, tree: Path) -> list[float]:
-    """Seconds of a work, in IPOPT and in building solvers; solvers built, runs and iterations; of one process."""
-    found: list[float] = json.loads(_run(tree, "-c", f"{_COUNTED}{_START}{work}{_SHARES}").splitlines()[-1])
+def warm(work: str, tree: Path) -> list[float]:
+    """Of a work in a checkout once the package is imported: seconds, its number, and what `_parts` shows."""
+    found: list[float] = json.loads(_run(tree, "-c", f"{_COUNTED}{_START}{work}{_END}").splitlines()[-1])
     return found
 
 
-def cold(words: tuple[str, ...], tree: Path) -> tuple[float, float]:
+def cold(words: tuple[str, ...], tree: Path) -> list[float]:
     """Seconds of a command from start to end, and 0."""
     with TemporaryDirectory() as folder:
         began = time.perf_counter()
         _run(tree, "-m", "tmsopt", *(word.format(folder) for word in words))
-        return time.perf_counter() - began, 0.0
+        return [time.perf_counter() - began, 0.0]
 
 
 def _run(tree: Path, *words: str) -> str:
@@ -181,25 +169,34 @@ def report(asked: Asked) -> str:
         *((name, partial(warm, work)) for name, work in WORKS.items()),
         *((f"`{name}`", partial(cold, words)) for name, words in COLD.items()),
     ]
-    rows = []
+    rows, parts = [], []
     for name, work in tqdm(works[:: _FEW if asked.quick else 1], desc="waiting"):
-        found = [[work(tree) for tree in trees] for _ in range(1 if asked.quick else _ROUNDS)]  # by turns
+        found = [[work(tree) for tree in trees]]
+        for _ in range(0 if asked.quick else _rounds(sum(one[0] for one in found[0])) - 1):
+            found.append([work(tree) for tree in trees])  # by turns
         seconds = [statistics.median(one[k][0] for one in found) for k in range(len(trees))]
         apart = max(abs(one[0][1] - one[-1][1]) / max(1.0, abs(one[0][1])) for one in found)
         beside = (duration(seconds[0]), times(seconds[0] / seconds[-1]), f"{apart:.0e}") if before else ("–",) * 3
         rows.append((name, duration(seconds[-1]), *beside))
+        parts += [_parts(name, tree is _HERE, *one) for tree, one in zip(trees, found[0], strict=True) if len(one) > 2]
     header = ("what", "time", "before", "times as fast", "the answer differs by")
     note = (
-        f"Medians of {_ROUNDS} rounds by turns, each in a process of its own; of commands with its start, of the "
-        "others without start, imports and a first solve."
+        f"Medians of {_ROUNDS} rounds by turns, of 3 where a round takes over {_LONG:.0f} s and of 1 over "
+        f"{3 * _LONG:.0f} s, each in a process of its own; of commands with its start, of the others without start, "
+        "imports and a first solve."
     )
-    profiled = list(WORKS.items())[:: _FEW if asked.quick else 1]
-    parts = [_parts(name, work, tree, tree is not _HERE) for name, work in profiled for tree in trees]
     columns = ("what", "which", "time", "in IPOPT", "building solvers", "the rest", "solvers", "runs", "iterations")
-    return page("Waiting", asked, table(header, rows), note, "### Where the time goes", table(columns, parts))
+    shares = ("### Where the time goes", table(columns, parts), "Of one process: fronts may use others beside it.")
+    return page("Waiting", asked, table(header, rows), note, *shares)
 
 
-def _parts(name: str, work: str, tree: Path, before: bool) -> tuple[object, ...]:
-    whole, solver, building, *counts = shares(work, tree)
+def _rounds(seconds: float) -> int:
+    """How often what takes so long is measured."""
+    return _ROUNDS if seconds < _LONG else 3 if seconds < 3 * _LONG else 1
+
+
+def _parts(
+    name: str, now: bool, whole: float, value: float, solver: float, building: float, *counts: float
+) -> tuple[object, ...]:
     rest = (solver / whole, building / whole, 1 - (solver + building) / whole)
-    return (name, "before" if before else "now", duration(whole), *(f"{part:.0%}" for part in rest), *map(int, counts))
+    return name, "now" if now else "before", duration(whole), *(f"{part:.0%}" for part in rest), *map(int, counts)
