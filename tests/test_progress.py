@@ -155,6 +155,22 @@ def test_nobody_is_told_oftener_than_he_can_read(clock: Clock) -> None:
     assert 15 <= len(told) <= 25
 
 
+def test_a_slow_listener_costs_a_tenth_of_the_time_at_most(clock: Clock) -> None:
+    """A hundred steps of 0.1 s, and a listener that takes as long: it is left alone for nine times that."""
+    called: list[float] = []
+
+    def listen(told: tmsopt.Progress) -> None:
+        called.append(told.done)
+        clock.now += 0.1
+
+    steps = counted(listen, "solving rows", "row")
+    assert steps is not None
+    for done in range(1, 101):
+        clock.now += 0.1
+        steps(done, 100)
+    assert 5 <= len(called) <= 14
+
+
 def test_work_that_is_begun_anew_goes_on_counting(clock: Clock) -> None:
     """12 of 64 starts on one side of the box, then 3 of 64 on the other; and after another piece of work, 5 of 8."""
     told: list[tmsopt.Progress] = []

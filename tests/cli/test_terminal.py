@@ -255,3 +255,11 @@ def test_a_terminal_that_cannot_erase_shows_nothing(tmp_path: Path, monkeypatch:
 )  # fmt: skip
 def test_a_record_in_words(told: Progress, since: float, line: str) -> None:
     assert import_module("tmsopt.cli.terminal").words(told, since) == line
+
+
+def test_what_does_not_fit_is_said_shorter_before_it_is_cut() -> None:
+    words = import_module("tmsopt.cli.terminal").words
+    told = Progress("searching", 7, 64, "start", 3.0, 19.0, "best abscissa = -0.52")
+    assert words(told, 0.0, 80) == "searching: 7 of 64 starts, about 19 s left; best abscissa = -0.52 (3 s)"
+    assert words(told, 0.0, 39) == "searching: 7/64, 19 s left"
+    assert words(told, 0.0, 12) == "searching: 7"

@@ -97,7 +97,7 @@ def study(
         results, stopped = _carried_out(asked, path, fresh, {"workers": workers, "scheduler": scheduler})
         with answering(), quiet():
             _show(results, path, stopped, as_json)
-        for target in exports:
+        for target in exports if len(results.rows) else ():
             with saving("--export", target):
                 results.export(target)
         if plot is not None:

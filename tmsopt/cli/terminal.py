@@ -41,7 +41,7 @@ class _Display:
             now = time.perf_counter()
             if now >= self._due and not self._held and not self._over.is_set():
                 self._due, self._shown = now + _NEXT, True
-                self._write(f"\r{words(self._told, now - self._at)[: self._width() - 1]}\033[K")
+                self._write(f"\r{words(self._told, now - self._at, self._width() - 1)}\033[K")
 
     def hold(self, count: int) -> None:
         """Erase it, and draw nothing until all who hold it have let go."""
@@ -117,8 +117,17 @@ def quiet() -> Iterator[None]:
             line.hold(-1)
 
 
-def words(told: Progress, since: float = 0.0) -> str:
-    """A record as one line, some seconds after it was told."""
+def words(told: Progress, since: float = 0.0, width: int = 1000) -> str:
+    """A record as one line of so many columns, some seconds after it was told; what does not fit is said shorter."""
+    whole = _words(told, since)
+    if len(whole) <= width or not (told.unit and math.isfinite(told.done)):
+        return whole[:width]
+    text = f"{told.what}: {told.done:,.0f}" + (f"/{told.most:,.0f}" if math.isfinite(told.most) else f" {told.unit}")
+    text += f", {_time(max(math.ceil(told.left - since), 1))} left" if math.isfinite(told.left) else ""
+    return text[:width]
+
+
+def _words(told: Progress, since: float) -> str:
     seconds, text = told.seconds + since, told.what
     if told.unit == "s" and math.isfinite(told.most):
         text += f": {min(told.done + since, told.most):.0f} of {told.most:.0f} s"

@@ -126,6 +126,8 @@ _SHARES = {"stable": "stable", "feasible": "every constraint met", "good": "both
 
 
 def _share(share: Share) -> str:
+    if not share.of:
+        return "no row so far"
     low, high = share.interval
     return (
         f"{share.count} of {share.of} ({100 * share.share:.3g} %; 95 % interval {100 * low:.3g} to {100 * high:.3g} %)"
