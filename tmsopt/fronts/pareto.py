@@ -56,7 +56,7 @@ def pareto(problem: Given, points: int = POINTS, **options: Unpack[Asked]) -> Fr
     front = Front(problem, ask.texts, ends[:1], (), (), n, 0.0)
     ranges = [max(p.objectives[k] for p in ends) - min(p.objectives[k] for p in ends) for k in range(n)]
     conflict = [r > _ALIKE * (1 + max(abs(p.objectives[k]) for p in ends)) for k, r in enumerate(ranges)]
-    ask = replace(ask, ranges=tuple(ranges))
+    ask = replace(ask, ranges=tuple(ranges), ends=ends)
     if not (all(conflict) if n == 2 else any(conflict)):
         best = min(ends, key=lambda p: sum(p.objectives))
         note = "the objectives are not in conflict: one design is best in all of them, and the front is that point"

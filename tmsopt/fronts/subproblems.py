@@ -1,10 +1,12 @@
 """Sub-problems of a Pareto front: one objective minimised, the others held below a value (eps-constraints)."""
 
+import math
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from tmsopt.checks.recheck import recheck
+from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.formulation.formulate import LIMIT
@@ -16,6 +18,7 @@ from tmsopt.solver.workspace import Family
 _RETRY = 16  # starts for a sub-problem that the neighbours' designs and a few starts did not solve
 _SLACK = 1e-9  # of a best value held while the next is minimised: what the recheck of a constraint forgives
 _AT_END = 1e-6  # of a parameter's range: IPOPT stays inside it, and where limits are degenerate polishing keeps that
+_BEYOND = 1e-6  # relative: a part of the box whose best is worse by less than this is searched all the same
 _WORTH = 1e-4  # gain at an end that its slack does not explain: at a smooth optimum it buys sqrt(1e-9) = 3e-5
 
 
@@ -27,13 +30,17 @@ class Asker:
         problem: with `pareto`.
         options: how to solve each, with so many new starts, against branches that the neighbours do not lead to.
         ranges: of the objectives over the front, once its ends are known.
+        ends: the same.
         families: what was built for sub-problems that differ in their limits alone.
+        easier: the least of each objective alone, as far as known: no sub-problem has a better one.
     """
 
     problem: Problem
     options: Options
     ranges: tuple[float, ...] = ()
+    ends: tuple[FrontPoint, ...] = ()
     families: dict[Hashable, Family] = field(default_factory=dict, compare=False)
+    easier: dict[int, Solution] = field(default_factory=dict, compare=False)
 
     def solve(
         self, problem: Problem, starts: int, near: Sequence[Solution] = (), blind: bool = False
@@ -45,7 +52,24 @@ class Asker:
         )
         beside = [_inside(problem, n) for n in near]
         options = replace(self.options, starts=starts + len(beside) + bool(problem.start))
-        return solved(problem, options, family, beside, blind)
+        return solved(problem, options, family, beside, blind, self._hopeless(problem, near))
+
+    def _hopeless(self, problem: Problem, near: Sequence[Solution]) -> frozenset[str]:
+        """Parts of the box whose best in an objective, without any limit, is worse than what is asked or had of it."""
+        names = eps_names(self)
+        limits = {k: limit_of(problem.constraints[n]) for k, n in enumerate(names) if n in problem.constraints}
+        most = {k: limit for k, limit in limits.items() if limit is not None}
+        hopeless = set[str]()
+        for k, best in self.easier.items():
+            if not best.sides:
+                continue
+            if problem.minimize == self.texts[k] and problem.free == self.problem.free:  # what is near bounds it
+                known = [*(p.objectives for p in self.ends), *(objectives(self, n) for n in near)]
+                met = [values[k] for values in known if all(values[j] <= limit for j, limit in most.items())]
+                most = {**most, k: min(met, default=math.inf)}
+            worse = most.get(k, math.inf)
+            hopeless |= {n for n, value in best.sides.items() if value > worse + _BEYOND * (1 + abs(worse))}
+        return frozenset(hopeless if hopeless < {n for best in self.easier.values() for n in best.sides} else ())
 
     def later(self, count: int) -> "Asker":
         """The same with other starts."""
@@ -63,7 +87,7 @@ def best_first(ask: Asker, order: Sequence[int]) -> Solution:
     Its status is not ``optimal`` when the first objective has no optimum.
     """
     first = order[0]
-    found = ask.solve(subproblem(ask, first, {}), STARTS)
+    found = ask.easier[first] = ask.solve(subproblem(ask, first, {}), STARTS)
     held: dict[int, float] = {}
     for done, k in pairwise(order):
         if found.status != "optimal":

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice, pairwise, zip_longest
+from itertools import chain, islice, pairwise, zip_longest
 
 import numpy as np
 
@@ -310,6 +310,8 @@ def exceptional(work: Workspace) -> list[dict[str, float]]:
     found: list[Candidate] = []
     if sampler is None or sample is None or degree == 1:
         return []
+    most = _HOPELESS_AFAR if sample.far_off else _LEADLESS
+    memory = work.family.memory(part)
     for pattern in (f"EP{degree}", *([f"CEP{degree // 2}"] if degree in _PAIRED else [])):
         asked = replace(part, locate=pattern, minimize="abscissa", maximize=None, constraints=limits)
         asked = replace(asked, scenarios={}, tolerances={})
@@ -317,12 +319,18 @@ def exceptional(work: Workspace) -> list[dict[str, float]]:
             continue
         leading = matching(asked)
         lead, ended = ipopt(leading, work.options), list[Candidate]()
+        before = memory.leads.get(pattern, []) if memory else []
         turns = zip_longest(*([(seen, k) for k in range(len(seen))] for seen in (sample.boldest, sample.refined)))
-        for seen, k in (turn for pair in turns for turn in pair if turn):
-            ended.append(_candidate(asked, leading, lead(complete(leading, asked, sampler.design(seen, k)))))
-            if len(ended) >= (_HOPELESS_AFAR if sample.far_off else _LEADLESS) and not any(c.feasible for c in ended):
+        afar = (sampler.design(seen, k) for seen, k in (turn for pair in turns for turn in pair if turn))
+        for count, design in enumerate(chain(before, afar), 1):
+            ended.append(_candidate(asked, leading, lead(complete(leading, asked, design))))
+            led = any(c.feasible for c in ended)
+            if led and count == len(before) or not led and count >= len(before) + most:
                 break
-        found += distinct(ended, found)[:_LEADS]
+        best = distinct(ended, found)[:_LEADS]
+        if memory:
+            memory.leads[pattern] = [work.design_at(c.run.x) for c in best]
+        found += best
     return [work.design_at(c.run.x) for c in found]
 
 

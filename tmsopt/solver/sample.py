@@ -2,14 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.arithmetic.sequence import golden_steps
-from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Problem
 from tmsopt.formulation.cube import Cube
 from tmsopt.formulation.judgement import Judged, judged
@@ -110,18 +109,20 @@ class Remembered:
 
     Attributes:
         u: designs that were refined for another of them.
-        drawn: the first designs, what they are, and the limits that this was said of.
+        drawn: the first designs, what they are, and the constraints that this was said of.
+        leads: designs with the roots of a pattern, found for the latest of the problems.
     """
 
     u: Array | None = None
-    drawn: tuple[Array, Judged, Array] | None = None
+    drawn: tuple[Array, Judged, tuple[str, ...]] | None = None
+    leads: dict[str, list[dict[str, float]]] = field(default_factory=dict)
 
-    def recall(self, limits: Array) -> tuple[Array, Judged] | None:
-        """The first designs, judged by other limits."""
+    def recall(self, constraints: tuple[str, ...]) -> tuple[Array, Judged] | None:
+        """The first designs, judged by other limits: each ``something <= number``."""
         if self.drawn is None:
             return None
         u, found, old = self.drawn
-        return u, replace(found, beyond=found.beyond + (old - limits)[:, None])
+        return u, replace(found, beyond=found.beyond + np.array(list(map(_lowered, old, constraints)))[:, None])
 
     def keep(self, u: Array) -> None:
         """Remember designs, the latest ones."""
@@ -188,11 +189,11 @@ class Sampler:
 
     def draw(self) -> Looked:
         """Corners, a quasi-random sequence, and some of it moved to faces."""
-        limits = np.array([limit_of(text) or 0.0 for text in self.problem.constraints.values()])
-        recalled = self.memory.recall(limits) if self.memory else None
+        constraints = tuple(self.problem.constraints.values())
+        recalled = self.memory.recall(constraints) if self.memory else None
         u, found = recalled or self._first()
         if self.memory and recalled is None:
-            self.memory.drawn = u, found, limits
+            self.memory.drawn = u, found, constraints
         for k, beyond in enumerate(found.beyond):
             known = np.abs(beyond[np.isfinite(beyond)])
             self.scales[k] = float(np.median(known)) if known.size and np.median(known) > 0 else 1.0
@@ -290,6 +291,15 @@ class Sampler:
         excess = found.excess / self.scales[:, None]
         violation = np.where(excess <= _MET, 0.0, excess).sum(axis=0)
         return Looked(u, np.where(np.isfinite(worth), worth, np.inf), violation)
+
+
+def _lowered(old: str, new: str) -> float:
+    """How much less the limit of a constraint is than it was."""
+    if old == new:
+        return 0.0
+    (rest, before), (same, after) = (text.rsplit("<=", 1) for text in (old, new))
+    assert rest == same, f"{old} and {new} differ in more than their limits"
+    return float(before) - float(after)
 
 
 def excluded(refined: Looked) -> bool:

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Unpack
@@ -68,13 +68,14 @@ def solve(
 
 def solved(
     design: Given, options: Options = DEFAULTS, family: Family | None = None,
-    beside: Sequence[Mapping[str, float]] = (), blind: bool = False,
+    beside: Sequence[Mapping[str, float]] = (), blind: bool = False, without: Collection[str] = (),
 ) -> Solution:  # fmt: skip
     """A solution as it is; of a problem, or of a file, what `solve` finds, whatever its status.
 
     Args:
         beside: designs that may be close to the optimum, to be started from.
         blind: search from these and the problem's start alone, without a look at the box.
+        without: parts of the box to be left out, such as ``forward tilt``.
     """
     if isinstance(design, Solution):
         return design
@@ -89,7 +90,7 @@ def solved(
             near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items() if n in options.near}
             options = replace(options, near=near)
         work = workspace(problem, options, family, beside, blind)
-        parts = [part for part in work.parts() if not options.near or part.holds(options.near)]
+        parts = [p for p in work.parts() if p.name not in without and (not options.near or p.holds(options.near))]
         explored: list[Explored] = []
         try:
             for part in parts:
