@@ -12,6 +12,7 @@ from tmsopt.design.solution import Solution
 from tmsopt.formulation.formulate import LIMIT
 from tmsopt.formulation.options import STARTS, Options
 from tmsopt.fronts.front import FrontPoint
+from tmsopt.solver.sample import Leads
 from tmsopt.solver.solve import solved
 from tmsopt.solver.workspace import Family
 
@@ -32,6 +33,7 @@ class Asker:
         ranges: of the objectives over the front, once its ends are known.
         ends: the same.
         families: what was built for sub-problems that differ in their limits alone.
+        leads: designs with roots of a pattern in each box.
         easier: the least of each objective alone, as far as known: no sub-problem has a better one.
     """
 
@@ -40,6 +42,7 @@ class Asker:
     ranges: tuple[float, ...] = ()
     ends: tuple[FrontPoint, ...] = ()
     families: dict[Hashable, Family] = field(default_factory=dict, compare=False)
+    leads: dict[Hashable, Leads] = field(default_factory=dict, compare=False)
     easier: dict[int, Solution] = field(default_factory=dict, compare=False)
 
     def solve(
@@ -48,7 +51,7 @@ class Asker:
         """The rechecked solution of a sub-problem, whatever its status, from designs near by and so many new starts."""
         limits = [n for n in eps_names(self) if n in problem.constraints]
         family = self.families.setdefault(
-            (problem.minimize, *limits, *problem.fixed.items()), Family([n + LIMIT for n in limits], memory=True)
+            (problem.minimize, *limits, *problem.fixed.items()), Family([n + LIMIT for n in limits], self.leads)
         )
         beside = [_inside(problem, n) for n in near]
         options = replace(self.options, starts=starts + len(beside) + bool(problem.start))

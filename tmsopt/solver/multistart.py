@@ -327,10 +327,9 @@ def exceptional(work: Workspace) -> list[dict[str, float]]:
             led = any(c.feasible for c in ended)
             if led and count == len(before) or not led and count >= len(before) + most:
                 break
-        best = distinct(ended, found)[:_LEADS]
-        if memory:
-            memory.leads[pattern] = [work.design_at(c.run.x) for c in best]
-        found += best
+        if memory and len(ended) > len(before):
+            memory.leads[pattern] = [*before, *(work.design_at(c.run.x) for c in distinct(ended)[:_LEADS])]
+        found += distinct(ended, found)[:_LEADS]
     return [work.design_at(c.run.x) for c in found]
 
 

@@ -47,6 +47,10 @@ _STEP = 1e-7  # of the box, for differences
 _SHARES = (1.0, 0.5, 0.1, 0.01, 1e-3)  # of a step, the best of which is taken
 
 
+Leads = dict[str, list[dict[str, float]]]
+"""Designs with the roots of each pattern."""
+
+
 @dataclass(frozen=True)
 class Looked:
     """Designs as points of the unit cube, with what they are; the first ones come first where nothing else decides.
@@ -115,7 +119,7 @@ class Remembered:
 
     u: Array | None = None
     drawn: tuple[Array, Judged, tuple[str, ...]] | None = None
-    leads: dict[str, list[dict[str, float]]] = field(default_factory=dict)
+    leads: Leads = field(default_factory=dict)
 
     def recall(self, constraints: tuple[str, ...]) -> tuple[Array, Judged] | None:
         """The first designs, judged by other limits: each ``something <= number``."""
