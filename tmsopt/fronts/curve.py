@@ -9,6 +9,7 @@ from tmsopt.design.solution import Solution
 from tmsopt.fronts.front import Front, FrontPoint, Gap, Kink, efficient
 from tmsopt.fronts.subproblems import Asker, least, point
 from tmsopt.progress import Counts
+from tmsopt.solver.solve import covered
 
 Objectives = tuple[float, ...]
 
@@ -245,7 +246,9 @@ def _thinned(search: _Search) -> Front:
     return Front(
         problem=search.ask.problem,
         objectives=search.ask.texts,
-        points=tuple(replace(chain[i], label="; ".join(words[i])) for i in kept),
+        points=tuple(
+            replace(chain[i], solution=covered(chain[i].solution), label="; ".join(words[i])) for i in kept
+        ),
         kinks=tuple(Kink(name, place[i], width) for i, name, width in changes),
         gaps=tuple(Gap(reason, place[i], failed) for i, reason, failed in gaps),
         solved=len(search.probes) + 2,

@@ -160,8 +160,13 @@ def objectives(ask: Asker, solution: Solution) -> tuple[float, ...]:
         found = ((expression, expression.text.strip()) for expression in problem.objectives)
         return tuple(known[text] if text in known else float(expression(values)) for expression, text in found)
     cases = (*problem.cases, *([solution.worst] if solution.worst else []))
-    alone = (replace(problem, pareto=(), minimize=text) for text in ask.texts)
-    return tuple(recheck(one, solution.parameters, cases).objective for one in alone)
+    moved = {n for case in cases for table in (case.at, case.offset, case.direction) for n in table}
+    known = {n: x for n, x in solution.parameters.items() if n not in moved}  # the same in every case
+    if solution.problem.minimize and not math.isnan(solution.value):
+        known[solution.problem.minimize] = solution.value
+    alone = (replace(problem, pareto=(), minimize=text) for text in ask.texts if text not in known)
+    known |= {one.minimize or "": recheck(one, solution.parameters, cases).objective for one in alone}
+    return tuple(known[text] for text in ask.texts)
 
 
 def point(ask: Asker, solution: Solution) -> FrontPoint:
@@ -175,10 +180,11 @@ def point(ask: Asker, solution: Solution) -> FrontPoint:
 
 def _tightened(ask: Asker, k: int, limits: Mapping[int, float], found: Solution) -> Solution:
     """A design as good in objective `k` and better in the others, if a limit that does not bind leaves one."""
-    names, values = eps_names(ask), objectives(ask, found)
+    names = eps_names(ask)
     loose = [j for j in limits if names[j] not in found.active and ask.ranges[j] > 0]
     if not loose:
         return found
+    values = objectives(ask, found)
     held = {**limits, k: values[k] + _SLACK * (1 + abs(values[k]))}
     rest = " + ".join(f"({ask.texts[j]}) / {ask.ranges[j]!r}" for j in loose)
     asked = _pinned(ask, replace(subproblem(ask, k, held), minimize=rest), k, found)

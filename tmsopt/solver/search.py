@@ -8,7 +8,7 @@ import numpy as np
 
 from tmsopt.checks.bound import bounded
 from tmsopt.checks.recheck import FEASIBLE
-from tmsopt.checks.worst_case import worst_cases
+from tmsopt.checks.worst_case import Worst, worst_cases
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import WORSE
 from tmsopt.design.problem import Problem
@@ -33,6 +33,7 @@ _LEADERS = 3  # optima followed when cases are added: a better one may do worse 
 _STABLE = "every root left of the axis"  # the name of a constraint
 _FEWER = 8  # starts for positive real roots where the others have led somewhere
 _NEARER = 1e-7  # share of the radius
+_BESIDE = 1e-6  # of the box: designs closer than that are one; what IPOPT leaves at a multiple root is farther off
 
 
 @dataclass(frozen=True)
@@ -146,8 +147,11 @@ def without_any(work: Workspace, tried: int) -> Finding:
 
 def evaluated_cases(problem: Problem, parameters: Mapping[str, float]) -> tuple[Case, ...]:
     """The listed cases of a design and the worst ones between them."""
-    listed = problem.cases
-    return (*listed, *(w.case for w in worst_cases(problem, parameters).values())) if listed else ()
+    return _listed(problem, worst_cases(problem, parameters) if problem.cases else {})
+
+
+def _listed(problem: Problem, worst: Mapping[str, Worst]) -> tuple[Case, ...]:
+    return (*problem.cases, *(w.case for w in worst.values())) if problem.cases else ()
 
 
 def _ratios(work: Workspace, nlp: NLP, trial: Trial | None) -> Iterator[tuple[float, int]]:
@@ -175,18 +179,19 @@ def _covered(
     if trial is not None and problem.asks_radius and not any(case.edge for case in nlp.cases):
         led = climbed(work, [trial.parameters, *_leaders(work, candidates)])
         nlp, candidates, trial = (led.nlp, led.candidates, led.trial) if led else (nlp, candidates, trial)
-    best = trial
+    best, worst = trial, dict[str, Worst]()
     for _ in range(_FAR_ROUNDS if problem.asks_radius else _ROUNDS):
         if trial is None or best is None:
             return None
         if sum(trial.checked.violations.values()) > math.sqrt(FEASIBLE) and not problem.asks_radius:
             break  # not even the cases at hand are met
-        more = [*_uncovered(problem, trial), *_nearer(nlp, trial)]
+        worst = worst_cases(problem, trial.parameters)
+        more = [*_uncovered(problem, trial, worst), *_nearer(nlp, trial)]
         if not more:
             break
-        best = trial if ahead(work, trial, best) else best
+        best, worst = trial if ahead(work, trial, best) else best, {}
         ours = [best.parameters] if best is trial else [best.parameters, trial.parameters]
-        leaders = [*ours, *_leaders(work, candidates)]
+        leaders = _apart(problem, [*ours, *_leaders(work, candidates)])
         nlp = work.formulate((*nlp.cases, *more))
         run = Runner(work, nlp)
         candidates = [run.ended(design, near=True) for design in leaders]
@@ -199,7 +204,8 @@ def _covered(
             trial = survivor(work, nlp, candidates)
     if trial is None:
         return None
-    others = [c for c in evaluated_cases(problem, trial.parameters) if c not in nlp.cases]
+    listed = _listed(problem, worst or worst_cases(problem, trial.parameters))
+    others = [c for c in listed if c not in nlp.cases]
     return found(work, nlp, trial, starts, (*nlp.cases, *others))
 
 
@@ -217,11 +223,11 @@ def _lost(work: Workspace, trial: Trial | None, leaders: Sequence[Mapping[str, f
     )
 
 
-def _uncovered(problem: Problem, trial: Trial) -> list[Case]:
+def _uncovered(problem: Problem, trial: Trial, found: Mapping[str, Worst]) -> list[Case]:
     """Cases in which the design does worse than in all that it was made for."""
     more: list[Case] = []
     known = trial.checked
-    for name, worst in worst_cases(problem, trial.parameters).items():
+    for name, worst in found.items():
         match name:
             case "abscissa":
                 excess = worst.value - known.structure.abscissa
@@ -253,6 +259,15 @@ def _nearer(nlp: NLP, trial: Trial) -> list[Case]:
     if any(all(abs(step[n] - k.get(n, 0.0)) < _NEARER for n in step) for k in known):  # stable again further out
         step = {n: u * around.radius / claimed * (1 + _NEARER) for n, u in step.items()}
     return [Case(direction=Table(step))]
+
+
+def _apart(problem: Problem, designs: Sequence[Mapping[str, float]]) -> list[Mapping[str, float]]:
+    """The designs without those beside an earlier one, as an end of the solver is beside what it was polished to."""
+    kept: list[Mapping[str, float]] = []
+    for d in designs:
+        if not any(all(abs(d[n] - k[n]) <= _BESIDE * (hi - lo) for n, (lo, hi) in problem.free.items()) for k in kept):
+            kept.append(d)
+    return kept
 
 
 def _leaders(work: Workspace, candidates: Sequence[Candidate]) -> list[dict[str, float]]:

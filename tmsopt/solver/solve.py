@@ -74,7 +74,7 @@ def solved(
 
     Args:
         beside: designs that may be close to the optimum, to be started from.
-        blind: search from these and the problem's start alone, without a look at the box.
+        blind: search from these and the problem's start alone, without a look at the box; and without `covered`.
         without: parts of the box to be left out, such as ``forward tilt``.
     """
     if isinstance(design, Solution):
@@ -110,6 +110,7 @@ def solved(
     else:
         finding = evaluated(problem, evaluated_cases(problem, problem.ordered({})))
     solution = replace(_assembled(problem, finding, notes, values, began), interrupted=interrupted)
+    solution = solution if blind else covered(solution)
     if interrupted or not options.stability or options.near:  # which keeps to its side of the box
         return solution
     try:
@@ -119,6 +120,14 @@ def solved(
             raise
         words = "the user stopped the question whether any design is stable"
         return replace(solution, interrupted=True, notes=(*solution.notes, words))
+
+
+def covered(solution: Solution) -> Solution:
+    """The same, with the proof that no case between those listed is worse, where that is asked of an optimum."""
+    problem = solution.problem
+    if solution.status != "optimal" or solution.cover or not (problem.variations or problem.tolerances):
+        return solution
+    return replace(solution, cover=cover(problem, solution.parameters, solution.abscissa))
 
 
 def solved_first(design: Given, progress: Listener | None) -> Solution:
@@ -253,7 +262,6 @@ def _assembled(
         finding = replace(finding, status="not_converged", notes=(*finding.notes, UNCLEAR))
     optimal = finding.status == "optimal"
     listed = bool(problem.variations or problem.tolerances)
-    covered = cover(problem, finding.parameters, numbers.abscissa) if listed and optimal else None
     return Solution(
         problem=problem,
         status=finding.status,
@@ -277,7 +285,6 @@ def _assembled(
         worst=checked.worst if listed else None,
         least_damped=checked.least_damped if listed else None,
         fastest=checked.fastest if listed and problem.asks(ANGULAR_FREQUENCY) else None,
-        cover=covered,
         sides=Table(sides),
         relaxation=finding.relaxation,
         si=numbers.si,
