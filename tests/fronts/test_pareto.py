@@ -17,10 +17,15 @@ from scipy.optimize import brentq, minimize_scalar
 
 import tmsopt
 from tmsopt import InputError, NotSolved, Problem
+from tmsopt.checks.worst_case import cover
 from tmsopt.cli import every as main
+from tmsopt.design.cases import Band
 from tmsopt.models import from_coefficients, tms
 from tmsopt.solver import solved
+from tmsopt.solver.sample import Remembered, Sampler
+from tmsopt.solver.search import explore
 
+solve = import_module("tmsopt.solver.solve")
 subproblems = import_module("tmsopt.fronts.subproblems")
 
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
@@ -254,6 +259,47 @@ def test_an_end_at_a_bound_is_best_in_the_others_too():
     assert end.objectives[2] == -1.4
     assert end.objectives[1] == pytest.approx(float(epset_Fr(Z_B, Z_H, 1.4)), abs=1e-9)
     assert (end.structure, end.limits) == ("CEP2", ("lambda_s.max",))
+
+
+TILTED = {"Fr": (0.01, 10), "chi_B": (1.01, 5), "lambda_s": (math.radians(-80), math.radians(80))}
+
+
+def test_a_half_of_the_box_that_is_worse_without_limits_is_searched_for_the_ends_alone(monkeypatch):
+    tilted = problem(free=TILTED)
+    searched = []
+    monkeypatch.setattr(solve, "explore", lambda work, insist: searched.append(work.name) or explore(work, insist))
+    front = tmsopt.pareto(tilted, points=4)
+    halves = searched.count("forward tilt"), searched.count("backward tilt")
+    monkeypatch.setattr(subproblems.Asker, "_hopeless", lambda *_: frozenset())
+    searched.clear()
+    everywhere = tmsopt.pareto(tilted, points=4)
+    assert searched.count("forward tilt") == searched.count("backward tilt") == max(halves)
+    assert min(halves) <= 4 < max(halves)  # of the two sub-problems of each end at most
+    found, expected = ([p.objectives for p in f.points] for f in (front, everywhere))
+    assert np.allclose(found, expected, rtol=0, atol=1e-8)
+
+
+def test_designs_are_judged_by_other_limits_as_if_looked_at_anew():
+    limits = {"decay": "abscissa <= -0.3", "far": "chi_B >= 1.5"}
+    of = problem(free=TILTED, pareto=[], minimize="Fr", constraints=limits)
+    other = replace(of, constraints={**of.constraints, "decay": "abscissa <= -0.7"})
+    memory = Remembered()
+    Sampler(of, 0, memory).draw()
+    recalled, anew = Sampler(other, 0, memory).draw(), Sampler(other, 0).draw()
+    assert np.array_equal(recalled.u, anew.u) and np.array_equal(recalled.worth, anew.worth)
+    assert np.allclose(recalled.violation, anew.violation, rtol=1e-12, atol=1e-12)  # one subtraction more
+    with pytest.raises(AssertionError, match="more than their limits"):
+        Sampler(replace(of, constraints={"decay": "abscissa <= -0.3", "far": "chi_B >= 2"}), 0, memory).draw()
+
+
+def test_points_over_a_band_are_proved_as_a_solution_is():
+    free, band = {"chi_B": (1.01, 3), "lambda_s": (0.05, 1.2)}, {"Fr": Band(1.2, 1.8, 3)}
+    asked = problem(free=free, constraints={}, pareto=["abscissa", "chi_B"], scenarios=band)
+    front = tmsopt.pareto(asked, points=3)
+    assert len(front.points) >= 3
+    for p in front.points:
+        assert p.solution.cover == cover(p.solution.problem, p.solution.parameters, p.solution.abscissa)
+        assert p.solution.cover.proven
 
 
 @pytest.mark.slow

@@ -325,7 +325,7 @@ def exceptional(work: Workspace) -> list[dict[str, float]]:
         for count, design in enumerate(chain(before, afar), 1):
             ended.append(_candidate(asked, leading, lead(complete(leading, asked, design))))
             led = any(c.feasible for c in ended)
-            if led and count == len(before) or not led and count >= len(before) + most:
+            if (led and count == len(before)) or (not led and count >= len(before) + most):
                 break
         if memory and len(ended) > len(before):
             memory.leads[pattern] = [*before, *(work.design_at(c.run.x) for c in distinct(ended)[:_LEADS])]

@@ -301,8 +301,8 @@ def _lowered(old: str, new: str) -> float:
     """How much less the limit of a constraint is than it was."""
     if old == new:
         return 0.0
-    (rest, before), (same, after) = (text.rsplit("<=", 1) for text in (old, new))
-    assert rest == same, f"{old} and {new} differ in more than their limits"
+    (rest, sign, before), (same, _, after) = (text.rpartition("<=") for text in (old, new))
+    assert sign and rest == same, f"{old} and {new} differ in more than their limits"
     return float(before) - float(after)
 
 
