@@ -7,6 +7,7 @@ import pickle
 from dataclasses import FrozenInstanceError, replace
 from importlib import import_module
 from itertools import pairwise
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -20,6 +21,8 @@ from tmsopt import InputError, NotSolved, Problem
 from tmsopt.checks.worst_case import cover
 from tmsopt.cli import every as main
 from tmsopt.design.cases import Band
+from tmsopt.formulation.options import Options
+from tmsopt.fronts.front import FrontPoint
 from tmsopt.models import from_coefficients, tms
 from tmsopt.solver import solved
 from tmsopt.solver.sample import Remembered, Sampler
@@ -264,19 +267,34 @@ def test_an_end_at_a_bound_is_best_in_the_others_too():
 TILTED = {"Fr": (0.01, 10), "chi_B": (1.01, 5), "lambda_s": (math.radians(-80), math.radians(80))}
 
 
-def test_a_half_of_the_box_that_is_worse_without_limits_is_searched_for_the_ends_alone(monkeypatch):
-    tilted = problem(free=TILTED)
-    searched = []
+def sides(forward, backward):
+    return SimpleNamespace(sides={"forward tilt": forward, "backward tilt": backward})
+
+
+@pytest.mark.parametrize(
+    ("halves", "k", "limits", "end", "out"),
+    [
+        (sides(-1.0, 0.1), 1, {0: -0.3}, (0.0, 9.0), {"backward tilt"}),
+        (sides(-1.0, 0.1), 1, {0: 0.1}, (0.0, 9.0), set()),
+        (sides(-1.0, 0.1), 1, {0: -2.0}, (0.0, 9.0), set()),  # no half is left
+        (sides(-1.0, math.nan), 1, {0: -0.3}, (0.0, 9.0), set()),  # a half of which nothing is known
+        (sides(-1.0, 0.1), 0, {1: 1.0}, (-0.5, 0.9), {"backward tilt"}),  # an end that meets the limit is better
+        (sides(-1.0, 0.1), 0, {1: 1.0}, (-0.5, 1.1), set()),  # an end that does not
+        (sides(-1.0, 0.1), 0, {}, (-0.5, 1.1), {"backward tilt"}),
+    ],
+)
+def test_a_half_of_the_box_is_left_out_where_its_best_without_limits_is_worse(halves, k, limits, end, out):
+    end = FrontPoint(end, None, ())
+    ask = subproblems.Asker(problem(free=TILTED), Options(), ends=(end,), easier={0: halves})
+    assert ask._hopeless(subproblems.subproblem(ask, k, limits), ()) == out
+
+
+def test_a_half_that_is_left_out_is_not_searched(monkeypatch):
+    searched, asked = [], problem(free=TILTED, pareto=[], minimize="abscissa")
     monkeypatch.setattr(solve, "explore", lambda work, insist: searched.append(work.name) or explore(work, insist))
-    front = tmsopt.pareto(tilted, points=4)
-    halves = searched.count("forward tilt"), searched.count("backward tilt")
-    monkeypatch.setattr(subproblems.Asker, "_hopeless", lambda *_: frozenset())
-    searched.clear()
-    everywhere = tmsopt.pareto(tilted, points=4)
-    assert searched.count("forward tilt") == searched.count("backward tilt") == max(halves)
-    assert min(halves) <= 4 < max(halves)  # of the two sub-problems of each end at most
-    found, expected = ([p.objectives for p in f.points] for f in (front, everywhere))
-    assert np.allclose(found, expected, rtol=0, atol=1e-8)
+    found = solved(asked, beside=[{"Fr": 2.2, "chi_B": 1.4, "lambda_s": 0.7}], blind=True, without=["backward tilt"])
+    assert searched == ["forward tilt"]
+    assert found.value == pytest.approx(EP4[0], abs=1e-8)
 
 
 def test_designs_are_judged_by_other_limits_as_if_looked_at_anew():
