@@ -8,6 +8,7 @@ import flint
 import numpy as np
 import pytest
 
+from tmsopt.arithmetic.elementary import greater, lesser
 from tmsopt.arithmetic.twofold import Twofold, twofold
 
 FORMULAS: dict[str, Callable[[Any, Any], Any]] = {
@@ -50,6 +51,8 @@ def test_what_does_not_exist_is_never_certain() -> None:
     with np.errstate(all="ignore"):
         for lost in (one / zero, (zero - one).sqrt(), (one - one) / (one - one), Twofold(np.array([1e300])) * 1e300):
             assert not lost.nearest()[1].any()
+            for choice in (greater(lost, 1.0), greater(1.0, lost), lesser(lost, 1.0), lesser(1.0, lost)):
+                assert not choice.nearest()[1].any()
 
 
 def test_exact_fractions_keep_their_digits() -> None:

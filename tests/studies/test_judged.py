@@ -58,6 +58,7 @@ STUDIES = {
     "EP4 as built": lambda: built(60), "very near EP4": lambda: built(40, 1e-6), "wheels": whipple, "limits": limited,
     "own": own, "own, stable": lambda: own({"decay": "abscissa <= -0.3", "size": "a*b >= 20"}),
     "own, another objective": lambda: own(maximize="damping_ratio**2 + sin(a)/3 - exp(-b)"),
+    "own, one of two has no value": lambda: own(maximize="max(log(k - 0.8), abscissa)"),
     "own, nothing asked": lambda: own({"size": "a*b/k <= 30"}, minimize=None),
 }  # fmt: skip
 

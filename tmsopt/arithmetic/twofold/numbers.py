@@ -57,7 +57,7 @@ class Twofold:
     def chosen(self, sign: int, a: Any, b: Any) -> "Twofold":
         """Of a difference a − b: a where it has the sign, else b; as far off as the other where that is not certain."""
         found = twofold(a).where(sign * self.high >= 0, twofold(b))
-        either = np.abs(self.high) <= 2 * self.off
+        either = ~(np.abs(self.high) > 2 * self.off)  # nor where there is no difference
         return Twofold(found.high, found.low, found.off + np.where(either, np.abs(self.high) + self.off, 0.0))
 
     def __getitem__(self, rows: Any) -> "Twofold":
