@@ -376,6 +376,18 @@ def test_a_boundary_in_an_edge_of_the_box_is_that_edge():
 
 def test_the_same_boundary_inside_the_box_is_drawn():
     found = domain(_absorber(c=(-0.5, 1.0), w=(0.2, 2.0)), starts=12)
-    lines = [arc for arc in found.stability if np.abs(arc.points["c"]).max() < 1e-12]
-    assert {arc.kind for arc in found.stability} == {"weave"}
-    assert lines
+    (line,) = found.stability
+    assert line.kind == "weave"
+    assert np.abs(line.points["c"]).max() < 1e-12
+    assert sorted((line.points["w"][0], line.points["w"][-1])) == [0.2, 2.0]
+    assert not found.corners
+
+
+def test_a_line_on_which_both_sides_are_unstable_bounds_nothing():
+    """Pairs of two oscillators with dampings c and −c: on c = 0 both lie on the axis, beside it one is unstable."""
+    import casadi as ca
+
+    c, w = ca.SX.sym("c"), ca.SX.sym("w")
+    model = tmsopt.models.from_matrices([[1, 0], [0, 1]], [[c, 0], [0, -c]], [[1, 0], [0, w * w]])
+    found = domain(tmsopt.Problem(model, free={"c": (-0.5, 1.0), "w": (1.2, 2.0)}), starts=12)
+    assert found.stability == ()

@@ -14,17 +14,21 @@ from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Array, Shown, Truth, plain
-from tmsopt.roots import pattern, real_roots
+from tmsopt.roots import is_stable, pattern, real_roots
 from tmsopt.roots.meetings import nearest_two
 from tmsopt.tracing.branch import Branch, Event
 from tmsopt.tracing.continuation import INFINITE, SINGULAR
+from tmsopt.tracing.equations import coefficients
 from tmsopt.tracing.infinity import Infinity, through_infinity
+from tmsopt.tracing.monitors import on_axis
 from tmsopt.tracing.trace import STARTS, STEP, trace
 
 _CLOSE = 5e-3
 """Widths of the box, a step, between the last point before infinity or a singular end and the corner it belongs to."""
 
 _EDGE = 1e-9  # widths of the box: a branch that starts beside an edge, not in it, leaves it by more
+
+_BESIDE = 1e-4  # widths of the box from a curve to its sides, where damping outgrows rounding
 
 
 @dataclass(frozen=True)
@@ -93,7 +97,7 @@ def domain(
     counted(progress, "looking for corners")
     infinite = list(through_infinity(plane, step, starts, seed))
     at_infinity = [c for curve in infinite for c in _changes(curve)]
-    stability = [arc for b in unstable_beyond for arc in _pieces(b, b.stable, plane, at_infinity)]
+    stability = [arc for b in unstable_beyond for arc in _pieces(b, _bounds(b, plane), plane, at_infinity)]
     stability += [arc for curve in infinite for arc in _runs(curve, curve.stable)]
     damping = [arc for b in found["EP2"] for arc in _pieces(b, b.heavily_damped & _once(b), plane, at_infinity)]
     damping += [arc for b in found["capsize"] for arc in _pieces(b, b.heavily_damped, plane, at_infinity)]
@@ -160,6 +164,25 @@ def _near(problem: Problem, event: Event, corners: Sequence[Corner]) -> list[Cor
         return max(abs(event.parameters[n] - corner.parameters[n]) / width for n, width in widths.items())
 
     return sorted((c for c in corners if distance(c) <= _CLOSE), key=distance, reverse=True)
+
+
+def _bounds(branch: Branch, problem: Problem) -> Truth:
+    """Where the other roots are stable, or on the axis too and the designs of one side alone stable.
+
+    Of several pairs that stay on the axis together, each with its curve, the fastest draws it.
+    """
+    rest = pattern(branch.pattern, problem.model.degree).remaining(list(branch.unknowns.values()))
+    tied = on_axis(rest, len(branch))
+    if np.all(tied < 0):
+        return branch.stable
+    widths = {n: high - low for n, (low, high) in problem.free.items()}
+    (x, dx), (y, dy) = ((branch.parameters[n], branch.tangent[n] / width) for n, width in widths.items())
+    (wide, high), length = widths.values(), np.hypot(dx, dy) + 1e-300
+    sides = [(x - s * wide * dy / length, y + s * high * dx / length) for s in (-_BESIDE, _BESIDE)]
+    with np.errstate(all="ignore"):  # a side may lie beyond what the model is made for: nan is not stable
+        one, other = (is_stable(coefficients(problem, dict(zip(widths, side, strict=True)))) for side in sides)
+    fastest = (tied >= 0) & (branch.unknowns.get("W", np.inf) >= tied)
+    return np.asarray(branch.stable | (fastest & (one != other)))
 
 
 def _parts(branch: Branch) -> Truth:

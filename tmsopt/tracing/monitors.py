@@ -21,7 +21,7 @@ NOTHING = 1e-9  # a function smaller than this all along the curve is 0 on it, n
 CHANGES = "stability changes"
 """Detail of the marks that count only where they change it."""
 
-_ROUNDED = 1e-14  # a tangent, its inverse and the scale: some roundings
+_ROUNDED = 1e-14  # a tangent, its inverse and the scale, or a real part beside the modulus: some roundings
 _REAL = 1e-6  # of |s|: a factor with a double root has coefficients right to 1e-15 and roots to the root of that
 
 
@@ -70,8 +70,11 @@ def values_of(problem: Problem, pattern: Pattern, columns: Mapping[str, Array], 
 
 
 def stability(factors: list[list[Any]], count: int) -> Truth:
-    """Where every factor has its roots left of the imaginary axis, from coefficients; no factor counts as stable."""
-    stable = np.ones(count, dtype=bool)
+    """Where every factor has its roots left of the imaginary axis, from coefficients; no factor counts as stable.
+
+    Roots that stay on the axis up to rounding are not left of it, whatever the sign of that.
+    """
+    stable = on_axis(factors, count) < 0
     for factor in factors:
         if len(factor) - 1 > CLOSED:
             stable &= is_stable(_rows(factor, count))
@@ -79,6 +82,16 @@ def stability(factors: list[list[Any]], count: int) -> Truth:
         for quantity in lienard_chipart(factor):
             stable &= np.broadcast_to(np.asarray(quantity, dtype=float) > 0, count)
     return stable
+
+
+def on_axis(factors: list[list[Any]], count: int) -> Array:
+    """Square of the modulus of the fastest root on the imaginary axis, up to rounding; −1 where none lies there."""
+    fastest = np.full(count, -1.0)
+    for factor in factors:
+        z = roots(_rows(factor, count))
+        tied = np.where(np.abs(z.real) <= _ROUNDED * np.abs(z), np.abs(z) ** 2, -1.0)
+        fastest = np.maximum(fastest, tied.max(axis=-1, initial=-1.0))
+    return fastest
 
 
 def all_real(factors: list[list[Any]], count: int) -> Truth:
