@@ -22,6 +22,7 @@ ALIKE = 1e-9
 _ITERATIONS = 200
 _FEASIBLE = 1e-10  # violation of scaled coefficients, up to which a point counts as on the edge
 _STATIONARY = 1e-8
+_SHIFTED = 1e-8  # share by which what is left of a violation shifts the square of the distance, times its multiplier
 _KEPT = 64  # solvers, of so many edges and models
 
 
@@ -65,7 +66,8 @@ def approach(place: Place, edge: Edge, sign: float, size: float) -> Callable[[Ar
         if not point.violation <= _FEASIBLE:
             return None
         u_found = np.clip(point.x[:n] * size, place.space.lower, place.space.upper)
-        return Approach(u_found, point.stationarity <= _STATIONARY)
+        amiss = point.violation * float(np.abs(point.row_multipliers).max(initial=0.0))
+        return Approach(u_found, point.stationarity <= _STATIONARY and amiss <= _SHIFTED * point.objective)
 
     return from_start
 

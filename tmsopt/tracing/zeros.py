@@ -54,7 +54,8 @@ def refined(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walk
 
             ends = (-steps[k - 1], steps[k])
             s = float(minimize_scalar(height, bounds=ends, method="bounded", options={"xatol": 1e-14}).x)
-            (y,), (t,) = between(on, walked.y[[k]], walked.t[[k]], np.array([s]))
+            beside = between(on, walked.y[[k]], walked.t[[k]], np.array([s]))
+            (y,), (t,) = between(on, *beside, np.zeros(1))  # once more: beside a singular point Newton is slow
             if np.abs(y - walked.y[k]).max() <= _ASTRAY * abs(s) and t @ walked.t[k] > 0:
                 added[(k, s) if s >= 0 else (k - 1, steps[k - 1] + s)] = y, t
     ys, ts = list(walked.y), list(walked.t)
