@@ -222,8 +222,8 @@ def test_a_gap_is_reported_where_it_is():
 def test_what_is_not_solved_is_reported_as_a_gap(monkeypatch):
     """Sub-problems with a limit between 1.5 and 2.5 are made to fail; the front is the whole box, 0 to 4."""
 
-    def failing(asked, options):
-        found = solved(asked, options)
+    def failing(asked, options, *more):
+        found = solved(asked, options, *more)
         values = (abs(float(text.split("<=")[1])) for text in asked.constraints.values())
         return replace(found, status="not_converged") if any(1.5 < v < 2.5 for v in values) else found
 

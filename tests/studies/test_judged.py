@@ -171,7 +171,12 @@ import sys
 from pathlib import Path
 from tmsopt import monte_carlo, run_study
 study = monte_carlo(Path(sys.argv[1]), 600_000, 1, "normal", {"chi_B": 0.005, "lambda_s": 0.0087, "Fr": 0.02})
-run_study(study, sys.argv[2], progress=lambda done, most: print(done, flush=True))
+
+def told(now):
+    if now.unit == "row":
+        print(round(now.done), flush=True)
+
+run_study(study, sys.argv[2], progress=told)
 """
 
 

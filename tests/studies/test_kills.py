@@ -13,7 +13,6 @@ import pytest
 from tmsopt.studies import alone, load_study, planned
 from tmsopt.studies.store import read_store
 
-EP4 = Path(__file__).parents[2] / "problems" / "ep4.toml"
 ROWS, KILLS, SAMPLE = 10_000, 20, 25
 PAUSE = (0.3, 2.0)
 """s of work between kills: some shorter than the second after which rows are committed, some longer."""
@@ -41,9 +40,11 @@ def workers_of(pid: int) -> list[int]:
 @pytest.mark.skipif(sys.platform != "linux", reason="finds workers by ps --ppid")
 def test_nothing_is_lost_or_solved_twice(tmp_path: Path) -> None:
     """What the store has acknowledged stays there and is never solved again; rows have the bits of any other run."""
-    (tmp_path / "built.toml").write_text(
-        f'title = "built"\nproblem = "{EP4}"\n[study]\nmethod = "monte_carlo"\nrows = {ROWS}\n'
-        '[tolerances]\nchi_B = "5 mm"\nlambda_s = "0.5 deg"\nFr = 0.02\n',
+    (tmp_path / "built.toml").write_text(  # of the angular frequency each row is judged for itself
+        f'title = "built"\n[study]\nmethod = "sobol"\nrows = {ROWS}\n[vary]\nFr = {{ min = 1, max = 3 }}\n'
+        'chi_B = { min = 1.2, max = 1.6 }\n[problem]\nmodel = "tms"\n[problem.parameters]\nchi_H = 1.0\nzeta_H = -0.2\n'
+        'zeta_B = -0.4\nmu = 0.1\nchi_B = 1.4\nFr = 2\nlambda_s = 0.35\n[problem.objective]\n'
+        'minimize = "angular_frequency"\n',
         encoding="utf-8",
     )
     path, rng = tmp_path / "s.sqlite", random.Random(0)

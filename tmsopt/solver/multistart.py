@@ -169,10 +169,9 @@ class Runner:
 
     @property
     def _hopeless(self) -> bool:
-        """Whether nothing speaks for a feasible end: neither the sample nor, without one, where other starts ended."""
-        if self.work.sample is not None:
-            return self.work.sample.far_off
-        return len(self.work.met) >= _NOWHERE and not any(c.feasible for _, c in self.work.met)
+        """Whether nothing speaks for a feasible end: there is no sample, and no other start satisfied all rows."""
+        met = self.work.met
+        return self.work.sample is None and len(met) >= _NOWHERE and not any(c.feasible for _, c in met)
 
     def _no_worse(self, best: Candidate, design: Mapping[str, float], start: str) -> Candidate:
         """Where it ended, or where a start that was better than that ends if IPOPT keeps to it, or does not."""

@@ -302,7 +302,7 @@ def _lowered(old: str, new: str) -> float:
     if old == new:
         return 0.0
     (rest, sign, before), (same, _, after) = (text.rpartition("<=") for text in (old, new))
-    assert sign and rest == same, f"{old} and {new} differ in more than their limits"
+    assert (sign, rest) == ("<=", same), f"{old} and {new} differ in more than their limits"
     return float(before) - float(after)
 
 
