@@ -18,17 +18,16 @@ from scipy.optimize import brentq, minimize_scalar
 
 import tmsopt
 from tmsopt import InputError, NotSolved, Problem
-from tmsopt.checks.worst_case import cover
 from tmsopt.cli import every as main
-from tmsopt.design.cases import Band
-from tmsopt.formulation.options import Options
-from tmsopt.fronts.front import FrontPoint
 from tmsopt.models import from_coefficients, tms
 from tmsopt.solver import solved
-from tmsopt.solver.sample import Remembered, Sampler
-from tmsopt.solver.search import explore
 
+cases = import_module("tmsopt.design.cases")
+front_data = import_module("tmsopt.fronts.front")
+options = import_module("tmsopt.formulation.options")
+sample = import_module("tmsopt.solver.sample")
 solve = import_module("tmsopt.solver.solve")
+worst_case = import_module("tmsopt.checks.worst_case")
 subproblems = import_module("tmsopt.fronts.subproblems")
 
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
@@ -284,13 +283,13 @@ def sides(forward, backward):
     ],
 )
 def test_a_half_of_the_box_is_left_out_where_its_best_without_limits_is_worse(halves, k, limits, end, out):
-    end = FrontPoint(end, None, ())
-    ask = subproblems.Asker(problem(free=TILTED), Options(), ends=(end,), easier={0: halves})
+    end = front_data.FrontPoint(end, None, ())
+    ask = subproblems.Asker(problem(free=TILTED), options.Options(), ends=(end,), easier={0: halves})
     assert ask._hopeless(subproblems.subproblem(ask, k, limits), ()) == out
 
 
 def test_a_half_that_is_left_out_is_not_searched(monkeypatch):
-    searched, asked = [], problem(free=TILTED, pareto=[], minimize="abscissa")
+    searched, explore, asked = [], solve.explore, problem(free=TILTED, pareto=[], minimize="abscissa")
     monkeypatch.setattr(solve, "explore", lambda work, insist: searched.append(work.name) or explore(work, insist))
     found = solved(asked, beside=[{"Fr": 2.2, "chi_B": 1.4, "lambda_s": 0.7}], blind=True, without=["backward tilt"])
     assert searched == ["forward tilt"]
@@ -301,23 +300,23 @@ def test_designs_are_judged_by_other_limits_as_if_looked_at_anew():
     limits = {"decay": "abscissa <= -0.3", "far": "chi_B >= 1.5"}
     of = problem(free=TILTED, pareto=[], minimize="Fr", constraints=limits)
     other = replace(of, constraints={**of.constraints, "decay": "abscissa <= -0.7"})
-    memory = Remembered()
-    Sampler(of, 0, memory).draw()
-    recalled, anew = Sampler(other, 0, memory).draw(), Sampler(other, 0).draw()
+    memory = sample.Remembered()
+    sample.Sampler(of, 0, memory).draw()
+    recalled, anew = sample.Sampler(other, 0, memory).draw(), sample.Sampler(other, 0).draw()
     assert np.array_equal(recalled.u, anew.u)
     assert np.array_equal(recalled.worth, anew.worth)
     assert np.allclose(recalled.violation, anew.violation, rtol=1e-12, atol=1e-12)  # one subtraction more
     with pytest.raises(AssertionError, match="more than their limits"):
-        Sampler(replace(of, constraints={"decay": "abscissa <= -0.3", "far": "chi_B >= 2"}), 0, memory).draw()
+        sample.Sampler(replace(of, constraints={"decay": "abscissa <= -0.3", "far": "chi_B >= 2"}), 0, memory).draw()
 
 
 def test_points_over_a_band_are_proved_as_a_solution_is():
-    free, band = {"chi_B": (1.01, 3), "lambda_s": (0.05, 1.2)}, {"Fr": Band(1.2, 1.8, 3)}
+    free, band = {"chi_B": (1.01, 3), "lambda_s": (0.05, 1.2)}, {"Fr": cases.Band(1.2, 1.8, 3)}
     asked = problem(free=free, constraints={}, pareto=["abscissa", "chi_B"], scenarios=band)
     front = tmsopt.pareto(asked, points=3)
     assert len(front.points) >= 3
     for p in front.points:
-        assert p.solution.cover == cover(p.solution.problem, p.solution.parameters, p.solution.abscissa)
+        assert p.solution.cover == worst_case.cover(p.solution.problem, p.solution.parameters, p.solution.abscissa)
         assert p.solution.cover.proven
 
 
