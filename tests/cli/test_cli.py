@@ -187,7 +187,10 @@ def test_an_answer_that_cannot_be_written_is_no_traceback():
     ("words", "said"),
     [
         (["ep4.toml", "--over", "Fr"], "--over: says what --plot draws over; add --plot FILE, or leave it out\n"),
-        (["pareto.toml", "--over", "Fr", "--plot", "front.png"], "--over: is for one design, and the file asks for a front"),
+        (
+            ["pareto.toml", "--over", "Fr", "--plot", "front.png"],
+            "--over: is for one design, and the file asks for a front",
+        ),
         (["pareto.toml", "--points", "9999999999"], "9999999999 is not in the range 2<=x<=10000"),
     ],
 )

@@ -45,7 +45,14 @@ def test_it_is_the_hessian_of_the_lagrangian(model, name):
     known = ca.Function("known", [x, p, objective, pull], [ca.triu(ca.hessian(lagrangian, x)[0])])
     random = np.random.default_rng(0)
     ratio = 1.3 ** np.arange(size)
-    settings = [*random.uniform(0.2, 0.8, 3), *random.uniform(0.5, 1, n), *ratio, *random.uniform(1, 2, size), -1.0, 0.7]
+    settings = [
+        *random.uniform(0.2, 0.8, 3),
+        *random.uniform(0.5, 1, n),
+        *ratio,
+        *random.uniform(1, 2, size),
+        -1.0,
+        0.7,
+    ]
     given = (random.uniform(0.1, 0.3, n + extra), settings, 1.5, random.normal(size=g.numel()))
     expected = known(*given).full()
     assert np.abs(found(*given).full() - expected).max() <= CLOSE * np.abs(expected).max()

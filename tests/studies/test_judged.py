@@ -129,7 +129,9 @@ def test_a_store_of_blocks_gives_back_the_same_rows(tmp_path: Path) -> None:
     with read_store(path) as store:
         assert store.done() == set(range(60))
         assert store.counts() == dict(kept.summary.counts)
-        assert [row.number for row in store.rows("infeasible")] == [r.number for r in kept.rows if r.status == "infeasible"]
+        assert [row.number for row in store.rows("infeasible")] == [
+            r.number for r in kept.rows if r.status == "infeasible"
+        ]
         assert store.row(20).identity == plain.rows[20].identity
         assert store.about()["schema"] == 2
         assert sum(session["rows"] for session in store.sessions()) == 60

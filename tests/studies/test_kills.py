@@ -43,7 +43,7 @@ def test_nothing_is_lost_or_solved_twice(tmp_path: Path) -> None:
     (tmp_path / "built.toml").write_text(  # of the angular frequency each row is judged for itself
         f'title = "built"\n[study]\nmethod = "sobol"\nrows = {ROWS}\n[vary]\nFr = {{ min = 1, max = 3 }}\n'
         'chi_B = { min = 1.2, max = 1.6 }\n[problem]\nmodel = "tms"\n[problem.parameters]\nchi_H = 1.0\nzeta_H = -0.2\n'
-        'zeta_B = -0.4\nmu = 0.1\nchi_B = 1.4\nFr = 2\nlambda_s = 0.35\n[problem.objective]\n'
+        "zeta_B = -0.4\nmu = 0.1\nchi_B = 1.4\nFr = 2\nlambda_s = 0.35\n[problem.objective]\n"
         'minimize = "angular_frequency"\n',
         encoding="utf-8",
     )

@@ -99,9 +99,7 @@ def frame(html: str, title: str) -> str:
     )
 
 
-def _explorer(
-    problem: Problem, solution: Solution | None, model: Mapping[str, Any], told: Listener | None
-) -> Explorer:
+def _explorer(problem: Problem, solution: Solution | None, model: Mapping[str, Any], told: Listener | None) -> Explorer:
     counted(told, "looking for designs worth going to")
     designs = known_designs(problem, solution, search=True)
     counted(told, "writing the page")

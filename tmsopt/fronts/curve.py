@@ -246,9 +246,7 @@ def _thinned(search: _Search) -> Front:
     return Front(
         problem=search.ask.problem,
         objectives=search.ask.texts,
-        points=tuple(
-            replace(chain[i], solution=covered(chain[i].solution), label="; ".join(words[i])) for i in kept
-        ),
+        points=tuple(replace(chain[i], solution=covered(chain[i].solution), label="; ".join(words[i])) for i in kept),
         kinks=tuple(Kink(name, place[i], width) for i, name, width in changes),
         gaps=tuple(Gap(reason, place[i], failed) for i, reason, failed in gaps),
         solved=len(search.probes) + 2,

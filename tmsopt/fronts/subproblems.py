@@ -45,9 +45,7 @@ class Asker:
     leads: dict[Hashable, Leads] = field(default_factory=dict, compare=False)
     easier: dict[int, Solution] = field(default_factory=dict, compare=False)
 
-    def solve(
-        self, problem: Problem, starts: int, near: Sequence[Solution] = (), blind: bool = False
-    ) -> Solution:
+    def solve(self, problem: Problem, starts: int, near: Sequence[Solution] = (), blind: bool = False) -> Solution:
         """The rechecked solution of a sub-problem, whatever its status, from designs near by and so many new starts."""
         limits = [n for n in eps_names(self) if n in problem.constraints]
         family = self.families.setdefault(

@@ -70,7 +70,6 @@ def _walks(problem: Problem, on: Curve, step: float, starts: int, seed: int) -> 
     walks: list[Walk] = []
     lines: list[dict[str, Array]] = []
 
-
     def found(designs: Sequence[Mapping[str, float]], first: int) -> Array:
         at = [[np.tan(v) if of[n].tangent else v for n, v in d.items()] for d in designs]
         return projected(on.evaluate, np.array(at) / on.scale, [(first + k) % 2 for k in range(len(designs))])
