@@ -8,7 +8,7 @@ import flint
 import numpy as np
 import pytest
 
-from tmsopt.arithmetic.elementary import greater, lesser
+from tmsopt.arithmetic import greater, lesser
 from tmsopt.arithmetic.twofold import Twofold, twofold
 
 FORMULAS: dict[str, Callable[[Any, Any], Any]] = {

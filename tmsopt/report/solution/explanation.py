@@ -34,7 +34,7 @@ def explained_lines(explanation: Explanation) -> list[str]:
     lines = [f"meaning: {explanation.summary}", *optimality_lines(explanation.optimality)]
     lines += [f"warning: {text}" for text in explanation.warnings]
     if explanation.levers:
-        lines += ["", "what moving a limit buys, solved again:"]
+        lines += ["", "what moving a limit buys, solved again from the optimum:"]
         lines += [f"  {lever.sentence}" for lever in explanation.levers]
     if explanation.precision:
         lines.append("")
