@@ -19,7 +19,7 @@ from tmsopt.records import Array
 ALIKE = 1e-9
 """Relative difference of distances that is no difference."""
 
-_ITERATIONS = 200
+_ITERATIONS, _UNFINISHED = 200, "Maximum_Iterations_Exceeded"
 _FEASIBLE = 1e-10  # violation of scaled coefficients, up to which a point counts as on the edge
 _STATIONARY = 1e-8
 _SHIFTED = 1e-8  # share by which what is left of a violation shifts the square of the distance, times its multiplier
@@ -28,7 +28,10 @@ _KEPT = 64  # solvers, of so many edges and models
 
 @dataclass(frozen=True)
 class Approach:
-    """Where one run ended, in weights; `refined` where the conditions of a nearest point hold to rounding."""
+    """Where one run ended, in weights; `refined` where the conditions of a nearest point hold to rounding.
+
+    They do not where a violation, times its multiplier, still moves the distance: beside roots of multiplicity 5 or 6.
+    """
 
     u: Array = field(default_factory=lambda: np.zeros(0))
     refined: bool = False
@@ -60,6 +63,8 @@ def approach(place: Place, edge: Edge, sign: float, size: float) -> Callable[[Ar
         if not (np.all(np.isfinite(c)) and c.any()):
             return None
         raw = solver.run(np.concatenate([u / size, edge.guess(c)]), nlp)
+        if below == math.inf and raw.status == _UNFINISHED:  # nothing is known yet: it may go on
+            raw = solver.run(raw.x, nlp)
         if float(np.linalg.norm(raw.x[:n])) * size >= below * (1 - ALIKE):
             return None
         point = solver.polish(raw, nlp)
