@@ -239,3 +239,15 @@ def test_a_limit_without_a_value_is_named_without_an_amount() -> None:
     conflict = Relaxation(design.parameters, Table({"trail": math.inf}), ("trail",), Table({}))
     report = design_report(replace(design, status="infeasible", relaxation=conflict))
     assert re.search(r"smallest change found: another trail, which has no value where the search\s+ended", report)
+
+
+def test_a_radius_out_of_reach_says_how_near_a_design_comes() -> None:
+    """What it says is the radius of the design that it shows, of another computation; 0.5 is far beyond it."""
+    asked = tmsopt.load("problems/tolerant.toml")
+    fixed = {**asked.fixed, "chi_B": 1.4, "lambda_s": 0.35}
+    found = tmsopt.solve(
+        replace(asked, fixed=fixed, free={"Fr": (0.5, 3.0)}, constraints={"stable": "radius >= 0.5"}), throw=False
+    )
+    (said,) = re.findall(r"the nearest design found has radius = ([0-9.]+)", design_report(found))
+    there = tmsopt.robustness(tmsopt.Problem(tms, fixed=dict(found.parameters), minimize="abscissa"))
+    assert float(said) == pytest.approx(there.radius, rel=1e-3)

@@ -240,7 +240,8 @@ def _sides_note(problem: Problem, explored: Sequence[Explored], finding: Finding
     for part in explored:
         if part is not won:
             if part.finding is None or part.finding.checked.violations:
-                sentences.append(f"with {part.name} nothing feasible was found")
+                stable = "stable and " if problem.asks_radius else ""
+                sentences.append(f"with {part.name} nothing {stable}feasible was found")
             elif problem.objective is None:
                 sentences.append(f"there is one with {part.name} too")
             elif same(part.finding.checked.objective, finding.checked.objective, objective_size(problem)):

@@ -101,9 +101,12 @@ def _nearest(solution: Solution, name: str) -> str:
         return ""
     sides = _SIGN.split(solution.problem.constraints[name])
     reached = condition.sides(solution.problem.values(relaxation.parameters))
-    for side, other, value in zip(sides, reversed(sides), reached, strict=True):
-        if _number(other) is not None:
-            if not math.isfinite(value) or not math.isfinite(relaxation.amounts.get(name, 0.0)):
+    amount = relaxation.amounts.get(name, 0.0)
+    for side, other, own, sign in zip(sides, reversed(sides), reached, (1, -1), strict=True):
+        if (limit := _number(other)) is not None:
+            # The radius is none of a design's own values.
+            value = own if math.isfinite(own) else limit + sign * condition.sign * amount
+            if not math.isfinite(value) or not math.isfinite(amount):
                 return f": {side.strip()} has no value where the search ended"
             return f": the nearest design found has {side.strip()} = {unit_of(solution.problem, name).show(value)}"
     return ""
