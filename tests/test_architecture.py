@@ -325,6 +325,7 @@ def test_files_are_written_whole() -> None:
     """A full disk or Ctrl-C leaves the earlier file; each exception says why it may."""
     found = {place for m, s in SOURCES.items() for place in written(m, s)}
     assert found == {
+        "tmsopt.cli.ending.streams",  # stdout
         "tmsopt.charts.folder.writing",  # tile by tile; what is recorded is right
         "tmsopt.disk.whole",  # itself
         "tmsopt.display.page._picture", "tmsopt.display.pictures._image", "tmsopt.plots.style.rendered",  # in memory

@@ -432,12 +432,12 @@ def test_few_files_may_be_open(name: str, tmp_path: Path) -> None:
 
 
 WORK = {
-    "solve": f"solve {PROBLEMS}/physical_machine.toml --json",
+    "solve": f"solve {PROBLEMS}/delivery_robot.toml --json",
     "certify": f"solve {PROBLEMS}/physical_machine.toml --certify 60 --json",
     "front": f"solve {PROBLEMS}/pareto.toml --points 60 --json",
-    "compare": f"compare {PROBLEMS}/optimised_benchmark.toml --json",
-    "prove": f"prove {PROBLEMS}/optimised_benchmark.toml --digits 1000 --json",
-    "trace": f"trace {PROBLEMS}/ep_set.toml --step 0.0001 --json",
+    "compare": f"compare {PROBLEMS}/delivery_robot.toml --json",
+    "prove": f"prove {PROBLEMS}/delivery_robot.toml --digits 1000 --json",
+    "trace": f"trace {PROBLEMS}/ep_set.toml --step 0.00003 --json",
     "chart": f"chart {PROBLEMS}/chart.toml --points 3000x3000 --json",
     "folder": f"chart {PROBLEMS}/chart.toml --points 30000x30000 --output out/c.chart --workers 2 --json",
     "study": f"study {PROBLEMS}/study_sway.toml --store out/s.sqlite --workers 2 --json",
@@ -463,6 +463,7 @@ def test_every_command_ends_soon(
     )  # fmt: skip
     time.sleep(seconds)
     if process.poll() is not None:
+        process.communicate()
         pytest.skip("it was done before the signal")
     process.send_signal(number)
     began = time.perf_counter()

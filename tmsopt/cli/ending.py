@@ -7,6 +7,7 @@ however the command would have ended.
 
 import atexit
 import errno
+import io
 import os
 import signal
 import sys
@@ -195,12 +196,15 @@ def streams() -> Iterator[TextIO]:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a narrow terminal encoding must not lose a result
+    given = sys.stdout
+    if isinstance(getattr(given, "buffer", None), io.RawIOBase):  # python -u loses the rest of what a signal interrupts
+        sys.stdout = os.fdopen(given.fileno(), "w", encoding=given.encoding, errors="replace", closefd=False)
     out, err = sys.stdout, sys.stderr
     sys.stderr = cast(TextIO, _Diagnostics(err))
     try:
         yield err
     finally:
-        sys.stderr = err
+        sys.stdout, sys.stderr = given, err
         for stream in (out, err):
             try:
                 stream.flush()
