@@ -76,21 +76,7 @@ COMMANDS: dict[str, tuple[str, set[str]]] = {
 FILES = {
     "study": 'problem = "{p}/ep4.toml"\n[vary]\nmu = [0.1, 0.2, 0.3]\n',
     "built": 'problem = "{p}/ep4.toml"\n[study]\nmethod = "monte_carlo"\nrows = 20\n[tolerances]\nmu = 0.01\n',
-    "infeasible": """
-model = "tms"
-[parameters]
-Fr = { min = 0.1, max = 5 }
-mu = 0.1
-chi_B = { min = 1.01, max = 5 }
-chi_H = 1.0
-zeta_B = -0.4
-zeta_H = -0.2
-lambda_s = 0.4
-[objective]
-minimize = "abscissa"
-[constraints]
-decay = "abscissa <= -100"
-""",
+    "infeasible": (PROBLEMS / "ep4.toml").read_text() + '[constraints]\ndecay = "abscissa <= -100"\n',
 }
 
 
