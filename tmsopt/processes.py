@@ -19,6 +19,13 @@ Inbox = SimpleQueue[tuple["Worker", Any]]
 """Workers, each with what a function returned there, as it comes; with None, once, when it has ended."""
 
 
+def cores() -> int:
+    """How many processes this one may keep busy: cores, less what affinity, quotas and LOKY_MAX_CPU_COUNT deny it."""
+    import loky
+
+    return int(loky.cpu_count())
+
+
 class Worker:
     """A process that calls functions, one after the other; to be ended.
 

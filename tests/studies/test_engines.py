@@ -15,7 +15,8 @@ from helpers.works import Fake, Unloadable
 
 from tmsopt.errors import InputError
 from tmsopt.studies import Row
-from tmsopt.studies.engines import Assignments, EngineError, cluster, cores, in_process, processes
+from tmsopt.processes import cores
+from tmsopt.studies.engines import Assignments, EngineError, cluster, in_process, processes
 
 Units = Sequence[tuple[int, ...]]
 Engine = Callable[..., Iterator[Row]]

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from tmsopt.design.solution import Solution
+from tmsopt.fronts.crew import AT_ONCE, Crew
 from tmsopt.fronts.front import Front, FrontPoint, Gap, Kink, efficient
 from tmsopt.fronts.subproblems import Asker, least, point
-from tmsopt.progress import Counts
+from tmsopt.progress import Steps, begin
 from tmsopt.solver.solve import covered
 
 Objectives = tuple[float, ...]
@@ -23,16 +24,17 @@ _END = 1e-3  # a change this close to an end is the end's own: beside EP4 the st
 _ROUNDS = 3  # of sweeps that carry a better branch along the front
 _NEAR = 0.02  # of the box: designs this close to one another are taken to lie on the same branch
 _MOST = 8  # sub-problems per point asked for, at most
+_ROOM = 1.5  # of the mean spacing: a longer stretch has room for a point
 _CLOSE = 0.3  # of the mean spacing: unlabelled points closer than this to another are left out
 
 
-def curve(ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Counts | None) -> Front:
+def curve(crew: Crew, ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Steps | None) -> Front:
     """The front between its two ends, with kinks and gaps.
 
     Each new limit is set where neighbours are farthest apart, on the objective that changes more there; sweeps both
     ways then carry a better branch along the front.
     """
-    search, interrupted = _Search(ask, ends, points, progress), False
+    search, interrupted = _Search(crew, ask, ends, points, progress), False
     try:
         for _ in range(_ROUNDS):
             search.fill()
@@ -94,9 +96,10 @@ class _Stretch:
 class _Search:
     """The probes made so far; the front is always read from them afresh."""
 
-    def __init__(self, ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Counts | None) -> None:
-        self.ask, self.ends, self.points, self.progress = ask, tuple(ends), points, progress
+    def __init__(self, crew: Crew, ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Steps | None) -> None:
+        self.crew, self.ask, self.ends, self.points, self.progress = crew, ask, tuple(ends), points, progress
         self.probes: list[_Probe] = []
+        self.done, self.most = 0, math.nan  # of what is counted
         self.range = tuple(abs(ends[0].objectives[k] - ends[1].objectives[k]) for k in (0, 1))
 
     def chain(self) -> list[FrontPoint]:
@@ -137,31 +140,28 @@ class _Search:
         found = probe.found.objectives
         return found[k] <= low[k] + margin or found[1 - k] >= low[1 - k] - _SAME * self.range[1 - k]
 
-    def split(self, s: _Stretch, share: float = 0.5, few: bool = False) -> None:
-        """Probe between two neighbours, at a share of the way from the one that is lower in the probed objective."""
+    def between(self, s: _Stretch, place: int, share: float = 0.5, few: bool = False) -> "_Asked":
+        """A probe between two neighbours, at a share of the way from the one that is lower in the probed objective."""
         low, high = s.unknown
         eps = low + (high - low) * (0.5 if s.suspect else share)
-        near = [s.left.solution, s.right.solution]
-        k, known = 1 - s.axis, s.right if s.axis else s.left
-        found = None
-        for quick in (True, False) if few else (False,):
-            found = self.probe(s.axis, eps, near[:1] if quick and self._near(*near) else near, quick)
-            if found is not None:
-                if found.objectives[k] <= known.objectives[k] + _UNUSED * self.range[k]:
-                    return
-                self.probes.pop()
-        if found is not None:  # a poor local optimum: the neighbour that meets the limit is better
-            self.probes.append(_Probe(s.axis, eps, known))
+        near, k, known = (s.left.solution, s.right.solution), 1 - s.axis, s.right if s.axis else s.left
+        quick = ((near[:1] if self._near(*near) else near, True),) if few else ()
+        enough = known.objectives[k] + _UNUSED * self.range[k]
+        return _Asked(s.axis, eps, (*quick, (near, False)), enough, known, len(self.probes) + place)
 
-    def probe(self, axis: int, eps: float, near: Sequence[Solution], few: bool = False) -> FrontPoint | None:
-        ask = self.ask.later(len(self.probes))
-        solution = least(ask, 1 - axis, {axis: eps}, near, few)
-        found = None if solution is None else point(ask, solution)
-        if found is not None or not few:
-            self.probes.append(_Probe(axis, eps, found))
-        if self.progress:
-            self.progress(len(self.probes), max(3 * self.points, len(self.probes)))
-        return found
+    def probe(self, asked: Sequence["_Asked"]) -> list[_Probe | None]:
+        """What comes of probes, solved side by side; those that have ended are kept when the user ends the others."""
+        found: dict[int, _Probe | None] = {}
+        try:
+            for k, probe in self.crew.each(_probed, self.ask, asked):
+                found[k] = probe
+                self.done += 1
+                if self.progress:
+                    self.progress(self.done, self.most)
+        finally:
+            ended = [found.get(k) for k in range(len(asked))]
+            self.probes += [probe for probe in ended if probe is not None]
+        return ended
 
     def _near(self, a: Solution, b: Solution) -> bool:
         """Whether two designs are close, so that starting from either comes to the same."""
@@ -174,47 +174,101 @@ class _Search:
 
     def fill(self) -> None:
         """Points where neighbours are farthest apart, until there are enough."""
+        begin(self.progress, "following the front", "point")
+        self.done, self.most = len(self.chain()), self.points
         while not self.exhausted:
             stretches = self.stretches()
-            open_ = [s for s in stretches if not s.gap and s.length > _GAP]
-            if len(stretches) + 1 >= self.points or not open_:
+            open_ = sorted((s for s in stretches if not s.gap and s.length > _GAP), key=lambda s: -s.length)
+            if (missing := self.points - 1 - len(stretches)) <= 0 or not open_:
                 return
-            widest = max(open_, key=lambda s: s.length)
             spacing = sum(s.length for s in stretches if not s.gap) / (self.points - 1)
-            parts = max(2, round(widest.length / spacing))
-            self.split(widest, (parts // 2) / parts)
+            parts = [max(2, round(s.length / spacing)) for s in open_]
+            wide = [k for k, s in enumerate(open_) if not k or s.length > _ROOM * spacing][: min(AT_ONCE, missing)]
+            self.probe([self.between(open_[k], k, (parts[k] // 2) / parts[k]) for k in wide])
 
     def sweep(self) -> bool:
         """Solve each point anew from the design before it, both ways; whether any became better."""
+        begin(self.progress, "looking for better branches", "sub-problem")
+        self.done, self.most = 0, math.nan
         before = len(self.chain())
         better = False
         for backwards in (False, True):
             chain = self.chain()[::-1] if backwards else self.chain()
-            previous = chain[0]
-            for old in chain[1:-1]:
-                asked = next((p for p in self.probes if p.found is old), None)
-                new = None
-                if asked is not None and not self._near(previous.solution, old.solution):
-                    new = self.probe(asked.axis, asked.eps, [previous.solution], few=True)
-                if new is not None and asked is not None:
-                    k = 1 - asked.axis
-                    gain = old.objectives[k] - new.objectives[k]
-                    if gain > _UNUSED * self.range[k]:
-                        better, previous = True, new
-                        continue
-                    self.probes.pop()  # the same again
-                previous = old
+            previous, rest = chain[0], chain[1:-1]
+            while rest:  # a few at once, as if none became better; where one does, those after it are asked again
+                ahead = self._next(previous, rest)
+                new = self.probe([asked for _, asked in ahead])
+                found = next((k for k, probe in enumerate(new) if probe is not None), None)
+                if found is None:
+                    last = ahead[-1][0] if len(ahead) == AT_ONCE else len(rest) - 1
+                    previous, rest = rest[last], rest[last + 1 :]
+                else:
+                    late = {id(probe) for probe in new[found + 1 :]}
+                    self.probes = [probe for probe in self.probes if id(probe) not in late]
+                    better, rest = True, rest[ahead[found][0] + 1 :]
+                    previous = self.probes[-1].found or previous
         return better or len(self.chain()) < before
+
+    def _next(self, previous: FrontPoint, rest: Sequence[FrontPoint]) -> list[tuple[int, "_Asked"]]:
+        """The next points that are to be solved anew, by their places, each from the one before it."""
+        ahead: list[tuple[int, _Asked]] = []
+        for place, old in enumerate(rest):
+            probe = next((p for p in self.probes if p.found is old), None)
+            if probe is not None and not self._near(previous.solution, old.solution):
+                k = 1 - probe.axis
+                enough = old.objectives[k] - _UNUSED * self.range[k]
+                way = ((previous.solution,), True)
+                ahead.append((place, _Asked(probe.axis, probe.eps, (way,), enough, None, len(self.probes))))
+            previous = old
+            if len(ahead) == AT_ONCE:
+                break
+        return ahead
 
     def settle(self) -> None:
         """Ends of gaps and places of kinks, to their tolerance."""
+        begin(self.progress, "placing kinks and gaps", "sub-problem")
+        self.done, self.most = 0, math.nan
         while not self.exhausted:
             stretches = self.stretches()
             unclear = [s for s in stretches if not s.gap and s.suspect and s.length > _GAP]
             changing = [s for s in stretches if s.changes and not s.located]
             if not unclear and not changing:
                 return
-            self.split((unclear or changing)[0], few=bool(changing and not unclear))
+            few = bool(changing and not unclear)
+            self.probe([self.between(s, k, few=few) for k, s in enumerate((unclear or changing)[:AT_ONCE])])
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A probe to be made.
+
+    Attributes:
+        axis, eps: the limit.
+        ways: designs to start from and whether from them alone, one way after the other until the result will do.
+        enough: what the other objective has to come to at least.
+        known: what stands for a design that does not come to that; None where it is then as if nothing was asked.
+        count: of probes before it, for starts of its own.
+    """
+
+    axis: int
+    eps: float
+    ways: tuple[tuple[tuple[Solution, ...], bool], ...]
+    enough: float
+    known: FrontPoint | None
+    count: int
+
+
+def _probed(ask: Asker, asked: _Asked) -> _Probe | None:
+    """What comes of a probe."""
+    found, ask = None, ask.later(asked.count)
+    for near, few in asked.ways:
+        solution = least(ask, 1 - asked.axis, {asked.axis: asked.eps}, near, few)
+        found = None if solution is None else point(ask, solution)
+        if found is not None and found.objectives[1 - asked.axis] <= asked.enough:
+            return _Probe(asked.axis, asked.eps, found)
+    if asked.known is None:
+        return None
+    return _Probe(asked.axis, asked.eps, found and asked.known)  # of a poor local optimum, the neighbour is better
 
 
 def _thinned(search: _Search) -> Front:
@@ -242,17 +296,22 @@ def _thinned(search: _Search) -> Front:
             kept.append(i)
             since = 0.0
     place = {i: k for k, i in enumerate(kept)}
+    proved = dict(search.crew.each(_covered, search.ask, [chain[i].solution for i in kept]))
     notes = () if not search.exhausted else ("the search was ended: too many sub-problems; ask for more points",)
     return Front(
         problem=search.ask.problem,
         objectives=search.ask.texts,
-        points=tuple(replace(chain[i], solution=covered(chain[i].solution), label="; ".join(words[i])) for i in kept),
+        points=tuple(replace(chain[i], solution=proved[k], label="; ".join(words[i])) for k, i in enumerate(kept)),
         kinks=tuple(Kink(name, place[i], width) for i, name, width in changes),
         gaps=tuple(Gap(reason, place[i], failed) for i, reason, failed in gaps),
         solved=len(search.probes) + 2,
         seconds=0.0,
         notes=notes,
     )
+
+
+def _covered(_: Asker, solution: Solution) -> Solution:
+    return covered(solution)
 
 
 def _ahead(stretches: Sequence[_Stretch], words: Sequence[list[str]]) -> list[float]:

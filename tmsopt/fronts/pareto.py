@@ -5,14 +5,16 @@ from dataclasses import replace
 from typing import Unpack
 
 from tmsopt.design.files import Given, problem_of
-from tmsopt.design.solution import NotSolved
+from tmsopt.design.solution import NotSolved, Solution
 from tmsopt.errors import MOST_POINTS, Fault, InputError, count_faults
 from tmsopt.formulation.options import Asked, Options, options_of, taking
+from tmsopt.fronts.crew import AT_ONCE, Crew
 from tmsopt.fronts.curve import curve
 from tmsopt.fronts.front import Front, FrontPoint
-from tmsopt.fronts.subproblems import Asker, best_first, point
+from tmsopt.fronts.subproblems import Asker, alone, best_first, point
 from tmsopt.fronts.surface import surface
-from tmsopt.progress import begin
+from tmsopt.processes import cores
+from tmsopt.progress import Steps, begin
 
 POINTS = 25
 STARTS = 2
@@ -23,62 +25,80 @@ _ALIKE = 1e-7  # relative difference of ends that counts as no conflict, that of
 
 
 @taking(Asked, _DEFAULTS)
-def pareto(problem: Given, points: int = POINTS, **options: Unpack[Asked]) -> Front:
+def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, **options: Unpack[Asked]) -> Front:
     """The front of two or three objectives, each minimised, with its ends, kinks and gaps.
 
     Two objectives: minimise one subject to the other ≤ eps, the next eps where neighbours are farthest apart and on
     the objective that changes more, then sweeps both ways that keep the better design. Three: a grid of eps over the
     payoff table, at most 12 × 12. Gaps narrower than the spacing of the points may be missed. Ctrl-C leaves what is
-    known of the front, once its ends are.
+    known of the front, once one of its ends is.
 
     Args:
         problem: with ``pareto``; ``locate`` and constraints narrow the designs.
         points: asked for along the front; kinks and ends of gaps come on top.
+        workers: processes, this one among them, by default one per core, of which up to four are of use; the front is
+            the same for any number.
         options: ``starts`` per sub-problem beside the designs of the neighbours, 2 by default, ``seed`` and
             ``linear_solver`` and ``progress`` as of `solve`.
 
     Raises:
         NotSolved: when an objective has no optimum, carrying the best point found.
-        InputError: for a problem without ``pareto``, or fewer than 2 points or more than 10000.
+        InputError: for a problem without ``pareto``, or fewer than 2 points or more than 10000, or no process.
     """
     problem = problem_of(problem)
     if not problem.pareto:
         message = 'no front is asked for; write e.g. pareto = ["abscissa", "Fr"], or use tmsopt.solve'
         raise InputError([Fault(message, ("objective",))])
     how = options_of(options, defaults=_DEFAULTS, fewest=0)
-    if faults := count_faults("points", points, 2, MOST_POINTS):
+    faults = count_faults("points", points, 2, MOST_POINTS)
+    if faults := faults + ([] if workers is None else count_faults("workers", workers, 1)):
         raise InputError(faults)
     began = time.perf_counter()
-    progress, ask = how.progress, Asker(problem, replace(how, progress=None))
-    begin(progress, "following the front", "sub-problem")
-    n = len(ask.texts)
-    ends = tuple(_end(ask, k) for k in range(n))
-    front = Front(problem, ask.texts, ends[:1], (), (), n, 0.0)
-    ranges = [max(p.objectives[k] for p in ends) - min(p.objectives[k] for p in ends) for k in range(n)]
-    conflict = [r > _ALIKE * (1 + max(abs(p.objectives[k]) for p in ends)) for k, r in enumerate(ranges)]
-    ask = replace(ask, ranges=tuple(ranges), ends=ends)
-    if not (all(conflict) if n == 2 else any(conflict)):
-        best = min(ends, key=lambda p: sum(p.objectives))
-        note = "the objectives are not in conflict: one design is best in all of them, and the front is that point"
-        front = replace(front, points=(replace(best, label="best in all"),), notes=(note,))
-    elif n == 2:
-        front = curve(ask, ends, points, progress)
-    else:
-        found, gaps, solved, interrupted = surface(ask, ends, points, progress)
-        front = replace(front, points=found, gaps=gaps, solved=solved, interrupted=interrupted)
+    with Crew(min(workers or cores(), AT_ONCE)) as crew:
+        front = _front(crew, Asker(problem, replace(how, progress=None)), points, how.progress)
     if front.interrupted:
         words = f"the user stopped the search after {front.solved} sub-problems; this is what is known of the front"
         front = replace(front, notes=(*front.notes, words))
     return replace(front, seconds=time.perf_counter() - began)
 
 
-def _end(ask: Asker, k: int) -> FrontPoint:
-    """The end of the front where objective `k` is best, with its label."""
-    n = len(ask.texts)
-    solution = best_first(ask, [(k + j) % n for j in range(n)])
-    if solution.status != "optimal":
-        raise NotSolved(solution)
-    text = ask.texts[k].strip()
+def _front(crew: Crew, ask: Asker, points: int, progress: Steps | None) -> Front:
+    begin(progress, "looking for the ends of the front", "sub-problem")
+    n, ends = len(ask.texts), dict[int, FrontPoint]()
+    front = Front(ask.problem, ask.texts, (), (), (), n, 0.0)
+    try:
+        easier: dict[int, Solution] = {}
+        for k, found in crew.each(alone, ask, range(n)):
+            easier[k] = found
+            if progress:
+                progress(len(easier), 2 * n)
+        if unsolved := [k for k in range(n) if easier[k].status != "optimal"]:
+            raise NotSolved(easier[unsolved[0]])
+        ask = replace(ask, easier=easier)
+        for k, best in crew.each(best_first, ask, range(n)):
+            ends[k] = replace(point(ask, best), label=_label(ask.texts[k].strip()))
+            if progress:
+                progress(n + len(ends), 2 * n)
+    except KeyboardInterrupt:
+        if not ends:
+            raise
+        return replace(front, points=tuple(ends.values()), solved=n + len(ends), interrupted=True)
+    at = tuple(ends[k] for k in range(n))
+    ranges = [max(p.objectives[k] for p in at) - min(p.objectives[k] for p in at) for k in range(n)]
+    conflict = [r > _ALIKE * (1 + max(abs(p.objectives[k]) for p in at)) for k, r in enumerate(ranges)]
+    ask = replace(ask, ranges=tuple(ranges), ends=at)
+    if not (all(conflict) if n == 2 else any(conflict)):
+        best_in_all = min(at, key=lambda p: sum(p.objectives))
+        note = "the objectives are not in conflict: one design is best in all of them, and the front is that point"
+        return replace(front, points=(replace(best_in_all, label="best in all"),), notes=(note,))
+    if n == 2:
+        return curve(crew, ask, at, points, progress)
+    shown, gaps, solved, interrupted = surface(crew, ask, at, points, progress)
+    return replace(front, points=shown, gaps=gaps, solved=solved, interrupted=interrupted)
+
+
+def _label(text: str) -> str:
+    """Of the end of the front where an objective is best."""
     opposite = text.removeprefix("-").strip()
     greatest = text != opposite and opposite.isidentifier()
-    return replace(point(ask, solution), label=f"greatest {opposite}" if greatest else f"least {text}")
+    return f"greatest {opposite}" if greatest else f"least {text}"

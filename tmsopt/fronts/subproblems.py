@@ -12,7 +12,7 @@ from tmsopt.design.solution import Solution
 from tmsopt.formulation.formulate import LIMIT
 from tmsopt.formulation.options import STARTS, Options
 from tmsopt.fronts.front import FrontPoint
-from tmsopt.solver.sample import Leads
+from tmsopt.solver.sample import Known
 from tmsopt.solver.solve import solved
 from tmsopt.solver.workspace import Family
 
@@ -21,6 +21,30 @@ _SLACK = 1e-9  # of a best value held while the next is minimised: what the rech
 _AT_END = 1e-6  # of a parameter's range: IPOPT stays inside it, and where limits are degenerate polishing keeps that
 _BEYOND = 1e-6  # relative: a part of the box whose best is worse by less than this is searched all the same
 _WORTH = 1e-4  # gain at an end that its slack does not explain: at a smooth optimum it buys sqrt(1e-9) = 3e-5
+
+
+class Workshop:
+    """What one process has built for sub-problems and met in solving them; never sent to another.
+
+    Attributes:
+        known: what was met.
+    """
+
+    def __init__(self) -> None:
+        self.known, self._families = Known(), dict[Hashable, Family]()
+
+    def __reduce__(self) -> tuple[type["Workshop"], tuple[()]]:
+        return Workshop, ()
+
+    def know(self, known: Known) -> None:
+        """Know what another does, and nothing else."""
+        copy = known.joined(())
+        self.known.refined, self.known.leads = copy.refined, copy.leads
+
+    def family(self, problem: Problem, limits: Sequence[str]) -> Family:
+        """Of the sub-problems that differ in these limits alone."""
+        name = problem.minimize, *limits, *problem.fixed.items()
+        return self._families.setdefault(name, Family([n + LIMIT for n in limits], self.known, name))
 
 
 @dataclass(frozen=True)
@@ -32,25 +56,21 @@ class Asker:
         options: how to solve each, with so many new starts, against branches that the neighbours do not lead to.
         ranges: of the objectives over the front, once its ends are known.
         ends: the same.
-        families: what was built for sub-problems that differ in their limits alone.
-        leads: designs with roots of a pattern in each box.
         easier: the least of each objective alone, as far as known: no sub-problem has a better one.
+        shop: where they are solved; not sent to other processes.
     """
 
     problem: Problem
     options: Options
     ranges: tuple[float, ...] = ()
     ends: tuple[FrontPoint, ...] = ()
-    families: dict[Hashable, Family] = field(default_factory=dict, compare=False)
-    leads: dict[Hashable, Leads] = field(default_factory=dict, compare=False)
-    easier: dict[int, Solution] = field(default_factory=dict, compare=False)
+    easier: Mapping[int, Solution] = field(default_factory=dict)
+    shop: Workshop = field(default_factory=Workshop, compare=False)
 
     def solve(self, problem: Problem, starts: int, near: Sequence[Solution] = (), blind: bool = False) -> Solution:
         """The rechecked solution of a sub-problem, whatever its status, from designs near by and so many new starts."""
         limits = [n for n in eps_names(self) if n in problem.constraints]
-        family = self.families.setdefault(
-            (problem.minimize, *limits, *problem.fixed.items()), Family([n + LIMIT for n in limits], self.leads)
-        )
+        family = self.shop.family(problem, limits)
         beside = [_inside(problem, n) for n in near]
         options = replace(self.options, starts=starts + len(beside) + bool(problem.start))
         return solved(problem, options, family, beside, blind, self._hopeless(problem, near))
@@ -82,17 +102,16 @@ class Asker:
         return tuple(self.problem.pareto)
 
 
-def best_first(ask: Asker, order: Sequence[int]) -> Solution:
-    """An end of the front: objectives minimised in order, each held at its best while the next is minimised.
+def alone(ask: Asker, k: int) -> Solution:
+    """Objective `k` minimised alone, whatever the others are; of any status."""
+    return ask.solve(subproblem(ask, k, {}), STARTS)
 
-    Its status is not ``optimal`` when the first objective has no optimum.
-    """
-    first = order[0]
-    found = ask.easier[first] = ask.solve(subproblem(ask, first, {}), STARTS)
-    held: dict[int, float] = {}
-    for done, k in pairwise(order):
-        if found.status != "optimal":
-            break
+
+def best_first(ask: Asker, first: int) -> Solution:
+    """An end of the front: the least of the first objective, held there while the others are minimised in turn."""
+    count = len(ask.texts)
+    found, held = ask.easier[first], dict[int, float]()
+    for done, k in pairwise((first + j) % count for j in range(count)):
         values = objectives(ask, found)
         held[done] = values[done] + _SLACK * (1 + abs(values[done]))
         better = least(ask, k, held, [found], pin=first)

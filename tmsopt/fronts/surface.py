@@ -1,12 +1,13 @@
 """The front of three objectives: a grid of limits on two of them, over the payoff table."""
 
-from collections.abc import Sequence
-from itertools import product
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from tmsopt.design.solution import Solution
+from tmsopt.fronts.crew import Crew
 from tmsopt.fronts.front import FrontPoint, Gap, efficient
 from tmsopt.fronts.subproblems import Asker, least, point, solvable
-from tmsopt.progress import Counts
+from tmsopt.progress import Steps, begin
 
 MOST = 12
 """Limits per objective at most, so 144 sub-problems."""
@@ -14,14 +15,25 @@ MOST = 12
 _SAME = 1e-7  # of the range: a corner of the table is held with a slack of 1e-9
 
 
+@dataclass(frozen=True)
+class _Cell:
+    """A sub-problem: limits on objectives, designs near by, and its number."""
+
+    limits: Mapping[int, float]
+    near: tuple[Solution, ...]
+    number: int
+
+
 def surface(
-    ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Counts | None
+    crew: Crew, ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Steps | None
 ) -> tuple[tuple[FrontPoint, ...], tuple[Gap, ...], int, bool]:
     """Efficient points, sub-problems that failed, the number of those solved, and whether the user ended it.
 
-    Objective 0 is minimised with limits on 1 and 2, from loose to tight; the worst values in the payoff table
-    stand for the nadir. A limit that no design meets ends its row, and every tighter one with it.
+    Objective 0 is minimised with limits on 1 and 2, from loose to tight, those side by side that do not follow from one
+    another; the worst values in the payoff table stand for the nadir. A limit that no design meets ends its row, and
+    every tighter one with it.
     """
+    begin(progress, "following the front", "sub-problem")
     table = [[p.objectives[k] for p in ends] for k in range(3)]
     low, high = [min(c) for c in table], [max(c) for c in table]
     side = min(points, MOST)
@@ -31,26 +43,34 @@ def surface(
     count = 0
     interrupted = False
     try:
-        for i, j in product(range(side, 0, -1), repeat=2):
-            looser = [(i + 1, j), (i, j + 1)]
-            if any(cell in impossible for cell in looser):
-                impossible.add((i, j))
-                continue
-            limits = {k: low[k] + (high[k] - low[k]) * step / side for k, step in ((1, i), (2, j))}
-            near = [s for s in (solved.get(cell) for cell in looser) if s is not None]
-            meets = [s for s in near if all(point(ask, s).objectives[k] <= v for k, v in limits.items())]
-            if meets:  # the best under looser limits is the best here
-                solved[i, j] = meets[0]
-                continue
-            found = least(ask.later(count), 0, limits, near or [p.solution for p in ends])
-            count += 1
-            if found is None and not solvable(ask, 0, limits):
-                impossible.add((i, j))
-            elif found is None:
-                failed.append(" and ".join(f"{ask.texts[k]} <= {v:.6g}" for k, v in limits.items()))
-            solved[i, j] = found
-            if progress:
-                progress(count, side * side)
+        for diagonal in range(2 * side, 1, -1):
+            cells: dict[tuple[int, int], _Cell] = {}
+            for i, j in ((i, diagonal - i) for i in range(side, 0, -1) if 1 <= diagonal - i <= side):
+                looser = [(i + 1, j), (i, j + 1)]
+                if any(cell in impossible for cell in looser):
+                    impossible.add((i, j))
+                    continue
+                limits = {k: low[k] + (high[k] - low[k]) * step / side for k, step in ((1, i), (2, j))}
+                near = [s for s in (solved.get(cell) for cell in looser) if s is not None]
+                meets = [s for s in near if all(point(ask, s).objectives[k] <= v for k, v in limits.items())]
+                if meets:  # the best under looser limits is the best here
+                    solved[i, j] = meets[0]
+                else:
+                    cells[i, j] = _Cell(limits, tuple(near or [p.solution for p in ends]), count + len(cells))
+            ended: dict[int, tuple[Solution | None, bool]] = {}
+            try:
+                for k, outcome in crew.each(_solved, ask, list(cells.values())):
+                    ended[k] = outcome
+                    count += 1
+                    if progress:
+                        progress(count, side * side)
+            finally:
+                for k, (cell, of) in enumerate(cells.items()):
+                    solved[cell], possible = ended.get(k, (None, True))
+                    if not possible:
+                        impossible.add(cell)
+                    elif solved[cell] is None and k in ended:
+                        failed.append(" and ".join(f"{ask.texts[j]} <= {v:.6g}" for j, v in of.limits.items()))
     except KeyboardInterrupt:
         interrupted = True
     every = [*ends, *(point(ask, s) for s in {id(s): s for s in solved.values() if s is not None}.values())]
@@ -58,3 +78,9 @@ def surface(
     kept = efficient(every, [_SAME * r for r in ranges])
     gaps = tuple(Gap(f"not solved for {text}; try more starts", 0, True) for text in failed)
     return tuple(kept), gaps, count + 3, interrupted
+
+
+def _solved(ask: Asker, cell: _Cell) -> tuple[Solution | None, bool]:
+    """The best of a cell, None where no optimum was found, and whether there may be one."""
+    found = least(ask.later(cell.number), 0, cell.limits, cell.near)
+    return found, found is not None or solvable(ask, 0, cell.limits)

@@ -1,6 +1,6 @@
 """A quasi-random sample of the whole box, judged by arrays and refined: where to start, and the referee of claims."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from itertools import product
@@ -49,6 +49,33 @@ _SHARES = (1.0, 0.5, 0.1, 0.01, 1e-3)  # of a step, the best of which is taken
 
 Leads = dict[str, list[dict[str, float]]]
 """Designs with the roots of each pattern."""
+
+
+@dataclass
+class Known:
+    """What problems that differ in their limits met, for those that come later. Its values are never changed.
+
+    Attributes:
+        refined: designs, as points of the unit cube, for the objective and the box that they were refined for.
+        leads: designs with the roots of a pattern for each box, whatever the objective.
+    """
+
+    refined: dict[Hashable, Array] = field(default_factory=dict)
+    leads: dict[Hashable, Leads] = field(default_factory=dict)
+
+    def joined(self, others: Sequence["Known"]) -> "Known":
+        """This with what others have come to from it: new designs first, and of new leads those of the first."""
+        refined = dict(self.refined)
+        for place in (place for other in others for place in other.refined):
+            old = {u.tobytes(): u for u in self.refined.get(place, ())}
+            every = {u.tobytes(): u for other in others for u in other.refined.get(place, ())}
+            new = [u for key, u in every.items() if key not in old]
+            refined[place] = np.array([*new, *old.values()][:_REMEMBERED])
+        leads = {box: dict(found) for box, found in self.leads.items()}
+        for box, pattern in ((b, p) for other in others for b, found in other.leads.items() for p in found):
+            found = (other.leads.get(box, {}).get(pattern, []) for other in (self, *others))
+            leads.setdefault(box, {})[pattern] = max(found, key=len)
+        return Known(refined, leads)
 
 
 @dataclass(frozen=True)
@@ -112,25 +139,30 @@ class Remembered:
     """What was seen of one box, for problems that differ in the numbers of their limits alone.
 
     Attributes:
-        u: designs that were refined for another of them.
-        drawn: the first designs, what they are, and the constraints that this was said of.
-        leads: designs with the roots of a pattern, found for the latest of the problems.
+        known: what such problems met, here or elsewhere.
+        place: under which it has designs that were refined for another of them.
+        box: under which it has designs with the roots of a pattern.
+        drawn: the first designs, what they are with 0 for the numbers of all limits, and the constraints without those.
     """
 
-    u: Array | None = None
+    known: Known = field(default_factory=Known)
+    place: Hashable = None
+    box: Hashable = None
     drawn: tuple[Array, Judged, tuple[str, ...]] | None = None
-    leads: Leads = field(default_factory=dict)
 
-    def recall(self, constraints: tuple[str, ...]) -> tuple[Array, Judged] | None:
-        """The first designs, judged by other limits: each ``something <= number``."""
-        if self.drawn is None:
-            return None
-        u, found, old = self.drawn
-        return u, replace(found, beyond=found.beyond + np.array(list(map(_lowered, old, constraints)))[:, None])
+    @property
+    def leads(self) -> Leads:
+        """Designs with the roots of a pattern."""
+        return self.known.leads.setdefault(self.box, {})
+
+    @property
+    def u(self) -> Array | None:
+        """Designs that were refined for another of the problems, the latest first."""
+        return self.known.refined.get(self.place)
 
     def keep(self, u: Array) -> None:
         """Remember designs, the latest ones."""
-        self.u = u if self.u is None else np.concatenate([u, self.u])[:_REMEMBERED]
+        self.known.refined[self.place] = u if self.u is None else np.concatenate([u, self.u])[:_REMEMBERED]
 
 
 class Sampler:
@@ -148,7 +180,8 @@ class Sampler:
         self.space, self.rng = Cube(problem), np.random.default_rng([seed, 16])
         self.count, self.memory = 0, memory
         self.scales = np.ones(len(problem.conditions))
-        self._offset = np.random.default_rng(seed).random(self.space.size)
+        # What is kept for others must not depend on which of them came first.
+        self._offset = np.random.default_rng(0 if memory else seed).random(self.space.size)
 
     @property
     def problem(self) -> Problem:
@@ -193,25 +226,33 @@ class Sampler:
 
     def draw(self) -> Looked:
         """Corners, a quasi-random sequence, and some of it moved to faces."""
-        constraints = tuple(self.problem.constraints.values())
-        recalled = self.memory.recall(constraints) if self.memory else None
-        u, found = recalled or self._first()
-        if self.memory and recalled is None:
-            self.memory.drawn = u, found, constraints
+        u, found = self._recalled(self.memory) if self.memory else self._first(self.problem)
         for k, beyond in enumerate(found.beyond):
             known = np.abs(beyond[np.isfinite(beyond)])
             self.scales[k] = float(np.median(known)) if known.size and np.median(known) > 0 else 1.0
         return self._standing(u, found)
 
-    def _first(self) -> tuple[Array, Judged]:
+    def _recalled(self, memory: Remembered) -> tuple[Array, Judged]:
+        """The same for this problem's limits, as if looked at anew, to the bit."""
+        pairs = [_open(text) for text in self.problem.constraints.values()]
+        texts = tuple(text for text, _ in pairs)
+        if memory.drawn is None:
+            names = self.problem.constraints
+            memory.drawn = *self._first(replace(self.problem, constraints=dict(zip(names, texts, strict=True)))), texts
+        u, found, before = memory.drawn
+        assert texts == before, f"{texts} and {before} differ in more than their limits"
+        return u, replace(found, beyond=found.beyond - np.array([number for _, number in pairs])[:, None])
+
+    def _first(self, problem: Problem) -> tuple[Array, Judged]:
         size = self.space.size
-        cost = max(1, len(self.problem.cases)) * (1 if self.problem.model.degree <= _QUICK else _SLOWER)
+        cost = max(1, len(problem.cases)) * (1 if problem.model.degree <= _QUICK else _SLOWER)
         count = max(min(_FIRST * _EACH ** min(size, _MANY), _MOST) // cost, _LEAST)
         u = (self._offset + np.arange(1, count + 1)[:, None] * golden_steps(size)) % 1.0
         u[::_FACES] = np.clip(3 * u[::_FACES] - 1, 0.0, 1.0)
         corners = np.array(list(product((0.0, 1.0), repeat=size))) if size <= _CORNERS else np.empty((0, size))
         u = np.concatenate([np.full((1, size), 0.5), corners, u])
-        return u, self._judged(u)
+        self.count += len(u)
+        return u, judged(problem, self.space.designs(u))
 
     def refined(self, start: Looked, reaches: Sequence[float] = _REACHES) -> Looked:
         """Each design improved by random steps that become shorter, limits first."""
@@ -297,13 +338,13 @@ class Sampler:
         return Looked(u, np.where(np.isfinite(worth), worth, np.inf), violation)
 
 
-def _lowered(old: str, new: str) -> float:
-    """How much less the limit of a constraint is than it was."""
-    if old == new:
-        return 0.0
-    (rest, sign, before), (same, _, after) = (text.rpartition("<=") for text in (old, new))
-    assert (sign, rest) == ("<=", same), f"{old} and {new} differ in more than their limits"
-    return float(before) - float(after)
+def _open(text: str) -> tuple[str, float]:
+    """A constraint ``something <= number`` with 0 for the number, and the number; any other as it is."""
+    rest, sign, number = text.rpartition("<=")
+    try:
+        return (f"{rest}<= 0.0", float(number)) if sign else (text, 0.0)
+    except ValueError:
+        return text, 0.0
 
 
 def excluded(refined: Looked) -> bool:

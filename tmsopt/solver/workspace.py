@@ -22,7 +22,7 @@ from tmsopt.formulation.options import DEFAULTS, Options
 from tmsopt.margins.nearest import Robustness, robustness_at
 from tmsopt.models import Quantity, Values
 from tmsopt.records import Array
-from tmsopt.solver.sample import Leads, Remembered, Sample, Sampler
+from tmsopt.solver.sample import Known, Remembered, Sample, Sampler
 
 _KEPT = 32
 """NLPs kept, with three solvers each: where cases are added row by row, most are not met again."""
@@ -41,12 +41,13 @@ class Family:
     Args:
         varied: names of the numbers that differ: fixed parameters, and ``trail.limit`` for the number that the
             constraint ``trail`` compares with. They are parameters of the NLPs; the box may differ too.
-        leads: with roots of a pattern in boxes, which families of other objectives may share; given where all but
-            limits is the same, what was seen of each box is remembered, too.
+        known: what other such problems met, which families of other objectives may share; given where all but limits
+            is the same.
+        name: under which this family has designs there.
     """
 
-    def __init__(self, varied: Collection[str] = (), leads: dict[Hashable, Leads] | None = None) -> None:
-        self.varied, self._leads = tuple(varied), leads
+    def __init__(self, varied: Collection[str] = (), known: Known | None = None, name: Hashable = None) -> None:
+        self.varied, self._known, self._name = tuple(varied), known, name
         self._memories: OrderedDict[Hashable, Remembered] = OrderedDict()
         self._nlps: OrderedDict[Hashable, NLP] = OrderedDict()
         self._made: OrderedDict[Hashable, tuple[ca.Function, Any]] = OrderedDict()
@@ -83,11 +84,10 @@ class Family:
 
     def memory(self, part: Problem) -> Remembered | None:
         """What was seen of a part of the box."""
-        if self._leads is None:
+        if (known := self._known) is None:
             return None
         box = tuple(part.free.items())
-        leads = self._leads.setdefault(box, {})
-        return _kept(self._memories, box, lambda: Remembered(leads=leads))
+        return _kept(self._memories, box, lambda: Remembered(known, (self._name, box), box))
 
     def _of(self, nlp: NLP, options: Hashable, make: Callable[[], T]) -> T:
         """Something made of an NLP's functions, which are kept with it lest another gets their address."""

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from tmsopt.design.unit_system import units_of
 from tmsopt.disk import path_of
 from tmsopt.errors import Fault, InputError, call_faults, count_faults, short, suggest
+from tmsopt.processes import cores
 from tmsopt.progress import Listener, counted
 from tmsopt.records import SCHEMA, Shown, Truth, frame
-from tmsopt.studies.engines import Note, Unit, cluster, cores, in_process, processes
+from tmsopt.studies.engines import Note, Unit, cluster, in_process, processes
 from tmsopt.studies.engines.work import silent
 from tmsopt.studies.export import columns, export, gridded
 from tmsopt.studies.judging import RowBlock, applies, gathered, judged, shared_by

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
-from tmsopt.processes import Inbox, Worker
+from tmsopt.processes import Inbox, Worker, cores
 from tmsopt.records import Table
 
 if TYPE_CHECKING:
@@ -218,8 +218,6 @@ def pictures(items: Sequence[Item], endings: Sequence[str]) -> Generator[tuple[i
 
     Several are drawn by processes of their own, as many as are of use; what one of them fails at is drawn here.
     """
-    from tmsopt.studies.engines import cores
-
     left = list(range(len(items)))
     workers = min(cores(), len(items)) if len(items) > 1 else 0
     if workers < 2:

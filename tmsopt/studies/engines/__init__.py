@@ -7,7 +7,7 @@ solved, try it again alone, and quarantine a row that ends its worker twice.
 
 from tmsopt.studies.engines.dask import cluster
 from tmsopt.studies.engines.dispatch import Assignments
-from tmsopt.studies.engines.local import cores, in_process, processes
+from tmsopt.studies.engines.local import in_process, processes
 from tmsopt.studies.engines.work import EngineError, Note, Unit, Work
 
-__all__ = ["Assignments", "EngineError", "Note", "Unit", "Work", "cluster", "cores", "in_process", "processes"]
+__all__ = ["Assignments", "EngineError", "Note", "Unit", "Work", "cluster", "in_process", "processes"]

@@ -4,7 +4,7 @@ from collections.abc import Generator, Sequence
 from queue import Empty, SimpleQueue
 
 from tmsopt.errors import Fault, InputError
-from tmsopt.processes import Inbox, Worker
+from tmsopt.processes import Inbox, Worker, cores
 from tmsopt.studies.engines.dispatch import Assignments
 from tmsopt.studies.engines.work import EngineError, Note, Unit, Work, attempt, keep, pickled, silent, timed
 from tmsopt.studies.row import Row
@@ -20,13 +20,6 @@ _ONE_THREAD = dict.fromkeys(
 _STILLBORN = 8  # workers in a row that end before they are ready; then it is not chance
 _LOOK = 1.0  # s; some systems do not hear Ctrl-C while they wait
 _PATIENCE = 5.0  # s that a worker may take to end when it has closed its pipe
-
-
-def cores() -> int:
-    """How many processes this one may keep busy: cores, less what affinity, quotas and LOKY_MAX_CPU_COUNT deny it."""
-    import loky
-
-    return int(loky.cpu_count())
 
 
 def in_process(work: Work, units: Sequence[Unit], note: Note = silent) -> Generator[Row]:
