@@ -14,8 +14,8 @@ import pytest
 from helpers.works import Fake, Unloadable
 
 from tmsopt.errors import InputError
-from tmsopt.studies import Row
 from tmsopt.processes import cores
+from tmsopt.studies import Row
 from tmsopt.studies.engines import Assignments, EngineError, cluster, in_process, processes
 
 Units = Sequence[tuple[int, ...]]

@@ -113,6 +113,10 @@ def _seconds(ctx: click.Context, param: click.Parameter, value: Any) -> float | 
 @click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write the points of a front.")
 @click.option("--points", type=click.IntRange(2, MOST_POINTS), default=None, help="Points of a front. [default: 25]")
 @click.option(
+    "--workers", type=click.IntRange(min=1), default=None,
+    help="Processes for a front, which is the same for any number. [default: as many as cores, up to 4]",
+)  # fmt: skip
+@click.option(
     "--wheelbase", default=None,
     help="Of a dimensionless bicycle (tms): show SI beside, for this wheelbase in m or with a unit. [1 if left out]",
 )  # fmt: skip
@@ -140,7 +144,7 @@ def _seconds(ctx: click.Context, param: click.Parameter, value: Any) -> float | 
 @click.pass_context
 def solve(
     context: click.Context, file: Path, as_json: bool, starts: int | None, seed: int, linear_solver: str,
-    plot: Path | None, report: Path | None, over: str | None, csv_file: Path | None, points: int | None,
+    plot: Path | None, report: Path | None, over: str | None, csv_file: Path | None, points: int | None, workers: int | None,
     wheelbase: str | None, rear_mass: str | None, full: bool, certify: float | None, every: bool,
     seconds: float | None,
 ) -> None:  # fmt: skip
@@ -165,7 +169,8 @@ def solve(
         _solve_all(problem, as_json, asked | options(seconds=seconds), file, report)
     if problem.pareto:
         try:
-            write_front(problem, asked | options(points=points), as_json, plot, csv_file, full, file, report)
+            asked |= options(points=points, workers=workers)
+            write_front(problem, asked, as_json, plot, csv_file, full, file, report)
             return
         except tmsopt.NotSolved as error:
             solution, plot = error.solution, None
@@ -214,7 +219,7 @@ def _check_options(problem: "Problem", given: list[str], every: bool) -> None:
         wrong |= dict.fromkeys(scaled, message)
     else:
         message = 'is for a front; write pareto = ["abscissa", "Fr"] under [objective], or leave the option out'
-        wrong |= dict.fromkeys(("--points", "--csv"), message)
+        wrong |= dict.fromkeys(("--points", "--csv", "--workers"), message)
     if problem.model.name != "tms" or problem.parameter_set.rate is not None:
         message = "scales a dimensionless bicycle, and the file is not one; leave it out"
         wrong |= dict.fromkeys(scaled, message)

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from tmsopt.design.solution import Solution
-from tmsopt.fronts.crew import AT_ONCE, Crew
 from tmsopt.fronts.front import Front, FrontPoint, Gap, Kink, efficient
 from tmsopt.fronts.subproblems import Asker, least, point
+from tmsopt.fronts.team import AT_ONCE, Team
 from tmsopt.progress import Steps, begin
 from tmsopt.solver.solve import covered
 
@@ -28,13 +28,13 @@ _ROOM = 1.5  # of the mean spacing: a longer stretch has room for a point
 _CLOSE = 0.3  # of the mean spacing: unlabelled points closer than this to another are left out
 
 
-def curve(crew: Crew, ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Steps | None) -> Front:
+def curve(team: Team, ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Steps | None) -> Front:
     """The front between its two ends, with kinks and gaps.
 
     Each new limit is set where neighbours are farthest apart, on the objective that changes more there; sweeps both
     ways then carry a better branch along the front.
     """
-    search, interrupted = _Search(crew, ask, ends, points, progress), False
+    search, interrupted = _Search(team, ask, ends, points, progress), False
     try:
         for _ in range(_ROUNDS):
             search.fill()
@@ -87,19 +87,19 @@ class _Stretch:
         return known and (self.left.structure, set(self.left.limits)) != (self.right.structure, set(self.right.limits))
 
     @property
-    def located(self) -> bool:
-        """Whether the change between the two is known closely enough, or is that of an end."""
+    def halvings(self) -> int:
+        """After how many the change between the two is known closely enough, or is that of an end."""
         at_end = bool(self.left.label or self.right.label)
-        return self.gap or self.length <= (_END if at_end else _KINK)
+        return 0 if self.gap else max(0, math.ceil(math.log2(self.length / (_END if at_end else _KINK))))
 
 
 class _Search:
     """The probes made so far; the front is always read from them afresh."""
 
-    def __init__(self, crew: Crew, ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Steps | None) -> None:
-        self.crew, self.ask, self.ends, self.points, self.progress = crew, ask, tuple(ends), points, progress
+    def __init__(self, team: Team, ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Steps | None) -> None:
+        self.team, self.ask, self.ends, self.points, self.progress = team, ask, tuple(ends), points, progress
         self.probes: list[_Probe] = []
-        self.done, self.most = 0, math.nan  # of what is counted
+        self.done, self.most = 0, points  # of what is counted
         self.range = tuple(abs(ends[0].objectives[k] - ends[1].objectives[k]) for k in (0, 1))
 
     def chain(self) -> list[FrontPoint]:
@@ -153,11 +153,11 @@ class _Search:
         """What comes of probes, solved side by side; those that have ended are kept when the user ends the others."""
         found: dict[int, _Probe | None] = {}
         try:
-            for k, probe in self.crew.each(_probed, self.ask, asked):
+            for k, probe in self.team.each(_probed, self.ask, asked):
                 found[k] = probe
                 self.done += 1
                 if self.progress:
-                    self.progress(self.done, self.most)
+                    self.progress(min(self.done, self.most), self.most)
         finally:
             ended = [found.get(k) for k in range(len(asked))]
             self.probes += [probe for probe in ended if probe is not None]
@@ -188,9 +188,9 @@ class _Search:
 
     def sweep(self) -> bool:
         """Solve each point anew from the design before it, both ways; whether any became better."""
-        begin(self.progress, "looking for better branches", "sub-problem")
-        self.done, self.most = 0, math.nan
         before = len(self.chain())
+        begin(self.progress, "looking for better branches", "sub-problem")
+        self.done, self.most = 0, 2 * before
         better = False
         for backwards in (False, True):
             chain = self.chain()[::-1] if backwards else self.chain()
@@ -227,14 +227,15 @@ class _Search:
     def settle(self) -> None:
         """Ends of gaps and places of kinks, to their tolerance."""
         begin(self.progress, "placing kinks and gaps", "sub-problem")
-        self.done, self.most = 0, math.nan
+        self.done = 0
         while not self.exhausted:
             stretches = self.stretches()
             unclear = [s for s in stretches if not s.gap and s.suspect and s.length > _GAP]
-            changing = [s for s in stretches if s.changes and not s.located]
+            changing = [s for s in stretches if s.changes and s.halvings]
             if not unclear and not changing:
                 return
             few = bool(changing and not unclear)
+            self.most = self.done + len(unclear) + sum(s.halvings for s in changing)
             self.probe([self.between(s, k, few=few) for k, s in enumerate((unclear or changing)[:AT_ONCE])])
 
 
@@ -296,7 +297,7 @@ def _thinned(search: _Search) -> Front:
             kept.append(i)
             since = 0.0
     place = {i: k for k, i in enumerate(kept)}
-    proved = dict(search.crew.each(_covered, search.ask, [chain[i].solution for i in kept]))
+    proved = dict(search.team.each(_covered, search.ask, [chain[i].solution for i in kept]))
     notes = () if not search.exhausted else ("the search was ended: too many sub-problems; ask for more points",)
     return Front(
         problem=search.ask.problem,

@@ -8,11 +8,11 @@ from tmsopt.design.files import Given, problem_of
 from tmsopt.design.solution import NotSolved, Solution
 from tmsopt.errors import MOST_POINTS, Fault, InputError, count_faults
 from tmsopt.formulation.options import Asked, Options, options_of, taking
-from tmsopt.fronts.crew import AT_ONCE, Crew
 from tmsopt.fronts.curve import curve
 from tmsopt.fronts.front import Front, FrontPoint
 from tmsopt.fronts.subproblems import Asker, alone, best_first, point
 from tmsopt.fronts.surface import surface
+from tmsopt.fronts.team import AT_ONCE, Team
 from tmsopt.processes import cores
 from tmsopt.progress import Steps, begin
 
@@ -54,28 +54,28 @@ def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, 
     if faults := faults + ([] if workers is None else count_faults("workers", workers, 1)):
         raise InputError(faults)
     began = time.perf_counter()
-    with Crew(min(workers or cores(), AT_ONCE)) as crew:
-        front = _front(crew, Asker(problem, replace(how, progress=None)), points, how.progress)
+    with Team(min(workers or cores(), AT_ONCE)) as team:
+        front = _front(team, Asker(problem, replace(how, progress=None)), points, how.progress)
     if front.interrupted:
         words = f"the user stopped the search after {front.solved} sub-problems; this is what is known of the front"
         front = replace(front, notes=(*front.notes, words))
     return replace(front, seconds=time.perf_counter() - began)
 
 
-def _front(crew: Crew, ask: Asker, points: int, progress: Steps | None) -> Front:
+def _front(team: Team, ask: Asker, points: int, progress: Steps | None) -> Front:
     begin(progress, "looking for the ends of the front", "sub-problem")
     n, ends = len(ask.texts), dict[int, FrontPoint]()
     front = Front(ask.problem, ask.texts, (), (), (), n, 0.0)
     try:
         easier: dict[int, Solution] = {}
-        for k, found in crew.each(alone, ask, range(n)):
+        for k, found in team.each(alone, ask, range(n)):
             easier[k] = found
             if progress:
                 progress(len(easier), 2 * n)
         if unsolved := [k for k in range(n) if easier[k].status != "optimal"]:
             raise NotSolved(easier[unsolved[0]])
         ask = replace(ask, easier=easier)
-        for k, best in crew.each(best_first, ask, range(n)):
+        for k, best in team.each(best_first, ask, range(n)):
             ends[k] = replace(point(ask, best), label=_label(ask.texts[k].strip()))
             if progress:
                 progress(n + len(ends), 2 * n)
@@ -92,8 +92,8 @@ def _front(crew: Crew, ask: Asker, points: int, progress: Steps | None) -> Front
         note = "the objectives are not in conflict: one design is best in all of them, and the front is that point"
         return replace(front, points=(replace(best_in_all, label="best in all"),), notes=(note,))
     if n == 2:
-        return curve(crew, ask, at, points, progress)
-    shown, gaps, solved, interrupted = surface(crew, ask, at, points, progress)
+        return curve(team, ask, at, points, progress)
+    shown, gaps, solved, interrupted = surface(team, ask, at, points, progress)
     return replace(front, points=shown, gaps=gaps, solved=solved, interrupted=interrupted)
 
 

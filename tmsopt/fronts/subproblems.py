@@ -12,7 +12,7 @@ from tmsopt.design.solution import Solution
 from tmsopt.formulation.formulate import LIMIT
 from tmsopt.formulation.options import STARTS, Options
 from tmsopt.fronts.front import FrontPoint
-from tmsopt.solver.sample import Known
+from tmsopt.solver.sample import Met
 from tmsopt.solver.solve import solved
 from tmsopt.solver.workspace import Family
 
@@ -31,15 +31,15 @@ class Workshop:
     """
 
     def __init__(self) -> None:
-        self.known, self._families = Known(), dict[Hashable, Family]()
+        self.known, self._families = Met(), dict[Hashable, Family]()
 
     def __reduce__(self) -> tuple[type["Workshop"], tuple[()]]:
         return Workshop, ()
 
-    def know(self, known: Known) -> None:
+    def know(self, known: Met) -> None:
         """Know what another does, and nothing else."""
-        copy = known.joined(())
-        self.known.refined, self.known.leads = copy.refined, copy.leads
+        self.known.refined = dict(known.refined)
+        self.known.leads = {box: dict(leads) for box, leads in known.leads.items()}
 
     def family(self, problem: Problem, limits: Sequence[str]) -> Family:
         """Of the sub-problems that differ in these limits alone."""

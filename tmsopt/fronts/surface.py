@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from tmsopt.design.solution import Solution
-from tmsopt.fronts.crew import Crew
 from tmsopt.fronts.front import FrontPoint, Gap, efficient
 from tmsopt.fronts.subproblems import Asker, least, point, solvable
+from tmsopt.fronts.team import Team
 from tmsopt.progress import Steps, begin
 
 MOST = 12
@@ -25,7 +25,7 @@ class _Cell:
 
 
 def surface(
-    crew: Crew, ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Steps | None
+    team: Team, ask: Asker, ends: Sequence[FrontPoint], points: int, progress: Steps | None
 ) -> tuple[tuple[FrontPoint, ...], tuple[Gap, ...], int, bool]:
     """Efficient points, sub-problems that failed, the number of those solved, and whether the user ended it.
 
@@ -59,7 +59,7 @@ def surface(
                     cells[i, j] = _Cell(limits, tuple(near or [p.solution for p in ends]), count + len(cells))
             ended: dict[int, tuple[Solution | None, bool]] = {}
             try:
-                for k, outcome in crew.each(_solved, ask, list(cells.values())):
+                for k, outcome in team.each(_solved, ask, list(cells.values())):
                     ended[k] = outcome
                     count += 1
                     if progress:

@@ -28,7 +28,7 @@ _RANKED = 1024  # first ones of an order among which those apart are chosen
 _LEADERS, _BOLD = 8, 8  # designs to start from, of either kind
 _CELL = 0.05  # of the box
 _SOUGHT, _SOUGHT_AGAIN = 256, 32  # designs from which limits are approached; beside those that are remembered
-_REMEMBERED = 256  # refined ones
+REMEMBERED = 256  # refined ones
 _NO_ROWS = np.arange(0)
 NARROW = 0.02  # share of designs that meet all limits, below which little is feasible
 _LOCAL = 40  # designs looked at around each that is refined, in each round
@@ -36,9 +36,7 @@ _REACHES = (0.1, 0.03, 0.008, 2e-3, 4e-4)  # of the box, round after round
 
 _SHELLS, _SHELL = 12, 64  # distances about a design, and designs at each
 _NEAR = 0.01  # of the box: distance of designs about one that count as different
-
 _VANISHING = 1e-2  # of its usual size: a leading coefficient that may come to 0
-
 _FAR_OFF = 1e-3  # of their scales, in sum: limits that refined designs violate by more exclude each other, it seems
 _NO_LIMIT = 1e300  # a scale by which nothing that exists counts
 _MET = 1e-10  # of its scale: excess up to which a limit counts as met by numeric roots
@@ -52,30 +50,16 @@ Leads = dict[str, list[dict[str, float]]]
 
 
 @dataclass
-class Known:
+class Met:
     """What problems that differ in their limits met, for those that come later. Its values are never changed.
 
     Attributes:
-        refined: designs, as points of the unit cube, for the objective and the box that they were refined for.
-        leads: designs with the roots of a pattern for each box, whatever the objective.
+        refined: designs, as points of the unit cube, by what they were refined for and the box.
+        leads: designs with the roots of a pattern, by the box.
     """
 
     refined: dict[Hashable, Array] = field(default_factory=dict)
     leads: dict[Hashable, Leads] = field(default_factory=dict)
-
-    def joined(self, others: Sequence["Known"]) -> "Known":
-        """This with what others have come to from it: new designs first, and of new leads those of the first."""
-        refined = dict(self.refined)
-        for place in (place for other in others for place in other.refined):
-            old = {u.tobytes(): u for u in self.refined.get(place, ())}
-            every = {u.tobytes(): u for other in others for u in other.refined.get(place, ())}
-            new = [u for key, u in every.items() if key not in old]
-            refined[place] = np.array([*new, *old.values()][:_REMEMBERED])
-        leads = {box: dict(found) for box, found in self.leads.items()}
-        for box, pattern in ((b, p) for other in others for b, found in other.leads.items() for p in found):
-            found = (other.leads.get(box, {}).get(pattern, []) for other in (self, *others))
-            leads.setdefault(box, {})[pattern] = max(found, key=len)
-        return Known(refined, leads)
 
 
 @dataclass(frozen=True)
@@ -140,29 +124,26 @@ class Remembered:
 
     Attributes:
         known: what such problems met, here or elsewhere.
-        place: under which it has designs that were refined for another of them.
-        box: under which it has designs with the roots of a pattern.
+        place, box: under which it has designs that were refined for another of them, and such as lead to a pattern.
         drawn: the first designs, what they are with 0 for the numbers of all limits, and the constraints without those.
     """
 
-    known: Known = field(default_factory=Known)
+    known: Met = field(default_factory=Met)
     place: Hashable = None
     box: Hashable = None
     drawn: tuple[Array, Judged, tuple[str, ...]] | None = None
 
     @property
     def leads(self) -> Leads:
-        """Designs with the roots of a pattern."""
         return self.known.leads.setdefault(self.box, {})
 
     @property
     def u(self) -> Array | None:
-        """Designs that were refined for another of the problems, the latest first."""
         return self.known.refined.get(self.place)
 
     def keep(self, u: Array) -> None:
         """Remember designs, the latest ones."""
-        self.known.refined[self.place] = u if self.u is None else np.concatenate([u, self.u])[:_REMEMBERED]
+        self.known.refined[self.place] = u if self.u is None else np.concatenate([u, self.u])[:REMEMBERED]
 
 
 class Sampler:
@@ -340,9 +321,9 @@ class Sampler:
 
 def _open(text: str) -> tuple[str, float]:
     """A constraint ``something <= number`` with 0 for the number, and the number; any other as it is."""
-    rest, sign, number = text.rpartition("<=")
+    rest, _, number = text.rpartition("<=")
     try:
-        return (f"{rest}<= 0.0", float(number)) if sign else (text, 0.0)
+        return (f"{rest}<= 0.0", float(number)) if rest else (text, 0.0)
     except ValueError:
         return text, 0.0
 

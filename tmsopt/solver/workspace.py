@@ -22,7 +22,7 @@ from tmsopt.formulation.options import DEFAULTS, Options
 from tmsopt.margins.nearest import Robustness, robustness_at
 from tmsopt.models import Quantity, Values
 from tmsopt.records import Array
-from tmsopt.solver.sample import Known, Remembered, Sample, Sampler
+from tmsopt.solver.sample import Met, Remembered, Sample, Sampler
 
 _KEPT = 32
 """NLPs kept, with three solvers each: where cases are added row by row, most are not met again."""
@@ -46,7 +46,7 @@ class Family:
         name: under which this family has designs there.
     """
 
-    def __init__(self, varied: Collection[str] = (), known: Known | None = None, name: Hashable = None) -> None:
+    def __init__(self, varied: Collection[str] = (), known: Met | None = None, name: Hashable = None) -> None:
         self.varied, self._known, self._name = tuple(varied), known, name
         self._memories: OrderedDict[Hashable, Remembered] = OrderedDict()
         self._nlps: OrderedDict[Hashable, NLP] = OrderedDict()

@@ -5,9 +5,11 @@ from dataclasses import dataclass, replace
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
+import numpy as np
+
 from tmsopt.fronts.subproblems import Asker, Workshop
 from tmsopt.processes import Inbox, Worker
-from tmsopt.solver.sample import Known
+from tmsopt.solver.sample import REMEMBERED, Met
 
 AT_ONCE = 4
 """Sub-problems set at a time, at most, however many processes there are: what is asked next depends on them all."""
@@ -33,7 +35,7 @@ class _Beside:
     ready: bool = False
 
 
-class Crew:
+class Team:
     """This process and others beside it; to be closed.
 
     What comes out is the same for any number of them: each sub-problem starts from what was known when its round began,
@@ -43,11 +45,11 @@ class Crew:
     def __init__(self, processes: int) -> None:
         self._inbox: Inbox = SimpleQueue()
         self._beside = [_Beside(Worker(self._inbox, apart=True), [None]) for _ in range(processes - 1)]
-        self._shop, self._known = Workshop(), Known()
+        self._shop, self._known = Workshop(), Met()
         for other in self._beside:
             other.worker.send(_begun)
 
-    def __enter__(self) -> "Crew":
+    def __enter__(self) -> "Team":
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -56,7 +58,7 @@ class Crew:
 
     def each(self, function: Callable[[Asker, T], R], ask: Asker, items: Sequence[T]) -> Generator[tuple[int, R]]:
         """Places of the items with what the function makes of each, as they come."""
-        left, met = list(range(len(items))), dict[int, Known]()
+        left, met = list(range(len(items))), dict[int, Met]()
         share = max(1, len(items) // (1 + len(self._beside)))
         for other in self._beside:  # of a round that was not ended
             other.queue = [None] * len(other.queue)
@@ -82,7 +84,7 @@ class Crew:
                 else:
                     result, met[place] = answer
                     yield place, result
-        self._known = self._known.joined([met[k] for k in sorted(met)])
+        self._known = _joined(self._known, [met[k] for k in sorted(met)])
 
     def _working(self) -> bool:
         return any(other.ready and any(k is not None for k in other.queue) for other in self._beside)
@@ -124,10 +126,24 @@ def _begun() -> bool:
     return True
 
 
+def _joined(before: Met, after: Sequence[Met]) -> Met:
+    """What was met before a round and in it: new designs first; of new leads those that were found first."""
+    refined = dict(before.refined)
+    for place in dict.fromkeys(place for met in after for place in met.refined):
+        old = {u.tobytes(): u for u in before.refined.get(place, ())}
+        every = {u.tobytes(): u for met in after for u in met.refined.get(place, ())}
+        refined[place] = np.array([*(u for key, u in every.items() if key not in old), *old.values()][:REMEMBERED])
+    leads = {box: dict(found) for box, found in before.leads.items()}
+    for box, pattern in ((box, pattern) for met in after for box, found in met.leads.items() for pattern in found):
+        every_lead = (met.leads.get(box, {}).get(pattern, []) for met in (before, *after))
+        leads.setdefault(box, {})[pattern] = max(every_lead, key=len)
+    return Met(refined, leads)
+
+
 def _carried(
-    function: Callable[[Asker, T], R], ask: Asker, known: Known, item: T, shop: Workshop = _SHOP
-) -> tuple[R, Known]:
+    function: Callable[[Asker, T], R], ask: Asker, known: Met, item: T, shop: Workshop = _SHOP
+) -> tuple[R, Met]:
     """What comes of an item, and what was met on the way."""
     shop.know(known)
     result = function(replace(ask, shop=shop), item)
-    return result, shop.known.joined(())
+    return result, Met(shop.known.refined, shop.known.leads)

@@ -1,0 +1,135 @@
+"""Sub-problems side by side: what comes of them does not depend on how many processes there are, or on their fate."""
+
+import os
+from importlib import import_module
+
+import numpy as np
+import pytest
+from helpers import shares
+
+import tmsopt
+from tmsopt import InputError
+from tmsopt.models import tms
+
+curve = import_module("tmsopt.fronts.curve")
+options = import_module("tmsopt.formulation.options")
+pareto = import_module("tmsopt.fronts.pareto")
+sample = import_module("tmsopt.solver.sample")
+subproblems = import_module("tmsopt.fronts.subproblems")
+team = import_module("tmsopt.fronts.team")
+
+FIXED = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
+FREE = {"Fr": (0.01, 10), "chi_B": (1.01, 5), "lambda_s": (0.035, 1.4)}
+PROBLEM = tmsopt.Problem(tms, FIXED, FREE, pareto=["abscissa", "Fr"], constraints={"decay": "abscissa <= -0.3"})
+ASK = subproblems.Asker(PROBLEM, options.Options())
+
+
+def each(function, items, processes):
+    with team.Team(processes) as side_by_side:
+        return dict(side_by_side.each(function, ASK, items))
+
+
+def started(side_by_side):
+    """Wait until the processes beside this one work."""
+    while not all(other.ready for other in side_by_side._beside):
+        list(side_by_side._heard(wait=True))
+
+
+@pytest.mark.parametrize("processes", [1, 2, 3])
+def test_every_item_has_its_answer(processes):
+    found = each(shares.squared, range(9), processes)
+    assert {k: square for k, (square, _) in found.items()} == {k: k**2 for k in range(9)}
+
+
+def test_a_process_that_works_takes_its_share():
+    with team.Team(2) as side_by_side:
+        started(side_by_side)
+        workers = [pid for _, (_, pid) in side_by_side.each(shares.squared, ASK, range(4))]
+    assert sorted(workers.count(pid) for pid in set(workers)) == [2, 2]
+    assert os.getpid() in workers
+
+
+def test_what_a_process_dies_of_is_done_here():
+    with team.Team(3) as side_by_side:
+        started(side_by_side)
+        items = [(k, os.getpid()) for k in range(9)]
+        assert dict(side_by_side.each(shares.dying_elsewhere, ASK, items)) == {k: k for k in range(9)}
+        assert not side_by_side._beside
+
+
+def test_what_cannot_be_sent_is_done_here():
+    assert each(lambda ask, item: (item, os.getpid()), range(3), 2) == {k: (k, os.getpid()) for k in range(3)}
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_a_round_knows_what_the_rounds_before_met_and_nothing_else(processes):
+    with team.Team(processes) as side_by_side:
+        if processes > 1:
+            started(side_by_side)
+        first = dict(side_by_side.each(shares.meeting, ASK, range(4)))
+        known = side_by_side._known
+        second = dict(side_by_side.each(shares.meeting, ASK, [7, 8]))
+    assert set(map(str, first.values())) == {str(({}, 0))}
+    assert np.array_equal(known.refined["here"], [[0], [1], [2], [3]])
+    assert known.leads == {"box": {"EP4": [{"x": 1.0}] * 2}}  # the first of those that have most
+    assert set(map(str, second.values())) == {str(({"here": 4}, 2))}
+
+
+def test_new_designs_come_first_and_the_oldest_are_forgotten():
+    old = sample.Met({"here": np.arange(float(sample.REMEMBERED))[:, None]})
+    met = [sample.Met({"here": np.concatenate([[[x], [x + 1]], old.refined["here"]])}) for x in (-8.0, -4.0)]
+    joined = team._joined(old, met).refined["here"].ravel()
+    assert joined.tolist() == [-8, -7, -4, -3, *range(sample.REMEMBERED - 4)]
+
+
+def test_what_was_done_before_an_interrupt_is_kept_and_the_team_can_go_on():
+    with team.Team(1) as side_by_side:
+        found = []
+        with pytest.raises(KeyboardInterrupt):
+            found.extend(side_by_side.each(shares.interrupted_at_two, ASK, range(4)))
+        assert found == [(0, 0), (1, 1)]
+        assert dict(side_by_side.each(shares.squared, ASK, [3])) == {0: (9, os.getpid())}
+
+
+def test_the_front_is_the_same_for_any_number_of_processes():
+    alone, beside = (tmsopt.pareto(PROBLEM, 5, workers=n) for n in (1, 3))
+    assert [p.objectives for p in alone.points] == [p.objectives for p in beside.points]
+    assert [dict(p.solution.parameters) for p in alone.points] == [dict(p.solution.parameters) for p in beside.points]
+    assert (alone.kinks, alone.gaps, alone.solved) == (beside.kinks, beside.gaps, beside.solved)
+
+
+def test_an_interrupt_leaves_the_ends_that_are_known(monkeypatch):
+    first = pareto.best_first
+    monkeypatch.setattr(pareto, "best_first", lambda ask, k: first(ask, k) if k == 0 else _stop())
+    front = tmsopt.pareto(PROBLEM, 5, workers=1)
+    assert front.interrupted
+    assert [p.label for p in front.points] == ["least abscissa"]
+    assert "stopped" in front.notes[0]
+
+
+def test_an_interrupt_leaves_the_points_that_are_known(monkeypatch):
+    probed, asked = curve._probed, []
+    monkeypatch.setattr(
+        curve, "_probed", lambda ask, of: probed(ask, of) if asked.append(of) or len(asked) < 3 else _stop()
+    )
+    front = tmsopt.pareto(PROBLEM, 9, workers=1)
+    assert front.interrupted
+    assert len(front.points) == 4
+    for of in asked[:2]:  # each limit binds; the recheck forgives 1e-9
+        assert min(abs(p.objectives[of.axis] - of.eps) for p in front.points) < 1e-9
+
+
+def test_an_interrupt_before_any_end_is_known_is_raised(monkeypatch):
+    monkeypatch.setattr(pareto, "alone", lambda ask, k: _stop())
+    with pytest.raises(KeyboardInterrupt):
+        tmsopt.pareto(PROBLEM, 5, workers=1)
+
+
+@pytest.mark.parametrize("workers", [0, -1, 1.5, "2"])
+def test_processes_that_cannot_be(workers):
+    with pytest.raises(InputError, match=r"workers: found .*; accepted: a whole number, 1 or more"):
+        tmsopt.pareto(PROBLEM, 5, workers=workers)
+
+
+def _stop():
+    raise KeyboardInterrupt

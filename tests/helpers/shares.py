@@ -1,0 +1,35 @@
+"""What a front has done side by side, in functions that other processes find."""
+
+import os
+
+import numpy as np
+
+
+def squared(ask, item):
+    """The square of a number, and the process that made it."""
+    return item**2, os.getpid()
+
+
+def dying_elsewhere(ask, item):
+    """A number; any process but the one that is named dies of it."""
+    number, home = item
+    if os.getpid() != home:
+        os._exit(3)
+    return number
+
+
+def meeting(ask, item):
+    """How much was known before; a design is met, and one that leads to a pattern, which depends on the number."""
+    known = ask.shop.known
+    before = {place: len(u) for place, u in known.refined.items()}, len(known.leads.get("box", {}).get("EP4", []))
+    old = known.refined.get("here", np.empty((0, 1)))
+    known.refined["here"] = np.concatenate([[[float(item)]], old])
+    known.leads.setdefault("box", {})["EP4"] = [{"x": float(item)}] * (1 + item % 2)
+    return before
+
+
+def interrupted_at_two(ask, item):
+    """A number; the user presses Ctrl-C at 2."""
+    if item == 2:
+        raise KeyboardInterrupt
+    return item
