@@ -63,8 +63,10 @@ def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, 
 
 
 def _front(team: Team, ask: Asker, points: int, progress: Steps | None) -> Front:
-    begin(progress, "looking for the ends of the front", "sub-problem")
     n, ends = len(ask.texts), dict[int, FrontPoint]()
+    begin(progress, "looking for the ends of the front", "sub-problem")
+    if progress:
+        progress(0, 2 * n)
     front = Front(ask.problem, ask.texts, (), (), (), n, 0.0)
     try:
         easier: dict[int, Solution] = {}
