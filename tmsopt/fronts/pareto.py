@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import replace
+from itertools import takewhile
 from typing import Unpack
 
 from tmsopt.design.files import Given, problem_of
@@ -74,8 +75,9 @@ def _front(team: Team, ask: Asker, points: int, progress: Steps | None) -> Front
             easier[k] = found
             if progress:
                 progress(len(easier), 2 * n)
-        if unsolved := [k for k in range(n) if easier[k].status != "optimal"]:
-            raise NotSolved(easier[unsolved[0]])
+            for solution in (easier[j] for j in takewhile(easier.__contains__, range(n))):
+                if solution.status != "optimal":
+                    raise NotSolved(solution)
         ask = replace(ask, easier=easier)
         for k, best in team.each(best_first, ask, range(n)):
             ends[k] = replace(point(ask, best), label=_label(ask.texts[k].strip()))
