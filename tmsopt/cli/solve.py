@@ -144,9 +144,9 @@ def _seconds(ctx: click.Context, param: click.Parameter, value: Any) -> float | 
 @click.pass_context
 def solve(
     context: click.Context, file: Path, as_json: bool, starts: int | None, seed: int, linear_solver: str,
-    plot: Path | None, report: Path | None, over: str | None, csv_file: Path | None, points: int | None, workers: int | None,
-    wheelbase: str | None, rear_mass: str | None, full: bool, certify: float | None, every: bool,
-    seconds: float | None,
+    plot: Path | None, report: Path | None, over: str | None, csv_file: Path | None, points: int | None,
+    workers: int | None, wheelbase: str | None, rear_mass: str | None, full: bool, certify: float | None,
+    every: bool, seconds: float | None,
 ) -> None:  # fmt: skip
     """Find the best design that the problem FILE asks for, or the front of the best ones."""
     with bad_input():
