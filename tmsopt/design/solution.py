@@ -92,18 +92,20 @@ class Relaxation:
     Attributes:
         parameters: a design that is feasible once the limits are moved.
         amounts: limit → how far it is moved, in its own units; signed for an equality, else towards what it forbids.
-        conflict: limits that keep the amounts from being smaller, those moved included.
+        conflict: limits that exclude each other in the box, and ends of it beyond which the others are met.
         alone: limit → how far it must be moved if it is the only one, where that suffices.
+        irreducible: whether designs were found that meet the others without any one of the conflict.
     """
 
     parameters: Table[float] = field(default_factory=Table)
     amounts: Table[float] = field(default_factory=Table)
     conflict: tuple[str, ...] = ()
     alone: Table[float] = field(default_factory=Table)
+    irreducible: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
-        return plain(self, "amounts conflict alone parameters")
+        return plain(self, "amounts conflict irreducible alone parameters")
 
 
 @dataclass(frozen=True)

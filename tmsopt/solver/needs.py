@@ -1,10 +1,12 @@
-"""The speed that a problem without an answer takes: freed, the least is looked for at which all else holds."""
+"""What a problem without an answer needs: the least speed at which all else holds; and which limits are in the way."""
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from tmsopt.checks.recheck import recheck
+from tmsopt.checks.worst_case import worst_cases
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Need, Solution
 from tmsopt.formulation.options import Options
@@ -17,6 +19,7 @@ from tmsopt.solver.workspace import Workspace, workspace
 _STABLE = "every root left of the axis"  # the name of a constraint
 _FASTEST, _TIMES = 10.0, 4.0  # speeds looked through, in √(g w); in the problem's own speed, where that is more
 _STARTS, _SECONDS = 6, 0.5  # what a search for it may cost; after which no other is begun
+_ASKED = 16  # sets of limits that are searched for designs at most
 
 
 def with_need(solution: Solution, options: Options) -> Solution:
@@ -50,8 +53,70 @@ def with_need(solution: Solution, options: Options) -> Solution:
     return replace(solution, need=Need(name, math.nan, False, (min(looked), max(looked)))) if looked else solution
 
 
+def irreducible(
+    problem: Problem, likely: Sequence[str], wide: Problem, known: Mapping[str, float], options: Options
+) -> tuple[tuple[str, ...], bool]:
+    """Limits that exclude each other, and whether without any one of them a design meets the others.
+
+    Constraints are left out one after the other, first those that are not likely to have a part, as long as no design
+    meets the rest in the box; ends of the box have a part where the rest is met beyond them.
+
+    Args:
+        problem: without an objective, and no design of it meets all that is asked.
+        likely: the limits that hold a least relaxation.
+        wide: the problem in the box as far as its ends may give way.
+        known: a design that violates little.
+    """
+    few, asked, free = replace(options, starts=_STARTS, progress=None), 0, problem.free
+
+    def met(names: Sequence[str], ends: Mapping[str, tuple[float, float]]) -> bool | None:
+        nonlocal asked
+        asked += 1
+        rest = {n: text for n, text in problem.constraints.items() if n in names}
+        part = replace(problem, constraints=rest, free={**free, **ends})
+        return _met(part, known, few, quick=bool(ends)) if asked <= _ASKED else None
+
+    kept, sure, wanted = tuple(problem.constraints), True, list[str]()
+    others = [n for n in kept if n not in likely]
+    groups = [others, *([n] for n in others if len(others) > 1), *([n] for n in kept if n in likely)]
+    for group in groups:
+        if group and set(group) <= set(kept):
+            found = met(rest := tuple(n for n in kept if n not in group), {})
+            kept, sure = rest if found is False else kept, sure and (found is not None or len(group) > 1)
+    for name, end in (n.rsplit(".", 1) for n in likely if n not in problem.constraints):
+        ends = (wide.free[name][0], free[name][1]) if end == "min" else (free[name][0], wide.free[name][1])
+        if met(kept, {name: ends}):
+            wanted.append(f"{name}.{end}")
+    return (*kept, *wanted), sure and bool(kept or wanted)
+
+
+def _met(problem: Problem, known: Mapping[str, float], options: Options, quick: bool) -> bool | None:
+    """Whether a design meets all that is asked, by a sample and a few starts; None where it is not known.
+
+    `quick`: where no design of the sample comes near, none is looked for; of what is only not named then.
+    """
+    parts = workspace(problem, options, beside=[known]).parts()
+    seen = [p.sampler.design(p.sample.refined, 0) for p in parts if p.sampler and p.sample]
+    designs = [problem.ordered(design) for design in (known, *seen)]
+    inside = [d for d in designs if all(lo <= d[n] <= hi for n, (lo, hi) in problem.free.items())]
+    if any(_holds(problem, d) for d in inside):
+        return True
+    if quick and all(p.sample and p.sample.far_off for p in parts):
+        return False
+    ended = [t for t in map(_best, parts) if t and not t.checked.violations]
+    return any(_holds(problem, t.parameters) for t in ended) or (None if ended else False)
+
+
+def _holds(problem: Problem, design: Mapping[str, float]) -> bool:
+    """Whether a design meets all that is asked, between the cases too."""
+    if recheck(problem, design).violations:
+        return False
+    between = [w.case for w in worst_cases(problem, design).values()] if problem.cases else []
+    return not between or not recheck(problem, design, (*problem.cases, *between)).violations
+
+
 def _best(work: Workspace) -> Trial | None:
-    nlp = work.formulate(())
+    nlp = work.formulate(work.problem.cases)
     return survivor(work, nlp, search(work, nlp, _STARTS))
 
 

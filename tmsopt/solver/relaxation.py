@@ -1,6 +1,6 @@
 """What stands in the way of a problem without an answer: limits in conflict, and the least that frees it."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
@@ -16,6 +16,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Relaxation
 from tmsopt.formulation.formulate import design_of, formulate
 from tmsopt.formulation.nlp import NLP, Lift
+from tmsopt.formulation.options import Options
 from tmsopt.models import Values
 from tmsopt.records import Table
 from tmsopt.solver.multistart import Runner, same, starting
@@ -58,7 +59,11 @@ class Limit:
         return max(beyond if self.name.endswith(".max") else -beyond, 0.0)
 
 
-def relax(work: Workspace) -> Relaxation | None:
+Excluding = Callable[[Problem, Sequence[str], Problem, Mapping[str, float], Options], tuple[tuple[str, ...], bool]]
+"""Which limits exclude each other, and whether no fewer do; see `needs.irreducible`."""
+
+
+def relax(work: Workspace, excluding: Excluding) -> Relaxation | None:
     """The least relaxation: of the constraints, or of the box too where these alone cannot help; None if none is found.
 
     Amounts are added up relative to the limits as written, those of the box in its widths. One limit that can do it
@@ -75,15 +80,29 @@ def relax(work: Workspace) -> Relaxation | None:
         met = [] if listed else [found for side in sides for found in islice(_met(work, side, limits), 1)]
         least, seen = min(met, key=lambda found: found[0], default=(np.inf, None))
         if seen and (trial is None or least < trial.point.objective * (1 - _TIE)):
-            return seen
+            return _named(problem, seen, seen.amounts, options, excluding)
         if trial is None or nlp is None:
             continue
         amounts = _amounts(wide, limits, trial.parameters, nlp.cases)
-        conflict = _conflict(nlp, limits, trial)
+        relaxation = Relaxation(Table(trial.parameters), Table(amounts))
+        likely = {**amounts, **_holding(nlp, limits, trial)}
+        relaxation = _named(problem, relaxation, likely, options, excluding)
+        conflict = relaxation.conflict
         wanted = options.alone and len(conflict) > 1
         single = _alone(workspace(problem, options), conflict, trial, nlp.cases) if wanted else {}
-        return Relaxation(Table(trial.parameters), Table(amounts), conflict, Table(single))
+        return replace(relaxation, alone=Table(single))
     return None
+
+
+def _named(
+    problem: Problem, relaxation: Relaxation, likely: Iterable[str], options: Options, excluding: Excluding
+) -> Relaxation:
+    """The same with the limits that exclude each other; with the likely ones where these alone do not."""
+    if not relaxation.amounts:
+        return relaxation
+    wide = _widened(problem, problem.free)
+    names, sure = excluding(problem, tuple(likely), wide, relaxation.parameters, options)
+    return replace(relaxation, conflict=names or tuple(likely), irreducible=sure)
 
 
 def _met(work: Workspace, side: Workspace, limits: Sequence[Limit]) -> Iterator[tuple[float, Relaxation]]:
@@ -101,7 +120,7 @@ def _met(work: Workspace, side: Workspace, limits: Sequence[Limit]) -> Iterator[
     for row in np.argsort(totals, kind="stable").tolist():
         parameters, amounts = needs[row]
         if not unlimited.recheck(parameters, ()).violations:
-            yield totals[row], Relaxation(Table(parameters), Table(amounts), tuple(amounts))
+            yield totals[row], Relaxation(Table(parameters), Table(amounts))
 
 
 def _stages(problem: Problem) -> Iterator[tuple[Problem, list[Limit]]]:
@@ -241,21 +260,18 @@ def _amounts(
     }
 
 
-def _conflict(nlp: NLP, limits: Sequence[Limit], trial: Trial) -> tuple[str, ...]:
-    """Limits with a multiplier: were one of them not there, less would do."""
+def _holding(nlp: NLP, limits: Sequence[Limit], trial: Trial) -> dict[str, float]:
+    """Limits with a multiplier, each with that: were one of them not there, less would do."""
     scales = {limit.name: limit.scale for limit in limits}
-    names = [
-        row
-        for row, multiplier in zip(nlp.rows, trial.point.row_multipliers.tolist(), strict=True)
-        if row in scales and abs(multiplier) * scales[row] > _HOLDS
-    ]
+    rows = zip(nlp.rows, trial.point.row_multipliers.tolist(), strict=True)
+    found = {row: m for row, m in rows if row in scales and abs(m) * scales[row] > _HOLDS}
     for k, name in enumerate(trial.candidate.nlp.variables):
         multiplier = float(trial.point.bound_multipliers[k])
         parameter = name.removeprefix("tan(").removesuffix(")")
         width = trial.candidate.nlp.upper[k] - trial.candidate.nlp.lower[k]
         if parameter in trial.parameters and abs(multiplier) * width > _HOLDS:
-            names.append(f"{parameter}.{'max' if multiplier > 0 else 'min'}")
-    return tuple(dict.fromkeys(names))
+            found[f"{parameter}.{'max' if multiplier > 0 else 'min'}"] = multiplier
+    return found
 
 
 def _alone(work: Workspace, conflict: Sequence[str], trial: Trial, cases: Sequence[Case]) -> dict[str, float]:

@@ -19,6 +19,7 @@ from tmsopt.formulation.nlp import NLP
 from tmsopt.progress import begin
 from tmsopt.records import Table
 from tmsopt.solver.multistart import Runner, distinct, exceptional, further, same, search
+from tmsopt.solver.needs import irreducible
 from tmsopt.solver.outcome import Finding, Trial, ahead, counted, found, mass_advice, survivor
 from tmsopt.solver.referee import held, ideal, outdone, refereed
 from tmsopt.solver.relaxation import relax
@@ -125,7 +126,7 @@ def without_any(work: Workspace, tried: int) -> Finding:
     problem = work.problem
     nlp = formulate(problem, problem.cases)
     begin(work.options.progress, "searching for the least that limits must give", "start")
-    relaxation = relax(work)
+    relaxation = relax(work, irreducible)
     free = relaxation.parameters if relaxation else middle(problem)
     design = {n: min(max(free[n], lo), hi) for n, (lo, hi) in problem.free.items()}
     parameters = problem.ordered(design)

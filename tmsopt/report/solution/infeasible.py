@@ -26,7 +26,8 @@ def infeasible_lines(solution: Solution, full: bool = False) -> list[str]:
         return lines
     names = relaxation.conflict or tuple(relaxation.amounts)
     if len(names) > 1:
-        lines.append(f"in conflict: {', '.join(_limit(problem, n) for n in names)}")
+        fewer = "" if relaxation.irreducible else "; whether fewer of them are, is not known"
+        lines.append(f"in conflict: {', '.join(_limit(problem, n) for n in names)}{fewer}")
     changes = " and ".join(_changed(problem, n, amount) for n, amount in relaxation.amounts.items())
     lines.append(f"smallest change found: {changes}")
     single = {n: a for n, a in relaxation.alone.items() if relaxation.amounts.keys() != {n}}
@@ -57,10 +58,12 @@ def _conflict(solution: Solution, relaxation: Relaxation) -> str:
     listed = _listed([_limit(problem, n) for n in asked])
     if ends:
         needs = _listed([_needed(problem, n, a) for n, a in ends.items()])
-        return f"{listed} need{'s' if len(asked) == 1 else ''} {needs}"
+        others = " with the other limits" if problem.constraints.keys() - set(asked) else ""
+        return f"{listed}{others} need{'s' if len(asked) == 1 else ''} {needs}"
+    roots = f" with {problem.pattern.name}" if problem.pattern and problem.pattern.name not in asked else ""
     if len(asked) > 1:
-        return f"{listed} cannot {'both' if len(asked) == 2 else 'all'} be met"
-    return f"{listed} is out of reach{_nearest(solution, asked[0])}"
+        return f"{listed} cannot {'both' if len(asked) == 2 else 'all'} be met{roots}"
+    return f"{listed} is out of reach{roots}{_nearest(solution, asked[0])}"
 
 
 def _speed(solution: Solution, need: Need) -> str:
