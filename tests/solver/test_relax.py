@@ -12,6 +12,8 @@ from helpers.hunt import abscissa
 
 import tmsopt
 from tmsopt import laws
+from tmsopt.records import Table
+from tmsopt.report import infeasible_lines
 
 TMS = tmsopt.models.tms
 FIXED = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}
@@ -268,3 +270,21 @@ def test_what_starts_met_on_the_way_counts():
     at = relaxed.fixed
     assert (at["zeta_B"] + 0.67) / 0.42 + (at["lambda_s"] - 0.64) / 0.61 <= 0.385 + 1e-9
     assert roots.real.max() < 0
+
+
+def test_the_headline_names_what_is_out_of_reach_and_not_what_has_no_value_for_it(tmp_path):
+    """No x_H of the box is 2; that the nearest design is unstable, and so has no decay time, says nothing of others."""
+    limits = 'arm = "abs(u_H) >= 0.02"\nfar = "x_H >= 2"\nquick = "decay_time <= 0.01"'
+    design = tmsopt.solve(written(tmp_path, ROBOT + limits), throw=False, alone=False)
+    assert set(design.relaxation.conflict) == {"far", "x_H.max"}
+    for shown in (design, replace(design, abscissa=1.0, stable_elsewhere=None)):
+        assert infeasible_lines(shown)[0].startswith("far (x_H >= 200 cm) is out of reach")
+
+
+def test_a_limit_that_must_go_down_to_nothing_is_shown_as_0():
+    """0.02 moved by 0.02 and what rounding adds to it."""
+    asked = problem(constraints={"arm": "abs(nu_H) >= 0.02"})
+    amounts = Table({"arm": 0.0200000000000183})
+    design = replace(failed("two bounds"), problem=asked)
+    design = replace(design, relaxation=replace(design.relaxation, amounts=amounts, conflict=("arm",)))
+    assert infeasible_lines(design)[-1] == "smallest change found: abs(nu_H) >= 0 instead of 0.02 (arm)"

@@ -8,7 +8,7 @@ from dataclasses import replace
 from tmsopt.checks.recheck import recheck
 from tmsopt.checks.worst_case import worst_cases
 from tmsopt.design.problem import Problem
-from tmsopt.design.solution import Need, Solution
+from tmsopt.design.solution import Need, Relaxation, Solution
 from tmsopt.formulation.options import Options
 from tmsopt.progress import begin
 from tmsopt.records import Table
@@ -19,6 +19,7 @@ from tmsopt.solver.workspace import Workspace, workspace
 _STABLE = "every root left of the axis"  # the name of a constraint
 _FASTEST, _TIMES = 10.0, 4.0  # speeds looked through, in √(g w); in the problem's own speed, where that is more
 _STARTS, _SECONDS = 6, 0.5  # what a search for it may cost; after which no other is begun
+_ENDS = "min", "max"
 _ASKED = 16  # sets of limits that are searched for designs at most
 
 
@@ -54,19 +55,20 @@ def with_need(solution: Solution, options: Options) -> Solution:
 
 
 def irreducible(
-    problem: Problem, likely: Sequence[str], wide: Problem, known: Mapping[str, float], options: Options
-) -> tuple[tuple[str, ...], bool]:
-    """Limits that exclude each other, and whether without any one of them a design meets the others.
+    problem: Problem, relaxation: Relaxation, likely: Sequence[str], wide: Problem, options: Options
+) -> Relaxation:
+    """The same with limits that exclude each other, and whether without any one of them a design meets the others.
 
-    Constraints are left out one after the other, first those that are not likely to have a part, as long as no design
-    meets the rest in the box; ends of the box have a part where the rest is met beyond them.
+    Constraints are left out one after the other, first those that are not likely to have a part, then those about the
+    roots, as long as no design meets the rest in the box; ends of it have a part where the rest is met beyond them.
 
     Args:
         problem: without an objective, and no design of it meets all that is asked.
         likely: the limits that hold a least relaxation.
         wide: the problem in the box as far as its ends may give way.
-        known: a design that violates little.
     """
+    if not relaxation.amounts:
+        return relaxation
     few, asked, free = replace(options, starts=_STARTS, progress=None), 0, problem.free
 
     def met(names: Sequence[str], ends: Mapping[str, tuple[float, float]]) -> bool | None:
@@ -74,20 +76,24 @@ def irreducible(
         asked += 1
         rest = {n: text for n, text in problem.constraints.items() if n in names}
         part = replace(problem, constraints=rest, free={**free, **ends})
-        return _met(part, known, few, quick=bool(ends)) if asked <= _ASKED else None
+        return _met(part, relaxation.parameters, few, quick=bool(ends)) if asked <= _ASKED else None
 
     kept, sure, wanted = tuple(problem.constraints), True, list[str]()
     others = [n for n in kept if n not in likely]
-    groups = [others, *([n] for n in others if len(others) > 1), *([n] for n in kept if n in likely)]
+    in_order = sorted((n for n in kept if n in likely), key=lambda n: n not in problem.asked_of_roots)
+    groups = [others, *([n] for n in others if len(others) > 1), *([n] for n in in_order)]
     for group in groups:
         if group and set(group) <= set(kept):
             found = met(rest := tuple(n for n in kept if n not in group), {})
             kept, sure = rest if found is False else kept, sure and (found is not None or len(group) > 1)
-    for name, end in (n.rsplit(".", 1) for n in likely if n not in problem.constraints):
+    named = [n for n in free if any(n in problem.conditions[k].names for k in kept)]
+    possible = [*(n for n in likely if n not in problem.constraints), *(f"{n}.{e}" for n in named for e in _ENDS)]
+    for name, end in (n.rsplit(".", 1) for n in dict.fromkeys(possible)):
         ends = (wide.free[name][0], free[name][1]) if end == "min" else (free[name][0], wide.free[name][1])
         if met(kept, {name: ends}):
             wanted.append(f"{name}.{end}")
-    return (*kept, *wanted), sure and bool(kept or wanted)
+    names = (*kept, *wanted)
+    return replace(relaxation, conflict=names or tuple(likely), irreducible=sure and bool(names))
 
 
 def _met(problem: Problem, known: Mapping[str, float], options: Options, quick: bool) -> bool | None:

@@ -1,6 +1,6 @@
 """What stands in the way of a problem without an answer: limits in conflict, and the least that frees it."""
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
@@ -59,11 +59,11 @@ class Limit:
         return max(beyond if self.name.endswith(".max") else -beyond, 0.0)
 
 
-Excluding = Callable[[Problem, Sequence[str], Problem, Mapping[str, float], Options], tuple[tuple[str, ...], bool]]
-"""Which limits exclude each other, and whether no fewer do; see `needs.irreducible`."""
+Named = Callable[[Problem, Relaxation, Sequence[str], Problem, Options], Relaxation]
+"""A relaxation with the limits that exclude each other; see `needs.irreducible`."""
 
 
-def relax(work: Workspace, excluding: Excluding) -> Relaxation | None:
+def relax(work: Workspace, named: Named) -> Relaxation | None:
     """The least relaxation: of the constraints, or of the box too where these alone cannot help; None if none is found.
 
     Amounts are added up relative to the limits as written, those of the box in its widths. One limit that can do it
@@ -72,6 +72,7 @@ def relax(work: Workspace, excluding: Excluding) -> Relaxation | None:
     """
     listed, options = work.problem.cases, work.options
     problem = replace(work.problem, minimize=None, maximize=None, pareto=())  # what else is asked plays no part
+    widest = _widened(problem, problem.free)
     for wide, limits in _stages(problem):
         sides = [workspace(part.part, options) for part in workspace(wide, options).parts()]
         ended = [_least_covered(side, limits, listed) for side in sides]
@@ -79,30 +80,18 @@ def relax(work: Workspace, excluding: Excluding) -> Relaxation | None:
         trial, nlp = min(reached, key=lambda found: found[0].point.objective, default=(None, None))
         met = [] if listed else [found for side in sides for found in islice(_met(work, side, limits), 1)]
         least, seen = min(met, key=lambda found: found[0], default=(np.inf, None))
-        if seen and (trial is None or least < trial.point.objective * (1 - _TIE)):
-            return _named(problem, seen, seen.amounts, options, excluding)
+        amounts = _amounts(wide, limits, trial.parameters, nlp.cases) if trial and nlp else {}
+        if seen and (trial is None or least < _total(limits, amounts) * (1 - _TIE)):
+            return named(problem, seen, tuple(seen.amounts), widest, options)
         if trial is None or nlp is None:
             continue
-        amounts = _amounts(wide, limits, trial.parameters, nlp.cases)
         relaxation = Relaxation(Table(trial.parameters), Table(amounts))
-        likely = {**amounts, **_holding(nlp, limits, trial)}
-        relaxation = _named(problem, relaxation, likely, options, excluding)
-        conflict = relaxation.conflict
-        wanted = options.alone and len(conflict) > 1
-        single = _alone(workspace(problem, options), conflict, trial, nlp.cases) if wanted else {}
+        likely = dict.fromkeys([*amounts, *_holding(nlp, limits, trial)])
+        relaxation = named(problem, relaxation, tuple(likely), widest, options)
+        wanted = options.alone and len(relaxation.conflict) > 1
+        single = _alone(workspace(problem, options), relaxation.conflict, trial, nlp.cases) if wanted else {}
         return replace(relaxation, alone=Table(single))
     return None
-
-
-def _named(
-    problem: Problem, relaxation: Relaxation, likely: Iterable[str], options: Options, excluding: Excluding
-) -> Relaxation:
-    """The same with the limits that exclude each other; with the likely ones where these alone do not."""
-    if not relaxation.amounts:
-        return relaxation
-    wide = _widened(problem, problem.free)
-    names, sure = excluding(problem, tuple(likely), wide, relaxation.parameters, options)
-    return replace(relaxation, conflict=names or tuple(likely), irreducible=sure)
 
 
 def _met(work: Workspace, side: Workspace, limits: Sequence[Limit]) -> Iterator[tuple[float, Relaxation]]:
@@ -116,11 +105,15 @@ def _met(work: Workspace, side: Workspace, limits: Sequence[Limit]) -> Iterator[
         refined = side.sampler.refined(side.sample.refined.take(np.arange(1)), _FINEST)
         designs.append(side.sampler.design(refined, 0))
     needs = [(p, _amounts(side.problem, limits, p, ())) for p in map(side.problem.ordered, designs)]
-    totals = [sum(abs(amounts.get(limit.name, 0.0)) / limit.scale for limit in limits) for _, amounts in needs]
+    totals = [_total(limits, amounts) for _, amounts in needs]
     for row in np.argsort(totals, kind="stable").tolist():
         parameters, amounts = needs[row]
         if not unlimited.recheck(parameters, ()).violations:
             yield totals[row], Relaxation(Table(parameters), Table(amounts))
+
+
+def _total(limits: Sequence[Limit], amounts: Mapping[str, float]) -> float:
+    return sum(abs(amounts.get(limit.name, 0.0)) / limit.scale for limit in limits)
 
 
 def _stages(problem: Problem) -> Iterator[tuple[Problem, list[Limit]]]:
@@ -260,18 +253,18 @@ def _amounts(
     }
 
 
-def _holding(nlp: NLP, limits: Sequence[Limit], trial: Trial) -> dict[str, float]:
-    """Limits with a multiplier, each with that: were one of them not there, less would do."""
+def _holding(nlp: NLP, limits: Sequence[Limit], trial: Trial) -> list[str]:
+    """Limits with a multiplier: were one of them not there, less would do."""
     scales = {limit.name: limit.scale for limit in limits}
     rows = zip(nlp.rows, trial.point.row_multipliers.tolist(), strict=True)
-    found = {row: m for row, m in rows if row in scales and abs(m) * scales[row] > _HOLDS}
+    names = [row for row, multiplier in rows if row in scales and abs(multiplier) * scales[row] > _HOLDS]
     for k, name in enumerate(trial.candidate.nlp.variables):
         multiplier = float(trial.point.bound_multipliers[k])
         parameter = name.removeprefix("tan(").removesuffix(")")
         width = trial.candidate.nlp.upper[k] - trial.candidate.nlp.lower[k]
         if parameter in trial.parameters and abs(multiplier) * width > _HOLDS:
-            found[f"{parameter}.{'max' if multiplier > 0 else 'min'}"] = multiplier
-    return found
+            names.append(f"{parameter}.{'max' if multiplier > 0 else 'min'}")
+    return names
 
 
 def _alone(work: Workspace, conflict: Sequence[str], trial: Trial, cases: Sequence[Case]) -> dict[str, float]:

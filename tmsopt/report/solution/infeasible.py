@@ -10,6 +10,7 @@ from tmsopt.design.unit_system import limit_text
 
 _SIGN = re.compile(r"<=|>=|==")
 _DIGITS = 5
+_LEFT = 1e-11  # of a limit: what rounding, also that of amounts upwards, leaves of it
 _OTHER = {"a0": "a mass matrix that is not singular (a0 = 0)", "coefficients": "coefficients that have values"}
 
 
@@ -36,7 +37,8 @@ def infeasible_lines(solution: Solution, full: bool = False) -> list[str]:
 
 def _sentence(solution: Solution) -> str:
     problem, relaxation = solution.problem, solution.relaxation
-    if solution.need and (solution.need.found or _unstable(solution)):
+    stands_alone = relaxation is None or not set(relaxation.conflict) - set(problem.asked_of_roots)
+    if solution.need and (solution.need.found or (_unstable(solution) and stands_alone)):
         return _speed(solution, solution.need)
     if solution.status != "infeasible":
         return ""
@@ -130,7 +132,7 @@ def _changed(problem: Problem, name: str, amount: float) -> str:
     if limit is None:
         return f"{_limit(problem, name)} missed by {_shown(unit_of(problem, name), abs(amount), True)}"
     unit, more = unit_of(problem, name), -amount if sign == ">=" else amount
-    new = _shown(unit, limit + more, more > 0)
+    new = _shown(unit, limit + more, more > 0, abs(limit))
     return f"{sides[0].strip()} {sign} {new} instead of {unit.number(limit)} ({name})"
 
 
@@ -154,7 +156,9 @@ def _number(text: str) -> float | None:
         return None
 
 
-def _shown(unit: Unit, value: float, up: bool) -> str:
+def _shown(unit: Unit, value: float, up: bool, size: float = 0.0) -> str:
+    """A value, or 0 where it is less than what is left of numbers of a size that cancel."""
+    value = 0.0 if abs(value) <= _LEFT * size else value
     return unit.show(_outwards(value / unit.one, up) * unit.one)
 
 
