@@ -7,6 +7,7 @@ import subprocess
 import sys
 from contextlib import closing, suppress
 from dataclasses import replace
+from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,13 +15,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tmsopt import Problem, Study, models, monte_carlo, run_study, solve
+from tmsopt import Problem, Sampling, Study, load, models, monte_carlo, run_study, solve
 from tmsopt.checks import verdicts
 from tmsopt.errors import InputError
+from tmsopt.plots import draw_histogram
+from tmsopt.report import design_report, row_lines, study_table
 from tmsopt.studies import Row, Solver, alone, columns, definition, summary
 from tmsopt.studies.judging import RowsInBlocks, applies, judged
 from tmsopt.studies.store import open_store, read_store
 
+SOLVES = import_module("tmsopt.studies.monte_carlo")
 PROBLEMS = Path(__file__).parents[2] / "problems"
 SPREAD = {"chi_B": 0.005, "lambda_s": 0.0087, "Fr": 0.02}
 OWN = models.from_coefficients(["m", "a", "b + 0.1", "c*a", "d/k"], name="own quartic")
@@ -213,3 +217,58 @@ def test_seeds_are_those_of_numpy() -> None:
         rows = run_study(study).rows
         assert [row.seed for row in rows] == [study.seed_of(row.number) for row in rows]
         assert isinstance(rows[0], Row)
+
+
+@pytest.mark.parametrize("study", [own(), built(12)], ids=["own", "drawn"])
+def test_what_is_judged_is_called_feasible_and_not_optimal(study: Study) -> None:
+    """Also where it is not stable: it is as given, and nobody looked for a better one."""
+    results, row = run_study(study), alone(study, 9)
+    assert row.row.status == "optimal"
+    assert row.solution is not None
+    told = [
+        study_table(study, results.summary, results.rows), row_lines(study, row.row), design_report(row.solution),
+        repr(results), repr(row.solution),
+    ]  # fmt: skip
+    if study.method != "monte_carlo":
+        told.append(draw_histogram(results).get_title())
+    assert not any(word in text for text in told for word in ("optimal", "minimize"))
+    assert all("feasible" in text or "as given" in text for text in told)
+
+
+DRAWN = Sampling(load(PROBLEMS / "ep4.toml"), 20, 1, "normal", SPREAD)
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("drawn") / "s.sqlite"
+    run_study(DRAWN, path)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("changed", "line"),
+    [
+        ({"rows": 30}, "columns.chi_B: 20 values in the store, 30 in the file"),
+        ({"seed": 2}, "seed: 1 in the store, 2 in the file"),
+        ({"distribution": "uniform"}, "columns.Fr: 20 of 20 values differ"),
+        ({"tolerances": SPREAD | {"Fr": 0.03}}, "columns.Fr: 20 of 20 values differ"),
+        ({"report": ["nu_H"]}, "report: [] in the store"),
+        ({"problem": replace(DRAWN.problem, fixed={**DRAWN.problem.fixed, "mu": 0.2})}, "problem.fixed.mu: 0.1"),
+        ({"problem": replace(DRAWN.problem, constraints={"slow": "Fr <= 3"})}, "problem.constraints.slow: none"),
+    ],
+    ids=lambda given: next(iter(given)) if isinstance(given, dict) else "is",
+)
+def test_a_changed_study_is_refused_before_its_design_is_solved(drawn, changed, line, monkeypatch) -> None:
+    monkeypatch.setattr(SOLVES, "solve", lambda *_, **__: pytest.fail("a design was solved"))
+    with pytest.raises(InputError) as refused:
+        run_study(replace(DRAWN, **changed), drawn)
+    assert line in str(refused.value)
+    assert "--fresh" in str(refused.value)
+
+
+def test_a_study_whose_design_alone_may_have_changed_is_solved_and_goes_on_where_it_has_not(drawn: Path) -> None:
+    narrower = replace(DRAWN.problem, free={**DRAWN.problem.free, "chi_B": (1.5, 5.0)})
+    assert run_study(DRAWN, drawn).solved == 0
+    with pytest.raises(InputError, match=r"problem\.fixed\.chi_B"):
+        run_study(replace(DRAWN, problem=narrower), drawn)
+    assert run_study(replace(DRAWN, seed=2), drawn, fresh=True).solved == 20

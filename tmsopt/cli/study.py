@@ -76,7 +76,7 @@ def study(
 ) -> None:  # fmt: skip
     """Solve the problem of the study FILE for every row of what varies in it."""
     with bad_input():
-        from tmsopt.studies import load_study
+        from tmsopt.studies import check_unchanged, load_study
 
         kept = {"--store": store, "--fresh": fresh, "--export": exports, "--plot": plot, "--report": report}
         _check_together(row, scheduler, workers, kept)
@@ -89,7 +89,10 @@ def study(
         path = store or Path(f"{file.stem}.sqlite")
         if row is None:
             check_output("--store", path, (path.suffix.lstrip(".").lower(),))
-        asked = _planned(load_study(file))
+        stated = load_study(file)
+        if row is None and not fresh:
+            check_unchanged(stated, path)
+        asked = _planned(stated)
         if row is not None:
             _show_row(asked, row, as_json)
             return
@@ -202,7 +205,7 @@ def _show_row(asked: "Study", number: int, as_json: bool) -> None:
         return
     from tmsopt.report import design_report, row_lines
 
-    said = [row_lines(solved.row)]
+    said = [row_lines(asked, solved.row)]
     if solved.solution is not None:
         said.append(design_report(solved.solution))
     with quiet():

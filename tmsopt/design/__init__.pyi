@@ -9,5 +9,6 @@ from .problem import Problem as Problem, freedom as freedom
 from .quantities import NO_RADIUS as NO_RADIUS, ROOT_NAMES as ROOT_NAMES
 from .solution import (
     Bound as Bound, NotSolved as NotSolved, Relaxation as Relaxation, Solution as Solution, Starts as Starts,
+    ended as ended,
 )
 from .unit_system import Unit as Unit, unit_of as unit_of, units_of as units_of

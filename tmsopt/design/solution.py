@@ -28,6 +28,11 @@ class Cover:
     boxes: int
 
 
+def ended(problem: Problem, status: str) -> str:
+    """A status in words; where nothing is free, a design is judged: it is not optimal but feasible."""
+    return "feasible" if status == "optimal" and not problem.free else status.replace("_", " ")
+
+
 GAIN_DIGITS = 6
 SIDE_DIGITS = 9
 

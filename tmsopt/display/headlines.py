@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from tmsopt.design import Unit, unit_of
+from tmsopt.design import Unit, ended, unit_of
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
@@ -27,7 +27,7 @@ Words = Iterator[str]
 def of_solution(solution: "Solution") -> Words:
     """Status, objective, structure, proof, stability."""
     problem = solution.problem
-    yield solution.status.replace("_", " ")
+    yield ended(problem, solution.status)
     asked = problem.minimize or problem.maximize
     name, value = (asked, solution.value) if asked else ("abscissa", solution.abscissa)
     yield f"{' '.join(name.split())} = {unit_of(problem, name).show(value)}"
@@ -93,7 +93,7 @@ def of_results(results: "Results") -> Words:
     """Rows and how they ended."""
     yield _count(len(results.rows), "row")
     for status, count in results.summary.counts.items():
-        yield f"{count} {status.replace('_', ' ')}"
+        yield f"{count} {ended(results.study.problem, status)}"
 
 
 def of_proof(proof: "Proof") -> Words:

@@ -4,7 +4,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from tmsopt.design import Problem, Solution, freedom
+from tmsopt.design import Problem, Solution, ended, freedom
 from tmsopt.design.files import posed
 from tmsopt.errors import InputError
 from tmsopt.guide import example
@@ -59,7 +59,7 @@ def _of_solution(solution: Solution) -> Known:
     """What was found, with how good it is known to be."""
     problem = solution.problem
     words = {"optimal": "optimum", "infeasible": "least infeasible", "not_converged": "best so far"}
-    facts, proof = [solution.status.replace("_", " "), *solution.notes], proof_line(solution)
+    facts, proof = [ended(problem, solution.status), *solution.notes], proof_line(solution)
     proved = proof if solution.bound.proven else ""
     if problem.nominal is problem:
         known = Structure(solution.structure, solution.roots, 0.0)

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from tmsopt.design.unit_system import Unit
+from tmsopt.design import Unit, ended
 from tmsopt.plots.labels import AxisScale, abscissa_label, finished, scale_of
 from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, STABLE, figure_of, on_axes
 from tmsopt.records import Array, Truth
@@ -107,4 +107,4 @@ def _over_what_varies(ax: Axes, data: Results) -> str:
         figure_of(ax).colorbar(drawn, ax=ax, label=aside.label)
     ax.set(xlabel=across.label if across else "row", ylabel=scale.label)
     ax.xaxis.set_major_locator(MaxNLocator(6))
-    return f"{np.count_nonzero(found)} of {len(found)} rows optimal"
+    return f"{np.count_nonzero(found)} of {len(found)} rows {ended(study.problem, 'optimal')}"

@@ -5,7 +5,7 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
 
-from tmsopt.design.unit_system import unit_of
+from tmsopt.design import ended, unit_of
 from tmsopt.report.text import HEIGHT, WIDTH, columns, number, screen, yes_no
 from tmsopt.studies.row import Row
 from tmsopt.studies.study import Study
@@ -17,8 +17,6 @@ LISTED = 40
 _FIRST = 10  # rows that are shown
 _CAUSES = 5
 _DIGITS = 6
-_WORDS = {"not_converged": "not converged"}
-_EVALUATED = {"optimal": "feasible"}
 
 
 def study_table(study: Study, found: Summary, rows: Iterable[Row], full: bool = False) -> str:
@@ -41,10 +39,10 @@ def study_table(study: Study, found: Summary, rows: Iterable[Row], full: bool = 
     return "".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in text)  # rows may come from anybody's store
 
 
-def row_lines(row: Row) -> str:
+def row_lines(study: Study, row: Row) -> str:
     """One row in a line: its number, seed, what varies and how it ended."""
     given = ", ".join(f"{name} = {number(value)}" for name, value in row.varied.items())
-    parts = [f"row {row.number}: {given}", f"seed {row.seed}", _WORDS.get(row.status, row.status), row.cause]
+    parts = [f"row {row.number}: {given}", f"seed {row.seed}", ended(study.problem, row.status), row.cause]
     return "; ".join(part for part in parts if part)
 
 
@@ -54,9 +52,9 @@ def _headline(study: Study, found: Summary) -> str:
     if study.grid_shape is not None:
         names = " × ".join(f"{name} ({size})" for name, size in study.grid_shape.items())
     made = f"{study.method.replace('_', ' ')} over {names}: {found.rows} rows"
-    ended = ", ".join(f"{count} {_word(study, status)}" for status, count in found.counts.items())
+    counts = ", ".join(f"{count} {ended(study.problem, status)}" for status, count in found.counts.items())
     missing = found.rows - sum(found.counts.values())
-    return f"{made}; {ended or 'none solved'}" + (f", {missing} not yet solved" if missing else "")
+    return f"{made}; {counts or 'none solved'}" + (f", {missing} not yet solved" if missing else "")
 
 
 def study_rows(study: Study, rows: Sequence[Row]) -> list[tuple[str, ...]]:
@@ -81,7 +79,7 @@ def _cells(study: Study, row: Row, asked: Sequence[str], free: Sequence[str]) ->
     found = (row.parameters, row.reports) if known else ({}, {})
     return (
         str(row.number), yes_no(row.stable) if known else "", *(shown(n, row.varied) for n in study.columns),
-        _word(study, row.status),
+        ended(problem, row.status),
         *(shown(n, {n: row.objective} if known else {}) for n in asked), _short(row.abscissa) if known else "",
         row.structure if known else "",
         *(shown(n, found[0]) for n in free), *(shown(n, found[1]) for n in _reports(study)),
@@ -137,11 +135,6 @@ def _share(share: Share) -> str:
 def _reports(study: Study) -> list[str]:
     """What is recorded beside what has a column anyway."""
     return [text for text in study.report if text not in ("abscissa", *study.problem.free, *study.columns)]
-
-
-def _word(study: Study, status: str) -> str:
-    """A status in words; where nothing is free, a row is not optimal but feasible."""
-    return _WORDS.get(status, status) if study.problem.free else _EVALUATED.get(status, status)
 
 
 def _short(value: float) -> str:

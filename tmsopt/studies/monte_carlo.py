@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem, unasked
-from tmsopt.design.solution import NotSolved, Solution
+from tmsopt.design.solution import NotSolved
 from tmsopt.errors import Fault, InputError, at_first, count_faults, short, suggest, text_faults
 from tmsopt.formulation.options import STARTS
 from tmsopt.progress import Listener, counted
@@ -105,7 +105,19 @@ def monte_carlo(
     if solution.status != "optimal":
         raise NotSolved(solution)
     stated = solution.problem.tolerances if tolerances is None else tolerances
-    drawn, notes = _as_built(solution)
+    return around(solution.problem, solution.parameters, rows, seed, distribution, stated, title, report)
+
+
+def around(
+    problem: Problem, design: Mapping[str, float], rows: int, seed: int, distribution: str,
+    stated: Mapping[str, float], title: str, report: Sequence[str],
+) -> Study:  # fmt: skip
+    """The same around any design of a problem.
+
+    Raises:
+        InputError: listing everything that is wrong.
+    """
+    drawn, notes = _as_built(problem, design)
     found = [*_tolerance_faults(drawn, stated), *_draw_faults(rows, distribution), *count_faults("seed", seed, 0)]
     if found := found or _room_faults(drawn, stated):
         raise InputError(found)
@@ -115,19 +127,18 @@ def monte_carlo(
         for (name, tolerance), error in zip(stated.items(), errors, strict=True)
     }
     return Study(
-        problem=drawn, columns=columns, title=title or solution.problem.title, seed=seed, report=report,
+        problem=drawn, columns=columns, title=title or problem.title, seed=seed, report=report,
         method="monte_carlo", notes=notes,
     )  # fmt: skip
 
 
-def _as_built(design: Solution) -> tuple[Problem, tuple[str, ...]]:
-    """The design's problem with everything fixed and nothing asked that no product can meet; what was left out."""
-    problem = design.problem
+def _as_built(problem: Problem, design: Mapping[str, float]) -> tuple[Problem, tuple[str, ...]]:
+    """A problem with everything fixed and nothing asked that no product can meet; what was left out."""
     equal = [name for name, condition in problem.conditions.items() if condition.equality]
     left_out = equal + ([f"the pattern {problem.locate}"] if problem.locate else [])
     notes = (f"left out, for no drawn design meets it exactly: {', '.join(left_out)}",) if left_out else ()
     fixed = replace(
-        problem, fixed=dict(design.parameters), free={}, start={}, tolerances={}, locate=None,
+        problem, fixed=dict(design), free={}, start={}, tolerances={}, locate=None,
         constraints={n: text for n, text in problem.constraints.items() if n not in equal},
     )  # fmt: skip
     return fixed, notes

@@ -21,12 +21,12 @@ from tmsopt.studies.engines.work import silent
 from tmsopt.studies.export import columns, export, gridded
 from tmsopt.studies.judging import RowBlock, applies, gathered, judged, shared_by
 from tmsopt.studies.load import load_study
-from tmsopt.studies.monte_carlo import Sampling, planned
+from tmsopt.studies.monte_carlo import Sampling, around, planned
 from tmsopt.studies.neighbours import blocks
 from tmsopt.studies.row import Row
 from tmsopt.studies.solving import Solver
 from tmsopt.studies.store.definition import doubles
-from tmsopt.studies.store.opening import open_store, read_store
+from tmsopt.studies.store.opening import check_same, open_store, read_store
 from tmsopt.studies.store.store import Store
 from tmsopt.studies.study import Study, definition
 from tmsopt.studies.summary import Summary, summary
@@ -141,6 +141,8 @@ def run_study(
     stated = load_study(study) if isinstance(study, str | PathLike) else study
     if faults := list(_faults(stated, workers, progress)):
         raise InputError(faults)
+    if store is not None and not fresh:
+        check_unchanged(stated, store)
     asked = planned(stated, progress)
     if store is None:
         found, seconds, engine = _carried_out(asked, _none(asked), workers, scheduler, note, progress)
@@ -168,6 +170,31 @@ def stored(study: Study, store: str | PathLike[str]) -> Results:
     with read_store(path_of(store, "an SQLite file")) as opened:
         held = _held(study, opened)
         return Results(study, gathered(held.blocks, held.rows), 0, 0.0, "", held.count, opened.about())
+
+
+def check_unchanged(study: Study | Sampling, store: str | PathLike[str]) -> None:
+    """Refuse the store of another Monte Carlo study before its design is found, if no design would make it the same.
+
+    That is so where it is another one around the design of the store, too.
+
+    Raises:
+        InputError: with the differences; where the store is none, or damaged.
+    """
+    path = path_of(store, "an SQLite file")
+    if not isinstance(study, Sampling) or not path.exists():
+        return
+    with read_store(path) as opened:
+        known = opened.about()["definition"]
+    try:
+        design = {n: float(known["problem"]["fixed"][n]) for n in study.problem.parameter_set.names}
+        design |= study.problem.fixed
+        stated = study.tolerances or study.problem.tolerances
+        drawn = around(
+            study.problem, design, study.rows, study.seed, study.distribution, stated, study.title, study.report
+        )
+    except (InputError, KeyError, TypeError, ValueError):  # of another model, or a design that cannot be drawn around
+        return
+    check_same(path, definition(drawn, doubles))
 
 
 @dataclass

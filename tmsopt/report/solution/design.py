@@ -143,7 +143,8 @@ def headline(solution: Solution, on_edge: bool = False) -> tuple[str, str]:
     text = problem.minimize or problem.maximize
     value = unit_of(problem, text).show(solution.value, 8) if text else ""
     located = f"locate {problem.locate}" if problem.locate else ""
-    asked = f"{problem.sense} {text.strip()}" + (f" = {value}" if math.isfinite(solution.value) else "") if text else ""
+    sense = f"{problem.sense} " if problem.free else ""  # what is given is not sought
+    asked = f"{sense}{text.strip()}" + (f" = {value}" if math.isfinite(solution.value) else "") if text else ""
     structure = in_words(solution.structure, problem.model.degree)
     silent = solution.status == "infeasible" and solution.any_stable is not False
     stable = "" if silent else stability(solution, on_edge)
@@ -162,7 +163,7 @@ def _ended(solution: Solution) -> str:
     }
     if solution.status in words:
         return words[solution.status]
-    if problem.objective is None:
+    if problem.objective is None or not problem.free:
         return "found" if problem.free else "as given"
     return f"optimal{proved or f', the best of {solution.starts.tried} starts, not proved'}"
 

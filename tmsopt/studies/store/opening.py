@@ -3,6 +3,7 @@
 import json
 import os
 import platform
+import sqlite3
 from collections.abc import Mapping, Sequence
 from contextlib import closing, suppress
 from pathlib import Path
@@ -53,6 +54,19 @@ def open_store(path: Path | str, definition: Mapping[str, Any], *, fresh: bool =
         raise
 
 
+def check_same(path: Path | str, definition: Mapping[str, Any]) -> None:
+    """That a store, if there is one, is of this study.
+
+    Raises:
+        InputError: with the differences where it is not; where it is no store, or damaged.
+    """
+    path = _placed(path)
+    if _occupied(path):
+        database.check(path)
+        with explained(path), closing(database.connect_to_read(path)) as connection:
+            _check_same(connection, path, Definition.of(definition))
+
+
 def read_store(path: Path | str) -> Store:
     """Open a store for reading, also while another process writes it.
 
@@ -77,12 +91,9 @@ def _opened(path: Path, wanted: Definition, today: dict[str, str], fresh: bool, 
     if not _occupied(path):
         database.create(path, wanted, today, platform.platform())
     with closing(database.connect_to_read(path)) as connection:  # what is refused is not changed
-        known = database.definition(connection, path, sum(map(len, wanted.columns.values())))
-        found = list(differences(known.data, wanted.data, ("in the store", "in the file")))
+        _check_same(connection, path, wanted)
         with undamaged(path, "the list of its writers"):
             earlier = [session["versions"] for session in database.sessions(connection) if session["rows"] > 0]
-    if found:
-        raise refuse(path, *_changed_study(found))
     warnings = list(dict.fromkeys(line for then in earlier for line in changed(then, today)))
     connection = database.connect_to_write(path)
     try:
@@ -107,6 +118,12 @@ def _placed(path: Path | str) -> Path:
 
 def _occupied(path: Path) -> bool:
     return os.path.lexists(path)
+
+
+def _check_same(connection: sqlite3.Connection, path: Path, wanted: Definition) -> None:
+    known = database.definition(connection, path, sum(map(len, wanted.columns.values())))
+    if found := list(differences(known.data, wanted.data, ("in the store", "in the file"))):
+        raise refuse(path, *_changed_study(found))
 
 
 def _changed_study(found: Sequence[str]) -> list[str]:
