@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tmsopt import Problem, Sampling, Study, load, models, monte_carlo, run_study, solve
-from tmsopt.checks import verdicts
+from tmsopt import Problem, Sampling, Study, load, models, monte_carlo, over_grid, run_study, solve
+from tmsopt.checks import LAWS, law_rows, verdicts
 from tmsopt.errors import InputError
 from tmsopt.plots import draw_histogram
 from tmsopt.report import design_report, row_lines, study_table
@@ -272,3 +272,27 @@ def test_a_study_whose_design_alone_may_have_changed_is_solved_and_goes_on_where
     with pytest.raises(InputError, match=r"problem\.fixed\.chi_B"):
         run_study(replace(DRAWN, problem=narrower), drawn)
     assert run_study(replace(DRAWN, seed=2), drawn, fresh=True).solved == 20
+
+
+def test_the_columns_of_a_study_are_those_of_its_file_whatever_is_drawn(tmp_path: Path) -> None:
+    """At tilts of either sign, designs on and off the weave boundary, feasible or not, other laws and limits apply."""
+    heads = set()
+    for seed, chi_H in ((1, 1.0), (2, 1.0), (3, 1.1)):
+        problem = replace(DRAWN.problem, fixed={**DRAWN.problem.fixed, "chi_H": chi_H}, constraints={"slow": "Fr <= 9"})
+        wide = {"chi_B": 0.3, "lambda_s": 0.4, "Fr": 1.5}
+        results = run_study(
+            Sampling(problem, 3, seed, tolerances=wide) if seed < 3 else over_grid(problem, {"mu": [1]})
+        )
+        heads.add(tuple(name for name in results.to_frame() if name.startswith(("law.", "violation."))))
+        results.export(tmp_path / f"{seed}.csv")
+        written = (tmp_path / f"{seed}.csv").read_text().splitlines()[0]
+        assert "law.frm," in written
+        assert "violation.slow," in written
+        for row in results.rows:
+            assert {f"law.{name}" for name in row.laws} <= set(results.to_frame())
+    assert len(heads) == 1
+
+
+def test_laws_have_the_names_of_their_columns() -> None:
+    design = solve(DRAWN.problem)
+    assert tuple(row.name for row in law_rows(design)) == LAWS

@@ -1,5 +1,5 @@
 from .bound import omega0_bound as omega0_bound, relation_bound as relation_bound
 from .judge import judgeable as judgeable, verdicts as verdicts
-from .law_rows import law_rows as law_rows
+from .law_rows import LAWS as LAWS, law_rows as law_rows
 from .recheck import realised_abscissa as realised_abscissa, recheck as recheck
 from .worst_case import cover as cover, worst_cases as worst_cases

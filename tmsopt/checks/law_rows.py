@@ -12,6 +12,13 @@ from tmsopt.design.solution import Solution
 from tmsopt.records import plain
 from tmsopt.roots import is_stable
 
+_CLOSED = "a1a3, a2, w0"  # equations that give several parameters
+LAWS = (
+    "w0", "4poly", "chib", "a2", "a1a3 a2 w0 Fr", "a1a3 a2 w0 mu", "a1a3 a2 w0 tan(lambda_s)", "lscf", "flus", "Frc1",
+    "frm", "w01", "chib1", "tls", "frep4", "epset",
+)  # fmt: skip
+"""Names of all laws, in the order of `law_rows`."""
+
 SAME_LAW = 1e-9
 """Relative difference up to which number and law count as agreeing; coefficients are matched to 1e-10."""
 
@@ -33,6 +40,11 @@ class LawRow:
     numeric: float
     law: float
     reason: str = ""
+
+    @property
+    def name(self) -> str:
+        """The label, with what it is about where that is of several; without commas, for tables."""
+        return f"{self.label} {self.subject.split(',')[0]}".replace(",", "") if self.label == _CLOSED else self.label
 
     @property
     def applies(self) -> bool:
@@ -82,7 +94,7 @@ def law_rows(design: Solution) -> Iterator[LawRow]:
     branch = _nearest(laws.ep4(r, **heights, chi_H=p["chi_H"]), p)
     closed = (("Fr", p["Fr"], branch.Fr), ("mu", p["mu"], branch.mu), ("tan(lambda_s)", T, branch.tan_lambda_s))
     for subject, numeric, law in closed:
-        yield LawRow("a1a3, a2, w0", f"{subject}, closed form for any chi_H", numeric, _f(law), general)
+        yield LawRow(_CLOSED, f"{subject}, closed form for any chi_H", numeric, _f(law), general)
 
     yield from _speed_rows(design, p, not_one)
     yield LawRow("w01", "abscissa, the 4-fold root", r, _f(laws.w01(**heights)), special)

@@ -27,6 +27,8 @@ for _field in fields(Row):
     if _field.name == "structure":
         _FIELDS["stable"] = bool  # or None
 _LARGEST = 2**63 - 1
+Names = Mapping[str, Iterable[str]]
+_NO_NAMES: Names = {}
 
 
 @dataclass(frozen=True)
@@ -75,13 +77,16 @@ class Format:
 _CHUNK = 10_000  # rows turned into text at once
 
 
-def export(rows: Iterable[Row], path: Path | str, metadata: Mapping[str, Any] | None = None) -> None:
+def export(
+    rows: Iterable[Row], path: Path | str, metadata: Mapping[str, Any] | None = None, names: Names = _NO_NAMES
+) -> None:
     """Write rows to a file whose ending says how, one of `FORMATS`; doubles come back bit by bit.
 
     Headers are those of `columns`. A blank in CSV is nan or absent; Parquet has null for what is absent; netCDF nan, on
     the dimension ``row``, and where the rows fill a grid also in the group ``grid``, over the values that vary.
 
     Args:
+        names: that have a column anyway; see `columns`.
         metadata: plain data to go with the rows in Parquet (schema metadata, key ``tmsopt``) and netCDF (attribute
             ``tmsopt``), as JSON; `Store.about` makes it.
 
@@ -92,7 +97,7 @@ def export(rows: Iterable[Row], path: Path | str, metadata: Mapping[str, Any] | 
     check_export(path)
     try:
         with whole(path) as temporary:
-            FORMATS[_ending(path)].write(columns(rows), temporary, json.dumps(metadata or {}))
+            FORMATS[_ending(path)].write(columns(rows, names), temporary, json.dumps(metadata or {}))
     except OSError as error:
         raise InputError([Fault(f"cannot be written: {error.strerror or error}", file=str(path))]) from error
 
@@ -210,14 +215,18 @@ FORMATS: Mapping[str, Format] = {
 """Ending → format; another one is added here."""
 
 
-def columns(rows: Iterable[Row]) -> Mapping[str, PartialColumn]:
-    """Header → column, in the order of the fields of a row; 8 bytes per number while they are collected."""
-    return _of_blocks(rows) if isinstance(rows, RowsInBlocks) else _of_each(rows)
+def columns(rows: Iterable[Row], names: Names = _NO_NAMES) -> Mapping[str, PartialColumn]:
+    """Header → column, in the order of the fields of a row; 8 bytes per number while they are collected.
+
+    Args:
+        names: table of a row, such as ``laws`` → names that have a column whatever the rows have.
+    """
+    return _of_blocks(rows, names) if isinstance(rows, RowsInBlocks) else _of_each(rows, names)
 
 
-def _of_blocks(rows: RowsInBlocks) -> Mapping[str, PartialColumn]:
+def _of_blocks(rows: RowsInBlocks, names: Names) -> Mapping[str, PartialColumn]:
     """Columns made when they are asked for."""
-    single, count = _of_each(rows.singles), len(rows.singles)
+    single, count = _of_each(rows.singles, _NO_NAMES), len(rows.singles)
     absent = PartialColumn(np.full(count, np.nan), np.zeros(count, dtype=bool))
 
     def made(of: Callable[..., Any], *names: str, header: str) -> Callable[[], PartialColumn]:
@@ -230,7 +239,7 @@ def _of_blocks(rows: RowsInBlocks) -> Mapping[str, PartialColumn]:
             found[name] = made(table.field, name, header=name)
             continue
         starts = {key: c.present for h, c in single.items() if (key := _key(name, h)) is not None}
-        for key in table.keys(rows, name, starts):
+        for key in dict.fromkeys([*names.get(name, ()), *table.keys(rows, name, starts)]):
             found[header(name, key)] = made(table.keyed, name, key, header=header(name, key))
     return table.Lazily(found)
 
@@ -245,11 +254,11 @@ def _key(of: str, head: str) -> str | None:
     return None if head in _FIELDS or head.startswith(others) else head
 
 
-def _of_each(rows: Iterable[Row]) -> dict[str, PartialColumn]:
+def _of_each(rows: Iterable[Row], names: Names) -> dict[str, PartialColumn]:
     plain: dict[str, list[Any] | array[float]] = {
         name: array("d") if kind is float else [] for name, kind in _FIELDS.items() if name not in PREFIXES
     }
-    tables: dict[str, dict[str, _Sparse]] = {name: {} for name in PREFIXES}
+    tables = {name: {key: _Sparse() for key in names.get(name, ())} for name in PREFIXES}
     count = 0
     for row in rows:
         for name, values in plain.items():

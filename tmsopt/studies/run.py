@@ -28,7 +28,7 @@ from tmsopt.studies.solving import Solver
 from tmsopt.studies.store.definition import doubles
 from tmsopt.studies.store.opening import check_same, open_store, read_store
 from tmsopt.studies.store.store import Store
-from tmsopt.studies.study import Study, definition
+from tmsopt.studies.study import Study, definition, names_of
 from tmsopt.studies.summary import Summary, summary
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ class Results(Shown):
         Raises:
             InputError: for a name that no row has.
         """
-        found = columns(self.rows)
+        found = columns(self.rows, names_of(self.study))
         if name not in tuple(found):
             raise InputError([Fault(f"no column '{name}'; {suggest(name, found)}", ("column",))])
         return found[name].numbers
@@ -88,7 +88,7 @@ class Results(Shown):
         Raises:
             InputError: where pandas is not installed.
         """
-        return frame({name: column.numbers for name, column in columns(self.rows).items()})
+        return frame({name: column.numbers for name, column in columns(self.rows, names_of(self.study)).items()})
 
     def to_xarray(self) -> "Dataset":
         """The rows over the values that vary, of a study whose rows fill a grid.
@@ -96,7 +96,7 @@ class Results(Shown):
         Raises:
             InputError: where they do not, or xarray is not installed.
         """
-        made: Dataset | None = gridded(columns(self.rows))
+        made: Dataset | None = gridded(columns(self.rows, names_of(self.study)))
         if made is None:
             message = f"the {len(self.rows)} rows fill no grid; use to_frame"
             raise InputError([Fault(message, ("study",))])
@@ -112,7 +112,7 @@ class Results(Shown):
         """Write the rows to a CSV, Parquet or netCDF file; see `tmsopt.studies.export`."""
         about = dict(self.about or {"definition": definition(self.study)})
         units = units_of(self.study.problem, self.study.report)
-        export(self.rows, path_of(path, "the file to write"), about | {"units": units})
+        export(self.rows, path_of(path, "the file to write"), about | {"units": units}, names_of(self.study))
 
 
 def run_study(

@@ -2,7 +2,6 @@
 
 import platform
 import time
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
@@ -10,7 +9,7 @@ from typing import Any
 
 from threadpoolctl import ThreadpoolController
 
-from tmsopt.checks.law_rows import LawRow, law_rows
+from tmsopt.checks.law_rows import law_rows
 from tmsopt.design.solution import Solution, violated_by
 from tmsopt.errors import InputError
 from tmsopt.models import tms
@@ -183,12 +182,4 @@ def _laws(solution: Solution) -> Mapping[str, float]:
     """Relative residual of each law that applies to an optimal design."""
     if solution.status != "optimal" or solution.problem.model is not tms:
         return {}
-    rows = [row for row in law_rows(solution) if row.applies]
-    shared = Counter(row.label for row in rows)
-    return {_law_name(row, shared[row.label] == 1): row.relative for row in rows}
-
-
-def _law_name(row: LawRow, only: bool) -> str:
-    """The label of a law, with what it is about where the label is of several; without commas, for tables."""
-    name = row.label if only else f"{row.label} {row.subject.split(',')[0]}"
-    return name.replace(",", "")
+    return {row.name: row.relative for row in law_rows(solution) if row.applies}

@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from tmsopt.checks.law_rows import LAWS
 from tmsopt.design.cases import Band
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.limit import with_limit
 from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError, table_faults
 from tmsopt.formulation.options import STARTS
+from tmsopt.models import tms
 from tmsopt.records import Array, Column, Table
 from tmsopt.studies.samples import grid
 from tmsopt.studies.validate import faults
@@ -127,6 +129,17 @@ def over_grid(
         problem=problem_of(problem), columns=grid(axes), title=title, seed=seed, starts=starts, warm=warm,
         report=report, grid_shape={name: len(values) for name, values in axes.items()}, method="grid",
     )  # fmt: skip
+
+
+def names_of(study: Study) -> dict[str, tuple[str, ...]]:
+    """Table of a row, such as ``laws`` → the names that rows of a study may have in it."""
+    problem = study.problem
+    pattern = (problem.pattern.name,) if problem.pattern else ()
+    return {
+        "varied": tuple(study.columns), "parameters": problem.parameter_set.names, "reports": tuple(study.report),
+        "laws": LAWS if problem.model is tms else (),
+        "violations": (*problem.constraints, *pattern, "a0", "coefficients"),
+    }  # fmt: skip
 
 
 def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) -> dict[str, Any]:
