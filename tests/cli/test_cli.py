@@ -310,3 +310,18 @@ def test_the_question_for_a_stable_design_is_shown(monkeypatch, tmp_path):
     assert stop.value.code == 130
     assert "looking for a stable design: 2 of 5 s" in sys.stderr.getvalue()
     assert "the user stopped the question whether any design is stable" in sys.stdout.getvalue()
+
+
+def test_the_rows_of_a_study_are_written_in_blocks_as_they_would_be_at_once(capsys, tmp_path, monkeypatch):
+    common = import_module("tmsopt.cli.common")
+    text = 'problem = "{}"\n[study]\nmethod = "monte_carlo"\nrows = 7\n[tolerances]\nmu = 0.01\n'
+    (tmp_path / "s.toml").write_text(text.format(Path("problems/ep4.toml").resolve()))
+    written = []
+    for size in (3, 100):
+        monkeypatch.setattr(common, "_BLOCK", size)
+        code, out, _ = run(capsys, "study", tmp_path / "s.toml", "--json", "--store", tmp_path / "s.sqlite")
+        assert code == 0
+        written.append(json.loads(out))
+        assert out == json.dumps(written[-1], indent=2, ensure_ascii=False) + "\n"
+    assert written[0]["table"] == written[1]["table"]
+    assert [row["number"] for row in written[0]["table"]] == list(range(7))

@@ -249,3 +249,15 @@ def test_heads_of_csv_name_units() -> None:
     names = ("v", "varied.lambda_s.max", "varied.arm.limit", "report.u_H", "violation.arm", "law.w0")
     assert [bare(name) for name in names] == ["v", "lambda_s", "arm", "u_H", "arm", "law.w0"]
     assert (headed("v", "m/s"), headed("mu", "")) == ("v (m/s)", "mu")
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_rows_are_counted_while_they_are_written(ending, tmp_path, monkeypatch):
+    module = import_module("tmsopt.studies.export")
+    monkeypatch.setattr(module, "_CHUNK", 2)
+    monkeypatch.setattr(module, "_GROUP", 2)
+    monkeypatch.setattr(import_module("tmsopt.progress"), "PAUSE", 0.0)
+    told = []
+    export([Row(k, 1, Table(), "optimal") for k in range(5)], tmp_path / f"x.{ending}", progress=told.append)
+    assert [(p.done, p.most) for p in told][1:] == [(2, 5), (4, 5), (5, 5)]
+    assert {(p.what, p.unit) for p in told} == {(f"writing x.{ending}", "row")}

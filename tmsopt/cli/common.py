@@ -4,7 +4,8 @@ import json
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,8 @@ FIGURES = ("png", "pdf", "svg")
 
 REPORTS = ("html", "htm")
 """Endings of pages to hand on."""
+
+_BLOCK = 5000  # rows of JSON made and written at once
 
 TYPED = "tmsopt.words"
 """Where the words of the command line are kept, in what click hands from a command to the next."""
@@ -137,6 +140,33 @@ def write_json(data: dict[str, Any]) -> None:
     said = json.dumps(data, indent=2, ensure_ascii=narrow, allow_nan=False)
     with quiet():
         click.echo(said)
+
+
+def write_json_rows(data: dict[str, Any], key: str, rows: Sequence[Any]) -> None:
+    """The same with a long list under a key, made and written a block after the other, and counted.
+
+    Args:
+        data: with an empty list there.
+        rows: that have `to_json`.
+    """
+    from tmsopt.progress import counted
+
+    narrow = not (sys.stdout.encoding or "utf").lower().startswith("utf")
+    said = partial(json.dumps, indent=2, ensure_ascii=narrow, allow_nan=False)
+    head = f'\n  "{key}": ['
+    before, _, after = said(data).partition(f"{head}]")
+    if not rows:
+        write_json(data)
+        return
+    steps = counted(None if sys.stdout.isatty() else shown(), "writing the answer", "row")
+    for first in range(0, len(rows), _BLOCK):
+        some = [row.to_json() for row in rows[first : first + _BLOCK]]
+        text = said(some)[1:-2].replace("\n", "\n  ")  # without its brackets, further in; strings have no line breaks
+        with quiet() if sys.stdout.isatty() else nullcontext():
+            click.echo(f"{',' if first else before + head}{text}", nl=False)
+        if steps:
+            steps(first + len(some), len(rows))
+    click.echo(f"\n  ]{after}")
 
 
 def answer(as_json: bool, data: Callable[[], dict[str, Any]], text: Callable[[], str]) -> None:

@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tmsopt.cli.common import FIGURES, REPORTS, bad_input, check_output, report_option, saving, write_json, write_report
+from tmsopt.cli.common import (
+    FIGURES,
+    REPORTS,
+    bad_input,
+    check_output,
+    report_option,
+    saving,
+    write_json,
+    write_json_rows,
+    write_report,
+)
 from tmsopt.cli.ending import BAD_INPUT, INTERRUPTED, answering
 from tmsopt.cli.terminal import doing, quiet, shown
 from tmsopt.disk import read_text
@@ -98,11 +108,11 @@ def study(
             return
         path = path.resolve()
         results, stopped = _carried_out(asked, path, fresh, {"workers": workers, "scheduler": scheduler})
-        with answering(), quiet():
+        with answering():
             _show(results, path, stopped, as_json)
         for target in exports if len(results.rows) else ():
             with saving("--export", target):
-                results.export(target)
+                results.export(target, shown())
         if plot is not None:
             from tmsopt.plots import save
 
@@ -185,12 +195,14 @@ def _show(results: "Results", path: Path, stopped: bool, as_json: bool) -> None:
             run["interrupted"] = True
         elif results.found < len(asked):
             run |= {"rows_solved": solved, "seconds": round(seconds, 4), "engine": results.engine}
-        write_json(results.to_json() | {"run": run})
+        write_json_rows(results.to_json(table=False) | {"run": run}, "table", results.rows)
         return
-    click.echo(study_table(asked, results.summary, results.rows))
-    if solved:
-        rate = solved / max(seconds, 1e-9)
-        click.echo(f"{solved} rows solved in {seconds:.3g} s, {rate:.3g} a second, {results.engine}; store: {path}")
+    text = study_table(asked, results.summary, results.rows)
+    with quiet():
+        click.echo(text)
+        if solved:
+            rate = solved / max(seconds, 1e-9)
+            click.echo(f"{solved} rows solved in {seconds:.3g} s, {rate:.3g} a second, {results.engine}; store: {path}")
 
 
 def _show_row(asked: "Study", number: int, as_json: bool) -> None:

@@ -4,7 +4,7 @@ import csv
 import json
 import re
 from array import array
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tmsopt.disk import cell, headed, netcdf_errors, whole
 from tmsopt.errors import Fault, InputError, needed
+from tmsopt.progress import Listener, Steps, counted
 from tmsopt.records import Array
 from tmsopt.studies.judging import RowsInBlocks, table
 from tmsopt.studies.row import Row
@@ -66,19 +67,24 @@ class Format:
     """How rows are written to a file of one ending.
 
     Attributes:
-        write: takes header → column, the path, and metadata as JSON.
+        write: takes header → column, the path, metadata as JSON, and what counts.
         needs: modules that the extra ``data`` brings.
     """
 
-    write: Callable[[Mapping[str, PartialColumn], Path, str], None]
+    write: Callable[[Mapping[str, PartialColumn], Path, str, Steps | None], None]
     needs: tuple[str, ...] = ()
 
 
 _CHUNK = 10_000  # rows turned into text at once
+_GROUP = 2**16  # rows of Parquet written at once
 
 
 def export(
-    rows: Iterable[Row], path: Path | str, metadata: Mapping[str, Any] | None = None, names: Names = _NO_NAMES
+    rows: Iterable[Row],
+    path: Path | str,
+    metadata: Mapping[str, Any] | None = None,
+    names: Names = _NO_NAMES,
+    progress: Listener | None = None,
 ) -> None:
     """Write rows to a file whose ending says how, one of `FORMATS`; doubles come back bit by bit.
 
@@ -86,6 +92,7 @@ def export(
     the dimension ``row``, and where the rows fill a grid also in the group ``grid``, over the values that vary.
 
     Args:
+        progress: called with a `tmsopt.Progress` now and then.
         names: that have a column anyway; see `columns`.
         metadata: plain data to go with the rows in Parquet (schema metadata, key ``tmsopt``) and netCDF (attribute
             ``tmsopt``), as JSON; `Store.about` makes it.
@@ -97,7 +104,8 @@ def export(
     check_export(path)
     try:
         with whole(path) as temporary:
-            FORMATS[_ending(path)].write(columns(rows, names), temporary, json.dumps(metadata or {}))
+            steps = counted(progress, f"writing {path.name}", "row")
+            FORMATS[_ending(path)].write(columns(rows, names), temporary, json.dumps(metadata or {}), steps)
     except OSError as error:
         raise InputError([Fault(f"cannot be written: {error.strerror or error}", file=str(path))]) from error
 
@@ -122,13 +130,21 @@ def _ending(path: Path) -> str:
     return path.suffix.lstrip(".").lower()
 
 
-def _csv(table: Mapping[str, PartialColumn], path: Path, metadata: str) -> None:
+def _parts(count: int, each: int, steps: Steps | None) -> Iterator[int]:
+    """Where parts of so many rows begin, counted as they are done."""
+    for first in range(0, count, each):
+        yield first
+        if steps:
+            steps(min(first + each, count), count)
+
+
+def _csv(table: Mapping[str, PartialColumn], path: Path, metadata: str, steps: Steps | None) -> None:
     units = json.loads(metadata).get("units", {})
     columns = list(table.values())
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(cell(headed(name, units.get(_bare(name), ""))) for name in table)
-        for first in range(0, len(columns[0].values), _CHUNK):
+        for first in _parts(len(columns[0].values), _CHUNK, steps):
             known: dict[bytes, list[str]] = {}  # columns may be equal, as the abscissa and the objective are
             some = [(c.values[first : first + _CHUNK], c.present[first : first + _CHUNK]) for c in columns]
             writer.writerows(zip(*(_texts(*part, known) for part in some), strict=True))
@@ -155,17 +171,20 @@ def _texts(values: NDArray[Any], present: NDArray[np.bool_], known: dict[bytes, 
     return known[key]
 
 
-def _parquet(table: Mapping[str, PartialColumn], path: Path, metadata: str) -> None:
+def _parquet(table: Mapping[str, PartialColumn], path: Path, metadata: str, steps: Steps | None) -> None:
     pa, parquet = needed("pyarrow"), needed("pyarrow.parquet")
     arrays = {name: pa.array(c.values, _kind(pa, c), mask=~c.present, from_pandas=False) for name, c in table.items()}
-    parquet.write_table(pa.table(arrays).replace_schema_metadata({"tmsopt": metadata}), path)
+    whole = pa.table(arrays).replace_schema_metadata({"tmsopt": metadata})
+    with parquet.ParquetWriter(path, whole.schema) as writer:
+        for first in _parts(len(whole), _GROUP, steps):
+            writer.write_table(whole.slice(first, _GROUP))
 
 
 def _kind(pa: Any, column: PartialColumn) -> Any:
     return pa.string() if column.values.dtype == object else pa.from_numpy_dtype(column.values.dtype)
 
 
-def _netcdf(table: Mapping[str, PartialColumn], path: Path, metadata: str) -> None:
+def _netcdf(table: Mapping[str, PartialColumn], path: Path, metadata: str, _: Steps | None) -> None:
     xarray = needed("xarray")
     names = _names(table)
     over_rows = {names[n]: ("row", c.numbers, {"long_name": n}) for n, c in table.items()}

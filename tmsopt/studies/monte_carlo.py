@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,15 @@ from numpy.typing import NDArray
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem, unasked
 from tmsopt.design.solution import NotSolved
+from tmsopt.disk import path_of
 from tmsopt.errors import Fault, InputError, at_first, count_faults, short, suggest, text_faults
 from tmsopt.formulation.options import STARTS
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Column, Table
 from tmsopt.solver.solve import solve, solved_first
-from tmsopt.studies.study import Study
+from tmsopt.studies.store.definition import doubles
+from tmsopt.studies.store.opening import check_same, read_store
+from tmsopt.studies.study import Study, definition
 from tmsopt.studies.validate import MOST_ROWS, common_faults
 
 DISTRIBUTIONS = ("uniform", "normal")
@@ -130,6 +134,31 @@ def around(
         problem=drawn, columns=columns, title=title or problem.title, seed=seed, report=report,
         method="monte_carlo", notes=notes,
     )  # fmt: skip
+
+
+def check_unchanged(study: Study | Sampling, store: str | PathLike[str]) -> None:
+    """Refuse the store of another Monte Carlo study before its design is found, if no design would make it the same.
+
+    That is so where it is another one around the design of the store, too.
+
+    Raises:
+        InputError: with the differences; where the store is none, or damaged.
+    """
+    path = path_of(store, "an SQLite file")
+    if not isinstance(study, Sampling) or not path.exists():
+        return
+    with read_store(path) as opened:
+        known = opened.about()["definition"]
+    try:
+        design = {n: float(known["problem"]["fixed"][n]) for n in study.problem.parameter_set.names}
+        design |= study.problem.fixed
+        stated = study.tolerances or study.problem.tolerances
+        drawn = around(
+            study.problem, design, study.rows, study.seed, study.distribution, stated, study.title, study.report
+        )
+    except (InputError, KeyError, TypeError, ValueError):  # of another model, or a design that cannot be drawn around
+        return
+    check_same(path, definition(drawn, doubles))
 
 
 def _as_built(problem: Problem, design: Mapping[str, float]) -> tuple[Problem, tuple[str, ...]]:

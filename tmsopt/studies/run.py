@@ -21,12 +21,12 @@ from tmsopt.studies.engines.work import silent
 from tmsopt.studies.export import columns, export, gridded
 from tmsopt.studies.judging import RowBlock, applies, gathered, judged, shared_by
 from tmsopt.studies.load import load_study
-from tmsopt.studies.monte_carlo import Sampling, around, planned
+from tmsopt.studies.monte_carlo import Sampling, check_unchanged, planned
 from tmsopt.studies.neighbours import blocks
 from tmsopt.studies.row import Row
 from tmsopt.studies.solving import Solver
 from tmsopt.studies.store.definition import doubles
-from tmsopt.studies.store.opening import check_same, open_store, read_store
+from tmsopt.studies.store.opening import open_store, read_store
 from tmsopt.studies.store.store import Store
 from tmsopt.studies.study import Study, definition, names_of
 from tmsopt.studies.summary import Summary, summary
@@ -102,17 +102,17 @@ class Results(Shown):
             raise InputError([Fault(message, ("study",))])
         return made
 
-    def to_json(self) -> dict[str, Any]:
-        """Plain data for ``json.dumps``: the summary, and the rows as ``table``."""
+    def to_json(self, table: bool = True) -> dict[str, Any]:
+        """Plain data for ``json.dumps``: the summary, and the rows as ``table``, unless it is to stay empty."""
         head = {"schema": SCHEMA, "title": self.study.title, "model": self.study.problem.model.name}
-        table = [row.to_json() for row in self.rows]
-        return head | {"method": self.study.method} | self.summary.to_json() | {"table": table}
+        rows = [row.to_json() for row in self.rows] if table else []
+        return head | {"method": self.study.method} | self.summary.to_json() | {"table": rows}
 
-    def export(self, path: str | PathLike[str]) -> None:
+    def export(self, path: str | PathLike[str], progress: Listener | None = None) -> None:
         """Write the rows to a CSV, Parquet or netCDF file; see `tmsopt.studies.export`."""
         about = dict(self.about or {"definition": definition(self.study)})
         units = units_of(self.study.problem, self.study.report)
-        export(self.rows, path_of(path, "the file to write"), about | {"units": units}, names_of(self.study))
+        export(self.rows, path_of(path, "the file to write"), about | {"units": units}, names_of(self.study), progress)
 
 
 def run_study(
@@ -170,31 +170,6 @@ def stored(study: Study, store: str | PathLike[str]) -> Results:
     with read_store(path_of(store, "an SQLite file")) as opened:
         held = _held(study, opened)
         return Results(study, gathered(held.blocks, held.rows), 0, 0.0, "", held.count, opened.about())
-
-
-def check_unchanged(study: Study | Sampling, store: str | PathLike[str]) -> None:
-    """Refuse the store of another Monte Carlo study before its design is found, if no design would make it the same.
-
-    That is so where it is another one around the design of the store, too.
-
-    Raises:
-        InputError: with the differences; where the store is none, or damaged.
-    """
-    path = path_of(store, "an SQLite file")
-    if not isinstance(study, Sampling) or not path.exists():
-        return
-    with read_store(path) as opened:
-        known = opened.about()["definition"]
-    try:
-        design = {n: float(known["problem"]["fixed"][n]) for n in study.problem.parameter_set.names}
-        design |= study.problem.fixed
-        stated = study.tolerances or study.problem.tolerances
-        drawn = around(
-            study.problem, design, study.rows, study.seed, study.distribution, stated, study.title, study.report
-        )
-    except (InputError, KeyError, TypeError, ValueError):  # of another model, or a design that cannot be drawn around
-        return
-    check_same(path, definition(drawn, doubles))
 
 
 @dataclass
