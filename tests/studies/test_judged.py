@@ -58,9 +58,16 @@ def own(limits: dict[str, str] | None = None, **asked: Any) -> Study:
     return Study(problem, drawn)
 
 
+def constant() -> Study:
+    """The trace, 0.1 + 0.7, is no double: one in its place would move nearly double roots, at k = 0.09, by 1e-14."""
+    model = models.from_matrices(A=[["-0.1", "1"], ["-k", "-0.7"]], name="a trace that is no double")
+    problem = Problem(model=model, fixed={"k": 0.01}, minimize="abscissa")
+    return Study(problem, {"k": 0.09 + np.geomspace(1e-7, 1e-3, 40) * (-1.0) ** np.arange(40)})
+
+
 STUDIES = {
     "EP4 as built": lambda: built(60), "very near EP4": lambda: built(40, 1e-6), "wheels": whipple, "limits": limited,
-    "own": own, "own, stable": lambda: own({"decay": "abscissa <= -0.3", "size": "a*b >= 20"}),
+    "constants": constant, "own": own, "own, stable": lambda: own({"decay": "abscissa <= -0.3", "size": "a*b >= 20"}),
     "own, another objective": lambda: own(maximize="damping_ratio**2 + sin(a)/3 - exp(-b)"),
     "own, one of two has no value": lambda: own(maximize="max(log(k - 0.8), abscissa)"),
     "own, nothing asked": lambda: own({"size": "a*b/k <= 30"}, minimize=None),

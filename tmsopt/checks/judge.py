@@ -6,22 +6,23 @@ them: a nearly multiple root, a limit missed by no more than tolerance, a coeffi
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from tmsopt import laws
-from tmsopt.arithmetic.twofold import Twofold, twofold
+from tmsopt.arithmetic.twofold import Twofold, of_balls, twofold
 from tmsopt.checks.bound import PROVEN, ROUNDING, bounded, is_rational
 from tmsopt.checks.law_rows import SAME_LAW
-from tmsopt.checks.recheck import FEASIBLE
+from tmsopt.checks.recheck import FEASIBLE, realised_roots
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, ARRAY_ROOT_QUANTITIES, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE
 from tmsopt.design.validate import SMALLEST
 from tmsopt.models import Values, tms
 from tmsopt.records import Array, Truth
-from tmsopt.roots import is_stable
+from tmsopt.roots import Root, is_stable
 from tmsopt.roots.isolated import Motions, motions
 
 BLOCK = 8192
@@ -77,6 +78,35 @@ def verdicts(problem: Problem, columns: Mapping[str, Array], reports: Sequence[s
             return _judged(problem, columns, reports)
     except Exception:  # of a formula that does not take arrays, or has no value: each design will tell by itself
         return None
+
+
+def realised(problem: Problem, designs: Sequence[Mapping[str, Any]]) -> tuple[Array, Array, Array]:
+    """Abscissa, damping ratio and greatest angular frequency of designs exactly as they are, nan where there is none.
+
+    By arrays; where these leave one in doubt, by roots isolated in ball arithmetic, one design after the other.
+
+    Args:
+        designs: each with a double or a ball for every parameter.
+    """
+    m, of = len(designs), problem.parameter_set
+    found, certain = np.full((3, m), np.nan), np.zeros(m, dtype=bool)
+    with suppress(Exception), np.errstate(all="ignore"):  # as in `verdicts`
+        columns = {n: of_balls([design[n] for design in designs]) for n in of.names}
+        coefficients = [_full(c, m) for c in problem.model.coefficients(columns, of)]
+        seen = motions(coefficients, [np.zeros(m)] * len(coefficients), 0.0)
+        (found[0], sure), (found[1], known) = seen.abscissa.nearest(), seen.damping_ratio.nearest()
+        found[2], certain = seen.frequency, seen.simple & sure & known
+    for k in np.flatnonzero(~certain).tolist():
+        found[:, k] = _motion_of(realised_roots(problem, designs[k]), problem.model.degree)
+    return found[0], found[1], found[2]
+
+
+def _motion_of(roots: Sequence[Root], degree: int) -> tuple[float, float, float]:
+    """The same three of given roots; of those that are fewer than the degree, one at infinity, the abscissa alone."""
+    if sum(root.multiplicity for root in roots) < degree:
+        return max((root.re for root in roots), default=np.nan), np.nan, np.nan
+    ratios = (-root.re / (math.hypot(root.re, root.im) or 1.0) for root in roots)
+    return roots[0].re, min(ratios) + 0.0, max(abs(root.im) for root in roots)
 
 
 def _judged(problem: Problem, columns: Mapping[str, Array], reports: Sequence[str]) -> Verdicts:

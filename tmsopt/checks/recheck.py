@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Any
 
 import casadi as ca
 import flint
@@ -20,7 +21,7 @@ from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, STRU
 from tmsopt.margins.nearest import Robustness, robustness_at
 from tmsopt.models import Model, Values
 from tmsopt.records import Array, Table
-from tmsopt.roots import Structure, exact_abscissa, pattern_distance, roots
+from tmsopt.roots import Root, Structure, exact_roots, pattern_distance, roots
 
 FEASIBLE = 1e-9
 """Violation, relative to the size of the two sides, up to which a constraint counts as satisfied."""
@@ -252,13 +253,22 @@ def _or_infinite(value: float) -> float:
 
 
 def realised_abscissa(problem: Problem, parameters: Mapping[str, float]) -> float:
-    """Abscissa of the parameters exactly as stored: coefficients at 120 digits, roots isolated in ball arithmetic."""
+    """Abscissa of the parameters exactly as stored."""
+    found = realised_roots(problem, parameters)
+    return found[0].re if found else math.nan
+
+
+def realised_roots(problem: Problem, parameters: Mapping[str, Any]) -> tuple[Root, ...]:
+    """Roots of the parameters exactly as stored, rightmost first; none where a coefficient does not exist.
+
+    Coefficients at 120 digits, roots isolated in ball arithmetic.
+    """
     with flint.ctx.workdps(_DIGITS):
         exact = {name: flint.arb(value) for name, value in parameters.items()}
         coefficients = problem.model.coefficients(exact, problem.parameter_set)
     if not all(c.is_finite() for c in coefficients):
-        return math.nan
+        return ()
     leading = next((k for k, c in enumerate(coefficients) if c.mid() != 0), None)
     if leading is None or leading == len(coefficients) - 1:
-        return math.nan
-    return exact_abscissa(coefficients[leading:])
+        return ()
+    return exact_roots(coefficients[leading:])

@@ -9,6 +9,7 @@ from typing import Any
 
 import flint
 import numpy as np
+from numpy.typing import NDArray
 
 from tmsopt.arithmetic.sequence import golden_steps
 from tmsopt.design.cases import Band, Case
@@ -71,29 +72,47 @@ def worst_cases(problem: Problem, parameters: Mapping[str, float]) -> dict[str, 
     A grid with a closer look at its worst points; the value in the case found is exact, with multiple roots
     recognised, but a peak narrower than the grid can escape: `prove` excludes that.
     """
-    spaces = list(_spaces(problem))
     found: dict[str, Worst] = {}
     for name, (sign, what) in subjects(problem, problem.cases).items():
         shared = {n: found[n].value for n in found if isinstance(what, Expression) and n in what.names}
-        peaks = [case for space in spaces for case in space.peaks(problem, parameters, sign, what, shared)]
-        measured = [Worst(case, _measured(problem, parameters, case, what, shared)) for case in peaks]
+        cases = [peak.case for peak in _peaks(problem, parameters, 1, sign, what, shared)[0]]
+        each = [problem.values(case.applied(parameters)) for case in cases]
+        measured = [Worst(c, float(_value(v, what, shared))) for c, v in zip(cases, each, strict=True)]
         found[name] = max(measured, key=lambda w: sign * w.value if np.isfinite(w.value) else np.inf)
     return found
 
 
-def _measured(
-    problem: Problem, parameters: Mapping[str, float], case: Case, what: Expression | str, shared: Mapping[str, float]
-) -> float:
-    """The value of a root quantity in one case, or of an expression with the given worst root quantities."""
-    values = problem.values(case.applied(parameters))
-    return float(_value(values, what, shared))
+def peaks(problem: Problem, designs: Mapping[str, float | Array], count: int) -> list[list[Case]]:
+    """Of each of several designs, the cases in which something may be worst, by numeric roots.
+
+    Args:
+        designs: parameter → its value, or one for each of the `count` designs.
+    """
+    cases: list[list[Case]] = [[] for _ in range(count)]
+    known: dict[str, Array] = {}
+    for name, (sign, what) in subjects(problem, problem.cases).items():
+        shared = {n: known[n] for n in known if isinstance(what, Expression) and n in what.names}
+        found = _peaks(problem, designs, count, sign, what, shared)
+        known[name] = np.array([sign * max(peak.value for peak in own) for own in found])
+        for own, seen in zip(found, cases, strict=True):
+            seen += [peak.case for peak in own]
+    return cases
 
 
-def _value(values: Values, what: Expression | str, shared: Mapping[str, float]) -> Any:
+def _value(values: Values, what: Expression | str, shared: Mapping[str, float | Array]) -> Any:
     """A root quantity, or an expression with the given worst root quantities."""
     for name, value in shared.items():
         values.define(name, value)
     return values[what] if isinstance(what, str) else what(values)
+
+
+def _peaks(
+    problem: Problem, designs: Mapping[str, float | Array], count: int, sign: float, what: Expression | str,
+    shared: Mapping[str, float | Array],
+) -> list[list[Worst]]:  # fmt: skip
+    """Of each of several designs, the worst few cases of every choice of separate scenario values; worse is greater."""
+    each = [space.peaks(problem, designs, count, sign, what, shared) for space in _spaces(problem)]
+    return [[peak for found in each for peak in found[k]] for k in range(count)]
 
 
 @dataclass(frozen=True)
@@ -111,36 +130,41 @@ class _Space:
         return Case(Table({**self.at, **values}), Table(moves))
 
     def peaks(
-        self, problem: Problem, parameters: Mapping[str, float], sign: float, what: Expression | str,
-        shared: Mapping[str, float],
-    ) -> Iterator[Case]:  # fmt: skip
-        """The worst few points of a grid, each moved to where it is locally worst."""
+        self, problem: Problem, designs: Mapping[str, float | Array], count: int, sign: float, what: Expression | str,
+        shared: Mapping[str, float | Array],
+    ) -> list[list[Worst]]:  # fmt: skip
+        """Of each design, the worst few points of a grid, each moved to where it is locally worst."""
         size = len(self.bands) + len(self.tolerances)
         if size == 0:
-            yield Case(self.at)
-            return
+            return [[Worst(Case(self.at), np.nan)]] * count
 
-        def badness(u: Array) -> Array:
+        def badness(u: Array, owner: NDArray[np.int64]) -> Array:
+            def own(table: Mapping[str, float | Array]) -> dict[str, Any]:
+                return {n: x[owner] if isinstance(x, np.ndarray) else x for n, x in table.items()}
+
             at, offset = self._columns(u)
-            found = _evaluated(problem, {**parameters, **self.at, **at}, offset, len(u), what, shared)
+            found = _evaluated(problem, {**own(designs), **self.at, **at}, offset, len(u), what, own(shared))
             return np.where(np.isfinite(found), sign * found, np.inf)
 
+        every = np.arange(count)
         u = _grid(size)
-        high = badness(u)
+        high = badness(np.tile(u, (count, 1)), np.repeat(every, len(u))).reshape(count, len(u))
         step = 1 / (_LINE - 1) if size == 1 else 0.5 * len(u) ** (-1 / size)
-        rows = _apart(u, high, 4 * step)
-        best, value = u[rows], high[rows]
-        every = _moves(len(rows), size)
+        chosen = [_apart(u, row, 4 * step) for row in high]
+        moves = np.concatenate([_moves(len(rows), size) for rows in chosen])
+        owner = np.repeat(every, [len(rows) for rows in chosen])
+        rows = np.concatenate(chosen)
+        best, value, peak = u[rows], high[owner, rows], np.arange(len(rows))
         for look in range(_LOOKS):  # all peaks at once: calls cost more than points
             reach = step * (_SHRINK if size == 1 else _SHRINK ** (1 / 2)) ** look
-            around = np.clip(best[:, None] + reach * every[:, look], 0, 1)
-            trial = badness(around.reshape(-1, size)).reshape(len(rows), _AROUND)
+            around = np.clip(best[:, None] + reach * moves[:, look], 0, 1)
+            trial = badness(around.reshape(-1, size), np.repeat(owner, _AROUND)).reshape(len(rows), _AROUND)
             top = np.argmax(trial, axis=1)
-            peak = np.arange(len(rows))
             higher = trial[peak, top] > value
             best = np.where(higher[:, None], around[peak, top], best)
             value = np.where(higher, trial[peak, top], value)
-        yield from map(self.case, best)
+        found = [Worst(self.case(point), float(x)) for point, x in zip(best, value, strict=True)]
+        return [[found[i] for i in np.flatnonzero(owner == k)] for k in range(count)]
 
     def _columns(self, u: Array) -> tuple[dict[str, Array], dict[str, Array]]:
         columns = list(np.moveaxis(u, -1, 0))
@@ -159,7 +183,7 @@ def _spaces(problem: Problem) -> Iterator[_Space]:
 
 def _evaluated(
     problem: Problem, parameters: Mapping[str, Any], offset: Mapping[str, Array], count: int, what: Expression | str,
-    shared: Mapping[str, float],
+    shared: Mapping[str, float | Array],
 ) -> Array:  # fmt: skip
     varied = Case(offset=offset).applied(parameters)  # type: ignore[arg-type]
     columns = {n: np.broadcast_to(np.asarray(v, dtype=float), count) for n, v in varied.items()}

@@ -4,6 +4,6 @@ from .optimality import (
     NOT_COVERED as NOT_COVERED, NOT_MINIMAL as NOT_MINIMAL, STRICT as STRICT, UNDECIDED as UNDECIDED,
     Optimality as Optimality, optimality as optimality,
 )
-from .rounding import rounded as rounded
+from .rounding import rounded as rounded, rounded_designs as rounded_designs
 from .summary import none_of as none_of
 from .steps import natural_step as natural_step, step_within as step_within

@@ -9,7 +9,7 @@ from tmsopt.design.files import Given
 from tmsopt.design.solution import Bound
 from tmsopt.explanation.limits import Lever, levers
 from tmsopt.explanation.optimality import Optimality, optimality
-from tmsopt.explanation.rounding import Rounded, rounded_alone, rounded_together, worst
+from tmsopt.explanation.rounding import Rounded, rounded_designs, worst
 from tmsopt.explanation.summary import summary, warnings
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Table, Tabular, plain
@@ -67,8 +67,7 @@ def explain(design: Given, *, resolve: bool = True, progress: Listener | None = 
     solution = solved_first(design, progress)
     steps = counted(progress, "moving limits" if resolve else "weighing limits", "limit")
     problem = solution.problem
-    feasible = not solution.violations
-    alone = rounded_alone(solution) if feasible else Table[Rounded]()
+    alone, together = rounded_designs(solution) if not solution.violations else (Table[Rounded](), ())
     return Explanation(
         summary=summary(solution),
         structure=solution.structure,
@@ -77,7 +76,7 @@ def explain(design: Given, *, resolve: bool = True, progress: Listener | None = 
         levers=levers(solution, resolve, steps),
         rounding=alone,
         worst=worst(alone),
-        precision=rounded_together(solution) if feasible else (),
+        precision=together,
         warnings=warnings(solution),
         goal=(problem.minimize or problem.maximize or problem.locate or "").strip(),
         abscissa=solution.abscissa,

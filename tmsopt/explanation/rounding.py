@@ -1,25 +1,27 @@
 """What rounding the parameters of a design does to its roots, in exact arithmetic."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 import flint
 import numpy as np
+from numpy.typing import NDArray
 
-from tmsopt.checks.recheck import FEASIBLE, realised_abscissa
-from tmsopt.checks.worst_case import worst_cases
+from tmsopt.checks.judge import realised
+from tmsopt.checks.recheck import FEASIBLE
+from tmsopt.checks.worst_case import peaks
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import varies
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import Unit, unit_of
+from tmsopt.formulation.judgement import values_of
 from tmsopt.models import Values
-from tmsopt.records import Table, plain
-from tmsopt.roots import roots
+from tmsopt.records import Array, Table, plain
 
 ALONE = 3
 """Significant digits to which each parameter is rounded alone."""
@@ -27,6 +29,7 @@ ALONE = 3
 DIGITS = (2, 3, 4, 6)
 """Significant digits to which all parameters are rounded together."""
 
+_MOTION = ("abscissa", "damping_ratio", ANGULAR_FREQUENCY)
 _SAME = 1e-15  # relative change that is no rounding: a degree or two written as radians
 _DEGREE = math.pi / 180
 _LARGEST_DENOMINATOR = 10**6  # of a factor between units, such as 5/18
@@ -43,7 +46,7 @@ class Rounded:
         realised: abscissa of the decimals, exact to double precision; the other parameters as stored. With scenarios
             or tolerances, its worst over whole bands and tolerance boxes.
         loss: realised minus ideal abscissa of the design.
-        damping_ratio: of the rounded design, in double precision.
+        damping_ratio: of the rounded design, likewise.
         objective: value of the objective expression; nan without one.
         violations: constraint or bound that the rounding violates → by how much, in its own units (rad, SI).
     """
@@ -62,39 +65,42 @@ class Rounded:
         return {"abscissa_realised" if name == "realised" else name: value for name, value in found.items()}
 
 
-def rounded_alone(solution: Solution, digits: int = ALONE) -> Table[Rounded]:
-    """Each free parameter rounded by itself; one that is no longer than that is left out."""
-    return Table({n: rounded(solution, [n], digits) for n in solution.problem.free if not _short(solution, n, digits)})
+def rounded_designs(solution: Solution) -> tuple[Table[Rounded], tuple[Rounded, ...]]:
+    """Each free parameter rounded alone, unless it is no longer than that, and all together, to ever more digits."""
+    names = list(solution.problem.free)
+    alone = [n for n in names if not _short(solution, n, ALONE)]
+    found = rounded(solution, [*(([n], ALONE) for n in alone), *((names, digits) for digits in DIGITS if names)])
+    return Table(dict(zip(alone, found, strict=False))), found[len(alone) :]
 
 
-def rounded_together(solution: Solution, digits: Iterable[int] = DIGITS) -> tuple[Rounded, ...]:
-    """All free parameters rounded together, one row per number of digits."""
-    return tuple(rounded(solution, list(solution.problem.free), d) for d in digits) if solution.problem.free else ()
-
-
-def rounded(solution: Solution, names: Iterable[str], digits: int) -> Rounded:
-    """A design with some of its parameters rounded to significant digits."""
-    problem = solution.problem
+def rounded(solution: Solution, choices: Sequence[tuple[Sequence[str], int]]) -> tuple[Rounded, ...]:
+    """A design with some of its parameters rounded, for each choice of these and of significant digits, all at once."""
+    if not choices:
+        return ()
+    problem, m = solution.problem, len(choices)
     units = {n: unit_of(problem, n) for n in problem.free}
-    written = {n: _decimal(solution.parameters[n], units[n], digits) for n in names}
+    written = [{n: _decimal(solution.parameters[n], units[n], digits) for n in names} for names, digits in choices]
     with flint.ctx.workdps(_WORKING):
-        exact: dict[str, Any] = {n: _exact(text, units[n]) for n, text in written.items()}
-    plain = {**solution.parameters, **{n: float(x.mid()) for n, x in exact.items()}}
-    cases = _cases(solution, plain)
-    realised = max(realised_abscissa(problem, c.applied({**solution.parameters, **exact})) for c in cases)
-    each = [problem.values(case.applied(plain)) for case in cases]
-    ratio = min(_damping_ratio([float(c) for c in values.coefficients]) for values in each)
-    known = {"abscissa": realised, "damping_ratio": ratio}  # and better than by fitting structures
-    if problem.asks(ANGULAR_FREQUENCY):
-        known[ANGULAR_FREQUENCY] = max(values[ANGULAR_FREQUENCY] for values in each)
-    values = problem.values(plain)
-    for one in (values, *each):
-        for name, number in known.items():
-            one.define(name, number)
-    texts = Table({n: f"{text} {units[n].text}".rstrip() for n, text in written.items()})
-    objective = float(problem.objective(values)) if problem.objective else math.nan
-    violated = Table(_violations(problem, plain, [values, *each]))
-    return Rounded(digits, texts, realised, realised - solution.abscissa, ratio, objective, violated)
+        nominal = [{**solution.parameters, **{n: _exact(x, units[n]) for n, x in row.items()}} for row in written]
+        each = [(k, case.applied(nominal[k])) for k, cases in enumerate(_cases(solution, nominal)) for case in cases]
+        designs, owner = [design for _, design in each], np.array([k for k, _ in each])
+        motion = realised(problem, designs)
+    whose = np.concatenate([np.arange(m), owner])
+    with np.errstate(all="ignore"):  # what has no value is nan or inf
+        values = values_of(problem, _doubles([*nominal, *designs]), whose.shape)
+    known = {}
+    for name, of, worst_of in zip(_MOTION, motion, (np.max, np.min, np.max), strict=True):
+        known[name] = np.array([worst_of(of[owner == k]) for k in range(m)])
+        values.define(name, known[name][whose])
+    objective = np.broadcast_to(problem.objective(values) if problem.objective else math.nan, whose.shape)
+    violated = _violations(problem, values, whose, m)
+    found = []
+    for k, (texts, (_, digits)) in enumerate(zip(written, choices, strict=True)):
+        shown = Table({n: f"{text} {units[n].text}".rstrip() for n, text in texts.items()})
+        abscissa, ratio = (float(known[name][k]) for name in _MOTION[:2])
+        loss = abscissa - solution.abscissa
+        found.append(Rounded(digits, shown, abscissa, loss, ratio, float(objective[k]), Table(violated[k])))
+    return tuple(found)
 
 
 def worst(alone: Mapping[str, Rounded]) -> str:
@@ -103,36 +109,46 @@ def worst(alone: Mapping[str, Rounded]) -> str:
     return max(losing, key=lambda name: losing[name], default="")
 
 
-def _cases(solution: Solution, rounded: Mapping[str, float]) -> list[Case]:
-    """The listed cases, and the worst of the design and of the rounded one; one that changes nothing without any."""
-    listed = [case for case in solution.problem.cases if not case.direction]
-    worst = [w.case for w in worst_cases(solution.problem, rounded).values()] if listed else []
-    return [*listed, *([solution.worst] if solution.worst else []), *worst] or [Case()]
+def _cases(solution: Solution, designs: Sequence[Mapping[str, Any]]) -> list[list[Case]]:
+    """Of each rounded design: the listed cases, the worst of the design and its own; one that changes nothing else."""
+    problem = solution.problem
+    listed = [case for case in problem.cases if not case.direction]
+    shared = [*listed, *([solution.worst] if solution.worst else [])]
+    own = peaks(problem, _doubles(designs), len(designs)) if listed else [[] for _ in designs]
+    return [list(dict.fromkeys([*shared, *cases])) or [Case()] for cases in own]
 
 
-def _violations(problem: Problem, parameters: Mapping[str, float], each: Sequence[Values]) -> dict[str, float]:
-    """What is violated in any case beyond tolerance, by how much; the first values are of the nominal design."""
-    found = {}
+def _doubles(designs: Sequence[Mapping[str, Any]]) -> dict[str, Array]:
+    """Parameters of several designs as columns."""
+    return {n: np.array([float(design[n]) for design in designs]) for n in designs[0]}
+
+
+def _violations(problem: Problem, values: Values, whose: NDArray[np.int64], count: int) -> list[dict[str, float]]:
+    """What each design violates in any case beyond tolerance, by how much.
+
+    Args:
+        values: of all designs, nominal, and then of their cases.
+        whose: number of the design that each is one of.
+    """
+    found: list[dict[str, float]] = [{} for _ in range(count)]
     for name, condition in problem.conditions.items():
-        if RADIUS not in condition.names:  # it takes a search of its own
-            at = each if varies(problem, condition, problem.cases) else each[:1]
-            worst = max(at, key=lambda v: math.inf if math.isnan(x := condition.violation(v)) else x)
-            if not condition.violation(worst) <= FEASIBLE:
-                found[name] = float(condition.excess(condition(worst)))
+        if RADIUS in condition.names:  # it takes a search of its own
+            continue
+        left, right = (np.broadcast_to(np.asarray(side, dtype=float), whose.shape) for side in condition.each(values))
+        excess = condition.excess(left - right)
+        relative = excess / np.maximum(1.0, np.maximum(np.abs(left), np.abs(right)))
+        relative = np.where(np.isfinite(left - right), relative, np.inf)
+        at = whose if varies(problem, condition, problem.cases) else whose[:count]
+        for k in range(count):
+            own = np.flatnonzero(at == k)
+            worst = own[relative[own].argmax()]
+            if relative[worst] > FEASIBLE:
+                found[k][name] = float(excess[worst])
     for name, (lower, upper) in problem.free.items():
-        x = parameters[name]
-        for end, amount, limit in (("min", lower - x, lower), ("max", x - upper, upper)):
-            if not amount <= FEASIBLE * max(1.0, abs(limit)):
-                found[f"{name}.{end}"] = amount
+        for end, amounts, limit in (("min", lower - values[name], lower), ("max", values[name] - upper, upper)):
+            for k in np.flatnonzero(amounts[:count] > FEASIBLE * max(1.0, abs(limit))).tolist():
+                found[k][f"{name}.{end}"] = float(amounts[k])
     return found
-
-
-def _damping_ratio(coefficients: Sequence[float]) -> float:
-    """By numeric roots, for rounding has moved the design far enough from an exceptional point."""
-    if coefficients[0] == 0:
-        return math.nan
-    z = roots(coefficients)
-    return float(np.min(-z.real / np.maximum(np.abs(z), 1e-300)))
 
 
 def _short(solution: Solution, name: str, digits: int) -> bool:

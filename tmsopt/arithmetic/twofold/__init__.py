@@ -4,6 +4,6 @@ In: doubles. Out: `Twofold`, of which `nearest` tells the double that is nearest
 certain. What balls do for one number, at a thousandth of the time for many.
 """
 
-from tmsopt.arithmetic.twofold.numbers import Twofold, twofold
+from tmsopt.arithmetic.twofold.numbers import Twofold, of_balls, twofold
 
-__all__ = ["Twofold", "twofold"]
+__all__ = ["Twofold", "of_balls", "twofold"]

@@ -1,5 +1,6 @@
 """Sums of two doubles by error-free transformations (Dekker, Numer. Math. 18, 224, 1971), with running error bounds."""
 
+from collections.abc import Sequence
 from fractions import Fraction
 from functools import cache
 from typing import Any
@@ -167,15 +168,22 @@ class Twofold:
 
 
 def twofold(x: Any) -> Twofold:
-    """A number or an array of doubles, or an exact fraction, as such numbers."""
+    """A number or an array of doubles, an exact fraction or a ball, as such numbers."""
     if isinstance(x, Twofold):
         return x
+    if isinstance(x, flint.arb):
+        return Twofold(*_split(x))
     if isinstance(x, flint.fmpq | flint.fmpz | Fraction | int) and not isinstance(x, bool):
         exact = x if isinstance(x, Fraction | int) else Fraction(int(flint.fmpq(x).p), int(flint.fmpq(x).q))
         high = float(exact)
         low = float(Fraction(exact) - Fraction(high))
         return Twofold(high, low, _ROUNDING * abs(high) if low else 0.0)
     return Twofold(x)
+
+
+def of_balls(balls: Sequence[Any]) -> Twofold:
+    """Balls, or doubles among them, as an array of such numbers."""
+    return Twofold(*np.array([(x, 0.0, 0.0) if isinstance(x, float) else _split(x) for x in balls]).T)
 
 
 def _sine_cosine(x: Twofold) -> tuple[Twofold, Twofold]:
@@ -224,9 +232,7 @@ def _tables() -> tuple[Twofold, Twofold, Twofold]:
     with flint.ctx.workprec(_BITS):
         step = flint.arb.pi() / _PARTS
         angles = [step * k for k in range(2 * _PARTS)]
-        each = [[_split(a.sin()) for a in angles], [_split(a.cos()) for a in angles]]
-        sines, cosines = (Twofold(*np.array(rows).T) for rows in each)
-        return Twofold(*_split(step)), sines, cosines
+        return Twofold(*_split(step)), of_balls([a.sin() for a in angles]), of_balls([a.cos() for a in angles])
 
 
 def _inverse_factorials() -> dict[int, Twofold]:
