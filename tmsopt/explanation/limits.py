@@ -10,10 +10,10 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import Unit, dimension_of, limit_text, unit_of
 from tmsopt.errors import InputError
+from tmsopt.explanation.again import Again, moved
 from tmsopt.explanation.steps import natural_step, step_within
 from tmsopt.progress import Counts
 from tmsopt.records import plain
-from tmsopt.solver.solve import solve
 
 DIFFERS = 0.2
 """Relative difference of the two gains from which the reader is told why."""
@@ -93,11 +93,12 @@ def levers(solution: Solution, resolve: bool = True, progress: Counts | None = N
     """One lever per limit that binds at an optimum, the most valuable step first."""
     if solution.status != "optimal":
         return ()
-    found = (_of_bound(solution, name) if _is_bound(solution, name) else _of_row(solution, name)
-             for name in solution.active)  # fmt: skip
+    found = [_of_bound(solution, name) if _is_bound(solution, name) else _of_row(solution, name)
+             for name in solution.active]  # fmt: skip
+    again = Again(solution, {lever.name: lever.step for lever in found if lever.step})
     checked = []
     for lever in found:
-        checked.append(_resolved(solution, lever) if resolve and lever.step else lever)
+        checked.append(_resolved(again, lever) if resolve and lever.step else lever)
         if progress:
             progress(len(checked), len(solution.active))
     return tuple(sorted(checked, key=lambda v: -(v.resolved if math.isfinite(v.resolved) else v.predicted)))
@@ -156,36 +157,23 @@ def _size(solution: Solution, text: str) -> float:
     return max((size for size in sides if math.isfinite(size)), default=1.0)
 
 
-def moved(problem: Problem, name: str, step: float) -> Problem:
-    """The problem with one limit changed by a step: a bound, or the right-hand side of a constraint."""
-    if name in problem.constraints:
-        left, sign, right = written_sides(problem.constraints[name])
-        text = f"({left}) {sign} ({right}) {'+' if step > 0 else '-'} {abs(step)!r}"
-        return replace(problem, constraints={**problem.constraints, name: text})
-    parameter, end = name.rsplit(".", 1)
-    lower, upper = problem.free[parameter]
-    ends = (lower, upper + step) if end == "max" else (lower + step, upper)
-    return replace(problem, free={**problem.free, parameter: ends})
-
-
-def _resolved(solution: Solution, lever: Lever) -> Lever:
+def _resolved(again: Again, lever: Lever) -> Lever:
     """A lever with the gain found by solving again from the optimum."""
-    problem = solution.problem
-    near = {name: solution.parameters[name] for name in problem.free}
+    solution = again.solution
     try:
-        asked = moved(problem, lever.name, lever.step)
+        asked = moved(solution.problem, lever.name, lever.step)
     except InputError:
         return replace(lever, reason="the moved problem cannot be written down")
     gain, found = math.nan, None
     for starts in (1, _RETRY):
-        again = solve(asked, starts=starts, near=near, throw=False, stability=0.0, interruptible=False)
-        better = -problem.sign * (again.value - solution.value)
-        if again.status == "optimal" and not better <= gain:
-            gain, found = better, again
+        ended = again.solved(asked, lever.name, starts)
+        better = -solution.problem.sign * (ended.value - solution.value)
+        if ended.status == "optimal" and not better <= gain:
+            gain, found = better, ended
         if found and gain >= -_NOISE * (1 + abs(solution.value)):
             break
     if found is None:
-        return replace(lever, reason=f"the moved problem is {again.status.replace('_', ' ')}")
+        return replace(lever, reason=f"the moved problem is {ended.status.replace('_', ' ')}")
     checked = replace(lever, resolved=gain, structure=found.structure)
     if abs(checked.relative) <= DIFFERS:
         return checked

@@ -69,6 +69,7 @@ def solve(
 def solved(
     design: Given, options: Options = DEFAULTS, family: Family | None = None,
     beside: Sequence[Mapping[str, float]] = (), blind: bool = False, without: Collection[str] = (),
+    bound: bool = True,
 ) -> Solution:  # fmt: skip
     """A solution as it is; of a problem, or of a file, what `solve` finds, whatever its status.
 
@@ -76,6 +77,7 @@ def solved(
         beside: designs that may be close to the optimum, to be started from.
         blind: search from these and the problem's start alone, without a look at the box; and without `covered`.
         without: parts of the box to be left out, such as ``forward tilt``.
+        bound: whether to say how good the design is at best.
     """
     if isinstance(design, Solution):
         return design
@@ -109,7 +111,7 @@ def solved(
         values = _side_values(explored)
     else:
         finding = evaluated(problem, evaluated_cases(problem, problem.ordered({})))
-    solution = replace(_assembled(problem, finding, notes, values, began), interrupted=interrupted)
+    solution = replace(_assembled(problem, finding, notes, values, began, bound), interrupted=interrupted)
     solution = solution if blind else covered(solution)
     if interrupted or not options.stability or options.near:  # which keeps to its side of the box
         return solution
@@ -254,8 +256,9 @@ def _sides_note(problem: Problem, explored: Sequence[Explored], finding: Finding
 
 
 def _assembled(
-    problem: Problem, finding: Finding, notes: tuple[str, ...], sides: dict[str, float], began: float
-) -> Solution:
+    problem: Problem, finding: Finding, notes: tuple[str, ...], sides: dict[str, float], began: float,
+    bound: bool = True,
+) -> Solution:  # fmt: skip
     checked = finding.checked
     numbers = certified(problem, finding.parameters, checked, finding.cases)
     told = math.isclose(numbers.value, checked.objective, rel_tol=_TOLD, abs_tol=_TOLD)
@@ -274,7 +277,7 @@ def _assembled(
         structure=checked.structure.name,
         active=Table(finding.active),
         violations=checked.amounts,
-        bound=instant_bound(problem, numbers.value) if optimal else Bound(),
+        bound=instant_bound(problem, numbers.value) if optimal and bound else Bound(),
         starts=finding.starts,
         seconds=time.perf_counter() - began,
         quantities=numbers.quantities,
