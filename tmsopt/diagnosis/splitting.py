@@ -1,13 +1,12 @@
 """How a multiple root splits when a parameter changes, and how far the leading term tells it."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import comb
 from typing import Any
 
 import flint
 import numpy as np
+from numpy.typing import NDArray
 
 from tmsopt.arithmetic.elementary import exact
 from tmsopt.diagnosis.puiseux import Branches, branches
@@ -95,30 +94,48 @@ def _holds(
     branch: Branches, k: int, base: Sequence[Any], own: Sequence[Any], changed: Any, about: tuple[Any, Any], sign: int
 ) -> float:
     """The largest sampled change up to which the roots are where the leading term has them; about = root, unit."""
+    s, unit = about
 
-    def held(eps: float) -> bool:
-        change = changed(flint.arb(sign) * eps)
-        coefficients = [b + _ball(c) - o for b, c, o in zip(base, change, own, strict=True)]
-        return _deviation(branch.shifts(sign * eps), k, coefficients, *about) <= DEVIATION
+    def held(changes: Sequence[float]) -> list[bool]:
+        """Of each size of a change."""
+        rows, predicted = [], [branch.shifts(sign * eps) for eps in changes]
+        scales = [max(abs(t) for t in each) for each in predicted]
+        for eps, scale in zip(changes, scales, strict=True):
+            change = changed(flint.arb(sign) * eps)
+            coefficients = [b + _ball(c) - o for b, c, o in zip(base, change, own, strict=True)]
+            shifted = _taylor(coefficients, s, unit * scale, len(coefficients) - 1)
+            # Of 1/t, so that those sought are the largest roots: companion eigenvalues have these to all digits.
+            rows.append([middle(c / shifted[k].abs_upper()) for c in shifted])
+        every = zip(predicted, scales, _largest(np.array(rows), k), strict=True)
+        return [_deviation(t, scale, inverse) <= DEVIATION for t, scale, inverse in every]
 
-    first = next((m for m in _DECADES if not held(10.0**m)), None)
+    first = next((m for m, right in zip(_DECADES, held([10.0**m for m in _DECADES]), strict=True) if not right), None)
     if first is None:
         return 10.0 ** _DECADES[-1]
     if first == _DECADES[0]:
         return 0.0
-    return 10.0 ** next((first - 1 + share for share in _WITHIN if held(10.0 ** (first - 1 + share))), first - 1)
+    reached = [10.0 ** (first - 1 + share) for share in _WITHIN]
+    return next((eps for eps, right in zip(reached, held(reached), strict=True) if right), 10.0 ** (first - 1))
 
 
-def _deviation(predicted: Sequence[complex], k: int, coefficients: Sequence[Any], s: Any, unit: Any) -> float:
+def _largest(rows: NDArray[np.complex128], k: int) -> list[NDArray[np.complex128]]:
+    """Roots other than 0 of polynomials, coefficients descending; none of one without first coefficients."""
+    plain = np.isfinite(rows).all(axis=1) & (rows[:, 0] != 0) & (rows[:, -1] != 0)
+    companion = np.zeros((int(plain.sum()), rows.shape[1] - 1, rows.shape[1] - 1), dtype=complex)
+    companion[:, 1:, :-1] = np.eye(rows.shape[1] - 2)
+    companion[:, 0] = -rows[plain, 1:] / rows[plain, :1]
+    every = iter(np.linalg.eigvals(companion))
+    found = []
+    for row, whole in zip(rows, plain, strict=True):
+        some = np.all(np.isfinite(row)) and np.any(row[: k + 1])
+        roots = next(every) if whole else np.roots(row) if some else np.empty(0, dtype=complex)
+        found.append(roots[roots != 0])
+    return found
+
+
+def _deviation(predicted: Sequence[complex], scale: float, inverse: NDArray[np.complex128]) -> float:
     """The largest distance of a predicted shift from the nearest true one, relative; inf where there is none."""
-    scale = max(abs(t) for t in predicted)
-    shifted = _taylor(coefficients, s, unit * scale, len(coefficients) - 1)
-    # Of 1/t, so that those sought are the largest roots: companion eigenvalues have these to all digits.
-    values = np.array([middle(c / shifted[k].abs_upper()) for c in shifted])
-    if not np.all(np.isfinite(values)) or not np.any(values[: k + 1]):
-        return math.inf
-    inverse = np.roots(values)
-    actual = scale / inverse[inverse != 0]
+    actual = scale / inverse
     return max(float(np.abs(actual - t).min(initial=np.inf)) / abs(t) for t in predicted)
 
 
@@ -129,12 +146,8 @@ def _in_unit(branch: Branches, unit: float) -> Branches:
 
 def _taylor(coefficients: Sequence[Any], s: Any, unit: Any, last: int) -> list[Any]:
     """Coefficients in t of p(s + unit t), ascending, up to a power."""
-    n = len(coefficients) - 1
-    found = []
-    for j in range(last + 1):
-        terms = (comb(n - i, j) * c * s ** (n - i - j) for i, c in enumerate(coefficients[: n - j + 1]))
-        found.append(flint.acb(sum(terms, flint.acb(0)) * unit**j))
-    return found
+    found = flint.acb_poly(list(coefficients[::-1]))(flint.acb_poly([s, unit]))
+    return [found[j] for j in range(last + 1)]
 
 
 def _ball(x: Any) -> Any:

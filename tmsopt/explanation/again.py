@@ -109,5 +109,5 @@ def _number(text: str) -> float | None:
 
 def _part(problem: Problem, design: Mapping[str, float]) -> Problem | None:
     """The part of the box that a design is on; None where it is on two."""
-    parts = [work.part for work in workspace(problem).parts() if work.holds(design)]
-    return parts[0] if len(parts) == 1 else None
+    parts = workspace(problem).parts(design)
+    return parts[0].part if len(parts) == 1 else None

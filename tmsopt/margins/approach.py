@@ -5,6 +5,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -14,6 +15,7 @@ from tmsopt.formulation.nlp import NLP
 from tmsopt.margins.boundaries import Edge
 from tmsopt.margins.curvature import curvature
 from tmsopt.margins.surroundings import Place
+from tmsopt.models import Model
 from tmsopt.records import Array
 
 ALIKE = 1e-9
@@ -109,19 +111,13 @@ def _nlp(place: Place, edge: Edge) -> NLP:
     """
     model, of = place.problem.model, place.problem.parameter_set
     n, extra = len(place.weights), len(edge.unknowns)
-    parts = (len(of.names), n, model.degree + 1, model.degree + 1, 2)
-    x, p = ca.SX.sym("x", n + extra), ca.SX.sym("p", sum(parts))
-    columns = iter(ca.vertsplit(p))
-    numbers, weights, scale, sizes, (sign, size) = ([next(columns) for _ in range(count)] for count in parts)
-    y, unknowns = [x[k] for k in range(n)], [x[n + k] for k in range(extra)]
-    parameters = dict(zip(of.names, numbers, strict=True))
-    moved = {name: parameters[name] + weights[k] * size * y[k] for k, name in enumerate(place.weights)}
-    a = model.coefficients({**parameters, **moved}, of)
-    c = [sign * coefficient / unit for coefficient, unit in zip(a, scale, strict=True)]
+    around = _around(model, of.name, tuple(place.weights))
+    x, p = ca.SX.sym("x", n + extra), ca.SX.sym("p", around.size1_in(1))
+    y, unknowns = x[:n], [x[n + k] for k in range(extra)]
+    c, sizes = (ca.vertsplit(column) for column in around(y, p))
     equations = [e / sizes[k] for e, k in zip(edge.equations(c, unknowns), edge.powers, strict=True)]
     others = edge.nonnegative(c, unknowns)
-    f, g = sum(v * v for v in y), ca.vertcat(*equations, *others)
-    operations = ca.Function("coefficients", [x, p], [ca.vertcat(*c)]).n_instructions()
+    f, g = ca.sumsqr(y), ca.vertcat(*equations, *others)
     return NLP(
         formulation="nearest",
         variables=(*place.weights, *edge.unknowns),
@@ -131,6 +127,21 @@ def _nlp(place: Place, edge: Edge) -> NLP:
         rows=(*[edge.name] * len(equations), *["others"] * len(others)),
         row_lower=(0.0,) * (len(equations) + len(others)),
         row_upper=(*[0.0] * len(equations), *[np.inf] * len(others)),
-        settings=(np.nan,) * sum(parts),
-        hessian=curvature(model, of, tuple(place.weights), edge, operations),
+        settings=(np.nan,) * p.numel(),
+        hessian=curvature(model, of, tuple(place.weights), edge, around.n_instructions()),
     )
+
+
+@lru_cache(maxsize=_KEPT)
+def _around(model: Model, set_name: str, weighted: tuple[str, ...]) -> ca.Function:
+    """Coefficients at a displacement, and their sizes, as functions of that and of an NLP's settings."""
+    of, n = model.parameter_set(set_name), len(weighted)
+    parts = (len(of.names), n, model.degree + 1, model.degree + 1, 2)
+    y, p = ca.SX.sym("y", n), ca.SX.sym("p", sum(parts))
+    columns = iter(ca.vertsplit(p))
+    numbers, weights, scale, sizes, (sign, size) = ([next(columns) for _ in range(count)] for count in parts)
+    parameters = dict(zip(of.names, numbers, strict=True))
+    moved = {name: parameters[name] + weights[k] * size * y[k] for k, name in enumerate(weighted)}
+    a = model.coefficients({**parameters, **moved}, of)
+    c = [sign * coefficient / unit for coefficient, unit in zip(a, scale, strict=True)]
+    return ca.Function("around", [y, p], [ca.vertcat(*c), ca.vertcat(*sizes)])

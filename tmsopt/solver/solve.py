@@ -92,7 +92,7 @@ def solved(
             near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items() if n in options.near}
             options = replace(options, near=near)
         work = workspace(problem, options, family, beside, blind)
-        parts = [p for p in work.parts() if p.name not in without and (not options.near or p.holds(options.near))]
+        parts = [part for part in work.parts(options.near) if part.name not in without]
         explored: list[Explored] = []
         try:
             for part in parts:

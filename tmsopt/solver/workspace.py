@@ -176,13 +176,19 @@ class Workspace:
         """What a design is in the given cases; see `checks.recheck`."""
         return recheck(self.problem, parameters, cases, self.family.around(self.problem, parameters))
 
-    def parts(self) -> "tuple[Workspace, ...]":
-        """The parts into which a parameter with two sides divides the box, positive values first."""
+    def parts(self, near: Mapping[str, float] | None = None) -> "tuple[Workspace, ...]":
+        """The parts into which a parameter with two sides divides the box, positive values first.
+
+        Args:
+            near: a design; only the parts that it is on.
+        """
         of = self.problem.parameter_set
         for name, (lower, upper) in self.problem.free.items():
             names = of[name].sides
             if names is not None and lower < -_THIN and upper > _THIN:
-                halves = ((names[1], (0.0, upper)), (names[0], (lower, 0.0)))
+                halves = [(names[1], (0.0, upper)), (names[0], (lower, 0.0))]
+                if near and name in near:
+                    halves = [half for half in halves if half[1][0] <= near[name] <= half[1][1]]
                 return tuple(replace(self, part=_on(self.problem, name, ends), name=side) for side, ends in halves)
         return (self,)
 
