@@ -11,14 +11,17 @@ from tmsopt.design.limit import limit_of, with_limit
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.formulation.formulate import LIMIT
+from tmsopt.formulation.judgement import Judged
 from tmsopt.formulation.nlp import objective_size
 from tmsopt.formulation.options import DEFAULTS
-from tmsopt.records import Array
-from tmsopt.solver.sample import Sampler
+from tmsopt.records import Array, Truth
+from tmsopt.solver.sample import Looked, Remembered, Sampler, apart
 from tmsopt.solver.solve import solved
 from tmsopt.solver.workspace import Family, workspace
 
 _LOST = 1e-7  # relative difference of the objective that makes a design better
+_ENTERED = 8  # designs far from each other that a move lets in
+_MET = 1e-10  # of its scale: excess up to which a limit counts as met
 _REACHES = (0.03, 8e-3, 2e-3, 4e-4)  # of the box, about the best designs that were seen without the move
 
 
@@ -37,14 +40,14 @@ class Again:
         """The solution of the problem with the limit of that name moved.
 
         From the optimum alone the box need not be looked at anew: unless one of the best designs that were seen of it,
-        improved under the limits as they are now, is better than what is found.
+        or that the move lets in, improved under the limits as they are now, is better than what is found.
         """
         free = {n: self.solution.parameters[n] for n in asked.free}
         options = replace(DEFAULTS, starts=starts, near=free)
         part = _part(asked, free)
         if starts == 1 and part and self._seen and self.solution.stable:
             found = solved(asked, options, self._family if name in self._shared else None, blind=True, bound=False)
-            if found.status == "optimal" and found.stable and not self._outdone(part, found):
+            if found.status == "optimal" and found.stable and not self._outdone(part, name, found):
                 return found
         return solved(asked, options, bound=False)
 
@@ -55,33 +58,77 @@ class Again:
         return [name for name in self.steps if name not in limits or _number(limits[name]) is not None]
 
     @cached_property
-    def _family(self) -> Family:
+    def _box(self) -> dict[str, tuple[float, float]]:
+        """The box with all its ends moved."""
         problem = self.solution.problem
-        every = [moved(problem, n, self.steps[n]).free for n in self._shared]
-        box = {n: (min(f[n][0] for f in every), max(f[n][1] for f in every)) for n in problem.free}
-        return Family([n + LIMIT for n in self._shared if n in problem.constraints], box=box)
+        for name, step in self.steps.items():
+            problem = problem if name in problem.constraints else moved(problem, name, step)
+        return dict(problem.free)
 
     @cached_property
-    def _seen(self) -> tuple[list[dict[str, float]], Array] | None:
-        """The best designs of the box far from each other, and the scales of limits; None where arrays cannot tell."""
-        problem = self.solution.problem
-        part = _part(problem, self.solution.parameters)
-        sampler = workspace(part).sampler if part else None
-        if sampler is None:
-            return None
-        refined = sampler.sample().refined
-        return [sampler.design(refined, k) for k in range(len(refined))], sampler.scales
+    def _family(self) -> Family:
+        limits = self.solution.problem.constraints
+        return Family([n + LIMIT for n in self._shared if n in limits], box=self._box)
 
-    def _outdone(self, part: Problem, found: Solution) -> bool:
+    @cached_property
+    def _seen(self) -> "_Seen | None":
+        """A look at that box; None where arrays cannot tell."""
+        part = _part(replace(self.solution.problem, free=self._box), self.solution.parameters)
+        told = workspace(part).sampler if part else None
+        if part is None or told is None:
+            return None
+        sampler = Sampler(part, DEFAULTS.seed, memory := Remembered())
+        refined = sampler.sample().refined
+        assert memory.drawn
+        u, found, _ = memory.drawn
+        best = [sampler.design(refined, k) for k in range(len(refined))]
+        return _Seen(best, u, sampler.space.designs(u), found, sampler.scales)
+
+    def _outdone(self, part: Problem, name: str, found: Solution) -> bool:
         """Whether a design that was looked at is better than what was found."""
-        assert self._seen
-        sampler, (designs, scales) = Sampler(part, DEFAULTS.seed), self._seen
-        sampler.scales = scales
-        start = sampler.look(np.array([sampler.space.points(design) for design in designs]))
+        problem, seen = self.solution.problem, self._seen
+        assert seen
+        sampler = Sampler(part, DEFAULTS.seed)
+        sampler.scales = seen.scales
+        shift = np.array([c.sign * self.steps[name] if n == name else 0.0 for n, c in problem.conditions.items()])
+        let_in = seen.met(part, shift) & ~seen.met(problem, 0 * shift)
+        rows = np.flatnonzero(let_in)
+        rows = rows[np.argsort(seen.worth[rows], kind="stable")]
+        entered = Looked(seen.u[rows], seen.worth[rows], np.zeros(len(rows)))
+        more = [{n: float(x[k]) for n, x in seen.columns.items()} for k in rows[apart(entered, _ENTERED)]]
+        start = sampler.look(np.array([sampler.space.points(design) for design in (*seen.best, *more)]))
         looked = sampler.refined(start, _REACHES).joined(sampler.around(found.parameters))
         worth = part.sign * found.value
         least = worth - _LOST * (objective_size(part) + abs(worth))
         return bool(np.any((looked.violation == 0) & (looked.worth < least)))
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Designs of the box with all its ends moved, under the other limits as they were.
+
+    Attributes:
+        best: the best far from each other, refined.
+        u, columns, judged: the sample that these are of, as points, as parameters, and what is said of it.
+        scales: of the limits.
+    """
+
+    best: list[dict[str, float]]
+    u: Array
+    columns: Mapping[str, Array]
+    judged: Judged
+    scales: Array
+
+    @property
+    def worth(self) -> Array:
+        """Of the sample; larger is worse."""
+        return np.zeros(len(self.u)) if self.judged.worth is None else self.judged.worth
+
+    def met(self, problem: Problem, shift: Array) -> Truth:
+        """Which of the sample are in a box and meet limits that are moved."""
+        excess = replace(self.judged, beyond=self.judged.beyond - shift[:, None]).excess
+        inside = [(lo <= self.columns[n]) & (self.columns[n] <= hi) for n, (lo, hi) in problem.free.items()]
+        return np.asarray(np.logical_and.reduce([*inside, *(excess <= _MET * self.scales[:, None])]))
 
 
 def moved(problem: Problem, name: str, step: float) -> Problem:
