@@ -7,15 +7,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from tmsopt.records import Array, Truth
 
 _SOLVED = 1e-10  # residual, relative to the terms, of a solution: a stationary point of the residual is none
 _DAMPING = 0.5 ** np.arange(1, 10)  # of a Gauss–Newton step that does not help
-_FINE = 1e-17
+_FINE = 1e-17  # of an interval: a zero at 0 up to rounding has no relative accuracy
 _EPS = 4 * np.finfo(float).eps
-_HALVINGS = 100  # steps towards a zero, as many as `brentq` takes at most
+_HALVINGS = 100  # steps towards a zero at most
 
 
 def project(system: ca.Function, y: Array, held: int | None = None, steps: int = 40) -> Array | None:
@@ -73,12 +72,7 @@ def _lower(y: Array, value: Array, size: Array) -> Truth:
 
 def crossing(function: Callable[[float], float], end: float) -> float:
     """Where a function that changes sign on [0, end] is 0."""
-    if function(0.0) == 0:
-        return 0.0
-    if function(end) == 0:
-        return end
-    # a zero at 0 up to rounding has no relative accuracy: that of the whole step is enough
-    return float(brentq(function, 0.0, end, xtol=_FINE * abs(end), rtol=4 * np.finfo(float).eps, disp=False))
+    return float(crossings(lambda s, _: np.array([function(float(x)) for x in s]), np.array([end]))[0])
 
 
 def crossings(function: Callable[[Array, NDArray[np.intp]], Array], ends: Array) -> Array:

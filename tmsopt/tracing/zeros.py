@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from tmsopt.design.problem import Problem
 from tmsopt.records import Array
@@ -53,6 +52,8 @@ def refined(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walk
                 return sign * float(_at(on, mark, walked.y[[k]], walked.t[[k]], np.array([s]))[0])
 
             ends = (-steps[k - 1], steps[k])
+            from scipy.optimize import minimize_scalar  # a fifth of a second, paid only where it is needed
+
             s = float(minimize_scalar(height, bounds=ends, method="bounded", options={"xatol": 1e-14}).x)
             beside = between(on, walked.y[[k]], walked.t[[k]], np.array([s]))
             (y,), (t,) = between(on, *beside, np.zeros(1))  # once more: beside a singular point Newton is slow
