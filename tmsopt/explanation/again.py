@@ -79,8 +79,7 @@ class Again:
             return None
         sampler = Sampler(part, DEFAULTS.seed, memory := Remembered())
         refined = sampler.sample().refined
-        assert memory.drawn
-        u, found, _ = memory.drawn
+        u, found = sampler.recalled(memory)
         best = [sampler.design(refined, k) for k in range(len(refined))]
         return _Seen(best, u, sampler.space.designs(u), found, sampler.scales)
 

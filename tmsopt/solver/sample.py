@@ -207,14 +207,14 @@ class Sampler:
 
     def draw(self) -> Looked:
         """Corners, a quasi-random sequence, and some of it moved to faces."""
-        u, found = self._recalled(self.memory) if self.memory else self._first(self.problem)
+        u, found = self.recalled(self.memory) if self.memory else self._first(self.problem)
         for k, beyond in enumerate(found.beyond):
             known = np.abs(beyond[np.isfinite(beyond)])
             self.scales[k] = float(np.median(known)) if known.size and np.median(known) > 0 else 1.0
         return self._standing(u, found)
 
-    def _recalled(self, memory: Remembered) -> tuple[Array, Judged]:
-        """The same for this problem's limits, as if looked at anew, to the bit."""
+    def recalled(self, memory: Remembered) -> tuple[Array, Judged]:
+        """The first designs for this problem's limits, as if looked at anew, to the bit."""
         pairs = [_open(text) for text in self.problem.constraints.values()]
         texts = tuple(text for text, _ in pairs)
         if memory.drawn is None:
