@@ -68,7 +68,8 @@ def search(work: Workspace, nlp: NLP, most: int | None = None) -> list[Candidate
             if work.sample is None:
                 candidates += _beside(run, candidates, starts - len(candidates))
             break
-    if part.pattern is not None and most is None and not any(c.feasible for c in candidates):
+    lost = part.pattern is not None and most is None and not any(c.feasible for c in candidates)
+    if lost and not work.out_of_reach:
         candidates += _rescued(work, nlp)
     return candidates
 
@@ -84,7 +85,7 @@ def _best(work: Workspace, candidates: Sequence[Candidate]) -> str:
 def _otherwise(run: "Runner", design: Mapping[str, float], ended: Candidate) -> Candidate:
     """Where a start ends that first took a way on which a0 may vanish, if it ended nowhere by the usual one."""
     work, nlp = run.work, run.nlp
-    if ended.feasible or work.sample is None or not (nlp.products and work.sample.singular):
+    if ended.feasible or run.hopeless or work.sample is None or not (nlp.products and work.sample.singular):
         return ended
     lead = -1 if float(work.problem.values(work.problem.ordered(design)).coefficients[0]) < 0 else 1
     led = Runner(work, work.formulate(nlp.cases, lead=lead)).ended(design, near=True, hopeful=False)
@@ -153,7 +154,7 @@ class Runner:
         for again in range(_AGAIN):
             if best.feasible and best.run.status == _SUCCESS and not best.nlp.tangled(best.run.x):
                 break
-            if not best.feasible and again >= (_AGAIN if hopeful else 0 if self._hopeless else _AGAIN_HOPELESS):
+            if not best.feasible and again >= (_AGAIN if hopeful else 0 if self.hopeless else _AGAIN_HOPELESS):
                 break
             if not np.all(np.isfinite(best.run.x)):
                 break
@@ -168,10 +169,13 @@ class Runner:
         return best
 
     @property
-    def _hopeless(self) -> bool:
-        """Whether nothing speaks for a feasible end: there is no sample, and no other start satisfied all rows."""
-        met = self.work.met
-        return self.work.sample is None and len(met) >= _NOWHERE and not any(c.feasible for _, c in met)
+    def hopeless(self) -> bool:
+        """Whether nothing speaks for a feasible end: not the limits, nor any other start where there is no sample."""
+        work, met = self.work, self.work.met
+        if any(c.feasible for _, c in met):
+            return False
+        alone = work.sample is None and len(met) >= _NOWHERE
+        return alone or (self.nlp.formulation != "elastic" and work.out_of_reach)
 
     def _no_worse(self, best: Candidate, design: Mapping[str, float], start: str) -> Candidate:
         """Where it ended, or where a start that was better than that ends if IPOPT keeps to it, or does not."""
@@ -258,8 +262,8 @@ def _settled(work: Workspace, candidates: list[Candidate]) -> bool:
     feasible = [c for c in candidates if c.feasible]
     failed = len(candidates) - len(feasible)
     if not feasible:
-        afar = work.sample is not None and work.sample.far_off
-        return failed >= (_HOPELESS_AFAR if afar else _HOPELESS_SAMPLED if sampled else _HOPELESS)
+        afar = failed >= _HOPELESS_AFAR and (work.sample.far_off if work.sample else work.out_of_reach)
+        return afar or failed >= (_HOPELESS_SAMPLED if sampled else _HOPELESS)
     best = min(c.objective for c in feasible)
     record = candidates[-1].feasible and all(candidates[-1].objective < c.objective for c in feasible[:-1])
     if record and _proven(problem, candidates[-1]):
@@ -324,7 +328,8 @@ def exceptional(work: Workspace) -> list[dict[str, float]]:
         for count, design in enumerate(chain(before, afar), 1):
             ended.append(_candidate(asked, leading, lead(complete(leading, asked, design))))
             led = any(c.feasible for c in ended)
-            if (led and count == len(before)) or (not led and count >= len(before) + most):
+            enough = count >= len(before) + most and (sample.refined.out_of_reach or not led)
+            if enough or (led and count == len(before)):
                 break
         if memory and len(ended) > len(before):
             memory.leads[pattern] = [*before, *(work.design_at(c.run.x) for c in distinct(ended)[:_LEADS])]

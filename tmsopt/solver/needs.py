@@ -122,6 +122,8 @@ def _holds(problem: Problem, design: Mapping[str, float]) -> bool:
 
 
 def _best(work: Workspace) -> Trial | None:
+    if work.out_of_reach:
+        return None
     nlp = work.formulate(work.problem.cases)
     return survivor(work, nlp, search(work, nlp, _STARTS))
 

@@ -21,7 +21,7 @@ from tmsopt.models import Values
 from tmsopt.records import Table
 from tmsopt.solver.multistart import Runner, same, starting
 from tmsopt.solver.outcome import Trial, survivor
-from tmsopt.solver.sample import Looked, Sampler, excluded
+from tmsopt.solver.sample import Sampler
 from tmsopt.solver.workspace import Candidate, Workspace, workspace
 
 _ROUNDS = 12  # times that cases are added
@@ -164,13 +164,12 @@ def _least_covered(work: Workspace, limits: Sequence[Limit], listed: Sequence[Ca
     movable = [limit for limit in limits if not limit.parameter]
     if trial is not None and trial.point.objective > _NOTHING and len(movable) > 1:
         run, sampler = Runner(work, nlp), _sampler(work)
-        drawn = sampler.draw()
-        for limit in movable:
-            ended = [run.ended(design, near=True) for design in _leads(sampler, limit.name, drawn)]
-            again = survivor(_unlimited(work, limits), nlp, ended)
-            less = again is not None and again.point.objective < trial.point.objective * (1 - _TIE)
-            if again is not None and less and not again.checked.violations:
-                trial = again
+        leads = {tuple(d.values()): d for limit in movable for d in _leads(work, sampler, limit.name)}
+        ended = [run.ended(design, near=True, hopeful=False) for design in leads.values()]
+        again = survivor(_unlimited(work, limits), nlp, ended)
+        less = again is not None and again.point.objective < trial.point.objective * (1 - _TIE)
+        if again is not None and less and not again.checked.violations:
+            trial = again
     for _ in range(_ROUNDS if listed else 0):
         if trial is None or not (more := _beyond(work.problem, limits, trial, nlp.cases)):
             break
@@ -192,31 +191,28 @@ def _least(
 
 
 def _sampler(work: Workspace, extended: Limit | None = None) -> Sampler:
-    """Looks at designs for their limits alone, and for how far one end of the box must be moved.
-
-    What is asked of the roots of a pattern is left aside.
-    """
-    part = work.part
-    gone = part.asked_of_roots if part.pattern else ()
-    kept = {name: text for name, text in part.constraints.items() if name not in gone}
-    asked = replace(part, locate=None, constraints=kept)
+    """Looks at designs for their limits alone, and for how far one end of the box must be moved."""
+    asked = replace(work.part, locate=None)
     if extended and extended.parameter and extended.name.endswith(".max"):
         asked = replace(asked, minimize=extended.parameter)
     elif extended and extended.parameter:
         asked = replace(asked, maximize=extended.parameter)
-    return Sampler(asked, work.options.seed)
+    sampler = Sampler(asked, work.options.seed)
+    sampler.draw()
+    return sampler
 
 
-def _leads(sampler: Sampler, name: str, drawn: Looked) -> list[dict[str, float]]:
+def _leads(work: Workspace, sampler: Sampler, name: str) -> list[dict[str, float]]:
     """Designs that may do with one limit moved, as far as it takes; none where the others exclude each other."""
-    found = sampler.without(name, drawn)
-    return [] if excluded(found) else [sampler.design(found, k) for k in range(min(len(found), _LED))]
+    found = sampler.without(name)
+    excluded = found.out_of_reach if work.problem.pattern else found.far_off
+    return [] if excluded else [sampler.design(found, k) for k in range(min(len(found), _LED))]
 
 
 def _ends(run: Runner, most: int) -> list[Candidate]:
     candidates: list[Candidate] = []
     for design, near in islice(starting(run.work), most):
-        candidates.append(run.ended(design, near, hopeful=any(c.feasible for c in candidates)))
+        candidates.append(run.ended(design, near, hopeful=False))
         if run.work.options.progress:
             run.work.options.progress(len(candidates), most)
         feasible = [c.objective for c in candidates if c.feasible]
@@ -276,7 +272,7 @@ def _alone(work: Workspace, conflict: Sequence[str], trial: Trial, cases: Sequen
         wide = _widened(problem, [limit.parameter] if limit.parameter else [])
         widened = workspace(wide, work.options)
         sampler = _sampler(widened, limit)
-        if not (led := _leads(sampler, limit.name, sampler.draw())):
+        if not (led := _leads(widened, sampler, limit.name)):
             continue
         nlp = _elastic(wide, cases, [limit])
         run = Runner(widened, nlp)

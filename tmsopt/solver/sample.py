@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.arithmetic.sequence import golden_steps
+from tmsopt.design.limit import opened
 from tmsopt.design.problem import Problem
 from tmsopt.formulation.cube import Cube
 from tmsopt.formulation.judgement import Judged, judged
@@ -38,9 +39,10 @@ _SHELLS, _SHELL = 12, 64  # distances about a design, and designs at each
 _NEAR = 0.01  # of the box: distance of designs about one that count as different
 _VANISHING = 1e-2  # of its usual size: a leading coefficient that may come to 0
 _FAR_OFF = 1e-3  # of their scales, in sum: limits that refined designs violate by more exclude each other, it seems
+_OUT_OF_REACH = 0.3  # the same where a multiple root is sought: moved by 1e-3 of the box its abscissa is off by 0.2
 _NO_LIMIT = 1e300  # a scale by which nothing that exists counts
 _MET = 1e-10  # of its scale: excess up to which a limit counts as met by numeric roots
-_STEPS = 12  # of Newton's method towards what violated limits allow
+_STEPS, _STEPS_AFAR = 12, 4  # of Newton's method towards what violated limits allow; where all stay far away
 _STEP = 1e-7  # of the box, for differences
 _SHARES = (1.0, 0.5, 0.1, 0.01, 1e-3)  # of a step, the best of which is taken
 
@@ -92,6 +94,16 @@ class Looked:
         """Rows by violation, then by worth."""
         return np.lexsort((self.worth, self.violation))
 
+    @property
+    def far_off(self) -> bool:
+        """Whether limits seem to exclude each other: where they can be met, some refined design meets them."""
+        return bool(np.all(self.violation > _FAR_OFF))
+
+    @property
+    def out_of_reach(self) -> bool:
+        """The same by so much that no needle explains it, such as a multiple root, which no sample meets."""
+        return bool(np.all(self.violation > _OUT_OF_REACH))
+
 
 @dataclass(frozen=True)
 class Sample:
@@ -114,8 +126,8 @@ class Sample:
 
     @property
     def far_off(self) -> bool:
-        """Whether all designs stay away from what the limits allow: refined, they are met where they can be met."""
-        return excluded(self.refined)
+        """Whether all designs stay away from what the limits allow."""
+        return self.refined.far_off
 
 
 @dataclass
@@ -155,6 +167,7 @@ class Sampler:
     Attributes:
         scales: of each limit's excess.
         count: of designs looked at.
+        drawn: the first ones, and what they are.
     """
 
     def __init__(self, problem: Problem, seed: int, memory: Remembered | None = None) -> None:
@@ -196,18 +209,18 @@ class Sampler:
         singular = bool(a0.min() <= 0 <= a0.max() or np.abs(a0).min() < _VANISHING * np.median(np.abs(a0)))
         return Sample(refined.take(refined.ranked), bold.take(apart(bold, _BOLD)), met, len(drawn), spread, singular)
 
-    def without(self, limit: str, drawn: Looked) -> Looked:
+    def without(self, limit: str) -> Looked:
         """Designs far from each other that violate the other limits least, refined; all of them count for no limit."""
         others, names = copy(self), list(self.problem.conditions)
         others.scales = np.where([name == limit for name in names], _NO_LIMIT, self.scales)
-        seen = others.look(drawn.u)
+        seen = others._standing(*self.drawn)
         ranked = seen.take(seen.ranked[:_RANKED])
         found = others.refined(others.nearer(ranked.take(apart(ranked, _LEADERS))))
         return found.take(found.ranked)
 
     def draw(self) -> Looked:
         """Corners, a quasi-random sequence, and some of it moved to faces."""
-        u, found = self.recalled(self.memory) if self.memory else self._first(self.problem)
+        u, found = self.drawn = self.recalled(self.memory) if self.memory else self._first(self.problem)
         for k, beyond in enumerate(found.beyond):
             known = np.abs(beyond[np.isfinite(beyond)])
             self.scales[k] = float(np.median(known)) if known.size and np.median(known) > 0 else 1.0
@@ -215,7 +228,7 @@ class Sampler:
 
     def recalled(self, memory: Remembered) -> tuple[Array, Judged]:
         """The first designs for this problem's limits, as if looked at anew, to the bit."""
-        pairs = [_open(text) for text in self.problem.constraints.values()]
+        pairs = [opened(text) for text in self.problem.constraints.values()]
         texts = tuple(text for text, _ in pairs)
         if memory.drawn is None:
             names = self.problem.constraints
@@ -252,9 +265,9 @@ class Sampler:
     def nearer(self, start: Looked) -> Looked:
         """Each design moved by Newton's method towards what the limits that it violates allow, the shortest way."""
         u, kept = start.u.copy(), start
-        for _ in range(_STEPS):
+        for step in range(_STEPS):
             rows = np.flatnonzero((kept.violation > 0) & np.isfinite(kept.violation))
-            if not rows.size:
+            if not rows.size or (step == _STEPS_AFAR and kept.out_of_reach):
                 break
             steps = self._newton_steps(u[rows])
             tried = np.clip(u[rows][:, None] + steps[:, None] * np.array(_SHARES)[:, None], 0.0, 1.0)
@@ -317,20 +330,6 @@ class Sampler:
         excess = found.excess / self.scales[:, None]
         violation = np.where(excess <= _MET, 0.0, excess).sum(axis=0)
         return Looked(u, np.where(np.isfinite(worth), worth, np.inf), violation)
-
-
-def _open(text: str) -> tuple[str, float]:
-    """A constraint ``something <= number`` with 0 for the number, and the number; any other as it is."""
-    rest, _, number = text.rpartition("<=")
-    try:
-        return (f"{rest}<= 0.0", float(number)) if rest else (text, 0.0)
-    except ValueError:
-        return text, 0.0
-
-
-def excluded(refined: Looked) -> bool:
-    """Whether limits seem to exclude each other: where they can be met, some refined design meets them."""
-    return bool(np.all(refined.violation > _FAR_OFF))
 
 
 def _spread(found: Looked, most: int) -> NDArray[np.int_]:

@@ -155,6 +155,14 @@ class Workspace:
         return self.sampler.sample() if self.sampler else None
 
     @cached_property
+    def out_of_reach(self) -> bool:
+        """Whether all designs of a sample are far from what the limits allow, be it without the pattern asked for."""
+        part, sample = self.part, self.sample
+        if sample is None and part.pattern and part.conditions and not (part.asks_radius or self.blind):
+            sample = Sampler(replace(part, locate=None), self.options.seed).sample()
+        return sample is not None and sample.refined.out_of_reach
+
+    @cached_property
     def never_stable(self) -> bool:
         """Whether it is certain at once that no design of this part is stable."""
         return none_stable(self.part)
