@@ -22,6 +22,14 @@ def hurwitz_minors(coefficients: Coefficients) -> list[Any]:
 
 def _hurwitz_minor(coefficients: Coefficients, m: int) -> Any:
     n = len(coefficients) - 1
+    match m, list(coefficients):
+        case 1, [_, a1, *_]:
+            return a1
+        case 2, [a0, a1, a2, *more]:
+            return a1 * a2 - more[0] * a0 if more else a1 * a2
+        case 3, [a0, a1, a2, a3, *more]:  # many are asked for, and each product counts
+            minor = a1 * (a2 * a3 - more[0] * a1 if more else a2 * a3) - a3 * (a0 * a3)
+            return minor + more[1] * (a0 * a1) if more[1:] else minor
 
     def entry(i: int, j: int) -> list[Any]:
         k = 2 * (j + 1) - (i + 1)
