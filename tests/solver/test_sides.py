@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from importlib import import_module
 from math import isnan
 
 import numpy as np
@@ -145,3 +146,19 @@ def test_sides_that_are_equally_good_are_said_to_be() -> None:
     (note,) = [n for n in design.notes if "both signs" in n]
     assert "is as good as" in note
     assert "wins" not in note
+
+
+def test_the_side_with_a_stable_design_is_searched_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On the other side stability need not be insisted on; sides are told in their order all the same."""
+    rooms, searched = import_module("tmsopt.solver.solve"), []
+    explore = rooms.explore
+
+    def told(part, insist):
+        searched.append((part.name, insist))
+        return explore(part, insist=insist)
+
+    monkeypatch.setattr(rooms, "explore", told)
+    design = tmsopt.solve(problem(SWAPPED, minimize="abscissa"))
+    assert searched == [(BACKWARD, True), (FORWARD, False)]
+    assert list(design.sides) == [FORWARD, BACKWARD]
+    assert design.value == pytest.approx(-(12.5**0.25), abs=1e-11)

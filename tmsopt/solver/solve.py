@@ -95,10 +95,11 @@ def solved(
         parts = [part for part in work.parts(options.near) if part.name not in without]
         explored: list[Explored] = []
         try:
-            for part in parts:
+            for part in _promising(parts, options):
                 met = [e.finding.checked for e in explored if e.finding and not e.finding.checked.violations]
                 stable = any(checked.structure.abscissa < 0 for checked in met)
                 explored.append(explore(part, insist=not stable))
+            explored.sort(key=lambda e: [part.name for part in parts].index(e.name))
             finding = _winner(problem, explored) or without_any(work, sum(len(e.candidates) for e in explored))
         except KeyboardInterrupt:
             so_far = _so_far(parts) if options.interruptible else None
@@ -213,6 +214,16 @@ def _check_near(problem: Problem, near: Mapping[str, float]) -> None:
     faults += [Fault(f"found {short(near[n])}; accepted: a finite number", ("near", n)) for n in wrong]
     if faults:
         raise InputError(faults)
+
+
+def _promising(parts: Sequence[Workspace], options: Options) -> Sequence[Workspace]:
+    """Parts of the box by what was seen of them: where one has a stable design, none need be insisted on in others."""
+    if len(parts) == 1:
+        return parts
+    begin(options.progress, "looking at designs")
+    seen = [part.sample.refined if part.sample else None for part in parts]
+    ranks = [(s.violation[0], s.worth[0]) if s else (0.0, 0.0) for s in seen]
+    return [parts[k] for k in sorted(range(len(parts)), key=ranks.__getitem__)]
 
 
 def _winner(problem: Problem, explored: Sequence[Explored]) -> Finding | None:
