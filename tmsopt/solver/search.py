@@ -200,9 +200,9 @@ def _covered(
         if _lost(work, trial, leaders, nlp):
             candidates = [*candidates, *(run.ended(design) for design in leaders)]
             trial = survivor(work, nlp, candidates)
-        if _lost(work, trial, leaders, nlp) and not problem.asks_radius:
-            candidates = [*candidates, *search(work, nlp)]
-            trial = survivor(work, nlp, candidates)
+            if not problem.asks_radius and _lost(work, trial, leaders, nlp):
+                candidates = [*candidates, *search(work, nlp)]
+                trial = survivor(work, nlp, candidates)
     if trial is None:
         return None
     listed = _listed(problem, worst or worst_cases(problem, trial.parameters))
