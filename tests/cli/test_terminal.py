@@ -51,6 +51,25 @@ main(prog_name="tmsopt")
 """
 """The command where every piece of work that is told of takes long."""
 
+DEAF = """
+import os, signal, time
+from tmsopt import progress
+begin = progress.Steps.begin
+def deaf(self, *about):
+    begin(self, *about)
+    time.sleep(1.0)
+    while True:
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(60)
+        except BaseException:
+            pass
+progress.Steps.begin = deaf
+from tmsopt.cli import main
+main(prog_name="tmsopt")
+"""
+"""The command where compiled code, as that may, drops what Ctrl-C raises."""
+
 COMMANDS: dict[str, tuple[str, set[str]]] = {
     "solve": ("solve {p}/realistic.toml", {"looking at designs", "searching", "looking for the nearest boundaries"}),
     "certify": ("solve {p}/realistic.toml --json --certify 2", {"searching", "bounding the optimum"}),
@@ -216,6 +235,15 @@ def test_ctrl_c_is_answered_with_a_line(text: str, tmp_path: Path) -> None:
     seen = on_a_terminal(text.format(p=PROBLEMS).split(), tmp_path, SLOW_AT_WORK, stop=what)
     assert seen.status == 130
     assert seen.screen == "stopped; what was printed before stands\n"
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("interruptible")
+def test_a_second_one_that_is_not_heard_leaves_no_line(tmp_path: Path) -> None:
+    seen = on_a_terminal(["solve", str(PROBLEMS / "ep4.toml")], tmp_path, DEAF)
+    assert (seen.status, seen.answer) == (130, "")
+    assert seen.lines
+    assert seen.screen == ""
 
 
 @pytest.mark.slow

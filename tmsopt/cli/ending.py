@@ -18,7 +18,7 @@ from importlib.machinery import ExtensionFileLoader
 from types import FrameType
 from typing import Any, TextIO, cast
 
-from tmsopt.cli.terminal import quiet
+from tmsopt.cli.terminal import erased, quiet
 
 BAD_INPUT, INTERRUPTED, UNREAD = 2, 130, 141
 """Exit status: what cannot be written, Ctrl-C, a reader who has gone; as a shell tells it of programs."""
@@ -97,6 +97,9 @@ class Heard:
 
     def _gone(self) -> None:
         threading.Event().wait(_LEFT)
+        erasing = threading.Thread(target=erased, daemon=True)
+        erasing.start()
+        erasing.join(_LEFT)  # a terminal that was stopped takes nothing
         os._exit(self.status)
 
 

@@ -93,6 +93,12 @@ def showing(stream: Any) -> Iterator[None]:
         _SHOWN.pop().close()
 
 
+def erased() -> None:
+    """Nothing is shown any more: the process ends."""
+    for line in _SHOWN:
+        line.close()
+
+
 def shown() -> Listener | None:
     """What the verbs of tmsopt are to call; None where nobody looks."""
     return _SHOWN[-1].tell if _SHOWN else None
