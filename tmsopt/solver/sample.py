@@ -28,7 +28,7 @@ _APART = 0.15  # of the box: distance of designs that may lie in different basin
 _RANKED = 1024  # first ones of an order among which those apart are chosen
 _LEADERS, _BOLD = 8, 8  # designs to start from, of either kind
 _CELL = 0.05  # of the box
-_SOUGHT, _SOUGHT_AGAIN = 256, 32  # designs from which limits are approached; beside those that are remembered
+_SOUGHT, _SOUGHT_AGAIN, _HALF = 256, 32, 0.5  # designs from which limits are approached; beside remembered ones
 REMEMBERED = 256  # refined ones
 _NO_ROWS = np.arange(0)
 NARROW = 0.02  # share of designs that meet all limits, below which little is feasible
@@ -195,7 +195,7 @@ class Sampler:
             sought = self.look(self.memory.u) if self.memory and self.memory.u is not None else drawn.take(_NO_ROWS)
             if np.sum(sought.violation == 0) < _LEADERS:
                 few = _spread(ranked, _SOUGHT_AGAIN if len(sought) else _SOUGHT)
-                sought = self.nearer(ranked.take(few)).joined(sought)
+                sought = self.nearer(ranked.take(few), _HALF if len(sought) else 1.0).joined(sought)
             sought = sought.take(sought.ranked)
             leaders = sought.take(apart(sought, 2 * _LEADERS))
         refined = self.refined(leaders)
@@ -262,21 +262,23 @@ class Sampler:
             kept = both.take(order[np.searchsorted(of[order], rows)])
         return kept
 
-    def nearer(self, start: Looked) -> Looked:
-        """Each design moved by Newton's method towards what the limits that it violates allow, the shortest way."""
-        u, kept = start.u.copy(), start
+    def nearer(self, start: Looked, share: float = 1.0) -> Looked:
+        """Each design moved by Newton's method towards what the limits that it violates allow, the shortest way.
+
+        One that a step leaves with more than a share of its violation is moved no further.
+        """
+        kept = start
+        moving = np.isfinite(kept.violation)
         for step in range(_STEPS):
-            rows = np.flatnonzero((kept.violation > 0) & np.isfinite(kept.violation))
+            rows = np.flatnonzero((kept.violation > 0) & moving)
             if not rows.size or (step == _STEPS_AFAR and kept.out_of_reach):
                 break
-            steps = self._newton_steps(u[rows])
-            tried = np.clip(u[rows][:, None] + steps[:, None] * np.array(_SHARES)[:, None], 0.0, 1.0)
+            steps = self._newton_steps(kept.u[rows])
+            tried = np.clip(kept.u[rows][:, None] + steps[:, None] * np.array(_SHARES)[:, None], 0.0, 1.0)
             ends = self.look(tried.reshape(-1, self.space.size))
             best = np.argmin(ends.violation.reshape(len(rows), -1), axis=1) + np.arange(len(rows)) * len(_SHARES)
-            better = ends.violation[best] < kept.violation[rows]
-            if not better.any():
-                break
-            u[rows[better]] = ends.u[best[better]]
+            before, after = kept.violation[rows], ends.violation[best]
+            better, moving[rows] = after < before, after < share * before
             joined = kept.joined(ends)
             places = np.arange(len(kept))
             places[rows[better]] = len(kept) + best[better]
