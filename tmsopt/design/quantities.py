@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from tmsopt.roots import Structure, abscissa_and_damping, roots, structure
 
 STRUCTURE_TOLERANCE = 1e-11
 """Relative change of a coefficient within which roots count as multiple: a polished optimum is within 1e-14."""
+
+_KEPT = 64  # structures: several quantities are asked of the same design, and of each of its worst cases
 
 _LARGEST = 1e50
 """Of a root: products of a few larger ones are no doubles."""
@@ -37,6 +40,11 @@ def _structure(values: Mapping[str, Any]) -> Structure:
     off = values.roundings()
     if abs(a[0]) <= off[0] < math.inf:
         return Structure("undecided", (), math.inf)  # rounding alone keeps it from 0; where all are such, all fits
+    return _known_structure(tuple(a), tuple(map(float, off)))
+
+
+@lru_cache(maxsize=_KEPT)
+def _known_structure(a: tuple[float, ...], off: tuple[float, ...]) -> Structure:
     return structure(a, STRUCTURE_TOLERANCE, off)
 
 

@@ -1,7 +1,7 @@
 """The multiplicity structure of a polynomial within a stated tolerance, decided on coefficients."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,7 +97,7 @@ def pattern_distance(
         return float("inf")
     found = numeric_roots(c)
     size = _sizes(c, found, off, tolerance)
-    return min((fit.distance for fit in _fits(pattern, c, found, size, np.inf)), default=float("inf"))
+    return min((distance for distance, _ in _fits(pattern, c, found, size, np.inf)), default=float("inf"))
 
 
 def nearest_unknowns(pattern: Pattern, coefficients: ArrayLike) -> list[tuple[float, ...]]:
@@ -136,14 +136,16 @@ def _matching(pattern: Pattern, coefficients: ArrayLike) -> Array:
 def _of_quartic(c: Array, found: Roots, size: Array, tolerance: float) -> Structure:
     undecided: Structure | None = None
     for pattern, multiplicity, on_line in _CANDIDATES:
-        for candidate in _fits(pattern, c, found, size, _NEAR):
+        for distance, unknowns in _fits(pattern, c, found, size, _NEAR):
+            if not distance <= tolerance + ROUNDING:
+                continue
+            candidate = Structure(pattern.name, _roots_of(pattern, unknowns), distance)
             line = [r for r in candidate.roots if r.re >= candidate.abscissa - _LINE * np.abs(found).max()]
             if line[0].multiplicity < multiplicity or sum(r.multiplicity for r in line) < on_line:
                 continue
-            if candidate.distance < tolerance - ROUNDING:
+            if distance < tolerance - ROUNDING:
                 return candidate
-            if candidate.distance <= tolerance + ROUNDING and undecided is None:
-                undecided = Structure("undecided", _simple(found), candidate.distance)
+            undecided = undecided or Structure("undecided", _simple(found), distance)
     return undecided or Structure(_simple_name(found), _simple(found), 0.0)
 
 
@@ -199,8 +201,8 @@ def _sorted(roots: list[Root]) -> tuple[Root, ...]:
     return tuple(sorted(roots, key=lambda r: (-r.re, -r.im)))
 
 
-def _fits(pattern: Pattern, c: Array, found: Roots, size: Array, near: float) -> Iterator[Structure]:
-    """Polynomials of a pattern close to c, one per guess that starts within `near`, the nearest first."""
+def _fits(pattern: Pattern, c: Array, found: Roots, size: Array, near: float) -> list[tuple[float, Array]]:
+    """Distance and unknowns of polynomials of a pattern close to c, one per guess within `near`, the nearest first."""
     fits = []
     monic = c / c[0]
     for guess in pattern.guesses(found):
@@ -208,9 +210,8 @@ def _fits(pattern: Pattern, c: Array, found: Roots, size: Array, near: float) ->
             continue
         unknowns = gauss_newton(pattern, np.array(guess, dtype=float), monic, size)
         if all(value >= -_CLOSED * np.abs(found).max() ** 2 for value in pattern.nonnegative(list(unknowns))):
-            distance = relative_distance(pattern, unknowns, monic, size)
-            fits.append(Structure(pattern.name, _roots_of(pattern, unknowns), distance))
-    yield from sorted(fits, key=lambda fit: fit.distance)
+            fits.append((relative_distance(pattern, unknowns, monic, size), unknowns))
+    return sorted(fits, key=lambda fit: fit[0])
 
 
 def _roots_of(pattern: Pattern, unknowns: Array) -> tuple[Root, ...]:
