@@ -13,7 +13,7 @@ from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, suggest, table_faults
 from tmsopt.margins.approach import ALIKE, Approach, approach
 from tmsopt.margins.boundaries import KINDS, Edge, edges, lies_on
-from tmsopt.margins.rays import RayCrossing, between, most_damped, ray_crossings
+from tmsopt.margins.rays import RayCrossing, between, elsewhere, most_damped, ray_crossings
 from tmsopt.margins.surroundings import Place, placed
 from tmsopt.margins.witness import exactly_stable, is_boundary
 from tmsopt.progress import Listener, counted
@@ -35,7 +35,8 @@ class Nearest(Shown):
         distance: √Σ ((x − x0)/weight)²; inf where none was found.
         parameters: every parameter of the point; empty where none was found.
         direction: (x − x0)/weight of each parameter that has a weight.
-        refined: whether the point meets the conditions of a nearest one to rounding; else it is the best crossing seen.
+        refined: whether the point meets the conditions of a locally nearest one to rounding; else it is the best
+            crossing seen. That no nearer point is far from it is not proved: it is the nearest that was found.
         direct: whether the straight way there stays on one side of the boundaries until it ends.
     """
 
@@ -235,11 +236,12 @@ def _pieces(place: Place, seen: list[RayCrossing], kind: str) -> Iterator[tuple[
 
 
 def _best(place: Place, edge: Edge, sign: float, starts: list[Array]) -> Approach:
-    """The nearest of where the starts lead; what is crossed on the way there is started from too."""
+    """The nearest of where the starts lead; what is crossed on the way there is started from too, and points as far."""
     best = Approach()
     size = min((float(np.linalg.norm(u)) for u in starts if u.any()), default=1.0)
     run = approach(place, edge, sign, size)
-    for _ in range(_ROUNDS):
+    for turn in range(_ROUNDS):
+        before = best.distance
         for u in starts:
             found = run(u, best.distance)
             if found is not None and lies_on(sign * place.space.coefficients(found.u), edge, place.sizes):
@@ -248,6 +250,8 @@ def _best(place: Place, edge: Edge, sign: float, starts: list[Array]) -> Approac
             break
         met = between(place.space, best.u, edge.name not in STABILITY)
         starts = [c.u for c in met if (c.edge, c.sign) == (edge.name, sign)]
+        if edge.name == "real" and best.distance < before:  # no rays came there, and starts much alike end alike
+            starts += elsewhere(place.space, best.distance, turn)
         if not starts:
             break
     return best

@@ -15,6 +15,7 @@ _RADII = np.concatenate([[0.0], np.geomspace(1e-4, 4.0, 36)])
 _COARSE, _FINE = (16, 2), (256, 6)  # parts and times: all crossings, and those that are kept to all digits
 _KEPT = 5
 _ALIKE = 0.9  # cosine between directions that lead to one start
+_ELSEWHERE = 4  # starts; as many as led 11 of 196 random systems of degrees 6 to 8 to nearer points, and 6 to no more
 _POINTS = 400  # looked at on the straight way to a nearest point
 _AROUND = np.array([0.1, 0.3, 1.0])
 _STEP = 1e-6  # of differences, which only choose directions
@@ -113,6 +114,13 @@ def most_damped(space: Space, sign: float, seed: int = 0) -> list[Array]:
     rows = np.argsort(-ratio, kind="stable").tolist()
     unit = u / np.linalg.norm(u, axis=1, keepdims=True)
     return [np.zeros(rays.shape[1]), *u[_different(unit, rows)]]
+
+
+def elsewhere(space: Space, distance: float, seed: int) -> list[Array]:
+    """A few points at a distance in random directions, be they stable or not."""
+    rays = np.random.default_rng(seed).standard_normal((_ELSEWHERE, len(space.lower)))
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    return [*space.along(rays, np.full(_ELSEWHERE, distance))]
 
 
 def _stable(c: Array) -> Truth:
