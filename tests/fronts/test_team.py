@@ -1,5 +1,6 @@
 """Sub-problems side by side: what comes of them does not depend on how many processes there are, or on their fate."""
 
+import operator
 import os
 from importlib import import_module
 
@@ -59,6 +60,13 @@ def test_what_a_process_dies_of_is_done_here():
 
 def test_what_cannot_be_sent_is_done_here():
     assert each(lambda ask, item: (item, os.getpid()), range(3), 2) == {k: (k, os.getpid()) for k in range(3)}
+
+
+def test_what_was_sent_before_something_that_cannot_be_is_done_here_too():
+    with team.Team(2) as side_by_side:
+        started(side_by_side)
+        given = [1, 2, 3, lambda: 0, 5]
+        assert sorted(k for k, _ in side_by_side.each(operator.is_, ASK, given)) == [*range(5)]
 
 
 @pytest.mark.parametrize("processes", [1, 2])

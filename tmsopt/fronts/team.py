@@ -66,6 +66,7 @@ class Team:
             for other in self._beside:
                 while len(left) > 1 and len(other.queue) < (share if other.ready else _UNBEGUN):
                     if not self._told(other, left[-1], function, ask, self._known, items[left[-1]]):
+                        left += self._given_up()
                         break
                     left.pop()
             if not left and not self._working():
@@ -93,10 +94,15 @@ class Team:
         try:
             other.worker.send(_carried, *task)
         except Exception:  # a model of the user's own may be nothing that can be sent
-            self.__exit__()
             return False
         other.queue.append(place)
         return True
+
+    def _given_up(self) -> list[int]:
+        """End the processes beside this one; the places of what they owed."""
+        owed = [k for other in self._beside for k in other.queue if k is not None]
+        self.__exit__()
+        return owed
 
     def _heard(self, wait: bool) -> Generator[tuple[int | None, Any]]:
         """Places with the answers that have come; at least one, where there is one to wait for."""

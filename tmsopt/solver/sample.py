@@ -221,6 +221,7 @@ class Sampler:
     def draw(self) -> Looked:
         """Corners, a quasi-random sequence, and some of it moved to faces."""
         u, found = self.drawn = self.recalled(self.memory) if self.memory else self._first(self.problem)
+        self.count += len(u)
         for k, beyond in enumerate(found.beyond):
             known = np.abs(beyond[np.isfinite(beyond)])
             self.scales[k] = float(np.median(known)) if known.size and np.median(known) > 0 else 1.0
@@ -245,7 +246,6 @@ class Sampler:
         u[::_FACES] = np.clip(3 * u[::_FACES] - 1, 0.0, 1.0)
         corners = np.array(list(product((0.0, 1.0), repeat=size))) if size <= _CORNERS else np.empty((0, size))
         u = np.concatenate([np.full((1, size), 0.5), corners, u])
-        self.count += len(u)
         return u, judged(problem, self.space.designs(u))
 
     def refined(self, start: Looked, reaches: Sequence[float] = _REACHES) -> Looked:
