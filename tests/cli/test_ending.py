@@ -219,9 +219,26 @@ def test_a_second_one_ends_what_the_first_has_left(run: Run, monkeypatch: pytest
                 pytest.fail("the second one is no invitation to leave something")
 
     monkeypatch.setattr(ending.Heard, "_gone", lambda self: gone.append(self.status))
+    monkeypatch.setattr(ending, "_AGAIN", 0.0)
     at_work(monkeypatch, work)
     assert run("schema") == (130, "", "")
     assert gone == [130]
+
+
+def test_one_that_is_told_twice_at_once_is_one(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As timeout(1) tells it to its command, and to the group of that."""
+
+    def work() -> None:
+        try:
+            press(signal.SIGTERM)
+            time.sleep(LONG)
+        except KeyboardInterrupt:
+            press(signal.SIGTERM)
+            print("the best so far")
+            raise
+
+    at_work(monkeypatch, work)
+    assert run("schema") == (143, "the best so far\n", STOPPED)
 
 
 def test_an_answer_in_hand_is_written_as_a_whole(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,8 +1,8 @@
 """What ends a command from outside: signals, and streams that take no more. The one place that knows of them.
 
-A signal raises KeyboardInterrupt, so that work that has something in hand leaves it, whatever the signal; a second one
-ends all of that, and what is left of this process a second later goes without a word. The status is that of the signal,
-however the command would have ended.
+A signal raises KeyboardInterrupt, so that work that has something in hand leaves it, whatever the signal; a second one,
+half a second later or more, ends all of that, and what is left of this process a second after it goes without a word.
+The status is that of the signal, however the command would have ended.
 """
 
 import atexit
@@ -12,6 +12,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from importlib.machinery import ExtensionFileLoader
@@ -34,6 +35,7 @@ _LOADING = {getattr(ExtensionFileLoader, name).__code__ for name in ("create_mod
 _CASADI = "casadi.casadi"  # its wrappers in Python; what is raised in one that compiled code called is dropped there
 _NO_ROOM = {errno.ENOSPC, errno.EBADF, errno.EIO, errno.EFBIG}
 _SOON = 0.01  # seconds
+_AGAIN = 0.5  # seconds in which the same is told twice, as by timeout(1), to a process and to its group
 _LEFT = 1.0  # seconds for tidying up after a second signal
 
 
@@ -50,7 +52,7 @@ class Heard:
     def forget(self) -> None:
         """Begin anew."""
         self.number: int | None = None
-        self._held, self._due = False, False
+        self._held, self._due, self._again = False, False, 0.0
 
     @property
     def status(self) -> int:
@@ -59,10 +61,12 @@ class Heard:
 
     def hear(self, number: int, frame: FrameType | None) -> None:
         """The handler."""
+        if self.number is not None and time.monotonic() < self._again:
+            return
         if self.number is not None:
             threading.Thread(target=self._gone, daemon=True).start()
             raise SystemExit(self.status)
-        self.number, self._due = number, True
+        self.number, self._due, self._again = number, True, time.monotonic() + _AGAIN
         self.raised(number, frame)
 
     def raised(self, _number: int, frame: FrameType | None) -> None:

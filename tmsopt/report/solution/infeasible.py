@@ -63,9 +63,12 @@ def _conflict(solution: Solution, relaxation: Relaxation) -> str:
         others = " with the other limits" if problem.constraints.keys() - set(asked) else ""
         return f"{listed}{others} need{'s' if len(asked) == 1 else ''} {needs}"
     roots = f" with {problem.pattern.name}" if problem.pattern and problem.pattern.name not in asked else ""
-    if len(asked) > 1:
-        return f"{listed} cannot {'both' if len(asked) == 2 else 'all'} be met{roots}"
-    return f"{listed} is out of reach{roots}{_nearest(solution, asked[0])}"
+    nearest = _nearest(solution, asked[0]) if len(asked) == 1 else ""
+    if not solution.bound.proven or problem.constraints.keys() - set(asked):  # what is proved is about all limits
+        both = {1: "", 2: "both "}.get(len(asked), "all of ")
+        return f"no design{roots} was found that meets {both}{listed}{nearest}"
+    all_of_them = f"cannot {'both' if len(asked) == 2 else 'all'} be met" if len(asked) > 1 else "is out of reach"
+    return f"{listed} {all_of_them}{roots}{nearest}"
 
 
 def _speed(solution: Solution, need: Need) -> str:

@@ -37,11 +37,9 @@ def proof_line(solution: Solution) -> str:
     text = (problem.minimize or problem.maximize or "").strip()
     unjudged = "branch and bound does not judge frequencies" if problem.asks(ANGULAR_FREQUENCY) else ""
     if solution.status == "infeasible":
-        return (
-            "proof: no design in the box meets all limits"
-            if bound.proven
-            else f"proof: none that no design is feasible; {unjudged or '--certify looks for one'}"
-        )
+        known = "that no design is stable; " if solution.any_stable is False else ""
+        unproved = f"{known}none that no design is feasible; {unjudged or '--certify looks for one'}"
+        return f"proof: {'no design in the box meets all limits' if bound.proven else unproved}"
     if not problem.free:
         return "proof: nothing is free, so nothing to prove; tmsopt prove proves the roots"
     if not text:
