@@ -512,8 +512,14 @@ def test_an_infeasible_problem_has_a_page(tmp_path: Path, capsys: pytest.Capture
 
 @pytest.mark.slow
 def test_a_design_so_far_has_a_page(tmp_path: Path) -> None:
-    tmsopt.save_report(replace(design(), interrupted=True), tmp_path / "p.html")
-    assert "stopped before the end, the best design so far" in (tmp_path / "p.html").read_text(encoding="utf-8")
+    for status, said in (
+        ("not_converged", "stopped before the end, the best design so far"),
+        ("optimal", "starts, stopped before it was proved"),
+    ):
+        tmsopt.save_report(
+            replace(design(), status=status, interrupted=True, bound=tmsopt.Bound()), tmp_path / "p.html"
+        )
+        assert said in (tmp_path / "p.html").read_text(encoding="utf-8")
 
 
 # In a browser

@@ -154,9 +154,10 @@ def headline(solution: Solution, on_edge: bool = False) -> tuple[str, str]:
 
 def _ended(solution: Solution) -> str:
     problem, bound = solution.problem, solution.bound
-    if solution.interrupted:
+    if solution.interrupted and solution.status != "optimal":
         return "stopped before the end, the best design so far"
     proved = ", proved" if bound.proven else ""
+    unproved = "stopped before it was proved" if solution.interrupted else "not proved"
     words = {
         "infeasible": f"infeasible{'' if problem.free else ' as given'}{proved}",
         "not_converged": "not converged, so a better design may be near",
@@ -165,7 +166,7 @@ def _ended(solution: Solution) -> str:
         return words[solution.status]
     if problem.objective is None or not problem.free:
         return "found" if problem.free else "as given"
-    return f"optimal{proved or f', the best of {solution.starts.tried} starts, not proved'}"
+    return f"optimal{proved or f', the best of {solution.starts.tried} starts, {unproved}'}"
 
 
 def stability(solution: Solution, on_edge: bool = False) -> str:
