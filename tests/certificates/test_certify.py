@@ -21,7 +21,7 @@ from helpers.oracles import polynomial_floats
 from scipy.optimize import brentq  # type: ignore[import-untyped]
 
 from benchmarks.suites import REFERENCES, random_problem, references
-from tmsopt import InputError, Problem, Progress, Solution, certify, models, solve
+from tmsopt import InputError, Problem, Progress, Solution, certify, load, models, solve
 from tmsopt.branch_and_bound import SCIP, UNDECIDED, Crew, Decision, GlobalSolver, Task
 from tmsopt.cli import every as main
 from tmsopt.design import Band, Bound
@@ -531,6 +531,16 @@ def test_a_crew_is_closed_whatever_happens(children: list[Any]) -> None:
 def test_time_must_be_positive(slow_plane: Solution, seconds: float) -> None:
     with pytest.raises(InputError, match=r"seconds.*found.*accepted: a positive number"):
         certify(slow_plane, seconds=seconds)
+
+
+def test_a_radius_has_no_bound_and_that_is_said() -> None:
+    """Branch and bound would know nothing of the radius, and any bound without it is none."""
+    asked = replace(load("problems/tolerant.toml"), maximize=None, minimize="Fr", constraints={"near": "radius >= 0.05"})
+    design = certify(asked, seconds=5)
+    assert [note for note in design.notes if "bound" in note] == [
+        "branch and bound cannot take radius, which has a search of its own: there is no bound"
+    ]
+    assert not design.bound.proven
 
 
 @pytest.fixture

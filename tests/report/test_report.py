@@ -248,6 +248,9 @@ def test_a_radius_out_of_reach_says_how_near_a_design_comes() -> None:
     found = tmsopt.solve(
         replace(asked, fixed=fixed, free={"Fr": (0.5, 3.0)}, constraints={"stable": "radius >= 0.5"}), throw=False
     )
-    (said,) = re.findall(r"the nearest design found has radius = ([0-9.]+)", " ".join(design_report(found).split()))
+    report = " ".join(design_report(found).split())
+    (said,) = re.findall(r"the nearest design found has radius = ([0-9.]+)", report)
+    assert "branch and bound does not judge the robustness radius" in report
+    assert "--certify" not in report
     there = tmsopt.robustness(tmsopt.Problem(tms, fixed=dict(found.parameters), minimize="abscissa"))
     assert float(said) == pytest.approx(there.radius, rel=1e-3)

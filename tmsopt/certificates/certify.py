@@ -17,7 +17,7 @@ from tmsopt.checks.recheck import recheck
 from tmsopt.design.cases import Case
 from tmsopt.design.files import Given, question_of
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ANGULAR_FREQUENCY, ROOT_NAMES
+from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES
 from tmsopt.design.solution import Bound, Solution
 from tmsopt.errors import Fault, InputError
 from tmsopt.formulation.formulate import Builder
@@ -41,7 +41,8 @@ def certify(design: Given, *, seconds: float = SECONDS, progress: Listener | Non
     """The same design with a bound that no design of the box can beat; or a better design, where one is found.
 
     SCIP is asked whether any design does better than this one by a gap; the answer no is the bound. It is a proof in
-    floating-point arithmetic, to its feasibility tolerance. Of an infeasible problem, it is a proof that it is.
+    floating-point arithmetic, to its feasibility tolerance. Of an infeasible problem, it is a proof that it is. Of the
+    robustness radius there is none.
 
     Args:
         design: what `solve` found, with throw=False where that is no optimum; or a problem or its file, solved first.
@@ -60,6 +61,8 @@ def certify(design: Given, *, seconds: float = SECONDS, progress: Listener | Non
         return _noted(found, "nothing is free, so there is nothing to bound")
     if problem.objective is None and feasible(found):
         return _noted(found, "nothing is minimised or maximised, so there is nothing to bound")
+    if problem.asks_radius:
+        return _noted(found, f"branch and bound cannot take {RADIUS}, which has a search of its own: there is no bound")
     with Crew(SOLVER) as crew:
         steps = heard(progress)
         clock = Clock(seconds, crew, steps)

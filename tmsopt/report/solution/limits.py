@@ -4,7 +4,7 @@ import math
 
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ANGULAR_FREQUENCY
+from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import unit_of
 from tmsopt.explanation import none_of
@@ -35,7 +35,9 @@ def proof_line(solution: Solution) -> str:
     """Whether it is proved that none is better, in one line, and how to go on where it is not."""
     bound, problem = solution.bound, solution.problem
     text = (problem.minimize or problem.maximize or "").strip()
-    unjudged = "branch and bound does not judge frequencies" if problem.asks(ANGULAR_FREQUENCY) else ""
+    beyond = {ANGULAR_FREQUENCY: "frequencies", RADIUS: "the robustness radius"}
+    beyond = {name: words for name, words in beyond.items() if problem.asks(name)}
+    unjudged = f"branch and bound does not judge {' or '.join(beyond.values())}" if beyond else ""
     if solution.status == "infeasible":
         known = "that no design is stable; " if solution.any_stable is False else ""
         unproved = f"{known}none that no design is feasible; {unjudged or '--certify looks for one'}"
