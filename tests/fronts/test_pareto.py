@@ -336,6 +336,29 @@ def test_three_objectives_on_a_sphere():
     assert found.to_json()["nadir"] == pytest.approx([max(p.objectives[k] for p in found.points) for k in range(3)])
 
 
+FLAT = {
+    "free": {"Fr": (0.5, 1.5), "chi_B": (1.1, 1.9)},
+    "fixed": {"chi_H": 1.2, "zeta_B": -0.4, "zeta_H": -0.2, "lambda_s": 0.3, "mu": 0.1},
+    "constraints": {},
+    "pareto": ["1 + 0.1*((Fr - 1)**2 + (chi_B - 1.5)**2)", "Fr", "chi_B - 0.5*Fr"],
+}
+
+
+def test_a_flat_end_of_three_objectives_is_on_the_front():
+    """Its slack of 2e-9 buys 1e-4 of the others there, which makes no better end of a neighbour."""
+    found = tmsopt.pareto(problem(**FLAT), 2, workers=1)
+    assert [p.label for p in found.points if p.label] == [f"least {FLAT['pareto'][k]}" for k in (0, 1, 2)]
+    assert found.points[0].objectives == pytest.approx((1.0, 1.0, 1.0), abs=1e-12)
+    assert found.points[0].solution.parameters["chi_B"] == pytest.approx(1.5, abs=1e-8)
+
+
+def test_points_of_three_objectives_are_limits_on_each_of_two():
+    told = []
+    found = tmsopt.pareto(problem(**FLAT), 3, workers=1, progress=told.append)
+    assert {t.most for t in told if t.what == "following the front" and t.most == t.most} == {3 * 3 - 1}
+    assert 3 < len(found) <= 3 * 3 + 2
+
+
 @pytest.mark.slow
 def test_constraints_of_the_user_keep_their_names():
     crowded = {"Fr <= eps": "chi_B >= 0.5", "chi_B <= eps": "chi_B <= 3.5"}

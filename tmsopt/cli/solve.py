@@ -111,7 +111,11 @@ def _seconds(ctx: click.Context, param: click.Parameter, value: Any) -> float | 
 @report_option
 @click.option("--over", help="What --plot draws over, e.g. lambda_s. [default: the speed, or the first free one]")
 @click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write the points of a front.")
-@click.option("--points", type=click.IntRange(2, MOST_POINTS), default=None, help="Points of a front. [default: 25]")
+@click.option(
+    "--points", type=click.IntRange(2, MOST_POINTS), default=None,
+    help="Points of a front; of three objectives limits on each of two, 12 at most: about as many points as their "
+    "square. [default: 25, or 12]",
+)  # fmt: skip
 @click.option(
     "--workers", type=click.IntRange(min=1), default=None,
     help="Processes for a front, which is the same for any number. [default: as many as cores, up to 4]",

@@ -31,12 +31,14 @@ def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, 
 
     Two objectives: minimise one subject to the other ≤ eps, the next eps where neighbours are farthest apart and on
     the objective that changes more, then sweeps both ways that keep the better design. Three: a grid of eps over the
-    payoff table, at most 12 × 12. Gaps narrower than the spacing of the points may be missed. Ctrl-C leaves what is
-    known of the front, once one of its ends is.
+    payoff table, points × points but at most 12 × 12. Gaps narrower than the spacing of the points may be missed.
+    Ctrl-C leaves what is known of the front, once one of its ends is.
 
     Args:
         problem: with ``pareto``; ``locate`` and constraints narrow the designs.
-        points: asked for along the front; kinks and ends of gaps come on top.
+        points: asked for along the front; kinks and ends of gaps come on top. Of three objectives, limits on each of
+            the last two, at most 12: the front has about the square of that in points, and fewer where limits follow
+            from one another or none can meet them.
         workers: processes, this one among them, by default one per core, of which up to four are of use; the front is
             the same for any number.
         options: ``starts`` per sub-problem beside the designs of the neighbours, 2 by default, ``seed`` and

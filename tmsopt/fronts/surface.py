@@ -10,7 +10,7 @@ from tmsopt.fronts.team import Team
 from tmsopt.progress import Steps, begin
 
 MOST = 12
-"""Limits per objective at most, so 144 sub-problems."""
+"""Limits per objective at most, so 144 cells."""
 
 _SAME = 1e-7  # of the range: a corner of the table is held with a slack of 1e-9
 
@@ -37,13 +37,13 @@ def surface(
     table = [[p.objectives[k] for p in ends] for k in range(3)]
     low, high = [min(c) for c in table], [max(c) for c in table]
     side = min(points, MOST)
-    solved: dict[tuple[int, int], Solution | None] = {}
+    solved: dict[tuple[int, int], Solution | None] = {(side, side): ends[0].solution}  # the loosest limits cut nothing
     impossible: set[tuple[int, int]] = set()
     failed: list[str] = []
     count = 0
     interrupted = False
     try:
-        for diagonal in range(2 * side, 1, -1):
+        for diagonal in range(2 * side - 1, 1, -1):
             cells: dict[tuple[int, int], _Cell] = {}
             for i, j in ((i, diagonal - i) for i in range(side, 0, -1) if 1 <= diagonal - i <= side):
                 looser = [(i + 1, j), (i, j + 1)]
@@ -63,7 +63,7 @@ def surface(
                     ended[k] = outcome
                     count += 1
                     if progress:
-                        progress(count, side * side)
+                        progress(count, side * side - 1)
             finally:
                 for k, (cell, of) in enumerate(cells.items()):
                     solved[cell], possible = ended.get(k, (None, True))
