@@ -77,8 +77,9 @@ def test_every_verb_tells_the_same_content(
         assert [t.done for t in of_it] == sorted(t.done for t in of_it)
         assert not of_it[-1].done > of_it[-1].most
         assert all(t.left >= 0 for t in of_it if not math.isnan(t.left))
-        later = [t for t in of_it if t.unit == "s" or t.done > of_it[0].done + 1]
-        assert len(of_it) < 6 or any(math.isfinite(t.left) for t in later)
+        first = next((t for t in of_it if not math.isnan(t.most)), of_it[0])
+        settled = [t for t in of_it if t.seconds > first.seconds + 3 and (t.unit == "s" or t.done >= first.done + 8)]
+        assert not settled or any(math.isfinite(t.left) for t in settled)
 
 
 @pytest.mark.parametrize(("what", "verb"), VERBS, ids=[f"{k}-{what}" for k, (what, _) in enumerate(VERBS)])
@@ -133,6 +134,30 @@ def test_time_left_is_that_of_the_rate_since_the_first_count(clock: Clock) -> No
     assert (first.done, first.most) == (40, 100)
     assert math.isnan(first.left)
     assert last == tmsopt.Progress("solving rows", 60, 100, "row", 4.0, 8.0, "all well")
+
+
+@pytest.mark.parametrize(
+    ("steps", "most", "seconds", "left"),
+    [
+        (7, 3000, 60.0, None),  # too few
+        (8, 3000, 1.9, None),  # too soon
+        (8, 3000, 2.0, 748.0),
+        (4, 15, 8.0, 22.0),
+        (1, 30, 30.0, None),
+        (2, 30, 30.0, 420.0),
+        (0, 0, 5.0, None),
+    ],
+)
+def test_time_left_is_told_once_the_rate_is_one(
+    clock: Clock, steps: int, most: int, seconds: float, left: float | None
+) -> None:
+    told: list[tmsopt.Progress] = []
+    counts = counted(told.append, "solving rows", "row")
+    assert counts is not None
+    counts(0, most)
+    clock.now += seconds
+    counts(steps, most)
+    assert told[-1].left == pytest.approx(math.nan if left is None else left, nan_ok=True)
 
 
 def test_of_work_that_ends_with_its_time_the_rest_of_it_is_left(clock: Clock) -> None:

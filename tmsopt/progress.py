@@ -10,6 +10,10 @@ from tmsopt.errors import InputError, call_faults
 PAUSE = 0.05
 """Seconds between two records of one piece of work, but for its first and its last."""
 
+_SETTLED, _STEPS, _PART = 2.0, 8, 0.05
+"""Seconds, and steps or a part of all of them, from which on a rate is one: before, processes start and modules are
+loaded, and one step may take many times as long as another."""
+
 _SHARE = 9.0  # times as long as a listener takes it is left alone, so that it costs a tenth of the time at most
 
 
@@ -24,7 +28,7 @@ class Progress:
         unit: of both: ``start``, ``row``, ``design`` …, ``s`` of work that ends with its time; empty where nothing is
             counted.
         seconds: since this piece of work began.
-        left: seconds that it takes at most at its rate so far; nan where that cannot be known.
+        left: seconds that it takes at most at its rate so far; nan where that cannot be known, as after a few steps.
         note: how good it is so far, such as ``gap 0.001``; often empty.
     """
 
@@ -79,8 +83,10 @@ class Steps:
         now, left = time.perf_counter(), math.nan
         if self._unit == "s":
             left = most - done
-        elif self._first and done > self._first[0]:  # from the first on: what was there before took no time now
-            left = (most - done) * (now - self._first[1]) / (done - self._first[0])
+        elif self._first:  # from the first on: what was there before took no time now
+            steps, took = done - self._first[0], now - self._first[1]
+            if took >= _SETTLED and (steps >= _STEPS or steps > _PART * (most - self._first[0])):
+                left = (most - done) * took / steps
         self._told(Progress(self._what, done, most, self._unit, now - self._began, left, self._note))
 
 
