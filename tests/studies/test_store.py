@@ -338,6 +338,7 @@ def changed(**given: Any) -> dict[str, Any]:
             changed(columns=STUDY["columns"] | {"mu": [0.1, 0.2]}),
             "columns.mu: 3 values in the store, 2 in the file",
         ),
+        (changed(columns={n: v[:2] for n, v in STUDY["columns"].items()}), "rows: 3 in the store, 2 in the file"),
         (changed(columns={"mu": [0.1, 0.2, 0.3]}), "columns.zeta_B: 3 values in the store, none in the file"),
     ],
 )

@@ -4,8 +4,9 @@ import json
 import os
 import platform
 import sqlite3
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -122,8 +123,24 @@ def _occupied(path: Path) -> bool:
 
 def _check_same(connection: sqlite3.Connection, path: Path, wanted: Definition) -> None:
     known = database.definition(connection, path, sum(map(len, wanted.columns.values())))
-    if found := list(differences(known.data, wanted.data, ("in the store", "in the file"))):
+    if found := list(_different(known, wanted)):
         raise refuse(path, *_changed_study(found))
+
+
+def _different(known: Definition, wanted: Definition) -> Iterator[str]:
+    """What differs, one phrase each; of another number of rows that, and columns as far as both go."""
+    counts = [{len(values) for values in side.columns.values()} for side in (known, wanted)]
+    if counts[0] != counts[1] and all(len(count) == 1 for count in counts):
+        there, asked = (count.pop() for count in counts)
+        yield f"rows: {there} in the store, {asked} in the file"
+        known, wanted = _cut(known, wanted, min(there, asked)), _cut(wanted, known, min(there, asked))
+    yield from differences(known.data, wanted.data, ("in the store", "in the file"))
+
+
+def _cut(one: Definition, other: Definition, rows: int) -> Definition:
+    """A definition with so many rows of the columns that both have."""
+    columns = {name: values[:rows] if name in other.columns else values for name, values in one.columns.items()}
+    return replace(one, columns=columns)
 
 
 def _changed_study(found: Sequence[str]) -> list[str]:
