@@ -180,6 +180,17 @@ def test_nobody_is_told_oftener_than_he_can_read(clock: Clock) -> None:
     assert 15 <= len(told) <= 25
 
 
+def test_beginnings_first_counts_and_ends_are_told_at_once(clock: Clock) -> None:
+    """Three pieces of work in no time: nine records, whatever else is counted."""
+    told: list[tmsopt.Progress] = []
+    steps = Steps(told.append)
+    for what in ("tracing weave", "tracing capsize", "tracing EP2"):
+        steps.begin(what, "start")
+        for done in range(1, 49):
+            steps(done, 48)
+    assert [t.done for t in told] == [0, 1, 48] * 3
+
+
 def test_a_slow_listener_costs_a_tenth_of_the_time_at_most(clock: Clock) -> None:
     """A hundred steps of 0.1 s, and a listener that takes as long: it is left alone for nine times that."""
     called: list[float] = []
