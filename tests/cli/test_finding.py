@@ -106,6 +106,20 @@ def test_bad_input_is_answered(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [
+        ("certify", "; it is tmsopt solve FILE --certify\n"),
+        ("pareto", '; it is tmsopt solve FILE, with pareto = ["abscissa", "Fr"] under [objective] of FILE\n'),
+        ("growth", "; it is tmsopt solve FILE --plot growth.png\n"),
+    ],
+)
+def test_a_word_that_is_no_command_is_answered_by_what_it_means(run: Run, word: str, meant: str) -> None:
+    status, out, err = run(word, "problems/ep4.toml")
+    assert (status, out) == (2, "")
+    assert err.endswith(f"No such command '{word}'{meant}")
+
+
 def test_examples_are_listed_and_written(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     status, out, _ = run("example")

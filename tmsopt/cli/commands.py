@@ -22,6 +22,14 @@ from tmsopt.cli.speeds import speeds
 from tmsopt.cli.study import study
 from tmsopt.cli.trace import trace
 
+_FRONT = 'tmsopt solve FILE, with pareto = ["abscissa", "Fr"] under [objective] of FILE'
+_MEANT = {
+    **{"certify": "tmsopt solve FILE --certify", "pareto": _FRONT, "front": _FRONT},
+    **dict.fromkeys(("growth", "plot"), "tmsopt solve FILE --plot growth.png"),
+    **dict.fromkeys(("explain", "robustness", "diagnose"), "tmsopt solve FILE --full"),
+}
+"""Words that are functions of the library or options, and no commands → what they are here."""
+
 
 class _Commands(click.Group):
     """Commands that end with words of ours where click has others, be it while words are read or at work."""
@@ -38,6 +46,12 @@ class _Commands(click.Group):
             context = super().make_context(info_name, args, *more, **extra)
             context.meta[TYPED] = words
             return context
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[Any, ...]:
+        """The command that is named; for a word that means a part of another one, that instead of a near name."""
+        if args[0] in _MEANT and not ctx.resilient_parsing:
+            ctx.fail(f"No such command {args[0]!r}; it is {_MEANT[args[0]]}")
+        return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""
