@@ -62,7 +62,7 @@ def certify(design: Given, *, seconds: float = SECONDS, progress: Listener | Non
     if problem.objective is None and feasible(found):
         return _noted(found, "nothing is minimised or maximised, so there is nothing to bound")
     if problem.asks_radius:
-        return _noted(found, f"branch and bound cannot take {RADIUS}, which has a search of its own: there is no bound")
+        return _noted(found, f"branch and bound cannot take {RADIUS}, which has a search of its own")
     with Crew(SOLVER) as crew:
         steps = heard(progress)
         clock = Clock(seconds, crew, steps)
