@@ -328,7 +328,7 @@ def exceptional(work: Workspace) -> list[dict[str, float]]:
         for count, design in enumerate(chain(before, afar), 1):
             ended.append(_candidate(asked, leading, lead(complete(leading, asked, design))))
             led = any(c.feasible for c in ended)
-            enough = count >= len(before) + most and (sample.refined.out_of_reach or not led)
+            enough = count >= len(before) + most and (sample.refined.out_of_reach(degree) or not led)
             if enough or (led and count == len(before)):
                 break
         if memory and len(ended) > len(before):

@@ -2,8 +2,8 @@
 
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from tmsopt.checks.recheck import recheck
 from tmsopt.checks.worst_case import worst_cases
@@ -21,6 +21,10 @@ _FASTEST, _TIMES = 10.0, 4.0  # speeds looked through, in √(g w); in the probl
 _STARTS, _SECONDS = 6, 0.5  # what a search for it may cost; after which no other is begun
 _ENDS = "min", "max"
 _ASKED = 16  # sets of limits that are searched for designs at most
+_ANEW = 3  # times that limits in conflict are sought, where whole searches meet them after all
+
+Reached = Callable[[Sequence[str]], Mapping[str, float] | None]
+"""A design that meets the constraints of these names, by a search like that of a problem which asks for no others."""
 
 
 def with_need(solution: Solution, options: Options) -> Solution:
@@ -55,62 +59,119 @@ def with_need(solution: Solution, options: Options) -> Solution:
 
 
 def irreducible(
-    problem: Problem, relaxation: Relaxation, likely: Sequence[str], wide: Problem, options: Options
-) -> Relaxation:
+    problem: Problem, relaxation: Relaxation, likely: Sequence[str], wide: Problem, options: Options,
+    reached: Reached,
+) -> Relaxation:  # fmt: skip
     """The same with limits that exclude each other, and whether without any one of them a design meets the others.
 
     Constraints are left out one after the other, first those that are not likely to have a part, then those about the
     roots, as long as no design meets the rest in the box; ends of it have a part where the rest is met beyond them.
+    A few starts decide each time; that none meets what is left in the end is said only after a whole search for it,
+    and where that finds a design, all is decided anew with it. What is met by none, no more is known of.
 
     Args:
         problem: without an objective, and no design of it meets all that is asked.
         likely: the limits that hold a least relaxation.
         wide: the problem in the box as far as its ends may give way.
+        reached: the whole search, for the constraints of these names.
     """
     if not relaxation.amounts:
         return relaxation
-    few, asked, free = replace(options, starts=_STARTS, progress=None), 0, problem.free
+    found = _Found(problem, replace(options, starts=_STARTS, progress=None))
+    designs: list[Mapping[str, float]] = [relaxation.parameters]
+    for _ in range(_ANEW):
+        found.designs = designs
+        kept, sure = _fewest(found, likely)
+        design = reached(kept) if len(kept) < len(problem.constraints) else None
+        if design is None:
+            break
+        designs = [*designs, design]
+    else:
+        kept, sure = tuple(problem.constraints), False
+    wanted = _ends(found, kept, likely, wide)
+    names = (*kept, *wanted)
+    return replace(relaxation, conflict=names or tuple(likely), irreducible=sure and bool(names))
 
-    def met(names: Sequence[str], ends: Mapping[str, tuple[float, float]]) -> bool | None:
-        nonlocal asked
-        asked += 1
-        rest = {n: text for n, text in problem.constraints.items() if n in names}
-        part = replace(problem, constraints=rest, free={**free, **ends})
-        return _met(part, relaxation.parameters, few, quick=bool(ends)) if asked <= _ASKED else None
 
-    kept, sure, wanted = tuple(problem.constraints), True, list[str]()
+@dataclass
+class _Found:
+    """Which limits of a problem are met together, by designs at hand and by a few starts.
+
+    Attributes:
+        designs: that may meet some of them.
+        asked: sets of limits that starts have been spent on, with what these came to.
+    """
+
+    problem: Problem
+    options: Options
+    designs: Sequence[Mapping[str, float]] = ()
+    asked: dict[Hashable, bool | None] = field(default_factory=dict)
+
+    def met(self, names: Sequence[str], ends: Mapping[str, tuple[float, float]]) -> bool | None:
+        """Whether a design meets the constraints of these names, with other ends of some ranges; None: not known."""
+        free = self.problem.free
+        rest = {n: text for n, text in self.problem.constraints.items() if n in names}
+        part = replace(self.problem, constraints=rest, free={**free, **ends})
+        if any(_inside(part, d) and _holds(part, part.ordered(d)) for d in self.designs):
+            return True
+        key = (tuple(rest), tuple(ends.items()))
+        if key not in self.asked and len(self.asked) < _ASKED:
+            self.asked[key] = _met(part, self.designs, self.options, quick=bool(ends))
+        return self.asked.get(key)
+
+
+def _fewest(found: _Found, likely: Sequence[str]) -> tuple[tuple[str, ...], bool]:
+    """Constraints of which all seem to be needed for there to be no design, and whether each of them surely is."""
+    problem = found.problem
+    kept, sure = tuple(problem.constraints), True
     others = [n for n in kept if n not in likely]
     in_order = sorted((n for n in kept if n in likely), key=lambda n: n not in problem.asked_of_roots)
     groups = [others, *([n] for n in others if len(others) > 1), *([n] for n in in_order)]
     for group in groups:
         if group and set(group) <= set(kept):
-            found = met(rest := tuple(n for n in kept if n not in group), {})
-            kept, sure = rest if found is False else kept, sure and (found is not None or len(group) > 1)
-    named = [n for n in free if any(n in problem.conditions[k].names for k in kept)]
+            met = found.met(rest := tuple(n for n in kept if n not in group), {})
+            kept, sure = rest if met is False else kept, sure and (met is not None or len(group) > 1)
+    return kept, sure
+
+
+def _ends(found: _Found, kept: Sequence[str], likely: Sequence[str], wide: Problem) -> list[str]:
+    """Ends of ranges beyond which constraints are met that no design in the box meets together."""
+    problem = found.problem
+    named = [n for n in problem.free if any(n in problem.conditions[k].names for k in kept)]
     possible = [*(n for n in likely if n not in problem.constraints), *(f"{n}.{e}" for n in named for e in _ENDS)]
-    for name, end in (n.rsplit(".", 1) for n in dict.fromkeys(possible)):
-        ends = (wide.free[name][0], free[name][1]) if end == "min" else (free[name][0], wide.free[name][1])
-        if met(kept, {name: ends}):
-            wanted.append(f"{name}.{end}")
-    names = (*kept, *wanted)
-    return replace(relaxation, conflict=names or tuple(likely), irreducible=sure and bool(names))
+    names = list(dict.fromkeys(possible))
+    if len(names) > 1 and found.met(kept, _beyond(problem, wide, names)) is False:
+        return []
+    return [name for name in names if found.met(kept, _beyond(problem, wide, [name]))]
 
 
-def _met(problem: Problem, known: Mapping[str, float], options: Options, quick: bool) -> bool | None:
-    """Whether a design meets all that is asked, by a sample and a few starts; None where it is not known.
+def _beyond(problem: Problem, wide: Problem, names: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Ranges with these ends of them as far as they may give way."""
+    ranges = dict(problem.free)
+    for name, end in (n.rsplit(".", 1) for n in names):
+        lower, upper = ranges[name]
+        ranges[name] = (wide.free[name][0], upper) if end == "min" else (lower, wide.free[name][1])
+    return {n: ends for n, ends in ranges.items() if ends != problem.free[n]}
+
+
+def _met(problem: Problem, known: Sequence[Mapping[str, float]], options: Options, quick: bool) -> bool | None:
+    """Whether a design seems to meet all that is asked, by a sample and a few starts; None where neither tells.
 
     `quick`: where no design of the sample comes near, none is looked for; of what is only not named then.
     """
-    parts = workspace(problem, options, beside=[known]).parts()
+    parts = workspace(problem, options, beside=known).parts()
     seen = [p.sampler.design(p.sample.refined, 0) for p in parts if p.sampler and p.sample]
-    designs = [problem.ordered(design) for design in (known, *seen)]
-    inside = [d for d in designs if all(lo <= d[n] <= hi for n, (lo, hi) in problem.free.items())]
-    if any(_holds(problem, d) for d in inside):
+    if any(_holds(problem, problem.ordered(d)) for d in seen):
         return True
     if quick and all(p.sample and p.sample.far_off for p in parts):
         return False
     ended = [t for t in map(_best, parts) if t and not t.checked.violations]
     return any(_holds(problem, t.parameters) for t in ended) or (None if ended else False)
+
+
+def _inside(problem: Problem, design: Mapping[str, float]) -> bool:
+    """Whether a design is in the box."""
+    return all(lower <= design[n] <= upper for n, (lower, upper) in problem.free.items())
 
 
 def _holds(problem: Problem, design: Mapping[str, float]) -> bool:

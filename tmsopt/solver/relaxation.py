@@ -205,7 +205,7 @@ def _sampler(work: Workspace, extended: Limit | None = None) -> Sampler:
 def _leads(work: Workspace, sampler: Sampler, name: str) -> list[dict[str, float]]:
     """Designs that may do with one limit moved, as far as it takes; none where the others exclude each other."""
     found = sampler.without(name)
-    excluded = found.out_of_reach if work.problem.pattern else found.far_off
+    excluded = found.out_of_reach(work.problem.model.degree) if work.problem.pattern else found.far_off
     return [] if excluded else [sampler.design(found, k) for k in range(min(len(found), _LED))]
 
 

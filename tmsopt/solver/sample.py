@@ -39,7 +39,7 @@ _SHELLS, _SHELL = 12, 64  # distances about a design, and designs at each
 _NEAR = 0.01  # of the box: distance of designs about one that count as different
 _VANISHING = 1e-2  # of its usual size: a leading coefficient that may come to 0
 _FAR_OFF = 1e-3  # of their scales, in sum: limits that refined designs violate by more exclude each other, it seems
-_OUT_OF_REACH = 0.3  # the same where a multiple root is sought: moved by 1e-3 of the box its abscissa is off by 0.2
+_OUT_OF_REACH, _SIMPLEST = 2.1, 4  # times the n-th root of the last reach, by which a sample misses an n-fold root
 _NO_LIMIT = 1e300  # a scale by which nothing that exists counts
 _MET = 1e-10  # of its scale: excess up to which a limit counts as met by numeric roots
 _STEPS, _STEPS_AFAR = 12, 4  # of Newton's method towards what violated limits allow; where all stay far away
@@ -99,10 +99,9 @@ class Looked:
         """Whether limits seem to exclude each other: where they can be met, some refined design meets them."""
         return bool(np.all(self.violation > _FAR_OFF))
 
-    @property
-    def out_of_reach(self) -> bool:
-        """The same by so much that no needle explains it, such as a multiple root, which no sample meets."""
-        return bool(np.all(self.violation > _OUT_OF_REACH))
+    def out_of_reach(self, degree: int) -> bool:
+        """The same by so much that it is not for a root of that multiplicity alone, which no sample meets."""
+        return bool(np.all(self.violation > _OUT_OF_REACH * _REACHES[-1] ** (1 / max(degree, _SIMPLEST))))
 
 
 @dataclass(frozen=True)
@@ -271,7 +270,7 @@ class Sampler:
         moving = np.isfinite(kept.violation)
         for step in range(_STEPS):
             rows = np.flatnonzero((kept.violation > 0) & moving)
-            if not rows.size or (step == _STEPS_AFAR and kept.out_of_reach):
+            if not rows.size or (step == _STEPS_AFAR and kept.out_of_reach(self.problem.model.degree)):
                 break
             steps = self._newton_steps(kept.u[rows])
             tried = np.clip(kept.u[rows][:, None] + steps[:, None] * np.array(_SHARES)[:, None], 0.0, 1.0)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from tmsopt.solver.referee import held, ideal, outdone, refereed
 from tmsopt.solver.relaxation import relax
 from tmsopt.solver.sample import Sampler
 from tmsopt.solver.tolerant import climbed, promising
-from tmsopt.solver.workspace import Candidate, Workspace
+from tmsopt.solver.workspace import Candidate, Workspace, workspace
 
 _ROUNDS, _FAR_ROUNDS = 12, 40
 """Times that cases are added; each time the worst one between them shrinks to its square, roughly."""
@@ -126,7 +127,7 @@ def without_any(work: Workspace, tried: int) -> Finding:
     problem = work.problem
     nlp = formulate(problem, problem.cases)
     begin(work.options.progress, "searching for the least that limits must give", "start")
-    relaxation = relax(work, irreducible)
+    relaxation = relax(work, partial(irreducible, reached=partial(_reached, work)))
     free = relaxation.parameters if relaxation else middle(problem)
     design = {n: min(max(free[n], lo), hi) for n, (lo, hi) in problem.free.items()}
     parameters = problem.ordered(design)
@@ -144,6 +145,19 @@ def without_any(work: Workspace, tried: int) -> Finding:
         status, note = "not_converged", f"feasible designs exist, but {none} converged; {advice}"
     starts, notes = Starts(tried=tried), (note,)
     return Finding(parameters, checked, status, {}, starts, nlp.formulation, cases, notes=notes, relaxation=relaxation)
+
+
+def _reached(work: Workspace, names: Sequence[str]) -> Mapping[str, float] | None:
+    """A design that meets the constraints of these names, whatever it does to others; None where none is found."""
+    problem, options = work.problem, replace(work.options, progress=None, near=None)
+    kept = replace(problem, constraints={n: text for n, text in problem.constraints.items() if n in names}, pareto=())
+    if kept.objective and (RADIUS in kept.objective.names or not (kept.pattern or set(names) & {*kept.asked_of_roots})):
+        kept = replace(kept, minimize=None, maximize=None)
+    for part in workspace(kept, options).parts():
+        finding = explore(part, insist=False).finding
+        if finding is not None and not finding.checked.violations:
+            return finding.parameters
+    return None
 
 
 def evaluated_cases(problem: Problem, parameters: Mapping[str, float]) -> tuple[Case, ...]:

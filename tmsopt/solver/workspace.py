@@ -160,7 +160,7 @@ class Workspace:
         part, sample = self.part, self.sample
         if sample is None and part.pattern and part.conditions and not (part.asks_radius or self.blind):
             sample = Sampler(replace(part, locate=None), self.options.seed).sample()
-        return sample is not None and sample.refined.out_of_reach
+        return sample is not None and sample.refined.out_of_reach(part.model.degree)
 
     @cached_property
     def never_stable(self) -> bool:
