@@ -1,6 +1,7 @@
 """Rounded designs are judged at once by arrays; here one by one, from exact roots and doubles."""
 
 import math
+from dataclasses import replace
 from fractions import Fraction
 from importlib import import_module
 
@@ -9,9 +10,10 @@ import pytest
 
 import tmsopt
 from tmsopt import Problem, models
-from tmsopt.checks import realised_abscissa, worst_cases
+from tmsopt.checks import realised_abscissa, recheck, worst_cases
 from tmsopt.design import unit_of
 from tmsopt.explanation import rounded_designs
+from tmsopt.explanation.rounding import rounded
 from tmsopt.roots import exact_roots
 
 judge = import_module("tmsopt.checks.judge")
@@ -131,6 +133,17 @@ def test_only_multiple_roots_are_isolated_one_by_one(monkeypatch):
         assert not isolated
     rounded_designs(tmsopt.solve(PROBLEMS["whole numbers with EP4"]))
     assert len(isolated) >= 4
+
+
+def test_a_limit_is_violated_by_as_much_as_in_the_recheck():
+    """(Fr - 2.2004)**4 <= 0 is met at one speed alone, which five digits have and two or three miss by 4e-4."""
+    problem = replace(tmsopt.load("problems/ep4.toml"), constraints={"speed": "(Fr - 2.2004)**4 <= 0"})
+    solution = replace(tmsopt.solve("problems/ep4.toml"), problem=problem)
+    solution = replace(solution, parameters={**solution.parameters, "Fr": 2.2004})
+    for row in rounded(solution, [(["Fr"], digits) for digits in (2, 3, 5)]):
+        checked = recheck(problem, {**solution.parameters, "Fr": float(row.written["Fr"])})
+        assert dict(row.violations) == dict(checked.amounts)
+        assert dict(row.violations) == ({"speed": pytest.approx(4e-4**4, rel=1e-9)} if row.digits < 4 else {})
 
 
 def test_what_has_no_motion_is_judged_too():

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.checks.judge import realised
-from tmsopt.checks.recheck import FEASIBLE
+from tmsopt.checks.recheck import FEASIBLE, is_violated
 from tmsopt.checks.worst_case import peaks
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import varies
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
+from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import Unit, unit_of
 from tmsopt.formulation.judgement import values_of
@@ -138,11 +138,13 @@ def _violations(problem: Problem, values: Values, whose: NDArray[np.int64], coun
         excess = condition.excess(left - right)
         relative = excess / np.maximum(1.0, np.maximum(np.abs(left), np.abs(right)))
         relative = np.where(np.isfinite(left - right), relative, np.inf)
+        names = (*problem.parameter_set.names, *(n for n in ROOT_NAMES if n in condition.names))
         at = whose if varies(problem, condition, problem.cases) else whose[:count]
         for k in range(count):
             own = np.flatnonzero(at == k)
             worst = own[relative[own].argmax()]
-            if relative[worst] > FEASIBLE:
+            one = {n: float(np.broadcast_to(values[n], whose.shape)[worst]) for n in names}
+            if is_violated(problem, condition, float(relative[worst]), one):
                 found[k][name] = float(excess[worst])
     for name, (lower, upper) in problem.free.items():
         for end, amounts, limit in (("min", lower - values[name], lower), ("max", values[name] - upper, upper)):
