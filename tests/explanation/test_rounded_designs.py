@@ -12,8 +12,7 @@ import tmsopt
 from tmsopt import Problem, models
 from tmsopt.checks import realised_abscissa, recheck, worst_cases
 from tmsopt.design import unit_of
-from tmsopt.explanation import rounded_designs
-from tmsopt.explanation.rounding import rounded
+from tmsopt.explanation import rounded, rounded_designs
 from tmsopt.roots import exact_roots
 
 judge = import_module("tmsopt.checks.judge")

@@ -9,7 +9,6 @@ import pytest
 
 import tmsopt
 from tmsopt.records import Table
-from tmsopt.solver.needs import irreducible
 
 FOLD = 8
 NAMES = [f"x{k}" for k in range(1, FOLD + 1)]
@@ -67,6 +66,7 @@ def named(problem: tmsopt.Problem, reached):
     relaxation = tmsopt.solve(replace(problem, minimize="x"), throw=False).relaxation
     relaxation = replace(relaxation, parameters=Table(near), amounts=Table({"b": 0.6}), conflict=(), irreducible=False)
     options = import_module("tmsopt.formulation.options").DEFAULTS
+    irreducible = import_module("tmsopt.solver.needs").irreducible
     return irreducible(problem, relaxation, ("b",), problem, options, reached)
 
 
