@@ -97,9 +97,10 @@ class Relaxation:
     Attributes:
         parameters: a design that is feasible once the limits are moved.
         amounts: limit → how far it is moved, in its own units; signed for an equality, else towards what it forbids.
-        conflict: limits that exclude each other in the box, and ends of it beyond which the others are met.
+        conflict: limits that no design was found to meet together in the box, and ends beyond which the others are met.
         alone: limit → how far it must be moved if it is the only one, where that suffices.
-        irreducible: whether designs were found that meet the others without any one of the conflict.
+        irreducible: whether designs were found that meet the others without any one of the conflict, and a whole search
+            found none for it; never where limits about the roots leave a0 free to vanish, for needles hide there.
     """
 
     parameters: Table[float] = field(default_factory=Table)

@@ -23,8 +23,9 @@ _ENDS = "min", "max"
 _ASKED = 16  # sets of limits that are searched for designs at most
 _ANEW = 3  # times that limits in conflict are sought, where whole searches meet them after all
 
-Reached = Callable[[Sequence[str]], Mapping[str, float] | None]
-"""A design that meets the constraints of these names, by a search like that of a problem which asks for no others."""
+Reached = Callable[[Sequence[str]], tuple[Mapping[str, float] | None, bool]]
+"""A design that meets the constraints of these names, by a search like that of a problem which asks for no others; and
+whether such a search can tell."""
 
 
 def with_need(solution: Solution, options: Options) -> Solution:
@@ -82,8 +83,9 @@ def irreducible(
     for _ in range(_ANEW):
         found.designs = designs
         kept, sure = _fewest(found, likely)
-        design = reached(kept) if len(kept) < len(problem.constraints) else None
+        design, told = reached(kept) if len(kept) < len(problem.constraints) else (None, True)
         if design is None:
+            sure = sure and told
             break
         designs = [*designs, design]
     else:

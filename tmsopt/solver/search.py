@@ -147,17 +147,20 @@ def without_any(work: Workspace, tried: int) -> Finding:
     return Finding(parameters, checked, status, {}, starts, nlp.formulation, cases, notes=notes, relaxation=relaxation)
 
 
-def _reached(work: Workspace, names: Sequence[str]) -> Mapping[str, float] | None:
-    """A design that meets the constraints of these names, whatever it does to others; None where none is found."""
+def _reached(work: Workspace, names: Sequence[str]) -> tuple[Mapping[str, float] | None, bool]:
+    """A design that meets the constraints of these names, whatever it does to others; and whether that can be told."""
     problem, options = work.problem, replace(work.options, progress=None, near=None)
     kept = replace(problem, constraints={n: text for n, text in problem.constraints.items() if n in names}, pareto=())
     if kept.objective and (RADIUS in kept.objective.names or not (kept.pattern or set(names) & {*kept.asked_of_roots})):
         kept = replace(kept, minimize=None, maximize=None)
-    for part in workspace(kept, options).parts():
+    parts = workspace(kept, options).parts()
+    if any(part.needles for part in parts):
+        return None, False
+    for part in parts:
         finding = explore(part, insist=False).finding
         if finding is not None and not finding.checked.violations:
-            return finding.parameters
-    return None
+            return finding.parameters, True
+    return None, True
 
 
 def evaluated_cases(problem: Problem, parameters: Mapping[str, float]) -> tuple[Case, ...]:

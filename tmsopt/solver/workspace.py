@@ -155,12 +155,22 @@ class Workspace:
         return self.sampler.sample() if self.sampler else None
 
     @cached_property
+    def _seen(self) -> Sample | None:
+        """The sample, of a pattern that of the limits alone."""
+        part = self.part
+        limits_alone = part.pattern and part.conditions and not (part.asks_radius or self.blind)
+        return Sampler(replace(part, locate=None), self.options.seed).sample() if limits_alone else self.sample
+
+    @property
     def out_of_reach(self) -> bool:
         """Whether all designs of a sample are far from what the limits allow, be it without the pattern asked for."""
-        part, sample = self.part, self.sample
-        if sample is None and part.pattern and part.conditions and not (part.asks_radius or self.blind):
-            sample = Sampler(replace(part, locate=None), self.options.seed).sample()
-        return sample is not None and sample.refined.out_of_reach(part.model.degree)
+        return self._seen is not None and self._seen.refined.out_of_reach(self.part.model.degree)
+
+    @property
+    def needles(self) -> bool:
+        """Whether limits about the roots may be met where the mass matrix is nearly singular, which few starts find."""
+        about = self.part.asked_of_roots or self.part.pattern
+        return bool(about) and self._seen is not None and self._seen.singular
 
     @cached_property
     def never_stable(self) -> bool:

@@ -27,8 +27,8 @@ def infeasible_lines(solution: Solution, full: bool = False) -> list[str]:
         return lines
     names = relaxation.conflict or tuple(relaxation.amounts)
     if len(names) > 1:
-        fewer = "" if relaxation.irreducible else "; whether fewer of them are, is not known"
-        lines.append(f"in conflict: {', '.join(_limit(problem, n) for n in names)}{fewer}")
+        told = "" if relaxation.irreducible else ", as far as a search tells"
+        lines.append(f"in conflict{told}: {', '.join(_limit(problem, n) for n in names)}")
     changes = " and ".join(_changed(problem, n, amount) for n, amount in relaxation.amounts.items())
     lines.append(f"smallest change found: {changes}")
     single = {n: a for n, a in relaxation.alone.items() if relaxation.amounts.keys() != {n}}
