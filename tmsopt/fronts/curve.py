@@ -40,7 +40,8 @@ def curve(team: Team, ask: Asker, ends: Sequence[FrontPoint], points: int, progr
             search.fill()
             if not search.sweep():
                 break
-        search.settle()
+        while search.settle():
+            search.sweep()
     except KeyboardInterrupt:
         interrupted = True
     return replace(_thinned(search), interrupted=interrupted)
@@ -138,6 +139,8 @@ class _Search:
         if probe.found is None:
             return True
         found = probe.found.objectives
+        if found[1 - k] > low[1 - k] + _UNUSED * self.range[1 - k]:  # no better one was known when it was asked
+            return False
         return found[k] <= low[k] + margin or found[1 - k] >= low[1 - k] - _SAME * self.range[1 - k]
 
     def between(self, s: _Stretch, place: int, share: float = 0.5, few: bool = False) -> "_Asked":
@@ -224,19 +227,30 @@ class _Search:
                 break
         return ahead
 
-    def settle(self) -> None:
-        """Ends of gaps and places of kinks, to their tolerance."""
+    def settle(self) -> bool:
+        """Ends of gaps and places of kinks, to their tolerance; ended early, with True, where another branch is met.
+
+        A kink is halved from the neighbours' designs alone and, as both may be on a poorer branch, at last as others.
+        """
         begin(self.progress, "placing kinks and gaps", "sub-problem")
         self.done = 0
         while not self.exhausted:
             stretches = self.stretches()
             unclear = [s for s in stretches if not s.gap and s.suspect and s.length > _GAP]
             changing = [s for s in stretches if s.changes and s.halvings]
-            if not unclear and not changing:
-                return
-            few = bool(changing and not unclear)
+            if not (now := (unclear or changing)[:AT_ONCE]):
+                break
             self.most = self.done + len(unclear) + sum(s.halvings for s in changing)
-            self.probe([self.between(s, k, few=few) for k, s in enumerate((unclear or changing)[:AT_ONCE])])
+            few = [not unclear and s.halvings > 1 for s in now]
+            found = self.probe([self.between(s, k, few=few[k]) for k, s in enumerate(now)])
+            if not unclear and any(not f and self._apart(p, s) for s, f, p in zip(now, few, found, strict=True)):
+                return True
+        return False
+
+    def _apart(self, probe: _Probe | None, s: _Stretch) -> bool:
+        """Whether a probe found a design close to neither neighbour."""
+        found = probe.found if probe else None
+        return found is not None and not any(self._near(found.solution, end.solution) for end in (s.left, s.right))
 
 
 @dataclass(frozen=True)
@@ -276,7 +290,7 @@ def _thinned(search: _Search) -> Front:
     """The front as reported: labelled points, and the others where they are not crowded."""
     stretches = search.stretches()
     chain = [stretches[0].left, *(s.right for s in stretches)]
-    words: list[list[str]] = [[p.label] if p.label else [] for p in chain]
+    words = [[search.ends[0].label], *(list[str]() for _ in chain[1:-1]), [search.ends[1].label]]  # even if better
     changes: list[tuple[int, str, float]] = []
     gaps: list[tuple[int, str, bool]] = []
     for i, s in enumerate(stretches):
