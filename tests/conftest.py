@@ -34,7 +34,11 @@ def pytest_collection_finish() -> None:
 
 @pytest.fixture
 def interruptible() -> Iterator[None]:
-    """Ctrl-C ends a process that is started now. A suite in the background of a script ignores it, and so would that."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    """What ends a process ends one that is started now. A suite in the background of a script, or one that nobody is to
+    hang up, ignores some of it, and so would that."""
+    first = {"SIGINT": signal.default_int_handler, "SIGTERM": signal.SIG_DFL, "SIGHUP": signal.SIG_DFL}
+    numbers = {getattr(signal, name): handler for name, handler in first.items() if hasattr(signal, name)}
+    before = {number: signal.signal(number, handler) for number, handler in numbers.items()}
     yield
-    signal.signal(signal.SIGINT, before)
+    for number, handler in before.items():
+        signal.signal(number, handler)

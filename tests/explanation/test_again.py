@@ -25,7 +25,9 @@ def searches(monkeypatch):
     return found
 
 
-@pytest.mark.parametrize("name", ["realistic", "delivery_robot", "heavily_damped"])
+@pytest.mark.parametrize(
+    "name", ["realistic", pytest.param("delivery_robot", marks=pytest.mark.slow), "heavily_damped"]
+)
 def test_gains_are_those_of_a_search_of_each_moved_problem(name, searches):
     solution = tmsopt.solve(f"problems/{name}.toml")
     levers = [lever for lever in tmsopt.explain(solution).levers if lever.step]

@@ -310,6 +310,7 @@ def test_designs_are_judged_by_other_limits_as_if_looked_at_anew():
         sample.Sampler(replace(of, constraints={"decay": "abscissa <= -0.3", "far": "chi_B >= 2"}), 0, memory).draw()
 
 
+@pytest.mark.slow
 def test_points_over_a_band_are_proved_as_a_solution_is():
     free, band = {"chi_B": (1.01, 3), "lambda_s": (0.05, 1.2)}, {"Fr": cases.Band(1.2, 1.8, 3)}
     asked = problem(free=free, constraints={}, pareto=["abscissa", "chi_B"], scenarios=band)

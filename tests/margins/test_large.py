@@ -24,6 +24,7 @@ def _system(seed: int, degree: int, count: int) -> tmsopt.Problem:
     return tmsopt.Problem(from_matrices(A=matrix), fixed=fixed)
 
 
+@pytest.mark.slow
 def test_a_run_without_a_rival_goes_on_until_it_ends():
     """No ray meets heavy damping here, and no start comes to it within the first 200 iterations."""
     found = tmsopt.nearest(_system(107, 10, 8), "heavy damping")

@@ -54,6 +54,7 @@ def test_where_a0_may_vanish_a_search_is_not_said_to_tell() -> None:
     assert "cannot" not in first
 
 
+@pytest.mark.slow
 def test_a_heavily_damped_design_meets_that_limit_alone() -> None:
     kept = {"damped": DAMPED.constraints["damped"]}
     design = tmsopt.solve(replace(DAMPED, constraints=kept), stability=0.0)
