@@ -13,7 +13,7 @@ from helpers.hunt import abscissa
 import tmsopt
 from tmsopt import laws
 from tmsopt.records import Table
-from tmsopt.report import infeasible_lines
+from tmsopt.report import design_report, infeasible_lines
 
 TMS = tmsopt.models.tms
 FIXED = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}
@@ -298,3 +298,20 @@ def test_what_is_proved_of_all_limits_is_not_said_of_some():
     said = [infeasible_lines(replace(design, relaxation=r))[0] for r in (two, three)]
     assert said[0] == "no design was found that meets both decay (abscissa <= -1) and slow (Fr <= 1)"
     assert said[1].endswith("wide (chi_B >= 0.5) cannot all be met")
+
+
+@pytest.mark.parametrize(
+    ("irreducible", "said"), [(True, "in conflict: "), (False, "in conflict, as far as a search tells: ")]
+)
+def test_what_a_search_cannot_tell_of_a_conflict_is_said(irreducible, said):
+    design = failed("two bounds")
+    design = replace(design, relaxation=replace(design.relaxation, conflict=("high", "low"), irreducible=irreducible))
+    assert infeasible_lines(design)[1] == f"{said}high (chi_B >= 1.8), low (chi_B <= 1.5)"
+
+
+@pytest.mark.parametrize(
+    ("known", "said"), [(False, "proof: that no design is stable; none that"), (None, "proof: none that")]
+)
+def test_a_proof_that_none_is_stable_is_no_proof_that_none_is_feasible(known, said):
+    design = replace(failed("faster than omega0"), bound=tmsopt.Bound(), abscissa=1.0, stable_elsewhere=known)
+    assert f"{said} no design is feasible; --certify looks for one" in " ".join(design_report(design).split())
