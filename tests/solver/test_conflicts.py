@@ -1,6 +1,7 @@
 """Limits said to exclude each other do, and those said to be out of reach alone are: what thin needles hide as well."""
 
 from dataclasses import replace
+from fractions import Fraction
 from importlib import import_module
 from math import comb
 
@@ -10,6 +11,7 @@ import pytest
 import tmsopt
 from tmsopt.records import Table
 from tmsopt.report import infeasible_lines
+from tmsopt.solver import workspace
 
 FOLD = 8
 NAMES = [f"x{k}" for k in range(1, FOLD + 1)]
@@ -44,6 +46,30 @@ def test_a_limit_that_a_needle_meets_is_not_out_of_reach() -> None:
     relaxation = tmsopt.solve(FAST, throw=False, alone=False, stability=0.0).relaxation
     limits = {n for n in relaxation.conflict if n in FAST.constraints}
     assert (limits, relaxation.irreducible) == (set(FAST.constraints), True)
+
+
+def routh(coefficients: list[Fraction]) -> bool:
+    """Whether all roots are left of the axis, exactly."""
+    above, row = coefficients[0::2], coefficients[1::2]
+    while row:
+        if row[0] <= 0:
+            return False
+        ratio = above[0] / row[0]
+        above, row = row, [x - ratio * y for x, y in zip(above[1:], [*row[1:], Fraction(0)], strict=False)]
+    return coefficients[0] > 0
+
+
+def test_a_whole_search_finds_what_a_needle_hides_and_none_is_asked_where_a0_may_vanish() -> None:
+    """All roots of the design found are left of -0.98, in exact numbers; DAMPED without its other limit is not asked."""
+    search = import_module("tmsopt.solver.search")
+    found, told = search._reached(workspace(FAST), ["far"])
+    assert told
+    shifted = [Fraction(float(c)) for c in FAST.values(found).coefficients]
+    for end in range(len(shifted), 1, -1):
+        for k in range(1, end):
+            shifted[k] -= Fraction(98, 100) * shifted[k - 1]
+    assert routh(shifted)
+    assert search._reached(workspace(DAMPED), ["damped"]) == (None, False)
 
 
 def test_where_a0_may_vanish_a_search_is_not_said_to_tell() -> None:
