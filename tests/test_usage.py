@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-USAGE, NOTEBOOK = ROOT / "tests" / "helpers" / "usage.py", ROOT / "tests" / "notebooks" / "first_steps.ipynb"
+USAGE, NOTEBOOK = ROOT / "tests" / "helpers" / "usage.py", ROOT / "docs" / "notebooks" / "first_bicycle.ipynb"
 CHECKERS = {
     "mypy": ["--strict", "--no-error-summary"],
     "basedpyright": ["--level", "error", "--pythonpath", sys.executable],  # pyright, whose Node comes with pip

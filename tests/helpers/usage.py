@@ -1,4 +1,4 @@
-"""Typical uses, as README and docs/python.md have them: type checkers and Python both run this file, from the root."""
+"""Typical uses, as README and docs/reference/python.md have them: type checkers and Python both run this file, from the root."""
 
 from typing import Any, assert_type
 

@@ -1,0 +1,112 @@
+"""Every page of the documentation runs: files are read, commands and Python executed, what is printed compared."""
+
+import doctest
+import shutil
+import tomllib
+from pathlib import Path
+
+import matplotlib
+import pytest
+from helpers.pages import Block, agrees, blocks_of, exchanges, may_install, missing, run
+
+import tmsopt
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted((ROOT / "docs").rglob("*.md"))
+LANGUAGES = {"toml", "console", "python", "pycon", "sh", "text", "json", "", "bibtex"}
+
+
+def part_of(part: object, whole: object) -> bool:
+    """Whether every entry of a table is in another one, with the same value."""
+    if isinstance(part, dict) and isinstance(whole, dict):
+        return all(key in whole and part_of(value, whole[key]) for key, value in part.items())
+    return part == whole
+
+
+def written(block: Block, folder: Path) -> None:
+    """A file that the page shows, or the part of one that it says it is."""
+    first, _, rest = block.text.partition("\n")
+    if first.startswith("# part of "):
+        whole = tomllib.loads((folder / first.removeprefix("# part of ").split()[0]).read_text(encoding="utf-8"))
+        assert part_of(tomllib.loads(rest), whole), first
+        return
+    assert first.startswith("# "), f"line {block.line}: what file is this?"
+    assert first.endswith(".toml"), f"line {block.line}: what file is this?"
+    file = folder / first.removeprefix("# ")
+    file.write_text(block.text, encoding="utf-8")
+    study = {"study", "vary"} & set(tomllib.loads(block.text))
+    _ = tmsopt.load_study(file) if study else tmsopt.load(file)
+
+
+def compared(block: Block, names: dict[str, object], page: Path) -> None:
+    """A session of Python prints what the page says."""
+    test = doctest.DocTestParser().get_doctest(block.text, names, page.name, str(page), block.line)
+    flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+    said: list[str] = []
+    doctest.DocTestRunner(optionflags=flags, verbose=False).run(test, out=said.append, clear_globs=False)
+    assert not said, "".join(said)
+    names.update(test.globs)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: f"{page.parent.name}-{page.stem}")
+def test_what_a_page_shows_is_so(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(ROOT / "problems", tmp_path / "problems")
+    monkeypatch.chdir(tmp_path)
+    matplotlib.use("agg")
+    names: dict[str, object] = {"__name__": "page"}
+    for block in blocks_of(page):
+        assert block.language in LANGUAGES, f"line {block.line}: {block.language}"
+        if block.language == "toml":
+            written(block, tmp_path)
+        elif block.language == "console":
+            for command, printed in exchanges(block):
+                now = run(command, tmp_path, ROOT)
+                line = missing(printed, now)
+                assert line is None, f"line {block.line}, {command}: {line!r} is not in\n" + "\n".join(now)
+        elif block.language == "python":
+            exec(compile(block.text, f"{page.name}, line {block.line}", "exec"), names)
+        elif block.language == "pycon":
+            compared(block, names, page)
+        elif block.language == "sh":
+            assert may_install(block), f"line {block.line}: commands that can be run belong in `console`"
+        else:
+            assert not block.text.startswith("$ "), f"line {block.line}: commands belong in `console`"
+
+
+def test_the_pages_are_there() -> None:
+    """So that nothing above passes because nothing was read."""
+    assert len(PAGES) >= 15
+    assert sum(block.language == "console" for page in PAGES for block in blocks_of(page)) >= 30
+
+
+@pytest.mark.parametrize(
+    ("printed", "now", "same"),
+    [
+        ("w 0.90909", "w 0.90909", True),
+        ("w 0.90909", "w 0.90908", False),
+        ("w 0.90909", "v 0.90909", False),
+        ("proved; 146 boxes, 0.62 s", "proved; 146 boxes, 1.3 s", True),
+        ("proved; 146 boxes, 0.62 s", "proved; 147 boxes, 0.62 s", False),
+        ("proved; … s", "proved; 1 box, 3 s", True),
+        ("proved; …", "found; 1 box", False),
+        ("a … c", "a b c", True),
+        ("a … c", "a b c d", False),
+    ],
+)
+def test_lines_are_compared_by_words_and_numbers(printed: str, now: str, same: bool) -> None:
+    assert agrees(printed, now) is same
+
+
+@pytest.mark.parametrize(
+    ("printed", "line"),
+    [
+        (["a", "b"], None),
+        (["b", "…", "d"], None),
+        (["a", "c"], "c"),
+        (["…", "d", "a"], "a"),
+        (["…", "c", "…", "b"], "b"),
+    ],
+)
+def test_lines_are_looked_for_in_their_order(printed: list[str], line: str | None) -> None:
+    assert missing(printed, ["a", "b", "c", "d"]) == line

@@ -1,0 +1,118 @@
+"""A page of the documentation as data: its fenced blocks, what each is, and what running it must print.
+
+A block of `toml` that begins with ``# NAME.toml`` is that file, one that begins with ``# part of problems/NAME.toml`` a part
+of it. A block of `console` has commands after ``$`` and what they print, lines in their order; a line ``…`` stands for what
+is left out, and so does ``…`` within a line. Blocks of `python` run one after the other, those of `pycon` are compared.
+"""
+
+import math
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import zip_longest
+from pathlib import Path
+
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+_SECONDS = re.compile(r"\d+(?:\.\d+)?(?= ?(?:s|ms|µs|h|min)\b)")
+_FENCE = re.compile(r"^(`{3,})(\{code-block\} )?(\w*)[^\n]*\n(.*?)^\1\s*$", re.MULTILINE | re.DOTALL)
+_INSTALLS = ("pip ", "eval ", "_TMSOPT", "python -m venv", "source ", "sphinx-build ", "git ")
+_LONGEST = 120  # seconds of a command
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block: its language, its text, the line of the page on which it begins."""
+
+    language: str
+    text: str
+    line: int
+
+
+def blocks_of(page: Path) -> list[Block]:
+    """The fenced blocks of a page, in its order."""
+    text = page.read_text(encoding="utf-8")
+    return [Block(m[3], m[4], text.count("\n", 0, m.start()) + 1) for m in _FENCE.finditer(text)]
+
+
+def lines_of(text: str) -> list[str]:
+    """The lines of an answer, blanks aside."""
+    return [" ".join(line.split()) for line in text.splitlines() if line.strip()]
+
+
+def agrees(printed: str, now: str) -> bool:
+    """The same words, and the same numbers within the rounding of the last digits: other machines, other sums.
+
+    Times count as equal, and ``…`` for whatever stands there.
+    """
+    if "…" in printed:
+        # the printed text around what is left out, in its order
+        rest = now
+        pieces = [piece.strip() for piece in printed.split("…")]
+        for first, piece in zip_longest([True], pieces):
+            at = rest.find(piece) if piece else 0
+            if at < 0 or (first and at > 0):
+                return False
+            rest = rest[at + len(piece) :]
+        return printed.endswith("…") or not rest
+    printed, now = _SECONDS.sub("0", printed), _SECONDS.sub("0", now)
+    if NUMBER.sub("", printed) != NUMBER.sub("", now):
+        return False
+    pairs = zip(NUMBER.findall(printed), NUMBER.findall(now), strict=True)
+    return all(math.isclose(float(a), float(b), rel_tol=1e-6, abs_tol=1e-12) for a, b in pairs)
+
+
+def exchanges(block: Block) -> Iterator[tuple[str, list[str]]]:
+    """Each command of a console block, with what the page says that it prints."""
+    for part in re.split(r"^\$ ", block.text, flags=re.MULTILINE)[1:]:
+        command, _, printed = part.partition("\n")
+        yield command, lines_of(printed)
+
+
+def run(command: str, folder: Path, path: Path) -> list[str]:
+    """What a command prints, its diagnostics after its answer; it fails no other way than by a message."""
+    if command.startswith(_INSTALLS):
+        return []
+    environment = {
+        **os.environ,
+        "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+        "PYTHONPATH": str(path),
+        "BROWSER": "true",
+        "MPLBACKEND": "agg",
+    }
+    ended = subprocess.run(
+        ["bash", "-c", command],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=_LONGEST,
+        check=False,
+    )
+    assert "Traceback" not in ended.stderr, f"{command}\n{ended.stderr}"
+    assert ended.returncode in (0, 2, 3, 4), f"{command}\n{ended.stderr}"
+    return lines_of(ended.stdout) + lines_of(ended.stderr)
+
+
+def missing(printed: list[str], now: list[str]) -> str | None:
+    """The first line that is printed on the page and not by the command, or not where it should be."""
+    rest = iter(now)
+    anywhere = True  # what is printed may begin anywhere: a page shows a part
+    for line in printed:
+        if line == "…":
+            anywhere = True
+        elif anywhere:
+            if not any(agrees(line, other) for other in rest):
+                return line
+            anywhere = False
+        elif not agrees(line, next(rest, "")):
+            return line
+    return None
+
+
+def may_install(block: Block) -> bool:
+    """Whether a block of `sh` has nothing that should have been run: what installs, or sets up a shell."""
+    lines = [line for line in block.text.splitlines() if line.strip() and not line.startswith("#")]
+    return all(line.startswith(_INSTALLS) for line in lines)
