@@ -188,12 +188,17 @@ locate = "CEP2"
     text = CliRunner().invoke(main, ["solve", str(file), "--all"]).output
     assert "locate CEP2: these are all: 2 solutions in the box (proved; " in text
     assert data["completeness"]["complete"]
+    assert (data["complete"], data["undecided"]) == (True, 0)
+    assert [s["proved"] for s in data["solutions"]] == [True, True]
     assert data["coverage"] is None
     text = CliRunner().invoke(main, ["solve", str(file), "--all", "--seconds", "0.001"]).output
     assert "locate CEP2: 2 solutions in the box" in text
     assert "proof that these are all: none, time was over" in text
     assert "undecided: c1 -2 … 2, c2 -2 … 2" in text
     assert "95 % confidence; no proof" in text
+    data = json.loads(CliRunner().invoke(main, ["solve", str(file), "--all", "--json", "--seconds", "0.001"]).stdout)
+    assert (data["complete"], data["undecided"]) == (False, len(data["completeness"]["undecided"]))
+    assert data["undecided"] >= 1
 
 
 def test_a_continuum_of_solutions_is_told_from_none() -> None:

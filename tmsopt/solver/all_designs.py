@@ -89,8 +89,14 @@ class Every(Tabular):
             yield {**solution.parameters, **found, "proved": proved}
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data for ``json.dumps``."""
-        return plain(self)
+        """Plain data for ``json.dumps``: each solution with ``proved``, beside them ``complete`` and ``undecided``."""
+        found = plain(self)
+        for solution, proved in zip(found["solutions"], self.proved, strict=True):
+            solution["proved"] = proved
+        known = self.completeness
+        return found | {
+            "complete": known is not None and known.complete, "undecided": len(known.undecided) if known else None
+        }  # fmt: skip
 
 
 @taking(Asked, _DEFAULTS)
