@@ -44,6 +44,9 @@ MODULES, LINES, DEPTH = 12, 350, 8
 CROWDED = {"tmsopt.paper.ledger": 16}
 """A room per section of the paper."""
 
+LONG = {"tmsopt.laws": 610}
+"""An oracle is one module: 28 laws of a few lines, each with its conditions and an example that runs."""
+
 
 def sources() -> dict[str, str]:
     """Module name → source of the whole package."""
@@ -241,7 +244,7 @@ def test_a_package_has_a_face_and_few_rooms(package: str) -> None:
 
 
 def test_no_room_is_long() -> None:
-    assert {m: n for m, s in SOURCES.items() if (n := s.count("\n")) > LINES and m != "tmsopt.laws"} == {}
+    assert {m: n for m, s in SOURCES.items() if (n := s.count("\n")) > LONG.get(m, LINES)} == {}
 
 
 def test_what_is_asked_above_is_asked_when_it_is_needed() -> None:

@@ -97,7 +97,15 @@ def _sqrt(square: Real) -> Real:
 def matrices(
     Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real
 ) -> tuple[Array, Array, Array]:
-    """M, V, P of M q'' + V q' + P q = 0, q = (lean, steer); of shape (..., 2, 2). Equation `matrices`."""
+    """M, V, P of M q'' + V q' + P q = 0, q = (lean, steer); of shape (..., 2, 2). Equation `matrices`.
+
+    Example:
+        >>> M, V, P = tmsopt.laws.matrices(Fr=1, mu=0.1, chi_B=1.2, chi_H=1.02, zeta_B=-0.4, zeta_H=-0.2, lambda_s=0)
+        >>> print(f"{M[0, 0]:.3f} {V[0, 1]:.4f} {P[0, 0]:.2f}")  # mu zeta_H^2 + zeta_B^2, ...
+        0.164 0.5004 -0.42
+
+    More: docs/explanation/paper.md
+    """
     cos, sin = np.cos(lambda_s), np.sin(lambda_s)
     nu_H = (chi_H - 1) * cos - zeta_H * sin
     weight = mu * zeta_H + zeta_B
@@ -118,6 +126,13 @@ def copo(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Rea
 
     They are det(M s^2 + V s + P) / (mu nu_H cos(lambda_s)): not monic, and a0 < 0 where nu_H < 0. The order
     is that of `np.polyval`.
+
+    Example:
+        >>> a = tmsopt.laws.copo(2.337214017, 20.84626701, 1.19, 1.02, -0.4, -0.2, 0.8514403685)  # four roots at -1
+        >>> (a / a[0]).round(6)
+        array([1., 4., 6., 4., 1.])
+
+    More: docs/explanation/paper.md
     """
     T, k = _tan(lambda_s), chi_H - 1
     a0 = -(zeta_H * T - chi_H + 1) * zeta_B**2
@@ -135,6 +150,13 @@ def flus(mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_
     It is the zero of a1 a2 a3 - a0 a3^2 - a1^2 a4 in Fr^2, for every chi_H and either sign of lambda_s;
     negative where no speed gives one. It bounds the stable speeds only where a0, a1, a3, a4 have one sign,
     and is positive there for chi_H > 0. Elsewhere a positive value is no boundary of stability.
+
+    Example:
+        >>> square = tmsopt.laws.flus(0.1, 1.2, 1.02, -0.4, -0.2, tmsopt.laws.bench["lambda_s"])
+        >>> print(f"{(9.81 * square) ** 0.5:.6f} m/s")  # the benchmark
+        2.841008 m/s
+
+    More: docs/explanation/paper.md
     """
     T, k, skew = _tan(lambda_s), chi_H - 1, zeta_B * chi_H - zeta_H * chi_B
     return (
@@ -146,7 +168,14 @@ def flus(mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_
 
 @_law
 def Fr_c(mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
-    """Critical Froude number, the root of `flus`; nan where that square is negative."""
+    """Critical Froude number, the root of `flus`; nan where that square is negative.
+
+    Example:
+        >>> print(f"{tmsopt.laws.Fr_c(0.1, 1.2, 1.02, -0.4, -0.2, tmsopt.laws.bench['lambda_s']):.6f}")
+        0.907064
+
+    More: docs/explanation/paper.md
+    """
     return _sqrt(flus(mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s))
 
 
@@ -159,6 +188,13 @@ def lscf(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Rea
     chi_H = 0.9, chi_B = 1.2, zeta_B = -0.5, zeta_H = -0.4, mu = 5, tan(lambda_s) = 0.5, where Fr_c = 1:
     unstable at every Fr > 1. For lambda_s < 0 they never hold together; there a bicycle is stable exactly if
     the first four are reversed, zeta_B chi_H > zeta_H chi_B and Fr > Fr_c. `lscf_complete` holds everywhere.
+
+    Example:
+        >>> benchmark = 0.1, 1.2, 1.02, -0.4, -0.2, tmsopt.laws.bench["lambda_s"]
+        >>> [tmsopt.laws.lscf(Fr, *benchmark).tolist() for Fr in (0.90, 0.91)]
+        [[True, True, True, True, False], [True, True, True, True, True]]
+
+    More: docs/explanation/paper.md
     """
     T, critical = _tan(lambda_s), Fr_c(mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s)
     conditions = (
@@ -176,6 +212,14 @@ def lscf_complete(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, ze
     """Whether the bicycle is asymptotically stable, by the complete Lienard-Chipart conditions on `copo`.
 
     Holds for any chi_H and either sign of lambda_s: the coefficients are first divided by the sign of a0.
+
+    Example:
+        >>> from math import atan
+        >>> counterexample = 2, 5, 1.2, 0.9, -0.5, -0.4, atan(0.5)
+        >>> bool(tmsopt.laws.lscf(*counterexample).all()), bool(tmsopt.laws.lscf_complete(*counterexample))
+        (True, False)
+
+    More: docs/explanation/paper.md
     """
     a = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s)
     a0, a1, a2, a3, a4 = a * np.sign(a[0])
@@ -188,7 +232,15 @@ def lscf_complete(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, ze
 
 
 class EP4(NamedTuple):
-    """A design with a four-fold root `omega0`; `mu` is nan where the mass ratio is free (chi_H = 1)."""
+    """A design with a four-fold root `omega0`; `mu` is nan where the mass ratio is free (chi_H = 1).
+
+    Example:
+        >>> design = tmsopt.laws.ep4_chi_H_1(-0.4, -0.2)
+        >>> print(f"{design.chi_B:.6f} {design.lambda_s:.6f} {design.mu}")
+        1.414214 0.410678 nan
+
+    More: docs/explanation/paper.md
+    """
 
     omega0: Real
     chi_B: Real
@@ -205,52 +257,110 @@ class EP4(NamedTuple):
 
 @_law
 def w0(mu: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
-    """-(a4/a0)^(1/4), the lower bound of the spectral abscissa; nan where a4/a0 < 0. Equation `w0`."""
+    """-(a4/a0)^(1/4), the lower bound of the spectral abscissa; nan where a4/a0 < 0. Equation `w0`.
+
+    Example:
+        >>> print(f"{tmsopt.laws.w0(0.1, 1, -0.4, -0.2, 0.3):.8f} {-(0.4 * 0.2) ** -0.25:.8f}")
+        -1.88030155 -1.88030155
+
+    More: docs/explanation/factors.md
+    """
     T, k = _tan(lambda_s), chi_H - 1
     return -_sqrt(_sqrt((zeta_B * T + mu * k) / (zeta_H * T - k) / zeta_B**2))
 
 
 @_law
 def poly4(omega0: Real) -> Array:
-    """Coefficients of (s - omega0)^4, shape (5, ...). Label `4poly`, where p(s) means the monic copo / a0."""
+    """Coefficients of (s - omega0)^4, shape (5, ...). Label `4poly`, where p(s) means the monic copo / a0.
+
+    Example:
+        >>> tmsopt.laws.poly4(-1)
+        array([1., 4., 6., 4., 1.])
+
+    More: docs/explanation/factors.md
+    """
     return _stack(omega0**0, -4 * omega0, 6 * omega0**2, -4 * omega0**3, omega0**4)
 
 
 @_law
 def a1a3(Fr: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real, omega0: Real) -> Array:
-    """Residuals a1 + 4 omega0 a0 and a3 + 4 omega0^3 a0, shape (2, ...); both 0 at EP4. Equation `a1a3`."""
+    """Residuals a1 + 4 omega0 a0 and a3 + 4 omega0^3 a0, shape (2, ...); both 0 at EP4. Equation `a1a3`.
+
+    Example:
+        >>> residuals = tmsopt.laws.a1a3(2.337214017, 1.19, 1.02, -0.4, -0.2, 0.8514403685, omega0=-1)
+        >>> bool(abs(residuals).max() < 1e-9)
+        True
+
+    More: docs/explanation/paper.md
+    """
     a0, a1, _, a3, _ = copo(Fr, 0, chi_B, chi_H, zeta_B, zeta_H, lambda_s)
     return _stack(a1 + 4 * omega0 * a0, a3 + 4 * omega0**3 * a0)
 
 
 @_law
 def chib(omega0: Real, chi_H: Real, zeta_B: Real, zeta_H: Real) -> Real:
-    """chi_B at EP4: the scaling law that makes a3/a1 = omega0^2. Equation `chib`."""
+    """chi_B at EP4: the scaling law that makes a3/a1 = omega0^2. Equation `chib`.
+
+    Example:
+        >>> print(f"{tmsopt.laws.chib(-1, 1.02, -0.4, -0.2):.6f}")
+        1.190000
+
+    More: docs/explanation/paper.md
+    """
     return (omega0**2 * zeta_B - 1) / (omega0**2 * zeta_H - 1) * chi_H
 
 
 @_law
 def a2(Fr: Real, mu: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real, omega0: Real) -> Real:
-    """Left minus right side of the EP4 condition a2 = 6 omega0^2 a0, divided by zeta_B. Equation `a2`."""
+    """Left minus right side of the EP4 condition a2 = 6 omega0^2 a0, divided by zeta_B. Equation `a2`.
+
+    Example:
+        >>> residual = tmsopt.laws.a2(2.337214017, 20.84626701, 1.02, -0.4, -0.2, 0.8514403685, omega0=-1)
+        >>> bool(abs(residual) < 1e-9)
+        True
+
+    More: docs/explanation/paper.md
+    """
     left = Fr**2 * (zeta_B - zeta_H) + (6 * omega0**2 * zeta_H * zeta_B - zeta_B - zeta_H) * _tan(lambda_s)
     return left - (chi_H - 1) * (6 * omega0**2 * zeta_B**2 + mu * zeta_H - zeta_B) / zeta_B
 
 
 @_law
 def e1(Fr: Real, mu: Real, lambda_s: Real) -> Real:
-    """Left side of `e1`: a2 - 6 a0 at chi_B, chi_H, zeta_B, zeta_H = 1.19, 1.02, -0.4, -0.2, omega0 = -1."""
+    """Left side of `e1`: a2 - 6 a0 at chi_B, chi_H, zeta_B, zeta_H = 1.19, 1.02, -0.4, -0.2, omega0 = -1.
+
+    Example:
+        >>> bool(abs(tmsopt.laws.e1(2.337214017, 20.84626701, 0.8514403685)) < 1e-9)
+        True
+
+    More: docs/explanation/paper.md
+    """
     return -0.432 * _tan(lambda_s) - 0.0272 + 0.08 * Fr**2 + 0.004 * mu
 
 
 @_law
 def e2(mu: Real, lambda_s: Real) -> Real:
-    """Left side of `e2`: a4 - a0 for the geometry of `e1`."""
+    """Left side of `e2`: a4 - a0 for the geometry of `e1`.
+
+    Example:
+        >>> bool(abs(tmsopt.laws.e2(20.84626701, 0.8514403685)) < 1e-9)
+        True
+
+    More: docs/explanation/paper.md
+    """
     return 0.368 * _tan(lambda_s) - 0.02 * mu - 0.0032
 
 
 @_law
 def e3(Fr: Real, mu: Real, lambda_s: Real) -> Real:
-    """Left side of `e3`: p(-1) for the geometry of `e1`."""
+    """Left side of `e3`: p(-1) for the geometry of `e1`.
+
+    Example:
+        >>> bool(abs(tmsopt.laws.e3(2.337214017, 20.84626701, 0.8514403685)) < 1e-9)
+        True
+
+    More: docs/explanation/paper.md
+    """
     return 0.192 * _tan(lambda_s) - 0.0048 - 0.136 * Fr + 0.08 * Fr**2 - 0.016 * mu
 
 
@@ -262,6 +372,13 @@ def ep4(omega0: Real, zeta_B: Real, zeta_H: Real, chi_H: Real) -> tuple[EP4, EP4
     requires (chi_H - 1) (zeta_H - zeta_B) (|w01| - |omega0|) > 0. The second has mu < 0 always. Fr, mu and
     tan_lambda_s are nan where complex (possible for zeta_H > 0), at zeta_B = zeta_H (no EP4 exists), and at
     chi_H = 1, where omega0 must be `w01` and mu is free: use `ep4_chi_H_1`.
+
+    Example:
+        >>> bicycle, other = tmsopt.laws.ep4(-1, -0.4, -0.2, 1.02)
+        >>> print(f"{bicycle.Fr:.9f} {bicycle.mu:.8f} {bicycle.lambda_s:.10f}", bool(other.mu < 0))
+        2.337214017 20.84626701 0.8514403685 True
+
+    More: docs/explanation/paper.md
     """
     # With u = zeta_H T - k the conditions leave a quadratic in u. Its discriminant looks like a difference
     # but is a sum of squares in y = -omega0^2 zeta_H, and S > 2: neither root cancels, however close they
@@ -293,13 +410,28 @@ def ep4(omega0: Real, zeta_B: Real, zeta_H: Real, chi_H: Real) -> tuple[EP4, EP4
 
 @_law
 def Frc1(chi_B: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
-    """Square of the critical Froude number for chi_H = 1; negative where `flus` is. Equation `Frc1`."""
+    """Square of the critical Froude number for chi_H = 1; negative where `flus` is. Equation `Frc1`.
+
+    Example:
+        >>> square = tmsopt.laws.Frc1(2**0.5, -0.4, -0.2, tmsopt.laws.ep4_chi_H_1(-0.4, -0.2).lambda_s)
+        >>> print(f"{square**0.5:.8f} {(30 * 2**0.5 + 120) ** 0.5 / 8:.8f}")  # Table 1
+        1.59308274 1.59308274
+
+    More: docs/explanation/paper.md
+    """
     return (zeta_B - zeta_H) / (zeta_B - chi_B * zeta_H) * chi_B / (chi_B - 1) * _tan(lambda_s)
 
 
 @_law
 def chibm(zeta_B: Real, zeta_H: Real) -> Real:
-    """chi_B that minimises `Frc1` between its poles chi_B = 1 and zeta_B/zeta_H. Equation `chibm`."""
+    """chi_B that minimises `Frc1` between its poles chi_B = 1 and zeta_B/zeta_H. Equation `chibm`.
+
+    Example:
+        >>> print(f"{tmsopt.laws.chibm(-0.4, -0.2):.8f}")  # the square root of 2
+        1.41421356
+
+    More: docs/explanation/paper.md
+    """
     return _sqrt(zeta_B / zeta_H)
 
 
@@ -308,6 +440,13 @@ def frm(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
     """The least critical Froude number over chi_B (not its square), at `chibm`. Equation `frm`.
 
     nan unless |zeta_B| > |zeta_H| and lambda_s >= 0, or both reversed.
+
+    Example:
+        >>> tilt = tmsopt.laws.ep4_chi_H_1(-0.4, -0.2).lambda_s
+        >>> print(f"{tmsopt.laws.frm(-0.4, -0.2, tilt - 0.05):.6f} {tmsopt.laws.frm(-0.4, -0.2, tilt + 0.80):.6f}")
+        1.482682 3.934332
+
+    More: docs/explanation/paper.md
     """
     b, h = _sqrt(np.abs(zeta_B)), _sqrt(np.abs(zeta_H))
     return _sqrt((b + h) / (b - h) * _tan(lambda_s))
@@ -315,19 +454,40 @@ def frm(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
 
 @_law
 def w01(zeta_B: Real, zeta_H: Real) -> Real:
-    """The four-fold root -(zeta_B zeta_H)^(-1/4), also the bound `w0`, for chi_H = 1. Equation `w01`."""
+    """The four-fold root -(zeta_B zeta_H)^(-1/4), also the bound `w0`, for chi_H = 1. Equation `w01`.
+
+    Example:
+        >>> print(f"{tmsopt.laws.w01(-0.4, -0.2):.8f} {-(5**0.5) / 2**0.25:.8f}")  # Table 1
+        -1.88030155 -1.88030155
+
+    More: docs/explanation/paper.md
+    """
     return -_sqrt(_sqrt(1 / (zeta_B * zeta_H)))
 
 
 @_law
 def chib1(zeta_B: Real, zeta_H: Real) -> Real:
-    """chi_B at EP4 and on the EP set; the same value as `chibm`. Equation `chib1`."""
+    """chi_B at EP4 and on the EP set; the same value as `chibm`. Equation `chib1`.
+
+    Example:
+        >>> print(f"{tmsopt.laws.chib1(-1.158, -0.526):.3f}")  # the machine that was built has 1.526
+        1.484
+
+    More: docs/explanation/paper.md
+    """
     return _sqrt(zeta_B / zeta_H)
 
 
 @_law
 def tls(zeta_B: Real, zeta_H: Real) -> Real:
-    """tan(lambda_s) at EP4, as printed, not lambda_s; negative for |zeta_B| < |zeta_H|. Equation `tls`."""
+    """tan(lambda_s) at EP4, as printed, not lambda_s; negative for |zeta_B| < |zeta_H|. Equation `tls`.
+
+    Example:
+        >>> print(f"{tmsopt.laws.tls(-0.4, -0.2):.8f} {15 / 4 - 75 / 32 * 2**0.5:.8f}")
+        0.43543696 0.43543696
+
+    More: docs/explanation/paper.md
+    """
     w2 = w01(zeta_B, zeta_H) ** 2
     total = (zeta_B + zeta_H) * w2
     return w2 * (zeta_B - zeta_H) / (16 * zeta_H) * (total - 6) / (total - 2)
@@ -339,6 +499,13 @@ def frep4(zeta_B: Real, zeta_H: Real) -> tuple[Real, Real]:
 
     tan(lambda_s) in it is `tls`. The true root is positive; the spurious one, no EP4, is never positive:
     -(r - 1)^2 |omega0| / (4 (r + 1)).
+
+    Example:
+        >>> true, spurious = tmsopt.laws.frep4(-0.4, -0.2)
+        >>> print(f"{true:.8f} {3 / 8 * (110 * 2**0.5 - 120) ** 0.5:.8f}", bool(spurious < 0))
+        2.23631752 2.23631752 True
+
+    More: docs/explanation/paper.md
     """
     w = w01(zeta_B, zeta_H)
     a, half_b, c = w**2 * zeta_B - 1, w**3 * zeta_B, -(w**2 * zeta_B + 1) * tls(zeta_B, zeta_H)
@@ -352,6 +519,13 @@ def epset(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
 
     nan unless tan(lambda_s) (r + 1)/(r - 1) > r/(4 h), which is its pole. The double roots are real (2EP2)
     for |tan(lambda_s)| below |`tls`| and complex (CEP2) above.
+
+    Example:
+        >>> tilt = tmsopt.laws.ep4_chi_H_1(-0.4, -0.2).lambda_s
+        >>> print(f"{tmsopt.laws.epset(-0.4, -0.2, tilt - 0.05):.6f} {tmsopt.laws.epset(-0.4, -0.2, tilt + 0.80):.6f}")
+        2.257421 4.103508
+
+    More: docs/how_to/tracing.md
     """
     w, T = w01(zeta_B, zeta_H), _tan(lambda_s)
     ratio = (w**2 * zeta_B - 1) / (w**2 * zeta_B + 1)
@@ -364,6 +538,12 @@ def dp(zeta_B: Real, zeta_H: Real) -> tuple[Real, Real]:
 
     The printed range 0 < tan(lambda_s) <= bound is empty for |zeta_B| < |zeta_H|; by `dual` the range there
     is bound <= tan(lambda_s) < 0.
+
+    Example:
+        >>> tmsopt.laws.dp(-0.4, -0.2) == (tmsopt.laws.chib1(-0.4, -0.2), tmsopt.laws.tls(-0.4, -0.2))
+        True
+
+    More: docs/explanation/paper.md
     """
     return chib1(zeta_B, zeta_H), tls(zeta_B, zeta_H)
 
@@ -373,7 +553,15 @@ def dp(zeta_B: Real, zeta_H: Real) -> tuple[Real, Real]:
 
 @_law
 def ep4_chi_H_1(zeta_B: Real, zeta_H: Real) -> EP4:
-    """The EP4 for chi_H = 1 in compact form; mu is nan, as any mass ratio serves. nan at zeta_B = zeta_H."""
+    """The EP4 for chi_H = 1 in compact form; mu is nan, as any mass ratio serves. nan at zeta_B = zeta_H.
+
+    Example:
+        >>> design = tmsopt.laws.ep4_chi_H_1(-0.4, -0.2)
+        >>> print(f"{design.Fr:.8f} {design.tan_lambda_s:.8f}")
+        2.23631752 0.43543696
+
+    More: docs/explanation/paper.md
+    """
     r, h = _sqrt(zeta_B / zeta_H), _sqrt(zeta_B * zeta_H)
     step = np.where(r == 1, np.nan, (r**2 + 6 * r + 1) / (r + 1))[()]  # r = 1 has a1 = a3 = 0, so no EP4
     return EP4(-1 / _sqrt(h), r, (r - 1) * step / (16 * h), step / (4 * _sqrt(h)), np.nan * r)
@@ -381,7 +569,14 @@ def ep4_chi_H_1(zeta_B: Real, zeta_H: Real) -> EP4:
 
 @_law
 def Fr_c2_chi_H_1(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
-    """Square of the critical Froude number for chi_H = 1 and chi_B = `chib1`; it is `frm` squared."""
+    """Square of the critical Froude number for chi_H = 1 and chi_B = `chib1`; it is `frm` squared.
+
+    Example:
+        >>> print(f"{tmsopt.laws.Fr_c2_chi_H_1(-0.4, -0.2, 0.3):.8f} {tmsopt.laws.frm(-0.4, -0.2, 0.3) ** 2:.8f}")
+        1.80294379 1.80294379
+
+    More: docs/explanation/paper.md
+    """
     r = _sqrt(zeta_B / zeta_H)
     return _tan(lambda_s) * (r + 1) / (r - 1)
 
@@ -392,6 +587,14 @@ def dual(Fr: Real, chi_B: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> d
 
     It exchanges the heights of the masses and the sign of lambda_s, and so maps the two classes of stable
     bicycles onto each other. Pass it to `copo` with chi_H = 1 and any mu.
+
+    Example:
+        >>> bicycle = dict(Fr=2, chi_B=1.4, zeta_B=-0.4, zeta_H=-0.2, lambda_s=0.3)
+        >>> a, b = (tmsopt.laws.copo(mu=1, chi_H=1, **d) for d in (bicycle, tmsopt.laws.dual(**bicycle)))
+        >>> bool(abs(b / b[0] - a / a[0]).max() < 1e-12)  # the same coefficients up to a factor
+        True
+
+    More: docs/explanation/paper.md
     """
     tilt: Real = np.arctan(-_tan(lambda_s) / chi_B**2)
     return {"Fr": Fr / chi_B, "chi_B": 1 / chi_B, "zeta_B": zeta_H, "zeta_H": zeta_B, "lambda_s": tilt}
