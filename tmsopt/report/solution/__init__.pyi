@@ -3,10 +3,12 @@ from .design import (
     si_parameters as si_parameters,
 )
 from .explanation import (
-    diagnosis_lines as diagnosis_lines, explained_lines as explained_lines, nearest_table as nearest_table,
-    optimality_lines as optimality_lines, robustness_line as robustness_line, robustness_table as robustness_table,
+    diagnosis_lines as diagnosis_lines, explained_lines as explained_lines, optimality_lines as optimality_lines,
     rounding_line as rounding_line,
 )
 from .findings import Findings as Findings, findings as findings
 from .infeasible import infeasible_lines as infeasible_lines
+from .robustness import (
+    nearest_table as nearest_table, robustness_line as robustness_line, robustness_table as robustness_table,
+)
 from .rows import parameter_rows as parameter_rows, quantity_rows as quantity_rows

@@ -10,17 +10,11 @@ from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import limit_text, unit_of
 from tmsopt.explanation import Lever
 from tmsopt.models import GRAVITY, tms, to_si
-from tmsopt.report.solution.explanation import (
-    diagnosis_lines,
-    optimality_lines,
-    robustness_line,
-    robustness_table,
-    rounding_line,
-    rounding_rows,
-)
+from tmsopt.report.solution.explanation import diagnosis_lines, optimality_lines, rounding_line, rounding_rows
 from tmsopt.report.solution.findings import Findings
 from tmsopt.report.solution.infeasible import infeasible_lines
 from tmsopt.report.solution.limits import bound_lines, case_lines, proof_line
+from tmsopt.report.solution.robustness import robustness_line, robustness_table
 from tmsopt.report.solution.rows import (
     ALL,
     NOTHING,

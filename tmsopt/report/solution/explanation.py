@@ -1,31 +1,18 @@
-"""What an optimum means, how its multiple roots split, and how far its boundaries are, as lines for a reader."""
+"""What an optimum means and how its multiple roots split, as lines for a reader."""
 
 import math
 from collections.abc import Sequence
 
-from tmsopt.design.unit_system import unit_of
 from tmsopt.diagnosis.diagnosis import Diagnosis
 from tmsopt.diagnosis.splitting import DEVIATION, Law, Response
 from tmsopt.explanation.explain import Explanation
 from tmsopt.explanation.optimality import NOT_COVERED, OnLine, Optimality
 from tmsopt.explanation.rounding import ALONE, Rounded
-from tmsopt.margins.nearest import Nearest, Robustness
-from tmsopt.models import Model, in_words_of, words_of
 from tmsopt.report.text import columns, number
 
 _SHARE, _LIMIT, _NIL = 0.05, 0.01, 1e-9
 """Of decay and objective, and of the sizes of limits: what rounding may cost; what is nothing."""
-_MAIN = 0.5
-"""Share of the largest change above which a parameter is named in the headline."""
-_WIDE = 12
-"""Parameters up to which each has a column; of more, each has a row."""
 _MULTIPLIERS = "what it costs, per unit, to change a root on the rightmost line"
-_LITTLE = 1e-3
-"""Share of the largest change below which one is 0."""
-_NAMED = 3
-"""Parameters named in the headline at most."""
-_VERBS = {"divergence": "diverge"}
-"""Of words that are no verbs."""
 _ROUNDING, _ROUNDED = 1e-16, 1e-13
 
 
@@ -203,106 +190,3 @@ def _diagnosis_row(response: Response, law: Law) -> tuple[str, ...]:
 
 def _change(response: Response) -> str:
     return "relative" if response.relative else "absolute"
-
-
-def robustness_line(found: Robustness) -> str:
-    """In one line: how large a change ends stability, or brings it, how, and by which parameters mostly."""
-    if found.edges:
-        on = " and ".join(_ON_EDGE[kind] for kind in found.edges)
-        if found.zeros:
-            return f"at its edge already: {', '.join(f'{n} = 0' for n in found.zeros)} ({on})"
-        return f"none, on the edge of stability already, with {on}"
-    limit = found.limit
-    if not limit.found:
-        return f"{'' if found.stable else 'not stable; '}no change that was looked at makes it {_other(found)}"
-    if not found.stable:
-        return f"not stable; {_size(found)} makes it stable{_mostly(limit, found.relative)}"
-    return f"{_size(found)} {_event(found.problem.model, limit.kind)}{_mostly(limit, found.relative)}"
-
-
-_ON_EDGE = {"weave": "a pair of roots on the imaginary axis", "capsize": "a root 0", "infinity": "a root at infinity"}
-
-
-def _other(found: Robustness) -> str:
-    return "unstable" if found.stable else "stable"
-
-
-def _event(model: Model, kind: str) -> str:
-    if kind == "infinity":
-        return "takes a root through infinity (a0 = 0)"
-    word = words_of(model)[kind]
-    return f"makes it {_VERBS.get(word, word)}"
-
-
-def robustness_table(found: Robustness) -> str:
-    """The sentence, then the nearest point of every boundary: its distance and the change of each parameter."""
-    names = list(found.weights)
-    kinds = (found.weave, found.capsize, found.infinity, found.heavy_damping)
-    rows: list[tuple[str, ...]] = [("relative changes" if found.relative else "changes in weights", "distance", *names)]
-    for n in kinds:
-        moves = _moves(n, found.relative) if n.found and n.distance else ["" for _ in names]
-        rows.append((_robust_row(n, found), _distance(n, found), *moves))
-    units = {name: unit_of(found.problem, name) for name in names}
-    rows.append(("weight", "", *(units[name].show(found.weights[name], 6) for name in names)))
-    for n in kinds:
-        if n.found and n.distance > 0:
-            at = "at" if n.kind == "infinity" else "with"
-            word = in_words_of(found.problem.model, n.kind)
-            rows.append((f"{at} {word}", "", *(units[name].show(n.parameters[name], 8) for name in names)))
-    if len(names) > _WIDE:
-        rows = list(zip(*rows, strict=True))
-    return "\n".join(line.rstrip() for line in [f"robustness: {robustness_line(found)}", "", *columns(rows)])
-
-
-def nearest_table(found: Nearest) -> str:
-    """How far one boundary is, then the nearest point and the change of each parameter in weights."""
-    if not found.found:
-        return f"no point of the boundary of {found.kind} was found"
-    lines = [f"to {found.kind}: {found.distance:.6g} in weights"]
-    if not found.refined:
-        lines[0] += ", the nearest crossing seen"
-    rows = [("", "there", "change in weights")]
-    rows += [(n, f"{found.parameters[n]:.8g}", f"{change:+.4g}") for n, change in found.direction.items()]
-    return "\n".join(line.rstrip() for line in [*lines, "", *columns(rows)])
-
-
-def _robust_row(n: Nearest, found: Robustness) -> str:
-    to = "at the edge of" if n.distance == 0 else "to"
-    if n.kind != "heavy damping":
-        return f"{to} {in_words_of(found.problem.model, n.kind)}"
-    return f"{to} {n.kind}" if n.distance == 0 else f"{'out of' if found.heavily_damped else 'into'} {n.kind}"
-
-
-def _distance(n: Nearest, found: Robustness) -> str:
-    if not n.found:
-        return "none found"
-    if n.distance == 0:
-        return ""
-    return _percent(n.distance) if found.relative else f"{n.distance:.4g}"
-
-
-def _moves(n: Nearest, relative: bool) -> list[str]:
-    """The change of each parameter; 0 for what is too little to matter."""
-    largest = max(map(abs, n.direction.values()))
-    shown = (x if abs(x) >= _LITTLE * largest else 0.0 for x in n.direction.values())
-    return ["0" if x == 0 else _percent(x, "+") if relative else f"{x:+.3g}" for x in shown]
-
-
-def _mostly(limit: Nearest, relative: bool) -> str:
-    """The parameters that change most."""
-    changes = sorted(limit.direction.items(), key=lambda item: -abs(item[1]))
-    largest = abs(changes[0][1])
-    named = [n for n, x in changes if largest > 0 and abs(x) >= _MAIN * largest]
-    return f", mostly {', '.join(named[:_NAMED])}" if named and len(changes) > 1 else ""
-
-
-def _size(found: Robustness) -> str:
-    if found.relative:
-        return f"{_percent(found.limit.distance)} of change"
-    return f"a change of {found.limit.distance:.2g} in {'your' if found.problem.weights else 'the'} weights"
-
-
-def _percent(x: float, sign: str = "") -> str:
-    """Two significant digits at least."""
-    digits = 1 if x == 0 else max(1 - math.floor(math.log10(abs(100 * x))), 0)
-    return f"{100 * x:{sign}.{digits}f} %"
