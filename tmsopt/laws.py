@@ -156,7 +156,7 @@ def flus(mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_
         >>> print(f"{(9.81 * square) ** 0.5:.6f} m/s")  # the benchmark
         2.841008 m/s
 
-    More: docs/explanation/paper.md
+    More: docs/explanation/weave_and_capsize.md
     """
     T, k, skew = _tan(lambda_s), chi_H - 1, zeta_B * chi_H - zeta_H * chi_B
     return (
@@ -174,7 +174,7 @@ def Fr_c(mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_
         >>> print(f"{tmsopt.laws.Fr_c(0.1, 1.2, 1.02, -0.4, -0.2, tmsopt.laws.bench['lambda_s']):.6f}")
         0.907064
 
-    More: docs/explanation/paper.md
+    More: docs/explanation/weave_and_capsize.md
     """
     return _sqrt(flus(mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s))
 
@@ -194,7 +194,7 @@ def lscf(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Rea
         >>> [tmsopt.laws.lscf(Fr, *benchmark).tolist() for Fr in (0.90, 0.91)]
         [[True, True, True, True, False], [True, True, True, True, True]]
 
-    More: docs/explanation/paper.md
+    More: docs/explanation/weave_and_capsize.md
     """
     T, critical = _tan(lambda_s), Fr_c(mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s)
     conditions = (
@@ -219,7 +219,7 @@ def lscf_complete(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, ze
         >>> bool(tmsopt.laws.lscf(*counterexample).all()), bool(tmsopt.laws.lscf_complete(*counterexample))
         (True, False)
 
-    More: docs/explanation/paper.md
+    More: docs/explanation/weave_and_capsize.md
     """
     a = copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s)
     a0, a1, a2, a3, a4 = a * np.sign(a[0])
@@ -239,7 +239,7 @@ class EP4(NamedTuple):
         >>> print(f"{design.chi_B:.6f} {design.lambda_s:.6f} {design.mu}")
         1.414214 0.410678 nan
 
-    More: docs/explanation/paper.md
+    More: docs/explanation/exceptional_points.md
     """
 
     omega0: Real
@@ -263,7 +263,7 @@ def w0(mu: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Rea
         >>> print(f"{tmsopt.laws.w0(0.1, 1, -0.4, -0.2, 0.3):.8f} {-(0.4 * 0.2) ** -0.25:.8f}")
         -1.88030155 -1.88030155
 
-    More: docs/explanation/factors.md
+    More: docs/explanation/exceptional_points.md
     """
     T, k = _tan(lambda_s), chi_H - 1
     return -_sqrt(_sqrt((zeta_B * T + mu * k) / (zeta_H * T - k) / zeta_B**2))
@@ -277,7 +277,7 @@ def poly4(omega0: Real) -> Array:
         >>> tmsopt.laws.poly4(-1)
         array([1., 4., 6., 4., 1.])
 
-    More: docs/explanation/factors.md
+    More: docs/explanation/exceptional_points.md
     """
     return _stack(omega0**0, -4 * omega0, 6 * omega0**2, -4 * omega0**3, omega0**4)
 
@@ -417,7 +417,7 @@ def Frc1(chi_B: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
         >>> print(f"{square**0.5:.8f} {(30 * 2**0.5 + 120) ** 0.5 / 8:.8f}")  # Table 1
         1.59308274 1.59308274
 
-    More: docs/explanation/paper.md
+    More: docs/explanation/weave_and_capsize.md
     """
     return (zeta_B - zeta_H) / (zeta_B - chi_B * zeta_H) * chi_B / (chi_B - 1) * _tan(lambda_s)
 
@@ -446,7 +446,7 @@ def frm(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
         >>> print(f"{tmsopt.laws.frm(-0.4, -0.2, tilt - 0.05):.6f} {tmsopt.laws.frm(-0.4, -0.2, tilt + 0.80):.6f}")
         1.482682 3.934332
 
-    More: docs/explanation/paper.md
+    More: docs/explanation/weave_and_capsize.md
     """
     b, h = _sqrt(np.abs(zeta_B)), _sqrt(np.abs(zeta_H))
     return _sqrt((b + h) / (b - h) * _tan(lambda_s))
@@ -460,7 +460,7 @@ def w01(zeta_B: Real, zeta_H: Real) -> Real:
         >>> print(f"{tmsopt.laws.w01(-0.4, -0.2):.8f} {-(5**0.5) / 2**0.25:.8f}")  # Table 1
         -1.88030155 -1.88030155
 
-    More: docs/explanation/paper.md
+    More: docs/explanation/exceptional_points.md
     """
     return -_sqrt(_sqrt(1 / (zeta_B * zeta_H)))
 
@@ -525,7 +525,7 @@ def epset(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
         >>> print(f"{tmsopt.laws.epset(-0.4, -0.2, tilt - 0.05):.6f} {tmsopt.laws.epset(-0.4, -0.2, tilt + 0.80):.6f}")
         2.257421 4.103508
 
-    More: docs/how_to/tracing.md
+    More: docs/explanation/exceptional_points.md
     """
     w, T = w01(zeta_B, zeta_H), _tan(lambda_s)
     ratio = (w**2 * zeta_B - 1) / (w**2 * zeta_B + 1)
@@ -575,7 +575,7 @@ def Fr_c2_chi_H_1(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
         >>> print(f"{tmsopt.laws.Fr_c2_chi_H_1(-0.4, -0.2, 0.3):.8f} {tmsopt.laws.frm(-0.4, -0.2, 0.3) ** 2:.8f}")
         1.80294379 1.80294379
 
-    More: docs/explanation/paper.md
+    More: docs/explanation/weave_and_capsize.md
     """
     r = _sqrt(zeta_B / zeta_H)
     return _tan(lambda_s) * (r + 1) / (r - 1)

@@ -23,6 +23,13 @@ def draw_bicycle(data: Sketch | Solution, ax: Axes | None = None) -> Axes:
     """A two-mass-skate bicycle to scale.
 
     The Axes show its side in wheelbases, z down, with dimension lines, speed, gravity, lean φ and steer δ.
+
+    Example:
+        >>> axes = tmsopt.plots.draw_bicycle(tmsopt.solve("problems/benchmark.toml"))
+        >>> {"steer axis", "$m_B$", "$m_H$", "$w$", "$x_B$", "$z_B$"} <= {text.get_text() for text in axes.texts}
+        True
+
+    More: docs/tutorials/first_bicycle.md
     """
     data = data if isinstance(data, Sketch) else sketch(data.dimensionless)
     ax = on_axes(ax, 6.4, 4.1)
@@ -42,7 +49,17 @@ def draw_bicycle(data: Sketch | Solution, ax: Axes | None = None) -> Axes:
 
 
 def draw_distance(data: Sketch, ax: Axes | None = None) -> Axes:
-    """The distance u_H = ν_H w of H from the steer axis; the Axes show an enlargement around H and the contact."""
+    """The distance u_H = ν_H w of H from the steer axis; the Axes show an enlargement around H and the contact.
+
+    Example:
+        >>> from tmsopt.paper import sketch
+        >>> design = tmsopt.solve("problems/benchmark.toml")
+        >>> axes = tmsopt.plots.draw_distance(sketch(design.dimensionless))
+        >>> f"{design.quantities['nu_H']:.4f}" in axes.texts[1].get_text()
+        True
+
+    More: docs/tutorials/first_bicycle.md
+    """
     ax = on_axes(ax, 3.4, 3.4)
     span = np.array([data.front, data.H, data.foot])
     middle, half = (span.max(axis=0) + span.min(axis=0)) / 2, 0.85 * float(np.ptp(span, axis=0).max())

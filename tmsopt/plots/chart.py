@@ -128,6 +128,13 @@ def draw_domain(
 
     The Axes show a plane of two parameters, by default the first two that vary along the boundaries; in the units of a
     problem where one is given, else in SI and rad.
+
+    Example:
+        >>> axes = tmsopt.plots.draw_domain(tmsopt.domain("problems/chart.toml"))
+        >>> [text.get_text() for text in axes.texts], axes.get_xlabel(), axes.get_ylabel()
+        (['EP4'], 'Fr', 'lambda_s')
+
+    More: docs/how_to/charts.md
     """
     arcs = (*data.stability, *data.heavy_damping, *data.parting)
     varying = [n for n in (arcs[0].points if arcs else ()) if any(np.ptp(a.points[n]) > 0 for a in arcs)]
@@ -155,6 +162,14 @@ def draw_chart(
 
     Raises:
         InputError: for a chart over three parameters, or a layer that it does not have.
+
+    Example:
+        >>> chart = tmsopt.chart("problems/chart.toml", points=(20, 20))
+        >>> axes = tmsopt.plots.draw_chart(chart, design=tmsopt.solve("problems/ep4.toml"))
+        >>> [text.get_text() for text in axes.texts]  # the design stands at the corner of heavy damping
+        ['EP4, design']
+
+    More: docs/how_to/charts.md
     """
     plane = plane_of(data)
     if layer not in data.layers:
@@ -183,7 +198,15 @@ def draw_chart(
 
 
 def chart_figure(chart: Chart, layer: str = "kind", design: Solution | None = None) -> Figure:
-    """A chart in a figure of its own."""
+    """A chart in a figure of its own.
+
+    Example:
+        >>> figure = tmsopt.plots.chart_figure(tmsopt.chart("problems/chart.toml", points=(20, 20)))
+        >>> figure.axes[0].get_title()
+        'chi_H = 1, chi_B = sqrt(2)'
+
+    More: docs/how_to/charts.md
+    """
     return figure_of(draw_chart(chart, None, layer, design))
 
 

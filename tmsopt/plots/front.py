@@ -42,6 +42,15 @@ def draw_front(data: Front, ax: Axes | None = None) -> Axes:
 
     The Axes show the first two objectives, in the units of the file: points by the structure of their roots; those that
     are not stable are hollow with a ring, and the curve is dashed along them; kinks and ends have names.
+
+    Example:
+        >>> oscillator = tmsopt.models.from_matrices([[1]], [["c"]], [[1]])  # x'' + c x' + x = 0
+        >>> problem = tmsopt.Problem(model=oscillator, free={"c": (0.1, 4)}, pareto=["abscissa", "c"])
+        >>> axes = tmsopt.plots.draw_front(tmsopt.pareto(problem, points=2))
+        >>> [text.get_text() for text in axes.texts]
+        ['least abscissa', 'least c']
+
+    More: docs/how_to/fronts.md
     """
     drawn = on_axes(ax, 6.4, 5.0, data.problem.title or "Pareto front")
     scales = [scale_of(data.problem, text) for text in data.objectives]
@@ -54,7 +63,16 @@ def draw_front(data: Front, ax: Axes | None = None) -> Axes:
 
 
 def front_figure(front: Front) -> Figure:
-    """A front in a figure of its own."""
+    """A front in a figure of its own.
+
+    Example:
+        >>> oscillator = tmsopt.models.from_matrices([[1]], [["c"]], [[1]])  # x'' + c x' + x = 0
+        >>> problem = tmsopt.Problem(model=oscillator, free={"c": (0.1, 4)}, pareto=["abscissa", "c"])
+        >>> tmsopt.plots.front_figure(tmsopt.pareto(problem, points=2)).axes[0].get_ylabel()
+        '$c$'
+
+    More: docs/how_to/fronts.md
+    """
     return figure_of(draw_front(front))
 
 

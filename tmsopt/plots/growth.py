@@ -51,6 +51,13 @@ def draw_growth(data: Growth | Solution, ax: Axes | None = None) -> Axes:
     The Axes show Re s, in 1/s for a problem in SI, over the parameter in the unit of the problem's file: each mode with
     its name, bands of stability and heavy damping, lines at the values where a mode loses stability and at the
     design's own, all with their numbers in the legend, and circles where roots meet.
+
+    Example:
+        >>> axes = tmsopt.plots.draw_growth(tmsopt.growth("problems/benchmark.toml"))
+        >>> [label for label in axes.get_legend_handles_labels()[1] if "at" in label]
+        ['weave at 2.841 m/s', 'design at 4 m/s']
+
+    More: docs/explanation/weave_and_capsize.md
     """
     return _drawn(data, ax, "real")
 
@@ -59,12 +66,27 @@ def draw_frequencies(data: Growth | Solution, ax: Axes | None = None) -> Axes:
     """Frequencies of every oscillating mode, marked in the same way.
 
     The Axes show Im s, for a problem in SI as Hz, over the parameter in the unit of the problem's file.
+
+    Example:
+        >>> axes = tmsopt.plots.draw_frequencies(tmsopt.growth("problems/benchmark.toml"))
+        >>> [text.get_text() for text in axes.texts], axes.get_ylabel()  # the one mode that swings
+        (['weave'], 'frequency in Hz')
+
+    More: docs/explanation/weave_and_capsize.md
     """
     return _drawn(data, ax, "imag")
 
 
 def growth_figure(data: Growth | Solution, title: str = "", metres_per_second: float | None = None) -> Figure:
-    """Growth rates above frequencies; an upper axis shows the speed for Fr = 1 being `metres_per_second`."""
+    """Growth rates above frequencies; an upper axis shows the speed for Fr = 1 being `metres_per_second`.
+
+    Example:
+        >>> figure = tmsopt.plots.growth_figure(tmsopt.growth("problems/benchmark.toml"))
+        >>> [axes.get_ylabel() for axes in figure.axes]
+        ['growth rate in 1/s', 'frequency in Hz']
+
+    More: docs/explanation/weave_and_capsize.md
+    """
     data = growth(data) if isinstance(data, Solution) else data
     figure = new_figure(6.4, 6.8)
     upper, lower = figure.subplots(2, 1, sharex=True)

@@ -29,7 +29,15 @@ FROUDE = r"Froude number $\mathrm{Fr} = v/\sqrt{gw}$"
 
 @dataclass(frozen=True)
 class Name:
-    """A word for a marked point."""
+    """A word for a marked point.
+
+    Example:
+        >>> name = tmsopt.plots.Name("EP4", x=2.236, y=0.411)
+        >>> name.text, name.x, name.y
+        ('EP4', 2.236, 0.411)
+
+    More: docs/how_to/tracing.md
+    """
 
     text: str
     x: float
@@ -97,6 +105,15 @@ def place_names(ax: Axes, names: Sequence[Name]) -> None:
     """Write names beside their points, clear of curves, of one another and of the frame; limits must stand.
 
     Points that fall together share one label.
+
+    Example:
+        >>> axes = tmsopt.plots.new_figure(3, 3).subplots()  # from 0 to 1
+        >>> names = [tmsopt.plots.Name(text, x, 0.5) for text, x in (("EP4", 0.5), ("design", 0.5), ("outside", 2))]
+        >>> tmsopt.plots.place_names(axes, names)
+        >>> [text.get_text() for text in axes.texts]
+        ['EP4, design']
+
+    More: docs/how_to/tracing.md
     """
     low, high = np.array([ax.get_xlim(), ax.get_ylim()]).T
     merged: list[tuple[np.ndarray, list[str]]] = []

@@ -26,6 +26,13 @@ def draw_rounding(data: Explanation, ax: Axes | None = None) -> Axes:
 
     The Axes show by how much the abscissa changes, logarithmic, when all free parameters are rounded to so many digits
     and when one is alone: hatched where it falls, with what is violated.
+
+    Example:
+        >>> axes = tmsopt.plots.draw_rounding(tmsopt.explain("problems/ep4.toml"))
+        >>> [label.get_text() for label in axes.get_yticklabels()][:2]
+        ['all to 2 digits', 'all to 3 digits']
+
+    More: docs/how_to/report.md
     """
     own = ax is None
     rows = [(f"all to {row.digits} digits", row) for row in data.precision]
@@ -46,6 +53,13 @@ def draw_robustness(data: Robustness | Nearest, ax: Axes | None = None) -> Axes:
 
     The Axes show each parameter's part of it, in units of its weight (without weights in %); the title says how far the
     boundaries are.
+
+    Example:
+        >>> axes = tmsopt.plots.draw_robustness(tmsopt.robustness("problems/benchmark.toml"))
+        >>> axes.get_xlabel()  # the nearest boundary
+        'change towards a root at infinity in %'
+
+    More: docs/how_to/tolerances.md
     """
     own, relative = ax is None, False
     if isinstance(data, Robustness):
@@ -74,6 +88,14 @@ def draw_comparison(data: Comparison, ax: Axes | None = None) -> Axes:
     """The design beside the laws of the paper.
 
     The Axes show the relative difference from each law that applies, logarithmic, with the limit of what agrees.
+
+    Example:
+        >>> comparison = tmsopt.compare("problems/ep4.toml")
+        >>> axes = tmsopt.plots.draw_comparison(comparison)
+        >>> len(axes.patches) == sum(row.applies for row in comparison.laws)  # a bar for each
+        True
+
+    More: docs/explanation/paper.md
     """
     own = ax is None
     rows = [row for row in data.laws if row.applies]
@@ -87,7 +109,16 @@ def draw_comparison(data: Comparison, ax: Axes | None = None) -> Axes:
 
 
 def draw_ledger(data: Ledger, ax: Axes | None = None) -> Axes:
-    """How many claims of the paper have which verdict; the Axes show counts."""
+    """How many claims of the paper have which verdict; the Axes show counts.
+
+    Example:
+        >>> ledger = tmsopt.verify(only=["lscf-*"])
+        >>> axes = tmsopt.plots.draw_ledger(ledger)
+        >>> [int(text.get_text()) for text in axes.texts] == list(ledger.counts.values())
+        True
+
+    More: docs/explanation/paper.md
+    """
     own, counts = ax is None, data.counts
     ax = on_axes(ax, 6.0, 1.2 + 0.3 * len(counts), f"{len(data.entries)} claims of the paper")
     _bars(ax, list(counts), [float(n) for n in counts.values()])
@@ -103,6 +134,13 @@ def draw_designs(data: Every, ax: Axes | None = None) -> Axes:
 
     The Axes show them over the first two free parameters, in the units of the file (of one parameter, the abscissa over
     it): proved ones filled, each with its abscissa.
+
+    Example:
+        >>> axes = tmsopt.plots.draw_designs(tmsopt.solve_all("problems/optimised_benchmark.toml"))
+        >>> [text.get_text() for text in axes.texts]  # one design, and its abscissa
+        ['-1']
+
+    More: docs/how_to/all_designs.md
     """
     own = ax is None
     if not data.solutions:

@@ -21,6 +21,13 @@ def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> A
 
     The Axes show the complex plane, in 1/s for a problem in SI; its right half, where motion grows, is grey. The title
     of a proof says how narrow the proved balls are.
+
+    Example:
+        >>> axes = tmsopt.plots.draw_roots(tmsopt.solve("problems/ep4.toml"))
+        >>> [text.get_text() for text in axes.texts]
+        ['4-fold']
+
+    More: docs/explanation/exceptional_points.md
     """
     rate, unit = 1.0, ""
     if isinstance(data, Solution):
@@ -56,6 +63,14 @@ def draw_splitting(data: Diagnosis, ax: Axes | None = None) -> Axes:
 
     The Axes show the largest shift over the change ε, relative or for a parameter that is 0 absolute, both logarithmic:
     a line per parameter as far as the law holds, with its exponent.
+
+    Example:
+        >>> diagnosis, = tmsopt.diagnose(tmsopt.solve("problems/ep4.toml"))
+        >>> axes = tmsopt.plots.draw_splitting(diagnosis)
+        >>> axes.get_title(), ["1/4" in line.get_label() for line in axes.lines] == [True] * len(axes.lines)
+        ('4-fold root at -1.8803, defective', True)
+
+    More: docs/explanation/exceptional_points.md
     """
     own = ax is None
     place = f"pair at {data.re:.5g} ± {data.im:.5g}i" if data.im else f"root at {data.re:.5g}"

@@ -26,6 +26,14 @@ def draw_histogram(data: Results, ax: Axes | None = None) -> Axes:
     Of a Monte Carlo study the Axes show how many designs have which abscissa, or for a problem in SI which decay rate
     in 1/s, stable ones apart from the others, with the nominal design and 0 marked and the share of stable ones in the
     title. Of another study they show the objective over what varies first, coloured by what varies next.
+
+    Example:
+        >>> study = tmsopt.monte_carlo("problems/benchmark.toml", rows=16, tolerances={"lambda_s": 0.001})
+        >>> axes = tmsopt.plots.draw_histogram(tmsopt.run_study(study, workers=1))
+        >>> axes.get_title().splitlines()[1]
+        '16 of 16 stable (100 %)'
+
+    More: docs/tutorials/study.md
     """
     drawn = on_axes(ax, 6.4, 4.2)
     title = data.study.title or data.study.problem.title

@@ -24,7 +24,15 @@ _TITLE = 11
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure, sizes in inches, that needs no display."""
+    """An empty figure, sizes in inches, that needs no display.
+
+    Example:
+        >>> figure = tmsopt.plots.new_figure(6.4, 4.8)
+        >>> figure.axes, figure.get_size_inches().tolist()
+        ([], [6.4, 4.8])
+
+    More: docs/reference/python.md
+    """
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
@@ -58,6 +66,16 @@ def save(drawn_on: Figure | Axes, path: str | PathLike[str]) -> None:
 
     Raises:
         OSError: when the file cannot be written.
+
+    Example:
+        >>> import pathlib, tempfile
+        >>> axes = tmsopt.plots.draw_speeds(tmsopt.speeds("problems/benchmark.toml"))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     tmsopt.plots.save(axes, pathlib.Path(folder, "speeds.svg"))
+        ...     pathlib.Path(folder, "speeds.svg").read_text(encoding="utf-8")[:5]
+        '<?xml'
+
+    More: docs/reference/python.md
     """
     path = path_of(path, "the file to write")
     figure = figure_of(drawn_on) if isinstance(drawn_on, Axes) else drawn_on

@@ -29,6 +29,13 @@ def draw_trace(
 
     The Axes show each branch as a line by its pattern (complex ones dashed, dotted where a constraint is violated) on a
     band coloured by the abscissa, narrow where unstable; events by name; parameters in the units of the file.
+
+    Example:
+        >>> axes = tmsopt.plots.draw_trace(tmsopt.trace("problems/ep_set.toml"))
+        >>> [text.get_text() for text in axes.texts], axes.get_legend_handles_labels()[1]
+        (['EP4'], ['CEP2', '2EP2'])
+
+    More: docs/how_to/tracing.md
     """
     first, second, *_ = [*(n for n in (horizontal, vertical) if n), *data.varying, *data.problem.free]
     plane = scale_of(data.problem, first), scale_of(data.problem, second)
@@ -72,7 +79,15 @@ def colour(kind: str) -> str:
 
 
 def trace_figure(trace: Trace, horizontal: str | None = None, vertical: str | None = None) -> Figure:
-    """All branches of a trace in one plane."""
+    """All branches of a trace in one plane.
+
+    Example:
+        >>> figure = tmsopt.plots.trace_figure(tmsopt.trace("problems/ep_set.toml"), "lambda_s", "Fr")
+        >>> figure.axes[0].get_xlabel().endswith("in deg"), "Fr" in figure.axes[0].get_ylabel()
+        (True, True)
+
+    More: docs/how_to/tracing.md
+    """
     return figure_of(draw_trace(trace, None, horizontal, vertical))
 
 

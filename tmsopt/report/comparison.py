@@ -10,7 +10,15 @@ from tmsopt.report.text import WIDTH, columns, number
 
 
 def comparison_table(comparison: Comparison) -> str:
-    """Law beside number where laws are known, then the two formulations beside each other."""
+    """Law beside number where laws are known, then the two formulations beside each other.
+
+    Example:
+        >>> comparison = tmsopt.compare(tmsopt.solve("problems/ep4.toml"))
+        >>> [line.split()[-1] for line in tmsopt.report.comparison_table(comparison).splitlines() if "tls" in line]
+        ['agrees']
+
+    More: docs/explanation/paper.md
+    """
     design = comparison.design
     lines = [design.problem.title or "untitled problem", *headline(design), ""]
     rows = [("law", "of", "numeric", "law says", "relative", "")]

@@ -21,7 +21,15 @@ _FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belon
 
 
 def chart_table(chart: Chart) -> str:
-    """Shares of the classes, the best grid point, and the boundaries with their corners of a plane in memory."""
+    """Shares of the classes, the best grid point, and the boundaries with their corners of a plane in memory.
+
+    Example:
+        >>> chart = tmsopt.chart("problems/chart.toml", points=(20, 20))
+        >>> print(tmsopt.report.chart_table(chart).splitlines()[1])
+        20 × 20 designs over Fr and lambda_s
+
+    More: docs/how_to/charts.md
+    """
     data: dict[str, Any] = chart.to_json()
     model = chart.problem.model
     if chart.path is not None or len(chart.axes) != 2:
@@ -42,7 +50,16 @@ def chart_table(chart: Chart) -> str:
 
 
 def domain_table(domain: Domain, problem: Problem | None = None) -> str:
-    """What bounds stability and heavy damping, and the corners, in the units of the problem where it is known."""
+    """What bounds stability and heavy damping, and the corners, in the units of the problem where it is known.
+
+    Example:
+        >>> print(tmsopt.report.domain_table(tmsopt.domain("problems/chart.toml")))
+        stability is bounded by weave (... points)
+        heavy damping is bounded by EP2 (2 curves, ... points)
+        ...
+
+    More: docs/how_to/charts.md
+    """
     lines, model = [], problem.model if problem else None
     for name, arcs in (("stability", domain.stability), ("heavy damping", domain.heavy_damping)):
         points: dict[str, list[int]] = {}
@@ -60,7 +77,14 @@ def _curves(sizes: Sequence[int]) -> str:
 
 
 def corner_rows(domain: Domain, problem: Problem | None = None) -> list[tuple[str, ...]]:
-    """Headings, and the cells of each corner, to all digits."""
+    """Headings, and the cells of each corner, to all digits.
+
+    Example:
+        >>> tmsopt.report.corner_rows(tmsopt.domain("problems/chart.toml"))
+        [('corner', 'Fr', 'lambda_s'), ('EP4', '2.23631751...', '0.41067753...')]
+
+    More: docs/how_to/charts.md
+    """
     model = problem.model if problem else None
     names = list(domain.corners[0].parameters) if domain.corners else []
     names = [n for n in names if any(n in arc.points for arc in (*domain.stability, *domain.heavy_damping))]
@@ -72,7 +96,15 @@ def corner_rows(domain: Domain, problem: Problem | None = None) -> list[tuple[st
 
 
 def swallowtail_table(found: Swallowtail) -> str:
-    """Pieces of the surface, then its edges as traces."""
+    """Pieces of the surface, then its edges as traces.
+
+    Example:
+        >>> surface = tmsopt.swallowtail("problems/ep_set.toml", rows=4, across=3, starts=4)
+        >>> print(tmsopt.report.swallowtail_table(surface).splitlines()[2])
+        cuspidal edges: EP3: 1 branch, ...
+
+    More: docs/explanation/exceptional_points.md
+    """
     problem = found.problem
     damped = sum(patch.heavily_damped for patch in found.patches)
     lines = [
@@ -117,6 +149,14 @@ def front_table(front: Front, full: bool = False) -> str:
 
     Args:
         full: every point, with all its digits.
+
+    Example:
+        >>> oscillator = tmsopt.models.from_matrices([[1]], [["c"]], [[1]])  # x'' + c x' + x = 0
+        >>> problem = tmsopt.Problem(model=oscillator, free={"c": (0.1, 4)}, pareto=["abscissa", "c"])
+        >>> print(tmsopt.report.front_table(tmsopt.pareto(problem, points=2)).splitlines()[-1])
+          -0.05 0.1 yes least c pair c.min
+
+    More: docs/how_to/fronts.md
     """
     problem = front.problem
     texts = [t.strip() for t in front.objectives]
@@ -139,7 +179,16 @@ def front_table(front: Front, full: bool = False) -> str:
 
 
 def front_rows(front: Front, full: bool = False) -> list[tuple[str, ...]]:
-    """Headings, and the cells of each point; all digits and whole labels where it is `full`."""
+    """Headings, and the cells of each point; all digits and whole labels where it is `full`.
+
+    Example:
+        >>> oscillator = tmsopt.models.from_matrices([[1]], [["c"]], [[1]])  # x'' + c x' + x = 0
+        >>> problem = tmsopt.Problem(model=oscillator, free={"c": (0.1, 4)}, pareto=["abscissa", "c"])
+        >>> tmsopt.report.front_rows(tmsopt.pareto(problem, points=2))[1]  # critical damping
+        ('-1', '2', 'yes', 'least abscissa', 'EP2', '')
+
+    More: docs/how_to/fronts.md
+    """
     texts = [t.strip() for t in front.objectives]
     free = [n for n in front.problem.free if n not in texts]
     units, digits = {n: unit_of(front.problem, n) for n in (*texts, *free)}, 12 if full else 6
@@ -154,7 +203,14 @@ def front_rows(front: Front, full: bool = False) -> list[tuple[str, ...]]:
 
 
 def trace_table(trace: Trace) -> str:
-    """Branches with their events, one a row, in the free parameters."""
+    """Branches with their events, one a row, in the free parameters.
+
+    Example:
+        >>> print(tmsopt.report.trace_table(tmsopt.trace("problems/ep_set.toml")).splitlines()[3])
+        branch 1: CEP2 and 2EP2, ...
+
+    More: docs/how_to/tracing.md
+    """
     units = {n: unit_of(trace.problem, n) for n in (*trace.problem.free, "abscissa")}
     lines = [trace.problem.title or "untitled problem", trace_headline(trace)]
     for number_, branch in enumerate(trace.branches, start=1):
@@ -173,7 +229,15 @@ def trace_headline(trace: Trace) -> str:
 
 
 def branch_table(branch: Branch) -> str:
-    """One branch with its events, in the free parameters."""
+    """One branch with its events, in the free parameters.
+
+    Example:
+        >>> branch = tmsopt.trace("problems/ep_set.toml").branches[0]
+        >>> print(tmsopt.report.branch_table(branch).splitlines()[3])  # Fr, chi_B, lambda_s, abscissa
+          EP4   2.23631751... 1.41421356... 0.41067753... -1.88030154...
+
+    More: docs/how_to/tracing.md
+    """
     form = "closed" if branch.closed else "open"
     lines = [f"{branch.pattern}: {len(branch)} points, {form}, coefficients met to {branch.residual:.0e}"]
     lines += columns(event_rows(branch, dict.fromkeys((*branch.tangent, "abscissa"), Unit())))
@@ -181,7 +245,15 @@ def branch_table(branch: Branch) -> str:
 
 
 def event_rows(branch: Branch, units: Mapping[str, Unit], model: Model | None = None) -> list[tuple[str, ...]]:
-    """Headings, and the cells of each event, to all digits, in these units."""
+    """Headings, and the cells of each event, to all digits, in these units.
+
+    Example:
+        >>> branch = tmsopt.trace("problems/ep_set.toml").branches[0]
+        >>> tmsopt.report.event_rows(branch, {})  # without columns of numbers
+        [('', ''), ('end', 'Fr.max'), ('EP4', ''), ('fold', 'Fr'), ('end', 'Fr.max')]
+
+    More: docs/how_to/tracing.md
+    """
     rows = [("", *(f"{n} {unit.text}".rstrip() for n, unit in units.items()), "")]
     for event in branch.events:
         found = {**event.parameters, "abscissa": float(branch.abscissa[event.index])}

@@ -6,7 +6,15 @@ from tmsopt.solver.all_designs import Coverage, Every
 
 
 def every_table(every: Every) -> str:
-    """All designs with a pattern, one column each, and what the proof or the search says about others."""
+    """All designs with a pattern, one column each, and what the proof or the search says about others.
+
+    Example:
+        >>> every = tmsopt.solve_all("problems/optimised_benchmark.toml")
+        >>> print(tmsopt.report.every_table(every).splitlines()[1])
+        locate EP4: ...1 solution in the box...
+
+    More: docs/how_to/all_designs.md
+    """
     found, coverage, proof = every.solutions, every.coverage, every.completeness
     known = proof is not None and proof.complete
     many = f"{len(found)} solution{'' if len(found) == 1 else 's'}"

@@ -18,7 +18,14 @@ _ABOUT = (
 
 
 def ledger_table(ledger: Ledger) -> str:
-    """Every entry under its section, wrapped, with the number of entries per verdict at the end."""
+    """Every entry under its section, wrapped, with the number of entries per verdict at the end.
+
+    Example:
+        >>> print(tmsopt.report.ledger_table(tmsopt.verify(only=["lscf-*"])).splitlines()[0])
+        O. N. Kirillov, Localizing EP sets in dissipative systems and the self-stability of bicycles (2018)
+
+    More: docs/explanation/paper.md
+    """
     lines: list[str] = [ledger.source, ""]
     for title, entries in groupby(ledger.entries, key=lambda entry: entry.section):
         lines += [title, "=" * len(title), ""]
@@ -34,7 +41,15 @@ def verdict_lines(ledger: Ledger) -> list[str]:
 
 
 def ledger_page(ledger: Ledger) -> str:
-    """The ledger as a Markdown page: a summary, then every entry under its section."""
+    """The ledger as a Markdown page: a summary, then every entry under its section.
+
+    Example:
+        >>> ledger = tmsopt.verify(only=["lscf-*"])
+        >>> f"| all | {len(ledger.entries)} |" in tmsopt.report.ledger_page(ledger)
+        True
+
+    More: docs/explanation/paper.md
+    """
     lines = [
         "# The paper, recomputed",
         "",

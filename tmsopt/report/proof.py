@@ -10,7 +10,15 @@ from tmsopt.report.text import columns
 
 
 def proof_text(problem: Problem, proof: Proof) -> str:
-    """What is proved, the numbers with their radii, and what they were taken for."""
+    """What is proved, the numbers with their radii, and what they were taken for.
+
+    Example:
+        >>> design = tmsopt.solve("problems/ep4.toml")
+        >>> print(tmsopt.report.proof_text(design.problem, tmsopt.prove(design)).splitlines()[1])
+        proved: a design with EP4 exists: 4-fold real root
+
+    More: docs/explanation/proofs.md
+    """
     lines = [problem.title or "untitled problem"]
     lines.append(f"{'proved' if proof.proved else 'not proved'}: {proof.claim}")
     if proof.reason:
@@ -30,7 +38,16 @@ def _numbers(problem: Problem, proof: Proof) -> list[str]:
 
 
 def number_rows(problem: Problem, proof: Proof) -> list[tuple[str, str, str, str]]:
-    """What was solved for, and the roots: name, decimal, radius, unit."""
+    """What was solved for, and the roots: name, decimal, radius, unit.
+
+    Example:
+        >>> design = tmsopt.solve("problems/ep4.toml")
+        >>> name, value, *_ = tmsopt.report.number_rows(design.problem, tmsopt.prove(design))[1]
+        >>> name, value  # the square root of 2
+        ('chi_B', '1.41421356237309504880168872420...')
+
+    More: docs/explanation/proofs.md
+    """
     rows = []
     for name in proof.moved:
         unit = problem.parameter_set[name].unit

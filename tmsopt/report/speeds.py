@@ -15,7 +15,14 @@ _DIGITS = 15
 
 
 def speeds_table(found: Speeds) -> str:
-    """Every speed with what happens there, then the stable and the heavily damped bands."""
+    """Every speed with what happens there, then the stable and the heavily damped bands.
+
+    Example:
+        >>> print(tmsopt.report.speeds_table(tmsopt.speeds("problems/benchmark.toml")).splitlines()[-2])
+        stable: from 2.8410083 m/s
+
+    More: docs/explanation/weave_and_capsize.md
+    """
     unit = unit_of(found.problem, found.parameter)
     end = f" < {unit.number(found.upper, 6)}" if math.isfinite(found.upper) else ""
     within = f" {unit.text}" if unit.text else ""
@@ -39,7 +46,17 @@ def speeds_table(found: Speeds) -> str:
 
 
 def growth_table(found: Growth) -> str:
-    """Over what, where the design stands, and the stable and the heavily damped bands."""
+    """Over what, where the design stands, and the stable and the heavily damped bands.
+
+    Example:
+        >>> print(tmsopt.report.growth_table(tmsopt.growth("problems/benchmark.toml")))
+        roots over v ...
+        the design: v = 4 m/s, structure pair, critical value 2.8410083 m/s
+        stable: 2.8410083 to 5 m/s
+        heavily damped: nowhere
+
+    More: docs/explanation/weave_and_capsize.md
+    """
     unit = unit_of(found.problem, found.over.name)
     critical = f", critical value {unit.show(found.critical, 8)}" if math.isfinite(found.critical) else ""
     lines = [

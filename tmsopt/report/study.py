@@ -24,6 +24,13 @@ def study_table(study: Study, found: Summary, rows: Iterable[Row], full: bool = 
 
     Args:
         full: up to `LISTED` rows, with every column.
+
+    Example:
+        >>> found = tmsopt.run_study(tmsopt.over_grid("problems/ep4.toml", {"zeta_B": [-0.4, -0.6]}), workers=1)
+        >>> print(tmsopt.report.study_table(found.study, found.summary, found.rows).splitlines()[1])
+        grid over zeta_B (2): 2 rows; 2 optimal
+
+    More: docs/tutorials/study.md
     """
     listed = list(islice(rows, LISTED if full else _FIRST))
     title = study.title or study.problem.title or "untitled study"
@@ -40,7 +47,15 @@ def study_table(study: Study, found: Summary, rows: Iterable[Row], full: bool = 
 
 
 def row_lines(study: Study, row: Row) -> str:
-    """One row in a line: its number, seed, what varies and how it ended."""
+    """One row in a line: its number, seed, what varies and how it ended.
+
+    Example:
+        >>> study = tmsopt.over_grid("problems/ep4.toml", {"zeta_B": [-0.4, -0.6]})
+        >>> print(tmsopt.report.row_lines(study, tmsopt.run_study(study, workers=1).rows[0]))
+        row 0: zeta_B = -0.4; seed ...; optimal
+
+    More: docs/tutorials/study.md
+    """
     given = ", ".join(f"{name} = {number(value)}" for name, value in row.varied.items())
     parts = [f"row {row.number}: {given}", f"seed {row.seed}", ended(study.problem, row.status), row.cause]
     return "; ".join(part for part in parts if part)
@@ -58,7 +73,17 @@ def _headline(study: Study, found: Summary) -> str:
 
 
 def study_rows(study: Study, rows: Sequence[Row]) -> list[tuple[str, ...]]:
-    """Headings, and the cells of each row, in the units in which the problem was written."""
+    """Headings, and the cells of each row, in the units in which the problem was written.
+
+    Example:
+        >>> study = tmsopt.over_grid("problems/ep4.toml", {"zeta_B": [-0.4, -0.6]})
+        >>> rows = tmsopt.report.study_rows(study, tmsopt.run_study(study, workers=1).rows)
+        >>> [row[2:6] for row in rows]  # the abscissa is -(zeta_B zeta_H)^(-1/4)
+        [('zeta_B', 'status', 'abscissa', 'structure'), ('-0.4', 'optimal', '-1.8803', 'EP4'),
+         ('-0.6', 'optimal', '-1.69904', 'EP4')]
+
+    More: docs/tutorials/study.md
+    """
     problem = study.problem
     free = [name for name in problem.free if name not in study.columns]
     text = problem.minimize or problem.maximize

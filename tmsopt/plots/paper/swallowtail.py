@@ -26,6 +26,14 @@ def draw_swallowtail(data: Swallowtail, ax: Axes3D | None = None) -> Axes3D:
 
     The Axes show three parameters (rad, SI): patches sorted by depth as one collection, so that nothing is drawn
     through, cuspidal edges (EP3) and self-intersection (2EP2, CEP2) on top.
+
+    Example:
+        >>> surface = tmsopt.swallowtail("problems/ep_set.toml", rows=4, across=3, starts=4)
+        >>> axes = tmsopt.plots.draw_swallowtail(surface)
+        >>> [text.get_text() for text in axes.texts]
+        ['EP4']
+
+    More: docs/explanation/exceptional_points.md
     """
     if ax is None:
         made = new_figure(6.4, 5.6).add_subplot(projection="3d", computed_zorder=False)

@@ -67,6 +67,15 @@ def design_report(
         found: what there is to say beside; nothing of it by default.
         full: all the rest as well, each part under its name.
         si: parameters in SI for a dimensionless problem, such as `si_parameters` gives; then shown beside.
+
+    Example:
+        >>> print(tmsopt.report.design_report(tmsopt.solve("problems/ep4.toml")))
+        EP4 of the chi_H = 1 bicycle
+        optimal, proved: stable
+        minimize abscissa = -1.8803015; four roots meet in one (EP4)
+        ...
+
+    More: docs/how_to/report.md
     """
     found = found or Findings()
     scaled = si or si_parameters(solution)
@@ -82,7 +91,15 @@ def design_report(
 
 
 def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> Mapping[str, float]:
-    """SI parameters: as solved for, or of dimensionless skates for the given wheelbase, rear mass and gravity."""
+    """SI parameters: as solved for, or of dimensionless skates for the given wheelbase, rear mass and gravity.
+
+    Example:
+        >>> design = tmsopt.solve("problems/ep4.toml")
+        >>> round(tmsopt.report.si_parameters(design, w=1.2)["x_B"], 6)  # 1.2 times the square root of 2, in m
+        1.697056
+
+    More: docs/how_to/units.md
+    """
     own = solution.problem.model is not tms or solution.problem.parameter_set.name == "SI"
     return solution.parameters if own else to_si(solution.dimensionless, w, m_B, g)
 
@@ -94,6 +111,14 @@ def design_parts(
 
     Args:
         si: as `si_parameters` gives; shown beside the design's own where asked for.
+
+    Example:
+        >>> design = tmsopt.solve("problems/ep4.toml")
+        >>> parts = tmsopt.report.design_parts(design, tmsopt.report.Findings(), tmsopt.report.si_parameters(design))
+        >>> [part.lines for part in parts if part.name == "proof"]
+        [['proof: no design in the box decays faster (omega0)']]
+
+    More: docs/how_to/report.md
     """
     edge = found.robustness is not None and bool(found.robustness.edges)
     told, asked = headline(solution, edge)
@@ -241,7 +266,16 @@ def _stored(solution: Solution) -> Iterator[str]:
 
 
 def lever_cells(solution: Solution, lever: Lever) -> tuple[str, ...]:
-    """A limit that binds: its name, what it says, a small move of it, and what that buys to first order."""
+    """A limit that binds: its name, what it says, a small move of it, and what that buys to first order.
+
+    Example:
+        >>> design = tmsopt.solve("problems/least_speed.toml")
+        >>> lever = tmsopt.explain(design, resolve=False).levers[0]
+        >>> tmsopt.report.lever_cells(design, lever)
+        ('decay:', 'abscissa <= -0.8', 'by 0.01', 'buys 0.0124')
+
+    More: docs/how_to/report.md
+    """
     limit = limit_text(solution.problem, lever.name)
     if not lever.step:
         return f"{lever.name}:", limit, "a physical end", ""

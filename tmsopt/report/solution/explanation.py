@@ -17,7 +17,15 @@ _ROUNDING, _ROUNDED = 1e-16, 1e-13
 
 
 def explained_lines(explanation: Explanation) -> list[str]:
-    """Summary, local optimality, levers, rounding, precision and warnings."""
+    """Summary, local optimality, levers, rounding, precision and warnings.
+
+    Example:
+        >>> explanation = tmsopt.explain("problems/ep4.toml")
+        >>> print(tmsopt.report.explained_lines(explanation)[0])
+        meaning: four roots meet in one (EP4): no design in the box decays faster (proven)
+
+    More: docs/how_to/report.md
+    """
     lines = [f"meaning: {explanation.summary}", *optimality_lines(explanation.optimality)]
     lines += [f"warning: {text}" for text in explanation.warnings]
     if explanation.levers:
@@ -35,6 +43,12 @@ def rounding_line(explanation: Explanation) -> str:
     """In one line: the fewest digits that keep what was asked, what fewer cost, and the parameter that needs the most.
 
     Kept is what is stable as the design was, within its limits to their 100th, and within 5 % in decay and objective.
+
+    Example:
+        >>> print(tmsopt.report.rounding_line(tmsopt.explain("problems/ep4.toml")))
+        3 digits lose 31 % of the decay; 6 digits keep 95 % of the decay; chi_B needs the most
+
+    More: docs/how_to/report.md
     """
     rows = explanation.precision
     if not rows or not math.isfinite(explanation.abscissa):
@@ -85,7 +99,14 @@ def _lose(row: Rounded, explanation: Explanation) -> str:
 
 
 def optimality_lines(optimality: Optimality) -> list[str]:
-    """The verdict, then the multipliers of each root on the rightmost line."""
+    """The verdict, then the multipliers of each root on the rightmost line.
+
+    Example:
+        >>> print(tmsopt.report.optimality_lines(tmsopt.optimality("problems/ep4.toml"))[0])
+        local optimality: this EP4 is a strict local minimum of abscissa: ...
+
+    More: docs/how_to/report.md
+    """
     if optimality.verdict == NOT_COVERED:
         return [f"local optimality: not judged, for {optimality.reason}"]
     lines = [f"local optimality: {optimality.reason}"]
@@ -125,7 +146,15 @@ def _row(what: str, to: str, row: Rounded) -> tuple[str, ...]:
 
 
 def diagnosis_lines(diagnoses: Sequence[Diagnosis], details: bool = False) -> list[str]:
-    """Two sentences for each multiple root: what it is, and how it splits; the laws of every parameter as details."""
+    """Two sentences for each multiple root: what it is, and how it splits; the laws of every parameter as details.
+
+    Example:
+        >>> diagnoses = tmsopt.diagnose(tmsopt.solve("problems/ep4.toml"))
+        >>> print(tmsopt.report.diagnosis_lines(diagnoses)[0])
+        4-fold root -1.8803015: defective, Jordan chain of length 4 ...
+
+    More: docs/explanation/exceptional_points.md
+    """
     lines: list[str] = []
     for found in diagnoses:
         lines += [_kind(found), *_splitting(found)]

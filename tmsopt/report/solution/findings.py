@@ -25,6 +25,13 @@ class Findings:
         robustness: the nearest boundaries, of stability and where all is wanted of heavy damping.
         stable: bands of its speed in which the design is stable.
         diagnoses: how its multiple roots split.
+
+    Example:
+        >>> found = tmsopt.report.Findings(stable=((1.5931, float("inf")),))
+        >>> "stable in Fr: from 1.5931" in tmsopt.report.design_report(tmsopt.solve("problems/ep4.toml"), found)
+        True
+
+    More: docs/how_to/report.md
     """
 
     explanation: Explanation | None = None
@@ -34,7 +41,15 @@ class Findings:
 
 
 def findings(solution: Solution, full: bool = False, progress: Listener | None = None) -> Findings:
-    """Of a solution; with gains of limits that are solved again, and how roots split, where all is wanted."""
+    """Of a solution; with gains of limits that are solved again, and how roots split, where all is wanted.
+
+    Example:
+        >>> found = tmsopt.report.findings(tmsopt.solve("problems/benchmark.toml"))
+        >>> [[f"{v:.6f} m/s" for v in band] for band in found.stable]  # above the speed of weaving
+        [['2.841008 m/s', 'inf m/s']]
+
+    More: docs/how_to/report.md
+    """
     if solution.interrupted:
         return Findings()
     finite = math.isfinite(solution.abscissa)

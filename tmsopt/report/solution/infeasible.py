@@ -18,6 +18,14 @@ def infeasible_lines(solution: Solution, full: bool = False) -> list[str]:
     """A sentence; the limits in conflict and the smallest change that frees the problem; `full`, each limit alone.
 
     Of a design that is not stable though that was looked for, the sentence alone; empty for any other.
+
+    Example:
+        >>> import dataclasses
+        >>> problem = dataclasses.replace(tmsopt.load("problems/ep4.toml"), constraints={"fast": "Fr >= 11"})
+        >>> print(tmsopt.report.infeasible_lines(tmsopt.solve(problem, throw=False))[0])
+        fast (Fr >= 11) needs Fr at least 11 (at most 10 is allowed)
+
+    More: docs/how_to/infeasible.md
     """
     relaxation, problem, need = solution.relaxation, solution.problem, solution.need
     lines = [text for text in [_sentence(solution)] if text]

@@ -31,6 +31,13 @@ def parameter_rows(solution: Solution, si: Mapping[str, float]) -> list[TableRow
 
     Args:
         si: the parameters in SI; of a model without a dimensionless form those of the solution.
+
+    Example:
+        >>> design = tmsopt.solve("problems/benchmark.toml")
+        >>> tmsopt.report.parameter_rows(design, tmsopt.report.si_parameters(design))[0]
+        ('w', '1', 'm', 'fixed', '', '', '', 'wheelbase')
+
+    More: docs/reference/quantities.md
     """
     problem = solution.problem
     of, other = problem.parameter_set, _other(problem.model, problem.parameter_set)
@@ -57,7 +64,16 @@ def parameter_rows(solution: Solution, si: Mapping[str, float]) -> list[TableRow
 
 
 def quantity_rows(solution: Solution, si: Mapping[str, float]) -> list[TableRow]:
-    """Those that exist: names, numbers, units, what they are in SI beside a dimensionless one, and the meaning."""
+    """Those that exist: names, numbers, units, what they are in SI beside a dimensionless one, and the meaning.
+
+    Example:
+        >>> design = tmsopt.solve("problems/benchmark.toml")
+        >>> rows = tmsopt.report.quantity_rows(design, tmsopt.report.si_parameters(design))
+        >>> [row[:3] for row in rows if row[0] == "v_c"]
+        [('v_c', '2.841008323...', 'm/s')]
+
+    More: docs/reference/quantities.md
+    """
     problem, found = solution.problem, solution.quantities
     of = problem.parameter_set
     rows: list[TableRow] = []
