@@ -369,7 +369,7 @@ def ep4(omega0: Real, zeta_B: Real, zeta_H: Real, chi_H: Real) -> tuple[EP4, EP4
     """Both designs with the four-fold root `omega0`, from `chib`, `a1a3`, `a2` and `w0`; fields of one shape.
 
     For zeta_B, zeta_H < 0 both are real. The first is the bicycle: Fr > 0 if omega0 < 0 < chi_H, and mu > 0
-    requires (chi_H - 1) (zeta_H - zeta_B) (|w01| - |omega0|) > 0. The second has mu < 0 always. Fr, mu and
+    requires (chi_H - 1) (zeta_H - zeta_B) (abs(w01) - abs(omega0)) > 0. The second has mu < 0 always. Fr, mu and
     tan_lambda_s are nan where complex (possible for zeta_H > 0), at zeta_B = zeta_H (no EP4 exists), and at
     chi_H = 1, where omega0 must be `w01` and mu is free: use `ep4_chi_H_1`.
 
@@ -439,7 +439,7 @@ def chibm(zeta_B: Real, zeta_H: Real) -> Real:
 def frm(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
     """The least critical Froude number over chi_B (not its square), at `chibm`. Equation `frm`.
 
-    nan unless |zeta_B| > |zeta_H| and lambda_s >= 0, or both reversed.
+    nan unless abs(zeta_B) > abs(zeta_H) and lambda_s >= 0, or both reversed.
 
     Example:
         >>> tilt = tmsopt.laws.ep4_chi_H_1(-0.4, -0.2).lambda_s
@@ -480,7 +480,7 @@ def chib1(zeta_B: Real, zeta_H: Real) -> Real:
 
 @_law
 def tls(zeta_B: Real, zeta_H: Real) -> Real:
-    """tan(lambda_s) at EP4, as printed, not lambda_s; negative for |zeta_B| < |zeta_H|. Equation `tls`.
+    """tan(lambda_s) at EP4, as printed, not lambda_s; negative for abs(zeta_B) < abs(zeta_H). Equation `tls`.
 
     Example:
         >>> print(f"{tmsopt.laws.tls(-0.4, -0.2):.8f} {15 / 4 - 75 / 32 * 2**0.5:.8f}")
@@ -498,7 +498,7 @@ def frep4(zeta_B: Real, zeta_H: Real) -> tuple[Real, Real]:
     """Both roots of the printed quadratic for Fr at EP4: the true one, then the spurious. Equation `frep4`.
 
     tan(lambda_s) in it is `tls`. The true root is positive; the spurious one, no EP4, is never positive:
-    -(r - 1)^2 |omega0| / (4 (r + 1)).
+    -(r - 1)^2 abs(omega0) / (4 (r + 1)).
 
     Example:
         >>> true, spurious = tmsopt.laws.frep4(-0.4, -0.2)
@@ -518,7 +518,7 @@ def epset(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
     """Froude number at which chi_H = 1 and chi_B = `chib1` give two double roots. Equation `epset`.
 
     nan unless tan(lambda_s) (r + 1)/(r - 1) > r/(4 h), which is its pole. The double roots are real (2EP2)
-    for |tan(lambda_s)| below |`tls`| and complex (CEP2) above.
+    for abs(tan(lambda_s)) below abs(`tls`) and complex (CEP2) above.
 
     Example:
         >>> tilt = tmsopt.laws.ep4_chi_H_1(-0.4, -0.2).lambda_s
@@ -536,7 +536,7 @@ def epset(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
 def dp(zeta_B: Real, zeta_H: Real) -> tuple[Real, Real]:
     """chi_B and the largest tan(lambda_s) for which some speed gives heavy damping. Equation `dp`.
 
-    The printed range 0 < tan(lambda_s) <= bound is empty for |zeta_B| < |zeta_H|; by `dual` the range there
+    The printed range 0 < tan(lambda_s) <= bound is empty for abs(zeta_B) < abs(zeta_H); by `dual` the range there
     is bound <= tan(lambda_s) < 0.
 
     Example:
