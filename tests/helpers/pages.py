@@ -12,7 +12,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import zip_longest
 from pathlib import Path
 
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
@@ -45,22 +44,14 @@ def lines_of(text: str) -> list[str]:
 def agrees(printed: str, now: str) -> bool:
     """The same words, and the same numbers within the rounding of the last digits: other machines, other sums.
 
-    Times count as equal, and ``…`` for whatever stands there.
+    Times count as equal, and ``…`` stands for anything.
     """
-    if "…" in printed:
-        # the printed text around what is left out, in its order
-        rest = now
-        pieces = [piece.strip() for piece in printed.split("…")]
-        for first, piece in zip_longest([True], pieces):
-            at = rest.find(piece) if piece else 0
-            if at < 0 or (first and at > 0):
-                return False
-            rest = rest[at + len(piece) :]
-        return printed.endswith("…") or not rest
     printed, now = _SECONDS.sub("0", printed), _SECONDS.sub("0", now)
-    if NUMBER.sub("", printed) != NUMBER.sub("", now):
+    words = [re.escape(words).replace("…", ".*?") for words in NUMBER.split(printed)]
+    found = re.fullmatch(f"({NUMBER.pattern})".join(words), now)
+    if found is None:
         return False
-    pairs = zip(NUMBER.findall(printed), NUMBER.findall(now), strict=True)
+    pairs = zip(NUMBER.findall(printed), found.groups(), strict=True)
     return all(math.isclose(float(a), float(b), rel_tol=1e-6, abs_tol=1e-12) for a, b in pairs)
 
 
