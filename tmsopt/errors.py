@@ -31,6 +31,12 @@ class Fault:
         message: what was found, what is accepted, and what to do.
         key: where, as a path of keys, e.g. ``("parameters", "Fr", "min")``.
         file, line: the file and line, where the problem came from a file.
+
+    Example:
+        >>> str(tmsopt.Fault("found -1; accepted: > 0", ("parameters", "Fr"), "robot.toml", 7))
+        'robot.toml:7: parameters.Fr: found -1; accepted: > 0'
+
+    More: docs/reference/problem_file.md
     """
 
     message: str
@@ -49,7 +55,18 @@ class Fault:
 
 
 class InputError(ValueError):
-    """A problem that is not well posed; `faults` has everything found wrong with it, the message the first `LISTED`."""
+    """A problem that is not well posed; `faults` has everything found wrong with it, the message the first `LISTED`.
+
+    Example:
+        >>> swing = tmsopt.models.from_coefficients([1, "c", 1])
+        >>> try:
+        ...     tmsopt.Problem(swing, free={"c": (3, 1)}, minimize="speed")
+        ... except tmsopt.InputError as error:
+        ...     print([".".join(fault.key) for fault in error.faults])
+        ['parameters.c', 'objective.minimize']
+
+    More: docs/reference/problem_file.md
+    """
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         self.faults = tuple(faults)

@@ -30,6 +30,15 @@ class Progress:
         seconds: since this piece of work began.
         left: seconds that it takes at most at its rate so far; nan where that cannot be known, as after a few steps.
         note: how good it is so far, such as ``gap 0.001``; often empty.
+
+    Example:
+        >>> from itertools import pairwise
+        >>> told = []
+        >>> design = tmsopt.solve("problems/ep4.toml", progress=told.append)
+        >>> all(now.done <= then.done for now, then in pairwise(told) if now.what == then.what == "searching")
+        True
+
+    More: docs/reference/python.md
     """
 
     what: str

@@ -51,6 +51,13 @@ def certify(design: Given, *, seconds: float = SECONDS, progress: Listener | Non
 
     Raises:
         InputError: where SCIP is not installed, for a time that is not positive, or for a problem that asks nothing.
+
+    Example:
+        >>> bound = tmsopt.certify("problems/ziegler.toml").bound  # Ziegler (1952): 41/28 + 0.1²/2 = 1.469286
+        >>> bound.proven, bound.method, 1.469285 < bound.value < 1.4695
+        (True, 'scip', True)
+
+    More: docs/how_to/certify.md
     """
     check_installed()
     if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0 < seconds < math.inf:

@@ -62,6 +62,15 @@ class Chart(Shown):
         path: of its folder; None in memory.
         run: of the process that computed it: ``engine``, ``seconds``, ``per_second``, of a folder also how many
             ``designs`` were left to it; empty where the chart was only opened.
+
+    Example:
+        >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])  # stable where c and k are positive
+        >>> plane = tmsopt.Problem(swing, free={"c": (-1, 1), "k": (-1, 1)})
+        >>> chart = tmsopt.chart(plane, points=(4, 4), boundaries=False)
+        >>> chart.shares["stable"], chart.shares["capsize"]
+        (0.25, 0.5)
+
+    More: docs/how_to/charts.md
     """
 
     about: Mapping[str, Any] = field(repr=False)
@@ -191,6 +200,15 @@ def chart(
     Raises:
         InputError: for bad input; for a folder that holds another chart, with the differences, or is damaged.
         OSError: where the disk is full; what is recorded stays right.
+
+    Example:
+        >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])
+        >>> plane = tmsopt.Problem(swing, free={"c": (-1, 1), "k": (-1, 1)})
+        >>> corner = tmsopt.chart(plane, points=(4, 4), boundaries=False).abscissa[0, 3]  # k = -1, c = 1
+        >>> f"{corner:.6f}"  # (√5 - 1)/2
+        '0.618034'
+
+    More: docs/how_to/charts.md
     """
     if faults := [*count_faults("workers", workers, 1, _MOST_WORKERS), *count_faults("tile", tile, 1),
                   *call_faults("progress", progress)]:  # fmt: skip
@@ -234,6 +252,15 @@ def open_chart(path: str | Path) -> Chart:
 
     Raises:
         InputError: where that is none, or is not finished, or damaged.
+
+    Example:
+        >>> from tempfile import TemporaryDirectory
+        >>> with TemporaryDirectory() as folder:
+        ...     made = tmsopt.chart("problems/chart.toml", points=(20, 10), folder=f"{folder}/plane.chart")
+        ...     tmsopt.open_chart(f"{folder}/plane.chart").counts == made.counts
+        True
+
+    More: docs/how_to/charts.md
     """
     return _opened(path_of(path, "a folder that tmsopt.chart made"))
 

@@ -51,6 +51,13 @@ class Growth(Tabular):
         events: where roots cross the axis or meet, exact; where the coefficients are no polynomials in `over`, those
             where stability changes alone.
         rate: how many 1/s a rate of 1 is, for each value; None without a unit of time.
+
+    Example:
+        >>> bands = tmsopt.growth("problems/whipple_benchmark.toml").stable
+        >>> [(f"{a:.4f}", f"{b:.4f}") for a, b in bands]  # weave and capsize speed of Meijaard et al. (2007), m/s
+        [('4.2924', '6.0243')]
+
+    More: docs/how_to/report.md
     """
 
     over: Parameter
@@ -97,6 +104,14 @@ def growth(
 
     Raises:
         InputError: for an unknown parameter.
+
+    Example:
+        >>> swing = tmsopt.models.from_coefficients([1, "c", 1])  # real roots from c = 2 on
+        >>> roots = tmsopt.growth(tmsopt.Problem(swing, fixed={"c": 1.0}), end=4.0, over="c")
+        >>> [(round(low, 9), round(high, 9)) for low, high in roots.heavily_damped]
+        [(2.0, 4.0)]
+
+    More: docs/how_to/report.md
     """
     design = solved_first(design, progress)
     counted(progress, "following the roots")

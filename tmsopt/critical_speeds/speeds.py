@@ -39,6 +39,13 @@ class Speeds(Tabular):
         marginal: bands with no root right of the imaginary axis, those on it simple, where roots stay on it; a root 0
             that is there at every speed is left aside.
         zeros: multiplicity of that root 0.
+
+    Example:
+        >>> ridden = tmsopt.speeds("problems/whipple_benchmark.toml")
+        >>> [f"{a:.6f} {b:.6f}" for a, b in ridden.stable]  # Meijaard et al. (2007), m/s
+        ['4.292383 6.024262']
+
+    More: docs/reference/quantities.md
     """
 
     problem: Problem
@@ -108,6 +115,15 @@ def speeds(
     Raises:
         NotSolved: where there is no design to look at.
         InputError: where the parameter does not enter as a polynomial.
+
+    Example:
+        >>> import math
+        >>> (slowest,) = tmsopt.speeds("problems/benchmark.toml").weave  # m/s
+        >>> law = tmsopt.laws.Fr_c(0.1, 1.2, 1.02, -0.4, -0.2, math.radians(5))
+        >>> f"{slowest:.6f} {law * math.sqrt(9.81 * 1.0):.6f}"  # Fr_c √(g w)
+        '2.841008 2.841008'
+
+    More: docs/reference/quantities.md
     """
     asked = problem_of(problem if problem is not None and isinstance(design, Mapping) else design).nominal
     of = asked.parameter_set

@@ -18,7 +18,16 @@ LARGEST = 16
 
 @dataclass(frozen=True)
 class Band:
-    """Every value of a parameter from `min` to `max`, looked at first in `points` even steps."""
+    """Every value of a parameter from `min` to `max`, looked at first in `points` even steps.
+
+    Example:
+        >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])  # s² + c s + k: the softest spring decides, at c = 2
+        >>> springs = tmsopt.Problem(swing, free={"c": (0, 4)}, scenarios={"k": tmsopt.Band(1, 4)}, minimize="abscissa")
+        >>> f"{tmsopt.solve(springs).parameters['c']:.6f}"
+        '2.000000'
+
+    More: docs/how_to/bands.md
+    """
 
     min: float
     max: float
@@ -43,6 +52,14 @@ class Case:
         offset: parameter → what is added, from a tolerance.
         direction: parameter → change per unit of the robustness radius, in units of its weight.
         edge: the boundary of stability whose nearest point is meant, sought from `direction` as it is.
+
+    Example:
+        >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])
+        >>> springs = tmsopt.Problem(swing, free={"c": (0, 4)}, scenarios={"k": [1.0, 4.0]}, minimize="abscissa")
+        >>> tmsopt.solve(springs).worst.at  # the softest decays slowest
+        {'k': 1.0}
+
+    More: docs/how_to/bands.md
     """
 
     at: Mapping[str, float] = Table()

@@ -99,6 +99,13 @@ def load(path: str | PathLike[str]) -> Problem:
 
     Raises:
         InputError: listing every fault with file, line, key, what was found and what is accepted.
+
+    Example:
+        >>> problem = tmsopt.load("problems/ep4.toml")
+        >>> problem.minimize, problem.free["chi_B"]
+        ('abscissa', (1.01, 5.0))
+
+    More: docs/reference/problem_file.md
     """
     return _read(path, lambda problem: [])
 

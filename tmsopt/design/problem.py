@@ -44,6 +44,15 @@ class Problem:
 
     Raises:
         InputError: listing everything that is wrong, each with the accepted values.
+
+    Example:
+        >>> K = [["1 + mu*w**2", "-mu*w**2"], ["-mu*w**2", "mu*w**2"]]  # a mass on a spring with an absorber of mass mu
+        >>> system = tmsopt.models.from_matrices(M=[[1, 0], [0, "mu"]], D=[["c", "-c"], ["-c", "c"]], K=K)
+        >>> tuned = tmsopt.Problem(system, fixed={"mu": 0.1}, free={"c": (0, 1), "w": (0.1, 3)}, minimize="abscissa")
+        >>> f"{tmsopt.solve(tuned).parameters['w']:.6f}"  # 1/(1 + mu)
+        '0.909091'
+
+    More: docs/reference/problem_file.md
     """
 
     model: Model

@@ -51,6 +51,13 @@ class Bound:
         nodes: that it needed.
         tolerance: its feasibility tolerance; it is a proof in floating-point arithmetic.
         solver: who searched, such as ``SCIP``, whoever's bound it is; empty without a search.
+
+    Example:
+        >>> bound = tmsopt.solve("problems/ep4.toml").bound  # no abscissa is below -(a4/a0)^(1/4), which an EP4 attains
+        >>> bound.proven, bound.gap < 1e-9
+        (True, True)
+
+    More: docs/explanation/proofs.md
     """
 
     value: float = -math.inf
@@ -74,6 +81,13 @@ class Starts:
 
     Attributes:
         looked: designs of the box that were looked at beside, to know where to start, and whether any is better.
+
+    Example:
+        >>> starts = tmsopt.solve("problems/ep4.toml").starts
+        >>> 1 <= starts.at_best <= starts.converged <= starts.tried
+        True
+
+    More: docs/how_to/report.md
     """
 
     tried: int = 0
@@ -176,6 +190,13 @@ class Solution(Shown):
             proved that there is none, None where it was not asked or did not decide.
         interrupted: whether the user ended the work before it was done.
         si: the design in s, Hz, mm, km/h, degrees, N and kg; empty unless the problem is written in SI.
+
+    Example:
+        >>> design = tmsopt.solve("problems/ep4.toml")
+        >>> f"{design.abscissa:.6f}", f"{tmsopt.laws.w01(-0.4, -0.2):.6f}"  # the law of the paper
+        ('-1.880302', '-1.880302')
+
+    More: docs/how_to/report.md
     """
 
     problem: Problem
@@ -277,7 +298,19 @@ def violated_by(solution: Solution) -> str:
 
 
 class NotSolved(RuntimeError):
-    """Raised by `solve` when there is no optimal design; `solution` holds the best point found."""
+    """Raised by `solve` when there is no optimal design; `solution` holds the best point found.
+
+    Example:
+        >>> swing = tmsopt.models.from_coefficients([1, "c", 1])  # no abscissa below -1
+        >>> asked = tmsopt.Problem(swing, free={"c": (0, 3)}, minimize="c", constraints={"fast": "abscissa <= -2"})
+        >>> try:
+        ...     tmsopt.solve(asked)
+        ... except tmsopt.NotSolved as error:
+        ...     print(error.solution.status)
+        infeasible
+
+    More: docs/how_to/infeasible.md
+    """
 
     def __init__(self, solution: Solution) -> None:
         self.solution = solution

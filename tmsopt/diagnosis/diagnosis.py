@@ -36,6 +36,13 @@ class Diagnosis(Shown):
         jordan: the singular values behind the verdict; None without matrices.
         distance: relative change of the coefficients from the design's to those with the structure.
         responses: most sensitive parameter first.
+
+    Example:
+        >>> (found,) = tmsopt.diagnose("problems/ep4.toml")
+        >>> found.kind, found.algebraic, found.geometric, found.partial  # one Jordan chain of four
+        ('defective', 4, 1, (4,))
+
+    More: docs/explanation/exceptional_points.md
     """
 
     re: float
@@ -74,6 +81,13 @@ def diagnose(design: Given, *, progress: Listener | None = None) -> tuple[Diagno
     Args:
         design: a solution; or a problem or its file, solved first.
         progress: called with a `tmsopt.Progress` now and then.
+
+    Example:
+        >>> (pair,) = tmsopt.diagnose("problems/pt_pair.toml")  # Bender et al. (2013): s² = -(1 - 0.1²/2), twice
+        >>> f"{pair.im**2:.6f}", pair.algebraic, pair.geometric
+        ('0.995000', 2, 1)
+
+    More: docs/explanation/exceptional_points.md
     """
     solution = solved_first(design, progress)
     counted(progress, "splitting roots")

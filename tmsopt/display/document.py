@@ -51,6 +51,16 @@ def save_report(
     Raises:
         InputError: for what is no result, or another ending.
         OSError: when the file cannot be written.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from tempfile import TemporaryDirectory
+        >>> with TemporaryDirectory() as folder:
+        ...     tmsopt.save_report(tmsopt.describe("tms"), f"{folder}/tms.html")
+        ...     "Froude number" in Path(folder, "tms.html").read_text(encoding="utf-8")
+        True
+
+    More: docs/how_to/hand_on.md
     """
     if type(result).__name__ not in WRITERS:
         raise InputError([Fault(f"found {short(result)}; accepted: a result, such as a solution", ("result",))])

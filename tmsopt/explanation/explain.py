@@ -32,6 +32,13 @@ class Explanation(Tabular):
         goal: what was optimised, or the pattern that was located; empty where nothing was asked.
         abscissa, value: of the design, and of its objective.
         warnings: arbitrary bounds that the design leans on, bounds touched for nothing, parameters without effect.
+
+    Example:
+        >>> explained = tmsopt.explain("problems/ep4.toml", resolve=False)
+        >>> explained.structure, explained.optimality.verdict
+        ('EP4', 'strict minimum')
+
+    More: docs/how_to/report.md
     """
 
     summary: str
@@ -63,6 +70,12 @@ def explain(design: Given, *, resolve: bool = True, progress: Listener | None = 
     Args:
         resolve: check each multiplier by solving again with its limit moved, from the optimum; 30 ms or so each.
         progress: called with a `tmsopt.Progress` now and then.
+
+    Example:
+        >>> print(tmsopt.explain("problems/ep4.toml").summary)
+        four roots meet in one (EP4): no design in the box decays faster (proven)
+
+    More: docs/how_to/report.md
     """
     solution = solved_first(design, progress)
     steps = counted(progress, "moving limits" if resolve else "weighing limits", "limit")

@@ -81,6 +81,13 @@ class Optimality(Shown):
         idle: free parameters without any part in it.
         better: of a design that is not minimal, one nearby that is better, rechecked.
         better_value: its objective.
+
+    Example:
+        >>> judged = tmsopt.optimality("problems/ep4.toml")
+        >>> judged.verdict, judged.order
+        ('strict minimum', 1)
+
+    More: docs/how_to/report.md
     """
 
     verdict: str
@@ -113,6 +120,12 @@ def optimality(design: Given, *, progress: Listener | None = None) -> Optimality
     Args:
         design: a solution; or a problem or its file, solved first.
         progress: called with a `tmsopt.Progress` now and then.
+
+    Example:
+        >>> tmsopt.optimality("problems/two_mass_spring.toml").verdict  # as Henrion and Overton (2006) prove
+        'strict minimum'
+
+    More: docs/how_to/report.md
     """
     solution = solved_first(design, progress)
     counted(progress, "judging the optimum")

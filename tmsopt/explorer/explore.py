@@ -28,6 +28,13 @@ class Explorer:
         problem: that the page is about.
         solution: its optimum, None where nothing was asked.
         html: the page, which asks nothing of any server.
+
+    Example:
+        >>> page = tmsopt.explore("problems/ep4.toml")
+        >>> page.solution.structure, "<script src" in page.html, "https://" in page.html
+        ('EP4', False, False)
+
+    More: docs/how_to/explorer.md
     """
 
     problem: Problem
@@ -65,6 +72,12 @@ def explore(problem: Given, **options: Unpack[Asked]) -> Explorer:
 
     Raises:
         InputError: for a file with faults, and for anything that is no problem.
+
+    Example:
+        >>> tmsopt.explore("problems/benchmark.toml").html.startswith("<!DOCTYPE html>")
+        True
+
+    More: docs/how_to/explorer.md
     """
     told = options.get("progress")
     if isinstance(problem, Solution):

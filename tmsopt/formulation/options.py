@@ -51,6 +51,12 @@ class Options:
             or to prove that there is none; 0 to do without. `solve` gives it 5, where SCIP is installed.
         interruptible: whether Ctrl-C ends the search with the best design so far, as `solve` has it; else it goes on to
             whoever called, as it always does where no design is in hand yet.
+
+    Example:
+        >>> tmsopt.Options().starts, tmsopt.solve("problems/ep4.toml", starts=4, seed=1).structure
+        (64, 'EP4')
+
+    More: docs/reference/commands.md
     """
 
     starts: int = STARTS

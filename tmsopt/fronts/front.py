@@ -86,6 +86,15 @@ class Front(Tabular):
         solved: sub-problems solved.
         notes: sentences for the reader.
         interrupted: whether the user ended the search; the front is then what is known of it.
+
+    Example:
+        >>> swing = tmsopt.models.from_coefficients([1, "c", 1])  # the abscissa is -c/2 up to c = 2
+        >>> asked = tmsopt.Problem(swing, free={"c": (1, 3)}, pareto=("abscissa", "c"))
+        >>> front = tmsopt.pareto(asked, points=5, workers=1)
+        >>> [f"{x:.6f}" for x in (*front.ideal, *front.nadir)]
+        ['-1.000000', '1.000000', '-0.500000', '2.000000']
+
+    More: docs/how_to/fronts.md
     """
 
     problem: Problem

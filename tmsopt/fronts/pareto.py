@@ -47,6 +47,15 @@ def pareto(problem: Given, points: int = POINTS, *, workers: int | None = None, 
     Raises:
         NotSolved: when an objective has no optimum, carrying the best point found.
         InputError: for a problem without ``pareto``, or fewer than 2 points or more than 10000, or no process.
+
+    Example:
+        >>> swing = tmsopt.models.from_coefficients([1, "c", 1])  # the abscissa is -c/2 up to c = 2
+        >>> asked = tmsopt.Problem(swing, free={"c": (1, 3)}, pareto=("abscissa", "c"))
+        >>> front = [point.objectives for point in tmsopt.pareto(asked, points=5, workers=1).points]
+        >>> all(abs(a + c / 2) < 1e-6 for a, c in front)
+        True
+
+    More: docs/how_to/fronts.md
     """
     problem = problem_of(problem)
     if not problem.pareto:

@@ -26,6 +26,13 @@ def describe(given: str | PathLike[str] | Model | Problem | Solution) -> Descrip
 
     Raises:
         InputError: for a file with faults, and for anything else.
+
+    Example:
+        >>> described = tmsopt.describe("problems/ep4.toml")
+        >>> described.model, described.title
+        ('tms', 'EP4 of the chi_H = 1 bicycle')
+
+    More: docs/reference/quantities.md
     """
     if isinstance(given, Model):
         return _described(given, None, {})

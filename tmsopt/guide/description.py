@@ -58,6 +58,12 @@ class Description(Shown):
         sketch: side view of a bicycle; empty for other systems.
         matrices: of a stated system, M, D, K, A or coefficients → rows of entries.
         asked: of a problem, section → key → text.
+
+    Example:
+        >>> tmsopt.describe("tms").patterns["EP4"]
+        '4-fold real root'
+
+    More: docs/reference/quantities.md
     """
 
     model: str

@@ -30,7 +30,14 @@ _OF_STUDY: Schema = {"anyOf": [{"required": [key]} for key in ("problem", "study
 
 
 def schema() -> Schema:
-    """The JSON Schema of problem files and study files, as plain data."""
+    """The JSON Schema of problem files and study files, as plain data.
+
+    Example:
+        >>> tmsopt.schema()["$schema"]
+        'https://json-schema.org/draft/2020-12/schema'
+
+    More: docs/reference/problem_file.md
+    """
     problem, defs = _shape(PROBLEM)
     study, more = _shape(STUDY)
     defs |= more

@@ -38,6 +38,14 @@ class Nearest(Shown):
         refined: whether the point meets the conditions of a locally nearest one to rounding; else it is the best
             crossing seen. That no nearer point is far from it is not proved: it is the nearest that was found.
         direct: whether the straight way there stays on one side of the boundaries until it ends.
+
+    Example:
+        >>> swing = tmsopt.Problem(tmsopt.models.from_coefficients([1, "c", "k"]), fixed={"c": 1.0, "k": 4.0})
+        >>> found = tmsopt.nearest(swing, "capsize", weights={"c": 1.0, "k": 1.0})  # at k = 0
+        >>> f"{found.distance:.6f} {found.direction['k']:.6f}"
+        '4.000000 -4.000000'
+
+    More: docs/how_to/tolerances.md
     """
 
     kind: str
@@ -73,6 +81,14 @@ class Robustness(Shown):
         weave, capsize, infinity: nearest points of the boundaries of stability.
         heavy_damping: nearest point of the edge of heavy damping: the way out of it for a heavily damped design, the
             way into it for another; distance 0 on the edge, as for an EP4.
+
+    Example:
+        >>> swing = tmsopt.Problem(tmsopt.models.from_coefficients([1, "c", "k"]), fixed={"c": 1.0, "k": 4.0})
+        >>> margins = tmsopt.robustness(swing, weights={"c": 1.0, "k": 1.0})  # weave at c = 0, capsize at k = 0
+        >>> [f"{x:.6f}" for x in (margins.weave.distance, margins.capsize.distance, margins.radius)]
+        ['1.000000', '4.000000', '1.000000']
+
+    More: docs/how_to/tolerances.md
     """
 
     problem: Problem = field(repr=False)
@@ -138,6 +154,14 @@ def nearest(
 
     Raises:
         InputError: for another pattern, or parameters or weights that are not accepted.
+
+    Example:
+        >>> swing = tmsopt.Problem(tmsopt.models.from_coefficients([1, "c", "k"]), fixed={"c": 1.0, "k": 4.0})
+        >>> found = tmsopt.nearest(swing, "heavy damping", weights={"c": 1.0})  # at c = 2 sqrt(k) = 4
+        >>> f"{found.distance:.6f} {found.parameters['c']:.6f}"
+        '3.000000 4.000000'
+
+    More: docs/how_to/tolerances.md
     """
     if pattern not in tuple(KINDS):
         raise InputError([Fault(f"unknown boundary {pattern!r}; {suggest(pattern, KINDS)}", ("pattern",))])
@@ -153,6 +177,13 @@ def robustness(
     """The nearest points of all boundaries, and the radius within which a design stays stable.
 
     Arguments, distances and exceptions are those of `nearest`.
+
+    Example:
+        >>> swing = tmsopt.Problem(tmsopt.models.from_coefficients([1, "c", "k"]), fixed={"c": 1.0, "k": 4.0})
+        >>> f"{tmsopt.robustness(swing, weights={'c': 1.0, 'k': 10.0}).radius:.6f}"  # to k = 0
+        '0.400000'
+
+    More: docs/how_to/tolerances.md
     """
     place = _place(design, parameters, weights)
     counted(progress, "looking for the nearest boundaries")

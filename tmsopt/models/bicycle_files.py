@@ -42,6 +42,13 @@ class Bicycle:
         parameters: those of the model ``whipple`` that the file gives, in SI units and radians; not always the speed.
         uncertainties: standard deviations of those that have one above 0.
         others: what the linear motion does not depend on, by its name in the file.
+
+    Example:
+        >>> bicycle = tmsopt.Bicycle("mine", {"w": 1.02, "m_B": 85.0}, uncertainties={"w": 0.005})
+        >>> bicycle.tolerances()  # two standard deviations
+        {'w': 0.01}
+
+    More: docs/how_to/import.md
     """
 
     name: str
@@ -61,6 +68,16 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
 
     Raises:
         InputError: listing every line that is not understood, names that are unknown, and names that are missing.
+
+    Example:
+        >>> from tempfile import TemporaryDirectory
+        >>> design = tmsopt.load("problems/whipple_benchmark.toml").fixed
+        >>> with TemporaryDirectory() as folder:
+        ...     tmsopt.write_bicycle(design, f"{folder}/benchmark.txt")
+        ...     tmsopt.read_bicycle(f"{folder}/benchmark.txt").parameters["lambda_s"] == design["lambda_s"]
+        True
+
+    More: docs/how_to/import.md
     """
     file = path_of(path, "a file of bicycle parameters")
     kind = "YAML" if file.suffix.lower() in _YAML else "TXT"
@@ -106,6 +123,15 @@ def write_bicycle(bicycle: Bicycle | Mapping[str, float], path: str | PathLike[s
     Raises:
         InputError: for another ending, or parameters that are missing.
         OSError: when the file cannot be written.
+
+    Example:
+        >>> from tempfile import TemporaryDirectory
+        >>> with TemporaryDirectory() as folder:
+        ...     tmsopt.write_bicycle(tmsopt.load("problems/whipple_benchmark.toml").fixed, f"{folder}/mine.yml")
+        ...     tmsopt.read_bicycle(f"{folder}/mine.yml").parameters["w"]
+        1.02
+
+    More: docs/how_to/import.md
     """
     file = path_of(path, "the file to write")
     ending = file.suffix.lower()
@@ -128,7 +154,15 @@ def write_bicycle(bicycle: Bicycle | Mapping[str, float], path: str | PathLike[s
 
 
 def problem_text(bicycle: Bicycle, speed: float | None = None) -> str:
-    """A problem file of a bicycle: every parameter fixed, at the speed given, or the file's, or else at 5 m/s."""
+    """A problem file of a bicycle: every parameter fixed, at the speed given, or the file's, or else at 5 m/s.
+
+    Example:
+        >>> own = tmsopt.Bicycle("mine", tmsopt.load("problems/whipple_benchmark.toml").fixed)
+        >>> "v = 6.0 " in tmsopt.models.problem_text(own, speed=6.0)
+        True
+
+    More: docs/how_to/import.md
+    """
     v = speed if speed is not None else bicycle.parameters.get("v", 5.0)
     lines = [f"title = {_quoted(bicycle.name)}", 'model = "whipple"', "", "[parameters]"]
     for parameter in _OF.parameters:

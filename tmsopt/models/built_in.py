@@ -12,7 +12,14 @@ MODELS = {model.name: model for model in (tms, whipple)}
 
 
 def named(name: str) -> Model:
-    """The model of a name that a problem file can use."""
+    """The model of a name that a problem file can use.
+
+    Example:
+        >>> tmsopt.models.named("tms") is tmsopt.models.tms
+        True
+
+    More: docs/reference/problem_file.md
+    """
     return MODELS[name]
 
 

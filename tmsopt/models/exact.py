@@ -49,6 +49,12 @@ def decimal(x: Any) -> Fraction:
 
     Raises:
         ValueError: for what is no number, and for one of more digits than `MOST_DIGITS`.
+
+    Example:
+        >>> tmsopt.models.decimal(0.1)
+        Fraction(1, 10)
+
+    More: docs/explanation/proofs.md
     """
     if isinstance(x, str):
         power = _POWER_OF_TEN.search(x[:MOST_DIGITS])

@@ -23,7 +23,15 @@ Matrix = list[list[Any]]
 
 @dataclass(frozen=True)
 class Range:
-    """An interval of physically possible values; an end that is not closed is excluded."""
+    """An interval of physically possible values; an end that is not closed is excluded.
+
+    Example:
+        >>> positive = tmsopt.models.Range(0, closed=False)
+        >>> str(positive), 0 in positive
+        ('> 0', False)
+
+    More: docs/reference/problem_file.md
+    """
 
     lower: float = -np.inf
     upper: float = np.inf
@@ -59,6 +67,13 @@ class Parameter:
         multiple_of: unit of the scale that a dimensionless parameter is a multiple of, e.g. ``m`` for wheelbases.
         sides: names of the designs with a negative and a positive value, where these are searched separately.
         counterpart: of one in SI, the dimensionless parameter that it gives, where that has another name.
+
+    Example:
+        >>> tilt = tmsopt.models.tms.sets[0]["lambda_s"]
+        >>> tilt.unit, tilt.tangent, 1.6 in tilt.range  # less than a right angle
+        ('rad', True, False)
+
+    More: docs/reference/quantities.md
     """
 
     name: str
@@ -91,6 +106,14 @@ class Quantity:
         aside: whether a report has it in a sentence, and not in its table.
         share: whether it is a part of a whole, read in percent.
         stands_for: the expression that a name is short for, in root quantities and parameters.
+
+    Example:
+        >>> import math
+        >>> arm = next(q for q in tmsopt.models.tms.quantities if q.name == "nu_H")  # (chi_H - 1) cos - zeta_H sin
+        >>> f"{arm.value({'chi_H': 1.0, 'zeta_H': -0.2, 'lambda_s': math.pi / 6}):.6f}"
+        '0.100000'
+
+    More: docs/reference/quantities.md
     """
 
     name: str
@@ -117,6 +140,12 @@ class ParameterSet:
         rate: for values of this set, how many 1/s a rate of 1 is; None where the set has no unit of time.
         root_unit: unit of the roots of the model's polynomial for values of this set.
         needs: parameter → one that must be above 0 where the first is not 0, and what is impossible otherwise.
+
+    Example:
+        >>> tmsopt.models.tms.parameter_set("SI").names
+        ('w', 'v', 'g', 'lambda_s', 'm_B', 'x_B', 'z_B', 'm_H', 'x_H', 'z_H')
+
+    More: docs/how_to/units.md
     """
 
     name: str
@@ -156,6 +185,13 @@ class Model:
         conventions: sentences on signs.
         sketch: the system drawn in text, with the symbols on it.
         absent: names that a user may look for in vain → what to write instead.
+
+    Example:
+        >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])
+        >>> print(swing.degree, *swing.coefficients({"c": 0.5, "k": 2.0}))
+        2 1.0 0.5 2.0
+
+    More: docs/tutorials/own_system.md
     """
 
     name: str
@@ -199,12 +235,26 @@ class Model:
 
 
 def words_of(model: Model) -> Mapping[str, str]:
-    """``weave`` and ``capsize``, as data have them, → the words that the users of a model read."""
+    """``weave`` and ``capsize``, as data have them, → the words that the users of a model read.
+
+    Example:
+        >>> dict(tmsopt.models.words_of(tmsopt.models.from_coefficients([1, "c", "k"])))
+        {'weave': 'flutter', 'capsize': 'divergence'}
+
+    More: docs/tutorials/own_system.md
+    """
     return dict(zip(("weave", "capsize"), model.words, strict=True))
 
 
 def in_words_of(model: Model, text: str) -> str:
-    """A name such as ``infinity and weave`` in the words of a model."""
+    """A name such as ``infinity and weave`` in the words of a model.
+
+    Example:
+        >>> tmsopt.models.in_words_of(tmsopt.models.from_coefficients([1, "c", "k"]), "infinity and weave")
+        'infinity and flutter'
+
+    More: docs/tutorials/own_system.md
+    """
     return re.sub("weave|capsize", lambda found: words_of(model)[found[0]], text)
 
 
@@ -216,6 +266,14 @@ class Values(Mapping[str, Any]):
         extra: quantities beside those of the model, e.g. of the roots.
         lift: asked first for each quantity; returns a variable that stands for it, or None for its formula.
         ranges: width of the range of each parameter that may move: what is far smaller stands for 0.
+
+    Example:
+        >>> p = {"Fr": 1.0, "mu": 0.1, "chi_B": 1.2, "chi_H": 1.02, "zeta_B": -0.4, "zeta_H": -0.2, "lambda_s": 0.1}
+        >>> values = tmsopt.models.Values(tmsopt.models.tms, tmsopt.models.tms.sets[0], p)
+        >>> f"{values['Fr_c']:.6f} {tmsopt.laws.Fr_c(0.1, 1.2, 1.02, -0.4, -0.2, 0.1):.6f}"  # the law of the paper
+        '0.962682 0.962682'
+
+    More: docs/reference/quantities.md
     """
 
     def __init__(

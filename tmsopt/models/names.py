@@ -36,7 +36,14 @@ def unusable(name: Any) -> str:
 
 
 def latex(name: str) -> str:
-    """A name as a symbol: ``mu_1`` and ``mu1`` as μ with an index, ``k_max`` with an upright one."""
+    """A name as a symbol: ``mu_1`` and ``mu1`` as μ with an index, ``k_max`` with an upright one.
+
+    Example:
+        >>> tmsopt.models.latex("x2")
+        'x_{2}'
+
+    More: docs/how_to/report.md
+    """
     first, *indices = filter(None, name.split("_"))
     if numbered := re.fullmatch(r"([A-Za-z]+)(\d+)", first):
         first, indices = numbered[1], [numbered[2], *indices]

@@ -18,6 +18,31 @@ MOST_QUANTITIES = 500
 _CIRCLES = 8  # that are listed
 
 
+class Unfit(ValueError):
+    """A statement that makes no model.
+
+    Attributes:
+        key: the part of it that is at fault, e.g. ``M``.
+        message: what was found, and what is accepted.
+
+    Example:
+        >>> try:
+        ...     tmsopt.models.from_matrices(A=[[1, 2]])
+        ... except tmsopt.models.Unfit as error:
+        ...     print(error.key)
+        A
+
+    More: docs/tutorials/own_system.md
+    """
+
+    def __init__(self, key: str, message: str) -> None:
+        self.key, self.message = key, message
+        super().__init__(key, message)
+
+    def __str__(self) -> str:
+        return f"{self.key}: {self.message}"
+
+
 class Texts:
     """Turns texts into expressions of shared symbols; discarded after one statement.
 

@@ -23,12 +23,11 @@ from tmsopt.models.built_in import MODELS
 from tmsopt.models.degree import faulty
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
 from tmsopt.models.names import latex, spelled, unusable
-from tmsopt.models.texts import untexted
+from tmsopt.models.texts import Unfit, untexted
 from tmsopt.roots.polynomial import characteristic_polynomial, quadratic_pencil
 
 _ACCEPTED = "accepted: finite numbers, expressions in quotes, and SX expressions"
 _FINITE = "accepted: finite numbers, and expressions of them"
-
 
 MOST = {"M": 6, "A": 12, "coefficients": 12}
 """Largest size of M, D, K; of A; largest degree."""
@@ -58,6 +57,13 @@ def from_matrices(
     Raises:
         Unfit: for matrices that are not square, of different sizes or too large, for entries that are no finite
             numbers or SX expressions, for names that are taken, or where no polynomial comes of it.
+
+    Example:
+        >>> pendulum = tmsopt.models.from_matrices(M=[[3, 1], [1, 1]], K=[["2 - p", "p - 1"], [-1, 1]])  # Ziegler's
+        >>> print(*pendulum.coefficients({"p": 2.0}))  # 2 s⁴ + (7 - 2 p) s² + 1
+        2.0 0.0 3.0 0.0 1.0
+
+    More: docs/tutorials/own_system.md
     """
     if A is not None:
         if M is not None or D is not None or K is not None:
@@ -80,6 +86,13 @@ def from_coefficients(coefficients: Any, *, name: str = "stated", quantities: Ma
 
     Raises:
         Unfit: for fewer than two coefficients, more than 13, or a leading one that is 0.
+
+    Example:
+        >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])
+        >>> tmsopt.solve(tmsopt.Problem(swing, fixed={"k": 4.0}, free={"c": (0, 9)}, minimize="abscissa")).structure
+        'EP2'
+
+    More: docs/tutorials/own_system.md
     """
     row = _listed(coefficients)
     if row is None or any(_listed(x) is not None for x in row) or not 2 <= len(row) <= MOST["coefficients"] + 1:
@@ -288,22 +301,6 @@ def _vanishing(polynomial: Any, names: Sequence[str]) -> int:
             if known and lost == 0:
                 return 0
     return lost
-
-
-class Unfit(ValueError):
-    """A statement that makes no model.
-
-    Attributes:
-        key: the part of it that is at fault, e.g. ``M``.
-        message: what was found, and what is accepted.
-    """
-
-    def __init__(self, key: str, message: str) -> None:
-        self.key, self.message = key, message
-        super().__init__(key, message)
-
-    def __str__(self) -> str:
-        return f"{self.key}: {self.message}"
 
 
 def _unfit(message: str, key: str, *name: str) -> NoReturn:

@@ -24,6 +24,14 @@ class Comparison(Tabular):
         laws: one row per law.
         other: the solution by the other formulation, if there is one.
         reason: why there is no other formulation to compare with; empty if there is.
+
+    Example:
+        >>> compared = tmsopt.compare("problems/ep4.toml")
+        >>> law = next(row for row in compared.laws if row.label == "chib1")  # chi_B = sqrt(zeta_B/zeta_H)
+        >>> f"{law.numeric:.6f}"
+        '1.414214'
+
+    More: docs/explanation/paper.md
     """
 
     design: Solution
@@ -58,6 +66,13 @@ def compare(design: Given, **options: Unpack[Asked]) -> Comparison:
     Args:
         design: a solution; or a problem or its file, solved first.
         options: for the solves that this takes; see `solve`.
+
+    Example:
+        >>> laws = {row.label: row for row in tmsopt.compare("problems/ep4.toml").laws}
+        >>> all(abs(laws[label].residual) < 1e-9 for label in ("w01", "chib1", "tls", "frep4"))
+        True
+
+    More: docs/explanation/paper.md
     """
     how = options_of(options)
     problem = question_of(design)

@@ -65,6 +65,13 @@ class Proof(Shown):
         limits: inequality of the problem → ``met``, ``violated``, ``binds`` or ``cannot be told``, at this design.
         seconds: that the proof took.
         problem: whose design it is.
+
+    Example:
+        >>> proof = tmsopt.prove("problems/ep4.toml")
+        >>> proof.proved, proof.pattern, proof.parameters["chi_B"].value[:20]  # the square root of 2
+        (True, 'EP4', '1.414213562373095048')
+
+    More: docs/explanation/proofs.md
     """
 
     claim: str

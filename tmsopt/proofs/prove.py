@@ -32,6 +32,12 @@ def prove(
     Raises:
         InputError: for a problem that asks nothing, options beside a solution, digits out of range, or exact numbers
             that are not the design's.
+
+    Example:
+        >>> tmsopt.prove("problems/ep4.toml", digits=40).parameters["chi_B"].value[:42]  # the square root of 2
+        '1.4142135623730950488016887242096980785696'
+
+    More: docs/explanation/proofs.md
     """
     wrong = [name for name in options if name != "progress"]
     if isinstance(design, Solution) and wrong:

@@ -29,6 +29,13 @@ def real_roots(coefficients: ArrayLike, exact: bool = True) -> tuple[Counts, Cou
 
     Raises:
         ValueError: for a leading coefficient 0 or coefficients that are not finite.
+
+    Example:
+        >>> negative, positive = tmsopt.roots.real_roots([1, 1, -5, 3])  # (s - 1)² (s + 3)
+        >>> int(negative), int(positive)
+        (1, 1)
+
+    More: docs/how_to/charts.md
     """
     c = np.asarray(coefficients, dtype=float)
     if c.ndim == 0 or c.shape[-1] < 2 or not np.all(np.isfinite(c)) or np.any(c[..., 0] == 0):
@@ -50,6 +57,13 @@ def may_be_real(coefficients: Array) -> NDArray[np.bool_]:
 
     Args:
         coefficients: shape (rows, n + 1), finite, with leading ones other than 0.
+
+    Example:
+        >>> import numpy as np
+        >>> tmsopt.roots.may_be_real(np.array([[1.0, 3.0, 2.0], [1.0, 0.0, 1.0]]))  # (s + 1)(s + 2), s² + 1
+        array([ True, False])
+
+    More: docs/how_to/charts.md
     """
     c = _scaled(coefficients)
     n = c.value.shape[1] - 1

@@ -14,6 +14,12 @@ def exact_roots(coefficients: Sequence[Any], digits: int = DIGITS) -> tuple[Root
 
     The square-free factorisation decides multiplicities, ball arithmetic isolates the roots to `digits`; the
     values returned are those rounded to double precision.
+
+    Example:
+        >>> [(s.re, s.im, s.multiplicity) for s in tmsopt.roots.exact_roots([1, 2, 2, 2, 1])]  # (s + 1)² (s² + 1)
+        [(0.0, 1.0, 1), (0.0, -1.0, 1), (-1.0, 0.0, 2)]
+
+    More: docs/explanation/factors.md
     """
     with flint.ctx.workdps(digits):
         found = [Root(float(z.real.mid()), float(z.imag.mid()), m) for z, m in isolated_roots(coefficients)]
@@ -31,5 +37,12 @@ def isolated_roots(coefficients: Sequence[Any]) -> list[tuple[Any, int]]:
 
 
 def exact_abscissa(coefficients: Sequence[Any]) -> float:
-    """Largest real part of the roots, correct to double precision even beside an exceptional point."""
+    """Largest real part of the roots, correct to double precision even beside an exceptional point.
+
+    Example:
+        >>> tmsopt.roots.exact_abscissa([1, 12, 66, 220, 495, 792, 924, 792, 495, 220, 66, 12, 1])  # (s + 1)¹²
+        -1.0
+
+    More: docs/explanation/factors.md
+    """
     return exact_roots(coefficients)[0].re

@@ -25,6 +25,12 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
 
     Raises:
         ValueError: for a leading coefficient 0 or coefficients that are not finite.
+
+    Example:
+        >>> [complex(s) for s in tmsopt.roots.roots([1, 2, 5]).round(9)]
+        [(-1+2j), (-1-2j)]
+
+    More: docs/explanation/factors.md
     """
     c = np.asarray(coefficients, dtype=float)
     if c.ndim == 0 or c.shape[-1] < 2 or not np.all(np.isfinite(c)) or np.any(c[..., 0] == 0):
@@ -46,12 +52,27 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
 
 
 def abscissa(coefficients: ArrayLike) -> Array:
-    """Largest real part of the roots, in double precision: shape (…, n + 1) in, (…) out."""
+    """Largest real part of the roots, in double precision: shape (…, n + 1) in, (…) out.
+
+    Example:
+        >>> [round(float(x), 12) for x in tmsopt.roots.abscissa([[1, 3, 2], [1, 0, 1]])]  # (s + 1)(s + 2) and s² + 1
+        [-1.0, 0.0]
+
+    More: docs/explanation/factors.md
+    """
     return np.asarray(roots(coefficients).real.max(axis=-1))
 
 
 def rebuilt(values: NDArray[np.complex128]) -> Array:
-    """Monic real coefficients of the polynomials with these roots: shape (…, n) in, (…, n + 1) out."""
+    """Monic real coefficients of the polynomials with these roots: shape (…, n) in, (…, n + 1) out.
+
+    Example:
+        >>> import numpy as np
+        >>> tmsopt.roots.rebuilt(np.array([-1 + 1j, -1 - 1j]))
+        array([1., 2., 2.])
+
+    More: docs/reference/python.md
+    """
     return _elementary(values).real
 
 
@@ -60,6 +81,13 @@ def backward_error(coefficients: ArrayLike, values: NDArray[np.complex128]) -> A
 
     Each coefficient's error is measured against the same symmetric function of |roots|, which is the size of
     the terms it is summed from: a coefficient that cancels to nearly 0 has no relative accuracy of its own.
+
+    Example:
+        >>> p = [1, 4, 6, 4, 1]
+        >>> bool(tmsopt.roots.backward_error(p, tmsopt.roots.roots(p)) < 1e-14)
+        True
+
+    More: docs/explanation/factors.md
     """
     c = np.asarray(coefficients, dtype=float)
     size = _elementary(-np.abs(values)).real

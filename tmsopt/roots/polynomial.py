@@ -14,7 +14,14 @@ Coefficients = Sequence[Any]
 
 
 def product(*factors: Coefficients) -> list[Any]:
-    """Coefficients of the product of polynomials given by their coefficients."""
+    """Coefficients of the product of polynomials given by their coefficients.
+
+    Example:
+        >>> tmsopt.roots.product([1, 1], [1, 2], [1, 3])  # (s + 1)(s + 2)(s + 3)
+        [1, 6, 11, 6]
+
+    More: docs/reference/python.md
+    """
     result: list[Any] = list(factors[0]) if factors else [1]
     with np.errstate(over="ignore", invalid="ignore"):  # users know inf and nan; one of its own for each thread
         for factor in factors[1:]:
@@ -27,7 +34,14 @@ def product(*factors: Coefficients) -> list[Any]:
 
 
 def shift(coefficients: Coefficients, gamma: Any) -> list[Any]:
-    """Coefficients of p(t + gamma) as a polynomial in t (Taylor shift by repeated Horner division)."""
+    """Coefficients of p(t + gamma) as a polynomial in t (Taylor shift by repeated Horner division).
+
+    Example:
+        >>> tmsopt.roots.shift([1, 4, 6, 4, 1], -1)  # (s + 1)⁴ in t = s + 1
+        [1, 0, 0, 0, 0]
+
+    More: docs/reference/python.md
+    """
     c = list(coefficients)
     for end in range(len(c), 1, -1):
         for k in range(1, end):
@@ -36,7 +50,14 @@ def shift(coefficients: Coefficients, gamma: Any) -> list[Any]:
 
 
 def evaluate(coefficients: Coefficients, s: Any) -> Any:
-    """Value of the polynomial at s, by Horner's rule."""
+    """Value of the polynomial at s, by Horner's rule.
+
+    Example:
+        >>> tmsopt.roots.evaluate([1, 4, 6, 4, 1], -3)  # (s + 1)⁴
+        16
+
+    More: docs/reference/python.md
+    """
     value: Any = 0
     for c in coefficients:
         value = value * s + c
@@ -44,7 +65,14 @@ def evaluate(coefficients: Coefficients, s: Any) -> Any:
 
 
 def quadratic_pencil(M: Sequence[Coefficients], D: Sequence[Coefficients], K: Sequence[Coefficients]) -> list[Any]:
-    """Coefficients of det(M s² + D s + K) for square matrices given as nested sequences."""
+    """Coefficients of det(M s² + D s + K) for square matrices given as nested sequences.
+
+    Example:
+        >>> tmsopt.roots.quadratic_pencil([[1, 0], [0, 1]], [[0, 0], [0, 0]], [[2, -1], [-1, 2]])  # (s² + 1)(s² + 3)
+        [1, 0, 4, 0, 3]
+
+    More: docs/tutorials/own_system.md
+    """
     size = range(len(M))
     return determinant([[[M[i][j], D[i][j], K[i][j]] for j in size] for i in size])
 
@@ -53,6 +81,12 @@ def determinant(matrix: Sequence[Sequence[Coefficients]]) -> list[Any]:
     """Coefficients of the determinant of a square matrix whose entries are polynomials.
 
     Laplace expansion with every minor computed once: no division, n 2ⁿ products.
+
+    Example:
+        >>> tmsopt.roots.determinant([[[1, 0], [-1]], [[1], [1, 2]]])  # s (s + 2) + 1
+        [1, 2, 1]
+
+    More: docs/tutorials/own_system.md
     """
 
     @cache
@@ -100,7 +134,14 @@ def _dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
 
 @dataclass(frozen=True)
 class Root:
-    """A root with its multiplicity; a complex pair is two of these."""
+    """A root with its multiplicity; a complex pair is two of these.
+
+    Example:
+        >>> tmsopt.roots.exact_roots([1, 4, 6, 4, 1])  # (s + 1)⁴
+        (Root(re=-1.0, im=0.0, multiplicity=4),)
+
+    More: docs/explanation/exceptional_points.md
+    """
 
     re: float
     im: float

@@ -16,7 +16,14 @@ _SMALL = 4
 
 
 def hurwitz_minors(coefficients: Coefficients) -> list[Any]:
-    """Leading principal minors Δ1 … Δn of the Hurwitz matrix of a polynomial of degree n, any numbers."""
+    """Leading principal minors Δ1 … Δn of the Hurwitz matrix of a polynomial of degree n, any numbers.
+
+    Example:
+        >>> tmsopt.roots.hurwitz_minors([1, 2, 3, 4])  # a1, a1 a2 - a0 a3, a3 times that
+        [2, 2, 8]
+
+    More: docs/explanation/exceptional_points.md
+    """
     return [_hurwitz_minor(coefficients, m) for m in range(1, len(coefficients))]
 
 
@@ -43,6 +50,12 @@ def lienard_chipart(coefficients: Coefficients) -> list[Any]:
 
     aₙ, aₙ₋₂, … and the Hurwitz minors Δₙ₋₁, Δₙ₋₃, … (Liénard–Chipart). Multiply the polynomial by the sign
     of a0 first.
+
+    Example:
+        >>> tmsopt.roots.lienard_chipart([1, 4, 6, 4, 1]), tmsopt.roots.lienard_chipart([1, 4, 6, 4, -1])
+        ([1, 6, 64, 4], [-1, 6, 96, 4])
+
+    More: docs/explanation/exceptional_points.md
     """
     n = len(coefficients) - 1
     return [coefficients[k] for k in range(n, 0, -2)] + [_hurwitz_minor(coefficients, m) for m in range(n - 1, 0, -2)]
@@ -53,6 +66,12 @@ def routh(coefficients: Coefficients) -> list[Any]:
 
     Numbers that can be divided: floats, arrays, fractions, balls. In fewer operations than `lienard_chipart`, which
     does without division; what follows an entry that is 0 means nothing.
+
+    Example:
+        >>> tmsopt.roots.routh([1.0, 2.0, 3.0, 4.0])
+        [2.0, 1.0, 4.0]
+
+    More: docs/explanation/exceptional_points.md
     """
     return list(_column(coefficients))
 
@@ -73,6 +92,12 @@ def is_stable(coefficients: ArrayLike, exact: bool = True) -> NDArray[np.bool_]:
     Args:
         exact: above degree 4, let exact arithmetic answer, from the coefficients as stored, where rounding could change
             a sign: some 0.1 ms each. Up to degree 4 the signs of the few rounded conditions count.
+
+    Example:
+        >>> tmsopt.roots.is_stable([[1, 4, 6, 4, 1], [1, 4, 6, 4, -1]])
+        array([ True, False])
+
+    More: docs/explanation/exceptional_points.md
     """
     c = np.asarray(coefficients, dtype=float)
     sign = np.sign(c[..., 0])
@@ -117,6 +142,12 @@ def discriminant(coefficients: Coefficients) -> Any:
 
     Raises:
         ValueError: for degree 0 or 1.
+
+    Example:
+        >>> tmsopt.roots.discriminant([1, 5, 4]), tmsopt.roots.discriminant([1, 4, 4])  # b² - 4 a c
+        (9, 0)
+
+    More: docs/explanation/exceptional_points.md
     """
     with np.errstate(over="ignore", invalid="ignore"):
         return _discriminant(list(coefficients))

@@ -75,6 +75,13 @@ class Every(Tabular):
         coverage: of the search; None where there was none.
         completeness: of the proof; None where none was asked for.
         proved: of each solution, whether it is proved to exist.
+
+    Example:
+        >>> every = tmsopt.solve_all("problems/coupled_pair.toml")
+        >>> sorted(round(design.parameters["c2"], 9) for design in every.solutions)
+        [-1.1, -1.1, 1.1, 1.1]
+
+    More: docs/how_to/all_designs.md
     """
 
     solutions: tuple[Solution, ...]
@@ -116,6 +123,14 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Ask
 
     Raises:
         InputError: for a problem that locates no pattern, leaves freedom, or constrains a quantity without a formula.
+
+    Example:
+        >>> swing = tmsopt.models.from_coefficients([1, "c", 1])  # (s + 1)² and (s - 1)²
+        >>> every = tmsopt.solve_all(tmsopt.Problem(swing, free={"c": (-3, 3)}, locate="EP2"))
+        >>> sorted(round(design.parameters["c"], 9) for design in every.solutions)
+        [-2.0, 2.0]
+
+    More: docs/how_to/all_designs.md
     """
     problem = problem_of(problem)
     if not is_number(seconds):

@@ -58,6 +58,13 @@ def solve(
         NotSolved: carrying the best point found, when `throw`.
         InputError: when parameters are free and nothing is asked of them.
         KeyboardInterrupt: when the user ends it before there is any design, or `interruptible` is False.
+
+    Example:
+        >>> design = tmsopt.solve("problems/ep4.toml")
+        >>> design.structure, f"{design.parameters['chi_B']:.6f}"  # at the square root of 2
+        ('EP4', '1.414214')
+
+    More: docs/tutorials/first_bicycle.md
     """
     problem = question_of(problem)
     solution = solved(problem, options_of(options, AskedOfSolve, _ASKING), family)

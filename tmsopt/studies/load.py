@@ -98,6 +98,13 @@ def load_study(path: str | PathLike[str]) -> Study | Sampling:
 
     Raises:
         InputError: listing every fault with file, line, key, what was found and what is accepted.
+
+    Example:
+        >>> study = tmsopt.load_study("problems/study_heights.toml")
+        >>> len(study.columns["mu"]), study.method
+        (32, 'sobol')
+
+    More: docs/reference/study_file.md
     """
     page = read_page(path, "study")
     if "parameters" in page.data and not {"problem", "study", "vary"} & set(page.data):

@@ -43,6 +43,13 @@ class Sampling:
 
     Raises:
         InputError: listing everything that is wrong, as far as it shows before the design is known.
+
+    Example:
+        >>> sampling = tmsopt.load_study("problems/study_built.toml")
+        >>> sampling.rows, sampling.distribution
+        (500, 'normal')
+
+    More: docs/how_to/tolerances.md
     """
 
     problem: Problem
@@ -103,6 +110,14 @@ def monte_carlo(
     Raises:
         NotSolved: for a design that is not optimal.
         InputError: listing everything else that is wrong.
+
+    Example:
+        >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])
+        >>> built = tmsopt.monte_carlo(tmsopt.Problem(swing, fixed={"c": 2.0, "k": 1.0}), 100, tolerances={"c": 0.1})
+        >>> sorted(built.columns), len(built.columns["c"]), max(abs(c - 2) for c in built.columns["c"]) <= 0.1
+        (['c'], 100, True)
+
+    More: docs/how_to/tolerances.md
     """
     solution = solved_first(design, progress)
     counted(progress, "drawing designs")

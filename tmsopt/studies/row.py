@@ -35,6 +35,13 @@ class Row:
         starts: tried.
         warm: whether it was started from a neighbour's optimum.
         seconds, host: how long it took and where; the only ones that differ when a row is solved again.
+
+    Example:
+        >>> row = tmsopt.run_study(tmsopt.over_grid("problems/ep4.toml", {"mu": [0.3]}), workers=1).rows[0]
+        >>> row.status, row.structure, row.varied
+        ('optimal', 'EP4', {'mu': 0.3})
+
+    More: docs/reference/study_file.md
     """
 
     number: int

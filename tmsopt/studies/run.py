@@ -53,6 +53,14 @@ class Results(Shown):
         engine: ``in process``, ``2 processes`` or the address of a cluster; empty where nothing was left to solve.
         found: rows that were in the store.
         about: what exports say of the study: its definition, and of a store when, where and with what it was made.
+
+    Example:
+        >>> study = tmsopt.over_grid("problems/ep4.toml", {"zeta_B": [-0.45, -0.8]})
+        >>> results = tmsopt.run_study(study, workers=1)
+        >>> [f"{row.parameters['chi_B']:.6f}" for row in results.rows]  # sqrt(zeta_B/zeta_H), zeta_H = -0.2
+        ['1.500000', '2.000000']
+
+    More: docs/reference/study_file.md
     """
 
     study: Study
@@ -137,6 +145,15 @@ def run_study(
     Raises:
         InputError: for a store of another study, and whatever else cannot be done as asked.
         NotSolved: where a Monte Carlo study has no design to draw around.
+
+    Example:
+        >>> study = tmsopt.over_grid("problems/ep4.toml", {"zeta_B": [-0.3, -0.5]})
+        >>> [f"{row.abscissa:.6f}" for row in tmsopt.run_study(study, workers=1).rows]
+        ['-2.020516', '-1.778279']
+        >>> [f"{tmsopt.laws.w01(zeta_B, -0.2):.6f}" for zeta_B in (-0.3, -0.5)]  # the law of the paper
+        ['-2.020516', '-1.778279']
+
+    More: docs/tutorials/study.md
     """
     stated = load_study(study) if isinstance(study, str | PathLike) else study
     if faults := list(_faults(stated, workers, progress)):

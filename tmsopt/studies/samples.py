@@ -17,7 +17,14 @@ _DIGITS = 15  # of a decimal number, all of which a double holds
 
 @dataclass(frozen=True)
 class Span:
-    """From `low` to `high`, evenly or, with `log`, by equal factors, for which both ends have one sign."""
+    """From `low` to `high`, evenly or, with `log`, by equal factors, for which both ends have one sign.
+
+    Example:
+        >>> [round(x, 9) for x in tmsopt.Span(1, 100, log=True).points(3)]
+        [1.0, 10.0, 100.0]
+
+    More: docs/reference/study_file.md
+    """
 
     low: float
     high: float
@@ -62,6 +69,13 @@ def latin_hypercube(ranges: Mapping[str, Any], rows: int, seed: int = 0) -> dict
 
     Raises:
         InputError: listing everything that is wrong.
+
+    Example:
+        >>> sample = tmsopt.latin_hypercube({"mu": (0, 1), "Fr": (1, 5)}, rows=4)
+        >>> sorted(int(4 * x) for x in sample["mu"])  # one in each quarter
+        [0, 1, 2, 3]
+
+    More: docs/reference/study_file.md
     """
     spans = _spans(ranges, rows, seed)
     from scipy.stats import qmc
@@ -77,6 +91,13 @@ def sobol(ranges: Mapping[str, Any], rows: int, seed: int = 0) -> dict[str, Colu
 
     Raises:
         InputError: listing everything that is wrong.
+
+    Example:
+        >>> sample = tmsopt.sobol({"mu": tmsopt.Span(0.01, 1, log=True)}, rows=2)
+        >>> sorted(x > 0.1 for x in sample["mu"])  # one in each half of the logarithms
+        [False, True]
+
+    More: docs/reference/study_file.md
     """
     spans = _spans(ranges, rows, seed)
     from scipy.stats import qmc

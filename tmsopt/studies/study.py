@@ -42,6 +42,13 @@ class Study:
 
     Raises:
         InputError: listing everything that is wrong, each with the accepted values.
+
+    Example:
+        >>> study = tmsopt.over_grid("problems/ep4.toml", {"mu": [0.1, 0.2], "zeta_H": [-0.2, -0.3]})
+        >>> list(study.columns["mu"]), list(study.columns["zeta_H"])
+        ([0.1, 0.1, 0.2, 0.2], [-0.2, -0.3, -0.2, -0.3])
+
+    More: docs/reference/study_file.md
     """
 
     problem: Problem
@@ -122,6 +129,13 @@ def over_grid(
 
     Raises:
         InputError: listing everything that is wrong with it.
+
+    Example:
+        >>> study = tmsopt.over_grid("problems/ep4.toml", {"mu": [0.1, 0.2, 0.3], "zeta_H": [-0.2, -0.3]})
+        >>> study.grid_shape, len(study.columns["mu"])
+        ({'mu': 3, 'zeta_H': 2}, 6)
+
+    More: docs/reference/study_file.md
     """
     if wrong := table_faults("axes", axes, "{'mu': [0.1, 0.2]}"):
         raise InputError(wrong)

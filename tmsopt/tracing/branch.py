@@ -23,6 +23,13 @@ class Event:
         detail: in words, e.g. which parameter folds or which limit ends the branch.
         parameters: every parameter of the design there.
         index: row of the branch.
+
+    Example:
+        >>> found = next(e for e in tmsopt.trace("problems/ep_set.toml").events if e.name == "EP4")
+        >>> f"{found.parameters['chi_B']:.6f}"  # the square root of 2
+        '1.414214'
+
+    More: docs/how_to/tracing.md
     """
 
     name: str
@@ -49,6 +56,14 @@ class Branch(Tabular):
         events: in the order of the arclength.
         closed: whether the last point is the first.
         residual: largest mismatch of a coefficient along the curve, relative to the terms that it is made of.
+
+    Example:
+        >>> branch = tmsopt.trace("problems/ep_set.toml").branches[0]
+        >>> law = tmsopt.laws.epset(-0.4, -0.2, branch.parameters["lambda_s"])  # of the paper; no part of the trace
+        >>> bool(abs(branch.parameters["Fr"] - law).max() < 1e-9)
+        True
+
+    More: docs/how_to/tracing.md
     """
 
     pattern: str
@@ -106,6 +121,13 @@ class Trace(Tabular):
     Attributes:
         starts: designs that the search for branches began from.
         seconds: for the whole; `seconds_walking` for the points alone.
+
+    Example:
+        >>> traced = tmsopt.trace("problems/ep_set.toml")
+        >>> len(traced.branches), "EP4" in [event.name for event in traced.events]
+        (1, True)
+
+    More: docs/how_to/tracing.md
     """
 
     problem: Problem

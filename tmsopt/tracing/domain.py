@@ -67,6 +67,13 @@ class Domain(Shown):
         parting: arcs that part capsize from weave among the unstable designs: two positive real roots merge, or one
             passes 0 or infinity, where no other root is real and positive.
         corners: of the first two boundaries.
+
+    Example:
+        >>> (corner,) = tmsopt.domain("problems/chart.toml").corners  # the tip of heavy damping, by the paper's law
+        >>> corner.name, f"{corner.parameters['Fr']:.6f}", f"{tmsopt.laws.frep4(-0.4, -0.2)[0]:.6f}"
+        ('EP4', '2.236318', '2.236318')
+
+    More: docs/how_to/charts.md
     """
 
     stability: tuple[Arc, ...]
@@ -86,6 +93,14 @@ def domain(
     """Boundaries of stability and of heavy damping in the plane of the two free parameters.
 
     Constraints of the problem are left aside. `step`, `starts`, `seed` and `progress` are those of `trace`.
+
+    Example:
+        >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])  # heavily damped beyond the parabola c² = 4 k
+        >>> (arc,) = tmsopt.domain(tmsopt.Problem(swing, free={"c": (0.1, 2), "k": (0.1, 1)})).heavy_damping
+        >>> bool(abs(arc.points["c"] ** 2 - 4 * arc.points["k"]).max() < 1e-12)
+        True
+
+    More: docs/how_to/charts.md
     """
     plane = replace(problem_of(problem), constraints={}, minimize=None, maximize=None, locate=None)
     how: dict[str, Any] = {"step": step, "starts": starts, "seed": seed, "progress": progress}

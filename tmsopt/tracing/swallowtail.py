@@ -57,6 +57,13 @@ class Swallowtail(Shown):
         axes: the three free parameters; rows of patches have one value of the first.
         cusps: traced EP3 curves, the cuspidal edges.
         crossing: the traced EP set, 2EP2 on the self-intersection of the surface and CEP2 beyond it.
+
+    Example:
+        >>> surface = tmsopt.swallowtail("problems/ep_set.toml", rows=4, across=4, starts=8)
+        >>> surface.cusps.pattern, surface.crossing.pattern
+        ('EP3', '2EP2')
+
+    More: docs/how_to/tracing.md
     """
 
     problem: Problem
@@ -85,6 +92,13 @@ def swallowtail(
     Raises:
         InputError: for another number of free parameters, coefficients that are not affine in two of them, or a
             model of degree 2 or 3, whose roots cannot meet two by two.
+
+    Example:
+        >>> surface = tmsopt.swallowtail("problems/ep_set.toml", rows=4, across=4, starts=8)
+        >>> [f"{event.parameters['chi_B']:.6f}" for event in surface.crossing.events if event.name == "EP4"]  # √2
+        ['1.414214']
+
+    More: docs/how_to/tracing.md
     """
     problem = problem_of(problem)
     if problem.model.degree < _LEAST:

@@ -55,6 +55,14 @@ def trace(
 
     Raises:
         InputError: for an unknown pattern, when the equations do not leave a curve, or for options out of range.
+
+    Example:
+        >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])  # EP2 where c² = 4 k
+        >>> (branch,) = tmsopt.trace(tmsopt.Problem(swing, free={"c": (0.1, 2), "k": (0.1, 1)}), "EP2").branches
+        >>> bool(abs(branch.parameters["c"] ** 2 - 4 * branch.parameters["k"]).max() < 1e-12)
+        True
+
+    More: docs/how_to/tracing.md
     """
     began = time.perf_counter()
     problem = _asked(problem_of(problem), pattern)

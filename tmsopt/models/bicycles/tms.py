@@ -48,7 +48,15 @@ _NATIVE = ParameterSet(
 
 
 def from_si(p: Mapping[str, Any]) -> dict[str, Any]:
-    """Dimensionless parameters for SI values (m, m/s, m/s², rad, kg), any numbers."""
+    """Dimensionless parameters for SI values (m, m/s, m/s², rad, kg), any numbers.
+
+    Example:
+        >>> own = dict(w=1.0, v=3.0, g=9.0, lambda_s=0.1, m_H=1.0, m_B=10.0, x_B=1.2, x_H=1.0, z_B=-0.4, z_H=-0.2)
+        >>> print(tmsopt.models.from_si(own)["Fr"], tmsopt.models.from_si(own)["mu"])  # v/√(g w), m_H/m_B
+        1.0 0.1
+
+    More: docs/how_to/units.md
+    """
     return {
         "Fr": p["v"] / sqrt(p["g"] * p["w"]), "mu": p["m_H"] / p["m_B"], "chi_B": p["x_B"] / p["w"],
         "chi_H": p["x_H"] / p["w"], "zeta_B": p["z_B"] / p["w"], "zeta_H": p["z_H"] / p["w"], "lambda_s": p["lambda_s"],
@@ -56,7 +64,15 @@ def from_si(p: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def to_si(p: Mapping[str, Any], w: Any = 1.0, m_B: Any = 1.0, g: Any = GRAVITY) -> dict[str, Any]:
-    """SI values for dimensionless parameters, given wheelbase w (m), rear frame mass m_B (kg) and g (m/s²)."""
+    """SI values for dimensionless parameters, given wheelbase w (m), rear frame mass m_B (kg) and g (m/s²).
+
+    Example:
+        >>> design = dict(Fr=1.0, mu=0.1, chi_B=1.2, chi_H=1.0, zeta_B=-0.4, zeta_H=-0.2, lambda_s=0.1)
+        >>> print(tmsopt.models.to_si(design, w=4.0, g=9.0)["v"])  # Fr √(g w)
+        6.0
+
+    More: docs/how_to/units.md
+    """
     return {
         "w": w, "v": p["Fr"] * sqrt(g * w), "g": g, "lambda_s": p["lambda_s"], "m_B": m_B, "x_B": p["chi_B"] * w,
         "z_B": p["zeta_B"] * w, "m_H": p["mu"] * m_B, "x_H": p["chi_H"] * w, "z_H": p["zeta_H"] * w,

@@ -7,6 +7,14 @@ def copo(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, T: 
     """Coefficients a0 … a4 of the characteristic polynomial, with T = tan λ_s (equation copo).
 
     This is det(M s² + V s + P) / (μ ν_H cos λ_s), by plain arithmetic on any numbers.
+
+    Example:
+        >>> a = tmsopt.models.copo(Fr=1, mu=0.1, chi_B=2**0.5, chi_H=1, zeta_B=-0.4, zeta_H=-0.2, T=1)
+        >>> same = tmsopt.models.copo(Fr=1, mu=9.0, chi_B=2**0.5, chi_H=1, zeta_B=-0.4, zeta_H=-0.2, T=1)
+        >>> a == same  # at chi_H = 1 the ratio of the masses plays no part
+        True
+
+    More: docs/explanation/paper.md
     """
     return [
         (chi_H - 1 - zeta_H * T) * zeta_B * zeta_B, Fr * (zeta_B * chi_H - zeta_H * chi_B) * zeta_B,
@@ -32,6 +40,14 @@ def matrices(
     """M, V and P of M q″ + V q′ + P q = 0, q = (lean, steer), from the sine and cosine of the steer axis tilt.
 
     Equation matrices of the paper; nested lists, any numbers.
+
+    Example:
+        >>> design = (1.0, 0.1, 1.2, 1.02, -0.4, -0.2)
+        >>> pencil = tmsopt.roots.quadratic_pencil(*tmsopt.models.matrices(*design, sine=0.6, cosine=0.8))
+        >>> {round(x / a, 9) for x, a in zip(pencil, tmsopt.models.copo(*design, T=0.75))}  # μ ν_H cos λ_s
+        {0.01088}
+
+    More: docs/explanation/paper.md
     """
     nu_H = (chi_H - 1) * cosine - zeta_H * sine
     lean = mu * zeta_H + zeta_B

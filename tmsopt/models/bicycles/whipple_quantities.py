@@ -28,6 +28,12 @@ def spin(I_yy: Any, r: Any) -> Any:
 
     A wheel of a given kind has I_yy ≤ m r², so its spin vanishes with its radius. One without radius that has inertia
     would turn infinitely fast: its spin is nan.
+
+    Example:
+        >>> print(tmsopt.models.spin(0.12, 0.3), tmsopt.models.spin(0.0, 0.0), tmsopt.models.spin(1.0, 0.0))
+        0.4 0.0 nan
+
+    More: docs/how_to/import.md
     """
     if is_symbolic(I_yy) or is_symbolic(r):
         return I_yy * r / (r * r + _TINY) if is_symbolic(r) else I_yy / r if r != 0 else 0 * I_yy
@@ -50,7 +56,15 @@ def algebraic(p: Design) -> dict[str, Any]:
 
 
 def canonical(p: Design) -> tuple[list[list[Any]], list[list[Any]], list[list[Any]], list[list[Any]]]:
-    """M, C1, K0 and K2 of Meijaard et al. for the native parameters (v and g have no part in them), any numbers."""
+    """M, C1, K0 and K2 of Meijaard et al. for the native parameters (v and g have no part in them), any numbers.
+
+    Example:
+        >>> M, C1, K0, K2 = tmsopt.models.canonical(tmsopt.load("problems/whipple_benchmark.toml").fixed)
+        >>> [f"{x:.5f}" for row in M for x in row]  # Meijaard et al. (2007)
+        ['80.81722', '2.31941', '2.31941', '0.29784']
+
+    More: docs/how_to/import.md
+    """
     sine, cosine = _sine_cosine(p)
     bodies = {name: p[name] for name in _IN_MATRICES}
     spins = {"S_R": spin(p["I_Ryy"], p["r_R"]), "S_F": spin(p["I_Fyy"], p["r_F"])}

@@ -56,6 +56,12 @@ def verify(progress: Listener | None = None, only: Sequence[str] = ()) -> Ledger
 
     Raises:
         InputError: for a pattern that no key matches.
+
+    Example:
+        >>> [(entry.place, entry.verdict) for entry in tmsopt.verify(only=["chib1*"]).entries]
+        [('Eq. chib1', 'exact'), ('text after Eq. chib1', 'exact')]
+
+    More: docs/explanation/paper.md
     """
     if faults := [*list_faults("only", only, "['lscf-*']"), *call_faults("progress", progress)]:
         raise InputError(faults)

@@ -73,7 +73,15 @@ class Entry:
 
 @dataclass(frozen=True, repr=False)
 class Ledger(Tabular):
-    """Every entry, in the order of the paper."""
+    """Every entry, in the order of the paper.
+
+    Example:
+        >>> ledger = tmsopt.verify(only=["chib1*"])
+        >>> ledger.counts["does not hold"]
+        0
+
+    More: docs/explanation/paper.md
+    """
 
     source: str
     entries: tuple[Entry, ...]

@@ -37,12 +37,26 @@ def pattern(name: str, degree: int) -> Pattern:
 
     Raises:
         ValueError: for a name that is none, or a pattern of more roots than the degree.
+
+    Example:
+        >>> triple = tmsopt.roots.pattern("EP3", 5)
+        >>> triple.unknowns, triple.codimension
+        (('r', 'c1', 'c2'), 2)
+
+    More: docs/explanation/exceptional_points.md
     """
     return _pattern("".join(name.split()), degree)
 
 
 def composition(name: str) -> list[tuple[str, int, int]]:
-    """What a pattern is made of: (kind, multiplicity, count), of kind ``EP``, ``CEP`` or one of the imaginary axis."""
+    """What a pattern is made of: (kind, multiplicity, count), of kind ``EP``, ``CEP`` or one of the imaginary axis.
+
+    Example:
+        >>> tmsopt.roots.composition("2EP2+CEP2")
+        [('EP', 2, 2), ('CEP', 2, 1)]
+
+    More: docs/explanation/exceptional_points.md
+    """
     return [(g.kind, g.order, g.count) for g in parts_of("".join(name.split()))]
 
 

@@ -173,6 +173,13 @@ def multiple_real_roots(coefficients: ArrayLike, tolerance: float) -> tuple[Root
     Numeric roots are gathered from the closest neighbours on, the most degenerate first, and ∏ (s − rᵢ)^mᵢ is fitted
     to the coefficients, descending, shape (n + 1,), with a leading one other than 0. It is near within `tolerance`:
     the root sum of squares of the changes, each relative to the terms that make up a coefficient.
+
+    Example:
+        >>> found = tmsopt.roots.multiple_real_roots([1, 5, 9, 7, 2 + 1e-13], 1e-9)  # near (s + 1)³ (s + 2)
+        >>> [(round(root.re, 6), root.multiplicity) for root in found]
+        [(-1.0, 3), (-2.0, 1)]
+
+    More: docs/explanation/exceptional_points.md
     """
     c = np.asarray(coefficients, dtype=float)
     z = numeric_roots(c)

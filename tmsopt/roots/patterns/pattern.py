@@ -40,6 +40,12 @@ class Pattern:
         marks: name of a more special pattern → expression of the unknowns that is 0 where it is met.
         ends: unknown → what happens where it reaches 0 and the pattern ends.
         degree: of the polynomials.
+
+    Example:
+        >>> tmsopt.roots.pattern("EP3", 4).monic([-1, -2])  # (s + 1)³ (s + 2)
+        [1, 5, 9, 7, 2]
+
+    More: docs/explanation/factors.md
     """
 
     name: str

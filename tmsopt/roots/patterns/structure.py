@@ -43,6 +43,13 @@ class Structure:
         roots: all roots with multiplicities, of the nearest polynomial that has the structure. Those of a quartic
             whose rightmost root is simple and alone are its own.
         distance: relative change of the coefficients (root sum of squares) that takes the polynomial there.
+
+    Example:
+        >>> found = tmsopt.roots.structure([1, 3, 3, 1])
+        >>> found.name, [(round(root.re, 9), root.multiplicity) for root in found.roots]
+        ('EP3', [(-1.0, 3)])
+
+    More: docs/explanation/exceptional_points.md
     """
 
     name: str
@@ -69,6 +76,12 @@ def structure(coefficients: ArrayLike, tolerance: float = 1e-12, off: ArrayLike 
 
     Raises:
         ValueError: for another shape, coefficients that are not finite, or a leading 0.
+
+    Example:
+        >>> tmsopt.roots.structure([1, 4, 8, 8, 4]).name  # (s² + 2 s + 2)²
+        'CEP2'
+
+    More: docs/explanation/exceptional_points.md
     """
     c = _checked(coefficients)
     found = numeric_roots(c)
@@ -90,6 +103,13 @@ def pattern_distance(
 
     Args:
         off, tolerance: see `structure`.
+
+    Example:
+        >>> double = tmsopt.roots.pattern("EP2", 2)
+        >>> f"{tmsopt.roots.pattern_distance(double, [1, 2, 1.001]):.6f}"  # c² = 4 k is 0.001/√5 away
+        '0.000447'
+
+    More: docs/explanation/factors.md
     """
     try:
         c = _matching(pattern, coefficients)

@@ -24,6 +24,13 @@ class Classes:
             with four different real roots (heavily damped).
         real_roots: number of different real roots.
         doubtful: number of quartics whose signs rounding left in doubt, and that `real_roots` decided.
+
+    Example:
+        >>> found = tmsopt.roots.quartic_classes(1, 4, 6, 4, [1, -1], compiled=False)  # (s + 1)⁴, and a root right of 0
+        >>> [tmsopt.roots.CLASSES[kind] for kind in found.kind], found.real_roots.tolist()
+        (['stable', 'capsize'], [1, 2])
+
+    More: docs/how_to/charts.md
     """
 
     kind: NDArray[np.int8]
@@ -44,6 +51,13 @@ def quartic_classes(
     Raises:
         ValueError: for shapes that cannot be broadcast.
         ModuleNotFoundError: for compiled without numba.
+
+    Example:
+        >>> found = tmsopt.roots.quartic_classes(1, 10, 35, 50, [24, 0], compiled=False)  # (s + 1)(s + 2)(s + 3)(s + 4)
+        >>> [tmsopt.roots.CLASSES[kind] for kind in found.kind]
+        ['heavily damped', 'capsize']
+
+    More: docs/how_to/charts.md
     """
     a, shape = columns(a0, a1, a2, a3, a4)
     size = a[0].size
@@ -66,7 +80,14 @@ def quartic_classes(
 def quartic_is_stable(
     a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayLike, a4: ArrayLike, *, compiled: bool | None = None
 ) -> NDArray[np.bool_]:
-    """Whether all roots have Re s < 0, as `is_stable` has it; arguments and errors as of `quartic_classes`."""
+    """Whether all roots have Re s < 0, as `is_stable` has it; arguments and errors as of `quartic_classes`.
+
+    Example:
+        >>> tmsopt.roots.quartic_is_stable(1, 4, 6, 4, [1, -1], compiled=False)
+        array([ True, False])
+
+    More: docs/how_to/charts.md
+    """
     a, shape = columns(a0, a1, a2, a3, a4)
     verdict = np.empty(a[0].size, np.bool_)
     if use_numba(compiled):

@@ -28,6 +28,13 @@ class Factors:
     Attributes:
         p, q: shape (…, 2); nan for coefficients that are not finite or a leading 0.
         fallbacks: number of quartics that needed companion eigenvalues.
+
+    Example:
+        >>> factors = tmsopt.roots.quartic_factors(1, 0, 5, 0, 4, compiled=False)  # (s² + 1)(s² + 4)
+        >>> sorted(factors.q.round(9).tolist())
+        [1.0, 4.0]
+
+    More: docs/explanation/factors.md
     """
 
     p: Array
@@ -49,6 +56,13 @@ class Motion:
     Attributes:
         abscissa, damping_ratio: shape (…); nan for coefficients that are not finite or a leading 0.
         fallbacks: number of quartics that needed companion eigenvalues.
+
+    Example:
+        >>> motion = tmsopt.roots.abscissa_and_damping(1, 4, 8, 8, 4, compiled=False)  # (s² + 2 s + 2)²: s = -1 ± i
+        >>> f"{motion.abscissa:.6f} {motion.damping_ratio:.6f}"
+        '-1.000000 0.707107'
+
+    More: docs/how_to/charts.md
     """
 
     abscissa: Array
@@ -69,6 +83,13 @@ def quartic_factors(
     Raises:
         ValueError: for shapes that cannot be broadcast.
         ModuleNotFoundError: for compiled without numba.
+
+    Example:
+        >>> factors = tmsopt.roots.quartic_factors(1, 4, 6, 4, 1, compiled=False)  # (s² + 2 s + 1)²
+        >>> factors.p.round(6).tolist(), factors.q.round(6).tolist()
+        ([2.0, 2.0], [1.0, 1.0])
+
+    More: docs/explanation/factors.md
     """
     a, shape = columns(a0, a1, a2, a3, a4)
     p, q = np.empty((a[0].size, 2)), np.empty((a[0].size, 2))
@@ -94,7 +115,15 @@ def quartic_factors(
 def abscissa_and_damping(
     a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayLike, a4: ArrayLike, *, compiled: bool | None = None
 ) -> Motion:
-    """Abscissa and damping ratio of the quartics a0 s⁴ + … + a4; arguments and errors as of `quartic_factors`."""
+    """Abscissa and damping ratio of the quartics a0 s⁴ + … + a4; arguments and errors as of `quartic_factors`.
+
+    Example:
+        >>> motion = tmsopt.roots.abscissa_and_damping(1, 10, 35, 50, 24, compiled=False)  # roots -1, -2, -3, -4
+        >>> f"{motion.abscissa:.6f} {motion.damping_ratio:.6f}"
+        '-1.000000 1.000000'
+
+    More: docs/how_to/charts.md
+    """
     a, shape = columns(a0, a1, a2, a3, a4)
     alpha, ratio = np.empty(a[0].size), np.empty(a[0].size)
     if use_numba(compiled):
