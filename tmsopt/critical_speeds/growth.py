@@ -57,7 +57,7 @@ class Growth(Tabular):
         >>> [(f"{a:.4f}", f"{b:.4f}") for a, b in bands]  # weave and capsize speed of Meijaard et al. (2007), m/s
         [('4.2924', '6.0243')]
 
-    More: docs/how_to/report.md
+    More: docs/explanation/weave_and_capsize.md
     """
 
     over: Parameter
@@ -111,7 +111,7 @@ def growth(
         >>> [(round(low, 9), round(high, 9)) for low, high in roots.heavily_damped]
         [(2.0, 4.0)]
 
-    More: docs/how_to/report.md
+    More: docs/explanation/weave_and_capsize.md
     """
     design = solved_first(design, progress)
     counted(progress, "following the roots")

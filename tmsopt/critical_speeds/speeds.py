@@ -45,7 +45,7 @@ class Speeds(Tabular):
         >>> [f"{a:.6f} {b:.6f}" for a, b in ridden.stable]  # Meijaard et al. (2007), m/s
         ['4.292383 6.024262']
 
-    More: docs/reference/quantities.md
+    More: docs/explanation/weave_and_capsize.md
     """
 
     problem: Problem
@@ -123,7 +123,7 @@ def speeds(
         >>> f"{slowest:.6f} {law * math.sqrt(9.81 * 1.0):.6f}"  # Fr_c √(g w)
         '2.841008 2.841008'
 
-    More: docs/reference/quantities.md
+    More: docs/explanation/weave_and_capsize.md
     """
     asked = problem_of(problem if problem is not None and isinstance(design, Mapping) else design).nominal
     of = asked.parameter_set

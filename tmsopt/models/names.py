@@ -42,7 +42,7 @@ def latex(name: str) -> str:
         >>> tmsopt.models.latex("x2")
         'x_{2}'
 
-    More: docs/how_to/report.md
+    More: docs/tutorials/own_system.md
     """
     first, *indices = filter(None, name.split("_"))
     if numbered := re.fullmatch(r"([A-Za-z]+)(\d+)", first):

@@ -22,7 +22,7 @@ def hurwitz_minors(coefficients: Coefficients) -> list[Any]:
         >>> tmsopt.roots.hurwitz_minors([1, 2, 3, 4])  # a1, a1 a2 - a0 a3, a3 times that
         [2, 2, 8]
 
-    More: docs/explanation/exceptional_points.md
+    More: docs/explanation/factors.md
     """
     return [_hurwitz_minor(coefficients, m) for m in range(1, len(coefficients))]
 
@@ -55,7 +55,7 @@ def lienard_chipart(coefficients: Coefficients) -> list[Any]:
         >>> tmsopt.roots.lienard_chipart([1, 4, 6, 4, 1]), tmsopt.roots.lienard_chipart([1, 4, 6, 4, -1])
         ([1, 6, 64, 4], [-1, 6, 96, 4])
 
-    More: docs/explanation/exceptional_points.md
+    More: docs/explanation/factors.md
     """
     n = len(coefficients) - 1
     return [coefficients[k] for k in range(n, 0, -2)] + [_hurwitz_minor(coefficients, m) for m in range(n - 1, 0, -2)]
@@ -71,7 +71,7 @@ def routh(coefficients: Coefficients) -> list[Any]:
         >>> tmsopt.roots.routh([1.0, 2.0, 3.0, 4.0])
         [2.0, 1.0, 4.0]
 
-    More: docs/explanation/exceptional_points.md
+    More: docs/explanation/factors.md
     """
     return list(_column(coefficients))
 
@@ -97,7 +97,7 @@ def is_stable(coefficients: ArrayLike, exact: bool = True) -> NDArray[np.bool_]:
         >>> tmsopt.roots.is_stable([[1, 4, 6, 4, 1], [1, 4, 6, 4, -1]])
         array([ True, False])
 
-    More: docs/explanation/exceptional_points.md
+    More: docs/explanation/factors.md
     """
     c = np.asarray(coefficients, dtype=float)
     sign = np.sign(c[..., 0])

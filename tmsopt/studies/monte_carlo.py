@@ -49,7 +49,7 @@ class Sampling:
         >>> sampling.rows, sampling.distribution
         (500, 'normal')
 
-    More: docs/how_to/tolerances.md
+    More: docs/tutorials/study.md
     """
 
     problem: Problem
@@ -117,7 +117,7 @@ def monte_carlo(
         >>> sorted(built.columns), len(built.columns["c"]), max(abs(c - 2) for c in built.columns["c"]) <= 0.1
         (['c'], 100, True)
 
-    More: docs/how_to/tolerances.md
+    More: docs/tutorials/study.md
     """
     solution = solved_first(design, progress)
     counted(progress, "drawing designs")
