@@ -391,3 +391,15 @@ def test_a_line_on_which_both_sides_are_unstable_bounds_nothing():
     model = tmsopt.models.from_matrices([[1, 0], [0, 1]], [[c, 0], [0, -c]], [[1, 0], [0, w * w]])
     found = domain(tmsopt.Problem(model, free={"c": (-0.5, 1.0), "w": (1.2, 2.0)}), starts=12)
     assert found.stability == ()
+
+
+def test_a_design_with_all_roots_at_zero_in_the_middle() -> None:
+    """s² + c s + k is stable where c > 0 and k > 0: the sample holds s² itself, where both boundaries meet."""
+    square = tmsopt.models.from_coefficients([1, "c", "k"])
+    found = domain(Problem(square, free={"c": (-1, 1), "k": (-1, 1)}))
+    stability = {arc.kind: arc.points for arc in found.stability}
+    assert set(stability) == {"weave", "capsize"}
+    assert np.abs(stability["weave"]["c"]).max() < 1e-12
+    assert np.abs(stability["capsize"]["k"]).max() < 1e-12
+    (corner,) = found.corners
+    assert (corner.parameters["c"], corner.parameters["k"]) == pytest.approx((0, 0), abs=1e-9)
