@@ -474,7 +474,7 @@ def test_the_page_in_the_repository_is_the_ledger(ledger) -> None:
 
 
 def test_the_documentation_counts_as_the_ledger(ledger) -> None:
-    text = " ".join((PAGE.parents[1] / "docs" / "paper.md").read_text(encoding="utf-8").split())
+    text = " ".join((PAGE.parents[1] / "docs" / "explanation" / "paper.md").read_text(encoding="utf-8").split())
     verdicts = Counter(entry.verdict for entry in ledger.entries)
     assert f"{len(ledger.entries)} numbers and statements" in text
     assert f"{verdicts['exact']} are exact" in text
