@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PACKAGE = "tmsopt"
 FLOORS = (
-    ("errors", "records", "progress", "disk", "locks", "processes", "laws"),
+    ("errors", "records", "progress", "disk", "locks", "processes", "versions", "laws"),
     ("arithmetic",),
     ("roots",),
     ("models",),

@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 
 V = TypeVar("V")
 
-SCHEMA = 1
-"""Version of the JSON of every command."""
-
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Truth = NDArray[np.bool_]

@@ -8,7 +8,7 @@ import click
 
 from tmsopt import __version__
 from tmsopt.cli.chart import chart
-from tmsopt.cli.common import TYPED
+from tmsopt.cli.common import TYPED, answer
 from tmsopt.cli.ending import STATUS, ended
 from tmsopt.cli.explore import explore
 from tmsopt.cli.guide.describe import describe, schema
@@ -21,6 +21,7 @@ from tmsopt.cli.solve import compare, solve
 from tmsopt.cli.speeds import speeds
 from tmsopt.cli.study import study
 from tmsopt.cli.trace import trace
+from tmsopt.versions import SCHEMA, environment
 
 _FRONT = 'tmsopt solve FILE, with pareto = ["abscissa", "Fr"] under [objective] of FILE'
 _MEANT = {
@@ -29,6 +30,9 @@ _MEANT = {
     **dict.fromkeys(("explain", "robustness", "diagnose"), "tmsopt solve FILE --full"),
 }
 """Words that are functions of the library or options, and no commands → what they are here."""
+
+
+_JSON = "tmsopt.version.json"
 
 
 class _Commands(click.Group):
@@ -59,6 +63,22 @@ class _Commands(click.Group):
             return super().invoke(ctx)
 
 
+def _version_as_json(ctx: click.Context, _: click.Parameter, given: bool) -> None:
+    ctx.meta[_JSON] = given  # which is read before --version, wherever it stands
+
+
+def _version(ctx: click.Context, _: click.Parameter, given: bool) -> None:
+    if ctx.resilient_parsing:
+        return
+    as_json = ctx.meta.get(_JSON, False)
+    if given:
+        data = {"schema": SCHEMA, "tmsopt": __version__}
+        answer(as_json, lambda: data | environment(), lambda: f"tmsopt, version {__version__}")
+        ctx.exit()
+    if as_json:
+        raise click.NoSuchOption("--json", possibilities=["--version"], ctx=ctx)
+
+
 def _unknown(word: str) -> bool:
     try:
         os.fsencode(word)
@@ -68,7 +88,11 @@ def _unknown(word: str) -> bool:
 
 
 @click.group("tmsopt", cls=_Commands, epilog=STATUS, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(__version__, prog_name="tmsopt")
+@click.option("--version", is_flag=True, expose_value=False, callback=_version, help="Show the version and exit.")
+@click.option(
+    "--json", is_flag=True, expose_value=False, is_eager=True, callback=_version_as_json,
+    help="With --version: also those of Python and the libraries, for a report of a bug.",
+)  # fmt: skip
 def every() -> None:
     """Design self-stable bicycles under your own constraints, and localise exceptional points.
 

@@ -12,9 +12,9 @@ from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTIT
 from tmsopt.design.validate import faults, guess_parameter_set, shape_faults
 from tmsopt.errors import Fault, InputError
 from tmsopt.models import Model, ParameterSet, Values
-from tmsopt.records import SCHEMA
 from tmsopt.roots import Pattern, pattern
 from tmsopt.units import TABLES, numbers
+from tmsopt.versions import SCHEMA
 
 _POINT = 1e-12
 """Relative width below which a range is a number: a few roundings leave nothing to move in."""

@@ -4,7 +4,6 @@ import math
 import platform
 from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files as resources
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -17,6 +16,7 @@ from tmsopt.display.page import badges
 from tmsopt.display.writers import WRITERS, report, title_of
 from tmsopt.errors import Fault, InputError, short
 from tmsopt.progress import Counts, Listener, counted
+from tmsopt.versions import installed
 
 if TYPE_CHECKING:
     from tmsopt.design import Solution
@@ -146,18 +146,12 @@ def _explorer(result: Any, design: "Solution | None") -> str:
 def _origin(result: Any, command: str, files: Mapping[str, str], seed: int | None) -> str:
     """Versions, system, date, seed, command and files."""
     seed = getattr(getattr(result, "study", None), "seed", seed)
-    listed = [*((name, _version(name)) for name in _PACKAGES), ("Python", platform.python_version())]
+    listed = [(name, found or "") for name, found in installed(_PACKAGES).items()]
     when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    system = f"{platform.system()} {platform.machine()}".strip()
     about = facts((
-        *listed, ("system", f"{platform.system()} {platform.machine()}".strip()), ("date", when),
+        *listed, ("Python", platform.python_version()), ("system", system), ("date", when),
         ("seed", "" if seed is None else str(seed)),
     ))  # fmt: skip
     texts = {"command": command} | dict(files)
     return about + "\n".join(f"<h3>{words(n)}</h3>\n{verbatim(text, n)}" for n, text in texts.items() if text)
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:  # of a checkout that was not installed
-        return ""

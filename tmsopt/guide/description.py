@@ -5,7 +5,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from tmsopt.guide.text import matrix, table, wrapped
-from tmsopt.records import SCHEMA, Shown, Table
+from tmsopt.records import Shown, Table
+from tmsopt.versions import SCHEMA
 
 
 @dataclass(frozen=True)

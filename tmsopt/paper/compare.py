@@ -10,9 +10,10 @@ from tmsopt.design.solution import Solution
 from tmsopt.formulation.options import Asked, Options, options_of, taking
 from tmsopt.models import tms
 from tmsopt.progress import begin
-from tmsopt.records import SCHEMA, Tabular, plain
+from tmsopt.records import Tabular, plain
 from tmsopt.roots import PATTERNS
 from tmsopt.solver.solve import solved
+from tmsopt.versions import SCHEMA
 
 
 @dataclass(frozen=True, repr=False)

@@ -15,7 +15,7 @@ from tmsopt.disk import path_of
 from tmsopt.errors import Fault, InputError, call_faults, count_faults, short, suggest
 from tmsopt.processes import cores
 from tmsopt.progress import Listener, counted
-from tmsopt.records import SCHEMA, Shown, Truth, frame
+from tmsopt.records import Shown, Truth, frame
 from tmsopt.studies.engines import Note, Unit, cluster, in_process, processes
 from tmsopt.studies.engines.work import silent
 from tmsopt.studies.export import columns, export, gridded
@@ -30,6 +30,7 @@ from tmsopt.studies.store.opening import open_store, read_store
 from tmsopt.studies.store.store import Store
 from tmsopt.studies.study import Study, definition, names_of
 from tmsopt.studies.summary import Summary, summary
+from tmsopt.versions import SCHEMA
 
 if TYPE_CHECKING:
     from pandas import DataFrame

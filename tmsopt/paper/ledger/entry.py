@@ -8,7 +8,8 @@ from typing import Any
 
 import flint
 
-from tmsopt.records import SCHEMA, Tabular, plain
+from tmsopt.records import Tabular, plain
+from tmsopt.versions import SCHEMA
 
 EXACT = "exact"
 DIGITS_HOLD = "holds to the printed digits"

@@ -1,0 +1,98 @@
+"""`tmsopt --version`: one line, and for a report of a bug all that an answer may depend on."""
+
+import json
+import platform
+import re
+import subprocess
+import sys
+import tomllib
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+import tmsopt
+from tmsopt.cli import main
+
+ROOT = Path(__file__).parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+
+def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[object, str, str]:
+    """Exit status, stdout, stderr."""
+    with pytest.raises(SystemExit) as stop:
+        main(args=list(words), prog_name="tmsopt")
+    written = capsys.readouterr()
+    return stop.value.code, written.out, written.err
+
+
+def test_version_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(capsys, "--version") == (0, f"tmsopt, version {tmsopt.__version__}\n", "")
+
+
+@pytest.mark.parametrize("words", ["--version --json", "--json --version", "--version --json solve no_such_file.toml"])
+def test_version_as_json_says_what_is_installed(capsys: pytest.CaptureFixture[str], words: str) -> None:
+    status, out, err = run(capsys, *words.split())
+    assert (status, err) == (0, "")
+    data = json.loads(out)
+    assert list(data) == ["schema", "tmsopt", "python", "implementation", "system", "machine", "packages"]
+    assert (data["schema"], data["tmsopt"], data["python"]) == (1, tmsopt.__version__, platform.python_version())
+    assert data["machine"] == platform.machine()
+    for name, version in data["packages"].items():
+        if name != "ipopt":
+            there = [d.version for d in metadata.distributions(name=name)]
+            assert version == (there[0] if there else None), name
+
+
+def test_all_that_tmsopt_needs_or_can_use_is_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    extras = [PROJECT["optional-dependencies"][name] for name in ("certify", "fast", "cluster", "data")]
+    stated = {re.split("[<>=!~;\\[ ]", text)[0] for text in sum(extras, PROJECT["dependencies"])}
+    assert set(json.loads(run(capsys, "--version", "--json")[1])["packages"]) == stated | {"ipopt"}
+
+
+def test_what_is_not_installed_is_null(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> str:
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr("tmsopt.versions.version", missing)
+    monkeypatch.setattr("tmsopt.versions.distribution", missing)
+    data = json.loads(run(capsys, "--version", "--json")[1])
+    assert set(data["packages"].values()) == {None}
+    assert data["tmsopt"] == tmsopt.__version__
+
+
+def test_the_version_of_ipopt_is_the_one_that_solves(capfd: pytest.CaptureFixture[str]) -> None:
+    """IPOPT says it itself, in the banner of a solve."""
+    import casadi
+
+    x = casadi.SX.sym("x")
+    casadi.nlpsol("s", "ipopt", {"x": x, "f": x * x}, {"print_time": False})(x0=1)
+    banner = re.search(r"This is Ipopt version (\d+(?:\.\d+)+)", capfd.readouterr().out)
+    with pytest.raises(SystemExit):
+        main(args=["--version", "--json"], prog_name="tmsopt")
+    told = json.loads(capfd.readouterr().out)["packages"]["ipopt"]
+    assert banner is not None
+    assert told in (banner[1], None)
+
+
+def test_nothing_is_loaded_for_it() -> None:
+    script = (
+        "import sys\nfrom tmsopt.cli import main\ntry: main(['--version', '--json'])\n"
+        "except SystemExit: print(*sys.modules, file=sys.stderr)"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert json.loads(ended.stdout)["tmsopt"] == tmsopt.__version__
+    assert not {"casadi", "numpy", "scipy", "matplotlib", "pydantic", "pint"} & set(ended.stderr.split())
+
+
+@pytest.mark.parametrize("words", ["--json", "--json solve problems/ep4.toml"])
+def test_json_alone_is_no_option_of_the_whole(capsys: pytest.CaptureFixture[str], words: str) -> None:
+    status, out, err = run(capsys, *words.split())
+    assert (status, out) == (2, "")
+    assert "No such option" in err
+    assert "--json" in err
+
+
+def test_the_help_says_what_json_is_for(capsys: pytest.CaptureFixture[str]) -> None:
+    help_ = " ".join(run(capsys, "--help")[1].split())
+    assert "--json With --version: also those of Python and the libraries" in help_
