@@ -31,7 +31,10 @@ extensions = [
 
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 4
-suppress_warnings = ["config.cache"]  # the gallery's order is a function
+suppress_warnings = [
+    "config.cache",  # the gallery's order is a function
+    "ref.python",  # `abscissa` is a field of many results, and leads to none of them
+]
 
 html_theme = "furo"
 html_title = f"tmsopt {release}"
@@ -43,12 +46,11 @@ copybutton_prompt_text = r"\$ |>>> |\.\.\. "
 copybutton_prompt_is_regexp = True
 copybutton_only_copy_prompt_lines = True
 
-default_role = "py:obj"  # in docstrings `x` is code, and a link where it is a public name
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
 autodoc_inherit_docstrings = False
 napoleon_google_docstring, napoleon_numpy_docstring = True, False
-napoleon_use_ivar = True
+napoleon_use_ivar, napoleon_attr_annotations = True, False
 
 sphinx_gallery_conf = {
     "examples_dirs": "../build/examples",

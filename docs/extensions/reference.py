@@ -54,6 +54,8 @@ def names_of(module: ModuleType) -> list[str]:
 def _entry(face: str, module: ModuleType, name: str) -> str:
     found = getattr(module, name)
     path = name if face == "tmsopt" else f"{face}.{name}"
+    if face != "tmsopt" and name in tmsopt.__all__:
+        return f"See `tmsopt.{name}`.\n"
     if inspect.isclass(found):
         return f".. autoclass:: tmsopt.{path}\n   :members:\n"
     return f".. autofunction:: tmsopt.{path}\n" if callable(found) else f"``tmsopt.{path}``\n"
@@ -76,9 +78,10 @@ def _api(face: str) -> str:
     for name in names:
         packages.setdefault(_package(getattr(module, name)), []).append(name)
     for package, inside in packages.items():
-        about = (import_module(f"tmsopt.{package}").__doc__ or "").split("\n\n")[0].rstrip(".")
-        heading = about.split(":")[0] if len(about) < 90 else about.split(":")[0]
-        text += f"{heading}\n{'-' * len(heading)}\n\n" + "\n".join(_entry(face, module, n) for n in inside) + "\n"
+        about = inspect.getdoc(import_module(f"tmsopt.{package}")) or ""
+        heading = package.replace("_", " ").capitalize()
+        entries = "\n".join(_entry(face, module, n) for n in inside)
+        text += f"{heading}\n{'-' * len(heading)}\n\n{about.splitlines()[0]}\n\n{entries}\n"
     return text
 
 
@@ -179,15 +182,36 @@ def _read(app: Sphinx, name: str, source: list[str]) -> None:
 
 
 def _docstring(_app: Sphinx, _what: str, _name: str, _found: object, _options: object, lines: list[str]) -> None:
-    """A docstring is about to be rendered: its last line leads to a page; bars and stars mean themselves."""
+    """A docstring is about to be rendered: its last line leads to a page, public names to themselves, `x` is code."""
     for number, line in enumerate(lines):
         page = re.fullmatch(r"More: docs/(.*)\.md", line.strip())
         if page:
             lines[number] = f"More: :doc:`/{page[1]}`"
         elif not line.lstrip().startswith((">>>", "...")):
-            pieces = re.split(r"(`[^`]*`)", line)
+            pieces = re.split(r"(``[^`]*``|(?<!:)`[^`]*`)", line)
             pieces[::2] = [re.sub(r"(?<!\\)([|]|\*(?=\*?\w))", r"\\\1", piece) for piece in pieces[::2]]
+            pieces[1::2] = [piece if piece.startswith("``") else _code(piece[1:-1]) for piece in pieces[1::2]]
             lines[number] = "".join(pieces)
+
+
+def _code(text: str) -> str:
+    name = text.removeprefix("tmsopt.")
+    return f":py:obj:`tmsopt.{name}`" if name in tmsopt.__all__ else f"``{text}``"
+
+
+def _help(_app: Sphinx, _context: object, lines: list[str]) -> None:
+    """The help of a command is about to be rendered: what stands as it is typed is code."""
+    found: list[str] = []
+    for line in lines:
+        if not line.startswith("| "):
+            found.append(re.sub(r"([*`])", r"\\\1", line))
+        elif line.endswith(":") and not line.startswith("|  "):
+            found += [line[2:], ""]
+        else:
+            if not found or not found[-1].startswith("    "):
+                found += ["", ".. code-block:: text", ""]
+            found.append("    " + line[2:])
+    lines[:] = found
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
@@ -195,4 +219,6 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("builder-inited", write_reference, priority=200)
     app.connect("source-read", _read)
     app.connect("autodoc-process-docstring", _docstring, priority=900)
+    for part in ("description", "epilog"):
+        app.connect(f"sphinx-click-process-{part}", _help)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
