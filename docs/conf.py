@@ -11,12 +11,13 @@ os.environ.setdefault("MPLBACKEND", "agg")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # two examples at once
 sys.path.insert(0, str(Path(__file__).parent))
 
-import tmsopt  # noqa: E402
+import tmsopt
 
 project, author = "tmsopt", "The tmsopt authors"
 project_copyright = f"2026, {author}"
 version = release = tmsopt.__version__
 language = "en-GB"
+smartquotes = False  # `--json` has two hyphens
 exclude_patterns = ["_build", "**/.ipynb_checkpoints"]
 extensions = [
     "myst_parser",

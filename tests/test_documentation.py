@@ -7,12 +7,13 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+from helpers import pages
 
 import tmsopt
 from tmsopt.cli import main
 
 ROOT = Path(__file__).parents[1]
-PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+PAGES = sorted([*ROOT.glob("*.md"), *pages.PAGES])
 README, CONTRIBUTING = (ROOT / name for name in ("README.md", "CONTRIBUTING.md"))
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
@@ -90,7 +91,7 @@ def test_every_problem_is_listed() -> None:
 
 def test_pictures_are_small() -> None:
     pictures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", README.read_text(encoding="utf-8"))
-    assert "docs/bicycle.png" in pictures
+    assert "docs/explorer.png" in pictures
     assert all((ROOT / p).stat().st_size < 200_000 for p in pictures)
 
 
@@ -102,7 +103,9 @@ def test_every_command_is_documented() -> None:
 @pytest.mark.parametrize("page", [p for p in PAGES if p.name != "CHANGELOG.md"], ids=lambda p: p.name)
 def test_public_names_exist(page: Path) -> None:
     """What a page calls tmsopt.something is public; the change log names what is gone, too."""
-    text = "\n".join(line for line in page.read_text(encoding="utf-8").splitlines() if not line.startswith("$ "))
+    text = "\n".join(
+        line for line in page.read_text(encoding="utf-8").splitlines() if not line.startswith(("$ ", ".. click::"))
+    )
     for name, inner in re.findall(r"(?<![\w/])tmsopt\.([A-Za-z_]\w*)(?:\.(\w+))?", text):
         assert name in {*tmsopt.__all__, "__all__", "__version__"}, name
         if inner and name in ("laws", "models", "roots"):

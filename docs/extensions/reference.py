@@ -14,10 +14,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import tmsopt
 from sphinx.application import Sphinx
 
-from extensions.gallery import EXAMPLES, ROOT, listed
+import tmsopt
+from extensions.gallery import EXAMPLES, ROOT
 
 DOCS = ROOT / "docs"
 GENERATED = DOCS / "generated"
@@ -29,13 +29,14 @@ COPIED = {
     "problems/paper.md": "ledger",
 }
 FACES = {
-    "tmsopt": "What is reached as `tmsopt.…`, by the package it is from.",
+    "tmsopt": "What is reached as ``tmsopt.…``, by the package it is from.",
     "laws": "The closed forms of the paper, each named after its equation; they import nothing of tmsopt.",
     "models": "Bicycles, and systems of your own.",
     "roots": "Polynomials, their roots, and which of them meet.",
     "plots": "Pictures, drawn into given Axes of Matplotlib.",
     "report": "The texts that commands print, in parts.",
 }
+_EXAMPLES = "Examples run at the root of the repository, after ``import tmsopt``."
 _LINK = re.compile(r"(?<=\]\()(?![a-z]+:)([^)#\s]*)(#[^)\s]*)?(?=\))")
 
 
@@ -70,7 +71,7 @@ def _api(face: str) -> str:
     """A page of one face."""
     module = tmsopt if face == "tmsopt" else getattr(tmsopt, face)
     title = face if face == "tmsopt" else f"tmsopt.{face}"
-    text = f"{title}\n{'=' * len(title)}\n\n{FACES[face]}\n\n"
+    text = f"{title}\n{'=' * len(title)}\n\n{FACES[face]} {_EXAMPLES}\n\n"
     names = [n for n in names_of(module) if not inspect.ismodule(getattr(module, n)) and not n.startswith("__")]
     if face != "tmsopt":
         return text + "\n".join(_entry(face, module, n) for n in names)
@@ -140,7 +141,11 @@ def write_reference(_: Sphinx) -> None:
     (GENERATED / "api").mkdir(parents=True)
     for face in FACES:
         (GENERATED / "api" / f"{face}.rst").write_text(_api(face), encoding="utf-8")
-    parts = {"problem_keys": _files("problem"), "study_keys": _files("study_file"), "quantities": "\n".join(_quantities())}
+    parts = {
+        "problem_keys": _files("problem"),
+        "study_keys": _files("study_file"),
+        "quantities": "\n".join(_quantities()),
+    }
     for name, text in parts.items():
         (GENERATED / f"{name}.inc").write_text(text, encoding="utf-8")
     for origin, name in COPIED.items():

@@ -7,12 +7,10 @@ from pathlib import Path
 
 import matplotlib
 import pytest
-from helpers.pages import Block, agrees, blocks_of, exchanges, may_install, missing, run
+from helpers.pages import PAGES, ROOT, Block, agrees, blocks_of, exchanges, may_install, missing, run
 
 import tmsopt
 
-ROOT = Path(__file__).parents[2]
-PAGES = sorted((ROOT / "docs").rglob("*.md"))
 LANGUAGES = {"toml", "console", "python", "pycon", "sh", "text", "json", "", "bibtex"}
 
 

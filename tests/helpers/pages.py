@@ -14,6 +14,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+ROOT = Path(__file__).parents[2]
+PAGES = sorted(page for page in (ROOT / "docs").rglob("*.md") if page.parent.name not in ("generated", "gallery"))
+"""The pages that are written by hand."""
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _SECONDS = re.compile(r"\d+(?:\.\d+)?(?= ?(?:s|ms|µs|h|min)\b)")
 _FENCE = re.compile(r"^(`{3,})(\{code-block\} )?(\w*)[^\n]*\n(.*?)^\1\s*$", re.MULTILINE | re.DOTALL)
