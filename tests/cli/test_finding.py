@@ -146,7 +146,7 @@ def test_examples_are_listed_and_written(run: Run, tmp_path: Path, monkeypatch: 
 def test_shells_complete_as_the_documentation_says(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], shell: str, words: str, expected: str
 ) -> None:
-    documented = (Path(__file__).parents[2] / "docs" / "command_line.md").read_text(encoding="utf-8")
+    documented = (Path(__file__).parents[2] / "docs" / "reference" / "commands.md").read_text(encoding="utf-8")
     assert f"_TMSOPT_COMPLETE={shell}_source tmsopt" in documented
     last = words.rsplit(maxsplit=1)[-1] if shell == "fish" else str(len(words.split()) - 1)
     for name, value in {"_TMSOPT_COMPLETE": f"{shell}_complete", "COMP_WORDS": words, "COMP_CWORD": last}.items():
