@@ -1,7 +1,7 @@
 """The gallery: every file of `problems/` as an example that is run when the site is built.
 
-What is there, in which section, and which command answers it, is the table of `problems.md`; what a problem is about, the
-comment at the head of its file. Scripts are examples as they are.
+What is there, in which section, and which command answers it, is the table of `problems.md`; what a problem is about, is
+the comment at the head of its file. Scripts are examples as they are.
 """
 
 import ast
@@ -18,6 +18,12 @@ from sphinx_gallery.scrapers import figure_rst
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "build" / "examples"
+
+_HEAD = """Gallery
+=======
+
+Every problem that comes with tmsopt, solved when this page was made: the file, the answer, its picture, and its explorer.
+"""
 
 _ASKED = {
     "solve": """
@@ -111,7 +117,7 @@ def _script(path: Path) -> str:
     code = text.split('"""', 2)[2].strip()
     drawn = "picture = design.plot()"
     if "def draw(" in code:
-        drawn = 'from pathlib import Path\n\nsys.argv[1:] = ["unfold.png"]\ndraw("unfold.png")\npicture = Path("unfold.png")'
+        drawn = 'draw("unfold.png")\npicture = Path("unfold.png")'
     return _titled(_plain(first), _plain("\n\n".join(rest))) + f"{code}\n\n# %%\n\n{drawn}\n"
 
 
@@ -129,8 +135,7 @@ def write_examples(_: Sphinx) -> None:
             (folder / "GALLERY_HEADER.rst").write_text(f"{section}\n{'-' * len(section)}\n", encoding="utf-8")
         text = _problem(path, verb) if path.suffix == ".toml" else _script(path)
         (folder / f"{path.stem}{'_script' if path.suffix == '.py' else ''}.py").write_text(text, encoding="utf-8")
-    head = "Gallery\n=======\n\nEvery problem that comes with tmsopt, solved when this page was made: the file, the answer, its picture, and\nits explorer.\n"
-    (EXAMPLES / "GALLERY_HEADER.rst").write_text(head, encoding="utf-8")
+    (EXAMPLES / "GALLERY_HEADER.rst").write_text(_HEAD, encoding="utf-8")
 
 
 def place(name: str) -> int:
