@@ -13,12 +13,7 @@ import tmsopt
 from tmsopt.cli import main
 
 ROOT = Path(__file__).parents[1]
-<<<<<<< HEAD
 PAGES = sorted([*ROOT.glob("*.md"), *pages.PAGES])
-=======
-DOCS = [p for p in (ROOT / "docs").rglob("*.md") if "generated" not in p.parts]  # what building the site leaves there
-PAGES = sorted([*ROOT.glob("*.md"), *DOCS])
->>>>>>> 7ff9d9a (Docs: lines of 120 characters; tests read no pages that building the site has left)
 README, CONTRIBUTING = (ROOT / name for name in ("README.md", "CONTRIBUTING.md"))
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
@@ -109,11 +104,7 @@ def test_every_command_is_documented() -> None:
 def test_public_names_exist(page: Path) -> None:
     """What a page calls tmsopt.something is public; the change log names what is gone, too."""
     text = "\n".join(
-<<<<<<< HEAD
         line for line in page.read_text(encoding="utf-8").splitlines() if not line.startswith(("$ ", ".. click::"))
-=======
-        line for line in page.read_text(encoding="utf-8").splitlines() if not line.startswith(("$ ", ".. "))
->>>>>>> 7ff9d9a (Docs: lines of 120 characters; tests read no pages that building the site has left)
     )
     for name, inner in re.findall(r"(?<![\w/])tmsopt\.([A-Za-z_]\w*)(?:\.(\w+))?", text):
         assert name in {*tmsopt.__all__, "__all__", "__version__"}, name

@@ -1,7 +1,7 @@
 """The gallery: every file of `problems/` as an example that is run when the site is built.
 
-What is there, in which section, and which command answers it, is the table of `problems.md`; what a problem is about, is
-the comment at the head of its file. Scripts are examples as they are.
+What is there, in which section, and which command answers it, is the table of `problems.md`; what a problem is about
+stands at the head of its file. Scripts are examples as they are.
 """
 
 import ast
@@ -22,7 +22,8 @@ EXAMPLES = ROOT / "build" / "examples"
 _HEAD = """Gallery
 =======
 
-Every problem that comes with tmsopt, solved when this page was made: the file, the answer, its picture, and its explorer.
+Every problem that comes with tmsopt, solved when this page was made: the file, the answer, its picture, and its
+explorer.
 """
 
 _ASKED = {

@@ -1,7 +1,7 @@
 """The reference, written from the program's own data when the site is built, and links that lead to pages of the site.
 
-Models say what their symbols are, the schema what a file may say, the stubs what is public, docstrings the rest. Files of
-the repository that are pages too (change log, ledger, results …) are taken over with their links.
+Models say what their symbols are, the schema what a file may say, the faces what is public, docstrings the rest. Files
+of the repository that are pages too (change log, ledger, results …) are taken over with their links.
 """
 
 import inspect

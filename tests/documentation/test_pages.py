@@ -11,11 +11,6 @@ from helpers.pages import PAGES, ROOT, Block, agrees, blocks_of, exchanges, may_
 
 import tmsopt
 
-<<<<<<< HEAD
-=======
-ROOT = Path(__file__).parents[2]
-PAGES = sorted(p for p in (ROOT / "docs").rglob("*.md") if "generated" not in p.parts)
->>>>>>> 7ff9d9a (Docs: lines of 120 characters; tests read no pages that building the site has left)
 LANGUAGES = {"toml", "console", "python", "pycon", "sh", "text", "json", "", "bibtex"}
 
 
