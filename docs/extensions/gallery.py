@@ -114,12 +114,12 @@ def _problem(path: Path, verb: str) -> str:
 def _script(path: Path) -> str:
     """An example of a script, with a picture of the last design that it found."""
     text = path.read_text(encoding="utf-8")
-    (first, *rest) = (ast.get_docstring(ast.parse(text)) or "").split("\n\n")
+    first, rest = re.split(r"(?<=[.?])\s", ast.get_docstring(ast.parse(text)) or "", maxsplit=1)
     code = text.split('"""', 2)[2].strip()
     drawn = "picture = design.plot()"
     if "def draw(" in code:
         drawn = 'draw("unfold.png")\npicture = Path("unfold.png")'
-    return _titled(_plain(first), _plain("\n\n".join(rest))) + f"{code}\n\n# %%\n\n{drawn}\n"
+    return _titled(_plain(first.rstrip(".")), _plain(rest)) + f"{code}\n\n# %%\n\n{drawn}\n"
 
 
 def write_examples(_: Sphinx) -> None:

@@ -90,6 +90,9 @@ def test_the_pages_are_there() -> None:
         ("proved; …", "found; 1 box", False),
         ("a … c", "a b c", True),
         ("a … c", "a b c d", False),
+        ("a … c", "a c", True),
+        ("at most -3.337…, proved", "at most -3.33745, proved", True),
+        ("at most -3.337…, proved", "at most -3.33845, proved", False),
     ],
 )
 def test_lines_are_compared_by_words_and_numbers(printed: str, now: str, same: bool) -> None:

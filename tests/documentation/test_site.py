@@ -41,7 +41,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The site, of a copy of what it is made from; a warning is an error."""
     pytest.importorskip("sphinx")
     root = tmp_path_factory.mktemp("site")
-    unwanted = shutil.ignore_patterns("generated", "gallery", "build", "__pycache__", ".*", "*.egg-info")
+    unwanted = shutil.ignore_patterns("generated", "gallery", "build", "__pycache__", ".git", ".*_cache", "*.egg-info")
     shutil.copytree(ROOT, root, ignore=unwanted, dirs_exist_ok=True)
     command = [sys.executable, "-m", "sphinx", "-nW", "--keep-going", "docs", "build/docs"]
     ended = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False, timeout=600)

@@ -18,6 +18,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = sorted(page for page in (ROOT / "docs").rglob("*.md") if page.parent.name not in ("generated", "gallery"))
 """The pages that are written by hand."""
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+_WHOLE = re.compile(NUMBER.pattern + r"(?![\d.]*…)")  # of 3.14… the digits are as they stand
 _SECONDS = re.compile(r"\d+(?:\.\d+)?(?= ?(?:s|ms|µs|h|min)\b)")
 _FENCE = re.compile(r"^(`{3,})(\{code-block\} )?(\w*)[^\n]*\n(.*?)^\1\s*$", re.MULTILINE | re.DOTALL)
 _INSTALLS = ("pip ", "eval ", "_TMSOPT", "python -m venv", "source ", "sphinx-build ", "git ")
@@ -49,12 +50,12 @@ def agrees(printed: str, now: str) -> bool:
 
     Times count as equal, and ``…`` stands for anything.
     """
-    printed, now = _SECONDS.sub("0", printed), _SECONDS.sub("0", now)
-    words = [re.escape(words).replace("…", ".*?") for words in NUMBER.split(printed)]
+    printed, now = _SECONDS.sub("0", re.sub(" ?… ?", "…", printed)), _SECONDS.sub("0", now)
+    words = [re.escape(words).replace("…", ".*?") for words in _WHOLE.split(printed)]
     found = re.fullmatch(f"({NUMBER.pattern})".join(words), now)
     if found is None:
         return False
-    pairs = zip(NUMBER.findall(printed), found.groups(), strict=True)
+    pairs = zip(_WHOLE.findall(printed), found.groups(), strict=True)
     return all(math.isclose(float(a), float(b), rel_tol=1e-6, abs_tol=1e-12) for a, b in pairs)
 
 
