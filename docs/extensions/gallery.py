@@ -135,13 +135,18 @@ def write_examples(_: Sphinx) -> None:
             shutil.copytree(ROOT / "problems", folder / "problems", ignore=shutil.ignore_patterns("*.py", "*.png"))
             (folder / "GALLERY_HEADER.rst").write_text(f"{section}\n{'-' * len(section)}\n", encoding="utf-8")
         text = _problem(path, verb) if path.suffix == ".toml" else _script(path)
-        (folder / f"{path.stem}{'_script' if path.suffix == '.py' else ''}.py").write_text(text, encoding="utf-8")
+        (folder / f"{_named(path)}.py").write_text(text, encoding="utf-8")
     (EXAMPLES / "GALLERY_HEADER.rst").write_text(_HEAD, encoding="utf-8")
 
 
 def place(name: str) -> int:
     """Where an example stands in its section: as in the table."""
-    return [p.stem for _, p, _, _ in listed()].index(Path(name).stem.removesuffix("_script"))
+    return [_named(path) for _, path, _, _ in listed()].index(Path(name).stem)
+
+
+def _named(path: Path) -> str:
+    """Name of an example; some scripts are called as a problem is."""
+    return f"{path.stem}_script" if path.suffix == ".py" else path.stem
 
 
 def drawn(_block: object, variables: dict[str, Any], conf: dict[str, Any]) -> str:
