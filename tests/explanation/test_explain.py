@@ -439,6 +439,19 @@ def test_rounding_in_one_line_says_how_many_digits_are_enough():
     assert told.startswith(f"3 digits lose {round(100 * (1 - kept[3]))} % of the decay; ")  # those of a workshop
 
 
+def test_digits_that_are_enough_by_chance_are_not_told():
+    """With two and three digits gain and loss of the pair are equal again, with four they are not: roots by NumPy."""
+    design = tmsopt.solve("problems/pt_pair.toml")
+    moved = {}
+    for digits in (2, 4, 6):
+        short = {n: float(f"{x:.{digits}g}") for n, x in design.parameters.items() if n in design.problem.free}
+        moved[digits] = np.roots(design.problem.model.coefficients({**design.parameters, **short})).real.max()
+    assert moved[2] < 1e-7 < moved[6] < moved[4]
+    assert rounding_line(tmsopt.explain(design, resolve=False)) == (
+        f"6 digits move the rightmost root by {moved[6]:.2g}"
+    )
+
+
 def test_rounding_that_makes_a_design_unstable_is_said_so():
     """s² + (x − 1.23456) s + 1 is stable for x > 1.23456 alone: two digits round 1.2346, the box's end, down to 1.2."""
     x = ca.SX.sym("x")

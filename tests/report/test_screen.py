@@ -179,3 +179,9 @@ def test_a_scale_is_refused_where_there_is_one() -> None:
     ended = CliRunner().invoke(main, ["solve", "problems/benchmark.toml", "--wheelbase", "1 m"])
     assert ended.exit_code == 2
     assert "--wheelbase: scales a dimensionless bicycle" in ended.output
+
+
+def test_a_band_that_is_one_speed_is_told_as_one() -> None:
+    """Around the EP3 that is heavily damped at the least speed there is no band: three roots part on both sides."""
+    told = str(tmsopt.speeds("problems/heavily_damped.toml"))
+    assert "\nheavily damped: at 1.9872866" in told

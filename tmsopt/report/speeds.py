@@ -123,7 +123,8 @@ def _written(bands: Sequence[Stretch], within: Stretch, unit: Unit, digits: int 
     for low, high in bands:
         begin = "" if low == within[0] else f"from {unit.number(low, digits)}"
         end = "" if high == within[1] else f"to {unit.number(high, digits)}"
-        words.append(" ".join(part for part in (begin, end) if part) or "everywhere")
+        alone = begin.removeprefix("from") == end.removeprefix("to")  # one speed, as far as its digits tell
+        words.append(begin.replace("from", "at") if begin and alone else f"{begin} {end}".strip() or "everywhere")
     text = ", ".join(words) or "nowhere"
     return text if text in ("nowhere", "everywhere") else f"{text} {unit.text}".rstrip()
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from itertools import takewhile
 
 from tmsopt.diagnosis.diagnosis import Diagnosis
 from tmsopt.diagnosis.splitting import DEVIATION, Law, Response
@@ -54,7 +55,8 @@ def rounding_line(explanation: Explanation) -> str:
     if not rows or not math.isfinite(explanation.abscissa):
         return ""
     stable = explanation.abscissa < -_NIL
-    enough = next((row for row in rows if _kept(row, explanation)), None)
+    held = list(takewhile(lambda row: _kept(row, explanation), reversed(rows)))  # few digits may do no harm by chance
+    enough = held[-1] if held else None
     three = next((row for row in rows if row.digits == ALONE), None)
     parts = []
     if stable and three and three.realised < 0 and (enough is None or enough.digits > ALONE):
