@@ -220,3 +220,18 @@ def test_the_pattern_that_is_suggested_has_as_many_conditions_as_there_are_free_
     fixed = {n: x for n, x in fixed.items() if n not in free}
     with pytest.raises(tmsopt.InputError, match=f"locate = '{named}'"):
         tmsopt.solve_all(tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, minimize="abscissa"))
+
+
+def test_designs_at_a_parameter_that_is_zero() -> None:
+    """H = [[10 + d − i, k], [k, 10 − d − 3i]]: 4 (d + i)² + 4 k² = 0 at d = 0 and k = ±1 alone, where ω = 10 − 2i."""
+    dimer = tmsopt.models.from_matrices(
+        A=[[-1, 0, "10 + d", "k"], [0, -3, "k", "10 - d"], ["-10 - d", "-k", -1, 0], ["-k", "-10 + d", 0, -3]]
+    )
+    problem = tmsopt.Problem(dimer, free={"d": (-5, 5), "k": (-5, 5)}, locate="CEP2")
+    every = tmsopt.solve_all(problem)
+    assert every.complete
+    found = sorted((s.parameters["k"], s.parameters["d"]) for s in every.solutions)
+    assert found == [(pytest.approx(-1, abs=1e-12), 0), (pytest.approx(1, abs=1e-12), 0)]
+    proof = tmsopt.prove(every.solutions[0])
+    assert proof.proved, proof.reason
+    assert float(proof.parameters["d"].value) == pytest.approx(0, abs=1e-50)

@@ -22,6 +22,7 @@ ROUNDINGS = 64
 
 _DEPENDENT = 1e-9  # relative size of what a parameter adds to the others, below which it adds nothing
 _NOTHING = 1e-30  # of a range: what a solver leaves of a 0
+_NEAR_ZERO = 1e-3  # of a range: what moves a parameter that is smaller than that is measured by this
 _EPS = float(np.finfo(float).eps)
 
 
@@ -125,7 +126,8 @@ def choose(system: Equations, at: Mapping[str, Any], among: Sequence[str]) -> Ch
     jacobian = np.array([[float(e) for e in row] for row in slopes(system, at, names).tolist()])
     values = np.array([abs(float(at[n])) for n in names])
     rounding = np.abs(jacobian) @ values + 1e-300
-    scale = np.where(values > 0, values, 1.0)
+    widths = {n: _NEAR_ZERO * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
+    scale = np.maximum(np.where(values > 0, values, 1.0), [widths.get(n, 0.0) for n in names])
     scaled = jacobian / rounding[:, None] * scale
     if not np.all(np.isfinite(scaled)):
         raise Refused("the equations have no finite derivatives at the design; move it off the edge of its range")

@@ -14,6 +14,7 @@ from tmsopt.completeness.statement import Completeness
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.solution import Solution
+from tmsopt.design.validate import SMALLEST
 from tmsopt.errors import Fault, InputError, is_number, short
 from tmsopt.formulation.formulate import design_of, matching
 from tmsopt.formulation.nlp import NLP
@@ -89,6 +90,11 @@ class Every(Tabular):
     completeness: Completeness | None = None
     proved: tuple[bool, ...] = ()
 
+    @property
+    def complete(self) -> bool:
+        """Whether these are proved to be all."""
+        return self.completeness is not None and self.completeness.complete
+
     def records(self) -> Iterable[dict[str, Any]]:
         """The designs, one a row."""
         for solution, proved in zip(self.solutions, self.proved, strict=True):
@@ -102,7 +108,7 @@ class Every(Tabular):
             solution["proved"] = proved
         known = self.completeness
         return found | {
-            "complete": known is not None and known.complete, "undecided": len(known.undecided) if known else None
+            "complete": self.complete, "undecided": len(known.undecided) if known else None
         }  # fmt: skip
 
 
@@ -231,7 +237,8 @@ def _clipped(problem: Problem, design: Mapping[str, Number]) -> Array:
 
 
 def _named(problem: Problem, point: Array) -> dict[str, float]:
-    return dict(zip(problem.free, point.tolist(), strict=True))
+    """What is nearer to 0 than any number of a problem is 0."""
+    return {n: x if abs(x) >= SMALLEST else 0.0 for n, x in zip(problem.free, point.tolist(), strict=True)}
 
 
 def _inside(problem: Problem, nlp: NLP, x: Array) -> Array | None:
