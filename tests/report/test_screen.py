@@ -10,6 +10,7 @@ import pytest
 
 import tmsopt
 from tmsopt.design import Solution, unit_of
+from tmsopt.report import design_report
 
 NUMBER = r"-?\d[\d.]*(?:e[+-]?\d+)?"
 QUICK = ("coupled_pair", "ep4", "pt_pair", "realistic", "ziegler_undamped")
@@ -185,3 +186,45 @@ def test_a_band_that_is_one_speed_is_told_as_one() -> None:
     """Around the EP3 that is heavily damped at the least speed there is no band: three roots part on both sides."""
     told = str(tmsopt.speeds("problems/heavily_damped.toml"))
     assert "\nheavily damped: at 1.9872866" in told
+
+
+CROWDED = {
+    "model": tmsopt.models.tms,
+    "fixed": {"w": 0.6, "m_B": 15},
+    "free": {
+        "m_H": (1, 6), "x_B": (0.1, 0.6), "z_B": (-0.7, -0.2), "x_H": (0.3, 0.9), "z_H": (-0.7, -0.1),
+        "lambda_s": ("-35 deg", "35 deg"),
+    },
+    "constraints": {"steer_arm": "abs(u_H) >= 0.02", "rear": "N_R >= 20", "front": "N_F >= 20"},
+    "scenarios": {"v": [2.0, 3.0]},
+    "tolerances": {"x_B": 0.003, "z_B": 0.003, "x_H": 0.003, "z_H": 0.003},
+    "minimize": "abscissa",
+}  # fmt: skip
+"""A robot whose report has more lines than a screen: limits, cases, a side of the tilt that loses."""
+
+
+@pytest.mark.slow
+def test_what_is_to_be_built_is_on_the_screen_however_crowded_it_is() -> None:
+    design = tmsopt.solve(tmsopt.Problem(**CROWDED))
+    told = str(design).splitlines()
+    assert len(told) <= 30
+    for name in (*design.problem.free, "fixed: w = "):
+        assert sum(line.lstrip().startswith(name) or f"  {name}  " in line for line in told) >= 1, name
+    assert any("both signs were searched" in line for line in told)
+
+
+@pytest.mark.slow
+def test_how_near_a_design_comes_is_said_of_its_worst_case() -> None:
+    """The sentence and the smallest change are about one number."""
+    asked = {**CROWDED, "constraints": {**CROWDED["constraints"], "fast": "decay_time <= 0.167"}}
+    told = str(tmsopt.solve(tmsopt.Problem(**asked), throw=False)).replace("\n  ", " ")
+    near, least = re.findall(r"decay_time (?:=|<=) ([\d.]+) s (?:in its worst case|instead of 0.167)", told)
+    assert float(near) == pytest.approx(float(least), rel=2e-4)  # five digits, the change rounded upwards
+    assert float(near) > 0.167
+
+
+def test_a_proof_that_was_tried_in_vain_is_told_so() -> None:
+    design = tmsopt.solve("problems/realistic.toml")
+    assert "proof: none that this is the best; --certify proves it, or finds better" in design_report(design)
+    tried = replace(design, bound=replace(design.bound, solver="SCIP", seconds=19.8))
+    assert "proof: none that this is the best in 20 s of SCIP; a longer --certify goes on" in design_report(tried)

@@ -1,10 +1,7 @@
 """The report of a solution: the answer on one screen, and all the rest on request, in one order."""
 
 import math
-import re
-import textwrap
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import limit_text, unit_of
@@ -27,35 +24,17 @@ from tmsopt.report.solution.rows import (
     roots_of,
     tidy,
 )
+from tmsopt.report.solution.screen import KEPT, Block, fitted, named, wrapped
 from tmsopt.report.speeds import range_line
-from tmsopt.report.text import HEIGHT, WIDTH, columns
+from tmsopt.report.text import HEIGHT, columns
 from tmsopt.roots.patterns.descriptions import in_words
 
 _DIGITS = 5
-_KEPT = "\xa0"  # a space where no line is broken
 _ROWS = 8  # of free parameters one below the other
 _APART = ("design", "motion", "limits", "robustness")
 """Parts with an empty line before them, where there is room."""
 
 _ASKED = {"a0": "must not be 0", "coefficients": "must have values"}
-
-
-@dataclass(frozen=True)
-class Block:
-    """A part of the report.
-
-    Attributes:
-        name: under which the full report has it.
-        lines: on one screen.
-        rest: what the full report has below its lines, or in place of them where it `replaces` them.
-        least: lines that stay where there is not room for all.
-    """
-
-    name: str
-    lines: list[str]
-    rest: tuple[str, ...] = ()
-    replaces: bool = False
-    least: int = 1
 
 
 def design_report(
@@ -80,10 +59,10 @@ def design_report(
     found = found or Findings()
     scaled = si or si_parameters(solution)
     parts = [p for p in design_parts(solution, found, scaled, beside=si is not None) if p.lines or (full and p.rest)]
-    title = _wrapped([solution.problem.title or "untitled problem"])[0]
+    title = wrapped([solution.problem.title or "untitled problem"])[0]
     if full:
-        return "\n".join([title, *(line for part in parts for line in _named(part))])
-    blocks = {part.name: _wrapped(part.lines) for part in _fitted(parts)}
+        return "\n".join([title, *(line for part in parts for line in named(part))])
+    blocks = {part.name: wrapped(part.lines) for part in fitted(parts)}
     room = HEIGHT - 2 - sum(map(len, blocks.values()))
     apart = [name for name in _APART if name in blocks][: max(room, 0)]
     lines = [line for name, block in blocks.items() for line in ([""] if name in apart else []) + block]
@@ -230,7 +209,7 @@ def _design(solution: Solution, si: Mapping[str, float] | None) -> list[str]:
         else []
     )
     rest = [
-        f"{p.name} = {shown[p.name]}".replace(" ", _KEPT) for p in of.parameters
+        f"{p.name} = {shown[p.name]}".replace(" ", KEPT) for p in of.parameters
         if role(solution, p.name) == "fixed" and not solution.parameters[p.name] == 0 == p.default
     ]  # fmt: skip
     most = 14
@@ -303,44 +282,3 @@ def branch_lines(solution: Solution) -> list[str]:
         where = ", ".join(f"{n} = {unit_of(problem, n).show(branch.parameters[n], ALL)}" for n in problem.free)
         lines.append(f"also solved by {where}; excluded by {', '.join(branch.excluded_by) or 'nothing'}")
     return lines
-
-
-def _named(part: Block) -> list[str]:
-    """A part of the full report, under its name."""
-    lines = [] if part.replaces else _wrapped(part.lines)
-    for line in part.rest:
-        lines += [line] if line.startswith("  ") else _wrapped([line])
-    return ["", part.name, "-" * len(part.name), *(line.rstrip() for line in lines)]
-
-
-def _wrapped(lines: list[str]) -> list[str]:
-    """Lines of `WIDTH` at most; rows of a table are cut."""
-    found = []
-    for line in lines:
-        if line.startswith("  "):
-            found.append(line if len(line) <= WIDTH else f"{line[: WIDTH - 1]}…")
-        else:
-            whole = re.sub(r"(?<=\d) (?=[^\W\d_]|[√%])", _KEPT, line)  # a number stays with its unit
-            wrapped = textwrap.wrap(whole, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
-            found += [part.replace(_KEPT, " ") for part in wrapped] or [""]
-    return found
-
-
-def _fitted(parts: list[Block]) -> list[Block]:
-    """Parts that fit the screen: the last lines of those that may be shorter are left out, and counted."""
-    cut = {part.name: len(part.lines) for part in parts}
-
-    def shown(part: Block) -> Block:
-        kept = cut[part.name]
-        if kept == len(part.lines):
-            return part
-        return Block(part.name, [*part.lines[:kept], f"  … {len(part.lines) - kept} more {part.name}: --full"])
-
-    def height() -> int:
-        return 2 + sum(len(_wrapped(shown(part).lines)) for part in parts)
-
-    for name in ("warnings", "limits", "answer", "conflict", "design"):
-        part = next((p for p in parts if p.name == name), None)
-        while part is not None and height() > HEIGHT and cut[name] > part.least:
-            cut[name] -= 1
-    return [shown(part) for part in parts]

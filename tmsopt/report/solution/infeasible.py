@@ -120,11 +120,13 @@ def _nearest(solution: Solution, name: str) -> str:
     amount = relaxation.amounts.get(name, 0.0)
     for side, other, own, sign in zip(sides, reversed(sides), reached, (1, -1), strict=True):
         if (limit := _number(other)) is not None:
-            # The radius is none of a design's own values.
-            value = own if math.isfinite(own) else limit + sign * condition.sign * amount
+            varied = solution.problem.nominal is not solution.problem
+            # The radius is none of a design's own values, and over several cases the worst one counts.
+            value = own if math.isfinite(own) and not varied else limit + sign * condition.sign * amount
             if not math.isfinite(value) or not math.isfinite(amount):
                 return f": {side.strip()} has no value where the search ended"
-            return f": the nearest design found has {side.strip()} = {unit_of(solution.problem, name).show(value)}"
+            shown = f"{side.strip()} = {unit_of(solution.problem, name).show(value)}"
+            return f": the nearest design found has {shown}{' in its worst case' if varied else ''}"
     return ""
 
 

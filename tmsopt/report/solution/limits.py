@@ -5,7 +5,7 @@ import math
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
-from tmsopt.design.solution import Solution
+from tmsopt.design.solution import Bound, Solution
 from tmsopt.design.unit_system import unit_of
 from tmsopt.explanation import none_of
 from tmsopt.report.text import number
@@ -40,7 +40,8 @@ def proof_line(solution: Solution) -> str:
     unjudged = f"branch and bound does not judge {' or '.join(beyond.values())}" if beyond else ""
     if solution.status == "infeasible":
         known = "that no design is stable; " if solution.any_stable is False else ""
-        unproved = f"{known}none that no design is feasible; {unjudged or '--certify looks for one'}"
+        looked = "a longer --certify goes on" if bound.solver else "--certify looks for one"
+        unproved = f"{known}none that no design is feasible{_tried(bound)}; {unjudged or looked}"
         return f"proof: {'no design in the box meets all limits' if bound.proven else unproved}"
     if not problem.free:
         return "proof: nothing is free, so nothing to prove; tmsopt prove proves the roots"
@@ -63,7 +64,12 @@ def proof_line(solution: Solution) -> str:
     if math.isfinite(bound.value):
         known = f"none allowed is {side} {unit.show(bound.value, 6)} ({bound.method})"
         return f"proof: {known}, {unit.show(bound.gap, 2)} open; {unjudged or '--certify goes on'}"
-    return f"proof: none that this is the best; {unjudged or '--certify proves it, or finds better'}"
+    further = "a longer --certify goes on" if bound.solver else "--certify proves it, or finds better"
+    return f"proof: none that this is the best{_tried(bound)}; {unjudged or further}"
+
+
+def _tried(bound: Bound) -> str:
+    return f" in {bound.seconds:.0f} s of {bound.solver}" if bound.solver else ""
 
 
 def case_lines(solution: Solution) -> list[str]:
