@@ -105,7 +105,7 @@ def _problem(path: Path, verb: str) -> str:
     parts.append(f"tmsopt.explore({explored})")
     return (
         _titled(_plain(title), about)
-        + f"# %%\n# ``{path.name}``:\n#\n# .. code-block:: toml\n#\n{shown}\n\n"
+        + f"# %%\n# :download:`{path.name} </../problems/{path.name}>`:\n#\n# .. code-block:: toml\n#\n{shown}\n\n"
         + "\n\n# %%\n\n".join(parts)
         + "\n"
     )

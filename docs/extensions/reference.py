@@ -59,7 +59,10 @@ def _entry(face: str, module: ModuleType, name: str) -> str:
         return f"See `tmsopt.{name}`.\n"
     if inspect.isclass(found):
         return f".. autoclass:: tmsopt.{path}\n   :members:\n"
-    return f".. autofunction:: tmsopt.{path}\n" if callable(found) else f"``tmsopt.{path}``\n"
+    if callable(found):
+        return f".. autofunction:: tmsopt.{path}\n"
+    text = repr(found) if len(repr(found)) < 90 else f"{type(found).__name__} of {len(found)}"
+    return f".. py:data:: tmsopt.{path}\n\n   ``{text}``\n"
 
 
 def _package(found: object) -> str:
@@ -104,15 +107,16 @@ def _keys(schema: Mapping[str, Any], path: str = "") -> Iterator[tuple[object, .
         key = f"{path}{name}"
         words = inside.get("description", "")
         accepted = inside.get("enum") or next((a["enum"] for a in inside.get("anyOf", ()) if "enum" in a), ())
-        default = f" Left out: `{inside['default']}`." if "default" in inside else ""
-        yield f"`{key}`", words + default, ", ".join(f"`{a}`" for a in accepted)
+        named = f" Such as {', '.join(f'`{a}`' for a in accepted)}." if accepted else ""
+        default = f" Left out: `{inside['default']}`." if inside.get("default", "") != "" else ""
+        yield f"`{key}`", f"{words}{named}{default}"
         tables = inside if "properties" in inside else inside.get("else", {})
         if "properties" in tables and name != "parameters":
             yield from _keys(tables, f"{key}.")
 
 
 def _files(kind: str) -> str:
-    return _table(("key", "means", "accepted"), _keys(tmsopt.schema()["$defs"][kind]))
+    return _table(("key", "means"), _keys(tmsopt.schema()["$defs"][kind]))
 
 
 def _quantities() -> Iterator[str]:
@@ -186,9 +190,32 @@ def _read(app: Sphinx, name: str, source: list[str]) -> None:
         source[0] = relinked(source[0], path.parent, path.parent)
 
 
+_COLON = "\x1a"  # in the place of a colon that begins no field
+
+
+def _before_napoleon(_app: Sphinx, what: str, _name: str, _found: object, _options: object, lines: list[str]) -> None:
+    """What napoleon would misread: a colon in the line of a property, and several fields in one line."""
+    if what in ("property", "attribute") and lines:
+        lines[0] = lines[0].replace(":", _COLON)
+    text = "\n".join(lines)
+    several = re.compile(r"^( +)(\w+(?:, \w+)+): (.*(?:\n\1 +.*)*)", re.MULTILINE)
+    lines[:] = several.sub(lambda m: "\n".join(f"{m[1]}{n}: {m[3]}" for n in m[2].split(", ")), text).split("\n")
+
+
+def _signature(
+    _app: Sphinx, what: str, _name: str, found: object, _options: object, signature: str | None, returned: str | None
+) -> tuple[str | None, str | None]:
+    """Names without the modules that they are from; results, which nobody calls, without arguments."""
+    if what == "class" and "Args:" not in (inspect.getdoc(found) or ""):
+        return "", None
+    short = re.compile(r"~?\b(?:[a-z_]\w*\.)+(?=[A-Za-z_]\w*)")
+    return signature and short.sub("", signature).replace("~", ""), returned and short.sub("", returned)
+
+
 def _docstring(_app: Sphinx, _what: str, _name: str, _found: object, _options: object, lines: list[str]) -> None:
     """A docstring is about to be rendered: its last line leads to a page, public names to themselves, `x` is code."""
-    for number, line in enumerate(lines):
+    for number, line in enumerate(line.replace(_COLON, ":") for line in list(lines)):
+        lines[number] = line
         page = re.fullmatch(r"More: docs/(.*)\.md", line.strip())
         if page:
             lines[number] = f"More: :doc:`/{page[1]}`"
@@ -223,7 +250,9 @@ def setup(app: Sphinx) -> dict[str, bool]:
     """Before anything is read; after the examples are written."""
     app.connect("builder-inited", write_reference, priority=200)
     app.connect("source-read", _read)
+    app.connect("autodoc-process-docstring", _before_napoleon, priority=400)
     app.connect("autodoc-process-docstring", _docstring, priority=900)
+    app.connect("autodoc-process-signature", _signature)
     for part in ("description", "epilog"):
         app.connect(f"sphinx-click-process-{part}", _help)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
