@@ -65,7 +65,7 @@ def prove(
         asked = options(starts=starts, seed=seed)
         solution = tmsopt.solve(problem, throw=False, interruptible=False, progress=shown(), **asked)
         proof = tmsopt.prove(solution, digits, exact=given, progress=shown())
-    heading = {"title": problem.title, "status": solution.status}
+    heading = problem.heading | {"status": solution.status}
     answer(as_json, lambda: heading | proof.to_json(), lambda: tmsopt.report.proof_text(problem, proof))
     write_report(proof, report, file, seed=seed, design=solution)
     sys.exit(DONE if proof.proved else NOT_CONVERGED if solution.status == "optimal" else INFEASIBLE)
