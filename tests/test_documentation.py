@@ -200,6 +200,31 @@ def test_the_figures_stand_in_the_results() -> None:
     assert [c for c in counts if c not in results] == []
 
 
+def test_the_times_stand_in_the_results() -> None:
+    """Medians of a solve, of its rival and of a proof: those of the benchmarks, to the digits shown."""
+    results = (ROOT / "benchmarks" / "results.md").read_text(encoding="utf-8")
+    table = {row[0]: row[1] for row in re.findall(r"^\| (.*?) +\| (.*) \|$", README.read_text(), re.MULTILINE)}
+    finds, proves = (next(cells for row, cells in table.items() if row.startswith(word)) for word in ("finds the", "proves it"))
+    medians = [
+        *(re.search(rf"^\| {row} \|.* (\d+) ms \|$", results, re.MULTILINE) for row in ("default solve", "DE, vectorised")),
+        re.search(r"^\| median time of a proof \| (\d+) ms \|$", results, re.MULTILINE),
+    ]
+    shown = re.findall(r", ([\d.]+) s", finds) + re.findall(r", ([\d.]+) s", proves)
+    assert len(shown) == len(medians)
+    for printed, median in zip(shown, medians, strict=True):
+        assert median is not None
+        assert f"{int(median[1]) / 1000:.{len(printed.partition('.')[2])}f}" == printed
+
+
+@pytest.mark.parametrize("name", ["measured", "proofs"])
+def test_counts_and_medians_of_a_page_stand_in_the_results(name: str) -> None:
+    text = prose(ROOT / "docs" / "explanation" / f"{name}.md")
+    results = (ROOT / "benchmarks" / "results.md").read_text(encoding="utf-8")
+    found = re.findall(r"\d+ of \d+\b|\b\d{3,} ms\b|\d+\.\d(?= %\))", text)
+    assert found
+    assert [one for one in found if one not in results] == []
+
+
 def test_the_first_python_example_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     names: dict[str, object] = {}

@@ -1,6 +1,7 @@
 """Every page of the documentation runs: files are read, commands and Python executed, what is printed compared."""
 
 import doctest
+import re
 import shutil
 import tomllib
 from pathlib import Path
@@ -11,7 +12,8 @@ from helpers.pages import PAGES, ROOT, Block, agrees, blocks_of, exchanges, may_
 
 import tmsopt
 
-LANGUAGES = {"toml", "console", "python", "pycon", "sh", "text", "json", "", "bibtex"}
+LANGUAGES = {"toml", "console", "python", "pycon", "sh", "text", "bibtex"}
+DIRECTIVES = {"{glossary}", "{toctree}", "{include}", "{eval-rst}"}
 
 
 def part_of(part: object, whole: object) -> bool:
@@ -39,6 +41,8 @@ def written(block: Block, folder: Path) -> None:
 def compared(block: Block, names: dict[str, object], page: Path) -> None:
     """A session of Python prints what the page says."""
     test = doctest.DocTestParser().get_doctest(block.text, names, page.name, str(page), block.line)
+    assert test.examples, f"line {block.line}: no line begins with >>>"
+    assert not any(example.options for example in test.examples), f"line {block.line}: nothing is left out or loosened"
     flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
     said: list[str] = []
     doctest.DocTestRunner(optionflags=flags, verbose=False).run(test, out=said.append, clear_globs=False)
@@ -54,7 +58,7 @@ def test_what_a_page_shows_is_so(page: Path, tmp_path: Path, monkeypatch: pytest
     matplotlib.use("agg")
     names: dict[str, object] = {"__name__": "page"}
     for block in blocks_of(page):
-        assert block.language in LANGUAGES, f"line {block.line}: {block.language}"
+        assert block.language in LANGUAGES | DIRECTIVES, f"line {block.line}: {block.language}"
         if block.language == "toml":
             written(block, tmp_path)
         elif block.language == "console":
@@ -69,7 +73,8 @@ def test_what_a_page_shows_is_so(page: Path, tmp_path: Path, monkeypatch: pytest
         elif block.language == "sh":
             assert may_install(block), f"line {block.line}: commands that can be run belong in `console`"
         else:
-            assert not block.text.startswith("$ "), f"line {block.line}: commands belong in `console`"
+            runs = re.search(r"^(\$ |>>> |\[\w+\]$)", block.text, re.MULTILINE)
+            assert runs is None, f"line {block.line}: {runs} belongs in a block that is run or read"
 
 
 def test_the_pages_are_there() -> None:
@@ -93,6 +98,13 @@ def test_the_pages_are_there() -> None:
         ("a … c", "a c", True),
         ("at most -3.337…, proved", "at most -3.33745, proved", True),
         ("at most -3.337…, proved", "at most -3.33845, proved", False),
+        ("decay time 0.5492 s; 3 s", "decay time 0.5492 s; 4 s", True),
+        ("decay time 0.5492 s", "decay time 0.5493 s", False),
+        ("decay_time <= 0.5 s by 0.1 s", "decay_time <= 0.7 s by 0.1 s", False),
+        ("1.414213562373095048801", "1.414213562373095048802", False),
+        ("± 2.7e-35", "± 3.1e-35", True),
+        ("± 2.7e-35", "± 2.7e-33", False),
+        ("off by 0", "off by 3e-16", True),
     ],
 )
 def test_lines_are_compared_by_words_and_numbers(printed: str, now: str, same: bool) -> None:
@@ -111,3 +123,26 @@ def test_lines_are_compared_by_words_and_numbers(printed: str, now: str, same: b
 )
 def test_lines_are_looked_for_in_their_order(printed: list[str], line: str | None) -> None:
     assert missing(printed, ["a", "b", "c", "d"]) == line
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "```console\ntmsopt solve a.toml\noptimal\n```",
+        "```console\nbefore\n$ true\n```",
+        "```console\n$ true\n",
+        "- item\n\n  ```toml\n  a = [\n  ```",
+        "~~~console\n$ false\n~~~",
+        "```{python}\n1/0\n```",
+        "```json\n{,}\n```",
+        "```pycon\n1 + 1\n3\n```",
+        "```pycon\n>>> 1 + 1  # doctest: +SKIP\n3\n```",
+        "```text\nFirst\n$ tmsopt solve a.toml\n```",
+        "```text\n[parameters]\nFr = 1\n```",
+    ],
+)
+def test_a_block_that_would_not_be_run_is_found(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(f"# Title\n\n{text}\n", encoding="utf-8")
+    with pytest.raises(AssertionError):
+        test_what_a_page_shows_is_so(page, tmp_path, monkeypatch)
