@@ -1,5 +1,6 @@
 """The front door: what README, docs/ and CONTRIBUTING say is there, runs, and gives the answers printed."""
 
+import inspect
 import math
 import re
 import tomllib
@@ -75,7 +76,12 @@ def test_the_two_commands_stand_between_the_markers() -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_links_lead_somewhere(page: Path) -> None:
-    targets = re.findall(r"\]\(([^)\s]+)\)", prose(page))
+    text = re.sub(r"`[^`\n]*`", "", prose(page))
+    assert re.findall(r"\]\(<|^ *\[[^]]+\]:|<a |<img ", text, re.MULTILINE) == [], (
+        "links are written as [words](target)"
+    )
+    targets = re.findall(r"\]\(([^)\s]+)(?:\s+\"[^\"]*\")?\)", prose(page))
+    assert len(targets) == text.count("](")
     for target in (t for t in targets if not re.match(r"[a-z]+:", t)):
         name, _, anchor = target.partition("#")
         found = (page.parent / name).resolve() if name else page
@@ -108,8 +114,22 @@ def test_public_names_exist(page: Path) -> None:
     )
     for name, inner in re.findall(r"(?<![\w/])tmsopt\.([A-Za-z_]\w*)(?:\.(\w+))?", text):
         assert name in {*tmsopt.__all__, "__all__", "__version__"}, name
-        if inner and name in ("laws", "models", "roots"):
-            assert hasattr(getattr(tmsopt, name), inner), f"{name}.{inner}"
+        found = getattr(tmsopt, name)
+        if inner and (inspect.ismodule(found) or inspect.isclass(found)):
+            assert hasattr(found, inner) or inner in getattr(found, "__annotations__", {}), f"{name}.{inner}"
+
+
+def test_options_exist() -> None:
+    """What a page calls `--something` is an option of a command, or of the benchmarks."""
+    commands = import_module("tmsopt.cli.commands").every
+    options = {
+        word for c in (commands, *commands.commands.values()) for p in c.params for word in (*p.opts, *p.secondary_opts)
+    }
+    known = options | {"--help", "--quick"}
+    texts = {page.name: page.read_text(encoding="utf-8") for page in [README, *pages.PAGES]}
+    named = {name: set(re.findall(r"(?:`|tmsopt [^\n`]* )(--[a-z][a-z-]*)", text)) for name, text in texts.items()}
+    assert len(set().union(*named.values())) > 30
+    assert {name: found - known for name, found in named.items() if found - known} == {}
 
 
 # CONTRIBUTING
@@ -204,9 +224,14 @@ def test_the_times_stand_in_the_results() -> None:
     """Medians of a solve, of its rival and of a proof: those of the benchmarks, to the digits shown."""
     results = (ROOT / "benchmarks" / "results.md").read_text(encoding="utf-8")
     table = {row[0]: row[1] for row in re.findall(r"^\| (.*?) +\| (.*) \|$", README.read_text(), re.MULTILINE)}
-    finds, proves = (next(cells for row, cells in table.items() if row.startswith(word)) for word in ("finds the", "proves it"))
+    finds, proves = (
+        next(cells for row, cells in table.items() if row.startswith(word)) for word in ("finds the", "proves it")
+    )
     medians = [
-        *(re.search(rf"^\| {row} \|.* (\d+) ms \|$", results, re.MULTILINE) for row in ("default solve", "DE, vectorised")),
+        *(
+            re.search(rf"^\| {row} \|.* (\d+) ms \|$", results, re.MULTILINE)
+            for row in ("default solve", "DE, vectorised")
+        ),
         re.search(r"^\| median time of a proof \| (\d+) ms \|$", results, re.MULTILINE),
     ]
     shown = re.findall(r", ([\d.]+) s", finds) + re.findall(r", ([\d.]+) s", proves)
