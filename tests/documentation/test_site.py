@@ -4,6 +4,8 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
+from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote
@@ -86,7 +88,11 @@ def test_every_problem_is_in_the_gallery(site: Path) -> None:
         (page,) = (site / "gallery").rglob(f"{name}.html")
         text = page.read_text(encoding="utf-8")
         assert f"sphx_glr_{name}_001.png" in text, name
-        assert "sphx-glr-script-out" in text, name
+        printed = re.findall(r"sphx-glr-script-out.*?<pre>(.*?)</pre>", text, re.DOTALL)
+        answer = unescape(re.sub(r"<[^>]+>", "", "\n".join(printed)))
+        assert len(answer) > 60, name
+        assert not re.search("not converged|infeasible", answer), name
+        assert file.suffix == ".py" or tomllib.loads(file.read_text(encoding="utf-8"))["title"] in answer, name
         assert file.suffix == ".py" or "<iframe" in text, name
 
 
