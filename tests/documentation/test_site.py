@@ -78,7 +78,9 @@ def test_nothing_is_loaded_from_elsewhere(pages: dict[Path, Page]) -> None:
     for path, page in pages.items():
         for load in page.loads:
             assert not re.match(r"(https?:)?//", load), (path, load)
-            assert load.startswith(("data:", "#")) or (path.parent / unquote(load).split("?")[0]).resolve().is_file(), load
+            assert load.startswith(("data:", "#")) or (path.parent / unquote(load).split("?")[0]).resolve().is_file(), (
+                load
+            )
 
 
 def test_every_problem_is_in_the_gallery(site: Path) -> None:
