@@ -14,6 +14,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from docutils import nodes
 from sphinx.application import Sphinx
 
 import tmsopt
@@ -246,6 +247,13 @@ def _help(_app: Sphinx, _context: object, lines: list[str]) -> None:
     lines[:] = found
 
 
+def _dashes(_app: Sphinx, doctree: nodes.document) -> None:
+    """Between a field and what it is stands a dash: smart quotes are off, for they would spoil `--json`."""
+    for text in list(doctree.findall(nodes.Text)):
+        if text == " -- ":
+            text.parent.replace(text, nodes.Text(" – "))
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Before anything is read; after the examples are written."""
     app.connect("builder-inited", write_reference, priority=200)
@@ -253,6 +261,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("autodoc-process-docstring", _before_napoleon, priority=400)
     app.connect("autodoc-process-docstring", _docstring, priority=900)
     app.connect("autodoc-process-signature", _signature)
+    app.connect("doctree-read", _dashes)
     for part in ("description", "epilog"):
         app.connect(f"sphinx-click-process-{part}", _help)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
