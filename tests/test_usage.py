@@ -1,6 +1,7 @@
 """Typical uses are understood by type checkers, hence by editors, and run; so do the notebooks."""
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -73,15 +74,22 @@ def test_a_notebook_is_kept_without_answers(notebook: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("alone", [False, True], ids=["from the root", "in a folder of its own"])
 @each_notebook
-def test_a_notebook_runs(notebook: Path) -> None:
-    """Each result that ends a cell has its page, of which the picture and the text that `print` gives are parts."""
+def test_a_notebook_runs(notebook: Path, alone: bool, tmp_path: Path) -> None:
+    """Each result that ends a cell has its page, of which the picture and the text that `print` gives are parts.
+
+    So it does in its own folder, where `jupyter lab` runs it, and where nothing else was fetched.
+    """
     nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
     pytest.importorskip("ipykernel")
-    read = nbformat.read(notebook, as_version=4)
+    read = nbformat.read(shutil.copy(notebook, tmp_path), as_version=4)
     nbformat.validate(read)
-    nbclient.NotebookClient(read, timeout=300, resources={"metadata": {"path": str(ROOT)}}).execute()
+    folder = str(tmp_path if alone else ROOT)
+    nbclient.NotebookClient(read, timeout=300, resources={"metadata": {"path": folder}}).execute()
     outputs = [output for cell in read.cells if cell.cell_type == "code" for output in cell.outputs]
     assert not [output for output in outputs if output.output_type == "error"]
     pages = [output.data["text/html"] for output in outputs if "text/html" in output.get("data", {})]
     assert any('class="tmsopt"' in page for page in pages)
+    folded = [cell for cell in read.cells if cell.metadata.get("jupyter", {}).get("source_hidden")]
+    assert not [cell for cell in folded if cell.outputs]  # an answer stays unseen when all is run
