@@ -109,3 +109,11 @@ def test_a_model_without_a_speed_has_no_bands_of_it():
     assert stable_speeds(tmsopt.solve("problems/two_mass_spring.toml")) is None
     model = tmsopt.models.from_coefficients([1.0, "Fr", 1.0])  # a name alone makes no speed: this may be negative
     assert stable_speeds(tmsopt.solve(tmsopt.Problem(model, free={"Fr": (0.5, 1)}, minimize="abscissa"))) is None
+
+
+def test_a_band_over_another_parameter_ends_where_stability_does() -> None:
+    """Of the EP4 over the tilt: Fr_c² = tan(lambda_s) (chi_B + 1)/(chi_B − 1) for chi_H = 1 reaches Fr²."""
+    design = tmsopt.solve("problems/ep4.toml")
+    Fr, chi_B = design.parameters["Fr"], design.parameters["chi_B"]
+    ((_, end),) = tmsopt.growth(design, over="lambda_s").stable
+    assert end == pytest.approx(math.atan(Fr**2 * (chi_B - 1) / (chi_B + 1)), rel=1e-12)

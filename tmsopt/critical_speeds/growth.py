@@ -45,7 +45,7 @@ class Growth(Tabular):
         design: value of the design.
         structure: structure of its rightmost roots.
         stable, heavily_damped: bands of values with all Re s < 0; with all s real and negative. Exact where the
-            coefficients are polynomials in the parameter, else from point to point.
+            coefficients are polynomials in the parameter; else `stable` by halving, the other from point to point.
         problem: that the design solves; its parameters, where `over` is one of them, have the units of its file.
         modes: the roots again, each followed from meeting to meeting, with a name.
         events: where roots cross the axis or meet, exact; where the coefficients are no polynomials in `over`, those
@@ -148,7 +148,8 @@ def growth(
         stable, heavily_damped = _within(met.stable, low, high), _within(met.heavily_damped, low, high)
     else:
         inside = is_stable(c)
-        stable, heavily_damped = _runs(values, inside), _runs(values, inside & np.all(found.imag == 0, axis=-1))
+        stable = tuple(_reaching(values, run, events) for run in _runs(values, inside))
+        heavily_damped = _runs(values, inside & np.all(found.imag == 0, axis=-1))
     rate = (
         None if of.rate is None else np.broadcast_to(of.rate({**parameters, name: values}), values.shape).astype(float)
     )
@@ -225,3 +226,12 @@ def _runs(values: Array, inside: Truth) -> tuple[Stretch, ...]:
     """First and last value of each run of points in which something holds."""
     changes = np.flatnonzero(np.diff(inside.astype(int), prepend=0, append=0))
     return tuple((float(values[k]), float(values[m - 1])) for k, m in changes.reshape(-1, 2))
+
+
+def _reaching(values: Array, run: Stretch, events: Sequence[Crossing]) -> Stretch:
+    """A run of points up to where stability changes between its ends and the points beside them."""
+    low, high = run
+    before, after = values[values < low][-1:], values[values > high][:1]
+    begin = [c.at for c in events if before.size and before[0] <= c.at <= low]
+    end = [c.at for c in events if after.size and high <= c.at <= after[0]]
+    return max(begin, default=low), min(end, default=high)
