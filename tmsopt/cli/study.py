@@ -33,7 +33,7 @@ _EXAMPLES = """
 \b
 Examples:
   tmsopt study problems/study_sway.toml
-  tmsopt study problems/study_sway.toml --row 17
+  tmsopt study problems/study_sway.toml --row 7
   tmsopt study problems/study_sway.toml --workers 4 --export rows.csv
   tmsopt study problems/study_built.toml --plot built.png
   tmsopt study problems/study_built.toml --json
@@ -46,7 +46,7 @@ FILE names a problem and what varies: title, problem = "ep4.toml" (or a table [p
             rows = 1000 (of a sample), csv = "rows.csv", distribution = "uniform" (default) or "normal",
             seed = 0, starts = 64 (a row, at most), warm = false, report = ["nu_H", "2*Fr_c"]
   [vary]    mu = [0.1, 0.2], mu = { min = 0.05, max = 1, points = 20, log = true }, "lambda_s.max" = ["20 deg"],
-            "trail.limit" = [0.02, 0.05]: fixed parameters, ends of free ones, numbers of constraints
+            "steer_arm.limit" = [0.02, 0.05]: fixed parameters, ends of free ones, numbers of constraints
   [tolerances]  of monte_carlo, by default those of the problem
 
 Rows go to the store, an SQLite file, as they are solved, once a second. The same command goes on where it was stopped,
