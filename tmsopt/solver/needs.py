@@ -194,7 +194,7 @@ def _best(work: Workspace) -> Trial | None:
 def _asked(solution: Solution) -> bool:
     """Whether the speed may help: what fails is about the roots."""
     problem = solution.problem
-    about = {*problem.asked_of_roots, *([problem.locate] if problem.locate else [])}
+    about = {*problem.asked_of_roots, *([problem.pattern.name] if problem.pattern else [])}
     if solution.status == "infeasible":
         return bool(about & set(solution.violations))
     return solution.stable is False and solution.stability_sought
