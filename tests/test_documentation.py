@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from helpers import pages
+from helpers.pages import NUMBER, agrees, lines_of
 
 import tmsopt
 from tmsopt.cli import main
@@ -16,12 +17,11 @@ from tmsopt.cli import main
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *pages.PAGES])
 README, CONTRIBUTING = (ROOT / name for name in ("README.md", "CONTRIBUTING.md"))
-NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
 
 def blocks(page: Path, language: str) -> list[str]:
-    """The fenced blocks of a page."""
-    return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    """The fenced blocks of a page in one language."""
+    return [block.text for block in pages.blocks_of(page) if block.language == language]
 
 
 def prose(page: Path) -> str:
@@ -37,15 +37,7 @@ def anchors(page: Path) -> set[str]:
 
 def answer(text: str) -> list[str]:
     """The lines of a printed answer, spaces and what is left out aside."""
-    return [" ".join(line.split()) for line in text.splitlines() if line.strip() and line.strip() != "…"]
-
-
-def agrees(printed: str, now: str) -> bool:
-    """The same words, and the same numbers within the rounding of the last digits: other machines, other sums."""
-    if NUMBER.sub("", printed) != NUMBER.sub("", now):
-        return False
-    pairs = zip(NUMBER.findall(printed), NUMBER.findall(now), strict=True)
-    return all(math.isclose(float(a), float(b), rel_tol=1e-7) for a, b in pairs)
+    return [line for line in lines_of(text) if line != "…"]
 
 
 def solved(file: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:

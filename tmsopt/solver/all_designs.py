@@ -97,14 +97,17 @@ class Every(Tabular):
 
     def records(self) -> Iterable[dict[str, Any]]:
         """The designs, one a row."""
-        for solution, proved in zip(self.solutions, self.proved, strict=True):
+        for solution, proved in zip(self.solutions, self._known(), strict=True):
             found = {"abscissa": solution.abscissa, "structure": solution.structure, "stable": solution.stable}
             yield {**solution.parameters, **found, "proved": proved}
+
+    def _known(self) -> tuple[bool, ...]:
+        return self.proved or (False,) * len(self.solutions)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``: each solution with ``proved``, beside them ``complete`` and ``undecided``."""
         found = plain(self)
-        for solution, proved in zip(found["solutions"], self.proved, strict=True):
+        for solution, proved in zip(found["solutions"], self._known(), strict=True):
             solution["proved"] = proved
         known = self.completeness
         return found | {
