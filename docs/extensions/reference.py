@@ -19,6 +19,7 @@ from sphinx.application import Sphinx
 
 import tmsopt
 from extensions.gallery import EXAMPLES, ROOT
+from tmsopt.records import Shown
 
 DOCS = ROOT / "docs"
 GENERATED = DOCS / "generated"
@@ -206,8 +207,8 @@ def _before_napoleon(_app: Sphinx, what: str, _name: str, _found: object, _optio
 def _signature(
     _app: Sphinx, what: str, _name: str, found: object, _options: object, signature: str | None, returned: str | None
 ) -> tuple[str | None, str | None]:
-    """Names without the modules that they are from; results, which nobody calls, without arguments."""
-    if what == "class" and "Args:" not in (inspect.getdoc(found) or ""):
+    """Names without the modules that they are from; results, which nobody makes, without arguments."""
+    if inspect.isclass(found) and issubclass(found, Shown):
         return "", None
     short = re.compile(r"~?\b(?:[a-z_]\w*\.)+(?=[A-Za-z_]\w*)")
     return signature and short.sub("", signature).replace("~", ""), returned and short.sub("", returned)

@@ -32,13 +32,13 @@ _DEVIATIONS = 3  # standard deviations in a tolerance
 
 @dataclass(frozen=True)
 class Sampling:
-    """A Monte Carlo study whose design has yet to be found; `planned` makes it a Study.
+    """A Monte Carlo study whose design has yet to be found; `run_study` finds it first.
 
     Attributes:
         problem: its optimum is the design; its tolerances are drawn from, unless `tolerances` are given.
         rows: designs drawn.
         seed: of the draws; the nominal design is solved from the starts of seed 0.
-        distribution: one of `DISTRIBUTIONS`.
+        distribution: uniform, or normal with a third of the tolerance as its standard deviation, cut off there.
         starts: of the nominal design, at most.
 
     Raises:

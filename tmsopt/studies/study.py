@@ -37,7 +37,7 @@ class Study:
         report: expressions recorded for every row beside parameters and abscissa.
         grid_shape: of a full grid, axis → how many values it has, in the order of the columns, the last one fastest;
             None for other studies.
-        method: how the columns were made, one of `METHODS`; rows do not depend on it.
+        method: how the columns were made (grid, list, latin_hypercube, sobol, csv, monte_carlo); rows are the same.
         notes: sentences for the reader.
 
     Raises:

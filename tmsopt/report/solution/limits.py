@@ -49,7 +49,7 @@ def proof_line(solution: Solution) -> str:
         left = solution.freedom.count
         among = {1: "a curve", 2: "a surface"}.get(left, f"a family of {left} parameters")
         more = f"; it is one of {among} of such designs, which tmsopt trace follows" if left > 0 else ""
-        return f"proof: tmsopt prove FILE proves that this design exists{more}"
+        return f"proof: tmsopt prove FILE proves, or refutes, that this design exists{more}"
     unit = unit_of(problem, text)
     side = "above" if problem.sense == "maximize" else "below"
     if bound.proven:
