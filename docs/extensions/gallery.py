@@ -10,7 +10,6 @@ import shutil
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from textwrap import dedent
 from typing import Any
 
 from sphinx.application import Sphinx
@@ -27,37 +26,15 @@ explorer.
 """
 
 _ASKED = {
-    "solve": """
-        design = tmsopt.solve("{path}", throw=False)
-        print(design)
-        """,
-    "front": """
-        design = tmsopt.pareto("{path}")
-        print(design)
-        """,
-    "all": """
-        every = tmsopt.solve_all("{path}")
-        print(every)
-        design = every.solutions[0]
-        """,
-    "trace": """
-        curve = tmsopt.trace("{path}")
-        print(curve)
-        """,
-    "chart": """
-        chart = tmsopt.chart("{path}")
-        print(chart)
-        """,
-    "study": """
-        results = tmsopt.run_study("{path}")
-        print(results)
-        """,
-    "speeds": """
-        speeds = tmsopt.speeds("{path}")
-        print(speeds)
-        """,
+    "solve": ("design", 'solve("{path}", throw=False)'),
+    "front": ("design", 'pareto("{path}")'),
+    "all": ("every", 'solve_all("{path}")'),
+    "trace": ("curve", 'trace("{path}")'),
+    "chart": ("chart", 'chart("{path}")'),
+    "study": ("results", 'run_study("{path}")'),
+    "speeds": ("speeds", 'speeds("{path}")'),
 }
-_DRAWN = {"solve": "design", "front": "design", "all": "design", "trace": "curve", "chart": "chart", "study": "results"}
+"""What answers a verb: the name of the answer, and how it is asked for."""
 
 
 def listed() -> Iterator[tuple[str, Path, str, str]]:
@@ -97,11 +74,10 @@ def _problem(path: Path, verb: str) -> str:
     name = f"problems/{path.name}"
     body = "\n".join(line for line in text.splitlines() if not line.startswith("#"))
     shown = "\n".join(f"#     {line}".rstrip() for line in body.strip().splitlines())
-    parts = [f"import tmsopt\n\n{dedent(_ASKED[verb].format(path=name)).strip()}"]
-    parts.append(f"picture = {_DRAWN.get(verb, 'speeds')}.plot()")
-    explored = "design" if verb in ("solve", "all") else f'"{name}"'
-    if verb == "study":
-        explored = "results.study.problem"
+    answer, asked = _ASKED[verb]
+    parts = [f"import tmsopt\n\n{answer} = tmsopt.{asked.format(path=name)}\nprint({answer})"]
+    parts.append(f"picture = {answer}.plot()")
+    explored = {"solve": "design", "all": "every.solutions[0]", "study": "results.study.problem"}.get(verb, f'"{name}"')
     parts.append(f"tmsopt.explore({explored})")
     return (
         _titled(_plain(title), about)

@@ -140,6 +140,11 @@ class Problem:
         return pattern(self.locate, self.model.degree) if self.locate else None
 
     @property
+    def located(self) -> tuple[str, ...]:
+        """The names of that pattern: as typed, and its own, as ``2EP2`` of ``EP2+EP2``."""
+        return (str(self.locate), self.pattern.name) if self.pattern else ()
+
+    @property
     def sense(self) -> str:
         """``minimize``, ``maximize``, ``pareto``, ``locate``, or ``evaluate`` when nothing is asked."""
         asked = {"minimize": self.minimize is not None, "maximize": self.maximize is not None}

@@ -56,9 +56,7 @@ def limit_rows(solution: "Solution") -> list[Row]:
     others = [name for name in solution.violations if name not in problem.constraints]
     rows: list[Row] = [("limit", "says", "stands")]
     for name in (*problem.constraints, *others):
-        said = limit_text(problem, name) or (
-            "pattern" if problem.pattern and name in (problem.locate, problem.pattern.name) else ""
-        )
+        said = limit_text(problem, name) or ("pattern" if name in problem.located else "")
         rows.append((name, said, _stands(solution, name)))
     return rows
 

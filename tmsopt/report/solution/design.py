@@ -9,7 +9,7 @@ from tmsopt.explanation import Lever
 from tmsopt.models import GRAVITY, tms, to_si
 from tmsopt.report.solution.explanation import diagnosis_lines, optimality_lines, rounding_line, rounding_rows
 from tmsopt.report.solution.findings import Findings
-from tmsopt.report.solution.infeasible import infeasible_lines, located
+from tmsopt.report.solution.infeasible import infeasible_lines
 from tmsopt.report.solution.limits import bound_lines, case_lines, proof_line
 from tmsopt.report.solution.robustness import robustness_line, robustness_table
 from tmsopt.report.solution.rows import (
@@ -187,7 +187,7 @@ def stability(solution: Solution, on_edge: bool = False) -> str:
 def _violated(solution: Solution) -> list[str]:
     problem, lines = solution.problem, []
     for name, value in solution.violations.items():
-        asked = limit_text(problem, name) or ("pattern" if name in located(problem) else _ASKED.get(name, ""))
+        asked = limit_text(problem, name) or ("pattern" if name in problem.located else _ASKED.get(name, ""))
         by = f" by {unit_of(problem, name).show(value, 4)}" if math.isfinite(value) else ", which has no value"
         lines.append(f"violated: {name} ({asked}){by if name not in _ASKED else ''}")
     return lines

@@ -83,7 +83,7 @@ def _speed(solution: Solution, need: Need) -> str:
     """Nothing at this speed, and where there is something."""
     problem, name = solution.problem, need.parameter
     unit = unit_of(problem, name)
-    about = [n for n in solution.violations if n in problem.asked_of_roots or n in located(problem)]
+    about = [n for n in solution.violations if n in problem.asked_of_roots or n in problem.located]
     unstable = _unstable(solution)
     what = "no stable design" if unstable else f"no design with {_listed([_limit(problem, n) for n in about])}"
     known = solution.bound.proven if solution.status == "infeasible" else False
@@ -156,11 +156,6 @@ def _limit(problem: Problem, name: str) -> str:
         bound = unit_of(problem, name).show(problem.free[parameter][end == "max"])
         return f"{parameter} {'<=' if end == 'max' else '>='} {bound}"
     return f"{name} ({limit_text(problem, name)})" if name in problem.constraints else _OTHER.get(name, name)
-
-
-def located(problem: Problem) -> set[str]:
-    """The names of the pattern that is asked for: as typed, and its own, as 2EP2 of EP2+EP2."""
-    return {str(problem.locate), problem.pattern.name} if problem.pattern else set()
 
 
 def _end(problem: Problem, name: str) -> bool:
