@@ -1,5 +1,6 @@
 """Limits said to exclude each other do, and those said to be out of reach alone are: what thin needles hide as well."""
 
+import math
 from dataclasses import replace
 from fractions import Fraction
 from importlib import import_module
@@ -161,3 +162,15 @@ def test_what_a_sample_misses_a_multiple_root_by_depends_on_its_multiplicity() -
         assert moved == pytest.approx(4e-4 ** (1 / fold), rel=1e-3)
         seen = [sample.Looked(np.zeros((1, 1)), np.zeros(1), np.array([off])) for off in (1.5 * moved, 3 * moved)]
         assert [one.out_of_reach(fold) for one in seen] == [False, True]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["2EP2", "EP2+EP2"])
+def test_the_least_speed_of_a_pattern_is_told_by_whichever_name(name: str) -> None:
+    """By the law epset: its Froude number falls as the tilt grows to 0.405, so at 0.38 at most it is that at 0.38."""
+    fixed = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1, "chi_B": math.sqrt(2), "Fr": 1.0}
+    problem = tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free={"lambda_s": (0.01, 0.38)}, locate=name)
+    need = tmsopt.solve(problem, throw=False).need
+    assert need is not None
+    assert need.parameter == "Fr"
+    assert need.value == pytest.approx(float(tmsopt.laws.epset(zeta_B=-0.4, zeta_H=-0.2, lambda_s=0.38)), rel=1e-6)

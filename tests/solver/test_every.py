@@ -232,6 +232,8 @@ def test_designs_at_a_parameter_that_is_zero() -> None:
     assert every.complete
     found = sorted((s.parameters["k"], s.parameters["d"]) for s in every.solutions)
     assert found == [(pytest.approx(-1, abs=1e-12), 0), (pytest.approx(1, abs=1e-12), 0)]
-    proof = tmsopt.prove(every.solutions[0])
-    assert proof.proved, proof.reason
-    assert float(proof.parameters["d"].value) == pytest.approx(0, abs=1e-50)
+    for start in (0.0, 1e-15):  # as it is, and as a search leaves it
+        near = replace(every.solutions[0], parameters={**every.solutions[0].parameters, "d": start})
+        proof = tmsopt.prove(near)
+        assert proof.proved, proof.reason
+        assert float(proof.parameters["d"].value) == pytest.approx(0, abs=1e-50)
