@@ -22,6 +22,24 @@ Matrix = list[list[Any]]
 
 
 @dataclass(frozen=True)
+class Feedback:
+    """Torques that a controller adds to M q″ + D q′ + K q, q = (lean, steer), in the model's own units.
+
+    Attributes:
+        mass: M.
+        gains: G of the torques −G (φ, δ, φ̇, δ̇), rows for lean and steer.
+        lag: time constant of the actuators; None for torques without delay. With it the states are those four and the
+            torque of each row that may be driven, lean before steer.
+        driven: those rows: 0 for lean, 1 for steer.
+    """
+
+    mass: Matrix
+    gains: Matrix
+    lag: Any = None
+    driven: tuple[int, ...] = (1,)
+
+
+@dataclass(frozen=True)
 class Range:
     """An interval of physically possible values; an end that is not closed is excluded.
 
@@ -139,6 +157,7 @@ class ParameterSet:
         quantities: derived quantities that only this set has.
         rate: for values of this set, how many 1/s a rate of 1 is; None where the set has no unit of time.
         root_unit: unit of the roots of the model's polynomial for values of this set.
+        torque: for values of this set, how many N m a torque of 1 is; None where the set has no unit of torque.
         needs: parameter → one that must be above 0 where the first is not 0, and what is impossible otherwise.
 
     Example:
@@ -154,6 +173,7 @@ class ParameterSet:
     quantities: tuple[Quantity, ...] = ()
     rate: Formula | None = None
     root_unit: str = "1"
+    torque: Formula | None = None
     needs: Mapping[str, tuple[str, str]] = field(default_factory=dict, hash=False)
 
     @cached_property
@@ -178,6 +198,7 @@ class Model:
             shared by all that need it: interval arithmetic and relaxations are the tighter for it.
         pencil: native parameters → matrices of the matrix polynomial with these roots, in descending powers: M, D, K
             of M s² + D s + K, or I, −A.
+        feedback: native parameters → the torques of a controller, whose part in the pencil is there already.
         natural: whether coefficients and roots are near 1 in the model's own units.
         origin: a function and its arguments, plain data, that make this model again in another process.
         statement: of a model that a user states, plain data that tell it from others.
@@ -203,6 +224,7 @@ class Model:
     quantities: tuple[Quantity, ...] = field(default=(), repr=False)
     compact: Callable[..., list[Any]] | None = field(default=None, repr=False)
     pencil: Callable[[Mapping[str, Any]], tuple[Matrix, ...]] | None = field(default=None, repr=False)
+    feedback: Callable[[Mapping[str, Any]], Feedback] | None = field(default=None, repr=False)
     natural: bool = False
     origin: tuple[Callable[..., "Model"], tuple[Any, ...]] | None = field(default=None, repr=False)
     statement: Mapping[str, Any] | None = field(default=None, repr=False, hash=False)

@@ -106,6 +106,7 @@ _SI = ParameterSet(
         Parameter("z_H", "m", "front assembly centre of mass, downward", "z_H", _NOT_POSITIVE, counterpart="zeta_H"),
     ),
     native=from_si, quantities=(*SI_QUANTITIES, *times(_rate, "sqrt(g/w)")), rate=_rate, root_unit="√(g/w)",
+    torque=lambda p: p["m_B"] * p["g"] * p["w"],
 )  # fmt: skip
 
 _ABSENT = {

@@ -67,6 +67,7 @@ _SI = ParameterSet(
         _inertia("I_Fyy", "moment of inertia of the front wheel about its axle"),
     ),
     native=dict, quantities=(*QUANTITIES, *times(lambda p: 1, "1")), rate=lambda p: 1, root_unit="1/s",
+    torque=lambda p: 1,
     needs={"I_Ryy": ("r_R", _NO_RADIUS), "I_Fyy": ("r_F", _NO_RADIUS)},
 )  # fmt: skip
 
