@@ -11,7 +11,7 @@ from tmsopt.design.expression import Expression, parse_comparison, parse_value
 from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTITIES, STRUCTURE, spelled_out
 from tmsopt.design.validate import faults, guess_parameter_set, shape_faults
 from tmsopt.errors import Fault, InputError
-from tmsopt.models import Model, ParameterSet, Values
+from tmsopt.models import Model, ParameterSet, Values, controlled
 from tmsopt.roots import Pattern, pattern
 from tmsopt.units import TABLES, numbers
 from tmsopt.versions import SCHEMA
@@ -74,6 +74,7 @@ class Problem:
         if found := list(shape_faults(self)):
             raise InputError(found)
         object.__setattr__(self, "scenarios", {n: as_scenario(s) for n, s in self.scenarios.items()})
+        object.__setattr__(self, "model", controlled(self.model, (*self.fixed, *self.free, *self.scenarios)))
         of = guess_parameter_set(self.model, {**self.fixed, **self.free, **self.scenarios})
         read, units, unreadable = numbers({table: getattr(self, table) for table in TABLES}, of)
         for name, value in (*read.items(), ("units", {**units, **self.units})):

@@ -1,10 +1,14 @@
 """The models that come with tmsopt, by name; a user's own may not take one of these."""
 
 import copyreg
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import cache
 from typing import Any
 
-from tmsopt.models.bicycles.tms import tms
-from tmsopt.models.bicycles.whipple import whipple
+from tmsopt.models.bicycles.feedback import names_of, with_feedback
+from tmsopt.models.bicycles.tms import STEERED as TMS, tms
+from tmsopt.models.bicycles.whipple import STEERED as WHIPPLE, whipple
 from tmsopt.models.model import Model
 
 MODELS = {model.name: model for model in (tms, whipple)}
@@ -21,6 +25,29 @@ def named(name: str) -> Model:
     More: docs/reference/problem_file.md
     """
     return MODELS[name]
+
+
+def controlled(model: Model, names: Iterable[str]) -> Model:
+    """A bicycle with the controller whose gains are among the names; without one if none is. Other models as they are.
+
+    Example:
+        >>> robot = tmsopt.models.controlled(tmsopt.models.whipple, ["k_phidot", "lag"])
+        >>> print(robot.degree, *robot.sets[0].names[-5:])  # a lag is a state more
+        5 k_phi k_delta k_phidot k_deltadot lag
+
+    More: docs/how_to/feedback.md
+    """
+    return _controlled(model.name, names_of(names)) if model.name in MODELS else model
+
+
+@cache
+def _controlled(name: str, names: tuple[str, ...]) -> Model:
+    if not names:
+        return MODELS[name]
+    return replace(with_feedback(_STEERED[name], names), origin=(_controlled, (name, names)))
+
+
+_STEERED = {steered.model.name: steered for steered in (TMS, WHIPPLE)}
 
 
 def _pickled(model: Model) -> Any:

@@ -7,6 +7,7 @@ import numpy as np
 
 from tmsopt.arithmetic.elementary import sqrt, tan
 from tmsopt.models.bicycles.bicycle import WORDS, times
+from tmsopt.models.bicycles.feedback import Steered
 from tmsopt.models.bicycles.sketches import CONVENTIONS, TMS
 from tmsopt.models.bicycles.tms_equations import compact_copo, copo, matrices
 from tmsopt.models.bicycles.tms_quantities import NATIVE_QUANTITIES, SI_QUANTITIES
@@ -120,3 +121,11 @@ tms = Model(
     words=WORDS, conventions=CONVENTIONS, sketch=TMS, absent=_ABSENT,
 )  # fmt: skip
 """The two-mass-skate bicycle."""
+
+
+def _steered(p: Mapping[str, Any]) -> tuple[Matrix, Matrix, Matrix]:
+    """M, V, P for a steer angle in units of 1/cos λ_s."""
+    return matrices(**{name: p[name] for name in _NATIVE.names if name != "lambda_s"}, sine=p["T"], cosine=1)
+
+
+STEERED = Steered(tms, _steered, unit=lambda p, h: (h, 1 + p["T"] * p["T"]), speed="Fr")

@@ -8,10 +8,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from tmsopt.models.bicycles.bicycle import WORDS, times
+from tmsopt.models.bicycles.feedback import Steered
 from tmsopt.models.bicycles.sketches import CONVENTIONS, WHIPPLE
 from tmsopt.models.bicycles.tms import GRAVITY, LAMBDA_S
 from tmsopt.models.bicycles.whipple_equations import carvallo_whipple, matrices
-from tmsopt.models.bicycles.whipple_quantities import QUANTITIES, algebraic, canonical
+from tmsopt.models.bicycles.whipple_quantities import QUANTITIES, algebraic, canonical, tangent_matrices
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Range
 
 __all__ = ["canonical", "carvallo_whipple", "matrices", "whipple"]
@@ -74,8 +75,10 @@ _SI = ParameterSet(
 
 def _pencil(p: Mapping[str, Any]) -> tuple[Matrix, ...]:
     """M, v C1 and g K0 + v² K2."""
-    M, C1, K0, K2 = canonical(p)
-    v, g = p["v"], p["g"]
+    return _at_speed(*canonical(p), p["v"], p["g"])
+
+
+def _at_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix, v: Any, g: Any) -> tuple[Matrix, Matrix, Matrix]:
     D = [[v * e for e in row] for row in C1]
     return M, D, [[g * a + v * v * b for a, b in zip(*rows, strict=True)] for rows in zip(K0, K2, strict=True)]
 
@@ -86,3 +89,11 @@ whipple = Model(
     sketch=WHIPPLE,
 )  # fmt: skip
 """The Carvallo–Whipple bicycle; its roots are in 1/s."""
+
+
+def _steered(p: Mapping[str, Any]) -> tuple[Matrix, Matrix, Matrix]:
+    """M, v C1 and g K0 + v² K2 for a steer angle in units of w/cos λ_s."""
+    return _at_speed(*tangent_matrices(p), p["v"], p["g"])
+
+
+STEERED = Steered(whipple, _steered, unit=lambda p, h: (p["w"] * h, p["w"] * p["w"] * (1 + p["T"] * p["T"])), speed="v")

@@ -79,10 +79,16 @@ def _sine_cosine(p: Design) -> tuple[Any, Any]:
 
 
 def _powers(v: Design) -> tuple[Any, ...]:
-    """b0 … b7 of `powers_of_speed`, for a steer angle in units of cos λ_s/w."""
-    of = algebraic(v)
+    """b0 … b7 of `powers_of_speed`, for a steer angle in units of w/cos λ_s."""
+    return powers_of_speed(*tangent_matrices(algebraic(v)))
+
+
+def tangent_matrices(
+    of: Mapping[str, Any],
+) -> tuple[list[list[Any]], list[list[Any]], list[list[Any]], list[list[Any]]]:
+    """M, C1, K0 and K2 for algebraic parameters and a steer angle in units of w/cos λ_s."""
     bodies = {name: of[name] for name in (*_IN_MATRICES, "S_R", "S_F")}
-    return powers_of_speed(*matrices(**bodies, sine=of["w"] * of["T"], cosine=of["w"], turn=1))
+    return matrices(**bodies, sine=of["w"] * of["T"], cosine=of["w"], turn=1)
 
 
 def _v_capsize(v: Design) -> Any:
