@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from tmsopt.design.solution import Solution
 from tmsopt.design.toml import Number, Page, Section, fitted, read_page
 from tmsopt.design.validate import VARIATIONS
 from tmsopt.errors import Fault, InputError, short, suggest, visible
-from tmsopt.models import MODELS, Model
+from tmsopt.models import MODELS, Model, gain_names
 from tmsopt.models.bicycle_files import read_bicycle
 
 _NO_PARAMETERS = "missing section [parameters]"
@@ -68,6 +69,10 @@ class _File(Section):
     )
     parameters: dict[str, _FreeParameter | StrictFloat | StrictInt | StrictStr] = Field(
         description='A number fixes, a table { min = …, max = … } frees; texts have units, such as "40 cm".'
+    )
+    feedback: dict[str, _FreeParameter | StrictFloat | StrictInt | StrictStr] = Field(
+        default_factory=dict,
+        description="Gains of a controller, such as k_phidot against the lean rate, each as in [parameters].",
     )
     objective: _Objective = Field(
         default_factory=_Objective, description="What is asked; a chart and a trace need nothing."
@@ -179,6 +184,7 @@ def posed(data: Mapping[str, Any], title: str) -> tuple[list[Fault], Problem | N
     Args:
         title: of a problem that has none.
     """
+    gains_faults, gains, data = _with_gains(data)
     shape_faults, parsed = fitted(data, _File, _shape_fault)
     if any(hint in f.message for f in shape_faults for hint in ("did you mean 'parameters'", "write [parameters]")):
         shape_faults = [f for f in shape_faults if f.message != _NO_PARAMETERS]  # they are there, under another name
@@ -199,7 +205,27 @@ def posed(data: Mapping[str, Any], title: str) -> tuple[list[Fault], Problem | N
             reported = {f.key[:2] for f in faults} | {("parameters", *f.key[1:2]) for f in faults}
             reported |= {f.key[:1] for f in faults if f.key[:1] == ("objective",)}
             faults = faults + [f for f in error.faults if f.key[:2] not in reported]
-    return faults, problem
+    typed = [replace(f, key=("feedback", *f.key[1:])) if {*f.key[1:2]} & gains else f for f in faults]
+    return gains_faults + typed, problem
+
+
+def _with_gains(data: Mapping[str, Any]) -> tuple[list[Fault], set[str], Mapping[str, Any]]:
+    """What is wrong with [feedback] itself, its names, and the tables with these among the parameters."""
+    gains, parameters, model = data.get("feedback", {}), data.get("parameters", {}), data.get("model", "tms")
+    if not isinstance(gains, dict) or not isinstance(parameters, dict):
+        return [], set(), data
+    if gains and not (isinstance(model, str) and model in MODELS):
+        message = "is for the bicycles tms and whipple; your own system takes B, C and G in [model]"
+        return [Fault(message, ("feedback",))], set(), {k: v for k, v in data.items() if k != "feedback"}
+    faults, known = [], gain_names(model) if gains else ()
+    for name in gains:
+        if name not in known:
+            faults.append(Fault(f"unknown gain {short(name)}; {suggest(name, known)}", ("feedback", name)))
+        elif name in parameters:
+            faults.append(Fault(f"'{name}' stands in [parameters] too; keep one", ("feedback", name)))
+    own = {n: v for n, v in gains.items() if n in known}
+    others = {k: v for k, v in data.items() if k != "feedback"}
+    return faults, set(own), {**others, "parameters": {**parameters, **own}} if own else others
 
 
 def _model(written: Any) -> tuple[list[Fault], Model | None]:
@@ -240,6 +266,8 @@ def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault: 
         case ("scenarios", _, *_):
             accepted = "{ min = …, max = …, points = … }, or a list of values such as [1, 2.5]"
             return Fault(f"found {short(found)}; accepted: {accepted}", key[:2])
+        case ("feedback",):
+            return Fault(f"found {short(found)}; accepted: a table of gains, such as k_phidot = -20", key)
         case (("tolerances" | "weights"), _, *_):
             return Fault(f"found {short(found)}; accepted: a number, or a text with a unit such as '5 mm'", key[:2])
         case ("objective", "pareto", *_):

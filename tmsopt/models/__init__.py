@@ -5,11 +5,10 @@ In: parameters by name. Out: coefficients and quantities in any arithmetic. Open
 """
 
 from tmsopt.models.bicycle_files import Bicycle, problem_text, read_bicycle, write_bicycle
-from tmsopt.models.bicycles.feedback import FEEDBACK
 from tmsopt.models.bicycles.tms import GRAVITY, copo, from_si, matrices, tms, to_si
 from tmsopt.models.bicycles.whipple import canonical, whipple
 from tmsopt.models.bicycles.whipple_quantities import spin
-from tmsopt.models.built_in import MODELS, controlled, named
+from tmsopt.models.built_in import MODELS, controlled, gain_names, named
 from tmsopt.models.exact import decimal
 from tmsopt.models.model import Model, Parameter, ParameterSet, Quantity, Range, Values, in_words_of, words_of
 from tmsopt.models.names import CONSTANTS, FUNCTIONS, TAKEN, latex
@@ -17,8 +16,8 @@ from tmsopt.models.texts import Unfit
 from tmsopt.models.user_defined import from_coefficients, from_matrices
 
 __all__ = [
-    "CONSTANTS", "FEEDBACK", "FUNCTIONS", "GRAVITY", "MODELS", "TAKEN", "Bicycle", "Model", "Parameter",
+    "CONSTANTS", "FUNCTIONS", "GRAVITY", "MODELS", "TAKEN", "Bicycle", "Model", "Parameter",
     "ParameterSet", "Quantity", "Range", "Unfit", "Values", "canonical", "controlled", "copo", "decimal",
-    "from_coefficients", "from_matrices", "from_si", "in_words_of", "latex", "matrices", "named", "problem_text",
-    "read_bicycle", "spin", "tms", "to_si", "whipple", "words_of", "write_bicycle",
+    "from_coefficients", "from_matrices", "from_si", "gain_names", "in_words_of", "latex", "matrices", "named",
+    "problem_text", "read_bicycle", "spin", "tms", "to_si", "whipple", "words_of", "write_bicycle",
 ]  # fmt: skip

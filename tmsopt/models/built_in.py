@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
-from tmsopt.models.bicycles.feedback import names_of, with_feedback
+from tmsopt.models.bicycles.feedback import FEEDBACK, names_of, native_name, with_feedback
 from tmsopt.models.bicycles.tms import STEERED as TMS, tms
 from tmsopt.models.bicycles.whipple import STEERED as WHIPPLE, whipple
 from tmsopt.models.model import Model
@@ -38,6 +38,18 @@ def controlled(model: Model, names: Iterable[str]) -> Model:
     More: docs/how_to/feedback.md
     """
     return _controlled(model.name, names_of(names)) if model.name in MODELS else model
+
+
+def gain_names(name: str) -> tuple[str, ...]:
+    """What [feedback] may name for a model of that name, in the units of each of its sets.
+
+    Example:
+        >>> tmsopt.models.gain_names("whipple")[:4]
+        ('k_phi', 'k_phidot', 'k_delta', 'k_deltadot')
+
+    More: docs/how_to/feedback.md
+    """
+    return (*FEEDBACK, *(native_name(n) for n in FEEDBACK if MODELS[name].sets[0].rate is None))
 
 
 @cache

@@ -195,8 +195,8 @@ def _extended(
 def _unit(name: str) -> str:
     if name == LAG:
         return "s"
-    unit = "N m s" if "dot" in name else "N m"
-    return f"{unit} s/m/rad" if name.endswith(_SLOPE) else f"{unit}/rad"
+    of_speed = name.endswith(_SLOPE)
+    return {True: "N s^2/rad" if of_speed else "N m s/rad", False: "N s/rad" if of_speed else "N m/rad"}["dot" in name]
 
 
 def _parameter(name: str, unit: str, written: str) -> Parameter:
