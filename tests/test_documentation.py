@@ -257,8 +257,8 @@ def test_the_first_python_example_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     [
         ("problem, study and bicycle files", "disk.LARGEST design.toml.MOST_DEEP design.toml.MOST_PARTS"),
         ("faults that are listed", "errors.LISTED"),
-        ("expressions", "models.expression._LONGEST models.expression._DEEPEST models.degree.LARGEST_EXPONENT models.degree.LARGEST_DEGREE"),
-        ("quantities of a model", "models.texts.MOST_QUANTITIES"),
+        ("expressions", "models.expression._LONGEST models.expression._DEEPEST models.stated.degree.LARGEST_EXPONENT models.stated.degree.LARGEST_DEGREE"),
+        ("quantities of a model", "models.stated.texts.MOST_QUANTITIES"),
         ("numbers of parameters", "models.exact.MOST_DIGITS units.text.LONGEST"),
         ("CSV files of rows", "studies.vary.LARGEST studies.vary.LONGEST_LINE studies.vary.MOST_COLUMNS studies.validate.MOST_ROWS studies.validate.MOST_NUMBERS"),
         ("a store that is received", "studies.store.database._NUMBERS disk.LARGEST_JSON studies.store.packing.LONGEST"),

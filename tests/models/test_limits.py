@@ -14,7 +14,7 @@ import pytest
 import tmsopt
 from tmsopt import models
 
-degree = import_module("tmsopt.models.degree")
+degree = import_module("tmsopt.models.stated.degree")
 expression = import_module("tmsopt.models.expression")
 elementary = import_module("tmsopt.arithmetic.elementary")
 text = import_module("tmsopt.units.text")
@@ -140,7 +140,7 @@ def test_quantities_in_layers_are_walked_once_each():
 
 
 def test_a_chain_of_quantities_as_long_as_is_read():
-    most = import_module("tmsopt.models.texts").MOST_QUANTITIES
+    most = import_module("tmsopt.models.stated.texts").MOST_QUANTITIES
     limit = sys.getrecursionlimit()
 
     def chain(count):

@@ -5,7 +5,7 @@ from typing import Any
 
 from tmsopt.errors import Fault, at_first, is_number, short, suggest, text_faults
 from tmsopt.models import Model, Unfit, from_coefficients, from_matrices
-from tmsopt.models.texts import Texts
+from tmsopt.models.stated.texts import Texts
 
 _MATRICES = ("M", "D", "K", "A")
 KEYS = {

@@ -12,8 +12,8 @@ from tmsopt.models.built_in import MODELS, controlled, gain_names, named
 from tmsopt.models.exact import decimal
 from tmsopt.models.model import Model, Parameter, ParameterSet, Quantity, Range, Values, in_words_of, words_of
 from tmsopt.models.names import CONSTANTS, FUNCTIONS, TAKEN, latex
-from tmsopt.models.texts import Unfit
-from tmsopt.models.user_defined import from_coefficients, from_matrices
+from tmsopt.models.stated.texts import Unfit
+from tmsopt.models.stated.user_defined import from_coefficients, from_matrices
 
 __all__ = [
     "CONSTANTS", "FUNCTIONS", "GRAVITY", "MODELS", "TAKEN", "Bicycle", "Model", "Parameter",

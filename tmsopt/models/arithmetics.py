@@ -12,8 +12,8 @@ import flint
 import numpy as np
 
 from tmsopt.arithmetic import elementary
-from tmsopt.models.degree import Degree, alone, applied, constant, same
 from tmsopt.models.names import FUNCTIONS
+from tmsopt.models.stated.degree import Degree, alone, applied, constant, same
 
 
 @dataclass(frozen=True)

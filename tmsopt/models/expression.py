@@ -17,8 +17,8 @@ from tmsopt.arithmetic import elementary
 from tmsopt.errors import short, suggest
 from tmsopt.models.advice import advice
 from tmsopt.models.arithmetics import BALLS, BINARY, DEGREES, NUMERIC, SYMBOLIC, Arithmetic
-from tmsopt.models.degree import Beyond, Degree
 from tmsopt.models.names import CONSTANTS, FUNCTIONS
+from tmsopt.models.stated.degree import Beyond, Degree
 
 COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
 

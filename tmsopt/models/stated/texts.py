@@ -7,10 +7,10 @@ from typing import Any
 import casadi as ca
 
 from tmsopt.models.arithmetics import DEGREES
-from tmsopt.models.degree import Beyond, Degree
 from tmsopt.models.expression import Expression, ExpressionError, parse_value
 from tmsopt.models.model import Matrix
 from tmsopt.models.names import unusable
+from tmsopt.models.stated.degree import Beyond, Degree
 
 MOST_QUANTITIES = 500
 """More take seconds to read."""

@@ -20,10 +20,10 @@ from tmsopt.arithmetic.twofold import Twofold
 from tmsopt.arithmetic.walk import NotAccepted, walk
 from tmsopt.errors import short
 from tmsopt.models.built_in import MODELS
-from tmsopt.models.degree import faulty
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
 from tmsopt.models.names import latex, spelled, unusable
-from tmsopt.models.texts import Unfit, untexted
+from tmsopt.models.stated.degree import faulty
+from tmsopt.models.stated.texts import Unfit, untexted
 from tmsopt.roots.polynomial import characteristic_polynomial, quadratic_pencil
 
 _ACCEPTED = "accepted: finite numbers, expressions in quotes, and SX expressions"
