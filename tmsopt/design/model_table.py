@@ -7,11 +7,14 @@ from tmsopt.errors import Fault, at_first, is_number, short, suggest, text_fault
 from tmsopt.models import Model, Unfit, from_coefficients, from_matrices
 from tmsopt.models.stated.texts import Texts
 
-_MATRICES = ("M", "D", "K", "A")
+_MATRICES = ("M", "D", "K", "A", "B", "C", "G")
 KEYS = {
     "name": "One line for reports.", "M": "Rows of the mass matrix of M q″ + D q′ + K q = 0, numbers or expressions.",
     "D": "Rows of its damping matrix; left out, it is 0.", "K": "Rows of its stiffness matrix.",
     "A": "Rows of the matrix of x′ = A x, in place of M, D and K.",
+    "B": "Rows of the matrix of a controller's inputs u, of M q″ + D q′ + K q = B u or x′ = A x + B u.",
+    "C": "Rows of what it measures, y = C x of the states, or of q and then q′; left out, all of them.",
+    "G": "Rows of its gains, u = −G y.",
     "coefficients": "Of the characteristic polynomial, descending, in place of matrices.",
     "quantities": "Names for more expressions, to be used in objectives and constraints.",
 }  # fmt: skip

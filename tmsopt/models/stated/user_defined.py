@@ -22,6 +22,7 @@ from tmsopt.errors import short
 from tmsopt.models.built_in import MODELS
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
 from tmsopt.models.names import latex, spelled, unusable
+from tmsopt.models.stated.closed_loop import check_loop, closed
 from tmsopt.models.stated.degree import faulty
 from tmsopt.models.stated.texts import Unfit, untexted
 from tmsopt.roots.polynomial import characteristic_polynomial, quadratic_pencil
@@ -39,15 +40,17 @@ _GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 def from_matrices(
-    M: Any = None, D: Any = None, K: Any = None, *, A: Any = None, name: str = "stated",
-    quantities: Mapping[str, Any] | None = None,
+    M: Any = None, D: Any = None, K: Any = None, *, A: Any = None, B: Any = None, C: Any = None, G: Any = None,
+    name: str = "stated", quantities: Mapping[str, Any] | None = None,
 ) -> Model:  # fmt: skip
-    """A model of M q″ + D q′ + K q = 0, or of x′ = A x, from expressions in text or of CasADi.
+    """A model of M q″ + D q′ + K q = B u, or of x′ = A x + B u, from expressions in text or of CasADi.
 
     Args:
         M, D, K: square, up to 6 × 6, as nested lists, NumPy arrays, SX or DM; D left out is 0. An entry is a number,
             text as in a problem file such as ``"1 + mu*w**2"``, or an SX.
         A: square, up to 12 × 12, instead of these.
+        B, C, G: of a controller u = −G y, y = C x; up to 12 each way. x are the states, or q and then q′. C left out,
+            all of them are measured. Without B and G there is no u.
         name: one word or more for reports.
         quantities: name → expression of the same symbols, for objectives and constraints; those in text may use one
             another.
@@ -78,6 +81,8 @@ def from_matrices(
         for n, size in sizes.items():
             if size != sizes["M"]:
                 raise Unfit(n, f"is {size} × {size}, and M is {sizes['M']} × {sizes['M']}; give all the same size")
+    matrices |= {n: _rectangular(n, value) for n, value in (("B", B), ("C", C), ("G", G)) if value is not None}
+    check_loop({n: (len(rows), len(rows[0])) for n, rows in matrices.items()})
     return _made("matrices", name, matrices, quantities)
 
 
@@ -133,6 +138,14 @@ def _square(key: str, value: Any) -> Matrix:
     if len(rows) > most:
         raise Unfit(key, f"is {len(rows)} × {len(rows)}; accepted: up to {most} × {most}")
     return square
+
+
+def _rectangular(key: str, value: Any) -> Matrix:
+    rows = _rows(value)
+    found = [row for row in rows or () if row and len(row) == len((rows or [[]])[0] or ())]
+    if rows is None or not rows or len(found) < len(rows) or max(len(rows), len(found[0])) > MOST["A"]:
+        raise Unfit(key, f"found {short(value)}; accepted: rows of equal length, up to {MOST['A']} × {MOST['A']}")
+    return found
 
 
 def _made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> Model:
@@ -191,7 +204,7 @@ def _rebuilt(
         for n, rows, columns in shapes:
             taken[n] = [found[at + i * columns : at + (i + 1) * columns] for i in range(rows)]
             at += rows * columns
-        return taken
+        return closed(taken)
 
     def every(values: Mapping[str, Any]) -> list[Any]:
         return _polynomial(kind, blocks(entry(values)))
