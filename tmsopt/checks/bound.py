@@ -185,23 +185,19 @@ def _inside(polynomial: Array) -> Array:
 
 
 def _algebraic_box(problem: Problem) -> tuple[dict[str, tuple[float, float]], Known]:
-    """Range of each algebraic parameter: they are monotone in every parameter of a set, so corners suffice.
+    """Range of each algebraic parameter as doubles, and the balls that their ends are rounded from.
 
-    That of an upright steer axis counts as one, on either side of which √(1 + T²) is monotone.
-
-    Beside the ends as doubles, the balls that these are rounded from.
+    They are monotone in every parameter of a set, so corners suffice; √(1 + T²) is on either side of an upright axis.
     """
     of = problem.parameter_set
     ends = {p.name: problem.free.get(p.name) or (problem.fixed[p.name],) for p in of.parameters}
     ends |= {p.name: (*e, 0.0) for p in of.parameters if p.tangent and min(e := ends[p.name]) < 0 < max(e)}
     corners = np.array(list(itertools.product(*(ends[n] for n in of.names))))
     values = problem.model.algebraic(of.native(dict(zip(of.names, corners.T, strict=True))))
-    box, known = {}, {}
-    balls: dict[int, dict[str, Any]] = {}
+    box, known, balls = {}, {}, dict[int, dict[str, Any]]()
     for n, given in values.items():
         column = np.broadcast_to(np.asarray(given, dtype=float), len(corners))
-        extremes = [int(column.argmin()), int(column.argmax())]
-        for k in extremes:
+        for k in (extremes := [int(column.argmin()), int(column.argmax())]):
             if k not in balls:
                 with flint.ctx.workprec(_BITS):
                     design = {m: exact(float(v)) for m, v in zip(of.names, corners[k], strict=True)}
