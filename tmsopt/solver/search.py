@@ -24,7 +24,7 @@ from tmsopt.solver.needs import irreducible
 from tmsopt.solver.outcome import Finding, Trial, ahead, counted, found, mass_advice, survivor
 from tmsopt.solver.referee import held, ideal, outdone, refereed
 from tmsopt.solver.relaxation import relax
-from tmsopt.solver.sample import Sampler
+from tmsopt.solver.sample import NARROW, Sampler
 from tmsopt.solver.tolerant import climbed, promising
 from tmsopt.solver.workspace import Candidate, Workspace, workspace
 
@@ -67,7 +67,7 @@ def explore(work: Workspace, insist: bool = True) -> Explored:
         return Explored(work.name, led.candidates, _covered(work, led.nlp, led.candidates, led.trial, starts))
     nlp = work.formulate(cases)
     mixed = {"abscissa", "damping_ratio"} <= set(nlp.variables)
-    needles = bool(work.sample and work.sample.singular and "abscissa" in nlp.variables)
+    needles = bool(work.sample and (work.sample.singular or rarely_stable(work)) and "abscissa" in nlp.variables)
     leads = exceptional(work) if (mixed or needles) and not work.options.near else []
     candidates = [*search(work, nlp, _FEWER if mixed and leads else None), *_from(work, nlp, leads)]
     trial = survivor(work, nlp, candidates)
@@ -91,6 +91,12 @@ def explore(work: Workspace, insist: bool = True) -> Explored:
         return Explored(work.name, tuple(candidates), held(work, standing, starts, listed))
     finding = _covered(work, nlp, candidates, trial, starts) if cases else found(work, nlp, trial, starts)
     return Explored(work.name, tuple(candidates), outdone(work, finding) if finding else None)
+
+
+def rarely_stable(work: Workspace) -> bool:
+    """Whether stability is asked for, and so few designs of the sample have it that basins may lie between them."""
+    worth = work.sampler.drawn[1].worth if work.sampler and bounded(work.part) else None
+    return worth is not None and bool(np.mean(worth < 0) < NARROW)
 
 
 def _from(work: Workspace, nlp: NLP, designs: Sequence[Mapping[str, float]]) -> list[Candidate]:
