@@ -135,6 +135,12 @@ def _quantities() -> Iterator[str]:
             yield _table(("symbol", "unit", "means", "range", "default"), rows)
             yield f"### Quantities of {model}, {words.name}\n"
             yield _table(("symbol", "unit", "means"), ((f"`{q.name}`", q.unit, q.meaning) for q in words.quantities))
+        for words in described.feedback:
+            yield f"### Gains of {model} in [feedback], {words.name}\n"
+            rows = (
+                (f"`{p.name}`", p.unit, p.meaning, p.range, p.given) for p in (*words.parameters, *words.quantities)
+            )
+            yield _table(("symbol", "unit", "means", "range", "default"), rows)
     described = tmsopt.describe("tms")
     yield "\n## Patterns of roots\n"
     yield _table(("pattern", "means"), ((f"`{n}`", m) for n, m in described.patterns.items()))

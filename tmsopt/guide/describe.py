@@ -12,6 +12,7 @@ from tmsopt.design.toml import read_page
 from tmsopt.errors import Fault, InputError, short
 from tmsopt.guide.description import Description, Word, Words
 from tmsopt.models import CONSTANTS, FUNCTIONS, MODELS, Model, Parameter, ParameterSet, Quantity, Range
+from tmsopt.models.built_in import controlled, gain_names
 from tmsopt.records import Table
 from tmsopt.roots import pattern
 from tmsopt.roots.patterns.composed import pattern_names
@@ -75,6 +76,7 @@ def _described(model: Model, problem: Problem | None, typed: Typed) -> Descripti
     return Description(
         model=model.name, meaning=model.title, degree=model.degree, title=problem.title if problem else "",
         sets=tuple(_words(model, of, problem, typed) for of in ([problem.parameter_set] if problem else model.sets)),
+        feedback=() if problem else tuple(_gains(model)),
         patterns=Table({name: pattern(name, model.degree).meaning for name in names}),
         functions=(*FUNCTIONS, *CONSTANTS), conventions=model.conventions, sketch=model.sketch,
         matrices=Table(dict(_matrices(model, typed))), asked=Table(_asked(problem, typed) if problem else {}),
@@ -88,6 +90,17 @@ def _words(model: Model, of: ParameterSet, problem: Problem | None, typed: Typed
         of.name, tuple(_parameter(p, problem, model.statement is not None) for p in of.parameters),
         tuple(_quantity(q, written.get(q.name, "")) for q in quantities),
     )  # fmt: skip
+
+
+def _gains(model: Model) -> Iterator[Words]:
+    """What [feedback] adds to the sets of a bicycle."""
+    if model.name not in MODELS:
+        return
+    for of, more in zip(model.sets, controlled(model, gain_names(model.name)).sets, strict=True):
+        added = [_parameter(p, None, False) for p in more.parameters if p not in of.parameters]
+        known = {q.name for q in of.quantities}
+        yield Words(of.name, tuple(added),
+                    tuple(_quantity(q, "") for q in more.quantities if q.name not in known))  # fmt: skip
 
 
 def _quantity(q: Parameter | Quantity, formula: str) -> Word:

@@ -59,6 +59,7 @@ class Description(Shown):
         sketch: side view of a bicycle; empty for other systems.
         matrices: of a stated system, M, D, K, A or coefficients → rows of entries.
         asked: of a problem, section → key → text.
+        feedback: of a bicycle, what [feedback] adds to each of its sets.
 
     Example:
         >>> tmsopt.describe("tms").patterns["EP4"]
@@ -78,6 +79,7 @@ class Description(Shown):
     title: str = ""
     matrices: Mapping[str, tuple[tuple[str, ...], ...]] = Table()
     asked: Mapping[str, Mapping[str, str]] = Table()
+    feedback: tuple[Words, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
@@ -87,6 +89,7 @@ class Description(Shown):
             "functions": list(self.functions), "conventions": list(self.conventions), "sketch": self.sketch,
             "matrices": {name: [list(row) for row in rows] for name, rows in self.matrices.items()},
             "asked": {section: dict(keys) for section, keys in self.asked.items()},
+            "feedback": [of.to_json() for of in self.feedback],
         }  # fmt: skip
 
 
@@ -108,6 +111,8 @@ def description_text(found: Description) -> str:
         new = [q for q in of.quantities if q.name not in shown and not _is_parameter(q, found)]
         shown |= {q.name for q in new}
         parts.append("\n".join([f"quantities{alone}", *_words(new)]))
+    for of in found.feedback:
+        parts.append("\n".join([f"[feedback], {of.name}", *_words((*of.parameters, *of.quantities))]))
     parts.append("\n".join(["patterns of roots, for locate", *table(list(found.patterns.items()))]))
     parts.append("\n".join(["expressions", *wrapped([f"+ - * / **   <= >= ==   {' '.join(found.functions)}"])]))
     return "\n\n".join(parts)
