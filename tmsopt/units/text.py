@@ -20,7 +20,7 @@ could keep a parser busy for ever."""
 
 _EXAMPLES = {
     "1": "a number", "rad": "'5 deg' or '0.1 rad'", "m": "'40 cm' or '1.2 m'", "kg": "'10 kg' or '500 g'",
-    "m/s": "'15 km/h' or '4 m/s'", "m/s^2": "'9.81 m/s^2'",
+    "m/s": "'15 km/h' or '4 m/s'", "m/s^2": "'9.81 m/s^2'", "s": "'50 ms' or '0.05 s'", "N m/rad": "'20 N m/rad'",
 }  # fmt: skip
 
 USUAL: Mapping[str, Mapping[str, float]] = {
@@ -29,6 +29,8 @@ USUAL: Mapping[str, Mapping[str, float]] = {
     "m/s": {"m/s": 1.0, "km/h": 5 / 18, "cm/s": 0.01, "ft/s": 0.3048, "mph": 0.44704},
     "m/s^2": dict.fromkeys(("m/s^2", "m/s**2"), 1.0) | {"cm/s^2": 0.01},
     "rad": {"rad": 1.0, "mrad": 0.001} | dict.fromkeys(("deg", "degree", "degrees"), math.pi / 180),
+    "s": {"s": 1.0, "ms": 0.001},
+    "N m/rad": {"N m/rad": 1.0}, "N m s/rad": {"N m s/rad": 1.0},
     "kg m^2": {"kg m^2": 1.0, "kg*m^2": 1.0, "kg cm^2": 0.0001},
 }  # fmt: skip
 """By unit, how many of it one of another is: those that are written every day, for which pint need not be loaded."""
@@ -107,7 +109,7 @@ def by_pint(written: str, unit: str) -> float | None:
         # Angles carry no dimension for pint, so their power is compared by name.
         found = registry.parse_units(written)
         powers = dict(registry.Quantity(1.0, found).to_base_units().unit_items())
-        if powers.get("radian", 0) != (unit == "rad"):
+        if powers.get("radian", 0) != {"rad": 1}.get(unit, -int(unit.endswith("/rad"))):
             return None
         quantity = registry.Quantity(2.0, found).to(unit)
         offset = registry.Quantity(0.0, found).to(unit)
