@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from importlib.metadata import version
 from importlib.resources import files
@@ -17,6 +17,8 @@ from tmsopt.explorer.subject import subject
 
 _COMMENT = re.compile(r"^//.*$|^/\*\*[\s\S]*?\*/$", re.MULTILINE)
 _BLANKS = re.compile(r"\s*([{};,])\s*|(:)\s+")  # that mean nothing in a style
+_TEXT = re.compile(r'("(?:[^"\\]|\\.)*")')
+_AROUND = re.compile(r" ?([=!]==|=>|[<>*]=|[?:|&*]{1,2}|[-+]=|[=,;{}()\[\]]) ?| ([-+]) (?![-+])")  # in a script
 _PARTS = "numerics state axes chart plane growth bicycle motion controls facts main"
 
 
@@ -40,11 +42,25 @@ def html_of(problem: Problem, designs: Sequence[Known], model: Mapping[str, Any]
 
 
 def _read(name: str) -> str:
-    """A file of the page without what only its readers need: indentation, comments, ends of lines in brackets."""
+    """A file of the page without what only its readers need: indentation, comments, ends of lines, blanks."""
     text = (files("tmsopt.explorer") / "page" / name).read_text(encoding="utf-8")
     lines = [line.strip() for line in text.splitlines()]
     plain = re.sub(r" // .*", "", _COMMENT.sub("", "\n".join(lines)))
+    if name.endswith(".js"):
+        plain = "\n".join(_tight(plain.splitlines()))
     return re.sub(r",?\n+(?=[)}\]])|(?<=[,;({\[])\n+", "", re.sub(r"\n{2,}", "\n", plain)).strip()
+
+
+def _tight(lines: Sequence[str]) -> Iterator[str]:
+    """Lines of a script without the blanks around operators; those with a template, or of one, as they stand."""
+    inside = False
+    for line in lines:
+        inside ^= line.count("`") % 2 == 1
+        if inside or "`" in line:
+            yield line
+        else:
+            parts = _TEXT.split(line)
+            yield "".join(t if k % 2 else _AROUND.sub(r"\1\2", t) for k, t in enumerate(parts))
 
 
 def _json(data: Any) -> str:
