@@ -16,6 +16,7 @@ from tmsopt.charts import array_function
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS, ROOT_QUANTITIES
+from tmsopt.models.bicycles.bicycle import contact_path
 
 
 class Spelling(NamedTuple):
@@ -59,7 +60,7 @@ class Script:
 
 
 def model_script(problem: Problem) -> Script:
-    """The model of a problem: coefficients, derived quantities, margins of constraints, matrices and rate.
+    """The model of a problem: coefficients, derived quantities, margins of constraints, matrices, rate, ride.
 
     Quantities and constraints that CasADi cannot write are left out, and those with the robustness radius, which takes
     a search. The parameters are those of `problem.parameter_set`, in its order, in SI units and radians.
@@ -77,15 +78,23 @@ def model_script(problem: Problem) -> Script:
     roots = [f"r[{k}]" for k in range(len(ROOT_QUANTITIES))]
     pencil, size, order = _pencil(problem)
     rate = _program(problem, lambda p: [math.nan if of.rate is None else of.rate(p)])
+    ride = _program(problem, lambda p: _ride(problem, p)) if is_bicycle(problem) else None
     parts = [
         f"degree: {model.degree}, size: {size}, order: {order}",
         function("coefficients", ("x", "a"), *_steps(coefficients, entries)),
         function("derived", ("x", "r", "y"), *_steps(derived, [*entries, *roots], turned)),
         function("pencil", ("x", "m"), *_steps(pencil, entries)) if pencil else "pencil: null",
         function("rate", ("x",), *_steps(rate, entries), fills=False),
+        function("ride", ("x", "y"), *_steps(ride, entries)) if ride else "ride: null",
     ]
     text = ",\n".join(parts)
     return Script(f"const MODEL = {{\n{text}\n}};\n", quantities, constraints)
+
+
+def is_bicycle(problem: Problem) -> bool:
+    """Whether the coordinates of a problem's model are lean and steer, with a steer axis to draw."""
+    model = problem.model
+    return model.pencil is not None and model.statement is None and "lambda_s" in problem.parameter_set.names
 
 
 def function(
@@ -180,6 +189,22 @@ def _pencil(problem: Problem) -> tuple[Program | None, int, int]:
         return [e for matrix in matrices for row in matrix for e in row]
 
     return _program(problem, entries), *shape
+
+
+def _ride(problem: Problem, p: Mapping[str, Any]) -> list[Any]:
+    """Rates of lean and steer after an impulse of steer torque of 1, M⁻¹ (0, 1), and the path of the contacts.
+
+    In the model's own unit of time; torque and lengths are those of the file.
+    """
+    model, of = problem.model, problem.parameter_set
+    assert model.pencil is not None
+    native = of.native(p)
+    (a, b), (c, d) = model.feedback(native).mass if model.feedback else model.pencil(native)[0]
+    impulse = 1 if of.rate is None or of.torque is None else of.rate(p) / of.torque(p)
+    length = p["w"] if "w" in p and "w" not in native else 1
+    yaw, yaw_of_rate, speed, ahead, aside = contact_path(native)
+    scale = impulse / (a * d - b * c)
+    return [-b * scale, a * scale, yaw, yaw_of_rate, speed * length, ahead * length, aside * length]
 
 
 def _steps(taken: Program, entries: Sequence[str], turned: Container[int] = ()) -> tuple[list[Step], list[int]]:

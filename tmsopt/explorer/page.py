@@ -19,7 +19,7 @@ _COMMENT = re.compile(r"^//.*$|^/\*\*[\s\S]*?\*/$", re.MULTILINE)
 _BLANKS = re.compile(r"\s*([{};,])\s*|(:)\s+")  # that mean nothing in a style
 _TEXT = re.compile(r'("(?:[^"\\]|\\.)*")')
 _AROUND = re.compile(r" ?([=!]==|=>|[<>*]=|[?:|&*]{1,2}|[-+]=|[=,;{}()\[\]]) ?| ([-+]) (?![-+])")  # in a script
-_PARTS = "numerics state axes chart plane growth bicycle motion controls facts main"
+_PARTS = "numerics state axes chart plane growth bicycle motion controls facts api main"
 
 
 def html_of(problem: Problem, designs: Sequence[Known], model: Mapping[str, Any], trace_curves: bool) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from tmsopt.checks.recheck import FEASIBLE
 from tmsopt.design import Problem, freedom, limit_of, unit_of
 from tmsopt.explorer.file_text import around
-from tmsopt.explorer.javascript import Script
+from tmsopt.explorer.javascript import Script, is_bicycle
 from tmsopt.explorer.known import Known
 from tmsopt.models import Parameter, words_of
 from tmsopt.records import Array
@@ -22,6 +22,9 @@ _DIGITS, _POINTS = 5, 80  # of a traced point, and at most of a curve: a chart h
 _SPEEDS, _TILT = ("v", "Fr"), "lambda_s"
 _USUAL = {"m": 0.5, "kg": 5.0, "kg m^2": 1.0, "rad": 0.5, "m/s": 5.0}
 """How far the slider of a fixed parameter that is 0 reaches, by its unit; 1 for others."""
+
+_IMPULSE = "m_B g w √(w/g)"
+"""Unit of an impulse of torque, of two masses on skates without units."""
 
 _MIDDLE = "nothing was solved here, so the page opens in the middle of the box"
 
@@ -43,7 +46,8 @@ def subject(
     asked = problem.minimize or problem.maximize or problem.locate or ""
     return {
         "title": problem.title, "model": problem.model.name, "modelTitle": problem.model.title,
-        "bicycle": problem.model.name if _TILT in of.names and problem.model.statement is None else None,
+        "bicycle": problem.model.name if is_bicycle(problem) else None,
+        "impulseUnit": _IMPULSE if of.torque is None else "N·m·s",
         "words": dict(words_of(problem.model)), "rootUnit": unit_of(problem, "abscissa").text,
         "parameters": [_parameter(problem, p, start[p.name]) for p in of.parameters],
         "quantities": [

@@ -30,6 +30,7 @@ const PICTURE_STYLE = `
 .reading { margin: 4px 0 0; min-height: 1.3em; font-size: .8rem; font-variant-numeric: tabular-nums; }
 .moves { align-items: center; }
 .moves label { display: flex; align-items: center; gap: 6px; }
+.moves input { width: 4.2rem; min-height: 2.25rem; padding: 0 .35rem; text-align: right; }
 `;
 
 /** An element with attributes and text, appended to a parent. */
@@ -263,7 +264,8 @@ function drawAxes(context, plot, x, y, colours) {
     if (x.label) context.fillText(text, Math.min(at, rightmost), y0 + height + 13);
   }
   context.textAlign = "right";
-  for (const tick of ticksBetween(plot.bottom / y.one, plot.top / y.one, height / 45)) {
+  const levels = [plot.bottom / y.one, plot.top / y.one].sort((low, high) => low - high);
+  for (const tick of ticksBetween(...levels, Math.max(3, height / 45))) {
     const at = Math.round(plot.y(tick * y.one)) + 0.5;
     drawStraight(context, [x0 - 4, at], [x0, at], colours.faint, 1);
     context.fillText(figure(tick, 12), x0 - 7, at);

@@ -1,4 +1,4 @@
-// The bicycle to scale, from the right side and from behind, as it leans and steers after a push.
+// The bicycle to scale, from the right side and from behind, as it leans and steers after a start; its tracks from above.
 
 const SLOWNESS = [1, 2, 5, 10, 50];
 
@@ -17,7 +17,7 @@ function bicycleShape(x) {
   const onAxis = (length) => meets.map((value, k) => value + length * up[k]);
   const alongAxis = (point) => point.reduce((sum, value, k) => sum + (value - meets[k]) * up[k], 0);
   const tall = top / Math.max(Math.cos(tilt), 0.35);
-  const speed = named.v ?? (named.Fr ?? 0) * Math.sqrt(9.81 * w);
+  const speed = named.v ?? named.Fr ?? 0;
   return {
     w,
     front,
@@ -124,29 +124,37 @@ function bicyclePicture(host) {
   let stopped = calm.matches;
   let resting = 0;
   let moved = "";
+  const starts = part(host, "div", {class: "moves"});
+  const fields = [
+    startField("lean", "start lean", "°", "to the right"),
+    startField("push", "steer push", DATA.impulseUnit, "an impulse of steer torque, to the right"),
+  ];
   const surface = canvasIn(host, heightOf, paint);
+  const above = canvasIn(host, (width) => clamp(150, 0.34 * width, 210), paintTracks);
   const reading = part(host, "p", {class: "reading"});
   const moves = part(host, "div", {class: "moves"});
   const play = part(moves, "button", {type: "button"}, "Play");
-  const again = part(moves, "button", {type: "button"}, "Push again");
+  const again = part(moves, "button", {type: "button"}, "Restart");
   const slower = part(part(moves, "label", {}, "shown"), "select");
-  for (const value of SLOWNESS) part(slower, "option", {value}, value > 1 ? `${value} times slower` : "in real time");
+  const real = clockPace(DATA.start) === 1 ? "in real time" : "in real time, w = 1 m";
+  for (const value of SLOWNESS) part(slower, "option", {value}, value > 1 ? `${value} times slower` : real);
   const legend = legendIn(host);
   const says = saysIn(surface.canvas);
-  clock.watchers.push((pushed) => {
+  const saysAbove = saysIn(above.canvas);
+  clock.watchers.push(() => {
     surface.repaint();
-    if (pushed) start(0);
+    above.repaint();
   });
 
   function paint(context, width, height) {
     if (!now) return;
     const colours = coloursNow();
-    const push = pushOf(now.state, now.drawing);
-    const time = push ? Math.min(clock.time, push.end) : 0;
-    const [lean, steer] = push ? [push.at(0, time), push.at(1, time)] : [0, 0];
+    const motion = motionFrom(now.state, now.drawing);
+    const time = motion ? Math.min(clock.time, motion.end) : 0;
+    const [lean, steer] = motion ? [motion.at(0, time), motion.at(1, time)] : [0, 0];
     const shape = bicycleShape(now.state.x);
     if (![...shape.B, ...shape.H, ...shape.up, shape.w, shape.trail].every(Number.isFinite)) return;
-    const drawn = lean * enlargement(push);
+    const drawn = lean * enlargement(motion);
     const {left, right, side, tallest} = boundsOf(shape);
     const scale = Math.min((width - 24) / (right - left + 2 * side), (height - 46) / tallest);
     const ground = height - 34;
@@ -198,12 +206,64 @@ function bicyclePicture(host) {
       context.fillStyle = colours.ink;
       context.fillText(view.name, (ends[0] + ends[1]) / 2, height - 9);
     });
-    tell(push, time, lean, steer);
+    tell(motion, time, lean, steer);
     legend([
       lineEntry("rear frame, centre of mass B", colours.weave, 4, DASHES.whole),
       lineEntry("front assembly, centre of mass H", colours.mark, 3, DASHES.whole),
       lineEntry("steer axis", colours.ink, 1.2, DASHES.mixed),
+      lineEntry("track of the rear contact, from above", colours.weave, 2, DASHES.whole),
+      lineEntry("track of the front contact", colours.mark, 2, DASHES.long),
     ]);
+  }
+
+  /** A field for what the bicycle starts with. */
+  function startField(name, words, unit, title) {
+    const label = part(starts, "label", {title}, words);
+    const field = part(label, "input", {type: "text", autocomplete: "off"});
+    part(label, "span", {class: "unit"}, unit);
+    const draw = () => {
+      if (document.activeElement !== field) field.value = String(now.state[name]).replaceAll("-", "−");
+      field.setAttribute("aria-invalid", "false");
+    };
+    field.addEventListener("change", () => {
+      const value = numberOf(field.value, unit);
+      const fit = isStart(name, value);
+      field.setAttribute("aria-invalid", String(!fit));
+      if (fit) change({[name]: value});
+      else say(`${name}: a number is wanted${name === "lean" ? ", of less than 30°" : ""}`);
+    });
+    return draw;
+  }
+
+  /** The tracks of both contacts from above, and the bicycle on them; sideways as large as fits. */
+  function paintTracks(context, width, height) {
+    const motion = now && motionFrom(now.state, now.drawing);
+    if (!motion) return;
+    const colours = coloursNow();
+    const {w, speed} = bicycleShape(now.state.x);
+    const times = motion.seconds.filter((time) => time < motion.end);
+    const tracks = [...times, motion.end].map(motion.contacts);
+    const sides = [-0.1 * w, 0.1 * w, ...tracks.flat().map(([, right]) => right)];
+    const [left, right] = [Math.min(...sides), Math.max(...sides)];
+    const room = 0.12 * (right - left);
+    const plot = plotIn(
+      {x0: PLOT_LEFT, y0: 8, width: width - PLOT_LEFT - 12, height: height - 50},
+      [-0.3 * w, Math.max(speed * motion.end + 1.5 * w, 2 * w)],
+      [right + room, left - room],
+    );
+    const at = ([ahead, aside]) => ({x: plot.x(ahead), y: plot.y(aside)});
+    const time = Math.min(clock.time, motion.end);
+    const [rear, front] = motion.contacts(time);
+    clipped(context, plot, () => {
+      drawLevel(context, plot, plot.y(0), colours.faint, 1);
+      drawLine(context, tracks.map((contacts) => at(contacts[0])), colours.weave, 2);
+      drawLine(context, tracks.map((contacts) => at(contacts[1])), colours.mark, 2, DASHES.long);
+      drawLine(context, [at(rear), at(front)], colours.ink, 4);
+      drawDot(context, ...Object.values(at(rear)), 5, colours.weave, colours.paper);
+      drawDot(context, ...Object.values(at(front)), 5, colours.mark, colours.paper);
+    });
+    const unit = timeUnit(now.state.x) === "s" ? "m" : "w";
+    drawAxes(context, plot, {label: `forward in ${unit}`, one: 1}, {label: `right in ${unit}`, one: 1}, colours);
   }
 
   /** What both views must hold: from left to right, to each side, and up. */
@@ -225,9 +285,9 @@ function bicyclePicture(host) {
   }
 
   /** By how much the lean is drawn larger than it is, where steering hides it. */
-  function enlargement(push) {
-    if (!push || !(push.peaks[0] > 0)) return 1;
-    const ratio = push.peaks[1] / push.peaks[0];
+  function enlargement(motion) {
+    if (!motion || !(motion.peaks[0] > 0)) return 1;
+    const ratio = motion.peaks[1] / motion.peaks[0];
     return [1, 2, 5, 10].filter((factor) => factor <= Math.max(1, ratio / 2)).pop();
   }
 
@@ -276,28 +336,24 @@ function bicyclePicture(host) {
     drawText(context, "trail", Math.max(contact.x, meets.x) + 5, contact.y - 12, colours);
   }
 
-  function tell(push, time, lean, steer) {
+  function tell(motion, time, lean, steer) {
     const degrees = (angle) => `${figure(Number(((180 / Math.PI) * angle).toFixed(1)))}°`;
-    const [rate, unit] = [
-      figure((180 / Math.PI) * (push ? push.start : 0), 3),
-      Number.isFinite(MODEL.rate(now.state.x)) ? "" : ", for a wheelbase of 1 m",
-    ];
-    const enlarged = enlargement(push);
-    reading.textContent = push
-      ? "A push to the right, scaled so that the largest angle is 15° " +
-        `(${rate}°/s of ${coordinateNames()[clock.pushed]}). ` +
-        `After ${time.toFixed(push.end < 1 ? 3 : 2)} s of ${figure(push.end, 3)} s${unit}: lean ${degrees(lean)}, ` +
-        `steer ${degrees(steer)}${enlarged > 1 ? ` (lean drawn ${enlarged} times)` : ""}.`
+    const [enlarged, unit] = [enlargement(motion), timeUnit(now.state.x)];
+    reading.textContent = motion
+      ? `After ${withUnit(time, unit, 3)} of ${withUnit(motion.end, unit, 3)}: lean ${degrees(lean)}, ` +
+        `steer ${degrees(steer)}${enlarged > 1 ? ` (lean drawn ${enlarged} times)` : ""}.` +
+        (motion.falls < Infinity ? " It falls: the end is at 30° of lean or 90° of steer." : "")
       : NO_MOTION;
     play.textContent = clock.playing ? "Pause" : "Play";
   }
 
   function step(moment) {
-    const push = clock.playing && now && pushOf(now.state, now.drawing);
-    if (!push) return;
-    setClock(Math.min(push.end, clock.time + Math.min(0.5, (moment - last) / 1000) / clock.slower));
+    const motion = clock.playing && now && motionFrom(now.state, now.drawing);
+    if (!motion) return;
+    const passed = (Math.min(0.5, (moment - last) / 1000) * clockPace(now.state.x)) / clock.slower;
+    setClock(Math.min(motion.end, clock.time + passed));
     last = moment;
-    if (clock.time < push.end) requestAnimationFrame(step);
+    if (clock.time < motion.end) requestAnimationFrame(step);
     else stop();
   }
 
@@ -317,9 +373,9 @@ function bicyclePicture(host) {
 
   play.addEventListener("click", () => {
     stopped = clock.playing;
-    const push = now && pushOf(now.state, now.drawing);
+    const motion = now && motionFrom(now.state, now.drawing);
     if (clock.playing) stop();
-    else start(push && clock.time >= push.end ? 0 : clock.time);
+    else start(motion && clock.time >= motion.end ? 0 : clock.time);
   });
   again.addEventListener("click", () => {
     stopped = false;
@@ -332,9 +388,10 @@ function bicyclePicture(host) {
   return {
     draw(state, drawing) {
       now = {state, drawing};
-      const design = Array.from(state.x).join(" ");
+      fields.forEach((drawField) => drawField());
+      const design = [...state.x, state.lean, state.push].join(" ");
       if (design !== moved) {
-        // a push follows every change of the design once it has rested, unless the reader wants no motion
+        // motion follows every change of the design once it has rested, unless the reader wants none
         moved = design;
         clock.playing = false;
         clock.time = 0;
@@ -342,8 +399,11 @@ function bicyclePicture(host) {
         resting = setTimeout(() => !stopped && !calm.matches && start(0), 600);
       }
       surface.repaint();
-      const fate = drawing.kind ? `: the motion ${drawing.kind > 2 ? "dies out" : "does not die out"}` : "";
-      says(`The bicycle to scale, from the right side and from behind, leaning and steering after a push${fate}.`);
+      above.repaint();
+      const motion = motionFrom(state, drawing);
+      const fate = motion ? `: ${fateOf(motion, drawing)}` : "";
+      says(`The bicycle to scale, from the right side and from behind, leaning and steering after a start${fate}.`);
+      saysAbove(`The tracks of the rear and of the front contact, seen from above${fate}.`);
     },
   };
 }

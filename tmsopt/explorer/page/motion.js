@@ -1,91 +1,148 @@
-// What follows a push: the linear response, as curves over time, and the clock that the bicycle moves by.
+// What follows a start: the linear response, as curves over time, and the clock that the bicycle moves by.
 
-const PUSH_POINTS = 601;
+const MOTION_POINTS = 601;
 const NO_MOTION = "No motion to show: the equations of this design cannot be solved.";
-const LARGEST_ANGLE = Math.PI / 12;
-const clock = {time: 0, playing: false, slower: 1, pushed: 0, watchers: []};
-let pushKept = {key: ""};
+const FALLEN = [Math.PI / 6, Math.PI / 2]; // lean and steer of a bicycle that falls: no linear equations there
+// time is that of the file: s, or where there is no unit √(w/g); `from`: the state of a stated system that starts at 1
+const clock = {time: 0, playing: false, slower: 1, from: 0, watchers: []};
+let motionKept = {key: ""};
 
-/** Set the clock, in seconds of what is shown, and let all who show it draw. */
+/** Set the clock, in the time of what is shown, and let all who show it draw. */
 function setClock(time) {
   clock.time = time;
   clock.watchers.forEach((watch) => watch());
 }
 
-/** 1/s per unit of the roots; of a bicycle without units, as if its wheelbase were 1 m. */
-function clockRate(x) {
-  const rate = MODEL.rate(x);
-  if (Number.isFinite(rate)) return rate;
-  return DATA.bicycle ? Math.sqrt(9.81) : NaN;
+/** How much of the file's time is played in a second: of a bicycle without units, as if its wheelbase were 1 m. */
+function clockPace(x) {
+  return DATA.bicycle && !Number.isFinite(MODEL.rate(x)) ? Math.sqrt(9.81) : 1;
 }
 
-/** Names of the coordinates that a push moves. */
+/** What a time is counted in. */
+function timeUnit(x) {
+  if (Number.isFinite(MODEL.rate(x))) return "s";
+  return DATA.bicycle ? "√(w/g)" : DATA.rootUnit && `1/(${DATA.rootUnit})`;
+}
+
+/** Names of the coordinates that move. */
 function coordinateNames() {
   if (DATA.bicycle) return ["lean", "steer"];
   return Array.from({length: MODEL.size}, (_, k) => `${MODEL.order === 2 ? "coordinate" : "state"} ${k + 1}`);
 }
 
-/** How long to look at most, in the model's time: until a push has died out or grown large, not for endless swings. */
-function pushLength(drawing, rate) {
+/** What a motion can start from. */
+function startNames() {
+  const names = coordinateNames();
+  return MODEL.order === 2 ? [...names, ...names.map((name) => `rate of ${name}`)] : names;
+}
+
+/**
+ * {A, n, rate, ride} of z' = A z, n states, and the file's time in that of the model; null where there are no
+ * equations. The last states of a bicycle are its yaw and how far the rear contact is to the right.
+ */
+function systemOf(x) {
+  const A = MODEL.pencil && firstOrder(x);
+  if (!A) return null;
+  const states = MODEL.size * MODEL.order;
+  const rate = Number.isFinite(MODEL.rate(x)) ? MODEL.rate(x) : 1;
+  if (!DATA.bicycle) return {A, n: states, rate};
+  const ride = new Float64Array(7);
+  MODEL.ride(x, ride);
+  const n = states + 2;
+  const whole = new Float64Array(n * n);
+  for (let i = 0; i < states; i += 1) whole.set(A.subarray(i * states, i * states + states), i * n);
+  whole[states * n + 1] = ride[2];
+  whole[states * n + 3] = ride[3];
+  whole[n * n - 2] = ride[4];
+  return {A: whole, n, rate, ride};
+}
+
+/** The state after a lean in degrees and an impulse of steer torque, or of other systems one state at 1. */
+function startIn({n, ride}, {lean, push}) {
+  const start = new Float64Array(n);
+  if (ride) start.set([(lean * Math.PI) / 180, 0, push * ride[0], push * ride[1]]);
+  else start[clock.from] = 1;
+  return start;
+}
+
+/** The row, with its fraction, in which a size comes to a limit; Infinity where it does not. */
+function fallsAt(rows, sizeAt, most) {
+  const row = rows.findIndex((k) => sizeAt(k) >= most);
+  return row > 0 ? row - (sizeAt(row) - most) / (sizeAt(row) - sizeAt(row - 1)) : row < 0 ? Infinity : 0;
+}
+
+/** The motion over a length of the model's time, or null; `at(k, time)` is a state, all times are those of the file. */
+function motionIn({A, n, rate, ride}, start, length) {
+  const times = evenly([0, length], MOTION_POINTS);
+  const values = flow(A, n, start, times);
+  if (!values.every(Number.isFinite)) return null;
+  const whole = times[MOTION_POINTS - 1] / rate;
+  const at = (k, time) => {
+    const place = clamp(0, (time / whole) * (MOTION_POINTS - 1), MOTION_POINTS - 1);
+    const row = Math.min(MOTION_POINTS - 2, Math.floor(place));
+    const [before, after] = [values[row * n + k], values[(row + 1) * n + k]];
+    return before + (place - row) * (after - before);
+  };
+  const size = (row, k) => Math.abs(values[row * n + k]);
+  const rows = Array.from(times.keys());
+  const peaks = coordinateNames().map((_, k) => rows.reduce((peak, row) => Math.max(peak, size(row, k)), 0));
+  const falls = ride ? FALLEN.map((most, k) => fallsAt(rows, (row) => size(row, k), most)) : [Infinity];
+  const fall = Math.min(...falls);
+  const high = 0.02 * Math.max(...peaks);
+  const last = rows.reverse().find((row) => peaks.some((_, k) => size(row, k) > high)) || 1;
+  return {
+    at,
+    rate,
+    peaks,
+    seconds: Array.from(times, (time) => time / rate),
+    end: whole,
+    falls: (fall / (MOTION_POINTS - 1)) * whole,
+    reached: times[Math.ceil(fall)] ?? Infinity,
+    seen: last / (MOTION_POINTS - 1),
+    /** Both contacts, [forward, to the right]. */
+    contacts(time) {
+      const [forward, yaw, right] = [ride[4] * rate * time, at(n - 2, time), at(n - 1, time)];
+      return [[forward, right], [forward + ride[5], right + ride[5] * yaw + ride[6] * at(1, time)]];
+    },
+  };
+}
+
+/** How long to look at most, in the model's time: until a start has died out or grown large, not for endless swings. */
+function lookLength(drawing, most) {
   const [abscissa, , frequency] = drawing.motion;
-  const fades = Math.abs(abscissa) > 0 ? (abscissa < 0 ? 16 : 3.5) / Math.abs(abscissa) : Infinity;
+  const fades = Math.abs(abscissa) > 0 ? (abscissa < 0 ? 16 : 5) / Math.abs(abscissa) : Infinity;
   const swings = frequency > 0 ? (20 * 2 * Math.PI) / frequency : Infinity;
-  const length = Math.min(fades, swings, Number.isFinite(rate) ? 20 * rate : Infinity);
+  const length = Math.min(fades, swings, most);
   return Number.isFinite(length) && length > 0 ? length : 10;
 }
 
-/** The response to a push on coordinate `clock.pushed`, kept while the design stays, or null; see `scaledPush`. */
-function pushOf(state, drawing) {
-  const key = `${clock.pushed} ${Array.from(state.x)}`;
-  if (pushKept.key === key) return pushKept.found;
-  const rate = clockRate(state.x);
-  const states = MODEL.size * MODEL.order;
-  const start = new Float64Array(states);
-  start[MODEL.order === 2 ? MODEL.size + clock.pushed : clock.pushed] = 1;
+/** The motion from the start that is set, until there is nothing more to see or it has fallen; kept until it changes. */
+function motionFrom(state, drawing) {
+  const key = `${clock.from} ${state.lean} ${state.push} ${Array.from(state.x)}`;
+  if (motionKept.key === key) return motionKept.found;
+  const system = drawing.kind ? systemOf(state.x) : null;
   let found = null;
-  let length = pushLength(drawing, rate);
-  // looked at twice: the second time only as long as there is something to see
-  for (let look = 0; look < 2 && drawing.kind; look += 1) {
-    const times = evenly([0, length], PUSH_POINTS);
-    const values = response(state.x, start, times);
-    found = values && values.every(Number.isFinite) ? scaledPush(values, times, states, rate) : null;
-    if (!found || drawing.motion[0] >= 0) break;
-    length *= Math.min(1, 1.1 * found.seen);
+  if (system) {
+    const start = startIn(system, state);
+    const timed = DATA.bicycle || Number.isFinite(MODEL.rate(state.x));
+    const length = lookLength(drawing, timed ? 20 * clockPace(state.x) * system.rate : Infinity);
+    found = motionIn(system, start, length);
+    // looked at twice: the second time only as long as there is something to see
+    const shorter = found && Math.min(found.reached, drawing.motion[0] < 0 ? 1.1 * found.seen * length : length);
+    if (found && shorter < length) found = motionIn(system, start, shorter);
+    if (found) found.end = Math.min(found.end, found.falls);
   }
-  pushKept = {key, found};
+  motionKept = {key, found};
   return found;
 }
 
-/** The response by seconds, where there are such: {at(k, time), seconds, end, rate, peaks, start}; angles to be seen. */
-function scaledPush(values, times, states, rate) {
-  const size = MODEL.size;
-  const peaks = Array.from({length: size}, (_, k) =>
-    times.reduce((peak, _time, row) => Math.max(peak, Math.abs(values[row * states + k])), 0),
-  );
-  const scale = DATA.bicycle ? LARGEST_ANGLE / Math.max(...peaks, 1e-300) : 1;
-  const second = Number.isFinite(rate) ? rate : 1;
-  const end = times[PUSH_POINTS - 1] / second;
-  const at = (k, time) => {
-    const place = clamp(0, (time / end) * (PUSH_POINTS - 1), PUSH_POINTS - 1);
-    const row = Math.min(PUSH_POINTS - 2, Math.floor(place));
-    const [before, after] = [values[row * states + k], values[(row + 1) * states + k]];
-    return scale * (before + (place - row) * (after - before));
-  };
-  const high = 0.02 * Math.max(...peaks);
-  const rows = Array.from(times.keys());
-  const last = rows.reverse().find((row) => peaks.some((_, k) => Math.abs(values[row * states + k]) > high)) || 1;
-  return {
-    at,
-    end,
-    rate: second,
-    peaks: peaks.map((peak) => scale * peak),
-    start: scale * second,
-    seconds: times.map((time) => time / second),
-    seen: last / (PUSH_POINTS - 1),
-  };
+/** How a motion ends, in words. */
+function fateOf(motion, drawing) {
+  if (motion.falls < Infinity) return "the bicycle falls";
+  return `the motion ${drawing.kind > 2 ? "dies out" : "does not die out"}`;
 }
 
-/** Response after a push over time; its pointer moves the clock. */
+/** The motion over time; its pointer moves the clock. */
 function motionPicture(host) {
   if (!MODEL.pencil) {
     const panel = host.closest("section") || host;
@@ -95,14 +152,16 @@ function motionPicture(host) {
   const names = coordinateNames();
   let now = null;
   let plot = null;
-  const choice = part(host, "p", {class: "moves"});
-  const label = part(choice, "label", {}, "push on");
-  const pushed = part(label, "select");
-  names.forEach((name, k) => part(pushed, "option", {value: k}, name));
-  pushed.addEventListener("change", () => {
-    clock.pushed = Number(pushed.value);
-    clock.watchers.forEach((watch) => watch(true));
-  });
+  if (!DATA.bicycle) {
+    const label = part(part(host, "p", {class: "moves"}), "label", {}, "starts at 1");
+    const from = part(label, "select");
+    startNames().forEach((name, k) => part(from, "option", {value: k}, name));
+    from.addEventListener("change", () => {
+      clock.from = Number(from.value);
+      setClock(0);
+      tell();
+    });
+  }
   const surface = canvasIn(host, (width) => clamp(220, 0.5 * width, 340), paint);
   const reading = part(host, "p", {class: "reading"});
   const legend = legendIn(host);
@@ -120,8 +179,8 @@ function motionPicture(host) {
     if (!now) return;
     const {state, drawing} = now;
     const colours = coloursNow();
-    const push = pushOf(state, drawing);
-    if (!push) {
+    const motion = motionFrom(state, drawing);
+    if (!motion) {
       plot = null;
       context.textAlign = "center";
       context.fillStyle = colours.ink;
@@ -131,43 +190,37 @@ function motionPicture(host) {
       return;
     }
     const one = DATA.bicycle ? Math.PI / 180 : 1;
-    const size = 1.12 * Math.max(...push.peaks, 1e-300);
+    const size = 1.12 * (Math.max(...motion.peaks) || one);
     plot = plotIn(
       {x0: PLOT_LEFT, y0: 8, width: width - PLOT_LEFT - 12, height: height - 50},
-      [0, push.end],
+      [0, motion.end],
       [-size, size],
     );
-    // a push follows e^(abscissa t) in the end where one root is rightmost, not where some meet there
+    // a motion follows e^(abscissa t) in the end where one root is rightmost, not where some meet there
     const last = rightmostOf(drawing.meetings) - roundingOf(drawing.meetings);
     const lone = drawing.meetings.every(([re, , times]) => times === 1 || re < last);
     const bounded = lone && !isMarginal(drawing.meetings);
     clipped(context, plot, () => {
       drawLevel(context, plot, plot.y(0), colours.faint, 1);
-      if (bounded) drawEnvelope(context, push, drawing.motion[0], colours);
-      const rows = Array.from(push.seconds);
+      if (bounded) drawEnvelope(context, motion, drawing.motion[0], colours);
+      const rows = Array.from(motion.seconds);
       names.forEach((_, k) => {
         const [colour, dash] = lookOf(k, colours);
         drawLine(
           context,
-          rows.map((time) => ({x: plot.x(time), y: plot.y(push.at(k, time))})),
+          rows.map((time) => ({x: plot.x(time), y: plot.y(motion.at(k, time))})),
           colour,
           2.2,
           dash,
         );
       });
-      const x = plot.x(Math.min(clock.time, push.end));
+      const x = plot.x(Math.min(clock.time, motion.end));
       drawUpright(context, plot, x, colours.ink, 1.4);
     });
-    const timed = Number.isFinite(MODEL.rate(state.x));
-    const time = timed
-      ? "time in s"
-      : DATA.bicycle
-        ? "time in s, for a wheelbase of 1 m"
-        : `time${DATA.rootUnit ? ` in 1/(${DATA.rootUnit})` : ""}`;
     drawAxes(
       context,
       plot,
-      {label: time, one: 1},
+      {label: withLabelUnit("time", timeUnit(state.x)), one: 1},
       {label: DATA.bicycle ? "angle in degrees" : "displacement", one},
       colours,
     );
@@ -175,15 +228,15 @@ function motionPicture(host) {
       ...names.map((name, k) => lineEntry(name, lookOf(k, colours)[0], 2.2, lookOf(k, colours)[1])),
       bounded && lineEntry("within a multiple of e^(abscissa · time)", colours.faint, 1, DASHES.dots),
     ].filter(Boolean));
-    read(push);
+    read(motion);
   }
 
   /** The least multiple of e^(abscissa t) that the curves stay within. */
-  function drawEnvelope(context, push, abscissa, colours) {
+  function drawEnvelope(context, motion, abscissa, colours) {
     if (!Number.isFinite(abscissa)) return;
-    const rows = Array.from(push.seconds);
-    const pace = (time) => Math.exp(abscissa * push.rate * time);
-    const most = Math.max(...names.flatMap((_, k) => rows.map((time) => Math.abs(push.at(k, time)) / pace(time))));
+    const rows = Array.from(motion.seconds);
+    const pace = (time) => Math.exp(abscissa * motion.rate * time);
+    const most = Math.max(...names.flatMap((_, k) => rows.map((time) => Math.abs(motion.at(k, time)) / pace(time))));
     const level = (time) => most * pace(time);
     for (const side of [1, -1]) {
       drawLine(
@@ -197,20 +250,19 @@ function motionPicture(host) {
   }
 
   /** What the coordinates are at the time of the clock. */
-  function read(push, time = Math.min(clock.time, push.end)) {
+  function read(motion, time = Math.min(clock.time, motion.end)) {
     const degree = DATA.bicycle ? 180 / Math.PI : 1;
     const values = names.map(
       (name, k) =>
-        `${name} = ${figure(Number((degree * push.at(k, time)).toPrecision(3)), 3)}${DATA.bicycle ? "°" : ""}`,
+        `${name} = ${figure(Number((degree * motion.at(k, time)).toPrecision(3)), 3)}${DATA.bicycle ? "°" : ""}`,
     );
-    const second = Number.isFinite(clockRate(now.state.x)) ? " s" : "";
-    reading.textContent = `after ${figure(time, 3)}${second}: ${values.join(", ")}`;
+    reading.textContent = `after ${withUnit(time, timeUnit(now.state.x), 3)}: ${values.join(", ")}`;
   }
 
   const toTime = (event) => {
     clock.playing = false;
-    const push = pushOf(now.state, now.drawing);
-    if (push && plot) setClock(clamp(0, plot.valueX(event.offsetX), push.end));
+    const motion = motionFrom(now.state, now.drawing);
+    if (motion && plot) setClock(clamp(0, plot.valueX(event.offsetX), motion.end));
   };
   takesKeys(surface.canvas);
   surface.canvas.addEventListener("pointerdown", (event) => {
@@ -220,25 +272,28 @@ function motionPicture(host) {
   surface.canvas.addEventListener("pointermove", (event) => event.buttons && toTime(event));
   surface.canvas.addEventListener("keydown", (event) => {
     const by = {ArrowLeft: -1, ArrowRight: 1}[event.key];
-    const push = by && pushOf(now.state, now.drawing);
-    if (!push) return;
+    const motion = by && motionFrom(now.state, now.drawing);
+    if (!motion) return;
     event.preventDefault();
     clock.playing = false;
-    setClock(clamp(0, clock.time + (by * push.end) / (event.shiftKey ? 20 : 200), push.end));
+    setClock(clamp(0, clock.time + (by * motion.end) / (event.shiftKey ? 20 : 200), motion.end));
   });
+
+  function tell() {
+    const motion = motionFrom(now.state, now.drawing);
+    const start = DATA.bicycle ? "a lean and a push" : `${startNames()[clock.from]} = 1`;
+    says(
+      motion
+        ? `${names.join(" and ")} over time after ${start}: ${fateOf(motion, now.drawing)}. Arrow keys move the time.`
+        : NO_MOTION,
+    );
+  }
 
   return {
     draw(state, drawing) {
       now = {state, drawing};
       surface.repaint();
-      const push = pushOf(state, drawing);
-      const fate = drawing.kind > 2 ? "dies out" : "does not die out"; // of an undefined design there is no push
-      says(
-        push
-          ? `${names.join(" and ")} over time after a push on ${names[clock.pushed]}: ` +
-              `the motion ${fate}. Arrow keys move the time.`
-          : NO_MOTION,
-      );
+      tell();
     },
   };
 }

@@ -691,14 +691,9 @@ function firstOrder(x) {
   return A.every(Number.isFinite) ? A : null;
 }
 
-/**
- * States of the pencil's system, displacements and then velocities, at ascending times from a start at time 0, time by
- * time; null without matrices, or where the leading one is singular.
- */
-function response(x, start, times) {
-  const A = MODEL.pencil && firstOrder(x);
-  if (!A) return null;
-  const n = MODEL.size * MODEL.order, found = new Float64Array(times.length * n);
+/** States of z' = A z, with n of them, at ascending times from a start at time 0, time by time. */
+function flow(A, n, start, times) {
+  const found = new Float64Array(times.length * n);
   let state = Float64Array.from(start), time = 0, step = NaN, over = null;
   for (let k = 0; k < times.length; k++) {
     const next = times[k] - time;
@@ -715,4 +710,10 @@ function response(x, start, times) {
     state = found.subarray(k * n, k * n + n);
   }
   return found;
+}
+
+/** The flow of the pencil's system, displacements and then velocities; null where `firstOrder` is, or without matrices. */
+function response(x, start, times) {
+  const A = MODEL.pencil && firstOrder(x);
+  return A ? flow(A, MODEL.size * MODEL.order, start, times) : null;
 }

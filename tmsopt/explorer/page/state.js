@@ -1,6 +1,8 @@
 // The state: what the page shows now, how it changes, and how it is kept in steps, in a link and in a file.
 
 const LAYERS = {kind: "stability", abscissa: "abscissa", damping: "damping ratio"};
+// degrees, and an impulse in DATA.impulseUnit: what the bicycle starts with
+const STARTS = {lean: 5, push: 0};
 const state = startingState();
 const steps = {past: [], future: [], before: null};
 const watchers = [];
@@ -37,13 +39,13 @@ function withUnit(value, unit, digits = 5) {
 }
 
 /**
- * The one way to change the state: x as pairs of index and value in SI, plane, over, layer. While something is
+ * The one way to change the state: x as pairs of index and value in SI, plane, over, layer, lean, push. While something is
  * dragged, settle is false: all until the next settled change is one step of undo.
  */
 function change(wanted, settle = true) {
   steps.before ??= fragmentOf(state);
   for (const [index, value] of wanted.x ?? []) state.x[index] = value;
-  for (const name of ["plane", "over", "layer"]) if (name in wanted) state[name] = wanted[name];
+  for (const name of ["plane", "over", "layer", ...Object.keys(STARTS)]) if (name in wanted) state[name] = wanted[name];
   if (settle) {
     if (fragmentOf(state) !== steps.before) {
       steps.past.push(steps.before);
@@ -78,16 +80,17 @@ function redo() {
 
 /** The state in which the page opened. */
 function startingState() {
-  return {x: Float64Array.from(DATA.start), plane: [...DATA.plane], over: DATA.over, layer: "kind"};
+  return {x: Float64Array.from(DATA.start), plane: [...DATA.plane], over: DATA.over, layer: "kind", ...STARTS};
 }
 
 /** All that differs from the start as the fragment of a link; its numbers come back bit for bit. */
-function fragmentOf({x, plane, over, layer}) {
+function fragmentOf({x, plane, over, layer, ...rest}) {
   const name = (k) => encodeURIComponent(DATA.parameters[k].name);
   const parts = [...x].flatMap((value, k) => (value === DATA.start[k] ? [] : [`${name(k)}=${value}`]));
   if (plane.join() !== DATA.plane.join()) parts.push(`.axes=${plane.map(name)}`);
   if (over !== DATA.over) parts.push(`.over=${name(over)}`);
   if (layer !== "kind") parts.push(`.layer=${layer}`);
+  for (const [key, value] of Object.entries(STARTS)) if (rest[key] !== value) parts.push(`.${key}=${rest[key]}`);
   return parts.join("&");
 }
 
@@ -113,12 +116,22 @@ function takePart(found, part) {
     if (Object.hasOwn(LAYERS, value)) found.layer = value;
     return Object.hasOwn(LAYERS, value);
   }
+  if (Object.hasOwn(STARTS, key.slice(1)) && key[0] === ".") {
+    const fit = isStart(key.slice(1), numberOf(value));
+    if (fit) found[key.slice(1)] = numberOf(value);
+    return fit;
+  }
   const index = indexOf(key === ".over" ? value : key);
   if (index < 0) return false;
   if (key === ".over") found.over = index;
   else if (impossible(DATA.parameters[index], numberOf(value))) return false;
   else found.x[index] = numberOf(value);
   return true;
+}
+
+/** Whether the bicycle can start with so much: a lean from which it has not fallen yet, any push. */
+function isStart(name, value) {
+  return Number.isFinite(value) && (name !== "lean" || Math.abs(value) < 30);
 }
 
 /** A part of a link in plain letters; itself where it is not well written. */

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from tmsopt.arithmetic.elementary import quotient, sqrt
+from tmsopt.arithmetic.elementary import quotient, sqrt, tan
 from tmsopt.models.model import Formula, Quantity, Range
 
 WORDS = "weave", "capsize"
@@ -36,6 +36,17 @@ def smaller_eigenvalue(first: Any, mixed: Any, second: Any, determinant: Any) ->
     """
     apart = sqrt((first - second) * (first - second) + 4 * mixed * mixed)
     return 2 * determinant / (first + second + apart + _TINY)
+
+
+def contact_path(p: Mapping[str, Any]) -> tuple[Any, Any, Any, Any, Any]:
+    """How the contacts go, as e, f, v, w, −c cos λ_s, the wheels rolling and the skates sliding without slip.
+
+    ψ′ = e δ + f δ′ = (v δ + c δ′) cos λ_s/w; to the right y_rear′ = v ψ, y_front = y_rear + w ψ − c cos λ_s δ. Without
+    units w is 1 and v is Fr.
+    """
+    T, v, w, c = tan(p["lambda_s"]), p["v"] if "v" in p else p["Fr"], p.get("w", 1), p.get("c", 0)
+    cosine = 1 / sqrt(1 + T * T)
+    return v * cosine / w, c * cosine / w, v, w, -c * cosine
 
 
 def times(rate: Formula, written: str) -> tuple[Quantity, ...]:

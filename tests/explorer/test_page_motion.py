@@ -1,0 +1,317 @@
+"""The motion that the page shows, in Chromium: against integrated equations, and moved by hands."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.browser import chromium, drawn, opened
+from scipy.integrate import solve_ivp
+
+import tmsopt
+
+pytestmark = pytest.mark.slow
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+PAGE = Path(tmsopt.__file__).parent / "explorer" / "page"
+BICYCLES = ["whipple_benchmark", "delivery_robot", "ep4"]
+BENCHMARK = {
+    "M": [[80.81722, 2.31941332208709], [2.31941332208709, 0.29784188199686]],
+    "C1": [[0, 33.86641391492494], [-0.85035641456978, 1.68540397397560]],
+    "K0": [[-80.95, -2.59951685249872], [-2.59951685249872, -0.80329488458618]],
+    "K2": [[0, 76.59734589573222], [0, 2.65431523794604]],
+}
+"""Meijaard et al. (2007), table 2 and equation (5.3)."""
+
+PAIR = """title = "Two carts"
+[model]
+M = [[1, 0], [0, 2]]
+D = [["c", 0], [0, 0.3]]
+K = [[3, -1], [-1, 2]]
+[parameters]
+c = { min = 0, max = 1, start = 0.2 }
+"""
+
+CLOSE = 1e-8
+"""Of the largest value: the page repeats a step by a rounded exponential 600 times, the integrator works to 1e-12."""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def explorers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[tmsopt.Explorer, Path]]:
+    folder, made = tmp_path_factory.mktemp("pages"), {}
+    for name in BICYCLES:
+        made[name] = tmsopt.explore(PROBLEMS / f"{name}.toml"), folder / f"{name}.html"
+        made[name][0].save(made[name][1])
+    return made
+
+
+def integrated(A: Any, start: Any, times: Any) -> Any:
+    """States of z' = A z, time by time."""
+    found = solve_ivp(lambda _, z: A @ z, (0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-14)
+    return found.y.T
+
+
+def first_order(M: Any, D: Any, K: Any) -> Any:
+    M, D, K = (np.array(m, dtype=float) for m in (M, D, K))
+    n = len(M)
+    return np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
+
+
+def equations(explorer: tmsopt.Explorer, values: dict[str, float]) -> tuple[Any, Any]:
+    """A of z' = A z for lean, steer and their rates, and the rates after an impulse of 1, in the units of the file."""
+    if explorer.problem.model.name == "whipple":  # by the published matrices
+        M, C1, K0, K2 = (np.array(m) for m in BENCHMARK.values())
+        return first_order(M, values["v"] * C1, 9.81 * K0 + values["v"] ** 2 * K2), np.linalg.solve(M, [0, 1])
+    of, pencil = explorer.problem.parameter_set, explorer.problem.model.pencil
+    assert pencil is not None
+    M, D, K = (np.array(m, dtype=float) for m in pencil(of.native(values)))
+    rate, torque = (float(f(values)) if f else 1.0 for f in (of.rate, of.torque))
+    in_file = (M * torque / rate**2, D * torque / rate, K * torque)  # N m per rad, N m s per rad, …
+    return first_order(*in_file), np.linalg.solve(in_file[0], [0, 1])
+
+
+def shown(page: Any) -> dict[str, float]:
+    found: dict[str, float] = page.evaluate(
+        "Object.fromEntries(DATA.parameters.map(({name}, k) => [name, state.x[k]]))"
+    )
+    return found
+
+
+@pytest.mark.parametrize("name", BICYCLES)
+@pytest.mark.parametrize(("lean", "push"), [(5, 0), (0, 0.2), (-3, 0.1)])
+def test_the_motion_is_that_of_the_equations(browser: Any, explorers: Any, name: str, lean: float, push: float) -> None:
+    """Where the page opens: ep4 and the robot at fourfold roots."""
+    explorer, path = explorers[name]
+    with opened(browser, path) as page:
+        found = page.evaluate(f"tmsopt.motion({{lean: {lean}, push: {push}, seconds: 3}})")
+        A, impulse = equations(explorer, shown(page))
+    assert found["t"][-1] == pytest.approx(3)
+    truth = integrated(A, [np.radians(lean), 0, *(push * impulse)], found["t"])
+    for k, angle in enumerate(("phi", "delta")):
+        np.testing.assert_allclose(found[angle], truth[:, k], atol=CLOSE * np.abs(truth[:, :2]).max())
+
+
+@pytest.mark.parametrize("name", BICYCLES)
+def test_the_contacts_go_where_the_wheels_point(browser: Any, explorers: Any, name: str) -> None:
+    """psi' = (v delta + c delta') cos(lambda_s)/w, integrated beside the equations, in the lengths of the file."""
+    explorer, path = explorers[name]
+    with opened(browser, path) as page:
+        times, contacts = page.evaluate("""() => {
+            const system = systemOf(state.x);
+            const motion = motionIn(system, startIn(system, {lean: 5, push: 0.1}), 3 * system.rate);
+            return [motion.seconds, motion.seconds.map(motion.contacts)];
+        }""")
+        values = shown(page)
+    A, impulse = equations(explorer, values)
+    v, w, c = values.get("v", values.get("Fr")), values.get("w", 1.0), values.get("c", 0.0)
+    cosine = np.cos(values["lambda_s"])
+    whole = np.zeros((6, 6))
+    whole[:4, :4] = A
+    whole[4, [1, 3]] = np.array([v, c]) * cosine / w
+    whole[5, 4] = v
+    z = integrated(whole, [np.radians(5), 0, *(0.1 * impulse), 0, 0], times)
+    rear = np.stack([v * np.array(times), z[:, 5]], axis=1)
+    front = rear + np.stack([np.full(len(z), w), w * z[:, 4] - c * cosine * z[:, 1]], axis=1)
+    truth = np.stack([rear, front], axis=1)
+    for side in (0, 1):  # forward and to the right are of different size
+        np.testing.assert_allclose(
+            np.array(contacts)[:, :, side], truth[:, :, side], atol=CLOSE * np.abs(truth[:, :, side]).max()
+        )
+
+
+def test_a_slow_bicycle_falls_and_the_page_says_so(browser: Any, explorers: Any) -> None:
+    """The moment by the integrator; the page takes it between two of its 601 times, which is good to 1e-4."""
+    explorer, path = explorers["whipple_benchmark"]
+    with opened(browser, path, reduced_motion="reduce") as page:
+        page.evaluate("tmsopt.set({v: 0.5})")
+        drawn(page)
+        assert "It falls" in page.locator("#bicycle .reading").inner_text()
+        end, falls = page.evaluate("[motionFrom(state, drawingOf()).end, tmsopt.motion({seconds: 3}).falls]")
+        A, _ = equations(explorer, shown(page))
+
+        def fallen(_: float, z: Any) -> float:
+            return float(max(abs(z[0]) - np.pi / 6, abs(z[1]) - np.pi / 2))
+
+        fallen.terminal = True  # type: ignore[attr-defined]
+        truth = solve_ivp(
+            lambda _, z: A @ z, (0, 20), [np.radians(5), 0, 0, 0], "DOP853", events=fallen, rtol=1e-12, atol=1e-14
+        )
+        assert end == pytest.approx(truth.t_events[0][0], rel=1e-4)
+        assert falls == pytest.approx(end, rel=1e-4)
+        page.locator("#bicycle select").select_option("1")
+        page.get_by_role("button", name="Play", exact=True).click()
+        page.wait_for_timeout(1000 * end + 1500)
+        assert page.evaluate("clock.time") == end  # and stands
+        assert page.get_by_role("button", name="Play", exact=True).is_visible()
+        page.wait_for_timeout(500)
+        assert page.locator("#bicycle canvas").first.get_attribute("aria-label").endswith("the bicycle falls.")
+        page.evaluate("tmsopt.set({v: 5})")  # within the band of stable speeds, 4.292 to 6.024 m/s
+        drawn(page)
+        assert "It falls" not in page.locator("#bicycle").inner_text()
+
+
+def test_a_start_is_typed_and_kept(browser: Any, explorers: Any) -> None:
+    _, path = explorers["whipple_benchmark"]
+    start = "[state.lean, state.push]"
+    with opened(browser, path, reduced_motion="reduce") as page:
+        for words, text in (("start lean", "−2,5°"), ("steer push", "1.5 N·m·s")):
+            field = page.locator("#bicycle").get_by_role("textbox", name=re.compile(words))
+            field.fill(text)
+            field.press("Enter")
+        drawn(page)
+        assert page.evaluate(start) == [-2.5, 1.5]
+        A, impulse = equations(explorers["whipple_benchmark"][0], shown(page))
+        last = page.evaluate("(() => {const m = motionFrom(state, drawingOf()); return [m.end, m.at(0, m.end)]})()")
+        truth = integrated(A, [np.radians(-2.5), 0, *(1.5 * impulse)], [0, last[0]])[-1, 0]
+        assert last[1] == pytest.approx(truth, abs=1e-5)  # where it falls, between two of 601 times
+        for text in ("30", "-31", "abc", ""):
+            field = page.locator("#bicycle").get_by_role("textbox", name=re.compile("start lean"))
+            field.fill(text)
+            field.press("Enter")
+            assert field.get_attribute("aria-invalid") == "true"
+        assert page.evaluate(start) == [-2.5, 1.5]
+        link = page.evaluate("fragmentOf(state)")
+        page.keyboard.press("Tab")
+        page.get_by_role("button", name="undo (Ctrl+Z)").click()
+        assert page.evaluate(start) == [-2.5, 0]
+    with opened(browser, path, link=link) as page:
+        assert page.evaluate(start) == [-2.5, 1.5]
+    with opened(browser, path, link=".lean=30&.push=x&.lean=") as page:
+        assert page.evaluate(start) == [5, 0]
+        assert page.locator("#note").inner_text().startswith("Ignored in the link: ")
+
+
+def test_play_pause_restart_and_the_slider_by_keys(browser: Any, explorers: Any) -> None:
+    _, path = explorers["ep4"]
+    with opened(browser, path, reduced_motion="reduce") as page:
+        before = page.evaluate("motionFrom(state, drawingOf()).at(0, 1)")
+        slider = page.get_by_role("slider", name=re.compile("^Fr, "))
+        for _ in range(20):
+            slider.press("ArrowRight")
+        drawn(page)
+        A, _ = equations(explorers["ep4"][0], shown(page))
+        found = page.evaluate("motionKept.found.at(0, 1)")  # what is drawn
+        truth = integrated(A, [np.radians(5), 0, 0, 0], [0, 1])[-1, 0]
+        assert found == pytest.approx(truth, abs=1e-5)  # between two of 601 times
+        assert abs(found - before) > 1e-4
+        assert page.evaluate("clock.time") == 0
+        play = page.get_by_role("button", name="Play", exact=True)
+        play.focus()
+        page.keyboard.press("Enter")
+        page.wait_for_timeout(300)
+        page.get_by_role("button", name="Pause", exact=True).press("Space")
+        paused = page.evaluate("clock.time")
+        assert paused > 0
+        page.wait_for_timeout(200)
+        assert page.evaluate("clock.time") == paused
+        plane = "document.querySelectorAll('#bicycle canvas')[1].toDataURL()"
+        tracks = page.evaluate(plane)
+        page.get_by_role("button", name="Restart", exact=True).press("Enter")
+        assert page.evaluate("clock.time") < paused + 0.2
+        page.wait_for_timeout(200)
+        assert page.evaluate(plane) != tracks
+
+
+def test_a_stated_system_starts_from_each_of_its_states(browser: Any, tmp_path: Path) -> None:
+    (tmp_path / "pair.toml").write_text(PAIR)
+    tmsopt.explore(tmp_path / "pair.toml").save(tmp_path / "pair.html")
+    with opened(browser, tmp_path / "pair.html") as page:
+        assert not page.locator("#bicycle").is_visible()
+        assert page.evaluate("tmsopt.motion({lean: 5})") is None
+        c = shown(page)["c"]
+        A = first_order([[1, 0], [0, 2]], [[c, 0], [0, 0.3]], [[3, -1], [-1, 2]])
+        for k, name in enumerate(["coordinate 1", "coordinate 2", "rate of coordinate 1", "rate of coordinate 2"]):
+            page.locator("#motion select").select_option(name)
+            times, values = page.evaluate("""() => {
+                const { seconds, at } = motionFrom(state, drawingOf());
+                return [seconds, seconds.map((time) => [at(0, time), at(1, time)])];
+            }""")
+            truth = integrated(A, np.eye(4)[k], times)[:, :2]
+            np.testing.assert_allclose(values, truth, atol=CLOSE * np.abs(truth).max())
+
+
+def test_a_model_by_its_coefficients_has_no_motion(browser: Any, tmp_path: Path) -> None:
+    (tmp_path / "k.toml").write_text(
+        '[model]\ncoefficients = ["1", "c", "1"]\n[parameters]\nc = { min = 0, max = 1 }\n'
+    )
+    tmsopt.explore(tmp_path / "k.toml").save(tmp_path / "k.html")
+    with opened(browser, tmp_path / "k.html") as page:
+        assert not page.locator("#motion").is_visible()
+        assert page.evaluate("tmsopt.motion()") is None
+
+
+def test_a_controller_with_a_lag_is_pushed_by_the_mass_of_the_bicycle(browser: Any, tmp_path: Path) -> None:
+    """T' = (-k phidot - T)/lag on the steering: five states, whose matrices I, -A have no mass in them."""
+    lag, gain = 0.2, 8.0
+    whipple = tmsopt.models.whipple
+
+    def pencil(p: Any) -> Any:
+        assert whipple.pencil is not None
+        (a, b), (c, d) = whipple.pencil(p)[0]
+        inverse = [[d / (a * d - b * c), -b / (a * d - b * c)], [-c / (a * d - b * c), a / (a * d - b * c)]]
+        rows: list[list[Any]] = [[0, 0, -1, 0, 0], [0, 0, 0, -1, 0]]
+        for row in inverse:
+            K, D = ([row[0] * m[0][k] + row[1] * m[1][k] for k in (0, 1)] for m in reversed(whipple.pencil(p)[1:]))
+            rows.append([*K, *D, -row[1]])
+        identity = [[float(i == k) for k in range(5)] for i in range(5)]
+        return identity, [*rows, [0, 0, gain / lag, 0, 1 / lag]]
+
+    def feedback(p: Any) -> Any:
+        from tmsopt.models.model import Feedback
+
+        assert whipple.pencil is not None
+        return Feedback(whipple.pencil(p)[0], [[0, 0, 0, 0], [0, 0, gain, 0]], lag)
+
+    posed = tmsopt.load(PROBLEMS / "whipple_benchmark.toml")
+    model = replace(whipple, pencil=pencil, feedback=feedback)
+    explorer = tmsopt.explore(replace(posed, model=model))
+    explorer.save(tmp_path / "lag.html")
+    with opened(browser, tmp_path / "lag.html") as page:
+        found = page.evaluate("tmsopt.motion({lean: 2, push: 0.3, seconds: 2})")
+        plain, impulse = equations(explorer, shown(page))
+    A = np.zeros((5, 5))
+    A[:4, :4] = plain
+    A[2:4, 4] = impulse
+    A[4, [2, 4]] = -gain / lag, -1 / lag
+    truth = integrated(A, [np.radians(2), 0, *(0.3 * impulse), 0], found["t"])
+    np.testing.assert_allclose([found["phi"], found["delta"]], truth[:, :2].T, atol=CLOSE * np.abs(truth[:, :2]).max())
+
+
+def test_programs_set_and_get_the_design(browser: Any, explorers: Any) -> None:
+    explorer, path = explorers["ep4"]
+    with opened(browser, path) as page:
+        at_start = page.evaluate("tmsopt.get()")
+        assert at_start["abscissa"] == explorer.solution.abscissa
+        assert len(at_start["roots"]) == 4
+        page.evaluate("tmsopt.set({Fr: 0.5, chi_B: 1.5})")
+        found = page.evaluate("tmsopt.get()")
+        values = shown(page)
+        assert (found["parameters"]["Fr"], found["parameters"]["chi_B"]) == (0.5, 1.5)
+        known = explorer.problem.values(values)
+        assert found["abscissa"] == pytest.approx(known["abscissa"], rel=1e-9)
+        assert found["damping_ratio"] == pytest.approx(known["damping_ratio"], rel=1e-9)
+        assert found["quantities"]["nu_H"] == pytest.approx(known["nu_H"], rel=1e-12)
+        assert found["kind"] in ("weave", "capsize")
+        for wrong in ("{Froude: 1}", "{Fr: -1}", "{Fr: 'fast'}"):
+            text = page.evaluate(f"(() => {{try {{tmsopt.set({wrong})}} catch (e) {{return e.message}}}})()")
+            assert text.startswith(("no parameter Froude; there are: Fr", "Fr: "))
+        assert shown(page) == values
+
+
+def test_a_page_is_small_and_its_texts_are_whole(explorers: Any) -> None:
+    """What the documentation promises; and taking blanks out of a script takes none out of its texts."""
+    html = tmsopt.explore(PROBLEMS / "whipple_ep4.toml").html
+    assert len(html.encode()) < 150_000
+    for path in PAGE.glob("*.js"):
+        code = re.sub(r"^\s*(//.*|/\*\*.*\*/|\*.*)$| // .*$", "", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
+        texts = re.findall(r'"(?:[^"\\\n]|\\.)*"', re.sub(r"`[^`]*`", "", code))
+        assert [t for t in texts if t not in html] == [], path.name

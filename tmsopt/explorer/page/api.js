@@ -1,0 +1,46 @@
+// What programs may ask of the page, in the units of the file: window.tmsopt.
+
+const KIND_WORDS = ["undefined", "capsize", "weave", "stable", "heavily damped"];
+
+window.tmsopt = {
+  /** Set parameters by their names. */
+  set(values) {
+    const wanted = Object.entries(values).map(([name, value]) => {
+      const index = DATA.parameters.findIndex((p) => p.name === name);
+      if (index < 0) throw new Error(`no parameter ${name}; there are: ${DATA.parameters.map((p) => p.name).join(", ")}`);
+      const reason = impossible(DATA.parameters[index], value * DATA.parameters[index].one);
+      if (reason) throw new Error(`${name}: ${reason}`);
+      return [index, value * DATA.parameters[index].one];
+    });
+    change({x: wanted});
+  },
+
+  /** The design that is shown, and what it is. */
+  get() {
+    const {meetings, motion, kind, y} = drawingOf();
+    const {re, im} = allRoots(meetings);
+    const named = (list, values) => Object.fromEntries(list.map(({name, one}, k) => [name, values[k] / one]));
+    return {
+      parameters: named(DATA.parameters, state.x),
+      roots: [...re].map((part, k) => [part, im[k]]),
+      abscissa: motion[0],
+      damping_ratio: motion[1],
+      kind: KIND_WORDS[kind],
+      quantities: named(DATA.quantities, y),
+    };
+  },
+
+  /**
+   * Lean and steer in rad after a lean in degrees and an impulse of steer torque, for so many seconds (without units
+   * √(w/g)); `falls`: when it falls, else null. Null without a bicycle, or where it cannot be solved.
+   */
+  motion({lean = state.lean, push = state.push, seconds = 3} = {}) {
+    const system = DATA.bicycle && systemOf(state.x);
+    if (!system) return null;
+    const found = motionIn(system, startIn(system, {lean, push}), seconds * system.rate);
+    if (!found) return null;
+    const {seconds: t, at, falls} = found;
+    const angles = (k) => t.map((time) => at(k, time));
+    return {t, phi: angles(0), delta: angles(1), falls: falls < Infinity ? falls : null};
+  },
+};
