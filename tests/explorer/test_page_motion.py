@@ -272,7 +272,7 @@ def test_a_controller_with_a_lag_is_pushed_by_the_mass_of_the_bicycle(browser: A
         return SimpleNamespace(mass=whipple.pencil(p)[0])  # what the page asks of it
 
     posed = tmsopt.load(PROBLEMS / "whipple_benchmark.toml")
-    model = replace(whipple, pencil=pencil, feedback=feedback)
+    model = replace(whipple, name="lagged", pencil=pencil, feedback=feedback)
     explorer = tmsopt.explore(replace(posed, model=model))
     explorer.save(tmp_path / "lag.html")
     with opened(browser, tmp_path / "lag.html") as page:
