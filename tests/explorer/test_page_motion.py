@@ -69,7 +69,7 @@ def first_order(M: Any, D: Any, K: Any) -> Any:
 
 def equations(explorer: tmsopt.Explorer, values: dict[str, float]) -> tuple[Any, Any]:
     """A of z' = A z for lean, steer and their rates, and the rates after an impulse of 1, in the units of the file."""
-    if explorer.problem.model.name == "whipple":  # by the published matrices
+    if "I_Rxx" in values:  # of Whipple, by the published matrices
         M, C1, K0, K2 = (np.array(m) for m in BENCHMARK.values())
         return first_order(M, values["v"] * C1, 9.81 * K0 + values["v"] ** 2 * K2), np.linalg.solve(M, [0, 1])
     of, pencil = explorer.problem.parameter_set, explorer.problem.model.pencil
