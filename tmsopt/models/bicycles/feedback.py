@@ -226,9 +226,7 @@ def _quantities(names: tuple[str, ...], torques: Callable[..., Feedback], rate: 
         _, gains = found.gains
         return quotient(gains[3] * a - gains[2] * b, a * d - b * c) * rate(v)
 
-    yield _size(
-        "torque_per_degree", "N m", "steer torque per degree of lean, at rest in it", r"T_\delta/\phi", per_degree
-    )
+    yield _size("torque_per_degree", "N m", "steer torque per degree of lean", r"T_\delta/\phi", per_degree)
     if LAG not in names:
         meaning = "steer torque right after a push on the handlebar of 1 N m s"
         yield _size("push_torque", "N m", meaning, r"T_\delta(0)", kicked)
