@@ -447,6 +447,19 @@ def test_text_file_of_bicycle_parameters(tmp_path):
     assert tmsopt.load(problem).fixed == {**BENCHMARK, "v": 4.6}
 
 
+def test_parts_and_other_geometry_are_kept_aside(tmp_path):
+    """RigidBenchmark.txt has the handlebar (G) and the fork (S) of H too, others both diameters, the offsets, a push."""
+    more = "mG = 3.35\nIGxz = 0.0049+/-3e-05\nxS = 0.892\nISyy = 0.093\nIRzz = 0.0603\nIFzz = 0.1405\nd3 = 0.03\nzcl = -0.9\n"
+    path = tmp_path / "RigidBenchmark.txt"
+    path.write_text(FILE + more)
+    bicycle = tmsopt.read_bicycle(path)
+    assert dict(bicycle.parameters) == {n: v for n, v in BENCHMARK.items() if n != "v"}
+    assert (bicycle.others["mG"], bicycle.others["zcl"]) == (3.35, -0.9)
+    path.write_text(FILE + "mK = 3\n")
+    with pytest.raises(tmsopt.InputError, match=r"unknown name 'mK'.* accepted: w c lam [^G]*$"):
+        tmsopt.read_bicycle(path)
+
+
 def test_yaml_files_of_bicycle_parameters(tmp_path):
     """Both layouts that the program has had."""
     names = {n: "lam" if n == "lambda_s" else n.replace("_", "") for n in SI.names}

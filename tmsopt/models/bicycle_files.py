@@ -22,6 +22,15 @@ _OWN = {written: name for name, written in _WRITTEN.items()}
 _NO_PART = ("IByy", "IHyy", "yB", "yH", "yR", "yF")
 """Names that the files have and the linear motion does not depend on."""
 
+_ASIDE = (
+    *("IRzz", "IFzz"),  # of round wheels: IRxx, IFxx
+    *("d1", "d2", "d3"),  # the geometry again, as others state it
+    *("xcl", "zcl"),  # where a sideways force acts
+    *(f"{of}{part}" for part in "GS" for of in ("m", "x", "z")),  # handlebar and fork, which H has together
+    *(f"I{part}{axes}" for part in "GS" for axes in ("xx", "yy", "zz", "xz")),
+)
+"""Names that only some files have; these say nothing more of the linear motion."""
+
 _OPTIONAL = ("v", "g")
 _YAML = (".yml", ".yaml")
 _TEXT = (".txt", ".ini")
@@ -91,7 +100,7 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
             if written.strip("'\" ").lower() not in _KINDS:
                 message = f"found the parameterization {short(written)}; accepted: Meijaard2007 or benchmark"
                 faults.append(Fault(message).at(str(path), number))
-        elif name not in _OWN and name not in _NO_PART:
+        elif name not in _OWN and name not in _NO_PART + _ASIDE:
             message = f"unknown name {short(name)}; {advice(name, [*_OWN, *_NO_PART])}"
             faults.append(Fault(message).at(str(path), number))
         elif numbers is None:
@@ -99,7 +108,7 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
                 f"{name}: found {short(written)}; accepted: a number, with +/- its uncertainty, or several after commas"
             )
             faults.append(Fault(message).at(str(path), number))
-        elif name in _NO_PART:
+        elif name in _NO_PART + _ASIDE:
             others[name] = numbers[0]
         else:
             found[_OWN[name]], off[_OWN[name]] = numbers
