@@ -7,12 +7,13 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import permutations
 from pathlib import Path
 
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from tmsopt.units import USUAL, by_pint, factor, read, with_unit
+from tmsopt.units import USUAL, Dimension, by_pint, dimensions, factor, read, with_unit
 
 AT_ONCE = 1.0
 """Seconds; pint needs a third of one to start."""
@@ -178,6 +179,15 @@ def test_products_and_powers_are_read() -> None:
     for text in ("5 m*m/m", "5 m^2/m", "5 m**2 / m", "5 m² m^-1", "5 m s / s"):
         with at_once():
             assert with_unit(text, "m") == 5
+
+
+def test_a_sum_of_unlike_units_has_none_whatever_is_added() -> None:
+    """In any order: metres and kilograms added are neither, and no third summand gives its unit to all."""
+    metre, kilogram, none = Dimension.of("m"), Dimension.of("kg"), Dimension()
+    for parts in permutations((metre, kilogram, kilogram, none)):
+        assert sum(parts, 1.0).unit == "1"
+        assert dimensions.power(sum(parts, none), 0.5).unit == (sum(parts, none) * metre / 2.0).unit == "1"
+    assert (metre + none + metre).unit == "m"
 
 
 @settings(max_examples=250, deadline=None, derandomize=True)

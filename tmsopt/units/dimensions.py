@@ -15,10 +15,11 @@ _POWERS = re.compile(r"(?P<name>[^\s/^*]+)(\^(?P<power>-?\d+))?")
 class Dimension:
     """Base units with their powers, in the order of the alphabet; arithmetic as of the numbers that have them.
 
-    In sums, what has no unit takes that of the rest. Two different units in a sum leave none.
+    In sums, what has no unit takes that of the rest. Two different units in a sum leave none, whatever is added.
     """
 
     powers: tuple[tuple[str, Fraction], ...] = ()
+    mixed: bool = False
 
     @classmethod
     def of(cls, unit: str) -> "Dimension":
@@ -45,11 +46,14 @@ class Dimension:
         return self._joined(other, -1)
 
     def __rtruediv__(self, other: Any) -> "Dimension":
-        return Dimension(tuple((n, -p) for n, p in self.powers))
+        return Dimension(tuple((n, -p) for n, p in self.powers), self.mixed)
 
     def __add__(self, other: Any) -> "Dimension":
-        own, others = self.powers, other.powers if isinstance(other, Dimension) else ()
-        return Dimension(own or others) if not own or not others or own == others else Dimension()
+        if not isinstance(other, Dimension):
+            return self
+        own, others = self.powers, other.powers
+        mixed = self.mixed or other.mixed or bool(own and others and own != others)
+        return Dimension(() if mixed else own or others, mixed)
 
     def __neg__(self) -> "Dimension":
         return self
@@ -57,8 +61,12 @@ class Dimension:
     __rmul__, __radd__, __sub__, __rsub__ = __mul__, __add__, __add__, __add__
 
     def _joined(self, other: Any, sign: int) -> "Dimension":
+        if not isinstance(other, Dimension):
+            return self
+        if self.mixed or other.mixed:
+            return Dimension(mixed=True)
         found = dict(self.powers)
-        for name, p in other.powers if isinstance(other, Dimension) else ():
+        for name, p in other.powers:
             found[name] = found.get(name, Fraction(0)) + sign * p
         return Dimension(tuple(sorted((n, p) for n, p in found.items() if p)))
 
@@ -70,7 +78,7 @@ def power(base: Any, exponent: Any) -> Any:
     if isinstance(exponent, Dimension) or not abs(exponent) < float("inf"):
         return Dimension()
     share = Fraction(exponent).limit_denominator(12)
-    return Dimension(tuple((n, p * share) for n, p in base.powers if share))
+    return Dimension(tuple((n, p * share) for n, p in base.powers if share), base.mixed)
 
 
 def _same(*values: Any) -> Any:
