@@ -5,8 +5,10 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 import tmsopt
+from tmsopt.cli import every
 from tmsopt.guide import STARTS, companions, example, examples, new_problem
 
 ROOT = Path(__file__).parents[2]
@@ -59,7 +61,9 @@ def test_the_examples_are_those_of_the_checkout_with_their_titles() -> None:
 def test_the_examples_are_found_where_they_are_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By the record of the distribution, at the place that pyproject.toml gives them in every installation."""
     data = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["data-files"]
-    ((place, patterns),) = data.items()
+    (place, patterns), (bicycles, ridden) = data.items()
+    assert bicycles == f"{place}/bicycles"
+    assert {path for pattern in ridden for path in ROOT.glob(pattern)} == set((ROOT / "problems/bicycles").iterdir())
     assert sorted(path for pattern in patterns for path in ROOT.glob(pattern)) == sorted(
         (ROOT / "problems").glob("*.toml")
     )
@@ -83,5 +87,21 @@ def test_what_a_file_refers_to_comes_with_it() -> None:
     assert set(companions(example("ep4"))) == {"tmsopt.schema.json"}
     assert companions(example("study_built"))["ep4.toml"] == example("ep4")
     for name in examples():
-        problem = tomllib.loads(example(name)).get("problem")
-        assert not isinstance(problem, str) or problem in companions(example(name))
+        for key in ("problem", "bicycle"):
+            refers = tomllib.loads(example(name)).get(key)
+            assert not isinstance(refers, str) or refers in companions(example(name))
+
+
+def test_a_problem_that_names_a_bicycle_comes_with_all_of_them(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    said = CliRunner().invoke(every, ["example", "smallest_change", "--output", str(file)])
+    assert (said.exit_code, said.stderr.count("wrote")) == (0, 3)  # the file, the schema, the folder
+    written, kept = ({p.name for p in (folder / "bicycles").iterdir()} for folder in (tmp_path, ROOT / "problems"))
+    assert written == kept
+    assert tmsopt.load(file).fixed == tmsopt.load(ROOT / "problems/smallest_change.toml").fixed
+    mine = tmp_path / "bicycles/fisher.txt"
+    mine.write_text("mine")
+    (tmp_path / "bicycles/silver.txt").unlink()
+    assert CliRunner().invoke(every, ["example", "smallest_gains", "-o", str(tmp_path / "b.toml")]).exit_code == 0
+    assert mine.read_text() == "mine"
+    assert (tmp_path / "bicycles/silver.txt").exists()

@@ -55,10 +55,16 @@ def example(name: str) -> str:
 
 
 def companions(text: str) -> dict[str, str]:
-    """Files that belong beside a problem or study file: name → text; the schema, and a problem that a study names."""
-    problem = tomllib.loads(text).get("problem")
+    """Files that belong beside a problem or study file: name → text.
+
+    The schema; a problem that a study names; where a problem names a bicycle, all that come with tmsopt.
+    """
+    data = tomllib.loads(text)
+    problem = data.get("problem")
     named = {problem: example(problem)} if isinstance(problem, str) else {}
-    return {SCHEMA_FILE: schema_text(), **named}
+    bicycles = next(iter(_files().values())).parent.glob("bicycles/*.txt") if "bicycle" in data else ()
+    ridden = {f"bicycles/{path.name}": path.read_text(encoding="utf-8") for path in sorted(bicycles)}
+    return {SCHEMA_FILE: schema_text(), **named, **ridden}
 
 
 def schema_text() -> str:

@@ -27,7 +27,8 @@ Examples:
   tmsopt example ep4 && tmsopt solve ep4.toml
   tmsopt example delivery_robot --output mine.toml
 
-What a file refers to is written beside it, unless it is there: tmsopt.schema.json for editors, the problem of a study.
+What a file refers to is written beside it, unless it is there: tmsopt.schema.json for editors, the problem of a study,
+bicycles/ where it names a bicycle.
 
 Exit status: 0 done, 2 bad input, such as a file that is there already.
 """
@@ -42,11 +43,16 @@ def write_new(option: str, path: Path, text: str) -> None:
 def _write_with_companions(option: str, path: Path, text: str) -> None:
     from tmsopt.guide import companions
 
-    written = {path: text}
-    written |= {path.with_name(name): other for name, other in companions(text).items()}
-    for file, content in written.items():
-        if file == path or not file.exists():
+    beside = {path.parent / name: other for name, other in companions(text).items()}
+    for file, content in {path: text, **beside}.items():
+        if file == path or (file.parent == path.parent and not file.exists()):
             write_new(option, file, content)
+    for folder in {file.parent for file in beside} - {path.parent}:
+        with saving(option, folder):
+            folder.mkdir(exist_ok=True)
+            for file, content in beside.items():
+                if file.parent == folder and not file.exists():
+                    write_text(file, content, new=True)
 
 
 @click.command(epilog=_OF_NEW)
