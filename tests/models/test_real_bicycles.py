@@ -1,0 +1,196 @@
+"""The tables of docs/how_to/real_bicycles.md, recomputed by NumPy from the matrices of Meijaard et al. (2007), appendix A.
+
+Nothing of tmsopt has a part in it but the reading of the files.
+"""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tmsopt
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs/how_to/real_bicycles.md").read_text(encoding="utf-8")
+DECAY = -0.01  # 1/s, as the page asks
+
+
+def table(head):
+    """Rows of a table of the page by their first cell."""
+    lines = PAGE[PAGE.index(head) :].partition("\n\n")[0].splitlines()[2:]
+    return {cells[0]: cells[1:] for cells in ([c.strip() for c in line.strip("|").split("|")] for line in lines)}
+
+
+CHANGES, GAINS = table("| bicycle | self-stable"), table("| bicycle | 4 m/s")
+NAMES = list(CHANGES)
+
+
+def bicycle(name):
+    return tmsopt.read_bicycle(ROOT / f"problems/bicycles/{name}.txt").parameters
+
+
+def matrices(p):
+    """M, C1, g K0, K2 of parameters that may be arrays, step by step as the appendix has them."""
+    (w, c, tilt, r_R, r_F) = (p[n] for n in ("w", "c", "lambda_s", "r_R", "r_F"))
+    sin, cos = np.sin(tilt), np.cos(tilt)
+    masses = [p["m_R"], p["m_B"], p["m_H"], p["m_F"]]
+    m_T = sum(masses)
+    mx_T = p["x_B"] * p["m_B"] + p["x_H"] * p["m_H"] + w * p["m_F"]
+    mz_T = -r_R * p["m_R"] + p["z_B"] * p["m_B"] + p["z_H"] * p["m_H"] - r_F * p["m_F"]
+    heights = (-r_R, p["z_B"], p["z_H"], -r_F)
+    I_Txx = sum(p[f"I_{b}xx"] for b in "RBHF") + sum(m * z**2 for m, z in zip(masses, heights, strict=True))
+    I_Txz = (
+        p["I_Bxz"] + p["I_Hxz"] - p["m_B"] * p["x_B"] * p["z_B"] - p["m_H"] * p["x_H"] * p["z_H"] + p["m_F"] * w * r_F
+    )
+    I_Tzz = p["I_Rxx"] + p["I_Bzz"] + p["I_Hzz"] + p["I_Fxx"]
+    I_Tzz = I_Tzz + p["m_B"] * p["x_B"] ** 2 + p["m_H"] * p["x_H"] ** 2 + p["m_F"] * w**2
+    m_A = p["m_H"] + p["m_F"]
+    x_A, z_A = (p["x_H"] * p["m_H"] + w * p["m_F"]) / m_A, (p["z_H"] * p["m_H"] - r_F * p["m_F"]) / m_A
+    up, down = p["z_H"] - z_A, r_F + z_A
+    I_Axx = p["I_Hxx"] + p["I_Fxx"] + p["m_H"] * up**2 + p["m_F"] * down**2
+    I_Axz = p["I_Hxz"] - p["m_H"] * (p["x_H"] - x_A) * up + p["m_F"] * (w - x_A) * down
+    I_Azz = p["I_Hzz"] + p["I_Fxx"] + p["m_H"] * (p["x_H"] - x_A) ** 2 + p["m_F"] * (w - x_A) ** 2
+    u_A = (x_A - w - c) * cos - z_A * sin
+    I_All = m_A * u_A**2 + I_Axx * sin**2 + 2 * I_Axz * sin * cos + I_Azz * cos**2
+    I_Alx = -m_A * u_A * z_A + I_Axx * sin + I_Axz * cos
+    I_Alz = m_A * u_A * x_A + I_Axz * sin + I_Azz * cos
+    mu, S_F = c / w * cos, p["I_Fyy"] / r_F
+    S_T, S_A = p["I_Ryy"] / r_R + S_F, m_A * u_A + mu * mx_T
+    one = np.ones(np.broadcast(w, c, tilt, S_F).shape)
+
+    def rows(a, b, c, d):
+        return np.moveaxis(np.array([[a * one, b * one], [c * one, d * one]]), (0, 1), (-2, -1))
+
+    M12 = I_Alx + mu * I_Txz
+    M = rows(I_Txx, M12, M12, I_All + 2 * mu * I_Alz + mu**2 * I_Tzz)
+    gyro = mu * S_T + S_F * cos
+    C1 = rows(0, gyro + I_Txz / w * cos - mu * mz_T, -gyro, I_Alz / w * cos + mu * (S_A + I_Tzz / w * cos))
+    assert m_T > 0
+    gK0 = p.get("g", 9.81) * rows(mz_T, -S_A, -S_A, -S_A * sin)
+    return M, C1, gK0, rows(0, (S_T - mz_T) / w * cos, 0, (S_A + S_F * sin) / w * cos)
+
+
+def abscissa(p, v, gains=(0.0, 0.0, 0.0, 0.0)):
+    """Largest real part of the eigenvalues, of every design or row of gains at once."""
+    M, C1, gK0, K2 = matrices(p)
+    v, k = np.asarray(v, dtype=float)[..., None, None], np.asarray(gains)
+    nothing = np.zeros(k.shape[:-1])
+    K = gK0 + v**2 * K2 + np.moveaxis(np.array([[nothing, nothing], [k[..., 0], k[..., 2]]]), (0, 1), (-2, -1))
+    D = v * C1 + np.moveaxis(np.array([[nothing, nothing], [k[..., 1], k[..., 3]]]), (0, 1), (-2, -1))
+    below = -np.linalg.solve(M, np.concatenate(np.broadcast_arrays(K, D), axis=-1))
+    above = np.broadcast_to(np.eye(2, 4, k=2), below.shape)
+    return np.linalg.eigvals(np.concatenate([above, below], axis=-2)).real.max(axis=-1)
+
+
+def test_the_tables_have_every_bicycle():
+    assert set(NAMES) == set(GAINS) == {p.stem for p in (ROOT / "problems/bicycles").glob("*.txt")}
+
+
+def test_the_matrices_are_those_that_are_published():
+    """Meijaard et al. (2007), section 5(a), all digits."""
+    M, C1, gK0, K2 = (m.tolist() for m in matrices(bicycle("benchmark")))
+    assert np.allclose(M, [[80.81722, 2.31941332208709], [2.31941332208709, 0.29784188199686]], rtol=1e-12)
+    assert np.allclose(C1, [[0, 33.86641391492494], [-0.85035641456978, 1.6854039739756]], rtol=1e-12)
+    K0 = [[-80.95, -2.59951685249872], [-2.59951685249872, -0.80329488458618]]
+    assert np.allclose(gK0, 9.81 * np.array(K0), rtol=1e-12)
+    assert np.allclose(K2, [[0, 76.59734589573222], [0, 2.65431523794604]], rtol=1e-12)
+
+
+def test_what_is_published_of_speeds():
+    """Meijaard et al. (2007), Kooijman et al. (2008), and section 4.1 of Moore, Hubbard and Hess (2016)."""
+    assert CHANGES["benchmark"][0] == "4.29 to 6.02"
+    assert CHANGES["silver"][0] == "3.99 to 7.90"  # 4.0 and 7.9 m/s in the paper
+    assert [n for n in NAMES if CHANGES[n][0] == "nowhere"] == ["optimal-4", "optimal-5", "optimal-10"]
+    assert all(abscissa(bicycle(f"optimal-{v}"), v) > 0 for v in (2, 4, 5, 6, 8, 10))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_self_stable_speeds(name):
+    """Eigenvalues at 4000 speeds up to 20 m/s; limits are rounded to 0.01 m/s."""
+    written = CHANGES[name][0]
+    speeds = np.linspace(0.005, 19.995, 4000)
+    if written == "nowhere":
+        low = high = 0.0
+    elif written.startswith("from"):
+        low, high = float(written.split()[1]), math.inf
+    else:
+        low, high = map(float, written.split(" to "))
+    clear = (np.abs(speeds - low) > 0.0051) & (np.abs(speeds - high) > 0.0051)
+    stable = abscissa(bicycle(name), speeds) < 0
+    assert (stable == ((speeds > low) & (speeds < high)))[clear].all()
+
+
+def changed(own, x):
+    """The design a change away: trail and wheelbase by the wheelbase, tilt in rad, I_Fyy by itself."""
+    more = {"c": own["c"] + x[..., 0] * own["w"], "w": own["w"] * (1 + x[..., 1])}
+    return {**own, **more, "lambda_s": own["lambda_s"] + x[..., 2], "I_Fyy": own["I_Fyy"] * (1 + x[..., 3])}
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if CHANGES[n][1] not in ("0", "none")])
+def test_the_change_is_enough_and_no_smaller_one_is(name):
+    """Of 40000 changes 2 % smaller, half of them near this one, none is. Rounding moves the abscissa by up to 0.012 (optimal-2)."""
+    own = bicycle(name)
+    size, trail, base, tilt, spin = (float(cell.rstrip(" %")) for cell in CHANGES[name][1:])
+    x = np.array([trail / 1e3 / own["w"], base / 1e3 / own["w"], math.radians(tilt), spin / 100])
+    assert np.linalg.norm(x) == pytest.approx(size / 100, abs=6e-5)
+    assert abscissa(changed(own, x), 4.0) == pytest.approx(DECAY, abs=0.013)
+    assert abscissa(own, 4.0) > DECAY
+    draw = np.random.default_rng(0)
+    way = draw.normal(size=(40000, 4))
+    way[::2] = x / np.linalg.norm(x) + 0.1 * way[::2]
+    nearer = 0.98 * size / 100 * way / np.linalg.norm(way, axis=1)[:, None]
+    hoop = own["I_Fyy"] * (1 + nearer[:, 3]) <= max(own["I_Fyy"], 2 * own["I_Fxx"])
+    assert (abscissa(changed(own, nearer), 4.0) > DECAY)[hoop].all()
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if CHANGES[n][1] == "0"])
+def test_what_needs_no_change_needs_no_gains(name):
+    assert abscissa(bicycle(name), 4.0) <= DECAY
+    assert GAINS[name][0] == "0"
+
+
+def least_gains(own, v):
+    """The least norm of gains with none beyond the edge and on it a real root, a pair DECAY ± iω, or both.
+
+    Each is linear in the gains for an ω; then the least over ω, refined twice.
+    """
+    if abscissa(own, v) <= DECAY:
+        return 0.0
+    M, C1, gK0, K2 = matrices(own)
+
+    def condition(s):
+        A = M * s**2 + v * C1 * s + gK0 + v**2 * K2
+        return np.array([-A[0, 1], -A[0, 1] * s, A[0, 0], A[0, 0] * s]), -np.linalg.det(A)
+
+    def least(points):
+        found = [condition(s) for s in points]
+        rows = [part for row, _ in found for part in (row.real, row.imag) if part.any()]
+        rights = [
+            part for (row, right) in found for part, of in ((right.real, row.real), (right.imag, row.imag)) if of.any()
+        ]
+        return np.linalg.lstsq(np.array(rows), np.array(rights), rcond=None)[0]
+
+    def norms(gains):
+        """Infinite where they are not enough; three roots that meet part by the cube root of rounding, 1e-5."""
+        return np.where(abscissa(own, v, gains) < DECAY + 1e-4, np.linalg.norm(gains, axis=-1), math.inf)
+
+    edge = complex(DECAY)
+    best = float(norms(least([edge])))
+    for more in ([], [edge]):
+        omegas = np.linspace(1e-3, 12, 1200)
+        for _ in range(3):
+            sizes = norms(np.array([least([edge + 1j * omega, *more]) for omega in omegas]))
+            best, omega, step = min(best, sizes.min()), omegas[sizes.argmin()], omegas[1] - omegas[0]
+            omegas = np.linspace(max(omega - step, 1e-3), omega + step, 41)
+    return best
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_gains_are_the_least(name):
+    for v, cell in ((4.0, GAINS[name][0]), (3.0, GAINS[name][5])):
+        assert float(cell) == pytest.approx(least_gains(bicycle(name), v), abs=6e-4)
+    if GAINS[name][0] != "0":
+        gains = np.array([float(cell) for cell in GAINS[name][1:5]])
+        assert np.linalg.norm(gains) == pytest.approx(float(GAINS[name][0]), abs=1.5e-3)
+        assert abscissa(bicycle(name), 4.0, gains) == pytest.approx(DECAY, abs=0.02)  # of gains with three digits
