@@ -26,6 +26,7 @@ FLOORS = (
     ("branch_and_bound",),
     ("solver",),
     ("certificates", "proofs", "explanation", "diagnosis", "fronts", "critical_speeds", "studies", "paper"),
+    ("motion",),
     ("report", "plots", "guide"),
     ("explorer",),
     ("display",),

@@ -18,6 +18,7 @@ from .fronts import Front as Front, pareto as pareto
 from .guide import Description as Description, describe as describe, schema as schema
 from .margins import Nearest as Nearest, Robustness as Robustness, nearest as nearest, robustness as robustness
 from .models import Bicycle as Bicycle, read_bicycle as read_bicycle, write_bicycle as write_bicycle
+from .motion import Simulation as Simulation, simulate as simulate
 from .paper import Comparison as Comparison, Ledger as Ledger, compare as compare, verify as verify
 from .progress import Progress as Progress
 from .proofs import Proof as Proof, prove as prove

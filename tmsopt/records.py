@@ -64,6 +64,11 @@ class Tabular(Shown, Protocol):
         return frame(self.records())
 
 
+def asked_above(name: str, *given: Any, **options: Any) -> Any:
+    """What a function of the display gives, for a result that has it as a method and knows nothing of its maker."""
+    return getattr(_display(), name)(*given, **options)
+
+
 def frame(rows: Iterable[Mapping[str, Any]] | Mapping[str, Any]) -> "DataFrame":
     """Rows, or columns by name, as a table of pandas.
 

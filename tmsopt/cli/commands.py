@@ -14,11 +14,12 @@ from tmsopt.cli.explore import explore
 from tmsopt.cli.guide.describe import describe, schema
 from tmsopt.cli.guide.files import example, new
 from tmsopt.cli.guide.import_ import convert
+from tmsopt.cli.motion.simulate import simulate
+from tmsopt.cli.motion.speeds import speeds
 from tmsopt.cli.paper.figure import figure
 from tmsopt.cli.paper.verify import verify
 from tmsopt.cli.prove import prove
 from tmsopt.cli.solve import compare, solve
-from tmsopt.cli.speeds import speeds
 from tmsopt.cli.study import study
 from tmsopt.cli.trace import trace
 from tmsopt.versions import SCHEMA, environment
@@ -106,6 +107,7 @@ def every() -> None:
       tmsopt compare problems/ep4.toml
       tmsopt prove problems/ep4.toml
       tmsopt speeds problems/whipple_benchmark.toml
+      tmsopt simulate problems/whipple_benchmark.toml --lean 5 --plot motion.png
       tmsopt trace problems/ep_set.toml --plot ep_set.png
       tmsopt chart problems/chart.toml --plot chart.png
       tmsopt study problems/study_heights.toml
@@ -121,6 +123,7 @@ for _command in (
     compare,
     prove,
     speeds,
+    simulate,
     trace,
     chart,
     study,

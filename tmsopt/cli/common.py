@@ -44,6 +44,31 @@ def bad_input() -> Iterator[None]:
         sys.exit(BAD_INPUT)
 
 
+@contextmanager
+def a_design(problem: "Problem") -> Iterator[None]:
+    """Where a problem has no design to look at, say so on stderr, with exit status 3 or 4."""
+    from tmsopt import NotSolved
+
+    try:
+        yield
+    except NotSolved as error:
+        status = error.solution.status
+        click.echo(f"{problem.title}: {status.replace('_', ' ')}; there is no design to look at", err=True)
+        raise SystemExit(INFEASIBLE if status == "infeasible" else NOT_CONVERGED) from None
+
+
+def named(option: str, given: Sequence[str], example: str) -> dict[str, str]:
+    """What an option that may be repeated gives as NAME=VALUE, by name."""
+    from tmsopt import Fault, InputError
+
+    pairs = [text.partition("=") for text in given]
+    if faults := [
+        Fault(f"found '{n}'; accepted: NAME=VALUE, such as {example}", (option,)) for n, e, _ in pairs if not e
+    ]:
+        raise InputError(faults)
+    return {name.strip(): value.strip() for name, _, value in pairs}
+
+
 def check_output(option: str, path: Path | None, endings: Sequence[str], folders: Sequence[str] = ()) -> None:
     """Refuse a file that could not be written, before any work is done; what ends in one of `folders` is a folder."""
     if path is None:

@@ -13,6 +13,7 @@ from tmsopt.cli.common import (
     answer,
     bad_input,
     check_output,
+    named,
     options,
     report_option,
     write_report,
@@ -60,7 +61,7 @@ def prove(
         from tmsopt.design import question_of
 
         check_output("--report", report, REPORTS)
-        given = _named(exact)
+        given = named("--exact", exact, "zeta_B=-1/3")
         problem = question_of(file)
         asked = options(starts=starts, seed=seed)
         solution = tmsopt.solve(problem, throw=False, interruptible=False, progress=shown(), **asked)
@@ -69,15 +70,3 @@ def prove(
     answer(as_json, lambda: heading | proof.to_json(), lambda: tmsopt.report.proof_text(problem, proof))
     write_report(proof, report, file, seed=seed, design=solution)
     sys.exit(DONE if proof.proved else NOT_CONVERGED if solution.status == "optimal" else INFEASIBLE)
-
-
-def _named(exact: tuple[str, ...]) -> dict[str, str]:
-    """Numbers of the command line by name."""
-    from tmsopt import Fault, InputError
-
-    pairs = [text.partition("=") for text in exact]
-    if faults := [
-        Fault(f"found '{n}'; accepted: NAME=VALUE, such as zeta_B=-1/3", ("--exact",)) for n, e, _ in pairs if not e
-    ]:
-        raise InputError(faults)
-    return {name.strip(): value.strip() for name, _, value in pairs}

@@ -8,7 +8,7 @@ from tmsopt.design.cases import Case
 from tmsopt.design.problem import Freedom, Problem
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.design.unit_system import unit_of, units_of
-from tmsopt.records import Shown, Table, plain
+from tmsopt.records import Shown, Table, asked_above, plain
 from tmsopt.roots import Root
 from tmsopt.units import Reading
 
@@ -258,6 +258,17 @@ class Solution(Shown):
         """The unit of each number that has one, as they are kept and as JSON has them: rad and SI."""
         text = self.problem.minimize or self.problem.maximize
         return units_of(self.problem, [text] if text else [])
+
+    def response(self, **asked: Any) -> Any:
+        """The motion of this design after a lean or a push, a `tmsopt.Simulation`: what `tmsopt.simulate` gives.
+
+        Args:
+            asked: as there: ``lean=5`` (degrees), ``push=10`` (N m s), ``seconds=3``, ``noise=1`` …
+
+        Raises:
+            InputError: for a model without matrices, or what cannot be asked of it.
+        """
+        return asked_above("response", self, **asked)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None.

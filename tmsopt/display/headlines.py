@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from tmsopt.fronts import Front
     from tmsopt.guide import Description
     from tmsopt.margins import Nearest, Robustness
+    from tmsopt.motion import Simulation
     from tmsopt.paper import Comparison, Ledger
     from tmsopt.proofs import Proof
     from tmsopt.solver import Every
@@ -80,6 +81,15 @@ def of_growth(growth: "Growth") -> Words:
     yield f"over {growth.over.name}"
     yield f"stable {_bands(growth.stable, unit_of(growth.problem, growth.over.name))}"
     yield growth.structure
+
+
+def of_motion(motion: "Simulation") -> Words:
+    """How long, and how far its first coordinates go."""
+    yield f"over {motion['t'][-1]:.4g} {motion.units.get('t', '')}".rstrip()
+    for measure in motion.measures[:2]:
+        yield f"peak {measure.name} = {measure.peak:.4g} {motion.units.get(measure.name, '')}".rstrip()
+    yield motion.structure
+    yield from _stable(motion.stable)
 
 
 def of_comparison(comparison: "Comparison") -> Words:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from tmsopt import guide, plots, report as texts
 from tmsopt.display import headlines
 from tmsopt.errors import Fault, InputError
+from tmsopt.motion import simulate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,6 +41,7 @@ WRITERS: Mapping[str, Writer] = {
     "Chart": Writer(lambda x, full: texts.chart_table(x), headlines.of_chart, "draw_chart"),
     "Speeds": Writer(lambda x, full: texts.speeds_table(x), headlines.of_speeds, "draw_speeds"),
     "Growth": Writer(lambda x, full: texts.growth_table(x), headlines.of_growth, "draw_growth"),
+    "Simulation": Writer(texts.motion_table, headlines.of_motion, "draw_motion"),
     "Comparison": Writer(lambda x, full: texts.comparison_table(x), headlines.of_comparison, "draw_comparison"),
     "Results": Writer(
         lambda x, full: texts.study_table(x.study, x.summary, x.rows, full), headlines.of_results, "draw_histogram"
@@ -120,6 +122,11 @@ def plotted(result: Any, ax: "Axes | None" = None) -> "Axes":
         figure: Any = axes.get_figure()
         Gcf._set_new_active_manager(canvas.new_manager(figure, number))
     return axes
+
+
+def response(solution: Any, **asked: Any) -> Any:
+    """The motion of a solution, for its method of that name."""
+    return simulate(solution, **asked)
 
 
 def _writer(result: Any) -> Writer:

@@ -7,6 +7,7 @@ from .meaning import (
     draw_comparison as draw_comparison, draw_designs as draw_designs, draw_ledger as draw_ledger,
     draw_robustness as draw_robustness, draw_rounding as draw_rounding,
 )
+from .motion import draw_motion as draw_motion, motion_figure as motion_figure
 from .paper.swallowtail import draw_swallowtail as draw_swallowtail
 from .roots import draw_roots as draw_roots, draw_splitting as draw_splitting
 from .speeds import draw_speeds as draw_speeds

@@ -6,6 +6,7 @@ from .curves import (
 )
 from .every import every_table as every_table
 from .ledger import ledger_page as ledger_page, ledger_table as ledger_table
+from .motion import motion_table as motion_table
 from .proof import number_rows as number_rows, proof_text as proof_text
 from .solution import (
     design_parts as design_parts, design_report as design_report, lever_cells as lever_cells,

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import INFEASIBLE, NOT_CONVERGED, answer, bad_input, nominal_of
+from tmsopt.cli.common import a_design, answer, bad_input, nominal_of
 from tmsopt.cli.terminal import shown
 
 _EXAMPLES = """
@@ -43,10 +43,6 @@ def speeds(file: Path, parameter: str | None, between: tuple[float, float] | Non
         import tmsopt
 
         problem = nominal_of(tmsopt.load(file))
-        try:
+        with a_design(problem):
             found = tmsopt.speeds(problem, parameter, between=between, progress=shown())
-        except tmsopt.NotSolved as error:
-            status = error.solution.status
-            click.echo(f"{problem.title}: {status.replace('_', ' ')}; there is no design to look at", err=True)
-            raise SystemExit(INFEASIBLE if status == "infeasible" else NOT_CONVERGED) from None
     answer(as_json, found.to_json, lambda: tmsopt.report.speeds_table(found))

@@ -1,0 +1,96 @@
+"""The command that shows what a design does after a push."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from tmsopt.cli.common import (
+    FIGURES,
+    REPORTS,
+    a_design,
+    answer,
+    bad_input,
+    check_output,
+    named,
+    nominal_of,
+    options,
+    report_option,
+    saving,
+    write_report,
+)
+from tmsopt.cli.terminal import shown
+
+_EXAMPLES = """
+\b
+Examples:
+  tmsopt simulate problems/whipple_benchmark.toml
+  tmsopt simulate problems/whipple_benchmark.toml --lean 5 --push 2 --seconds 3 --csv motion.csv --plot motion.png
+  tmsopt simulate problems/ep4.toml --push 0.001 --json
+  tmsopt simulate problems/whipple_benchmark.toml --noise 0.2 --seed 7
+  tmsopt simulate problems/ziegler.toml --start q2=0.1
+
+The linear equations of the design are solved by matrix exponentials, exact also at an exceptional point: peaks,
+overshoots, settling times, and the shape of every mode. A file that frees parameters is solved first. Where nothing is
+asked, a bicycle starts with a lean of 1 degree, a system of your own with 1 in its first coordinate. For parameters
+without units, torques are in m_B g w and times in sqrt(w/g).
+
+The table has the columns t, phi, delta, phidot, deltadot (lean and steer to the right, in s and rad), of your own
+matrices t, q1, ..., q1dot, ... or t, x1, ...
+
+Exit status: 0 done, stable or not, 2 bad input, 3 infeasible, 4 not converged.
+"""
+
+
+@click.command(epilog=_EXAMPLES)
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--lean", type=float, metavar="DEGREES", help="Lean to the right at the start.")
+@click.option("--steer", type=float, metavar="DEGREES", help="Steer to the right at the start.")
+@click.option("--push", type=float, metavar="IMPULSE", help="Of steer torque at the start, in N m s.")
+@click.option("--lean-push", type=float, metavar="IMPULSE", help="Of lean torque at the start, in N m s.")
+@click.option("--start", multiple=True, metavar="NAME=VALUE", help="Any state at the start, in rad and s: phidot=0.1.")
+@click.option("--noise", type=float, metavar="INTENSITY", help="White noise on the steer torque, in N m sqrt(s).")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the noise.")
+@click.option("--seconds", type=float, help="How long. [default: until it has settled]")
+@click.option(
+    "--points", type=click.IntRange(2, 1_000_000), default=1001, show_default=True, help="Times in the table."
+)
+@click.option("--json", "as_json", is_flag=True, help="Write JSON to stdout instead of a table.")
+@click.option("--csv", "csv_file", type=click.Path(path_type=Path), help="Write the motion.")
+@click.option("--path", "whole", is_flag=True, help="With --csv: a controller's torques and the wheels' path too.")
+@click.option("--plot", type=click.Path(path_type=Path), help="Draw the motion (png, pdf, svg).")
+@report_option
+def simulate(
+    file: Path, as_json: bool, csv_file: Path | None, whole: bool, plot: Path | None, report: Path | None,
+    start: tuple[str, ...], **asked: Any,
+) -> None:  # fmt: skip
+    """Show what the design of FILE does after a lean, a push of the handlebar, or in noise."""
+    with bad_input():
+        import tmsopt
+
+        check_output("--csv", csv_file, ("csv",))
+        check_output("--plot", plot, FIGURES)
+        check_output("--report", report, REPORTS)
+        if whole and csv_file is None:
+            raise tmsopt.InputError([tmsopt.Fault("says what --csv writes; add --csv FILE", ("--path",))])
+        states = {name: _number(name, text) for name, text in named("--start", start, "phidot=0.1").items()}
+        problem = nominal_of(tmsopt.load(file))
+        with a_design(problem):
+            found = tmsopt.simulate(problem, start=states or None, progress=shown(), **options(**asked))
+    answer(as_json, found.to_json, found.report)
+    if csv_file is not None:
+        with saving("--csv", csv_file):
+            found.write_csv(csv_file, whole=whole)
+    if plot is not None:
+        with saving("--plot", plot):
+            tmsopt.plots.save(tmsopt.plots.motion_figure(found), plot)
+    write_report(found, report, file, seed=asked["seed"])
+
+
+def _number(name: str, text: str) -> float:
+    from tmsopt import Fault, InputError
+
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError([Fault(f"found '{text}'; accepted: a number", ("--start", name))]) from None

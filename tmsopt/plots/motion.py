@@ -1,0 +1,92 @@
+"""The motion of a design over time, and the path of its wheels."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tmsopt.motion import Simulation
+from tmsopt.plots.labels import finished
+from tmsopt.plots.style import COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, new_figure, on_axes
+
+_COLOURS = (CRITICAL, MARK, REAL, HEAVY, COMPLEX, LINE)
+_LATEX = {"phi": r"lean $\varphi$", "delta": r"steer $\delta$", "T_phi": r"lean torque", "T_delta": r"steer torque"}
+_TITLE = 11
+
+
+def draw_motion(motion: Simulation, ax: Axes | None = None) -> Axes:
+    """Lean and steer in degrees over time, of a stated system its coordinates; grey where all of them have settled.
+
+    Example:
+        >>> axes = tmsopt.plots.draw_motion(tmsopt.simulate("problems/ep4.toml", lean=5))
+        >>> [line.get_label() for line in axes.get_lines()]
+        ['lean $\\\\varphi$', 'steer $\\\\delta$']
+
+    More: docs/how_to/motion.md
+    """
+    own = ax is None
+    ax = on_axes(ax, 6.4, 3.2, motion.problem.title)
+    _angles(motion, ax)
+    return finished(ax, own)
+
+
+def motion_figure(motion: Simulation) -> Figure:
+    """The same as a figure, with the torques of a controller and, from above, the path of both contacts below it.
+
+    Example:
+        >>> figure = tmsopt.plots.motion_figure(tmsopt.simulate("problems/whipple_benchmark.toml", lean=5))
+        >>> [axes.get_ylabel() for axes in figure.axes]
+        ['angle in deg', 'to the right in m']
+
+    More: docs/how_to/motion.md
+    """
+    torques = [n for n in ("T_phi", "T_delta") if n in motion.columns]
+    parts = [_angles, *([_torques] if torques else []), *([_path] if "x" in motion.columns else [])]
+    figure = new_figure(6.4, 1.0 + 2.4 * len(parts))
+    axes = figure.subplots(len(parts), 1, squeeze=False)[:, 0]
+    axes[0].set_title(motion.problem.title, fontsize=_TITLE)
+    for draw, ax in zip(parts, axes, strict=True):
+        draw(motion, ax)
+        finished(ax, False)
+    return figure
+
+
+def _angles(motion: Simulation, ax: Axes) -> None:
+    names = [m.name for m in motion.measures if not m.name.startswith("T_")]
+    bicycle = "phi" in motion.columns
+    _lines(motion, ax, names, 180 / np.pi if bicycle else 1.0)
+    ax.set_ylabel("angle in deg" if bicycle else "coordinate")
+    settled = max((m.settling for m in motion.measures), default=np.nan)  # nan if the first is
+    if settled < motion["t"][-1]:
+        ax.axvspan(settled, motion["t"][-1], color="0.93", zorder=0, label="settled within 2 %")
+
+
+def _torques(motion: Simulation, ax: Axes) -> None:
+    _lines(motion, ax, [n for n in ("T_phi", "T_delta") if n in motion.columns], 1.0)
+    ax.set_ylabel(f"torque in {motion.units['T_delta']}")
+
+
+def _path(motion: Simulation, ax: Axes) -> None:
+    x = np.asarray(motion["x"])
+    ahead = dict(_contacts(motion))
+    for (name, column), colour in zip(ahead.items(), _COLOURS, strict=False):
+        ax.plot(x, np.asarray(motion[column]), color=colour, linewidth=1.2, label=name)
+    ax.invert_yaxis()  # seen from above, ahead is to the right
+    unit = motion.units["x"]
+    ax.set(xlabel=f"way of the rear contact in {unit}", ylabel=f"to the right in {unit}")
+
+
+def _contacts(motion: Simulation) -> Iterator[tuple[str, str]]:
+    yield from (("rear contact", "y_rear"), ("front contact", "y_front"))
+
+
+def _lines(motion: Simulation, ax: Axes, names: list[str], scale: float) -> None:
+    for k, name in enumerate(names):
+        label = _LATEX.get(name, name)
+        ax.plot(np.asarray(motion["t"]), scale * np.asarray(motion[name]), color=_COLOURS[k % 6], linewidth=1.2,
+                linestyle="-" if k < 6 else "--", label=label)  # fmt: skip
+    ax.axhline(0, color="0.6", linewidth=0.6, zorder=0, label="_0")
+    ax.set_xlim(0, motion["t"][-1])
+    unit = motion.units.get("t", "")
+    ax.set_xlabel(f"time in {unit}" if unit else "time")

@@ -1,0 +1,127 @@
+"""The motion of a design as text: what set it moving, peaks, settling, shapes of modes."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+from tmsopt.motion import ModeShape, Simulation
+from tmsopt.report.text import columns
+
+_WORDS = {"phi": "lean phi", "delta": "steer delta", "T_phi": "lean torque", "T_delta": "steer torque"}
+_COUNTS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}
+_STEEP = 20.0  # degrees beyond which the equations, which are linear, say little
+_ROWS, _SHAPES = 8, 4  # of each table, coordinates of a shape, if not full
+_NOTHING = 1e-12  # of a root: a real part so small is rounding
+
+
+def motion_table(motion: Simulation, full: bool = False) -> str:
+    """What sets a design moving, peak, overshoot and settling time of each angle and torque, and the modes.
+
+    Example:
+        >>> print(tmsopt.report.motion_table(tmsopt.simulate("problems/ep4.toml", lean=5)).splitlines()[-3])
+        EP4: four modes merge in one shape...
+
+    More: docs/how_to/motion.md
+    """
+    title, time = motion.problem.title or "untitled problem", _with(motion, "t", motion["t"][-1])
+    lines = [title, f"motion over {time} {_cause(motion)}", "", *columns(_cut([*_measured(motion)], full)), ""]
+    lines += [*columns(_cut([*_modes(motion, full)], full)), "", *_notes(motion)]
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _cut(rows: list[Sequence[str]], full: bool) -> list[Sequence[str]]:
+    left = len(rows) - 1 - _ROWS
+    return rows if full or left <= 0 else [*rows[: _ROWS + 1], (f"… {left} more", *[""] * (len(rows[0]) - 1))]
+
+
+def _cause(motion: Simulation) -> str:
+    """In words."""
+    asked, time = motion.disturbance, motion.units.get("t", "")
+    torque = "N m" if time == "s" else "m_B g w"
+    said = [f"{_named(name)} = {_with(motion, name, value)}" for name, value in asked.start.items()]
+    said += [f"an impulse of {n} torque of {x:.6g} {torque} {time}" for n, x in
+             (("steer", asked.push), ("lean", asked.lean_push)) if x]  # fmt: skip
+    said = [f"from {' and '.join(said)}"] if said else ["from rest"]
+    if asked.noise:
+        root = "√s" if time == "s" else "(w/g)^(1/4)"
+        said.append(f"in white noise of steer torque of {asked.noise:.6g} {torque} {root} (seed {asked.seed})")
+    return ", ".join(said) + (", as nothing else was asked" if asked.default else "")
+
+
+def _measured(motion: Simulation) -> Iterator[Sequence[str]]:
+    noisy = bool(motion.disturbance.noise)
+    yield ("", "peak", "at", *(("in the long run",) if noisy else ("overshoot", "settled within 2 % at")))
+    for m in motion.measures:
+        rest: tuple[str, ...] = (f"{100 * m.overshoot:.3g} %", _with(motion, "t", m.settling))
+        if noisy:
+            deviation = motion.deviations.get(m.name, math.nan)
+            rest = (f"± {_with(motion, m.name, deviation)}" if math.isfinite(deviation) else "none",)
+        yield _named(m.name), _with(motion, m.name, m.peak), _with(motion, "t", m.at), *rest
+
+
+def _modes(motion: Simulation, full: bool) -> Iterator[Sequence[str]]:
+    bicycle = "phi" in motion.columns
+    unit = {"s": "1/s", "√(w/g)": "√(g/w)"}.get(motion.units.get("t", ""), "")
+    heads = ("steer per lean", "steer ahead of lean") if bicycle else ("amplitudes and phases",)
+    yield f"root {unit}".rstrip(), *heads
+    for mode in motion.modes:
+        times = f" ({mode.multiplicity}-fold)" if mode.multiplicity > 1 else ""
+        re = 0.0 if abs(mode.re) < _NOTHING * abs(mode.im) else mode.re
+        root = f"{re:.6g}" + (f" ± {mode.im:.6g}i" if mode.im else "") + times
+        if bicycle:
+            ratio = f"{mode.steer_per_lean:.4g}" if math.isfinite(mode.steer_per_lean) else "no lean"
+            yield root, ratio, _degrees(mode.phases["delta"])
+        else:
+            said = [f"{n} {x:.3g} at {_degrees(mode.phases[n])}" for n, x in mode.amplitudes.items() if x]
+            left = len(said) - _SHAPES
+            yield root, ", ".join(said if full or left <= 0 else [*said[:_SHAPES], f"… {left} more"])
+
+
+def _notes(motion: Simulation) -> Iterator[str]:
+    noisy = bool(motion.disturbance.noise)
+    merged = {(m.re, m.im): m for m in motion.modes if m.multiplicity > 1}
+    yield from map(_merging, merged.values())
+    if merged:
+        yield "roots: of the ideal design; motion: of the design as stored, which rounding moves by no more than itself"
+    if not motion.stable:
+        yield "not stable: it does not settle, and peaks are those of the time shown"
+    elif not noisy:
+        yield "stable; peaks, overshoots and settling times are those of the whole motion, however long is shown"
+    if "x" in motion.columns:
+        end = {n: column[-1] for n, column in motion.columns.items()}
+        side = "right" if end["y_rear"] >= 0 else "left"
+        where = f"{_with(motion, 'x', end['x'])} on, {_with(motion, 'y_rear', abs(end['y_rear']))} to the {side}"
+        turned = "right" if end["psi"] >= 0 else "left"
+        yield f"at the end: {where}, heading {_with(motion, 'psi', abs(end['psi']))} to the {turned}"
+        angles = [abs(m.peak) for m in motion.measures if motion.units.get(m.name) == "rad"]
+        if max(angles) > math.radians(_STEEP):
+            yield f"beyond {_STEEP:.0f} deg the equations, which are linear, tell what a smaller push does, enlarged"
+
+
+def _merging(mode: ModeShape) -> str:
+    k, chains = mode.multiplicity, mode.partial
+    name = f"{'C' if mode.im else ''}EP{k}"
+    many = _COUNTS.get(k, str(k))
+    if mode.geometric == k:
+        return f"{many} roots meet and keep {many} shapes: no chain, no power of t"
+    if mode.geometric > 1:
+        return f"{many} roots meet in {mode.geometric} shapes, Jordan chains of {', '.join(map(str, chains))}"
+    top = "t" if k == 2 else f"t^{k - 1}"
+    return f"{name}: {many} modes merge in one shape, a Jordan chain of {k}: the motion has terms up to {top} e^(st)"
+
+
+def _named(name: str) -> str:
+    return _WORDS.get(name, name)
+
+
+def _with(motion: Simulation, name: str, value: float) -> str:
+    """A number with its unit, angles in degrees."""
+    unit = motion.units.get(name, "")
+    if not math.isfinite(value):
+        return "none"
+    if unit.startswith("rad"):
+        value, unit = math.degrees(value), unit.replace("rad", "deg")
+    return f"{value + 0.0:.5g} {unit}".rstrip()
+
+
+def _degrees(value: float) -> str:
+    return f"{value + 0.0:.4g} deg" if math.isfinite(value) else "none"
