@@ -1,5 +1,7 @@
 """x′ = A x by matrix exponentials, which are smooth where eigenvectors merge: nothing here needs an eigenvector."""
 
+import math
+
 import numpy as np
 from scipy.linalg import expm, solve_continuous_lyapunov
 
@@ -25,13 +27,18 @@ def at_times(A: Array, x: Array, times: Array) -> Array:
 def shaken(A: Array, x: Array, force: Array, step: float, count: int, seed: int) -> Array:
     """A path of dx = A x dt + b dW at the times k h, b the `force`: no step is too long, for each is exact.
 
-    The covariance of a step, ∫ e^(As) b bᵀ e^(Aᵀs) ds from 0 to h, is a block of one exponential (Van Loan 1978).
+    The covariance Q(h) = ∫ e^(As) b bᵀ e^(Aᵀs) ds from 0 to h is a block of one exponential (Van Loan 1978), of a part
+    of the step in which e^(−As) does not grow, and Q(2s) = Q(s) + e^(As) Q(s) e^(Aᵀs).
     """
     n = len(A)
+    halvings = max(0, math.ceil(math.log2(np.linalg.norm(A, 2) * step + 1e-300)))
     whole = np.block([[-A, np.outer(force, force)], [np.zeros((n, n)), A.T]])
-    power = expm(whole * step)
+    power = expm(whole * (step / 2**halvings))
     forward = power[n:, n:].T
     covariance = forward @ power[:n, n:]
+    for _ in range(halvings):
+        covariance = covariance + forward @ covariance @ forward.T
+        forward = forward @ forward
     sizes, axes = np.linalg.eigh((covariance + covariance.T) / 2)
     root = axes * np.sqrt(np.maximum(sizes, 0.0))
     steps = np.random.default_rng(seed).standard_normal((count - 1, n)) @ root.T
@@ -44,5 +51,4 @@ def shaken(A: Array, x: Array, force: Array, step: float, count: int, seed: int)
 
 def stationary(A: Array, force: Array) -> Array:
     """The covariance Σ of x in the long run of dx = A x dt + b dW: A Σ + Σ Aᵀ + b bᵀ = 0; A must be stable."""
-    found: Array = solve_continuous_lyapunov(A, -np.outer(force, force))
-    return found
+    return np.asarray(solve_continuous_lyapunov(A, -np.outer(force, force)), dtype=float)

@@ -1,12 +1,12 @@
 """What an engineer reads off a motion: peak, overshoot, settling time, refined so that no step of a grid is in them."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from tmsopt.motion.flow import at_times, sampled
@@ -78,10 +78,7 @@ def measured(name: str, row: Array, on: Watched, settles: bool) -> Measure:
     """
     values, slopes = on.states @ row, on.states @ on.A.T @ row
     turns = np.flatnonzero(slopes[:-1] * slopes[1:] < 0)
-    at, peak = _largest(row, on, turns, values, 1.0 if values.max() >= -values.min() else -1.0)
-    other = _largest(row, on, turns, values, -1.0 if values.max() >= -values.min() else 1.0)
-    if abs(other[1]) > abs(peak):
-        (at, peak), other = other, (at, peak)
+    at, peak = max((_largest(row, on, turns, values, sign) for sign in (1.0, -1.0)), key=lambda each: abs(each[1]))
     if peak == 0:
         return Measure(name, 0.0, 0.0, 0.0, 0.0 if settles else math.nan)
     after = turns[on.times[turns + 1] > at]
@@ -91,7 +88,7 @@ def measured(name: str, row: Array, on: Watched, settles: bool) -> Measure:
     return Measure(name, peak, at, overshoot, settling)
 
 
-def _largest(row: Array, on: Watched, turns: Array, values: Array, sign: float) -> tuple[float, float]:
+def _largest(row: Array, on: Watched, turns: NDArray[np.intp], values: Array, sign: float) -> tuple[float, float]:
     """Time and value of the greatest sign · c x: at an end of the grid, or at a turn, found exactly."""
     best = int(np.argmax(sign * values))
     found = [(float(on.times[best]), float(values[best]))]
@@ -108,7 +105,7 @@ def _turn(row: Array, on: Watched, k: int) -> tuple[float, float]:
     return float(on.times[k] + own), _after(on.A, on.states[k], row, own)
 
 
-def _settling(row: Array, on: Watched, turns: Sequence[int] | Array, values: Array, within: float) -> float:
+def _settling(row: Array, on: Watched, turns: NDArray[np.intp], values: Array, within: float) -> float:
     """When |c x| was above the limit for the last time; nan where it still is at the end."""
     above = np.flatnonzero(np.abs(values) > within)
     if not above.size:

@@ -67,6 +67,7 @@ def mode_shapes(
     chains = {(d.re, d.im): d for d in diagnosed(model, of, parameters, structure)}
     roots: dict[tuple[float, float], Root] = {(r.re, abs(r.im)): r for r in structure.roots}
     found = []
+    partial: tuple[int, ...]
     for (re, im), root in sorted(roots.items(), key=lambda item: (-item[0][0], -item[0][1])):
         chain = min(chains.values(), key=lambda d: math.hypot(d.re - re, d.im - im), default=None)
         s, geometric, partial = complex(re, im), 1, (1,)

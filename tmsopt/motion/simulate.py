@@ -15,7 +15,7 @@ from tmsopt.disk import write_csv
 from tmsopt.errors import Fault, InputError
 from tmsopt.motion.asked import Disturbance, asked_for
 from tmsopt.motion.flow import sampled, shaken, stationary
-from tmsopt.motion.measures import Watched, Measure, grid, measured
+from tmsopt.motion.measures import Measure, Watched, grid, measured
 from tmsopt.motion.modes import ModeShape, mode_shapes
 from tmsopt.motion.system import ANGLES, RATES, System, matrices_of, system_of
 from tmsopt.progress import Listener, counted
@@ -138,10 +138,10 @@ def simulate(
         InputError: for a model without matrices, or what cannot be asked of it.
 
     Example:
-        >>> ridden = tmsopt.simulate("problems/whipple_benchmark.toml", lean=5)
-        >>> lean = next(m for m in ridden.measures if m.name == "phi")
-        >>> ridden.stable, f"{math.degrees(lean.peak):.6f}", lean.at
-        (True, '5.000000', 0.0)
+        >>> swing = tmsopt.models.from_matrices(M=[[1]], D=[["c"]], K=[[1]])
+        >>> pushed = tmsopt.simulate(tmsopt.Problem(swing, fixed={"c": 2.0}), start={"q1dot": 1})  # q = t e^(-t)
+        >>> [f"{x:.6f}" for x in (pushed.measures[0].peak, math.exp(-1))], pushed.structure
+        (['0.367879', '0.367879'], 'EP2')
 
     More: docs/how_to/motion.md
     """
@@ -179,9 +179,10 @@ def simulate(
     if rest:
         columns["x"] = Column(system.speed * times)
     modes = mode_shapes(asked, own, structure, rate)
+    deviations = _deviations(system, force) if noise and stable else Table[float]()
     units = Table({n: system.units[n] for n in columns if n in system.units})
     return Simulation(
-        asked, Table(own), disturbance, Table(columns), units, measures, _deviations(system, force) if noise and stable else Table(), modes, structure.name, stable,
+        asked, Table(own), disturbance, Table(columns), units, measures, deviations, modes, structure.name, stable,
         (*rest, *(("x",) if rest else ())),
     )  # fmt: skip
 
