@@ -26,6 +26,7 @@ VERBS: list[tuple[str, Callable[..., Any]]] = [
     ("proving to 30 digits", lambda **told: tmsopt.prove(optimum(), **told)),
     ("comparing", lambda **told: tmsopt.compare(EP4, **told)),
     ("isolating speeds", lambda **told: tmsopt.speeds(optimum(), **told)),
+    ("following the motion", lambda **told: tmsopt.simulate(optimum(), **told)),
     ("searching", lambda **told: tmsopt.speeds("problems/realistic.toml", **told)),
     ("following the roots", lambda **told: tmsopt.growth(EP4, **told)),
     ("looking for the nearest boundaries", lambda **told: tmsopt.robustness(optimum(), **told)),

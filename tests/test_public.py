@@ -31,6 +31,7 @@ ASKED: dict[str, Callable[[Any], Any]] = {
     "optimality": lambda given: tmsopt.optimality(given).verdict,
     "diagnose": tmsopt.diagnose,
     "growth": lambda given: tmsopt.growth(given).stable,
+    "simulate": lambda given: tmsopt.simulate(given, lean=5).columns,
 }
 """Verbs about a design: a problem is solved first."""
 

@@ -351,6 +351,7 @@ WORDS = CHEAP | {
     "compare": f"compare {PROBLEMS}/ep4.toml",
     "prove": f"prove {PROBLEMS}/ep4.toml",
     "speeds": f"speeds {PROBLEMS}/whipple_benchmark.toml",
+    "simulate": f"simulate {PROBLEMS}/whipple_benchmark.toml --csv out/m.csv --plot out/m.pdf",
     "trace": f"trace {PROBLEMS}/off_law.toml --csv out/t.csv --plot out/t.pdf",
     "chart": f"chart {PROBLEMS}/chart.toml --points 30x20 --plot out/c.png --output out/c.npz",
     "folder": f"chart {PROBLEMS}/chart.toml --points 30x20 --output out/c.chart",

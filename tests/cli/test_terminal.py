@@ -87,6 +87,7 @@ COMMANDS: dict[str, tuple[str, set[str]]] = {
     "prove": ("prove {p}/ep4.toml", {"searching", "proving to 30 digits"}),
     "explore": ("explore {p}/ep4.toml -o page.html", {"looking for designs worth going to", "writing the page"}),
     "compare": ("compare {p}/ep4.toml", {"searching", "comparing"}),
+    "simulate": ("simulate {p}/realistic.toml", {"searching", "following the motion"}),
     "speeds": ("speeds {p}/realistic.toml", {"searching", "isolating speeds"}),
     "verify": ("verify --only tab1-*", {"recomputing claims"}),
 }

@@ -4,6 +4,7 @@ import math
 import pickle
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,10 @@ from scipy.integrate import solve_ivp
 
 import tmsopt
 from tmsopt.models import canonical, from_matrices, matrices, tms, whipple
-from tmsopt.models.model import Feedback
 from tmsopt.motion import system_of
 from tmsopt.records import Array
 
+Feedback = import_module("tmsopt.models.model").Feedback
 PROBLEMS = Path(__file__).parents[2] / "problems"
 BENCHMARK, EP4 = PROBLEMS / "whipple_benchmark.toml", PROBLEMS / "ep4.toml"
 STATES = ("phi", "delta", "phidot", "deltadot")

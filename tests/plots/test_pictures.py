@@ -412,13 +412,13 @@ def results(whipple, chart):
         "domain": chart.domain, "trace": tmsopt.trace("problems/ep_set.toml", starts=2),
         "speeds": tmsopt.speeds(whipple), "rounding": tmsopt.explain(ep4), "robustness": tmsopt.nearest(ep4, "weave"),
         "splitting": tmsopt.diagnose(ep4)[0], "comparison": tmsopt.compare(ep4), "bicycle": ep4,
-        "ledger": tmsopt.verify(only=["epset*"]), "designs": tmsopt.solve_all("problems/ep4_matching.toml"),
+        "motion": tmsopt.simulate(ep4, lean=5), "ledger": tmsopt.verify(only=["epset*"]), "designs": tmsopt.solve_all("problems/ep4_matching.toml"),
     }  # fmt: skip
 
 
 NAMES = (
     "growth", "frequencies", "roots", "chart", "domain", "trace", "speeds", "rounding", "robustness", "splitting",
-    "comparison", "bicycle", "ledger", "designs",
+    "comparison", "bicycle", "motion", "ledger", "designs",
 )  # fmt: skip
 
 
