@@ -54,7 +54,7 @@ class Simulation(Tabular):
         >>> pushed = tmsopt.simulate("problems/whipple_benchmark.toml", push=1, seconds=5)
         >>> jump = [pushed.columns[name][0] for name in ("phidot", "deltadot")]  # M⁻¹ (0, 1)
         >>> M = tmsopt.models.canonical(pushed.parameters)[0]
-        >>> [round(sum(m * x for m, x in zip(row, jump)), 9) + 0.0 for row in M]
+        >>> [round(float(sum(m * x for m, x in zip(row, jump))), 9) + 0.0 for row in M]
         [0.0, 1.0]
 
     More: docs/how_to/motion.md

@@ -20,8 +20,8 @@ def draw_motion(motion: Simulation, ax: Axes | None = None) -> Axes:
 
     Example:
         >>> axes = tmsopt.plots.draw_motion(tmsopt.simulate("problems/ep4.toml", lean=5))
-        >>> [line.get_label() for line in axes.get_lines()]
-        ['lean $\\\\varphi$', 'steer $\\\\delta$']
+        >>> axes.get_legend_handles_labels()[1]
+        ['lean $\\\\varphi$', 'steer $\\\\delta$', 'settled within 2 %']
 
     More: docs/how_to/motion.md
     """

@@ -17,7 +17,7 @@ def motion_table(motion: Simulation, full: bool = False) -> str:
     """What sets a design moving, peak, overshoot and settling time of each angle and torque, and the modes.
 
     Example:
-        >>> print(tmsopt.report.motion_table(tmsopt.simulate("problems/ep4.toml", lean=5)).splitlines()[-3])
+        >>> print(tmsopt.report.motion_table(tmsopt.simulate("problems/ep4.toml", lean=5)).splitlines()[-4])
         EP4: four modes merge in one shape...
 
     More: docs/how_to/motion.md
