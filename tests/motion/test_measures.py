@@ -99,6 +99,26 @@ def test_a_root_far_to_the_left_hides_no_peak() -> None:
     assert found.peak == pytest.approx((math.exp(-at) - math.exp(-1000 * at)) / 999, rel=1e-12)
 
 
+@pytest.mark.parametrize("damping", [1e-4, 50.0, 1e3])
+def test_slow_decay_is_followed_to_its_end(damping: float) -> None:
+    """Of an overdamped one the slow root alone is left, e^(s t)/(1 − s/f): s = −ζ + √(ζ² − 1), f the fast one."""
+    (found,) = tmsopt.simulate(spring(damping), start={"q1": 1}).measures
+    if damping < 1:  # within half a period of its envelope
+        assert found.settling == pytest.approx(math.log(50) / damping, abs=math.pi)
+        return
+    slow = -1 / (damping + math.sqrt(damping**2 - 1))
+    amplitude = 1 / (1 - slow * slow)  # f s = 1
+    assert found.settling == pytest.approx(math.log(50 * amplitude) / -slow, rel=1e-8)  # rounding is relative to f
+
+
+def test_what_dies_out_too_slowly_is_said() -> None:
+    motion = tmsopt.simulate(spring(1e-9), start={"q1": 1})
+    assert motion.stable
+    assert math.isnan(motion.measures[0].settling)
+    assert "stable, but it dies out too slowly for a settling time" in str(motion)
+    assert len(tmsopt.plots.draw_motion(motion).patches) == 0
+
+
 # White noise
 
 

@@ -356,3 +356,13 @@ def test_growth_beyond_all_numbers_is_refused() -> None:
     motion = tmsopt.simulate(falling)
     assert (motion.stable, motion.to_json()["measures"]["q1"]["settling"]) == (False, None)
     assert np.array(motion["q1"]) == pytest.approx(np.cosh(2 * np.array(motion["t"])), rel=1e-12)
+
+
+def test_a_mass_alone_rolls_on() -> None:
+    """Both roots 0, one chain: q = q′(0) t."""
+    alone = tmsopt.Problem(from_matrices(M=[["m"]], K=[[0]]), fixed={"m": 3.0})
+    motion = tmsopt.simulate(alone, start={"q1dot": 2}, seconds=7)
+    assert np.array(motion["q1"]) == pytest.approx(2 * np.array(motion["t"]), rel=1e-14)
+    assert [(m.multiplicity, m.partial) for m in motion.modes] == [(2, (2,))]
+    (found,) = tmsopt.diagnose(alone)
+    assert [(r.parameter, r.unmoved, r.laws) for r in found.responses] == [("m", 2, ())]

@@ -65,7 +65,7 @@ def branches(terms: Sequence[Sequence[complex]]) -> tuple[tuple[Branches, ...], 
         q = width // gcd(width, drop)
         polynomial = [complex(terms[m1 - i * q * drop // width][j1 + i * q]) for i in reversed(range(width // q + 1))]
         found.append(Branches(width, drop * q // width, q, _roots(np.array(polynomial))))
-    return tuple(sorted(found, key=lambda b: b.exponent)), hull[0][0]
+    return tuple(sorted(found, key=lambda b: b.exponent)), hull[0][0] if hull else k  # all roots 0, whatever changes
 
 
 def _roots(polynomial: NDArray[np.complex128]) -> tuple[complex, ...]:

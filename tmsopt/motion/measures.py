@@ -15,7 +15,7 @@ from tmsopt.records import Array, plain
 SETTLED = 0.02
 """Share of the peak within which a motion counts as settled."""
 
-_FINEST, _LEAST, _MOST = 24, 1024, 2**17  # points of a period of the fastest oscillation; points of a grid
+FINEST, _LEAST, MOST = 24, 1024, 2**19  # points of a period of the fastest oscillation; points of a grid
 _EARLY = 256  # further points before the first of the grid, where fast roots die out
 _NEAR = 0.95  # of the largest sample: a peak between samples may be that much larger
 
@@ -60,7 +60,7 @@ def grid(A: Array, x: Array, end: float, fastest: float, largest: float) -> Watc
         fastest: greatest |Im s|.
         largest: greatest |s|.
     """
-    count = int(min(max(_FINEST * fastest * end / (2 * math.pi), _LEAST), _MOST)) + 1
+    count = int(min(max(FINEST * fastest * end / (2 * math.pi), _LEAST), MOST)) + 1
     step = end / (count - 1)
     times, states = np.linspace(0.0, end, count), sampled(A, x, step, count)
     if largest * step > 0.1:

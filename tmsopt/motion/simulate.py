@@ -15,7 +15,7 @@ from tmsopt.disk import write_csv
 from tmsopt.errors import Fault, InputError
 from tmsopt.motion.asked import Disturbance, asked_for
 from tmsopt.motion.flow import sampled, shaken, stationary
-from tmsopt.motion.measures import Measure, Watched, grid, measured
+from tmsopt.motion.measures import FINEST, MOST, Measure, Watched, grid, measured
 from tmsopt.motion.modes import ModeShape, mode_shapes
 from tmsopt.motion.system import ANGLES, RATES, System, matrices_of, system_of
 from tmsopt.progress import Listener, counted
@@ -25,7 +25,8 @@ from tmsopt.solver.solve import solve
 
 _DECAYS, _GROWTHS, _RADIANS = 10.0, 3.0, 200.0  # times of a motion that is watched, in times 1/|abscissa| and 1/|s|
 _DOUBLINGS, _STILL = 8, 0.002  # of a stable one, until the second half is so much smaller than its peak
-_NO_DECAY = 1e-9  # of the largest root: a real part that stands for 0
+_NO_GROWTH, _ROUNDING = 1e-9, 1e-15  # of the largest root: a real part that stands for 0
+_SLOW = _DECAYS * FINEST / (2 * math.pi * MOST)  # of the fastest oscillation: decay that no grid can follow to its end
 _AFTER = 1.2  # times the settling time
 _LARGEST = 600.0  # powers of e by which a motion may grow
 
@@ -42,7 +43,7 @@ class Simulation(Tabular):
             ``y_front`` to the right; of a stated system ``q1 … q1dot …`` or ``x1 …``.
         units: of each column that has one: s, rad, N m, m; of dimensionless parameters √(w/g), rad, m_B g w, w.
         measures: of each coordinate and torque; of the whole motion where the design is stable, else of the time
-            shown; in noise of the times shown.
+            shown, as where it dies out so slowly that 20 000 oscillations do not show it; in noise of the times shown.
         deviations: in noise, standard deviations of the long run; empty where there are none, as of a design that is
             not stable.
         modes: shapes of the modes, rightmost first.
@@ -205,10 +206,10 @@ def _watched(
         accepted = f"accepted: up to {_LARGEST / abscissa:.4g}, in which it grows by e^{_LARGEST:.0f}"
         raise InputError([Fault(f"found {seconds:.6g} of a design that is not stable; {accepted}", ("seconds",))])
     ending = _RADIANS / largest if largest else 10.0
-    if not stable or abscissa > -_NO_DECAY * largest:
-        if abscissa > _NO_DECAY * largest:
+    if not stable or -abscissa < max(_SLOW * fastest, _ROUNDING * largest):
+        if abscissa > _NO_GROWTH * largest:
             ending = min(ending, _GROWTHS / abscissa)
-        ending = ending if seconds is None else seconds
+        ending = _rounded_up(ending) if seconds is None else seconds
         return stable, ending, grid(system.A, x, ending, fastest, largest)
     ending, rows = _DECAYS / -abscissa, [system.rows[name] for name in system.coordinates]
     for _ in range(_DOUBLINGS):
@@ -220,7 +221,7 @@ def _watched(
     if seconds is None:
         settled = [measured("", row, on, True).settling for row in rows]
         last = max((s for s in settled if s > 0), default=ending)
-        seconds = ending if noisy or not last else _rounded_up(_AFTER * last)
+        seconds = _rounded_up(ending if noisy else _AFTER * last)
     return stable, seconds, on
 
 

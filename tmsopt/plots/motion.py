@@ -57,7 +57,7 @@ def _angles(motion: Simulation, ax: Axes) -> None:
     bicycle = "phi" in motion.columns
     _lines(motion, ax, names, 180 / np.pi if bicycle else 1.0)
     ax.set_ylabel("angle in deg" if bicycle else "coordinate")
-    settled = max((m.settling for m in motion.measures), default=np.nan)  # nan if the first is
+    settled = np.max([m.settling for m in motion.measures])  # nan if one is
     if settled < motion["t"][-1]:
         ax.axvspan(settled, motion["t"][-1], color="0.93", zorder=0, label="settled within 2 %")
 

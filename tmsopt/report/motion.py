@@ -84,6 +84,8 @@ def _notes(motion: Simulation) -> Iterator[str]:
         yield "roots: of the ideal design; motion: of the design as stored, which rounding moves by no more than itself"
     if not motion.stable:
         yield "not stable: it does not settle, and peaks are those of the time shown"
+    elif not noisy and any(math.isnan(m.settling) for m in motion.measures):
+        yield "stable, but it dies out too slowly for a settling time: peaks are those of the time shown"
     elif not noisy:
         yield "stable; peaks, overshoots and settling times are those of the whole motion, however long is shown"
     if "x" in motion.columns:
