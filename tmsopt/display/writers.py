@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 from tmsopt import guide, plots, report as texts
 from tmsopt.display import headlines
 from tmsopt.errors import Fault, InputError
-from tmsopt.motion import simulate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -126,6 +125,8 @@ def plotted(result: Any, ax: "Axes | None" = None) -> "Axes":
 
 def response(solution: Any, **asked: Any) -> Any:
     """The motion of a solution, for its method of that name."""
+    from tmsopt.motion import simulate  # and SciPy, which to show a result takes not
+
     return simulate(solution, **asked)
 
 

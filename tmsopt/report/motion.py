@@ -2,9 +2,12 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
-from tmsopt.motion import ModeShape, Simulation
 from tmsopt.report.text import columns
+
+if TYPE_CHECKING:
+    from tmsopt.motion import ModeShape, Simulation
 
 _WORDS = {"phi": "lean phi", "delta": "steer delta", "T_phi": "lean torque", "T_delta": "steer torque"}
 _COUNTS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}
@@ -13,7 +16,7 @@ _ROWS, _SHAPES = 8, 4  # of each table, coordinates of a shape, if not full
 _NOTHING = 1e-12  # of a root: a real part so small is rounding
 
 
-def motion_table(motion: Simulation, full: bool = False) -> str:
+def motion_table(motion: "Simulation", full: bool = False) -> str:
     """What sets a design moving, peak, overshoot and settling time of each angle and torque, and the modes.
 
     Example:
@@ -33,7 +36,7 @@ def _cut(rows: list[Sequence[str]], full: bool) -> list[Sequence[str]]:
     return rows if full or left <= 0 else [*rows[: _ROWS + 1], (f"… {left} more", *[""] * (len(rows[0]) - 1))]
 
 
-def _cause(motion: Simulation) -> str:
+def _cause(motion: "Simulation") -> str:
     """In words."""
     asked, time = motion.disturbance, motion.units.get("t", "")
     torque = "N m" if time == "s" else "m_B g w"
@@ -47,7 +50,7 @@ def _cause(motion: Simulation) -> str:
     return ", ".join(said) + (", as nothing else was asked" if asked.default else "")
 
 
-def _measured(motion: Simulation) -> Iterator[Sequence[str]]:
+def _measured(motion: "Simulation") -> Iterator[Sequence[str]]:
     noisy = bool(motion.disturbance.noise)
     yield ("", "peak", "at", *(("in the long run",) if noisy else ("overshoot", "settled within 2 % at")))
     for m in motion.measures:
@@ -58,7 +61,7 @@ def _measured(motion: Simulation) -> Iterator[Sequence[str]]:
         yield _named(m.name), _with(motion, m.name, m.peak), _with(motion, "t", m.at), *rest
 
 
-def _modes(motion: Simulation, full: bool) -> Iterator[Sequence[str]]:
+def _modes(motion: "Simulation", full: bool) -> Iterator[Sequence[str]]:
     bicycle = "phi" in motion.columns
     unit = {"s": "1/s", "√(w/g)": "√(g/w)"}.get(motion.units.get("t", ""), "")
     heads = ("steer per lean", "steer ahead of lean") if bicycle else ("amplitudes and phases",)
@@ -76,7 +79,7 @@ def _modes(motion: Simulation, full: bool) -> Iterator[Sequence[str]]:
             yield root, ", ".join(said if full or left <= 0 else [*said[:_SHAPES], f"… {left} more"])
 
 
-def _notes(motion: Simulation) -> Iterator[str]:
+def _notes(motion: "Simulation") -> Iterator[str]:
     noisy = bool(motion.disturbance.noise)
     merged = {(m.re, m.im): m for m in motion.modes if m.multiplicity > 1}
     yield from map(_merging, merged.values())
@@ -99,7 +102,7 @@ def _notes(motion: Simulation) -> Iterator[str]:
             yield f"beyond {_STEEP:.0f} deg the equations, which are linear, tell what a smaller push does, enlarged"
 
 
-def _merging(mode: ModeShape) -> str:
+def _merging(mode: "ModeShape") -> str:
     k, chains = mode.multiplicity, mode.partial
     name = f"{'C' if mode.im else ''}EP{k}"
     many = _COUNTS.get(k, str(k))
@@ -115,7 +118,7 @@ def _named(name: str) -> str:
     return _WORDS.get(name, name)
 
 
-def _with(motion: Simulation, name: str, value: float) -> str:
+def _with(motion: "Simulation", name: str, value: float) -> str:
     """A number with its unit, angles in degrees."""
     unit = motion.units.get(name, "")
     if not math.isfinite(value):
