@@ -37,7 +37,8 @@ def controlled(model: Model, names: Iterable[str]) -> Model:
 
     More: docs/how_to/feedback.md
     """
-    return _controlled(model.name, names_of(names)) if model.name in MODELS else model
+    own = MODELS.get(model.name) is model or (model.origin is not None and model.origin[0] is _controlled)
+    return _controlled(model.name, names_of(names)) if own else model
 
 
 def gain_names(name: str) -> tuple[str, ...]:
