@@ -10,6 +10,7 @@ import numpy as np
 from tmsopt.design.problem import Problem
 from tmsopt.errors import Fault, InputError
 from tmsopt.models import Model
+from tmsopt.models.bicycles.bicycle import contact_path
 from tmsopt.models.model import Feedback
 from tmsopt.records import Array, Table
 
@@ -71,9 +72,8 @@ def matrices_of(model: Model) -> Any:
 def system_of(problem: Problem, parameters: Mapping[str, float]) -> System:
     """The linear system of a design, in SI where the problem is written so, else in the model's own units.
 
-    M q″ + D q′ + K q = 0 becomes x′ = A x, x = (q, q′); two matrices I, −A are it already. Of a bicycle the yaw
-    ψ′ = (v δ + c δ′) cos λ_s / w and the rear contact y′ = v ψ are further states, so that they are exact too; the
-    front contact is at y + w ψ − c δ cos λ_s.
+    M q″ + D q′ + K q = 0 becomes x′ = A x, x = (q, q′); two matrices I, −A are it already. Of a bicycle the yaw and
+    the rear contact of `contact_path` are further states, so that they are exact too.
 
     Raises:
         InputError: without matrices, or where the mass matrix cannot be inverted.
@@ -107,16 +107,15 @@ def _bicycle(A: Array, mass: Array, feedback: Feedback | None, native: Mapping[s
     driven = () if feedback is None else tuple(TORQUES[k] for k in sorted(feedback.driven))
     lagged = feedback is not None and feedback.lag is not None
     names = (*ANGLES, *RATES, *(driven if lagged else ()))
-    w, v, c = float(native.get("w", 1.0)), float(native["v" if "v" in native else "Fr"]), float(native.get("c", 0.0))
-    cosine = math.cos(native["lambda_s"])
+    yaw, yaw_of_rate, v, w, aside = map(float, contact_path(native))
     n = len(names)
     whole = np.zeros((n + 2, n + 2))
     whole[:n, :n] = A
-    whole[n, [1, 3]] = v * cosine / w, c * cosine / w
+    whole[n, [1, 3]] = yaw, yaw_of_rate
     whole[n + 1, n] = v
     unit = np.eye(n + 2)
     rows = {**dict(zip(names, unit, strict=False)), "psi": unit[n], "y_rear": unit[n + 1]}
-    rows["y_front"] = unit[n + 1] + w * unit[n] - c * cosine * unit[1]
+    rows["y_front"] = unit[n + 1] + w * unit[n] + aside * unit[1]
     if feedback is not None and not lagged:
         gains = np.hstack([np.array(feedback.gains, dtype=float), np.zeros((2, 2))])
         rows |= {TORQUES[k]: -gains[k] for k in sorted(feedback.driven)}
