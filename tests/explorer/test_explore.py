@@ -101,7 +101,9 @@ def test_what_it_saves_is_the_same_system(path: Path, tmp_path: Path) -> None:
     assert again.title == problem.title
     assert again.constraints == problem.constraints
     assert dict(again.fixed) == values
-    assert [*map(float, again.values(values).coefficients)] == [*map(float, problem.values(values).coefficients)]
+    assert again.model.statement == problem.model.statement
+    if problem.model.carrier is None:  # which that of a complex system chooses for its ranges
+        assert [*map(float, again.values(values).coefficients)] == [*map(float, problem.values(values).coefficients)]
 
 
 @pytest.mark.parametrize("path", PLAIN, ids=lambda p: p.stem)

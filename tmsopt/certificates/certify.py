@@ -147,7 +147,7 @@ def _next(proved: float, failed: float, converged: bool) -> float | None:
 def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     """No design was found: the proof that there is none, or one after all."""
     clock.note = "whether there is any design"
-    anything = Question(design.problem, _cases(design), None, unit_of(design.roots))
+    anything = Question(design.problem, _cases(design), None, unit_of(design.of_polynomial.roots))
     answered = answer(anything, clock, 1.0, partial(confirmed, design, _cases(design)))
     if answered.better is not None:
         return answered.better, True
@@ -196,7 +196,7 @@ def _over_the_box(design: Solution) -> Bound:
 def _question(design: Solution, level: float) -> Question:
     """Whether any design is better by a gap of some level."""
     limit = design.value - design.problem.sign * _gap(design.value, level)
-    return Question(design.problem, _cases(design), limit, unit_of(design.roots))
+    return Question(design.problem, _cases(design), limit, unit_of(design.of_polynomial.roots))
 
 
 def _bound(design: Solution, level: float, clock: Clock) -> Bound:

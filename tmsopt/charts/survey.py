@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -136,6 +136,8 @@ class Survey:
                 if values[name] is not whole:
                     whole[...] = values[name]
             found = classified(list(a), self._needs, self.engine)
+            if self.problem.model.carrier is not None and found.damping_ratio is not None:
+                found = replace(found, damping_ratio=np.full_like(found.damping_ratio, np.nan))
             known = {n: v for n in ("abscissa", "damping_ratio") if (v := getattr(found, n)) is not None}
             values |= self.after(up | known) if self.after.names else {}
             layers = {n: self._layer(n, found, values, shape) for n in self.names}

@@ -7,7 +7,7 @@ a definite real number, enclosed in a ball that is narrowed until only one doubl
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any
 
@@ -20,7 +20,8 @@ from tmsopt.design.cases import Case
 from tmsopt.design.dependence import varies
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
-from tmsopt.models import Values
+from tmsopt.models import Model, Values
+from tmsopt.models.told import roots_told
 from tmsopt.records import Table
 from tmsopt.roots import Root, Structure
 from tmsopt.roots.patterns.enclosed import Enclosed, enclosed_roots, nearest_decimal, nearest_double, nearest_roots
@@ -77,7 +78,7 @@ def certified(
             break
     # At the very end of where a quantity exists, as Fr_c = 0, rounding of the parameters alone may carry it beyond.
     lost = {key for key, number in numbers.items() if math.isnan(number) and math.isfinite(known.get(key, math.nan))}
-    return _assembled(checked, {**known, **{key: x for key, x in numbers.items() if key not in lost}})
+    return _assembled(problem.model, checked, {**known, **{key: x for key, x in numbers.items() if key not in lost}})
 
 
 def _known(checked: Checked) -> dict[_Key, float]:
@@ -140,10 +141,10 @@ class _Design:
         if roots.ideal:
             known["abscissa"] = _rightmost(roots.ideal)
             yield ("abscissa",), known["abscissa"], 0
-            for k, root in enumerate(roots.ideal):
+            for k, root in enumerate(_told(self.problem.model, roots.ideal)):
                 for part, ball in (("re", root.re), ("im", root.im), ("multiplicity", exact(root.multiplicity))):
                     yield ("roots", str(k), part), ball, 0
-        if roots.damped:
+        if roots.damped and self.problem.model.carrier is None:
             known["damping_ratio"] = reduce(lesser, (_ratio(r) for r in roots.damped))
             yield ("quantities", "damping_ratio"), known["damping_ratio"], 0
         asked = ANGULAR_FREQUENCY in checked.quantities
@@ -203,7 +204,7 @@ class _Design:
     def located(self, coefficients: Sequence[Any], found: Sequence[Root]) -> _Several | None:
         """Roots of the nearest polynomial with the multiple real root that is located, where it is not rightmost."""
         pattern = self.problem.pattern
-        order = re.fullmatch(r"EP(\d+)", pattern.name) if pattern else None
+        order = re.fullmatch(r"EP(\d+)", pattern.form) if pattern else None
         if pattern is None or order is None or pattern.name in self.checked.violations:
             return None
         z = np.array([complex(r.re, r.im) for r in found])
@@ -211,7 +212,7 @@ class _Design:
         together = min(nearest, key=lambda which: float(np.ptp(z[which].real) + np.ptp(z[which].imag)))
         multiple = Root(float(z[together].real.mean()), 0.0, len(together))
         return nearest_roots(
-            pattern.name, coefficients, [multiple, *(r for k, r in enumerate(found) if k not in together)]
+            pattern.form, coefficients, [multiple, *(r for k, r in enumerate(found) if k not in together)]
         )
 
     def values(self, case: Case) -> Values:
@@ -254,7 +255,16 @@ def _ratio(root: Enclosed) -> Any:
     return flint.arb(0) if root.re == 0 and root.im == 0 else -root.re / root.modulus
 
 
-def _assembled(checked: Checked, numbers: Mapping[_Key, float]) -> Certified:
+def _told(model: Model, roots: _Several) -> _Several:
+    """The roots as the user reads them; an eigenfrequency that is the carrier's own to 60 digits is 0."""
+    found: _Several = roots_told(model, roots)
+    if model.carrier is None:
+        return found
+    nothing = flint.arb(2) ** -_PRECISIONS[0] * (1 + abs(model.carrier))
+    return tuple(replace(z, im=flint.arb(0)) if z.im.contains(0) and abs(z.im) < nothing else z for z in found)
+
+
+def _assembled(model: Model, checked: Checked, numbers: Mapping[_Key, float]) -> Certified:
     count = sum(key[0] == "roots" and key[2] == "multiplicity" for key in numbers)
     parts = [[numbers.get(("roots", str(k), part)) for part in ("re", "im", "multiplicity")] for k in range(count)]
     roots = tuple(Root(re, im, int(m)) for re, im, m in parts if re is not None and im is not None and m is not None)
@@ -269,7 +279,7 @@ def _assembled(checked: Checked, numbers: Mapping[_Key, float]) -> Certified:
         value=numbers["value",],
         abscissa=numbers["abscissa",],
         realised=numbers["realised",],
-        roots=roots if roots and len(roots) == count else checked.structure.roots,
+        roots=roots if roots and len(roots) == count else roots_told(model, checked.structure.roots),
         quantities=Table({n: numbers["quantities", n] for n in checked.quantities}),
         dimensionless=Table({n: numbers["dimensionless", n] for n in checked.dimensionless}),
         si=Table(si),

@@ -61,8 +61,9 @@ class Verdicts:
 
 
 def judgeable(problem: Problem) -> bool:
-    """Whether designs of a problem may be judged at once: nothing is free, listed, located or searched for."""
-    listed = problem.free or problem.variations or problem.tolerances
+    """Whether designs of a problem may be judged at once: nothing is free, listed, located or searched for, and roots
+    are told as they are."""
+    listed = problem.free or problem.variations or problem.tolerances or problem.model.carrier is not None
     return not (listed or problem.pattern or problem.asks(RADIUS) or problem.asks(ANGULAR_FREQUENCY))
 
 

@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 _EXIT = {"optimal": DONE, "infeasible": INFEASIBLE, "not_converged": NOT_CONVERGED}
 
 _CONTRACT = frozenset((
-    "schema", "title", "model", "status", "objective", "parameters", "units", "abscissa", "abscissa_realised", "stable",
-    "any_stable", "roots", "structure", "active", "violations", "bound", "starts", "seconds", "relaxation",
-    "worst_case", "notes", "interrupted",
+    "schema", "title", "model", "status", "objective", "parameters", "units", "abscissa", "abscissa_realised",
+    "stable", "any_stable", "roots", "eigenfrequencies", "structure", "active", "violations", "bound", "starts",
+    "seconds", "relaxation", "worst_case", "notes", "interrupted",
 ))  # fmt: skip
 """Keys of JSON without --full."""
 

@@ -204,7 +204,7 @@ def _sheets(problem: Problem) -> Iterator[Sheet]:
     scale = scale_of(problem)
     scale = Scale(_UNITS * scale.unit, scale.lead)
     held = {n: rational(decimal(x)) for n, x in problem.fixed.items()}
-    for pieces in sheets(problem.pattern.name):
+    for pieces in sheets(problem.pattern.form):
         yield Sheet(problem, pieces, scale, equalities, tuple(met.values()), held)
 
 

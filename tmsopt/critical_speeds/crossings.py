@@ -7,7 +7,7 @@ a root 0, is split off before (`lasting`).
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import flint
@@ -23,6 +23,8 @@ from tmsopt.critical_speeds.parametric import (
     trimmed,
     value_at,
 )
+from tmsopt.models import Model
+from tmsopt.models.told import name_told, roots_told
 from tmsopt.roots.exact import exact_roots
 from tmsopt.roots.polynomial import Root
 from tmsopt.roots.stability import lienard_chipart
@@ -112,6 +114,16 @@ def crossings(
         _bands(cells, marginal),
         split.zeros if split else 0,
     )
+
+
+def told(model: Model, found: Crossings) -> Crossings:
+    """Crossings of the polynomial as the user reads them: of a complex system those of its eigenfrequencies."""
+    if model.carrier is None:
+        return found
+    own = [c for c in found.found if c.kind not in ("capsize", "infinity")]
+    roots = [roots_told(model, [replace(c.root, im=-c.root.im)])[0] for c in own]
+    each = tuple(replace(c, kind=name_told(model, c.kind), root=z) for c, z in zip(own, roots, strict=True))
+    return replace(found, found=each, heavily_damped=())
 
 
 def _conditions(a: Sequence[Polynomial]) -> tuple[dict[str, Polynomial], Lasting | None]:

@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.arithmetic.elementary import exact
-from tmsopt.critical_speeds.crossings import Crossing, Stretch, crossings
+from tmsopt.critical_speeds.crossings import Crossing, Stretch, crossings, told
 from tmsopt.critical_speeds.modes import Mode, modes
 from tmsopt.critical_speeds.speeds import coefficients_over, speed_of
 from tmsopt.design.files import Given
@@ -17,6 +17,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, is_number, short, suggest
 from tmsopt.models import Model, Parameter, ParameterSet, Values
+from tmsopt.models.told import numbers_told
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Array, Tabular, Truth, plain
 from tmsopt.roots import Root, is_stable, roots
@@ -125,7 +126,7 @@ def growth(
     low, high = _ends(design, name, end, at)
     try:
         a = coefficients_over(model, of, parameters, name)
-        met = crossings(a, exact(low), None if speed and end is None else exact(high))
+        met = told(model, crossings(a, exact(low), None if speed and end is None else exact(high)))
     except InputError:  # no polynomials in it
         met = None
     if speed and end is None and met is not None:
@@ -156,6 +157,11 @@ def growth(
     many = [c.at for c in events if _crowded(c.kind)] + [at] * _crowded(design.structure)
     bicycle = model.words[0] == "weave" and model.degree == _BICYCLE
     followed = modes(values, found, at, many, bicycle=bicycle, speed=speed)
+    if model.carrier is not None:
+        found = numbers_told(model, found)
+        followed = tuple(
+            replace(m, name=m.name.replace("pair", "mode"), roots=m.roots.conj() + 1j * model.carrier) for m in followed
+        )
     return Growth(
         of[name], values, found, critical, at, design.structure, stable, heavily_damped, design.problem, followed,
         events, rate,

@@ -8,7 +8,7 @@ from typing import Any
 import flint
 
 from tmsopt.arithmetic.elementary import exact, rational
-from tmsopt.critical_speeds.crossings import Crossing, Stretch, crossings
+from tmsopt.critical_speeds.crossings import Crossing, Stretch, crossings, told
 from tmsopt.critical_speeds.parametric import Polynomial, interpolated
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
@@ -147,7 +147,7 @@ def speeds(
         raise InputError([Fault(message, ("between",))])
     a = coefficients_over(asked.model, of, own, name)
     met = crossings(a, exact(float(lower)), exact(float(upper)) if math.isfinite(upper) else None)
-    return Speeds(asked, name, Table(own), float(lower), float(upper), **vars(met))
+    return Speeds(asked, name, Table(own), float(lower), float(upper), **vars(told(asked.model, met)))
 
 
 def stable_speeds(design: Solution) -> tuple[Stretch, ...] | None:

@@ -5,9 +5,12 @@ from typing import Any
 
 from tmsopt.errors import Fault, at_first, is_number, short, suggest, text_faults
 from tmsopt.models import Model, Unfit, from_coefficients, from_matrices
+from tmsopt.models.stated.hamiltonian import complex_texts, from_pairs, text_entry
+from tmsopt.models.stated.pairs import Pair
 from tmsopt.models.stated.texts import Texts
+from tmsopt.models.stated.user_defined import square
 
-_MATRICES = ("M", "D", "K", "A", "B", "C", "G")
+_MATRICES = ("M", "D", "K", "A", "B", "C", "G", "H")
 KEYS = {
     "name": "One line for reports.", "M": "Rows of the mass matrix of M q″ + D q′ + K q = 0, numbers or expressions.",
     "D": "Rows of its damping matrix; left out, it is 0.", "K": "Rows of its stiffness matrix.",
@@ -15,13 +18,15 @@ KEYS = {
     "B": "Rows of the matrix of a controller's inputs u, of M q″ + D q′ + K q = B u or x′ = A x + B u.",
     "C": "Rows of what it measures, y = C x of the states, or of q and then q′; left out, all of them.",
     "G": "Rows of its gains, u = −G y.",
+    "H": "Rows of the complex matrix of i psi' = H psi, such as 'w - 1j*g', in place of M, D, K and A.",
     "coefficients": "Of the characteristic polynomial, descending, in place of matrices.",
     "quantities": "Names for more expressions, to be used in objectives and constraints.",
 }  # fmt: skip
 """Keys of the table → meaning."""
 
 _EXAMPLE = (
-    "write M = [['m']], D = [['c']], K = [['k']], or A = [['a', '1'], ['b', '0']], or coefficients = ['1', 'c', 'k']"
+    "write M = [['m']], D = [['c']], K = [['k']], or A = [['a', '1'], ['b', '0']], "
+    "or H = [['w - 1j*g', 'k'], ['k', 'w']], or coefficients = ['1', 'c', 'k']"
 )
 
 
@@ -44,6 +49,9 @@ def stated_model(table: Mapping[str, Any]) -> tuple[list[Fault], Model | None]:
         reader.fault(f"states no system; {_EXAMPLE}")
     if "coefficients" in given and len(given) > 1:
         reader.fault(f"stands beside {given[0]}; keep coefficients, or the matrices", "coefficients")
+    if "H" in given and len(given) > 1:
+        beside = next(key for key in given if key != "H")
+        reader.fault(f"stands beside {beside}; keep H, a complex system, or the matrices of a real one", "H")
     reader.read_quantities()
     entries = {key: reader.matrix(key) for key in given if key != "coefficients"}
     row = reader.row(table["coefficients"], ("coefficients",)) if "coefficients" in given else []
@@ -51,6 +59,8 @@ def stated_model(table: Mapping[str, Any]) -> tuple[list[Fault], Model | None]:
     if reader.faults:
         return reader.faults, None
     try:
+        if "H" in entries:
+            return [], from_pairs(square("H", entries["H"]), name.strip(), quantities)
         if row:
             return [], from_coefficients(row, name=name.strip(), quantities=quantities)
         return [], from_matrices(**entries, name=name.strip(), quantities=quantities)
@@ -67,7 +77,7 @@ class _Reader:
     def __init__(self, table: Mapping[str, Any]) -> None:
         self.table = table
         self.faults: list[Fault] = []
-        self.texts = Texts(self.fault)
+        self.texts = complex_texts(self.fault) if "H" in table else Texts(self.fault)
 
     def fault(self, message: str, *key: str) -> None:
         self.faults.append(Fault(message, ("model", *key)))
@@ -92,11 +102,11 @@ class _Reader:
     def entry(self, entry: Any, key: str, where: str) -> Any:
         """One entry as a number or CasADi expression."""
         if is_number(entry):
-            return entry
+            return Pair(entry) if key == "H" else entry
         if not isinstance(entry, str):
             self.fault(f"{where}: found {short(entry)}; accepted: a finite number, or an expression in quotes", key)
-            return 0
-        return self.texts.entry(entry, key, where)
+            return Pair(0) if key == "H" else 0
+        return text_entry(self.texts, entry, where) if key == "H" else self.texts.entry(entry, key, where)
 
     def read_quantities(self) -> None:
         """The formulas of the quantities."""

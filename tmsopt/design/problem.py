@@ -6,13 +6,22 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
-from tmsopt.design.cases import Band, Case, Scenario, as_scenario, first_cases, middle_of
+from tmsopt.design.cases import Band, Case, Scenario, as_scenario, first_cases, middle_of, points_of
 from tmsopt.design.expression import Expression, parse_comparison, parse_value
-from tmsopt.design.quantities import NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTITIES, STRUCTURE, spelled_out
+from tmsopt.design.quantities import (
+    NO_RADIUS,
+    RADIUS,
+    ROOT_NAMES,
+    ROOT_QUANTITIES,
+    STRUCTURE,
+    root_names,
+    spelled_out,
+)
 from tmsopt.design.validate import faults, guess_parameter_set, shape_faults
 from tmsopt.errors import Fault, InputError
 from tmsopt.models import Model, ParameterSet, Values, controlled
-from tmsopt.roots import Pattern, pattern
+from tmsopt.models.told import pattern_of
+from tmsopt.roots import Pattern
 from tmsopt.units import TABLES, numbers
 from tmsopt.versions import SCHEMA
 
@@ -93,8 +102,21 @@ class Problem:
         plain |= {"free": ends, "constraints": {n: text.strip() for n, text in self.constraints.items()}}
         plain |= {"pareto": tuple(text.strip() for text in self.pareto)}  # reports show it on one line
         plain |= {s: text and text.strip() for s, text in (("minimize", self.minimize), ("maximize", self.maximize))}
+        plain |= {"model": self.model.within(self._reach(plain["fixed"], ends))}
         for name, value in plain.items():
             object.__setattr__(self, name, value)
+
+    def _reach(
+        self, fixed: Mapping[str, float], ends: Mapping[str, tuple[float, float]]
+    ) -> dict[str, tuple[float, float]]:
+        """Least and greatest value of every parameter, in all cases."""
+        found = {n: (x, x) for n, x in fixed.items()} | dict(ends)
+        for name, scenario in self.variations.items():
+            points = [*points_of(scenario), fixed[name]]
+            found[name] = min(points), max(points)
+        return {
+            n: (lo - self.tolerances.get(n, 0.0), hi + self.tolerances.get(n, 0.0)) for n, (lo, hi) in found.items()
+        }
 
     @property
     def variations(self) -> dict[str, Scenario]:
@@ -138,7 +160,7 @@ class Problem:
     @property
     def pattern(self) -> Pattern | None:
         """The pattern to locate."""
-        return pattern(self.locate, self.model.degree) if self.locate else None
+        return pattern_of(self.model, self.locate) if self.locate else None
 
     @property
     def located(self) -> tuple[str, ...]:
@@ -192,7 +214,7 @@ class Problem:
     def vocabulary(self) -> tuple[str, ...]:
         """Every name that an expression may use."""
         of = self.parameter_set
-        return (*of.names, *self.model.quantity_names(of), *ROOT_NAMES)
+        return (*of.names, *self.model.quantity_names(of), *root_names(self.model))
 
     def values(self, parameters: Mapping[str, float]) -> Values:
         """Everything derived from a numeric design, root quantities included."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.models import ParameterSet, Quantity, Values
+from tmsopt.models import Model, ParameterSet, Quantity, Values
 from tmsopt.records import Array
 from tmsopt.roots import Structure, abscissa_and_damping, roots, structure
 
@@ -49,6 +49,8 @@ def _known_structure(a: tuple[float, ...], off: tuple[float, ...]) -> Structure:
 
 
 def _damping_ratio(values: Mapping[str, Any]) -> float:
+    if isinstance(values, Values) and values.model.carrier is not None:
+        return math.nan  # frequencies without a zero
     roots = values["structure"].roots
     ratios = (-r.re / math.hypot(r.re, r.im) if r.re or r.im else 0.0 for r in roots)
     return min(ratios, default=math.nan)
@@ -81,6 +83,11 @@ NO_RADIUS = Quantity(RADIUS, "1", _RADIUS, "r", lambda values: math.nan)
 _QUARTIC = 5  # coefficients of the degree that has formulas of its own
 
 ROOT_NAMES = (*(q.name for q in ROOT_QUANTITIES), RADIUS)
+
+
+def root_names(model: Model) -> tuple[str, ...]:
+    """Names of the quantities of the roots that a model has."""
+    return tuple(name for name in ROOT_NAMES if name not in model.absent)
 
 
 def spelled_out(text: str, of: ParameterSet) -> str:

@@ -8,8 +8,9 @@ from tmsopt.design.cases import Case
 from tmsopt.design.problem import Freedom, Problem
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.design.unit_system import unit_of, units_of
+from tmsopt.models.told import eigenfrequencies, meant
 from tmsopt.records import Shown, Table, asked_above, plain
-from tmsopt.roots import Root
+from tmsopt.roots import Root, Structure
 from tmsopt.units import Reading
 
 
@@ -259,6 +260,16 @@ class Solution(Shown):
         text = self.problem.minimize or self.problem.maximize
         return units_of(self.problem, [text] if text else [])
 
+    @property
+    def eigenfrequencies(self) -> tuple[Root, ...]:
+        """ω = i s of a complex system, in the order of the roots, each with its multiplicity; none of a real one."""
+        return eigenfrequencies(self.problem.model, self.roots)
+
+    @property
+    def of_polynomial(self) -> Structure:
+        """Structure and roots of the model's polynomial: of a complex system, of the real one of twice the size."""
+        return meant(self.problem.model, self.structure, self.roots)
+
     def response(self, **asked: Any) -> Any:
         """The motion of this design after a lean or a push, a `tmsopt.Simulation`: what `tmsopt.simulate` gives.
 
@@ -292,7 +303,8 @@ class Solution(Shown):
                 {"locate": problem.locate} if problem.locate else {}
             ),
             "parameters": plain(self.parameters), "units": self.units,
-            **plain(self, "abscissa abscissa_realised stable any_stable roots structure"),
+            **plain(self, "abscissa abscissa_realised stable any_stable roots"),
+            **(plain(self, "eigenfrequencies") if self.eigenfrequencies else {}), **plain(self, "structure"),
             "active": plain(self.active, digits=GAIN_DIGITS), "violations": plain(self.violations, digits=GAIN_DIGITS),
             **plain(self, "bound"), "starts": plain(self.starts, "tried converged at_best"),
             "looked": self.starts.looked, "seconds": round(self.seconds, 4),

@@ -7,11 +7,10 @@ from typing import Any
 from tmsopt.design.advice.names import unknown
 from tmsopt.design.cases import Band, points_of
 from tmsopt.design.expression import ExpressionError, UnknownName, parse_comparison, parse_value
-from tmsopt.design.quantities import ROOT_NAMES, spelled_out
+from tmsopt.design.quantities import root_names, spelled_out
 from tmsopt.errors import Fault, at_first, short, suggest, table_faults, text_faults
 from tmsopt.models import Model, ParameterSet
-from tmsopt.roots import pattern
-from tmsopt.roots.patterns.composed import pattern_names
+from tmsopt.models.told import pattern_of, patterns_of
 
 VARIATIONS = ("scenarios", "tolerances", "weights")
 """Tables of a problem that name parameters beside those of `fixed` and `free`."""
@@ -242,20 +241,20 @@ def _objective_faults(problem: Stated) -> Iterator[Fault]:
         yield Fault("pareto beside minimize or maximize; keep one of them", key)
     yield from _pareto_faults(problem.pareto)
     if problem.locate is not None:
-        yield from pattern_faults(problem.locate, problem.model.degree, (*key, "locate"))
+        yield from pattern_faults(problem.locate, problem.model, (*key, "locate"))
 
 
-def pattern_faults(name: Any, degree: int, key: tuple[str, ...]) -> Iterator[Fault]:
-    """What is wrong with the name of a pattern for polynomials of a degree."""
+def pattern_faults(name: Any, model: Model, key: tuple[str, ...]) -> Iterator[Fault]:
+    """What is wrong with the name of a pattern for the polynomials of a model."""
     try:
         if not isinstance(name, str):
             raise ValueError(f"{short(name)} is no pattern")
         if len(name) > _LONGEST:
             raise ValueError(f"{short(name)} is no pattern")
-        pattern(name, degree)
+        pattern_of(model, name)
     except ValueError as error:
-        joined = ", or several, joined by +" if degree > 4 else ""
-        yield Fault(f"unknown pattern: {error}; {suggest(str(name), pattern_names(degree))}{joined}", key)
+        joined = ", or several, joined by +" if model.degree > 4 else ""
+        yield Fault(f"unknown pattern: {error}; {suggest(str(name), patterns_of(model))}{joined}", key)
 
 
 def _pareto_faults(texts: Any) -> Iterator[Fault]:
@@ -266,7 +265,7 @@ def _pareto_faults(texts: Any) -> Iterator[Fault]:
 
 
 def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
-    accepted = (*of.names, *problem.model.quantity_names(of), *ROOT_NAMES)
+    accepted = (*of.names, *problem.model.quantity_names(of), *root_names(problem.model))
     advice = at_first(unknown)
 
     def parsed(parse: Any, text: Any, *key: str) -> Iterator[Fault]:

@@ -12,6 +12,7 @@ from tmsopt.design.files import Given
 from tmsopt.diagnosis.jordan import Jordan, is_regular, jordan
 from tmsopt.diagnosis.splitting import DEVIATION, Ideal, Law, Response, response
 from tmsopt.models import Model, ParameterSet
+from tmsopt.models.told import eigenfrequencies, roots_told
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Shown, plain
 from tmsopt.roots import Root, Structure
@@ -36,6 +37,7 @@ class Diagnosis(Shown):
         jordan: the singular values behind the verdict; None without matrices.
         distance: relative change of the coefficients from the design's to those with the structure.
         responses: most sensitive parameter first.
+        eigenfrequency: of a complex system ω = i s.
 
     Example:
         >>> (found,) = tmsopt.diagnose("problems/ep4.toml")
@@ -54,11 +56,14 @@ class Diagnosis(Shown):
     jordan: Jordan | None
     distance: float
     responses: tuple[Response, ...]
+    eigenfrequency: complex | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that only describe have 6 digits."""
         return {
-            **plain(self, "re im algebraic geometric partial kind"),
+            **plain(self, "re im"),
+            **(plain(self, "eigenfrequency") if self.eigenfrequency is not None else {}),
+            **plain(self, "algebraic geometric partial kind"),
             "matrices": self.jordan is not None,
             **({"singular_values": plain(self.jordan, "zero nonzero threshold", digits=6)} if self.jordan else {}),
             **plain(self, "distance", digits=6),
@@ -109,7 +114,7 @@ def diagnosed(
         return tuple(
             _diagnosis(model, of, design, structure, ideal, place)
             for place, (root, _) in enumerate(ideal)
-            if root.multiplicity > 1 and root.im >= 0
+            if root.multiplicity > 1 and (root.im >= 0 if model.carrier is None else root.im < 0)
         )
 
 
@@ -133,7 +138,11 @@ def _diagnosis(
     kind = "semisimple" if geometric == k else "defective" if geometric == 1 else "partly defective"
     responses = (response(model, of, design, ideal, place, name) for name in of.names)
     ordered = tuple(sorted(responses, key=_sensitivity))
-    return Diagnosis(root.re, root.im, k, geometric, partial, kind, ranks, structure.distance, ordered)
+    (shown,) = roots_told(model, [Root(root.re, root.im, k)])
+    omega = tuple(complex(z.re, z.im) for z in eigenfrequencies(model, [shown]))
+    return Diagnosis(
+        shown.re, shown.im, k, geometric, partial, kind, ranks, structure.distance, ordered, *omega
+    )  # fmt: skip
 
 
 def _ranks(

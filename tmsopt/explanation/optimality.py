@@ -31,8 +31,11 @@ from tmsopt.explanation.descent import Better, better
 from tmsopt.explanation.program import LocalProgram, NotCovered, program
 from tmsopt.formulation.formulate import formulate
 from tmsopt.formulation.starts import complete
+from tmsopt.models import Model
+from tmsopt.models.told import eigenfrequencies, roots_told
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Shown, Table, plain
+from tmsopt.roots import Root
 from tmsopt.solver.solve import solved_first
 
 STRICT, NOT_MINIMAL, UNDECIDED, NOT_COVERED = "strict minimum", "not minimal", "undecided", "not covered"
@@ -51,6 +54,7 @@ class OnLine:
         kappa: likewise of what moves a multiple root apart along the line: κᵢ of a real one, (κ₁ − κ₂)²/(16 ω²) of
             a complex one; nan for a simple root.
         ties: likewise of the other coefficients, of either sign, for they must stay 0.
+        eigenfrequency: of a complex system ω = i s.
     """
 
     re: float
@@ -60,6 +64,12 @@ class OnLine:
     beta: float
     kappa: float = math.nan
     ties: tuple[float, ...] = ()
+    eigenfrequency: complex | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``."""
+        found = plain(self, "re im multiplicity share beta kappa ties")
+        return found | (plain(self, "eigenfrequency") if self.eigenfrequency is not None else {})
 
 
 @dataclass(frozen=True, repr=False)
@@ -276,8 +286,18 @@ def _on_line(around: LocalProgram, found: Conditions) -> tuple[OnLine, ...]:
         first, second = own.pop("c1"), own.pop("c2", math.nan)
         share = float(root.multiplicity * first / total) if total else math.nan
         beta = first / 2 if root.im else first  # β moves two roots of a pair, by half of it
-        listed.append(OnLine(root.re, root.im, root.multiplicity, share, beta, second, tuple(own.values())))
+        shown, *omega = _shown(around.problem.model, root)
+        listed.append(OnLine(shown.re, shown.im, root.multiplicity, share, beta, second, tuple(own.values()), *omega))
     return tuple(listed)
+
+
+def _shown(model: Model, upper: Root) -> tuple[Any, ...]:
+    """A root as the user reads it; of a complex system the one that is its conjugate, and the eigenfrequency."""
+    if model.carrier is None:
+        return (upper,)
+    (shown,) = roots_told(model, [replace(upper, im=-upper.im)])
+    (omega,) = eigenfrequencies(model, [shown])
+    return shown, complex(omega.re, omega.im)
 
 
 def _limits(solution: Solution, around: LocalProgram, found: Conditions) -> Mapping[str, float]:

@@ -144,7 +144,7 @@ def program(problem: Problem, solution: Solution) -> LocalProgram:
             if abs(solution.parameters[names[k]] - limit) <= _AT * (abs(limit) + width):
                 bound = symbols[k] - known[names[k]]
                 build.one(Held(f"{names[k]}.{end}", True), bound if end == "min" else -bound)
-    size = max(np.hypot(r.re, r.im) for r in solution.roots)
+    size = max(np.hypot(r.re, r.im) for r in solution.of_polynomial.roots)
     widths = [_natural_size(problem, names[k], known[names[k]]) if names[k] in problem.free
               else size / nlp.unit if names[k] == "abscissa"
               else max(abs(known[names[k]]), 1e-3) for k in kept]  # fmt: skip
@@ -163,10 +163,10 @@ def program(problem: Problem, solution: Solution) -> LocalProgram:
 
 def on_the_line(solution: Solution) -> tuple[tuple[Root, ...], tuple[Root, ...]]:
     """The roots on the rightmost line, complex pairs by their upper root, and all others."""
-    size = max(np.hypot(r.re, r.im) for r in solution.roots)
-    near = 0.0 if solution.structure in ("pair", "real") else _LINE * size
-    line = [r for r in solution.roots if r.re >= solution.abscissa - near]
-    return tuple(r for r in line if r.im >= 0), tuple(r for r in solution.roots if r not in line)
+    size = max(np.hypot(r.re, r.im) for r in solution.of_polynomial.roots)
+    near = 0.0 if solution.of_polynomial.name in ("pair", "real") else _LINE * size
+    line = [r for r in solution.of_polynomial.roots if r.re >= solution.abscissa - near]
+    return tuple(r for r in line if r.im >= 0), tuple(r for r in solution.of_polynomial.roots if r not in line)
 
 
 def _rows_of(nlp: NLP, name: str) -> list[int]:

@@ -98,6 +98,7 @@ def rounded(solution: Solution, choices: Sequence[tuple[Sequence[str], int]]) ->
     for k, (texts, (_, digits)) in enumerate(zip(written, choices, strict=True)):
         shown = Table({n: f"{text} {units[n].text}".rstrip() for n, text in texts.items()})
         abscissa, ratio = (float(known[name][k]) for name in _MOTION[:2])
+        ratio = ratio if problem.model.carrier is None else math.nan
         loss = abscissa - solution.abscissa
         found.append(Rounded(digits, shown, abscissa, loss, ratio, float(objective[k]), Table(violated[k])))
     return tuple(found)

@@ -11,7 +11,7 @@ from tmsopt.design.quantities import ROOT_QUANTITIES
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import unit_of
 from tmsopt.explanation.limits import is_physical
-from tmsopt.roots.patterns.descriptions import in_words
+from tmsopt.models.told import structure_in_words
 
 _ROOTS = {q.name for q in ROOT_QUANTITIES}
 _PARTS = (0.0, 0.29, 0.5, 0.83, 1.0)  # of a range: a change along it shows at one of these
@@ -26,7 +26,7 @@ def summary(solution: Solution) -> str:
         if not solution.problem.free:
             return f"the design as given violates {names}"
         return f"no design in the box was found that meets all that is asked; the nearest one violates {names}"
-    words = in_words(solution.structure, solution.problem.model.degree)
+    words = structure_in_words(solution.problem.model, solution.structure)
     if solution.status != "optimal":
         return f"{words}; the search did not converge, so a better design may be near"
     return f"{words}: {_quality(solution)}"

@@ -177,7 +177,7 @@ def _program(problem: Problem, formulas: Callable[[Mapping[str, Any]], Sequence[
 def _pencil(problem: Problem) -> tuple[Program | None, int, int]:
     """Entries of the matrices of a model, rows of each, and how many there are less one."""
     model, of = problem.model, problem.parameter_set
-    if model.pencil is None:
+    if model.pencil is None or model.carrier is not None:  # whose carrier is no motion of the user's
         return None, 0, 0
     shape: tuple[int, int] = (0, 0)
 

@@ -62,7 +62,7 @@ def _of_solution(solution: Solution) -> Known:
     facts, proof = [ended(problem, solution.status), *solution.notes], proof_line(solution)
     proved = proof if solution.bound.proven else ""
     if problem.nominal is problem:
-        known = Structure(solution.structure, solution.roots, 0.0)
+        known = solution.of_polynomial
     else:  # what is proved is proved of every case, and the page shows one
         known, proved = _structure(problem, solution.parameters), ""
         facts[0] += " over every case of its bands and tolerances"
@@ -95,7 +95,10 @@ def _exceptional(problem: Problem) -> Known | None:
 
     A k-fold root takes k − 1 free parameters.
     """
-    order = min(problem.model.degree, len(problem.free) + 1, _ORDER)
+    size, free = problem.model.degree, len(problem.free)
+    if problem.model.carrier is not None:  # of which every condition is two
+        size, free = size // 2, free // 2
+    order = min(size, free + 1, _ORDER)
     if order < 2:
         return None
     asked = replace(
@@ -107,7 +110,7 @@ def _exceptional(problem: Problem) -> Known | None:
     if found.status != "optimal" or "EP" not in found.structure:
         return None
     facts = ("limits left aside",) if problem.constraints else ()
-    return Known(found.structure, found.parameters, Structure(found.structure, found.roots, 0.0), facts)
+    return Known(found.structure, found.parameters, found.of_polynomial, facts)
 
 
 def _structure(problem: Problem, parameters: Mapping[str, float]) -> Structure:

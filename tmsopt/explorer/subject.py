@@ -13,8 +13,8 @@ from tmsopt.explorer.file_text import around
 from tmsopt.explorer.javascript import Script, is_bicycle
 from tmsopt.explorer.known import Known
 from tmsopt.models import Parameter, words_of
+from tmsopt.models.told import name_told, structure_in_words
 from tmsopt.records import Array
-from tmsopt.roots.patterns.descriptions import in_words
 from tmsopt.tracing import domain, trace
 
 _STARTS = 8  # of traced curves: the tracer's grid shows what they miss
@@ -49,6 +49,7 @@ def subject(
         "bicycle": problem.model.name if is_bicycle(problem) else None,
         "impulseUnit": _IMPULSE if of.torque is None else "N·m·s",
         "words": dict(words_of(problem.model)), "rootUnit": unit_of(problem, "abscissa").text,
+        "carrier": problem.model.carrier,
         "parameters": [_parameter(problem, p, start[p.name]) for p in of.parameters],
         "quantities": [
             {"name": n, "meaning": quantities[n].meaning, "share": quantities[n].share, **_unit(problem, n)}
@@ -109,10 +110,10 @@ def _constraint(problem: Problem, name: str) -> dict[str, Any]:
 
 
 def _design(problem: Problem, known: Known) -> dict[str, Any]:
-    structure = known.structure
+    structure, model = known.structure, problem.model
     return {
         "name": known.name, "values": [float(known.parameters[n]) for n in problem.parameter_set.names],
-        "structure": in_words(structure.name, problem.model.degree) if structure.roots else "",
+        "structure": structure_in_words(model, name_told(model, structure.name)) if structure.roots else "",
         "abscissa": structure.abscissa, "roots": [[r.re, r.im, r.multiplicity] for r in structure.roots if r.im >= 0],
         "facts": list(known.facts), "proved": known.proved,
     }  # fmt: skip

@@ -13,9 +13,8 @@ from tmsopt.errors import Fault, InputError, short
 from tmsopt.guide.description import Description, Word, Words
 from tmsopt.models import CONSTANTS, FUNCTIONS, MODELS, Model, Parameter, ParameterSet, Quantity, Range
 from tmsopt.models.built_in import controlled, gain_names
+from tmsopt.models.told import pattern_of, patterns_of
 from tmsopt.records import Table
-from tmsopt.roots import pattern
-from tmsopt.roots.patterns.composed import pattern_names
 from tmsopt.studies import load_study
 
 Typed = Mapping[str, Any]
@@ -72,12 +71,12 @@ def _with_models(error: InputError, given: str | PathLike[str]) -> InputError:
 
 
 def _described(model: Model, problem: Problem | None, typed: Typed) -> Description:
-    names = pattern_names(model.degree)
+    size = model.degree if model.carrier is None else model.degree // 2
     return Description(
-        model=model.name, meaning=model.title, degree=model.degree, title=problem.title if problem else "",
+        model=model.name, meaning=model.title, degree=size, title=problem.title if problem else "",
         sets=tuple(_words(model, of, problem, typed) for of in ([problem.parameter_set] if problem else model.sets)),
         feedback=() if problem else tuple(_gains(model)),
-        patterns=Table({name: pattern(name, model.degree).meaning for name in names}),
+        patterns=Table({name: pattern_of(model, name).meaning for name in patterns_of(model)}),
         functions=(*FUNCTIONS, *CONSTANTS), conventions=model.conventions, sketch=model.sketch,
         matrices=Table(dict(_matrices(model, typed))), asked=Table(_asked(problem, typed) if problem else {}),
     )  # fmt: skip

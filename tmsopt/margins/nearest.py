@@ -198,16 +198,22 @@ def robustness_at(problem: Problem, parameters: Mapping[str, float]) -> Robustne
 def _surveyed(place: Place, kinds: Sequence[str] = tuple(KINDS)) -> Robustness:
     damped = "heavy damping" in kinds
     seen = ray_crossings(place.space, damped=damped)
-    found = [_nearest(place, seen, kind) for kind in kinds]
+    found = _each(place, seen, kinds)
     limit = min((n for n in found if n.kind in STABILITY), key=lambda n: n.distance)
     if limit.found and not limit.direct:  # another boundary is nearer, and no ray met it
         u = np.array([limit.direction[n] for n in place.weights])
         seen = sorted([*seen, *between(place.space, u, damped)], key=lambda c: c.distance)
-        found = [_nearest(place, seen, kind) for kind in kinds]
+        found = _each(place, seen, kinds)
     stable = place.stable and not place.stands_on
     own = Table(place.parameters), Table(place.weights)
     zeros = _zeros(place) if place.stands_on else ()
     return Robustness(place.problem, stable, place.stands_on, zeros, place.heavily_damped, *own, *found)
+
+
+def _each(place: Place, seen: list[RayCrossing], kinds: Sequence[str]) -> list[Nearest]:
+    """The nearest point of each boundary; eigenfrequencies of a complex system pass the real line alone."""
+    real = place.problem.model.carrier is None
+    return [_nearest(place, seen, kind) if real or kind == "weave" else Nearest(kind) for kind in kinds]
 
 
 def _zeros(place: Place) -> tuple[str, ...]:

@@ -46,7 +46,9 @@ def advice(text: str, reads: Callable[[str], bool]) -> str:
         reads: whether a text parses.
     """
     if re.search(r"\d[jJ]\b", text):
-        return "; expressions are real: write real and imaginary parts as numbers of their own"
+        return (
+            "; expressions are real: write real and imaginary parts as numbers of their own; a complex matrix goes in H"
+        )
     if missing := text.count("(") - text.count(")"):
         return f"; a {'()'[missing > 0]} is missing"
     mended = text.strip()

@@ -206,6 +206,9 @@ class Model:
         conventions: sentences on signs.
         sketch: the system drawn in text, with the symbols on it.
         absent: names that a user may look for in vain → what to write instead.
+        carrier: of a complex H, what is added to each eigenfrequency, lest a root of the polynomial, of twice
+            the degree, meets the conjugate of another; None of a real system.
+        carried: of a complex H, ranges of the native parameters → the model with a carrier for them.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])
@@ -232,11 +235,17 @@ class Model:
     conventions: tuple[str, ...] = field(default=(), repr=False)
     sketch: str = field(default="", repr=False)
     absent: Mapping[str, str] = field(default_factory=dict, repr=False, hash=False)
+    carrier: float | None = field(default=None, repr=False)
+    carried: Callable[[Mapping[str, tuple[float, float]]], "Model"] | None = field(default=None, repr=False)
 
     def coefficients(self, parameters: Mapping[str, Any], of: ParameterSet | None = None) -> list[Any]:
         """Coefficients a0 … aₙ, descending, for values of any kind: floats, arrays, CasADi, balls."""
         native = (of or self.sets[0]).native(parameters)
         return self.polynomial(**self.algebraic(native))
+
+    def within(self, ranges: Mapping[str, tuple[float, float]]) -> "Model":
+        """The model for parameters within ranges: of a complex H with a carrier for these, any other itself."""
+        return self if self.carried is None else self.carried(ranges)
 
     def coefficient_names(self) -> tuple[str, ...]:
         """``a0 … an``, or ``coefficient0 …`` where a parameter or quantity has one of these names."""
@@ -303,7 +312,7 @@ class Values(Mapping[str, Any]):
         lift: Callable[[Quantity, "Values"], Any] | None = None, ranges: Mapping[str, float] | None = None,
     ) -> None:  # fmt: skip
         native = of.native(parameters)
-        self.coefficients = model.polynomial(**model.algebraic(native))
+        self.model, self.coefficients = model, model.polynomial(**model.algebraic(native))
         self._at = (model, of, dict(parameters), dict(ranges or {}))
         self._known = {**native, **dict(zip(model.coefficient_names(), self.coefficients, strict=True)), **parameters}
         self._formulas = {q.name: q for q in (*model.quantities, *of.quantities, *extra)}

@@ -1,6 +1,7 @@
 """Roots in the complex plane, and how a multiple one splits."""
 
 import math
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -40,7 +41,8 @@ def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> A
     else:
         title = f"{data.goal or 'abscissa'}: {data.verdict}"
     found = {(float(r.re), float(r.im)): r.multiplicity for r in data.roots}
-    found |= {(re, -im): m for (re, im), m in found.items()}
+    if not _of_H(data):
+        found |= {(re, -im): m for (re, im), m in found.items()}
     own = ax is None
     ax = on_axes(ax, 4.6, 4.4)
     ax.set_title(title, fontsize=9.5)
@@ -56,6 +58,13 @@ def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> A
     ax.set(xlim=(-size, right), ylim=(-size, size))
     ax.set(xlabel=rf"$\mathrm{{Re}}\,s${unit}", ylabel=rf"$\mathrm{{Im}}\,s${unit}")
     return finished(ax, own)
+
+
+def _of_H(data: Any) -> bool:
+    """Whether roots are those of a complex system, which have no conjugates."""
+    if getattr(data, "eigenfrequencies", ()):
+        return True
+    return any(getattr(root, "eigenfrequency", None) is not None for root in data.roots)
 
 
 def draw_splitting(data: Diagnosis, ax: Axes | None = None) -> Axes:

@@ -50,7 +50,7 @@ class Existing:
 def exactly(problem: Problem, pattern: Pattern, design: Written) -> Existing | None:
     """The design itself, if its numbers are fractions and have the pattern exactly."""
     a = exact_coefficients(problem, design)
-    if a is None or not rational.has(pattern.name, a):
+    if a is None or not rational.has(pattern.form, a):
         return None
     if any(c.equality for c in problem.conditions.values()):
         return None
@@ -216,7 +216,7 @@ def _other_kind(pattern: Pattern) -> str:
 
 
 def _undecided_kind(pattern: Pattern) -> str:
-    if pattern.name in ("2EP2", "CEP2"):
+    if pattern.form in ("2EP2", "CEP2") and not pattern.doubles:
         return "b² − 4c cannot be told from 0, so not 2EP2 from CEP2 and EP4; locate EP4, with a parameter more free"
     if _of_quadratics(pattern):
         return f"b² − 4c cannot be told from 0, so neither whether it is {pattern.name}; locate what the roots meet in"

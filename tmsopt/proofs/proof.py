@@ -14,11 +14,13 @@ from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
 from tmsopt.errors import InputError, count_faults
 from tmsopt.models.exact import Written, written
+from tmsopt.models.told import name_told, pattern_of, roots_told
 from tmsopt.proofs import rational
 from tmsopt.proofs.existence import Existing, beside, exact_coefficients, exactly
 from tmsopt.proofs.facts import NOTHING, Verdict, as_stored, heavy_damping, inside, limits, stability
 from tmsopt.records import Shown, Table, plain
-from tmsopt.roots import PATTERNS, Pattern, Root, pattern as pattern_of
+from tmsopt.roots import PATTERNS, Pattern, Root
+from tmsopt.roots.patterns.doubled import complex_shown
 from tmsopt.roots.patterns.naming import implies, shown_patterns
 from tmsopt.roots.patterns.pattern import LINES
 
@@ -32,7 +34,11 @@ _EXTRA = 50  # decimal digits carried beyond twice those asked for, where a desi
 
 _IMPLIES = {"EP4": ("EP3", "2EP2", "CEP2", "EP2"), "EP3": ("EP2",), "2EP2": ("EP2",)}
 _QUARTIC = 4  # of which every structure has a pattern of its own
-_SIMPLE = {"pair": "the rightmost roots are a simple complex pair", "real": "the rightmost root is real and simple"}
+_SIMPLE = {
+    "pair": "the rightmost roots are a simple complex pair",
+    "real": "the rightmost root is real and simple",
+    "single": "the least damped eigenfrequency is simple",
+}
 
 
 @dataclass(frozen=True, repr=False)
@@ -58,6 +64,7 @@ class Proof(Shown):
         distance: from the proved to the stored design, in the parameter for which it is largest against `explained`.
         explained: how far rounding of the stored numbers may move that parameter.
         roots: with exact multiplicities, rightmost first; none where two cannot be told apart.
+        eigenfrequencies: of a complex system ω = i s, in the order of the roots.
         abscissa: the largest real part.
         stable: whether all roots are left of the imaginary axis.
         heavily_damped: whether all roots are real and negative.
@@ -92,6 +99,7 @@ class Proof(Shown):
     distance: float = math.nan
     explained: float = math.nan
     roots: tuple[ProvedRoot, ...] = ()
+    eigenfrequencies: tuple[ProvedRoot, ...] = ()
     abscissa: Number | None = None
     stable: Verdict = NOTHING
     heavily_damped: Verdict = NOTHING
@@ -106,7 +114,9 @@ class Proof(Shown):
             **plain(self, "claim proved reason pattern method digits"),
             "of": "the design as stored" if self.stored or not self.proved else "the proved design",
             **plain(self, "parameters tangents unknowns moved held stated radius uniqueness distance explained"),
-            **plain(self, "roots abscissa stable heavily_damped inside limits"),
+            **plain(self, "roots"),
+            **(plain(self, "eigenfrequencies") if self.eigenfrequencies else {}),
+            **plain(self, "abscissa stable heavily_damped inside limits"),
             "seconds": round(self.seconds, 4),
         }
 
@@ -162,13 +172,13 @@ def _proved(
             reasons.append(str(refusal))
         else:
             return _assembled(problem, design, pattern.name, pattern, found, digits)
-    name = problem.locate or structure
+    name = problem.locate or name_told(problem.model, structure)
     meant = next((p for p in patterns if p.name == name), None)
     stored = as_stored(problem, design)
     if stored is None:
         reason = reasons[0] if reasons else "a0 cannot be told from 0: a root may be at infinity"
         return Proof(_claim(name, meant), False, reason, name, digits=digits)
-    why = reasons or _of_simple(structure, stored)
+    why = reasons or _of_simple(problem, structure, stored)
     return _assembled(problem, design, name, meant, stored, digits, why, stored=True)
 
 
@@ -177,11 +187,13 @@ def _patterns(problem: Problem, structure: str, roots: Sequence[Root]) -> list[P
     located = problem.pattern
     if problem.model.degree == _QUARTIC:
         known = {**PATTERNS, **LINES}.get(structure)
-        named = [known] if known and (not located or located.name in _IMPLIES.get(structure, ())) else []
-    elif roots and (not located or implies(roots, located.name)):
+        named = [known] if known and (not located or located.form in _IMPLIES.get(structure, ())) else []
+    elif roots and (not located or implies(roots, located.form)):
         named = shown_patterns(roots)
     else:
         named = []
+    if problem.model.carrier is not None:
+        named = [complex_shown(p) for p in named]
     return list({p.name: p for p in [*named, *([located] if located else [])]}.values())
 
 
@@ -189,20 +201,21 @@ def _decided(problem: Problem, design: Written) -> list[Pattern]:
     """The pattern of all multiple roots of a design that is exact."""
     a = exact_coefficients(problem, design)
     name = rational.multiple(a) if a else ""
-    return [pattern_of(name, problem.model.degree)] if name else []
+    return [pattern_of(problem.model, name_told(problem.model, name))] if name else []
 
 
-def _of_simple(structure: str, found: Existing) -> list[str]:
+def _of_simple(problem: Problem, structure: str, found: Existing) -> list[str]:
     """Why the structure of a design without multiple roots is not proved; nothing if it is."""
     if structure not in _SIMPLE:
-        return [f"the structure is {structure}: double precision cannot tell it; locate the pattern that is meant"]
+        name = name_told(problem.model, structure)
+        return [f"the structure is {name}: double precision cannot tell it; locate the pattern that is meant"]
     roots = found.factored.roots
     if roots is None:
         return ["the roots cannot be isolated: some are equal, or too near; locate the pattern that is meant"]
     rest = roots[1:] if roots[0].real else roots[2:]
     if roots[0].real == (structure == "real") and all(z.re < roots[0].re for z in rest):
         return []
-    return [f"the rightmost root of the design as stored is not certainly a {structure}"]
+    return [f"the rightmost root of the design as stored is not certainly a {name_told(problem.model, structure)}"]
 
 
 def _assembled(
@@ -216,6 +229,10 @@ def _assembled(
         for n, ball in found.parameters.items()
     }
     abscissa = found.factored.abscissa
+    real = problem.model.carrier is None
+    hidden = () if real or pattern is None else pattern.unknowns  # of the double with its carrier
+    hidden = (*hidden, *(f"{pattern.name}.{n}" for n in hidden)) if pattern else ()
+    roots = roots_told(problem.model, found.factored.roots or ())
     return Proof(
         claim=_claim(name, pattern),
         proved=not reasons,
@@ -226,7 +243,7 @@ def _assembled(
         stored=stored,
         parameters=Table({n: numbers[n] for n in problem.parameter_set.names}),
         tangents=Table({n: number(ball, digits) for n, ball in found.tangents.items()}),
-        unknowns=Table({n: number(ball, digits) for n, ball in found.unknowns.items()}),
+        unknowns=Table({n: number(ball, digits) for n, ball in found.unknowns.items() if n not in hidden}),
         moved=found.moved,
         held=Table(dict(design.text(n) for n in problem.parameter_set.names if n not in found.moved)),
         stated=design.stated,
@@ -234,12 +251,13 @@ def _assembled(
         uniqueness=found.uniqueness,
         distance=found.distance,
         explained=found.explained,
-        roots=tuple(
-            ProvedRoot(number(z.re, digits), number(z.im, digits), z.multiplicity) for z in found.factored.roots or ()
+        roots=tuple(ProvedRoot(number(z.re, digits), number(z.im, digits), z.multiplicity) for z in roots),
+        eigenfrequencies=tuple(
+            ProvedRoot(number(-z.im, digits), number(z.re, digits), z.multiplicity) for z in (() if real else roots)
         ),
         abscissa=None if abscissa is None else number(abscissa, digits),
         stable=stability(found.factored),
-        heavily_damped=heavy_damping(found.factored),
+        heavily_damped=heavy_damping(found.factored) if real else NOTHING,
         inside=inside(problem, design, found),
         limits=Table(limits(problem, found)),
     )

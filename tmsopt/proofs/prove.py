@@ -51,4 +51,5 @@ def prove(
         claim = f"a design of '{problem.title or 'the problem'}' exists"
         return Proof(claim, False, reason, digits=digits, problem=problem)
     begin(how.progress, f"proving to {digits} digits")
-    return prove_design(problem, found.parameters, found.structure, digits, exact, found.worst, found.roots)
+    shown = found.of_polynomial
+    return prove_design(problem, found.parameters, shown.name, digits, exact, found.worst, shown.roots)

@@ -10,8 +10,8 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.unit_system import Unit, unit_of
 from tmsopt.fronts.front import Front
 from tmsopt.models import Model, in_words_of
+from tmsopt.models.told import pattern_of
 from tmsopt.report.text import HEIGHT, columns, screen, yes_no
-from tmsopt.roots import pattern
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
 from tmsopt.tracing.domain import Domain
 from tmsopt.tracing.swallowtail import Swallowtail
@@ -263,7 +263,7 @@ def event_rows(branch: Branch, units: Mapping[str, Unit], model: Model | None = 
 
 def _summary(branch: Branch, trace: Trace) -> str:
     share = f"{100 * float(np.mean(branch.stable)):.0f} % of its points"
-    rest = pattern(branch.pattern, trace.problem.model.degree).rest
+    rest = pattern_of(trace.problem.model, branch.pattern).rest
     states = f"{'bounds stability' if rest else 'stable'} on {share}"
     if any(not c.equality for c in trace.problem.conditions.values()):
         states += f", constraints hold on {100 * float(np.mean(branch.satisfied)):.0f} %"

@@ -57,6 +57,11 @@ def number_rows(problem: Problem, proof: Proof) -> list[tuple[str, str, str, str
     rows += [(name, *_cells(number), "") for name, number in proof.unknowns.items()]
     if proof.abscissa:
         rows.append(("abscissa", *_cells(proof.abscissa), ""))
+    if proof.eigenfrequencies:
+        for omega in proof.eigenfrequencies:
+            times = f" ({omega.multiplicity}-fold)" if omega.multiplicity > 1 else ""
+            rows += [(f"eigenfrequency{times}, re", *_cells(omega.re), ""), ("  im", *_cells(omega.im), "")]
+        return rows
     told = {number.value for number in proof.unknowns.values()}
     for root in (r for r in proof.roots if r.re.value not in told or r.im.value != "0"):
         times = f" ({root.multiplicity}-fold)" if root.multiplicity > 1 else ""
@@ -83,10 +88,8 @@ def _place(problem: Problem, proof: Proof) -> list[str]:
 
 def _facts(proof: Proof) -> list[str]:
     of = " (of the design as stored)" if proof.stored and proof.reason else ""
-    facts = [
-        _verdict(f"stable{of}", proof.stable), _verdict(f"heavily damped{of}", proof.heavily_damped),
-        _verdict("in the box", proof.inside),
-    ]  # fmt: skip
+    damped = [] if proof.eigenfrequencies else [_verdict(f"heavily damped{of}", proof.heavily_damped)]
+    facts = [_verdict(f"stable{of}", proof.stable), *damped, _verdict("in the box", proof.inside)]
     return facts + [f"{name}: {verdict}" for name, verdict in proof.limits.items()]
 
 

@@ -9,6 +9,7 @@ from tmsopt.critical_speeds.speeds import Speeds, speed_of
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import Unit, unit_of
 from tmsopt.models import in_words_of
+from tmsopt.report.solution.rows import frequency_of
 from tmsopt.report.text import columns
 
 _DIGITS = 15
@@ -32,16 +33,19 @@ def speeds_table(found: Speeds) -> str:
         "by exact root isolation for the numbers as stored",
         "",
     ]
-    roots = f"root {unit_of(found.problem, 'abscissa').text}".rstrip()
+    real = found.problem.model.carrier is None
+    roots = "eigenfrequency" if not real else f"root {unit_of(found.problem, 'abscissa').text}".rstrip()
     rows: list[Sequence[str]] = [("", f"{found.parameter} {unit.text}".rstrip(), roots, "")]
     for c in found.found:
-        rows.append((in_words_of(found.problem.model, c.kind), unit.number(c.at, _DIGITS), _root(c), _meaning(c)))
+        place = _root(c) if real else frequency_of(-c.root.im, c.root.re, 12, c.root.multiplicity)
+        rows.append((in_words_of(found.problem.model, c.kind), unit.number(c.at, _DIGITS), place, _meaning(c)))
     lines += [*columns(rows), ""] if found.found else [_nothing(found), ""]
     lines += list(_always(found))
     lines.append(f"stable: {_bands(found, found.stable)}")
     if found.always and (found.zeros or "weave" in found.always):
         lines.append(f"{_marginally(found)}: {_bands(found, found.marginal)}")
-    lines.append(f"heavily damped: {_bands(found, found.heavily_damped)}")
+    if real:
+        lines.append(f"heavily damped: {_bands(found, found.heavily_damped)}")
     return "\n".join(line.rstrip() for line in lines)
 
 
@@ -63,7 +67,8 @@ def growth_table(found: Growth) -> str:
         f"roots over {found.over.name} from {unit.number(found.values[0], 6)} to {unit.show(found.values[-1], 6)}",
         f"the design: {found.over.name} = {unit.show(found.design, 8)}, structure {found.structure}{critical}",
     ]
-    for name, bands in (("stable", found.stable), ("heavily damped", found.heavily_damped)):
+    kinds = [("stable", found.stable), ("heavily damped", found.heavily_damped)]
+    for name, bands in kinds if found.problem.model.carrier is None else kinds[:1]:
         words = ", ".join(f"{unit.number(low, 8)} to {unit.show(high, 8)}" for low, high in bands)
         lines.append(f"{name}: {words or 'nowhere'}")
     return "\n".join(lines)

@@ -21,6 +21,7 @@ from tmsopt.formulation.formulate import design_of
 from tmsopt.formulation.nlp import objective_size
 from tmsopt.formulation.options import DEFAULTS, AskedOfSolve, Options, options_of, taking
 from tmsopt.margins import edges_at
+from tmsopt.models.told import name_told
 from tmsopt.progress import Listener, begin, heard
 from tmsopt.records import Table
 from tmsopt.solver.multistart import rank, same
@@ -292,7 +293,7 @@ def _assembled(
         abscissa=numbers.abscissa,
         abscissa_realised=numbers.realised,
         roots=numbers.roots,
-        structure=checked.structure.name,
+        structure=name_told(problem.model, checked.structure.name),
         active=Table(finding.active),
         violations=checked.amounts,
         bound=instant_bound(problem, numbers.value) if optimal and bound else Bound(),

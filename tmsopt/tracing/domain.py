@@ -12,9 +12,10 @@ import numpy as np
 
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
+from tmsopt.models.told import pattern_of
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Array, Shown, Truth, plain
-from tmsopt.roots import is_stable, pattern, real_roots
+from tmsopt.roots import is_stable, real_roots
 from tmsopt.roots.meetings import nearest_two
 from tmsopt.tracing.branch import Branch, Event
 from tmsopt.tracing.continuation import INFINITE, SINGULAR
@@ -104,10 +105,9 @@ def domain(
     """
     plane = replace(problem_of(problem), constraints={}, minimize=None, maximize=None, locate=None)
     how: dict[str, Any] = {"step": step, "starts": starts, "seed": seed, "progress": progress}
-    found = {
-        name: [b for b in trace(plane, name, **how).branches if not _in_edge(b, plane)]
-        for name in ("weave", "capsize", "EP2")
-    }
+    bounding = ("weave", "capsize", "EP2") if plane.model.carrier is None else ("weave",)
+    found: dict[str, list[Branch]] = {"capsize": [], "EP2": []}
+    found |= {name: [b for b in trace(plane, name, **how).branches if not _in_edge(b, plane)] for name in bounding}
     unstable_beyond = [b for name in ("weave", "capsize") for b in found[name]]
     counted(progress, "looking for corners")
     infinite = list(through_infinity(plane, step, starts, seed))
@@ -186,7 +186,7 @@ def _bounds(branch: Branch, problem: Problem) -> Truth:
 
     Of several pairs that stay on the axis together, each with its curve, the fastest draws it.
     """
-    rest = pattern(branch.pattern, problem.model.degree).remaining(list(branch.unknowns.values()))
+    rest = pattern_of(problem.model, branch.pattern).remaining(list(branch.unknowns.values()))
     tied = on_axis(rest, len(branch))
     if np.all(tied < 0):
         return branch.stable
@@ -233,7 +233,7 @@ def _corners(branch: Branch, problem: Problem) -> Iterator[Corner]:
 
 def _turns(branch: Branch, event: Event, problem: Problem) -> bool:
     if event.name == "end":
-        return event.detail in pattern(branch.pattern, problem.model.degree).ends.values()
+        return event.detail in pattern_of(problem.model, branch.pattern).ends.values()
     return event.name not in ("fold", "constraint")
 
 

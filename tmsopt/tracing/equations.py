@@ -13,8 +13,9 @@ from tmsopt.errors import Fault, InputError
 from tmsopt.formulation.formulate import matching, variables_of
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import spread
+from tmsopt.models.told import pattern_of
 from tmsopt.records import Array, Complex, Truth
-from tmsopt.roots import Pattern, pattern as pattern_of, roots
+from tmsopt.roots import Pattern, roots
 from tmsopt.tracing.continuation import Curve, curve
 
 _SAMPLE = 32  # designs by which sizes are judged
@@ -74,7 +75,7 @@ class Traced:
 
 def prepare(problem: Problem) -> Traced:
     """The equations of a pattern problem, compiled for tracing."""
-    pattern = pattern_of(str(problem.locate), problem.model.degree)
+    pattern = pattern_of(problem.model, str(problem.locate))
     equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].equality}
     nlp = matching(replace(problem, constraints=equalities))
     free = len(problem.free)

@@ -73,9 +73,9 @@ def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, wal
 
 def _doubled(pattern: Pattern) -> tuple[int, tuple[str, ...]]:
     """Where b of a factor s² + bs + c stands among the unknowns, and the events at which it is a square."""
-    if pattern.name.lstrip("2C") != pattern.name and pattern.unknowns[:2] == ("b", "c"):
+    if pattern.form.lstrip("2C") != pattern.form and pattern.unknowns[:2] == ("b", "c"):
         return 0, tuple(m for m in pattern.marks if re.fullmatch(r"EP\d+", m))
-    if pattern.name == "EP2" and pattern.unknowns[-2:] == ("b", "c"):
+    if pattern.form == "EP2" and pattern.unknowns[-2:] == ("b", "c"):
         return len(pattern.unknowns) - 2, ("EP4", "2EP2")
     return 0, ()
 
@@ -189,7 +189,7 @@ def _end_words(problem: Problem, pattern: Pattern, end: End) -> str:
 
 def touched(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walked: Walk) -> Iterator[Found]:
     """EP4 where a curve of EP2 passes through it in a section: EP3 and 2EP2 touch 0 there, and keep their signs."""
-    if pattern.name != "EP2" or not {*pattern.marks} >= _TOUCHING:
+    if pattern.form != "EP2" or not {*pattern.marks} >= _TOUCHING:
         return
     x = walked.y * on.scale
     u = [x[:, k] for k in range(unknowns.start, unknowns.stop)]

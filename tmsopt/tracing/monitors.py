@@ -129,7 +129,7 @@ def marks(problem: Problem, pattern: Pattern, unknowns: slice, within: Sequence[
 
     for name, special in pattern.marks.items():
         yield Mark(name, "", of_unknowns(partial(_reduced, pattern, special)))
-    if pattern.name == "EP2" and "2EP2" in within:  # q(r) has a double zero where r is the double root of q
+    if pattern.form == "EP2" and "2EP2" in within:  # q(r) has a double zero where r is the double root of q
         yield Mark("EP4", "", of_unknowns(lambda u: u[0] - nearest_two(pattern.factors(u)[-1])))
     example = [np.ones(1)] * len(pattern.unknowns)
     for number, factor in enumerate(pattern.remaining(example)):

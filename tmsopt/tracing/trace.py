@@ -22,10 +22,9 @@ from tmsopt.errors import (
     suggest,
     table_faults,
 )
+from tmsopt.models.told import pattern_of, patterns_of
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Array
-from tmsopt.roots import pattern as pattern_of
-from tmsopt.roots.patterns.composed import pattern_names
 from tmsopt.tracing.branch import Branch, Event, Trace
 from tmsopt.tracing.continuation import SINGULAR, Walk, both_ways, contains, same
 from tmsopt.tracing.equations import Traced, design_at, prepare
@@ -121,12 +120,12 @@ def branch_of(ready: Traced, walked: Walk) -> Branch:
 def _asked(problem: Problem, name: str | None) -> Problem:
     """The problem with the pattern as its only question, checked to leave a curve."""
     name = name or problem.locate
-    names = pattern_names(problem.model.degree)
+    names = patterns_of(problem.model)
     if name is None:
         message = f"no pattern to trace; write locate = 'EP2' or another, or name one. accepted: {' '.join(names)}"
         raise InputError([Fault(message, ("objective", "locate"))])
     try:
-        name = pattern_of(str(name), problem.model.degree).name
+        name = pattern_of(problem.model, str(name)).name
     except ValueError as error:
         why = "" if str(error).endswith("is no pattern") else f": {error}"
         message = f"unknown pattern '{name}'{why}; {suggest(str(name), names)}"

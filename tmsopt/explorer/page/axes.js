@@ -136,10 +136,17 @@ function valueText(k, value, digits = 4) {
 /** Roots [re, im, multiplicity] in words. */
 function rootsInWords(roots, digits = 4, rate = 1) {
   const words = ([re, im, times]) =>
-    figure(re * rate, digits) +
-    (im > 0 ? ` ± ${figure(im * rate, digits)}i` : "") +
+    (DATA.carrier === null
+      ? figure(re * rate, digits) + (im > 0 ? ` ± ${figure(im * rate, digits)}i` : "")
+      : frequencyText(re * rate, (im - DATA.carrier) * rate, digits)) +
     (times > 1 ? ` (${times}-fold)` : "");
   return roots.map(words).join(", ");
+}
+
+/** The eigenfrequency of a complex system that decays or grows so fast. */
+function frequencyText(growth, frequency, digits) {
+  if (Math.abs(frequency) <= 1e-12 * Math.abs(DATA.carrier)) frequency = 0; // rounding of the carrier
+  return `${figure(frequency, digits)} ${growth < 0 ? "-" : "+"} ${figure(Math.abs(growth), digits)}i`;
 }
 
 /** A label with its unit, if there is one. */

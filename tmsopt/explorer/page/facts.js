@@ -146,9 +146,10 @@ function rootTexts({meetings}) {
   return meetings.map(([re, im, times]) => rootText(re, im) + (times > 1 ? ` (${times}-fold)` : ""));
 }
 
-/** A real root, or a conjugate pair. */
+/** A real root, or a conjugate pair; of a complex system an eigenfrequency. */
 function rootText(re, im) {
   if (Number.isNaN(re)) return "none";
+  if (DATA.carrier !== null) return frequencyText(re, im - DATA.carrier, 5);
   return im ? `${figure(re, 5)} ± ${figure(Math.abs(im), 5)}i` : figure(re, 5);
 }
 
@@ -164,7 +165,8 @@ function quantitiesPanel(host) {
   host.append(roots, origin);
   if (rows.length) host.append(element("table", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows)));
   return (drawing) => {
-    roots.textContent = `roots${DATA.rootUnit ? ` in ${DATA.rootUnit}` : ""}: ${rootTexts(drawing).join(", ") || "none"}`;
+    const what = DATA.carrier === null ? "roots" : "eigenfrequencies";
+    roots.textContent = `${what}${DATA.rootUnit ? ` in ${DATA.rootUnit}` : ""}: ${rootTexts(drawing).join(", ") || "none"}`;
     origin.hidden = !hasMeeting(drawing.meetings);
     origin.textContent = drawing.known?.roots.length
       ? "As they were found: where roots meet, computed ones scatter." : "Those that rounding alone keeps apart are taken for one.";

@@ -258,7 +258,7 @@ function growthPicture(host) {
   function motionsOf(state, drawing, sweep, timed) {
     const scaled = ([re, im], at) => {
       const rate = rateAt(state, at);
-      return [re * rate, (im * rate) / (timed ? 2 * Math.PI : 1)];
+      return [re * rate, ((im - (DATA.carrier ?? 0)) * rate) / (timed ? 2 * Math.PI : 1)];
     };
     const curves = sweep.curves.map(({pair, points}) => ({
       pair,
@@ -276,6 +276,7 @@ function growthPicture(host) {
       curves,
       here,
       growths: growthLimits(part(here, 0), part(near, 0), typical),
+      lowest: DATA.carrier === null ? 0 : Math.min(limitsOf(part(near, 1))[0], 1.1 * Math.min(0, ...part(here, 1))),
       highest: Math.max(limitsOf(part(near, 1))[1], 1.1 * Math.max(0, ...part(here, 1))),
     };
   }
@@ -307,12 +308,12 @@ function growthPicture(host) {
     const colours = coloursNow();
     const sweep = sweepOf(state);
     const timed = Number.isFinite(MODEL.rate(state.x));
-    const {curves, here, growths, highest} = motionsOf(state, drawing, sweep, timed);
+    const {curves, here, growths, lowest, highest} = motionsOf(state, drawing, sweep, timed);
     const box = {x0: PLOT_LEFT, width: width - PLOT_LEFT - 12};
     const upper = 0.52 * (height - 92);
     plots = [
       plotIn({...box, y0: 36, height: upper}, sweep.ends, growths),
-      plotIn({...box, y0: 50 + upper, height: height - 92 - upper}, sweep.ends, [0, highest]),
+      plotIn({...box, y0: 50 + upper, height: height - 92 - upper}, sweep.ends, [lowest, highest]),
     ];
     tellPlot(surface.canvas, plots[0]);
     plots.forEach((plot, lower) => {
@@ -324,7 +325,8 @@ function growthPicture(host) {
         drawDesign(context, plot, plot.x(state.x[state.over]), here, lower, colours);
       });
       const unit = timed ? (lower ? "Hz" : "1/s") : DATA.rootUnit;
-      const label = withLabelUnit(lower ? `frequency${timed ? "" : " |Im s|"}` : "growth rate Re s", unit);
+      const [growth, frequency] = DATA.carrier === null ? ["Re s", " |Im s|"] : ["Im ω", " Re ω"];
+      const label = withLabelUnit(lower ? `frequency${timed ? "" : frequency}` : `growth rate ${growth}`, unit);
       const {one} = DATA.parameters[state.over];
       const below = lower ? parameterLabel(state.over, plot.width) : "";
       drawAxes(context, plot, {label: below, one}, {label, one: 1}, colours);
@@ -355,7 +357,7 @@ function growthPicture(host) {
     const places = `${met.slice(0, 4).join(", ")}${met.length > 4 ? " and more" : ""}${unit ? ` ${unit}` : ""}`;
     if (met.length) texts.push(`roots meet at ${places}`);
     for (const {name, at, root} of exact)
-      texts.push(`a ${root[2]}-fold ${root[1] ? "pair" : "root"} at ${valueText(over, at, 5)} (${name})`);
+      texts.push(`a ${root[2]}-fold ${DATA.carrier === null ? (root[1] ? "pair" : "root") : "eigenfrequency"} at ${valueText(over, at, 5)} (${name})`);
     if (!events.length) texts.push(`no crossing was found at ${SWEEP_POINTS} values`);
     const text = texts.join("; ");
     return `${text[0].toUpperCase() + text.slice(1)}.`;
@@ -411,7 +413,7 @@ function growthPicture(host) {
     const has = (pair) => sweep.curves.some((curve) => curve.pair === pair);
     const met = (kind) => sweep.events.some((event) => event.kind === kind);
     return [
-      has(true) && lineEntry("a pair of roots, which swings", colours.weave, 2.2, DASHES.whole),
+      has(true) && lineEntry(DATA.carrier === null ? "a pair of roots, which swings" : "an eigenfrequency", colours.weave, 2.2, DASHES.whole),
       has(false) && lineEntry("a real root, which does not", colours.real, 2.2, DASHES.long),
       sweep.stable.length && boxEntry("stable", stable, colours.faint),
       sweep.heavy.length && boxEntry("heavily damped", heavy, colours.faint),
@@ -436,7 +438,7 @@ function growthPicture(host) {
     const unit = Number.isFinite(MODEL.rate(state.x)) ? "1/s" : DATA.rootUnit;
     const text = rootsInWords(roots, 4, rate);
     const where = `${symbolOf(state.over)} = ${valueText(state.over, value, 5)}`;
-    reading.textContent = `${where}: ${designWords(kindOf(a), roots)}; roots ${withLabelUnit(text || "none", unit)}`;
+    reading.textContent = `${where}: ${designWords(kindOf(a), roots)}; ${DATA.carrier === null ? "roots" : "eigenfrequencies"} ${withLabelUnit(text || "none", unit)}`;
   }
 
   const within = (value) => withinRange(now.state.over, value);

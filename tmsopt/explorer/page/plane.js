@@ -10,7 +10,7 @@ function planeReach(roots, path, kept) {
   const need = {
     left: Math.min(-0.25 * size, ...points.map(({re}) => re)),
     right: Math.max(0.25 * size, ...points.map(({re}) => re)),
-    top: Math.max(0.5 * size, ...points.map(({im}) => im)),
+    top: Math.max(0.5 * size, ...points.map(({im}) => Math.abs(im))),
   };
   const width = need.right - need.left;
   const serves =
@@ -34,6 +34,8 @@ function planePicture(host) {
   const reading = part(host, "p", {class: "reading"});
   const legend = legendIn(host);
   const says = saysIn(surface.canvas);
+  const ofH = DATA.carrier !== null; // eigenfrequencies of a complex system: the upper roots, less the carrier
+  const zero = DATA.carrier ?? 0;
 
   /** Equal scales along both axes: the angle of a root is its damping. */
   function plotOf(width, height, {left, right, top}) {
@@ -47,11 +49,13 @@ function planePicture(host) {
     if (!now) return;
     const {state, drawing} = now;
     const colours = coloursNow();
-    const roots = drawing.meetings;
+    const roots = drawing.meetings.map(([re, im, times]) => [re, im - zero, times]);
     const sweep = sweepOf(state);
     const value = state.x[state.over];
     const reach = 0.15 * (sweep.ends[1] - sweep.ends[0]);
-    const path = sweep.curves.flatMap(({points}) => points.filter(({at}) => Math.abs(at - value) <= reach));
+    const path = sweep.curves
+      .flatMap(({points}) => points.filter(({at}) => Math.abs(at - value) <= reach))
+      .map(({re, im}) => ({re, im: im - zero}));
     ({reach: kept, far} = planeReach(roots, path, kept));
     const plot = plotOf(width, height, kept);
     const fills = classFills(colours);
@@ -70,8 +74,8 @@ function planePicture(host) {
     drawAxes(
       context,
       plot,
-      {label: withLabelUnit("growth rate Re s", DATA.rootUnit), one: 1},
-      {label: withLabelUnit("frequency Im s", DATA.rootUnit), one: 1},
+      {label: withLabelUnit(`growth rate ${ofH ? "Im ω" : "Re s"}`, DATA.rootUnit), one: 1},
+      {label: withLabelUnit(`frequency ${ofH ? "Re ω" : "Im s"}`, DATA.rootUnit), one: 1},
       colours,
     );
     describe(state, roots, colours);
@@ -81,9 +85,9 @@ function planePicture(host) {
   function drawPath(context, plot, sweep, value, colours) {
     const span = sweep.ends[1] - sweep.ends[0];
     const shade = (at) => 0.18 + 0.82 * Math.max(0, 1 - Math.abs(at - value) / (0.45 * span));
-    for (const side of [1, -1]) {
+    for (const side of ofH ? [1] : [1, -1]) {
       for (const {points} of sweep.curves) {
-        const at = ({re, im}) => ({x: plot.x(re), y: plot.y(side * im)});
+        const at = ({re, im}) => ({x: plot.x(re), y: plot.y(side * (im - zero))});
         let gone = 0;
         points.slice(1).forEach((point, k) => {
           const ends = [at(points[k]), at(point)];
@@ -99,7 +103,7 @@ function planePicture(host) {
 
   function drawRoots(context, plot, roots, colours) {
     for (const [re, im, times] of roots) {
-      for (const side of im > 0 ? [1, -1] : [1]) {
+      for (const side of im > 0 && !ofH ? [1, -1] : [1]) {
         const [x, y] = [plot.x(re), plot.y(side * im)];
         drawDot(context, x, y, times > 1 ? 7.5 : 5.5, colours.mark, colours.paper, 2);
         if (times === 1) continue;
@@ -114,11 +118,11 @@ function planePicture(host) {
     const {name} = DATA.parameters[state.over];
     const [low, high] = rangeOf(state.over).map((end) => valueText(state.over, end));
     legend([
-      dotEntry("roots of this design", colours.mark, colours.paper),
+      dotEntry(`${ofH ? "eigenfrequencies" : "roots"} of this design`, colours.mark, colours.paper),
       lineEntry(`at lower ${name}, from ${low}`, colours.complex, 3.2, DASHES.dots),
       lineEntry(`at higher ${name}, to ${high}`, colours.real, 2.4, DASHES.whole),
     ]);
-    const beyond = rootsInWords(far, 3);
+    const beyond = rootsInWords(far.map(([re, im, times]) => [re, im + zero, times]), 3);
     reading.textContent = roots.length
       ? beyond
         ? `Beyond the picture: ${beyond}`

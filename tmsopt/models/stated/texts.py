@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Mapping
 from graphlib import CycleError, TopologicalSorter
+from types import MappingProxyType
 from typing import Any
 
 import casadi as ca
 
-from tmsopt.models.arithmetics import DEGREES
+from tmsopt.models.arithmetics import DEGREES, SYMBOLIC, Arithmetic
 from tmsopt.models.expression import Expression, ExpressionError, parse_value
 from tmsopt.models.model import Matrix
 from tmsopt.models.names import unusable
@@ -50,13 +51,17 @@ class Texts:
         fault: called with what is wrong with a text, and where: ``M``, or ``quantities`` and a name.
         symbols: those that there are beside texts.
         known: quantities that are expressions already.
+        arithmetic: that entries are computed in.
+        beside: names that mean something in it.
     """
 
     def __init__(
         self, fault: Callable[..., None], symbols: Mapping[str, Any] | None = None,
-        known: Mapping[str, Any] | None = None,
+        known: Mapping[str, Any] | None = None, arithmetic: Arithmetic = SYMBOLIC,
+        beside: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:  # fmt: skip
         self.fault = fault
+        self.arithmetic, self.beside = arithmetic, beside
         self.symbols = dict(symbols or {})
         self.known = dict(known or {})
         self.written: dict[str, Expression | None] = {}
@@ -66,7 +71,7 @@ class Texts:
     def entry(self, text: str, key: str, where: str) -> Any:
         """One entry as an expression of CasADi; 0 for one with a fault."""
         expression = self._parsed(text, (key,), f"{where}: ")
-        return self._symbolic(expression, (key,), f"{where}: ")[0] if expression else 0
+        return self._symbolic(expression, (key,), f"{where}: ", self.arithmetic)[0] if expression else 0
 
     def read_quantities(self, texts: Mapping[str, str]) -> None:
         """The formulas of the quantities, which may use one another, each to be had by `quantity`."""
@@ -101,10 +106,12 @@ class Texts:
                 )
         return self.known[name]
 
-    def _symbolic(self, expression: Expression, key: tuple[str, ...], where: str) -> tuple[Any, Degree]:
+    def _symbolic(
+        self, expression: Expression, key: tuple[str, ...], where: str, arithmetic: Arithmetic = SYMBOLIC
+    ) -> tuple[Any, Degree]:
         """An expression in symbols, made when first met, and its degree with the quantities in it written out."""
-        values = {}
-        for name in expression.names:
+        values = {} if arithmetic is SYMBOLIC else dict(self.beside)
+        for name in (n for n in expression.names if n not in values):
             derived = name in self.written or name in self.known
             values[name] = self.quantity(name) if derived else self.symbols.setdefault(name, ca.SX.sym(name))
         try:
@@ -112,7 +119,11 @@ class Texts:
         except Beyond as error:
             self.fault(f"{where}{error}", *key)
             return 0, Degree()
-        return expression.symbolic(values), degree
+        try:
+            return expression.evaluate(values, arithmetic), degree
+        except Beyond as error:
+            self.fault(f"{where}'{expression.text}' {error}", *key)
+            return 0, Degree()
 
     def _parsed(self, text: str, key: tuple[str, ...], where: str) -> Expression | None:
         """An expression; None for one with a fault."""
@@ -122,7 +133,7 @@ class Texts:
             self.fault(f"{where}{error}", *key)
             return None
         for name in expression.names:
-            if why := unusable(name):
+            if (why := unusable(name)) and name not in self.beside:
                 self.fault(f"{where}'{name}' {why}; give the parameter another name", *key)
                 return None
         return expression

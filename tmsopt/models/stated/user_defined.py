@@ -24,14 +24,16 @@ from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
 from tmsopt.models.names import latex, spelled, unusable
 from tmsopt.models.stated.closed_loop import check_loop, closed
 from tmsopt.models.stated.degree import faulty
+from tmsopt.models.stated.doubles import carriers, complex_model
+from tmsopt.models.stated.equations import IMAGINARY, in_order, pencil, polynomial, whole
+from tmsopt.models.stated.pairs import complex_text
 from tmsopt.models.stated.texts import Unfit, untexted
-from tmsopt.roots.polynomial import characteristic_polynomial, quadratic_pencil
 
 _ACCEPTED = "accepted: finite numbers, expressions in quotes, and SX expressions"
 _FINITE = "accepted: finite numbers, and expressions of them"
 
-MOST = {"M": 6, "A": 12, "coefficients": 12}
-"""Largest size of M, D, K; of A; largest degree."""
+MOST = {"M": 6, "A": 12, "H": 6, "coefficients": 12}
+"""Largest size of M, D, K; of A; of H; largest degree."""
 
 _SAMPLES = 24  # designs at which a leading coefficient must vanish for it to be looked at
 _DIGITS = 60
@@ -71,19 +73,19 @@ def from_matrices(
     if A is not None:
         if M is not None or D is not None or K is not None:
             raise Unfit("A", "stands beside M, D or K; give either A, or M and K with D")
-        matrices: dict[str, Matrix] = {"A": _square("A", A)}
+        matrices: dict[str, Matrix] = {"A": square("A", A)}
     else:
         missing = [n for n, value in (("M", M), ("K", K)) if value is None]
         if missing:
             raise Unfit(missing[0], "is missing; give M and K (and D), or A, or coefficients")
-        matrices = {n: _square(n, value) for n, value in (("M", M), ("D", D), ("K", K)) if value is not None}
+        matrices = {n: square(n, value) for n, value in (("M", M), ("D", D), ("K", K)) if value is not None}
         sizes = {n: len(rows) for n, rows in matrices.items()}
         for n, size in sizes.items():
             if size != sizes["M"]:
                 raise Unfit(n, f"is {size} × {size}, and M is {sizes['M']} × {sizes['M']}; give all the same size")
     matrices |= {n: _rectangular(n, value) for n, value in (("B", B), ("C", C), ("G", G)) if value is not None}
     check_loop({n: (len(rows), len(rows[0])) for n, rows in matrices.items()})
-    return _made("matrices", name, matrices, quantities)
+    return made("matrices", name, matrices, quantities)
 
 
 def from_coefficients(coefficients: Any, *, name: str = "stated", quantities: Mapping[str, Any] | None = None) -> Model:
@@ -103,7 +105,7 @@ def from_coefficients(coefficients: Any, *, name: str = "stated", quantities: Ma
     if row is None or any(_listed(x) is not None for x in row) or not 2 <= len(row) <= MOST["coefficients"] + 1:
         found = "no list" if row is None else f"{len(row)} entries" if row else "none"
         raise Unfit("coefficients", f"found {found}; accepted: from 2 to {MOST['coefficients'] + 1}, descending")
-    return _made("coefficients", name, {"coefficients": [row]}, quantities)
+    return made("coefficients", name, {"coefficients": [row]}, quantities)
 
 
 def _listed(value: Any) -> list[Any] | None:
@@ -125,19 +127,19 @@ def _rows(value: Any) -> list[list[Any] | None] | None:
     return None if rows is None else [_listed(row) for row in rows]
 
 
-def _square(key: str, value: Any) -> Matrix:
+def square(key: str, value: Any) -> Matrix:
     rows = _rows(value)
     if rows is None:
         found = f"an array of {value.ndim} dimensions" if isinstance(value, np.ndarray) else type(value).__name__
         raise Unfit(key, f"found {found}; accepted: a matrix as nested lists, a NumPy array, SX or DM")
-    square = [row for row in rows if row is not None and len(row) == len(rows)]
-    if not rows or len(square) < len(rows):
+    found_rows = [row for row in rows if row is not None and len(row) == len(rows)]
+    if not rows or len(found_rows) < len(rows):
         shape = " + ".join("?" if row is None else str(len(row)) for row in rows)
         raise Unfit(key, f"found rows of {shape or 'no'} entries; accepted: as many rows as entries in each")
-    most = MOST["A" if key == "A" else "M"]
+    most = MOST.get(key, MOST["M"])
     if len(rows) > most:
         raise Unfit(key, f"is {len(rows)} × {len(rows)}; accepted: up to {most} × {most}")
-    return square
+    return found_rows
 
 
 def _rectangular(key: str, value: Any) -> Matrix:
@@ -148,7 +150,7 @@ def _rectangular(key: str, value: Any) -> Matrix:
     return found
 
 
-def _made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> Model:
+def made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> Model:
     """The model of a statement; the same object for the same statement."""
     key = next(iter(matrices))
     if not isinstance(name, str) or not name.strip() or not name.isprintable():
@@ -164,8 +166,9 @@ def _made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) ->
         for i, row in enumerate(rows, start=1)
         for j, x in enumerate(row, start=1)
     } | {("quantities", str(n)): x for n, x in derived.items()}
-    every = ca.vertcat(*(scalar(*place, x) for place, x in given.items()))
-    symbols = ca.symvar(every)
+    entries = {place: scalar(whole(place[0]), place[1], x) for place, x in given.items()}
+    every = ca.vertcat(*entries.values())
+    symbols = ca.symvar(ca.vertcat(*(entries[place] for place in in_order(kind, entries))))
     names = tuple(x.name() for x in symbols)
     twice = {n for n in names if names.count(n) > 1}
     if twice:
@@ -182,14 +185,14 @@ def _made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) ->
     function = ca.Function("stated", [ca.vertcat(*symbols)], [ca.densify(every)])
     if wrong := faulty(function):
         (key, where), why = list(given)[wrong[0]], wrong[1]
-        raise Unfit(key, f"{where}: {why}")
+        raise Unfit(whole(key), f"{where}: {why}")
     return _rebuilt(kind, name.strip(), names, shapes, tuple(derived), function.serialize())
 
 
 @lru_cache(maxsize=64)
 def _rebuilt(
     kind: str, name: str, names: tuple[str, ...], shapes: tuple[tuple[str, int, int], ...], derived: tuple[str, ...],
-    serialized: str,
+    serialized: str, carrier: float = 0.0,
 ) -> Model:  # fmt: skip
     """A model from plain data; in each process there is one of each."""
     entry = Formulas(names, ca.Function.deserialize(serialized))
@@ -207,10 +210,10 @@ def _rebuilt(
         return closed(taken)
 
     def every(values: Mapping[str, Any]) -> list[Any]:
-        return _polynomial(kind, blocks(entry(values)))
+        return polynomial(kind, blocks(entry(values)), carrier)
 
     def as_printed(values: Mapping[str, Any]) -> list[Any]:
-        return _polynomial(kind, blocks(walk(entry.function, [values[n] for n in names], _DECIMALS)[0]))
+        return polynomial(kind, blocks(walk(entry.function, [values[n] for n in names], _DECIMALS)[0]))
 
     def vanish(leading: int) -> int:
         """How many of so many leading coefficients are 0 by their expressions, one after the other."""
@@ -219,7 +222,7 @@ def _rebuilt(
             found = blocks(walk(entry.function, field.inputs, field.arithmetic())[0])
             for n in ("D", "K")[max(leading - 1, 0) :] if "M" in found else ():  # without part in these coefficients
                 found[n] = [[0] * len(found["M"]) for _ in found["M"]]
-            row = _polynomial(kind, found)[:leading]
+            row = polynomial(kind, found)[:leading]
             return next((k for k, c in enumerate(row) if not field.vanishes(c)), leading)
         except (ZeroDivisionError, NotAccepted):  # or too large to tell
             return 0
@@ -252,10 +255,15 @@ def _rebuilt(
         quantities=tuple(
             Quantity(n, "1", "quantity", latex(n), alone(x)) for n, x in zip(derived, written[count:], strict=True)
         ),
-        pencil=None if kind == "coefficients" else lambda values: _pencil(blocks(entry(values))),
+        pencil=None if kind == "coefficients" else lambda values: pencil(blocks(entry(values)), carrier),
     )
-    origin = (_rebuilt, (kind, name, names, shapes, derived, serialized))
-    return replace(made, origin=origin, statement=_statement(entry, shapes, derived))
+    plain = (kind, name, names, shapes, derived, serialized)
+    made = replace(
+        made, origin=(_rebuilt, (*plain, carrier) if carrier else plain), statement=_statement(entry, shapes, derived)
+    )
+    if kind != "hamiltonian":
+        return made
+    return complex_model(made, carrier, carriers(written[:count]), lambda c: _rebuilt(*plain, *([c] if c else [])))
 
 
 def _statement(entry: Formulas, shapes: Sequence[tuple[str, int, int]], derived: Sequence[str]) -> dict[str, Any]:
@@ -264,6 +272,10 @@ def _statement(entry: Formulas, shapes: Sequence[tuple[str, int, int]], derived:
     rest = iter(texts)
     matrices = {n: [[next(rest) for _ in range(columns)] for _ in range(rows)] for n, rows, columns in shapes}
     quantities = dict(zip(derived, rest, strict=True))
+    if IMAGINARY in matrices:
+        imaginary = matrices.pop(IMAGINARY)
+        each = (zip(re, im, strict=True) for re, im in zip(matrices["H"], imaginary, strict=True))
+        matrices["H"] = [[complex_text(re, im) for re, im in row] for row in each]
     return {"parameters": list(entry.names), **matrices, "quantities": quantities, "shared": shared}
 
 
@@ -271,23 +283,6 @@ def _ball(x: Any) -> Any:
     """A coefficient as a ball, or as the series or the formula that it is."""
     x = exact(x)
     return flint.arb(x) if isinstance(x, flint.fmpq) else x
-
-
-def _polynomial(kind: str, blocks: dict[str, Matrix]) -> list[Any]:
-    if kind == "coefficients":
-        return blocks["coefficients"][0]
-    if "A" in blocks:
-        return characteristic_polynomial(blocks["A"])
-    M, K = blocks["M"], blocks["K"]
-    return quadratic_pencil(M, blocks.get("D") or [[0] * len(M) for _ in M], K)
-
-
-def _pencil(blocks: dict[str, Matrix]) -> tuple[Matrix, ...]:
-    if "A" in blocks:
-        A = blocks["A"]
-        return [[int(i == j) for j in range(len(A))] for i in range(len(A))], [[-x for x in row] for row in A]
-    M = blocks["M"]
-    return M, blocks.get("D") or [[0] * len(M) for _ in M], blocks["K"]
 
 
 def _vanishing(polynomial: Any, names: Sequence[str]) -> int:

@@ -7,6 +7,7 @@ from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import limit_text, unit_of
 from tmsopt.explanation import Lever
 from tmsopt.models import GRAVITY, tms, to_si
+from tmsopt.models.told import structure_in_words
 from tmsopt.report.solution.explanation import diagnosis_lines, optimality_lines, rounding_line, rounding_rows
 from tmsopt.report.solution.findings import Findings
 from tmsopt.report.solution.infeasible import infeasible_lines
@@ -21,13 +22,12 @@ from tmsopt.report.solution.rows import (
     pitching,
     quantity_rows,
     role,
-    roots_of,
+    roots_line,
     tidy,
 )
 from tmsopt.report.solution.screen import KEPT, Block, fitted, named, wrapped
 from tmsopt.report.speeds import range_line
 from tmsopt.report.text import HEIGHT, columns
-from tmsopt.roots.patterns.descriptions import in_words
 
 _DIGITS = 5
 _ROWS = 8  # of free parameters one below the other
@@ -143,7 +143,7 @@ def headline(solution: Solution, on_edge: bool = False) -> tuple[str, str]:
     located = f"locate {problem.locate}" if problem.locate else ""
     sense = f"{problem.sense} " if problem.free else ""  # what is given is not sought
     asked = f"{sense}{text.strip()}" + (f" = {value}" if math.isfinite(solution.value) else "") if text else ""
-    structure = in_words(solution.structure, problem.model.degree)
+    structure = structure_in_words(problem.model, solution.structure)
     silent = solution.status == "infeasible" and solution.any_stable is not False
     stable = "" if silent else stability(solution, on_edge)
     told = ": ".join(part for part in (_ended(solution), stable) if part)
@@ -220,11 +220,10 @@ def _design(solution: Solution, si: Mapping[str, float] | None) -> list[str]:
 def _motion(solution: Solution, found: Findings) -> list[str]:
     on_edge = found.robustness is not None and found.robustness.edges
     lines = [motion(solution, bool(on_edge))]
-    roots = ", ".join(roots_of(solution.roots, _DIGITS)) or "none"
     unit = unit_of(solution.problem, "abscissa").text
     if found.stable is not None:
         lines.append(range_line(found.stable, solution))
-    return [*lines, f"roots: {roots}{f'  in {unit}' if unit else ''}"]
+    return [*lines, f"{roots_line(solution, _DIGITS)}{f'  in {unit}' if unit else ''}"]
 
 
 def _more(solution: Solution, found: Findings) -> str:
@@ -237,11 +236,11 @@ def _more(solution: Solution, found: Findings) -> str:
 def _stored(solution: Solution) -> Iterator[str]:
     """To all digits: the abscissa, and that of the numbers as they are stored."""
     unit = unit_of(solution.problem, "abscissa")
-    size = max((math.hypot(r.re, r.im) for r in solution.roots), default=1.0)
+    size = max((math.hypot(r.re, r.im) for r in solution.of_polynomial.roots), default=1.0)
     abscissa = solution.abscissa if not abs(solution.abscissa) <= NOTHING * size else 0.0
     yield f"abscissa {unit.show(abscissa, ALL)}; of the parameters as rounded to doubles "\
           f"{unit.number(solution.abscissa_realised, ALL)}"  # fmt: skip
-    yield "roots: " + (", ".join(roots_of(solution.roots, ALL)) or "none")
+    yield roots_line(solution, ALL)
 
 
 def lever_cells(solution: Solution, lever: Lever) -> tuple[str, ...]:

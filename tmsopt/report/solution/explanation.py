@@ -9,6 +9,7 @@ from tmsopt.diagnosis.splitting import DEVIATION, Law, Response
 from tmsopt.explanation.explain import Explanation
 from tmsopt.explanation.optimality import NOT_COVERED, OnLine, Optimality
 from tmsopt.explanation.rounding import ALONE, Rounded
+from tmsopt.report.solution.rows import frequency_of
 from tmsopt.report.text import columns, number
 
 _SHARE, _LIMIT, _NIL = 0.05, 0.01, 1e-9
@@ -119,6 +120,8 @@ def optimality_lines(optimality: Optimality) -> list[str]:
 
 def _root_line(root: OnLine) -> str:
     place = _place(root.re, root.im, 5)
+    if (omega := root.eigenfrequency) is not None:
+        place = frequency_of(omega.real, omega.imag, 5)
     times = f" ({root.multiplicity}-fold)" if root.multiplicity > 1 else ""
     share = f" ({100 * root.share:.3g} % of what all bear)" if root.share < 1 - 1e-9 else ""
     kappa = f", to part it {_seen(root.kappa, root.beta):.4g}" if root.multiplicity > 1 else ""
@@ -138,7 +141,9 @@ def _seen(x: float, size: float = 1.0) -> float:
 def rounding_rows(explanation: Explanation) -> list[Sequence[str]]:
     rows: list[Sequence[str]] = [("rounded", "to", "abscissa", "loses", "damping_ratio", "violates")]
     rows += [_row(f"{name} alone", row.written[name], row) for name, row in explanation.rounding.items()]
-    return rows + [_row("all", f"{row.digits} digits", row) for row in explanation.precision]
+    rows += [_row("all", f"{row.digits} digits", row) for row in explanation.precision]
+    known = any(math.isfinite(row.damping_ratio) for row in (*explanation.rounding.values(), *explanation.precision))
+    return rows if known else [(*row[:4], *row[5:]) for row in rows]
 
 
 def _row(what: str, to: str, row: Rounded) -> tuple[str, ...]:
@@ -178,6 +183,8 @@ def _kind(found: Diagnosis) -> str:
     chains = f"Jordan chains of length {', '.join(map(str, found.partial))}" if found.partial else "chains not decided"
     chains = chains.replace("chains", "chain", 1) if len(found.partial) == 1 else chains
     what = "pair" if found.im else "root"
+    if (omega := found.eigenfrequency) is not None:
+        what, place = "eigenfrequency", frequency_of(omega.real, omega.imag, 8)
     return f"{found.algebraic}-fold {what} {place}: {found.kind}, {chains} ({why})"
 
 

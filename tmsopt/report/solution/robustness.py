@@ -15,8 +15,9 @@ _LITTLE = 1e-3
 """Share of the largest change below which one is 0."""
 _NAMED = 3
 """Parameters named in the headline at most."""
-_VERBS = {"divergence": "diverge"}
+_VERBS = {"divergence": "diverge", "threshold": "reach its threshold"}
 """Of words that are no verbs."""
+_OF_H = {"weave": "a real eigenfrequency"}
 _ON_EDGE = {"weave": "a pair of roots on the imaginary axis", "capsize": "a root 0", "infinity": "a root at infinity"}
 
 
@@ -30,7 +31,8 @@ def robustness_line(found: Robustness) -> str:
     More: docs/how_to/tolerances.md
     """
     if found.edges:
-        on = " and ".join(_ON_EDGE[kind] for kind in found.edges)
+        words = _ON_EDGE if found.problem.model.carrier is None else _OF_H
+        on = " and ".join(words[kind] for kind in found.edges)
         if found.zeros:
             return f"at its edge already: {', '.join(f'{n} = 0' for n in found.zeros)} ({on})"
         return f"none, on the edge of stability already, with {on}"
@@ -63,7 +65,8 @@ def robustness_table(found: Robustness) -> str:
     More: docs/how_to/tolerances.md
     """
     names = list(found.weights)
-    kinds = (found.weave, found.capsize, found.infinity, found.heavy_damping)
+    kinds: tuple[Nearest, ...] = (found.weave, found.capsize, found.infinity, found.heavy_damping)
+    kinds = kinds if found.problem.model.carrier is None else kinds[:1]
     rows: list[tuple[str, ...]] = [("relative changes" if found.relative else "changes in weights", "distance", *names)]
     for n in kinds:
         moves = _moves(n, found.relative) if n.found and n.distance else ["" for _ in names]

@@ -122,6 +122,10 @@ def motion(solution: Solution, on_edge: bool = False) -> str:
         return "no motion to describe: a root is at infinity"
     kind = "decay time" if abscissa < 0 else "growth time"
     lasts = "neither decay nor growth" if on_edge or not abscissa else f"{kind} {time.show(1 / abs(abscissa), 4)}"
+    if solution.problem.model.carrier is not None:
+        if on_edge or not abscissa:
+            return "neither loss nor gain"
+        return f"{'least loss' if abscissa < 0 else 'gain'} {abs(abscissa):.4g} ({lasts})"
     swings = [f for f in frequencies(solution.roots, rate) if f * 2 * math.pi > 1e-9 * rate]
     if not swings:
         return f"{lasts}; nothing swings"
@@ -144,6 +148,27 @@ def loads(solution: Solution) -> str:
     shares = {wheel: f"{100 * at_rest[share]:.4g} %" for wheel, share, _ in named}
     newtons = {w: unit_of(problem, n).show(at_rest[n], 4) for w, _, n in named if n in at_rest}
     return ", ".join(f"{w} wheel {newtons[w]} ({s})" if w in newtons else f"{w} wheel {s}" for w, s in shares.items())
+
+
+def roots_line(solution: Solution, digits: int) -> str:
+    """The roots, or of a complex system its eigenfrequencies."""
+    if solution.problem.model.carrier is None:
+        return "roots: " + (", ".join(roots_of(solution.roots, digits)) or "none")
+    each, size = solution.eigenfrequencies, abs(solution.problem.model.carrier)
+    middle = sum(z.re for z in each) / len(each) if each else 0.0
+    spread = max((math.hypot(z.re - middle, z.im) for z in each), default=0.0) or 1.0
+    digits = min(digits + max(0, math.ceil(math.log10(max(abs(middle), spread) / spread))), ALL)
+    return "eigenfrequencies: " + ", ".join(frequency_of(z.re, z.im, digits, z.multiplicity, size) for z in each)
+
+
+def frequency_of(re: float, im: float, digits: int, multiplicity: int = 1, size: float = 0.0) -> str:
+    """An eigenfrequency as text; a part that is none but for rounding, beside a size, is 0."""
+    size = max(size, math.hypot(re, im))
+    re, im = (x if abs(x) > NOTHING * size else 0.0 for x in (re, im))
+    parts = ([f"{re:.{digits}g}"] if re or not im else []) + ([f"{abs(im):.{digits}g}i"] if im else [])
+    sign = "-" if im < 0 else "+"
+    value = f" {sign} ".join(parts) if len(parts) > 1 else f"{'-' if im < 0 else ''}{parts[0]}"
+    return value + (f" ({multiplicity}-fold)" if multiplicity > 1 else "")
 
 
 def roots_of(roots: Sequence[Root], digits: int = 8) -> list[str]:

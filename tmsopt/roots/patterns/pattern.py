@@ -40,6 +40,7 @@ class Pattern:
         marks: name of a more special pattern → expression of the unknowns that is 0 where it is met.
         ends: unknown → what happens where it reaches 0 and the pattern ends.
         degree: of the polynomials.
+        doubles: of a pattern of a complex matrix, the name of the one of the real system of twice the size that it is.
 
     Example:
         >>> tmsopt.roots.pattern("EP3", 4).monic([-1, -2])  # (s + 1)³ (s + 2)
@@ -60,6 +61,12 @@ class Pattern:
     marks: Mapping[str, Callable[[Sequence[Any]], Any]] = field(default_factory=dict)
     ends: Mapping[str, str] = field(default_factory=dict)
     degree: int = 4
+    doubles: str = ""
+
+    @property
+    def form(self) -> str:
+        """The name that says which factors these are, in a real polynomial."""
+        return self.doubles or self.name
 
     @property
     def codimension(self) -> int:
@@ -89,7 +96,7 @@ class Pattern:
     def kind(self, unknowns: Sequence[Any]) -> NDArray[np.str_]:
         """Name of the pattern at each point: 2EP2 and CEP2 are one set, told apart by the sign of b² − 4c."""
         plain = self.name.removeprefix("2").removeprefix("C")
-        if self.name not in (f"2{plain}", f"C{plain}"):
+        if self.doubles or self.name not in (f"2{plain}", f"C{plain}"):
             return np.full(np.shape(unknowns[0]), self.name, dtype=_NAME)
         b, c = unknowns[:2]
         return np.where(b * b - 4 * c >= 0, f"2{plain}", f"C{plain}").astype(_NAME)

@@ -1,0 +1,200 @@
+"""Complex systems psi' = -i H psi: what H makes, what it refuses, and the carrier that its double is given."""
+
+import math
+import pickle
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import tmsopt
+from tmsopt.models import Model, Unfit, from_hamiltonian
+
+DIMER = [["w1 - 1j*g1", "k"], ["k", "w2 - 1j*g2"]]
+
+
+def frequencies(model: Model, parameters: dict[str, float]) -> list[complex]:
+    """Eigenfrequencies of a design as it is reported, each as often as it counts, by real part."""
+    found = tmsopt.solve(tmsopt.Problem(model, fixed=parameters)).eigenfrequencies
+    every = [complex(z.re, z.im) for z in found for _ in range(z.multiplicity)]
+    return sorted(every, key=lambda z: (round(z.real, 9), z.imag))
+
+
+def of_numpy(matrix: Any) -> list[complex]:
+    found = np.linalg.eigvals(np.array(matrix, dtype=complex))
+    return sorted(map(complex, found), key=lambda z: (round(z.real, 9), z.imag))
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 6])
+def test_eigenfrequencies_are_those_of_the_matrix(size: int) -> None:
+    """Beside LAPACK, for random complex matrices; 1e-9 of rounding in a polynomial of degree 12 with simple roots."""
+    rng = np.random.default_rng(size)
+    for _ in range(3):
+        H = rng.normal(size=(size, size)) + 1j * rng.normal(size=(size, size))
+        rows = [[f"x*({z.real!r} + {z.imag!r}*1j)" for z in row] for row in H.tolist()]
+        found = frequencies(from_hamiltonian(rows), {"x": 1.0})
+        assert np.allclose(found, of_numpy(H), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("carrier", [0.0, -3.0, 1e3, 1e6])
+def test_a_carrier_of_the_user_costs_no_digits(carrier: float) -> None:
+    """Frequencies relative to it are those without it, but for the roundings of the sum: 1e-16 of the carrier."""
+    model = from_hamiltonian(DIMER)
+    own = {"g1": 0.25, "g2": 0.125, "k": 0.75}
+    found = frequencies(model, {**own, "w1": carrier + 0.5, "w2": carrier - 0.25})
+    alone = of_numpy([[0.5 - 0.25j, 0.75], [0.75, -0.25 - 0.125j]])
+    assert np.allclose(np.array(found) - carrier, alone, rtol=0, atol=4e-16 * carrier + 1e-13)
+
+
+def test_a_rotating_frame_has_no_false_meeting() -> None:
+    """±a, and i b: the double without a carrier has there double roots that H has not."""
+    model = from_hamiltonian(DIMER)
+    opposite = {"w1": 0.5, "w2": -0.5, "g1": 0.0, "g2": 0.0, "k": 0.0}
+    found = tmsopt.solve(tmsopt.Problem(model, fixed=opposite))
+    assert found.structure == "two singles"
+    assert [z.multiplicity for z in found.roots] == [1, 1]
+    overdamped = tmsopt.solve(tmsopt.Problem(model, fixed={"w1": 0.0, "w2": 0.0, "g1": 1.0, "g2": 0.2, "k": 0.1}))
+    assert (overdamped.structure, [z.multiplicity for z in overdamped.roots]) == ("single", [1, 1])
+    gap = math.sqrt(0.4**2 - 0.1**2)
+    assert [z.re for z in overdamped.roots] == pytest.approx([-0.6 + gap, -0.6 - gap], abs=1e-14)
+    assert [z.im for z in overdamped.roots] == pytest.approx([0, 0], abs=1e-14)
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-7, 1e-6])
+def test_uncoupled_resonators_of_little_loss_do_not_meet(apart: float) -> None:
+    """Losses below 1e-6 of the frequency: written as a real system they pass for one."""
+    model = from_hamiltonian([["w1 - 1j*g1", 0], [0, "w2 - 1j*g2"]])
+    found = tmsopt.solve(tmsopt.Problem(model, fixed={"w1": 1.0, "w2": 1.0 + apart, "g1": 1e-7, "g2": 3e-7}))
+    assert found.structure == "single"
+    assert [z.im for z in found.eigenfrequencies] == pytest.approx([-1e-7, -3e-7], rel=1e-9)
+
+
+def test_uncoupled_resonators_with_the_same_loss_and_frequency_are_semisimple() -> None:
+    model = from_hamiltonian([["w - 1j*g", "k"], ["k", "w - 1j*g"]])
+    (found,) = tmsopt.diagnose(tmsopt.Problem(model, fixed={"w": 1.0, "g": 0.1, "k": 0.0}))
+    assert (found.algebraic, found.geometric, found.kind) == (2, 2, "semisimple")
+    assert found.eigenfrequency == pytest.approx(1 - 0.1j, abs=1e-14)
+
+
+def test_the_carrier_is_no_part_of_the_problem() -> None:
+    """Two problems written the same are equal, whatever model objects were made on the way."""
+    free = {"k": (0.1, 2.0)}
+
+    def stated() -> tmsopt.Problem:
+        fixed = {"w1": 0.0, "w2": 0.0, "g1": 1.0, "g2": 0.2}
+        return tmsopt.Problem(from_hamiltonian(DIMER), fixed=fixed, free=free, locate="EP2")
+
+    one, other = stated(), stated()
+    assert one == other
+    assert one.model is other.model
+    assert pickle.loads(pickle.dumps(one)) == one
+    assert one.model.statement == from_hamiltonian(DIMER).statement
+    assert tmsopt.Problem(one.model, fixed=one.fixed, free=one.free, locate="EP2") == one
+    assert not {"a0", "a4"} & set(tmsopt.solve(one).quantities)  # of the double
+
+
+def test_a_carrier_serves_its_ranges_and_grows_with_them() -> None:
+    """No root of the double comes as near to the real axis as the spread of the eigenfrequencies."""
+    model = from_hamiltonian(DIMER)
+    box = {"w1": (-1.0, 1.0), "w2": (0.0, 0.0), "g1": (0.0, 2.0), "g2": (0.1, 0.1), "k": (0.0, 3.0)}
+    made = model.within(box)
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        at = {n: float(rng.uniform(lo, hi)) for n, (lo, hi) in box.items()}
+        H = [[at["w1"] - 1j * at["g1"], at["k"]], [at["k"], at["w2"] - 1j * at["g2"]]]
+        assert made.carrier is not None
+        assert min(z.real for z in of_numpy(H)) + made.carrier > 3.0
+    assert made.within(box) is made
+    assert model.within({**box, "k": (0.0, 300.0)}).carrier != made.carrier
+
+
+def test_where_an_entry_has_no_bound_a_sample_tells_the_carrier() -> None:
+    model = from_hamiltonian([["1/x - 1j*g", "k"], ["k", "-1j*g"]])
+    found = tmsopt.solve(tmsopt.Problem(model, fixed={"g": 0.1}, free={"x": (-1, 2), "k": (0.1, 1)}, minimize="k"))
+    assert found.parameters["k"] == 0.1
+
+
+def test_entries_of_every_kind_make_the_same() -> None:
+    k, g, w = (ca.SX.sym(n) for n in "kgw")
+    at = {"w": 0.5, "g": 0.25, "k": 0.75}
+    matrix = [[0.5 - 0.25j, 0.75j], [0.75, 2 + 1j]]
+    written = [["w - 1j*g", "1j*k"], ["k", "2 + 1j"]]
+    for H in (
+        written,
+        [[(w, -g), (0, k)], [k, 2 + 1j]],
+        [["w - g*1i", "k/-1j"], ["k*exp(0)", "(2j + 1j**2)*(-1j) + 3j*0"]],
+    ):
+        assert frequencies(from_hamiltonian(H), at) == pytest.approx(of_numpy(matrix), abs=1e-13)
+
+
+def test_functions_of_complex_numbers() -> None:
+    """Quotients, whole powers and exp, beside Python's own complex numbers; a 1 × 1 matrix is its entry."""
+    for text in (
+        "(x + 1j)**3",
+        "(x + 2j)/(1 - x*1j)",
+        "(x - 1j)**-2",
+        "exp((0.3 + 2j)*x)",
+        "sqrt(x)*1j - x**0.5",
+        "2**x*1e1j",
+    ):
+        (omega,) = frequencies(from_hamiltonian([[text]]), {"x": 0.7})
+        value = {"exp": np.exp, "sqrt": np.sqrt, "x": 0.7}
+        expected = complex(eval(text, {"__builtins__": {}}, value))
+        assert omega == pytest.approx(expected, abs=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("H", "words"),
+    [
+        ([["j*g"]], "write the imaginary unit as 1j"),
+        ([["sin(1j*g)"]], "'sin(1j*g)' takes sin of a complex number"),
+        ([["(g + 1j)**g"]], "'(g + 1j)**g' is a complex number to a power"),
+        ([["g", 1]], "found rows of 2 entries"),
+        ([["g*2j", 1], [0, "conj(g)"]], "calls 'conj'"),
+        ([["g*"]], "does not parse"),
+        ([[0.5]], "names no parameter"),
+        ([["g", float("nan")], [0, 1j]], "row 1, column 2: is nan"),
+        ([["g" if i == j else 0 for i in range(7)] for j in range(7)], "accepted: up to 6 × 6"),
+        ([[(1, 2, 3)]], "accepted: two, the real and the imaginary part"),
+    ],
+)
+def test_what_is_refused_is_told(H: Any, words: str) -> None:
+    with pytest.raises(Unfit) as refused:
+        from_hamiltonian(H)
+    assert refused.value.key == "H"
+    assert words in str(refused.value)
+    assert "_1j" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ('H = [["w"]]\nA = [["w"]]', "stands beside A; keep H, a complex system"),
+        ('H = [["1j*w", 1]]', "found rows of 2 entries"),
+        ('H = [["w - 2j*"]]', "'w - 2j*' does not parse"),
+        ('H = "w"', "accepted: rows in brackets"),
+        ('A = [["1j*w"]]', "a complex matrix goes in H"),
+    ],
+)
+def test_a_file_is_refused_at_its_line(tmp_path: Path, table: str, words: str) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(f"[model]\n{table}\n[parameters]\nw = 1\n", encoding="utf-8")
+    with pytest.raises(tmsopt.InputError, match=r"own\.toml:[23]: model\.[AH]") as refused:
+        tmsopt.load(path)
+    assert words in str(refused.value)
+
+
+@pytest.mark.parametrize("asked", ["damping_ratio", "angular_frequency"])
+def test_what_has_no_meaning_in_a_rotating_frame_is_not_offered(asked: str) -> None:
+    fixed = {"w1": 0.0, "w2": 0.0, "g1": 1.0, "g2": 0.2}
+    with pytest.raises(tmsopt.InputError, match="rotating frame"):
+        tmsopt.Problem(from_hamiltonian(DIMER), fixed=fixed, free={"k": (0.1, 2)}, maximize=asked)
+
+
+@pytest.mark.parametrize("name", ["CEP2", "EP3", "capsize"])
+def test_patterns_are_those_of_the_matrix(name: str) -> None:
+    fixed = {"w1": 0.0, "w2": 0.0, "g1": 1.0, "g2": 0.2}
+    with pytest.raises(tmsopt.InputError, match="EP2 weave resonance"):
+        tmsopt.Problem(from_hamiltonian(DIMER), fixed=fixed, free={"k": (0.1, 2)}, locate=name)

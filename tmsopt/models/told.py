@@ -1,0 +1,82 @@
+"""What the polynomial of a model shows, in the words of its user: of a complex H in those of H, not of its double.
+
+The polynomial of a complex H is that of the real system of twice the size with a carrier: roots s = −i (ω + carrier)
+and their conjugates. Told are s = −i ω, each with its multiplicity.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Any
+
+from tmsopt.models.model import Model
+from tmsopt.roots import Pattern, Root, Structure, pattern
+from tmsopt.roots.patterns.composed import pattern_names
+from tmsopt.roots.patterns.descriptions import in_words
+from tmsopt.roots.patterns.doubled import (
+    complex_in_words,
+    complex_name,
+    complex_pattern,
+    complex_pattern_names,
+    doubled_name,
+)
+
+
+def pattern_of(model: Model, name: str) -> Pattern:
+    """The pattern of a name for the polynomials of a model; of a complex H one of its eigenfrequencies.
+
+    Raises:
+        ValueError: for a name that is none, or a pattern of more roots than there are.
+    """
+    return pattern(name, model.degree) if model.carrier is None else complex_pattern(name, model.degree // 2)
+
+
+def patterns_of(model: Model) -> tuple[str, ...]:
+    """Names of the patterns of a model that are not made up of others."""
+    return pattern_names(model.degree) if model.carrier is None else complex_pattern_names(model.degree // 2)
+
+
+def name_told(model: Model, name: str) -> str:
+    """The name of a pattern or structure of the polynomial as the user reads it."""
+    return name if model.carrier is None else complex_name(name)
+
+
+def roots_told(model: Model, roots: Iterable[Any]) -> tuple[Any, ...]:
+    """Roots of the polynomial as the user reads them: numbers or balls with ``re``, ``im`` and multiplicity."""
+    if model.carrier is None:
+        return tuple(roots)
+    return tuple(replace(r, im=r.im + model.carrier) for r in roots if r.im < 0)
+
+
+def numbers_told(model: Model, roots: Any) -> Any:
+    """Likewise an array of complex numbers with all roots along its last axis, in the order of their real parts."""
+    if model.carrier is None:
+        return roots
+    import numpy as np
+
+    order = np.argsort(np.where(roots.imag < 0, 0, 1), axis=-1, kind="stable")[..., : model.degree // 2]
+    return np.take_along_axis(roots, order, axis=-1) + 1j * model.carrier
+
+
+def told(model: Model, found: Structure) -> Structure:
+    """A structure of the polynomial as the user reads it."""
+    return replace(found, name=name_told(model, found.name), roots=roots_told(model, found.roots))
+
+
+def meant(model: Model, name: str, roots: Sequence[Root]) -> Structure:
+    """The structure of the polynomial that a user reads so; the inverse of `told`."""
+    if model.carrier is None:
+        return Structure(name, tuple(roots), 0.0)
+    lower = [replace(r, im=r.im - model.carrier) for r in roots]
+    return Structure(doubled_name(name), tuple(w for r in lower for w in (replace(r, im=-r.im), r)), 0.0)
+
+
+def structure_in_words(model: Model, structure: str) -> str:
+    """A structure, as it is told, in words."""
+    if model.carrier is None:
+        return in_words(structure, model.degree)
+    return complex_in_words(structure, model.degree // 2)
+
+
+def eigenfrequencies(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
+    """ω = i s of roots as they are told; none of a real system."""
+    return () if model.carrier is None else tuple(Root(-r.im + 0.0, r.re, r.multiplicity) for r in roots)

@@ -1,0 +1,93 @@
+"""Patterns and structures of a complex matrix H, of which those of the real system of twice the size are made.
+
+Every eigenvalue of H stands for a complex pair of roots of that system, so an EPn of H is a CEPn there. That holds
+where no root meets the conjugate of another, for which H has a carrier.
+"""
+
+import re
+from dataclasses import replace
+from functools import cache
+
+from tmsopt.roots.patterns.composed import pattern
+from tmsopt.roots.patterns.parts import parts_of
+from tmsopt.roots.patterns.pattern import Pattern
+
+_MEANING = {"weave": "a real eigenfrequency", "resonance": "a real double eigenfrequency"}
+_COUNTS = ("", "", "two ", "three ", "four ", "five ", "six ")
+_REAL = "is a pattern of a real system"
+
+
+def complex_pattern_names(size: int) -> tuple[str, ...]:
+    """Names of the patterns of a matrix of a size that are not made up of others."""
+    several = [f"2EP{k}" for k in range(size // 2, 1, -1)]
+    return (*(f"EP{k}" for k in range(size, 1, -1)), *several, "weave", *(["resonance"] if size > 1 else []))
+
+
+@cache
+def complex_pattern(name: str, size: int) -> Pattern:
+    """The pattern of a name such as ``EP3`` or ``EP2+EP2``, for the eigenvalues of complex matrices of a size.
+
+    Its factors are those of the real polynomial of twice the degree: `Pattern.form` names them, ``CEP3``.
+
+    Raises:
+        ValueError: for a name that is none, or a pattern of more eigenvalues than there are.
+    """
+    written = "".join(name.split())
+    for part in parts_of(written):
+        if part.kind == "CEP":
+            raise ValueError(f"'{name}' {_REAL}; of a complex H write EP{part.order}")
+        if part.kind == "capsize":
+            raise ValueError(f"'{name}' {_REAL}; of a complex H write weave, a real eigenfrequency")
+    taken = sum(part.roots for part in parts_of(written) if part.kind == "EP")
+    if taken > size:
+        raise ValueError(f"'{name}' takes {taken} eigenfrequencies, and H has {size}")
+    made = pattern(written.replace("EP", "CEP"), 2 * size)
+    words = (_meaning(part.kind, part.order, part.count) for part in parts_of(written))
+    return replace(made, name=complex_name(made.name), meaning=" and ".join(words), marks={}, doubles=made.name)
+
+
+def _meaning(kind: str, order: int, count: int) -> str:
+    if kind != "EP":
+        return _MEANING[kind]
+    times = {2: "double", 3: "triple"}.get(order, f"{order}-fold")
+    return f"a {times} eigenfrequency" if count == 1 else f"{_COUNTS[count]}{times} eigenfrequencies"
+
+
+def complex_name(name: str) -> str:
+    """A pattern or structure of the double in the words of H: ``CEP2+two pairs`` as ``EP2+two singles``."""
+    return re.sub(r"\bpair", "single", name.replace("CEP", "EP"))
+
+
+def complex_shown(shown: Pattern) -> Pattern:
+    """A pattern that the roots of a double show, as one of H."""
+    words = shown.meaning.replace(" on one vertical line", " with one decay rate")
+    words = words.replace("complex double", "double complex")
+    words = re.sub(r"(complex )?pair(s?)", lambda m: "eigenfrequencies" if m[2] else "eigenfrequency", words)
+    return replace(shown, name=complex_name(shown.name), meaning=words, marks={}, doubles=shown.form)
+
+
+def doubled_name(name: str) -> str:
+    """The same the other way round."""
+    return re.sub(r"\bsingle", "pair", name.replace("EP", "CEP"))
+
+
+def complex_in_words(structure: str, size: int) -> str:
+    """A structure of the least damped eigenfrequencies in words; one that is unknown as it is."""
+    if structure == "undecided":
+        return "double precision cannot tell which eigenfrequencies meet (undecided)"
+    if structure == "single":
+        return "one eigenfrequency is least damped (single)"
+    if match := re.fullmatch(r"EP(\d+)", structure):
+        order = int(match[1])
+        every = "both" if order == 2 else f"all {_COUNTS[order].strip()}"
+        which = every if order == size else f"the {_COUNTS[order]}least damped"
+        return f"{which} eigenfrequencies meet in one ({structure})"
+    named = [_part(part) for part in structure.split("+")]
+    listed = named[0] if len(named) == 1 else f"{', '.join(named[:-1])} and {named[-1]}"
+    return f"{listed} have one decay rate ({structure})"
+
+
+def _part(part: str) -> str:
+    if match := re.fullmatch(r"EP(\d+)", part):
+        return _meaning("EP", int(match[1]), 1)
+    return "a simple eigenfrequency" if part == "single" else part.replace("singles", "simple eigenfrequencies")
