@@ -81,6 +81,9 @@ def test_the_curve_of_a_dimer_is_half_the_difference_of_losses() -> None:
         assert np.abs(at["k"] - np.abs(1 - at["g2"]) / 2).max() < EXACT
         assert np.abs(at["d"]).max() < EXACT
         assert np.allclose(branch.abscissa, -(1 + at["g2"]) / 2, rtol=0, atol=EXACT)
+        row = next(iter(branch.records()))
+        assert (row["omega_re"], row["omega_im"]) == pytest.approx((0, -(1 + row["g2"]) / 2), abs=EXACT)
+        assert "c" not in row
 
 
 def test_all_exceptional_points_of_a_dimer_are_counted() -> None:

@@ -56,6 +56,7 @@ class Branch(Tabular):
         events: in the order of the arclength.
         closed: whether the last point is the first.
         residual: largest mismatch of a coefficient along the curve, relative to the terms that it is made of.
+        eigenfrequency: of a complex system the multiple one, as ``omega_re`` and ``omega_im``, in place of `unknowns`.
 
     Example:
         >>> branch = tmsopt.trace("problems/ep_set.toml").branches[0]
@@ -79,9 +80,15 @@ class Branch(Tabular):
     events: tuple[Event, ...]
     closed: bool
     residual: float
+    eigenfrequency: Mapping[str, Array] | None = None
 
     def __len__(self) -> int:
         return len(self.arclength)
+
+    @property
+    def told(self) -> Mapping[str, Array]:
+        """The unknowns of the pattern; of a complex system the multiple eigenfrequency, where it is one."""
+        return self.unknowns if self.eigenfrequency is None else self.eigenfrequency
 
     def records(self) -> Iterable[dict[str, Any]]:
         """One record per point, as written to CSV."""
@@ -94,7 +101,7 @@ class Branch(Tabular):
                 **{name: float(column[k]) for name, column in self.parameters.items()},
                 **{f"d_{name}": float(column[k]) for name, column in self.tangent.items()},
                 # a parameter may have the name of an unknown, such as a damping c
-                **{f"{self.pattern}.{n}" if n in self.parameters else n: float(c[k]) for n, c in self.unknowns.items()},
+                **{f"{self.pattern}.{n}" if n in self.parameters else n: float(c[k]) for n, c in self.told.items()},
                 "abscissa": float(self.abscissa[k]),
                 "kind": str(self.kinds[k]),
                 "stable": bool(self.stable[k]),

@@ -68,7 +68,18 @@ def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, wal
         satisfied=satisfied(problem, values, len(x)), abscissa=np.broadcast_to(values["abscissa"], len(x)),
         events=tuple(sorted(events, key=lambda e: e.index)), closed=walked.closed,
         residual=float(np.max(_residual(values, pattern.monic(u), u))),
+        eigenfrequency=_eigenfrequency(problem, pattern, u),
     )  # fmt: skip
+
+
+def _eigenfrequency(problem: Problem, pattern: Pattern, u: list[Array]) -> dict[str, Array] | None:
+    """Of a complex system ω = i s of a multiple root, of s² + bs + c less the carrier; None of a real one."""
+    if problem.model.carrier is None:
+        return None
+    if not pattern.form.startswith("CEP") or pattern.unknowns[:2] != ("b", "c"):
+        return {}
+    b, c = u[:2]
+    return {"omega_re": np.sqrt(c - b * b / 4) - problem.model.carrier, "omega_im": -b / 2}
 
 
 def _doubled(pattern: Pattern) -> tuple[int, tuple[str, ...]]:
