@@ -104,7 +104,7 @@ def test_public_names_exist(page: Path) -> None:
     text = "\n".join(
         line for line in page.read_text(encoding="utf-8").splitlines() if not line.startswith(("$ ", ".. click::"))
     )
-    for name, inner in re.findall(r"(?<![\w/])tmsopt\.([A-Za-z_]\w*)(?:\.(\w+))?", text):
+    for name, inner in re.findall(r"(?<![\w/.])tmsopt\.([A-Za-z_]\w*)(?:\.(\w+))?", text):
         assert name in {*tmsopt.__all__, "__all__", "__version__"}, name
         found = getattr(tmsopt, name)
         if inner and (inspect.ismodule(found) or inspect.isclass(found)):
