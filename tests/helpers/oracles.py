@@ -31,7 +31,7 @@ def polynomial_60(
     with mp.workdps(DIGITS + GUARD):
         Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s = map(_mpf, (Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s))
         cos, sin = mp.cos(lambda_s), mp.sin(lambda_s)
-        M, V, P, nu_H = _matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, cos, sin)
+        M, V, P, nu_H = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, cos, sin)
         return _rounded(a / (mu * nu_H * cos) for a in _determinant(M, V, P))
 
 
@@ -44,14 +44,14 @@ def polynomial_exact(
     each have it as a factor, and it leaves the quotient. So cos = 1 and sin = T serve.
     """
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = map(Fraction, (Fr, mu, chi_B, chi_H, zeta_B, zeta_H, tan_lambda_s))
-    M, V, P, nu_H = _matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, Fraction(1), T)
+    M, V, P, nu_H = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, Fraction(1), T)
     return [a / (mu * nu_H) for a in _determinant(M, V, P)]
 
 
 def polynomial_floats(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, lambda_s: Any) -> list[Any]:
     """The same coefficients, but for a common factor, in double precision for arrays."""
     cos, sin = np.cos(lambda_s), np.sin(lambda_s)
-    M, V, P, _ = _matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, cos, sin)
+    M, V, P, _ = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, cos, sin)
     return _determinant(M, V, P)
 
 
@@ -64,11 +64,11 @@ def symbolic_copo() -> tuple[list[sympy.Expr], dict[str, sympy.Symbol]]:
     symbols = dict(zip(names.split(), sympy.symbols(names, real=True), strict=True))
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = symbols.values()
     cos = sympy.Symbol("c", positive=True)
-    M, V, P, nu_H = _matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, cos, T * cos)
+    M, V, P, nu_H = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, cos, T * cos)
     return [sympy.expand(sympy.cancel(a / (mu * nu_H * cos))) for a in _determinant(M, V, P)], symbols
 
 
-def _matrices(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, cos: Any, sin: Any) -> Any:
+def matrices(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, cos: Any, sin: Any) -> Any:
     """M, V, P as printed, and nu_H, in whatever arithmetic the arguments bring."""
     nu_H = (chi_H - 1) * cos - zeta_H * sin
     M = [[mu * zeta_H**2 + zeta_B**2, -mu * zeta_H * nu_H], [-mu * zeta_H * nu_H, mu * nu_H**2]]

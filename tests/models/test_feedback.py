@@ -1,0 +1,365 @@
+"""A controller on both bicycles, against state matrices from the equations as printed, in fractions."""
+
+import math
+import pickle
+from fractions import Fraction
+
+import casadi as ca
+import flint
+import mpmath
+import numpy as np
+import pytest
+from helpers.bicycles import BENCHMARK, appendix, bicycles
+from helpers.oracles import matrices
+from mpmath import mp
+
+import tmsopt
+from tmsopt.models import controlled, from_si, tms, whipple
+from tmsopt.roots import exact_roots
+
+STATES = ("phi", "delta", "phidot", "deltadot")
+STEER = tuple(f"k_{x}" for x in STATES)
+LEAN = tuple(f"lean_{x}" for x in STATES)
+SLOPES = tuple(f"{n}_v" for n in (*STEER, *LEAN))
+GAINS = {
+    "steer": STEER,
+    "one": ("k_phidot",),
+    "lean": LEAN,
+    "both": (*STEER, *LEAN),
+    "slopes": (*STEER, *LEAN, *SLOPES),
+    "slope alone": ("k_phidot_v",),
+    "lag": (*STEER, "lag"),
+    "lag of both": ("k_phi", "lean_phidot", "lag"),
+    "everything": (*STEER, *LEAN, *SLOPES, "lag"),
+}
+SKATES = ("w", "v", "g", "m_B", "x_B", "z_B", "m_H", "x_H", "z_H")
+SINE, COSINE = Fraction(3, 5), Fraction(4, 5)
+
+
+def rounded(values):
+    return {n: Fraction(float(x)).limit_denominator(1000) for n, x in values.items()}
+
+
+def gains_of(names, seed):
+    rng = np.random.default_rng(seed)
+    return rounded({n: rng.uniform(0.02, 0.5) if n == "lag" else rng.uniform(-60, 60) for n in names})
+
+
+def wheeled(p):
+    """M, D, K in SI by the appendix."""
+    M, C1, K0, K2 = appendix(p, SINE, COSINE)
+    v, g = p["v"], p["g"]
+    return M, scaled(C1, v), added(scaled(K0, g), scaled(K2, v * v))
+
+
+def skating(p):
+    """M, D, K in SI by the paper's matrices: these are per m_B w², and linear in Fr and Fr² = v²/(g w)."""
+    w, v, g, m = p["w"], p["v"], p["g"], p["m_B"]
+    ratios = (p["m_H"] / m, p["x_B"] / w, p["x_H"] / w, p["z_B"] / w, p["z_H"] / w, COSINE, SINE)
+    M, V, P, _ = matrices(Fraction(1), *ratios)
+    rest = matrices(Fraction(0), *ratios)[2]
+    K = added(scaled(rest, m * g * w), scaled(added(P, scaled(rest, -1)), m * v * v))
+    return scaled(M, m * w * w), scaled(V, m * w * v), K
+
+
+def scaled(A, factor):
+    return [[factor * x for x in row] for row in A]
+
+
+def added(A, B):
+    return [[a + b for a, b in zip(*rows, strict=True)] for rows in zip(A, B, strict=True)]
+
+
+def state_matrix(M, D, K, gains, v):
+    """x′ = A x of φ, δ, φ′, δ′ and, with a lag, of the torques: M q″ + D q′ + K q = T, lag T′ + T = −G (q, q′)."""
+
+    def gain(torque, x):
+        return gains.get(f"{torque}_{x}", 0) + gains.get(f"{torque}_{x}_v", 0) * v
+
+    G = [[gain(torque, x) for x in STATES] for torque in ("lean", "k")]
+    determinant = M[0][0] * M[1][1] - M[0][1] * M[1][0]
+    inverse = scaled([[M[1][1], -M[0][1]], [-M[1][0], M[0][0]]], 1 / Fraction(determinant))
+    lag = gains.get("lag")
+    driven = [row for row in (0, 1) if lag and (row == 1 or any(n.startswith("lean") for n in gains))]
+    size = 4 + len(driven)
+    A = [[Fraction(0)] * size for _ in range(size)]
+    A[0][2] = A[1][3] = Fraction(1)
+    passive = [[-x for x in (*k, *d)] for k, d in zip(K, D, strict=True)]
+    if not lag:
+        passive = added(passive, scaled(G, -1))
+    for i in (0, 1):
+        for j in range(4):
+            A[2 + i][j] = inverse[i][0] * passive[0][j] + inverse[i][1] * passive[1][j]
+        for n, row in enumerate(driven):
+            A[2 + i][4 + n] = inverse[i][row]
+    for n, row in enumerate(driven):
+        A[4 + n][:4] = [-g / lag for g in G[row]]
+        A[4 + n][4 + n] = -1 / lag
+    return A
+
+
+def characteristic(A):
+    """1, c1 … cn, exactly."""
+    rows = [[flint.fmpq(x.numerator, x.denominator) for x in map(Fraction, row)] for row in A]
+    return [Fraction(int(c.p), int(c.q)) for c in reversed(list(flint.fmpq_mat(rows).charpoly()))]
+
+
+def balls(values):
+    """λ_s is the angle whose tangent is 3/4."""
+    found = {n: flint.arb(flint.fmpq(x.numerator, x.denominator)) for n, x in values.items()}
+    return {**found, "lambda_s": (flint.arb(3) / 4).atan()}
+
+
+def agree(got, exact):
+    """Balls, of which every one has the exact coefficient, and hardly anything else."""
+    assert len(got) == len(exact)
+    for ball, c in zip(got, exact, strict=True):
+        ratio = ball / got[0]
+        expected = flint.arb(flint.fmpq(c.numerator, c.denominator))
+        assert ratio.overlaps(expected)
+        assert float(ratio.rad()) <= 1e-45 * max(1.0, abs(float(expected)))
+
+
+@pytest.fixture(autouse=True)
+def digits():
+    with flint.ctx.workprec(230):  # 69 digits, some ten of which the products lose
+        yield
+
+
+# The equations
+
+
+@pytest.mark.parametrize("kind", GAINS)
+def test_wheels_by_the_appendix(kind):
+    for seed, bicycle in enumerate(bicycles(8, seed=11)):
+        p, gains = rounded(bicycle), gains_of(GAINS[kind], seed)
+        model = controlled(whipple, gains)
+        given = {**balls({**p, **dict.fromkeys(STEER, Fraction(0)), **gains})}
+        agree(model.coefficients(given), characteristic(state_matrix(*wheeled(p), gains, p["v"])))
+
+
+@pytest.mark.parametrize("kind", GAINS)
+def test_skates_in_si_by_the_paper(kind):
+    """Roots are per √(g/w) there: the k-th coefficient has k of these."""
+    for seed, bicycle in enumerate(bicycles(8, seed=12)):
+        p, gains = rounded({n: bicycle[n] for n in SKATES}), gains_of(GAINS[kind], seed)
+        model = controlled(tms, gains)
+        given = balls({**p, **dict.fromkeys(STEER, Fraction(0)), **gains})
+        rate = (given["g"] / given["w"]).sqrt()
+        got = model.coefficients(given, model.parameter_set("SI"))
+        exact = characteristic(state_matrix(*skating(p), gains, p["v"]))
+        agree([c * rate**k for k, c in enumerate(got)], exact)
+
+
+@pytest.mark.parametrize("kind", GAINS)
+def test_skates_without_dimensions_are_those_in_si(kind):
+    """Torques per m_B g w, times per √(w/g), a slope per Fr = v/√(g w)."""
+    for seed, bicycle in enumerate(bicycles(8, seed=13)):
+        p, gains = rounded({n: bicycle[n] for n in SKATES}), gains_of(GAINS[kind], seed)
+        model = controlled(tms, gains)
+        given = balls({**p, **dict.fromkeys(STEER, Fraction(0)), **gains})
+        rate, speed = (given["g"] / given["w"]).sqrt(), (given["g"] * given["w"]).sqrt()
+        own = {"tau": given["lag"] * rate} if "lag" in given else {}
+        for n in given:
+            if n.startswith(("k_", "lean_")):
+                value = given[n] / (given["m_B"] * given["g"] * given["w"])
+                value = value * (rate if "dot" in n else 1) * (speed if n.endswith("_v") else 1)
+                own[f"kappa_{n.removeprefix('k_')}"] = value
+        got = model.coefficients({**from_si(given), **own})
+        one = model.coefficients(given, model.parameter_set("SI"))
+        assert all((a / got[0]).overlaps(b / one[0]) for a, b in zip(got, one, strict=True))
+        assert set(model.sets[0].names) == {*from_si(given), *own}
+
+
+@pytest.mark.parametrize("kind", GAINS)
+def test_without_wheels_and_trail_it_is_that_of_skates(kind):
+    absent = {p.name: Fraction(0) for p in whipple.sets[0].parameters if p.default == 0}
+    for seed, bicycle in enumerate(bicycles(4, seed=14)):
+        p = rounded({n: bicycle[n] for n in SKATES})
+        gains = {**dict.fromkeys(STEER, Fraction(0)), **gains_of(GAINS[kind], seed)}
+        given, skates = balls({**p, **gains}), controlled(tms, gains)
+        rate = (given["g"] / given["w"]).sqrt()
+        one = controlled(whipple, gains).coefficients({**balls(absent), **given})
+        other = skates.coefficients(given, skates.parameter_set("SI"))
+        assert all(
+            (a / one[0]).overlaps(b * rate**k / other[0]) for k, (a, b) in enumerate(zip(one, other, strict=True))
+        )
+
+
+def test_published_matrices_and_gains():
+    """Table 1 of Meijaard et al. (2007), matrices as printed: what anyone would write by hand."""
+    M = np.array([[80.81722, 2.31941332208709], [2.31941332208709, 0.29784188199686]])
+    C1 = np.array([[0, 33.86641391492494], [-0.85035641456978, 1.68540397397560]])
+    K0 = np.array([[-80.95, -2.59951685249872], [-2.59951685249872, -0.80329488458618]])
+    K2 = np.array([[0, 76.59734589573222], [0, 2.65431523794604]])
+    for v, gains in ((1.7, (-100, -29.6, 17.0, 2.5)), (4.0, (10, -5, 3, 0.5)), (9.0, (0, 7, -2, 1))):
+        k = dict(zip(("k_phi", "k_phidot", "k_delta", "k_deltadot"), gains, strict=True))
+        D, K = v * C1, 9.81 * K0 + v * v * K2
+        D[1] += [k["k_phidot"], k["k_deltadot"]]
+        K[1] += [k["k_phi"], k["k_delta"]]
+        A = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
+        got = controlled(whipple, k).coefficients({**BENCHMARK, "v": v, **k})
+        # 14 printed decimals of numbers near 1, and their condition, some ten
+        np.testing.assert_allclose(np.array(got) / got[0], np.poly(A), rtol=1e-11)
+
+
+@pytest.mark.parametrize("kind", GAINS)
+@pytest.mark.parametrize("model", [tms, whipple], ids=lambda m: m.name)
+def test_pencil_has_the_roots_of_the_polynomial(model, kind):
+    """Two ways to the same coefficients: with a lag by M⁻¹ and a matrix of 5 or 6, without by M, D, K."""
+    robot = controlled(model, GAINS[kind])
+    rng = np.random.default_rng(5)
+    for bicycle in bicycles(4, seed=15):
+        p = bicycle if model is whipple else {n: bicycle[n] for n in (*SKATES, "lambda_s")}
+        si = robot.parameter_set("SI")
+        native = si.native({**p, **{n: rng.uniform(0.1, 3) for n in si.names if n not in p}})
+        (*rest,) = robot.pencil(native)
+        if len(rest) == 2:
+            expected = np.poly(-np.array(rest[1], dtype=float))
+        else:
+            M, D, K = (np.array(m, dtype=float) for m in rest)
+            zero, one = np.zeros((2, 2)), np.eye(2)
+            expected = np.poly(np.block([[zero, one], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]]))
+        got = robot.coefficients(native)
+        # both by roots of some 1e4, whose products lose a few digits
+        np.testing.assert_allclose(np.array(got) / got[0], expected, rtol=1e-8, atol=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("lag", [1e-3, 1e-5, 1e-7])
+def test_a_short_lag_is_none(lag):
+    """To first order: a root s of p moves by −lag s p₁(s)/p′(s), p₁ the part without the gains; one more is near −1/lag."""
+    k = {"k_phi": -100.0, "k_phidot": -30.0, "k_delta": 20.0, "k_deltadot": 3.0}
+    design = {**BENCHMARK, "v": 2.0, **k}
+    without = roots(controlled(whipple, k).coefficients(design))
+    *near, far = sorted(roots(controlled(whipple, (*k, "lag")).coefficients({**design, "lag": lag})), key=abs)
+    assert abs(far * lag + 1) <= 100 * lag
+    assert all(min(abs(z - s) for s in near) <= 1e3 * lag for z in without)
+
+
+@pytest.mark.parametrize("model", [tms, whipple], ids=lambda m: m.name)
+def test_gains_of_0_are_no_controller(model):
+    for bicycle in bicycles(5, seed=16):
+        p = bicycle if model is whipple else {n: bicycle[n] for n in (*SKATES, "lambda_s")}
+        robot = controlled(model, GAINS["slopes"])
+        got = robot.coefficients(
+            {**balls({}), **as_balls({**p, **dict.fromkeys(GAINS["slopes"], 0.0)})}, robot.parameter_set("SI")
+        )
+        passive = model.coefficients(as_balls(p), model.parameter_set("SI"))
+        assert all((a / got[0]).overlaps(b / passive[0]) for a, b in zip(got, passive, strict=True))
+
+
+def as_balls(values):
+    return {n: flint.arb(x) for n, x in values.items()}
+
+
+def roots(coefficients):
+    return [complex(r.re, r.im) for r in exact_roots(coefficients) for _ in range(r.multiplicity)]
+
+
+@pytest.mark.parametrize("kind", GAINS)
+@pytest.mark.parametrize("model", [tms, whipple], ids=lambda m: m.name)
+def test_every_arithmetic_evaluates_the_same_formula(model, kind):
+    robot = controlled(model, GAINS[kind])
+    si = robot.parameter_set("SI")
+    rng = np.random.default_rng(6)
+    rows = [{n: b[n] if n in b else rng.uniform(0.1, 3) for n in si.names} for b in bicycles(6, seed=17)]
+    arrays = np.stack(robot.coefficients({n: np.array([p[n] for p in rows]) for n in si.names}, si), axis=-1)
+    x = ca.SX.sym("x", len(si.names))
+    made = robot.coefficients(dict(zip(si.names, ca.vertsplit(x), strict=True)), si)
+    function = ca.Function("a", [x], [ca.vertcat(*made)])
+    for p, row in zip(rows, arrays, strict=True):
+        exact = [float(b.mid()) for b in robot.coefficients(as_balls(p), si)]
+        for got in (row, robot.coefficients(p, si), np.array(function(list(p.values()))).ravel()):
+            # differences of products that are some 1e3 of the coefficients left
+            np.testing.assert_allclose(got, exact, rtol=1e-10, atol=1e-13 * max(map(abs, exact)))
+
+
+# Poles where one wants them
+
+
+def ackermann(A, b, wanted):
+    """k of u = −k x with det(s − A + b k) = wanted, in the numbers given: the last row of C⁻¹, times wanted(A)."""
+    size = A.rows
+    column, columns = b, []
+    for _ in range(size):
+        columns.append(column)
+        column = A * column
+    reach = mpmath.matrix(size, size)
+    for j, c in enumerate(columns):
+        for i in range(size):
+            reach[i, j] = c[i]
+    total, power = mpmath.zeros(size), mpmath.eye(size)
+    for c in reversed(wanted):
+        total, power = total + c * power, power * A
+    last = mpmath.matrix(1, size)
+    last[size - 1] = 1
+    return list(mpmath.lu_solve(reach.T, last.T).T * total)
+
+
+def open_loop(v):
+    """A and b of the benchmark bicycle and the torque on its steer, at 40 digits, λ_s = 18° and the rest as printed."""
+    p = {n: mp.mpf(repr(x)) for n, x in BENCHMARK.items()}
+    tilt = mp.pi / 10
+    M, C1, K0, K2 = (mpmath.matrix(m) for m in appendix(p, mp.sin(tilt), mp.cos(tilt)))
+    inverse = M**-1
+    K, D = -inverse * (p["g"] * K0 + v * v * K2), -inverse * (v * C1)
+    A = mpmath.matrix(4, 4)
+    A[0, 2] = A[1, 3] = 1
+    for i in (0, 1):
+        for j in (0, 1):
+            A[2 + i, j], A[2 + i, 2 + j] = K[i, j], D[i, j]
+    return A, mpmath.matrix([0, 0, inverse[0, 1], inverse[1, 1]])
+
+
+def placed(root, v):
+    """The gains with four roots there."""
+    A, b = open_loop(v)
+    return dict(zip(STEER, ackermann(A, b, [mp.binomial(4, k) * (-root) ** k for k in range(5)]), strict=True))
+
+
+def test_balance_assist_is_ackermanns_formula():
+    """The root with k_phi at its limit, −100, is that of a quartic in the root, to 40 digits; then all four gains."""
+    with mp.workdps(40):
+        root = mp.findroot(lambda r: placed(r, mp.mpf("1.7"))["k_phi"] + 100, (-5.2, -4.7), solver="anderson")
+        expected = {n: float(k) for n, k in placed(root, mp.mpf("1.7")).items()}
+    design = tmsopt.solve("problems/balance_assist.toml")
+    assert float(root) == pytest.approx(-4.9503638, abs=5e-8)
+    assert design.structure == "EP4"
+    assert design.abscissa == pytest.approx(float(root), abs=1e-9)
+    for n, k in expected.items():
+        assert design.parameters[n] == pytest.approx(k, abs=1e-9 * max(1, abs(k)))
+
+
+def test_any_fourfold_root_is_placed():
+    with mp.workdps(40):
+        expected = {n: float(k) for n, k in placed(mp.mpf(-3), mp.mpf("1.7")).items()}
+    free = dict.fromkeys(STEER, (-200.0, 200.0))
+    fixed = {**BENCHMARK, "v": 1.7}
+    problem = tmsopt.Problem(whipple, fixed=fixed, free=free, locate="EP4", constraints={"there": "abscissa == -3"})
+    design = tmsopt.solve(problem)
+    assert {n: design.parameters[n] for n in STEER} == pytest.approx(expected, rel=1e-9)
+
+
+# What it is as data
+
+
+@pytest.mark.parametrize("kind", GAINS)
+def test_it_is_the_same_model_in_another_process(kind):
+    for model in (tms, whipple):
+        robot = controlled(model, GAINS[kind])
+        assert pickle.loads(pickle.dumps(robot)) is robot
+        assert robot is controlled(robot, GAINS[kind])
+    assert controlled(tms, ("Fr", "w")) is tms
+
+
+def test_torques_in_words():
+    """1° of lean is π/180 rad; a push p on the handlebar gives rates M⁻¹ (0, p), here from the appendix."""
+    k = {"k_phi": -100.0, "k_phidot": -30.0, "k_delta": 20.0, "k_deltadot": 3.0, "k_phi_v": 4.0, "k_phidot_v": 2.0}
+    v = 2.0
+    M = np.array(appendix(BENCHMARK, math.sin(math.pi / 10), math.cos(math.pi / 10))[0])
+    rates = np.linalg.solve(M, [0, 1])
+    torque = abs(-(k["k_phidot"] + 2.0 * v) * rates[0] - 3.0 * rates[1])
+    problem = tmsopt.Problem(whipple, fixed={**BENCHMARK, "v": v, **k})
+    found = tmsopt.solve(problem).quantities
+    assert found["torque_per_degree"] == pytest.approx(92 * math.pi / 180, rel=1e-14)
+    assert found["push_torque"] == pytest.approx(torque, rel=1e-12)
