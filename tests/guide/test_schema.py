@@ -10,6 +10,7 @@ import pytest
 
 import tmsopt
 from tmsopt.guide import SCHEMA_FILE, STARTS, new_problem, schema_text
+from tmsopt.models import gain_names
 
 PROBLEMS = sorted(Path("problems").glob("*.toml"))
 SCHEMA = tmsopt.schema()
@@ -62,6 +63,27 @@ arm = "u_H >= 0.02"
 [tolerances]
 x_B = "5 mm"
 """
+STEERED = """model = "whipple"
+[parameters]
+w = 1
+v = { min = 1, max = 2 }
+x_B = 0.3
+z_B = -0.9
+m_B = 85
+x_H = 0.9
+z_H = -0.7
+m_H = 4
+lambda_s = 0.3
+k_phi = -10
+[feedback]
+k_phidot = { min = -100, max = "5 N m s/rad" }
+lean_delta_v = "1 N s/rad"
+lag = "50 ms"
+[tolerances]
+k_phidot = 2
+[objective]
+minimize = "abscissa"
+"""
 STUDY = """problem = "ep4.toml"
 [study]
 method = "sobol"
@@ -96,6 +118,14 @@ WRONG = {
     "unknown pattern": (GOOD, 'minimize = "abscissa"', 'locate = "EP1"', "objective.locate"),
     "tolerance of nothing": (GOOD, 'x_B = "5 mm"', 'c = "5 mm"', "tolerances"),
     "no parameters": ('title = "x"\n', "x", "y", ""),
+    "unknown gain": (STEERED, "k_phidot = {", "k_phidott = {", "feedback"),
+    "dimensionless gain of wheels": (STEERED, "k_phidot = {", "kappa_phidot = {", "feedback"),
+    "unknown gain among parameters": (STEERED, "k_phi = -10", "k_fi = -10", "parameters"),
+    "gain without end": (STEERED, ', max = "5 N m s/rad"', "", "feedback.k_phidot"),
+    "gain in quotes": (STEERED, '"5 N m s/rad"', '"5"', "feedback.k_phidot.max"),
+    "no lag": (STEERED, '"50 ms"', "0", "feedback.lag"),
+    "feedback of one's own system": (OWN, "[parameters]", "[feedback]\nk_phi = 1\n[parameters]", "feedback"),
+    "feedback that is no table": (GOOD, 'model = "tms"', 'model = "tms"\nfeedback = 3', "feedback"),
     "method misspelt": (STUDY, "sobol", "sobel", "study.method"),
     "rows below 1": (STUDY, "rows = 8", "rows = 0", "study.rows"),
     "nothing to vary over": (STUDY, "{ min = 0.1, max = 1 }", "3", "vary.mu"),
@@ -106,7 +136,7 @@ WRONG = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("text", [GOOD, STUDY, OWN])
+@pytest.mark.parametrize("text", [GOOD, STEERED, STUDY, OWN])
 def test_what_they_are_made_from_fits(text: str) -> None:
     assert faults(text) == []
 
@@ -128,7 +158,8 @@ def test_parameters_are_explained_by_their_meanings() -> None:
     for name in ("tms", "whipple"):
         explained: dict[str, Any] = SCHEMA["$defs"][f"parameters_{name}"]["properties"]
         model = getattr(tmsopt.models, name)
-        assert set(explained) == {n for of in model.sets for n in of.names}
+        assert set(explained) == {n for of in model.sets for n in of.names} | set(gain_names(name))
+        assert set(SCHEMA["$defs"][f"feedback_{name}"]["properties"]) == set(gain_names(name))
         assert all(explained[p.name]["description"].startswith(p.meaning) for of in model.sets for p in of.parameters)
 
 

@@ -216,7 +216,8 @@ def _with_gains(data: Mapping[str, Any]) -> tuple[list[Fault], set[str], Mapping
         return [], set(), data
     if gains and not (isinstance(model, str) and model in MODELS):
         message = "is for the bicycles tms and whipple; your own system takes B, C and G in [model]"
-        return [Fault(message, ("feedback",))], set(), {k: v for k, v in data.items() if k != "feedback"}
+        found = [] if isinstance(model, str) else [Fault(message, ("feedback",))]  # of a misspelt name something else
+        return found, set(), {k: v for k, v in data.items() if k != "feedback"}
     faults, known = [], gain_names(model) if gains else ()
     for name in gains:
         if name not in known:

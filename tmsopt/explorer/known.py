@@ -62,7 +62,7 @@ def _of_solution(solution: Solution) -> Known:
     facts, proof = [ended(problem, solution.status), *solution.notes], proof_line(solution)
     proved = proof if solution.bound.proven else ""
     if problem.nominal is problem:
-        known = solution.of_polynomial
+        known = Structure(solution.structure, solution.roots, 0.0)
     else:  # what is proved is proved of every case, and the page shows one
         known, proved = _structure(problem, solution.parameters), ""
         facts[0] += " over every case of its bands and tolerances"
@@ -73,7 +73,7 @@ def _of_solution(solution: Solution) -> Known:
 
 
 def _benchmark(problem: Problem) -> Known | None:
-    """The published bicycle of the problem's model in its own parameters; None where there is none."""
+    """The published bicycle of the problem's model in its own parameters, without a controller; None without one."""
     of = problem.parameter_set
     if problem.model.name not in _BENCHMARKS:
         return None
@@ -83,10 +83,9 @@ def _benchmark(problem: Problem) -> Known | None:
         return None
     if faults or found is None:
         return None
-    values = found.values(found.fixed)
-    if not set(of.names) <= set(values):  # one with a controller has gains, the published one has none
-        return None
-    parameters = {n: float(values[n]) for n in of.names}
+    values, rest = found.values(found.fixed), {p.name: problem.fixed.get(p.name, 0.0) for p in of.parameters}
+    rest |= {p.name: p.default for p in of.parameters if p.default is not None}
+    parameters = {n: float(values[n] if n in values else rest[n]) for n in of.names}
     return Known("benchmark", parameters, _structure(problem, parameters), (found.title,))
 
 
@@ -95,10 +94,7 @@ def _exceptional(problem: Problem) -> Known | None:
 
     A k-fold root takes k − 1 free parameters.
     """
-    size, free = problem.model.degree, len(problem.free)
-    if problem.model.carrier is not None:  # of which every condition is two
-        size, free = size // 2, free // 2
-    order = min(size, free + 1, _ORDER)
+    order = min(problem.model.degree, len(problem.free) + 1, _ORDER)
     if order < 2:
         return None
     asked = replace(
@@ -110,7 +106,7 @@ def _exceptional(problem: Problem) -> Known | None:
     if found.status != "optimal" or "EP" not in found.structure:
         return None
     facts = ("limits left aside",) if problem.constraints else ()
-    return Known(found.structure, found.parameters, found.of_polynomial, facts)
+    return Known(found.structure, found.parameters, Structure(found.structure, found.roots, 0.0), facts)
 
 
 def _structure(problem: Problem, parameters: Mapping[str, float]) -> Structure:

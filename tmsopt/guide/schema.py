@@ -5,12 +5,12 @@ completes and explains by ``properties``, ``anyOf`` and ``$ref`` alone, and chec
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from tmsopt.design.files import SHAPE as PROBLEM
 from tmsopt.design.model_table import KEYS
-from tmsopt.models import MODELS, Model, Parameter
+from tmsopt.models import MODELS, Parameter, ParameterSet, controlled, gain_names
 from tmsopt.roots.patterns.composed import pattern_names
 from tmsopt.studies.load import SHAPE as STUDY
 from tmsopt.studies.monte_carlo import DISTRIBUTIONS
@@ -44,7 +44,12 @@ def schema() -> Schema:
     _refine_problem(problem, defs)
     _refine_study(study, defs)
     defs |= {"parameters_own": _own(defs.pop("FreeParameter"))}
-    defs |= {f"parameters_{model.name}": _parameters(model) for model in MODELS.values()}
+    for name in MODELS:
+        sets, gains = _sets(name), set(gain_names(name))
+        own = [[p for p in of.parameters if p.name in gains] for of in sets]
+        defs[f"feedback_{name}"] = _table(f"Gains of a controller of {name}.", own)
+        defs[f"parameters_{name}"] = _table(f"Parameters of {name}.", [of.parameters for of in sets])
+        defs[f"parameters_{name}"]["properties"] |= {n: _ref(f"feedback_{name}/properties/{n}") for n in sorted(gains)}
     return {
         "$schema": DRAFT, "title": "tmsopt", "description": "A problem file or a study file of tmsopt.",
         "type": "object", **_shown(_ref("problem"), _ref("study_file")),
@@ -115,6 +120,8 @@ def _refine_problem(problem: Schema, defs: dict[str, Schema]) -> None:
     tables = [*(_ref(f"parameters_{name}") for name in MODELS), _ref("parameters_own")]
     described = keys["parameters"]["description"]
     keys["parameters"] = {"description": described, "type": "object", **_shown(*tables)}
+    gains = map(_ref, (f"feedback_{name}" for name in MODELS))
+    keys["feedback"] = {"description": keys["feedback"]["description"], "type": "object", **_shown(*gains)}
     _, listed = keys["scenarios"]["additionalProperties"]["anyOf"]
     keys["scenarios"]["additionalProperties"] = _either(defs.pop("Band"), listed)
     del problem["required"]  # of parameters, which a measured bicycle has in its own file
@@ -127,29 +134,35 @@ def _by_model(names: list[str]) -> Schema:
     """Which names and values a file may use, by its model; tms where it names none."""
     if not names:
         return {"if": {"properties": {"model": {"type": "object"}}, "required": ["model"]},
-                "then": {"properties": {"parameters": _ref("parameters_own")}}, "else": _with_names("tms")}  # fmt: skip
+                "then": {"properties": {"parameters": _ref("parameters_own"), "feedback": {"maxProperties": 0}}},
+                "else": _with_names("tms")}  # fmt: skip
     named = {"properties": {"model": {"const": names[0]}}, "required": ["model"]}
     return {"if": named, "then": _with_names(names[0]), "else": _by_model(names[1:])}
 
 
 def _with_names(model: str) -> Schema:
-    accepted = {"propertyNames": {"enum": list(dict.fromkeys(n for of in MODELS[model].sets for n in of.names))}}
+    accepted = {"propertyNames": {"enum": list(dict.fromkeys(n for of in _sets(model) for n in of.names))}}
     tables = dict.fromkeys(("scenarios", "tolerances", "weights"), accepted)
-    return {"properties": {"parameters": _ref(f"parameters_{model}"), **tables}}
+    own = {"parameters": _ref(f"parameters_{model}"), "feedback": _ref(f"feedback_{model}")}
+    return {"properties": {**own, **tables}}
 
 
-def _parameters(model: Model) -> Schema:
-    """The table [parameters] of a model; its sets are not mixed."""
-    sets = model.sets
-    every = {p.name: p for of in sets for p in of.parameters}
-    accepted: Schema = _only(sets[-1].names)
-    for of in reversed(sets[:-1]):
-        others = {n for other in sets if other is not of for n in other.names}
-        named = {"anyOf": [{"required": [n]} for n in of.names if n not in others]}
-        accepted = {"if": named, "then": _only(of.names), "else": accepted}
-    properties = {n: _parameter(p) for n, p in every.items()}
+def _sets(model: str) -> tuple[ParameterSet, ...]:
+    """With all that a controller may have, which may stand in [parameters] too."""
+    return controlled(MODELS[model], gain_names(model)).sets
+
+
+def _table(description: str, sets: Sequence[Sequence[Parameter]]) -> Schema:
+    """A table of parameters; sets are not mixed."""
+    names = [[p.name for p in of] for of in sets]
+    accepted: Schema = _only(names[-1])
+    for k, of in reversed(list(enumerate(names[:-1]))):
+        others = {n for j, other in enumerate(names) if j != k for n in other}
+        named = {"anyOf": [{"required": [n]} for n in of if n not in others]}
+        accepted = {"if": named, "then": _only(of), "else": accepted}
+    properties = {p.name: _parameter(p) for of in sets for p in of}
     closed = {"properties": properties, "additionalProperties": False}
-    return {"description": f"Parameters of {model.name}.", "type": "object", **accepted, **closed}
+    return {"description": description, "type": "object", **accepted, **closed}
 
 
 def _only(names: Iterable[str]) -> Schema:

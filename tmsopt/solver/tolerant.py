@@ -68,7 +68,7 @@ def _climb(work: Workspace, design: Mapping[str, float], built: dict[tuple[str, 
             return None
         if any(weight != weight_of(n, around.parameters[n], problem.weights) for n, weight in around.weights.items()):
             return None
-        feet = _joined(feet, around)
+        feet = _joined(problem, feet, around)
         if not feet:
             return None
         edges = tuple(case.edge for case in feet)
@@ -86,14 +86,17 @@ def _climb(work: Workspace, design: Mapping[str, float], built: dict[tuple[str, 
     return None
 
 
-def _joined(feet: list[Case], around: Robustness) -> list[Case]:
+def _joined(problem: Problem, feet: list[Case], around: Robustness) -> list[Case]:
     """The feet so far, and those of a design that are others."""
     near = [n for n in (around.weave, around.capsize, around.infinity) if n.distance <= _BESIDE * around.radius]
-    return [*feet, *(case for case in map(_foot, near) if not any(_alike(case, other) for other in feet))]
+    found = [_foot(problem, n) for n in near]
+    return [*feet, *(case for case in found if not any(_alike(case, other) for other in feet))]
 
 
-def _foot(nearest: Nearest) -> Case:
-    return Case(direction=Table(nearest.direction), edge=nearest.kind)
+def _foot(problem: Problem, nearest: Nearest) -> Case:
+    """In all that the radius lets change: what is 0 in a design, such as a gain, has no part in its own direction."""
+    names = weighted(problem.parameter_set, problem.weights, problem.fixed)
+    return Case(direction=Table({n: nearest.direction.get(n, 0.0) for n in names}), edge=nearest.kind)
 
 
 def _alike(one: Case, other: Case) -> bool:

@@ -56,6 +56,14 @@ def native_name(name: str) -> str:
     return "tau" if name == LAG else f"kappa_{name.removeprefix('k_')}"
 
 
+def size(name: str, p: Mapping[str, Any], rate: Formula, torque: Formula) -> Any:
+    """How much of a name of [feedback] in SI a dimensionless one of 1 is."""
+    if name == LAG:
+        return 1 / rate(p)
+    found = torque(p) / rate(p) if "dot" in name else torque(p)
+    return found / sqrt(p["g"] * p["w"]) if name.endswith(_SLOPE) else found
+
+
 def names_of(names: Iterable[str]) -> tuple[str, ...]:
     """Those of [feedback] among some names, of either set; all four of the steer torque if there is one."""
     given = set(names)
@@ -171,17 +179,11 @@ def _extended(
     turn, rate, torque = of.native, of.rate, of.torque
     assert torque is not None
 
-    def scaled(p: Mapping[str, Any], name: str) -> Any:
-        if name == LAG:
-            return p[name] * rate(p)
-        value = p[name] / torque(p)
-        value = value * rate(p) if "dot" in name else value
-        return value * (sqrt(p["g"] * p["w"])) if name.endswith(_SLOPE) else value
-
     def in_native(p: Mapping[str, Any]) -> dict[str, Any]:
-        return {**turn(p), **{native(n): p[n] if native(n) == n else scaled(p, n) for n in names}}
+        own = {native(n): p[n] if native(n) == n else p[n] / size(n, p, rate, torque) for n in names}
+        return {**turn(p), **own}
 
-    own = tuple(_parameter(n, _unit(n), n) for n in names)
+    own = tuple(replace(_parameter(n, _unit(n), n), counterpart="" if native(n) == n else native(n)) for n in names)
     quantities = tuple(q for q in of.quantities if q.name not in _PASSIVE)
     every = (*of.parameters, *own)
 
@@ -226,13 +228,13 @@ def _quantities(names: tuple[str, ...], torques: Callable[..., Feedback], rate: 
         _, gains = found.gains
         return quotient(gains[3] * a - gains[2] * b, a * d - b * c) * rate(v)
 
-    yield _size("torque_per_degree", "N m", "steer torque per degree of lean", r"T_\delta/\phi", per_degree)
+    yield _sized("torque_per_degree", "N m", "steer torque per degree of lean", r"T_\delta/\phi", per_degree)
     if LAG not in names:
         meaning = "steer torque right after a push on the handlebar of 1 N m s"
-        yield _size("push_torque", "N m", meaning, r"T_\delta(0)", kicked)
+        yield _sized("push_torque", "N m", meaning, r"T_\delta(0)", kicked)
 
 
-def _size(name: str, unit: str, meaning: str, latex: str, signed: Formula) -> Quantity:
+def _sized(name: str, unit: str, meaning: str, latex: str, signed: Formula) -> Quantity:
     """The size of a quantity of either sign."""
     return Quantity(
         name, unit, meaning, latex, lambda v: magnitude(signed(v)), range=Range(lower=0.0),

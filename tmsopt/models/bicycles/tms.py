@@ -7,7 +7,7 @@ import numpy as np
 
 from tmsopt.arithmetic.elementary import sqrt, tan
 from tmsopt.models.bicycles.bicycle import WORDS, times
-from tmsopt.models.bicycles.feedback import Steered
+from tmsopt.models.bicycles.feedback import FEEDBACK, Steered, native_name, size
 from tmsopt.models.bicycles.sketches import CONVENTIONS, TMS
 from tmsopt.models.bicycles.tms_equations import compact_copo, copo, matrices
 from tmsopt.models.bicycles.tms_quantities import NATIVE_QUANTITIES, SI_QUANTITIES
@@ -67,6 +67,8 @@ def from_si(p: Mapping[str, Any]) -> dict[str, Any]:
 def to_si(p: Mapping[str, Any], w: Any = 1.0, m_B: Any = 1.0, g: Any = GRAVITY) -> dict[str, Any]:
     """SI values for dimensionless parameters, given wheelbase w (m), rear frame mass m_B (kg) and g (m/s²).
 
+    Gains of a controller are among them if there are any.
+
     Example:
         >>> design = dict(Fr=1.0, mu=0.1, chi_B=1.2, chi_H=1.0, zeta_B=-0.4, zeta_H=-0.2, lambda_s=0.1)
         >>> print(tmsopt.models.to_si(design, w=4.0, g=9.0)["v"])  # Fr √(g w)
@@ -74,10 +76,11 @@ def to_si(p: Mapping[str, Any], w: Any = 1.0, m_B: Any = 1.0, g: Any = GRAVITY) 
 
     More: docs/how_to/units.md
     """
-    return {
+    own = {
         "w": w, "v": p["Fr"] * sqrt(g * w), "g": g, "lambda_s": p["lambda_s"], "m_B": m_B, "x_B": p["chi_B"] * w,
         "z_B": p["zeta_B"] * w, "m_H": p["mu"] * m_B, "x_H": p["chi_H"] * w, "z_H": p["zeta_H"] * w,
     }  # fmt: skip
+    return {**own, **{n: p[native_name(n)] * size(n, own, _rate, _torque) for n in FEEDBACK if native_name(n) in p}}
 
 
 def _pencil(p: Mapping[str, Any]) -> tuple[Matrix, ...]:
@@ -91,6 +94,11 @@ def _pencil(p: Mapping[str, Any]) -> tuple[Matrix, ...]:
 def _rate(p: Mapping[str, Any]) -> Any:
     """√(g/w), in 1/s."""
     return sqrt(p["g"] / p["w"])
+
+
+def _torque(p: Mapping[str, Any]) -> Any:
+    """In N m."""
+    return p["m_B"] * p["g"] * p["w"]
 
 
 _SI = ParameterSet(
@@ -107,7 +115,7 @@ _SI = ParameterSet(
         Parameter("z_H", "m", "front assembly centre of mass, downward", "z_H", _NOT_POSITIVE, counterpart="zeta_H"),
     ),
     native=from_si, quantities=(*SI_QUANTITIES, *times(_rate, "sqrt(g/w)")), rate=_rate, root_unit="√(g/w)",
-    torque=lambda p: p["m_B"] * p["g"] * p["w"],
+    torque=_torque,
 )  # fmt: skip
 
 _ABSENT = {
