@@ -53,6 +53,7 @@ SECTIONS = (
     Section("i", "systems", f"{_SYSTEMS}.sixfold", "a 6-fold root from random starts, beside HANSO and PyGRANSO"),
     Section("j", "random", f"{_SYSTEMS}.random_systems", "random systems of degree 3 to 12, beside evolution"),
     Section("j", "designs", f"{_SYSTEMS}.all_designs", "all designs with a pattern, proved, beside a search"),
+    Section("j", "beyond", f"{_SYSTEMS}.feedback", "a controller, beside python-control and SciPy"),
     Section("k", "solve", f"{_DESIGNS}.random_designs", "200 random designs, beside SciPy", long=True),
     Section("l", "variety", f"{_DESIGNS}.varied_designs", "varied problems, judged by eigenvalues", long=True),
     Section("m", "band", f"{_DESIGNS}.bands", "bands of speeds, proved between the scenarios", long=True),

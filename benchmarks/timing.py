@@ -1,4 +1,4 @@
-"""Times taken side by side, how they grow, and the runs of IPOPT in them."""
+"""Times taken side by side, how they grow, the runs of IPOPT in them, and work over processes."""
 
 import math
 import time
@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
+from multiprocessing import get_context
 from typing import Any
 from unittest.mock import patch
 
@@ -22,6 +23,15 @@ def best(works: Mapping[str, Callable[[], Any]], repeats: int) -> dict[str, floa
             work()
             seconds[name] = min(seconds[name], time.perf_counter() - began)
     return seconds
+
+
+def over_processes(work: Callable[[Any], Any], items: Sequence[Any], workers: int) -> Iterator[Any]:
+    """The answers in order, from processes that end when this one is interrupted; of one worker from this one."""
+    if workers == 1 or not items:  # processes take a second to begin
+        yield from map(work, items)
+        return
+    with get_context("spawn").Pool(workers) as pool:
+        yield from pool.imap(work, items)
 
 
 def exponent(sizes: Sequence[float], seconds: Sequence[float]) -> float:

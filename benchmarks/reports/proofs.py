@@ -79,17 +79,13 @@ def report(asked: Asked) -> str:
     ]
     cells = [
         (
-            r.place,
-            r.proof.pattern if r.proof.proved else f"{r.proof.pattern}: not proved, {r.proof.reason}",
-            _first(r.proof),
-            f"{r.proof.radius:.0e}" if r.proof.radius else "exact",
+            r.place, r.proof.pattern if r.proof.proved else f"{r.proof.pattern}: not proved, {r.proof.reason}",
+            _first(r.proof), f"{r.proof.radius:.0e}" if r.proof.radius else "exact",
             f"{r.proof.uniqueness:.1g}" if math.isfinite(r.proof.uniqueness) else "–",
-            f"{r.proof.distance:.0e}" if r.proof.moved else "–",
-            _answers(r.proof),
-            duration(r.seconds),
+            f"{r.proof.distance:.0e}" if r.proof.moved else "–", _answers(r.proof), duration(r.seconds),
         )
         for r in found[DIGITS[0]]
-    ]
+    ]  # fmt: skip
     header = (
         "point", "pattern", "abscissa", "radius", "unique within", "stored design off by", "stable, damped", "time"
     )  # fmt: skip

@@ -75,20 +75,12 @@ def report(asked: Asked) -> str:
     starts = 4 if asked.quick else STARTS
     rides = [ride(name, problem, starts) for name, problem in tqdm(boxes, desc="bands of speeds")]
     rows = [
-        (
-            r.name,
-            r.solution.status,
-            f"{r.solution.abscissa:.9f}",
-            share(k < r.solution.starts.converged for k in range(r.solution.starts.tried)),
-            duration(r.single),
-            duration(r.per_start),
-            f"{r.excess:.0e}",
-            f"{'yes' if r.proved else 'no'}, {r.pieces} pieces",
-            ("yes" if r.stable else "no"),
-            r.own,
-        )
+        (r.name, r.solution.status, f"{r.solution.abscissa:.9f}",
+         share(k < r.solution.starts.converged for k in range(r.solution.starts.tried)), duration(r.single),
+         duration(r.per_start), f"{r.excess:.0e}", f"{'yes' if r.proved else 'no'}, {r.pieces} pieces",
+         "yes" if r.stable else "no", r.own)
         for r in rides
-    ]
+    ]  # fmt: skip
     header = (
         "box", "status", "abscissa", "starts feasible", "median start", "solve / starts",
         f"excess at {CHECKED} speeds", "proved between them", "stable in all of it", "own proof",

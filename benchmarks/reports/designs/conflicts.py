@@ -96,13 +96,8 @@ def report(asked: Asked) -> str:
         enough, needed = sum(c.enough for c in group), sum(c.needed for c in group)
         rows.append((kind, len(group), said, enough, needed, median(c.seconds for c in group)))
     header = (
-        "conflict",
-        "problems",
-        "said infeasible",
-        "relaxation is enough",
-        f"{LESS:.0%} of it is not",
-        "median time",
-    )
+        "conflict", "problems", "said infeasible", "relaxation is enough", f"{LESS:.0%} of it is not", "median time",
+    )  # fmt: skip
     failed = [(k, c.conflict.kind, c.cause, dict(c.amounts)) for k, c in enumerate(checks) if c.cause]
     return page(
         "Conflicts",

@@ -5,7 +5,6 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from multiprocessing import get_context
 
 import numpy as np
 from tqdm import tqdm
@@ -14,6 +13,7 @@ from benchmarks.judges import SCALE, SOLVED, Designs, exactly
 from benchmarks.reports.designs.hard_references import path_of, run
 from benchmarks.reports.tables import Asked, facts, median, page, table
 from benchmarks.suites import HARD_COUNT, HARD_SEED, Target, hard_family, hard_problem, targets
+from benchmarks.timing import over_processes
 from tmsopt import Problem, solve
 
 CLAIMED = 1e-8
@@ -136,15 +136,8 @@ def judge_all(
     """Solves of all of them that have a reference, in as many processes as there are workers."""
     kept = targets(path_of(seed)) if known is None else known
     wanted = [i for i in indices if i in kept]
-    return list(tqdm(_each(wanted, seed, kept, workers), "hard problems", len(wanted)))
-
-
-def _each(indices: Sequence[int], seed: int, known: Mapping[int, Target], workers: int) -> Iterator[Verdict]:
-    if workers == 1:
-        yield from (judged(i, seed, known[i]) for i in indices)
-        return
-    with get_context("spawn").Pool(workers) as pool:
-        yield from pool.imap(partial(_one, seed=seed), [known[i] for i in indices])
+    every = over_processes(partial(_one, seed=seed), [kept[i] for i in wanted], workers)
+    return list(tqdm(every, "hard problems", len(wanted)))
 
 
 def _one(target: Target, seed: int) -> Verdict:

@@ -1,13 +1,13 @@
 """The best value of each hard problem that is found without the package, kept: what `hard_designs` measures against."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 
 from benchmarks.reports.tables import Asked, facts, origin, page, table
 from benchmarks.rivals import best_known
 from benchmarks.suites import HARD, HARD_COUNT, HARD_SEED, Target, hard_family, hard_problem, targets, write
+from benchmarks.timing import over_processes
 
 SEARCHES = 2
 """Searches of each problem, each with its own random numbers."""
@@ -43,20 +43,11 @@ def run(indices: Sequence[int], seed: int, workers: int, command: str) -> dict[i
 def searched(indices: Sequence[int], seed: int, workers: int, command: str, searches: range) -> dict[int, Target]:
     """What the file has, after searches of these problems; the better of old and new is kept."""
     for some in (indices[k : k + 10] for k in range(0, len(indices), 10)):
-        found = list(_each(some, seed, workers, searches))
+        found = list(over_processes(partial(target, seed=seed, searches=searches), some, workers))
         known = targets(path_of(seed))  # as others left it
         known |= {t.index: better(seed, known.get(t.index, t), t) for t in found}
         write(path_of(seed), {"origin": origin(command), "seed": seed}, "problems", known.values())
     return targets(path_of(seed))
-
-
-def _each(indices: Sequence[int], seed: int, workers: int, searches: range) -> Iterator[Target]:
-    one = partial(target, seed=seed, searches=searches)
-    if workers == 1:
-        yield from map(one, indices)
-        return
-    with get_context("spawn").Pool(workers) as pool:
-        yield from pool.imap_unordered(one, indices)
 
 
 def report(asked: Asked) -> str:

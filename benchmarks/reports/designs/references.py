@@ -6,10 +6,9 @@ beside it.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -21,6 +20,7 @@ from benchmarks.judges import EXACT, MET, Attempt, attempt, confirmed, same, sta
 from benchmarks.reports.tables import Asked, facts, origin, page
 from benchmarks.rivals import differential, least_violation
 from benchmarks.suites import REFERENCES, SEED, Reference, random_problem, read, references, write
+from benchmarks.timing import over_processes
 from tmsopt import Problem
 from tmsopt.checks import realised_abscissa
 
@@ -81,15 +81,11 @@ def best_of(
         best = min((*solved, *evolved), key=lambda r: r.violation)
     known = {s: min(r.value for r in feasible if r.source == s) for s in dict.fromkeys(r.source for r in feasible)}
     return Reference(
-        index=index,
-        solvable=bool(feasible),
-        value=best.value if feasible else math.nan,
+        index=index, solvable=bool(feasible), value=best.value if feasible else math.nan,
         realised=realised_abscissa(problem, problem.ordered(best.parameters)) if feasible else math.nan,
-        violation=best.violation,
-        parameters=problem.ordered(best.parameters),
-        known=known,
+        violation=best.violation, parameters=problem.ordered(best.parameters), known=known,
         doubtful=tuple(sorted(doubtful)),
-    )
+    )  # fmt: skip
 
 
 def _ended(problem: Problem, end: Mapping[str, float]) -> _Reached:
@@ -110,18 +106,12 @@ def run(count: int, settings: Settings, workers: int, path: Path, command: str) 
     found = references(path)
     missing = [i for i in range(count) if i not in found]
     for one in tqdm(
-        _each(missing, settings, workers), "references", count, unit="problem", initial=count - len(missing)
-    ):
+        over_processes(partial(reference, settings=settings), missing, workers), "references", count, unit="problem",
+        initial=count - len(missing),
+    ):  # fmt: skip
         found[one.index] = one
         write(path, {"origin": origin(command), "settings": asdict(settings)}, "problems", found.values())
     return found
-
-
-def _each(indices: Sequence[int], settings: Settings, workers: int) -> Iterator[Reference]:
-    if not indices:
-        return  # processes take a second to begin
-    with get_context("spawn").Pool(workers) as pool:  # ends its processes when interrupted
-        yield from pool.imap_unordered(partial(reference, settings=settings), indices)
 
 
 def report(asked: Asked) -> str:

@@ -93,16 +93,10 @@ def overview(heats: Sequence[Heat]) -> str:
 
 def _problems(heats: Sequence[Heat]) -> str:
     rows = [
-        (
-            h.title,
-            len(h.problem.free),
-            len(h.problem.conditions),
-            f"{h.optimum:.12g}",
-            h.proof,
-            duration(h.runs[0].seconds),
-        )
+        (h.title, len(h.problem.free), len(h.problem.conditions), f"{h.optimum:.12g}", h.proof,
+         duration(h.runs[0].seconds))
         for h in heats
-    ]
+    ]  # fmt: skip
     return table(("problem", "free", "constraints", "least abscissa", "known by", OWN), rows)
 
 

@@ -132,10 +132,7 @@ def report(asked: Asked) -> str:
                 ("with tolerances", sum(bool(t.problem.tolerances) for t in every)),
                 ("in SI", sum(t.problem.parameter_set.name == "SI" for t in every)),
                 ("somebody found a feasible design", sum(t.solvable for t in every)),
-                (
-                    "of these, stable at the best known",
-                    stable,
-                ),
+                ("of these, stable at the best known", stable),
                 ("**solved at default settings**", f"**{share(not t.cause for t in every)}**"),
                 ("of these, infeasible and nobody found otherwise", sum(not t.solvable for t in good)),
                 ("median time of a solve", median(t.default.seconds for t in every)),
@@ -170,17 +167,10 @@ def _asked(trial: Trial) -> str:
 def _failures(trials: Sequence[Trial]) -> str:
     rows = [
         (
-            t.index,
-            len(t.problem.free),
-            ", ".join(n for n in ("scenarios", "tolerances") if getattr(t.problem, n)),
-            _asked(t),
-            t.cause,
-            f"{t.default.value:.9g}",
-            f"{t.best:.9g}",
-            ", ".join(t.by),
+            t.index, len(t.problem.free), ", ".join(n for n in ("scenarios", "tolerances") if getattr(t.problem, n)),
+            _asked(t), t.cause, f"{t.default.value:.9g}", f"{t.best:.9g}", ", ".join(t.by),
         )
-        for t in trials
-        if t.cause
-    ]
+        for t in trials if t.cause
+    ]  # fmt: skip
     header = ("problem", "free", "with", "objective", "cause", "value", "best known", "reached by")
     return table(header, sorted(rows, key=lambda row: str(row[4])), "None.")
