@@ -127,7 +127,8 @@ def with_feedback(of: Steered, names: tuple[str, ...]) -> Model:
 
     sets = tuple(_extended(s, names, native, feedback) for s in base.sets)
     lost = {*_PASSIVE, *(("omega0",) if lagged else ())}
-    absent = {q.name: _ABSENT for s in (base, *base.sets) for q in s.quantities if q.name in lost}
+    every = (*base.quantities, *(q for s in base.sets for q in s.quantities))
+    absent = {q.name: _ABSENT for q in every if q.name in lost}
     return replace(
         base, title=f"{base.title} with a controller", degree=4 + len(driven) * lagged, sets=sets, algebraic=algebraic,
         polynomial=polynomial, compact=None, pencil=pencil, feedback=feedback, natural=False,
