@@ -57,16 +57,11 @@ def ride(name: str, problem: Problem, starts: int = STARTS) -> Ride:
     cover = solution.cover
     proved, pieces = abscissa_below(*speeds, solution.abscissa + MARGIN)
     return Ride(
-        name=name,
-        solution=solution,
-        per_start=seconds / solution.starts.tried,
-        single=quantile(run.seconds for run in runs),
-        excess=highest_abscissa(*speeds, CHECKED) - solution.abscissa,
-        proved=proved,
-        stable=abscissa_below(*speeds, 0.0)[0],
-        pieces=pieces,
+        name=name, solution=solution, per_start=seconds / solution.starts.tried,
+        single=quantile(run.seconds for run in runs), excess=highest_abscissa(*speeds, CHECKED) - solution.abscissa,
+        proved=proved, stable=abscissa_below(*speeds, 0.0)[0], pieces=pieces,
         own="–" if cover is None else f"{'yes' if cover.proven else 'no'}, {cover.boxes} boxes",
-    )
+    )  # fmt: skip
 
 
 def report(asked: Asked) -> str:

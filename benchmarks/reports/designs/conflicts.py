@@ -74,14 +74,10 @@ def check(conflict: Conflict) -> Relaxed:
     amounts, design = dict(relaxation.amounts), relaxation.parameters
     less = moved(problem, amounts, LESS)
     return Relaxed(
-        conflict=conflict,
-        status=solution.status,
-        amounts=amounts,
+        conflict=conflict, status=solution.status, amounts=amounts,
         violation=verdict(moved(problem, amounts), design).violation,
-        less=solve(less, throw=False).status,
-        evolved=least_violation(less).violation,
-        seconds=solution.seconds,
-    )
+        less=solve(less, throw=False).status, evolved=least_violation(less).violation, seconds=solution.seconds,
+    )  # fmt: skip
 
 
 def report(asked: Asked) -> str:

@@ -8,13 +8,14 @@ from typing import Any
 import control
 import numpy as np
 from scipy.linalg import expm
-from scipy.optimize import differential_evolution, minimize
+from scipy.optimize import Bounds, differential_evolution, minimize
 
 from benchmarks.reports.tables import Asked, duration, median, page, share, table, times
 from benchmarks.rivals import poles
 from benchmarks.suites import PROBLEMS
 from benchmarks.timing import best
 from tmsopt import Problem, Solution, load, solve
+from tmsopt.records import Array
 
 _NAMES = ("k_phi", "k_delta", "k_phidot", "k_deltadot")
 _HEADER = ("question", "theirs", "time", "ours", "time", "time, ours over theirs")
@@ -22,7 +23,8 @@ _HEADER = ("question", "theirs", "time", "ours", "time", "time, ours over theirs
 
 def _rows(problem: Problem, design: Solution, repeats: int) -> Iterator[tuple[object, ...]]:
     assert problem.model.pencil is not None
-    M, D, K = map(np.array, problem.model.pencil(problem.ordered(dict.fromkeys(problem.free, 0.0))))
+    passive = problem.model.pencil(problem.ordered(dict.fromkeys(problem.free, 0.0)))
+    M, D, K = (np.array(m, dtype=float) for m in passive)
     inverse = np.linalg.inv(M)
     A = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ K, -inverse @ D]])
     b, at, four = np.array([[0], [0], *inverse[:, 1:]]), np.linspace(0, 3, 301), [design.abscissa] * 4
@@ -52,21 +54,27 @@ def _rows(problem: Problem, design: Solution, repeats: int) -> Iterator[tuple[ob
 
 
 def _searched(problem: Problem, least: float, count: int) -> str:
-    at, box, ends, seconds = poles(problem), np.array(list(problem.free.values())), [], []
-    for start in np.random.default_rng(0).uniform(*box.T, (count, len(box))):
+    at, ends, seconds = poles(problem), [], []
+    low, high = np.array(list(problem.free.values())).T
+    bounds = Bounds(low, high)
+    way: dict[str, Any] = {"method": "Nelder-Mead", "options": {"xatol": 1e-12, "fatol": 1e-12, "maxfev": 20_000}}
+
+    def abscissa(x: Array) -> float:
+        return at(x)[0]
+
+    for start in np.random.default_rng(0).uniform(low, high, (count, len(low))):
         began = time.process_time()
-        way: dict[str, Any] = {"bounds": box, "options": {"xatol": 1e-12, "fatol": 1e-12, "maxfev": 20_000}}
-        ends.append(at.stored(np.array(minimize(lambda x: at(x)[0], start, method="Nelder-Mead", **way).x)) - least)
+        answer: Any = minimize(abscissa, start, bounds=bounds, **way)
         seconds.append(time.process_time() - began)
+        ends.append(at.stored(np.asarray(answer.x)) - least)
     began = time.process_time()
-    evolved = float(differential_evolution(lambda x: at(x)[0], box, rng=0, tol=1e-8, maxiter=5000).fun) - least
-    took = time.process_time() - began
+    evolved = float(differential_evolution(abscissa, bounds, rng=0, tol=1e-8, maxiter=5000).fun) - least
+    took = duration(time.process_time() - began)
     within = ", ".join(f"{share(e <= w for e in ends)} within {w:g}" for w in (1, 0.1, 0.01))
     return (
         f"SciPy's Nelder–Mead on the eigenvalues from {count} random starts: {within} of our {least:.7f} 1/s, the best "
         f"{min(ends):.2g} off, {median(seconds)} each; its differential evolution ends {evolved:.2g} off after "
-        f"{duration(took)}. `control.place` and SciPy's `place_poles` refuse a root that is "
-        "repeated more often than there are torques."
+        f"{took}. `control.place` and `place_poles` refuse roots that are repeated more often than there are torques."
     )
 
 
