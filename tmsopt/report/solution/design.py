@@ -79,7 +79,7 @@ def si_parameters(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float
 
     More: docs/how_to/units.md
     """
-    own = solution.problem.model.name != "tms" or solution.problem.parameter_set.name == "SI"
+    own = solution.problem.parameter_set.rate is not None or len(solution.problem.model.sets) == 1
     return solution.parameters if own else to_si(solution.dimensionless, w, m_B, g)
 
 
