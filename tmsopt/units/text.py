@@ -68,7 +68,7 @@ def read(text: str, unit: str) -> tuple[float, str]:
         raise ValueError(f"found '{text}', a number in quotes without a unit; {accepted}")
     if unit == "1":
         raise ValueError(f"found '{text}', but the parameter is dimensionless; {accepted}")
-    written = " ".join(written.replace("²", "^2").replace("³", "^3").split())
+    written = " ".join(written.replace("²", "^2").replace("³", "^3").replace("·", "*").split())
     if not _UNIT.fullmatch(written):
         raise ValueError(f"found the unit '{written}', which does not read as a unit; {accepted}")
     one = _factor(written.replace("°", "deg"), unit)

@@ -34,6 +34,13 @@ _SAID = (
 )
 
 
+UNCONTROLLED = {
+    **dict.fromkeys(FEEDBACK, "a gain of a controller stands in a table [feedback], such as k_phidot = -20"),
+    **dict.fromkeys(("torque_per_degree", "push_torque"), "without [feedback] there is no controller and no torque"),
+}
+"""Names that a bicycle without a controller does not know → what to write."""
+
+
 @dataclass(frozen=True)
 class Steered:
     """What a bicycle says of itself so that a controller can be added.
@@ -127,13 +134,14 @@ def with_feedback(of: Steered, names: tuple[str, ...]) -> Model:
 
     sets = tuple(_extended(s, names, native, feedback) for s in base.sets)
     lost = {*_PASSIVE, *(("omega0",) if lagged else ())}
+    kept = {name: said for name, said in base.absent.items() if name not in UNCONTROLLED}
     every = (*base.quantities, *(q for s in base.sets for q in s.quantities))
     absent = {q.name: _ABSENT for q in every if q.name in lost}
     return replace(
         base, title=f"{base.title} with a controller", degree=4 + len(driven) * lagged, sets=sets, algebraic=algebraic,
         polynomial=polynomial, compact=None, pencil=pencil, feedback=feedback, natural=False,
         quantities=tuple(q for q in base.quantities if q.name not in lost),
-        conventions=(*base.conventions, _SAID), absent={**base.absent, **absent},
+        conventions=(*base.conventions, _SAID), absent=kept | absent,
     )  # fmt: skip
 
 

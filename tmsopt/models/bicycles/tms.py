@@ -7,7 +7,7 @@ import numpy as np
 
 from tmsopt.arithmetic.elementary import sqrt, tan
 from tmsopt.models.bicycles.bicycle import WORDS, times
-from tmsopt.models.bicycles.feedback import FEEDBACK, Steered, native_name, size
+from tmsopt.models.bicycles.feedback import FEEDBACK, UNCONTROLLED, Steered, native_name, size
 from tmsopt.models.bicycles.sketches import CONVENTIONS, TMS
 from tmsopt.models.bicycles.tms_equations import compact_copo, copo, matrices
 from tmsopt.models.bicycles.tms_quantities import NATIVE_QUANTITIES, SI_QUANTITIES
@@ -126,7 +126,7 @@ _ABSENT = {
 tms = Model(
     name="tms", title="two-mass-skate bicycle", degree=4, sets=(_NATIVE, _SI), algebraic=_algebraic, polynomial=copo,
     quantities=NATIVE_QUANTITIES, compact=compact_copo, pencil=_pencil, natural=True,
-    words=WORDS, conventions=CONVENTIONS, sketch=TMS, absent=_ABSENT,
+    words=WORDS, conventions=CONVENTIONS, sketch=TMS, absent=_ABSENT | UNCONTROLLED,
 )  # fmt: skip
 """The two-mass-skate bicycle."""
 

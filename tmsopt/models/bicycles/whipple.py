@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from tmsopt.models.bicycles.bicycle import WORDS, times
-from tmsopt.models.bicycles.feedback import Steered
+from tmsopt.models.bicycles.feedback import UNCONTROLLED, Steered
 from tmsopt.models.bicycles.sketches import CONVENTIONS, WHIPPLE
 from tmsopt.models.bicycles.tms import GRAVITY, LAMBDA_S
 from tmsopt.models.bicycles.whipple_equations import carvallo_whipple, matrices
@@ -86,7 +86,7 @@ def _at_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix, v: Any, g: Any) -> 
 whipple = Model(
     name="whipple", title="Carvallo–Whipple bicycle", degree=4, sets=(_SI,), algebraic=algebraic,
     polynomial=carvallo_whipple, pencil=_pencil, words=WORDS, conventions=CONVENTIONS,
-    sketch=WHIPPLE,
+    sketch=WHIPPLE, absent=UNCONTROLLED,
 )  # fmt: skip
 """The Carvallo–Whipple bicycle; its roots are in 1/s."""
 
