@@ -145,7 +145,7 @@ def _marks(ax: Axes, data: Growth, scale: AxisScale, part: str) -> None:
     words = events_of(data.problem.model)
     for kind, (colour, style) in _EVENTS.items():
         at = scale.of([c.at for c in data.events if c.kind == kind])
-        label = f"{words[kind]} at {', '.join(f'{x:.4g}' for x in at)}{unit}"
+        label = f"{words[kind]} at {', '.join(dict.fromkeys(f'{x:.4g}' for x in at))}{unit}"
         for k, x in enumerate(at):
             ax.axvline(x, color=colour, linewidth=1.1, linestyle=style, label=None if k else label)
     structure = f" ({data.structure})" if "EP" in data.structure else ""
