@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tmsopt.checks.bound import bounded, instant_bound
 from tmsopt.checks.recheck import Checked, recheck
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
@@ -97,6 +98,8 @@ def found(
     if unclear(problem, checked):
         ended = False
         notes = (UNCLEAR,)
+    flat = not ended and not notes and not checked.violations and bounded(problem)  # a flat stretch has no gradient
+    ended = ended or (flat and instant_bound(problem, checked.objective).proven)
     status = "optimal" if ended and not checked.violations else "not_converged"
     if status != "optimal" and not notes and not checked.violations:
         notes = ("feasible, but the solver did not converge here: a better design may be close",)
