@@ -342,7 +342,7 @@ def test_a_heavily_damped_bicycle_can_lean_more_before_it_recovers() -> None:
     """Two modes of the linear system itself, scaled to leans 1 and −1: the lean starts at 0 and grows."""
     with mp.workdps(30):
         lean_angle = mp.atan(mp.mpf(1) / 4)
-        M, V, P, _ = oracles._matrices(
+        M, V, P, _ = oracles.matrices(
             mp.mpf("1.45"), 1, 2, 1, -2, mp.mpf(-1) / 2, mp.cos(lean_angle), mp.sin(lean_angle)
         )
         roots = [z.real for z in oracles.roots_60(hand(Fraction("1.45"), Fraction(1, 4)))]
