@@ -138,6 +138,19 @@ def test_the_optimum_of_a_lossy_dimer_is_its_trace() -> None:
     assert found.bound.proven
 
 
+@pytest.mark.parametrize("size", [1, 2, 3])
+def test_the_optimum_where_nothing_is_stable_is_the_mean_gain(size: int) -> None:
+    """No greatest gain is below the mean one, which symmetric chains reach; a search for EPs of full order leads on."""
+    rows: list[list[str]] = [
+        ["k" if abs(i - j) == 1 else f"1j*{size - i} + d" if i == j == 0 else f"1j*{size - i}" if i == j else "0"
+         for j in range(size)]
+        for i in range(size)
+    ]  # fmt: skip
+    free = {"d": (-1.0, 1.0), "k": (0.1, 2.0)} if size > 1 else {"d": (-1.0, 1.0)}
+    found = tmsopt.solve(tmsopt.Problem(from_hamiltonian(rows), free=free, minimize="abscissa"))
+    assert found.abscissa == pytest.approx((1 + size) / 2, abs=1e-9)
+
+
 @pytest.mark.parametrize("command", ["solve", "prove", "describe"])
 def test_no_words_of_the_double_are_shown(command: str) -> None:
     text = (

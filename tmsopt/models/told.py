@@ -35,6 +35,14 @@ def patterns_of(model: Model) -> tuple[str, ...]:
     return pattern_names(model.degree) if model.carrier is None else complex_pattern_names(model.degree // 2)
 
 
+def full_patterns(model: Model) -> tuple[str, ...]:
+    """Names of the patterns in which one root, or one pair, is all roots; none of a single root."""
+    if model.carrier is not None:
+        return (f"EP{model.degree // 2}",) if model.degree > 2 else ()
+    pairs = (f"CEP{model.degree // 2}",) if model.degree > 2 and model.degree % 2 == 0 else ()
+    return (f"EP{model.degree}", *pairs) if model.degree > 1 else ()
+
+
 def name_told(model: Model, name: str) -> str:
     """The name of a pattern or structure of the polynomial as the user reads it."""
     return name if model.carrier is None else complex_name(name)

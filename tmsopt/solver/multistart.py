@@ -13,6 +13,7 @@ from tmsopt.formulation.formulate import abscissa, design_of, matching, middle
 from tmsopt.formulation.ipopt import Run, ipopt
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import complete, designs, opposite, worth
+from tmsopt.models.told import full_patterns
 from tmsopt.progress import begin
 from tmsopt.records import Array
 from tmsopt.roots import roots
@@ -35,7 +36,6 @@ _SCATTER = 0.01  # of the size of the roots: in double precision those beside a 
 _RESIDUAL = 1e-11  # of the equations: an n-fold root is off by its n-th root
 _LEADS = 3  # designs with one root, and with one pair, that are started from
 _LEADLESS = 8  # starts that led to none, after which no more are tried
-_PAIRED = range(4, 13, 2)  # degrees at which one pair may be all roots
 _RESCUES = 4  # starts from abscissa optima, for a pattern that no start reached
 
 _AGAIN = 4  # times that a start is taken up again where it ended badly
@@ -315,7 +315,7 @@ def exceptional(work: Workspace) -> list[dict[str, float]]:
         return []
     most = _HOPELESS_AFAR if sample.far_off else _LEADLESS
     memory = work.family.memory(part)
-    for pattern in (f"EP{degree}", *([f"CEP{degree // 2}"] if degree in _PAIRED else [])):
+    for pattern in full_patterns(part.model):
         asked = replace(part, locate=pattern, minimize="abscissa", maximize=None, constraints=limits)
         asked = replace(asked, scenarios={}, tolerances={})
         if freedom(asked).count < 0:
