@@ -198,3 +198,10 @@ def test_patterns_are_those_of_the_matrix(name: str) -> None:
     fixed = {"w1": 0.0, "w2": 0.0, "g1": 1.0, "g2": 0.2}
     with pytest.raises(tmsopt.InputError, match="EP2 weave resonance"):
         tmsopt.Problem(from_hamiltonian(DIMER), fixed=fixed, free={"k": (0.1, 2)}, locate=name)
+
+
+@pytest.mark.parametrize("H", [[["x", 0], [0, 0]], [["x", "x"], [0, "x"]], [[0, 1], [0, "x"]]])
+def test_zero_is_an_eigenfrequency_as_others_are(H: Any) -> None:
+    """Of a zero matrix every carrier is too large; intervals have a rounding even there."""
+    found = tmsopt.solve(tmsopt.Problem(from_hamiltonian(H), fixed={"x": 0.0})).eigenfrequencies
+    assert [(z.re, z.im, z.multiplicity) for z in found] == [(0.0, 0.0, 2)]

@@ -15,6 +15,7 @@ from tmsopt.models.model import Model
 _ROOM = 16
 """A carrier is kept for other ranges while no root is farther from the axis than so many times the spread."""
 
+_NOTHING = 2.0**-300  # a spread below is the rounding of intervals around 0, and its carrier no number in a polynomial
 _SAMPLE = 256  # designs by which frequencies are judged where intervals have no bound
 _AT_LEAST = 0.9  # of the spread: distance of the roots from the axis
 _WIDER = 2.0  # than what a sample shows
@@ -92,7 +93,8 @@ def carriers(entries: Sequence[ca.SX]) -> Callable[[Mapping[str, Interval]], tup
             reach = np.hypot(re, im).reshape(n, -1).sum(axis=1)
             ends.append(((diagonal[:, 0] - reach).min(), (diagonal[:, 1] + reach).max()))
         (low, high), loss = ends[0], np.abs(ends[1]).max()
-        return float(low + high) / 2, float(max((high - low) / 2, loss)) or 1.0
+        spread = float(max((high - low) / 2, loss))
+        return float(low + high) / 2, spread if spread > _NOTHING else 1.0
 
     return bounds
 
