@@ -14,7 +14,7 @@ from mpmath import mp
 from scipy.integrate import solve_ivp
 
 import tmsopt
-from tmsopt.models import canonical, from_matrices, matrices, tms, whipple
+from tmsopt.models import canonical, from_hamiltonian, from_matrices, matrices, tms, whipple
 from tmsopt.motion import system_of
 from tmsopt.records import Array
 
@@ -366,3 +366,27 @@ def test_a_mass_alone_rolls_on() -> None:
     assert [(m.multiplicity, m.partial) for m in motion.modes] == [(2, (2,))]
     (found,) = tmsopt.diagnose(alone)
     assert [(r.parameter, r.unmoved, r.laws) for r in found.responses] == [("m", 2, ())]
+
+
+def test_the_carrier_of_a_complex_system_is_not_shown_as_a_motion() -> None:
+    dimer = from_hamiltonian([["1j*g", "k"], ["k", "-1j*l"]])
+    with pytest.raises(tmsopt.InputError, match=r"complex.*write the frame that is meant as a real system, A ="):
+        tmsopt.simulate(tmsopt.Problem(dimer, fixed={"g": 0.1, "k": 1.0, "l": 0.3}))
+
+
+def test_what_dies_out_too_slowly_to_be_followed_has_no_settling_time() -> None:
+    """x1 = e^(−300 t) cos(900 t) + 0.05 e^(−0.001 t) sin t: within 2 % from 0.01 on, and beyond again at t = 0.41."""
+    A = [[-300, 900, 15 - 0.05 * 0.001, 0.05], [-900, -300, 45, 0], [0, 0, "-p", 1], [0, 0, -1, "-p"]]
+    motion = tmsopt.simulate(tmsopt.Problem(from_matrices(A=A), fixed={"p": 0.001}), start={"x1": 1, "x4": 1})
+    assert motion.stable
+    assert math.isnan(motion.measures[0].settling)
+    at = [float(t) for t in motion["t"]]
+    whole = [math.exp(-300 * t) * math.cos(900 * t) + 0.05 * math.exp(-0.001 * t) * math.sin(t) for t in at]
+    assert np.array(motion["x1"]) == pytest.approx(whole, abs=1e-12)
+
+
+def test_a_root_that_is_rounding_gives_no_settling_time() -> None:
+    """2 × 56.56 = 10.1 × 11.2, but for 1.6e-14 in doubles: what comes to rest elsewhere would settle after 1e14 s."""
+    resting = from_matrices(A=[["p", -56.56], [2, -11.2]])
+    measures = tmsopt.simulate(tmsopt.Problem(resting, fixed={"p": 10.1}), start={"x1": 1}).measures
+    assert all(math.isnan(found.settling) for found in measures)

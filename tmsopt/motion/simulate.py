@@ -25,7 +25,7 @@ from tmsopt.solver.solve import solve
 
 _DECAYS, _GROWTHS, _RADIANS = 10.0, 3.0, 200.0  # times of a motion that is watched, in times 1/|abscissa| and 1/|s|
 _DOUBLINGS, _STILL = 8, 0.002  # of a stable one, until the second half is so much smaller than its peak
-_NO_GROWTH, _ROUNDING = 1e-9, 1e-15  # of the largest root: a real part that stands for 0
+_NO_GROWTH, _ROUNDING = 1e-9, 1e-12  # of the largest root: growth that is none; decay that doubles cannot follow
 _SLOW = _DECAYS * FINEST / (2 * math.pi * MOST)  # of the fastest oscillation: decay that no grid can follow to its end
 _AFTER = 1.2  # times the settling time
 _LARGEST = 600.0  # powers of e by which a motion may grow
@@ -164,7 +164,8 @@ def simulate(
     of = asked.parameter_set
     rate = 1.0 if of.rate is None else float(of.rate(own))
     x = disturbance.state(system)
-    stable, ending, on = _watched(system, x, structure, rate, seconds, bool(noise))
+    stable = structure.abscissa < 0
+    whole, ending, on = _watched(system, x, structure, rate, seconds, bool(noise))
     times = np.linspace(0.0, ending, points)
     step = ending / (points - 1)
     force = disturbance.noise * system.impulses["T_delta"] if noise else np.zeros(len(x))
@@ -173,7 +174,7 @@ def simulate(
     if noise:
         measures = tuple(_greatest(name, times, states @ system.rows[name]) for name in watched)
     else:
-        measures = tuple(measured(name, system.rows[name], on, stable) for name in watched)
+        measures = tuple(measured(name, system.rows[name], on, whole) for name in watched)
     base = tuple(n for n in system.names if n not in system.torques)
     rest = tuple(n for n in system.rows if n not in base)
     columns = {"t": Column(times)} | {n: Column(states @ system.rows[n]) for n in (*base, *rest)}
@@ -191,7 +192,7 @@ def simulate(
 def _watched(
     system: System, x: Array, structure: Structure, rate: float, seconds: float | None, noisy: bool
 ) -> tuple[bool, float, Watched]:  # fmt: skip
-    """Whether a design is stable, how long its motion is shown, and the motion that is measured.
+    """Whether the motion dies out while it is measured, how long it is shown, and the motion that is measured.
 
     Raises:
         InputError: where it would grow beyond all numbers.
@@ -210,7 +211,7 @@ def _watched(
         if abscissa > _NO_GROWTH * largest:
             ending = min(ending, _GROWTHS / abscissa)
         ending = _rounded_up(ending) if seconds is None else seconds
-        return stable, ending, grid(system.A, x, ending, fastest, largest)
+        return False, ending, grid(system.A, x, ending, fastest, largest)
     ending, rows = _DECAYS / -abscissa, [system.rows[name] for name in system.coordinates]
     for _ in range(_DOUBLINGS):
         on = grid(system.A, x, ending, fastest, largest)
@@ -222,7 +223,7 @@ def _watched(
         settled = [measured("", row, on, True).settling for row in rows]
         last = max((s for s in settled if s > 0), default=ending)
         seconds = _rounded_up(ending if noisy else _AFTER * last)
-    return stable, seconds, on
+    return True, seconds, on
 
 
 def _rounded_up(value: float) -> float:

@@ -60,8 +60,14 @@ def matrices_of(model: Model) -> Any:
     """The matrices of a model by its native parameters.
 
     Raises:
-        InputError: where it is known by its characteristic polynomial alone.
+        InputError: where it is known by its characteristic polynomial alone, or is complex.
     """
+    if model.carrier is not None:
+        message = (
+            f"'{model.name}' is complex, and its motion is that of one rotating frame, which H alone does not tell; "
+            "write the frame that is meant as a real system, A = [[J, R], [-R, J]] of H = R + 1j*J"
+        )
+        raise InputError([Fault(message, ("model",))])
     if model.pencil is None:
         advice = "write its matrices under [model], M, D and K or A (in Python tmsopt.models.from_matrices)"
         message = f"'{model.name}' is given by its coefficients alone, which tell roots and no motion; {advice}"
