@@ -3,7 +3,7 @@
 import json
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
@@ -157,6 +157,12 @@ def nominal_of(problem: "Problem") -> "Problem":
         values = ", ".join(f"{n} = {problem.fixed[n]:.6g}" for n in problem.scenarios)
         click.echo(f"scenarios and tolerances are left aside{': ' + values if values else ''}", err=True)
     return problem.nominal
+
+
+def say_nominal(problem: "Problem", varied: Iterable[str] = ()) -> None:
+    """Where a design is the one for several scenarios, say which of them it is looked at in."""
+    if values := ", ".join(f"{n} = {problem.fixed[n]:.6g}" for n in problem.scenarios if n not in varied):
+        click.echo(f"the design for all scenarios, looked at for {values}", err=True)
 
 
 def write_json(data: dict[str, Any]) -> None:

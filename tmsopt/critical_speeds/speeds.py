@@ -125,7 +125,8 @@ def speeds(
 
     More: docs/explanation/weave_and_capsize.md
     """
-    asked = problem_of(problem if problem is not None and isinstance(design, Mapping) else design).nominal
+    whole = problem_of(problem if problem is not None and isinstance(design, Mapping) else design)
+    asked = whole.nominal
     of = asked.parameter_set
     name = parameter if parameter is not None else speed_of(of)
     if name is None:
@@ -134,7 +135,7 @@ def speeds(
         raise InputError([Fault(message, ("parameter",))])
     if name not in of.names:
         raise InputError([Fault(f"unknown parameter '{name}'; {suggest(name, of.names)}", ("parameter",))])
-    own = _parameters(design, asked, name, progress)
+    own = _parameters(design, whole, name, progress)
     counted(progress, "isolating speeds")
     allowed = of[name].range
     try:
@@ -185,18 +186,18 @@ def coefficients_over(model: Model, of: ParameterSet, own: Mapping[str, float], 
     return a
 
 
-def _parameters(design: Any, asked: Problem, name: str, progress: Listener | None) -> dict[str, float]:
+def _parameters(design: Any, whole: Problem, name: str, progress: Listener | None) -> dict[str, float]:
     """The parameters of the design; that of a problem which frees more than the one that varies is found first."""
     if isinstance(design, Solution):
         return dict(design.parameters)
     if isinstance(design, Mapping):
-        own = {**asked.fixed, **design}
-        if faults := [f for f in parameter_faults(asked, own) if f.key[-1] != name]:
+        own = {**whole.fixed, **design}
+        if faults := [f for f in parameter_faults(whole, own) if f.key[-1] != name]:
             raise InputError(faults)
         return own
-    if set(asked.free) <= {name}:
-        return dict(asked.fixed)
-    return dict(solve(asked, progress=progress, interruptible=False).parameters)
+    if set(whole.free) <= {name}:
+        return dict(whole.fixed)
+    return dict(solve(whole, progress=progress, interruptible=False).parameters)
 
 
 def _linear(model: Model, of: ParameterSet, own: Mapping[str, float], name: str) -> dict[str, tuple[Any, Any]]:

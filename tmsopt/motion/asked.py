@@ -64,7 +64,8 @@ def asked_for(system: System, **given: Any) -> Disturbance:
             try:
                 start[name] = _radians(given[word])
             except ValueError as error:
-                faults.append(Fault(str(error), (word,)))
+                said = str(error).replace("a number without quotes in rad", "a number without quotes in degrees")
+                faults.append(Fault(said, (word,)))
     if faults:
         raise InputError(faults)
     start |= {name: float(x) for name, x in (given["start"] or {}).items()}

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import Any
 
@@ -13,6 +13,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.disk import write_csv
 from tmsopt.errors import Fault, InputError
+from tmsopt.margins.surroundings import parameter_faults
 from tmsopt.motion.asked import Disturbance, asked_for
 from tmsopt.motion.flow import sampled, shaken, stationary
 from tmsopt.motion.measures import FINEST, MOST, Measure, Watched, grid, measured
@@ -109,7 +110,8 @@ class Simulation(Tabular):
 def simulate(
     design: Given, *, lean: float | str | None = None, steer: float | str | None = None, push: float | None = None,
     lean_push: float | None = None, start: Mapping[str, float] | None = None, noise: float | None = None,
-    seed: int = 0, seconds: float | None = None, points: int = 1001, progress: Listener | None = None,
+    seed: int = 0, seconds: float | None = None, points: int = 1001, at: Mapping[str, float] | None = None,
+    progress: Listener | None = None,
 ) -> Simulation:  # fmt: skip
     """What a design does after a lean, a push of its handlebar or in noise, exactly, also where its roots meet.
 
@@ -132,6 +134,8 @@ def simulate(
         seconds: how long; by default until all has settled, of a design that is not stable until it has grown
             e³-fold, or 200 radians of its fastest root. Of dimensionless parameters in √(w/g).
         points: how many times, evenly spaced, 0 and the last one included.
+        at: parameters of the design that have other values here, such as another speed: ``{"v": 1.5}``. A design of
+            several scenarios is looked at for the nominal one.
         progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
@@ -146,13 +150,16 @@ def simulate(
 
     More: docs/how_to/motion.md
     """
-    asked = problem_of(design).nominal
+    whole = problem_of(design)
+    asked = whole.nominal
     matrices_of(asked.model)
     if isinstance(design, Solution):
         own = dict(design.parameters)
     else:
-        own = dict(solve(asked, progress=progress, interruptible=False).parameters if asked.free else asked.fixed)
-    own = asked.ordered(own)
+        own = dict(solve(whole, progress=progress, interruptible=False).parameters if whole.free else whole.fixed)
+    own = asked.ordered(own) | dict(at or {})
+    if faults := list(parameter_faults(asked, own)):
+        raise InputError([replace(f, key=("at", *f.key[-1:])) for f in faults])
     counted(progress, "following the motion")
     system = system_of(asked, own)
     disturbance = asked_for(
@@ -165,7 +172,7 @@ def simulate(
     rate = 1.0 if of.rate is None else float(of.rate(own))
     x = disturbance.state(system)
     stable = structure.abscissa < 0
-    whole, ending, on = _watched(system, x, structure, rate, seconds, bool(noise))
+    followed, ending, on = _watched(system, x, structure, rate, seconds, bool(noise))
     times = np.linspace(0.0, ending, points)
     step = ending / (points - 1)
     force = disturbance.noise * system.impulses["T_delta"] if noise else np.zeros(len(x))
@@ -174,7 +181,7 @@ def simulate(
     if noise:
         measures = tuple(_greatest(name, times, states @ system.rows[name]) for name in watched)
     else:
-        measures = tuple(measured(name, system.rows[name], on, whole) for name in watched)
+        measures = tuple(measured(name, system.rows[name], on, followed) for name in watched)
     base = tuple(n for n in system.names if n not in system.torques)
     rest = tuple(n for n in system.rows if n not in base)
     columns = {"t": Column(times)} | {n: Column(states @ system.rows[n]) for n in (*base, *rest)}

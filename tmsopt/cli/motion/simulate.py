@@ -13,10 +13,10 @@ from tmsopt.cli.common import (
     bad_input,
     check_output,
     named,
-    nominal_of,
     options,
     report_option,
     saving,
+    say_nominal,
     write_report,
 )
 from tmsopt.cli.terminal import shown
@@ -28,6 +28,7 @@ Examples:
   tmsopt simulate problems/whipple_benchmark.toml --lean 5 --push 2 --seconds 3 --csv motion.csv --plot motion.png
   tmsopt simulate problems/ep4.toml --push 0.001 --json
   tmsopt simulate problems/whipple_benchmark.toml --noise 0.2 --seed 7
+  tmsopt simulate problems/gain_schedule.toml --at v=1.5
   tmsopt simulate problems/ziegler.toml --start q2=0.1
 
 The linear equations of the design are solved by matrix exponentials, exact also at an exceptional point: peaks,
@@ -49,6 +50,7 @@ Exit status: 0 done, stable or not, 2 bad input, 3 infeasible, 4 not converged.
 @click.option("--push", type=float, metavar="IMPULSE", help="Of steer torque at the start, in N m s.")
 @click.option("--lean-push", type=float, metavar="IMPULSE", help="Of lean torque at the start, in N m s.")
 @click.option("--start", multiple=True, metavar="NAME=VALUE", help="Any state at the start, in rad and s: phidot=0.1.")
+@click.option("--at", multiple=True, metavar="NAME=VALUE", help="Another value of a parameter, in SI: v=1.5.")
 @click.option("--noise", type=float, metavar="INTENSITY", help="White noise on the steer torque, in N m sqrt(s).")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the noise.")
 @click.option("--seconds", type=float, help="How long. [default: until it has settled]")
@@ -62,7 +64,7 @@ Exit status: 0 done, stable or not, 2 bad input, 3 infeasible, 4 not converged.
 @report_option
 def simulate(
     file: Path, as_json: bool, csv_file: Path | None, whole: bool, plot: Path | None, report: Path | None,
-    start: tuple[str, ...], **asked: Any,
+    start: tuple[str, ...], at: tuple[str, ...], **asked: Any,
 ) -> None:  # fmt: skip
     """Show what the design of FILE does after a lean, a push of the handlebar, or in noise."""
     with bad_input():
@@ -74,9 +76,13 @@ def simulate(
         if whole and csv_file is None:
             raise tmsopt.InputError([tmsopt.Fault("says what --csv writes; add --csv FILE", ("--path",))])
         states = {name: _number(name, text) for name, text in named("--start", start, "phidot=0.1").items()}
-        problem = nominal_of(tmsopt.load(file))
+        problem = tmsopt.load(file)
+        values = {name: _number(name, text, "--at") for name, text in named("--at", at, "v=1.5").items()}
+        say_nominal(problem, values)
         with a_design(problem):
-            found = tmsopt.simulate(problem, start=states or None, progress=shown(), **options(**asked))
+            found = tmsopt.simulate(
+                problem, start=states or None, at=values or None, progress=shown(), **options(**asked)
+            )
     answer(as_json, found.to_json, found.report)
     if csv_file is not None:
         with saving("--csv", csv_file):
@@ -87,10 +93,10 @@ def simulate(
     write_report(found, report, file, seed=asked["seed"])
 
 
-def _number(name: str, text: str) -> float:
+def _number(name: str, text: str, option: str = "--start") -> float:
     from tmsopt import Fault, InputError
 
     try:
         return float(text)
     except ValueError:
-        raise InputError([Fault(f"found '{text}'; accepted: a number", ("--start", name))]) from None
+        raise InputError([Fault(f"found '{text}'; accepted: a number", (option, name))]) from None

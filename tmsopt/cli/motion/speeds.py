@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tmsopt.cli.common import a_design, answer, bad_input, nominal_of
+from tmsopt.cli.common import a_design, answer, bad_input, say_nominal
 from tmsopt.cli.terminal import shown
 
 _EXAMPLES = """
@@ -42,7 +42,8 @@ def speeds(file: Path, parameter: str | None, between: tuple[float, float] | Non
     with bad_input():
         import tmsopt
 
-        problem = nominal_of(tmsopt.load(file))
+        problem = tmsopt.load(file)
+        say_nominal(problem, [parameter] if parameter else ("v", "Fr"))
         with a_design(problem):
             found = tmsopt.speeds(problem, parameter, between=between, progress=shown())
     answer(as_json, found.to_json, lambda: tmsopt.report.speeds_table(found))

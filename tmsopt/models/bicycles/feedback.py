@@ -29,6 +29,7 @@ FEEDBACK = (*_GAINS, *(f"{n}{_SLOPE}" for n in _GAINS), LAG)
 
 _PASSIVE = ("v_weave", "v_capsize", "Fr_c", "v_c")
 _ABSENT = "its formula is that of a bicycle without a controller; `tmsopt speeds` finds where this one is stable"
+_LATE = "through a lag the torque begins at 0; its peak after a push is told by `tmsopt simulate`"
 _SAID = (
     "A controller adds the steer torque −(k_phi φ + k_phidot φ′ + k_delta δ + k_deltadot δ′), to the right positive."
 )
@@ -136,7 +137,7 @@ def with_feedback(of: Steered, names: tuple[str, ...]) -> Model:
     lost = {*_PASSIVE, *(("omega0",) if lagged else ())}
     kept = {name: said for name, said in base.absent.items() if name not in UNCONTROLLED}
     every = (*base.quantities, *(q for s in base.sets for q in s.quantities))
-    absent = {q.name: _ABSENT for q in every if q.name in lost}
+    absent = {q.name: _ABSENT for q in every if q.name in lost} | ({"push_torque": _LATE} if lagged else {})
     return replace(
         base, title=f"{base.title} with a controller", degree=4 + len(driven) * lagged, sets=sets, algebraic=algebraic,
         polynomial=polynomial, compact=None, pencil=pencil, feedback=feedback, natural=False,
