@@ -67,7 +67,8 @@ def explore(work: Workspace, insist: bool = True) -> Explored:
         return Explored(work.name, led.candidates, _covered(work, led.nlp, led.candidates, led.trial, starts))
     nlp = work.formulate(cases)
     mixed = {"abscissa", "damping_ratio"} <= set(nlp.variables)
-    needles = bool(work.sample and (work.sample.singular or rarely_stable(work)) and "abscissa" in nlp.variables)
+    thin = work.problem.model.feedback is not None or (work.sample and work.sample.singular) or rarely_stable(work)
+    needles = bool(work.sample and thin and "abscissa" in nlp.variables)
     leads = exceptional(work) if (mixed or needles) and not work.options.near else []
     candidates = [*search(work, nlp, _FEWER if mixed and leads else None), *_from(work, nlp, leads)]
     trial = survivor(work, nlp, candidates)
