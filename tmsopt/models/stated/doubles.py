@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 
 import casadi as ca
 import numpy as np
@@ -11,6 +12,7 @@ from tmsopt.arithmetic.formulas import Formulas, formulas
 from tmsopt.arithmetic.intervals import Interval, ranges
 from tmsopt.arithmetic.walk import NotAccepted
 from tmsopt.models.model import Model
+from tmsopt.records import Array
 
 _ROOM = 16
 """A carrier is kept for other ranges while no root is farther from the axis than so many times the spread."""
@@ -19,6 +21,8 @@ _NOTHING = 2.0**-300  # a spread below is the rounding of intervals around 0, an
 _SAMPLE = 256  # designs by which frequencies are judged where intervals have no bound
 _AT_LEAST = 0.9  # of the spread: distance of the roots from the axis
 _WIDER = 2.0  # than what a sample shows
+_SEEN, _LEAST_SEEN = 1.25, 1 / 64  # times the spread that designs of a sample have; of the spread that is certain
+_CORNERS = 8  # parameters up to which the sample has all corners of the box
 _PARTS = 32  # of its size that a carrier is a multiple of, so that near ranges have the same
 
 WORDS = ("threshold", "zero frequency")
@@ -72,7 +76,9 @@ def carriers(entries: Sequence[ca.SX]) -> Callable[[Mapping[str, Interval]], tup
     """The middle and the spread of Re ω over ranges of parameters, the spread no less than any |Im ω|.
 
     The eigenvalues of H lie in its field of values: Re ω among those of (H + H*)/2, Im ω among those of (H − H*)/2i,
-    each within Gershgorin's discs. By intervals; where these have no bound, as of 1/x, by a sample.
+    each within Gershgorin's discs. By intervals; where these have no bound, as of 1/x, by a sample. As the discs may be
+    far wider, and a wide carrier costs digits, a sample of designs says how wide the eigenfrequencies really are: roots
+    meet conjugates of others only beyond twice that.
     """
     n = math.isqrt(len(entries) // 2)
     R, J = (
@@ -84,6 +90,7 @@ def carriers(entries: Sequence[ca.SX]) -> Callable[[Mapping[str, Interval]], tup
     every = [*R.diagonal(), *J.diagonal(), *even[0], *even[1], *odd[0], *odd[1]]
     names = [x.name() for x in ca.symvar(ca.vertcat(*every))]
     asked = formulas([ca.simplify(x) for x in every], names)
+    matrix = formulas([*R.ravel(), *J.ravel()], names)
 
     def bounds(box: Mapping[str, Interval]) -> tuple[float, float]:
         found = np.array(_ranges(asked, [box[name] for name in names]))
@@ -94,9 +101,32 @@ def carriers(entries: Sequence[ca.SX]) -> Callable[[Mapping[str, Interval]], tup
             ends.append(((diagonal[:, 0] - reach).min(), (diagonal[:, 1] + reach).max()))
         (low, high), loss = ends[0], np.abs(ends[1]).max()
         spread = float(max((high - low) / 2, loss))
+        seen = _frequencies(matrix, n, [box[name] for name in names])
+        if seen.size:
+            least, most = seen.real.min(), seen.real.max()
+            own = _SEEN * max((most - least) / 2, np.abs(seen.imag).max())
+            if own < spread:
+                low, high, spread = least, most, float(max(own, _LEAST_SEEN * spread))
         return float(low + high) / 2, spread if spread > _NOTHING else 1.0
 
     return bounds
+
+
+def _frequencies(matrix: Formulas, n: int, box: Sequence[Interval]) -> Array:
+    """Eigenvalues of H at designs of the box, corners among them where these are few; none where H does not exist."""
+    share = _shares(len(box))
+    if len(box) <= _CORNERS:
+        share = np.concatenate([share, np.array(list(product((0.0, 1.0), repeat=len(box))))])
+    columns = {name: lo + (hi - lo) * at for name, (lo, hi), at in zip(matrix.names, box, share.T, strict=True)}
+    values = np.array([np.broadcast_to(np.asarray(x, dtype=float), len(share)) for x in matrix(columns)])
+    H = (values[: n * n] + 1j * values[n * n :]).T.reshape(-1, n, n)
+    return np.linalg.eigvals(H) if np.isfinite(H).all() else np.zeros(0)
+
+
+def _shares(size: int) -> Array:
+    """Places in the unit cube, spread evenly."""
+    share = np.modf(np.outer(np.arange(_SAMPLE), 1 / np.sqrt([2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41])))[0]
+    return np.asarray(share[:, np.arange(size) % share.shape[1]])
 
 
 def _ranges(asked: Formulas, box: Sequence[Interval]) -> list[Interval]:
@@ -106,8 +136,7 @@ def _ranges(asked: Formulas, box: Sequence[Interval]) -> list[Interval]:
             return found
     except NotAccepted:
         pass
-    share = np.modf(np.outer(np.arange(_SAMPLE), 1 / np.sqrt([2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41])))[0]
-    places = zip(asked.names, box, share[:, np.arange(len(box)) % share.shape[1]].T, strict=True)
+    places = zip(asked.names, box, _shares(len(box)).T, strict=True)
     columns = {name: lo + (hi - lo) * at for name, (lo, hi), at in places}
     values = np.array([np.broadcast_to(x, _SAMPLE) for x in asked(columns)])
     values = np.where(np.isfinite(values), values, 0.0)
