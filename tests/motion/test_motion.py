@@ -14,7 +14,7 @@ from mpmath import mp
 from scipy.integrate import solve_ivp
 
 import tmsopt
-from tmsopt.models import canonical, from_hamiltonian, from_matrices, matrices, tms, whipple
+from tmsopt.models import canonical, from_matrices, matrices, tms, whipple
 from tmsopt.motion import system_of
 from tmsopt.records import Array
 
@@ -366,12 +366,6 @@ def test_a_mass_alone_rolls_on() -> None:
     assert [(m.multiplicity, m.partial) for m in motion.modes] == [(2, (2,))]
     (found,) = tmsopt.diagnose(alone)
     assert [(r.parameter, r.unmoved, r.laws) for r in found.responses] == [("m", 2, ())]
-
-
-def test_the_carrier_of_a_complex_system_is_not_shown_as_a_motion() -> None:
-    dimer = from_hamiltonian([["1j*g", "k"], ["k", "-1j*l"]])
-    with pytest.raises(tmsopt.InputError, match=r"complex.*write the frame that is meant as a real system, A ="):
-        tmsopt.simulate(tmsopt.Problem(dimer, fixed={"g": 0.1, "k": 1.0, "l": 0.3}))
 
 
 def test_what_dies_out_too_slowly_to_be_followed_has_no_settling_time() -> None:

@@ -209,6 +209,7 @@ class Model:
         carrier: of a complex H, what is added to each eigenfrequency, lest a root of the polynomial, of twice
             the degree, meets the conjugate of another; None of a real system.
         carried: of a complex H, ranges of the native parameters → the model with a carrier for them.
+        double: of a complex H, the pencil without carrier, I and −A of (Re ψ, Im ψ)′ = A (Re ψ, Im ψ).
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])
@@ -237,6 +238,7 @@ class Model:
     absent: Mapping[str, str] = field(default_factory=dict, repr=False, hash=False)
     carrier: float | None = field(default=None, repr=False)
     carried: Callable[[Mapping[str, tuple[float, float]]], "Model"] | None = field(default=None, repr=False)
+    double: Callable[[Mapping[str, Any]], tuple[Matrix, ...]] | None = field(default=None, repr=False)
 
     def coefficients(self, parameters: Mapping[str, Any], of: ParameterSet | None = None) -> list[Any]:
         """Coefficients a0 … aₙ, descending, for values of any kind: floats, arrays, CasADi, balls."""

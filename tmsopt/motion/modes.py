@@ -9,7 +9,8 @@ import numpy as np
 
 from tmsopt.design.problem import Problem
 from tmsopt.diagnosis import diagnosed
-from tmsopt.motion.system import ANGLES, is_bicycle, matrices_of
+from tmsopt.models.told import eigenfrequencies, roots_told
+from tmsopt.motion.system import ANGLES, coordinates_of, matrices_of
 from tmsopt.records import Complex, Table, plain
 from tmsopt.roots import Root, Structure
 
@@ -22,12 +23,14 @@ class ModeShape:
     """One shape of a root, of a pair of the upper one: e^(st) times these amplitudes solves the equations of motion.
 
     Attributes:
-        re, im: the root, per unit of time of the motion.
+        re, im: the root, per unit of time of the motion; of a complex H s = −i ω.
         multiplicity: how many roots meet there.
         geometric: how many independent shapes they have left; 1 where all have merged in this one.
         partial: lengths of their Jordan chains, longest first: a chain of k moves as t^(k−1) e^(st).
         amplitudes: of each coordinate, the largest 1.
-        phases: in degrees, by which each is ahead of the first (of lean), from −180 to 180; nan of one at rest.
+        phases: in degrees, by which each is ahead of the first (of lean), from −180 to 180; nan of one at rest. Of a
+            complex H the argument of ψₖ/ψ₁, of motion as e^(−iωt).
+        eigenfrequency: of a complex H ω = i s, else None.
     """
 
     re: float
@@ -37,6 +40,7 @@ class ModeShape:
     partial: tuple[int, ...]
     amplitudes: Table[float]
     phases: Table[float]
+    eigenfrequency: complex | None = None
 
     @property
     def steer_per_lean(self) -> float:
@@ -48,7 +52,8 @@ class ModeShape:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
         ratio = plain(self, "steer_per_lean", digits=_DIGITS) if "delta" in self.amplitudes else {}
         shape = plain(self, "amplitudes phases", digits=_DIGITS)
-        return plain(self, "re im multiplicity geometric partial") | shape | ratio
+        omega = plain(self, "eigenfrequency") if self.eigenfrequency is not None else {}
+        return plain(self, "re im") | omega | plain(self, "multiplicity geometric partial") | shape | ratio
 
 
 def mode_shapes(
@@ -57,15 +62,19 @@ def mode_shapes(
     """The shapes at every root of a design, rightmost first: null vectors of its matrices at the root.
 
     They are the right singular vectors of L(s) with the smallest singular values, at the roots of the ideal design:
-    where roots meet, those of the design as rounded are scattered around it.
+    where roots meet, those of the design as rounded are scattered around it. Of a complex H L(s) = s + i H.
 
     Args:
         rate: how many 1/s a rate of 1 is.
     """
     model, of = problem.model, problem.parameter_set
     pencil = [np.array(P, dtype=float) for P in matrices_of(model)(of.native(parameters))]
+    names = coordinates_of(model, pencil)
     chains = {(d.re, d.im): d for d in diagnosed(model, of, parameters, structure)}
-    roots: dict[tuple[float, float], Root] = {(r.re, abs(r.im)): r for r in structure.roots}
+    if model.double is not None:
+        pencil = _of_H(pencil[1])
+    told = roots_told(model, structure.roots)
+    roots: dict[tuple[float, float], Root] = {(r.re, r.im if model.double else abs(r.im)): r for r in told}
     found = []
     partial: tuple[int, ...]
     for (re, im), root in sorted(roots.items(), key=lambda item: (-item[0][0], -item[0][1])):
@@ -74,13 +83,20 @@ def mode_shapes(
         if root.multiplicity > 1 and chain is not None:
             s, geometric, partial = complex(chain.re, chain.im), chain.geometric, chain.partial
         vectors = _null(pencil, s, geometric)
-        n = 2 if is_bicycle(model) else vectors.shape[1]
-        names = ANGLES if is_bicycle(model) else [f"{'q' if len(pencil) == 3 else 'x'}{k}" for k in range(1, n + 1)]
+        (omega,) = [complex(z.re, z.im) for z in eigenfrequencies(model, [Root(s.real, s.imag, 1)])] or [None]
         for vector in vectors:
-            amplitudes, phases = _amplitudes(vector[:n])
+            amplitudes, phases = _amplitudes(vector[: len(names)])
             tables = (Table(dict(zip(names, column, strict=True))) for column in (amplitudes, phases))
-            found.append(ModeShape(rate * s.real, rate * s.imag, root.multiplicity, len(vectors), partial, *tables))
+            found.append(
+                ModeShape(rate * s.real, rate * s.imag, root.multiplicity, len(vectors), partial, *tables, omega)
+            )
     return tuple(found)
+
+
+def _of_H(double: Any) -> list[Any]:
+    """I and i H of the real matrix −[[J, R], [−R, J]]."""
+    n = len(double) // 2
+    return [np.eye(n), double[:n, :n] - 1j * double[:n, n:]]
 
 
 def _null(pencil: Sequence[Any], s: complex, count: int) -> Complex:

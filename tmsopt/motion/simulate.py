@@ -14,6 +14,7 @@ from tmsopt.design.solution import Solution
 from tmsopt.disk import write_csv
 from tmsopt.errors import Fault, InputError
 from tmsopt.margins.surroundings import parameter_faults
+from tmsopt.models.told import told
 from tmsopt.motion.asked import Disturbance, asked_for
 from tmsopt.motion.flow import sampled, shaken, stationary
 from tmsopt.motion.measures import FINEST, MOST, Measure, Watched, grid, measured
@@ -26,8 +27,9 @@ from tmsopt.solver.solve import solve
 
 _DECAYS, _GROWTHS, _RADIANS = 10.0, 3.0, 200.0  # times of a motion that is watched, in times 1/|abscissa| and 1/|s|
 _DOUBLINGS, _STILL = 8, 0.002  # of a stable one, until the second half is so much smaller than its peak
-_NO_GROWTH, _ROUNDING = 1e-9, 1e-12  # of the largest root: growth that is none; decay that doubles cannot follow
+_NO_GROWTH, _ROUNDING = 1e-9, 1e-12  # of the largest root: growth that is none; decay that doubles cannot tell
 _SLOW = _DECAYS * FINEST / (2 * math.pi * MOST)  # of the fastest oscillation: decay that no grid can follow to its end
+_ALONE = 10.0  # times 1/‖A‖ where all roots are 0
 _AFTER = 1.2  # times the settling time
 _LARGEST = 600.0  # powers of e by which a motion may grow
 
@@ -41,7 +43,8 @@ class Simulation(Tabular):
         disturbance: what set it moving.
         columns: ``t``; of a bicycle ``phi delta phidot deltadot``, then the torques of a controller if it has one
             (``T_phi``, ``T_delta``), then the path: ``x`` along the road, yaw ``psi``, the contacts ``y_rear`` and
-            ``y_front`` to the right; of a stated system ``q1 … q1dot …`` or ``x1 …``.
+            ``y_front`` to the right; of a stated system ``q1 … q1dot …`` or ``x1 …``, of a
+            complex H ``psi1_re psi1_im psi2_re …``.
         units: of each column that has one: s, rad, N m, m; of dimensionless parameters √(w/g), rad, m_B g w, w.
         measures: of each coordinate and torque; of the whole motion where the design is stable, else of the time
             shown, as where it dies out so slowly that 20 000 oscillations do not show it; in noise of the times shown.
@@ -49,7 +52,8 @@ class Simulation(Tabular):
             not stable.
         modes: shapes of the modes, rightmost first.
         structure: which roots meet on the rightmost line, e.g. ``EP4``.
-        stable: whether all roots lie left of the axis.
+        stable: whether all roots lie left of the axis; not where those that lie on it but for rounding are multiple, or
+            those of a complex H, whose loss then is none.
         extra: the columns of torques and path.
 
     Example:
@@ -127,7 +131,8 @@ def simulate(
             coordinate.
         push, lean_push: impulse of steer torque and of lean torque at t = 0, in N m s; of dimensionless parameters in
             m_B g w √(w/g).
-        start: other states at the start, by the names of columns, in rad and s: ``{"phidot": 0.1}``, ``{"q1": 1}``.
+        start: other states at the start, by the names of columns, in rad and s: ``{"phidot": 0.1}``, ``{"q1": 1}``,
+            ``{"psi1_re": 1}``.
         noise: intensity σ of white noise on the steer torque, in N m √s: in a time T its impulse has the standard
             deviation σ √T.
         seed: of the noise.
@@ -166,13 +171,14 @@ def simulate(
         system, lean=lean, steer=steer, push=push, lean_push=lean_push, start=start, noise=noise, seed=seed,
         seconds=seconds, points=points,
     )  # fmt: skip
-    structure = asked.values(own)["structure"]
-    assert isinstance(structure, Structure)
+    found = asked.values(own)["structure"]
+    assert isinstance(found, Structure)
+    structure = told(asked.model, found)
     of = asked.parameter_set
     rate = 1.0 if of.rate is None else float(of.rate(own))
     x = disturbance.state(system)
-    stable = structure.abscissa < 0
-    followed, ending, on = _watched(system, x, structure, rate, seconds, bool(noise))
+    stable = _dies_out(asked, found)
+    followed, ending, on = _watched(system, x, structure, stable, rate, seconds, bool(noise))
     times = np.linspace(0.0, ending, points)
     step = ending / (points - 1)
     force = disturbance.noise * system.impulses["T_delta"] if noise else np.zeros(len(x))
@@ -187,7 +193,7 @@ def simulate(
     columns = {"t": Column(times)} | {n: Column(states @ system.rows[n]) for n in (*base, *rest)}
     if rest:
         columns["x"] = Column(system.speed * times)
-    modes = mode_shapes(asked, own, structure, rate)
+    modes = mode_shapes(asked, own, found, rate)
     deviations = _deviations(system, force) if noise and stable else Table[float]()
     units = Table({n: system.units[n] for n in columns if n in system.units})
     return Simulation(
@@ -196,8 +202,16 @@ def simulate(
     )  # fmt: skip
 
 
+def _dies_out(problem: Problem, found: Structure) -> bool:
+    """Whether the design is stable, multiple roots and those of a complex H by more than rounding."""
+    rightmost = [r.multiplicity for r in found.roots if r.re == found.abscissa]
+    exact = problem.model.carrier is None and max(rightmost, default=1) == 1
+    largest = max((math.hypot(r.re, r.im) for r in found.roots), default=0.0)
+    return found.abscissa < (0.0 if exact else -_ROUNDING * largest)
+
+
 def _watched(
-    system: System, x: Array, structure: Structure, rate: float, seconds: float | None, noisy: bool
+    system: System, x: Array, structure: Structure, stable: bool, rate: float, seconds: float | None, noisy: bool
 ) -> tuple[bool, float, Watched]:  # fmt: skip
     """Whether the motion dies out while it is measured, how long it is shown, and the motion that is measured.
 
@@ -209,11 +223,11 @@ def _watched(
         raise InputError([Fault(message, ("parameters",))])
     abscissa, fastest = rate * structure.abscissa, rate * max(abs(r.im) for r in structure.roots)
     largest = rate * max(math.hypot(r.re, r.im) for r in structure.roots)
-    stable = abscissa < 0
     if seconds is not None and seconds * abscissa > _LARGEST:
         accepted = f"accepted: up to {_LARGEST / abscissa:.4g}, in which it grows by e^{_LARGEST:.0f}"
         raise InputError([Fault(f"found {seconds:.6g} of a design that is not stable; {accepted}", ("seconds",))])
-    ending = _RADIANS / largest if largest else 10.0
+    size = float(np.linalg.norm(system.A[: len(system.names), : len(system.names)], 2))
+    ending = _RADIANS / largest if largest > _ROUNDING * size else _ALONE / (size or 1.0)
     if not stable or -abscissa < max(_SLOW * fastest, _ROUNDING * largest):
         if abscissa > _NO_GROWTH * largest:
             ending = min(ending, _GROWTHS / abscissa)

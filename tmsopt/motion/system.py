@@ -1,7 +1,7 @@
 """A design as one linear system of first order x′ = A x, the path of its wheels among the states."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -57,17 +57,13 @@ def is_bicycle(model: Model) -> bool:
 
 
 def matrices_of(model: Model) -> Any:
-    """The matrices of a model by its native parameters.
+    """The matrices of a model by its native parameters, of a complex H those of (Re ψ, Im ψ).
 
     Raises:
-        InputError: where it is known by its characteristic polynomial alone, or is complex.
+        InputError: where it is known by its characteristic polynomial alone.
     """
-    if model.carrier is not None:
-        message = (
-            f"'{model.name}' is complex, and its motion is that of one rotating frame, which H alone does not tell; "
-            "write the frame that is meant as a real system, A = [[J, R], [-R, J]] of H = R + 1j*J"
-        )
-        raise InputError([Fault(message, ("model",))])
+    if model.double is not None:
+        return model.double
     if model.pencil is None:
         advice = "write its matrices under [model], M, D and K or A (in Python tmsopt.models.from_matrices)"
         message = f"'{model.name}' is given by its coefficients alone, which tell roots and no motion; {advice}"
@@ -75,11 +71,22 @@ def matrices_of(model: Model) -> Any:
     return model.pencil
 
 
+def coordinates_of(model: Model, pencil: Sequence[Any]) -> tuple[str, ...]:
+    """Names of the coordinates of a mode: lean and steer, ``q1 …``, ``x1 …`` or, of a complex H, ``psi1 …``."""
+    if is_bicycle(model):
+        return ANGLES
+    n, letter = len(pencil[0]), "q" if len(pencil) == 3 else "x"
+    if model.double is not None:
+        n, letter = n // 2, "psi"
+    return tuple(f"{letter}{k}" for k in range(1, n + 1))
+
+
 def system_of(problem: Problem, parameters: Mapping[str, float]) -> System:
     """The linear system of a design, in SI where the problem is written so, else in the model's own units.
 
     M q″ + D q′ + K q = 0 becomes x′ = A x, x = (q, q′); two matrices I, −A are it already. Of a bicycle the yaw and
-    the rear contact of `contact_path` are further states, so that they are exact too.
+    the rear contact of `contact_path` are further states, so that they are exact too. Of ψ′ = −i H ψ, H = R + i J as
+    written, they are Re ψ₁, Im ψ₁, Re ψ₂ …, of A = [[J, R], [−R, J]] in that order.
 
     Raises:
         InputError: without matrices, or where the mass matrix cannot be inverted.
@@ -103,7 +110,12 @@ def system_of(problem: Problem, parameters: Mapping[str, float]) -> System:
         torque = 1.0 if of.torque is None else float(of.torque(parameters))
         length = parameters["w"] / native.get("w", 1.0) if "w" in parameters else 1.0
         return replace(_in_units(moving, rate, torque, length), units=_units(of.rate is not None))
-    q = tuple(f"{'q' if len(pencil) == 3 else 'x'}{k}" for k in range(1, n + 1))
+    if model.double is not None:
+        order = np.arange(n).reshape(2, -1).T.ravel()
+        names = tuple(f"{name}_{part}" for name in coordinates_of(model, pencil) for part in ("re", "im"))
+        unit = Table(dict(zip(names, np.eye(n), strict=True)))
+        return System(names, names, A[np.ix_(order, order)], unit, Table(), math.nan, Table())
+    q = coordinates_of(model, pencil)
     names = (*q, *(f"{name}dot" for name in q)) if len(pencil) == 3 else q
     return System(names, q, A, Table(dict(zip(names, np.eye(len(names)), strict=True))), Table(), math.nan, Table())
 

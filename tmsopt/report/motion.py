@@ -13,7 +13,7 @@ _WORDS = {"phi": "lean phi", "delta": "steer delta", "T_phi": "lean torque", "T_
 _COUNTS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}
 _STEEP = 20.0  # degrees beyond which the equations, which are linear, say little
 _ROWS, _SHAPES = 8, 4  # of each table, coordinates of a shape, if not full
-_NOTHING = 1e-12  # of a root: a real part so small is rounding
+_NOTHING = 1e-12  # of a root: a real part so small is rounding, and on the axis beside the largest
 
 
 def motion_table(motion: "Simulation", full: bool = False) -> str:
@@ -65,11 +65,10 @@ def _modes(motion: "Simulation", full: bool) -> Iterator[Sequence[str]]:
     bicycle = "phi" in motion.columns
     unit = {"s": "1/s", "√(w/g)": "√(g/w)"}.get(motion.units.get("t", ""), "")
     heads = ("steer per lean", "steer ahead of lean") if bicycle else ("amplitudes and phases",)
-    yield f"root {unit}".rstrip(), *heads
+    yield f"{'eigenfrequency' if motion.problem.model.double else 'root'} {unit}".rstrip(), *heads
     for mode in motion.modes:
         times = f" ({mode.multiplicity}-fold)" if mode.multiplicity > 1 else ""
-        re = 0.0 if abs(mode.re) < _NOTHING * abs(mode.im) else mode.re
-        root = f"{re:.6g}" + (f" ± {mode.im:.6g}i" if mode.im else "") + times
+        root = _root(motion, mode) + times
         if bicycle:
             ratio = f"{mode.steer_per_lean:.4g}" if math.isfinite(mode.steer_per_lean) else "no lean"
             yield root, ratio, _degrees(mode.phases["delta"])
@@ -84,8 +83,14 @@ def _notes(motion: "Simulation") -> Iterator[str]:
     merged = {(m.re, m.im): m for m in motion.modes if m.multiplicity > 1}
     yield from map(_merging, merged.values())
     if merged:
-        yield "roots: of the ideal design; motion: of the design as stored, which rounding moves by no more than itself"
-    if not motion.stable:
+        what, moved = (
+            "eigenfrequencies" if motion.problem.model.double else "roots",
+            "which rounding moves by no more than itself",
+        )
+        yield f"{what}: of the ideal design; motion: of the design as stored, {moved}"
+    if not motion.stable and (words := _on_axis(motion)):
+        yield f"not stable: {words}; peaks are those of the time shown"
+    elif not motion.stable:
         yield "not stable: it does not settle, and peaks are those of the time shown"
     elif not noisy and any(math.isnan(m.settling) for m in motion.measures):
         yield "stable, but it dies out too slowly for a settling time: peaks are those of the time shown"
@@ -102,16 +107,49 @@ def _notes(motion: "Simulation") -> Iterator[str]:
             yield f"beyond {_STEEP:.0f} deg the equations, which are linear, tell what a smaller push does, enlarged"
 
 
+def _root(motion: "Simulation", mode: "ModeShape") -> str:
+    """A root, or an eigenfrequency, of which a part that is rounding is 0."""
+    if mode.eigenfrequency is not None:
+        least = _NOTHING * _largest(motion)
+        re, im = (0.0 if abs(x) <= least else x for x in (mode.eigenfrequency.real, mode.eigenfrequency.imag))
+        return f"{re:.6g}" + (f" {'-' if im < 0 else '+'} {abs(im):.6g}i" if im else "")
+    re = 0.0 if abs(mode.re) < _NOTHING * abs(mode.im) else mode.re
+    return f"{re:.6g}" + (f" ± {mode.im:.6g}i" if mode.im else "")
+
+
+def _largest(motion: "Simulation") -> float:
+    """A size beside which a root is none: of the roots of the polynomial, those of a complex H with its carrier."""
+    carrier = motion.problem.model.carrier or 0.0
+    return max(math.hypot(m.re, m.im - carrier) for m in motion.modes)
+
+
+def _on_axis(motion: "Simulation") -> str:
+    """What the rightmost modes do where they lie on the axis but for rounding, and are multiple or of a complex H."""
+    least = _NOTHING * _largest(motion)
+    first = [m for m in motion.modes if abs(m.re) <= least]
+    if any(m.re > least for m in motion.modes) or not first:
+        return ""
+    of_H = motion.problem.model.double is not None
+    longest = max(m.partial[0] for m in first)
+    if longest > 1:
+        power = "t" if longest == 2 else f"t^{longest - 1}"
+        return f"on the {'real' if of_H else 'imaginary'} axis, where modes merge, it grows as {power}"
+    return "an eigenfrequency is real, and its motion neither grows nor dies out" if of_H else ""
+
+
 def _merging(mode: "ModeShape") -> str:
     k, chains = mode.multiplicity, mode.partial
-    name = f"{'C' if mode.im else ''}EP{k}"
-    many = _COUNTS.get(k, str(k))
+    of_H = mode.eigenfrequency is not None
+    name = f"{'C' if mode.im and not of_H else ''}EP{k}"
+    many, roots, wave = _COUNTS.get(k, str(k)), "roots", "e^(st)"
+    if of_H:
+        roots, wave = "eigenfrequencies", "e^(-i omega t)"
     if mode.geometric == k:
-        return f"{many} roots meet and keep {many} shapes: no chain, no power of t"
+        return f"{many} {roots} meet and keep {many} shapes: no chain, no power of t"
     if mode.geometric > 1:
-        return f"{many} roots meet in {mode.geometric} shapes, Jordan chains of {', '.join(map(str, chains))}"
+        return f"{many} {roots} meet in {mode.geometric} shapes, Jordan chains of {', '.join(map(str, chains))}"
     top = "t" if k == 2 else f"t^{k - 1}"
-    return f"{name}: {many} modes merge in one shape, a Jordan chain of {k}: the motion has terms up to {top} e^(st)"
+    return f"{name}: {many} modes merge in one shape, a Jordan chain of {k}: the motion has terms up to {top} {wave}"
 
 
 def _named(name: str) -> str:

@@ -37,7 +37,7 @@ asked, a bicycle starts with a lean of 1 degree, a system of your own with 1 in 
 without units, torques are in m_B g w and times in sqrt(w/g).
 
 The table has the columns t, phi, delta, phidot, deltadot (lean and steer to the right, in s and rad), of your own
-matrices t, q1, ..., q1dot, ... or t, x1, ...
+matrices t, q1, ..., q1dot, ... or t, x1, ..., of a complex H t, psi1_re, psi1_im, ...
 
 Exit status: 0 done, stable or not, 2 bad input, 3 infeasible, 4 not converged.
 """

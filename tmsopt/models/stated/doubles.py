@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from tmsopt.arithmetic.formulas import Formulas, formulas
 from tmsopt.arithmetic.intervals import Interval, ranges
 from tmsopt.arithmetic.walk import NotAccepted
-from tmsopt.models.model import Model
+from tmsopt.models.model import Matrix, Model
 from tmsopt.records import Array
 
 _ROOM = 16
@@ -45,13 +46,14 @@ CONVENTIONS = (
 
 def complex_model(
     made: Model, carrier: float, bounds: Callable[[Mapping[str, Interval]], tuple[float, float]],
-    carried: Callable[[float], Model],
+    carried: Callable[[float], Model], double: Callable[[Mapping[str, Any]], tuple[Matrix, ...]],
 ) -> Model:  # fmt: skip
     """The model of a complex H, of its double with a carrier.
 
     Args:
         bounds: ranges of parameters → middle and spread of the eigenfrequencies.
         carried: the model with another carrier.
+        double: its pencil without one.
     """
 
     def within(box: Mapping[str, Interval]) -> Model:
@@ -61,7 +63,9 @@ def complex_model(
             return model
         return carried(carrier_for(middle, spread))
 
-    model = replace(made, carrier=carrier, carried=within, words=WORDS, absent=ABSENT, conventions=CONVENTIONS)
+    model = replace(
+        made, carrier=carrier, carried=within, double=double, words=WORDS, absent=ABSENT, conventions=CONVENTIONS
+    )
     return model
 
 

@@ -263,7 +263,10 @@ def _rebuilt(
     )
     if kind != "hamiltonian":
         return made
-    return complex_model(made, carrier, carriers(written[:count]), lambda c: _rebuilt(*plain, *([c] if c else [])))
+    return complex_model(
+        made, carrier, carriers(written[:count]), lambda c: _rebuilt(*plain, *([c] if c else [])),
+        lambda values: pencil(blocks(entry(values))),
+    )  # fmt: skip
 
 
 def _statement(entry: Formulas, shapes: Sequence[tuple[str, int, int]], derived: Sequence[str]) -> dict[str, Any]:
