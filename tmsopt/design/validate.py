@@ -251,6 +251,9 @@ def pattern_faults(name: Any, model: Model, key: tuple[str, ...]) -> Iterator[Fa
             raise ValueError(f"{short(name)} is no pattern")
         if len(name) > _LONGEST:
             raise ValueError(f"{short(name)} is no pattern")
+        if name in model.words and (known := ("weave", "capsize")[model.words.index(name)]) in patterns_of(model):
+            yield Fault(f"unknown pattern: '{name}' is {known} in data; write {known}", key)
+            return
         pattern_of(model, name)
     except ValueError as error:
         joined = ", or several, joined by +" if model.degree > 4 else ""

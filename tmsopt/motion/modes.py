@@ -83,13 +83,12 @@ def mode_shapes(
         if root.multiplicity > 1 and chain is not None:
             s, geometric, partial = complex(chain.re, chain.im), chain.geometric, chain.partial
         vectors = _null(pencil, s, geometric)
-        (omega,) = [complex(z.re, z.im) for z in eigenfrequencies(model, [Root(s.real, s.imag, 1)])] or [None]
+        omega = next((complex(z.re, z.im) for z in eigenfrequencies(model, [Root(s.real, s.imag, 1)])), None)
         for vector in vectors:
             amplitudes, phases = _amplitudes(vector[: len(names)])
-            tables = (Table(dict(zip(names, column, strict=True))) for column in (amplitudes, phases))
-            found.append(
-                ModeShape(rate * s.real, rate * s.imag, root.multiplicity, len(vectors), partial, *tables, omega)
-            )
+            sizes, turns = (Table(dict(zip(names, column, strict=True))) for column in (amplitudes, phases))
+            at = rate * s.real, rate * s.imag
+            found.append(ModeShape(*at, root.multiplicity, len(vectors), partial, sizes, turns, omega))
     return tuple(found)
 
 

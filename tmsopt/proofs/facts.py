@@ -52,8 +52,14 @@ def as_stored(problem: Problem, design: Written) -> Existing | None:
     return Existing("isolated roots", a, balls, tangents, {}, whole, radius=largest_radius(list(balls.values())))
 
 
-def stability(factored: Factored) -> Verdict:
-    """Whether all roots are left of the imaginary axis, by the signs of Liénard and Chipart in balls."""
+def stability(factored: Factored, of_H: bool = False) -> Verdict:
+    """Whether all roots are left of the imaginary axis, by the signs of Liénard and Chipart in balls.
+
+    Args:
+        of_H: whether to say it of eigenfrequencies ω = i s.
+    """
+    if of_H:
+        return _of_eigenfrequencies(factored)
     if factored.stable:
         return Verdict(True, "all roots are left of the imaginary axis (Routh–Hurwitz signs in balls)")
     if factored.stable is None:
@@ -69,6 +75,22 @@ def stability(factored: Factored) -> Verdict:
     return Verdict(
         False, "a root is right of the imaginary axis" if right else "a root is not left of the imaginary axis"
     )
+
+
+def _of_eigenfrequencies(factored: Factored) -> Verdict:
+    found = stability(factored)
+    if found.holds:
+        return Verdict(True, "all eigenfrequencies are below the real axis (Routh–Hurwitz signs in balls)")
+    if found.holds is None:
+        return found
+    roots = factored.roots or ()
+    if any(z.re > 0 for z in roots):
+        return Verdict(False, "an eigenfrequency is above the real axis")
+    if not any(z.re == 0 for z in roots):
+        return Verdict(False, "an eigenfrequency is not below the real axis")
+    simple = all(z.multiplicity == 1 for z in roots if z.re == 0 or z.re < 0)
+    rest = ", the others below the axis: on the boundary of stability" if simple else ""
+    return Verdict(False, "an eigenfrequency is real" + rest)
 
 
 def heavy_damping(factored: Factored) -> Verdict:

@@ -256,7 +256,7 @@ def _assembled(
             ProvedRoot(number(-z.im, digits), number(z.re, digits), z.multiplicity) for z in (() if real else roots)
         ),
         abscissa=None if abscissa is None else number(abscissa, digits),
-        stable=stability(found.factored),
+        stable=stability(found.factored, not real),
         heavily_damped=heavy_damping(found.factored) if real else NOTHING,
         inside=inside(problem, design, found),
         limits=Table(limits(problem, found)),

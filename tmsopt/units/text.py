@@ -18,6 +18,8 @@ _UNIT = re.compile(rf"[A-Za-zµμ°%]+{_POWER}(?:(?: ?[*/] ?| )[A-Za-zµμ°%]+{
 """Names with one-digit powers, joined by * / or one blank, so that a text matches in one way at most: anything richer
 could keep a parser busy for ever."""
 
+_OF_TWO = "write its parts as two parameters, kr + 1j*ki in H"
+
 _EXAMPLES = {
     "1": "a number", "rad": "'5 deg' or '0.1 rad'", "m": "'40 cm' or '1.2 m'", "kg": "'10 kg' or '500 g'",
     "m/s": "'15 km/h' or '4 m/s'", "m/s^2": "'9.81 m/s^2'", "s": "'50 ms' or '0.05 s'", "N m/rad": "'20 N m/rad'",
@@ -45,6 +47,13 @@ def with_unit(text: str, unit: str) -> float:
     return read(text, unit)[0]
 
 
+def _is_complex(text: str) -> bool:
+    try:
+        return complex(text.replace(" ", "")).imag != 0
+    except ValueError:
+        return False
+
+
 def read(text: str, unit: str) -> tuple[float, str]:
     """The same, with the unit as written.
 
@@ -58,6 +67,8 @@ def read(text: str, unit: str) -> tuple[float, str]:
         raise ValueError(
             f"found '{text[:LONGEST]}…', {len(text)} characters, and a number has up to {LONGEST}; {accepted}"
         )
+    if _is_complex(text):
+        raise ValueError(f"found '{text}', a complex number, and parameters are real; {_OF_TWO}")
     parts = _QUANTITY.fullmatch(text.strip())
     if parts is None:
         raise ValueError(f"found '{text}', not a number with a unit; {accepted}")

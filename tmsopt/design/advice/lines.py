@@ -20,6 +20,8 @@ def line_advice(line: str) -> str:  # noqa: PLR0911 - one per case
         return f"; write a decimal point: {comma[1]}.{comma[2]}"
     if share := re.search(rf"=\s*({_NUMBER})\s*%", bare):
         return f"; write {float(share[1]) / 100:.12g} for {share[1]} %"
+    if re.search(rf"=\s*(?:{_NUMBER}\s*[+-]\s*)?{_NUMBER}[ij]\s*([,}}]|$)", bare):
+        return "; parameters are real: write the parts of a complex one as two, kr + 1j*ki in H"
     if unit := re.search(rf"=\s*({_NUMBER}\s*[A-Za-z°µμ][\w°²/^*]*)\s*([,}}]|$)", bare):
         return f'; write a number with a unit in quotes: "{unit[1].strip()}"'
     for opening, closing in _PAIRS.items():

@@ -18,13 +18,15 @@ window.tmsopt = {
   /** The design that is shown, and what it is. */
   get() {
     const {meetings, motion, kind, y} = drawingOf();
-    const {re, im} = allRoots(meetings);
+    const all = allRoots(meetings);
+    const every = [...all.re].map((part, k) => [part, all.im[k]]);
+    const ofH = DATA.carrier !== null; // s = −i ω alone, without carrier and without conjugates
     const named = (list, values) => Object.fromEntries(list.map(({name, one}, k) => [name, values[k] / one]));
     return {
       parameters: named(DATA.parameters, state.x),
-      roots: [...re].map((part, k) => [part, im[k]]),
+      roots: ofH ? every.filter(([, im]) => im < 0).map(([re, im]) => [re, im + DATA.carrier]) : every,
       abscissa: motion[0],
-      damping_ratio: motion[1],
+      ...(ofH ? {} : {damping_ratio: motion[1]}),
       kind: KIND_WORDS[kind],
       quantities: named(DATA.quantities, y),
     };

@@ -71,8 +71,9 @@ def complex_texts(
 
 def text_entry(texts: Texts, text: str, where: str) -> Pair:
     """One entry as a pair; 0 for one with a fault."""
+    known = set(texts.symbols)
     found = pair(texts.entry(real_text(text), "H", where))
-    for taken in (n for n in _UNIT_NAMES if n in texts.symbols):
+    for taken in (n for n in _UNIT_NAMES if n in texts.symbols and n not in known):
         texts.fault(f"{where}: '{taken}' would be a parameter; write the imaginary unit as 1j", "H")
     return found
 

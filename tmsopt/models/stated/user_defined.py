@@ -174,7 +174,7 @@ def made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> 
     if twice:
         raise Unfit(key, f"has two symbols named {min(twice)}; make one and use it everywhere")
     if not names:
-        raise Unfit(key, "names no parameter, so there is nothing to design")
+        raise Unfit(key, "names no parameter, so there is nothing to design; name one entry, such as 'k'")
     for n in names:
         if why := unusable(n):
             raise Unfit(key, f"has a symbol named {n!r}, which {why}; give it another name")

@@ -1,0 +1,61 @@
+"""What a user of a complex H is told."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tmsopt
+from tmsopt.models import Unfit, from_hamiltonian
+
+HEAD = '[model]\nH = [["d - 1j*g", "k"], ["k", "-1j*l"]]\n[parameters]\nd = 0\nl = 0.7\ng = { min = 0, max = 2 }\n'
+
+
+def refused(tmp_path: Path, text: str) -> str:
+    path = tmp_path / "own.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(tmsopt.InputError) as found:
+        tmsopt.load(path)
+    return str(found.value)
+
+
+@pytest.mark.parametrize("k", ['"0.5+0.2j"', "0.5j", '"0.5j"', "0.5+0.2j"])
+def test_parameters_are_real(tmp_path: Path, k: str) -> None:
+    said = refused(tmp_path, f"{HEAD}k = {k}\n[objective]\nlocate = 'EP2'\n")
+    assert "own.toml:7" in said
+    assert "parameters are real" in said
+    assert "kr + 1j*ki" in said
+    assert "with a unit" not in said
+
+
+def test_a_threshold_is_weave_in_data(tmp_path: Path) -> None:
+    assert "'threshold' is weave in data; write weave" in refused(
+        tmp_path, f"{HEAD}k = 0.5\n[objective]\nlocate = 'threshold'\n"
+    )
+
+
+def test_a_bare_j_is_told_where_it_is_alone(tmp_path: Path) -> None:
+    said = refused(tmp_path, '[model]\nH = [["1j*g", "k"], ["j*k", "-1j"]]\n[parameters]\ng = 1\nk = 1\n')
+    assert said.count("would be a parameter") == 1
+    assert "row 2, column 1: 'j' would be a parameter" in said
+
+
+def test_numbers_alone_make_no_model() -> None:
+    with pytest.raises(Unfit, match="name one entry, such as 'k'"):
+        from_hamiltonian(np.array([[1 - 1j, 1], [1, 2]]))
+
+
+@pytest.mark.parametrize(
+    ("g", "holds", "words"),
+    [
+        (1.0, True, "all eigenfrequencies are below the real axis"),
+        (-1.0, False, "an eigenfrequency is above the real axis"),
+    ],
+)
+def test_a_proof_speaks_of_eigenfrequencies(g: float, holds: bool, words: str) -> None:
+    """−i g and −3i, uncoupled."""
+    design = tmsopt.solve(tmsopt.Problem(from_hamiltonian([["-1j*g", 0], [0, "-3j"]]), fixed={"g": g}))
+    stable = tmsopt.prove(design).stable
+    assert stable.holds is holds
+    assert words in stable.words
+    assert "imaginary" not in stable.words
