@@ -237,3 +237,26 @@ def test_designs_at_a_parameter_that_is_zero() -> None:
         proof = tmsopt.prove(near)
         assert proof.proved, proof.reason
         assert float(proof.parameters["d"].value) == pytest.approx(0, abs=1e-50)
+
+
+def test_double_exceptional_points_of_a_chain_with_gain_and_loss() -> None:
+    """det(ω − H) = (ω² + bω + c)² of the matrix itself; H → −H* mirrors d1, d2, and one design is its own image."""
+    d1, d2, g1, g2 = (ca.SX.sym(n) for n in ("d1", "d2", "g1", "g2"))
+    rows = [[(d1, g1), 1, 0, 0], [1, (d2, -g2), 0.4, 0], [0, 0.4, 0.9j, 1], [0, 0, 1, -0.8j]]
+    free = {"d1": (-1, 1), "d2": (-1, 1), "g1": (0, 2), "g2": (0, 2)}
+    chain = tmsopt.Problem(tmsopt.models.from_hamiltonian(rows), free=free, locate="EP2+EP2")
+    every = all_of(chain)
+    designs = [[s.parameters[n] for n in free] for s in every.solutions]
+    for a, b, g, h in designs:
+        H = np.array([[a + 1j * g, 1, 0, 0], [1, b - 1j * h, 0.4, 0], [0, 0.4, 0.9j, 1], [0, 0, 1, -0.8j]])
+        p = np.poly(H)
+        half = p[1] / 2
+        square = np.convolve(*[[1, half, (p[2] - half**2) / 2]] * 2)
+        assert np.allclose(p, square, rtol=0, atol=1e-10)
+    mirrored = [[-a, -b, g, h] for a, b, g, h in designs]
+    assert len(designs) == 3
+    assert all(min(np.abs(np.subtract(x, y)).max() for y in designs) < 1e-9 for x in mirrored)
+    one = tmsopt.solve(chain).parameters
+    assert min(np.abs(np.subtract([one[n] for n in free], y)).max() for y in designs) < 1e-9
+    assert every.coverage is not None
+    assert min(every.coverage.hits) >= 3

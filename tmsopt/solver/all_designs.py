@@ -23,7 +23,7 @@ from tmsopt.formulation.starts import completions, spread
 from tmsopt.progress import begin
 from tmsopt.records import Array, Tabular, plain
 from tmsopt.solver.multistart import Runner
-from tmsopt.solver.newton import newton, square_system
+from tmsopt.solver.newton import newton, square_system, taken
 from tmsopt.solver.solve import solved
 from tmsopt.solver.workspace import Workspace, workspace
 
@@ -176,7 +176,7 @@ def _search(problem: Problem, nlp: NLP, work: Workspace) -> tuple[list[Array], C
         ends = [newton(system, x) for x in completions(nlp, problem, design)]
         if done % _BY_IPOPT == 0:
             ended = runner.ended(design)
-            ends.append(newton(system, ended.run.x) if ended.feasible else None)
+            ends.append((newton(system, ended.run.x) or taken(system, ended.run.x)) if ended.feasible else None)
         met: set[int] = set()
         doubtful = False
         for end in ends:
