@@ -437,6 +437,36 @@ def test_a_parameter_without_effect_is_no_unknown() -> None:
     assert "do not depend on mu" in proof.reason
 
 
+@pytest.mark.parametrize("rate", [1e-9, 1e6, 1e12])
+@pytest.mark.parametrize("carrier", [0.0, 1e6])
+def test_an_EP2_of_H_in_any_unit_and_frame(rate: float, carrier: float) -> None:
+    """|g1 − g2|/2 = k and d = 0, whatever the unit of rates; a carrier costs its own digits of double precision."""
+    dimer = tmsopt.models.from_hamiltonian([["w + d - 1j*g1", "k"], ["k", "w - 1j*g2"]])
+    fixed = {"w": carrier * rate, "g1": 3 * rate, "g2": rate}
+    free = {"d": (-5 * rate, 5 * rate), "k": (rate / 10, 5 * rate)}
+    proof = tmsopt.prove(tmsopt.Problem(dimer, fixed=fixed, free=free, locate="EP2"))
+    assert proof.proved, proof.reason
+    half = (Fraction(repr(3 * rate)) - Fraction(repr(rate))) / 2  # of the decimals that print them
+    assert abs(Fraction(proof.parameters["k"].value) / half - 1) <= Fraction(1, 10**30)
+    assert 2 * proof.uniqueness > proof.distance > 0
+    assert proof.uniqueness < 2 * rate  # the other EP2 of H, at −k, is 2 k away
+
+
+@pytest.mark.parametrize("rate", [1e-6, 1e6])
+def test_a_CEP2_of_oscillators_in_any_unit_of_time(rate: float) -> None:
+    """c1 − c2 = ±2 δ with δ² = A + B − 2 √(AB − k²), A = 1 + k, B = w + k, in units of the rate."""
+    k, w = 0.3, 1.2
+    square = rate * rate
+    stiff = [[(1 + k) * square, -k * square], [-k * square, (w + k) * square]]
+    free = {"c1": (-3 * rate, 3 * rate), "c2": (-3 * rate, 3 * rate)}
+    model = tmsopt.models.from_matrices([[1, 0], [0, 1]], [["c1", 0], [0, "c2"]], stiff)
+    proof = tmsopt.prove(tmsopt.Problem(model, free=free, locate="CEP2"))
+    assert proof.proved, proof.reason
+    A, B = 1 + k, w + k
+    apart = abs(float(proof.parameters["c1"]) - float(proof.parameters["c2"])) / rate
+    assert apart == pytest.approx(2 * math.sqrt(A + B - 2 * math.sqrt(A * B - k * k)), rel=1e-12)
+
+
 def test_too_few_free_parameters() -> None:
     problem = tmsopt.Problem(tmsopt.models.tms, fixed={**HEIGHTS, "chi_B": SQRT2, "Fr": 2.236317518367822},
                              free={"lambda_s": (0.1, 1.0)}, locate="EP4")  # fmt: skip

@@ -9,6 +9,7 @@ in the interior of X proves that X holds exactly one solution, and that it lies 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import flint
@@ -18,6 +19,7 @@ from tmsopt.arithmetic.balls import lower
 System = Callable[[Mapping[str, Any]], list[Any]]
 """Left sides of equations for balls or series by name."""
 
+_NO_UNITS: Mapping[str, float] = MappingProxyType({})
 _STEPS = 60
 _WIDEST = 1.0
 _TENTHS = 80  # powers of ten down which a box is looked for
@@ -34,7 +36,7 @@ class Enclosure:
 
     Attributes:
         balls: unknown → ball that holds the solution.
-        uniqueness: it is the only one this near, in every unknown.
+        uniqueness: it is the only one this near, in every unknown, each in its unit.
     """
 
     balls: Mapping[str, Any]
@@ -47,8 +49,13 @@ def slopes(system: System, at: Mapping[str, Any], names: Sequence[str]) -> Any:
     return flint.arb_mat([list(row) for row in zip(*columns, strict=True)])
 
 
-def refined(system: System, start: Mapping[str, Any], names: Sequence[str], digits: int) -> dict[str, Any]:
+def refined(
+    system: System, start: Mapping[str, Any], names: Sequence[str], digits: int, units: Mapping[str, float] = _NO_UNITS
+) -> dict[str, Any]:
     """The solution near a start as exact middles, by Newton's method at the working precision.
+
+    Args:
+        units: of unknowns that are not of the size of 1.
 
     Raises:
         Refused: where it is not found.
@@ -57,7 +64,7 @@ def refined(system: System, start: Mapping[str, Any], names: Sequence[str], digi
     small = flint.arb(10) ** -digits
     for _ in range(_STEPS):
         move = _solved(slopes(system, at, names), system(at))
-        size = [(abs(move[k, 0]).mid() / (1 + abs(at[n]))).mid() for k, n in enumerate(names)]
+        size = [(abs(move[k, 0]).mid() / (units.get(n, 1) + abs(at[n]))).mid() for k, n in enumerate(names)]
         for k, n in enumerate(names):
             at[n] = (at[n] - move[k, 0]).mid()
         if not all(at[n].is_finite() for n in names):
@@ -76,8 +83,13 @@ def _solved(jacobian: Any, residual: Sequence[Any]) -> Any:
         raise Refused("the Jacobian of the equations is singular there: the solution is not isolated") from None
 
 
-def enclosed(system: System, middle: Mapping[str, Any], names: Sequence[str], digits: int) -> Enclosure:
+def enclosed(
+    system: System, middle: Mapping[str, Any], names: Sequence[str], digits: int, units: Mapping[str, float] = _NO_UNITS
+) -> Enclosure:
     """The solution beside a middle that is right to `digits`, in the smallest and the largest box that prove it.
+
+    Args:
+        units: see `refined`.
 
     Raises:
         Refused: where no box does.
@@ -88,17 +100,19 @@ def enclosed(system: System, middle: Mapping[str, Any], names: Sequence[str], di
         raise Refused("the Jacobian of the equations is singular there: the solution is not isolated") from None
     step = inverse * flint.arb_mat([[r] for r in system(middle)])
     test = _Test(system, middle, names, inverse, [step[k, 0] for k in range(len(names))])
-    inner = test([flint.arb(10) ** -digits * (1 + abs(middle[n])) for n in names])
+    sizes = [flint.arb(units.get(n, 1)) for n in names]
+    inner = test([flint.arb(10) ** -digits * (u + abs(middle[n])) for n, u in zip(names, sizes, strict=True)])
     if inner is None:
         raise Refused(
             "the Krawczyk test fails: the Jacobian of the equations is singular at the solution, or nearly so"
         )
     radius = flint.arb(0)
     for tenth in range(_TENTHS):
-        if found := next((r for r in _radii(tenth) if test([r] * len(names))), None):
+        if found := next((r for r in _radii(tenth) if test([r * u for u in sizes])), None):
             radius = found
             break
-    smallest = max(inner[n].rad() + abs(inner[n] - middle[n]).upper() for n in names)
+    off = {n: inner[n].rad() + abs(inner[n] - middle[n]).upper() for n in names}
+    smallest = max(off[n] / u for n, u in zip(names, sizes, strict=True))
     if not radius > smallest:
         raise Refused("the Krawczyk test fails in every box but the smallest: the solution is hardly isolated")
     return Enclosure(inner, lower(radius))

@@ -291,7 +291,13 @@ def units_of(problem: Problem) -> tuple[float, ...]:
     if problem.model.natural:
         return ()
     sizes = [max(map(abs, ends)) for ends in problem.free.values()]
-    return tuple(1.0 if _ORDINARY[0] <= size <= _ORDINARY[1] else _power_of_two(np.array([size])) for size in sizes)
+    return tuple(ordinary(size) for size in sizes)
+
+
+def ordinary(size: float) -> float:
+    """A power of 2 near a size, or 1 where that is near enough, or there is none."""
+    near = _ORDINARY[0] <= size <= _ORDINARY[1] or size == 0 or not np.isfinite(size)
+    return 1.0 if near else _power_of_two(np.array([size]))
 
 
 def _power_of_two(sizes: Any) -> float:

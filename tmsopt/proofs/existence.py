@@ -9,6 +9,7 @@ import flint
 from tmsopt.arithmetic.balls import GUARD, largest_radius, upper
 from tmsopt.arithmetic.krawczyk import Enclosure, Refused, enclosed, refined
 from tmsopt.design.problem import Problem
+from tmsopt.formulation.nlp import Scale
 from tmsopt.models.exact import Written
 from tmsopt.proofs import rational
 from tmsopt.proofs.factored import Factored, of_pattern
@@ -76,20 +77,20 @@ def beside(problem: Problem, pattern: Pattern, design: Written, stored: Mapping[
     Raises:
         Refused: with the reason in words.
     """
-    carried = digits + _EXTRA
+    system, carried = equations(problem, pattern, stored), digits + _EXTRA
     for _ in range(_TIMES):
         with flint.ctx.workdps(carried):
-            found = _beside(problem, pattern, design, stored, carried - _EXTRA // 2)
+            found = _beside(system, design, stored, carried - _EXTRA // 2)
             small = flint.arb(10) ** -(digits + GUARD)
-            balls = [*found.parameters.values(), *found.unknowns.values()]
-            if all(b.rad() <= small * (1 + abs(b)) for b in balls):
+            balls = [*found.parameters.items(), *found.unknowns.items()]
+            if all(b.rad() <= small * (system.units.get(n, 1) + abs(b)) for n, b in balls):
                 return found
         carried *= 2
     raise Refused(f"the balls do not shrink to {digits} digits; ask for fewer")
 
 
-def _beside(problem: Problem, pattern: Pattern, design: Written, stored: Mapping[str, float], digits: int) -> Existing:
-    system = equations(problem, pattern, stored)
+def _beside(system: Equations, design: Written, stored: Mapping[str, float], digits: int) -> Existing:
+    problem, pattern = system.problem, system.pattern
     held = _numbers(problem, design)
     free = [n for n in problem.free if n not in {_name(s) for s in design.stated}]
     reasons: list[str] = []
@@ -119,13 +120,15 @@ def _starts(system: Equations, held: Mapping[str, Any], problem: Problem) -> Ite
     own = {n: float(held[n].atan()) if of[n].tangent else float(held[n]) for n in of.names}
     values = problem.values(own)
     lifted = {q.name: flint.arb(float(values[q.name])) for q in system.lifted}
-    coefficients = [float(c) for c in problem.model.coefficients(own, of)]
+    scale = Scale(system.unit)
+    coefficients = scale.scaled([float(c) for c in problem.model.coefficients(own, of)])
     try:
         fits = nearest_unknowns(system.pattern, coefficients)
     except ValueError:
         raise Refused("a0 is 0, or a coefficient does not exist: a root is at infinity") from None
     for fit in fits[:2]:
-        yield lifted | {n: flint.arb(x) for n, x in zip(system.of_pattern, fit, strict=True)}
+        units = (system.units.get(n, 1.0) for n in system.of_pattern)
+        yield lifted | {n: flint.arb(x * u) for n, x, u in zip(system.of_pattern, fit, units, strict=True)}
 
 
 def _proved(system: Equations, start: Mapping[str, Any], among: list[str], digits: int) -> Existing:
@@ -133,10 +136,10 @@ def _proved(system: Equations, start: Mapping[str, Any], among: list[str], digit
     of = problem.parameter_set
     chosen = choose(system, start, among)
     names = [*chosen.moved, *system.unknowns]
-    middle = refined(system, start, names, digits)
-    enclosure = enclosed(system, middle, names, digits)
+    middle = refined(system, start, names, digits, system.units)
+    enclosure = enclosed(system, middle, names, digits, system.units)
     at = {**middle, **enclosure.balls}
-    distance, explained = _distance(chosen, start, enclosure)
+    distance, explained = _distance(chosen, start, enclosure, system.units)
     tangents = {n: at[n] for n in of.names if of[n].tangent}
     parameters = {n: at[n].atan() if n in tangents else at[n] for n in of.names}
     coefficients = problem.model.coefficients(parameters, of)
@@ -150,14 +153,16 @@ def _proved(system: Equations, start: Mapping[str, Any], among: list[str], digit
         {n: at[n] for n in system.unknowns},
         of_pattern(pattern, unknowns),
         chosen.moved,
-        enclosure.uniqueness,
+        enclosure.uniqueness * min((system.units.get(n, 1.0) for n in names), default=1.0),
         largest_radius([at[n] for n in names]),
         distance,
         explained,
     )
 
 
-def _distance(chosen: Chosen, start: Mapping[str, Any], enclosure: Enclosure) -> tuple[float, float]:
+def _distance(
+    chosen: Chosen, start: Mapping[str, Any], enclosure: Enclosure, units: Mapping[str, float]
+) -> tuple[float, float]:
     """The moved parameter that the stored design is off most, against what rounding explains.
 
     Raises:
@@ -166,11 +171,12 @@ def _distance(chosen: Chosen, start: Mapping[str, Any], enclosure: Enclosure) ->
     """
     explained = chosen.explained
     off = {n: upper(abs(enclosure.balls[n] - start[n])) for n in chosen.moved}
-    loose = max(explained, key=lambda n: explained[n], default=None)
-    if loose and not explained[loose] < enclosure.uniqueness:
+    unique = {n: enclosure.uniqueness * units.get(n, 1.0) for n in explained}
+    loose = max(explained, key=lambda n: explained[n] / unique[n], default=None)
+    if loose and not explained[loose] < unique[loose]:
         raise Refused(
             f"nearly singular: rounding alone moves {loose} by {explained[loose]:.2g}, and the solution is the only "
-            f"one within {enclosure.uniqueness:.2g} only; hold another parameter, or give exact numbers"
+            f"one within {unique[loose]:.2g} only; hold another parameter, or give exact numbers"
         )
     worst = max(off, key=lambda n: off[n] / explained[n], default=None)
     if worst is None:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from tmsopt.arithmetic.krawczyk import Refused, slopes
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
+from tmsopt.formulation.nlp import ordinary, scale_of, units_of
 from tmsopt.models import Quantity, Values
 from tmsopt.models.exact import decimal_fraction
 from tmsopt.proofs.factored import abscissa_formula
@@ -36,12 +37,16 @@ class Equations:
     Attributes:
         equalities: the == constraints.
         lifted: quantities in them that are unknowns with an equation.
+        unit: of the roots.
+        units: of numbers that are not of the size of 1, powers of 2.
     """
 
     problem: Problem
     pattern: Pattern
     equalities: tuple[Expression, ...]
     lifted: tuple[Quantity, ...]
+    unit: float = 1.0
+    units: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def unknowns(self) -> tuple[str, ...]:
@@ -95,7 +100,11 @@ def equations(problem: Problem, pattern: Pattern, parameters: Mapping[str, float
     values.define("abscissa", math.nan)
     for equality in equalities:
         equality(values)
-    return Equations(problem, pattern, equalities, tuple(met.values()))
+    own = Equations(problem, pattern, equalities, tuple(met.values()), ordinary(scale_of(problem).unit))
+    units = dict(zip(problem.free, units_of(problem), strict=False))  # none of natural units
+    units |= {q.name: ordinary(abs(float(problem.values(parameters)[q.name]))) for q in own.lifted}
+    units |= {n: own.unit**power for n, power in zip(own.of_pattern, pattern.powers, strict=True)}
+    return replace(own, units=units)
 
 
 @dataclass(frozen=True)
@@ -127,24 +136,26 @@ def choose(system: Equations, at: Mapping[str, Any], among: Sequence[str]) -> Ch
     values = np.array([abs(float(at[n])) for n in names])
     rounding = np.abs(jacobian) @ values + 1e-300
     widths = {n: _NEAR_ZERO * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
-    scale = np.maximum(np.where(values > 0, values, 1.0), [widths.get(n, 0.0) for n in names])
-    scaled = jacobian / rounding[:, None] * scale
-    if not np.all(np.isfinite(scaled)):
-        raise Refused("the equations have no finite derivatives at the design; move it off the edge of its range")
+    units = [system.units.get(n, 1.0) for n in names]
+    scale = np.maximum(np.where(values > 0, values, units), [widths.get(n, 0.0) for n in names])
     outside = [names.index(n) for n in system.unknowns]
     free = [names.index(n) for n in among]
+    size = np.abs(jacobian)[:, [*free, *outside]] @ scale[[*free, *outside]] + 1e-300
+    scaled = jacobian / size[:, None] * scale
+    if not np.all(np.isfinite(scaled)):
+        raise Refused("the equations have no finite derivatives at the design; move it off the edge of its range")
     basis = np.linalg.qr(scaled[:, outside], mode="complete")[0][:, len(outside) :] if outside else np.eye(len(scaled))
     reduced = basis.T @ scaled[:, free]
     order, pivots = _pivoted(reduced, count)
     if count and not pivots[-1] > _DEPENDENT * max(pivots[0], 1e-3):
-        idle = [n for n, column in zip(among, reduced.T, strict=True) if not np.abs(column).max() > _DEPENDENT]
+        idle = [n for n, k in zip(among, free, strict=True) if not np.any(jacobian[:, k])]
         why = f"; they do not depend on {', '.join(idle)}" if idle else ""
         raise Refused(
             f"the equations are (nearly) singular in the free parameters {', '.join(among)}{why}; free another one"
         )
     moved = tuple(sorted((among[k] for k in order), key=of.names.index))
-    square = jacobian[:, [names.index(n) for n in (*moved, *system.unknowns)]]
-    effect = np.abs(np.linalg.pinv(square)) @ rounding * (ROUNDINGS * _EPS)
+    square = [names.index(n) for n in (*moved, *system.unknowns)]
+    effect = np.abs(np.linalg.pinv(scaled[:, square])) @ (rounding / size) * scale[square] * (ROUNDINGS * _EPS)
     floors = {n: _NOTHING * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
     solved = zip((*moved, *system.unknowns), effect, strict=True)
     return Chosen(moved, {n: float(e) + 2 * _EPS * abs(float(at[n])) + floors.get(n, 0.0) for n, e in solved})
