@@ -41,3 +41,13 @@ def test_the_chance_of_another_solution_is_claimed_with_95_percent_confidence(sh
         drawn = rng.multinomial(starts, shares, size=2000)
         kept = sum(shares[row == 0].sum() <= coverage_of(starts, [int(h) for h in row if h], 0).chance for row in drawn)
         assert kept >= 0.95 * 2000
+
+
+@pytest.mark.parametrize("rate", [1e-9, 1e6, 1e12])
+def test_all_EP2_of_a_dimer_in_any_unit(rate: float) -> None:
+    """k = |g1 − g2|/2 and d = 0 alone: the discriminant (d − i (g1 − g2))² + 4 k² is 0 nowhere else with k > 0."""
+    dimer = tmsopt.models.from_hamiltonian([["d - 1j*g1", "k"], ["k", "-1j*g2"]])
+    free = {"d": (-5 * rate, 5 * rate), "k": (rate / 10, 5 * rate)}
+    every = tmsopt.solve_all(tmsopt.Problem(dimer, fixed={"g1": 3 * rate, "g2": rate}, free=free, locate="EP2"))
+    assert every.complete
+    assert [s.parameters["k"] / rate for s in every.solutions] == [pytest.approx(1, rel=1e-12)]

@@ -23,7 +23,7 @@ from tmsopt.completeness.trees import ends, partial, tree
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ROOT_NAMES
-from tmsopt.formulation.nlp import Scale, scale_of
+from tmsopt.formulation.nlp import Scale, reaches_of, scale_of
 from tmsopt.models import Quantity, Values
 from tmsopt.models.exact import decimal, decimal_fraction
 from tmsopt.processes import Inbox, Worker
@@ -259,12 +259,14 @@ def _range(limits: tuple[Any, Any]) -> Ends:
 def _zero(sheet: Sheet, box: Box) -> _Zero | None:
     """The zero beside a box, proved; None where the test fails."""
     start = {n: flint.arb(lo + (hi - lo) / 2) for n, (lo, hi) in zip(sheet.names, box, strict=True)}
+    units = reaches_of(sheet.problem)
     try:
-        middle = refined(sheet, start, sheet.names, _DIGITS)
-        found = enclosed(sheet, middle, sheet.names, _DIGITS)
+        middle = refined(sheet, start, sheet.names, _DIGITS, units)
+        found = enclosed(sheet, middle, sheet.names, _DIGITS, units)
     except (Refused, ZeroDivisionError, ValueError):
         return None
-    near = [(middle[n] - found.uniqueness, middle[n] + found.uniqueness) for n in sheet.names]
+    around = {n: found.uniqueness * units.get(n, 1.0) for n in sheet.names}
+    near = [(middle[n] - r, middle[n] + r) for n, r in around.items()]
     return _Zero(sheet, found, tuple((interval(lo)[1], interval(hi)[0]) for lo, hi in near))
 
 

@@ -294,6 +294,12 @@ def units_of(problem: Problem) -> tuple[float, ...]:
     return tuple(ordinary(size) for size in sizes)
 
 
+def reaches_of(problem: Problem) -> dict[str, float]:
+    """For each free parameter a power of 2 near its size, or its range where it is large: what a proof moves it by."""
+    units = dict(zip(problem.free, units_of(problem), strict=False))  # none of natural units
+    return {n: u if u <= 1 else ordinary(problem.free[n][1] - problem.free[n][0]) for n, u in units.items()}
+
+
 def ordinary(size: float) -> float:
     """A power of 2 near a size, or 1 where that is near enough, or there is none."""
     near = _ORDINARY[0] <= size <= _ORDINARY[1] or size == 0 or not np.isfinite(size)

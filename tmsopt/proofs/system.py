@@ -11,7 +11,7 @@ from tmsopt.arithmetic.krawczyk import Refused, slopes
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
-from tmsopt.formulation.nlp import ordinary, scale_of, units_of
+from tmsopt.formulation.nlp import ordinary, reaches_of, scale_of
 from tmsopt.models import Quantity, Values
 from tmsopt.models.exact import decimal_fraction
 from tmsopt.proofs.factored import abscissa_formula
@@ -101,7 +101,7 @@ def equations(problem: Problem, pattern: Pattern, parameters: Mapping[str, float
     for equality in equalities:
         equality(values)
     own = Equations(problem, pattern, equalities, tuple(met.values()), ordinary(scale_of(problem).unit))
-    units = dict(zip(problem.free, units_of(problem), strict=False))  # none of natural units
+    units = reaches_of(problem)
     units |= {q.name: ordinary(abs(float(problem.values(parameters)[q.name]))) for q in own.lifted}
     units |= {n: own.unit**power for n, power in zip(own.of_pattern, pattern.powers, strict=True)}
     return replace(own, units=units)
