@@ -251,7 +251,8 @@ def pattern_faults(name: Any, model: Model, key: tuple[str, ...]) -> Iterator[Fa
             raise ValueError(f"{short(name)} is no pattern")
         if len(name) > _LONGEST:
             raise ValueError(f"{short(name)} is no pattern")
-        if name in model.words and (known := ("weave", "capsize")[model.words.index(name)]) in patterns_of(model):
+        known = dict(zip(model.words, ("weave", "capsize"), strict=True)).get(name, name)
+        if known != name and known in patterns_of(model):
             yield Fault(f"unknown pattern: '{name}' is {known} in data; write {known}", key)
             return
         pattern_of(model, name)

@@ -116,7 +116,7 @@ def carriers(entries: Sequence[ca.SX]) -> Callable[[Mapping[str, Interval]], tup
     return bounds
 
 
-def _frequencies(matrix: Formulas, n: int, box: Sequence[Interval]) -> Array:
+def _frequencies(matrix: Formulas, n: int, box: Sequence[Interval]) -> Any:
     """Eigenvalues of H at designs of the box, corners among them where these are few; none where H does not exist."""
     share = _shares(len(box))
     if len(box) <= _CORNERS:
