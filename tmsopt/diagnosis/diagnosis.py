@@ -100,19 +100,20 @@ def diagnose(design: Given, *, progress: Listener | None = None) -> tuple[Diagno
     parameters = solution.worst.applied(solution.parameters) if solution.worst else dict(solution.parameters)
     found = problem.values(parameters)["structure"]
     assert isinstance(found, Structure)
-    return diagnosed(problem.model, problem.parameter_set, parameters, found)
+    return diagnosed(problem.model, problem.parameter_set, parameters, found, problem.free)
 
 
 def diagnosed(
     model: Model, of: ParameterSet, design: Mapping[str, float], structure: Structure,
+    free: Mapping[str, tuple[float, float]] | None = None,
 ) -> tuple[Diagnosis, ...]:  # fmt: skip
-    """The same for any design of a model whose roots have a structure."""
+    """The same for any design of a model whose roots have a structure; free = ranges beside which it may be 0."""
     if all(root.multiplicity == 1 for root in structure.roots):
         return ()
     with flint.ctx.workprec(_BITS):
         ideal = _ideal(model, of, design, structure)
         return tuple(
-            _diagnosis(model, of, design, structure, ideal, place)
+            _diagnosis(model, of, design, structure, ideal, place, {n: b - a for n, (a, b) in (free or {}).items()})
             for place, (root, _) in enumerate(ideal)
             if root.multiplicity > 1 and (root.im >= 0 if model.carrier is None else root.im < 0)
         )
@@ -128,15 +129,16 @@ def _ideal(model: Model, of: ParameterSet, design: Mapping[str, float], structur
 
 
 def _diagnosis(
-    model: Model, of: ParameterSet, design: Mapping[str, float], structure: Structure, ideal: Ideal, place: int
-) -> Diagnosis:
+    model: Model, of: ParameterSet, design: Mapping[str, float], structure: Structure, ideal: Ideal, place: int,
+    widths: Mapping[str, float],
+) -> Diagnosis:  # fmt: skip
     root, s = ideal[place]
     k = root.multiplicity
     ranks = _ranks(model, of, design, structure.distance, s, k)
     partial = ranks.partial if ranks else (k,)
     geometric = ranks.geometric if ranks else 1
     kind = "semisimple" if geometric == k else "defective" if geometric == 1 else "partly defective"
-    responses = (response(model, of, design, ideal, place, name) for name in of.names)
+    responses = (response(model, of, design, ideal, place, name, widths.get(name, 0.0)) for name in of.names)
     ordered = tuple(sorted(responses, key=_sensitivity))
     (shown,) = roots_told(model, [Root(root.re, root.im, k)])
     omega = tuple(complex(z.re, z.im) for z in eigenfrequencies(model, [shown]))

@@ -18,6 +18,7 @@ DEVIATION = 0.1
 
 _NOTHING = 1e-9  # of its terms: a derivative that vanishes at the exact multiple root, and not quite at the stored one
 _FAINT = 1e-13  # of the coefficients' own terms: a derivative that rounding of the design alone may bring about
+_ZERO = 1e-12  # of the range of a parameter: a change relative to so little is none
 _DECADES = range(-16, 1)  # of the changes at which a law is tried
 _WITHIN = (0.75, 0.5, 0.25)  # and, before the first decade at which it fails
 
@@ -32,7 +33,9 @@ class Law:
     Attributes:
         branches: tᵠ = C εᵖ for the shift t of each, to leading order.
         below, above: |ε| up to which every sampled shift is within `DEVIATION` of it, for ε < 0 and ε > 0; sampled at
-            each decade from 1e-16 to 1, and four times in the last one that is reached; 0 if it fails at 1e-16.
+            each decade from 1e-16 to 1, and four times in the last one that is reached; 0 if it holds at none. The
+            least decades do not count where the law fails there alone: by the rounding of the design, which parts
+            roots that the change leaves together.
     """
 
     branches: Branches
@@ -45,7 +48,7 @@ class Response:
     """How a multiple root answers to one parameter.
 
     Attributes:
-        relative: whether ε is relative to the parameter's value; of a parameter that is 0 it is absolute.
+        relative: whether ε is relative to the parameter's value; of one that is 0, but for rounding, it is absolute.
         laws: fastest first; empty if no root moves.
         unmoved: roots that stay, to the orders looked at.
     """
@@ -57,12 +60,16 @@ class Response:
 
 
 def response(
-    model: Model, of: ParameterSet, design: Mapping[str, float], ideal: Ideal, place: int, name: str
+    model: Model, of: ParameterSet, design: Mapping[str, float], ideal: Ideal, place: int, name: str, width: float = 0.0
 ) -> Response:
-    """How one of the multiple roots of the ideal polynomial answers to a parameter, at the precision of `flint.ctx`."""
+    """How one of the multiple roots of the ideal polynomial answers to a parameter, at the precision of `flint.ctx`.
+
+    Args:
+        width: of the range of the parameter, beside which it may be 0 but for rounding; 0 of one that is fixed.
+    """
     root, s = ideal[place]
     k = root.multiplicity
-    relative = design[name] != 0
+    relative = abs(design[name]) > _ZERO * width
     step = exact(design[name]) if relative else exact(1.0)
 
     def changed(by: Any) -> list[Any]:
@@ -109,11 +116,14 @@ def _holds(
         every = zip(predicted, scales, _largest(np.array(rows), k), strict=True)
         return [_deviation(t, scale, inverse) <= DEVIATION for t, scale, inverse in every]
 
-    first = next((m for m, right in zip(_DECADES, held([10.0**m for m in _DECADES]), strict=True) if not right), None)
+    every = list(zip(_DECADES, held([10.0**m for m in _DECADES]), strict=True))
+    while every and not every[0][1]:
+        every.pop(0)
+    if not every:
+        return 0.0
+    first = next((m for m, right in every if not right), None)
     if first is None:
         return 10.0 ** _DECADES[-1]
-    if first == _DECADES[0]:
-        return 0.0
     reached = [10.0 ** (first - 1 + share) for share in _WITHIN]
     return next((eps for eps, right in zip(reached, held(reached), strict=True) if right), 10.0 ** (first - 1))
 
