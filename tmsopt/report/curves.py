@@ -1,5 +1,6 @@
 """Traces, charts and fronts as text: what is on them, and where their events are."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -17,6 +18,8 @@ from tmsopt.tracing.domain import Domain
 from tmsopt.tracing.swallowtail import Swallowtail
 
 _LABEL = 40  # characters of what happens at a point of a front, if not all is wanted
+_DIGITS = 12
+_LOOSE = 1e-10  # mismatch of a coefficient beyond which a point has fewer digits
 _FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
 
 
@@ -245,7 +248,7 @@ def branch_table(branch: Branch) -> str:
 
 
 def event_rows(branch: Branch, units: Mapping[str, Unit], model: Model | None = None) -> list[tuple[str, ...]]:
-    """Headings, and the cells of each event, to all digits, in these units.
+    """Headings, and the cells of each event, to as many digits as its coefficients are met, in these units.
 
     Example:
         >>> branch = tmsopt.trace("problems/ep_set.toml").branches[0]
@@ -257,8 +260,14 @@ def event_rows(branch: Branch, units: Mapping[str, Unit], model: Model | None = 
     rows = [("", *(f"{n} {unit.text}".rstrip() for n, unit in units.items()), "")]
     for event in branch.events:
         found = {**event.parameters, "abscissa": float(branch.abscissa[event.index])}
-        rows.append((_said(model, event.name), *(u.number(found[n], 12) for n, u in units.items()), event.detail))
+        digits = _digits(event.residual)
+        rows.append((_said(model, event.name), *(u.number(found[n], digits) for n, u in units.items()), event.detail))
     return rows
+
+
+def _digits(residual: float) -> int:
+    """Of a point whose coefficients are met to so much: two less than that, for it may be off by some times more."""
+    return max(math.floor(-math.log10(residual)) - 2, 2) if residual > _LOOSE else _DIGITS
 
 
 def _summary(branch: Branch, trace: Trace) -> str:

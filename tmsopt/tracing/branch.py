@@ -23,6 +23,7 @@ class Event:
         detail: in words, e.g. which parameter folds or which limit ends the branch.
         parameters: every parameter of the design there.
         index: row of the branch.
+        residual: relative mismatch of the coefficients there.
 
     Example:
         >>> found = next(e for e in tmsopt.trace("problems/ep_set.toml").events if e.name == "EP4")
@@ -36,6 +37,7 @@ class Event:
     detail: str
     parameters: Table[float]
     index: int
+    residual: float = 0.0
 
 
 @dataclass(frozen=True, repr=False)

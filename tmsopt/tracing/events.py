@@ -58,7 +58,8 @@ def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, wal
         ends = zip(walked.ends, (0, len(x) - 1), strict=True)
         named += [("end", _end_words(problem, pattern, end), row) for end, row in ends]
     at = [Table({n: float(c[row]) for n, c in columns.items()}) for *_, row in named]
-    events = [Event(name, detail, place, row) for (name, detail, row), place in zip(named, at, strict=True)]
+    met = np.broadcast_to(_residual(values, pattern.monic(u), u), len(x))
+    events = [Event(*of, place, row, float(met[row])) for (*of, row), place in zip(named, at, strict=True)]
     return Branch(
         pattern=str(problem.locate), parameters=columns, unknowns=dict(zip(pattern.unknowns, u, strict=True)),
         tangent=dict(zip(free, _natural_tangent(problem, on, x, t).T, strict=True)),
@@ -67,7 +68,7 @@ def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, wal
         heavily_damped=all_real(pattern.remaining(u), len(x)) & ("W" not in pattern.unknowns),
         satisfied=satisfied(problem, values, len(x)), abscissa=np.broadcast_to(values["abscissa"], len(x)),
         events=tuple(sorted(events, key=lambda e: e.index)), closed=walked.closed,
-        residual=float(np.max(_residual(values, pattern.monic(u), u))),
+        residual=float(np.max(met)),
         eigenfrequency=_eigenfrequency(problem, pattern, u),
     )  # fmt: skip
 
