@@ -11,6 +11,8 @@ from click.testing import CliRunner
 import tmsopt
 from tmsopt.cli import every as main
 from tmsopt.models import from_hamiltonian
+from tmsopt.models.told import structure_in_words
+from tmsopt.plots.chart import CLASSES, class_handles
 
 EXACT = 1e-12
 """What print and closed forms are met to: some hundred roundings."""
@@ -190,3 +192,102 @@ def test_charts_and_pages_take_a_complex_system() -> None:
     assert np.array_equal((names == "stable")[off], ((gain < loss) & (gain * loss < 1))[off])
     page = tmsopt.explore("problems/loss_only_dimer.toml").html
     assert "both eigenfrequencies meet in one (EP2)" in page
+
+
+LASER = [["d + 1j*g", "k"], ["k", "-1j*l"]]
+"""Characteristic equation (ω − d − i g)(ω + i l) = k²; a real ω asks for (ω − d) ω + g l = k² and ω (l − g) = d l."""
+
+
+def test_the_threshold_is_the_edge_and_says_which_eigenfrequency_is_real() -> None:
+    """ω = d l / (l − g) by the imaginary part of the characteristic equation; the other is the trace less this."""
+    fixed = {"l": 0.5, "d": 0.2, "k": 0.3}
+    found = tmsopt.solve(tmsopt.Problem(from_hamiltonian(LASER), fixed=fixed, free={"g": (-1, 1.5)}, locate="weave"))
+    real = 0.2 * 0.5 / (0.5 - found.parameters["g"])
+    assert found.stable is False
+    assert found.beyond_axis == 0
+    assert found.to_json()["stable"] is False
+    assert found.notes == ()
+    report = tmsopt.report.design_report(found)
+    assert "found: on the edge of stability\n" in report
+    assert f"neither loss nor gain; {real:.5g} is real" in report
+
+
+def test_a_threshold_of_a_lossier_mode_is_not_the_edge() -> None:
+    """The other eigenfrequency has the imaginary part of the trace, g − l."""
+    fixed = {"l": 0.1, "d": 0.3, "k": 0.5}
+    found = tmsopt.solve(tmsopt.Problem(from_hamiltonian(LASER), fixed=fixed, free={"g": (-2, 2)}, locate="weave"))
+    gain = found.parameters["g"] - 0.1
+    assert gain > 0.01
+    assert found.beyond_axis == pytest.approx(gain, abs=EXACT)
+    assert found.notes == (f"not the edge of stability: another eigenfrequency has gain {gain:.2g}",)
+    report = tmsopt.report.design_report(found)
+    assert "one eigenfrequency has the most gain" in report
+    assert "least damped" not in report
+
+
+@pytest.mark.parametrize(("rest", "beyond"), [("s + 1", 0.0), ("s - 1", 1.0)])
+def test_a_weave_of_a_real_system_says_whether_it_is_the_edge(rest: str, beyond: float) -> None:
+    """(s² + c s + 1.3) times s ± 1, whose weave is c = 0."""
+    r = 1 if rest == "s + 1" else -1
+    model = tmsopt.models.from_coefficients([1, f"c + {r}", f"1.3 + {r}*c", f"1.3*{r}"])
+    found = tmsopt.solve(tmsopt.Problem(model, free={"c": (-0.5, 0.7)}, locate="weave"))
+    assert found.parameters["c"] == pytest.approx(0, abs=EXACT)
+    assert found.stable is False
+    assert found.beyond_axis == pytest.approx(beyond, abs=EXACT)
+    assert found.notes == (("not the edge of stability: another root has real part 1",) if beyond else ())
+    assert ("on the edge of stability\n" in tmsopt.report.design_report(found)) is not bool(beyond)
+
+
+def test_a_parameter_at_zero_is_changed_absolutely_and_shifts_hold() -> None:
+    """A detuning ε of an EP2 moves it by (k ε)^(1/2) beside ε/2, which is within 10 % up to some 1e-2; a common one by ε.
+
+    Of −i (g1 + g2)/2 ± (k² − (g1 − g2)²/4 + …)^(1/2) the EP2 is at k = (g1 − g2)/2 = 0.6.
+    """
+    model = from_hamiltonian([["w + d - 1j*g1", "k"], ["k", "w - 1j*g2"]])
+    free = {"d": (-1, 1), "k": (0.05, 2)}
+    asked = tmsopt.Problem(model, fixed={"w": 0.0, "g1": 1.3, "g2": 0.1}, free=free, locate="EP2")
+    (found,) = tmsopt.diagnose(tmsopt.solve(asked))
+    by = {r.parameter: r for r in found.responses}
+    assert not by["d"].relative
+    (law,) = by["d"].laws
+    assert (str(law.branches.exponent), law.branches.size) == ("1/2", pytest.approx(math.sqrt(0.6), rel=1e-9))
+    (common,) = by["w"].laws
+    assert (str(common.branches.exponent), common.branches.size) == ("1", pytest.approx(1, rel=1e-9))
+    assert (common.below, common.above) == (1, 1)  # it is exact
+    text = "\n".join(tmsopt.report.diagnosis_lines([found], details=True))
+    assert "not move it" not in text
+    assert "nowhere sampled" not in text
+
+
+def test_digits_of_a_curve_through_an_EP3_are_no_more_than_are_met() -> None:
+    """The EP3 of the trimer at g = l = √2, d = 0: what is printed near it is right to half a unit of its last digit."""
+    model = from_hamiltonian([["d + 1j*g", "k", "0"], ["k", "0", "k"], ["0", "k", "-1j*l"]])
+    free = {"g": (0.1, 2.5), "l": (0.1, 2.5), "d": (-1.0, 1.0)}
+    traced = tmsopt.trace(tmsopt.Problem(model, fixed={"k": 1.0}, free=free, locate="EP2"))
+    near = [e for e in traced.events if abs(e.parameters["g"] - math.sqrt(2)) < 1e-3 and abs(e.parameters["d"]) < 1e-3]
+    assert near
+    for branch in traced.branches:
+        for row in tmsopt.report.event_rows(branch, {"g": tmsopt.design.Unit()}, model)[1:]:
+            value = float(row[1])
+            if abs(value - math.sqrt(2)) < 1e-3 and "g" in row[-1].split(", "):
+                assert abs(value - math.sqrt(2)) <= 0.5 * 10.0 ** -len(row[1].split(".")[1])
+
+
+def test_no_damping_ratio_is_told_of_the_cases_of_a_matrix() -> None:
+    model = from_hamiltonian([["d - 1j*g1", "k"], ["k", "-1j*g2"]])
+    asked = tmsopt.Problem(
+        model, fixed={"g2": 0.1}, free={"g1": (0, 3), "d": (-1, 1), "k": (0.05, 1)}, minimize="abscissa",
+        constraints={"c": "k <= 0.6"}, tolerances={"g1": 0.05, "k": 0.02},
+    )  # fmt: skip
+    report = tmsopt.report.design_report(tmsopt.solve(asked))
+    assert "worst case" in report
+    assert "damping ratio" not in report
+
+
+def test_words_of_a_matrix_with_gain() -> None:
+    model = from_hamiltonian([["1j", "k", "0"], ["k", "0", "k"], ["0", "k", "-1j"]])
+    lossy, gaining = (structure_in_words(model, "EP2", gain) for gain in (False, True))
+    assert lossy == "the two least damped eigenfrequencies meet in one (EP2)"
+    assert gaining == "the two eigenfrequencies of most gain meet in one (EP2)"
+    (patch,) = class_handles(np.array([CLASSES.index("weave")], dtype=np.int8), model)
+    assert patch.get_label() == "gain, beyond threshold"

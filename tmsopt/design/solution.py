@@ -8,7 +8,7 @@ from tmsopt.design.cases import Case
 from tmsopt.design.problem import Freedom, Problem
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.design.unit_system import unit_of, units_of
-from tmsopt.models.told import eigenfrequencies, meant
+from tmsopt.models.told import beyond_axis, eigenfrequencies, meant
 from tmsopt.records import Shown, Table, asked_above, plain
 from tmsopt.roots import Root, Structure
 from tmsopt.units import Reading
@@ -34,8 +34,7 @@ def ended(problem: Problem, status: str) -> str:
     return "feasible" if status == "optimal" and not problem.free else status.replace("_", " ")
 
 
-GAIN_DIGITS = 6
-SIDE_DIGITS = 9
+GAIN_DIGITS, SIDE_DIGITS = 6, 9
 
 
 @dataclass(frozen=True)
@@ -234,7 +233,12 @@ class Solution(Shown):
     def stable(self) -> bool | None:
         """Whether all roots lie left of the axis: ideal and as stored, in the worst case; None where there are none."""
         ends = (self.abscissa, self.abscissa_realised)
-        return max(ends) < 0 if all(map(math.isfinite, ends)) else None
+        return max(ends) < 0 and self.beyond_axis is None if all(map(math.isfinite, ends)) else None
+
+    @property
+    def beyond_axis(self) -> float | None:
+        """The abscissa where the located pattern ties roots to the axis, 0 on the edge of stability; else None."""
+        return beyond_axis(self.problem.model, self.problem.located if self.status == "optimal" else (), self.roots)
 
     @property
     def stability_sought(self) -> bool:
@@ -257,8 +261,7 @@ class Solution(Shown):
     @property
     def units(self) -> dict[str, str]:
         """The unit of each number that has one, as they are kept and as JSON has them: rad and SI."""
-        text = self.problem.minimize or self.problem.maximize
-        return units_of(self.problem, [text] if text else [])
+        return units_of(self.problem, filter(None, [self.problem.minimize or self.problem.maximize]))
 
     @property
     def eigenfrequencies(self) -> tuple[Root, ...]:
@@ -316,8 +319,8 @@ class Solution(Shown):
 
 def violated_by(solution: Solution) -> str:
     """What a solution violates, and by how much, in the units in which the problem was written."""
-    found = solution.violations.items()
-    return ", ".join(f"{name} by {unit_of(solution.problem, name).show(amount, 3)}" for name, amount in found)
+    each, problem = solution.violations.items(), solution.problem
+    return ", ".join(f"{name} by {unit_of(problem, name).show(amount, 3)}" for name, amount in each)
 
 
 class NotSolved(RuntimeError):
@@ -336,8 +339,7 @@ class NotSolved(RuntimeError):
     """
 
     def __init__(self, solution: Solution) -> None:
-        self.solution = solution
-        violated = violated_by(solution)
+        self.solution, violated = solution, violated_by(solution)
         super().__init__(
             f"{solution.problem.title or 'problem'}: {solution.status}"
             + (f"; violated: {violated}" if violated else "")

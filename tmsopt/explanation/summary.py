@@ -26,7 +26,7 @@ def summary(solution: Solution) -> str:
         if not solution.problem.free:
             return f"the design as given violates {names}"
         return f"no design in the box was found that meets all that is asked; the nearest one violates {names}"
-    words = structure_in_words(solution.problem.model, solution.structure)
+    words = structure_in_words(solution.problem.model, solution.structure, solution.abscissa > 0)
     if solution.status != "optimal":
         return f"{words}; the search did not converge, so a better design may be near"
     return f"{words}: {_quality(solution)}"

@@ -4,6 +4,7 @@ The polynomial of a complex H is that of the real system of twice the size with 
 and their conjugates. Told are s = −i ω, each with its multiplicity.
 """
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -19,6 +20,9 @@ from tmsopt.roots.patterns.doubled import (
     complex_pattern_names,
     doubled_name,
 )
+
+_ON_AXIS = 1e-12
+"""Of the largest root of the polynomial: so far right of the imaginary axis is on it, as far as rounding tells."""
 
 
 def pattern_of(model: Model, name: str) -> Pattern:
@@ -78,13 +82,34 @@ def meant(model: Model, name: str, roots: Sequence[Root]) -> Structure:
     return Structure(doubled_name(name), tuple(w for r in lower for w in (replace(r, im=-r.im), r)), 0.0)
 
 
-def structure_in_words(model: Model, structure: str) -> str:
-    """A structure, as it is told, in words."""
+def structure_in_words(model: Model, structure: str, gain: bool = False) -> str:
+    """A structure, as it is told, in words; of a complex H by its gain where it has any."""
     if model.carrier is None:
         return in_words(structure, model.degree)
-    return complex_in_words(structure, model.degree // 2)
+    return complex_in_words(structure, model.degree // 2, gain)
 
 
 def eigenfrequencies(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
     """ω = i s of roots as they are told; none of a real system."""
     return () if model.carrier is None else tuple(Root(-r.im + 0.0, r.re, r.multiplicity) for r in roots)
+
+
+def on_axis(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
+    """Those of roots, as they are told, that are on the imaginary axis: the real ones of the eigenfrequencies of H."""
+    each = tuple(roots)
+    return tuple(r for r in each if abs(r.re) <= _ON_AXIS * _size(model, each))
+
+
+def beyond_axis(model: Model, located: Sequence[str], roots: Sequence[Root]) -> float | None:
+    """How far right of the imaginary axis a root is where located patterns tie others to it; 0 on the very edge.
+
+    None where no pattern ties a root to the axis.
+    """
+    if not roots or all(pattern_of(model, name).rest is None for name in located):
+        return None
+    rightmost = max(r.re for r in roots)
+    return rightmost if rightmost > _ON_AXIS * _size(model, roots) else 0.0
+
+
+def _size(model: Model, roots: Iterable[Root]) -> float:
+    return max((math.hypot(r.re, r.im - (model.carrier or 0.0)) for r in roots), default=0.0)

@@ -68,7 +68,8 @@ def fill_classes(ax: Axes, chart: Chart, plane: Plane) -> None:
 
 def class_handles(kind: NDArray[np.int8], model: Model) -> list[Patch]:
     """Legend entries of the classes that occur."""
-    words = {kind: f"unstable by {word}" for kind, word in events_of(model).items()}
+    how = "unstable by" if model.carrier is None else "gain, beyond"
+    words = {kind: f"{how} {word}" for kind, word in events_of(model).items()}
     present = [code for code in range(len(CLASSES)) if np.any(kind == code)]
     return [
         Patch(facecolor=CLASS_COLOURS[k], edgecolor="grey", label=words.get(CLASSES[k], CLASSES[k])) for k in present

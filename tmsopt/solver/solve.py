@@ -21,7 +21,7 @@ from tmsopt.formulation.formulate import design_of
 from tmsopt.formulation.nlp import objective_size
 from tmsopt.formulation.options import DEFAULTS, AskedOfSolve, Options, options_of, taking
 from tmsopt.margins import edges_at
-from tmsopt.models.told import name_told
+from tmsopt.models.told import beyond_axis, name_told
 from tmsopt.progress import Listener, begin, heard
 from tmsopt.records import Table
 from tmsopt.solver.multistart import rank, same
@@ -322,11 +322,15 @@ def _stability_note(
     if "a0" in checked.violations:
         return (f"the mass matrix is singular (a0 = 0), so a root is at infinity; {mass_advice(problem)}",)
     asked = [n for n, c in problem.conditions.items() if n in checked.violations and "abscissa" in c.names]
-    if asked and checked.structure.abscissa >= 0:
-        return (UNSTABLE,)
-    if not optimal or checked.structure.abscissa < 0:
-        return ()
+    unstable = (UNSTABLE,) if asked and checked.structure.abscissa >= 0 else ()
+    beyond = beyond_axis(problem.model, problem.located, checked.structure.roots) if optimal else None
+    if beyond:
+        excess = unit_of(problem, "abscissa").show(beyond, 2)
+        another = "root has real part" if problem.model.carrier is None else "eigenfrequency has gain"
+        return (f"not the edge of stability: another {another} {excess}",)
+    if unstable or not optimal or checked.structure.abscissa < 0:
+        return unstable
     if problem.free and (problem.minimize or "").strip() == "abscissa":
         return ("no stable design was found in the box; this is the least unstable one",)
-    on_edge = edges_at(problem, parameters)  # neither decay nor growth, as the report says
+    on_edge = beyond == 0 or edges_at(problem, parameters)  # neither decay nor growth, as the report says
     return () if on_edge else ("the design is not stable: abscissa >= 0",)

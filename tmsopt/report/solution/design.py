@@ -143,7 +143,7 @@ def headline(solution: Solution, on_edge: bool = False) -> tuple[str, str]:
     located = f"locate {problem.locate}" if problem.locate else ""
     sense = f"{problem.sense} " if problem.free else ""  # what is given is not sought
     asked = f"{sense}{text.strip()}" + (f" = {value}" if math.isfinite(solution.value) else "") if text else ""
-    structure = structure_in_words(problem.model, solution.structure)
+    structure = structure_in_words(problem.model, solution.structure, solution.abscissa > 0)
     silent = solution.status == "infeasible" and solution.any_stable is not False
     stable = "" if silent else stability(solution, on_edge)
     told = ": ".join(part for part in (_ended(solution), stable) if part)
@@ -172,8 +172,8 @@ def stability(solution: Solution, on_edge: bool = False) -> str:
     problem, known = solution.problem, solution.any_stable
     if solution.stable is not False:
         return "" if solution.stable is None else "stable"
-    if on_edge:
-        return "on the edge of stability, as far as rounding tells"
+    if on_edge or solution.beyond_axis == 0:
+        return f"on the edge of stability{'' if solution.beyond_axis == 0 else ', as far as rounding tells'}"
     if known is False:
         limited = problem.locate or len(problem.constraints) > len(problem.asked_of_roots)
         return f"no design in the box is stable (proved){' under its constraints' if limited else ''}"

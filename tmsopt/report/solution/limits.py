@@ -78,7 +78,7 @@ def case_lines(solution: Solution) -> list[str]:
         return []
     of = solution.problem
     lines = [f"worst case: {_place(of, solution.worst)}; motion and roots are those there, the rest nominal"]
-    if solution.least_damped is not None and solution.least_damped != solution.worst:
+    if solution.least_damped not in (None, solution.worst) and of.model.carrier is None:
         lines.append(f"least damped case: {_place(of, solution.least_damped)}; the damping ratio is that there")
     if solution.fastest is not None and solution.fastest != solution.worst:
         lines.append(f"fastest case: {_place(of, solution.fastest)}; limits on the frequency are on that there")

@@ -11,6 +11,7 @@ from tmsopt.checks.recheck import FEASIBLE
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import Unit, unit_of
 from tmsopt.models import Model, Parameter, ParameterSet, Quantity, Values
+from tmsopt.models.told import eigenfrequencies, on_axis
 from tmsopt.roots import Root
 from tmsopt.units import frequencies
 
@@ -121,11 +122,15 @@ def motion(solution: Solution, on_edge: bool = False) -> str:
     if solution.stable is None:
         return "no motion to describe: a root is at infinity"
     kind = "decay time" if abscissa < 0 else "growth time"
-    lasts = "neither decay nor growth" if on_edge or not abscissa else f"{kind} {time.show(1 / abs(abscissa), 4)}"
+    on_edge = on_edge or not abscissa or solution.beyond_axis == 0
+    lasts = "neither decay nor growth" if on_edge else f"{kind} {time.show(1 / abs(abscissa), 4)}"
     if solution.problem.model.carrier is not None:
-        if on_edge or not abscissa:
-            return "neither loss nor gain"
-        return f"{'least loss' if abscissa < 0 else 'gain'} {abs(abscissa):.4g} ({lasts})"
+        found = (
+            "neither loss nor gain"
+            if on_edge
+            else f"{'least loss' if abscissa < 0 else 'gain'} {abs(abscissa):.4g} ({lasts})"
+        )
+        return f"{found}{_real(solution) if on_edge or solution.beyond_axis else ''}"
     swings = [f for f in frequencies(solution.roots, rate) if f * 2 * math.pi > 1e-9 * rate]
     if not swings:
         return f"{lasts}; nothing swings"
@@ -137,6 +142,13 @@ def motion(solution: Solution, on_edge: bool = False) -> str:
         f"{lasts}; {name} {listed} {hertz.text}".rstrip()
         + f"; damping ratio {ratio if abs(ratio) > NOTHING else 0:.4g}"
     )
+
+
+def _real(solution: Solution) -> str:
+    """Which eigenfrequencies of a complex system are real."""
+    model = solution.problem.model
+    real = [frequency_of(z.re, 0.0, 5, z.multiplicity) for z in eigenfrequencies(model, on_axis(model, solution.roots))]
+    return f"; {' and '.join(real)} {'is' if len(real) == 1 else 'are'} real" if real else ""
 
 
 def loads(solution: Solution) -> str:

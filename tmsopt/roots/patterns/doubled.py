@@ -71,20 +71,21 @@ def doubled_name(name: str) -> str:
     return re.sub(r"\bsingle", "pair", name.replace("EP", "CEP"))
 
 
-def complex_in_words(structure: str, size: int) -> str:
-    """A structure of the least damped eigenfrequencies in words; one that is unknown as it is."""
+def complex_in_words(structure: str, size: int, gain: bool = False) -> str:
+    """A structure of the least damped eigenfrequencies, or of most gain, in words; one that is unknown as it is."""
     if structure == "undecided":
         return "double precision cannot tell which eigenfrequencies meet (undecided)"
     if structure == "single":
-        return "one eigenfrequency is least damped (single)"
+        return f"one eigenfrequency {'has the most gain' if gain else 'is least damped'} (single)"
     if match := re.fullmatch(r"EP(\d+)", structure):
         order = int(match[1])
         every = "both" if order == 2 else f"all {_COUNTS[order].strip()}"
-        which = every if order == size else f"the {_COUNTS[order]}least damped"
-        return f"{which} eigenfrequencies meet in one ({structure})"
+        which = every if order == size else f"the {_COUNTS[order]}{'' if gain else 'least damped'}".rstrip()
+        most = " of most gain" if gain and order != size else ""
+        return f"{which} eigenfrequencies{most} meet in one ({structure})"
     named = [_part(part) for part in structure.split("+")]
     listed = named[0] if len(named) == 1 else f"{', '.join(named[:-1])} and {named[-1]}"
-    return f"{listed} have one decay rate ({structure})"
+    return f"{listed} have one {'gain' if gain else 'decay rate'} ({structure})"
 
 
 def _part(part: str) -> str:
