@@ -1,6 +1,7 @@
 """Exceptional points of complex matrices beside closed forms: located, proved, traced, counted, split."""
 
 import math
+from importlib import import_module
 from typing import Any
 
 import mpmath
@@ -11,8 +12,6 @@ from click.testing import CliRunner
 import tmsopt
 from tmsopt.cli import every as main
 from tmsopt.models import from_hamiltonian
-from tmsopt.models.told import structure_in_words
-from tmsopt.plots.chart import CLASSES, class_handles
 
 EXACT = 1e-12
 """What print and closed forms are met to: some hundred roundings."""
@@ -286,8 +285,9 @@ def test_no_damping_ratio_is_told_of_the_cases_of_a_matrix() -> None:
 
 def test_words_of_a_matrix_with_gain() -> None:
     model = from_hamiltonian([["1j", "k", "0"], ["k", "0", "k"], ["0", "k", "-1j"]])
-    lossy, gaining = (structure_in_words(model, "EP2", gain) for gain in (False, True))
+    told, chart = import_module("tmsopt.models.told"), import_module("tmsopt.plots.chart")
+    lossy, gaining = (told.structure_in_words(model, "EP2", gain) for gain in (False, True))
     assert lossy == "the two least damped eigenfrequencies meet in one (EP2)"
     assert gaining == "the two eigenfrequencies of most gain meet in one (EP2)"
-    (patch,) = class_handles(np.array([CLASSES.index("weave")], dtype=np.int8), model)
+    (patch,) = chart.class_handles(np.array([chart.CLASSES.index("weave")], dtype=np.int8), model)
     assert patch.get_label() == "gain, beyond threshold"

@@ -59,7 +59,8 @@ def describe(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, wal
         named += [("end", _end_words(problem, pattern, end), row) for end, row in ends]
     at = [Table({n: float(c[row]) for n, c in columns.items()}) for *_, row in named]
     met = np.broadcast_to(_residual(values, pattern.monic(u), u), len(x))
-    events = [Event(*of, place, row, float(met[row])) for (*of, row), place in zip(named, at, strict=True)]
+    each = zip(named, at, strict=True)
+    events = [Event(name, detail, place, row, float(met[row])) for (name, detail, row), place in each]
     return Branch(
         pattern=str(problem.locate), parameters=columns, unknowns=dict(zip(pattern.unknowns, u, strict=True)),
         tangent=dict(zip(free, _natural_tangent(problem, on, x, t).T, strict=True)),
