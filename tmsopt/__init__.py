@@ -18,7 +18,7 @@ The public names stand in `__init__.pyi`, once; each is imported when it is firs
 wait for CasADi.
 """
 
-__version__ = "1.0.0"
+__version__ = "1.1.0"
 
 
 def __getattr__(name: str) -> object:
