@@ -33,7 +33,7 @@ def controlled(model: Model, names: Iterable[str]) -> Model:
     Example:
         >>> robot = tmsopt.models.controlled(tmsopt.models.whipple, ["k_phidot", "lag"])
         >>> print(robot.degree, *robot.sets[0].names[-5:])  # a lag is a state more
-        5 k_phi k_delta k_phidot k_deltadot lag
+        5 k_phi k_phidot k_delta k_deltadot lag
 
     More: docs/how_to/feedback.md
     """

@@ -20,7 +20,7 @@ TableRow = Sequence[str]
 NOTHING = 1e-14
 """Of the size of a root, or of 1: less is rounding."""
 
-_OF_RANGE = 1e-15  # likewise of a range
+_OF_RANGE = 1e-12  # likewise of a range
 ALL = 12
 """Digits of a full report."""
 
@@ -147,7 +147,8 @@ def motion(solution: Solution, on_edge: bool = False) -> str:
 def _real(solution: Solution) -> str:
     """Which eigenfrequencies of a complex system are real."""
     model = solution.problem.model
-    real = [frequency_of(z.re, 0.0, 5, z.multiplicity) for z in eigenfrequencies(model, on_axis(model, solution.roots))]
+    met = eigenfrequencies(model, on_axis(model, solution.roots))
+    real = [frequency_of(z.re, 0.0, 5, z.multiplicity, abs(model.carrier or 0.0)) for z in met]
     return f"; {' and '.join(real)} {'is' if len(real) == 1 else 'are'} real" if real else ""
 
 
