@@ -205,3 +205,14 @@ def test_zero_is_an_eigenfrequency_as_others_are(H: Any) -> None:
     """Of a zero matrix every carrier is too large; intervals have a rounding even there."""
     found = tmsopt.solve(tmsopt.Problem(from_hamiltonian(H), fixed={"x": 0.0})).eigenfrequencies
     assert [(z.re, z.im, z.multiplicity) for z in found] == [(0.0, 0.0, 2)]
+
+
+def test_a_carrier_is_no_wider_than_the_eigenfrequencies_ask() -> None:
+    """ω = ±√(1 − g²) is within 0.142 of 0 for g from 0.99 to 1.01, and the discs of the matrix reach to 1 and beyond.
+
+    A carrier is at most four times the spread, which is at most 1.25 times what is seen: 5 · 0.142.
+    """
+    pair = tmsopt.models.from_hamiltonian([["1j*g", 1], [1, "-1j*g"]])
+    problem = tmsopt.Problem(pair, free={"g": (0.99, 1.01)}, minimize="abscissa")
+    assert problem.model.carrier is not None
+    assert 0.142 < abs(problem.model.carrier) <= 0.71
