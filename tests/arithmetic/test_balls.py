@@ -1,6 +1,7 @@
 """Formulas over balls: the same value as at 60 digits, certain enclosures, and nan where nothing exists."""
 
 import math
+import re
 from fractions import Fraction
 from typing import Any
 
@@ -115,15 +116,16 @@ def test_expressions_over_balls_enclose_the_60_digit_value(text: str) -> None:
     x, y = 0.7, 1.9
     tree = parse_value(text.replace("one", "1"), ["x", "y"])
     with mp.workdps(60), flint.ctx.workdps(50):
-        names = {**ORACLE, "x": mp.mpf(x), "y": mp.mpf(y), "one": mp.mpf(1), "__builtins__": {}}
-        wanted = mp.mpf(eval(text, names))
+        names = {**ORACLE, "x": mp.mpf(x), "y": mp.mpf(y), "one": mp.mpf(1), "mpf": mp.mpf, "__builtins__": {}}
+        exactly = re.sub(r"\d+\.\d+", lambda number: f"(mpf({number[0]!r}))", text)  # as written, not as doubles
+        wanted = mp.mpf(eval(exactly, names))
         for convert in (exact, flint.arb):
             got = tree.enclosure({"x": convert(x), "y": convert(y)})
             assert abs(mp.mpf(middle(got).numerator) / middle(got).denominator - wanted) < mp.mpf(10) ** -45
         got = tree.enclosure({"x": series(x), "y": flint.arb(y)})
         slope = got[1] if isinstance(got, flint.arb_series) else flint.arb(0)
         step = mp.mpf(10) ** -15
-        up, down = (mp.mpf(eval(text, {**names, "x": mp.mpf(x) + s})) for s in (step, -step))
+        up, down = (mp.mpf(eval(exactly, {**names, "x": mp.mpf(x) + s})) for s in (step, -step))
         assert float(slope) == pytest.approx(float((up - down) / (2 * step)), rel=1e-12, abs=1e-12)
 
 
@@ -134,9 +136,10 @@ def test_expressions_without_a_value_are_nan(text: str) -> None:
 
 
 def test_a_comparison_over_balls_is_left_minus_right() -> None:
-    """Both sides as the doubles that they are: 0.1 is not 1/10."""
-    got = parse_comparison("x >= 0.1", ["x"]).enclosure({"x": exact(0.5)})
-    assert middle(got) == Fraction(1, 2) - Fraction(0.1)
+    """A number is what its digits say, however many, and a quotient of numbers is a fraction."""
+    for text in ("0.1", "1/10", "0.1000", "1e-1", "0.30000000000000004444 - 0.20000000000000004444"):
+        got = parse_comparison(f"x >= {text}", ["x"]).enclosure({"x": exact(0.5)})
+        assert middle(got) == Fraction(1, 2) - Fraction(1, 10)
 
 
 def test_choices_and_magnitudes_of_balls() -> None:

@@ -2,10 +2,11 @@ from .arrays import Program as Program, program as program
 from .balls import Number as Number, number as number
 from .elementary import (
     exact as exact, greater as greater, lesser as lesser, magnitude as magnitude, positive_part as positive_part,
+    printed as printed,
     power as power, quotient as quotient, sqrt as sqrt, tan as tan,
 )
 from .formal import variable as variable
-from .formulas import formulas as formulas
+from .formulas import Formulas as Formulas
 from .intervals import (
     EVERYTHING as EVERYTHING, INTERVALS as INTERVALS, ball as ball, interval as interval, ranges as ranges,
     root_bound as root_bound, square as square,

@@ -114,6 +114,11 @@ def exact(x: Any) -> Any:
     return flint.fmpq(*x.as_integer_ratio())
 
 
+def printed(x: float) -> flint.fmpq:
+    """A double as the shortest decimal that prints it, 0.1 as 1/10."""
+    return flint.fmpq(*Fraction(repr(float(x))).as_integer_ratio())
+
+
 def as_ball(x: Any) -> Any:
     """An exact fraction as a ball of the working precision; balls and series unchanged."""
     return flint.arb(x) if isinstance(x, flint.fmpq) else x

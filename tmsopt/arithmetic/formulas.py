@@ -1,8 +1,9 @@
 """Formulas in named symbols, for numbers of any kind: floats, arrays, CasADi expressions, balls."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
@@ -12,17 +13,43 @@ from tmsopt.arithmetic.operations import ARRAYS, BALLS
 from tmsopt.arithmetic.walk import walk
 
 
+class Constant(Protocol):
+    """A number that no double is, such as 8/3 or √2."""
+
+    @property
+    def text(self) -> str:
+        """As it is written."""
+
+    def enclosure(self, values: Mapping[str, Any]) -> Any:
+        """The number as a fraction, or as a ball of the working precision; `values` are none."""
+
+
 @dataclass(frozen=True)
 class Formulas:
     """Expressions of CasADi, the same for every kind of number.
 
+    CasADi keeps numbers as doubles. Those that are none are arguments of the function, given as doubles to what
+    computes in doubles, and exactly to balls.
+
     Attributes:
         names: of the symbols.
-        function: one vector, an entry for each name → one vector, an entry for each formula.
+        exact: one vector, an entry for each name and for each constant → one vector, an entry for each formula.
+        constants: numbers that no double is.
     """
 
     names: tuple[str, ...]
-    function: ca.Function
+    exact: ca.Function
+    constants: tuple[Constant, ...] = ()
+
+    @cached_property
+    def function(self) -> ca.Function:
+        """The same with constants as doubles: one vector, an entry for each name → one vector."""
+        x = ca.SX.sym("x", len(self.names))
+        return ca.Function("formulas", [x], [self.exact(ca.vertcat(x, *map(float, self.numbers())))])
+
+    def numbers(self) -> list[Any]:
+        """The constants as fractions, or as balls of the working precision."""
+        return [constant.enclosure({}) for constant in self.constants]
 
     def __call__(self, values: Mapping[str, Any]) -> list[Any]:
         """The value of each formula; floats give nan and inf where a formula has no value, without a warning."""
@@ -31,17 +58,8 @@ class Formulas:
             found = self.function(ca.vertcat(*given))
             return [found[k] for k in range(found.numel())]
         if any(is_ball(x) for x in given):
-            return walk(self.function, given, BALLS)[0]
+            return walk(self.exact, [*given, *self.numbers()], BALLS)[0]
         if all(np.ndim(x) == 0 for x in given):
             return list(np.array(self.function(given)).ravel())
         with np.errstate(all="ignore"):
             return walk(self.function, [np.asarray(x, dtype=float)[()] for x in given], ARRAYS)[0]
-
-
-def formulas(expressions: Sequence[Any], names: Sequence[str]) -> Formulas:
-    """Formulas from CasADi expressions or numbers, in symbols of these names."""
-    column = ca.vertcat(*[ca.SX(e) for e in expressions])
-    known = {x.name(): x for x in ca.symvar(column)}
-    symbols = [known.get(name, ca.SX.sym(name)) for name in names]
-    function = ca.Function("formulas", [ca.vertcat(*symbols) if symbols else ca.SX(0, 1)], [ca.densify(column)])
-    return Formulas(tuple(names), function)

@@ -5,7 +5,7 @@ tan = sin/cos, √x² = x and |x|² = x². What vanishes for another reason is n
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
@@ -93,14 +93,21 @@ def _power(a: Any, n: int) -> Any:
 
 
 class Field:
-    """Rational functions of the inputs of a function, and of what else it makes of them; one for each function."""
+    """Rational functions of the inputs of a function, and of what else it makes of them; one for each function.
 
-    def __init__(self, function: ca.Function) -> None:
+    Args:
+        numbers: what the last inputs are; one that is no fraction is an unknown.
+    """
+
+    def __init__(self, function: ca.Function, numbers: Sequence[Any] = ()) -> None:
         count = function.nnz_in(0)
         others = sum(step.operation not in (ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST) for step in steps(function))
         context = flint.fmpq_mpoly_ctx.get(tuple(f"x{k}" for k in range(count + 2 * others + 1)), "lex")
         self._context, self._one = context, context.constant(1)
         self.inputs = [self._free(k) for k in range(count)]
+        for k, number in enumerate(numbers, start=count - len(numbers)):
+            if isinstance(number, flint.fmpq):
+                self.inputs[k] = Quotient(number * self._one, self._one)
         self._used = count
         self._known: list[tuple[int, tuple[Quotient, ...], Quotient]] = []
         self._squares: list[tuple[int, Quotient]] = []

@@ -30,6 +30,11 @@ def interval(x: Any) -> Interval:
     return math.nextafter(float(x.lower()), -math.inf), math.nextafter(float(x.upper()), math.inf)
 
 
+def outwards(lower: float, upper: float) -> Interval:
+    """Doubles that enclose an interval whose ends are decimals; a number alone is itself."""
+    return (lower, upper) if lower == upper else (math.nextafter(lower, -math.inf), math.nextafter(upper, math.inf))
+
+
 def ranges(function: ca.Function, box: Sequence[Interval]) -> list[list[Interval]]:
     """Ranges of all outputs of a function of one vector over a box; without bounds where it may not exist.
 

@@ -11,6 +11,7 @@ import flint
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.arithmetic.intervals import Interval, outwards
 from tmsopt.arithmetic.sequence import golden_steps
 from tmsopt.design.cases import Band, Case
 from tmsopt.design.dependence import WORSE, varies
@@ -37,8 +38,6 @@ _SHRINK = 0.25
 _LOOKS = 14  # times that the look closes in: at a smooth maximum the value is then exact
 _FEWEST = 32  # boxes of a proof
 _DIGITS = 30
-
-Interval = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -298,7 +297,8 @@ class _Box:
 def _first(problem: Problem) -> Iterator[_Box]:
     """Bands and tolerances whole, one box for each choice of separate scenario values."""
     choices = [[(s.min, s.max)] if isinstance(s, Band) else [(v, v) for v in s] for s in problem.variations.values()]
-    offset = {n: (-t, t) for n, t in problem.tolerances.items()}
+    choices = [[outwards(*ends) for ends in each] for each in choices]
+    offset = {n: outwards(-t, t) for n, t in problem.tolerances.items()}
     for values in product(*choices):
         at = dict(zip(problem.variations, values, strict=True))
         shares = {f"at {n}": 1.0 for n, (lo, hi) in at.items() if hi > lo} | {f"offset {n}": 1.0 for n in offset}

@@ -25,7 +25,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.formulation.nlp import Scale, reaches_of, scale_of
 from tmsopt.models import Quantity, Values
-from tmsopt.models.exact import decimal, decimal_fraction
+from tmsopt.models.exact import decimal
 from tmsopt.processes import Inbox, Worker
 from tmsopt.progress import Counts
 from tmsopt.records import Table
@@ -222,7 +222,7 @@ def _puzzle(sheet: Sheet) -> tuple[Puzzle, Box]:
     for condition in sheet.problem.conditions.values():
         if not condition.equality:
             try:
-                limits.append(-condition.sign * condition.enclosure(values, decimal_fraction))
+                limits.append(-condition.sign * condition.enclosure(values))
             except (NotAccepted, TypeError, KeyError, ZeroDivisionError):
                 continue  # it takes no part, and is asked of every design that is found
     box = tuple(_range(ends) for ends in _ends(sheet))
@@ -286,7 +286,7 @@ def _standing(zero: _Zero) -> str | None:
     room += [("", x) for x in sheet.ascending(at)]
     for name, condition in sheet.problem.conditions.items():
         if not condition.equality:
-            excess = condition.sign * flint.arb(condition.enclosure(values, decimal_fraction))
+            excess = condition.sign * flint.arb(condition.enclosure(values))
             if not excess.is_finite() and not _met(sheet.problem, condition, at):
                 return None
             room.append((f"constraint {name}", -excess))

@@ -17,7 +17,6 @@ from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.formulation.nlp import Scale
 from tmsopt.models import Quantity, Values
-from tmsopt.models.exact import decimal_fraction
 from tmsopt.roots import product as multiplied
 from tmsopt.roots.patterns.parts import Part, parts_of
 
@@ -153,7 +152,7 @@ class Sheet:
         values = self.values(at)
         left = conditions(self._scaled(values), self.pieces, [at[n] for n in self.unknowns])
         left += [q.equation(values, at[q.name]) for q in self.lifted if q.equation]
-        return left + [e.enclosure(values, decimal_fraction) for e in self.equalities]
+        return left + [e.enclosure(values) for e in self.equalities]
 
     def shared(self, at: Mapping[str, Any]) -> list[Any]:
         """What must be 0 beside the equations where roots of size 1 count as small and as large."""

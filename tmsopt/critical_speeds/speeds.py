@@ -7,7 +7,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.arithmetic.elementary import exact, rational
+from tmsopt.arithmetic.elementary import exact, printed, rational
 from tmsopt.critical_speeds.crossings import Crossing, Stretch, crossings, told
 from tmsopt.critical_speeds.parametric import Polynomial, interpolated
 from tmsopt.design.files import Given, problem_of
@@ -207,7 +207,7 @@ def _linear(model: Model, of: ParameterSet, own: Mapping[str, float], name: str)
         InputError: where one is no such function.
     """
     with flint.ctx.workdps(_DIGITS):
-        at = ({n: flint.fmpq(k) if n == name else exact(float(own[n])) for n in of.names} for k in (1, 2, 3))
+        at = ({n: flint.fmpq(k) if n == name else printed(own[n]) for n in of.names} for k in (1, 2, 3))
         first, second, third = ({n: flint.arb(v) for n, v in model.algebraic(of.native(d)).items()} for d in at)
         found = {}
         for n, a in first.items():

@@ -5,6 +5,7 @@ import math
 import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import casadi as ca
@@ -12,18 +13,25 @@ import flint
 import numpy as np
 
 from tmsopt.arithmetic import elementary
-from tmsopt.models.names import FUNCTIONS
+from tmsopt.models.names import CONSTANTS, FUNCTIONS
 from tmsopt.models.stated.degree import Degree, alone, applied, constant, same
 
 
 @dataclass(frozen=True)
 class Arithmetic:
-    """What the functions, operators and numbers of an expression mean for one kind of values."""
+    """What the functions, operators and numbers of an expression mean for one kind of values.
+
+    Attributes:
+        literal: from a number, as Python reads it and as it is written.
+        constant: from the text of a part without names; None where such a part is computed as any other.
+    """
 
     functions: Mapping[str, Callable[..., Any]]
     number: Callable[[Any], Any]
     operators: Mapping[type[ast.operator], Callable[[Any, Any], Any]]
-    pi: Any = lambda: math.pi
+    pi: Callable[[], Any] = lambda: math.pi
+    literal: Callable[[Any, str], Any] = lambda value, text: float(value)
+    constant: Callable[[str], Any] | None = None
 
 
 def _as_array(value: Any) -> Any:
@@ -56,6 +64,7 @@ BALLS = Arithmetic(
         "sqrt": elementary.sqrt, "abs": elementary.magnitude, "min": elementary.lesser, "max": elementary.greater,
     },
     elementary.exact, {**BINARY, ast.Div: elementary.quotient, ast.Pow: elementary.power}, flint.arb.pi,
+    lambda value, text: elementary.rational(Fraction(value if isinstance(value, int) else text.replace("_", ""))),
 )  # fmt: skip
 DEGREES = Arithmetic(
     {
@@ -66,3 +75,20 @@ DEGREES = Arithmetic(
     {sign: applied(join, join) for sign, join in BINARY.items()},
     lambda: constant(math.pi),
 )
+
+
+def note_constants(body: ast.expr, text: str) -> None:
+    """Note the text of every part without names, for `constant_text`."""
+    for node in reversed(list(ast.walk(body))):  # parts before the whole
+        if isinstance(node, ast.expr):
+            parts = node.args if isinstance(node, ast.Call) else ast.iter_child_nodes(node)
+            known = all(constant_text(part) for part in parts if isinstance(part, ast.expr))
+            if isinstance(node, ast.Name):
+                known = node.id in CONSTANTS
+            own = text[node.col_offset : node.end_col_offset]
+            node.constant_text = own if known else ""  # type: ignore[attr-defined]
+
+
+def constant_text(node: ast.expr) -> str:
+    """The text of a part without names; empty for any other."""
+    return str(node.constant_text)  # type: ignore[attr-defined]

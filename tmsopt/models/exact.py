@@ -9,7 +9,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.arithmetic.elementary import exact, rational
+from tmsopt.arithmetic.elementary import rational
 from tmsopt.errors import Fault, InputError, short, suggest, table_faults
 from tmsopt.models.model import ParameterSet
 from tmsopt.records import Table
@@ -70,9 +70,6 @@ def _is_long(x: Any) -> bool:
     return isinstance(x, int | Fraction) and max(abs(x.numerator), x.denominator) >= 10**MOST_DIGITS
 
 
-def decimal_fraction(x: Any) -> Any:
-    """A number of an expression likewise; balls unchanged."""
-    return rational(decimal(x)) if isinstance(x, float) else exact(x)
 
 
 @dataclass(frozen=True)

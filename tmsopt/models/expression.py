@@ -6,15 +6,15 @@ import math
 import re
 import threading
 import warnings
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from tmsopt.arithmetic import elementary
 from tmsopt.errors import short, suggest
+from tmsopt.models import arithmetics
 from tmsopt.models.advice import advice
 from tmsopt.models.arithmetics import BALLS, BINARY, DEGREES, NUMERIC, SYMBOLIC, Arithmetic
 from tmsopt.models.names import CONSTANTS, FUNCTIONS
@@ -69,13 +69,13 @@ class Expression:
             sides = [limit if _is_number(side) else _value(side, values, SYMBOLIC) for side in self._sides()]
         return sides[0] - sides[1]
 
-    def enclosure(self, values: Mapping[str, Any], number: Callable[[Any], Any] = elementary.exact) -> Any:
+    def enclosure(self, values: Mapping[str, Any]) -> Any:
         """Ball that certainly holds the value, for balls or exact fractions; of a comparison, left minus right.
 
-        A number in the text stands for the double nearest to it, unless `number` makes it another fraction, and pi for
-        the number π. The ball is nan where the value does not exist, or may not.
+        A number in the text is the fraction that its digits say, and pi the number π. The ball is nan where the value
+        does not exist, or may not.
         """
-        return self.evaluate(values, BALLS if number is elementary.exact else replace(BALLS, number=number))
+        return self.evaluate(values, BALLS)
 
     def violation(self, values: Mapping[str, Any]) -> float:
         """By how much a numeric design violates a comparison, relative to the size of its sides; nan if undefined."""
@@ -208,7 +208,9 @@ def _parse(text: str) -> ast.expr:
 def _tree(text: str) -> ast.expr:
     with _ONE_AT_A_TIME, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the tokenizer warns of texts like 1if, which fail below
-        return ast.parse(text.strip(), mode="eval").body
+        body = ast.parse(text.strip(), mode="eval").body
+    arithmetics.note_constants(body, text.strip())
+    return body
 
 
 def _advice(text: str) -> str:
@@ -324,9 +326,11 @@ def _value(node: ast.expr, values: Mapping[str, Any], arithmetic: Arithmetic) ->
 
 def _computed(node: ast.expr, values: Mapping[str, Any], arithmetic: Arithmetic) -> Any:
     number = arithmetic.number
+    if arithmetic.constant and (text := arithmetics.constant_text(node)):
+        return arithmetic.constant(text)
     match node:
-        case ast.Constant():
-            return _number(node, "")
+        case ast.Constant(value=value):
+            return arithmetic.literal(value, arithmetics.constant_text(node))
         case ast.Name(id=name):
             return arithmetic.pi() if name in CONSTANTS else values[name]
         case ast.UnaryOp(op=op, operand=operand):

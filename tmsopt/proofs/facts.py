@@ -10,7 +10,7 @@ from tmsopt.arithmetic.elementary import rational
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.models import Values
-from tmsopt.models.exact import Written, decimal, decimal_fraction
+from tmsopt.models.exact import Written, decimal
 from tmsopt.proofs.existence import Existing, exact_coefficients
 from tmsopt.proofs.factored import Factored
 from tmsopt.proofs.rational import factored
@@ -140,7 +140,7 @@ def limits(problem: Problem, found: Existing) -> dict[str, str]:
         values.define(name, nothing if value is None else value)
     verdicts = {}
     for name, condition in problem.conditions.items():
-        difference = flint.arb(condition.enclosure(values, decimal_fraction))
+        difference = flint.arb(condition.enclosure(values))
         if condition.equality:
             verdicts[name] = _equal(difference, equations=found.method == "Krawczyk")
         else:

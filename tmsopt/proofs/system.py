@@ -13,7 +13,6 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.formulation.nlp import ordinary, reaches_of, scale_of
 from tmsopt.models import Quantity, Values
-from tmsopt.models.exact import decimal_fraction
 from tmsopt.proofs.factored import abscissa_formula
 from tmsopt.records import Array
 from tmsopt.roots import Pattern
@@ -77,7 +76,7 @@ class Equations:
         left += [q.equation(values, at[q.name]) for q in self.lifted if q.equation]
         if self.equalities:
             values.define("abscissa", abscissa_formula(self.pattern, u))
-        return left + [expression.enclosure(values, decimal_fraction) for expression in self.equalities]
+        return left + [expression.enclosure(values) for expression in self.equalities]
 
 
 def equations(problem: Problem, pattern: Pattern, parameters: Mapping[str, float]) -> Equations:

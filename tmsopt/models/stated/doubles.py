@@ -9,9 +9,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.arithmetic.formulas import Formulas, formulas
+from tmsopt.arithmetic.formulas import Formulas
 from tmsopt.arithmetic.intervals import Interval, ranges
 from tmsopt.arithmetic.walk import NotAccepted
+from tmsopt.models.constants import formulas
 from tmsopt.models.model import Matrix, Model
 from tmsopt.records import Array
 

@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 
 from tmsopt.models.arithmetics import BINARY, SYMBOLIC, Arithmetic
+from tmsopt.models.constants import constant
 from tmsopt.models.names import FUNCTIONS
 from tmsopt.models.stated.degree import LARGEST_EXPONENT, Beyond
 
@@ -108,7 +109,7 @@ def _exp(x: Any) -> Pair:
 
 PAIRS = Arithmetic(
     {**{name: _real(name, SYMBOLIC.functions[name]) for name in FUNCTIONS}, "exp": _exp}, pair,
-    {sign: partial(_joined, join) for sign, join in BINARY.items()},
+    {sign: partial(_joined, join) for sign, join in BINARY.items()}, constant=lambda text: Pair(constant(text)),
 )  # fmt: skip
 """Of CasADi's expressions."""
 

@@ -1,6 +1,7 @@
 """A stated system in text: its entries and quantities as expressions of shared symbols."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from types import MappingProxyType
 from typing import Any
@@ -8,6 +9,7 @@ from typing import Any
 import casadi as ca
 
 from tmsopt.models.arithmetics import DEGREES, SYMBOLIC, Arithmetic
+from tmsopt.models.constants import constant
 from tmsopt.models.expression import Expression, ExpressionError, parse_value
 from tmsopt.models.model import Matrix
 from tmsopt.models.names import unusable
@@ -15,6 +17,8 @@ from tmsopt.models.stated.degree import Beyond, Degree
 
 MOST_QUANTITIES = 500
 """More take seconds to read."""
+
+_SYMBOLIC = replace(SYMBOLIC, constant=constant)
 
 _CIRCLES = 8  # that are listed
 
@@ -57,7 +61,7 @@ class Texts:
 
     def __init__(
         self, fault: Callable[..., None], symbols: Mapping[str, Any] | None = None,
-        known: Mapping[str, Any] | None = None, arithmetic: Arithmetic = SYMBOLIC,
+        known: Mapping[str, Any] | None = None, arithmetic: Arithmetic = _SYMBOLIC,
         beside: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:  # fmt: skip
         self.fault = fault
@@ -107,10 +111,10 @@ class Texts:
         return self.known[name]
 
     def _symbolic(
-        self, expression: Expression, key: tuple[str, ...], where: str, arithmetic: Arithmetic = SYMBOLIC
+        self, expression: Expression, key: tuple[str, ...], where: str, arithmetic: Arithmetic = _SYMBOLIC
     ) -> tuple[Any, Degree]:
         """An expression in symbols, made when first met, and its degree with the quantities in it written out."""
-        values = {} if arithmetic is SYMBOLIC else dict(self.beside)
+        values = {} if arithmetic is _SYMBOLIC else dict(self.beside)
         for name in (n for n in expression.names if n not in values):
             derived = name in self.written or name in self.known
             values[name] = self.quantity(name) if derived else self.symbols.setdefault(name, ca.SX.sym(name))

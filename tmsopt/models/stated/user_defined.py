@@ -3,9 +3,8 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from fractions import Fraction
 from functools import lru_cache
-from numbers import Real
+from numbers import Rational, Real
 from typing import Any, NoReturn
 
 import casadi as ca
@@ -13,13 +12,13 @@ import flint
 import numpy as np
 
 from tmsopt.arithmetic.elementary import exact, is_ball
-from tmsopt.arithmetic.formulas import Formulas, formulas
+from tmsopt.arithmetic.formulas import Formulas
 from tmsopt.arithmetic.identity import Field
-from tmsopt.arithmetic.operations import BALLS
 from tmsopt.arithmetic.twofold import Twofold
 from tmsopt.arithmetic.walk import NotAccepted, walk
 from tmsopt.errors import short
 from tmsopt.models.built_in import MODELS
+from tmsopt.models.constants import constant, constants, formulas, rebuilt
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
 from tmsopt.models.names import latex, spelled, unusable
 from tmsopt.models.stated.closed_loop import check_loop, closed
@@ -37,7 +36,6 @@ MOST = {"M": 6, "A": 12, "H": 6, "coefficients": 12}
 
 _SAMPLES = 24  # designs at which a leading coefficient must vanish for it to be looked at
 _DIGITS = 60
-_DECIMALS = {**BALLS, ca.OP_CONST: lambda x: flint.fmpq(*Fraction(repr(x)).as_integer_ratio())}
 _GOLDEN = (math.sqrt(5) - 1) / 2
 
 
@@ -168,7 +166,11 @@ def made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> 
     } | {("quantities", str(n)): x for n, x in derived.items()}
     entries = {place: scalar(whole(place[0]), place[1], x) for place, x in given.items()}
     every = ca.vertcat(*entries.values())
-    symbols = ca.symvar(ca.vertcat(*(entries[place] for place in in_order(kind, entries))))
+    texts = constants(every)
+    numbers = [constant(text) for text in texts]
+    in_numbers = {x.name() for x in numbers}
+    ordered = ca.vertcat(*(entries[place] for place in in_order(kind, entries)))
+    symbols = [x for x in ca.symvar(ordered) if x.name() not in in_numbers]
     names = tuple(x.name() for x in symbols)
     twice = {n for n in names if names.count(n) > 1}
     if twice:
@@ -182,23 +184,23 @@ def made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> 
         if why := "is the name of a parameter" if n in names else unusable(n):
             raise Unfit("quantities", f"{n!r} {why}; give the quantity a name of its own")
     shapes = tuple((n, len(rows), len(rows[0])) for n, rows in matrices.items())
-    function = ca.Function("stated", [ca.vertcat(*symbols)], [ca.densify(every)])
-    if wrong := faulty(function):
+    exact = ca.Function("stated", [ca.vertcat(*symbols, *numbers)], [ca.densify(every)])
+    if wrong := faulty(rebuilt(names, texts, exact).function):
         (key, where), why = list(given)[wrong[0]], wrong[1]
         raise Unfit(whole(key), f"{where}: {why}")
-    return _rebuilt(kind, name.strip(), names, shapes, tuple(derived), function.serialize())
+    return _rebuilt(kind, name.strip(), names, shapes, tuple(derived), exact.serialize(), texts)
 
 
 @lru_cache(maxsize=64)
 def _rebuilt(
     kind: str, name: str, names: tuple[str, ...], shapes: tuple[tuple[str, int, int], ...], derived: tuple[str, ...],
-    serialized: str, carrier: float = 0.0,
+    serialized: str, texts: tuple[str, ...], carrier: float = 0.0,
 ) -> Model:  # fmt: skip
     """A model from plain data; in each process there is one of each."""
-    entry = Formulas(names, ca.Function.deserialize(serialized))
+    entry = rebuilt(names, texts, ca.Function.deserialize(serialized))
     count = sum(rows * columns for _, rows, columns in shapes)
     symbols = {n: ca.SX.sym(n) for n in names}
-    written = [ca.SX(e) for e in entry(symbols)]
+    written = ca.vertsplit(entry.exact(ca.vertcat(*symbols.values(), *map(constant, texts))))
     zero = [e.is_zero() for e in written]
 
     def blocks(entries: Sequence[Any]) -> dict[str, Matrix]:
@@ -212,14 +214,11 @@ def _rebuilt(
     def every(values: Mapping[str, Any]) -> list[Any]:
         return polynomial(kind, blocks(entry(values)), carrier)
 
-    def as_printed(values: Mapping[str, Any]) -> list[Any]:
-        return polynomial(kind, blocks(walk(entry.function, [values[n] for n in names], _DECIMALS)[0]))
-
     def vanish(leading: int) -> int:
         """How many of so many leading coefficients are 0 by their expressions, one after the other."""
-        field = Field(entry.function)
+        field = Field(entry.exact, entry.numbers())
         try:
-            found = blocks(walk(entry.function, field.inputs, field.arithmetic())[0])
+            found = blocks(walk(entry.exact, field.inputs, field.arithmetic())[0])
             for n in ("D", "K")[max(leading - 1, 0) :] if "M" in found else ():  # without part in these coefficients
                 found[n] = [[0] * len(found["M"]) for _ in found["M"]]
             row = polynomial(kind, found)[:leading]
@@ -231,7 +230,7 @@ def _rebuilt(
         formula = formulas([written], names)
         return lambda values: formula(values)[0]
 
-    lost = _vanishing(as_printed, names)
+    lost = _vanishing(every, names)
     lost = lost and vanish(lost)
     if lost == (degree := count - 1 if kind == "coefficients" else shapes[0][1] * (1 if shapes[0][0] == "A" else 2)):
         raise Unfit(shapes[0][0], "makes a polynomial without s, which has no root")
@@ -257,21 +256,22 @@ def _rebuilt(
         ),
         pencil=None if kind == "coefficients" else lambda values: pencil(blocks(entry(values)), carrier),
     )
-    plain = (kind, name, names, shapes, derived, serialized)
+    plain = (kind, name, names, shapes, derived, serialized, texts)
     made = replace(
         made, origin=(_rebuilt, (*plain, carrier) if carrier else plain), statement=_statement(entry, shapes, derived)
     )
     if kind != "hamiltonian":
         return made
     return complex_model(
-        made, carrier, carriers(written[:count]), lambda c: _rebuilt(*plain, *([c] if c else [])),
+        made, carrier, carriers(entry(symbols)[:count]), lambda c: _rebuilt(*plain, *([c] if c else [])),
         lambda values: pencil(blocks(entry(values))),
     )  # fmt: skip
 
 
 def _statement(entry: Formulas, shapes: Sequence[tuple[str, int, int]], derived: Sequence[str]) -> dict[str, Any]:
     """What tells a model from others, every number in full."""
-    texts, shared = spelled(entry.function, entry.names)
+    numbers = (n.text if n.text.replace(".", "").isdigit() else f"({n.text})" for n in entry.constants)
+    texts, shared = spelled(entry.exact, [*entry.names, *numbers])
     rest = iter(texts)
     matrices = {n: [[next(rest) for _ in range(columns)] for _ in range(rows)] for n, rows, columns in shapes}
     quantities = dict(zip(derived, rest, strict=True))
@@ -330,7 +330,8 @@ def scalar(key: str, where: str, value: Any) -> ca.SX:
         if value.numel() != 1:
             raise Unfit(key, f"{where}: is a matrix; accepted: scalar expressions")
         return ca.densify(ca.SX(value))
-    return ca.SX(_number(key, where, value))
+    number = _number(key, where, value)
+    return constant(str(value)) if isinstance(value, Rational) else ca.SX(number)
 
 
 def _number(key: str, where: str, value: Any) -> float:
