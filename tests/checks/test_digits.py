@@ -334,8 +334,8 @@ def test_the_omega0_bound_is_never_above_the_true_one() -> None:
         problem = tmsopt.Problem(model=tms, fixed=fixed, free=free, minimize="abscissa")
         bound = omega0_bound(problem, 0.0)
         with mp.workdps(DIGITS):
-            stated = {**fixed, **{name: lower for name, (lower, _) in free.items()}}
-            a0, *_, a4 = polynomial_60(**native_60({name: repr(value) for name, value in stated.items()}))
+            anywhere = native_60({**fixed, **{name: lower for name, (lower, _) in free.items()}})
+            a0, *_, a4 = polynomial_60(**anywhere)
             true = -mp.root(abs(a4 / a0), 4)
             assert bound.method == "omega0"
             assert true * (1 + mp.mpf("2e-15")) <= bound.value <= true

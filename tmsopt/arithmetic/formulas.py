@@ -14,7 +14,7 @@ from tmsopt.arithmetic.walk import walk
 
 
 class Constant(Protocol):
-    """A number that no double is, such as 8/3 or √2."""
+    """A number, such as 8/3 or √2."""
 
     @property
     def text(self) -> str:
@@ -28,13 +28,13 @@ class Constant(Protocol):
 class Formulas:
     """Expressions of CasADi, the same for every kind of number.
 
-    CasADi keeps numbers as doubles. Those that are none are arguments of the function, given as doubles to what
+    CasADi keeps numbers as doubles, and folds them. So numbers are arguments of the function, given as doubles to what
     computes in doubles, and exactly to balls.
 
     Attributes:
         names: of the symbols.
         exact: one vector, an entry for each name and for each constant → one vector, an entry for each formula.
-        constants: numbers that no double is.
+        constants: numbers in them.
     """
 
     names: tuple[str, ...]

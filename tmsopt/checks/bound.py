@@ -22,7 +22,7 @@ import casadi as ca
 import flint
 import numpy as np
 
-from tmsopt.arithmetic.elementary import as_ball, exact, printed, quotient
+from tmsopt.arithmetic.elementary import as_ball, exact, quotient
 from tmsopt.arithmetic.walk import steps
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Bound
@@ -126,9 +126,9 @@ def _enclosed_product(problem: Problem) -> float:
     """An upper end of |aₙ/a0| over the box, by balls; inf where they contain a0 = 0."""
     of = problem.parameter_set
     with flint.ctx.workprec(_BITS):
-        ends = {n: (printed(lo), printed(hi)) for n, (lo, hi) in problem.free.items()}
+        ends = {n: (exact(lo), exact(hi)) for n, (lo, hi) in problem.free.items()}
         box = {n: as_ball(lo).union(as_ball(hi)) for n, (lo, hi) in ends.items()}
-        a = problem.model.coefficients(problem.ordered({n: printed(v) for n, v in problem.fixed.items()} | box), of)
+        a = problem.model.coefficients(problem.ordered({n: exact(v) for n, v in problem.fixed.items()} | box), of)
         upper = as_ball(abs(quotient(as_ball(a[-1]), as_ball(a[0])))).upper()
         return float(upper) if upper.is_finite() else math.inf
 
@@ -200,7 +200,7 @@ def _algebraic_box(problem: Problem) -> tuple[dict[str, tuple[float, float]], Kn
         for k in (extremes := [int(column.argmin()), int(column.argmax())]):
             if k not in balls:
                 with flint.ctx.workprec(_BITS):
-                    design = {m: printed(v) for m, v in zip(of.names, corners[k], strict=True)}
+                    design = {m: exact(float(v)) for m, v in zip(of.names, corners[k], strict=True)}
                     balls[k] = problem.model.algebraic(of.native(design))
             known[n, float(column[k])] = balls[k][n]
         box[n] = (float(column[extremes[0]]), float(column[extremes[1]]))
@@ -333,7 +333,7 @@ def _dependent(problem: Problem) -> bool:
 def _exact_rows(problem: Problem) -> list[list[Any]] | None:
     """Coefficients at random designs of the box; None where one is no fraction."""
     of, rng = problem.parameter_set, np.random.default_rng(0)
-    fixed = {n: printed(v) for n, v in problem.fixed.items()}
+    fixed = {n: exact(v) for n, v in problem.fixed.items()}
     if any(of[n].tangent and v != 0 for n, v in problem.fixed.items()):
         return None
     rows = []

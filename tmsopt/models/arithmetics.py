@@ -89,6 +89,14 @@ def note_constants(body: ast.expr, text: str) -> None:
             node.constant_text = own if known else ""  # type: ignore[attr-defined]
 
 
+def constant_texts(body: ast.expr) -> list[str]:
+    """The parts without names, each as large as it can be."""
+    if own := constant_text(body):
+        return [own]
+    parts = body.args if isinstance(body, ast.Call) else ast.iter_child_nodes(body)
+    return [text for part in parts if isinstance(part, ast.expr) for text in constant_texts(part)]
+
+
 def constant_text(node: ast.expr) -> str:
     """The text of a part without names; empty for any other."""
     return str(node.constant_text)  # type: ignore[attr-defined]

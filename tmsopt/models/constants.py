@@ -1,5 +1,6 @@
-"""Numbers in formulas of CasADi that no double is: symbols of their own, named by the text of the number."""
+"""Numbers in formulas of CasADi, which folds them to doubles: symbols of their own, named by the text of the number."""
 
+import math
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
@@ -7,7 +8,6 @@ from typing import Any
 import casadi as ca
 import flint
 
-from tmsopt.arithmetic.elementary import printed
 from tmsopt.arithmetic.formulas import Formulas
 from tmsopt.models.expression import parse_value
 
@@ -19,16 +19,27 @@ _DIGITS = 60
 
 @lru_cache(maxsize=4096)
 def constant(text: str) -> ca.SX:
-    """A number by an expression without names, such as ``sqrt(2)``: as itself where a double is it, else a symbol."""
+    """A number by an expression without names, such as ``sqrt(2)``: a symbol, but for 0 and what has no value."""
+    number = value_of(text)
+    return ca.SX.sym(_SIGN + text) if number and math.isfinite(number) else ca.SX(number)
+
+
+def value_of(text: str) -> float:
+    """The double nearest to an expression without names; nan where it has no value."""
     with flint.ctx.workdps(_DIGITS):
-        exact = parse_value(text, ()).enclosure({})
-        number = float(exact)
-    is_double = isinstance(exact, flint.fmpq) and printed(number) == exact
-    return ca.SX.sym(_SIGN + text) if number - number == 0 and not is_double else ca.SX(number)
+        return float(parse_value(text, ()).enclosure({}))
+
+
+def value_of_symbol(symbol: ca.SX) -> float | None:
+    """The number that a symbol stands for, or that is a constant of CasADi; None for anything else."""
+    if symbol.is_constant():
+        return float(symbol)
+    name = symbol.name() if symbol.is_symbolic() else ""
+    return value_of(name.removeprefix(_SIGN)) if name.startswith(_SIGN) else None
 
 
 def constants(expressions: ca.SX) -> tuple[str, ...]:
-    """Texts of the numbers in expressions that no double is."""
+    """Texts of the numbers in expressions."""
     names = [symbol.name() for symbol in ca.symvar(expressions)]
     return tuple(name.removeprefix(_SIGN) for name in names if name.startswith(_SIGN))
 

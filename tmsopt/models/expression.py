@@ -85,6 +85,11 @@ class Expression:
         return excess / max(1.0, abs(left), abs(right)) if math.isfinite(difference) else math.nan
 
     @property
+    def numbers(self) -> list[str]:
+        """Texts of the parts without names."""
+        return arithmetics.constant_texts(_parse(self.text))
+
+    @property
     def equality(self) -> bool:
         """Whether a comparison allows one value alone, so that it takes away a degree of freedom."""
         return self.allowed[0] == self.allowed[1]
@@ -109,8 +114,7 @@ class Expression:
 
     def sides(self, values: Mapping[str, Any]) -> tuple[float, float]:
         """Both sides of a comparison for a numeric design."""
-        with np.errstate(all="ignore"):
-            left, right = (float(_value(side, values, NUMERIC)) for side in self._sides())
+        left, right = map(float, self.each(values))
         return left, right
 
     def each(self, values: Mapping[str, Any]) -> list[Any]:
@@ -256,7 +260,7 @@ def _checked_names(  # noqa: PLR0912 - one case per kind of node
         case ast.Constant(value=bool()):
             raise ExpressionError(f"{_quoted(text)} uses {node.value!r}; accepted: numbers and names")
         case ast.Constant(value=int() | float()):
-            _number(node, text)
+            _check_number(node, text)
             return ()
         case ast.Name(id=name):
             if name in CONSTANTS:
@@ -302,17 +306,14 @@ def _source(node: ast.expr, text: str) -> str:
     return ast.get_source_segment(text.strip(), node) or text
 
 
-def _number(node: ast.Constant, text: str) -> float:
-    value = node.value
-    assert isinstance(value, int | float)
+def _check_number(node: ast.Constant, text: str) -> None:
     try:
-        number = float(value)
+        number = float(node.value)  # type: ignore[arg-type]
     except OverflowError:
         number = math.inf
-    if not math.isfinite(number) or (number == 0 and text and re.match(r"[0._]*[1-9]", _source(node, text))):
+    if not math.isfinite(number) or (number == 0 and re.match(r"[0._]*[1-9]", _source(node, text))):
         message = f"contains {_source(node, text)[:_LEGIBLE]}, a number beyond double precision"
         raise ExpressionError(f"{_quoted(text)} {message}")
-    return number
 
 
 def _value(node: ast.expr, values: Mapping[str, Any], arithmetic: Arithmetic) -> Any:

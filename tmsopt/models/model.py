@@ -202,6 +202,7 @@ class Model:
         natural: whether coefficients and roots are near 1 in the model's own units.
         origin: a function and its arguments, plain data, that make this model again in another process.
         statement: of a model that a user states, plain data that tell it from others.
+        numbers: texts of the numbers in the formulas of a stated model that are not whole.
         words: what its users call a pair on the imaginary axis, ``weave`` in data, and a root 0, ``capsize``.
         conventions: sentences on signs.
         sketch: the system drawn in text, with the symbols on it.
@@ -232,6 +233,7 @@ class Model:
     natural: bool = False
     origin: tuple[Callable[..., "Model"], tuple[Any, ...]] | None = field(default=None, repr=False)
     statement: Mapping[str, Any] | None = field(default=None, repr=False, hash=False)
+    numbers: tuple[str, ...] = field(default=(), repr=False)
     words: tuple[str, str] = field(default=("flutter", "divergence"), repr=False)
     conventions: tuple[str, ...] = field(default=(), repr=False)
     sketch: str = field(default="", repr=False)

@@ -59,6 +59,7 @@ class Proof(Shown):
         moved: parameters that were solved for; the others are held.
         held: parameter, or ``tan(parameter)`` → the fraction that it is taken for, exactly.
         stated: of these, those given exactly by the user.
+        numbers: those in formulas that are not whole, as written; each is what its digits say.
         radius: of the largest ball among the numbers solved for.
         uniqueness: no other solution is this near, in each of these numbers; inf where none is solved for.
         distance: from the proved to the stored design, in the parameter for which it is largest against `explained`.
@@ -94,6 +95,7 @@ class Proof(Shown):
     moved: tuple[str, ...] = ()
     held: Table[str] = field(default_factory=Table)
     stated: tuple[str, ...] = ()
+    numbers: tuple[str, ...] = ()
     radius: float = math.nan
     uniqueness: float = math.nan
     distance: float = math.nan
@@ -113,8 +115,8 @@ class Proof(Shown):
         return {
             **plain(self, "claim proved reason pattern method digits"),
             "of": "the design as stored" if self.stored or not self.proved else "the proved design",
-            **plain(self, "parameters tangents unknowns moved held stated radius uniqueness distance explained"),
-            **plain(self, "roots"),
+            **plain(self, "parameters tangents unknowns moved held stated numbers"),
+            **plain(self, "radius uniqueness distance explained roots"),
             **(plain(self, "eigenfrequencies") if self.eigenfrequencies else {}),
             **plain(self, "abscissa stable heavily_damped inside limits"),
             "seconds": round(self.seconds, 4),
@@ -247,6 +249,7 @@ def _assembled(
         moved=found.moved,
         held=Table(dict(design.text(n) for n in problem.parameter_set.names if n not in found.moved)),
         stated=design.stated,
+        numbers=_numbers(problem),
         radius=found.radius,
         uniqueness=found.uniqueness,
         distance=found.distance,
@@ -261,6 +264,12 @@ def _assembled(
         inside=inside(problem, design, found),
         limits=Table(limits(problem, found)),
     )
+
+
+def _numbers(problem: Problem) -> tuple[str, ...]:
+    """Texts of the numbers in formulas that are not whole."""
+    equalities = [n for c in problem.conditions.values() if c.equality for n in c.numbers if not n.isdigit()]
+    return tuple(dict.fromkeys([*problem.model.numbers, *equalities]))
 
 
 def _claim(name: str, pattern: Pattern | None) -> str:

@@ -95,9 +95,10 @@ def _facts(proof: Proof) -> list[str]:
 
 def _held(problem: Problem, proof: Proof) -> list[str]:
     """Numbers that were taken exactly, and a word on angles."""
-    if not proof.held:
+    exact = [*(f"{name} = {_fraction(value)}" for name, value in proof.held.items()), *proof.numbers]
+    if not exact:
         return []
-    lines = [f"taken exactly: {', '.join(f'{name} = {_fraction(value)}' for name, value in proof.held.items())}"]
+    lines = [f"taken exactly: {', '.join(exact)}"]
     of = problem.parameter_set
     angles = [n for n in proof.held if n in of.names and of[n].tangent and n not in proof.stated]
     angles = [n for n in angles if proof.parameters[n].value != "0"]

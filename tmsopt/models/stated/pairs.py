@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 
 from tmsopt.models.arithmetics import BINARY, SYMBOLIC, Arithmetic
-from tmsopt.models.constants import constant
+from tmsopt.models.constants import constant, value_of_symbol
 from tmsopt.models.names import FUNCTIONS
 from tmsopt.models.stated.degree import LARGEST_EXPONENT, Beyond
 
@@ -83,9 +83,8 @@ def is_real(x: Pair) -> bool:
 def _whole(n: Pair) -> int | None:
     if not is_real(n):
         return None
-    number = ca.SX(n.re)
-    value = float(number) if number.is_constant() else 0.5
-    return int(value) if value == int(value) and abs(value) <= LARGEST_EXPONENT else None
+    value = value_of_symbol(ca.SX(n.re))
+    return int(value) if value is not None and value == int(value) and abs(value) <= LARGEST_EXPONENT else None
 
 
 def _real(name: str, function: Callable[..., Any]) -> Callable[..., Pair]:

@@ -15,7 +15,7 @@ from tmsopt.arithmetic.elementary import exact, is_ball
 from tmsopt.arithmetic.formulas import Formulas
 from tmsopt.arithmetic.identity import Field
 from tmsopt.arithmetic.twofold import Twofold
-from tmsopt.arithmetic.walk import NotAccepted, walk
+from tmsopt.arithmetic.walk import NotAccepted, steps, walk
 from tmsopt.errors import short
 from tmsopt.models.built_in import MODELS
 from tmsopt.models.constants import constant, constants, formulas, rebuilt
@@ -257,9 +257,11 @@ def _rebuilt(
         pencil=None if kind == "coefficients" else lambda values: pencil(blocks(entry(values)), carrier),
     )
     plain = (kind, name, names, shapes, derived, serialized, texts)
+    decimals = dict.fromkeys(step.constant for step in steps(entry.exact) if step.operation == ca.OP_CONST)
     made = replace(
-        made, origin=(_rebuilt, (*plain, carrier) if carrier else plain), statement=_statement(entry, shapes, derived)
-    )
+        made, origin=(_rebuilt, (*plain, carrier) if carrier else plain), statement=_statement(entry, shapes, derived),
+        numbers=(*(n for n in texts if not n.lstrip("-").isdigit()), *(repr(x) for x in decimals if x % 1)),
+    )  # fmt: skip
     if kind != "hamiltonian":
         return made
     return complex_model(
@@ -270,8 +272,7 @@ def _rebuilt(
 
 def _statement(entry: Formulas, shapes: Sequence[tuple[str, int, int]], derived: Sequence[str]) -> dict[str, Any]:
     """What tells a model from others, every number in full."""
-    numbers = (n.text if n.text.replace(".", "").isdigit() else f"({n.text})" for n in entry.constants)
-    texts, shared = spelled(entry.exact, [*entry.names, *numbers])
+    texts, shared = spelled(entry.function, entry.names)
     rest = iter(texts)
     matrices = {n: [[next(rest) for _ in range(columns)] for _ in range(rows)] for n, rows, columns in shapes}
     quantities = dict(zip(derived, rest, strict=True))

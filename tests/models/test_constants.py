@@ -1,0 +1,94 @@
+"""Numbers in formulas are what their digits and quotients say: against mpmath, at 60 digits."""
+
+import pickle
+import random
+import re
+from fractions import Fraction
+
+import casadi as ca
+import flint
+import pytest
+from mpmath import mp
+
+import tmsopt
+from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices
+
+NUMBERS = ["0.1", "8/3", "2/7", "1.8", "sqrt(2)", "pi", "2", "0.5", "(1/3 - 0.3)", "exp(0.1)", "-0.7", "1e-3", "12"]
+NAMES = {name: getattr(mp, name) for name in ("sqrt", "exp", "sin")} | {"pi": mp.pi, "mpf": mp.mpf, "__builtins__": {}}
+
+
+def truth(text: str, x: str, y: str) -> mp.mpf:
+    """The value at 60 digits; a number is made of its digits."""
+    exactly = re.sub(r"\d+\.?\d*(e-?\d+)?", lambda found: f"mpf('{found[0]}')", text)
+    return mp.mpf(eval(exactly, {**NAMES, "x": mp.mpf(x), "y": mp.mpf(y)}))
+
+
+def random_text(rng: random.Random, depth: int) -> str:
+    """Sums, products and quotients of numbers and of x and y, which CasADi would like to gather."""
+    if depth == 0:
+        return rng.choice([*NUMBERS, "x", "y", "x", "y"])
+    a, b = random_text(rng, depth - 1), random_text(rng, rng.randrange(depth))
+    return rng.choice([f"({a} + {b})", f"({a} - {b})", f"({a})*({b})", f"({a})/(2 + ({b})**2)", f"sin({a})"])
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_random_formulas_hold_the_60_digit_value(seed: int) -> None:
+    rng = random.Random(seed)
+    text = f"{random_text(rng, 4)} + x/3*0.6/0.2 + y - y"
+    model = pickle.loads(pickle.dumps(from_coefficients(["1", text, "0.1*x"], quantities={"q": f"{text} - 0.3"})))
+    x, y = Fraction(rng.randrange(1, 900), 100), Fraction(rng.randrange(-900, 900), 100)
+    values = {"x": flint.fmpq(*x.as_integer_ratio()), "y": flint.fmpq(*y.as_integer_ratio())}
+    with flint.ctx.workdps(70), mp.workdps(70):
+        written = truth(text, str(float(x)), str(float(y)))
+        found = flint.arb(model.coefficients(values)[1]), flint.arb(model.quantities[0].value(values))
+        for ball, wanted in zip(found, (written, written - mp.mpf("0.3")), strict=True):
+            off = abs(flint.arb(mp.nstr(wanted, 65)) - ball)
+            assert off.abs_upper() < flint.arb(10) ** -55 * (1 + abs(ball))
+        assert model.coefficients({"x": float(x), "y": float(y)})[1] == pytest.approx(
+            float(written), rel=1e-11, abs=1e-12
+        )
+
+
+@pytest.mark.parametrize(
+    "eight_thirds", ["8/3", Fraction(8, 3), "2.6 + 1/15", "(2 + 2/3)"], ids=["text", "Fraction", "sum", "brackets"]
+)
+def test_a_quotient_is_a_fraction_however_it_is_given(eight_thirds: object) -> None:
+    """c = 2 √(8/3), not twice the root of the double nearest to 8/3, which is 9e-17 off."""
+    with mp.workdps(60):
+        wanted = mp.nstr(2 * mp.sqrt(mp.mpf(8) / 3), 50)
+    for model in (
+        from_coefficients([1, "c", eight_thirds]),
+        from_matrices(A=[[0, 1], [f"-({eight_thirds})", "-c"]]),
+        from_matrices(M=[[1]], D=[["c"]], K=[[eight_thirds]]),
+    ):
+        proof = tmsopt.prove(tmsopt.solve(tmsopt.Problem(model, free={"c": (1, 9)}, locate="EP2")))
+        assert proof.proved
+        assert proof.parameters["c"].contains(wanted)
+        assert float(proof.parameters["c"].radius) < 1e-30
+
+
+def test_decimals_of_arrays_and_of_casadi_are_decimals() -> None:
+    """As in [[0.1, 0.7], [0.3, 2.1]], whose determinant is 0 and in binary is not."""
+    c = ca.SX.sym("c")
+    for rows in ([[0.1, 0.7], ["0.3*c", "2.1*c"]], [[ca.SX(0.1), ca.SX(0.7)], [0.3 * c, 2.1 * c]]):
+        a = from_matrices(A=rows).coefficients({"c": flint.fmpq(1, 3)})
+        assert a[2] == 0
+        assert a[1] == -flint.fmpq(1, 10) - flint.fmpq(7, 10)
+
+
+def test_complex_entries_keep_their_numbers() -> None:
+    """|g1 − g2|/2 for g1 = 7/10 and g2 = 1/3."""
+    model = from_hamiltonian([["d - 0.7j", "k"], ["k", "-1j/3"]])
+    problem = tmsopt.Problem(model, free={"d": (-1, 1), "k": (0.01, 3)}, locate="EP2")
+    proof = tmsopt.prove(tmsopt.solve(problem))
+    assert proof.proved
+    assert Fraction(proof.parameters["k"].radius) < Fraction(1, 10**30)
+    assert proof.parameters["k"].contains(Fraction(11, 60))
+
+
+def test_a_proof_lists_the_numbers_that_it_takes_exactly() -> None:
+    proof = tmsopt.prove(
+        tmsopt.solve(tmsopt.Problem(from_coefficients([1, "c", "8/3"]), free={"c": (1, 9)}, locate="EP2"))
+    )
+    assert proof.numbers == ("8/3",)
+    assert "8/3" in proof.report().split("taken exactly:")[1]
