@@ -7,12 +7,17 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from fractions import Fraction
 from itertools import permutations
 from pathlib import Path
 
+import flint
 import pytest
 from hypothesis import given, settings, strategies as st
+from mpmath import mp
 
+import tmsopt
 from tmsopt.units import USUAL, Dimension, by_pint, dimensions, factor, read, with_unit
 
 AT_ONCE = 1.0
@@ -99,6 +104,41 @@ def test_usual_units_are_as_pint_has_them(written: str, unit: str, monkeypatch: 
     assert own == ([read(text, unit) for text in texts], factor(written, unit))
 
 
+CONSTANTS = {
+    ("8/3", "1"): lambda: mp.mpf(8) / 3,
+    ("-sqrt(2)/2", "1"): lambda: -1 / mp.sqrt(2),
+    ("0.1234567890123456789012345", "1"): lambda: mp.mpf("0.1234567890123456789012345"),
+    ("2*pi/3 rad", "rad"): lambda: 2 * mp.pi / 3,
+    ("20/3 deg", "rad"): lambda: mp.pi / 27,
+    ("1/3 m", "m"): lambda: mp.mpf(1) / 3,
+    ("10 km/h", "m/s"): lambda: mp.mpf(25) / 9,
+    ("sqrt(2) in", "m"): lambda: mp.sqrt(2) * mp.mpf("0.0254"),
+    ("7 ft", "m"): lambda: mp.mpf("2.1336"),
+    ("exp(1)/3 kg", "kg"): lambda: mp.e / 3,
+}
+
+
+@pytest.mark.parametrize(("text", "unit"), CONSTANTS)
+def test_a_constant_is_kept_as_it_is_written(text: str, unit: str) -> None:
+    """The double is near, and the exact number is the true one, to 50 digits by mpmath."""
+    with mp.workdps(60), flint.ctx.workdps(70):
+        truth = CONSTANTS[text, unit]()
+        number, _, exact = read(text, unit)
+        assert exact is not None
+        assert number == pytest.approx(float(truth), rel=3e-16)
+        assert abs(mp.mpf(exact.ball().str(60, radius=False)) - truth) < 1e-50
+
+
+def test_a_problem_keeps_the_constants_that_it_was_given() -> None:
+    system = tmsopt.models.from_coefficients([1, "c", "k"])
+    problem = tmsopt.Problem(system, fixed={"k": "8/3"}, free={"c": ("1/10", "sqrt(50)")}, locate="EP2")
+    assert problem.fixed["k"] == 8 / 3
+    assert problem.typed({"k": 8 / 3, "c": 50**0.5}) == {"k": "8/3", "c": "sqrt(50)"}
+    assert "c" not in problem.typed({"c": 0.1})  # whose own decimal is exact
+    assert replace(problem, fixed={"k": 2.5}).typed({"k": 2.5}) == {}
+    assert tmsopt.Problem(system, fixed={"k": Fraction(8, 3)}, free={"c": (0, 9)}).typed({"k": 8 / 3}) == {"k": "8/3"}
+
+
 REFUSED = {
     "wrong dimension": [
         ("5 m", "rad"), ("5 deg", "m"), ("5 kg", "m"), ("5 s", "m"), ("5 m", "kg"), ("5 m/s", "m"), ("5 m", "m/s"),
@@ -108,7 +148,8 @@ REFUSED = {
     "a unit on a dimensionless number": [
         ("5 m", "1"), ("5 deg", "1"), ("5 %", "1"), ("5 rad", "1"), ("5 percent", "1"),
     ],
-    "no unit": [("5", "m"), ("5.0", "rad"), ("1e3", "kg"), (" 5 ", "m"), ("5", "1")],
+    "no unit": [("5", "m"), ("5.0", "rad"), ("1e3", "kg"), (" 5 ", "m"), ("pi/6", "rad"), ("8/3", "m")],
+    "no constant": [("1/0", "1"), ("sqrt(-1)", "1"), ("8/3*c", "1"), ("2*(3", "1"), ("9^2", "1"), ("1e999", "1")],
     "malformed": [
         ("", "m"), (" ", "m"), ("m", "m"), ("deg", "rad"), ("five m", "m"), ("5 5 m", "m"), ("5,5 m", "m"),
         ("1.2.3 m", "m"), ("+-5 m", "m"), ("--5 m", "m"), ("5 m 5", "m"), ("5 *m", "m"), ("5 m*", "m"), ("5 m/", "m"),

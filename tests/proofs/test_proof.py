@@ -253,7 +253,7 @@ def test_a_design_without_multiple_roots_is_taken_as_it_is() -> None:
     proof = tmsopt.prove(design)
     assert (proof.proved, proof.pattern, proof.moved, proof.method) == (True, "pair", (), "isolated roots")
     with mp.workdps(60):
-        p = {n: mp.mpf(v.value) for n, v in proof.parameters.items()}
+        p = {n: mp.mpf(v.value) for n, v in proof.parameters.items()} | {"lambda_s": mp.radians(5)}  # as typed
         native = {"Fr": p["v"] / mp.sqrt(p["g"] * p["w"]), "mu": p["m_H"] / p["m_B"]}
         native |= {f"chi_{k}": p[f"x_{k}"] / p["w"] for k in "BH"} | {f"zeta_{k}": p[f"z_{k}"] / p["w"] for k in "BH"}
         a = tmsopt.models.tms.polynomial(**native, T=mp.tan(p["lambda_s"]))

@@ -49,7 +49,9 @@ class Problem:
         weights: parameter → size of a change that counts as 1 in the robustness radius; by default relative changes
             of every parameter.
         units: parameter → unit in which it was typed, for reports; by default those of numbers given as texts. Any
-            number may be given as a text with a unit, such as ``free={"w": ("25 cm", "60 cm")}``.
+            number may be given as a text with a unit, such as ``free={"w": ("25 cm", "60 cm")}``, as a constant such as
+            ``"8/3"`` or ``"sqrt(2)/2 m"``, or as a Fraction.
+        written: parameter → number → the exact one that was typed for it, where its own decimal is another.
 
     Raises:
         InputError: listing everything that is wrong, each with the accepted values.
@@ -78,6 +80,7 @@ class Problem:
     weights: Mapping[str, float] = field(default_factory=dict)
     pareto: Sequence[str] = ()
     units: Mapping[str, str] = field(default_factory=dict, compare=False)
+    written: Mapping[str, Mapping[float, str]] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
         if found := list(shape_faults(self)):
@@ -85,8 +88,9 @@ class Problem:
         object.__setattr__(self, "scenarios", {n: as_scenario(s) for n, s in self.scenarios.items()})
         object.__setattr__(self, "model", controlled(self.model, (*self.fixed, *self.free, *self.scenarios)))
         of = guess_parameter_set(self.model, {**self.fixed, **self.free, **self.scenarios})
-        read, units, unreadable = numbers({table: getattr(self, table) for table in TABLES}, of)
-        for name, value in (*read.items(), ("units", {**units, **self.units})):
+        read, units, typed, unreadable = numbers({table: getattr(self, table) for table in TABLES}, of)
+        written = {n: {**typed.get(n, {}), **self.written.get(n, {})} for n in (*self.written, *typed)}
+        for name, value in (*read.items(), ("units", {**units, **self.units}), ("written", written)):
             object.__setattr__(self, name, value)
         places = {f.key[:2] for f in unreadable}
         if found := [*unreadable, *(f for f in faults(self) if f.key[:2] not in places)]:
@@ -221,6 +225,11 @@ class Problem:
         ranges = {n: hi - lo for n, (lo, hi) in self.free.items()}
         extra = (*ROOT_QUANTITIES, NO_RADIUS, STRUCTURE)
         return Values(self.model, self.parameter_set, parameters, extra=extra, ranges=ranges)
+
+    def typed(self, parameters: Mapping[str, float]) -> dict[str, str]:
+        """The exact numbers that were typed for some of a design's doubles, such as ``8/3`` or ``20 deg``."""
+        exact = {n: self.written.get(n, {}).get(x) for n, x in parameters.items()}
+        return {n: text for n, text in exact.items() if text}
 
     def ordered(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Every parameter in the model's order: the given values of the free ones, and the fixed ones."""

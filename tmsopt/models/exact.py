@@ -5,12 +5,14 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from types import MappingProxyType
 from typing import Any
 
 import flint
 
-from tmsopt.arithmetic.elementary import rational
+from tmsopt.arithmetic.elementary import DIGITS, rational
 from tmsopt.errors import Fault, InputError, short, suggest, table_faults
+from tmsopt.models.expression import Expression, parse_value
 from tmsopt.models.model import ParameterSet
 from tmsopt.records import Table
 
@@ -26,22 +28,72 @@ _DEGREES = re.compile(r"(.*?)\s*(?:deg|°)")
 
 @dataclass(frozen=True)
 class Exact:
-    """A fraction, or a fraction of degrees.
+    """A constant of arithmetic, or so many degrees.
 
     Attributes:
-        value: of degrees, where `degrees`.
+        value: of degrees, where `degrees`; an expression without names where it is irrational.
     """
 
-    value: Fraction
+    value: Fraction | Expression
     degrees: bool = False
+
+    @property
+    def fraction(self) -> Fraction | None:
+        """The number as a fraction; None for degrees, and where it is irrational."""
+        return self.value if isinstance(self.value, Fraction) and not self.degrees else None
 
     def ball(self) -> Any:
         """The number, an angle in radians, as a ball at the working precision."""
-        ball = flint.arb(rational(self.value))
+        value: Any = self.value
+        ball = flint.arb(rational(value) if isinstance(value, Fraction) else value.enclosure({}))
         return ball * flint.arb.pi() / 180 if self.degrees else ball
 
+    def times(self, factor: Fraction) -> "Exact":
+        """The product with a fraction."""
+        if isinstance(self.value, Fraction):
+            return Exact(self.value * factor)
+        return self if factor == 1 else Exact(parse_value(f"({self.value.text})*{factor}", ()))
+
+    def in_degrees(self) -> "Exact":
+        """So many degrees."""
+        return Exact(self.value, degrees=bool(self.value))
+
+    def __float__(self) -> float:
+        if self.fraction is not None:
+            return _double(self.fraction)
+        with flint.ctx.workdps(DIGITS):
+            ball = self.ball()
+            return 0.0 if ball.contains(0) else _double(Fraction(str(rational(ball))))
+
     def __str__(self) -> str:
-        return f"{self.value} deg" if self.degrees else str(self.value)
+        text = str(self.value) if isinstance(self.value, Fraction) else self.value.text
+        return f"{text} deg" if self.degrees else text
+
+
+def constant(text: str) -> Exact:
+    """A constant of arithmetic such as ``8/3``, ``-0.1`` or ``2*pi/3``.
+
+    Raises:
+        ValueError: with the reason, for what is none, has no value or is beyond double precision.
+    """
+    number: Any = None
+    expression = None
+    try:
+        number = decimal(text)
+    except (ValueError, ZeroDivisionError):
+        expression = parse_value(text, (), "8/3")
+        with flint.ctx.workdps(DIGITS):
+            number = expression.enclosure({})
+        if isinstance(number, flint.fmpq):
+            number = Fraction(int(number.p), int(number.q))
+        elif number.is_finite():
+            number = expression
+        else:
+            raise ValueError(f"'{text}' has no value") from None
+    found = Exact(number)
+    if not math.isfinite(float(found)) or (float(found) == 0 and number not in (0, expression)):
+        raise ValueError(f"'{text}' is a number beyond double precision")
+    return found
 
 
 def decimal(x: Any) -> Fraction:
@@ -64,6 +116,14 @@ def decimal(x: Any) -> Fraction:
     if _is_long(found):
         raise ValueError("too many digits")
     return found
+
+
+def _double(x: Fraction) -> float:
+    """The nearest double; infinite beyond them."""
+    try:
+        return float(x)
+    except OverflowError:
+        return math.inf if x > 0 else -math.inf
 
 
 def _is_long(x: Any) -> bool:
@@ -92,17 +152,16 @@ class Written:
         return balls | {name: number.ball().atan() for name, number in self.tangents.items()}
 
     def fractions(self, of: ParameterSet) -> dict[str, Any] | None:
-        """Parameter → fraction, an angle as a `Tilt`; None where a tangent is not a fraction."""
+        """Parameter → fraction, an angle as a `Tilt`; None where a number or a tangent is not a fraction."""
         found: dict[str, Any] = {}
         for name in of.names:
-            if not of[name].tangent:
-                found[name] = rational(self.values[name].value)
-            elif name in self.tangents:
-                found[name] = Tilt(rational(self.tangents[name].value))
-            elif self.values[name].value == 0:
-                found[name] = Tilt(flint.fmpq(0))
-            else:
+            number = self.tangents.get(name, self.values.get(name))
+            if number is None or number.fraction is None:
                 return None
+            value = rational(number.fraction)
+            if of[name].tangent and name not in self.tangents and value != 0:
+                return None
+            found[name] = Tilt(value) if of[name].tangent else value
         return found
 
     def text(self, name: str) -> tuple[str, str]:
@@ -123,12 +182,16 @@ class Tilt:
         return self.tangent
 
 
-def written(of: ParameterSet, parameters: Mapping[str, float], stated: Mapping[str, Any] | None = None) -> Written:
+def written(
+    of: ParameterSet, parameters: Mapping[str, float], stated: Mapping[str, Any] | None = None,
+    typed: Mapping[str, str] = MappingProxyType({}),
+) -> Written:  # fmt: skip
     """A design's doubles as decimals, save those for which an exact number is given.
 
     Args:
         stated: parameter, or ``tan(parameter)`` of an angle → int, Fraction, fmpq, a float that stands for its decimal,
-            or text such as ``"-2/5"``, ``"1.02"``, and for an angle ``"20 deg"``.
+            or text such as ``"-2/5"``, ``"1.02"``, ``"sqrt(2)/2"``, and for an angle ``"20 deg"``.
+        typed: parameter → such a text of the problem itself, as `Problem.typed` has it.
 
     Raises:
         InputError: for an unknown name, another kind of number, or one that is not the design's.
@@ -137,6 +200,7 @@ def written(of: ParameterSet, parameters: Mapping[str, float], stated: Mapping[s
         raise InputError(wrong)
     names = {n: n for n in of.names} | {f"tan({p.name})": p.name for p in of.parameters if p.tangent}
     values = {n: Exact(decimal(float(parameters[n]))) for n in of.names}
+    values |= {n: number for n, text in typed.items() if (number := _parsed(text, angle=of[n].unit == "rad"))}
     tangents: dict[str, Exact] = {}
     faults = []
     for key, given in (stated or {}).items():
@@ -166,19 +230,21 @@ def written(of: ParameterSet, parameters: Mapping[str, float], stated: Mapping[s
 def _parsed(given: Any, angle: bool) -> Exact | None:
     if isinstance(given, bool):
         return None
-    degrees = _DEGREES.fullmatch(given.strip()) if isinstance(given, str) and angle else None
     try:
+        if isinstance(given, str):
+            degrees = _DEGREES.fullmatch(given.strip()) if angle else None
+            return constant(degrees[1]).in_degrees() if degrees else constant(given)
         if isinstance(given, flint.fmpq | flint.fmpz):
             fraction = rational(given) if isinstance(given, flint.fmpq) else flint.fmpq(given)
             given = Fraction(int(fraction.p), int(fraction.q))
-        return Exact(decimal(degrees[1] if degrees else given), bool(degrees))
-    except (ValueError, TypeError, ZeroDivisionError, OverflowError):
+        return Exact(decimal(given))
+    except (ValueError, TypeError, OverflowError):
         return None
 
 
 def _accepted(given: Any, angle: bool) -> str:
     angles = ", or an angle such as '20 deg'" if angle else ""
     accepted = (
-        f"an int, a Fraction, a decimal or fraction in quotes such as '-2/5'{angles}, of up to {MOST_DIGITS} digits"
+        f"an int, a Fraction, a constant in quotes such as '-2/5' or 'sqrt(2)'{angles}, of up to {MOST_DIGITS} digits"
     )
     return f"found {'a number of more digits' if _is_long(given) else short(given)}; accepted: {accepted}"

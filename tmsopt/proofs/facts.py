@@ -111,8 +111,8 @@ def inside(problem: Problem, design: Written, found: Existing) -> Verdict:
     undecided = []
     for name, (least, greatest) in problem.free.items():
         value: Any = flint.arb(found.parameters[name])
-        if name not in found.moved and name not in design.tangents and not design.values[name].degrees:
-            value = rational(design.values[name].value)
+        if name not in (*found.moved, *design.tangents) and (known := design.values[name].fraction) is not None:
+            value = rational(known)
         if {name, f"tan({name})"} & set(design.stated) and float(value) in (least, greatest):
             continue  # the exact form of a limit
         lo, hi = rational(decimal(least)), rational(decimal(greatest))

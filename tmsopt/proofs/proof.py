@@ -146,7 +146,8 @@ def prove_design(
     digits = int(digits)
     began = time.perf_counter()
     varied = case.applied(parameters) if case else dict(parameters)
-    design = written(problem.parameter_set, varied, exact)
+    typed = {n: text for n, text in problem.typed(varied).items() if n in problem.fixed}
+    design = written(problem.parameter_set, varied, exact, typed)
     with flint.ctx.workdps(2 * digits + _EXTRA):
         patterns = _patterns(problem, structure, roots)
         proof = _proved(_asked(problem, case), design, varied, structure, patterns, digits)
@@ -226,8 +227,8 @@ def _assembled(
 ) -> Proof:  # fmt: skip
     numbers = {
         n: number(ball, digits)
-        if n in found.moved or n in design.tangents or design.values[n].degrees
-        else fraction(design.values[n].value, digits)
+        if n in (*found.moved, *design.tangents) or (known := design.values[n].fraction) is None
+        else fraction(known, digits)
         for n, ball in found.parameters.items()
     }
     abscissa = found.factored.abscissa

@@ -1,4 +1,4 @@
-"""Text such as "40 cm" or "1 deg" as a number in the parameter's own unit."""
+"""Text such as "40 cm", "1/3 m" or "8/3" as a number in the parameter's own unit."""
 
 import math
 import re
@@ -7,12 +7,15 @@ from fractions import Fraction
 from functools import cache
 from typing import Any
 
+from tmsopt.models.exact import Exact, constant
+
 LONGEST = 80
 """Characters of a number with its unit."""
 
 _LARGEST_DENOMINATOR = 10**6  # of a factor between units, such as 5/18
 _ROUNDED = 4e-16  # relative error of a factor in double precision
-_QUANTITY = re.compile(r"(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.+-].*)?", re.ASCII)
+_DECIMAL = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_QUANTITY = re.compile(rf"(?P<number>(?>{_DECIMAL}|pi\b|[a-z]+\(|[-+](?!\s*[-+])|[*/()\s])*+)(?P<unit>.*)", re.A | re.S)
 _POWER = r"(?: ?(?:\*\*|\^) ?-?\d)?"
 _UNIT = re.compile(rf"[A-Za-zµμ°%]+{_POWER}(?:(?: ?[*/] ?| )[A-Za-zµμ°%]+{_POWER})*", re.ASCII)
 """Names with one-digit powers, joined by * / or one blank, so that a text matches in one way at most: anything richer
@@ -21,7 +24,8 @@ could keep a parser busy for ever."""
 _OF_TWO = "write its parts as two parameters, kr + 1j*ki in H"
 
 _EXAMPLES = {
-    "1": "a number", "rad": "'5 deg' or '0.1 rad'", "m": "'40 cm' or '1.2 m'", "kg": "'10 kg' or '500 g'",
+    "1": "a number, or one in quotes such as '8/3' or 'sqrt(2)/2'", "rad": "'5 deg', '0.1 rad' or 'pi/6 rad'",
+    "m": "'40 cm' or '1.2 m'", "kg": "'10 kg' or '500 g'",
     "m/s": "'15 km/h' or '4 m/s'", "m/s^2": "'9.81 m/s^2'", "s": "'50 ms' or '0.05 s'", "N m/rad": "'20 N m/rad'",
 }  # fmt: skip
 
@@ -54,8 +58,8 @@ def _is_complex(text: str) -> bool:
         return False
 
 
-def read(text: str, unit: str) -> tuple[float, str]:
-    """The same, with the unit as written.
+def read(text: str, unit: str) -> tuple[float, str, Exact | None]:  # noqa: PLR0912 - one for each fault
+    """The same, with the unit as written and the exact number, None where no exact factor between the units is known.
 
     Raises:
         ValueError: likewise.
@@ -70,13 +74,18 @@ def read(text: str, unit: str) -> tuple[float, str]:
     if _is_complex(text):
         raise ValueError(f"found '{text}', a complex number, and parameters are real; {_OF_TWO}")
     parts = _QUANTITY.fullmatch(text.strip())
-    if parts is None:
-        raise ValueError(f"found '{text}', not a number with a unit; {accepted}")
-    number, written = float(parts["number"]), parts["unit"]
-    if not _is_double(number, parts["number"]):
-        raise ValueError(f"found '{text}', a number beyond double precision; {accepted}")
-    if not written:
+    assert parts  # any text matches: either part may be empty
+    number, written = parts["number"].strip(), parts["unit"]
+    if not number:
+        raise ValueError(f"found '{text}', not a number{'' if unit == '1' else ' with a unit'}; {accepted}")
+    try:
+        found = constant(number)
+    except ValueError as error:
+        raise ValueError(f"found '{text}', no number: {str(error).partition('; accepted')[0]}; {accepted}") from None
+    if not written and unit != "1":
         raise ValueError(f"found '{text}', a number in quotes without a unit; {accepted}")
+    if not written:
+        return float(found), "", found
     if unit == "1":
         raise ValueError(f"found '{text}', but the parameter is dimensionless; {accepted}")
     written = " ".join(written.replace("²", "^2").replace("³", "^3").replace("·", "*").split())
@@ -85,18 +94,17 @@ def read(text: str, unit: str) -> tuple[float, str]:
     one = _factor(written.replace("°", "deg"), unit)
     if one is None:
         raise ValueError(f"found the unit '{written}', which is not known or not a unit of {unit}; {accepted}")
-    if not _is_double(number * one, parts["number"]):
+    share, exact = Fraction(one).limit_denominator(_LARGEST_DENOMINATOR), None
+    if abs(share - Fraction(one)) > _ROUNDED * share:  # an angle
+        value = float(found) * one
+        if one == USUAL["rad"]["deg"]:
+            exact = found.in_degrees()
+    else:
+        exact = found.times(share)
+        value = float(exact)  # the nearest to what is written: 70 cm is 0.7 m
+    if not math.isfinite(value) or (value == 0) != (float(found) == 0):
         raise ValueError(f"found '{text}', a number beyond double precision; {accepted}")
-    share = Fraction(one).limit_denominator(_LARGEST_DENOMINATOR)
-    if number == 0 or abs(share - Fraction(one)) > _ROUNDED * share:  # an angle
-        return number * one, written
-    value = float(Fraction(parts["number"]) * share)  # the double nearest to what is written: 70 cm is 0.7 m
-    return value, written
-
-
-def _is_double(number: float, written: str) -> bool:
-    """Whether a double is near what is written: finite, and 0 only for a nought."""
-    return math.isfinite(number) and (number != 0 or not re.search("[1-9]", re.split("[eE]", written)[0]))
+    return value, written, exact
 
 
 def factor(written: str, unit: str) -> float:
