@@ -11,7 +11,6 @@ from typing import Any
 import flint
 
 from tmsopt.arithmetic.balls import number
-from tmsopt.arithmetic.elementary import rational
 from tmsopt.arithmetic.formal import variable
 from tmsopt.arithmetic.intervals import interval
 from tmsopt.arithmetic.krawczyk import Enclosure, Refused, enclosed, refined
@@ -25,7 +24,6 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.formulation.nlp import Scale, reaches_of, scale_of
 from tmsopt.models import Quantity, Values
-from tmsopt.models.exact import decimal
 from tmsopt.processes import Inbox, Worker
 from tmsopt.progress import Counts
 from tmsopt.records import Table
@@ -203,7 +201,7 @@ def _sheets(problem: Problem) -> Iterator[Sheet]:
         equality(values)
     scale = scale_of(problem)
     scale = Scale(_UNITS * scale.unit, scale.lead)
-    held = {n: rational(decimal(x)) for n, x in problem.fixed.items()}
+    held = problem.exactly(problem.fixed)
     for pieces in sheets(problem.pattern.form):
         yield Sheet(problem, pieces, scale, equalities, tuple(met.values()), held)
 
@@ -242,7 +240,7 @@ def _ends(sheet: Sheet) -> list[tuple[Any, Any]]:
     problem = sheet.problem
     found: list[tuple[Any, Any]] = []
     for name, (least, greatest) in problem.free.items():
-        lo, hi = flint.arb(rational(decimal(least))), flint.arb(rational(decimal(greatest)))
+        lo, hi = (flint.arb(problem.exactly({name: end})[name]) for end in (least, greatest))
         found.append((lo.tan(), hi.tan()) if problem.parameter_set[name].tangent else (lo, hi))
     for low, high in [(q.range.lower, q.range.upper) for q in sheet.lifted] + [
         r for p in sheet.pieces for r in p.ranges

@@ -7,7 +7,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.arithmetic.elementary import exact, printed, rational
+from tmsopt.arithmetic.elementary import exact, rational
 from tmsopt.critical_speeds.crossings import Crossing, Stretch, crossings, told
 from tmsopt.critical_speeds.parametric import Polynomial, interpolated
 from tmsopt.design.files import Given, problem_of
@@ -146,7 +146,7 @@ def speeds(
     if not known:
         message = f"found {short(between)}; accepted: a least value and a greater one, `--between LOW,HIGH`"
         raise InputError([Fault(message, ("between",))])
-    a = coefficients_over(asked.model, of, own, name)
+    a = coefficients_over(asked.model, of, asked.exactly(own), name)
     met = crossings(a, exact(float(lower)), exact(float(upper)) if math.isfinite(upper) else None)
     return Speeds(asked, name, Table(own), float(lower), float(upper), **vars(told(asked.model, met)))
 
@@ -163,7 +163,7 @@ def stable_speeds(design: Solution) -> tuple[Stretch, ...] | None:
     of, name = asked.parameter_set, speed_of(asked.parameter_set)
     if name is None or not math.isfinite(of[name].range.lower):
         return None
-    a, ends = coefficients_over(asked.model, of, design.parameters, name), of[name].range
+    a, ends = coefficients_over(asked.model, of, asked.exactly(design.parameters), name), of[name].range
     upper = exact(ends.upper) if math.isfinite(ends.upper) else None
     return crossings(a, exact(ends.lower), upper, bands_alone=True).stable
 
@@ -173,7 +173,7 @@ def speed_of(of: ParameterSet) -> str | None:
     return next((p.name for p in of.parameters if p.unit == "m/s" or p.name == "Fr"), None)
 
 
-def coefficients_over(model: Model, of: ParameterSet, own: Mapping[str, float], name: str) -> Sequence[Polynomial]:
+def coefficients_over(model: Model, of: ParameterSet, own: Mapping[str, Any], name: str) -> Sequence[Polynomial]:
     """The coefficients of a design as polynomials in one of its parameters.
 
     Raises:
@@ -200,14 +200,14 @@ def _parameters(design: Any, whole: Problem, name: str, progress: Listener | Non
     return dict(solve(whole, progress=progress, interruptible=False).parameters)
 
 
-def _linear(model: Model, of: ParameterSet, own: Mapping[str, float], name: str) -> dict[str, tuple[Any, Any]]:
+def _linear(model: Model, of: ParameterSet, own: Mapping[str, Any], name: str) -> dict[str, tuple[Any, Any]]:
     """The algebraic parameters as α + β x.
 
     Raises:
         InputError: where one is no such function.
     """
     with flint.ctx.workdps(_DIGITS):
-        at = ({n: flint.fmpq(k) if n == name else printed(own[n]) for n in of.names} for k in (1, 2, 3))
+        at = ({n: flint.fmpq(k) if n == name else exact(own[n]) for n in of.names} for k in (1, 2, 3))
         first, second, third = ({n: flint.arb(v) for n, v in model.algebraic(of.native(d)).items()} for d in at)
         found = {}
         for n, a in first.items():

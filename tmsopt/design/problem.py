@@ -20,6 +20,7 @@ from tmsopt.design.quantities import (
 from tmsopt.design.validate import faults, guess_parameter_set, shape_faults
 from tmsopt.errors import Fault, InputError
 from tmsopt.models import Model, ParameterSet, Values, controlled
+from tmsopt.models.exact import number
 from tmsopt.models.told import pattern_of
 from tmsopt.roots import Pattern
 from tmsopt.units import TABLES, numbers
@@ -230,6 +231,11 @@ class Problem:
         """The exact numbers that were typed for some of a design's doubles, such as ``8/3`` or ``20 deg``."""
         exact = {n: self.written.get(n, {}).get(x) for n, x in parameters.items()}
         return {n: text for n, text in exact.items() if text}
+
+    def exactly(self, parameters: Mapping[str, float]) -> dict[str, Any]:
+        """Numbers of the file as they were typed, as fractions or as balls of the working precision."""
+        typed = self.typed(parameters)
+        return {n: number(x, typed.get(n, "")) for n, x in parameters.items()}
 
     def ordered(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Every parameter in the model's order: the given values of the free ones, and the fixed ones."""

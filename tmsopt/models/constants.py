@@ -6,39 +6,34 @@ from functools import lru_cache
 from typing import Any
 
 import casadi as ca
-import flint
 
 from tmsopt.arithmetic.formulas import Formulas
+from tmsopt.models.exact import constant
 from tmsopt.models.expression import parse_value
 
 _SIGN = "="
 """No parameter has a name that begins with it."""
 
-_DIGITS = 60
-
 
 @lru_cache(maxsize=4096)
-def constant(text: str) -> ca.SX:
-    """A number by an expression without names, such as ``sqrt(2)``: a symbol, but for 0 and what has no value."""
-    number = value_of(text)
-    return ca.SX.sym(_SIGN + text) if number and math.isfinite(number) else ca.SX(number)
+def number_symbol(text: str) -> ca.SX:
+    """A symbol for an expression without names, such as ``sqrt(2)``; 0 and what has no value are constants."""
+    try:
+        number = float(constant(text))
+    except ValueError:
+        return ca.SX(math.nan)
+    return ca.SX.sym(_SIGN + text) if number else ca.SX(0.0)
 
 
-def value_of(text: str) -> float:
-    """The double nearest to an expression without names; nan where it has no value."""
-    with flint.ctx.workdps(_DIGITS):
-        return float(parse_value(text, ()).enclosure({}))
-
-
-def value_of_symbol(symbol: ca.SX) -> float | None:
+def number_of(symbol: ca.SX) -> float | None:
     """The number that a symbol stands for, or that is a constant of CasADi; None for anything else."""
     if symbol.is_constant():
         return float(symbol)
     name = symbol.name() if symbol.is_symbolic() else ""
-    return value_of(name.removeprefix(_SIGN)) if name.startswith(_SIGN) else None
+    return float(constant(name.removeprefix(_SIGN))) if name.startswith(_SIGN) else None
 
 
-def constants(expressions: ca.SX) -> tuple[str, ...]:
+def number_texts(expressions: ca.SX) -> tuple[str, ...]:
     """Texts of the numbers in expressions."""
     names = [symbol.name() for symbol in ca.symvar(expressions)]
     return tuple(name.removeprefix(_SIGN) for name in names if name.startswith(_SIGN))
@@ -48,7 +43,7 @@ def formulas(expressions: Sequence[Any], names: Sequence[str]) -> Formulas:
     """Formulas from CasADi expressions or numbers, in symbols of these names."""
     column = ca.vertcat(*[ca.SX(e) for e in expressions])
     known = {x.name(): x for x in ca.symvar(column)}
-    texts = constants(column)
+    texts = number_texts(column)
     symbols = [known.get(name, ca.SX.sym(name)) for name in (*names, *(_SIGN + text for text in texts))]
     inputs = ca.vertcat(*symbols) if symbols else ca.SX(0, 1)
     return rebuilt(names, texts, ca.Function("formulas", [inputs], [ca.densify(column)]))

@@ -96,6 +96,13 @@ def constant(text: str) -> Exact:
     return found
 
 
+def number(x: float, text: str = "") -> Any:
+    """A double as the number that was typed for it, a fraction or a ball; the decimal that prints it without a text."""
+    typed = _parsed(text, angle=True) if text else None
+    fraction = typed.fraction if typed else decimal(float(x))
+    return typed.ball() if typed and fraction is None else rational(fraction)
+
+
 def decimal(x: Any) -> Fraction:
     """A number as the user wrote it: a double stands for the shortest decimal that prints it, 0.1 for 1/10.
 

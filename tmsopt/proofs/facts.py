@@ -10,7 +10,7 @@ from tmsopt.arithmetic.elementary import rational
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.models import Values
-from tmsopt.models.exact import Written, decimal
+from tmsopt.models.exact import Written
 from tmsopt.proofs.existence import Existing, exact_coefficients
 from tmsopt.proofs.factored import Factored
 from tmsopt.proofs.rational import factored
@@ -115,7 +115,7 @@ def inside(problem: Problem, design: Written, found: Existing) -> Verdict:
             value = rational(known)
         if {name, f"tan({name})"} & set(design.stated) and float(value) in (least, greatest):
             continue  # the exact form of a limit
-        lo, hi = rational(decimal(least)), rational(decimal(greatest))
+        lo, hi = (problem.exactly({name: end})[name] for end in (least, greatest))
         if value < lo or value > hi:
             return Verdict(False, f"{name} is outside its limits")
         if not (value >= lo and value <= hi):

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 
 from tmsopt.models.arithmetics import BINARY, SYMBOLIC, Arithmetic
-from tmsopt.models.constants import constant, value_of_symbol
+from tmsopt.models.constants import number_of, number_symbol
 from tmsopt.models.names import FUNCTIONS
 from tmsopt.models.stated.degree import LARGEST_EXPONENT, Beyond
 
@@ -83,7 +83,7 @@ def is_real(x: Pair) -> bool:
 def _whole(n: Pair) -> int | None:
     if not is_real(n):
         return None
-    value = value_of_symbol(ca.SX(n.re))
+    value = number_of(ca.SX(n.re))
     return int(value) if value is not None and value == int(value) and abs(value) <= LARGEST_EXPONENT else None
 
 
@@ -108,7 +108,7 @@ def _exp(x: Any) -> Pair:
 
 PAIRS = Arithmetic(
     {**{name: _real(name, SYMBOLIC.functions[name]) for name in FUNCTIONS}, "exp": _exp}, pair,
-    {sign: partial(_joined, join) for sign, join in BINARY.items()}, constant=lambda text: Pair(constant(text)),
+    {sign: partial(_joined, join) for sign, join in BINARY.items()}, constant=lambda text: Pair(number_symbol(text)),
 )  # fmt: skip
 """Of CasADi's expressions."""
 

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 
 from tmsopt.models.arithmetics import DEGREES, SYMBOLIC, Arithmetic
-from tmsopt.models.constants import constant
+from tmsopt.models.constants import number_symbol
 from tmsopt.models.expression import Expression, ExpressionError, parse_value
 from tmsopt.models.model import Matrix
 from tmsopt.models.names import unusable
@@ -18,7 +18,7 @@ from tmsopt.models.stated.degree import Beyond, Degree
 MOST_QUANTITIES = 500
 """More take seconds to read."""
 
-_SYMBOLIC = replace(SYMBOLIC, constant=constant)
+_SYMBOLIC = replace(SYMBOLIC, constant=number_symbol)
 
 _CIRCLES = 8  # that are listed
 

@@ -18,7 +18,7 @@ from tmsopt.arithmetic.twofold import Twofold
 from tmsopt.arithmetic.walk import NotAccepted, steps, walk
 from tmsopt.errors import short
 from tmsopt.models.built_in import MODELS
-from tmsopt.models.constants import constant, constants, formulas, rebuilt
+from tmsopt.models.constants import formulas, number_symbol, number_texts, rebuilt
 from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
 from tmsopt.models.names import latex, spelled, unusable
 from tmsopt.models.stated.closed_loop import check_loop, closed
@@ -166,8 +166,8 @@ def made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> 
     } | {("quantities", str(n)): x for n, x in derived.items()}
     entries = {place: scalar(whole(place[0]), place[1], x) for place, x in given.items()}
     every = ca.vertcat(*entries.values())
-    texts = constants(every)
-    numbers = [constant(text) for text in texts]
+    texts = number_texts(every)
+    numbers = [number_symbol(text) for text in texts]
     in_numbers = {x.name() for x in numbers}
     ordered = ca.vertcat(*(entries[place] for place in in_order(kind, entries)))
     symbols = [x for x in ca.symvar(ordered) if x.name() not in in_numbers]
@@ -200,7 +200,7 @@ def _rebuilt(
     entry = rebuilt(names, texts, ca.Function.deserialize(serialized))
     count = sum(rows * columns for _, rows, columns in shapes)
     symbols = {n: ca.SX.sym(n) for n in names}
-    written = ca.vertsplit(entry.exact(ca.vertcat(*symbols.values(), *map(constant, texts))))
+    written = ca.vertsplit(entry.exact(ca.vertcat(*symbols.values(), *map(number_symbol, texts))))
     zero = [e.is_zero() for e in written]
 
     def blocks(entries: Sequence[Any]) -> dict[str, Matrix]:
@@ -332,7 +332,7 @@ def scalar(key: str, where: str, value: Any) -> ca.SX:
             raise Unfit(key, f"{where}: is a matrix; accepted: scalar expressions")
         return ca.densify(ca.SX(value))
     number = _number(key, where, value)
-    return constant(str(value)) if isinstance(value, Rational) else ca.SX(number)
+    return number_symbol(str(value)) if isinstance(value, Rational) else ca.SX(number)
 
 
 def _number(key: str, where: str, value: Any) -> float:
