@@ -125,7 +125,7 @@ def growth(
     speed = name in SPEEDS
     low, high = _ends(design, name, end, at)
     try:
-        a = coefficients_over(model, of, design.problem.exactly(parameters), name)
+        a = coefficients_over(design.problem, of, parameters, name)
         met = told(model, crossings(a, exact(low), None if speed and end is None else exact(high)))
     except InputError:  # no polynomials in it
         met = None

@@ -15,7 +15,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.errors import Fault, InputError, short, suggest
 from tmsopt.margins.surroundings import parameter_faults
-from tmsopt.models import Model, ParameterSet
+from tmsopt.models import ParameterSet
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Table, Tabular, plain
 from tmsopt.solver.solve import solve
@@ -146,7 +146,7 @@ def speeds(
     if not known:
         message = f"found {short(between)}; accepted: a least value and a greater one, `--between LOW,HIGH`"
         raise InputError([Fault(message, ("between",))])
-    a = coefficients_over(asked.model, of, asked.exactly(own), name)
+    a = coefficients_over(asked, of, own, name)
     met = crossings(a, exact(float(lower)), exact(float(upper)) if math.isfinite(upper) else None)
     return Speeds(asked, name, Table(own), float(lower), float(upper), **vars(told(asked.model, met)))
 
@@ -163,7 +163,7 @@ def stable_speeds(design: Solution) -> tuple[Stretch, ...] | None:
     of, name = asked.parameter_set, speed_of(asked.parameter_set)
     if name is None or not math.isfinite(of[name].range.lower):
         return None
-    a, ends = coefficients_over(asked.model, of, asked.exactly(design.parameters), name), of[name].range
+    a, ends = coefficients_over(asked, of, design.parameters, name), of[name].range
     upper = exact(ends.upper) if math.isfinite(ends.upper) else None
     return crossings(a, exact(ends.lower), upper, bands_alone=True).stable
 
@@ -173,14 +173,14 @@ def speed_of(of: ParameterSet) -> str | None:
     return next((p.name for p in of.parameters if p.unit == "m/s" or p.name == "Fr"), None)
 
 
-def coefficients_over(model: Model, of: ParameterSet, own: Mapping[str, Any], name: str) -> Sequence[Polynomial]:
+def coefficients_over(problem: Problem, of: ParameterSet, own: Mapping[str, float], name: str) -> Sequence[Polynomial]:
     """The coefficients of a design as polynomials in one of its parameters.
 
     Raises:
         InputError: where they are none.
     """
-    at = _linear(model, of, own, name)
-    a = interpolated(lambda x: model.polynomial(**{n: p if q == 0 else p + q * x for n, (p, q) in at.items()}))
+    at = _linear(problem, of, own, name)
+    a = interpolated(lambda x: problem.model.polynomial(**{n: p if q == 0 else p + q * x for n, (p, q) in at.items()}))
     if a is None or not any(any(c != 0 for c in p) for p in a):
         raise InputError([Fault(f"the coefficients are no polynomials in {name}, or all 0", ("parameter",))])
     return a
@@ -200,15 +200,16 @@ def _parameters(design: Any, whole: Problem, name: str, progress: Listener | Non
     return dict(solve(whole, progress=progress, interruptible=False).parameters)
 
 
-def _linear(model: Model, of: ParameterSet, own: Mapping[str, Any], name: str) -> dict[str, tuple[Any, Any]]:
+def _linear(problem: Problem, of: ParameterSet, own: Mapping[str, float], name: str) -> dict[str, tuple[Any, Any]]:
     """The algebraic parameters as α + β x.
 
     Raises:
         InputError: where one is no such function.
     """
     with flint.ctx.workdps(_DIGITS):
-        at = ({n: flint.fmpq(k) if n == name else exact(own[n]) for n in of.names} for k in (1, 2, 3))
-        first, second, third = ({n: flint.arb(v) for n, v in model.algebraic(of.native(d)).items()} for d in at)
+        typed = problem.exactly(own)
+        at = (of.native({**typed, name: flint.fmpq(k)}) for k in (1, 2, 3))
+        first, second, third = ({n: flint.arb(v) for n, v in problem.model.algebraic(d).items()} for d in at)
         found = {}
         for n, a in first.items():
             slope, bend = second[n] - a, third[n] - second[n] - (second[n] - a)
