@@ -257,6 +257,49 @@ def test_the_counterexample_to_sufficiency() -> None:
     assert not oracles.routh_exact(oracles.polynomial_exact(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T))
 
 
+@pytest.mark.parametrize(("tilt", "chi_B", "speeds", "real"), [
+    (0.435437, 1.404214, (2.2, 2.3), [2, 0]), (0.435437, 1.424214, (2.2, 2.3), [2, 0]),
+    (0.377177, 1.404214, (2.2, 2.221, 2.23), [2, 4, 2]), (0.377177, 1.424214, (2.23, 2.239, 2.25), [2, 4, 2]),
+])  # fmt: skip
+def test_curves_still_meet_near_the_real_exceptional_points(tilt, chi_B, speeds, real, by_key) -> None:
+    """Number of real roots by mpmath at 40 digits, from the oracle's own coefficients."""
+    with mp.workdps(40):
+        found = []
+        for Fr in map(str, speeds):
+            a = oracles.polynomial_exact(Fr, 1, chi_B, 1, ZB, ZH, tilt)
+            roots = mp.polyroots([mp.mpf(c.numerator) / c.denominator for c in a], maxsteps=200, extraprec=200)
+            found.append(sum(abs(mp.im(z)) < 1e-20 for z in roots))
+    assert found == real
+    assert by_key["fig3-repelling"].verdict == CONDITIONAL
+
+
+def test_other_chi_H_affect_generality(by_key) -> None:
+    """Faster than the ω0 of χ_H = 1 with the same heights; and μ moves the product of the roots only off χ_H = 1."""
+    a = oracles.polynomial_exact("2.2362", "1.9673", "1.4754", "0.95", ZB, ZH, "0.4903")
+    shifted = np.poly1d([float(c / a[0]) for c in a])(np.poly1d([1, -2.4]))
+    assert oracles.routh_exact([Fraction(x) for x in shifted.coeffs])
+    assert -float((ZB * ZH) ** -1) ** 0.25 > -2.4
+    for chi_H, moves in (("1", False), ("1.02", True)):
+        products = {
+            b[4] / b[0] for mu in (1, 2) for b in [oracles.polynomial_exact(2, mu, "1.3", chi_H, ZB, ZH, "0.5")]
+        }
+        assert (len(products) == 2) is moves
+    assert by_key["chi_H-generality"].verdict == CONDITIONAL
+
+
+def test_the_speed_of_capsize_is_a_closed_form(by_key) -> None:
+    """Meijaard et al. (2007), Table 2: 6.02426201538837 m/s; here by bisection of det(g K0 + v² K2)."""
+    K0 = np.array([[-80.95, -2.59951685249872], [-2.59951685249872, -0.80329488458618]])
+    K2 = np.array([[0, 76.59734589573222], [0, 2.65431523794604]])
+    low, high = 5.0, 7.0
+    for _ in range(60):
+        middle = (low + high) / 2
+        unstable = np.linalg.det(9.81 * K0 + middle**2 * K2) < 0
+        low, high = (low, middle) if unstable else (middle, high)
+    assert float(by_key["conclusion-numerical"].computed) == pytest.approx(low, rel=1e-12)
+    assert by_key["conclusion-numerical"].verdict == FAILS
+
+
 def test_a_bicycle_that_is_stable_backward() -> None:
     """In the sense of the paper's own polynomial, with both masses behind the rear contact."""
     design = fractions(BACKWARD)
@@ -478,6 +521,7 @@ def test_the_documentation_counts_as_the_ledger(ledger) -> None:
     verdicts = Counter(entry.verdict for entry in ledger.entries)
     assert f"{len(ledger.entries)} numbers and statements" in text
     assert f"{verdicts['exact']} are exact" in text
+    assert f"{verdicts[CONDITIONAL]} hold only under a condition" in text
 
 
 def test_the_command(tmp_path) -> None:

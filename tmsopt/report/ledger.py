@@ -13,7 +13,7 @@ _ABOUT = (
     "be verified, computed anew by a route that does not use the printed formula. Numbers are balls that contain the "
     "true value, shown to 40 digits; general statements are proved by exact algebra, or refuted by a counterexample in "
     "small fractions. Statements are read in their context: λ_s > 0 and the conditions `lscf`, where the section "
-    "assumes them. Statements about the literature are not judged."
+    "assumes them. A statement about the literature is judged only where it can be computed."
 )
 
 

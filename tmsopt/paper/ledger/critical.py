@@ -2,12 +2,15 @@
 
 from typing import Any
 
+import flint
+
 from tmsopt.models import copo
 from tmsopt.models.exact import Tilt
-from tmsopt.paper.ledger import printed
-from tmsopt.paper.ledger.algebra import depends, polynomials, q, ring
+from tmsopt.paper.ledger import lemmas, printed
+from tmsopt.paper.ledger.algebra import depends, polynomials, q, ring, stable_left_of
 from tmsopt.paper.ledger.entry import Claim, Outcome, proof, section, universal
 from tmsopt.paper.ledger.printed import laws
+from tmsopt.paper.ledger.stability import WITNESS, upright_case, wrongly_admitted
 
 _claim = section("2.4.1 χ_H = 1: the critical Froude number and its minimum")
 
@@ -24,6 +27,33 @@ def _near_1() -> Outcome:
         f"the printed values 1.02 and 0.921 differ from 1 by {gaps[0]} and {gaps[1]}, on different sides, and the "
         "stability conditions are not the same on the two sides (see lscf-sufficient)",
         all(gap > 0 for gap in gaps),
+    )
+
+
+FASTER: lemmas.Design = tuple(q(x) for x in ("2.2362", "1.9673", "1.4754", "0.95", "-0.4", "-0.2", "0.4903"))
+"""A design with χ_H < 1 that decays faster than any with χ_H = 1 and the same heights."""
+
+
+@_claim(
+    "chi_H-generality", "text before Eq. Frc1", "χ_H = 1 simplifies without affecting generality",
+    "what is proved at χ_H = 1, tried elsewhere: derivatives with respect to μ, the Routh conditions of two rational "
+    "designs, and interval Newton at the EP4",
+)  # fmt: skip
+def _generality() -> Outcome:
+    Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = polynomials("Fr mu chi_B chi_H zeta_B zeta_H T")
+    slopes = [c.derivative("mu") for c in copo(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T)]
+    by_mass = any(x != 0 for x in slopes) and all(x.subs({"chi_H": 1}) == 0 for x in slopes)
+    bound = -1 / flint.arb(FASTER[4] * FASTER[5]).root(4)  # ω0 at χ_H = 1
+    decays = stable_left_of(copo(*FASTER), q("-2.4"))
+    return universal(
+        "said of what exists, for χ_H near 1: the EP4 is a regular zero, so one persists, with other numbers; and of "
+        "lscf for χ_H ≥ 1",
+        bool(lemmas.ep4()) and upright_case(),
+        "for every χ_H ≠ 1 the spectrum depends on μ. With χ_H = 19/20, μ = 1.9673, χ_B = 1.4754, tan λ_s = 0.4903, "
+        f"Fr = 2.2362 and the heights of Table 1 all roots lie left of −2.4, where {bound.str(5, radius=False)} is "
+        "the least abscissa with χ_H = 1; and for χ_H = 9/10 all five lines of lscf admit an unstable bicycle (see "
+        "lscf-sufficient), which they cannot for χ_H = 1",
+        by_mass and decays and bound > q("-2") and wrongly_admitted(WITNESS),
     )
 
 
@@ -134,4 +164,4 @@ def _frm() -> Outcome:
     )
 
 
-CLAIMS: tuple[Claim, ...] = (_near_1, _frc1, _no_mu, _implied, _five, _chibm, _frm)
+CLAIMS: tuple[Claim, ...] = (_near_1, _generality, _frc1, _no_mu, _implied, _five, _chibm, _frm)

@@ -147,15 +147,23 @@ def _stabilized() -> Outcome:
 
 
 @_claim(
-    "fig3-repelling", "caption of Fig. fig3; text", "eigenvalue curves repel near the CEP2 when χ_B ≠ √2",
-    "p = a0 (s² + b s + c)² is impossible off the plane, in r and q; certified distance of the pairs at Fr_EP",
+    "fig3-repelling", "caption of Fig. fig3; text", "eigenvalue curves repel near EPs when χ_B ≠ √2",
+    "p = a0 (s² + b s + c)² is impossible off the plane, in r and q; certified distance of the pairs at Fr_EP of the "
+    "lower row; number of certified real roots as Fr grows, in the upper and the middle row",
 )  # fmt: skip
 def _repelling() -> Outcome:
     gaps = [_gap(shift) for shift in ("0.1", "-0.1")]
-    return proof(
+    upper = [_real_roots(chi_B, ("2.2", "2.3"), "0.435437") for chi_B in ("1.404214", "1.424214")]
+    middle = [_real_roots("1.404214", ("2.2", "2.221", "2.23")), _real_roots("1.424214", ("2.23", "2.239", "2.25"))]
+    return universal(
+        "near a CEP2, the lower row",
         lemmas.asymmetry_identity() and all(gap > 0.01 for gap in gaps),
-        f"At Fr_EP the two pairs are {gaps[0]:.3f} apart for χ_B = √2 + 0.1 and {gaps[1]:.3f} for √2 − 0.1. Near the "
-        "EP4 and the 2EP2 they still meet on the real axis, as a double real root has codimension 1.",
+        "near the EP4 and the 2EP2 the curves still meet on the real axis. In the upper row, χ_B = √2 ± 0.01 and "
+        "tan λ_s = 0.435437 rounded, two roots are real at Fr = 2.2 and none at 2.3; in the middle row, "
+        "tan λ_s = 0.377177, two, four and two are real at Fr = 2.2, 2.221, 2.23 (minus), at 2.23, 2.239, 2.25 (plus)",
+        upper == [[2, 0]] * 2 and middle == [[2, 4, 2]] * 2,
+        remark=f"At Fr_EP of the lower row the two pairs are {gaps[0]:.3f} apart for χ_B = √2 + 0.1 and {gaps[1]:.3f} "
+        "for √2 − 0.1. A double real root has codimension 1, and a curve of designs meets it; a double pair has 2.",
     )
 
 
@@ -210,8 +218,8 @@ def _similar() -> Outcome:
     )
 
 
-def _real_roots(chi_B: str, speeds: Sequence[str]) -> list[int]:
-    return [real_roots(lemmas.at_heights(q(Fr), q(chi_B), q("0.377177"))) for Fr in speeds]
+def _real_roots(chi_B: str, speeds: Sequence[str], T: str = "0.377177") -> list[int]:
+    return [real_roots(lemmas.at_heights(q(Fr), q(chi_B), q(T))) for Fr in speeds]
 
 
 CLAIMS: tuple[Claim, ...] = (
