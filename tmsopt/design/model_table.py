@@ -1,5 +1,6 @@
 """The [model] table of a problem file: the user's own system, by matrices or coefficients written as expressions."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -23,6 +24,8 @@ KEYS = {
     "quantities": "Names for more expressions, to be used in objectives and constraints.",
 }  # fmt: skip
 """Keys of the table → meaning."""
+
+_DESCENDING = "accepted: expressions in brackets, by descending powers of s, such as ['1', 'c', 'k']"
 
 _EXAMPLE = (
     "write M = [['m']], D = [['c']], K = [['k']], or A = [['a', '1'], ['b', '0']], "
@@ -71,6 +74,14 @@ def stated_model(table: Mapping[str, Any]) -> tuple[list[Fault], Model | None]:
         return [Fault(error.message, ("model", error.key))], None
 
 
+def _square(entries: Any) -> str:
+    """What to write for a list of n² entries; empty for anything else."""
+    n = math.isqrt(len(entries)) if isinstance(entries, list) else 0
+    if not n or n * n != len(entries) or any(isinstance(x, list) for x in entries):
+        return ""
+    return f"write {short([entries[k : k + n] for k in range(0, n * n, n)])}; "
+
+
 class _Reader:
     """Reads the entries and collects what is wrong; discarded after one table."""
 
@@ -85,13 +96,14 @@ class _Reader:
     def matrix(self, key: str) -> list[list[Any]]:
         rows = self.table[key]
         if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
-            self.fault(f"found {short(rows)}; accepted: rows in brackets, such as [['m', 0], [0, 'm']]", key)
+            accepted = "accepted: rows in brackets, such as [['m', 0], [0, 'm']], each expression in quotes of its own"
+            self.fault(f"found {short(rows)}; {_square(rows)}{accepted}", key)
             return []
         return [self.row(row, (key, str(k))) for k, row in enumerate(rows, start=1)]
 
     def row(self, entries: Any, place: tuple[str, ...]) -> list[Any]:
         if not isinstance(entries, list) or not entries:
-            self.fault(f"found {short(entries)}; accepted: expressions in brackets, such as ['1', 'c', 'k']", place[0])
+            self.fault(f"found {short(entries)}; {_DESCENDING}", place[0])
             return []
         many = len(place) > 1
         return [

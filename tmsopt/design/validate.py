@@ -10,6 +10,7 @@ from tmsopt.design.expression import ExpressionError, UnknownName, parse_compari
 from tmsopt.design.quantities import root_names, spelled_out
 from tmsopt.errors import Fault, at_first, short, suggest, table_faults, text_faults
 from tmsopt.models import Model, ParameterSet
+from tmsopt.models.names import MEANT
 from tmsopt.models.told import pattern_of, patterns_of
 
 VARIATIONS = ("scenarios", "tolerances", "weights")
@@ -100,7 +101,8 @@ def _name_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     given = tables["parameters"].keys() | problem.scenarios
     if missing := [p.name for p in of.parameters if p.name not in given and p.default is None]:
         example = f"{missing[0]} = 1.0, or {missing[0]} = {{ min = 0.5, max = 2 }}"
-        yield Fault(f"missing parameter {', '.join(missing)}; write e.g. {example}", ("parameters",))
+        meant = "".join(f"; {MEANT[name]}" for name in missing if name in MEANT)
+        yield Fault(f"missing parameter {', '.join(missing)}; write e.g. {example}{meant}", ("parameters",))
     for name in problem.start:
         if name not in problem.free:
             yield Fault(f"start for '{name}', which is not a free parameter", ("parameters", name, "start"))

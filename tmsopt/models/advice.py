@@ -1,7 +1,9 @@
 """What was meant by an expression that does not read as one, written as it should be."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+
+from tmsopt.models.names import MEANT
 
 _NUMBER = r"(?<![\w.])(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)"
 _UNITS = {
@@ -15,6 +17,16 @@ _SIGNS = {
     "²": "**2", "³": "**3", "^": "**", "√": "sqrt", "π": "pi", "λ": "lambda_s", "ζ": "zeta", "χ": "chi", "ν": "nu",
     "μ": "mu", "µ": "mu", "ω": "omega",
 }  # fmt: skip
+
+_CALLS = {
+    "ln": "log(x)", "log10": "log(x)/log(10)", "cosh": "(exp(x) + exp(-x))/2", "sinh": "(exp(x) - exp(-x))/2",
+    "tanh": "1 - 2/(exp(2*x) + 1)", "fabs": "abs(x)", "pow": "x**y", "cot": "1/tan(x)",
+    **{f"arc{name}": f"a{name}(x)" for name in ("sin", "cos", "tan")},
+    **dict.fromkeys(("re", "Re", "real"), "abscissa for the largest real part of the roots; expressions are real"),
+    **dict.fromkeys(("im", "Im", "imag"), "angular_frequency for the largest |Im s|; expressions are real"),
+    **dict.fromkeys(("eig", "eigs", "eigvals", "eigenvalues", "roots"), "abscissa for the largest real part of them"),
+}
+"""Functions that others have → what to write."""
 
 Repair = tuple[str, str | Callable[[re.Match[str]], str]]
 
@@ -37,6 +49,12 @@ _REPAIRS: tuple[Repair, ...] = (
 """What others write → what is read here, one after the other."""
 
 _WITH_UNIT = re.compile(_NUMBER + rf"\s*({'|'.join(_UNITS)}|deg|°)(?!\w)")
+
+
+def call_advice(name: str, arguments: Iterable[str]) -> str:
+    """The end of a sentence that says what to write for a function that there is not; empty likewise."""
+    meant = f"write {_CALLS[name]}" if name in _CALLS else MEANT["t"] if "t" in arguments else ""
+    return f"; {meant}" if meant else ""
 
 
 def advice(text: str, reads: Callable[[str], bool]) -> str:

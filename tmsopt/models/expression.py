@@ -9,25 +9,28 @@ import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from tmsopt.errors import short, suggest
 from tmsopt.models import arithmetics
-from tmsopt.models.advice import advice
+from tmsopt.models.advice import advice, call_advice
 from tmsopt.models.arithmetics import BALLS, BINARY, DEGREES, NUMERIC, SYMBOLIC, Arithmetic
-from tmsopt.models.names import CONSTANTS, FUNCTIONS
+from tmsopt.models.names import CONSTANTS, FUNCTIONS, OUTSIDE
 from tmsopt.models.stated.degree import Beyond, Degree
 
 COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
+_STRICT = {ast.Lt: "<=", ast.Gt: ">="}
 
 _ALLOWED = {"<=": (-math.inf, 0.0), ">=": (0.0, math.inf), "==": (0.0, 0.0), "": (-math.inf, math.inf)}
 
 _LONGEST = 2000  # characters; longer texts could exhaust the parser's stack
 _DEEPEST = 200
 _LEGIBLE = 60  # characters of a part at fault
-_LANGUAGE = f"numbers, names, + - * / **, parentheses and {' '.join(FUNCTIONS)}"
+_FUNCTIONS = " ".join(FUNCTIONS)
+_LANGUAGE = f"numbers, names, + - * / **, parentheses and {_FUNCTIONS}"
 _NOT_ACCEPTED = re.compile(r"[^ -~]|#")  # look-alike letters, line breaks and comments
 
 
@@ -155,7 +158,10 @@ def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
     if not isinstance(body, ast.Compare):
         raise ExpressionError(f"{_quoted(text)} is not a comparison; write e.g. 'nu_H >= 0.02' with <=, >= or ==")
     if len(body.ops) > 1:
-        raise ExpressionError(f"{_quoted(text)} joins several comparisons; write one constraint for each")
+        sides = [_source(side, text) for side in (body.left, *body.comparators)]
+        signs = [{**COMPARISONS, **_STRICT}.get(type(op), "==") for op in body.ops]
+        each = " and ".join(f"'{a} {sign} {b}'" for (a, b), sign in zip(pairwise(sides), signs, strict=True))
+        raise ExpressionError(f"{_quoted(text)} joins several comparisons; write one constraint for each, {each}")
     symbol = COMPARISONS.get(type(body.ops[0]))
     if symbol is None:
         raise ExpressionError(f"{_quoted(text)} compares with another sign than <=, >= or =={_advice(text)}")
@@ -194,19 +200,17 @@ def _parse(text: str) -> ast.expr:
     if len(text) > _LONGEST:
         raise ExpressionError(f"expression of {len(text)} characters; accepted: up to {_LONGEST}")
     if strange := _NOT_ACCEPTED.search(text.strip()):
-        raise ExpressionError(
-            f"{_quoted(text)} contains {strange[0]!r}{_advice(text)}; accepted: one line of {_LANGUAGE}"
-        )
+        found = f"{_quoted(text)} contains {strange[0]!r}{_advice(text)}"
+        raise ExpressionError(f"{found}; accepted: one line of {_LANGUAGE}")
     try:
         return _tree(text)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         column = f" at character {error.offset}" if isinstance(error, SyntaxError) and error.offset else ""
         kept = next((word for word in re.findall(r"[A-Za-z_]\w*", text) if keyword.iskeyword(word)), None)
         own = f"; '{kept}' is a reserved word, write e.g. {kept}_" if kept else ""
-        own += " (the tilt of a bicycle is lambda_s)" if kept == "lambda" else ""
-        raise ExpressionError(
-            f"{_quoted(text)} does not parse{column}{own}{_advice(text)}; accepted: {_LANGUAGE}"
-        ) from None
+        own += f" (the tilt of a bicycle is lambda_s; of the eigenvalue: {OUTSIDE})" if kept == "lambda" else ""
+        message = f"{_quoted(text)} does not parse{column}{own}{_advice(text)}; accepted: {_LANGUAGE}"
+        raise ExpressionError(message) from None
 
 
 def _tree(text: str) -> ast.expr:
@@ -266,9 +270,8 @@ def _checked_names(  # noqa: PLR0912 - one case per kind of node
             if name in CONSTANTS:
                 return ()
             if name in FUNCTIONS:
-                raise ExpressionError(
-                    f"{_quoted(text)} names the function {name} without its argument; write {name}(…)"
-                )
+                message = f"names the function {name} without its argument; write {name}(…)"
+                raise ExpressionError(f"{_quoted(text)} {message}")
             if accepted is not None and name not in accepted:
                 raise UnknownName(text, name, accepted)
             return (name,)
@@ -281,19 +284,18 @@ def _checked_names(  # noqa: PLR0912 - one case per kind of node
         case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in FUNCTIONS:
             fewest, most = (2, 99) if name in ("min", "max") else (1, 1)
             if not fewest <= len(args) <= most:
-                wanted = f"{fewest} to {most} arguments" if most > 1 else "one argument"
+                wanted = f"{fewest} to {most} arguments, {name}(a, b)" if most > 1 else "one argument"
+                wanted += f"; of one number write {_source(args[0], text)} alone" if 0 < len(args) < fewest else ""
                 raise ExpressionError(f"{_quoted(text)} calls {name} with {len(args)} arguments; accepted: {wanted}")
             return names_in(*args)
         case ast.Call():
-            raise ExpressionError(
-                f"{_quoted(text)} calls '{_source(node.func, text)}'; accepted: {' '.join(FUNCTIONS)}"
-            )
+            called, of = _source(node.func, text), [_source(a, text) for a in node.args]
+            raise ExpressionError(f"{_quoted(text)} calls '{called}'{call_advice(called, of)}; accepted: {_FUNCTIONS}")
         case ast.Attribute():
             raise ExpressionError(f"{_quoted(text)} uses the attribute '{_source(node, text)}'; accepted: plain names")
         case _:
-            raise ExpressionError(
-                f"{_quoted(text)} contains '{_source(node, text)}'{_advice(text)}; accepted: {_LANGUAGE}"
-            )
+            found = f"{_quoted(text)} contains '{_source(node, text)}'{_advice(text)}"
+            raise ExpressionError(f"{found}; accepted: {_LANGUAGE}")
 
 
 def _is_number(node: ast.expr) -> bool:

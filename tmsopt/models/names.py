@@ -16,6 +16,24 @@ CONSTANTS = ("pi",)
 TAKEN = ("abscissa", "damping_ratio", "angular_frequency", "radius", "structure", "objective", *CONSTANTS, *FUNCTIONS)
 """Names that an expression of a problem uses for something else."""
 
+OUTSIDE = (
+    "a delay exp(-s*tau), as any nonlinear eigenproblem, is outside of what tmsopt does; approximate it by states "
+    "(Padé: x(t - tau) = w - x with w' = (4*x - 2*w)/tau)"
+)
+_EIGENVALUE = (
+    f"is the eigenvalue, on which no entry depends: its powers are coefficients, or go in M, D and K, and {OUTSIDE}"
+)
+
+MEANT = {
+    "s": f"if s is the eigenvalue: {OUTSIDE}",
+    "t": "if t is the time: a system that changes with time is outside of what tmsopt does; write its average",
+    "z": "if z is that of discrete time: write p((1 + s)/(1 - s))*(1 - s)**n, whose roots are left where |z| < 1",
+    "omega": f"if omega is the eigenfrequency: {OUTSIDE}",
+    "e": "if e is Euler's number: write exp(1)",
+    **dict.fromkeys(("i", "I", "j"), "if it is the imaginary unit: write 1j, in [model] H, for matrices are real"),
+}
+"""Names that may stand for more than a parameter → what to do then."""
+
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _GREEK = re.compile(
     "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|kappa|lambda|mu|nu|xi|pi|rho|sigma|tau|phi|chi|psi|omega"
@@ -26,12 +44,14 @@ _INFIX = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/", ca.OP_
 _SHORT = {ca.OP_NEG: "(-{})", ca.OP_SQ: "({}**2)", ca.OP_TWICE: "(2*{})", ca.OP_INV: "(1/{})"}
 
 
-def unusable(name: Any) -> str:
-    """Why no parameter or quantity may have a name; empty where one may."""
+def unusable(name: Any, of_H: bool = False) -> str:
+    """Why no parameter or quantity may have a name; empty where one may, as s in a complex H, which has ω."""
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         return "is no name: a letter, then letters, digits and _"
     if keyword.iskeyword(name):
         return "is a reserved word"
+    if name == "s" and not of_H:
+        return _EIGENVALUE
     return "is what tmsopt computes" if name in TAKEN else ""
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from operator import itemgetter
 
-from tmsopt.design.quantities import NO_RADIUS, ROOT_QUANTITIES, root_names
+from tmsopt.design.quantities import ANGULAR_FREQUENCY, NO_RADIUS, ROOT_QUANTITIES, root_names
 from tmsopt.errors import nearest, suggest
 from tmsopt.models import Model, Parameter, ParameterSet, Quantity
 
@@ -46,6 +46,8 @@ def unknown(name: str, model: Model, of: ParameterSet, accepted: Iterable[str] |
     """What to write for a name that is none: the nearest by spelling, or the one that means it."""
     if name in model.absent:
         return model.absent[name]
+    if name == "s" and accepted is None:
+        return f"s is the eigenvalue: write abscissa for the largest Re s, {ANGULAR_FREQUENCY} for the largest |Im s|"
     known = vocabulary(model, of)
     names = list(known if accepted is None else accepted)
     if not nearest(name.lower(), [n.lower() for n in names], _NEAR):

@@ -83,7 +83,7 @@ class Texts:
             self.fault(f"found {len(texts)} quantities; accepted: up to {MOST_QUANTITIES}", "quantities")
             texts = {}
         for name, text in texts.items():
-            if why := unusable(name):
+            if why := unusable(name, bool(self.beside)):
                 self.fault(f"'{name}' {why}; give the quantity a name of its own", "quantities", str(name))
             else:
                 self.written[name] = self._parsed(text, ("quantities", name), "")
@@ -137,7 +137,7 @@ class Texts:
             self.fault(f"{where}{error}", *key)
             return None
         for name in expression.names:
-            if (why := unusable(name)) and name not in self.beside:
+            if (why := unusable(name, bool(self.beside))) and name not in self.beside:
                 self.fault(f"{where}'{name}' {why}; give the parameter another name", *key)
                 return None
         return expression

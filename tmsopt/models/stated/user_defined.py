@@ -178,10 +178,10 @@ def made(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> 
     if not names:
         raise Unfit(key, "names no parameter, so there is nothing to design; name one entry, such as 'k'")
     for n in names:
-        if why := unusable(n):
+        if why := unusable(n, kind == "hamiltonian"):
             raise Unfit(key, f"has a symbol named {n!r}, which {why}; give it another name")
     for n in derived:
-        if why := "is the name of a parameter" if n in names else unusable(n):
+        if why := "is the name of a parameter" if n in names else unusable(n, kind == "hamiltonian"):
             raise Unfit("quantities", f"{n!r} {why}; give the quantity a name of its own")
     shapes = tuple((n, len(rows), len(rows[0])) for n, rows in matrices.items())
     exact = ca.Function("stated", [ca.vertcat(*symbols, *numbers)], [ca.densify(every)])
