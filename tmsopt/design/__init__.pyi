@@ -11,4 +11,7 @@ from .solution import (
     Bound as Bound, NotSolved as NotSolved, Relaxation as Relaxation, Solution as Solution, Starts as Starts,
     ended as ended,
 )
-from .unit_system import Unit as Unit, unit_of as unit_of, units_of as units_of
+from .unit_system import (
+    Unit as Unit, rate_of as rate_of, show_at as show_at, unit_at as unit_at, unit_of as unit_of,
+    unit_of_all as unit_of_all, units_of as units_of,
+)

@@ -5,6 +5,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from tmsopt.design.expression import Expression, dimension, parse_comparison, parse_value, written_sides
 from tmsopt.design.limit import limit_of
@@ -13,6 +14,7 @@ from tmsopt.design.quantities import ANGULAR_FREQUENCY
 from tmsopt.models import Parameter, Quantity
 from tmsopt.units import Dimension, factor
 
+_PER_SECOND = "1/s"
 _FREQUENCY, _HERTZ = "frequency", "Hz"  # which is a rate, and no 1/s to a reader
 
 
@@ -54,6 +56,43 @@ def unit_of(problem: Problem, text: str) -> Unit:
     if name in units:
         return _of_kind(problem, Dimension.of(units[name]))
     return _of_kind(problem, dimension_of(problem, text, units))
+
+
+def rate_of(problem: Problem, text: str, parameters: Mapping[str, Any]) -> Any:
+    """How many 1/s one unit of an expression is at a design, where it is per √(g/w) and a second is known; else None.
+
+    Of numbers and of arrays.
+    """
+    of = problem.parameter_set
+    if of.rate is None or of.root_unit == _PER_SECOND or unit_of(problem, text).text != of.root_unit:
+        return None
+    return of.rate(parameters)
+
+
+def unit_at(problem: Problem, text: str, parameters: Mapping[str, float]) -> Unit:
+    """The unit in which a reader has an expression at a design: rates in 1/s where there are seconds."""
+    rate = rate_of(problem, text, parameters)
+    return unit_of(problem, text) if rate is None else Unit(_PER_SECOND, 1 / float(rate))
+
+
+def unit_of_all(problem: Problem, text: str, held: Mapping[str, float] | None = None) -> Unit:
+    """The same where a second is one for all designs of a problem, for bounds and differences; else its own unit.
+
+    Args:
+        held: what these designs have in common; by default what is fixed, and nowhere varied.
+    """
+    varied = {*problem.scenarios, *problem.tolerances}
+    try:
+        return unit_at(problem, text, {n: x for n, x in problem.fixed.items() if n not in varied} if held is None else held)
+    except KeyError:
+        return unit_of(problem, text)
+
+
+def show_at(problem: Problem, text: str, parameters: Mapping[str, float], value: float, digits: int = 5) -> str:
+    """A number in the unit of `unit_at`, and where that is another in its own behind."""
+    shown, own = unit_at(problem, text, parameters), unit_of(problem, text)
+    behind = f" ({own.show(value, digits)})" if shown != own and math.isfinite(value) else ""
+    return f"{shown.show(value, digits)}{behind}"
 
 
 def si_units(problem: Problem) -> dict[str, str]:

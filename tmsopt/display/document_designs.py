@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from tmsopt.design import Problem, Solution
+from tmsopt.design import Problem, Solution, unit_at
 from tmsopt.models import in_words_of
 
 if TYPE_CHECKING:
@@ -52,9 +52,14 @@ def _listed(designs: Iterable[Named]) -> list[Named]:
 def _of_front(front: "Front") -> Iterator[Named]:
     """The fastest decay, then both ends and what changes between them."""
     if front.points:
-        best = min(front.points, key=lambda p: _or_infinite(p.solution.abscissa))
+        best = min(front.points, key=lambda p: _or_infinite(_decay(p.solution)))
         yield best.label or "least abscissa", best.solution.parameters
     yield from ((point.label, point.solution.parameters) for point in front.points if point.label)
+
+
+def _decay(solution: "Solution") -> float:
+    """Abscissa by the clock, where there is one."""
+    return solution.abscissa / unit_at(solution.problem, "abscissa", solution.parameters).one
 
 
 def _of_trace(trace: "Trace") -> Iterator[Named]:
@@ -80,8 +85,10 @@ def _of_results(results: "Results") -> Iterator[Named]:
     """The best row, and the one that decays least."""
     known = [row for row in results.rows if math.isfinite(row.abscissa)]
     if known:
-        best = results.summary.best or min(known, key=lambda row: row.abscissa)
-        last = max(known, key=lambda row: row.abscissa)
+        problem = results.study.problem
+        decays = {row.number: row.abscissa / unit_at(problem, "abscissa", row.parameters).one for row in known}
+        best = results.summary.best or min(known, key=lambda row: decays[row.number])
+        last = max(known, key=lambda row: decays[row.number])
         yield f"best, row {best.number}", best.parameters
         yield f"greatest abscissa, row {last.number}", last.parameters
 

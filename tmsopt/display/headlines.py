@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from tmsopt.design import Unit, ended, unit_of
+from tmsopt.design import Unit, ended, show_at, unit_of
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
@@ -31,7 +31,7 @@ def of_solution(solution: "Solution") -> Words:
     yield ended(problem, solution.status)
     asked = problem.minimize or problem.maximize
     name, value = (asked, solution.value) if asked else ("abscissa", solution.abscissa)
-    yield f"{' '.join(name.split())} = {unit_of(problem, name).show(value)}"
+    yield f"{' '.join(name.split())} = {show_at(problem, name, solution.parameters, value)}"
     yield solution.structure
     if solution.bound.proven:
         yield "proved"

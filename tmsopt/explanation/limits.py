@@ -8,7 +8,7 @@ from typing import Any
 from tmsopt.design.expression import written_sides
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
-from tmsopt.design.unit_system import Unit, dimension_of, limit_text, unit_of
+from tmsopt.design.unit_system import Unit, dimension_of, limit_text, unit_of, unit_of_all
 from tmsopt.errors import InputError
 from tmsopt.explanation.again import Again, moved
 from tmsopt.explanation.steps import natural_step, step_within
@@ -144,7 +144,7 @@ def _of_row(solution: Solution, name: str) -> Lever:
 
 def _lever(solution: Solution, name: str, kind: str, limit: str, physical: bool, move: str, step: float) -> Lever:
     text = solution.problem.minimize or solution.problem.maximize
-    gained = unit_of(solution.problem, text) if text else Unit()
+    gained = unit_of_all(solution.problem, text) if text else Unit()
     return Lever(name, kind, limit, physical, move, step, abs(solution.active[name]), gained=gained)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from tmsopt.charts.chart import Chart
 from tmsopt.design.problem import Problem
-from tmsopt.design.unit_system import Unit, unit_of
+from tmsopt.design.unit_system import Unit, unit_of, unit_of_all
 from tmsopt.fronts.front import Front
 from tmsopt.models import Model, in_words_of
 from tmsopt.models.told import pattern_of
@@ -128,7 +128,7 @@ def _said(model: Model | None, name: str) -> str:
 def _best(problem: Problem, names: Iterable[str], best: Mapping[str, float]) -> str:
     """The best design of a grid."""
     where = ", ".join(f"{n} = {unit_of(problem, n).show(best[n], 6)}" for n in names)
-    return f"least abscissa on the grid: {unit_of(problem, 'abscissa').show(best['value'], 6)} at {where}"
+    return f"least abscissa on the grid: {unit_of_all(problem, 'abscissa').show(best['value'], 6)} at {where}"
 
 
 def _summary_table(problem: Problem, data: Mapping[str, Any]) -> str:
@@ -214,7 +214,7 @@ def trace_table(trace: Trace) -> str:
 
     More: docs/how_to/tracing.md
     """
-    units = {n: unit_of(trace.problem, n) for n in (*trace.problem.free, "abscissa")}
+    units = {n: unit_of_all(trace.problem, n) for n in (*trace.problem.free, "abscissa")}
     lines = [trace.problem.title or "untitled problem", trace_headline(trace)]
     for number_, branch in enumerate(trace.branches, start=1):
         lines += ["", f"branch {number_}: {_summary(branch, trace)}"]

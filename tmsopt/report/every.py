@@ -1,6 +1,7 @@
 """All designs with a pattern as text for a reader."""
 
 from tmsopt.completeness import Completeness
+from tmsopt.design import unit_at
 from tmsopt.report.text import columns, number
 from tmsopt.solver.all_designs import Coverage, Every
 
@@ -27,7 +28,9 @@ def every_table(every: Every) -> str:
         names = [n for n in found[0].parameters if n in problem.free]
         rows = [("", *(str(k) for k in range(1, len(found) + 1)))]
         rows += [(n, *(number(s.parameters[n]) for s in found)) for n in names]
-        rows += [("abscissa", *(number(s.abscissa) for s in found)), ("structure", *(s.structure for s in found))]
+        each = [unit_at(problem, "abscissa", s.parameters) for s in found]
+        decays = [number(s.abscissa / unit.one) for s, unit in zip(found, each, strict=True)]
+        rows += [(f"abscissa {each[0].text}".rstrip(), *decays), ("structure", *(s.structure for s in found))]
         rows += [("met", *(str(h) for h in coverage.hits))] if coverage else []
         rows += [("proved", *("yes" if p else "no" for p in every.proved))] if any(every.proved) and not known else []
         all_of_them = f"these are all: {many} in the box (proved; {effort})"

@@ -4,6 +4,8 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from tmsopt.critical_speeds.speeds import speed_of
+from tmsopt.design import unit_of
 from tmsopt.report.text import columns
 
 if TYPE_CHECKING:
@@ -26,7 +28,9 @@ def motion_table(motion: "Simulation", full: bool = False) -> str:
     More: docs/how_to/motion.md
     """
     title, time = motion.problem.title or "untitled problem", _with(motion, "t", motion["t"][-1])
-    lines = [title, f"motion over {time} {_cause(motion)}", "", *columns(_cut([*_measured(motion)], full)), ""]
+    name = speed_of(motion.problem.parameter_set)
+    at = f" at {name} = {unit_of(motion.problem, name).show(motion.parameters[name])}" if name else ""
+    lines = [title, f"motion over {time}{at} {_cause(motion)}", "", *columns(_cut([*_measured(motion)], full)), ""]
     lines += [*columns(_cut([*_modes(motion, full)], full)), "", *_notes(motion)]
     return "\n".join(line.rstrip() for line in lines)
 

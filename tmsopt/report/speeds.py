@@ -7,7 +7,7 @@ from tmsopt.critical_speeds.crossings import Crossing, Stretch
 from tmsopt.critical_speeds.growth import Growth
 from tmsopt.critical_speeds.speeds import Speeds, speed_of
 from tmsopt.design.solution import Solution
-from tmsopt.design.unit_system import Unit, unit_of
+from tmsopt.design.unit_system import Unit, unit_of, unit_of_all
 from tmsopt.models import in_words_of
 from tmsopt.report.solution.rows import frequency_of
 from tmsopt.report.text import columns
@@ -34,10 +34,12 @@ def speeds_table(found: Speeds) -> str:
         "",
     ]
     real = found.problem.model.carrier is None
-    roots = "eigenfrequency" if not real else f"root {unit_of(found.problem, 'abscissa').text}".rstrip()
+    held = {n: x for n, x in found.parameters.items() if n != found.parameter}
+    per = unit_of_all(found.problem, "abscissa", held)
+    roots = "eigenfrequency" if not real else f"root {per.text}".rstrip()
     rows: list[Sequence[str]] = [("", f"{found.parameter} {unit.text}".rstrip(), roots, "")]
     for c in found.found:
-        place = _root(c) if real else frequency_of(-c.root.im, c.root.re, 12, c.root.multiplicity)
+        place = _root(c, per) if real else frequency_of(-c.root.im, c.root.re, 12, c.root.multiplicity)
         rows.append((in_words_of(found.problem.model, c.kind), unit.number(c.at, _DIGITS), place, _meaning(c)))
     lines += [*columns(rows), ""] if found.found else [_nothing(found), ""]
     lines += list(_always(found))
@@ -102,14 +104,14 @@ def _marginally(found: Speeds) -> str:
     return "marginally stable (no root right of the imaginary axis, those on it simple)"
 
 
-def _root(c: Crossing) -> str:
+def _root(c: Crossing, unit: Unit) -> str:
     if c.kind == "infinity":
         return "infinite"
     times = f" ({c.root.multiplicity}-fold)" if c.root.multiplicity > 1 else ""
     if not c.root.im:
-        return f"{c.root.re:.12g}{times}"
-    real = f"{c.root.re:.12g} " if c.root.re else ""
-    return f"{real}± {c.root.im:.12g}i{times}"
+        return f"{unit.number(c.root.re, 12)}{times}"
+    real = f"{unit.number(c.root.re, 12)} " if c.root.re else ""
+    return f"{real}± {unit.number(c.root.im, 12)}i{times}"
 
 
 def _meaning(c: Crossing) -> str:

@@ -5,7 +5,7 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
 
-from tmsopt.design import ended, unit_of
+from tmsopt.design import ended, show_at, unit_at, unit_of
 from tmsopt.report.text import HEIGHT, WIDTH, columns, number, screen, yes_no
 from tmsopt.studies.row import Row
 from tmsopt.studies.study import Study
@@ -88,9 +88,11 @@ def study_rows(study: Study, rows: Sequence[Row]) -> list[tuple[str, ...]]:
     free = [name for name in problem.free if name not in study.columns]
     text = problem.minimize or problem.maximize
     asked = [text] if text and text != "abscissa" and text not in free else []
-    units = {n: f"{n} {unit_of(problem, n).text}".rstrip() for n in (*study.columns, *asked, *free, *_reports(study))}
+    some = dict.fromkeys(problem.parameter_set.names, 1.0)  # a unit has one name for all designs
+    names = (*study.columns, *asked, *free, "abscissa", *_reports(study))
+    units = {n: f"{n} {unit_at(problem, n, some).text}".rstrip() for n in names}
     varied, objective, rest = ([units[n] for n in names] for names in (study.columns, asked, (*free, *_reports(study))))
-    heads = ["row", "stable", *varied, "status", *objective, "abscissa", "structure", *rest]
+    heads = ["row", "stable", *varied, "status", *objective, units["abscissa"], "structure", *rest]
     return [tuple(heads), *(_cells(study, row, asked, free) for row in rows)]
 
 
@@ -99,13 +101,14 @@ def _cells(study: Study, row: Row, asked: Sequence[str], free: Sequence[str]) ->
     known = row.status in ("optimal", "not_converged") or (row.status == "infeasible" and not problem.free)
 
     def shown(name: str, values: Mapping[str, float]) -> str:
-        return unit_of(problem, name).number(values[name], _DIGITS) if name in values else ""
+        return unit_at(problem, name, row.parameters).number(values[name], _DIGITS) if name in values else ""
 
     found = (row.parameters, row.reports) if known else ({}, {})
     return (
         str(row.number), yes_no(row.stable) if known else "", *(shown(n, row.varied) for n in study.columns),
         ended(problem, row.status),
-        *(shown(n, {n: row.objective} if known else {}) for n in asked), _short(row.abscissa) if known else "",
+        *(shown(n, {n: row.objective} if known else {}) for n in asked),
+        shown("abscissa", {"abscissa": row.abscissa} if known else {}),
         row.structure if known else "",
         *(shown(n, found[0]) for n in free), *(shown(n, found[1]) for n in _reports(study)),
     )  # fmt: skip
@@ -116,13 +119,16 @@ def _facts(study: Study, found: Summary) -> list[str]:
     if found.best is not None and study.problem.free:
         problem = study.problem
         given = ", ".join(f"{n} = {unit_of(problem, n).show(x, _DIGITS)}" for n, x in found.best.varied.items())
-        best = unit_of(problem, problem.minimize or problem.maximize or "").show(found.best.objective, _DIGITS)
+        text = problem.minimize or problem.maximize or ""
+        best = show_at(problem, text, found.best.parameters, found.best.objective, _DIGITS)
         lines.append(f"best: row {found.best.number}, {best} at {given}")
     same = (study.problem.minimize or "").strip() == "abscissa"
-    for name, (least, median, most) in found.spread.items():
+    for name, ends in found.spread.items():
         if (same and name == "objective") or found.product is not None:
             continue
-        lines.append(f"{name}: {_short(least)} to {_short(most)}, median {_short(median)}")
+        least, median, most = found.clocked.get(name, ends)
+        unit = " 1/s" if name in found.clocked else ""
+        lines.append(f"{name}: {_short(least)} to {_short(most)}{unit}, median {_short(median)}{unit}")
     if found.product is None:
         lines.append(f"stable: {found.stable} of {sum(found.counts.values())} rows")
     if found.structures:
@@ -135,8 +141,10 @@ def _facts(study: Study, found: Summary) -> list[str]:
     if found.product is not None:
         for name in ("stable", "feasible", "good"):
             lines.append(f"{_SHARES[name]}: {_share(getattr(found.product, name))}")
-        at = ", ".join(f"{100 * float(q):g} % {_short(value)}" for q, value in found.product.abscissa.items())
-        unit = unit_of(study.problem, "abscissa").text
+        values = found.clocked.get("quantiles", tuple(found.product.abscissa.values()))
+        each = zip(found.product.abscissa, values, strict=True)
+        at = ", ".join(f"{100 * float(q):g} % {_short(value)}" for q, value in each)
+        unit = "1/s" if "quantiles" in found.clocked else unit_of(study.problem, "abscissa").text
         lines.append(f"abscissa{f' in {unit}' if unit else ''} at most, for a share of all rows: {at}")
     for cause, count in islice(found.causes.items(), _CAUSES):
         lines.append(f"{count} × {cause}")

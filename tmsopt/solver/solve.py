@@ -15,7 +15,7 @@ from tmsopt.design.files import Given, question_of
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.quantities import ANGULAR_FREQUENCY
 from tmsopt.design.solution import Bound, NotSolved, Solution, Starts
-from tmsopt.design.unit_system import unit_of
+from tmsopt.design.unit_system import unit_at, unit_of
 from tmsopt.errors import Fault, InputError, is_number, short, suggest
 from tmsopt.formulation.formulate import design_of
 from tmsopt.formulation.nlp import objective_size
@@ -269,7 +269,7 @@ def _sides_note(problem: Problem, explored: Sequence[Explored], finding: Finding
                 return (f"both signs were searched: {part.name} is as good as {won.name}",)
             else:
                 found = "the best" if part.finding.status == "optimal" else "what was found"
-                asked = unit_of(problem, problem.minimize or problem.maximize or "")
+                asked = unit_at(problem, problem.minimize or problem.maximize or "", part.finding.parameters)
                 sentences.append(f"{found} with {part.name} is {asked.show(part.finding.checked.objective, 6)}")
     return ("; ".join(sentences),)
 

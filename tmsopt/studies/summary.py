@@ -4,11 +4,12 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from tmsopt.design import rate_of
 from tmsopt.records import Array, Table, Truth, plain
 from tmsopt.studies.export import PREFIXES, PartialColumn, columns
 from tmsopt.studies.judging import RowsInBlocks
@@ -88,6 +89,7 @@ class Summary:
         laws: law → greatest relative residual over the rows in which it applies.
         seconds: that the rows took, one after the other.
         product: of a Monte Carlo study, the shares that are as they should be.
+        clocked: the spread, and the ``quantiles`` of `product`, in 1/s; of what is per √(g/w) where a second is known.
     """
 
     rows: int
@@ -102,6 +104,7 @@ class Summary:
     laws: Table[float]
     seconds: float
     product: Yield | None = None
+    clocked: Table[tuple[float, ...]] = field(default_factory=Table)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
@@ -119,8 +122,14 @@ def summary(study: Study, rows: Iterable[Row]) -> Summary:
     values = {name: table[name].values for name in ("status", "objective", "abscissa", "structure", "proven", "warm")}
     status, objective = values["status"], values["objective"]
     counts, optimal = Counter(status.tolist()), status == "optimal"
-    ranked = np.flatnonzero(optimal & np.isfinite(objective))
-    best = ranked[np.argmin(study.problem.sign * objective[ranked])] if ranked.size else None
+    clocked = _clocked(study, table, values)
+    judged = clocked.get("objective", objective)
+    ranked = np.flatnonzero(optimal & np.isfinite(judged))
+    best = ranked[np.argmin(study.problem.sign * judged[ranked])] if ranked.size else None
+    answered = optimal | (status == "infeasible")
+    quantiles = study.method == "monte_carlo" and "abscissa" in clocked
+    in_seconds: dict[str, tuple[float, ...]] = {n: ends for n, x in clocked.items() if (ends := _ends(x[optimal]))}
+    in_seconds |= {"quantiles": tuple(_quantiles(clocked["abscissa"][answered]))} if quantiles else {}
     laws = {
         name.removeprefix(LAW): float(np.fmax.reduce(np.abs(column.values[column.present]), initial=0.0))
         for name, column in table.items() if name.startswith(LAW)
@@ -133,8 +142,18 @@ def summary(study: Study, rows: Iterable[Row]) -> Summary:
         stable=int(_stable(table).sum()), structures=_ranked(values["structure"][optimal].tolist()),
         proven=int(values["proven"].sum()), warm=int(values["warm"].sum()), laws=Table(laws),
         seconds=float(table["seconds"].values.sum()),
-        product=yield_of(known) if study.method == "monte_carlo" else None,
+        product=yield_of(known) if study.method == "monte_carlo" else None, clocked=Table(in_seconds),
     )  # fmt: skip
+
+
+def _clocked(study: Study, table: Mapping[str, PartialColumn], values: Mapping[str, Array]) -> dict[str, Array]:
+    """Objective and abscissa of every row in 1/s, where they are per √(g/w) and a second is known: w may differ."""
+    problem, found = study.problem, {}
+    parameters = {n: table[n].values for n in problem.parameter_set.names if n in table}
+    for name, text in (("objective", problem.minimize or problem.maximize), ("abscissa", "abscissa")):
+        if text and parameters and (rates := rate_of(problem, text, parameters)) is not None:
+            found[name] = values[name] * rates
+    return found
 
 
 def _stable(table: Mapping[str, PartialColumn]) -> Truth:
@@ -167,11 +186,15 @@ def yield_of(rows: Iterable[Row]) -> Yield:
     status, abscissa, stable = table["status"].values, table["abscissa"].values, _stable(table)
     feasible = status == "optimal"
     answered = feasible | (status == "infeasible")
-    known = np.sort(np.where(np.isnan(abscissa), np.inf, abscissa)[answered])
-    most = len(known)
-    at = {f"{q:g}": float(known[max(math.ceil(q * most) - 1, 0)]) for q in QUANTILES if most}
+    most = int(answered.sum())
+    at = dict(zip((f"{q:g}" for q in QUANTILES), _quantiles(abscissa[answered]), strict=False))
     shares = [Share(int((of & answered).sum()), most) for of in (stable, feasible, stable & feasible)]
     return Yield(shares[0], shares[1], shares[2], len(status) - most, Table(at))
+
+
+def _quantiles(abscissa: Array) -> list[float]:
+    known = np.sort(np.where(np.isnan(abscissa), np.inf, abscissa))
+    return [float(known[max(math.ceil(q * len(known)) - 1, 0)]) for q in QUANTILES if len(known)]
 
 
 def wilson(count: int, of: int, z: float = _Z) -> tuple[float, float]:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from tmsopt.design.solution import Solution
-from tmsopt.design.unit_system import limit_text, unit_of
+from tmsopt.design.unit_system import limit_text, show_at, unit_at, unit_of
 from tmsopt.explanation import Lever
 from tmsopt.models import GRAVITY, tms, to_si
 from tmsopt.models.told import structure_in_words
@@ -16,6 +16,7 @@ from tmsopt.report.solution.robustness import robustness_line, robustness_table
 from tmsopt.report.solution.rows import (
     ALL,
     NOTHING,
+    at_worst,
     loads,
     motion,
     parameter_rows,
@@ -23,6 +24,7 @@ from tmsopt.report.solution.rows import (
     quantity_rows,
     role,
     roots_line,
+    speed_in,
     tidy,
 )
 from tmsopt.report.solution.screen import KEPT, Block, fitted, named, wrapped
@@ -139,7 +141,7 @@ def headline(solution: Solution, on_edge: bool = False) -> tuple[str, str]:
     """How it ended, and what was asked, in words."""
     problem = solution.problem
     text = problem.minimize or problem.maximize
-    value = unit_of(problem, text).show(solution.value, 8) if text else ""
+    value = show_at(problem, text, at_worst(solution), solution.value, 8) if text else ""
     located = f"locate {problem.locate}" if problem.locate else ""
     sense = f"{problem.sense} " if problem.free else ""  # what is given is not sought
     asked = f"{sense}{text.strip()}" + (f" = {value}" if math.isfinite(solution.value) else "") if text else ""
@@ -219,11 +221,11 @@ def _design(solution: Solution, si: Mapping[str, float] | None) -> list[str]:
 
 def _motion(solution: Solution, found: Findings) -> list[str]:
     on_edge = found.robustness is not None and found.robustness.edges
-    lines = [motion(solution, bool(on_edge))]
-    unit = unit_of(solution.problem, "abscissa").text
+    at = speed_in(solution, solution.worst)
+    lines = [f"{f'at {at}: ' if at else ''}{motion(solution, bool(on_edge))}"]
     if found.stable is not None:
         lines.append(range_line(found.stable, solution))
-    return [*lines, f"{roots_line(solution, _DIGITS)}{f'  in {unit}' if unit else ''}"]
+    return [*lines, roots_line(solution, _DIGITS)]
 
 
 def _more(solution: Solution, found: Findings) -> str:
@@ -235,11 +237,12 @@ def _more(solution: Solution, found: Findings) -> str:
 
 def _stored(solution: Solution) -> Iterator[str]:
     """To all digits: the abscissa, and that of the numbers as they are stored."""
-    unit = unit_of(solution.problem, "abscissa")
+    problem, at = solution.problem, at_worst(solution)
     size = max((math.hypot(r.re, r.im) for r in solution.of_polynomial.roots), default=1.0)
     abscissa = solution.abscissa if not abs(solution.abscissa) <= NOTHING * size else 0.0
-    yield f"abscissa {unit.show(abscissa, ALL)}; of the parameters as rounded to doubles "\
-          f"{unit.number(solution.abscissa_realised, ALL)}"  # fmt: skip
+    realised = unit_at(problem, "abscissa", at).number(solution.abscissa_realised, ALL)
+    shown = show_at(problem, "abscissa", at, abscissa, ALL)
+    yield f"abscissa {shown}; of the parameters as rounded to doubles {realised}"
     yield roots_line(solution, ALL)
 
 

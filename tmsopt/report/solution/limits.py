@@ -6,7 +6,7 @@ from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.design.solution import Bound, Solution
-from tmsopt.design.unit_system import unit_of
+from tmsopt.design.unit_system import unit_of, unit_of_all
 from tmsopt.explanation import none_of
 from tmsopt.report.text import number
 
@@ -50,7 +50,7 @@ def proof_line(solution: Solution) -> str:
         among = {1: "a curve", 2: "a surface"}.get(left, f"a family of {left} parameters")
         more = f"; it is one of {among} of such designs, which tmsopt trace follows" if left > 0 else ""
         return f"proof: tmsopt prove FILE proves, or refutes, that this design exists{more}"
-    unit = unit_of(problem, text)
+    unit = unit_of_all(problem, text)
     side = "above" if problem.sense == "maximize" else "below"
     if bound.proven:
         by = f" by more than {bound.gap:.1e}" if bound.tolerance else ""

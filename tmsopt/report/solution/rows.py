@@ -8,8 +8,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tmsopt.checks.recheck import FEASIBLE
+from tmsopt.critical_speeds.speeds import speed_of
+from tmsopt.design.cases import Case
 from tmsopt.design.solution import Solution
-from tmsopt.design.unit_system import Unit, unit_of
+from tmsopt.design.unit_system import Unit, unit_at, unit_of
 from tmsopt.models import Model, Parameter, ParameterSet, Quantity, Values
 from tmsopt.models.told import eigenfrequencies, on_axis
 from tmsopt.roots import Root
@@ -106,11 +108,16 @@ def role(solution: Solution, name: str) -> str:
     return "free" if name in problem.free else "scenario" if name in problem.scenarios else "fixed"
 
 
+def at_worst(solution: Solution) -> Mapping[str, float]:
+    """The parameters in the case that roots and abscissa belong to: of a band the worst one, else the design's own."""
+    return solution.worst.applied(solution.parameters) if solution.worst else solution.parameters
+
+
 def clock(solution: Solution) -> tuple[float, Unit, Unit]:
     """What a rate of 1 is, and the units of times and of frequencies: s and Hz, or the model's own time."""
     of = solution.problem.parameter_set
     if of.rate is not None:
-        return float(of.rate(solution.parameters)), Unit("s"), Unit("Hz")
+        return float(of.rate(at_worst(solution))), Unit("s"), Unit("Hz")
     natural = any(s.rate is not None for s in solution.problem.model.sets)
     return 1.0, Unit("√(w/g)" if natural else ""), Unit("√(g/w)" if natural else "")
 
@@ -141,7 +148,16 @@ def motion(solution: Solution, on_edge: bool = False) -> str:
     return (
         f"{lasts}; {name} {listed} {hertz.text}".rstrip()
         + f"; damping ratio {ratio if abs(ratio) > NOTHING else 0:.4g}"
+        + (f" at {least}" if (least := speed_in(solution, solution.least_damped)) else "")
     )
+
+
+def speed_in(solution: Solution, case: Case | None) -> str:
+    """The speed of a case, where speeds differ from case to case; else empty."""
+    name = speed_of(solution.problem.parameter_set)
+    if name is None or case is None or name not in {**case.at, **case.offset}:
+        return ""
+    return f"{name} = {unit_of(solution.problem, name).show(case.applied(solution.parameters)[name])}"
 
 
 def _real(solution: Solution) -> str:
@@ -166,7 +182,10 @@ def loads(solution: Solution) -> str:
 def roots_line(solution: Solution, digits: int) -> str:
     """The roots, or of a complex system its eigenfrequencies."""
     if solution.problem.model.carrier is None:
-        return "roots: " + (", ".join(roots_of(solution.roots, digits)) or "none")
+        unit, own = unit_at(solution.problem, "abscissa", at_worst(solution)), unit_of(solution.problem, "abscissa")
+        named = f"  in {unit.text}" if unit.text else ""
+        named += f"; √(g/w) = {1 / unit.one:.{digits}g} {unit.text}" if unit != own else ""
+        return "roots: " + (", ".join(roots_of(solution.roots, digits, 1 / unit.one)) or "none") + named
     each, size = solution.eigenfrequencies, abs(solution.problem.model.carrier)
     middle = sum(z.re for z in each) / len(each) if each else 0.0
     spread = max((math.hypot(z.re - middle, z.im) for z in each), default=0.0) or 1.0
@@ -184,14 +203,14 @@ def frequency_of(re: float, im: float, digits: int, multiplicity: int = 1, size:
     return value + (f" ({multiplicity}-fold)" if multiplicity > 1 else "")
 
 
-def roots_of(roots: Sequence[Root], digits: int = 8) -> list[str]:
-    """Roots as text, a conjugate pair as one entry."""
+def roots_of(roots: Sequence[Root], digits: int = 8, rate: float = 1.0) -> list[str]:
+    """Roots as text, times a rate, a conjugate pair as one entry."""
     words = []
     for root in roots:
         if root.im < 0:
             continue
         size = math.hypot(root.re, root.im)
-        re, im = (x if abs(x) > NOTHING * size else 0.0 for x in (root.re, root.im))
+        re, im = (x * rate if abs(x) > NOTHING * size else 0.0 for x in (root.re, root.im))
         value = f"{re:.{digits}g}" + (f" ± {im:.{digits}g}i" if im else "")
         words.append(value + (f" ({root.multiplicity}-fold)" if root.multiplicity > 1 else ""))
     return words
