@@ -81,9 +81,10 @@ def unit_of_all(problem: Problem, text: str, held: Mapping[str, float] | None = 
     Args:
         held: what these designs have in common; by default what is fixed, and nowhere varied.
     """
-    varied = {*problem.scenarios, *problem.tolerances}
+    if held is None:
+        held = {n: x for n, x in problem.fixed.items() if n not in {*problem.scenarios, *problem.tolerances}}
     try:
-        return unit_at(problem, text, {n: x for n, x in problem.fixed.items() if n not in varied} if held is None else held)
+        return unit_at(problem, text, held)
     except KeyError:
         return unit_of(problem, text)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from tmsopt.charts.chart import Chart
 from tmsopt.design.problem import Problem
-from tmsopt.design.unit_system import Unit, unit_of, unit_of_all
+from tmsopt.design.unit_system import Unit, unit_at, unit_of, unit_of_all
 from tmsopt.fronts.front import Front
 from tmsopt.models import Model, in_words_of
 from tmsopt.models.told import pattern_of
@@ -195,10 +195,12 @@ def front_rows(front: Front, full: bool = False) -> list[tuple[str, ...]]:
     texts = [t.strip() for t in front.objectives]
     free = [n for n in front.problem.free if n not in texts]
     units, digits = {n: unit_of(front.problem, n) for n in (*texts, *free)}, 12 if full else 6
-    heads = {n: f"{n} {units[n].text}".rstrip() for n in units}
+    some = dict.fromkeys(front.problem.parameter_set.names, 1.0)  # a unit has one name for all designs
+    heads = {n: f"{n} {unit_at(front.problem, n, some).text}".rstrip() for n in units}
     rows = [(*(heads[t] for t in texts), "stable", "", *(heads[n] for n in free), "structure", "limits that bind")]
     for p in front.points:
-        numbers = [units[t].number(v, digits) for t, v in zip(texts, p.objectives, strict=True)]
+        each = (unit_at(front.problem, t, p.solution.parameters) for t in texts)
+        numbers = [unit.number(v, digits) for unit, v in zip(each, p.objectives, strict=True)]
         design = [units[n].number(p.solution.parameters[n], digits) for n in free]
         label = p.label if full or len(p.label) <= _LABEL else f"{p.label[: _LABEL - 1]}…"
         rows.append((*numbers, yes_no(p.stable), label, *design, p.structure, ", ".join(p.limits)))
