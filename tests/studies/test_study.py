@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from helpers import oracles
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from tmsopt import Progress, laws
@@ -474,3 +475,40 @@ def test_what_a_row_says_is_printable(tmp_path: Path) -> None:
     study = over_grid("problems/ep4.toml", {"mu": [0.1]})
     rows = [Row(0, 1, Table({"mu": 0.1}), "failed", cause="\x1b[31mred\u202e")]
     assert "\ufffd[31mred\ufffd" in study_table(study, summary(study, rows), rows)
+
+
+# By the clock
+
+
+def by_clock(row: Row) -> float:
+    """Eigenvalues of the oracle's polynomial times √(g/w)."""
+    p = row.parameters
+    w, rate = p["w"], np.sqrt(p["g"] / p["w"])
+    ratios = (p["m_H"] / p["m_B"], p["x_B"] / w, p["x_H"] / w, p["z_B"] / w, p["z_H"] / w, np.tan(p["lambda_s"]))
+    a = oracles.polynomial_exact(p["v"] / (rate * w), *ratios)
+    return float(np.roots([float(c) for c in a]).real.max() * rate)
+
+
+def test_rows_are_ranked_by_the_clock() -> None:
+    """On the moon it decays as fast per √(g/w), and the speed of the best design is in the box: not so on the earth."""
+    fixed = {"w": 1.0, "m_B": 10.0, "m_H": 1.0, "x_B": 1.3, "z_B": -0.4, "x_H": 1.01, "z_H": -0.2, "lambda_s": 0.2618}
+    problem = Problem(tms, fixed, {"v": (1, 6)}, minimize="abscissa")
+    found = run_study(over_grid(problem, {"g": [1.62, 3.71, 9.81]}), workers=1)
+    decays = [by_clock(row) for row in found.rows]
+    assert int(np.argmin([row.abscissa for row in found.rows])) == 0
+    assert found.summary.best.number == int(np.argmin(decays)) == 2
+    least, median, most = found.summary.clocked["abscissa"]
+    assert [least, median, most] == pytest.approx(sorted(decays), rel=1e-6)
+    text = str(found)
+    assert "abscissa 1/s" in text
+    assert f"best: row 2, {decays[2]:.6g} 1/s" in text
+    assert found.to_json()["spread"]["abscissa"]["min"] == min(row.abscissa for row in found.rows)
+
+
+def test_quantiles_of_a_monte_carlo_are_by_the_clock() -> None:
+    fixed = {"w": 1.0, "g": 9.81, "v": 4.0, "m_B": 10.0, "m_H": 1.0, "x_B": 1.3, "z_B": -0.4, "x_H": 1.01, "z_H": -0.2}
+    problem = Problem(tms, {**fixed, "lambda_s": 0.2618}, minimize="abscissa")
+    found = run_study(monte_carlo(problem, 41, tolerances={"w": 0.005}), workers=1)
+    decays = sorted(by_clock(row) for row in found.rows)
+    assert found.summary.clocked["quantiles"][2] == pytest.approx(decays[20], rel=1e-9)
+    assert f"50 % {decays[20]:.6g}" in " ".join(str(found).split())

@@ -15,7 +15,15 @@ from benchmarks.suites.statements.case import Answer, Case
 _CONDITION, _FAILS, _EXACT = "holds only under a stated condition", "does not hold", "exact"
 
 
-def _coefficients(Fr: str, mu: str, chi_B: str, chi_H: str, zeta_B: str, zeta_H: str, T: str) -> list[Fraction]:
+def coefficients(
+    Fr: str | float,
+    mu: str | float,
+    chi_B: str | float,
+    chi_H: str | float,
+    zeta_B: str | float,
+    zeta_H: str | float,
+    T: str | float,
+) -> list[Fraction]:
     """Of the paper's characteristic polynomial, descending, with T = tan λ_s."""
     f, m, b, h, zb, zh, t = map(Fraction, (Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T))
     nu = h - 1 - zh * t  # of the front mass from the steer axis, over cos λ_s
@@ -71,12 +79,12 @@ def _case(name: str, key: str, verdict: str, truth: bool, source: str, words: tu
 
 def _meets(tilt: str, chi_B: str, speeds: tuple[str, ...]) -> bool:
     """Whether the number of real roots changes with the speed, so that curves of eigenvalues meet."""
-    counts = {real_roots(_coefficients(Fr, "1", chi_B, "1", "-0.4", "-0.2", tilt)) for Fr in speeds}
+    counts = {real_roots(coefficients(Fr, "1", chi_B, "1", "-0.4", "-0.2", tilt)) for Fr in speeds}
     return len(counts) > 1
 
 
 def _spectrum(*design: str) -> np.ndarray:
-    return np.roots([float(c) for c in _coefficients(*design)])
+    return np.roots([float(c) for c in coefficients(*design)])
 
 
 def _stable(*design: str) -> bool:
@@ -90,7 +98,7 @@ def _printed(Fr: str, mu: str, chi_B: str, chi_H: str, zeta_B: str, zeta_H: str,
         return False
 
     def hurwitz(f: float) -> float:
-        a = [float(c) for c in _coefficients(str(f), mu, chi_B, chi_H, zeta_B, zeta_H, T)]
+        a = [float(c) for c in coefficients(str(f), mu, chi_B, chi_H, zeta_B, zeta_H, T)]
         return (a[1] * a[2] * a[3] - a[0] * a[3] ** 2 - a[4] * a[1] ** 2) / (a[1] * a[3])
 
     lead = hurwitz(2.0) - hurwitz(1.0)  # the quotient is affine in Fr²
@@ -184,6 +192,6 @@ CASES: tuple[Case, ...] = (
     ),
     _case(
         "three designs: still exact", "fig3-EPs", _EXACT,
-        real_roots(_coefficients("2.24", "1", "1.4142136", "1", "-0.4", "-0.2", _MIDDLE)) == 4, "Sturm's chain",
+        real_roots(coefficients("2.24", "1", "1.4142136", "1", "-0.4", "-0.2", _MIDDLE)) == 4, "Sturm's chain",
     ),
 )  # fmt: skip

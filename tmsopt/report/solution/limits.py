@@ -85,7 +85,9 @@ def case_lines(solution: Solution) -> list[str]:
     cover = solution.cover
     if cover is not None:
         means = f"by interval arithmetic on {cover.boxes} boxes" if cover.proven else "looked for, not proven"
-        lines.append(f"every case: abscissa at most {number(cover.limit)}, {means}")
+        unit = unit_of_all(of, "abscissa")
+        limit = f"{number(cover.limit / unit.one)} {unit.text}".rstrip()
+        lines.append(f"every case: abscissa at most {limit}, {means}")
     return lines
 
 
