@@ -158,9 +158,9 @@ def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
     if not isinstance(body, ast.Compare):
         raise ExpressionError(f"{_quoted(text)} is not a comparison; write e.g. 'nu_H >= 0.02' with <=, >= or ==")
     if len(body.ops) > 1:
-        sides = [_source(side, text) for side in (body.left, *body.comparators)]
-        signs = [{**COMPARISONS, **_STRICT}.get(type(op), "==") for op in body.ops]
-        each = " and ".join(f"'{a} {sign} {b}'" for (a, b), sign in zip(pairwise(sides), signs, strict=True))
+        sides = pairwise(_source(side, text) for side in (body.left, *body.comparators))
+        signs = ({**COMPARISONS, **_STRICT}.get(type(op), "==") for op in body.ops)
+        each = " and ".join(f"'{a} {sign} {b}'" for (a, b), sign in zip(sides, signs, strict=True))
         raise ExpressionError(f"{_quoted(text)} joins several comparisons; write one constraint for each, {each}")
     symbol = COMPARISONS.get(type(body.ops[0]))
     if symbol is None:
@@ -294,8 +294,8 @@ def _checked_names(  # noqa: PLR0912 - one case per kind of node
         case ast.Attribute():
             raise ExpressionError(f"{_quoted(text)} uses the attribute '{_source(node, text)}'; accepted: plain names")
         case _:
-            found = f"{_quoted(text)} contains '{_source(node, text)}'{_advice(text)}"
-            raise ExpressionError(f"{found}; accepted: {_LANGUAGE}")
+            found = f"contains '{_source(node, text)}'{_advice(text)}"
+            raise ExpressionError(f"{_quoted(text)} {found}; accepted: {_LANGUAGE}")
 
 
 def _is_number(node: ast.expr) -> bool:
