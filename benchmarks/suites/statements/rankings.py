@@ -151,7 +151,7 @@ x_H = 1.01
 z_H = -0.2
 lambda_s = "15 deg"
 [scenarios]
-v = { min = 3, max = 6, points = 3 }
+v = { min = 4.5, max = 8, points = 3 }
 [objective]
 minimize = "abscissa"
 """

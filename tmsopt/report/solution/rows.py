@@ -144,11 +144,11 @@ def motion(solution: Solution, on_edge: bool = False) -> str:
     shown = [f if hertz.text == "Hz" else 2 * math.pi * f for f in swings]
     name = ("" if hertz.text == "Hz" else "angular ") + ("frequency" if len(shown) == 1 else "frequencies")
     listed = " and ".join(f"{f:.4g}" for f in dict.fromkeys(shown))
-    ratio = solution.quantities["damping_ratio"]
+    ratio, least = solution.quantities["damping_ratio"], speed_in(solution, solution.least_damped)
     return (
         f"{lasts}; {name} {listed} {hertz.text}".rstrip()
         + f"; damping ratio {ratio if abs(ratio) > NOTHING else 0:.4g}"
-        + (f" at {least}" if (least := speed_in(solution, solution.least_damped)) else "")
+        + (f" at {least}" if least and least != speed_in(solution, solution.worst) else "")
     )
 
 
