@@ -29,8 +29,7 @@ _ALLOWED = {"<=": (-math.inf, 0.0), ">=": (0.0, math.inf), "==": (0.0, 0.0), "":
 _LONGEST = 2000  # characters; longer texts could exhaust the parser's stack
 _DEEPEST = 200
 _LEGIBLE = 60  # characters of a part at fault
-_FUNCTIONS = " ".join(FUNCTIONS)
-_LANGUAGE = f"numbers, names, + - * / **, parentheses and {_FUNCTIONS}"
+_LANGUAGE = f"numbers, names, + - * / **, parentheses and {' '.join(FUNCTIONS)}"
 _NOT_ACCEPTED = re.compile(r"[^ -~]|#")  # look-alike letters, line breaks and comments
 
 
@@ -209,8 +208,8 @@ def _parse(text: str) -> ast.expr:
         kept = next((word for word in re.findall(r"[A-Za-z_]\w*", text) if keyword.iskeyword(word)), None)
         own = f"; '{kept}' is a reserved word, write e.g. {kept}_" if kept else ""
         own += f" (the tilt of a bicycle is lambda_s; of the eigenvalue: {OUTSIDE})" if kept == "lambda" else ""
-        message = f"{_quoted(text)} does not parse{column}{own}{_advice(text)}; accepted: {_LANGUAGE}"
-        raise ExpressionError(message) from None
+        found = f"does not parse{column}{own}{_advice(text)}; accepted: {_LANGUAGE}"
+        raise ExpressionError(f"{_quoted(text)} {found}") from None
 
 
 def _tree(text: str) -> ast.expr:
@@ -270,8 +269,7 @@ def _checked_names(  # noqa: PLR0912 - one case per kind of node
             if name in CONSTANTS:
                 return ()
             if name in FUNCTIONS:
-                message = f"names the function {name} without its argument; write {name}(…)"
-                raise ExpressionError(f"{_quoted(text)} {message}")
+                raise ExpressionError(f"{_quoted(text)} names the function {name} without its argument; write {name}(…)")
             if accepted is not None and name not in accepted:
                 raise UnknownName(text, name, accepted)
             return (name,)
@@ -289,13 +287,13 @@ def _checked_names(  # noqa: PLR0912 - one case per kind of node
                 raise ExpressionError(f"{_quoted(text)} calls {name} with {len(args)} arguments; accepted: {wanted}")
             return names_in(*args)
         case ast.Call():
-            called, of = _source(node.func, text), [_source(a, text) for a in node.args]
-            raise ExpressionError(f"{_quoted(text)} calls '{called}'{call_advice(called, of)}; accepted: {_FUNCTIONS}")
+            advised = call_advice(called := _source(node.func, text), [_source(a, text) for a in node.args])
+            raise ExpressionError(f"{_quoted(text)} calls '{called}'{advised}; accepted: {' '.join(FUNCTIONS)}")
         case ast.Attribute():
             raise ExpressionError(f"{_quoted(text)} uses the attribute '{_source(node, text)}'; accepted: plain names")
         case _:
-            found = f"contains '{_source(node, text)}'{_advice(text)}"
-            raise ExpressionError(f"{_quoted(text)} {found}; accepted: {_LANGUAGE}")
+            found = f"contains '{_source(node, text)}'{_advice(text)}; accepted: {_LANGUAGE}"
+            raise ExpressionError(f"{_quoted(text)} {found}")
 
 
 def _is_number(node: ast.expr) -> bool:
