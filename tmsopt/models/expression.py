@@ -269,7 +269,7 @@ def _checked_names(  # noqa: PLR0912 - one case per kind of node
             if name in CONSTANTS:
                 return ()
             if name in FUNCTIONS:
-                raise ExpressionError(f"{_quoted(text)} names the function {name} without its argument; write {name}(…)")
+                raise ExpressionError(f"{_quoted(text)} names the function {name} without argument; write {name}(…)")
             if accepted is not None and name not in accepted:
                 raise UnknownName(text, name, accepted)
             return (name,)
