@@ -19,7 +19,7 @@ from tmsopt.checks.recheck import Checked
 from tmsopt.design.cases import Case
 from tmsopt.design.dependence import varies
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
+from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS, SIMPLE
 from tmsopt.models import Model, Values
 from tmsopt.models.told import roots_told
 from tmsopt.records import Table
@@ -29,8 +29,6 @@ from tmsopt.units import Reading, frequencies, readings
 
 _PRECISIONS = (212, 424, 848, 1696)
 """Bits carried, one after the other until they suffice; the first are 60 digits, half of which a fit may lose."""
-
-_SIMPLE = ("real", "pair", "undecided")
 
 _Key = tuple[str, ...]
 
@@ -197,7 +195,7 @@ class _Design:
         if not found.roots:
             return ()
         coefficients = self.values(case).coefficients
-        if found.name in _SIMPLE and all(root.multiplicity == 1 for root in found.roots):
+        if found.name in SIMPLE and all(root.multiplicity == 1 for root in found.roots):
             return self.located(coefficients, found.roots) or stored or enclosed_roots(coefficients)
         return nearest_roots(found.name, coefficients, found.roots)
 

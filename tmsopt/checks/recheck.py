@@ -7,7 +7,6 @@ from functools import lru_cache
 from typing import Any
 
 import casadi as ca
-import flint
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,11 +16,11 @@ from tmsopt.design.cases import Case
 from tmsopt.design.dependence import varies
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
-from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE
+from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE, roots_at
 from tmsopt.margins.nearest import Robustness, robustness_at
 from tmsopt.models import Model, Values
 from tmsopt.records import Array, Table
-from tmsopt.roots import Root, Structure, exact_roots, pattern_distance, roots
+from tmsopt.roots import Root, Structure, pattern_distance, roots
 
 FEASIBLE = 1e-9
 """Violation, relative to the size of the two sides, up to which a constraint counts as satisfied."""
@@ -31,7 +30,6 @@ MATCHED = 1e-10
 
 _SCATTER = 2e-3  # of the largest root: five times what numeric roots beside a 4-fold one are off
 _TAKEN = 10 * STRUCTURE_TOLERANCE  # of the terms of a polynomial, more than those are off that are taken for multiple
-_DIGITS = 120  # products of five doubles are exact, and the tangent is right far beyond the answer
 
 
 @dataclass(frozen=True)
@@ -73,13 +71,7 @@ def recheck(
     """
     looked = _look(problem, parameters, problem.cases if cases is None else cases, around)
     listed, nominal, each, top, around = looked.cases, looked.nominal, looked.each, looked.top, looked.around
-    violations, amounts = {}, {}
-    for name, condition in problem.conditions.items():
-        at = looked.at(problem, condition)
-        violation, worst = max(((condition.violation(v), v) for v in at), key=lambda pair: _or_infinite(pair[0]))
-        if is_violated(problem, condition, violation, worst):
-            violations[name] = violation
-            amounts[name] = float(condition.excess(float(condition(worst))))
+    violations, amounts = _violated(problem, looked, problem.conditions)
     structure = each[top]["structure"]
     if not math.isfinite(structure.abscissa):
         exist = all(math.isfinite(float(c)) for c in each[top].coefficients)
@@ -113,6 +105,43 @@ def recheck(
         fastest=listed[looked.fastest] if listed else Case(),
         around=around,
     )
+
+
+def missed(
+    problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case], around: Robustness | None = None
+) -> dict[str, float]:
+    """Limits on the roots that the exact roots of the parameters as stored miss → by how much, in their own units.
+
+    Args:
+        around: as for `recheck`.
+    """
+    asked = {n: problem.conditions[n] for n in problem.asked_of_roots if RADIUS not in problem.conditions[n].names}
+    if not asked:
+        return {}
+    looked = _look(problem, parameters, cases, around)
+    near = {n: c for n, c in asked.items() if any(_is_near(c, v) for v in looked.at(problem, c))}
+    return _violated(problem, _look(problem, parameters, cases, looked.around, stored=True), near)[1] if near else {}
+
+
+def _is_near(condition: Expression, values: Values) -> bool:
+    """Whether numeric roots leave it open that a condition is missed."""
+    left, right = condition.sides(values)
+    slack = -condition.sign * (left - right)
+    return condition.equality or not slack > _SCATTER * max(1.0, abs(left), abs(right))
+
+
+def _violated(
+    problem: Problem, looked: "_Look", conditions: Mapping[str, Expression]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Violations of conditions beyond tolerance, relative and in the units of the sides."""
+    violations, amounts = {}, {}
+    for name, condition in conditions.items():
+        at = looked.at(problem, condition)
+        violation, worst = max(((condition.violation(v), v) for v in at), key=lambda pair: _or_infinite(pair[0]))
+        if is_violated(problem, condition, violation, worst):
+            violations[name] = violation
+            amounts[name] = float(condition.excess(float(condition(worst))))
+    return violations, amounts
 
 
 def is_violated(
@@ -197,12 +226,18 @@ class _Look:
 
 
 def _look(
-    problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case], around: Robustness | None = None
-) -> _Look:
+    problem: Problem, parameters: Mapping[str, float], cases: Sequence[Case], around: Robustness | None = None,
+    stored: bool = False,
+) -> _Look:  # fmt: skip
+    """A design in its cases, by the roots of its structure or by those of the parameters exactly as `stored`."""
     listed = [case for case in cases if not case.direction]
+    designs = [case.applied(parameters) for case in listed] or [parameters]
     nominal = problem.values(parameters)
-    each = [problem.values(case.applied(parameters)) for case in listed] or [nominal]
+    each = [problem.values(design) for design in designs] if listed else [nominal]
     near_top, near_least, near_fastest = _candidates(each)
+    if stored:
+        for design, values in zip((*designs, parameters), (*each, nominal), strict=True):
+            values.define("structure", Structure("undecided", realised_roots(problem, design), 0.0))
     top = max(near_top, key=lambda k: _or_infinite(each[k]["abscissa"]))
     least = min(near_least, key=lambda k: float(each[k]["damping_ratio"]))
     worst = {"abscissa": each[top]["abscissa"], "damping_ratio": each[least]["damping_ratio"]}
@@ -272,16 +307,5 @@ def realised_abscissa(problem: Problem, parameters: Mapping[str, float]) -> floa
 
 
 def realised_roots(problem: Problem, parameters: Mapping[str, Any]) -> tuple[Root, ...]:
-    """Roots of the parameters exactly as stored, rightmost first; none where a coefficient does not exist.
-
-    Coefficients at 120 digits, roots isolated in ball arithmetic.
-    """
-    with flint.ctx.workdps(_DIGITS):
-        exact = {name: flint.arb(value) for name, value in parameters.items()}
-        coefficients = problem.model.coefficients(exact, problem.parameter_set)
-    if not all(c.is_finite() for c in coefficients):
-        return ()
-    leading = next((k for k, c in enumerate(coefficients) if c.mid() != 0), None)
-    if leading is None or leading == len(coefficients) - 1:
-        return ()
-    return exact_roots(coefficients[leading:])
+    """Roots of the parameters exactly as stored, rightmost first; none where a coefficient does not exist."""
+    return roots_at(problem.model, problem.parameter_set, parameters)

@@ -7,14 +7,22 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
+import flint
 import numpy as np
 
 from tmsopt.models import Model, ParameterSet, Quantity, Values
 from tmsopt.records import Array
-from tmsopt.roots import Structure, abscissa_and_damping, roots, structure
+from tmsopt.roots import Root, Structure, abscissa_and_damping, exact_roots, roots, structure
 
 STRUCTURE_TOLERANCE = 1e-11
 """Relative change of a coefficient within which roots count as multiple: a polished optimum is within 1e-14."""
+
+SIMPLE = ("real", "pair", "undecided")
+"""Structures whose roots are numeric, as they are."""
+
+_SCATTER, _ROUNDING = 1e-11, 4 * np.finfo(float).eps  # of roots, relative, beyond which exact ones are computed
+
+_DIGITS = 120  # products of five doubles are exact, and the tangent is right far beyond the answer
 
 _KEPT = 64  # structures: several quantities are asked of the same design, and of each of its worst cases
 
@@ -40,12 +48,39 @@ def _structure(values: Mapping[str, Any]) -> Structure:
     off = values.roundings()
     if abs(a[0]) <= off[0] < math.inf:
         return Structure("undecided", (), math.inf)  # rounding alone keeps it from 0; where all are such, all fits
-    return _known_structure(tuple(a), tuple(map(float, off)))
+    found = _known_structure(tuple(a), tuple(map(float, off)))
+    simple = found.name in SIMPLE and all(root.multiplicity == 1 for root in found.roots)
+    if simple and _scatter(np.array(a), found) > _SCATTER:  # numeric roots are not to be trusted
+        found = replace(found, roots=roots_at(*values.given) or found.roots)
+    return found
+
+
+def _scatter(a: Array, found: Structure) -> float:
+    """How far simple numeric roots may be off by rounding, relative to the largest."""
+    z = np.array([complex(root.re, root.im) for root in found.roots])
+    terms, slope = np.polyval(np.abs(a), np.abs(z)), np.abs(np.polyval(np.polyder(a), z))
+    return float((_ROUNDING * terms / (slope + np.finfo(float).tiny)).max() / (np.abs(z).max() or 1.0))
 
 
 @lru_cache(maxsize=_KEPT)
 def _known_structure(a: tuple[float, ...], off: tuple[float, ...]) -> Structure:
     return structure(a, STRUCTURE_TOLERANCE, off)
+
+
+def roots_at(model: Model, of: ParameterSet, parameters: Mapping[str, Any]) -> tuple[Root, ...]:
+    """Roots of parameters exactly as they are, rightmost first; none where a coefficient does not exist.
+
+    Coefficients at 120 digits, roots isolated in ball arithmetic.
+    """
+    with flint.ctx.workdps(_DIGITS):
+        exact = {name: flint.arb(value) for name, value in parameters.items()}
+        coefficients = model.coefficients(exact, of)
+    if not all(c.is_finite() for c in coefficients):
+        return ()
+    leading = next((k for k, c in enumerate(coefficients) if c.mid() != 0), None)
+    if leading is None or leading == len(coefficients) - 1:
+        return ()
+    return exact_roots(coefficients[leading:])
 
 
 def _damping_ratio(values: Mapping[str, Any]) -> float:

@@ -172,6 +172,9 @@ class Solution(Shown):
         active: constraint or bound (``Fr.max``) → gain of the objective per unit that the limit is relaxed.
         violations: name → by how much it is violated, in its own units (rad, SI), where beyond tolerance; of a pattern,
             relative to the coefficients.
+        missed: limit on the roots → by how much the parameters as stored miss it beyond tolerance though the ideal design
+            meets it, in its own units. Empty wherever doubles near the ideal design meet all limits, for then they are
+            the ones that are stored.
         quantities: derived quantities; nan where one does not exist.
         dimensionless: the native parameters.
         formulation: ``abscissa``, ``matching`` or ``none``.
@@ -216,6 +219,7 @@ class Solution(Shown):
     dimensionless: Table[float]
     formulation: str
     freedom: Freedom
+    missed: Table[float] = field(default_factory=Table)
     branches: tuple[OtherBranch, ...] = ()
     notes: tuple[str, ...] = field(default=())
     worst: Case | None = None

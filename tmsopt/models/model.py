@@ -329,6 +329,11 @@ class Values(Mapping[str, Any]):
             self._known[name] = quantity.value(self) if lifted is None else lifted
         return self._known[name]
 
+    @property
+    def given(self) -> tuple[Model, ParameterSet, dict[str, Any]]:
+        """What everything is derived from."""
+        return self._at[:3]
+
     def roundings(self) -> list[float]:
         """How far each coefficient of a numeric design may be off as its parameters are rounded to doubles."""
         model, of, parameters, ranges = self._at

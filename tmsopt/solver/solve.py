@@ -9,7 +9,8 @@ from typing import Unpack
 
 from tmsopt.checks.bound import instant_bound
 from tmsopt.checks.digits import certified
-from tmsopt.checks.recheck import Checked, recheck
+from tmsopt.checks.recheck import Checked, missed, recheck
+from tmsopt.checks.stored import held
 from tmsopt.checks.worst_case import cover
 from tmsopt.design.files import Given, question_of
 from tmsopt.design.problem import Problem, freedom
@@ -278,7 +279,12 @@ def _assembled(
     problem: Problem, finding: Finding, notes: tuple[str, ...], sides: dict[str, float], began: float,
     bound: bool = True,
 ) -> Solution:  # fmt: skip
-    checked = finding.checked
+    parameters, checked = finding.parameters, finding.checked
+    lost: Mapping[str, float] = {}
+    if not checked.violations:
+        parameters, checked = held(problem, parameters, checked, finding.cases)
+        lost = missed(problem, parameters, finding.cases, checked.around)
+        finding = replace(finding, parameters=parameters, checked=checked)
     numbers = certified(problem, finding.parameters, checked, finding.cases)
     told = math.isclose(numbers.value, checked.objective, rel_tol=_TOLD, abs_tol=_TOLD)
     if finding.status == "optimal" and problem.free and problem.objective is not None and not told:
@@ -296,6 +302,7 @@ def _assembled(
         structure=name_told(problem.model, checked.structure.name),
         active=Table(finding.active),
         violations=checked.amounts,
+        missed=Table(lost),
         bound=instant_bound(problem, numbers.value) if optimal and bound else Bound(),
         starts=finding.starts,
         seconds=time.perf_counter() - began,

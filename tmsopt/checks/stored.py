@@ -1,0 +1,214 @@
+"""A design near another that meets limits on the roots exactly as stored, where the doubles of the other miss them.
+
+Beside an m-fold root s₀ a change ε of a coefficient moves roots by ε^(1/m), so the doubles nearest to an ideal design
+miss a limit by 1e-8 at a double root, by 4e-4 at a 4-fold one. With u the direction along the limit, s = s₀ + u t, and
+∏ (t − tⱼ) = tᵐ + c₁ tᵐ⁻¹ + … + c_m, roots that are spread evenly over −h ≤ t ≤ h stay within d of the limit while
+
+    |Im cₖ| ≤ h^(k−1) d / 2,    |Re cₖ − Re cₖ of the spread| ≤ hᵏ / 8    (k ≥ 2),
+
+and h² is what the spread costs. Doubles near such a design are a lattice. Its point that keeps these best, each in
+units of what it leaves, comes by a reduced basis (Lenstra, Lenstra and Lovász 1982) and the nearest plane (Babai
+1986), and is judged by its exact roots. h grows until one is met.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import flint
+import numpy as np
+
+from tmsopt.checks.recheck import FEASIBLE, Checked, missed, recheck
+from tmsopt.design.cases import Case
+from tmsopt.design.problem import Problem
+from tmsopt.design.quantities import ANGULAR_FREQUENCY
+from tmsopt.records import Array
+from tmsopt.roots import Root, Structure
+from tmsopt.roots.exact import isolated_roots
+from tmsopt.roots.patterns.enclosed import nearest_roots
+
+_DIGITS = 150  # slopes are differences over 2⁻¹⁰⁰ of a parameter
+_SPREADS = 4.0 ** np.arange(10) * 2e-12  # h² over s₀² C(m, 2), from what a structure tolerates up to 5e-7
+_LINE = 1e-6  # relative distance from the worst root up to which another is on the limit too
+_STEPS, _TRIALS, _NEIGHBOURS = 4, 4, 4  # of Newton's method; designs judged; basis vectors added to the nearest point
+_RANK = 1e-9  # of the steepest direction, below which one moves nothing
+_MOVE = 3e-12  # relative: moves on the lattice, beside their other ends, lest slopes change
+_BITS = 60  # behind the point, of the coordinates of the lattice
+_AT_END = 1e-9  # of a range: a parameter so close to an end stays there
+
+
+@dataclass(frozen=True)
+class _Cluster:
+    """A multiple root on a limit.
+
+    Attributes:
+        case: in which it is there.
+        root: of the ideal design, on or above the real axis.
+        along: unit vector along the limit.
+    """
+
+    case: Case
+    root: Root
+    along: complex
+
+    @property
+    def place(self) -> complex:
+        """The root as a number."""
+        return complex(self.root.re, self.root.im)
+
+    def parts(self) -> Iterator[tuple[int, bool]]:
+        """Order k of each cₖ, and whether it is its real part; without those that are 0 or free to move."""
+        for k in range(1, self.root.multiplicity + 1):
+            for real in (True, False):
+                if (k > 1 or not real) and (self.root.im or real == (k % 2 == 0 or self.along.imag == 0)):
+                    yield k, real
+
+
+def held(
+    problem: Problem, parameters: Mapping[str, float], checked: Checked, cases: Sequence[Case]
+) -> tuple[Mapping[str, float], Checked]:
+    """A design and its recheck, moved as little as it takes to meet the limits on its roots exactly as stored.
+
+    The structure remains that of the ideal design. Where no such design is found, the one that is given.
+    """
+    amounts = missed(problem, parameters, cases, checked.around)
+    if not amounts:
+        return parameters, checked
+    clusters = _clusters(problem, parameters, checked, cases, amounts)
+    ends = problem.free.items()
+    inside = [n for n, (lo, hi) in ends if min(parameters[n] - lo, hi - parameters[n]) > _AT_END * (hi - lo)]
+    for names in dict.fromkeys((tuple(inside), tuple(problem.free))) if clusters else ():
+        for spread in _SPREADS.tolist() if names else ():
+            for design in _nearest(problem, parameters, clusters, names, spread):
+                if not all(lo <= design[n] <= hi for n, (lo, hi) in ends) or missed(problem, design, cases):
+                    continue
+                again = recheck(problem, design, cases, checked.around)
+                roots = set(problem.asked_of_roots) | set(problem.located)
+                if set(again.violations) <= roots:
+                    return design, _structured(problem, design, checked, again)
+    return parameters, checked
+
+
+def _clusters(
+    problem: Problem,
+    parameters: Mapping[str, float],
+    checked: Checked,
+    cases: Sequence[Case],
+    names: Sequence[str],
+) -> list[_Cluster]:
+    """The multiple roots that stand on the limits of these names."""
+    asked = {name for limit in names for name in problem.conditions[limit].names}
+    found = []
+    for case in [case for case in cases if not case.direction] or [Case()]:
+        structure = problem.values(case.applied(parameters))["structure"]
+        size = _LINE * max(math.hypot(r.re, r.im) for r in structure.roots)
+        for root in structure.roots:
+            z = complex(root.re, root.im)
+            if root.multiplicity == 1 or root.im < 0 or z == 0:
+                continue
+            if ANGULAR_FREQUENCY in asked and root.im >= checked.quantities[ANGULAR_FREQUENCY] - size:
+                found.append(_Cluster(case, root, 1.0))
+            elif "damping_ratio" in asked and -root.re <= (checked.quantities["damping_ratio"] + _LINE) * abs(z):
+                found.append(_Cluster(case, root, z / abs(z)))
+            elif root.re >= checked.structure.abscissa - size:
+                found.append(_Cluster(case, root, 1j))
+    return found
+
+
+def _nearest(
+    problem: Problem,
+    parameters: Mapping[str, float],
+    clusters: Sequence[_Cluster],
+    names: Sequence[str],
+    spread: float,
+) -> Iterator[dict[str, float]]:
+    """Doubles close to a design whose clusters are spread along their limits, the most promising first."""
+    target, leeway, size = _aims(clusters, spread)
+    widths = np.array([abs(parameters[n]) or np.ptp(problem.free[n]) for n in names])
+    with flint.ctx.workdps(_DIGITS):
+        at = {n: flint.arb(x) for n, x in parameters.items()}
+        known, slopes = _off(problem, at, clusters, target), []
+        for n, width in zip(names, widths.tolist(), strict=True):
+            step = flint.arb(width) * flint.arb(2) ** -100
+            moved = _off(problem, {**at, n: at[n] + step}, clusters, target)
+            slopes.append([float((b - a) / step) for a, b in zip(known, moved, strict=True)])
+        slope = np.array(slopes)
+        inverse = np.linalg.pinv((slope * widths[:, None] / size).T, rcond=_RANK)
+        for _ in range(_STEPS):
+            steps = widths * (inverse @ (np.array([float(x) for x in known]) / size))
+            at |= {n: (at[n] - flint.arb(step)).mid() for n, step in zip(names, steps.tolist(), strict=True)}
+            known = _off(problem, at, clusters, target)
+        start = {n: float(at[n]) for n in names}
+        off = [float(x) for x in _off(problem, {**at, **{n: flint.arb(x) for n, x in start.items()}}, clusters, target)]
+        aside = np.array([float(flint.arb(x) - at[n]) for n, x in start.items()])
+    if not np.all(np.isfinite([*off, *start.values()])):
+        return
+    units = np.array([math.ulp(x) for x in start.values()])
+    rows = np.hstack([slope * units[:, None] / leeway, np.diag(units / (_MOVE * widths))])
+    for steps in _rounded(rows, np.array([*(off / leeway), *(aside / (_MOVE * widths))])):
+        yield {**parameters, **{n: x + k * u for (n, x), k, u in zip(start.items(), steps, units.tolist(), strict=True)}}
+
+
+def _aims(clusters: Sequence[_Cluster], spread: float) -> tuple[Array, Array, Array]:
+    """Of each part of each cₖ: what it is in the spread, how far it may be off, and its natural size."""
+    aims = []
+    for cluster in clusters:
+        m, size = cluster.root.multiplicity, abs(cluster.place)
+        h = size * math.sqrt(spread * math.comb(m, 2))
+        even = np.poly(np.linspace(-1, 1, m))
+        for k, real in cluster.parts():
+            off = h**k / 8 if real or not cluster.root.im and not cluster.along.real == 0 else 0.0
+            across = h ** (k - 1) * FEASIBLE * size / 2
+            aims.append((even[k] * h**k if real else 0.0, off or across, size**k))
+    target, leeway, sizes = (np.array(column) for column in zip(*aims, strict=True))
+    return target, leeway, sizes
+
+
+def _off(
+    problem: Problem, parameters: Mapping[str, Any], clusters: Sequence[_Cluster], target: Sequence[float]
+) -> list[Any]:
+    """Each part of each cₖ of an exact design, minus what is aimed at."""
+    found = []
+    for cluster in clusters:
+        a = problem.model.coefficients(cluster.case.applied(parameters), problem.parameter_set)
+        z = [z for z, m in isolated_roots(a) for _ in range(m)]
+        place, c = flint.acb(cluster.place), [flint.acb(1)]
+        z.sort(key=lambda z: float(abs(z - place)))
+        for root in z[: cluster.root.multiplicity]:
+            t = (root - place) / flint.acb(cluster.along)
+            c = [a - t * b for a, b in zip([*c, 0], [0, *c], strict=True)]
+        found += [c[k].real if real else c[k].imag for k, real in cluster.parts()]
+    return [(x - t).mid() for x, t in zip(found, target, strict=True)]
+
+
+def _rounded(rows: Array, off: Array) -> Iterator[list[int]]:
+    """Integer combinations of rows that cancel best what is off, the best first."""
+    whole = [[int(math.ldexp(x, _BITS)) for x in row] for row in rows.tolist()]
+    reduced, transform = flint.fmpz_mat(whole).lll(transform=True)
+    n = len(rows)
+    basis = np.array([[math.ldexp(int(reduced[i, j]), -_BITS) for j in range(len(off))] for i in range(n)])
+    q, r = np.linalg.qr(basis.T)
+    rest, nearest = off, [0] * n
+    for i in range(n)[::-1]:
+        nearest[i] = -round(float(q[:, i] @ rest / r[i, i]))
+        rest = rest + nearest[i] * basis[i]
+    beside = itertools.product((0, 1, -1), repeat=min(n, _NEIGHBOURS))
+    ranked = sorted(beside, key=lambda more: float(np.abs(rest + more @ basis[: len(more)]).max()))
+    for more in ranked[:_TRIALS]:
+        by = [a + b for a, b in itertools.zip_longest(nearest, more, fillvalue=0)]
+        yield [sum(b * int(transform[i, j]) for i, b in enumerate(by)) for j in range(n)]
+
+
+def _structured(problem: Problem, design: Mapping[str, float], checked: Checked, again: Checked) -> Checked:
+    """The recheck of a design, with the structure of the ideal one that it was moved from."""
+    structure = again.structure
+    if structure.name != checked.structure.name:
+        with flint.ctx.workdps(_DIGITS):
+            exact = {n: flint.arb(x) for n, x in checked.worst.applied(design).items()}
+            a = problem.model.coefficients(exact, problem.parameter_set)
+            found = nearest_roots(checked.structure.name, a, checked.structure.roots) or ()
+        roots = tuple(Root(float(r.re), float(r.im), r.multiplicity) for r in found) or checked.structure.roots
+        structure = Structure(checked.structure.name, roots, checked.structure.distance)
+    return replace(again, structure=structure, violations=checked.violations, amounts=checked.amounts)
