@@ -231,7 +231,7 @@ def _look(
 ) -> _Look:  # fmt: skip
     """A design in its cases, by the roots of its structure or by those of the parameters exactly as `stored`."""
     listed = [case for case in cases if not case.direction]
-    designs = [case.applied(parameters) for case in listed] or [parameters]
+    designs = [case.applied(parameters) for case in listed] or [dict(parameters)]
     nominal = problem.values(parameters)
     each = [problem.values(design) for design in designs] if listed else [nominal]
     near_top, near_least, near_fastest = _candidates(each)

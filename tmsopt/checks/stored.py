@@ -24,6 +24,8 @@ from tmsopt.checks.recheck import FEASIBLE, Checked, missed, recheck
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY
+from tmsopt.design.solution import Solution
+from tmsopt.design.unit_system import amounts_text, show_at, unit_at
 from tmsopt.records import Array
 from tmsopt.roots import Root, Structure
 from tmsopt.roots.exact import isolated_roots
@@ -36,6 +38,7 @@ _STEPS, _TRIALS, _NEIGHBOURS = 4, 4, 4  # of Newton's method; designs judged; ba
 _RANK = 1e-9  # of the steepest direction, below which one moves nothing
 _MOVE = 3e-12  # relative: moves on the lattice, beside their other ends, lest slopes change
 _BITS = 60  # behind the point, of the coordinates of the lattice
+_APART, _SHOWN = 1e-6, 8  # relative difference of two abscissae from which both are shown; digits of each
 _AT_END = 1e-9  # of a range: a parameter so close to an end stays there
 
 
@@ -68,15 +71,16 @@ class _Cluster:
 
 def held(
     problem: Problem, parameters: Mapping[str, float], checked: Checked, cases: Sequence[Case]
-) -> tuple[Mapping[str, float], Checked]:
-    """A design and its recheck, moved as little as it takes to meet the limits on its roots exactly as stored.
+) -> tuple[Mapping[str, float], Checked, Mapping[str, float]]:
+    """A feasible design and its recheck, moved as little as it takes to meet limits on its roots exactly as stored.
 
-    The structure remains that of the ideal design. Where no such design is found, the one that is given.
+    The structure remains that of the ideal design. Where no such design is found, the one that is given, and what it
+    misses → by how much.
     """
-    amounts = missed(problem, parameters, cases, checked.around)
+    amounts = {} if checked.violations else missed(problem, parameters, cases, checked.around)
     if not amounts:
-        return parameters, checked
-    clusters = _clusters(problem, parameters, checked, cases, amounts)
+        return parameters, checked, amounts
+    clusters = _clusters(problem, parameters, checked, cases, list(amounts))
     ends = problem.free.items()
     inside = [n for n, (lo, hi) in ends if min(parameters[n] - lo, hi - parameters[n]) > _AT_END * (hi - lo)]
     for names in dict.fromkeys((tuple(inside), tuple(problem.free))) if clusters else ():
@@ -87,8 +91,31 @@ def held(
                 again = recheck(problem, design, cases, checked.around)
                 roots = set(problem.asked_of_roots) | set(problem.located)
                 if set(again.violations) <= roots:
-                    return design, _structured(problem, design, checked, again)
-    return parameters, checked
+                    return design, _structured(problem, design, checked, again), {}
+    return parameters, checked, amounts
+
+
+def abscissa_as_stored(solution: Solution) -> str:
+    """The abscissa of the parameters as stored in words, with the ideal one unless that is the objective.
+
+    Empty where the two differ by no more than a millionth.
+    """
+    ideal, realised = solution.abscissa, solution.abscissa_realised
+    size = max((math.hypot(root.re, root.im) for root in solution.roots), default=0.0)
+    if not abs(realised - ideal) > _APART * abs(ideal) + FEASIBLE * size:
+        return ""
+    at = solution.worst.applied(solution.parameters) if solution.worst else solution.parameters
+    goal = (solution.problem.minimize or solution.problem.maximize or "").strip()
+    first = "" if goal == "abscissa" else f"abscissa {show_at(solution.problem, 'abscissa', at, ideal, _SHOWN)}, "
+    return f"{first}as stored in doubles {unit_at(solution.problem, 'abscissa', at).number(realised, _SHOWN)}"
+
+
+def missed_note(problem: Problem, amounts: Mapping[str, float]) -> tuple[str, ...]:
+    """What parameters miss as they are stored, as a sentence for the reader."""
+    why = (
+        "found no doubles near the ideal design that meet every limit" if problem.free else "the ideal design does not"
+    )
+    return (f"as stored in doubles, the parameters miss {amounts_text(problem, amounts)}; {why}",) if amounts else ()
 
 
 def _clusters(
@@ -147,8 +174,9 @@ def _nearest(
         return
     units = np.array([math.ulp(x) for x in start.values()])
     rows = np.hstack([slope * units[:, None] / leeway, np.diag(units / (_MOVE * widths))])
-    for steps in _rounded(rows, np.array([*(off / leeway), *(aside / (_MOVE * widths))])):
-        yield {**parameters, **{n: x + k * u for (n, x), k, u in zip(start.items(), steps, units.tolist(), strict=True)}}
+    for counts in _rounded(rows, np.array([*(off / leeway), *(aside / (_MOVE * widths))])):
+        moves = zip(start.items(), counts, units.tolist(), strict=True)
+        yield {**parameters, **{n: x + count * unit for (n, x), count, unit in moves}}
 
 
 def _aims(clusters: Sequence[_Cluster], spread: float) -> tuple[Array, Array, Array]:
@@ -159,16 +187,13 @@ def _aims(clusters: Sequence[_Cluster], spread: float) -> tuple[Array, Array, Ar
         h = size * math.sqrt(spread * math.comb(m, 2))
         even = np.poly(np.linspace(-1, 1, m))
         for k, real in cluster.parts():
-            off = h**k / 8 if real or not cluster.root.im and not cluster.along.real == 0 else 0.0
             across = h ** (k - 1) * FEASIBLE * size / 2
-            aims.append((even[k] * h**k if real else 0.0, off or across, size**k))
+            aims.append((even[k] * h**k, h**k / 8, size**k) if real else (0.0, across, size**k))
     target, leeway, sizes = (np.array(column) for column in zip(*aims, strict=True))
     return target, leeway, sizes
 
 
-def _off(
-    problem: Problem, parameters: Mapping[str, Any], clusters: Sequence[_Cluster], target: Sequence[float]
-) -> list[Any]:
+def _off(problem: Problem, parameters: Mapping[str, Any], clusters: Sequence[_Cluster], target: Array) -> list[Any]:
     """Each part of each cₖ of an exact design, minus what is aimed at."""
     found = []
     for cluster in clusters:
@@ -180,13 +205,13 @@ def _off(
             t = (root - place) / flint.acb(cluster.along)
             c = [a - t * b for a, b in zip([*c, 0], [0, *c], strict=True)]
         found += [c[k].real if real else c[k].imag for k, real in cluster.parts()]
-    return [(x - t).mid() for x, t in zip(found, target, strict=True)]
+    return [(x - t).mid() for x, t in zip(found, target.tolist(), strict=True)]
 
 
 def _rounded(rows: Array, off: Array) -> Iterator[list[int]]:
     """Integer combinations of rows that cancel best what is off, the best first."""
     whole = [[int(math.ldexp(x, _BITS)) for x in row] for row in rows.tolist()]
-    reduced, transform = flint.fmpz_mat(whole).lll(transform=True)
+    reduced, transform = flint.fmpz_mat(whole).lll(True)
     n = len(rows)
     basis = np.array([[math.ldexp(int(reduced[i, j]), -_BITS) for j in range(len(off))] for i in range(n)])
     q, r = np.linalg.qr(basis.T)

@@ -12,6 +12,6 @@ from .solution import (
     ended as ended,
 )
 from .unit_system import (
-    Unit as Unit, rate_of as rate_of, show_at as show_at, unit_at as unit_at, unit_of as unit_of,
-    unit_of_all as unit_of_all, units_of as units_of,
+    Unit as Unit, amounts_text as amounts_text, rate_of as rate_of, show_at as show_at, unit_at as unit_at,
+    unit_of as unit_of, unit_of_all as unit_of_all, units_of as units_of,
 )

@@ -7,7 +7,7 @@ from typing import Any
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Freedom, Problem
 from tmsopt.design.quantities import ROOT_NAMES
-from tmsopt.design.unit_system import unit_of, units_of
+from tmsopt.design.unit_system import amounts_text, units_of
 from tmsopt.models.told import beyond_axis, eigenfrequencies, meant
 from tmsopt.records import Shown, Table, asked_above, plain
 from tmsopt.roots import Root, Structure
@@ -172,9 +172,8 @@ class Solution(Shown):
         active: constraint or bound (``Fr.max``) → gain of the objective per unit that the limit is relaxed.
         violations: name → by how much it is violated, in its own units (rad, SI), where beyond tolerance; of a pattern,
             relative to the coefficients.
-        missed: limit on the roots → by how much the parameters as stored miss it beyond tolerance though the ideal design
-            meets it, in its own units. Empty wherever doubles near the ideal design meet all limits, for then they are
-            the ones that are stored.
+        missed: limit on the roots that the ideal design meets → by how much the parameters as stored miss it, in its
+            own units; empty wherever doubles near the ideal design meet all limits, for those are stored then.
         quantities: derived quantities; nan where one does not exist.
         dimensionless: the native parameters.
         formulation: ``abscissa``, ``matching`` or ``none``.
@@ -313,18 +312,13 @@ class Solution(Shown):
             **plain(self, "abscissa abscissa_realised stable any_stable roots"),
             **(plain(self, "eigenfrequencies") if self.eigenfrequencies else {}), **plain(self, "structure"),
             "active": plain(self.active, digits=GAIN_DIGITS), "violations": plain(self.violations, digits=GAIN_DIGITS),
+            **({"missed_as_stored": plain(self.missed, digits=GAIN_DIGITS)} if self.missed else {}),
             **plain(self, "bound"), "starts": plain(self.starts, "tried converged at_best"),
             "looked": self.starts.looked, "seconds": round(self.seconds, 4),
             **plain(self, "quantities dimensionless formulation"),
             "freedom": plain(self.freedom, "free conditions count kind"), **plain(self, "branches notes"),
             **{name: value for name, value in optional.items() if value},
         }  # fmt: skip
-
-
-def violated_by(solution: Solution) -> str:
-    """What a solution violates, and by how much, in the units in which the problem was written."""
-    each, problem = solution.violations.items(), solution.problem
-    return ", ".join(f"{name} by {unit_of(problem, name).show(amount, 3)}" for name, amount in each)
 
 
 class NotSolved(RuntimeError):
@@ -343,7 +337,7 @@ class NotSolved(RuntimeError):
     """
 
     def __init__(self, solution: Solution) -> None:
-        self.solution, violated = solution, violated_by(solution)
+        self.solution, violated = solution, amounts_text(solution.problem, solution.violations)
         super().__init__(
             f"{solution.problem.title or 'problem'}: {solution.status}"
             + (f"; violated: {violated}" if violated else "")

@@ -105,6 +105,11 @@ def si_units(problem: Problem) -> dict[str, str]:
     return dict.fromkeys(problem.vocabulary, "1") | rates | {q.name: q.unit for q in listed}
 
 
+def amounts_text(problem: Problem, amounts: Mapping[str, float]) -> str:
+    """By how much each limit is violated, in the units in which the problem was written."""
+    return ", ".join(f"{name} by {unit_of(problem, name).show(amount, 3)}" for name, amount in amounts.items())
+
+
 def limit_text(problem: Problem, name: str) -> str:
     """A limit with its number in the unit in which the problem was written; empty for what is none."""
     parameter, _, end = name.rpartition(".")

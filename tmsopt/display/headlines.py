@@ -4,7 +4,8 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from tmsopt.design import Unit, ended, show_at, unit_of
+from tmsopt.checks import abscissa_as_stored
+from tmsopt.design import Unit, amounts_text, ended, show_at, unit_of
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
@@ -32,6 +33,9 @@ def of_solution(solution: "Solution") -> Words:
     asked = problem.minimize or problem.maximize
     name, value = (asked, solution.value) if asked else ("abscissa", solution.abscissa)
     yield f"{' '.join(name.split())} = {show_at(problem, name, solution.parameters, value)}"
+    yield from filter(None, [abscissa_as_stored(solution)])
+    if solution.missed:
+        yield f"as stored in doubles misses {amounts_text(problem, solution.missed)}"
     yield solution.structure
     if solution.bound.proven:
         yield "proved"

@@ -41,7 +41,8 @@ class FrontPoint:
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
         solution = plain(self.solution, "parameters abscissa abscissa_realised stable structure")
-        return plain(self, "objectives") | solution | plain(self, "limits label")
+        lost = {"missed_as_stored": plain(self.solution.missed)} if self.solution.missed else {}
+        return plain(self, "objectives") | solution | lost | plain(self, "limits label")
 
 
 @dataclass(frozen=True)

@@ -317,7 +317,7 @@ class Values(Mapping[str, Any]):
     ) -> None:  # fmt: skip
         native = of.native(parameters)
         self.model, self.coefficients = model, model.polynomial(**model.algebraic(native))
-        self._at = (model, of, dict(parameters), dict(ranges or {}))
+        self.given, self._ranges = (model, of, dict(parameters)), dict(ranges or {})
         self._known = {**native, **dict(zip(model.coefficient_names(), self.coefficients, strict=True)), **parameters}
         self._formulas = {q.name: q for q in (*model.quantities, *of.quantities, *extra)}
         self._lift = lift
@@ -329,14 +329,9 @@ class Values(Mapping[str, Any]):
             self._known[name] = quantity.value(self) if lifted is None else lifted
         return self._known[name]
 
-    @property
-    def given(self) -> tuple[Model, ParameterSet, dict[str, Any]]:
-        """What everything is derived from."""
-        return self._at[:3]
-
     def roundings(self) -> list[float]:
         """How far each coefficient of a numeric design may be off as its parameters are rounded to doubles."""
-        model, of, parameters, ranges = self._at
+        (model, of, parameters), ranges = self.given, self._ranges
         sizes = {n: abs(float(x)) for n, x in parameters.items()}
         sizes |= {n: width for n, width in ranges.items() if sizes[n] <= _NOTHING * width}
         with flint.ctx.workprec(_BITS):

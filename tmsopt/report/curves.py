@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.charts.chart import Chart
+from tmsopt.checks import missed_note
 from tmsopt.design.problem import Problem
 from tmsopt.design.unit_system import Unit, unit_at, unit_of, unit_of_all
 from tmsopt.fronts.front import Front
@@ -175,6 +176,8 @@ def front_table(front: Front, full: bool = False) -> str:
     ]
     rows = front_rows(front, full)
     remarks = [f"gap: {gap.reason}" for gap in front.gaps] + [f"note: {note}" for note in front.notes]
+    for k, p in enumerate(front.points, start=1):
+        remarks += [f"point {k}: {note}" for note in missed_note(p.solution.problem, p.solution.missed)]
     labelled = [k for k, p in enumerate(front.points) if p.label]
     height = HEIGHT - len(lines) - len(remarks) - 2 * bool(remarks) - 3
     lines += columns(rows) if full else screen(rows, height, labelled, "--full, --csv")

@@ -9,8 +9,8 @@ from typing import Unpack
 
 from tmsopt.checks.bound import instant_bound
 from tmsopt.checks.digits import certified
-from tmsopt.checks.recheck import Checked, missed, recheck
-from tmsopt.checks.stored import held
+from tmsopt.checks.recheck import Checked, recheck
+from tmsopt.checks.stored import held, missed_note
 from tmsopt.checks.worst_case import cover
 from tmsopt.design.files import Given, question_of
 from tmsopt.design.problem import Problem, freedom
@@ -279,12 +279,8 @@ def _assembled(
     problem: Problem, finding: Finding, notes: tuple[str, ...], sides: dict[str, float], began: float,
     bound: bool = True,
 ) -> Solution:  # fmt: skip
-    parameters, checked = finding.parameters, finding.checked
-    lost: Mapping[str, float] = {}
-    if not checked.violations:
-        parameters, checked = held(problem, parameters, checked, finding.cases)
-        lost = missed(problem, parameters, finding.cases, checked.around)
-        finding = replace(finding, parameters=parameters, checked=checked)
+    parameters, checked, lost = held(problem, finding.parameters, finding.checked, finding.cases)
+    finding = replace(finding, parameters=parameters, checked=checked)
     numbers = certified(problem, finding.parameters, checked, finding.cases)
     told = math.isclose(numbers.value, checked.objective, rel_tol=_TOLD, abs_tol=_TOLD)
     if finding.status == "optimal" and problem.free and problem.objective is not None and not told:
@@ -311,7 +307,10 @@ def _assembled(
         formulation=finding.formulation,
         freedom=freedom(problem),
         branches=finding.branches,
-        notes=(*finding.notes, *notes, *_stability_note(problem, checked, finding.parameters, optimal)),
+        notes=(
+            *finding.notes, *missed_note(problem, lost), *notes,
+            *_stability_note(problem, checked, finding.parameters, optimal),
+        ),
         worst=checked.worst if listed else None,
         least_damped=checked.least_damped if listed else None,
         fastest=checked.fastest if listed and problem.asks(ANGULAR_FREQUENCY) else None,

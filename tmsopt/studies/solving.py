@@ -10,7 +10,8 @@ from typing import Any
 from threadpoolctl import ThreadpoolController
 
 from tmsopt.checks.law_rows import law_rows
-from tmsopt.design.solution import Solution, violated_by
+from tmsopt.design.solution import Solution
+from tmsopt.design.unit_system import amounts_text
 from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.records import Table
@@ -168,8 +169,9 @@ def _new(answer: SolvedRow) -> bool:
 def _cause(solution: Solution) -> str:
     """Why a solution is not optimal, in words."""
     if solution.status == "optimal":
-        return ""
-    violated = violated_by(solution)
+        lost = amounts_text(solution.problem, solution.missed)
+        return f"as stored in doubles, misses {lost}" if lost else ""
+    violated = amounts_text(solution.problem, solution.violations)
     conflict = solution.relaxation.conflict if solution.relaxation else ()
     parts = [
         f"violated: {violated}" if violated else "", f"in conflict: {', '.join(conflict)}" if conflict else "",

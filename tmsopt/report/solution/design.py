@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 
+from tmsopt.checks import abscissa_as_stored
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import limit_text, show_at, unit_at, unit_of
 from tmsopt.explanation import Lever
@@ -149,7 +150,7 @@ def headline(solution: Solution, on_edge: bool = False) -> tuple[str, str]:
     silent = solution.status == "infeasible" and solution.any_stable is not False
     stable = "" if silent else stability(solution, on_edge)
     told = ": ".join(part for part in (_ended(solution), stable) if part)
-    return told, "; ".join(part for part in (located, asked, structure) if part)
+    return told, "; ".join(part for part in (located, asked, abscissa_as_stored(solution), structure) if part)
 
 
 def _ended(solution: Solution) -> str:
