@@ -2,13 +2,13 @@
 
 Beside an m-fold root s₀ a change ε of a coefficient moves roots by ε^(1/m), so the doubles nearest to an ideal design
 miss a limit by 1e-8 at a double root, by 4e-4 at a 4-fold one. With u the direction along the limit, s = s₀ + u t, and
-∏ (t − tⱼ) = tᵐ + c₁ tᵐ⁻¹ + … + c_m, roots that are spread evenly over −h ≤ t ≤ h stay within d of the limit while
+∏ (t − tⱼ) = tᵐ + c₁ tᵐ⁻¹ + … + c_m, roots that are spread evenly over −h ≤ t ≤ h stay within d of their line while cₖ is
+within h^(k−1) d / 2 of its aim across the limit, and within hᵏ / 8 along it (k ≥ 2). The line may stand inside the limit
+by some h²; that and the spread cost h² each.
 
-    |Im cₖ| ≤ h^(k−1) d / 2,    |Re cₖ − Re cₖ of the spread| ≤ hᵏ / 8    (k ≥ 2),
-
-and h² is what the spread costs. Doubles near such a design are a lattice. Its point that keeps these best, each in
-units of what it leaves, comes by a reduced basis (Lenstra, Lenstra and Lovász 1982) and the nearest plane (Babai
-1986), and is judged by its exact roots. h grows until one is met.
+Doubles near such a design are a lattice. Its point that comes closest, in these units, is found by a reduced basis
+(Lenstra, Lenstra and Lovász 1982) and the nearest plane (Babai 1986), and judged by its exact roots. h grows until one
+keeps every limit.
 """
 
 import itertools
@@ -49,12 +49,14 @@ class _Cluster:
     Attributes:
         case: in which it is there.
         root: of the ideal design, on or above the real axis.
-        along: unit vector along the limit.
+        along: unit vector along the limit, the inside of which is on its left.
+        exactly: whether the limit is an equality.
     """
 
     case: Case
     root: Root
     along: complex
+    exactly: bool
 
     @property
     def place(self) -> complex:
@@ -127,6 +129,7 @@ def _clusters(
 ) -> list[_Cluster]:
     """The multiple roots that stand on the limits of these names."""
     asked = {name for limit in names for name in problem.conditions[limit].names}
+    exactly = any(problem.conditions[limit].equality for limit in names)
     found = []
     for case in [case for case in cases if not case.direction] or [Case()]:
         structure = problem.values(case.applied(parameters))["structure"]
@@ -136,11 +139,11 @@ def _clusters(
             if root.multiplicity == 1 or root.im < 0 or z == 0:
                 continue
             if ANGULAR_FREQUENCY in asked and root.im >= checked.quantities[ANGULAR_FREQUENCY] - size:
-                found.append(_Cluster(case, root, 1.0))
+                found.append(_Cluster(case, root, -1.0, exactly))
             elif "damping_ratio" in asked and -root.re <= (checked.quantities["damping_ratio"] + _LINE) * abs(z):
-                found.append(_Cluster(case, root, z / abs(z)))
+                found.append(_Cluster(case, root, z / abs(z), exactly))
             elif root.re >= checked.structure.abscissa - size:
-                found.append(_Cluster(case, root, 1j))
+                found.append(_Cluster(case, root, 1j, exactly))
     return found
 
 
@@ -185,10 +188,11 @@ def _aims(clusters: Sequence[_Cluster], spread: float) -> tuple[Array, Array, Ar
     for cluster in clusters:
         m, size = cluster.root.multiplicity, abs(cluster.place)
         h = size * math.sqrt(spread * math.comb(m, 2))
-        even = np.poly(np.linspace(-1, 1, m))
+        inside = 0.0 if cluster.exactly else size * spread
+        c = np.poly(h * np.linspace(-1, 1, m) + 1j * inside)
+        across = (FEASIBLE * size + inside) / 2
         for k, real in cluster.parts():
-            across = h ** (k - 1) * FEASIBLE * size / 2
-            aims.append((even[k] * h**k, h**k / 8, size**k) if real else (0.0, across, size**k))
+            aims.append((c[k].real, h**k / 8, size**k) if real else (c[k].imag, h ** (k - 1) * across, size**k))
     target, leeway, sizes = (np.array(column) for column in zip(*aims, strict=True))
     return target, leeway, sizes
 

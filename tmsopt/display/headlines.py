@@ -35,7 +35,7 @@ def of_solution(solution: "Solution") -> Words:
     yield f"{' '.join(name.split())} = {show_at(problem, name, solution.parameters, value)}"
     yield from filter(None, [abscissa_as_stored(solution)])
     if solution.missed:
-        yield f"as stored in doubles misses {amounts_text(problem, solution.missed)}"
+        yield f"misses {amounts_text(problem, solution.missed)}"
     yield solution.structure
     if solution.bound.proven:
         yield "proved"
