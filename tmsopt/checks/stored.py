@@ -2,9 +2,9 @@
 
 Beside an m-fold root s₀ a change ε of a coefficient moves roots by ε^(1/m), so the doubles nearest to an ideal design
 miss a limit by 1e-8 at a double root, by 4e-4 at a 4-fold one. With u the direction along the limit, s = s₀ + u t, and
-∏ (t − tⱼ) = tᵐ + c₁ tᵐ⁻¹ + … + c_m, roots that are spread evenly over −h ≤ t ≤ h stay within d of their line while cₖ is
-within h^(k−1) d / 2 of its aim across the limit, and within hᵏ / 8 along it (k ≥ 2). The line may stand inside the limit
-by some h²; that and the spread cost h² each.
+∏ (t − tⱼ) = tᵐ + c₁ tᵐ⁻¹ + … + c_m, roots that are spread evenly over −h ≤ t ≤ h stay within d of their line while cₖ
+is within h^(k−1) d / 2 of its aim across the limit, and within hᵏ / 8 along it (k ≥ 2). The line may stand inside the
+limit by some h²; that and the spread cost h² each.
 
 Doubles near such a design are a lattice. Its point that comes closest, in these units, is found by a reduced basis
 (Lenstra, Lenstra and Lovász 1982) and the nearest plane (Babai 1986), and judged by its exact roots. h grows until one

@@ -362,7 +362,7 @@ def _bicycles() -> Iterator[Case]:
         "w = 1.25; v = { min = 0.5, max = 9 }; g = 9.8125; lambda_s = { min = 0.02, max = 1.4 }; m_B = 40; "
         "x_B = { min = 0.3, max = 6 }; z_B = { min = -2, max = -0.05 }; m_H = 4; x_H = 1.25; z_H = -0.25"
     )
-    for limit in (Limit("decay_time", "<=", 0.3), Limit("decay_rate", ">=", 3.7), Limit("decay_time", "<=", 0.22)):
+    for limit in (Limit("decay_time", "<=", 0.25), Limit("decay_rate", ">=", 4.2), Limit("decay_time", "<=", 0.22)):
         yield _case(f"{limit.quantity} {limit.number}", si, 'minimize = "z_B"', [limit])
     for speed, gains, number in (
         ("1.75", "k_phi k_phidot k_delta k_deltadot", 3.0),
