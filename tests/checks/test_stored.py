@@ -83,8 +83,8 @@ def test_the_headline_has_the_abscissa_of_the_doubles_too() -> None:
     """At the EP4 of the benchmark heights rounding alone moves the rightmost root by some 1e-4."""
     found = tmsopt.solve("problems/ep4.toml")
     assert abs(found.abscissa_realised - found.abscissa) > 1e-6
-    assert f"as stored {found.abscissa_realised:.8g}" in repr(found)
-    assert f"as stored in doubles {found.abscissa_realised:.8g}" in found.report()
+    for text in (repr(found), found.report()):
+        assert f"as stored {found.abscissa_realised:.8g}" in text
     assert "as stored" not in repr(tmsopt.solve("problems/least_speed.toml"))  # of simple roots
 
 

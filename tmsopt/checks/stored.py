@@ -109,7 +109,7 @@ def abscissa_as_stored(solution: Solution) -> str:
     at = solution.worst.applied(solution.parameters) if solution.worst else solution.parameters
     goal = (solution.problem.minimize or solution.problem.maximize or "").strip()
     first = "" if goal == "abscissa" else f"abscissa {show_at(solution.problem, 'abscissa', at, ideal, _SHOWN)}, "
-    return f"{first}as stored in doubles {unit_at(solution.problem, 'abscissa', at).number(realised, _SHOWN)}"
+    return f"{first}as stored {unit_at(solution.problem, 'abscissa', at).number(realised, _SHOWN)}"
 
 
 def missed_note(problem: Problem, amounts: Mapping[str, float]) -> tuple[str, ...]:

@@ -285,11 +285,8 @@ def _polynomials() -> Iterator[Case]:
             goal = f'minimize = "{" + ".join(names)}"'
             yield _case(f"{n}-fold root at -{number}", _stated(["1", *names], box), goal, _fast(number))
     mixed = _stated(["1", "a + b", "a*b + c", "b*c + 0.5*d", "d"], _box("abcd"))
-    for number in (0.9, 0.35):
+    for number in (0.9, 0.35, 0.6):
         yield _case(f"products of four, {number}", mixed, 'minimize = "a + 2*b + c + d"', _fast(number))
-    loop = _stated(["1", "a", "b + k", "0.25*a + k*t"], _box("abkt"))
-    for number in (0.55, 0.2):
-        yield _case(f"a loop, {number}", loop, 'minimize = "a + b + k + t"', _fast(number))
     for ratio, top in ((0.6, 30.0), (0.35, 30.0), (0.9, 30.0)):
         damped = _stated(["1", "a", "b", "c", "1"], _box("abc", 0, top))
         limits = [Limit("damping_ratio", ">=", ratio)]
@@ -298,9 +295,6 @@ def _polynomials() -> Iterator[Case]:
         real = _stated(["1", *names, "1.7"], _box(names, 0, 30))
         goal = f'minimize = "{" + ".join(names)}"'
         yield _case(f"all {len(names) + 1} roots real", real, goal, [Limit("damping_ratio", ">=", 1.0)])
-    slow = _stated(["1", "a", "b", "c", "d"], _box("abcd"))
-    limits = [Limit("angular_frequency", "<=", 1.3)]
-    yield _case("no faster than 1.3", slow, 'maximize = "d - a"', limits, ['top = "a <= 1.9"', 'b = "b <= 3.7"'])
     for number in (0.7, 0.45):
         band = _stated(["1", "a", "b", "c + m"], _box("abc"), {"m": 0.5})
         cases = [{"m": x} for x in (0.25, 0.75)]
@@ -331,7 +325,7 @@ def _oscillators() -> Iterator[Case]:
         system = _matrices([["1", "0"], ["0", "1"]], dashpots, chain, box)
         yield _case(f"two masses, {number}", system, 'minimize = "c + d + k + q"', _fast(number))
     tuned = {"m": (0.05, 2), "d": (0, 5), "q": (0, 5)}
-    for number in (0.1, 0.15):
+    for number in (0.12, 0.15, 0.18):
         system = _matrices(
             [["1", "0"], ["0", "m"]], [["d", "-1*d"], ["-1*d", "d"]], [["1 + q", "-1*q"], ["-1*q", "q"]], tuned
         )
@@ -339,7 +333,7 @@ def _oscillators() -> Iterator[Case]:
     system = _matrices(
         [["1", "0"], ["0", "m"]], [["d", "-1*d"], ["-1*d", "d"]], [["1 + q", "-1*q"], ["-1*q", "q"]], tuned
     )
-    for ratio in (0.1, 0.2):
+    for ratio in (0.15, 0.2, 0.25):
         yield _case(f"tuned mass of ratio {ratio}", system, 'minimize = "m"', [Limit("damping_ratio", ">=", ratio)])
     gains = {"p": (-20, 20), "r": (-20, 20), "d": (-20, 20), "e": (-20, 20)}
     driven = _matrices([["1", "0"], ["0", "0.5"]], [["0.25", "0"], ["r", "d"]], [["-2", "1"], ["p", "e"]], gains)
@@ -351,12 +345,12 @@ def _bicycles() -> Iterator[Case]:
     heights = "chi_H = 1.0; zeta_H = -0.2; zeta_B = { min = -2, max = -0.05 }; mu = 0.1"
     rest = "chi_B = { min = 1.01, max = 5 }; Fr = { min = 0.01, max = 10 }; lambda_s = { min = 0.02, max = 1.4 }"
     skates = _dimensionless(f"{heights}; {rest}")
-    for number in (1.1, 1.4, 1.7, 2.1):
+    for number in (1.4, 1.55, 1.7, 1.9, 2.1):
         yield _case(f"the tallest of {number}", skates, 'minimize = "zeta_B"', _fast(number))
     fixed = _dimensionless(f"chi_H = 1.0; zeta_H = -0.2; zeta_B = -0.4; mu = 0.1; {rest}")
-    for number in (1.1, 1.5, 1.8):
+    for number in (1.8, 1.83, 1.86):
         yield _case(f"the slowest of {number}", fixed, 'minimize = "Fr"', _fast(number))
-    for ratio in (0.7, 1.0):
+    for ratio in (1.0,):
         yield _case(f"the slowest of ratio {ratio}", fixed, 'minimize = "Fr"', [Limit("damping_ratio", ">=", ratio)])
     si = _si(
         "w = 1.25; v = { min = 0.5, max = 9 }; g = 9.8125; lambda_s = { min = 0.02, max = 1.4 }; m_B = 40; "
@@ -367,6 +361,8 @@ def _bicycles() -> Iterator[Case]:
     for speed, gains, number in (
         ("1.75", "k_phi k_phidot k_delta k_deltadot", 3.0),
         ("1.75", "k_phi k_phidot k_delta k_deltadot", 4.0),
+        ("2.25", "k_phi k_phidot k_delta k_deltadot", 3.4),
+        ("5.0", "k_phi k_phidot k_delta k_deltadot", 2.9),
         ("3.5", "k_phi k_phidot k_delta k_deltadot", 2.3),
         ("2.5", "k_phidot k_delta k_deltadot", 0.55),
         ("4.0", "k_phi k_phidot k_deltadot", 1.15),

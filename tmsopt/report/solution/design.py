@@ -54,7 +54,7 @@ def design_report(
         >>> print(tmsopt.report.design_report(tmsopt.solve("problems/ep4.toml")))
         EP4 of the chi_H = 1 bicycle
         optimal, proved: stable
-        minimize abscissa = -1.8803015; four roots meet in one (EP4)
+        minimize abscissa = -1.8803015; as stored ...; four roots meet in one (EP4)
         ...
 
     More: docs/how_to/report.md
