@@ -94,7 +94,7 @@ def test_what_it_saves_is_the_same_system(path: Path, tmp_path: Path) -> None:
     problem = tmsopt.load(path)
     data = data_of(page_of(problem))
     values = {p["name"]: p["value"] for p in data["parameters"]}
-    lines = "".join(f"{name} = {value!r}\n" for name, value in values.items())
+    lines = "".join(f"{p['name']} = {p['text']}\n" for p in data["parameters"])
     saved = tmp_path / "saved.toml"
     saved.write_text(data["toml"]["before"] + lines + data["toml"]["after"])
     again = tmsopt.load(saved)

@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import flint
+import numpy as np
 
 from tmsopt.arithmetic.elementary import exact
 from tmsopt.design.files import Given
@@ -15,7 +16,7 @@ from tmsopt.models import Model, ParameterSet
 from tmsopt.models.told import eigenfrequencies, roots_told
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Shown, plain
-from tmsopt.roots import Root, Structure
+from tmsopt.roots import Root, Structure, backward_error
 from tmsopt.roots.patterns.enclosed import nearest_roots
 from tmsopt.solver.solve import solved_first
 
@@ -98,8 +99,12 @@ def diagnose(design: Given, *, progress: Listener | None = None) -> tuple[Diagno
     counted(progress, "splitting roots")
     problem = solution.problem
     parameters = solution.worst.applied(solution.parameters) if solution.worst else dict(solution.parameters)
-    found = problem.values(parameters)["structure"]
+    values, told = problem.values(parameters), solution.of_polynomial
+    found = values["structure"]
     assert isinstance(found, Structure)
+    if found.name != told.name:  # the doubles stand a little aside, to keep a limit
+        z = np.array([complex(r.re, r.im) for r in told.roots for _ in range(r.multiplicity)])
+        found = replace(told, distance=float(backward_error([float(c) for c in values.coefficients], z)))
     return diagnosed(problem.model, problem.parameter_set, parameters, found, problem.free)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from tmsopt.checks.recheck import FEASIBLE
 from tmsopt.design import Problem, freedom, limit_of, unit_of
-from tmsopt.explorer.file_text import around
+from tmsopt.explorer.file_text import around, exact_value
 from tmsopt.explorer.javascript import Script, is_bicycle
 from tmsopt.explorer.known import Known
 from tmsopt.models import Parameter, words_of
@@ -84,6 +84,7 @@ def _parameter(problem: Problem, parameter: Parameter, value: float) -> dict[str
     return {
         "name": parameter.name, "meaning": parameter.meaning, **_unit(problem, parameter.name),
         "free": parameter.name in problem.free, "low": low, "high": high, "value": value,
+        "text": exact_value(value, unit_of(problem, parameter.name).text, parameter.unit),
     } | {n: end for n, end in ends.items() if end is not False and math.isfinite(end)}  # fmt: skip
 
 

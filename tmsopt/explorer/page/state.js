@@ -184,9 +184,10 @@ function visit() {
 
 /** The design as the text of a problem file, every parameter fixed, as exactly as doubles can. */
 function problemText() {
-  const lines = DATA.parameters.map(({name, unit, one}, k) => {
+  const lines = DATA.parameters.map(({name, unit, one, value, text}, k) => {
     const number = String(state.x[k] / one);
-    return `${name} = ${unit ? JSON.stringify(`${number} ${unit}`) : number}\n`;
+    const moved = unit ? JSON.stringify(`${number} ${unit}`) : number;
+    return `${name} = ${state.x[k] === value ? text : moved}\n`;
   });
   return DATA.toml.before + lines.join("") + DATA.toml.after;
 }
