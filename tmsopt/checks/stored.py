@@ -37,6 +37,7 @@ _LINE = 1e-6  # relative distance from the worst root up to which another is on 
 _STEPS, _TRIALS, _NEIGHBOURS = 4, 4, 4  # of Newton's method; designs judged; basis vectors added to the nearest point
 _RANK = 1e-9  # of the steepest direction, below which one moves nothing
 _MOVE = 3e-12  # relative: moves on the lattice, beside their other ends, lest slopes change
+_FINEST = 1e-20  # relative: steps of a parameter that is 0
 _BITS = 60  # behind the point, of the coordinates of the lattice
 _APART, _SHOWN = 1e-6, 8  # relative difference of two abscissae from which both are shown; digits of each
 _AT_END = 1e-9  # of a range: a parameter so close to an end stays there
@@ -91,8 +92,7 @@ def held(
                 if not all(lo <= design[n] <= hi for n, (lo, hi) in ends) or missed(problem, design, cases):
                     continue
                 again = recheck(problem, design, cases, checked.around)
-                roots = set(problem.asked_of_roots) | set(problem.located)
-                if set(again.violations) <= roots:
+                if set(again.violations) <= set(problem.asked_of_roots):
                     return design, _structured(problem, design, checked, again), {}
     return parameters, checked, amounts
 
@@ -114,9 +114,7 @@ def abscissa_as_stored(solution: Solution) -> str:
 
 def missed_note(problem: Problem, amounts: Mapping[str, float]) -> tuple[str, ...]:
     """What parameters miss as they are stored, as a sentence for the reader."""
-    why = (
-        "found no doubles near the ideal design that meet every limit" if problem.free else "the ideal design does not"
-    )
+    why = "no doubles nearby that meet every limit were found" if problem.free else "the ideal design does not"
     return (f"as stored in doubles, the parameters miss {amounts_text(problem, amounts)}; {why}",) if amounts else ()
 
 
@@ -165,6 +163,8 @@ def _nearest(
             moved = _off(problem, {**at, n: at[n] + step}, clusters, target)
             slopes.append([float((b - a) / step) for a, b in zip(known, moved, strict=True)])
         slope = np.array(slopes)
+        if not np.all(np.isfinite(slope)):
+            return
         inverse = np.linalg.pinv((slope * widths[:, None] / size).T, rcond=_RANK)
         for _ in range(_STEPS):
             steps = widths * (inverse @ (np.array([float(x) for x in known]) / size))
@@ -175,7 +175,7 @@ def _nearest(
         aside = np.array([float(flint.arb(x) - at[n]) for n, x in start.items()])
     if not np.all(np.isfinite([*off, *start.values()])):
         return
-    units = np.array([math.ulp(x) for x in start.values()])
+    units = np.maximum([math.ulp(x) for x in start.values()], _FINEST * widths)
     rows = np.hstack([slope * units[:, None] / leeway, np.diag(units / (_MOVE * widths))])
     for counts in _rounded(rows, np.array([*(off / leeway), *(aside / (_MOVE * widths))])):
         moves = zip(start.items(), counts, units.tolist(), strict=True)
@@ -202,6 +202,8 @@ def _off(problem: Problem, parameters: Mapping[str, Any], clusters: Sequence[_Cl
     found = []
     for cluster in clusters:
         a = problem.model.coefficients(cluster.case.applied(parameters), problem.parameter_set)
+        if not all(c.is_finite() for c in a):
+            return [flint.arb("nan")] * len(target)
         z = [z for z, m in isolated_roots(a) for _ in range(m)]
         place, c = flint.acb(cluster.place), [flint.acb(1)]
         z.sort(key=lambda z: float(abs(z - place)))
