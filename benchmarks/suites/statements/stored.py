@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import mpmath as mp
+from mpmath import mp
 
 from benchmarks.suites.statements.case import Answer, Case
 
