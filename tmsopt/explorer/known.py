@@ -8,6 +8,7 @@ from tmsopt.design import Problem, Solution, ended, freedom
 from tmsopt.design.files import posed
 from tmsopt.errors import InputError
 from tmsopt.guide import example
+from tmsopt.models.told import told
 from tmsopt.report.solution.limits import proof_line
 from tmsopt.roots import Structure
 from tmsopt.solver import solve
@@ -20,7 +21,7 @@ _STARTS, _ORDER = 2, 4  # of the search for an exceptional point, of which there
 
 @dataclass(frozen=True)
 class Known:
-    """A design with a name, and the structure of its roots, multiple ones recognised.
+    """A design with a name, and the structure of its roots as the user reads them, multiple ones recognised.
 
     Attributes:
         facts: what is known of it, a sentence each.
@@ -110,5 +111,4 @@ def _exceptional(problem: Problem) -> Known | None:
 
 
 def _structure(problem: Problem, parameters: Mapping[str, float]) -> Structure:
-    found: Structure = problem.nominal.values(parameters)["structure"]
-    return found
+    return told(problem.model, problem.nominal.values(parameters)["structure"])

@@ -13,8 +13,9 @@ from tmsopt.explorer.file_text import around, exact_value
 from tmsopt.explorer.javascript import Script, is_bicycle
 from tmsopt.explorer.known import Known
 from tmsopt.models import Parameter, words_of
-from tmsopt.models.told import name_told, structure_in_words
+from tmsopt.models.told import ON_AXIS, eigenfrequencies, structure_in_words
 from tmsopt.records import Array
+from tmsopt.roots import Structure
 from tmsopt.tracing import domain, trace
 
 _STARTS = 8  # of traced curves: the tracer's grid shows what they miss
@@ -49,7 +50,7 @@ def subject(
         "bicycle": problem.model.name if is_bicycle(problem) else None,
         "impulseUnit": _IMPULSE if of.torque is None else "N·m·s",
         "words": dict(words_of(problem.model)), "rootUnit": unit_of(problem, "abscissa").text,
-        "carrier": problem.model.carrier,
+        "carrier": problem.model.carrier, "onAxis": ON_AXIS,
         "parameters": [_parameter(problem, p, start[p.name]) for p in of.parameters],
         "quantities": [
             {"name": n, "meaning": quantities[n].meaning, "share": quantities[n].share, **_unit(problem, n)}
@@ -112,12 +113,26 @@ def _constraint(problem: Problem, name: str) -> dict[str, Any]:
 
 def _design(problem: Problem, known: Known) -> dict[str, Any]:
     structure, model = known.structure, problem.model
+    roots = list(_drawn(problem, structure))
     return {
         "name": known.name, "values": [float(known.parameters[n]) for n in problem.parameter_set.names],
-        "structure": structure_in_words(model, name_told(model, structure.name)) if structure.roots else "",
-        "abscissa": structure.abscissa, "roots": [[r.re, r.im, r.multiplicity] for r in structure.roots if r.im >= 0],
+        "structure": structure_in_words(model, structure.name, structure.abscissa > 0) if structure.roots else "",
+        "abscissa": max((root[0] for root in roots), default=math.nan), "roots": roots,
         "facts": list(known.facts), "proved": known.proved,
     }  # fmt: skip
+
+
+def _drawn(problem: Problem, found: Structure) -> Iterator[list[float]]:
+    """Growth rate, frequency and multiplicity of each root; of a complex H Im ω and Re ω, else of one of each pair.
+
+    What is 0 but for rounding is 0.
+    """
+    model = problem.model
+    size = ON_AXIS * max((math.hypot(r.re, r.im, model.carrier or 0.0) for r in found.roots), default=0.0)
+    own = eigenfrequencies(model, found.roots)
+    parts = [(w.im, w.re, w) for w in own] if own else [(r.re, r.im, r) for r in found.roots if r.im >= 0]
+    for re, im, root in parts:
+        yield [*(x if abs(x) > size else 0.0 for x in (re, im)), root.multiplicity]
 
 
 def _by_interest(problem: Problem) -> list[str]:

@@ -21,7 +21,7 @@ from tmsopt.roots.patterns.doubled import (
     doubled_name,
 )
 
-_ON_AXIS = 1e-12
+ON_AXIS = 1e-12
 """Of the largest root of the polynomial: so far right of the imaginary axis is on it, as far as rounding tells."""
 
 
@@ -97,7 +97,7 @@ def eigenfrequencies(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
 def on_axis(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
     """Those of roots, as they are told, that are on the imaginary axis: the real ones of the eigenfrequencies of H."""
     each = tuple(roots)
-    return tuple(r for r in each if abs(r.re) <= _ON_AXIS * _size(model, each))
+    return tuple(r for r in each if abs(r.re) <= ON_AXIS * _size(model, each))
 
 
 def beyond_axis(model: Model, located: Sequence[str], roots: Sequence[Root]) -> float | None:
@@ -108,7 +108,7 @@ def beyond_axis(model: Model, located: Sequence[str], roots: Sequence[Root]) -> 
     if not roots or all(pattern_of(model, name).rest is None for name in located):
         return None
     rightmost = max(r.re for r in roots)
-    return rightmost if rightmost > _ON_AXIS * _size(model, roots) else 0.0
+    return rightmost if rightmost > ON_AXIS * _size(model, roots) else 0.0
 
 
 def _size(model: Model, roots: Iterable[Root]) -> float:

@@ -1,6 +1,6 @@
 // What programs may ask of the page, in the units of the file: window.tmsopt.
 
-const KIND_WORDS = ["undefined", "capsize", "weave", "stable", "heavily damped"];
+const KIND_WORDS = OF_H ? CLASS_WORDS : ["undefined", "capsize", "weave", "stable", "heavily damped"];
 
 window.tmsopt = {
   /** Set parameters by their names. */
@@ -20,14 +20,14 @@ window.tmsopt = {
     const {meetings, motion, kind, y} = drawingOf();
     const all = allRoots(meetings);
     const every = [...all.re].map((part, k) => [part, all.im[k]]);
-    const ofH = DATA.carrier !== null; // s = −i ω alone, without carrier and without conjugates
     const named = (list, values) => Object.fromEntries(list.map(({name, one}, k) => [name, values[k] / one]));
     return {
       parameters: named(DATA.parameters, state.x),
-      roots: ofH ? every.filter(([, im]) => im < 0).map(([re, im]) => [re, im + DATA.carrier]) : every,
+      // s = −i ω
+      roots: OF_H ? every.map(([loss, frequency]) => [loss, 0 - frequency]) : every,
       abscissa: motion[0],
-      ...(ofH ? {} : {damping_ratio: motion[1]}),
-      kind: KIND_WORDS[kind],
+      ...(OF_H ? {eigenfrequencies: every.map(([loss, frequency]) => [frequency, loss])} : {damping_ratio: motion[1]}),
+      kind: isOnEdge(kind, meetings) ? "marginal" : KIND_WORDS[kind],
       quantities: named(DATA.quantities, y),
     };
   },

@@ -74,10 +74,11 @@ function classFills(colours) {
 /** Words for a class code. */
 function classWords(kind) {
   const {weave, capsize} = DATA.words;
+  const how = OF_H ? "gain, beyond" : "unstable by";
   return [
     "undefined",
-    `unstable by ${capsize}`,
-    `unstable by ${weave}`,
+    `${how} ${capsize}`,
+    `${how} ${weave}`,
     "stable",
     "heavily damped (stable, nothing swings)",
   ][kind];
@@ -85,7 +86,7 @@ function classWords(kind) {
 
 /** How far from the imaginary axis roots [re, im, multiplicity] cannot be told to stand. */
 function roundingOf(roots) {
-  return 1e-12 * Math.max(0, ...roots.map(([re, im]) => Math.hypot(re, im)));
+  return DATA.onAxis * Math.max(0, ...roots.map(([re, im]) => Math.hypot(re, im + (DATA.carrier ?? 0))));
 }
 
 /** The largest real part of roots. */
@@ -98,12 +99,17 @@ function isMarginal(roots) {
   return Math.abs(rightmostOf(roots)) <= roundingOf(roots);
 }
 
+/** Whether a design of a class is neither stable nor unstable; signs are exact but for the rounding of a carrier. */
+function isOnEdge(kind, roots) {
+  return kind > 0 && (kind < 3 ? rightmostOf(roots) <= roundingOf(roots) : OF_H && isMarginal(roots));
+}
+
 /** Words for a design with such roots: its class, and what of the boundaries it stands on. */
 function designWords(kind, roots) {
-  if (kind > 2 && roots.every(([, im]) => im === 0) && roots.some((root) => root[2] > 1))
+  if (!OF_H && kind > 2 && roots.every(([, im]) => im === 0) && roots.some((root) => root[2] > 1))
     return "stable, on the edge of heavy damping: nothing swings";
-  if (!kind || kind > 2 || !isMarginal(roots)) return classWords(kind);
-  return "marginal: roots on the imaginary axis, as far as can be computed";
+  if (!isOnEdge(kind, roots)) return classWords(kind);
+  return `marginal: ${ROOTS} on ${AXIS}, as far as can be computed`;
 }
 
 /** A number for people: so many digits, a true minus, powers of ten in words of digits. */
@@ -129,24 +135,28 @@ function clamp(low, value, high) {
 
 /** A value of a parameter in its unit, with the unit. */
 function valueText(k, value, digits = 4) {
-  const {one, unit} = DATA.parameters[k];
-  return figure(value / one, digits) + (unit ? ` ${unit}` : "");
+  const {one, unit, low, high} = DATA.parameters[k];
+  const shown = Math.abs(value) > DATA.onAxis * (high - low) ? value : 0;
+  return figure(shown / one, digits) + (unit ? ` ${unit}` : "");
 }
 
 /** Roots [re, im, multiplicity] in words. */
 function rootsInWords(roots, digits = 4, rate = 1) {
   const words = ([re, im, times]) =>
-    (DATA.carrier === null
-      ? figure(re * rate, digits) + (im > 0 ? ` ± ${figure(im * rate, digits)}i` : "")
-      : frequencyText(re * rate, (im - DATA.carrier) * rate, digits)) +
+    (OF_H
+      ? frequencyText(re * rate, im * rate, digits)
+      : figure(re * rate, digits) + (im > 0 ? ` ± ${figure(im * rate, digits)}i` : "")) +
     (times > 1 ? ` (${times}-fold)` : "");
   return roots.map(words).join(", ");
 }
 
 /** The eigenfrequency of a complex system that decays or grows so fast. */
 function frequencyText(growth, frequency, digits) {
-  if (Math.abs(frequency) <= 1e-12 * Math.abs(DATA.carrier)) frequency = 0; // rounding of the carrier
-  return `${figure(frequency, digits)} ${growth < 0 ? "-" : "+"} ${figure(Math.abs(growth), digits)}i`;
+  const nothing = DATA.onAxis * Math.hypot(growth, frequency, DATA.carrier);
+  const [re, im] = [frequency, growth].map((part) => (Math.abs(part) > nothing ? part : 0));
+  if (!im) return figure(re, digits);
+  const [sign, size] = [im < 0 ? "−" : "+", `${figure(Math.abs(im), digits)}i`];
+  return re ? `${figure(re, digits)} ${sign} ${size}` : sign.replace("+", "") + size;
 }
 
 /** A label with its unit, if there is one. */

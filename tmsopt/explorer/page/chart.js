@@ -192,7 +192,7 @@ function chartPicture(host) {
       context.fillStyle = colours.ink;
       const words =
         state.layer === "abscissa"
-          ? `${withLabelUnit("abscissa", DATA.rootUnit)}: below 0 decays`
+          ? `${withLabelUnit(ABSCISSA, DATA.rootUnit)}: below 0 decays`
           : "damping ratio: above 0 decays, 1 swings not at all";
       context.fillText(words, plot.x0, 8);
       drawBar(context, plot.x0, 18, plot.width, bands, state.layer, colours);
@@ -291,7 +291,7 @@ function chartPicture(host) {
   function read(state, words, abscissa, at = state.x) {
     const where = state.plane.map((k) => `${symbolOf(k)} = ${valueText(k, at[k])}`).join(", ");
     const number = Number.isFinite(abscissa)
-      ? `, abscissa ${figure(abscissa)}${DATA.rootUnit ? ` ${DATA.rootUnit}` : ""}`
+      ? `, ${ABSCISSA} ${figure(abscissa)}${DATA.rootUnit ? ` ${DATA.rootUnit}` : ""}`
       : "";
     const inside = state.plane.every((k) => at[k] >= rangeOf(k)[0] && at[k] <= rangeOf(k)[1]);
     reading.textContent = `${where}: ${words}${number}${inside ? "" : "; outside of this picture"}`;

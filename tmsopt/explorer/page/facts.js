@@ -1,6 +1,8 @@
 // What is true of the design shown: the verdict, limits, numbers, and what was found out before.
 
-const CLASS_WORDS = ["undefined", DATA.words.capsize, DATA.words.weave, "stable", "heavily damped"];
+const CLASS_WORDS = OF_H
+  ? ["undefined", "gain", "gain", "stable", "stable"]
+  : ["undefined", DATA.words.capsize, DATA.words.weave, "stable", "heavily damped"];
 
 // units of time, by that of the roots
 const TIMES = {"√(g/w)": "√(w/g)", "1/s": "s"};
@@ -19,9 +21,9 @@ function verdictOf(drawing) {
   const {near, times} = slowestOf(drawing);
   const power = times > 1 ? `t${times > 2 ? `^${times - 1}` : ""}` : "";
   if (!kind) return ["undefined", "No verdict: of the characteristic polynomial a coefficient is no number, or the first is 0"];
-  if (kind < 3 && abscissa <= near) {
-    const where = "on the imaginary axis, as far as can be computed";
-    const fate = power ? `can grow as ${power}: roots meet` : "neither grows nor dies out: the rightmost roots are";
+  if (isOnEdge(kind, meetings)) {
+    const where = `on ${AXIS}, as far as can be computed`;
+    const fate = power ? `can grow as ${power}: ${ROOTS} meet` : `neither grows nor dies out: ${ROOTS} are`;
     return ["marginal", `A disturbance ${fate} ${where}`];
   }
   const rate = MODEL.rate(state.x);
@@ -32,7 +34,7 @@ function verdictOf(drawing) {
     const words = both ? CLASS_WORDS.slice(1, 3).join(" and ") : CLASS_WORDS[kind];
     return ["unstable", `${words[0].toUpperCase()}${words.slice(1)}: a disturbance grows as ${term}`];
   }
-  const edge = meetings.every(([, im]) => !im) && hasMeeting(meetings);
+  const edge = !OF_H && meetings.every(([, im]) => !im) && hasMeeting(meetings);
   if (abscissa >= -near) return [CLASS_WORDS[kind], "Every disturbance dies out, more slowly than can be computed"];
   const still = edge ? " and nothing swings, on the edge of heavy damping" : kind === 4 ? " and nothing swings" : "";
   return [edge ? "stable" : CLASS_WORDS[kind], `Every disturbance dies out${still}, slowest as ${term}`];
@@ -50,7 +52,7 @@ function liftsOf(y) {
 function nearnessOf(known) {
   if (known) return `${known.name}: ${known.structure}`;
   const near = DATA.designs.find(({values}) => sameBeside(state.x, values, [], 1e-5));
-  return near ? `close to ${near.name}${hasMeeting(near.roots) ? ", whose roots are sensitive" : ""}: its button goes there` : "";
+  return near ? `close to ${near.name}${hasMeeting(near.roots) ? ", whose ${ROOTS} are sensitive" : ""}: its button goes there` : "";
 }
 
 /** Whether some roots meet. */
@@ -92,7 +94,7 @@ function verdictPanel(host) {
   return (drawing) => {
     const {motion, known, y} = drawing;
     const [word, words] = verdictOf(drawing);
-    const abscissa = `abscissa ${withUnit(motion[0], DATA.rootUnit)}`;
+    const abscissa = `${ABSCISSA} ${withUnit(motion[0], DATA.rootUnit)}`;
     badge.dataset.is = MARKS[word] ?? "✓";
     badge.textContent = `${badge.dataset.is} ${word}`;
     sentence.replaceChildren(...typeset(words));
@@ -138,7 +140,7 @@ function marginInWords({text, equality, tolerance, unit, one}, margin, holds) {
 function remarkOf(name, value, drawing) {
   const {times} = slowestOf(drawing);
   if (name === "decay_rate" && value <= 0) return "it does not die out";
-  return name === "decay_time" && value < Infinity && times > 1 ? `first it grows: the rightmost root is ${times}-fold` : "";
+  return name === "decay_time" && value < Infinity && times > 1 ? `first it grows: ${OF_H ? "an eigenfrequency of the least loss" : "the rightmost root"} is ${times}-fold` : "";
 }
 
 /** Roots as text, conjugates and multiple ones together. */
@@ -149,7 +151,7 @@ function rootTexts({meetings}) {
 /** A real root, or a conjugate pair; of a complex system an eigenfrequency. */
 function rootText(re, im) {
   if (Number.isNaN(re)) return "none";
-  if (DATA.carrier !== null) return frequencyText(re, im - DATA.carrier, 5);
+  if (OF_H) return frequencyText(re, im, 5);
   return im ? `${figure(re, 5)} ± ${figure(Math.abs(im), 5)}i` : figure(re, 5);
 }
 
@@ -165,11 +167,10 @@ function quantitiesPanel(host) {
   host.append(roots, origin);
   if (rows.length) host.append(element("table", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows)));
   return (drawing) => {
-    const what = DATA.carrier === null ? "roots" : "eigenfrequencies";
-    roots.textContent = `${what}${DATA.rootUnit ? ` in ${DATA.rootUnit}` : ""}: ${rootTexts(drawing).join(", ") || "none"}`;
+    roots.textContent = `${ROOTS}${DATA.rootUnit ? ` in ${DATA.rootUnit}` : ""}: ${rootTexts(drawing).join(", ") || "none"}`;
     origin.hidden = !hasMeeting(drawing.meetings);
     origin.textContent = drawing.known?.roots.length
-      ? "As they were found: where roots meet, computed ones scatter." : "Those that rounding alone keeps apart are taken for one.";
+      ? `As they were found: where ${ROOTS} meet, computed ones scatter.` : "Those that rounding alone keeps apart are taken for one.";
     DATA.quantities.forEach(({name, one, share}, k) => {
       const value = drawing.y[k];
       const never = name === "decay_time" && value === Infinity ? "never" : figure((value / one) * (share ? 100 : 1), 5);
@@ -190,7 +191,7 @@ function knownPanel(host) {
   if (DATA.objective) host.append(element("p", {}, "asked: ", element("code", {}, DATA.objective)));
   const articles = DATA.designs.map((design) => element("article", {},
     element("h3", {}, design.name),
-    element("p", {}, [design.structure, `abscissa ${withUnit(design.abscissa, DATA.rootUnit)}`].filter(Boolean).join(", ")),
+    element("p", {}, [design.structure, `${ABSCISSA} ${withUnit(design.abscissa, DATA.rootUnit)}`].filter(Boolean).join(", ")),
     element("ul", {}, ...design.facts.map((fact) => element("li", {}, factText(fact, design.proved))))));
   const now = element("p", {className: "faint", hidden: !DATA.designs.length});
   host.append(element("div", {className: "designs"}, ...articles), ...DATA.shown.map((sentence) => element("p", {}, sentence)), now);

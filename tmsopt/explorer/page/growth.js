@@ -72,10 +72,11 @@ function curvesOf(samples) {
     }
     open = next;
   }
+  for (const {points} of curves) for (const point of points) point.im = heightOf(point.im);
   return curves;
 }
 
-/** How many roots grow, but for those on the imaginary axis as far as can be computed. */
+/** How many roots of the polynomial grow, but for those on the imaginary axis as far as can be computed. */
 function growingOf({re, im}) {
   const sizes = re.map((part, k) => Math.hypot(part, im[k])).sort();
   return re.filter((part) => part > 1e-7 * sizes[re.length >> 1]).length;
@@ -137,7 +138,8 @@ function sweepOf(state) {
   const inside = ({kind, at}) => {
     // crossings come from computed roots
     const edge = kind === "crossing" ? 1e4 * width : 10 * width;
-    return at > ends[0] + edge && at < ends[1] - edge;
+    const met = kind === "crossing" && known.some((one) => hasMeeting(one.roots) && Math.abs(one.at - at) < edge);
+    return !met && at > ends[0] + edge && at < ends[1] - edge;
   };
   const events = [];
   const samples = [];
@@ -202,6 +204,7 @@ function meetingOf(first, second) {
 function eventWords({kind, at, gains, roots, far}, over) {
   const where = `at ${symbolOf(over)} = ${valueText(over, at, 7)}`;
   if (kind === "infinity") return `a root passes infinity ${where}, ${gains ? "" : "un"}stable from there`;
+  if (OF_H && kind === "crossing") return `${roots > 2 ? `${roots / 2} eigenfrequencies cross` : "an eigenfrequency crosses"} ${AXIS} ${where}`;
   const many = ["a real root crosses", "a pair of roots crosses"][roots - 1] ?? `${roots} roots cross`;
   if (kind === "crossing") return `${many} ${far ? "infinity" : "0"} ${where}`;
   return `${DATA.words[kind]} ${gains ? "ends" : "begins"} ${where}`;
@@ -214,6 +217,14 @@ function limitsOf(values) {
   const at = (share) => sorted[Math.round(share * (sorted.length - 1))];
   const [low, high] = [Math.min(0, at(0.02)), Math.max(0, at(0.98))];
   const room = 0.12 * (high - low) || 1;
+  return [low - room, high + room];
+}
+
+/** Limits of an axis that show all values, with some room. */
+function limitsOfAll(values) {
+  const all = values.filter(Number.isFinite);
+  const [low, high] = [Math.min(...all), Math.max(...all)];
+  const room = 0.08 * (high - low) || 0.1 * Math.abs(high) || 1;
   return [low - room, high + room];
 }
 
@@ -254,29 +265,36 @@ function growthPicture(host) {
     return MODEL.rate(at) || 1;
   }
 
+  /** Growth rate and frequency of a root at a value of the parameter, in their units. */
+  function scaled([re, im], at) {
+    const rate = rateAt(now.state, at);
+    return [re * rate, (im * rate) / (Number.isFinite(MODEL.rate(now.state.x)) ? 2 * Math.PI : 1)];
+  }
+
   /** Growth rates and frequencies of the curves and of the design, [growth, frequency] in their units, and limits. */
-  function motionsOf(state, drawing, sweep, timed) {
-    const scaled = ([re, im], at) => {
-      const rate = rateAt(state, at);
-      return [re * rate, ((im - (DATA.carrier ?? 0)) * rate) / (timed ? 2 * Math.PI : 1)];
-    };
+  function motionsOf(state, drawing, sweep) {
     const curves = sweep.curves.map(({pair, points}) => ({
       pair,
       along: points.map(({at, re, im}) => ({at, values: scaled([re, im], at)})),
     }));
     const value = state.x[state.over];
     const roots = drawing.meetings;
-    const here = roots.map((root) => ({pair: root[1] > 0, times: root[2], values: scaled(root, value)}));
+    const here = roots.map((root) => ({pair: OF_H || root[1] > 0, times: root[2], values: scaled(root, value)}));
     const room = 0.15 * (sweep.ends[1] - sweep.ends[0]);
     const centres = [value, ...sweep.events.filter(({kind}) => kind !== "meeting").map(({at}) => at)];
     const near = curves.flatMap(({along}) => along.filter(({at}) => centres.some((c) => Math.abs(at - c) < room)));
     const part = (list, k) => list.map(({values}) => values[k]);
     const typical = rateAt(state, value) * typicalSize(roots, ([re]) => Math.abs(re));
+    if (OF_H) {
+      const all = [...curves.flatMap(({along}) => along), ...here];
+      const [growths, [lowest, highest]] = [limitsOfAll([0, ...part(all, 0)]), limitsOfAll(part(all, 1))];
+      return {curves, here, growths, lowest, highest};
+    }
     return {
       curves,
       here,
       growths: growthLimits(part(here, 0), part(near, 0), typical),
-      lowest: DATA.carrier === null ? 0 : Math.min(limitsOf(part(near, 1))[0], 1.1 * Math.min(0, ...part(here, 1))),
+      lowest: 0,
       highest: Math.max(limitsOf(part(near, 1))[1], 1.1 * Math.max(0, ...part(here, 1))),
     };
   }
@@ -308,7 +326,7 @@ function growthPicture(host) {
     const colours = coloursNow();
     const sweep = sweepOf(state);
     const timed = Number.isFinite(MODEL.rate(state.x));
-    const {curves, here, growths, lowest, highest} = motionsOf(state, drawing, sweep, timed);
+    const {curves, here, growths, lowest, highest} = motionsOf(state, drawing, sweep);
     const box = {x0: PLOT_LEFT, width: width - PLOT_LEFT - 12};
     const upper = 0.52 * (height - 92);
     plots = [
@@ -322,11 +340,14 @@ function growthPicture(host) {
         if (!lower) drawLevel(context, plot, plot.y(0), colours.ink, 1.5);
         drawCurves(context, plot, curves, lower, colours);
         for (const event of sweep.events) drawEvent(context, plot, event, lower, colours);
+        for (const {at, roots} of sweep.known)
+          for (const root of roots.filter((one) => one[2] > 1 && (!lower || OF_H || one[1])))
+            drawDot(context, plot.x(at), plot.y(scaled(root, at)[lower]), 4, colours.paper, colours.ink);
         drawDesign(context, plot, plot.x(state.x[state.over]), here, lower, colours);
       });
       const unit = timed ? (lower ? "Hz" : "1/s") : DATA.rootUnit;
-      const [growth, frequency] = DATA.carrier === null ? ["Re s", " |Im s|"] : ["Im ω", " Re ω"];
-      const label = withLabelUnit(lower ? `frequency${timed ? "" : frequency}` : `growth rate ${growth}`, unit);
+      const labels = OF_H ? ["Im ω (loss negative)", "Re ω"] : ["growth rate Re s", `frequency${timed ? "" : " |Im s|"}`];
+      const label = withLabelUnit(labels[lower], unit);
       const {one} = DATA.parameters[state.over];
       const below = lower ? parameterLabel(state.over, plot.width) : "";
       drawAxes(context, plot, {label: below, one}, {label, one: 1}, colours);
@@ -355,9 +376,9 @@ function growthPicture(host) {
     const apart = ({at}) => exact.every((other) => Math.abs(at - other.at) > 1e-3 * (ends[1] - ends[0]));
     const met = events.filter((event) => event.kind === "meeting" && apart(event)).map(({at}) => figure(at / one, 5));
     const places = `${met.slice(0, 4).join(", ")}${met.length > 4 ? " and more" : ""}${unit ? ` ${unit}` : ""}`;
-    if (met.length) texts.push(`roots meet at ${places}`);
+    if (met.length) texts.push(`${ROOTS} meet at ${places}`);
     for (const {name, at, root} of exact)
-      texts.push(`a ${root[2]}-fold ${DATA.carrier === null ? (root[1] ? "pair" : "root") : "eigenfrequency"} at ${valueText(over, at, 5)} (${name})`);
+      texts.push(`a ${root[2]}-fold ${OF_H ? "eigenfrequency" : root[1] ? "pair" : "root"} at ${valueText(over, at, 5)} (${name})`);
     if (!events.length) texts.push(`no crossing was found at ${SWEEP_POINTS} values`);
     const text = texts.join("; ");
     return `${text[0].toUpperCase() + text.slice(1)}.`;
@@ -400,7 +421,7 @@ function growthPicture(host) {
       drawText(context, text, found.middle, found.y, colours, colour);
     };
     context.textAlign = "center";
-    const value = (at) => figure(at / DATA.parameters[state.over].one, 4);
+    const value = (at) => valueText(state.over, at).split(" ")[0];
     const own = plot.x(state.x[state.over]);
     if (own >= plot.x0 && own <= plot.x0 + plot.width) place(value(state.x[state.over]), own, colours.mark);
     for (const {kind, at} of events.filter((event) => DATA.words[event.kind] || event.kind === "infinity")) {
@@ -413,15 +434,15 @@ function growthPicture(host) {
     const has = (pair) => sweep.curves.some((curve) => curve.pair === pair);
     const met = (kind) => sweep.events.some((event) => event.kind === kind);
     return [
-      has(true) && lineEntry(DATA.carrier === null ? "a pair of roots, which swings" : "an eigenfrequency", colours.weave, 2.2, DASHES.whole),
+      has(true) && lineEntry(OF_H ? "an eigenfrequency" : "a pair of roots, which swings", colours.weave, 2.2, DASHES.whole),
       has(false) && lineEntry("a real root, which does not", colours.real, 2.2, DASHES.long),
       sweep.stable.length && boxEntry("stable", stable, colours.faint),
       sweep.heavy.length && boxEntry("heavily damped", heavy, colours.faint),
       met("weave") && lineEntry(DATA.words.weave, colours.ink, 1.3, DASHES.short),
       met("capsize") && lineEntry(DATA.words.capsize, colours.ink, 1.3, DASHES.mixed),
       met("infinity") && lineEntry("a root passes infinity", colours.ink, 1.3, DASHES.dots),
-      met("crossing") && lineEntry("a root crosses 0 or infinity, unstable before and after", colours.faint, 1.3, DASHES.dots),
-      met("meeting") && dotEntry("roots meet", colours.paper, colours.ink),
+      met("crossing") && lineEntry(`${OF_H ? `an eigenfrequency crosses ${AXIS}` : "a root crosses 0 or infinity"}, unstable before and after`, colours.faint, 1.3, DASHES.dots),
+      (met("meeting") || sweep.known.some(({roots}) => hasMeeting(roots))) && dotEntry(`${ROOTS} meet`, colours.paper, colours.ink),
       now.state.x[now.state.over] === withinRange(now.state.over, now.state.x[now.state.over])
         ? lineEntry("this design: drag it", colours.mark, 1.6, DASHES.whole)
         : lineEntry("this design is outside of this range", colours.paper, 0, DASHES.whole),
@@ -438,7 +459,7 @@ function growthPicture(host) {
     const unit = Number.isFinite(MODEL.rate(state.x)) ? "1/s" : DATA.rootUnit;
     const text = rootsInWords(roots, 4, rate);
     const where = `${symbolOf(state.over)} = ${valueText(state.over, value, 5)}`;
-    reading.textContent = `${where}: ${designWords(kindOf(a), roots)}; ${DATA.carrier === null ? "roots" : "eigenfrequencies"} ${withLabelUnit(text || "none", unit)}`;
+    reading.textContent = `${where}: ${designWords(kindOf(a), roots)}; ${ROOTS} ${withLabelUnit(text || "none", unit)}`;
   }
 
   const within = (value) => withinRange(now.state.over, value);

@@ -168,6 +168,7 @@ function saidOfLink(ignored) {
 function start() {
   by("title").textContent = DATA.title || DATA.modelTitle;
   by("about").textContent = DATA.title ? DATA.modelTitle : "";
+  if (OF_H) by("plane-title").textContent = "Eigenfrequencies";
   by("footer").textContent = `tmsopt ${DATA.version}`;
   const nextTheme = theme();
   const parts = [

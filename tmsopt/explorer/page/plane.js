@@ -4,7 +4,9 @@
 function planeReach(roots, path, kept) {
   const middle = typicalSize(roots, ([re, im]) => Math.hypot(re, im)) || Infinity;
   const seen = roots.filter(([re, im]) => Math.hypot(re, im) <= 10 * middle);
-  const size = Math.max(1e-300, ...seen.map(([re, im]) => Math.hypot(re, im)));
+  const least = 1e-6 * Math.max(1e-300, ...path.map(({re, im}) => Math.hypot(re, im)));
+  const own = Math.max(...seen.map(([re, im]) => Math.hypot(re, im)));
+  const size = own > least ? own : 1e6 * least; // where all roots are 0 the path says how large the picture is
   const near = path.filter(({re, im}) => Math.hypot(re, im) < 1.6 * size);
   const points = [...seen.map(([re, im]) => ({re, im})), ...near];
   const need = {
@@ -34,30 +36,30 @@ function planePicture(host) {
   const reading = part(host, "p", {class: "reading"});
   const legend = legendIn(host);
   const says = saysIn(surface.canvas);
-  const ofH = DATA.carrier !== null; // eigenfrequencies of a complex system: the upper roots, less the carrier
-  const zero = DATA.carrier ?? 0;
 
-  /** Equal scales along both axes: the angle of a root is its damping. */
-  function plotOf(width, height, {left, right, top}) {
+  /** Equal scales along both axes: the angle of a root is its damping. Of H the middle frequency is halfway up. */
+  function plotOf(width, height, {left, right, top}, middle) {
     const box = {x0: PLOT_LEFT, y0: 8, width: width - PLOT_LEFT - 12, height: height - 50};
     const scale = Math.max((right - left) / box.width, (2 * top) / box.height);
     const [across, up] = [(scale * box.width - (right - left)) / 2, (scale * box.height) / 2];
-    return plotIn(box, [left - across, right + across], [-up, up]);
+    return plotIn(box, [left - across, right + across], [middle - up, middle + up]);
   }
 
   function paint(context, width, height) {
     if (!now) return;
     const {state, drawing} = now;
     const colours = coloursNow();
-    const roots = drawing.meetings.map(([re, im, times]) => [re, im - zero, times]);
+    const roots = drawing.meetings;
     const sweep = sweepOf(state);
     const value = state.x[state.over];
     const reach = 0.15 * (sweep.ends[1] - sweep.ends[0]);
-    const path = sweep.curves
-      .flatMap(({points}) => points.filter(({at}) => Math.abs(at - value) <= reach))
-      .map(({re, im}) => ({re, im: im - zero}));
-    ({reach: kept, far} = planeReach(roots, path, kept));
-    const plot = plotOf(width, height, kept);
+    const path = sweep.curves.flatMap(({points}) => points.filter(({at}) => Math.abs(at - value) <= reach));
+    const all = allRoots(roots).im;
+    const middle = OF_H ? all.reduce((sum, im) => sum + im, 0) / all.length : 0;
+    ({reach: kept, far} = planeReach(roots.map(([re, im, times]) => [re, im - middle, times]),
+      path.map(({re, im}) => ({re, im: im - middle})), kept));
+    far = far.map(([re, im, times]) => [re, im + middle, times]);
+    const plot = plotOf(width, height, kept, middle);
     const fills = classFills(colours);
     clipped(context, plot, () => {
       drawBox(context, plot.x0, plot.y0, plot.x(0) - plot.x0, plot.height, mixed(fills[3], colours.paper, 0.6));
@@ -74,8 +76,8 @@ function planePicture(host) {
     drawAxes(
       context,
       plot,
-      {label: withLabelUnit(`growth rate ${ofH ? "Im ω" : "Re s"}`, DATA.rootUnit), one: 1},
-      {label: withLabelUnit(`frequency ${ofH ? "Re ω" : "Im s"}`, DATA.rootUnit), one: 1},
+      {label: withLabelUnit(OF_H ? "Im ω (loss negative)" : "growth rate Re s", DATA.rootUnit), one: 1},
+      {label: withLabelUnit(OF_H ? "Re ω" : "frequency Im s", DATA.rootUnit), one: 1},
       colours,
     );
     describe(state, roots, colours);
@@ -85,9 +87,9 @@ function planePicture(host) {
   function drawPath(context, plot, sweep, value, colours) {
     const span = sweep.ends[1] - sweep.ends[0];
     const shade = (at) => 0.18 + 0.82 * Math.max(0, 1 - Math.abs(at - value) / (0.45 * span));
-    for (const side of ofH ? [1] : [1, -1]) {
+    for (const side of OF_H ? [1] : [1, -1]) {
       for (const {points} of sweep.curves) {
-        const at = ({re, im}) => ({x: plot.x(re), y: plot.y(side * (im - zero))});
+        const at = ({re, im}) => ({x: plot.x(re), y: plot.y(side * im)});
         let gone = 0;
         points.slice(1).forEach((point, k) => {
           const ends = [at(points[k]), at(point)];
@@ -103,7 +105,7 @@ function planePicture(host) {
 
   function drawRoots(context, plot, roots, colours) {
     for (const [re, im, times] of roots) {
-      for (const side of im > 0 && !ofH ? [1, -1] : [1]) {
+      for (const side of im > 0 && !OF_H ? [1, -1] : [1]) {
         const [x, y] = [plot.x(re), plot.y(side * im)];
         drawDot(context, x, y, times > 1 ? 7.5 : 5.5, colours.mark, colours.paper, 2);
         if (times === 1) continue;
@@ -118,16 +120,16 @@ function planePicture(host) {
     const {name} = DATA.parameters[state.over];
     const [low, high] = rangeOf(state.over).map((end) => valueText(state.over, end));
     legend([
-      dotEntry(`${ofH ? "eigenfrequencies" : "roots"} of this design`, colours.mark, colours.paper),
+      dotEntry(`${ROOTS} of this design`, colours.mark, colours.paper),
       lineEntry(`at lower ${name}, from ${low}`, colours.complex, 3.2, DASHES.dots),
       lineEntry(`at higher ${name}, to ${high}`, colours.real, 2.4, DASHES.whole),
     ]);
-    const beyond = rootsInWords(far.map(([re, im, times]) => [re, im + zero, times]), 3);
+    const beyond = rootsInWords(far, 3);
     reading.textContent = roots.length
       ? beyond
         ? `Beyond the picture: ${beyond}`
         : ""
-      : "This design has no roots: its leading coefficient is 0 or not a number.";
+      : `This design has no ${ROOTS}: its leading coefficient is 0 or not a number.`;
     reading.hidden = !reading.textContent;
   }
 
@@ -137,7 +139,7 @@ function planePicture(host) {
       surface.repaint();
       const list = rootsInWords(drawing.meetings);
       says(
-        `Roots in the complex plane: ${list || "none"}; their path over ${symbolOf(state.over)} is drawn.`,
+        `${OF_H ? "Eigenfrequencies" : "Roots"} in the complex plane: ${list || "none"}; their path over ${symbolOf(state.over)} is drawn.`,
       );
     },
   };

@@ -1,8 +1,14 @@
 // The state: what the page shows now, how it changes, and how it is kept in steps, in a link and in a file.
 
-const LAYERS = {kind: "stability", abscissa: "abscissa", damping: "damping ratio"};
 // degrees, and an impulse in DATA.impulseUnit: what the bicycle starts with
 const STARTS = {lean: 5, push: 0};
+// whether roots are eigenfrequencies of a complex H: [Im ω, Re ω, multiplicity], without conjugates
+const OF_H = DATA.carrier !== null;
+// what the greatest growth rate, the roots and the line between decay and growth are called
+const [ABSCISSA, ROOTS, AXIS] = OF_H
+  ? ["largest Im ω", "eigenfrequencies", "the real axis"]
+  : ["abscissa", "roots", "the imaginary axis"];
+const LAYERS = {kind: "stability", abscissa: ABSCISSA, ...(OF_H ? {} : {damping: "damping ratio"})};
 const state = startingState();
 const steps = {past: [], future: [], before: null};
 const watchers = [];
@@ -201,15 +207,21 @@ function save() {
   setTimeout(() => URL.revokeObjectURL(address), 60000);
 }
 
-/** Roots given as [re, im >= 0, multiplicity], each as often as it counts, conjugates too. */
+/** Roots given as [re, im >= 0, multiplicity], each as often as it counts, conjugates too where there are any. */
 function allRoots(meetings) {
-  const all = meetings.flatMap(([re, im, times]) => Array(times).fill(im ? [[re, im], [re, -im]] : [[re, 0]]).flat());
+  const each = ([re, im]) => (im && !OF_H ? [[re, im], [re, -im]] : [[re, im]]);
+  const all = meetings.flatMap((root) => Array(root[2]).fill(each(root)).flat());
   return {re: Float64Array.from(all, (root) => root[0]), im: Float64Array.from(all, (root) => root[1])};
 }
 
 /** Roots as [re, im >= 0, multiplicity], rightmost first: those that rounding alone keeps apart are one. */
 function meetingsAt(a) {
-  return meetingsOf(rootsOf(a)).filter(([re]) => Number.isFinite(re));
+  return meetingsOf(rootsOf(a)).filter(([re]) => Number.isFinite(re)).map(([re, im, times]) => [re, heightOf(im), times]);
+}
+
+/** What stands for the height of a root of the polynomial: of H Re ω. All else knows of no carrier but by rounding. */
+function heightOf(im) {
+  return im - (DATA.carrier ?? 0);
 }
 
 /** Everything that follows from the state, once per change, for all pictures. */
