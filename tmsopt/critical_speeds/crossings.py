@@ -6,7 +6,7 @@ These are isolated in ball arithmetic, so that none is missed, however close to 
 a root 0, is split off before (`lasting`).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -120,10 +120,16 @@ def told(model: Model, found: Crossings) -> Crossings:
     """Crossings of the polynomial as the user reads them: of a complex system those of its eigenfrequencies."""
     if model.carrier is None:
         return found
-    own = [c for c in found.found if c.kind not in ("capsize", "infinity")]
+    return replace(found, found=each_told(model, found.found), heavily_damped=())
+
+
+def each_told(model: Model, found: Iterable[Crossing]) -> tuple[Crossing, ...]:
+    """The same of single ones."""
+    if model.carrier is None:
+        return tuple(found)
+    own = [c for c in found if c.kind not in ("capsize", "infinity")]
     roots = [roots_told(model, [replace(c.root, im=-c.root.im)])[0] for c in own]
-    each = tuple(replace(c, kind=name_told(model, c.kind), root=z) for c, z in zip(own, roots, strict=True))
-    return replace(found, found=each, heavily_damped=())
+    return tuple(replace(c, kind=name_told(model, c.kind), root=z) for c, z in zip(own, roots, strict=True))
 
 
 def _conditions(a: Sequence[Polynomial]) -> tuple[dict[str, Polynomial], Lasting | None]:

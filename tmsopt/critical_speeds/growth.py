@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.arithmetic.elementary import exact
-from tmsopt.critical_speeds.crossings import Crossing, Stretch, crossings, told
+from tmsopt.critical_speeds.crossings import Crossing, Stretch, crossings, each_told, told
 from tmsopt.critical_speeds.modes import Mode, modes
 from tmsopt.critical_speeds.speeds import coefficients_over, speed_of
 from tmsopt.design.files import Given
@@ -41,7 +41,8 @@ class Growth(Tabular):
     Attributes:
         over: the parameter.
         values: of it, ascending, shape (n,).
-        roots: shape (n, degree); columns are not modes, for modes cannot be told apart at an exceptional point.
+        roots: shape (n, degree), of a complex H s = −i ω, shape (n, size of H); columns are not modes, for modes cannot
+            be told apart at an exceptional point.
         critical: critical value that the model knows, such as Fr_c, nan if there is none.
         design: value of the design.
         structure: structure of its rightmost roots.
@@ -52,6 +53,7 @@ class Growth(Tabular):
         events: where roots cross the axis or meet, exact; where the coefficients are no polynomials in `over`, those
             where stability changes alone.
         rate: how many 1/s a rate of 1 is, for each value; None without a unit of time.
+        multiple: multiple roots of the design, which its numbers give to half of their digits or less.
 
     Example:
         >>> bands = tmsopt.growth("problems/whipple_benchmark.toml").stable
@@ -73,6 +75,7 @@ class Growth(Tabular):
     modes: tuple[Mode, ...] = ()
     events: tuple[Crossing, ...] = ()
     rate: Array | None = None
+    multiple: tuple[Root, ...] = ()
 
     def records(self) -> Iterable[dict[str, Any]]:
         """The roots at each value, one a row."""
@@ -135,7 +138,7 @@ def growth(
         events = tuple(c for c in met.found if low < c.at < high)
     else:
         steps = np.linspace(low, high, _POINTS)
-        events = tuple(_changes(lambda x: _numbers(model, of, {**parameters, name: x}), steps))
+        events = each_told(model, _changes(lambda x: _numbers(model, of, {**parameters, name: x}), steps))
     centres = [at, *(c.at for c in events if "EP" in c.kind)]
     first = low + (high - low) / _POINTS if speed else low  # at rest a speed leaves roots 0
     grid = np.unique(np.concatenate([np.linspace(first, high, _POINTS), *(c + _CROWD * (high - low) for c in centres)]))
@@ -164,7 +167,7 @@ def growth(
         )
     return Growth(
         of[name], values, found, critical, at, design.structure, stable, heavily_damped, design.problem, followed,
-        events, rate,
+        events, rate, tuple(r for r in design.roots if r.multiplicity > 1),
     )  # fmt: skip
 
 

@@ -123,16 +123,9 @@ def _design(problem: Problem, known: Known) -> dict[str, Any]:
 
 
 def _drawn(problem: Problem, found: Structure) -> Iterator[list[float]]:
-    """Growth rate, frequency and multiplicity of each root; of a complex H Im ω and Re ω, else of one of each pair.
-
-    What is 0 but for rounding is 0.
-    """
-    model = problem.model
-    size = ON_AXIS * max((math.hypot(r.re, r.im, model.carrier or 0.0) for r in found.roots), default=0.0)
-    own = eigenfrequencies(model, found.roots)
-    parts = [(w.im, w.re, w) for w in own] if own else [(r.re, r.im, r) for r in found.roots if r.im >= 0]
-    for re, im, root in parts:
-        yield [*(x if abs(x) > size else 0.0 for x in (re, im)), root.multiplicity]
+    """Growth rate, frequency and multiplicity of each root, of conjugates of one; of a complex H Im ω and Re ω."""
+    own = [[w.im, w.re, w.multiplicity] for w in eigenfrequencies(problem.model, found.roots)]
+    yield from own or ([r.re, r.im, r.multiplicity] for r in found.roots if r.im >= 0)
 
 
 def _by_interest(problem: Problem) -> list[str]:

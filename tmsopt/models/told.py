@@ -24,6 +24,8 @@ from tmsopt.roots.patterns.doubled import (
 ON_AXIS = 1e-12
 """Of the largest root of the polynomial: so far right of the imaginary axis is on it, as far as rounding tells."""
 
+_NOTHING = 1e-14  # likewise: some roundings
+
 
 def pattern_of(model: Model, name: str) -> Pattern:
     """The pattern of a name for the polynomials of a model; of a complex H one of its eigenfrequencies.
@@ -90,8 +92,13 @@ def structure_in_words(model: Model, structure: str, gain: bool = False) -> str:
 
 
 def eigenfrequencies(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
-    """ω = i s of roots as they are told; none of a real system."""
-    return () if model.carrier is None else tuple(Root(-r.im + 0.0, r.re, r.multiplicity) for r in roots)
+    """ω = i s of roots as they are told, parts 0 but for a carrier's rounding as 0; of a real system none."""
+    if model.carrier is None:
+        return ()
+    each = tuple(roots)
+    nothing = _NOTHING * _size(model, each)
+    own = ([x if abs(x) > nothing else 0.0 for x in (-r.im, r.re)] for r in each)
+    return tuple(Root(re, im, r.multiplicity) for (re, im), r in zip(own, each, strict=True))
 
 
 def on_axis(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:

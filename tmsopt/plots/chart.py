@@ -1,6 +1,7 @@
 """Stability charts drawn with their exact boundary curves."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from matplotlib import colormaps
@@ -20,7 +21,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import Unit
 from tmsopt.errors import Fault, InputError, suggest
-from tmsopt.models import Model
+from tmsopt.models import Model, in_words_of
 from tmsopt.plots.labels import AxisScale, Name, abscissa_label, events_of, finished, scale_of
 from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, figure_of, on_axes
 from tmsopt.records import Array
@@ -142,9 +143,14 @@ def draw_domain(
     chosen = [*(n for n in (horizontal, vertical) if n), *varying, "", ""][:2]
     first, second = (scale_of(problem, n) if problem else AxisScale(n, n, Unit()) for n in chosen)
     drawn = on_axes(ax, 6.4, 5.0, problem.title if problem else "")
-    names = domain_curves(drawn, data, (first, second))
+    names = _in_words(domain_curves(drawn, data, (first, second)), problem)
     drawn.set(xlabel=first.label, ylabel=second.label)
     return finished(drawn, ax is None, names, domain_handles(data))
+
+
+def _in_words(names: list[Name], problem: Problem | None) -> list[Name]:
+    """Names of corners as users of a problem read them."""
+    return [replace(n, text=in_words_of(problem.model, n.text)) for n in names] if problem else names
 
 
 def draw_chart(
@@ -184,7 +190,7 @@ def draw_chart(
         _fill_layer(drawn, data, plane, layer)
     names: list[Name] = []
     if data.domain is not None:
-        names = domain_curves(drawn, data.domain, plane)
+        names = _in_words(domain_curves(drawn, data.domain, plane), data.problem)
         handles += domain_handles(data.domain)
     violated = _violated(drawn, data, plane)
     handles += [violated] if violated else []
@@ -264,14 +270,16 @@ def _optimum(ax: Axes, chart: Chart, plane: Plane) -> list[Artist]:
         found = solve(problem, throw=False, interruptible=False)
         if found.status == "optimal":
             x, y = (float(scale.of(found.parameters[scale.name])) for scale in plane)
-            return _mark(ax, x, y, "*", f"optimum ({found.structure}), abscissa {found.abscissa:.4g}")
+            word = "abscissa" if problem.model.carrier is None else "largest Im ω"
+            return _mark(ax, x, y, "*", f"optimum ({found.structure}), {word} {found.abscissa:.4g}")
     allowed = chart.satisfied if "satisfied" in chart.layers else np.ones(chart.abscissa.shape, bool)
     values = np.where(allowed & np.isfinite(chart.abscissa), chart.abscissa, np.inf)
     row, column = np.unravel_index(int(values.argmin()), values.shape)
     if not np.isfinite(values[row, column]):
         return []
     x, y = (axis[k] for axis, k in zip(_grid(chart, plane), (column, row), strict=True))
-    return _mark(ax, float(x), float(y), "*", f"least abscissa on the grid, {values[row, column]:.4g}")
+    word = "least abscissa" if problem.model.carrier is None else "best Im ω"
+    return _mark(ax, float(x), float(y), "*", f"{word} on the grid, {values[row, column]:.4g}")
 
 
 def _mark(ax: Axes, x: float, y: float, marker: str, label: str) -> list[Artist]:
@@ -279,6 +287,6 @@ def _mark(ax: Axes, x: float, y: float, marker: str, label: str) -> list[Artist]
     return [
         *ax.plot(
             [x], [y], marker, color="#F0E442", markeredgecolor=LINE, markersize=size, zorder=6, label=label,
-            linestyle="none",
+            linestyle="none", clip_on=False,
         )
     ]  # fmt: skip

@@ -6,11 +6,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.typing import LineStyleType
+from numpy.typing import ArrayLike
 
 from tmsopt.critical_speeds.growth import SPEEDS, Growth, growth
 from tmsopt.critical_speeds.modes import Mode
 from tmsopt.design.solution import Solution
-from tmsopt.plots.labels import AxisScale, Name, events_of, finished, place_all, scale_over
+from tmsopt.plots.labels import OF_H, AxisScale, Name, events_of, finished, place_all, scale_over
 from tmsopt.plots.style import (
     CAPSIZE,
     COMPLEX,
@@ -40,9 +41,13 @@ _EVENTS: Mapping[str, tuple[str, LineStyleType]] = {
     "weave": (CRITICAL, "--"), "capsize": (MARK, "-."), "infinity": (CAPSIZE, (0, (1, 1))),
 }  # fmt: skip
 
+_NOTHING = 1e-12  # of the range: less is 0 but for rounding
+
 _ALONG = 0.7, 0.17  # of the width of a plot: where the first name stands, and how far left of it the next
 
 _INNER = 0.3, 0.9  # of a curve: between them, not at its ends
+
+_ROOM = 0.08  # of all that is shown of H, above and below it
 
 
 def draw_growth(data: Growth | Solution, ax: Axes | None = None) -> Axes:
@@ -50,7 +55,8 @@ def draw_growth(data: Growth | Solution, ax: Axes | None = None) -> Axes:
 
     The Axes show Re s, in 1/s for a problem in SI, over the parameter in the unit of the problem's file: each mode with
     its name, bands of stability and heavy damping, lines at the values where a mode loses stability and at the
-    design's own, all with their numbers in the legend, and circles where roots meet.
+    design's own, all with their numbers in the legend, and circles where roots meet. Of a complex H they show Im ω of
+    every eigenfrequency, to the ends of all curves.
 
     Example:
         >>> axes = tmsopt.plots.draw_growth(tmsopt.growth("problems/benchmark.toml"))
@@ -65,7 +71,8 @@ def draw_growth(data: Growth | Solution, ax: Axes | None = None) -> Axes:
 def draw_frequencies(data: Growth | Solution, ax: Axes | None = None) -> Axes:
     """Frequencies of every oscillating mode, marked in the same way.
 
-    The Axes show Im s, for a problem in SI as Hz, over the parameter in the unit of the problem's file.
+    The Axes show Im s, for a problem in SI as Hz, over the parameter in the unit of the problem's file; of a complex H
+    Re ω of every eigenfrequency, of either sign.
 
     Example:
         >>> axes = tmsopt.plots.draw_frequencies(tmsopt.growth("problems/benchmark.toml"))
@@ -117,14 +124,16 @@ def _curves(ax: Axes, data: Growth, part: str) -> list[Name]:
             ax.axvspan(*scale.of(ends), color=colour, alpha=alpha, linewidth=0, label=words if k == 0 else None)
     names = list(dict.fromkeys(mode.name for mode in sorted(data.modes, key=lambda m: _reached(m, data.design))))
     for mode in data.modes:
-        if part == "imag" and not mode.roots.imag.any():
+        if part == "imag" and not (_of_H(data) or mode.roots.imag.any()):
             continue
         colour, style = _STYLES.get(mode.name, _OTHERS[names.index(mode.name) % len(_OTHERS)])
-        ax.plot(scale.of(mode.values), _part(data, mode, part), color=colour, linewidth=1.4, linestyle=style)
+        ax.plot(scale.of(mode.values), _part(data, mode, part), color=colour, linewidth=1.4, linestyle=style,
+                zorder=2 + 0.01 * names.index(mode.name))  # whole lines below dashed ones
     _marks(ax, data, scale, part)
     unit = "" if data.rate is None else " in 1/s" if part == "real" else " in Hz"
     symbol = rf" $\mathrm{{{'Re' if part == 'real' else 'Im'}}}\,s$" if data.rate is None else ""
-    ax.set_ylabel(("growth rate" if part == "real" else "frequency") + symbol + unit)
+    label = ("growth rate" if part == "real" else "frequency") + symbol + unit
+    ax.set_ylabel(OF_H[part] if _of_H(data) else label)
     ax.set_xlabel(scale.label)
     low, high = scale.of([min(0.0, data.values[0]) if data.over.name in SPEEDS else data.values[0], data.values[-1]])
     ax.set_xlim(low, high)
@@ -134,9 +143,18 @@ def _curves(ax: Axes, data: Growth, part: str) -> list[Name]:
 
 def _part(data: Growth, mode: Mode, part: str) -> Array:
     """Growth rates or frequencies of a mode as they stand on the axis."""
-    rate = np.ones(1) if data.rate is None else np.interp(mode.values, data.values, data.rate)
-    hertz = 1.0 if part == "real" or data.rate is None else 2 * np.pi
-    return np.asarray(getattr(mode.roots, part) * rate / hertz, dtype=float)
+    return _heights(data, mode.values, mode.roots, part)
+
+
+def _heights(data: Growth, at: ArrayLike, roots: ArrayLike, part: str) -> Array:
+    """The same of roots at values of the parameter; of H the eigenfrequencies are ω = i s."""
+    rate = np.ones(1) if data.rate is None else np.interp(at, data.values, data.rate)
+    unit = -1.0 if _of_H(data) else 1.0 if data.rate is None else 2 * np.pi
+    return np.asarray(getattr(np.asarray(roots), part) * rate / (1.0 if part == "real" else unit), dtype=float)
+
+
+def _of_H(data: Growth) -> bool:
+    return data.problem.model.carrier is not None
 
 
 def _marks(ax: Axes, data: Growth, scale: AxisScale, part: str) -> None:
@@ -149,16 +167,15 @@ def _marks(ax: Axes, data: Growth, scale: AxisScale, part: str) -> None:
         for k, x in enumerate(at):
             ax.axvline(x, color=colour, linewidth=1.1, linestyle=style, label=None if k else label)
     structure = f" ({data.structure})" if "EP" in data.structure else ""
-    label = f"design at {scale.of(data.design):.4g}{unit}{structure}"
+    at = data.design if abs(data.design) > _NOTHING * np.ptp(data.values) else 0.0
+    label = f"design at {scale.of(at):.4g}{unit}{structure}"
     ax.axvline(float(scale.of(data.design)), color=LINE, linewidth=1.2, linestyle=":", label=label)
-    met = [c for c in data.events if "EP" in c.kind]
-    rates = np.ones(1) if data.rate is None else np.interp([c.at for c in met], data.values, data.rate)
+    met = [(c.at, complex(c.root.re, c.root.im)) for c in data.events if "EP" in c.kind] + _multiple(data)
     if met:
-        heights = np.array([c.root.re if part == "real" else c.root.im for c in met]) * rates
-        heights = heights / (2 * np.pi) if part == "imag" and data.rate is not None else heights
+        at, roots = zip(*met, strict=True)
         ax.plot(
-            scale.of([c.at for c in met]), heights, linestyle="none", marker="o", markersize=4.5, color=LINE,
-            markerfacecolor="white", zorder=4, label="roots meet",
+            scale.of(at), _heights(data, at, roots, part), linestyle="none", marker="o", markersize=4.5, color=LINE,
+            markerfacecolor="white", zorder=4, label=f"{'eigenfrequencies' if _of_H(data) else 'roots'} meet",
         )  # fmt: skip
     if part == "real":
         ax.axhline(0, color="grey", linewidth=0.6, zorder=1)
@@ -174,6 +191,12 @@ def _focus(ax: Axes, data: Growth, part: str) -> None:
         for m in data.modes
         if part == "real" or m.roots.imag.any()
     ]
+    if _of_H(data):  # all there is
+        every = np.concatenate([_part(data, m, part) for m in data.modes] + [np.zeros(1 if part == "real" else 0)])
+        bottom, top = every.min(), every.max()
+        margin = _ROOM * (top - bottom) or _ROOM * abs(top) or _ROOM
+        ax.set_ylim(bottom - margin, top + margin)
+        return
     near = np.concatenate([*shown, np.zeros(1)])
     bottom, top = (float(np.percentile(near, q)) for q in ((1, 99) if part == "real" else (0, 99)))
     margin = 0.2 * (top - bottom) or 0.1
@@ -188,7 +211,7 @@ def _names(ax: Axes, data: Growth, scale: AxisScale, part: str, names: list[str]
         pieces = []
         for mode in data.modes:
             x, y = scale.of(mode.values), _part(data, mode, part)
-            seen = (x > left) & (x < right) & (y > bottom) & (y < top) & ((part == "real") | (y > 0))
+            seen = (x > left) & (x < right) & (y > bottom) & (y < top) & ((part == "real") | _of_H(data) | (y > 0))
             if mode.name == name and seen.any():
                 pieces.append((x[seen], y[seen]))
         if pieces:
@@ -196,7 +219,15 @@ def _names(ax: Axes, data: Growth, scale: AxisScale, part: str, names: list[str]
             place = left + (_ALONG[0] - _ALONG[1] * k) * (right - left)
             at = int(np.abs(x - np.clip(place, *np.quantile([x[0], x[-1]], _INNER))).argmin())
             found.append(Name(name, float(x[at]), float(y[at])))
+    kind = "EP{}" if "EP" in data.structure else "{}-fold"
+    for root, (at, z) in zip(data.multiple, _multiple(data), strict=True) if _of_H(data) else ():
+        found.append(Name(kind.format(root.multiplicity), float(scale.of(at)), float(_heights(data, at, z, part))))
     return found
+
+
+def _multiple(data: Growth) -> list[tuple[float, complex]]:
+    """Where the design stands, and its multiple roots, of conjugates the upper ones."""
+    return [(data.design, complex(r.re, r.im)) for r in data.multiple if r.im >= 0 or _of_H(data)]
 
 
 def _reached(mode: Mode, design: float) -> tuple[float, float]:

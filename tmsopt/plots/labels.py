@@ -24,6 +24,9 @@ _SIZE = 8
 
 _SAME = 0.02  # of an axis: names of marks so close would stand beside the wrong ones
 
+OF_H = {"real": r"$\mathrm{Im}\,\omega$ (loss negative)", "imag": r"$\mathrm{Re}\,\omega$"}
+"""Axes of the real and imaginary parts of s = −i ω of a complex H."""
+
 FROUDE = r"Froude number $\mathrm{Fr} = v/\sqrt{gw}$"
 
 
@@ -80,6 +83,8 @@ def scale_over(problem: Problem, parameter: Parameter) -> AxisScale:
 def abscissa_label(problem: Problem, words: str = "spectral abscissa") -> str:
     """The abscissa with its unit: 1/s of a model in SI, per √(g/w) where the model is dimensionless and its data SI."""
     of = problem.parameter_set
+    if problem.model.carrier is not None:
+        return rf"largest {OF_H['real']}"
     if of.rate is None:
         return words
     return words + (" in 1/s" if of is problem.model.sets[0] else r" per $\sqrt{g/w}$")

@@ -1,6 +1,7 @@
 """Roots in the complex plane, and how a multiple one splits."""
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from matplotlib.axes import Axes
 from tmsopt.design.solution import Solution
 from tmsopt.diagnosis import Diagnosis
 from tmsopt.explanation import Optimality
-from tmsopt.plots.labels import finished
+from tmsopt.plots.labels import OF_H, finished
 from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, MARK, REAL, on_axes
 from tmsopt.proofs import Proof
 
@@ -20,8 +21,8 @@ _STYLES = ("-", "--", "-.", ":")
 def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> Axes:
     """Roots with their multiplicities, of a judgement of an optimum those on the rightmost line.
 
-    The Axes show the complex plane, in 1/s for a problem in SI; its right half, where motion grows, is grey. The title
-    of a proof says how narrow the proved balls are.
+    The Axes show the complex plane, in 1/s for a problem in SI; the half of it where motion grows is grey: of a complex
+    H, whose eigenfrequencies they show, the upper one. The title of a proof says how narrow the proved balls are.
 
     Example:
         >>> axes = tmsopt.plots.draw_roots(tmsopt.solve("problems/ep4.toml"))
@@ -34,30 +35,56 @@ def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> A
     if isinstance(data, Solution):
         if (of := data.problem.parameter_set).rate is not None:
             rate, unit = float(of.rate(data.parameters)), " in 1/s"
-        title = f"{data.problem.title}\n{data.structure}, rightmost at {rate * data.abscissa:.5g}{unit[3:]}".strip()
+        reach = f"rightmost at {rate * data.abscissa:.5g}{unit[3:]}"
+        if _of_H(data):
+            reach = f"largest Im ω {max(w.im for w in data.eigenfrequencies):.5g}"
+        title = f"{data.problem.title}\n{data.structure}, {reach}".strip()
     elif isinstance(data, Proof):
         narrow = f"each number within {data.radius:.1g}" if math.isfinite(data.radius) else data.method
         title = f"{data.claim}:\n" + (f"proved, {narrow}" if data.proved else "not proved")
     else:
         title = f"{data.goal or 'abscissa'}: {data.verdict}"
     found = {(float(r.re), float(r.im)): r.multiplicity for r in data.roots}
-    if not _of_H(data):
-        found |= {(re, -im): m for (re, im), m in found.items()}
     own = ax is None
     ax = on_axes(ax, 4.6, 4.4)
     ax.set_title(title, fontsize=9.5)
+    ax.axhline(0, color="grey", linewidth=0.6)
+    if _of_H(data):
+        scale = abs(data.problem.model.carrier or 1.0) if getattr(data, "problem", None) else 1.0
+        _draw_frequencies(ax, {(0.0 - im, re): m for (re, im), m in found.items()}, 1e-12 * scale)
+        return finished(ax, own)
+    found |= {(re, -im): m for (re, im), m in found.items()}
     size = rate * max((math.hypot(*z) for z in found), default=1.0) * 1.3 or 1.0
     ax.axvspan(0, size, color="0.92", zorder=0)
-    ax.axhline(0, color="grey", linewidth=0.6)
     ax.axvline(0, color="grey", linewidth=0.6)
-    for (re, im), m in found.items():
-        ax.plot([rate * re], [rate * im], "o" if m == 1 else "s", color=REAL if m == 1 else MARK, markersize=5 + m)
-        if m > 1:
-            ax.annotate(f"{m}-fold", (rate * re, rate * im), xytext=(7, 7), textcoords="offset points", fontsize=9)
+    _mark(ax, {(rate * re, rate * im): m for (re, im), m in found.items()})
     right = max([0.3 * size, *(1.2 * rate * re for re, _ in found)])
     ax.set(xlim=(-size, right), ylim=(-size, size))
     ax.set(xlabel=rf"$\mathrm{{Re}}\,s${unit}", ylabel=rf"$\mathrm{{Im}}\,s${unit}")
     return finished(ax, own)
+
+
+def _draw_frequencies(ax: Axes, found: Mapping[tuple[float, float], int], nothing: float) -> None:
+    """Eigenfrequencies with their multiplicities, and the real axis, above which motion grows.
+
+    Args:
+        nothing: less is 0 but for rounding.
+    """
+    x, y = np.array([*found]).reshape(-1, 2).T
+    middle, ends = float(np.mean(x)), (min(0.0, *y), max(0.0, *y))
+    size = max(np.ptp(x), ends[1] - ends[0])
+    size = size if size > nothing else max(abs(middle), 1e12 * nothing)
+    ax.axhspan(0, ends[1] + size, color="0.92", zorder=0)
+    _mark(ax, found)
+    ax.set(xlim=(middle - 0.8 * size, middle + 0.8 * size), ylim=(ends[0] - 0.3 * size, ends[1] + 0.3 * size))
+    ax.set(xlabel=OF_H["imag"], ylabel=OF_H["real"])
+
+
+def _mark(ax: Axes, found: Mapping[tuple[float, float], int]) -> None:
+    for place, m in found.items():
+        ax.plot(*place, "o" if m == 1 else "s", color=REAL if m == 1 else MARK, markersize=5 + m)
+        if m > 1:
+            ax.annotate(f"{m}-fold", place, xytext=(7, 7), textcoords="offset points", fontsize=9)
 
 
 def _of_H(data: Any) -> bool:
@@ -83,6 +110,8 @@ def draw_splitting(data: Diagnosis, ax: Axes | None = None) -> Axes:
     """
     own = ax is None
     place = f"pair at {data.re:.5g} ± {data.im:.5g}i" if data.im else f"root at {data.re:.5g}"
+    if (omega := data.eigenfrequency) is not None:
+        place = f"eigenfrequency {f'{omega:.5g}'.replace('j', 'i') if omega else 0}"
     ax = on_axes(ax, 6.0, 4.4, f"{data.algebraic}-fold {place}, {data.kind}")
     for k, response in enumerate(data.responses):
         for law in response.laws[:1]:
@@ -93,5 +122,6 @@ def draw_splitting(data: Diagnosis, ax: Axes | None = None) -> Axes:
                 eps, law.branches.size * eps ** float(law.branches.exponent), color=_COLOURS[k % 5], label=label,
                 linestyle=_STYLES[k % 4], marker="o", markevery=[1], markersize=4,
             )  # fmt: skip
-    ax.set(xlabel=r"change $\varepsilon$ of a parameter", ylabel="shift of the farthest root")
+    farthest = "root" if omega is None else "eigenfrequency"
+    ax.set(xlabel=r"change $\varepsilon$ of a parameter", ylabel=f"shift of the farthest {farthest}")
     return finished(ax, own)

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from tmsopt.models import Model, in_words_of, tms
 from tmsopt.plots.labels import AxisScale, Name, abscissa_label, finished, scale_of
 from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, figure_of, on_axes
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
@@ -42,9 +43,10 @@ def draw_trace(
     drawn = on_axes(ax, 6.4, 5.0, data.problem.title or data.pattern)
     _bands(drawn, data, plane)
     for branch in data.branches:
-        draw_branch(drawn, branch, plane, width=1.2, tint=LINE)
+        draw_branch(drawn, branch, plane, width=1.2, tint=LINE, model=data.problem.model)
     marked = [e for e in data.events if e.name not in _UNLABELLED]
-    names = [Name(e.name, *(float(s.of(e.parameters[s.name])) for s in plane)) for e in marked]
+    model = data.problem.model
+    names = [Name(in_words_of(model, e.name), *(float(s.of(e.parameters[s.name])) for s in plane)) for e in marked]
     for name in names:
         drawn.plot([name.x], [name.y], "o", color=MARK, markeredgecolor="white", markersize=5, zorder=4)
     drawn.set(xlabel=plane[0].label, ylabel=plane[1].label)
@@ -52,13 +54,18 @@ def draw_trace(
 
 
 def draw_branch(
-    ax: Axes, branch: Branch, plane: tuple[AxisScale, AxisScale], width: float = 1.4, tint: str | None = None
+    ax: Axes, branch: Branch, plane: tuple[AxisScale, AxisScale], width: float = 1.4, tint: str | None = None,
+    model: Model = tms,
 ) -> None:  # fmt: skip
-    """One branch as lines, cut where its pattern, its stability or a constraint changes; pale where unstable."""
+    """One branch as lines, cut where its pattern, its stability or a constraint changes; pale where unstable.
+
+    Args:
+        model: in whose words.
+    """
     x, y = (scale.of(branch.parameters[scale.name]) for scale in plane)
     states = list(zip(kinds_along(branch), branch.stable.tolist(), branch.satisfied.tolist(), strict=True))
     events = {e.index for e in branch.events}
-    start = 0
+    start, said = 0, {True: (), False: ("constraint violated",)}
     for (kind, stable, satisfied), run in groupby(states):
         stop = start + len(list(run))
         first = start - 1 if start and start - 1 in events else start
@@ -66,7 +73,7 @@ def draw_branch(
         ax.plot(
             x[first:end], y[first:end], color=tint or colour(kind), linewidth=width if satisfied else width / 2,
             linestyle="--" if kind.startswith("CEP") else "-" if satisfied else ":", alpha=1.0 if stable else 0.35,
-            label=_label(ax, kind + ("" if stable else ", unstable") + ("" if satisfied else ", constraint violated")),
+            label=_label(ax, ", ".join([in_words_of(model, kind), *["unstable"] * (not stable), *said[satisfied]])),
         )  # fmt: skip
         start = stop
 

@@ -65,7 +65,10 @@ def domain_table(domain: Domain, problem: Problem | None = None) -> str:
     More: docs/how_to/charts.md
     """
     lines, model = [], problem.model if problem else None
-    for name, arcs in (("stability", domain.stability), ("heavy damping", domain.heavy_damping)):
+    bounded = [("stability", domain.stability)]
+    if model is None or model.carrier is None:  # eigenfrequencies of H have no axis on which nothing swings
+        bounded.append(("heavy damping", domain.heavy_damping))
+    for name, arcs in bounded:
         points: dict[str, list[int]] = {}
         for arc in arcs:
             points.setdefault(_said(model, arc.kind), []).append(len(next(iter(arc.points.values()))))

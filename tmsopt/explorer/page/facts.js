@@ -23,7 +23,7 @@ function verdictOf(drawing) {
   if (!kind) return ["undefined", "No verdict: of the characteristic polynomial a coefficient is no number, or the first is 0"];
   if (isOnEdge(kind, meetings)) {
     const where = `on ${AXIS}, as far as can be computed`;
-    const fate = power ? `can grow as ${power}: ${ROOTS} meet` : `neither grows nor dies out: ${ROOTS} are`;
+    const fate = power ? `can grow as ${power}: ${ROOTS} meet` : `neither grows nor dies out: the ${OF_H ? "least damped" : "rightmost"} ${ROOTS} are`;
     return ["marginal", `A disturbance ${fate} ${where}`];
   }
   const rate = MODEL.rate(state.x);
