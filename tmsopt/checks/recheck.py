@@ -82,9 +82,7 @@ def recheck(
         if not distance <= MATCHED:
             violations[problem.pattern.name] = distance
     of = problem.parameter_set
-    names = [n for n in (*problem.model.quantity_names(of), "damping_ratio") if n not in problem.model.sets[0].names]
-    if problem.model.carrier is not None:  # which the coefficients have in them
-        names = [n for n in names if n not in problem.model.coefficient_names()]
+    names = [n for n in (*problem.model.public_names(of), "damping_ratio") if n not in problem.model.sets[0].names]
     if around is not None:
         names.append(RADIUS)
     if problem.asks(ANGULAR_FREQUENCY):

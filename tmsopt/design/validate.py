@@ -271,7 +271,7 @@ def _pareto_faults(texts: Any) -> Iterator[Fault]:
 
 
 def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
-    accepted = (*of.names, *problem.model.quantity_names(of), *root_names(problem.model))
+    accepted = (*of.names, *problem.model.public_names(of), *root_names(problem.model))
     advice = at_first(unknown)
 
     def parsed(parse: Any, text: Any, *key: str) -> Iterator[Fault]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from tmsopt.checks.recheck import FEASIBLE
 from tmsopt.design import Problem, freedom, limit_of, unit_of
+from tmsopt.design.validate import SMALLEST
 from tmsopt.explorer.file_text import around, exact_value
 from tmsopt.explorer.javascript import Script, is_bicycle
 from tmsopt.explorer.known import Known
@@ -50,7 +51,7 @@ def subject(
         "bicycle": problem.model.name if is_bicycle(problem) else None,
         "impulseUnit": _IMPULSE if of.torque is None else "N·m·s",
         "words": dict(words_of(problem.model)), "rootUnit": unit_of(problem, "abscissa").text,
-        "carrier": problem.model.carrier, "onAxis": ON_AXIS,
+        "carrier": problem.model.carrier, "onAxis": ON_AXIS, "smallest": SMALLEST,
         "parameters": [_parameter(problem, p, start[p.name]) for p in of.parameters],
         "quantities": [
             {"name": n, "meaning": quantities[n].meaning, "share": quantities[n].share, **_unit(problem, n)}

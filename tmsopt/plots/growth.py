@@ -1,12 +1,12 @@
 """Growth rates and frequencies over the speed, or another parameter, with their modes named."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.typing import LineStyleType
-from numpy.typing import ArrayLike
 
 from tmsopt.critical_speeds.growth import SPEEDS, Growth, growth
 from tmsopt.critical_speeds.modes import Mode
@@ -146,7 +146,7 @@ def _part(data: Growth, mode: Mode, part: str) -> Array:
     return _heights(data, mode.values, mode.roots, part)
 
 
-def _heights(data: Growth, at: ArrayLike, roots: ArrayLike, part: str) -> Array:
+def _heights(data: Growth, at: Any, roots: Any, part: str) -> Array:
     """The same of roots at values of the parameter; of H the eigenfrequencies are ω = i s."""
     rate = np.ones(1) if data.rate is None else np.interp(at, data.values, data.rate)
     unit = -1.0 if _of_H(data) else 1.0 if data.rate is None else 2 * np.pi
@@ -167,15 +167,16 @@ def _marks(ax: Axes, data: Growth, scale: AxisScale, part: str) -> None:
         for k, x in enumerate(at):
             ax.axvline(x, color=colour, linewidth=1.1, linestyle=style, label=None if k else label)
     structure = f" ({data.structure})" if "EP" in data.structure else ""
-    at = data.design if abs(data.design) > _NOTHING * np.ptp(data.values) else 0.0
-    label = f"design at {scale.of(at):.4g}{unit}{structure}"
+    own = data.design if abs(data.design) > _NOTHING * np.ptp(data.values) else 0.0
+    label = f"design at {scale.of(own):.4g}{unit}{structure}"
     ax.axvline(float(scale.of(data.design)), color=LINE, linewidth=1.2, linestyle=":", label=label)
     met = [(c.at, complex(c.root.re, c.root.im)) for c in data.events if "EP" in c.kind] + _multiple(data)
     if met:
-        at, roots = zip(*met, strict=True)
+        places, roots = zip(*met, strict=True)
         ax.plot(
-            scale.of(at), _heights(data, at, roots, part), linestyle="none", marker="o", markersize=4.5, color=LINE,
-            markerfacecolor="white", zorder=4, label=f"{'eigenfrequencies' if _of_H(data) else 'roots'} meet",
+            scale.of(places), _heights(data, places, roots, part), linestyle="none", marker="o", markersize=4.5,
+            color=LINE, markerfacecolor="white", zorder=4,
+            label=f"{'eigenfrequencies' if _of_H(data) else 'roots'} meet",
         )  # fmt: skip
     if part == "real":
         ax.axhline(0, color="grey", linewidth=0.6, zorder=1)
@@ -220,8 +221,9 @@ def _names(ax: Axes, data: Growth, scale: AxisScale, part: str, names: list[str]
             at = int(np.abs(x - np.clip(place, *np.quantile([x[0], x[-1]], _INNER))).argmin())
             found.append(Name(name, float(x[at]), float(y[at])))
     kind = "EP{}" if "EP" in data.structure else "{}-fold"
-    for root, (at, z) in zip(data.multiple, _multiple(data), strict=True) if _of_H(data) else ():
-        found.append(Name(kind.format(root.multiplicity), float(scale.of(at)), float(_heights(data, at, z, part))))
+    for root, (own, z) in zip(data.multiple, _multiple(data), strict=True) if _of_H(data) else ():
+        height = float(_heights(data, own, z, part).item())
+        found.append(Name(kind.format(root.multiplicity), float(scale.of(own)), height))
     return found
 
 

@@ -50,7 +50,8 @@ def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> A
     ax.set_title(title, fontsize=9.5)
     ax.axhline(0, color="grey", linewidth=0.6)
     if _of_H(data):
-        scale = abs(data.problem.model.carrier or 1.0) if getattr(data, "problem", None) else 1.0
+        problem = getattr(data, "problem", None)
+        scale = abs(problem.model.carrier or 1.0) if problem else 1.0
         _draw_frequencies(ax, {(0.0 - im, re): m for (re, im), m in found.items()}, 1e-12 * scale)
         return finished(ax, own)
     found |= {(re, -im): m for (re, im), m in found.items()}

@@ -32,7 +32,8 @@ def comparison_table(comparison: Comparison) -> str:
     known = design.problem.model is tms
     model = design.problem.model
     named = f"the {model.title}" if model.statement is None else f"'{model.title}'"
-    lines += [*columns(rows), *_silent(silent)] if known else [f"no laws are known of {named}, only of skates (tms)"]
+    of_skates = "" if model.carrier is not None else ", only of skates (tms)"
+    lines += [*columns(rows), *_silent(silent)] if known else [f"no laws are known of {named}{of_skates}"]
     lines.append("")
     if comparison.other is None:
         lines.append(f"other formulation: none, {comparison.reason}")

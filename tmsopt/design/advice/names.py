@@ -1,6 +1,7 @@
 """Every name that an expression may use, with its meaning, and what was meant by one that is not among them."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from operator import itemgetter
 
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, NO_RADIUS, ROOT_QUANTITIES, root_names
@@ -27,14 +28,15 @@ _KEYS = {
 def vocabulary(model: Model, of: ParameterSet) -> dict[str, Parameter | Quantity]:
     """Every name that an expression may use, in the order of the documentation."""
     native = () if of is model.sets[0] else model.sets[0].parameters
-    of_H = "" if model.carrier is None else " of the real system of twice the size, with its carrier"
     known: dict[str, Parameter | Quantity] = {
-        n: Quantity(n, "", _power(model.degree - k) + of_H, f"a_{{{k}}}", itemgetter(n))
+        n: Quantity(n, "", _power(model.degree - k), f"a_{{{k}}}", itemgetter(n))
         for k, n in enumerate(model.coefficient_names())
     }
     derived = (*model.quantities, *of.quantities, *ROOT_QUANTITIES, NO_RADIUS)
     known |= {p.name: p for p in (*native, *of.parameters)} | {q.name: q for q in derived}
-    return {name: known[name] for name in (*of.names, *model.quantity_names(of), *root_names(model))}
+    if model.carrier is not None:
+        known["abscissa"] = replace(ROOT_QUANTITIES[0], meaning="largest Im omega, gain less loss")
+    return {name: known[name] for name in (*of.names, *model.public_names(of), *root_names(model))}
 
 
 def _power(k: int) -> str:

@@ -52,7 +52,7 @@ function liftsOf(y) {
 function nearnessOf(known) {
   if (known) return `${known.name}: ${known.structure}`;
   const near = DATA.designs.find(({values}) => sameBeside(state.x, values, [], 1e-5));
-  return near ? `close to ${near.name}${hasMeeting(near.roots) ? ", whose ${ROOTS} are sensitive" : ""}: its button goes there` : "";
+  return near ? `close to ${near.name}${hasMeeting(near.roots) ? `, whose ${ROOTS} are sensitive` : ""}: its button goes there` : "";
 }
 
 /** Whether some roots meet. */

@@ -191,9 +191,11 @@ function visit() {
 /** The design as the text of a problem file, every parameter fixed, as exactly as doubles can. */
 function problemText() {
   const lines = DATA.parameters.map(({name, unit, one, value, text}, k) => {
-    const number = String(state.x[k] / one);
+    // a file may have no smaller size
+    const tiny = Math.abs(state.x[k]) < DATA.smallest;
+    const number = String(tiny ? 0 : state.x[k] / one);
     const moved = unit ? JSON.stringify(`${number} ${unit}`) : number;
-    return `${name} = ${state.x[k] === value ? text : moved}\n`;
+    return `${name} = ${state.x[k] === value && !tiny ? text : moved}\n`;
   });
   return DATA.toml.before + lines.join("") + DATA.toml.after;
 }

@@ -106,7 +106,8 @@ def carriers(entries: Sequence[ca.SX]) -> Callable[[Mapping[str, Interval]], tup
             ends.append(((diagonal[:, 0] - reach).min(), (diagonal[:, 1] + reach).max()))
         (low, high), loss = ends[0], np.abs(ends[1]).max()
         spread = float(max((high - low) / 2, loss))
-        seen = _frequencies(matrix, n, [box[name] for name in names])
+        own_box = [box[name] for name in names]
+        seen = _frequencies(matrix, n, own_box) if any(lo < hi for lo, hi in own_box) else np.zeros(0)
         if seen.size:
             least, most = seen.real.min(), seen.real.max()
             own = _SEEN * max((most - least) / 2, np.abs(seen.imag).max())
