@@ -19,7 +19,7 @@ from tmsopt.progress import Counts, Listener, counted
 from tmsopt.versions import installed
 
 if TYPE_CHECKING:
-    from tmsopt.design import Solution
+    from tmsopt.design import Problem, Solution
 
 ENDINGS = ("html", "htm")
 """Of the name of a document."""
@@ -136,9 +136,12 @@ def _explorer(result: Any, design: "Solution | None") -> str:
         return ""
     from tmsopt.explorer import frame, page_of
 
+    problem: Problem = getattr(of, "problem", of)
+    of_H = problem.model.carrier is not None
+    roots, side = ("eigenfrequencies", "below the real axis") if of_H else ("roots", "left of the imaginary axis")
     return (
-        "<p>Move a parameter, and see the roots move: disturbances die out where all are left of "
-        f"the imaginary axis.</p>\n{frame(page_of(of, designs, trace_curves=True), 'Explorer of this problem')}\n"
+        f"<p>Move a parameter, and see the {roots} move: disturbances die out where all are {side}.</p>\n"
+        f"{frame(page_of(of, designs, trace_curves=True), 'Explorer of this problem')}\n"
         '<p class="print">The explorer is in the file itself, not on paper.</p>'
     )
 

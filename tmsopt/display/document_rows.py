@@ -91,14 +91,16 @@ def point_rows(trace: "Trace") -> tuple[list[Row], str]:
     """Points of all branches with their events, in the units of the problem."""
     units = {n: unit_of(trace.problem, n) for n in (*trace.problem.free, "abscissa")}
     heads = ("branch", *(f"{n} {u.text}".rstrip() for n, u in units.items()))
-    facts = ("kind", "stable", "heavily damped", "constraints", "event")
+    model = trace.problem.model
+    swings = () if model.carrier is not None else ("heavily damped",)
+    facts = ("kind", "stable", *swings, "constraints", "event")
     records = [*trace.records()]
     marked = [k for k, record in enumerate(records) if record["event"]]
     kept, note = thinned(records, "points", "tmsopt trace FILE --csv curve.csv writes all", marked)
     rows: list[Row] = [(*heads, *facts)]
     for record in kept:
         numbers = (unit.number(record[n], _DIGITS) for n, unit in units.items())
-        said = (_cell(record[fact.replace(" ", "_")]) for fact in facts)
+        said = (in_words_of(model, _cell(record[fact.replace(" ", "_")])) for fact in facts)
         rows.append((str(record["branch"] + 1), *numbers, *said))
     return rows, note
 
@@ -113,6 +115,7 @@ def chart_rows(chart: "Chart") -> tuple[list[Row], str]:
         for n, values in zip(chart.axes, reversed(grid), strict=True)
     }
     left_out = () if len(problem.constraints) > len(chart.left_aside) else ("satisfied", "margin")
+    left_out += () if problem.model.carrier is None else ("damping_ratio", "real_roots")  # eigenfrequencies have none
     for name, layer in ((n, layer) for n, layer in shown.layers.items() if n not in left_out):
         values = np.asarray(layer).ravel().tolist()
         if name == "kind":

@@ -2,7 +2,8 @@
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from tmsopt.design import Problem, Solution, ended, freedom
 from tmsopt.design.files import posed
@@ -27,6 +28,7 @@ class Known:
         facts: what is known of it, a sentence each.
         is_answer: whether it is what the problem asks for, or the nearest to it.
         proved: what is proved of it, in one line; empty without a proof.
+        verdict: on its stability, with the power of t by which it grows, as in JSON; empty where nobody asked.
     """
 
     name: str
@@ -35,6 +37,7 @@ class Known:
     facts: tuple[str, ...]
     is_answer: bool = False
     proved: str = ""
+    verdict: Mapping[str, Any] = field(default_factory=dict)
 
 
 def known_designs(
@@ -70,7 +73,8 @@ def _of_solution(solution: Solution) -> Known:
     name = words[solution.status] if problem.free else "as given"
     if problem.sense == "locate" and solution.status == "optimal":
         name = str(problem.locate)
-    return Known(name, solution.parameters, known, (*facts, proof), True, proved)
+    said = getattr(solution, "stability", None) if known.roots is solution.roots else None
+    return Known(name, solution.parameters, known, (*facts, proof), True, proved, said.to_json() if said else {})
 
 
 def _benchmark(problem: Problem) -> Known | None:

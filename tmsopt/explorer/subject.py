@@ -119,7 +119,7 @@ def _design(problem: Problem, known: Known) -> dict[str, Any]:
         "name": known.name, "values": [float(known.parameters[n]) for n in problem.parameter_set.names],
         "structure": structure_in_words(model, structure.name, structure.abscissa > 0) if structure.roots else "",
         "abscissa": max((root[0] for root in roots), default=math.nan), "roots": roots,
-        "facts": list(known.facts), "proved": known.proved,
+        "facts": list(known.facts), "proved": known.proved, **known.verdict,
     }  # fmt: skip
 
 

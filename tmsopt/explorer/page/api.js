@@ -17,7 +17,7 @@ window.tmsopt = {
 
   /** The design that is shown, and what it is. */
   get() {
-    const {meetings, motion, kind, y} = drawingOf();
+    const {meetings, motion, kind, y, known} = drawingOf();
     const all = allRoots(meetings);
     const every = [...all.re].map((part, k) => [part, all.im[k]]);
     const named = (list, values) => Object.fromEntries(list.map(({name, one}, k) => [name, values[k] / one]));
@@ -27,7 +27,7 @@ window.tmsopt = {
       roots: OF_H ? every.map(([loss, frequency]) => [loss, 0 - frequency]) : every,
       abscissa: motion[0],
       ...(OF_H ? {eigenfrequencies: every.map(([loss, frequency]) => [frequency, loss])} : {damping_ratio: motion[1]}),
-      kind: isOnEdge(kind, meetings) ? "marginal" : KIND_WORDS[kind],
+      kind: isOnEdge(kind, meetings, known) ? edgeWord(meetings, known) : KIND_WORDS[kind],
       quantities: named(DATA.quantities, y),
     };
   },

@@ -18,6 +18,8 @@ const PICTURE_FONT = "12px system-ui, sans-serif";
 const PLOT_LEFT = 68;
 const DASHES = {whole: [], long: [9, 4], short: [4, 3], dots: [1.5, 3], mixed: [8, 3, 2, 3]};
 const repaints = [];
+// verdicts of the package on what is neither stable nor unstable
+const EDGES = ["marginally stable", "growing", "on the edge of stability"];
 
 const PICTURE_STYLE = `
 .picture { min-width: 0; }
@@ -99,17 +101,28 @@ function isMarginal(roots) {
   return Math.abs(rightmostOf(roots)) <= roundingOf(roots);
 }
 
-/** Whether a design of a class is neither stable nor unstable; signs are exact but for the rounding of a carrier. */
-function isOnEdge(kind, roots) {
+/** Whether a design of a class is on the edge of stability; signs are exact but for the rounding of a carrier. */
+function isOnEdge(kind, roots, known) {
+  if (known?.verdict) return EDGES.includes(known.verdict);
   return kind > 0 && (kind < 3 ? rightmostOf(roots) <= roundingOf(roots) : OF_H && isMarginal(roots));
 }
 
+/**
+ * The word for a design on the edge: that of the command where it is known; else a multiple root leaves open whether it
+ * grows, for of eigenvectors the page knows nothing.
+ */
+function edgeWord(roots, known) {
+  const near = rightmostOf(roots) - roundingOf(roots);
+  const open = roots.some(([re, , times]) => times > 1 && re >= near);
+  return known?.verdict || (open ? "marginal" : "marginally stable");
+}
+
 /** Words for a design with such roots: its class, and what of the boundaries it stands on. */
-function designWords(kind, roots) {
+function designWords(kind, roots, known) {
   if (!OF_H && kind > 2 && roots.every(([, im]) => im === 0) && roots.some((root) => root[2] > 1))
     return "stable, on the edge of heavy damping: nothing swings";
-  if (!isOnEdge(kind, roots)) return classWords(kind);
-  return `marginal: ${ROOTS} on ${AXIS}, as far as can be computed`;
+  if (!isOnEdge(kind, roots, known)) return classWords(kind);
+  return `${edgeWord(roots, known)}: ${ROOTS} on ${AXIS}, as far as can be computed`;
 }
 
 /** A number for people: so many digits, a true minus, powers of ten in words of digits. */

@@ -299,7 +299,7 @@ function chartPicture(host) {
 
   function readOwn() {
     const {state, drawing} = now;
-    read(state, designWords(drawing.kind, drawing.meetings), drawing.motion[0]);
+    read(state, designWords(drawing.kind, drawing.meetings, drawing.known), drawing.motion[0]);
   }
 
   const placeAt = (px, py) =>
@@ -335,7 +335,7 @@ function chartPicture(host) {
       const [first, second] = state.plane.map((k) => `${symbolOf(k)} ${valueText(k, state.x[k], 3)}`);
       const classes = (surveyed.present || []).map((kind) => classWords(kind)).join("; ");
       says(
-        `Stability chart: this design, ${first} and ${second}, is ${designWords(drawing.kind, drawing.meetings)}; ` +
+        `Stability chart: this design, ${first} and ${second}, is ${designWords(drawing.kind, drawing.meetings, drawing.known)}; ` +
           `in the picture are ${classes}. Arrow keys move the design.`,
       );
     },

@@ -6,7 +6,7 @@ const CLASS_WORDS = OF_H
 
 // units of time, by that of the roots
 const TIMES = {"√(g/w)": "√(w/g)", "1/s": "s"};
-const MARKS = {undefined: "?", marginal: "≈", unstable: "✗"};
+const MARKS = {undefined: "?", marginal: "≈", "marginally stable": "≈", growing: "✗", unstable: "✗"};
 
 /** How near the axis rounding does not tell, and how many roots at most meet where the slowest part is. */
 function slowestOf({motion, meetings}) {
@@ -16,15 +16,17 @@ function slowestOf({motion, meetings}) {
 
 /** The verdict in a word and in a sentence, with powers as ^3 and ^(−2 t). */
 function verdictOf(drawing) {
-  const {kind, motion, meetings} = drawing;
+  const {kind, motion, meetings, known} = drawing;
   const [abscissa] = motion;
   const {near, times} = slowestOf(drawing);
   const power = times > 1 ? `t${times > 2 ? `^${times - 1}` : ""}` : "";
   if (!kind) return ["undefined", "No verdict: of the characteristic polynomial a coefficient is no number, or the first is 0"];
-  if (isOnEdge(kind, meetings)) {
+  if (isOnEdge(kind, meetings, known)) {
     const where = `on ${AXIS}, as far as can be computed`;
-    const fate = power ? `can grow as ${power}: ${ROOTS} meet` : `neither grows nor dies out: the ${OF_H ? "least damped" : "rightmost"} ${ROOTS} are`;
-    return ["marginal", `A disturbance ${fate} ${where}`];
+    const fate = known?.growth
+      ? `grows as ${known.growth}: ${ROOTS} and their eigenvectors meet`
+      : power && !known?.verdict ? `can grow as ${power}: ${ROOTS} meet` : `neither grows nor dies out: the ${OF_H ? "least damped" : "rightmost"} ${ROOTS} are`;
+    return [edgeWord(meetings, known), `A disturbance ${fate} ${where}`];
   }
   const rate = MODEL.rate(state.x);
   const unit = Number.isFinite(rate) ? "s" : TIMES[DATA.rootUnit];

@@ -459,7 +459,7 @@ function growthPicture(host) {
     const unit = Number.isFinite(MODEL.rate(state.x)) ? "1/s" : DATA.rootUnit;
     const text = rootsInWords(roots, 4, rate);
     const where = `${symbolOf(state.over)} = ${valueText(state.over, value, 5)}`;
-    reading.textContent = `${where}: ${designWords(kindOf(a), roots)}; ${ROOTS} ${withLabelUnit(text || "none", unit)}`;
+    reading.textContent = `${where}: ${designWords(kindOf(a), roots, own ? drawing.known : undefined)}; ${ROOTS} ${withLabelUnit(text || "none", unit)}`;
   }
 
   const within = (value) => withinRange(now.state.over, value);
@@ -483,7 +483,7 @@ function growthPicture(host) {
       const {name} = DATA.parameters[state.over];
       says(
         `Growth rates and frequencies over ${name}; this design at ${valueText(state.over, state.x[state.over])} is ` +
-          `${designWords(drawing.kind, drawing.meetings)}. ${happens.textContent} ` +
+          `${designWords(drawing.kind, drawing.meetings, drawing.known)}. ${happens.textContent} ` +
           `Left and right arrow keys move ${name}.`,
       );
     },

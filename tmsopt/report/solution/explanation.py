@@ -14,7 +14,7 @@ from tmsopt.report.text import columns, number
 
 _SHARE, _LIMIT, _NIL = 0.05, 0.01, 1e-9
 """Of decay and objective, and of the sizes of limits: what rounding may cost; what is nothing."""
-_MULTIPLIERS = "what it costs, per unit, to change a root on the rightmost line"
+_MULTIPLIERS = "what it costs, per unit, to change "
 _ROUNDING, _ROUNDED = 1e-16, 1e-13
 
 
@@ -114,7 +114,9 @@ def optimality_lines(optimality: Optimality) -> list[str]:
         return [f"local optimality: not judged, for {optimality.reason}"]
     lines = [f"local optimality: {optimality.reason}"]
     if optimality.roots:
-        lines.append(f"  {_MULTIPLIERS} (they balance within {optimality.residual:.1g}):")
+        of_H = optimality.roots[0].eigenfrequency is not None
+        what = "an eigenfrequency of the largest Im ω" if of_H else "a root on the rightmost line"
+        lines.append(f"  {_MULTIPLIERS}{what} (they balance within {optimality.residual:.1g}):")
     return [*lines, *map(_root_line, optimality.roots)]
 
 
@@ -125,7 +127,7 @@ def _root_line(root: OnLine) -> str:
     times = f" ({root.multiplicity}-fold)" if root.multiplicity > 1 else ""
     share = f" ({100 * root.share:.3g} % of what all bear)" if root.share < 1 - 1e-9 else ""
     kappa = f", to part it {_seen(root.kappa, root.beta):.4g}" if root.multiplicity > 1 else ""
-    return f"  {place}{times}: to move it left {root.beta:.4g}{share}{kappa}"
+    return f"  {place}{times}: to move it {'left' if omega is None else 'down'} {root.beta:.4g}{share}{kappa}"
 
 
 def _place(re: float, im: float, digits: int) -> str:
