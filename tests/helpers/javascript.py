@@ -1,6 +1,7 @@
 """JavaScript run by Node, which pip brings with basedpyright; data go in and out as JSON."""
 
 import json
+import re
 import subprocess
 import tempfile
 from collections.abc import Sequence
@@ -48,3 +49,18 @@ def run(scripts: Sequence[str], answer: str, given: Any) -> Any:
         ended = node(arguments, return_completed_process=True, stderr=subprocess.PIPE, text=True)
         assert ended.returncode == 0, ended.stderr[-2000:]
         return json.loads(found.read_text(encoding="utf-8"))
+
+
+_STUB = """
+const any = new Proxy(function () {}, {get: (of, k) => (k === Symbol.toPrimitive ? () => "" : any), apply: () => any,
+  construct: () => any, set: () => true});
+for (const n of ["document", "history", "ResizeObserver", "MutationObserver", "requestAnimationFrame"]) globalThis[n] = any;
+Object.assign(globalThis, {window: globalThis, location: {hash: ""}, matchMedia: () => any, addEventListener: () => {}});
+"""
+
+
+def said_by(html: str, answer: str) -> Any:
+    """An expression in a whole page, whose pictures draw nowhere."""
+    script = re.search(r"<script>(.*)</script>", html, re.DOTALL)
+    assert script is not None
+    return run([_STUB, script[1]], f"() => ({answer})", None)

@@ -59,3 +59,14 @@ def test_a_proof_speaks_of_eigenfrequencies(g: float, holds: bool, words: str) -
     assert stable.holds is holds
     assert words in stable.words
     assert "imaginary" not in stable.words
+
+
+def test_coefficients_of_the_real_system_are_no_names_of_h(tmp_path: Path) -> None:
+    """Their carrier is chosen for the ranges of a problem, so that a limit on them would say nothing of H."""
+    said = refused(tmp_path, f'{HEAD}k = 0.5\n[objective]\nlocate = "EP2"\n[constraints]\nc = "a1 <= 2"\n')
+    assert "a1" in said
+    assert "a2" not in said
+    problem = tmsopt.Problem(from_hamiltonian([["d - 1j*g", 1], [1, "-1j"]]), fixed={"d": 0.0, "g": 1.0})
+    (of,) = tmsopt.describe(problem).sets
+    assert not {"a0", "a4"} & {w.name for w in of.quantities}
+    assert next(w.meaning for w in of.quantities if w.name == "abscissa").startswith("largest Im omega")

@@ -19,7 +19,7 @@ from tmsopt.progress import Counts, Listener, counted
 from tmsopt.versions import installed
 
 if TYPE_CHECKING:
-    from tmsopt.design import Problem, Solution
+    from tmsopt.design import Solution
 
 ENDINGS = ("html", "htm")
 """Of the name of a document."""
@@ -136,7 +136,7 @@ def _explorer(result: Any, design: "Solution | None") -> str:
         return ""
     from tmsopt.explorer import frame, page_of
 
-    problem: Problem = getattr(of, "problem", of)
+    problem: Any = getattr(of, "problem", None) or of
     of_H = problem.model.carrier is not None
     roots, side = ("eigenfrequencies", "below the real axis") if of_H else ("roots", "left of the imaginary axis")
     return (

@@ -114,8 +114,8 @@ def chart_rows(chart: "Chart") -> tuple[list[Row], str]:
         f"{n} {units[n].text}".rstrip(): [units[n].number(x, _DIGITS) for x in values.ravel().tolist()]
         for n, values in zip(chart.axes, reversed(grid), strict=True)
     }
-    left_out = () if len(problem.constraints) > len(chart.left_aside) else ("satisfied", "margin")
-    left_out += () if problem.model.carrier is None else ("damping_ratio", "real_roots")  # eigenfrequencies have none
+    left_out = [] if len(problem.constraints) > len(chart.left_aside) else ["satisfied", "margin"]
+    left_out += [] if problem.model.carrier is None else ["damping_ratio", "real_roots"]  # eigenfrequencies have none
     for name, layer in ((n, layer) for n, layer in shown.layers.items() if n not in left_out):
         values = np.asarray(layer).ravel().tolist()
         if name == "kind":
