@@ -207,6 +207,7 @@ function eventWords({kind, at, gains, roots, far}, over) {
   if (OF_H && kind === "crossing") return `${roots > 2 ? `${roots / 2} eigenfrequencies cross` : "an eigenfrequency crosses"} ${AXIS} ${where}`;
   const many = ["a real root crosses", "a pair of roots crosses"][roots - 1] ?? `${roots} roots cross`;
   if (kind === "crossing") return `${many} ${far ? "infinity" : "0"} ${where}`;
+  if (OF_H) return `${DATA.words[kind]} ${where}, ${gains ? "stable" : "gain"} from there`;
   return `${DATA.words[kind]} ${gains ? "ends" : "begins"} ${where}`;
 }
 
