@@ -113,7 +113,8 @@ def description_text(found: Description) -> str:
         parts.append("\n".join([f"quantities{alone}", *_words(new)]))
     for of in found.feedback:
         parts.append("\n".join([f"[feedback], {of.name}", *_words((*of.parameters, *of.quantities))]))
-    parts.append("\n".join(["patterns of roots, for locate", *table(list(found.patterns.items()))]))
+    roots = "eigenfrequencies" if "H" in found.matrices else "roots"
+    parts.append("\n".join([f"patterns of {roots}, for locate", *table(list(found.patterns.items()))]))
     parts.append("\n".join(["expressions", *wrapped([f"+ - * / **   <= >= ==   {' '.join(found.functions)}"])]))
     return "\n\n".join(parts)
 

@@ -40,12 +40,12 @@ def draw_trace(
     """
     first, second, *_ = [*(n for n in (horizontal, vertical) if n), *data.varying, *data.problem.free]
     plane = scale_of(data.problem, first), scale_of(data.problem, second)
-    drawn = on_axes(ax, 6.4, 5.0, data.problem.title or data.pattern)
+    model = data.problem.model
+    drawn = on_axes(ax, 6.4, 5.0, data.problem.title or in_words_of(model, data.pattern))
     _bands(drawn, data, plane)
     for branch in data.branches:
-        draw_branch(drawn, branch, plane, width=1.2, tint=LINE, model=data.problem.model)
+        draw_branch(drawn, branch, plane, width=1.2, tint=LINE, model=model)
     marked = [e for e in data.events if e.name not in _UNLABELLED]
-    model = data.problem.model
     names = [Name(in_words_of(model, e.name), *(float(s.of(e.parameters[s.name])) for s in plane)) for e in marked]
     for name in names:
         drawn.plot([name.x], [name.y], "o", color=MARK, markeredgecolor="white", markersize=5, zorder=4)

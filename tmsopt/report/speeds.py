@@ -65,8 +65,9 @@ def growth_table(found: Growth) -> str:
     """
     unit = unit_of(found.problem, found.over.name)
     critical = f", critical value {unit.show(found.critical, 8)}" if math.isfinite(found.critical) else ""
+    roots = "roots" if found.problem.model.carrier is None else "eigenfrequencies"
     lines = [
-        f"roots over {found.over.name} from {unit.number(found.values[0], 6)} to {unit.show(found.values[-1], 6)}",
+        f"{roots} over {found.over.name} from {unit.number(found.values[0], 6)} to {unit.show(found.values[-1], 6)}",
         f"the design: {found.over.name} = {unit.show(found.design, 8)}, structure {found.structure}{critical}",
     ]
     kinds = [("stable", found.stable), ("heavily damped", found.heavily_damped)]
@@ -77,9 +78,10 @@ def growth_table(found: Growth) -> str:
 
 
 def _nothing(found: Speeds) -> str:
-    if found.always:
-        return f"beside what holds for every {found.parameter}, no root meets another or the imaginary axis"
-    return "no root meets another or the imaginary axis"
+    real = found.problem.model.carrier is None
+    root, axis = ("root", "imaginary") if real else ("eigenfrequency", "real")
+    beside = f"beside what holds for every {found.parameter}, " if found.always else ""
+    return f"{beside}no {root} meets another or the {axis} axis"
 
 
 def _always(found: Speeds) -> Iterator[str]:
