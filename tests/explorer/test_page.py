@@ -305,7 +305,7 @@ def test_close_to_a_known_design_it_says_so(browser: Any, ep4: Path) -> None:
 
 VERDICTS = {
     "s^2 (s^2 + 1)": ('["1", "0", "1", "0", "k - 2"]', "≈ marginal A disturbance can grow as t: roots meet"),
-    "undamped": ('["1", "0", "1 + k", "0", "k"]', "≈ marginal A disturbance neither grows nor dies out: the rightmost"),
+    "undamped": ('["1", "0", "1 + k", "0", "k"]', "≈ marginally stable A disturbance neither grows nor dies out: the rightmost"),
     "(s + k)^3": ('["1", "3*k", "3*k**2", "k**3"]', "✓ stable Every disturbance dies out and nothing swings, on the edge "
                   "of heavy damping, slowest as t2 e−2 t"),
     "(s + k)(s + 5)": ('["1", "5 + k", "5*k"]', "✓ heavily damped Every disturbance dies out and nothing swings, slowest as "

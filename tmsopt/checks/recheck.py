@@ -19,6 +19,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE, roots_at
 from tmsopt.margins.nearest import Robustness, robustness_at
 from tmsopt.models import Model, Values
+from tmsopt.models.told import public_names
 from tmsopt.records import Array, Table
 from tmsopt.roots import Root, Structure, pattern_distance, roots
 
@@ -82,7 +83,7 @@ def recheck(
         if not distance <= MATCHED:
             violations[problem.pattern.name] = distance
     of = problem.parameter_set
-    names = [n for n in (*problem.model.public_names(of), "damping_ratio") if n not in problem.model.sets[0].names]
+    names = [n for n in (*public_names(problem.model, of), "damping_ratio") if n not in problem.model.sets[0].names]
     if around is not None:
         names.append(RADIUS)
     if problem.asks(ANGULAR_FREQUENCY):

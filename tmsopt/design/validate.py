@@ -11,7 +11,7 @@ from tmsopt.design.quantities import root_names, spelled_out
 from tmsopt.errors import Fault, at_first, short, suggest, table_faults, text_faults
 from tmsopt.models import Model, ParameterSet
 from tmsopt.models.names import MEANT
-from tmsopt.models.told import pattern_of, patterns_of
+from tmsopt.models.told import pattern_of, patterns_of, public_names
 
 VARIATIONS = ("scenarios", "tolerances", "weights")
 """Tables of a problem that name parameters beside those of `fixed` and `free`."""
@@ -271,7 +271,7 @@ def _pareto_faults(texts: Any) -> Iterator[Fault]:
 
 
 def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
-    accepted = (*of.names, *problem.model.public_names(of), *root_names(problem.model))
+    accepted = (*of.names, *public_names(problem.model, of), *root_names(problem.model))
     advice = at_first(unknown)
 
     def parsed(parse: Any, text: Any, *key: str) -> Iterator[Fault]:

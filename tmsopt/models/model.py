@@ -264,11 +264,6 @@ class Model:
         derived = tuple(q.name for q in (*self.quantities, *of.quantities))
         return tuple(n for n in (*native, *self.coefficient_names(), *derived) if n not in of.names)
 
-    def public_names(self, of: ParameterSet) -> tuple[str, ...]:
-        """The same without coefficients that have a carrier in them, which say nothing of H."""
-        hidden = () if self.carrier is None else self.coefficient_names()
-        return tuple(n for n in self.quantity_names(of) if n not in hidden)
-
     def parameter_set(self, name: str) -> ParameterSet:
         """The parameter set of that name."""
         return next(s for s in self.sets if s.name == name)

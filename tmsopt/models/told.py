@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from tmsopt.models.model import Model
+from tmsopt.models.model import Model, ParameterSet
 from tmsopt.roots import Pattern, Root, Structure, pattern
 from tmsopt.roots.patterns.composed import pattern_names
 from tmsopt.roots.patterns.descriptions import in_words
@@ -47,6 +47,12 @@ def full_patterns(model: Model) -> tuple[str, ...]:
         return (f"EP{model.degree // 2}",) if model.degree > 2 else ()
     pairs = (f"CEP{model.degree // 2}",) if model.degree > 2 and model.degree % 2 == 0 else ()
     return (f"EP{model.degree}", *pairs) if model.degree > 1 else ()
+
+
+def public_names(model: Model, of: ParameterSet) -> tuple[str, ...]:
+    """`Model.quantity_names` without coefficients that have a carrier in them, which say nothing of H."""
+    hidden = () if model.carrier is None else model.coefficient_names()
+    return tuple(n for n in model.quantity_names(of) if n not in hidden)
 
 
 def name_told(model: Model, name: str) -> str:

@@ -7,6 +7,7 @@ from operator import itemgetter
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, NO_RADIUS, ROOT_QUANTITIES, root_names
 from tmsopt.errors import nearest, suggest
 from tmsopt.models import Model, Parameter, ParameterSet, Quantity
+from tmsopt.models.told import public_names
 
 _NEAR = 0.7  # of a misspelt word; what is less alike is looked for among the meanings first
 
@@ -36,7 +37,7 @@ def vocabulary(model: Model, of: ParameterSet) -> dict[str, Parameter | Quantity
     known |= {p.name: p for p in (*native, *of.parameters)} | {q.name: q for q in derived}
     if model.carrier is not None:
         known["abscissa"] = replace(ROOT_QUANTITIES[0], meaning="largest Im omega, gain less loss")
-    return {name: known[name] for name in (*of.names, *model.public_names(of), *root_names(model))}
+    return {name: known[name] for name in (*of.names, *public_names(model, of), *root_names(model))}
 
 
 def _power(k: int) -> str:
