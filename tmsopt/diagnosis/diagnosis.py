@@ -5,22 +5,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-import flint
 import numpy as np
 
-from tmsopt.arithmetic.elementary import exact
 from tmsopt.design.files import Given
 from tmsopt.diagnosis.jordan import Jordan, is_regular, jordan
-from tmsopt.diagnosis.splitting import DEVIATION, Ideal, Law, Response, response
+from tmsopt.diagnosis.meeting import Meeting, many_digits, met, middle, pencil_of, polished
+from tmsopt.diagnosis.splitting import DEVIATION, Law, Response, response
 from tmsopt.models import Model, ParameterSet
 from tmsopt.models.told import eigenfrequencies, roots_told
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Shown, plain
 from tmsopt.roots import Root, Structure, backward_error
-from tmsopt.roots.patterns.enclosed import nearest_roots
 from tmsopt.solver.solve import solved_first
 
-_BITS = 424  # 127 digits: changes down to 1e-16 are differences of coefficients
 _RANK = 1e-7  # relative singular value that counts as 0; of a nearly semisimple root it is the root of the distance
 _TIMES = 10.0  # likewise, times the root of the distance from the structure
 
@@ -70,7 +67,7 @@ class Diagnosis(Shown):
             **plain(self, "distance", digits=6),
             "responses": [
                 {"parameter": r.parameter, "change": "relative" if r.relative else "absolute"}
-                | {"unmoved": r.unmoved, "laws": [_law(law) for law in r.laws]}
+                | {"unmoved": r.unmoved, "unresolved": r.unresolved, "laws": [_law(law) for law in r.laws]}
                 for r in self.responses
             ],
         }
@@ -115,52 +112,39 @@ def diagnosed(
     """The same for any design of a model whose roots have a structure; free = ranges beside which it may be 0."""
     if all(root.multiplicity == 1 for root in structure.roots):
         return ()
-    with flint.ctx.workprec(_BITS):
-        ideal = _ideal(model, of, design, structure)
+    with many_digits():
         return tuple(
-            _diagnosis(model, of, design, structure, ideal, place, {n: b - a for n, (a, b) in (free or {}).items()})
-            for place, (root, _) in enumerate(ideal)
-            if root.multiplicity > 1 and (root.im >= 0 if model.carrier is None else root.im < 0)
+            _diagnosis(model, of, design, structure.distance, root, {n: b - a for n, (a, b) in (free or {}).items()})
+            for root in roots_told(model, structure.roots)
+            if root.multiplicity > 1 and (root.im >= 0 or model.double is not None)
         )
 
 
-def _ideal(model: Model, of: ParameterSet, design: Mapping[str, float], structure: Structure) -> Ideal:
-    coefficients = model.coefficients({n: exact(x) for n, x in design.items()}, of)
-    balls = nearest_roots(structure.name, coefficients, structure.roots)
-    if balls is None:
-        return [(r, flint.acb(r.re, r.im)) for r in structure.roots]
-    middles = [flint.acb(z.re.mid(), z.im.mid()) for z in balls]
-    return [(Root(float(m.real), float(m.imag), z.multiplicity), m) for z, m in zip(balls, middles, strict=True)]
-
-
 def _diagnosis(
-    model: Model, of: ParameterSet, design: Mapping[str, float], structure: Structure, ideal: Ideal, place: int,
+    model: Model, of: ParameterSet, design: Mapping[str, float], distance: float, root: Root,
     widths: Mapping[str, float],
 ) -> Diagnosis:  # fmt: skip
-    root, s = ideal[place]
     k = root.multiplicity
-    ranks = _ranks(model, of, design, structure.distance, s, k)
+    stored = met(model, of, design, widths, complex(root.re, root.im), k)
+    ranks = _ranks(model, of, stored, distance)
+    at = polished(stored, ranks.geometric if ranks else 1)
+    exact = _ranks(model, of, at, distance)
+    ranks = exact if ranks and exact and exact.geometric == ranks.geometric else ranks
     partial = ranks.partial if ranks else (k,)
-    geometric = ranks.geometric if ranks else 1
-    kind = "semisimple" if geometric == k else "defective" if geometric == 1 else "partly defective"
-    responses = (response(model, of, design, ideal, place, name, widths.get(name, 0.0)) for name in of.names)
-    ordered = tuple(sorted(responses, key=_sensitivity))
-    (shown,) = roots_told(model, [Root(root.re, root.im, k)])
-    omega = tuple(complex(z.re, z.im) for z in eigenfrequencies(model, [shown]))
-    return Diagnosis(
-        shown.re, shown.im, k, geometric, partial, kind, ranks, structure.distance, ordered, *omega
-    )  # fmt: skip
+    kind = "semisimple" if at.geometric == k else "defective" if at.geometric == 1 else "partly defective"
+    ordered = tuple(sorted((response(at, name) for name in of.names), key=_sensitivity))
+    place = middle(at.s)
+    omega = tuple(complex(z.re, z.im) for z in eigenfrequencies(model, [Root(place.real, place.imag, k)]))
+    return Diagnosis(place.real, place.imag, k, at.geometric, partial, kind, ranks, distance, ordered, *omega)
 
 
-def _ranks(
-    model: Model, of: ParameterSet, design: Mapping[str, float], distance: float, s: Any, k: int,
-) -> Jordan | None:  # fmt: skip
+def _ranks(model: Model, of: ParameterSet, at: Meeting, distance: float) -> Jordan | None:
     """Jordan structure by the matrices; None without them, or if they are singular for every s."""
     if model.pencil is None:
         return None
-    matrices = model.pencil(of.native({n: flint.arb(x) for n, x in design.items()}))
+    matrices = pencil_of(model, of, at.values)
     threshold = max(_RANK, _TIMES * math.sqrt(distance))
-    return jordan(matrices, s, k, threshold) if is_regular(matrices, s, threshold) else None
+    return jordan(matrices, at.s, at.multiplicity, threshold) if is_regular(matrices, at.s, threshold) else None
 
 
 def _sensitivity(response: Response) -> tuple[float, float]:
@@ -174,5 +158,5 @@ def _law(law: Law) -> dict[str, Any]:
         "roots": b.roots,
         "exponent": str(b.exponent),
         **plain(b, "numerator denominator constants size", digits=6),
-        "holds": plain(law, "below above", digits=6) | {"deviation": DEVIATION},
+        "holds": plain(law, "least below above", digits=6) | {"deviation": DEVIATION},
     }

@@ -8,7 +8,7 @@ from typing import Any
 import flint
 import numpy as np
 
-from tmsopt.diagnosis.splitting import middle
+from tmsopt.diagnosis.meeting import middle
 from tmsopt.records import Array, Complex
 
 Matrix = Sequence[Sequence[Any]]

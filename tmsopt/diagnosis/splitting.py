@@ -1,6 +1,6 @@
-"""How a multiple root splits when a parameter changes, and how far the leading term tells it."""
+"""How a multiple root splits when a parameter changes: laws by Newton's polygon, each confirmed by the roots."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -8,22 +8,18 @@ import flint
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.arithmetic.elementary import exact
+from tmsopt.diagnosis.meeting import Meeting, middle, order
 from tmsopt.diagnosis.puiseux import Branches, branches
-from tmsopt.models import Model, ParameterSet
-from tmsopt.roots import Root, product
 
 DEVIATION = 0.1
 """Share by which a root may be off the leading term while the law is said to hold."""
 
-_NOTHING = 1e-9  # of its terms: a derivative that vanishes at the exact multiple root, and not quite at the stored one
-_FAINT = 1e-13  # of the coefficients' own terms: a derivative that rounding of the design alone may bring about
-_ZERO = 1e-12  # of the range of a parameter: a change relative to so little is none
 _DECADES = range(-16, 1)  # of the changes at which a law is tried
 _WITHIN = (0.75, 0.5, 0.25)  # and, before the first decade at which it fails
-
-Ideal = Sequence[tuple[Root, Any]]
-"""Each root of the nearest polynomial with the structure, and as a complex ball without a radius."""
+_SCALES = 2  # decades over which a law must hold, on both sides, to count
+_STILL = (1e-2, 1e-4)  # changes at which roots that do not move are counted
+_SMALL = (1e-5, 1e-8, 1e-11)  # of what moves least, or of the size of roots: what is nearer does not move
+_SCATTER = 8  # times the distance that roots keep from one another where they are met to rounding only
 
 
 @dataclass(frozen=True)
@@ -33,14 +29,15 @@ class Law:
     Attributes:
         branches: tᵠ = C εᵖ for the shift t of each, to leading order.
         below, above: |ε| up to which every sampled shift is within `DEVIATION` of it, for ε < 0 and ε > 0; sampled at
-            each decade from 1e-16 to 1, and four times in the last one that is reached; 0 if it holds at none. The
-            least decades do not count where the law fails there alone: by the rounding of the design, which parts
-            roots that the change leaves together.
+            each decade from 1e-16 to 1, and four times in the last one that is reached.
+        least: |ε| from which it does; 0 if at every decade. Where a root is met to rounding only, roots that the change
+            leaves together are apart, and less is not seen.
     """
 
     branches: Branches
     below: float
     above: float
+    least: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -49,83 +46,107 @@ class Response:
 
     Attributes:
         relative: whether ε is relative to the parameter's value; of one that is 0, but for rounding, it is absolute.
-        laws: fastest first; empty if no root moves.
+        laws: fastest first; those alone that the roots confirm at two changes, one 100 times the other.
         unmoved: roots that stay, to the orders looked at.
+        unresolved: roots of which neither was confirmed.
     """
 
     parameter: str
     relative: bool
     laws: tuple[Law, ...]
     unmoved: int
+    unresolved: int = 0
 
 
-def response(
-    model: Model, of: ParameterSet, design: Mapping[str, float], ideal: Ideal, place: int, name: str, width: float = 0.0
-) -> Response:
-    """How one of the multiple roots of the ideal polynomial answers to a parameter, at the precision of `flint.ctx`.
-
-    Args:
-        width: of the range of the parameter, beside which it may be 0 but for rounding; 0 of one that is fixed.
-    """
-    root, s = ideal[place]
-    k = root.multiplicity
-    relative = abs(design[name]) > _ZERO * width
-    step = exact(design[name]) if relative else exact(1.0)
-
-    def changed(by: Any) -> list[Any]:
-        varied: dict[str, Any] = {n: flint.arb(x) for n, x in design.items()}
-        varied[name] = varied[name] + flint.arb(step) * by
-        return model.coefficients(varied, of)
-
-    own = [_ball(c) for c in changed(flint.arb(0))]
-    base = [own[0] * c for c in product(*([1, -z] for r, z in ideal for _ in range(r.multiplicity)))]
-    series = changed(flint.arb_series([0, 1], prec=k + 1))
-    unit = abs(s) if abs(s) > 0 else abs(max((z for _, z in ideal), key=lambda z: float(abs(z)))) or flint.arb(1)
-    size = _taylor([abs(c) for c in base], abs(s), unit, k)
-    terms = [[0j] * k + [middle(_taylor(base, s, unit, k)[k])]]
-    for m in range(1, k + 1):
-        order = [c[m] if isinstance(c, flint.arb_series) else flint.arb(0) for c in series]
-        values, sizes = _taylor(order, s, unit, k), _taylor([abs(c) for c in order], abs(s), unit, k)
-        pairs = zip(sizes, size, strict=True)
-        floors = [_NOTHING * float(abs(a).mid()) + _FAINT * float(abs(b).mid()) for a, b in pairs]
-        terms.append([z if abs(z := middle(v)) > f else 0j for v, f in zip(values, floors, strict=True)])
+def response(at: Meeting, name: str) -> Response:
+    """How a multiple root answers to a parameter, at the precision of `many_digits`."""
+    k, relative = at.multiplicity, at.relative(name)
+    terms = _terms(at, name)
+    if terms is None:
+        return Response(name, relative, (), 0, k)
     found, unmoved = branches(terms)
-    laws = []
-    for branch in found:
-        below, above = (_holds(branch, k, base, own, changed, (s, unit), sign) for sign in (-1, 1))
-        laws.append(Law(_in_unit(branch, float(unit.mid())), below, above))
-    return Response(name, relative, tuple(laws), unmoved)
+    laws = [law for branch in found if (law := _confirmed(at, name, branch))]
+    if unmoved and not _stays(at, name, found, unmoved):
+        unmoved = 0
+    left = k - unmoved - sum(law.branches.roots for law in laws)
+    return Response(name, relative, tuple(laws), unmoved, left)
 
 
-def _holds(
-    branch: Branches, k: int, base: Sequence[Any], own: Sequence[Any], changed: Any, about: tuple[Any, Any], sign: int
-) -> float:
-    """The largest sampled change up to which the roots are where the leading term has them; about = root, unit."""
-    s, unit = about
+def _terms(at: Meeting, name: str) -> list[list[complex]] | None:
+    """terms[m][j] of ε^m t^j, t in the root's unit; 0 is what the doubt of the parameters contains. None where unknown.
+
+    With g independent eigenvectors, p is to leading order the determinant of a g × g matrix that vanishes at the root:
+    terms below order g in both are 0.
+    """
+    k, g = at.multiplicity, at.geometric
+    series = at.changed(name, flint.arb_series([0, at.step(name)], prec=2 * k + 1), doubt=True)
+    rows = [at.taylor(order(series, m), doubt=True)[: k + 1] for m in range(2 * k + 1)]
+    if not all(x.is_finite() for row in rows for x in row) or rows[0][k].contains(0):
+        return None
+    rows[0][:k] = [flint.acb(0)] * k
+    return [
+        [0j if m + j < g or x.contains(0) else middle(x / rows[0][k].mid()) for j, x in enumerate(row)]
+        for m, row in enumerate(rows)
+    ]
+
+
+def _confirmed(at: Meeting, name: str, branch: Branches) -> Law | None:
+    """The law with its ends, if the roots are where it has them at changes of both signs and of two sizes."""
+    ends = [_ends(at, name, branch, sign) for sign in (-1, 1)]
+    least = max(low for low, _ in ends)
+    if any(high < 10**_SCALES * max(low, 10.0 ** _DECADES[0]) for low, high in ends):
+        return None
+    return Law(_in_unit(branch, at.unit), ends[0][1], ends[1][1], least)
+
+
+def _ends(at: Meeting, name: str, branch: Branches, sign: int) -> tuple[float, float]:
+    """The least and the largest sampled change between which the roots are where the law has them; (0, 0) if none."""
 
     def held(changes: Sequence[float]) -> list[bool]:
-        """Of each size of a change."""
         rows, predicted = [], [branch.shifts(sign * eps) for eps in changes]
         scales = [max(abs(t) for t in each) for each in predicted]
         for eps, scale in zip(changes, scales, strict=True):
-            change = changed(flint.arb(sign) * eps)
-            coefficients = [b + _ball(c) - o for b, c, o in zip(base, change, own, strict=True)]
-            shifted = _taylor(coefficients, s, unit * scale, len(coefficients) - 1)
+            shifted = at.taylor(at.changed(name, sign * eps * at.step(name)), scale)
             # Of 1/t, so that those sought are the largest roots: companion eigenvalues have these to all digits.
-            rows.append([middle(c / shifted[k].abs_upper()) for c in shifted])
-        every = zip(predicted, scales, _largest(np.array(rows), k), strict=True)
+            rows.append([middle(c / shifted[at.multiplicity].abs_upper()) for c in shifted])
+        every = zip(predicted, scales, _largest(np.array(rows), at.multiplicity), strict=True)
         return [_deviation(t, scale, inverse) <= DEVIATION for t, scale, inverse in every]
 
-    every = list(zip(_DECADES, held([10.0**m for m in _DECADES]), strict=True))
-    while every and not every[0][1]:
-        every.pop(0)
-    if not every:
-        return 0.0
-    first = next((m for m, right in every if not right), None)
+    every = dict(zip(_DECADES, held([10.0**m for m in _DECADES]), strict=True))
+    low = next((m for m, right in every.items() if right), None)
+    if low is None:
+        return 0.0, 0.0
+    least = 10.0**low if low > _DECADES[0] else 0.0
+    first = next((m for m, right in every.items() if m > low and not right), None)
     if first is None:
-        return 10.0 ** _DECADES[-1]
+        return least, 10.0 ** _DECADES[-1]
     reached = [10.0 ** (first - 1 + share) for share in _WITHIN]
-    return next((eps for eps, right in zip(reached, held(reached), strict=True) if right), 10.0 ** (first - 1))
+    end = next((eps for eps, right in zip(reached, held(reached), strict=True) if right), 10.0 ** (first - 1))
+    return least, end
+
+
+def _stays(at: Meeting, name: str, moved: Sequence[Branches], unmoved: int) -> bool:
+    """Whether so many roots stay as a parameter changes, by Rouché's theorem at each of a few changes."""
+    return all(
+        any(_within(at, name, sign * eps, radius) == unmoved for radius in _radii(at, moved, eps))
+        for eps in _STILL
+        for sign in (-1, 1)
+    )
+
+
+def _radii(at: Meeting, moved: Sequence[Branches], eps: float) -> list[float]:
+    """Radii, in the root's unit, within which only roots that stay should be."""
+    least = min((abs(t) for branch in moved for t in branch.shifts(eps)), default=1.0)
+    k = at.multiplicity
+    terms = [middle(x) for x in at.taylor(at.polynomial(at.values))[: k + 1]]
+    scatter = max(abs(x / terms[k]) ** (1 / (k - j)) for j, x in enumerate(terms[:k]))
+    return [max(small * least, _SCATTER * scatter) for small in _SMALL]
+
+
+def _within(at: Meeting, name: str, eps: float, radius: float) -> int | None:
+    """How many roots are within a radius; None where one term does not outweigh all others there."""
+    terms = [abs(x) for x in at.taylor(at.changed(name, eps * at.step(name)), radius)]
+    return next((u for u, x in enumerate(terms) if 2 * x > sum(terms, flint.arb(0))), None)
 
 
 def _largest(rows: NDArray[np.complex128], k: int) -> list[NDArray[np.complex128]]:
@@ -144,26 +165,16 @@ def _largest(rows: NDArray[np.complex128], k: int) -> list[NDArray[np.complex128
 
 
 def _deviation(predicted: Sequence[complex], scale: float, inverse: NDArray[np.complex128]) -> float:
-    """The largest distance of a predicted shift from the nearest true one, relative; inf where there is none."""
-    actual = scale / inverse
-    return max(float(np.abs(actual - t).min(initial=np.inf)) / abs(t) for t in predicted)
+    """The largest distance of a predicted shift from the nearest true one left, relative; inf where there is none."""
+    left, worst = list(scale / inverse), 0.0
+    for t in predicted:
+        nearest = min(range(len(left)), key=lambda i: abs(left[i] - t), default=None)
+        if nearest is None:
+            return np.inf
+        worst = max(worst, abs(left.pop(nearest) - t) / abs(t))
+    return float(worst)
 
 
 def _in_unit(branch: Branches, unit: float) -> Branches:
     """With the shift in the unit of s."""
     return replace(branch, constants=tuple(c * unit**branch.denominator for c in branch.constants))
-
-
-def _taylor(coefficients: Sequence[Any], s: Any, unit: Any, last: int) -> list[Any]:
-    """Coefficients in t of p(s + unit t), ascending, up to a power."""
-    found = flint.acb_poly(list(coefficients[::-1]))(flint.acb_poly([s, unit]))
-    return [found[j] for j in range(last + 1)]
-
-
-def _ball(x: Any) -> Any:
-    return x[0] if isinstance(x, flint.arb_series) else flint.arb(x)
-
-
-def middle(x: Any) -> complex:
-    """The middle of a complex ball."""
-    return complex(float(x.real.mid()), float(x.imag.mid()))
