@@ -20,7 +20,7 @@ from mpmath import mp
 import tmsopt
 from tmsopt.cli import every as main
 from tmsopt.diagnosis import Diagnosis, Response, branches, diagnosed, is_regular, jordan
-from tmsopt.models import Model, from_coefficients, from_matrices, tms
+from tmsopt.models import Model, from_coefficients, from_hamiltonian, from_matrices, tms
 from tmsopt.report import diagnosis_lines
 from tmsopt.roots import structure
 
@@ -259,6 +259,74 @@ def test_parameters_are_ordered_by_how_far_they_move_the_root() -> None:
     a, b, c = symbols("a b c")
     found = diagnosis_of(from_coefficients([1, 2, 1 - a - 4 * b - c * c]), a=0.0, b=0.0, c=0.0)
     assert [r.parameter for r in found.responses] == ["b", "a", "c"]
+
+
+# Points that are met to rounding, or less
+
+
+def test_a_crossing_that_is_met_to_less_than_its_digits_moves_linearly() -> None:
+    """[[d, k], [k, −d]] has ω = ±√(d² + k²): a double root at d = k = 0 alone, which coefficients meet to their root."""
+    model = from_hamiltonian([["d", "k"], ["k", "-d"]]).within({"d": (-1, 1), "k": (-1, 1)})
+    at = {"d": -6.5e-10, "k": -3.1e-10}
+    found = structure([float(c) for c in model.coefficients(at)], 1e-12)
+    (diagnosis,) = diagnosed(model, model.sets[0], at, found, {"d": (-1, 1), "k": (-1, 1)})
+    assert (diagnosis.kind, diagnosis.eigenfrequency) == ("semisimple", 0)
+    for answer in diagnosis.responses:
+        (law,) = answer.laws
+        assert (answer.relative, str(law.branches.exponent), law.branches.roots) == (False, "1", 2)
+        assert law.branches.size == pytest.approx(1, rel=1e-12)
+
+
+def test_equal_oscillators_that_are_met_to_their_sixth_digit_move_linearly() -> None:
+    """As above: k₂ moves one root by k ε/(2 √(k − c²/4)), and the other stays."""
+    m, c, k1, k2 = symbols("m c k1 k2")
+    model = from_matrices([[m, 0], [0, 1]], [[c, 0], [0, c]], [[k1, 0], [0, k2]])
+    at = {"m": 1.0, "c": 0.1, "k1": 2.0, "k2": 2.0000009}
+    found = structure([float(x) for x in model.coefficients(at)], 1e-12)
+    (diagnosis,) = diagnosed(model, model.sets[0], at, found, {"k2": (1, 3)})
+    assert diagnosis.im == pytest.approx(sqrt(2 - 0.0025), rel=1e-14)
+    (law,) = response(diagnosis, "k2").laws
+    assert (str(law.branches.exponent), law.branches.roots, response(diagnosis, "k2").unmoved) == ("1", 1, 1)
+    assert law.branches.size == pytest.approx(1 / sqrt(2 - 0.0025), rel=1e-9)
+
+
+def test_a_singular_exceptional_point_moves_linearly() -> None:
+    """[[a + ib, 1], [0, 0]] has ω = a + ib and 0, one Jordan block at a = b = 0."""
+    model = from_hamiltonian([["a + 1j*b", 1], [0, 0]]).within({"a": (-1, 1), "b": (-1, 1)})
+    at = {"a": 5.2e-8, "b": 6e-30}
+    found = structure([float(c) for c in model.coefficients(at)], 1e-12)
+    (diagnosis,) = diagnosed(model, model.sets[0], at, found, {"a": (-1, 1), "b": (-1, 1)})
+    assert (diagnosis.geometric, diagnosis.eigenfrequency) == (1, 0)
+    for answer in diagnosis.responses:
+        (law,) = answer.laws
+        assert (answer.relative, str(law.branches.exponent), law.branches.size) == (False, "1", pytest.approx(1))
+        assert (answer.unmoved, answer.unresolved) == (1, 0)
+
+
+def test_what_has_no_power_series_is_not_resolved() -> None:
+    """(s + 1)² = √x + y: at x = 0 the slope in x is infinite."""
+    x, y = symbols("x y")
+    found = diagnosis_of(from_coefficients([1, 2, 1 - ca.sqrt(x) - y]), x=0.0, y=0.0)
+    assert response(found, "x") == Response("x", False, (), 0, 2)
+    assert str(response(found, "y").laws[0].branches.exponent) == "1/2"
+    assert "not resolved for x" in diagnosis_lines([found])[1]
+
+
+def test_orders_beyond_ten_count() -> None:
+    """(s + 1)¹² + x¹¹ − y: by x the roots move as ε^(11/12), by y as ε^(1/12)."""
+    x, y = symbols("x y")
+    binomials = [1, 12, 66, 220, 495, 792, 924, 792, 495, 220, 66, 12]
+    found = diagnosis_of(from_coefficients([*binomials, 1 + x**11 - y]), x=0.0, y=0.0)
+    assert [str(response(found, n).laws[0].branches.exponent) for n in "xy"] == ["11/12", "1/12"]
+
+
+def test_every_parameter_is_listed_with_its_law() -> None:
+    a, b, c = symbols("a b c")
+    found = diagnosis_of(from_coefficients([1, 2, 1 - a - 4 * b - c * c]), a=0.0, b=0.0, c=0.0)
+    (_, line) = diagnosis_lines([found])
+    assert "of b moves it by 2 ε^(1/2)" in line
+    assert "a (absolute) by 1 ε^(1/2)" in line
+    assert "c (absolute) by 1 ε" in line
 
 
 # The EP4 of the two-mass-skate bicycle

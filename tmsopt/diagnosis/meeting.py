@@ -20,7 +20,7 @@ _NEAR = 1e-3  # of the range of a parameter: what is smaller may be meant to be 
 _ZERO = 1e-12  # of the size of a parameter: a change relative to so little is none
 _FARTHEST = 0.01  # of a parameter's size, or of its range where it is 0: a point beyond is another one
 _SLOW = 0.9  # of the residual before: a step that leaves more ends the search
-_RANKS = (1e-3, 1e-6, 1e-9, 1e-13)  # relative singular values of directions in which nothing is moved: the best counts
+_RANKS = (1e-3, 1e-7, 1e-12)  # relative singular values of directions in which nothing is moved: the best counts
 _MET = 2.0**-200  # relative: conditions that are met to all digits
 _LAST = 4  # times the last step, which where conditions are singular is as long as what is left
 
@@ -117,7 +117,12 @@ def pencil_of(model: Model, of: ParameterSet, values: Mapping[str, Any]) -> tupl
 
 
 def met(
-    model: Model, of: ParameterSet, design: Mapping[str, float], widths: Mapping[str, float], s: complex, multiplicity: int
+    model: Model,
+    of: ParameterSet,
+    design: Mapping[str, float],
+    widths: Mapping[str, float],
+    s: complex,
+    multiplicity: int,
 ) -> Meeting:
     """A root where it is stored, its place alone made exact: there the derivative before the first that stays is 0."""
     sizes = {n: width if abs(x) <= _NEAR * (width := widths.get(n, 0.0)) else abs(x) for n, x in design.items()}
@@ -151,7 +156,7 @@ def _improved(start: Meeting, moving: Sequence[str]) -> Meeting:
             at = _moved(best, step, moving)
             if all(abs(at.values[n] - start.values[n]) <= _FARTHEST * start.sizes[n] for n in moving):
                 tried.append((_norm(new := _conditions(at, lead, bool(moving))), at, new, step))
-        new_off, at, new, step = min(tried, key=lambda each: each[0], default=(off, best, left, ()))
+        new_off, at, new, step = min(tried, key=lambda each: each[0], default=(off, best, left, []))
         if not new_off < _SLOW * off:
             break
         lengths = {n: _LAST * abs(float(x)) for n, x in zip(moving, step, strict=False)}
@@ -184,11 +189,13 @@ def _steps(at: Meeting, left: Sequence[Any], lead: Any, moving: Sequence[str]) -
         columns.append([flint.acb(0, 1) * x for x in columns[-1]])
     matrix = np.array([[middle(x) for x in column] for column in columns]).T
     right = np.array([middle(x / size) for x in left])
-    both = [np.concatenate([x.real, x.imag]) for x in (matrix, right)]
-    for rank in _RANKS if all(np.isfinite(x).all() for x in both) else ():
-        found = np.linalg.lstsq(both[0], -both[1], rcond=rank)[0]
-        steps: list[Any] = [size * float(x) for x in found[: len(moving)]]
-        yield [*steps, size * flint.acb(*found[len(moving) :].tolist())]
+    J, r = (np.concatenate([x.real, x.imag]) for x in (matrix, right))
+    slopes = np.linalg.norm(J, axis=1)
+    for weights in (np.ones_like(r), 1 / np.where(slopes > 0, slopes, np.inf)) if np.isfinite(J).all() else ():
+        for rank in _RANKS:  # where conditions are singular their slopes vanish with what is left of them
+            found = np.linalg.lstsq(weights[:, None] * J, -weights * r, rcond=rank)[0]
+            steps: list[Any] = [size * float(x) for x in found[: len(moving)]]
+            yield [*steps, size * flint.acb(*found[len(moving) :].tolist())]
 
 
 def _moved(at: Meeting, step: Sequence[Any], moving: Sequence[str]) -> Meeting:
@@ -219,7 +226,9 @@ def _norm(left: Sequence[Any]) -> Any:
 
 def order(series: Sequence[Any], m: int) -> list[Any]:
     """The coefficients of ε to a power."""
-    return [c[m] if isinstance(c, flint.arb_series | flint.acb_series) else flint.acb(c if m == 0 else 0) for c in series]
+    return [
+        c[m] if isinstance(c, flint.arb_series | flint.acb_series) else flint.acb(c if m == 0 else 0) for c in series
+    ]
 
 
 def _complex(x: Any) -> Any:

@@ -17,8 +17,11 @@ DEVIATION = 0.1
 _DECADES = range(-16, 1)  # of the changes at which a law is tried
 _WITHIN = (0.75, 0.5, 0.25)  # and, before the first decade at which it fails
 _SCALES = 2  # decades over which a law must hold, on both sides, to count
+_SLOWER = 1e-13  # of the coefficients, in the unit of a law: roots by so little are at 0 there
 _STILL = (1e-2, 1e-4)  # changes at which roots that do not move are counted
-_SMALL = (1e-5, 1e-8, 1e-11)  # of what moves least, or of the size of roots: what is nearer does not move
+_SMALL = (1e-11, 1e-8, 1e-5)  # of what moves least, or of the size of roots: what is nearer does not move
+_BESIDE = (1e-3, 3e-2)  # likewise where others move
+_CLEAR = 2  # times that distance: shifts that are told from it
 _SCATTER = 8  # times the distance that roots keep from one another where they are met to rounding only
 
 
@@ -30,8 +33,8 @@ class Law:
         branches: tᵠ = C εᵖ for the shift t of each, to leading order.
         below, above: |ε| up to which every sampled shift is within `DEVIATION` of it, for ε < 0 and ε > 0; sampled at
             each decade from 1e-16 to 1, and four times in the last one that is reached.
-        least: |ε| from which it does; 0 if at every decade. Where a root is met to rounding only, roots that the change
-            leaves together are apart, and less is not seen.
+        least: |ε| from which it does; 0 if at every decade. Where a root is met to rounding only, shifts below the
+            distance of the roots that nearly meet are not looked at.
     """
 
     branches: Branches
@@ -106,13 +109,17 @@ def _ends(at: Meeting, name: str, branch: Branches, sign: int) -> tuple[float, f
         rows, predicted = [], [branch.shifts(sign * eps) for eps in changes]
         scales = [max(abs(t) for t in each) for each in predicted]
         for eps, scale in zip(changes, scales, strict=True):
-            shifted = at.taylor(at.changed(name, sign * eps * at.step(name)), scale)
+            shifted = _about(at, name, sign * eps, scale)
             # Of 1/t, so that those sought are the largest roots: companion eigenvalues have these to all digits.
-            rows.append([middle(c / shifted[at.multiplicity].abs_upper()) for c in shifted])
+            row = np.array([middle(c / shifted[at.multiplicity].abs_upper()) for c in shifted])
+            row[np.cumsum(np.abs(row)) <= _SLOWER * np.abs(row).sum()] = 0  # of roots that stay far behind
+            rows.append(row)
         every = zip(predicted, scales, _largest(np.array(rows), at.multiplicity), strict=True)
         return [_deviation(t, scale, inverse) <= DEVIATION for t, scale, inverse in every]
 
-    every = dict(zip(_DECADES, held([10.0**m for m in _DECADES]), strict=True))
+    seen = _CLEAR * _scatter(at)
+    decades = [m for m in _DECADES if max(abs(t) for t in branch.shifts(sign * 10.0**m)) > seen]
+    every = dict(zip(decades, held([10.0**m for m in decades]), strict=True)) if decades else {}
     low = next((m for m, right in every.items() if right), None)
     if low is None:
         return 0.0, 0.0
@@ -136,17 +143,30 @@ def _stays(at: Meeting, name: str, moved: Sequence[Branches], unmoved: int) -> b
 
 def _radii(at: Meeting, moved: Sequence[Branches], eps: float) -> list[float]:
     """Radii, in the root's unit, within which only roots that stay should be."""
-    least = min((abs(t) for branch in moved for t in branch.shifts(eps)), default=1.0)
-    k = at.multiplicity
-    terms = [middle(x) for x in at.taylor(at.polynomial(at.values))[: k + 1]]
-    scatter = max(abs(x / terms[k]) ** (1 / (k - j)) for j, x in enumerate(terms[:k]))
-    return [max(small * least, _SCATTER * scatter) for small in _SMALL]
+    if moved:
+        least = min(abs(t) for branch in moved for t in branch.shifts(eps))
+        return [small * least for small in (*_SMALL, *_BESIDE)]
+    return [max(small, _SCATTER * _scatter(at)) for small in _SMALL]
 
 
 def _within(at: Meeting, name: str, eps: float, radius: float) -> int | None:
     """How many roots are within a radius; None where one term does not outweigh all others there."""
-    terms = [abs(x) for x in at.taylor(at.changed(name, eps * at.step(name)), radius)]
+    terms = [abs(x) for x in _about(at, name, eps, radius)]
     return next((u for u, x in enumerate(terms) if 2 * x > sum(terms, flint.arb(0))), None)
+
+
+def _about(at: Meeting, name: str, eps: float, scale: float) -> list[Any]:
+    """Coefficients in t of a changed polynomial, less what keeps the root from being met where nothing is changed."""
+    changed = at.taylor(at.changed(name, eps * at.step(name)), scale)
+    own = at.taylor(at.polynomial(at.values), scale)
+    return [a - b if j < at.multiplicity else a for j, (a, b) in enumerate(zip(changed, own, strict=True))]
+
+
+def _scatter(at: Meeting) -> float:
+    """How far apart the roots are, in their unit, that nearly meet."""
+    k = at.multiplicity
+    terms = [middle(x) for x in at.taylor(at.polynomial(at.values))[: k + 1]]
+    return float(max(abs(x / terms[k]) ** (1 / (k - j)) for j, x in enumerate(terms[:k])))
 
 
 def _largest(rows: NDArray[np.complex128], k: int) -> list[NDArray[np.complex128]]:

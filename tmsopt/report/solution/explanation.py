@@ -16,6 +16,10 @@ _SHARE, _LIMIT, _NIL = 0.05, 0.01, 1e-9
 """Of decay and objective, and of the sizes of limits: what rounding may cost; what is nothing."""
 _MULTIPLIERS = "what it costs, per unit, to change "
 _ROUNDING, _ROUNDED = 1e-16, 1e-13
+_UNRESOLVED = (
+    "no power of ε holds at two changes, one 100 times the other; state constants exactly, as in sqrt(2) or 8/3, or "
+    "solve with another value to see"
+)
 
 
 def explained_lines(explanation: Explanation) -> list[str]:
@@ -166,7 +170,7 @@ def diagnosis_lines(diagnoses: Sequence[Diagnosis], details: bool = False) -> li
     """
     lines: list[str] = []
     for found in diagnoses:
-        lines += [_kind(found), *_splitting(found)]
+        lines += [_kind(found), _splitting(found, details)]
         if details:
             lines += ["", *(f"  {line}".rstrip() for line in columns(_diagnosis_rows(found))), ""]
     return lines[:-1] if details and lines else lines
@@ -190,14 +194,31 @@ def _kind(found: Diagnosis) -> str:
     return f"{found.algebraic}-fold {what} {place}: {found.kind}, {chains} ({why})"
 
 
-def _splitting(found: Diagnosis) -> list[str]:
+def _splitting(found: Diagnosis, details: bool) -> str:
+    """Every parameter with its laws, the most sensitive first; that alone where a table has them all."""
     moved = [r for r in found.responses if r.laws]
-    if not moved:
-        return ["  no parameter moves it"]
-    first, still = moved[0], [r.parameter for r in found.responses if not r.laws]
-    rest = f"; {', '.join(still)} {'does' if len(still) == 1 else 'do'} not move it" if still else ""
-    change = "relative change" if first.relative else "change"
-    return [f"  a {change} ε of {first.parameter} moves it by {_law(first.laws[0])}, {_range(first.laws[0])}{rest}"]
+    unsure = [r.parameter for r in found.responses if r.unresolved]
+    still = [r.parameter for r in found.responses if not (r.laws or r.unresolved)]
+    parts = [f"{r.parameter}{'' if r.relative else ' (absolute)'} by {_laws(r, found)}" for r in moved[1:]]
+    parts = [] if details else parts
+    if moved:
+        first = moved[0]
+        change = "relative change" if first.relative else "change"
+        moves = f"a {change} ε of {first.parameter} moves it by {_laws(first, found)}"
+        parts = [f"{moves}, within {100 * DEVIATION:.0f} % {_range(first.laws[0])}, as sampled", *parts]
+    if still:
+        none = "no parameter moves it" if len(still) == len(found.responses) else ""
+        parts.append(none or f"{', '.join(still)} {'does' if len(still) == 1 else 'do'} not move it")
+    if unsure:
+        parts.append(f"not resolved for {', '.join(unsure)}: {_UNRESOLVED}")
+    return f"  {'; '.join(parts)}"
+
+
+def _laws(response: Response, found: Diagnosis) -> str:
+    return " and ".join(
+        _law(law) + (f" ({law.branches.roots} of {found.algebraic})" if law.branches.roots < found.algebraic else "")
+        for law in response.laws
+    )
 
 
 def _law(law: Law) -> str:
@@ -207,24 +228,22 @@ def _law(law: Law) -> str:
 
 
 def _range(law: Law) -> str:
-    least = min(law.below, law.above)
-    within = f"within {100 * DEVIATION:.0f} %"
-    if not least:
-        return f"{within} for no change that was sampled"
-    return f"{within} while |ε| <= {least:.2g}, as sampled"
+    least = f"|ε| >= {law.least:.2g} and " if law.least else ""
+    return f"while {least}|ε| <= {min(law.below, law.above):.2g}"
 
 
 def _diagnosis_rows(found: Diagnosis) -> list[Sequence[str]]:
     rows: list[Sequence[str]] = [("parameter", "change", "roots", "shift", "holds for ε < 0", "holds for ε > 0")]
     for response in found.responses:
         rows += [_diagnosis_row(response, law) for law in response.laws]
-        if response.unmoved:
-            rows.append((response.parameter, _change(response), str(response.unmoved), "none", "", ""))
+        for count, word in ((response.unmoved, "none"), (response.unresolved, "not resolved")):
+            rows += [(response.parameter, _change(response), str(count), word, "", "")] if count else []
     return rows
 
 
 def _diagnosis_row(response: Response, law: Law) -> tuple[str, ...]:
-    ends = (f"|ε| <= {x:.2g}" if x else "nowhere sampled" for x in (law.below, law.above))
+    least = f"{law.least:.2g} <= " if law.least else ""
+    ends = (f"{least}|ε| <= {x:.2g}" for x in (law.below, law.above))
     return (response.parameter, _change(response), str(law.branches.roots), _law(law), *ends)
 
 
