@@ -145,7 +145,7 @@ def growth(
     values = grid[(grid > low) & (grid <= high)] if speed else grid[(grid >= low) & (grid <= high)]
 
     c = _numbers(model, of, {**parameters, name: values})
-    shown = c[:, 0] != 0  # a root at infinity cannot be shown
+    shown = np.isfinite(c).all(axis=1) & (c[:, 0] != 0)  # neither a pole nor a root at infinity can be shown
     values, c = values[shown], c[shown]
     found = roots(c)
     if met is not None:
@@ -225,7 +225,10 @@ def _changes(coefficients: Callable[[Array], Array], grid: Array) -> Iterator[Cr
         for _ in range(_HALVINGS):
             middle = (low + high) / 2
             low, high = (middle, high) if is_stable(coefficients(middle)) == inside[k] else (low, middle)
-        found = roots(coefficients(high))
+        there = coefficients(high)
+        if not np.all(np.isfinite(there)) or there[0] == 0:  # a pole, or a root at infinity: nothing crosses the axis
+            continue
+        found = roots(there)
         first = found[np.abs(found.real).argmin()]
         kind = "weave" if first.imag else "capsize"
         yield Crossing(float(high), kind, Root(0.0, abs(float(first.imag))), rightmost=True, changes=True)

@@ -11,6 +11,7 @@ from tmsopt.design.expression import Expression, dimension, parse_comparison, pa
 from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY
+from tmsopt.design.validate import SMALLEST
 from tmsopt.models import Parameter, Quantity
 from tmsopt.units import Dimension, factor
 
@@ -30,9 +31,20 @@ class Unit:
     text: str = ""
     one: float = 1.0
 
-    def number(self, value: float, digits: int = 5) -> str:
-        """A number in this unit, without its name; ``none`` where it does not exist, and no −0."""
-        return f"{value / self.one + 0.0:.{digits}g}" if math.isfinite(value) else "none"
+    def number(self, value: float, digits: int = 5, error: float = 0.0) -> str:
+        """A number in this unit, without its name; ``none`` where it does not exist, and no −0.
+
+        Args:
+            digits: at most.
+            error: of the value: fewer digits where no more hold, and 0 for what is 0 within it.
+        """
+        if not math.isfinite(value):
+            return "none"
+        if abs(value) <= max(error, SMALLEST):
+            return "0"
+        if error > 0:
+            digits = min(digits, max(math.floor(math.log10(abs(value))) - math.floor(math.log10(error)), 1))
+        return f"{value / self.one + 0.0:.{digits}g}"
 
     def show(self, value: float, digits: int = 5) -> str:
         """A number in this unit, with its name."""

@@ -27,9 +27,13 @@ def every_table(every: Every) -> str:
         problem = found[0].problem
         names = [n for n in found[0].parameters if n in problem.free]
         rows = [("", *(str(k) for k in range(1, len(found) + 1)))]
-        rows += [(n, *(number(s.parameters[n]) for s in found)) for n in names]
+        off = every.errors or ({},) * len(found)
+        rows += [(n, *(number(s.parameters[n], e.get(n, 0.0)) for s, e in zip(found, off, strict=True))) for n in names]
         each = [unit_at(problem, "abscissa", s.parameters) for s in found]
-        decays = [number(s.abscissa / unit.one) for s, unit in zip(found, each, strict=True)]
+        decays = [
+            number(s.abscissa / unit.one, e.get("abscissa", 0.0) / unit.one)
+            for s, unit, e in zip(found, each, off, strict=True)
+        ]
         rows += [(f"abscissa {each[0].text}".rstrip(), *decays), ("structure", *(s.structure for s in found))]
         rows += [("met", *(str(h) for h in coverage.hits))] if coverage else []
         rows += [("proved", *("yes" if p else "no" for p in every.proved))] if any(every.proved) and not known else []

@@ -1,5 +1,6 @@
 """A proof as text."""
 
+import re
 from fractions import Fraction
 
 from tmsopt.arithmetic.balls import Number, fraction
@@ -7,6 +8,8 @@ from tmsopt.design.problem import Problem
 from tmsopt.proofs.facts import Verdict
 from tmsopt.proofs.proof import Proof
 from tmsopt.report.text import columns
+
+_OF_OTHERS = re.compile(r"(.*\.)?[bcdW]\d+")  # of factors whose roots are listed
 
 
 def proof_text(problem: Problem, proof: Proof) -> str:
@@ -54,7 +57,7 @@ def number_rows(problem: Problem, proof: Proof) -> list[tuple[str, str, str, str
         rows.append((name, *_cells(proof.parameters[name]), "" if unit == "1" else unit))
         if name in proof.tangents:
             rows.append((f"tan({name})", *_cells(proof.tangents[name]), ""))
-    rows += [(name, *_cells(number), "") for name, number in proof.unknowns.items()]
+    rows += [(name, *_cells(x), "") for name, x in proof.unknowns.items() if not _OF_OTHERS.fullmatch(name)]
     if proof.abscissa:
         rows.append(("abscissa", *_cells(proof.abscissa), ""))
     if proof.eigenfrequencies:

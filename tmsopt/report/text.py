@@ -1,15 +1,18 @@
 """Numbers and columns as text."""
 
-import math
 from collections.abc import Collection, Sequence
+
+from tmsopt.design.unit_system import Unit
 
 WIDTH, HEIGHT = 100, 30
 """Columns of every line; lines of a report, if not full."""
 
+_ALL = 12  # digits
 
-def number(value: float) -> str:
-    """Twelve digits, or ``none`` for a number that does not exist; no −0."""
-    return f"{value + 0.0:.12g}" if math.isfinite(value) else "none"
+
+def number(value: float, error: float = 0.0) -> str:
+    """Twelve digits, fewer where its error leaves no more; see `Unit.number`."""
+    return Unit().number(value, _ALL, error)
 
 
 def yes_no(value: bool | None) -> str:

@@ -21,9 +21,9 @@ from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.options import Asked, Options, options_of, taking
 from tmsopt.formulation.starts import completions, spread
 from tmsopt.progress import begin
-from tmsopt.records import Array, Tabular, plain
+from tmsopt.records import Array, Table, Tabular, plain
 from tmsopt.solver.multistart import Runner
-from tmsopt.solver.newton import newton, square_system, taken
+from tmsopt.solver.newton import error, newton, square_system, taken
 from tmsopt.solver.solve import solved
 from tmsopt.solver.workspace import Workspace, workspace
 
@@ -36,6 +36,7 @@ _AGAIN = 3  # times that every solution must have been met before the search may
 _SAME = 1e-7  # of the box: distance of designs that are one solution, whatever their factors are called
 _INSIDE = 1e-9  # of the box: how far outside an end counts as on it
 _BY_IPOPT = 4  # every so many starts, IPOPT is asked too: it reaches what Newton's method runs away from
+_ROUNDING = 1e-15  # relative, of a double and of a root
 _DEVIATIONS = 2.0  # beyond the estimate: with `_NEVER`, 95 % for few solutions and for many, alike and unlike
 _NEVER = 3.0  # −ln 5 %: what was met in none of n starts is met in fewer than 3/n of them, with 95 %
 
@@ -76,6 +77,7 @@ class Every(Tabular):
         coverage: of the search; None where there was none.
         completeness: of the proof; None where none was asked for.
         proved: of each solution, whether it is proved to exist.
+        errors: of each solution, how far its free parameters and its abscissa may be off.
 
     Example:
         >>> every = tmsopt.solve_all("problems/coupled_pair.toml")
@@ -89,6 +91,7 @@ class Every(Tabular):
     coverage: Coverage | None = None
     completeness: Completeness | None = None
     proved: tuple[bool, ...] = ()
+    errors: tuple[Table[float], ...] = ()
 
     @property
     def complete(self) -> bool:
@@ -149,18 +152,32 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Ask
     begin(work.options.progress, "proving that no design is missed", "s")
     proof = completeness(problem, seconds, work.options.progress) if seconds > 0 else None
     proved = [] if proof is None else [_clipped(problem, design) for design in proof.designs]
-    found, coverage = ([], None) if proof and (proof.complete or proof.stopped) else _search(problem, nlp, work)
+    known = proof is not None and (proof.complete or proof.stopped)
+    found, errors, coverage = ([], [], None) if known else _search(problem, nlp, work)
     width = np.array([hi - lo for lo, hi in problem.free.values()])
     new = [x for x in proved if not any(_same(x, y, width) for y in found)]
     if coverage:
         coverage = replace(coverage, hits=(*coverage.hits, *(0 for _ in new)))
     solutions = tuple(_solution(problem, _named(problem, x)) for x in [*found, *new])
     told = tuple(any(_same(x, y, width) for y in proved) for x in [*found, *new])
-    return Every(solutions, coverage, proof, told)
+    radii = [{n: float(x.radius) for n, x in design.items()} for design in proof.designs] if proof else []
+    proofs = [next((r for r, y in zip(radii, proved, strict=True) if _same(x, y, width)), {}) for x in [*found, *new]]
+    each = zip(solutions, [*errors, *({} for _ in new)], proofs, strict=True)
+    return Every(solutions, coverage, proof, told, tuple(_errors(s, own, radius) for s, own, radius in each))
 
 
-def _search(problem: Problem, nlp: NLP, work: Workspace) -> tuple[list[Array], Coverage]:
-    """Solutions that many starts lead to, those met most often first."""
+def _errors(solution: Solution, own: Mapping[str, float], radius: Mapping[str, float]) -> Table[float]:
+    """What a proof says of a parameter, or else the search; a double is rounded, and so are roots."""
+    size = max((math.hypot(r.re, r.im) for r in solution.roots), default=0.0)
+    least = {n: abs(solution.parameters[n]) for n in solution.problem.free} | {"abscissa": size}
+    known = {**own, **radius, **({"abscissa": 0.0} if radius else {})}
+    return Table({n: max(known.get(n, 0.0), _ROUNDING * x) for n, x in least.items()})
+
+
+def _search(
+    problem: Problem, nlp: NLP, work: Workspace
+) -> tuple[list[Array], list[dict[str, float]], Coverage]:
+    """Solutions that many starts lead to, those met most often first, and their errors."""
     starts, progress = work.options.starts, work.options.progress
     begin(progress, "searching", "start")
     system = square_system(nlp)
@@ -168,6 +185,7 @@ def _search(problem: Problem, nlp: NLP, work: Workspace) -> tuple[list[Array], C
     runner = Runner(work, nlp)
     width = np.array([hi - lo for lo, hi in problem.free.values()])
     found: list[Array] = []
+    errors: list[dict[str, float]] = []
     hits: list[int] = []
     done = singular = 0
     for design in spread(problem, work.options.seed):
@@ -192,6 +210,7 @@ def _search(problem: Problem, nlp: NLP, work: Workspace) -> tuple[list[Array], C
                     continue
                 known = len(found)
                 found.append(point)
+                errors.append(_off(problem, error(system, end.x)))
                 hits.append(0)
             met.add(known)
         for k in met:
@@ -201,7 +220,13 @@ def _search(problem: Problem, nlp: NLP, work: Workspace) -> tuple[list[Array], C
         if progress:
             progress(done, starts)
     order = np.argsort([-h for h in hits], kind="stable")
-    return [found[k] for k in order], coverage_of(done, [hits[k] for k in order], singular)
+    return [found[k] for k in order], [errors[k] for k in order], coverage_of(done, [hits[k] for k in order], singular)
+
+
+def _off(problem: Problem, off: Array) -> dict[str, float]:
+    """Errors of free parameters, of an angle no greater than that of its tangent, and of the roots."""
+    own = dict(zip(problem.free, off.tolist(), strict=False))
+    return own | {"abscissa": max(off[len(own) :].tolist(), default=0.0)}
 
 
 def _posed(problem: Problem) -> NLP:

@@ -11,6 +11,7 @@ from tmsopt.records import Array
 
 _STEPS = 60
 _STALLS = 3  # steps that may lead nowhere: some way on, a solution may still be met
+_ULPS, _MOVES = 4, 8  # units in the last place, and how often, by which rounding is seen
 _ISOLATED = 1e-9  # ratio of singular values below which a solution is one of a continuum, such as p = 0
 
 
@@ -82,6 +83,19 @@ def newton(system: ca.Function, x: Array) -> Zero | None:
 def taken(system: ca.Function, x: Array) -> Zero:
     """A point that another method calls a solution, as it is."""
     return Zero(x, _regular(np.array(system(x)[1])))
+
+
+def error(system: ca.Function, x: Array) -> Array:
+    """How far each variable of a solution may be off: by what is left of the equations, and by their own rounding.
+
+    The rounding is seen where the solution is moved by units in the last place, beside what slopes say.
+    """
+    value, jacobian = (np.array(part) for part in system(x))
+    moves = np.random.default_rng(0).choice([-_ULPS, _ULPS], (_MOVES, len(x))) * np.finfo(float).eps * np.abs(x)
+    noise = [np.abs(np.array(system(x + d)[0]) - value - jacobian @ d[:, None]) for d in moves]
+    left = np.abs(value) + 2 * np.max(noise, axis=0)
+    off = np.abs(np.linalg.pinv(jacobian)) @ left
+    return np.asarray(off.ravel() + np.finfo(float).eps * np.abs(x))
 
 
 def _regular(jacobian: Array) -> bool:

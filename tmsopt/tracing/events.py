@@ -197,7 +197,7 @@ def _end_words(problem: Problem, pattern: Pattern, end: End) -> str:
     if end.limit < len(free):
         return f"{free[end.limit]}.{end.reason}"
     name = pattern.unknowns[end.limit - len(free)]
-    return pattern.ends.get(name, f"{name} reaches its limit")
+    return pattern.ends.get(name, "the other roots reach a limit of the search")
 
 
 def touched(problem: Problem, pattern: Pattern, on: Curve, unknowns: slice, walked: Walk) -> Iterator[Found]:

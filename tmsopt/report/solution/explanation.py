@@ -155,7 +155,7 @@ def rounding_rows(explanation: Explanation) -> list[Sequence[str]]:
 def _row(what: str, to: str, row: Rounded) -> tuple[str, ...]:
     violated = ", ".join(row.violations)
     ratio, loss = _seen(row.damping_ratio), _seen(row.loss)
-    return (what, to, number(_seen(row.realised)), f"{loss:.2g}", f"{ratio:.4g}", violated)
+    return (what, to, number(row.realised, _ROUNDED), f"{loss:.2g}", f"{ratio:.4g}", violated)
 
 
 def diagnosis_lines(diagnoses: Sequence[Diagnosis], details: bool = False) -> list[str]:
