@@ -310,8 +310,7 @@ def _bound_of(relation: Sequence[Any]) -> float:
         integral: Any = flint.fmpz_poly([int(c) for c in (h * h.denom()).coeffs()])
         zeros += [float(z.real.upper()) for z, _ in integral.complex_roots() if z.imag == 0]
         h = h.derivative()
-    largest = max(zeros)
-    return math.nextafter(-largest, -math.inf) if largest else 0.0
+    return math.nextafter(-max(zeros), -math.inf) if max(zeros) else 0.0
 
 
 def _dependent(problem: Problem) -> bool:

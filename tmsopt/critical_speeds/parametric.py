@@ -30,7 +30,10 @@ def interpolated(values: Callable[[Any], Sequence[Any]], most: int = 40) -> list
     newton: list[list[Any]] = []
     idle = 0
     for k in range(most + _FURTHER + 1):
-        row = [[rational(x) for x in values(flint.fmpq(k + 1))]]
+        found = values(flint.fmpq(k + 1))
+        if not all(x.is_finite() for x in found if isinstance(x, flint.arb)):  # no value there: no polynomial
+            return None
+        row = [[rational(x) for x in found]]
         for j, before in enumerate(edges, start=1):
             row.append([(a - b) / j for a, b in zip(row[-1], before, strict=True)])
         edges = row

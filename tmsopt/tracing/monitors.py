@@ -88,9 +88,11 @@ def on_axis(factors: list[list[Any]], count: int) -> Array:
     """Square of the modulus of the fastest root on the imaginary axis, up to rounding; −1 where none lies there."""
     fastest = np.full(count, -1.0)
     for factor in factors:
-        z = roots(_rows(factor, count))
+        rows = _rows(factor, count)
+        known = np.isfinite(rows).all(axis=1) & (rows[:, 0] != 0)  # beside infinity factors may be beyond doubles
+        z = roots(rows[known])
         tied = np.where(np.abs(z.real) <= _ROUNDED * np.abs(z), np.abs(z) ** 2, -1.0)
-        fastest = np.maximum(fastest, tied.max(axis=-1, initial=-1.0))
+        fastest[known] = np.maximum(fastest[known], tied.max(axis=-1, initial=-1.0))
     return fastest
 
 

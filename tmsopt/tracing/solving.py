@@ -26,6 +26,7 @@ def project(system: ca.Function, y: Array, held: int | None = None, steps: int =
     return None if np.isnan(found[0]) else found
 
 
+@np.errstate(over="ignore")
 def projected(system: ca.Function, y: Array, held: Sequence[int | None], steps: int = 40) -> Array:
     """`project` of every row of y, each on its own, all at once; rows of nan where nothing is found."""
     found = np.full(y.shape, np.nan)
