@@ -39,6 +39,7 @@ _RANK = 1e-9  # of the steepest direction, below which one moves nothing
 _MOVE = 3e-12  # relative: moves on the lattice, beside their other ends, lest slopes change
 _FINEST = 1e-20  # relative: steps of a parameter that is 0
 _BITS = 60  # behind the point, of the coordinates of the lattice
+_NOTHING = 1e-14  # of the size of roots: less is rounding
 _APART, _SHOWN = 1e-6, 8  # relative difference of two abscissae from which both are shown; digits of each
 _AT_END = 1e-9  # of a range: a parameter so close to an end stays there
 
@@ -103,7 +104,8 @@ def abscissa_as_stored(solution: Solution) -> str:
     Empty where the two differ by no more than a millionth.
     """
     ideal, realised = solution.abscissa, solution.abscissa_realised
-    size = max((math.hypot(root.re, root.im) for root in solution.roots), default=0.0)
+    size = max((math.hypot(root.re, root.im) for root in solution.of_polynomial.roots), default=0.0)
+    ideal, realised = (x if abs(x) > _NOTHING * size else 0.0 for x in (ideal, realised))
     if not abs(realised - ideal) > _APART * abs(ideal) + FEASIBLE * size:
         return ""
     at = solution.worst.applied(solution.parameters) if solution.worst else solution.parameters

@@ -1,5 +1,7 @@
 """All designs with a pattern as text for a reader."""
 
+from collections.abc import Mapping, Sequence
+
 from tmsopt.completeness import Completeness
 from tmsopt.design import unit_at
 from tmsopt.report.text import columns, number
@@ -27,7 +29,7 @@ def every_table(every: Every) -> str:
         problem = found[0].problem
         names = [n for n in found[0].parameters if n in problem.free]
         rows = [("", *(str(k) for k in range(1, len(found) + 1)))]
-        off = every.errors or ({},) * len(found)
+        off: Sequence[Mapping[str, float]] = every.errors or ({},) * len(found)
         rows += [(n, *(number(s.parameters[n], e.get(n, 0.0)) for s, e in zip(found, off, strict=True))) for n in names]
         each = [unit_at(problem, "abscissa", s.parameters) for s in found]
         decays = [

@@ -55,7 +55,7 @@ def values_of(problem: Problem, pattern: Pattern, columns: Mapping[str, Array], 
 
     def factor_roots() -> Complex:
         parts = [np.stack(np.broadcast_arrays(*f, u[0]), axis=-1)[:, :-1] for f in pattern.factors(u)]
-        return np.concatenate([roots(part) for part in parts], axis=-1)
+        return np.concatenate([_roots(part) for part in parts], axis=-1)
 
     def damping_ratio(_: Any) -> Array:
         z = factor_roots()
@@ -88,11 +88,9 @@ def on_axis(factors: list[list[Any]], count: int) -> Array:
     """Square of the modulus of the fastest root on the imaginary axis, up to rounding; −1 where none lies there."""
     fastest = np.full(count, -1.0)
     for factor in factors:
-        rows = _rows(factor, count)
-        known = np.isfinite(rows).all(axis=1) & (rows[:, 0] != 0)  # beside infinity factors may be beyond doubles
-        z = roots(rows[known])
+        z = _roots(_rows(factor, count))
         tied = np.where(np.abs(z.real) <= _ROUNDED * np.abs(z), np.abs(z) ** 2, -1.0)
-        fastest[known] = np.maximum(fastest[known], tied.max(axis=-1, initial=-1.0))
+        fastest = np.maximum(fastest, tied.max(axis=-1, initial=-1.0))
     return fastest
 
 
@@ -100,9 +98,17 @@ def all_real(factors: list[list[Any]], count: int) -> Truth:
     """Where every root of the factors is real and negative."""
     real = stability(factors, count)
     for factor in factors:
-        z = roots(_rows(factor, count))
+        z = _roots(_rows(factor, count))
         real &= np.all(np.abs(z.imag) <= _REAL * np.abs(z), axis=-1)
     return real
+
+
+def _roots(rows: Array) -> Complex:
+    """Roots of one factor along a curve; nan where it is beyond doubles, as beside infinity."""
+    known = np.isfinite(rows).all(axis=1) & (rows[:, 0] != 0)
+    found = np.full((len(rows), rows.shape[1] - 1), np.nan, dtype=complex)
+    found[known] = roots(rows[known])
+    return found
 
 
 def _rows(factor: list[Any], count: int) -> Array:

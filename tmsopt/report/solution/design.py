@@ -240,8 +240,8 @@ def _stored(solution: Solution) -> Iterator[str]:
     """To all digits: the abscissa, and that of the numbers as they are stored."""
     problem, at = solution.problem, at_worst(solution)
     size = max((math.hypot(r.re, r.im) for r in solution.of_polynomial.roots), default=1.0)
-    abscissa = solution.abscissa if not abs(solution.abscissa) <= NOTHING * size else 0.0
-    realised = unit_at(problem, "abscissa", at).number(solution.abscissa_realised, ALL)
+    abscissa, stored = (x if abs(x) > NOTHING * size else 0.0 for x in (solution.abscissa, solution.abscissa_realised))
+    realised = unit_at(problem, "abscissa", at).number(stored, ALL)
     shown = show_at(problem, "abscissa", at, abscissa, ALL)
     yield f"abscissa {shown}; of the parameters as rounded to doubles {realised}"
     yield roots_line(solution, ALL)
