@@ -52,7 +52,7 @@ def _zeros(answer: Answer) -> str:
     section = ""
     for line, below in zip(answer.stdout.splitlines(), [*answer.stdout.splitlines()[1:], ""], strict=True):
         section = line if below and set(below) == {"-"} else section
-        if section not in _OUTSIDE and (found := _NOTHING.search(line)):
+        if section not in _OUTSIDE and (found := _NOTHING.search(line.replace("below 1e-16", ""))):
             return f"{found[0]} in: {line.strip()}"
     return "" if answer.stdout else "nothing was printed"
 
