@@ -292,7 +292,7 @@ def _polynomials() -> Iterator[Case]:
         limits = [Limit("damping_ratio", ">=", ratio)]
         yield _case(f"quartic of damping ratio {ratio}", damped, 'minimize = "a + c"', limits)
     for names in ("ab", "abc"):
-        real = _stated(["1", *names, "1.7"], _box(names, 0, 30))
+        real = _stated(["1", *names, "1.75"], _box(names, 0, 30))
         goal = f'minimize = "{" + ".join(names)}"'
         yield _case(f"all {len(names) + 1} roots real", real, goal, [Limit("damping_ratio", ">=", 1.0)])
     for number in (0.7, 0.45):
