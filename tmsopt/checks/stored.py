@@ -25,7 +25,7 @@ from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY
 from tmsopt.design.solution import Solution
-from tmsopt.design.unit_system import amounts_text, show_at, unit_at
+from tmsopt.design.unit_system import amounts_text, unit_at
 from tmsopt.records import Array
 from tmsopt.roots import Root, Structure
 from tmsopt.roots.exact import isolated_roots
@@ -40,7 +40,7 @@ _MOVE = 3e-12  # relative: moves on the lattice, beside their other ends, lest s
 _FINEST = 1e-20  # relative: steps of a parameter that is 0
 _BITS = 60  # behind the point, of the coordinates of the lattice
 _NOTHING = 1e-14  # of the size of roots: less is rounding
-_APART, _SHOWN = 1e-6, 8  # relative difference of two abscissae from which both are shown; digits of each
+_APART, _SHOWN = 1e-6, 7  # relative difference of two abscissae from which both are shown; digits, which show it
 _AT_END = 1e-9  # of a range: a parameter so close to an end stays there
 
 
@@ -109,9 +109,9 @@ def abscissa_as_stored(solution: Solution) -> str:
     if not abs(realised - ideal) > _APART * abs(ideal) + FEASIBLE * size:
         return ""
     at = solution.worst.applied(solution.parameters) if solution.worst else solution.parameters
-    goal = (solution.problem.minimize or solution.problem.maximize or "").strip()
-    first = "" if goal == "abscissa" else f"abscissa {show_at(solution.problem, 'abscissa', at, ideal, _SHOWN)}, "
-    return f"{first}as stored {unit_at(solution.problem, 'abscissa', at).number(realised, _SHOWN)}"
+    unit, goal = unit_at(solution.problem, "abscissa", at), solution.problem.minimize or solution.problem.maximize or ""
+    first = "" if goal.strip() == "abscissa" else f"abscissa {unit.show(ideal, _SHOWN)}, "
+    return f"{first}as stored {unit.number(realised, _SHOWN)}"
 
 
 def missed_note(problem: Problem, amounts: Mapping[str, float]) -> tuple[str, ...]:
