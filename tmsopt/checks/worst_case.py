@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 
 from tmsopt.arithmetic.intervals import Interval, outwards
 from tmsopt.arithmetic.sequence import golden_steps
-from tmsopt.design.cases import Band, Case
+from tmsopt.design.cases import Band, Case, Cover
 from tmsopt.design.dependence import WORSE, varies
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES
-from tmsopt.design.solution import Cover
 from tmsopt.models import Values
 from tmsopt.records import Array, Table
 from tmsopt.roots import lienard_chipart, shift

@@ -37,7 +37,8 @@ _EXIT = {"optimal": DONE, "infeasible": INFEASIBLE, "not_converged": NOT_CONVERG
 _CONTRACT = frozenset((
     "schema", "title", "model", "status", "objective", "parameters", "units", "abscissa", "abscissa_realised",
     "stable", "any_stable", "roots", "eigenfrequencies", "structure", "active", "violations",
-    "missed_as_stored", "bound", "starts", "seconds", "relaxation", "worst_case", "notes", "interrupted",
+    "missed_as_stored", "bound", "starts", "seconds", "inertia_margin", "relaxation", "worst_case", "notes",
+    "interrupted",
 ))  # fmt: skip
 """Keys of JSON without --full."""
 

@@ -94,6 +94,21 @@ def points_of(scenario: Scenario) -> tuple[float, ...]:
     return scenario.values if isinstance(scenario, Band) else scenario
 
 
+@dataclass(frozen=True)
+class Cover:
+    """What is known of every case together.
+
+    Attributes:
+        limit: no root of any case is right of it, if `proven`.
+        proven: by interval arithmetic over all the boxes; else by a search for the worst case alone.
+        boxes: parts that bands and tolerances were divided into.
+    """
+
+    limit: float
+    proven: bool
+    boxes: int
+
+
 def as_scenario(stated: Any) -> Any:
     """A scenario as stated: a band, a mapping with its min, max and points, or separate values."""
     if isinstance(stated, Mapping) and {"min", "max"} <= set(stated) <= {"min", "max", "points"}:

@@ -4,29 +4,15 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from tmsopt.design.cases import Case
+from tmsopt.design.cases import Case, Cover
 from tmsopt.design.problem import Freedom, Problem
 from tmsopt.design.quantities import ROOT_NAMES
 from tmsopt.design.unit_system import amounts_text, units_of
+from tmsopt.models import inertia_margin
 from tmsopt.models.told import beyond_axis, eigenfrequencies, meant
 from tmsopt.records import Shown, Table, asked_above, plain
 from tmsopt.roots import Root, Structure
 from tmsopt.units import Reading
-
-
-@dataclass(frozen=True)
-class Cover:
-    """What is known of every case together.
-
-    Attributes:
-        limit: no root of any case is right of it, if `proven`.
-        proven: by interval arithmetic over all the boxes; else by a search for the worst case alone.
-        boxes: parts that bands and tolerances were divided into.
-    """
-
-    limit: float
-    proven: bool
-    boxes: int
 
 
 def ended(problem: Problem, status: str) -> str:
@@ -272,6 +258,12 @@ class Solution(Shown):
         return eigenfrequencies(self.problem.model, self.roots)
 
     @property
+    def inertia_margin(self) -> Table[float | None] | None:
+        """Of a stable design of point masses in SI, by `models.inertia_margin` at its nominal values; else None."""
+        in_si = self.problem.model.name == "tms" and self.problem.parameter_set.rate is not None
+        return inertia_margin(self.parameters) if in_si and self.stable else None
+
+    @property
     def of_polynomial(self) -> Structure:
         """Structure and roots of the model's polynomial: of a complex system, of the real one of twice the size."""
         return meant(self.problem.model, self.structure, self.roots)
@@ -318,6 +310,7 @@ class Solution(Shown):
             **plain(self, "quantities dimensionless formulation"),
             "freedom": plain(self.freedom, "free conditions count kind"), **plain(self, "branches notes"),
             **{name: value for name, value in optional.items() if value},
+            **(plain(self, "inertia_margin") if self.problem.model.omits and self.problem.parameter_set.rate else {}),
         }  # fmt: skip
 
 

@@ -33,7 +33,7 @@ Chapters = Iterator[Chapter]
 
 _POINTS = 800 * 800  # of a chart that a picture shows
 
-_TOLD = ("motion", "loads", "cases", "warnings", "robustness", "rounding", "proof", "search")
+_TOLD = ("motion", "loads", "model", "cases", "warnings", "robustness", "rounding", "proof", "search")
 """Parts of the report of a design that stand beside the answer."""
 
 

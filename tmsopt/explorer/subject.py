@@ -47,7 +47,8 @@ def subject(
     plane, quantities = _plane(problem), {q.name: q for q in (*problem.model.quantities, *of.quantities)}
     asked = problem.minimize or problem.maximize or problem.locate or ""
     return {
-        "title": problem.title, "model": problem.model.name, "modelTitle": problem.model.title,
+        "title": problem.title, "model": problem.model.name,
+        "modelTitle": ": ".join(filter(None, (problem.model.title, problem.model.omits))),
         "bicycle": problem.model.name if is_bicycle(problem) else None,
         "impulseUnit": _IMPULSE if of.torque is None else "N·m·s",
         "words": dict(words_of(problem.model)), "rootUnit": unit_of(problem, "abscissa").text,

@@ -77,7 +77,7 @@ def _described(model: Model, problem: Problem | None, typed: Typed) -> Descripti
         sets=tuple(_words(model, of, problem, typed) for of in ([problem.parameter_set] if problem else model.sets)),
         feedback=() if problem else tuple(_gains(model)),
         patterns=Table({name: pattern_of(model, name).meaning for name in patterns_of(model)}),
-        functions=(*FUNCTIONS, *CONSTANTS), conventions=model.conventions, sketch=model.sketch,
+        functions=(*FUNCTIONS, *CONSTANTS), omits=model.omits, conventions=model.conventions, sketch=model.sketch,
         matrices=Table(dict(_matrices(model, typed))), asked=Table(_asked(problem, typed) if problem else {}),
     )  # fmt: skip
 

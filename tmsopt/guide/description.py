@@ -55,6 +55,7 @@ class Description(Shown):
         sets: of a problem, the one in which it is written.
         patterns: name of a root pattern that can be located → meaning.
         functions: of expressions.
+        omits: what the model leaves out, for a builder; empty where nothing need be said.
         conventions: sentences on signs.
         sketch: side view of a bicycle; empty for other systems.
         matrices: of a stated system, M, D, K, A or coefficients → rows of entries.
@@ -74,6 +75,7 @@ class Description(Shown):
     sets: tuple[Words, ...]
     patterns: Mapping[str, str]
     functions: tuple[str, ...]
+    omits: str = ""
     conventions: tuple[str, ...] = ()
     sketch: str = ""
     title: str = ""
@@ -85,6 +87,7 @@ class Description(Shown):
         """Plain data for ``json.dumps``."""
         return {
             "schema": SCHEMA, "title": self.title, "model": self.model, "meaning": self.meaning, "degree": self.degree,
+            "omits": self.omits,
             "sets": [of.to_json() for of in self.sets], "patterns": dict(self.patterns),
             "functions": list(self.functions), "conventions": list(self.conventions), "sketch": self.sketch,
             "matrices": {name: [list(row) for row in rows] for name, rows in self.matrices.items()},
@@ -97,6 +100,8 @@ def description_text(found: Description) -> str:
     """Title, sketch, signs, what is asked, symbols, patterns and functions, at most 100 columns wide."""
     name = f"{found.title}\n{found.model}" if found.title else found.model
     parts = [f"{name}: {found.meaning}, degree {found.degree}" if found.meaning != found.model else name]
+    if found.omits:
+        parts.append(f"the model is {found.omits}")
     if found.sketch:
         parts.append(found.sketch.strip("\n"))
     if found.conventions:

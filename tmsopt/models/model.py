@@ -204,6 +204,7 @@ class Model:
         statement: of a model that a user states, plain data that tell it from others.
         numbers: texts of the numbers in the formulas of a stated model that are not whole.
         words: what its users call a pair on the imaginary axis, ``weave`` in data, and a root 0, ``capsize``.
+        omits: what the model is made of and what it leaves out, for a builder; empty where nothing need be said.
         conventions: sentences on signs.
         sketch: the system drawn in text, with the symbols on it.
         absent: names that a user may look for in vain → what to write instead.
@@ -235,6 +236,7 @@ class Model:
     statement: Mapping[str, Any] | None = field(default=None, repr=False, hash=False)
     numbers: tuple[str, ...] = field(default=(), repr=False)
     words: tuple[str, str] = field(default=("flutter", "divergence"), repr=False)
+    omits: str = field(default="", repr=False)
     conventions: tuple[str, ...] = field(default=(), repr=False)
     sketch: str = field(default="", repr=False)
     absent: Mapping[str, str] = field(default_factory=dict, repr=False, hash=False)

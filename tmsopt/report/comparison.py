@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from tmsopt.models import tms
 from tmsopt.paper.compare import Comparison
 from tmsopt.report.solution.design import branch_lines, headline
-from tmsopt.report.text import WIDTH, columns, number
+from tmsopt.report.text import WIDTH, columns, model_lines, number
 
 
 def comparison_table(comparison: Comparison) -> str:
@@ -20,7 +20,7 @@ def comparison_table(comparison: Comparison) -> str:
     More: docs/explanation/paper.md
     """
     design = comparison.design
-    lines = [design.problem.title or "untitled problem", *headline(design), ""]
+    lines = [design.problem.title or "untitled problem", *headline(design), *model_lines(design.problem.model), ""]
     rows = [("law", "of", "numeric", "law says", "relative", "")]
     silent: dict[str, list[str]] = {}
     for row in comparison.laws:

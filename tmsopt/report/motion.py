@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from tmsopt.critical_speeds.speeds import speed_of
 from tmsopt.design import unit_of
-from tmsopt.report.text import columns
+from tmsopt.report.text import columns, model_lines
 
 if TYPE_CHECKING:
     from tmsopt.motion import ModeShape, Simulation
@@ -30,7 +30,8 @@ def motion_table(motion: "Simulation", full: bool = False) -> str:
     title, time = motion.problem.title or "untitled problem", _with(motion, "t", motion["t"][-1])
     name = speed_of(motion.problem.parameter_set)
     at = f" at {name} = {unit_of(motion.problem, name).show(motion.parameters[name])}" if name else ""
-    lines = [title, f"motion over {time}{at} {_cause(motion)}", "", *columns(_cut([*_measured(motion)], full)), ""]
+    lines = [title, f"motion over {time}{at} {_cause(motion)}", *model_lines(motion.problem.model), ""]
+    lines += [*columns(_cut([*_measured(motion)], full)), ""]
     lines += [*columns(_cut([*_modes(motion, full)], full)), "", *_notes(motion)]
     return "\n".join(line.rstrip() for line in lines)
 

@@ -10,7 +10,7 @@ from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import Unit, unit_of, unit_of_all
 from tmsopt.models import in_words_of
 from tmsopt.report.solution.rows import frequency_of
-from tmsopt.report.text import columns
+from tmsopt.report.text import columns, model_lines
 
 _DIGITS = 15
 
@@ -31,6 +31,7 @@ def speeds_table(found: Speeds) -> str:
         found.problem.title or "untitled problem",
         f"{unit.number(found.lower, 6)} < {found.parameter}{end}{within}, "
         "by exact root isolation for the numbers as stored",
+        *model_lines(found.problem.model),
         "",
     ]
     real = found.problem.model.carrier is None

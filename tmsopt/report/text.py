@@ -3,11 +3,17 @@
 from collections.abc import Collection, Sequence
 
 from tmsopt.design.unit_system import Unit
+from tmsopt.models import Model
 
 WIDTH, HEIGHT = 100, 30
 """Columns of every line; lines of a report, if not full."""
 
 _ALL = 12  # digits
+
+
+def model_lines(model: Model) -> list[str]:
+    """What a model leaves out, in one line; none where nothing need be said."""
+    return [f"model: {model.omits}"] if model.omits else []
 
 
 def number(value: float, error: float = 0.0) -> str:

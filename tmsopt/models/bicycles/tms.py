@@ -126,7 +126,8 @@ _ABSENT = {
 tms = Model(
     name="tms", title="two-mass-skate bicycle", degree=4, sets=(_NATIVE, _SI), algebraic=_algebraic, polynomial=copo,
     quantities=NATIVE_QUANTITIES, compact=compact_copo, pencil=_pencil, natural=True,
-    words=WORDS, conventions=CONVENTIONS, sketch=TMS, absent=_ABSENT | UNCONTROLLED,
+    words=WORDS, omits="two point masses on skates, without wheels, rotational inertia or trail",
+    conventions=CONVENTIONS, sketch=TMS, absent=_ABSENT | UNCONTROLLED,
 )  # fmt: skip
 """The two-mass-skate bicycle."""
 

@@ -18,6 +18,7 @@ from tmsopt.report.solution.rows import (
     ALL,
     NOTHING,
     at_worst,
+    inertia_lines,
     loads,
     motion,
     parameter_rows,
@@ -30,7 +31,7 @@ from tmsopt.report.solution.rows import (
 )
 from tmsopt.report.solution.screen import KEPT, Block, fitted, named, wrapped
 from tmsopt.report.speeds import range_line
-from tmsopt.report.text import HEIGHT, columns
+from tmsopt.report.text import HEIGHT, columns, model_lines
 
 _DIGITS = 5
 _ROWS = 8  # of free parameters one below the other
@@ -119,6 +120,7 @@ def design_parts(
     )
     if "load_rear" in solution.quantities:
         yield Block("loads", [f"{loads(solution)}; {pitching(solution, si)}"])
+    yield Block("model", [*model_lines(solution.problem.model), *inertia_lines(solution)])
     yield Block("cases", case_lines(solution))
     explained = found.explanation
     if explained is not None and explained.levers:

@@ -12,7 +12,7 @@ from tmsopt.critical_speeds.speeds import speed_of
 from tmsopt.design.cases import Case
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import Unit, unit_at, unit_of
-from tmsopt.models import Model, Parameter, ParameterSet, Quantity, Values
+from tmsopt.models import INERTIAS, Model, Parameter, ParameterSet, Quantity, Values
 from tmsopt.models.told import eigenfrequencies, on_axis
 from tmsopt.roots import Root
 from tmsopt.units import frequencies
@@ -177,6 +177,16 @@ def loads(solution: Solution) -> str:
     shares = {wheel: f"{100 * at_rest[share]:.4g} %" for wheel, share, _ in named}
     newtons = {w: unit_of(problem, n).show(at_rest[n], 4) for w, _, n in named if n in at_rest}
     return ", ".join(f"{w} wheel {newtons[w]} ({s})" if w in newtons else f"{w} wheel {s}" for w, s in shares.items())
+
+
+def inertia_lines(solution: Solution) -> list[str]:
+    """How much of each moment of inertia a stable design of point masses bears, also as a radius of gyration √(I/m)."""
+    length, words = unit_of(solution.problem, "w"), []
+    for name, inertia in (solution.inertia_margin or {}).items():
+        radius = "" if inertia is None else length.show(math.sqrt(inertia / solution.parameters[INERTIAS[name]]), 3)
+        words.append(f"{name} {inertia:.4g} kg m^2 ({radius})" if radius else f"{name} none")
+    head = "inertia at which it is no longer stable, each alone (radius of gyration)"
+    return [f"{head}: {', '.join(words)}"] if words else []
 
 
 def roots_line(solution: Solution, digits: int) -> str:

@@ -1,0 +1,61 @@
+"""How much rotational inertia two masses on skates bear, by the equations of Whipple's bicycle that contain them."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import flint
+
+from tmsopt.arithmetic.elementary import rational
+from tmsopt.models.bicycles.whipple import whipple
+from tmsopt.models.built_in import controlled
+from tmsopt.records import Table
+from tmsopt.roots import hurwitz_minors, lienard_chipart
+from tmsopt.roots.exact import isolated_roots
+
+INERTIAS = {"I_Bxx": "m_B", "I_Bzz": "m_B", "I_Hxx": "m_H", "I_Hzz": "m_H"}
+"""Moment of inertia about the centre of mass of its body → mass of that body."""
+
+_BITS = 400  # of tan λ_s and its secant, the only numbers that no fraction is
+
+
+def inertia_margin(parameters: Mapping[str, float]) -> Table[float | None] | None:
+    """The least value of each moment of inertia, the others 0, at which a design is no longer stable; in kg m².
+
+    Without wheels, trail and inertia, Whipple's equations are those of two masses on skates. Their coefficients are
+    polynomials in one moment of inertia, and stability is lost at the least positive root of a0 aₙ Δₙ₋₁, with Δ the
+    Hurwitz determinants: a root at infinity, a root 0, or a pair on the imaginary axis. Of the stored doubles, exactly.
+
+    Args:
+        parameters: of two masses on skates, in SI; gains of a controller may be among them.
+
+    Returns:
+        None for a moment of inertia of which any amount is borne; None for a design that is not stable without.
+
+    Example:
+        >>> own = dict(w=1, v=6.9, g=9.81, lambda_s=0.4, m_B=10, x_B=1.4, z_B=-0.4, m_H=1, x_H=1, z_H=-0.2)
+        >>> {name: x and round(x, 6) for name, x in tmsopt.models.inertia_margin(own).items()}
+        {'I_Bxx': None, 'I_Bzz': None, 'I_Hxx': 0.010779, 'I_Hzz': 0.015763}
+
+    More: docs/how_to/inertia.md
+    """
+    model = controlled(whipple, parameters)
+    of = model.sets[0]
+    with flint.ctx.workprec(_BITS):
+        given = {p.name: flint.arb(float(parameters.get(p.name, p.default or 0.0))) for p in of.parameters}
+        points = {name: rational(x) for name, x in model.algebraic(of.native(given)).items()}
+        coefficients = model.polynomial(**points)
+        sign = 1 if coefficients[0] > 0 else -1
+        if not all(x > 0 for x in [sign * coefficients[0], *lienard_chipart([sign * c for c in coefficients])]):
+            return None
+        x = flint.fmpq_poly([0, 1])
+        return Table({name: _least_root(model.polynomial(**{**points, name: x})) for name in INERTIAS})
+
+
+def _least_root(coefficients: Sequence[Any]) -> float | None:
+    """The least positive root of a0 aₙ Δₙ₋₁, coefficients being polynomials in one unknown or numbers."""
+    *_, minor, _ = hurwitz_minors(coefficients)
+    found = []
+    for boundary in (coefficients[0], coefficients[-1], minor):
+        terms = list(flint.fmpq_poly([0]) + boundary)[::-1]
+        found += [z.real for z, _ in isolated_roots(terms) if z.imag == 0 and z.real > 0]
+    return min((float(z.mid()) for z in found), default=None)
