@@ -15,7 +15,7 @@ from .explanation import (
 )
 from .formulation import Options as Options
 from .fronts import Front as Front, pareto as pareto
-from .guide import Description as Description, describe as describe, schema as schema
+from .guide import Description as Description, convert as convert, describe as describe, schema as schema
 from .margins import Nearest as Nearest, Robustness as Robustness, nearest as nearest, robustness as robustness
 from .models import Bicycle as Bicycle, read_bicycle as read_bicycle, write_bicycle as write_bicycle
 from .motion import Simulation as Simulation, simulate as simulate

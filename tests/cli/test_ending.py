@@ -450,11 +450,11 @@ def test_few_files_may_be_open(name: str, tmp_path: Path) -> None:
 
 
 WORK = {
-    "solve": f"solve {PROBLEMS}/delivery_robot.toml --json",
+    "solve": f"solve {PROBLEMS}/point_mass_robot.toml --json",
     "certify": f"solve {PROBLEMS}/physical_machine.toml --certify 60 --json",
     "front": f"solve {PROBLEMS}/pareto.toml --points 60 --json",
-    "compare": f"compare {PROBLEMS}/delivery_robot.toml --json",
-    "prove": f"prove {PROBLEMS}/delivery_robot.toml --digits 1000 --json",
+    "compare": f"compare {PROBLEMS}/point_mass_robot.toml --json",
+    "prove": f"prove {PROBLEMS}/point_mass_robot.toml --digits 1000 --json",
     "trace": f"trace {PROBLEMS}/ep_set.toml --step 0.00003 --json",
     "chart": f"chart {PROBLEMS}/chart.toml --points 3000x3000 --json",
     "folder": f"chart {PROBLEMS}/chart.toml --points 30000x30000 --output out/c.chart --workers 2 --json",

@@ -40,7 +40,7 @@ def design() -> tmsopt.Solution:
 @cache
 def robot() -> tmsopt.Solution:
     """In SI, in units as they were typed."""
-    return tmsopt.solve(PROBLEMS / "delivery_robot.toml")
+    return tmsopt.solve(PROBLEMS / "point_mass_robot.toml")
 
 
 @cache

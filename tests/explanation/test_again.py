@@ -26,7 +26,7 @@ def searches(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "name", ["realistic", pytest.param("delivery_robot", marks=pytest.mark.slow), "heavily_damped"]
+    "name", ["realistic", pytest.param("point_mass_robot", marks=pytest.mark.slow), "heavily_damped"]
 )
 def test_gains_are_those_of_a_search_of_each_moved_problem(name, searches):
     solution = tmsopt.solve(f"problems/{name}.toml")

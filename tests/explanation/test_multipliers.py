@@ -90,7 +90,7 @@ def gains_60(data: Mapping[str, Any], problem: tmsopt.Problem) -> dict[str, Any]
 
 
 @pytest.mark.parametrize(
-    "name", ["ballast_free", "childs_bicycle", pytest.param("delivery_robot", marks=pytest.mark.slow), "least_speed"]
+    "name", ["ballast_free", "childs_bicycle", pytest.param("point_mass_robot", marks=pytest.mark.slow), "least_speed"]
 )
 def test_printed_gains_are_right_to_the_last_of_their_six_digits(name: str) -> None:
     """At optima with a pair, an EP4 and three roots on a line; one limit is on the kink of a quantity that is 0."""

@@ -22,7 +22,7 @@ from tmsopt.roots import backward_error, quartic_classes, roots
 
 FOLDER = Path(__file__).parents[2] / "problems"
 FILES = (
-    "ep4", "delivery_robot", "whipple_ep4", "whipple_benchmark", "brake_squeal", "pt_pair", "ziegler_undamped",
+    "ep4", "point_mass_robot", "whipple_ep4", "whipple_benchmark", "brake_squeal", "pt_pair", "ziegler_undamped",
     "three_masses_pt", "chocolate", "two_mass_spring", "three_masses", "transport_aircraft",
 )  # fmt: skip
 DESIGNS = 2000
@@ -338,7 +338,7 @@ def test_roots_give_their_coefficients_back_wherever_they_meet(degree):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
-    ["ep4", "whipple_benchmark", "delivery_robot", "brake_squeal", "three_masses", "transport_aircraft", "chain"],
+    ["ep4", "whipple_benchmark", "point_mass_robot", "brake_squeal", "three_masses", "transport_aircraft", "chain"],
 )
 def test_responses_are_those_of_the_matrix_exponential(name):
     problem = problem_of(name)
@@ -381,7 +381,7 @@ SURVEY = """([x, i, j, xs, ys]) => survey(Float64Array.from(x), i, j, Float64Arr
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "file", ["ep4", "delivery_robot", "whipple_ep4", "three_masses_pt", "two_mass_spring", "three_masses", "chain"]
+    "file", ["ep4", "point_mass_robot", "whipple_ep4", "three_masses_pt", "two_mass_spring", "three_masses", "chain"]
 )
 def test_surveys_are_the_designs_one_by_one(file):
     problem = problem_of(file)

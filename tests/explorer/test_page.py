@@ -18,7 +18,7 @@ from tmsopt.charts import array_function
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 PAGE = Path(tmsopt.__file__).parent / "explorer" / "page"
-NAMES = ("ep4", "whipple_ep4", "delivery_robot", "pt_pair", "three_masses")
+NAMES = ("ep4", "whipple_ep4", "point_mass_robot", "pt_pair", "three_masses")
 MARKUP = "<script>alert(1)</script><b>"
 HOSTILE = f"""title = "{MARKUP} /* script */ <!-- title -->"
 [model]
@@ -330,15 +330,15 @@ def test_the_verdict_of_plain_polynomials(browser: Any, tmp_path: Path, stated: 
 @pytest.mark.slow
 def test_the_verdict_has_its_unit_and_its_reserve(browser: Any, explorers: Any) -> None:
     of = {}
-    for name in ("ep4", "whipple_ep4", "delivery_robot"):
+    for name in ("ep4", "whipple_ep4", "point_mass_robot"):
         with opened(browser, explorers[name][1]) as page:
             of[name] = verdict(page)
             assert "--certify" not in page.locator("main").inner_text()
             assert "(equation" not in page.locator("main").inner_text()
             assert ("first it grows" in page.locator("#quantities").inner_text()) == (name != "ep4")
-    robot = explorers["delivery_robot"][0].solution
+    robot = explorers["point_mass_robot"][0].solution
     rate = robot.abscissa * math.sqrt(robot.parameters["g"] / robot.parameters["w"])
-    shown = re.search(r"slowest as t3 e−([\d.]+) t, t in s", of["delivery_robot"])
+    shown = re.search(r"slowest as t3 e−([\d.]+) t, t in s", of["point_mass_robot"])
     assert shown is not None
     assert -float(shown[1]) == pytest.approx(rate, rel=5e-4)
     assert "e−1.88 t · the rear wheel would lift (load −38 %)" in of["ep4"]
@@ -593,7 +593,7 @@ def test_a_picture_that_fails_says_so_alone(browser: Any, ep4: Path) -> None:
 @pytest.mark.slow
 def test_limits_are_lit(browser: Any, explorers: Any) -> None:
     """Sign, words and margin of each limit against the problem's own judgement."""
-    explorer, path = explorers["delivery_robot"]
+    explorer, path = explorers["point_mass_robot"]
     problem, random = explorer.problem, np.random.default_rng(20)
     with opened(browser, path) as page:
         for _ in range(8):

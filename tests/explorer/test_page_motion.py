@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 PAGE = Path(tmsopt.__file__).parent / "explorer" / "page"
-BICYCLES = ["whipple_benchmark", "delivery_robot", "ep4"]
+BICYCLES = ["whipple_benchmark", "point_mass_robot", "ep4"]
 BENCHMARK = {
     "M": [[80.81722, 2.31941332208709], [2.31941332208709, 0.29784188199686]],
     "C1": [[0, 33.86641391492494], [-0.85035641456978, 1.68540397397560]],

@@ -247,7 +247,7 @@ def test_the_line_of_the_growth_plot_can_be_dragged_and_moved_by_keys(browser: A
         assert page.evaluate("state.x[state.over]") == pytest.approx(dragged + (high - low) / 200, rel=1e-12)
 
 
-@pytest.mark.parametrize("name", ["ep4", "delivery_robot", "whipple_ep4"])
+@pytest.mark.parametrize("name", ["ep4", "point_mass_robot", "whipple_ep4"])
 def test_the_bicycle_is_to_scale_and_moves_as_a_body(browser: Any, tmp_path: Path, name: str) -> None:
     """The distance of H from the drawn axis is the quantity of the model; leaning and steering keep all distances."""
     explorer = tmsopt.explore(PROBLEMS / f"{name}.toml")
@@ -381,7 +381,7 @@ def test_an_envelope_is_drawn_where_it_is_one(browser: Any, tmp_path: Path) -> N
 
 def test_one_pole_does_not_set_the_scale_of_the_growth_rates(browser: Any, tmp_path: Path) -> None:
     """Robot, wheelbase: a root passes infinity beside the optimum, whose roots are at -11 1/s."""
-    with opened(browser, saved(PROBLEMS / "delivery_robot.toml", tmp_path)) as page:
+    with opened(browser, saved(PROBLEMS / "point_mass_robot.toml", tmp_path)) as page:
         wheelbase = page.evaluate("DATA.parameters.findIndex(({ name }) => name === 'w')")
         low, high = page.evaluate(f"""() => {{
             change({{ over: {wheelbase} }});

@@ -52,7 +52,7 @@ def test_a_file_is_described_by_every_name_that_it_may_use(path: Path) -> None:
 
 
 def test_numbers_stand_as_they_were_typed() -> None:
-    (of,) = tmsopt.describe("problems/delivery_robot.toml").sets
+    (of,) = tmsopt.describe("problems/point_mass_robot.toml").sets
     given = {s.name: s.given for s in of.parameters}
     assert given["w"] == "80 cm"
     assert given["v"] == "1 m/s … 4 m/s"
@@ -74,7 +74,7 @@ def test_a_problem_of_python_has_the_units_of_the_model() -> None:
 
 
 def test_a_problem_of_python_has_the_units_in_which_it_was_typed() -> None:
-    path = "problems/delivery_robot.toml"
+    path = "problems/point_mass_robot.toml"
     assert tmsopt.describe(tmsopt.load(path)) == tmsopt.describe(path)
     problem = replace(tmsopt.load(path), scenarios={"m_B": ("12 kg", "500 g")}, tolerances={"w": 0.005})
     found = tmsopt.describe(problem)

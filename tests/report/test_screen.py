@@ -129,7 +129,7 @@ def test_the_fastest_decay_in_seconds(sense: str, expression: str) -> None:
 
 
 def test_who_may_vary_the_unit_of_time_is_warned() -> None:
-    problem = tmsopt.load("problems/delivery_robot.toml")
+    problem = tmsopt.load("problems/point_mass_robot.toml")
     fixed = {n: v for n, v in problem.fixed.items() if n != "w"}
     design = replace(tmsopt.solve(tmsopt.load("problems/benchmark.toml")), problem=replace(
         problem, fixed=fixed, free={**problem.free, "w": (0.6, 1.0)}))  # fmt: skip

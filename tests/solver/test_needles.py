@@ -66,7 +66,7 @@ def test_a_needle_about_the_least_abscissa_is_not_called_empty(goal: str) -> Non
 
     No design that was looked at is in it.
     """
-    robot = tmsopt.load("problems/delivery_robot.toml")
+    robot = tmsopt.load("problems/point_mass_robot.toml")
     least = tmsopt.solve(robot)
     limits = {**robot.constraints, "fast": "abscissa <= -3.125"}
     found = tmsopt.solve(replace(robot, minimize=goal, constraints=limits), throw=False)

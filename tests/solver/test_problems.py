@@ -74,7 +74,7 @@ def in_workshop(d, steps=STEPS):
     return np.max(found, axis=0), 0 * d["x_B"]
 
 
-def delivery_robot(d):
+def point_mass_robot(d):
     weight = (d["m_B"] + d["m_H"]) * 9.81
     return abscissa(d), worst(
         0.02 - abs(arm(d)) * d["w"], (20 - weight * centre(d)) / 1e3, (20 - weight * (1 - centre(d))) / 1e3
@@ -189,14 +189,14 @@ def findroot_2(residuals, x):
 
 def robot_violation(d):
     """Of a dimensionless design, 0 where it is a robot that the file accepts."""
-    fixed, box = hunt.read("delivery_robot")
+    fixed, box = hunt.read("point_mass_robot")
     w = fixed["w"]
     si = {"v": d["Fr"] * sqrt(9.81 * w), "m_H": d["mu"] * fixed["m_B"], "lambda_s": d["lambda_s"]}
     si |= {f"x_{k}": d[f"chi_{k}"] * w for k in "BH"} | {f"z_{k}": d[f"zeta_{k}"] * w for k in "BH"}
     outside = [
         np.maximum((low - si[n]) / (high - low), (si[n] - high) / (high - low)) for n, (low, high) in box.items()
     ]
-    _, constraints = delivery_robot({**fixed, **si})
+    _, constraints = point_mass_robot({**fixed, **si})
     bad = sum(np.maximum(violation, 0) for violation in (*outside, constraints))
     return np.where(np.isfinite(bad), bad, 1e2)
 
@@ -216,27 +216,27 @@ FACTORS = {"beta_1": (0.0, 6.0), "kappa_1": (0.0, 20.0), "beta_2": (0.0, 6.0), "
 
 @pytest.mark.slow
 def test_robot_is_the_best_of_all_designs_with_a_four_fold_root():
-    design = solved("delivery_robot")
+    design = solved("point_mass_robot")
     point, best = hunt.least(robot_with_ep4, {}, HEIGHTS, generations=150, rounds=6)
     assert design.structure == "EP4"
     assert design.value == pytest.approx(best, abs=1e-9)
-    assert delivery_robot(dict(design.parameters))[1] <= FEASIBLE
+    assert point_mass_robot(dict(design.parameters))[1] <= FEASIBLE
     # Parameters rounded to doubles move a 4-fold root of this size by ε^(1/4) of it, 4e-4 each, seven of them.
     assert abscissa_60(polynomial_60(**hunt.native(dict(design.parameters)))) == pytest.approx(best, abs=5e-3)
     # No splitting of the four roots does better around it, nor does any design that a coarse global search finds.
     ep4 = {**point, **dict.fromkeys(FACTORS, 0.0)}
     _, split = hunt.least(robot_with_roots, {}, HEIGHTS | FACTORS, generations=80, rounds=1, start=ep4)
     assert split >= best - 1e-9
-    fixed, box = hunt.read("delivery_robot")
-    _, anything = hunt.least(delivery_robot, fixed, box, generations=100, rounds=2)
+    fixed, box = hunt.read("point_mass_robot")
+    _, anything = hunt.least(point_mass_robot, fixed, box, generations=100, rounds=2)
     assert best - 1e-6 <= anything < -1
 
 
 def test_robot_with_forward_tilt_does_not_balance_itself():
     """Why the answer tilts backward: with both wheels down no design that tilts forward is stable at 4 m/s."""
-    fixed, box = hunt.read("delivery_robot")
+    fixed, box = hunt.read("point_mass_robot")
     box["lambda_s"] = (0.0, box["lambda_s"][1])
-    _, best = hunt.least(delivery_robot, fixed, box, generations=120, rounds=4)
+    _, best = hunt.least(point_mass_robot, fixed, box, generations=120, rounds=4)
     assert best > 0
 
 

@@ -11,9 +11,10 @@ from tmsopt.cli.chart import chart
 from tmsopt.cli.common import TYPED, answer
 from tmsopt.cli.ending import STATUS, ended
 from tmsopt.cli.explore import explore
+from tmsopt.cli.guide.convert import convert
 from tmsopt.cli.guide.describe import describe, schema
 from tmsopt.cli.guide.files import example, new
-from tmsopt.cli.guide.import_ import convert
+from tmsopt.cli.guide.import_ import import_
 from tmsopt.cli.motion.simulate import simulate
 from tmsopt.cli.motion.speeds import speeds
 from tmsopt.cli.paper.figure import figure
@@ -129,6 +130,7 @@ for _command in (
     study,
     figure,
     verify,
+    import_,
     convert,
     new,
     example,

@@ -1,6 +1,5 @@
 """The text of a problem file around its parameters, so that a design seen on a page can be solved and shared."""
 
-import json
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -9,6 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 from tmsopt.design import Problem
+from tmsopt.guide import toml_key, toml_text
 from tmsopt.units import factor, with_unit
 
 _LARGEST_DENOMINATOR = 10**6  # of a factor between units, such as 5/18
@@ -22,13 +22,13 @@ def around(problem: Problem, model: Mapping[str, Any]) -> dict[str, str]:
     Args:
         model: the table that states the model, as typed; without one it is written from the model itself.
     """
-    before = [f"title = {_text(problem.title)}"]
+    before = [f"title = {toml_text(problem.title)}"]
     if problem.model.statement is None:
-        before.append(f"model = {_text(problem.model.name)}")
+        before.append(f"model = {toml_text(problem.model.name)}")
     else:
         before += ["", *_model(model or _stated(problem))]
-    limits = [f"{_key(name)} = {_text(text)}" for name, text in problem.constraints.items()]
-    weights = [f"{_key(name)} = {weight!r}" for name, weight in problem.weights.items()]
+    limits = [f"{toml_key(name)} = {toml_text(text)}" for name, text in problem.constraints.items()]
+    weights = [f"{toml_key(name)} = {weight!r}" for name, weight in problem.weights.items()]
     after = ["", "[constraints]", *limits] if limits else []
     after += ["", "[weights]", *weights] if weights else []
     if problem.nominal is not problem:
@@ -51,15 +51,15 @@ def exact_value(value: float, written: str, own: str) -> str:
     near = value / one
     beside = (repr(near + k * math.ulp(near)).removesuffix(".0") for k in (0, 1, -1, 2, -2))
     texts = (f"{number} {written}" for number in (*beside, long))
-    return next((_text(text) for text in texts if with_unit(text, own) == value), repr(value))
+    return next((toml_text(text) for text in texts if with_unit(text, own) == value), repr(value))
 
 
 def _model(table: Mapping[str, Any]) -> Iterator[str]:
     yield "[model]"
     inner = {n: v for n, v in table.items() if isinstance(v, Mapping)}
-    yield from (f"{_key(n)} = {_value(v)}" for n, v in table.items() if n not in inner)
+    yield from (f"{toml_key(n)} = {_value(v)}" for n, v in table.items() if n not in inner)
     for name, values in inner.items():
-        yield from ("", f"[model.{_key(name)}]", *(f"{_key(n)} = {_value(v)}" for n, v in values.items()))
+        yield from ("", f"[model.{toml_key(name)}]", *(f"{toml_key(n)} = {_value(v)}" for n, v in values.items()))
 
 
 def _stated(problem: Problem) -> dict[str, Any]:
@@ -85,13 +85,6 @@ def _stated(problem: Problem) -> dict[str, Any]:
 def _value(value: Any) -> str:
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_value, value))}]"
-    return _text(value) if isinstance(value, str) else repr(value).lower() if isinstance(value, bool) else repr(value)
-
-
-def _text(text: str) -> str:
-    """A TOML text: JSON has the same escapes."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")
-
-
-def _key(name: str) -> str:
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _text(name)
+    if isinstance(value, str):
+        return toml_text(value)
+    return repr(value).lower() if isinstance(value, bool) else repr(value)

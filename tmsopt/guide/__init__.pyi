@@ -1,3 +1,4 @@
+from .conversion import convert as convert, converted_file as converted_file
 from .describe import describe as describe
 from .description import (
     Description as Description, Word as Word, Words as Words, description_text as description_text,
@@ -6,4 +7,5 @@ from .examples import (
     SCHEMA_FILE as SCHEMA_FILE, STARTS as STARTS, companions as companions, example as example, examples as examples,
     new_problem as new_problem, schema_text as schema_text,
 )
+from .problem_text import toml_key as toml_key, toml_text as toml_text
 from .schema import schema as schema

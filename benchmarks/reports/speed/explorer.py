@@ -9,7 +9,7 @@ import tmsopt
 from benchmarks.reports.tables import Asked, duration, page, table
 from benchmarks.suites import PROBLEMS
 
-PAGES = ("ep4", "realistic", "delivery_robot", "whipple_ep4", "coupled_pair", "two_mass_spring", "transport_aircraft")
+PAGES = ("ep4", "realistic", "point_mass_robot", "whipple_ep4", "coupled_pair", "two_mass_spring", "transport_aircraft")
 SURVEY = """(wanted) => {
   const [i, j] = DATA.plane, {low, high} = DATA.parameters[i], {low: least, high: most} = DATA.parameters[j];
   const axis = (from, to) => Float64Array.from({length: 200}, (_, k) => from + (to - from) * k / 199), times = [];

@@ -32,7 +32,7 @@ tmsopt.solve("problems/ep4.toml")
 def solved(name, **changed):
     return tmsopt.solve(replace(tmsopt.load(f"problems/{name}.toml"), **changed), throw=False)
 def robot(**changed):
-    problem = tmsopt.load("problems/delivery_robot.toml")
+    problem = tmsopt.load("problems/point_mass_robot.toml")
     return replace(problem, **{**changed, "constraints": {**problem.constraints, **changed.get("constraints", {})}})
 def ends(front):
     return sum(front.ideal.values()) if isinstance(front.ideal, dict) else sum(front.ideal)
@@ -123,7 +123,7 @@ work = lambda: needed(problem)""",
 COLD: Mapping[str, tuple[str, ...]] = {
     "tmsopt solve problems/ep4.toml": ("solve", "problems/ep4.toml"),
     "tmsopt solve problems/realistic.toml": ("solve", "problems/realistic.toml"),
-    "tmsopt solve problems/delivery_robot.toml": ("solve", "problems/delivery_robot.toml"),
+    "tmsopt solve problems/point_mass_robot.toml": ("solve", "problems/point_mass_robot.toml"),
     "tmsopt speeds problems/whipple_benchmark.toml": ("speeds", "problems/whipple_benchmark.toml"),
     "tmsopt study problems/study_built.toml": ("study", "problems/study_built.toml", "--store", "{}/s.sqlite"),
     "tmsopt chart problems/chart.toml": ("chart", "problems/chart.toml"),

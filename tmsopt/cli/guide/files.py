@@ -40,7 +40,8 @@ def write_new(option: str, path: Path, text: str) -> None:
         write_text(path, text, new=True)
 
 
-def _write_with_companions(option: str, path: Path, text: str) -> None:
+def write_with_companions(option: str, path: Path, text: str) -> None:
+    """Write a new file, and beside it what it refers to, unless that is there."""
     from tmsopt.guide import companions
 
     beside = {path.parent / name: other for name, other in companions(text).items()}
@@ -65,7 +66,7 @@ def new(file: Path, model: str) -> None:
 
         check_output("FILE", file, ("toml",))
         text = new_problem(model)
-    _write_with_companions("FILE", file, text)
+    write_with_companions("FILE", file, text)
 
 
 def _names(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:
@@ -90,7 +91,7 @@ def example(name: str | None, output: Path | None, as_json: bool) -> None:
         text = None if name is None else text_of(name)
     if name is not None and text is not None:
         path = output or Path(f"{name.removesuffix('.toml')}.toml")
-        _write_with_companions("NAME" if output is None else "--output", path, text)
+        write_with_companions("NAME" if output is None else "--output", path, text)
     elif as_json:
         write_json(examples())
     else:

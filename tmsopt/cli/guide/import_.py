@@ -26,7 +26,7 @@ Exit status: 0 done, 2 bad input.
     "--output", "-o", type=click.Path(path_type=Path), help="Write the problem file (toml). [default: stdout]"
 )
 @click.option("--speed", type=click.FloatRange(min=0), help="In m/s. [default: of FILE, or 5]")
-def convert(file: Path, output: Path | None, speed: float | None) -> None:
+def import_(file: Path, output: Path | None, speed: float | None) -> None:
     """Make a problem file of a bicycle that BicycleParameters has measured."""
     with bad_input():
         from tmsopt.models import problem_text, read_bicycle

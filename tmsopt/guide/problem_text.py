@@ -1,0 +1,95 @@
+"""A problem as the text of a problem file, in the units in which it was typed."""
+
+import json
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from tmsopt.design import Band, Problem, unit_of
+from tmsopt.design.cases import middle_of
+from tmsopt.models import Parameter, gain_names
+from tmsopt.units import with_unit
+
+_DIGITS = range(6, 18)  # of a number in its unit: the fewest that read back the same
+
+
+def toml_problem(problem: Problem, comments: Iterable[str] = ()) -> str:
+    """A file that is read as the same problem, of one of the bicycles.
+
+    Args:
+        comments: lines to begin with.
+    """
+    gains = gain_names(problem.model.name)
+    rows = {p.name: _row(problem, p) for p in problem.parameter_set.parameters if _is_written(problem, p)}
+    tables = {
+        "parameters": {name: row for name, row in rows.items() if name not in gains},
+        "feedback": {name: row for name, row in rows.items() if name in gains},
+        "objective": dict(_objective(problem)),
+        "constraints": {name: toml_text(text) for name, text in problem.constraints.items()},
+    }
+    for table in ("scenarios", "tolerances", "weights"):
+        tables[table] = {name: _value(problem, name, value) for name, value in getattr(problem, table).items()}
+    lines = ["#:schema ./tmsopt.schema.json", *(f"# {comment}" for comment in comments)]
+    lines += [f"title = {toml_text(problem.title)}", f"model = {toml_text(problem.model.name)}"]
+    for table, entries in tables.items():
+        if entries:
+            lines += ["", f"[{table}]", *(f"{toml_key(name)} = {text}" for name, text in entries.items())]
+    return "\n".join([*lines, ""])
+
+
+def toml_text(text: str) -> str:
+    """A TOML text: JSON has the same escapes."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")
+
+
+def toml_key(name: str) -> str:
+    """A name as a key of TOML."""
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else toml_text(name)
+
+
+def _is_written(problem: Problem, parameter: Parameter) -> bool:
+    """Whether a parameter must be in the file: no default, nor the middle of a scenario."""
+    if parameter.name in problem.free:
+        return True
+    default, varied = parameter.default, problem.variations.get(parameter.name)
+    return problem.fixed[parameter.name] != (default if varied is None else middle_of(varied))
+
+
+def _row(problem: Problem, parameter: Parameter) -> str:
+    name = parameter.name
+    comment = f"# {parameter.meaning}" + ("" if name in problem.units else f", {parameter.unit}")
+    if name not in problem.free:
+        return f"{_number(problem, name, problem.fixed[name])}  {comment}"
+    ends = dict(zip(("min", "max"), problem.free[name], strict=True))
+    ends |= {"start": problem.start[name]} if name in problem.start else {}
+    return f"{_table(problem, name, ends)}  {comment}"
+
+
+def _table(problem: Problem, name: str, entries: Mapping[str, float]) -> str:
+    return f"{{ {', '.join(f'{end} = {_number(problem, name, x)}' for end, x in entries.items())} }}"
+
+
+def _value(problem: Problem, name: str, value: Any) -> str:
+    if isinstance(value, Band):
+        return f"{_table(problem, name, {'min': value.min, 'max': value.max})[:-2]}, points = {value.points} }}"
+    if isinstance(value, tuple):
+        return f"[{', '.join(_number(problem, name, x) for x in value)}]"
+    return _number(problem, name, value)
+
+
+def _number(problem: Problem, name: str, value: float) -> str:
+    """In the unit in which the parameter was typed, where it then reads back the same; else in SI."""
+    kept = problem.parameter_set[name].unit
+    for digits in _DIGITS if name in problem.units else ():
+        text = unit_of(problem, name).show(value, digits)
+        if with_unit(text, kept) == value:
+            return toml_text(text)
+    return repr(float(value))
+
+
+def _objective(problem: Problem) -> Iterator[tuple[str, str]]:
+    for sense in ("locate", "minimize", "maximize"):
+        if text := getattr(problem, sense):
+            yield sense, toml_text(text)
+    if problem.pareto:
+        yield "pareto", f"[{', '.join(map(toml_text, problem.pareto))}]"
