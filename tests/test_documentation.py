@@ -174,12 +174,14 @@ def test_one_version() -> None:
 
 def test_the_examples_are_problem_files(tmp_path: Path) -> None:
     robot, absorber = blocks(README, "toml")
-    for number, text in enumerate((robot, absorber)):
-        file = tmp_path / f"{number}.toml"
-        file.write_text(text, encoding="utf-8")
-        assert tmsopt.load(file).minimize == "abscissa"
+    file = tmp_path / "absorber.toml"
+    file.write_text(absorber, encoding="utf-8")
+    assert tmsopt.load(file).minimize == "abscissa"
     whole = tomllib.loads((ROOT / "problems" / "delivery_robot.toml").read_text(encoding="utf-8"))
-    assert tomllib.loads(robot) == {k: v for k, v in whole.items() if k not in ("title", "model")}
+    for table, shown in tomllib.loads(robot).items():
+        assert shown.items() <= whole[table].items()
+        free = {name for name, value in whole[table].items() if table != "parameters" or isinstance(value, dict)}
+        assert shown.keys() == free, "all but what is fixed"
 
 
 def test_the_robot_has_the_answer_that_is_printed(capsys: pytest.CaptureFixture[str]) -> None:

@@ -23,7 +23,7 @@ _WORDS = {
     "Fr": "(v/sqrt(g*w))", "mu": "(m_H/m_B)", "chi_B": "(x_B/w)", "chi_H": "(x_H/w)", "zeta_B": "(z_B/w)",
     "zeta_H": "(z_H/w)", "nu_H": "(u_H/w)", "chi_T": "(x_T/w)", "omega0": "(omega0/sqrt(g/w))",
     "abscissa": "(abscissa/sqrt(g/w))", "angular_frequency": "(angular_frequency/sqrt(g/w))",
-    "ballast_rear": "(m_ballast_rear/m_B)",
+    "ballast_rear": "(m_ballast_rear/m_B)", "v_c": "v_weave", "Fr_c": "(v_weave/sqrt(g*w))",
     **{n: n for n in ("damping_ratio", "radius", "load_front", "load_rear", *FUNCTIONS, *CONSTANTS)},
 }  # fmt: skip
 """Word of an expression about point masses → the same in Whipple's model; those in SI alone are the same."""

@@ -1,0 +1,137 @@
+"""How much rotational inertia point masses on skates bear, against Whipple's matrices as they are printed."""
+
+import json
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from helpers.bicycles import BODIES, appendix
+
+import tmsopt
+from benchmarks.judges.whipple import largest_real_part
+from tmsopt.cli import every as main
+from tmsopt.models import canonical, inertia_margin, matrices, whipple
+
+ROBOT = {
+    "w": 0.8, "v": 3.718577772, "g": 9.81, "lambda_s": math.radians(-24.7171588), "m_B": 20.0, "x_B": 0.467199284,
+    "z_B": -0.25, "m_H": 6.0, "x_H": 1.1, "z_H": -0.699557,
+}  # fmt: skip
+"""Near the EP4 of problems/point_mass_robot.toml."""
+
+NOTHING = dict.fromkeys(BODIES.split(), 0.0) | {"r_R": 1.0, "r_F": 1.0}
+"""No wheels; appendix A divides by their radii."""
+
+
+def abscissa(p, **inertia):
+    """In 1/s, by eigenvalues of the matrices of appendix A without wheels and trail."""
+    M, C1, K0, K2 = map(np.array, appendix(NOTHING | p | inertia, np.sin(p["lambda_s"]), np.cos(p["lambda_s"])))
+    D, K = p["v"] * C1, p["g"] * K0 + p["v"] ** 2 * K2
+    A = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
+    return np.linalg.eigvals(A).real.max()
+
+
+def test_matrices_without_wheels_and_trail_are_those_of_skates_in_exact_numbers():
+    """M, v C1 and g K0 + v² K2 of Meijaard et al. are m_B w² times M, V √(g/w) and P g/w of Kirillov."""
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        w, rate, Fr, mu, chi_B, chi_H, zeta_B, zeta_H, m_B, t = (Fraction(int(n), 8) for n in rng.integers(1, 40, 10))
+        sine, cosine = 2 * t / (1 + t * t), (1 - t * t) / (1 + t * t)
+        g, v = rate**2 * w, Fr * rate * w
+        si = {"w": w, "x_B": chi_B * w, "z_B": -zeta_B * w, "m_B": m_B}
+        si |= {"x_H": chi_H * w, "z_H": -zeta_H * w, "m_H": mu * m_B}
+        M, C1, K0, K2 = appendix({n: Fraction(x) for n, x in NOTHING.items()} | si, sine, cosine)
+        D, K = (
+            [[v * x for x in row] for row in C1],
+            [[g * a + v * v * b for a, b in zip(*rows, strict=True)] for rows in zip(K0, K2, strict=True)],
+        )
+        own = matrices(Fr, mu, chi_B, chi_H, -zeta_B, -zeta_H, sine, cosine)
+        for printed, skates, power in zip((M, D, K), own, range(3), strict=True):
+            assert printed == [[m_B * w * w * rate**power * x for x in row] for row in skates]
+
+
+def test_the_package_has_the_matrices_of_the_appendix_without_wheels():
+    values = {p.name: p.default or 0.0 for p in whipple.sets[0].parameters} | ROBOT | {"I_Hzz": 0.01, "I_Bxx": 0.2}
+    expected = appendix(
+        NOTHING | values | {"r_R": 1.0, "r_F": 1.0}, np.sin(ROBOT["lambda_s"]), np.cos(ROBOT["lambda_s"])
+    )
+    for got, printed in zip(canonical(values), expected, strict=True):
+        np.testing.assert_allclose(got, printed, rtol=1e-12, atol=1e-12)
+
+
+def test_the_robot_of_point_masses():
+    """−10.9 1/s without inertia; −4.9, −0.84 and +1.44 with 0.001, 0.003 and 0.01 kg m² of I_Hzz."""
+    found = inertia_margin(ROBOT)
+    assert [round(abscissa(ROBOT, I_Hzz=x), 1) for x in (0.001, 0.003, 0.01)] == [-4.9, -0.8, 1.4]
+    assert found["I_Bzz"] is found["I_Hxx"] is None
+    for name in ("I_Bxx", "I_Hzz"):
+        assert abscissa(ROBOT, **{name: 0.99 * found[name]}) < 0 < abscissa(ROBOT, **{name: 1.01 * found[name]})
+        assert abs(abscissa(ROBOT, **{name: found[name]})) < 1e-6  # a pair or a root on the axis
+    assert max(abscissa(ROBOT, I_Bzz=x) for x in np.geomspace(1e-6, 1e4, 50)) < 0
+
+
+def test_margin_is_the_least_of_several_crossings():
+    """Random designs: stable for every inertia below the margin, on a grid; most that have one lose it for good."""
+    rng = np.random.default_rng(0)
+    margins = []
+    while len(margins) < 40:
+        p = {"w": 1.0, "v": rng.uniform(1, 12), "g": 9.81, "lambda_s": rng.uniform(-1, 1), "m_B": 10.0,
+             "x_B": rng.uniform(0.2, 2), "z_B": -rng.uniform(0.1, 1), "m_H": rng.uniform(0.2, 9),
+             "x_H": rng.uniform(0.7, 1.3), "z_H": -rng.uniform(0.1, 1)}  # fmt: skip
+        found = inertia_margin(p)
+        assert (found is not None) == (abscissa(p) < 0)
+        for name, x in (found or {}).items():
+            if x is not None:
+                margins.append(x)
+                assert all(abscissa(p, **{name: part * x}) < 0 for part in np.linspace(0, 0.99, 12))
+                assert abscissa(p, **{name: 1.001 * x}) > 0
+
+
+@pytest.mark.parametrize(("gains", "least"), [({"k_phidot": -5.0}, 4), ({"k_phidot": -5.0, "lag": 0.01}, 5)])
+def test_a_controller_has_its_part(gains, least):
+    """With the steer torque of a motor, with a lag too: eigenvalues of the loop change sign at the margin."""
+    p = {**ROBOT, "v": 1.5, "lambda_s": 0.3, "x_H": 0.8, "k_phi": -60.0, "k_delta": 10.0, "k_deltadot": 1.0, **gains}
+    found = inertia_margin(p)
+    assert largest_real_part(p) < 0
+    assert any(x is not None for x in found.values())
+    for name, x in found.items():
+        if x is not None:
+            assert largest_real_part({**p, name: 0.99 * x}) < 0 < largest_real_part({**p, name: 1.01 * x})
+
+
+FILE = "[parameters]\n" + "\n".join(f"{n} = {x!r}" for n, x in ROBOT.items()) + "\n"
+
+
+def test_report_and_json_have_it(tmp_path):
+    file = tmp_path / "robot.toml"
+    file.write_text(FILE)
+    data = json.loads(CliRunner().invoke(main, ["solve", str(file), "--json"]).stdout)
+    assert data["inertia_margin"] == dict(inertia_margin(ROBOT))
+    text = " ".join(CliRunner().invoke(main, ["solve", str(file)]).stdout.split())
+    radius = 100 * math.sqrt(data["inertia_margin"]["I_Hzz"] / 6)
+    assert f"I_Hzz {data['inertia_margin']['I_Hzz']:.4g} kg m^2 ({radius / 100:.3g} m)" in text
+    assert "I_Bzz none" in text
+    assert "without wheels, rotational inertia or trail" in text
+
+
+def test_a_design_that_is_not_stable_has_none(tmp_path):
+    file = tmp_path / "robot.toml"
+    file.write_text(FILE.replace("v = 3.7", "v = 1.7"))
+    found = CliRunner().invoke(main, ["solve", str(file), "--json"])
+    assert json.loads(found.stdout)["inertia_margin"] is None
+    assert "radius of gyration" not in CliRunner().invoke(main, ["solve", str(file)]).stdout
+
+
+def test_who_says_what_is_left_out():
+    words = "without wheels, rotational inertia or trail"
+    design = tmsopt.solve("problems/benchmark.toml")
+    told = [design.report(), str(tmsopt.speeds(design)), str(tmsopt.simulate(design)), str(tmsopt.describe("tms"))]
+    told += [
+        str(tmsopt.compare(design)),
+        tmsopt.solve("problems/ep4.toml").report(full=True),
+        tmsopt.explore(design).html,
+    ]
+    assert [words in " ".join(text.split()) for text in told] == [True] * 7
+    assert "inertia_margin" not in tmsopt.solve("problems/ep4.toml").to_json()
+    assert "model: " not in tmsopt.solve("problems/whipple_benchmark.toml").report()
