@@ -31,7 +31,7 @@ m_B = "20 kg"
 m_H = "3000 g"
 x_B = { min = "30 cm", max = "100 cm" }
 z_B = "-25 cm"
-x_H = "110 cm"
+x_H = "10/9 m"
 z_H = "-10 cm"
 lambda_s = { min = "-35 deg", max = "35 deg" }
 [feedback]
@@ -116,11 +116,13 @@ def test_all_that_a_file_says_is_kept(tmp_path):
     old = tmsopt.load(file_of(tmp_path, TWO_MASSES))
     text = converted_file(old)
     assert 'm_H = "3000 g"' in text
+    assert 'x_H = "10/9 m"' in text
     file = tmp_path / "new.toml"
     file.write_text(text, encoding="utf-8")
     new = tmsopt.load(file)
     assert new.model.name == "whipple"
     assert new.fixed["k_phi"] == -2
+    assert new.typed(new.fixed)["x_H"] == "10/9"
     assert "[feedback]" in text
     assert (new.free, new.start, new.tolerances) == (old.free, old.start, old.tolerances)
     assert new.minimize == "abscissa"

@@ -83,6 +83,7 @@ def convert(
         minimize=_objective(problem, problem.minimize), maximize=_objective(problem, problem.maximize),
         locate=problem.locate, pareto=tuple(str(_objective(problem, text)) for text in problem.pareto),
         scenarios=problem.scenarios, tolerances=problem.tolerances, weights=problem.weights, units=problem.units,
+        written=problem.written,
     )  # fmt: skip
 
 

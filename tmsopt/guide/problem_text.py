@@ -8,7 +8,7 @@ from typing import Any
 from tmsopt.design import Band, Problem, unit_of
 from tmsopt.design.cases import middle_of
 from tmsopt.models import Parameter, gain_names
-from tmsopt.units import with_unit
+from tmsopt.units.text import read
 
 _DIGITS = range(6, 18)  # of a number in its unit: the fewest that read back the same
 
@@ -78,12 +78,15 @@ def _value(problem: Problem, name: str, value: Any) -> str:
 
 
 def _number(problem: Problem, name: str, value: float) -> str:
-    """In the unit in which the parameter was typed, where it then reads back the same; else in SI."""
-    kept = problem.parameter_set[name].unit
+    """In the unit in which the parameter was typed, where it then reads back the same; else as typed, or in SI."""
+    kept, typed = problem.parameter_set[name].unit, problem.typed({name: value}).get(name, "")
     for digits in _DIGITS if name in problem.units else ():
         text = unit_of(problem, name).show(value, digits)
-        if with_unit(text, kept) == value:
+        found, _, exact = read(text, kept)
+        if found == value and (not typed or str(exact) == typed):
             return toml_text(text)
+    if typed:
+        return toml_text(typed if kept in ("1", "rad") else f"{typed} {kept}")
     return repr(float(value))
 
 
