@@ -53,6 +53,7 @@ def test_it_fits_a_screen_in_one_unit_each(file: Path) -> None:
         "design",
         "motion",
         "loads",
+        "model",
         "cases",
         "limits",
         "warnings",

@@ -204,9 +204,7 @@ class Model:
         statement: of a model that a user states, plain data that tell it from others.
         numbers: texts of the numbers in the formulas of a stated model that are not whole.
         words: what its users call a pair on the imaginary axis, ``weave`` in data, and a root 0, ``capsize``.
-        omits: what the model is made of and what it leaves out, for a builder; empty where nothing need be said.
-        conventions: sentences on signs.
-        sketch: the system drawn in text, with the symbols on it.
+        omits, conventions, sketch: what the model leaves out, signs, the system drawn with the symbols on it, in text.
         absent: names that a user may look for in vain → what to write instead.
         carrier: of a complex H, what is added to each eigenfrequency, lest a root of the polynomial, of twice
             the degree, meets the conjugate of another; None of a real system.
