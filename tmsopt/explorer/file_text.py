@@ -1,18 +1,12 @@
 """The text of a problem file around its parameters, so that a design seen on a page can be solved and shared."""
 
-import math
 import re
 from collections.abc import Iterator, Mapping
-from decimal import Decimal, localcontext
-from fractions import Fraction
 from typing import Any
 
 from tmsopt.design import Problem
 from tmsopt.guide import toml_key, toml_text
-from tmsopt.units import factor, with_unit
 
-_LARGEST_DENOMINATOR = 10**6  # of a factor between units, such as 5/18
-_PLACES = 22  # of a decimal that only one double is nearest to, in any unit
 _SHARED = re.compile(r"\[(\d+)\]")
 
 
@@ -34,24 +28,6 @@ def around(problem: Problem, model: Mapping[str, Any]) -> dict[str, str]:
     if problem.nominal is not problem:
         before.append("# one design, at its nominal values: bands and tolerances are left out")
     return {"before": "\n".join([*before, "", "[parameters]", ""]), "after": "\n".join([*after, ""])}
-
-
-def exact_value(value: float, written: str, own: str) -> str:
-    """A parameter's value in TOML, in the unit that it was written in where that gives back the same double.
-
-    Args:
-        written, own: the unit as written, and the one that the value is kept in.
-    """
-    if not written:
-        return repr(value)
-    one = factor(written, own)
-    share = Fraction(one).limit_denominator(_LARGEST_DENOMINATOR)
-    with localcontext(prec=_PLACES):
-        long = str(Decimal(repr(value)) * share.denominator / share.numerator)
-    near = value / one
-    beside = (repr(near + k * math.ulp(near)).removesuffix(".0") for k in (0, 1, -1, 2, -2))
-    texts = (f"{number} {written}" for number in (*beside, long))
-    return next((toml_text(text) for text in texts if with_unit(text, own) == value), repr(value))
 
 
 def _model(table: Mapping[str, Any]) -> Iterator[str]:

@@ -10,9 +10,10 @@ import numpy as np
 from tmsopt.checks.recheck import FEASIBLE
 from tmsopt.design import Problem, freedom, limit_of, unit_of
 from tmsopt.design.validate import SMALLEST
-from tmsopt.explorer.file_text import around, exact_value
+from tmsopt.explorer.file_text import around
 from tmsopt.explorer.javascript import Script, is_bicycle
 from tmsopt.explorer.known import Known
+from tmsopt.guide import exact_value
 from tmsopt.models import Parameter, words_of
 from tmsopt.models.told import ON_AXIS, eigenfrequencies, structure_in_words
 from tmsopt.records import Array

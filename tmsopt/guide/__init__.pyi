@@ -7,5 +7,5 @@ from .examples import (
     SCHEMA_FILE as SCHEMA_FILE, STARTS as STARTS, companions as companions, example as example, examples as examples,
     new_problem as new_problem, schema_text as schema_text,
 )
-from .problem_text import toml_key as toml_key, toml_text as toml_text
+from .problem_text import exact_value as exact_value, toml_key as toml_key, toml_text as toml_text
 from .schema import schema as schema

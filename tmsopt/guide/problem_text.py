@@ -1,16 +1,21 @@
 """A problem as the text of a problem file, in the units in which it was typed."""
 
 import json
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from decimal import Decimal, localcontext
+from fractions import Fraction
 from typing import Any
 
-from tmsopt.design import Band, Problem, unit_of
+from tmsopt.design import Band, Problem
 from tmsopt.design.cases import middle_of
 from tmsopt.models import Parameter, gain_names
+from tmsopt.units import factor, with_unit
 from tmsopt.units.text import read
 
-_DIGITS = range(6, 18)  # of a number in its unit: the fewest that read back the same
+_LARGEST_DENOMINATOR = 10**6  # of a factor between units, such as 5/18
+_PLACES = 22  # of a decimal that only one double is nearest to, in any unit
 
 
 def toml_problem(problem: Problem, comments: Iterable[str] = ()) -> str:
@@ -47,6 +52,24 @@ def toml_key(name: str) -> str:
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else toml_text(name)
 
 
+def exact_value(value: float, written: str, own: str) -> str:
+    """A parameter's value in TOML, in the unit that it was written in where that gives back the same double.
+
+    Args:
+        written, own: the unit as written, and the one that the value is kept in.
+    """
+    if not written:
+        return repr(value)
+    one = factor(written, own)
+    share = Fraction(one).limit_denominator(_LARGEST_DENOMINATOR)
+    with localcontext(prec=_PLACES):
+        long = str(Decimal(repr(value)) * share.denominator / share.numerator)
+    near = value / one
+    beside = (repr(near + k * math.ulp(near)).removesuffix(".0") for k in (0, 1, -1, 2, -2))
+    texts = (f"{number} {written}" for number in (*beside, long))
+    return next((toml_text(text) for text in texts if with_unit(text, own) == value), repr(value))
+
+
 def _is_written(problem: Problem, parameter: Parameter) -> bool:
     """Whether a parameter must be in the file: no default, nor the middle of a scenario."""
     if parameter.name in problem.free:
@@ -78,16 +101,12 @@ def _value(problem: Problem, name: str, value: Any) -> str:
 
 
 def _number(problem: Problem, name: str, value: float) -> str:
-    """In the unit in which the parameter was typed, where it then reads back the same; else as typed, or in SI."""
+    """As it was typed, where it is exactly that number; in the unit of the file if it reads back so."""
     kept, typed = problem.parameter_set[name].unit, problem.typed({name: value}).get(name, "")
-    for digits in _DIGITS if name in problem.units else ():
-        text = unit_of(problem, name).show(value, digits)
-        found, _, exact = read(text, kept)
-        if found == value and (not typed or str(exact) == typed):
-            return toml_text(text)
-    if typed:
+    text = exact_value(value, problem.units.get(name, ""), kept)
+    if typed and (text[0] != '"' or str(read(text[1:-1], kept)[2]) != typed):
         return toml_text(typed if kept in ("1", "rad") else f"{typed} {kept}")
-    return repr(float(value))
+    return text
 
 
 def _objective(problem: Problem) -> Iterator[tuple[str, str]]:
