@@ -19,10 +19,10 @@ from mpmath import mp
 
 import tmsopt
 from tmsopt.cli import every as main
-from tmsopt.diagnosis import Diagnosis, Response, branches, diagnosed, is_regular, jordan
+from tmsopt.diagnosis import Diagnosis, Response, branches, diagnosed
 from tmsopt.models import Model, from_coefficients, from_hamiltonian, from_matrices, tms
 from tmsopt.report import diagnosis_lines
-from tmsopt.roots import structure
+from tmsopt.roots import is_regular, jordan, structure
 
 # Jordan chains
 

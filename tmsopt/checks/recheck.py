@@ -17,6 +17,7 @@ from tmsopt.design.dependence import varies
 from tmsopt.design.expression import Expression
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, STRUCTURE_TOLERANCE, roots_at
+from tmsopt.design.verdict.meetings import is_crossing
 from tmsopt.margins.nearest import Robustness, robustness_at
 from tmsopt.models import Model, Values
 from tmsopt.models.told import public_names
@@ -44,6 +45,7 @@ class Checked:
         least_damped: the case with the least damping ratio.
         fastest: the case with the greatest angular frequency, where the problem asks for that.
         around: the boundaries nearest to the design, where the problem asks for the robustness radius.
+        crossing: whether the pattern is violated by eigenvectors alone: roots meet, and no Jordan chain is so long.
     """
 
     structure: Structure
@@ -57,6 +59,7 @@ class Checked:
     least_damped: Case = field(default_factory=Case)
     fastest: Case = field(default_factory=Case)
     around: Robustness | None = None
+    crossing: bool = False
 
 
 def recheck(
@@ -73,6 +76,7 @@ def recheck(
     looked = _look(problem, parameters, problem.cases if cases is None else cases, around)
     listed, nominal, each, top, around = looked.cases, looked.nominal, looked.each, looked.top, looked.around
     violations, amounts = _violated(problem, looked, problem.conditions)
+    crossing = False
     structure = each[top]["structure"]
     if not math.isfinite(structure.abscissa):
         exist = all(math.isfinite(float(c)) for c in each[top].coefficients)
@@ -80,8 +84,9 @@ def recheck(
     if problem.pattern is not None:
         a = [float(c) for c in nominal.coefficients]
         distance = pattern_distance(problem.pattern, a, nominal.roundings(), MATCHED)
-        if not distance <= MATCHED:
-            violations[problem.pattern.name] = distance
+        crossing = distance <= MATCHED and is_crossing(problem, problem.pattern, parameters)
+        if crossing or not distance <= MATCHED:
+            violations[problem.pattern.name] = 1.0 if crossing else distance
     of = problem.parameter_set
     names = [n for n in (*public_names(problem.model, of), "damping_ratio") if n not in problem.model.sets[0].names]
     if around is not None:
@@ -103,6 +108,7 @@ def recheck(
         least_damped=listed[looked.least] if listed else Case(),
         fastest=listed[looked.fastest] if listed else Case(),
         around=around,
+        crossing=crossing,
     )
 
 

@@ -36,9 +36,9 @@ _EXIT = {"optimal": DONE, "infeasible": INFEASIBLE, "not_converged": NOT_CONVERG
 
 _CONTRACT = frozenset((
     "schema", "title", "model", "status", "objective", "parameters", "units", "abscissa", "abscissa_realised",
-    "stable", "any_stable", "roots", "eigenfrequencies", "structure", "active", "violations",
-    "missed_as_stored", "bound", "starts", "seconds", "inertia_margin", "relaxation", "worst_case", "notes",
-    "interrupted",
+    "stable", "any_stable", "verdict", "growth", "defective", "geometric_multiplicity", "roots", "eigenfrequencies",
+    "structure", "active", "violations", "missed_as_stored", "bound", "starts", "seconds", "inertia_margin",
+    "relaxation", "worst_case", "notes", "interrupted",
 ))  # fmt: skip
 """Keys of JSON without --full."""
 

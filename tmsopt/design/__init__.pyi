@@ -7,11 +7,9 @@ from .files import Given as Given, load as load, problem_of as problem_of, quest
 from .limit import limit_of as limit_of, with_limit as with_limit
 from .problem import Problem as Problem, freedom as freedom
 from .quantities import NO_RADIUS as NO_RADIUS, ROOT_NAMES as ROOT_NAMES
-from .solution import (
-    Bound as Bound, NotSolved as NotSolved, Relaxation as Relaxation, Solution as Solution, Starts as Starts,
-    ended as ended,
-)
+from .solution import Bound as Bound, Relaxation as Relaxation, Solution as Solution, Starts as Starts
 from .unit_system import (
     Unit as Unit, amounts_text as amounts_text, rate_of as rate_of, show_at as show_at, unit_at as unit_at,
     unit_of as unit_of, unit_of_all as unit_of_all, units_of as units_of,
 )
+from .verdict.status import NotSolved as NotSolved, ended as ended

@@ -7,18 +7,13 @@ from typing import Any
 from tmsopt.design.cases import Case, Cover
 from tmsopt.design.problem import Freedom, Problem
 from tmsopt.design.quantities import ROOT_NAMES
-from tmsopt.design.unit_system import amounts_text, units_of
+from tmsopt.design.unit_system import units_of
+from tmsopt.design.verdict.stability import STABLE, MultipleRoot, StabilityVerdict, joined, stability
 from tmsopt.models import inertia_margin
 from tmsopt.models.told import beyond_axis, eigenfrequencies, meant
 from tmsopt.records import Shown, Table, asked_above, plain
 from tmsopt.roots import Root, Structure
 from tmsopt.units import Reading
-
-
-def ended(problem: Problem, status: str) -> str:
-    """A status in words; where nothing is free, a design is judged: it is not optimal but feasible."""
-    return "feasible" if status == "optimal" and not problem.free else status.replace("_", " ")
-
 
 GAIN_DIGITS, SIDE_DIGITS = 6, 9
 
@@ -177,6 +172,10 @@ class Solution(Shown):
         stable_elsewhere: of a design that is not stable, whether branch and bound found one that is: False where it
             proved that there is none, None where it was not asked or did not decide.
         interrupted: whether the user ended the work before it was done.
+        meetings: what meets in each multiple root: the located ones, then the others, rightmost first.
+        edges: boundaries of stability that it stands on: ``weave``, ``capsize``, ``infinity``; `edge_is_exact` where
+            that is certain, and not only as far as rounding tells.
+        without_best: whether designs get better without an end, as towards a singular mass matrix: none is the best.
         si: the design in s, Hz, mm, km/h, degrees, N and kg; empty unless the problem is written in SI.
 
     Example:
@@ -216,13 +215,23 @@ class Solution(Shown):
     need: Need | None = None
     stable_elsewhere: bool | None = None
     interrupted: bool = False
+    meetings: tuple[MultipleRoot, ...] = ()
+    edges: tuple[str, ...] = ()
+    edge_is_exact: bool = False
+    without_best: bool = False
     si: Table[Reading] = field(default_factory=Table)
+
+    @property
+    def stability(self) -> StabilityVerdict:
+        """The verdict, and the power of t by which the motion grows, in the worst case."""
+        largest = max((math.hypot(r.re, r.im) for r in self.of_polynomial.roots), default=0.0)
+        return stability((self.abscissa, self.abscissa_realised), self.edges, self.meetings, largest)
 
     @property
     def stable(self) -> bool | None:
         """Whether all roots lie left of the axis: ideal and as stored, in the worst case; None where there are none."""
-        ends = (self.abscissa, self.abscissa_realised)
-        return max(ends) < 0 and self.beyond_axis is None if all(map(math.isfinite, ends)) else None
+        verdict = self.stability.verdict
+        return verdict == STABLE if verdict else None
 
     @property
     def beyond_axis(self) -> float | None:
@@ -301,8 +310,8 @@ class Solution(Shown):
                 {"locate": problem.locate} if problem.locate else {}
             ),
             "parameters": plain(self.parameters), "units": self.units,
-            **plain(self, "abscissa abscissa_realised stable any_stable roots"),
-            **(plain(self, "eigenfrequencies") if self.eigenfrequencies else {}), **plain(self, "structure"),
+            **plain(self, "abscissa abscissa_realised stable any_stable"), **self.stability.to_json(),
+            **joined(self), **plain(self, "structure"),
             "active": plain(self.active, digits=GAIN_DIGITS), "violations": plain(self.violations, digits=GAIN_DIGITS),
             **({"missed_as_stored": plain(self.missed, digits=GAIN_DIGITS)} if self.missed else {}),
             **plain(self, "bound"), "starts": plain(self.starts, "tried converged at_best"),
@@ -312,30 +321,3 @@ class Solution(Shown):
             **{name: value for name, value in optional.items() if value},
             **(plain(self, "inertia_margin") if self.problem.model.omits and self.problem.parameter_set.rate else {}),
         }  # fmt: skip
-
-
-class NotSolved(RuntimeError):
-    """Raised by `solve` when there is no optimal design; `solution` holds the best point found.
-
-    Example:
-        >>> swing = tmsopt.models.from_coefficients([1, "c", 1])  # no abscissa below -1
-        >>> asked = tmsopt.Problem(swing, free={"c": (0, 3)}, minimize="c", constraints={"fast": "abscissa <= -2"})
-        >>> try:
-        ...     tmsopt.solve(asked)
-        ... except tmsopt.NotSolved as error:
-        ...     print(error.solution.status)
-        infeasible
-
-    More: docs/how_to/infeasible.md
-    """
-
-    def __init__(self, solution: Solution) -> None:
-        self.solution, violated = solution, amounts_text(solution.problem, solution.violations)
-        super().__init__(
-            f"{solution.problem.title or 'problem'}: {solution.status}"
-            + (f"; violated: {violated}" if violated else "")
-            + "".join(f"; {note}" for note in solution.notes)
-        )
-
-    def __reduce__(self) -> tuple[type["NotSolved"], tuple[Solution]]:
-        return NotSolved, (self.solution,)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from tmsopt.design.files import Given
-from tmsopt.diagnosis.jordan import Jordan, is_regular, jordan
 from tmsopt.diagnosis.meeting import Meeting, many_digits, met, middle, pencil_of, polished
 from tmsopt.diagnosis.splitting import DEVIATION, Law, Response, response
 from tmsopt.models import Model, ParameterSet
@@ -16,6 +15,7 @@ from tmsopt.models.told import eigenfrequencies, roots_told
 from tmsopt.progress import Listener, counted
 from tmsopt.records import Shown, plain
 from tmsopt.roots import Root, Structure, backward_error
+from tmsopt.roots.jordan import Jordan, is_regular, jordan
 from tmsopt.solver.solve import solved_first
 
 _RANK = 1e-7  # relative singular value that counts as 0; of a nearly semisimple root it is the root of the distance

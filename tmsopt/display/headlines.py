@@ -39,7 +39,8 @@ def of_solution(solution: "Solution") -> Words:
     yield solution.structure
     if solution.bound.proven:
         yield "proved"
-    yield from _stable(solution.stable)
+    if verdict := solution.stability.verdict:
+        yield f"{verdict}{f' as {growth}' if (growth := solution.stability.growth) else ''}"
 
 
 def of_front(front: "Front") -> Words:

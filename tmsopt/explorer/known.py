@@ -5,8 +5,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from tmsopt.design import Problem, Solution, ended, freedom
+from tmsopt.design import Problem, Solution, freedom
 from tmsopt.design.files import posed
+from tmsopt.design.verdict.meetings import meetings
+from tmsopt.design.verdict.stability import MultipleRoot
+from tmsopt.design.verdict.status import status_in_words, verdict_in_words
 from tmsopt.errors import InputError
 from tmsopt.guide import example
 from tmsopt.models.told import told
@@ -29,6 +32,7 @@ class Known:
         is_answer: whether it is what the problem asks for, or the nearest to it.
         proved: what is proved of it, in one line; empty without a proof.
         verdict: on its stability, with the power of t by which it grows, as in JSON; empty where nobody asked.
+        meetings: what meets in each multiple root.
     """
 
     name: str
@@ -38,6 +42,7 @@ class Known:
     is_answer: bool = False
     proved: str = ""
     verdict: Mapping[str, Any] = field(default_factory=dict)
+    meetings: tuple[MultipleRoot, ...] = ()
 
 
 def known_designs(
@@ -56,25 +61,32 @@ def known_designs(
     worth = solution is None or (solution.stable and "EP" not in solution.structure)
     found = _exceptional(problem) if search and worth else None
     named = [Known(name, values, _structure(problem, values), (), True) for name, values in others]
-    return [k for k in (*optimum, *named, found, _benchmark(problem)) if k is not None]
+    every = [k for k in (*optimum, *named, found, _benchmark(problem)) if k is not None]
+    return [k if k.meetings else replace(k, meetings=_meetings(problem, k)) for k in every]
+
+
+def _meetings(problem: Problem, known: Known) -> tuple[MultipleRoot, ...]:
+    return meetings(problem.nominal, known.parameters, problem.nominal.values(known.parameters)["structure"].roots)
 
 
 def _of_solution(solution: Solution) -> Known:
     """What was found, with how good it is known to be."""
     problem = solution.problem
-    words = {"optimal": "optimum", "infeasible": "least infeasible", "not_converged": "best so far"}
-    facts, proof = [ended(problem, solution.status), *solution.notes], proof_line(solution)
+    names = {"optimal": "optimum", "infeasible": "least infeasible", "not_converged": "best so far"}
+    words = status_in_words(solution), verdict_in_words(solution)
+    facts, proof = [": ".join(filter(None, words)), *solution.notes], proof_line(solution)
     proved = proof if solution.bound.proven else ""
     if problem.nominal is problem:
         known = Structure(solution.structure, solution.roots, 0.0)
     else:  # what is proved is proved of every case, and the page shows one
         known, proved = _structure(problem, solution.parameters), ""
         facts[0] += " over every case of its bands and tolerances"
-    name = words[solution.status] if problem.free else "as given"
+    name = names[solution.status] if problem.free else "as given"
     if problem.sense == "locate" and solution.status == "optimal":
         name = str(problem.locate)
-    said = getattr(solution, "stability", None) if known.roots is solution.roots else None
-    return Known(name, solution.parameters, known, (*facts, proof), True, proved, said.to_json() if said else {})
+    said = solution.stability.to_json() if known.roots is solution.roots else {}
+    met = solution.meetings if said else ()
+    return Known(name, solution.parameters, known, (*facts, proof), True, proved, said, met)
 
 
 def _benchmark(problem: Problem) -> Known | None:

@@ -15,8 +15,9 @@ from tmsopt.explorer.javascript import Script, is_bicycle
 from tmsopt.explorer.known import Known
 from tmsopt.guide import exact_value
 from tmsopt.models import Parameter, words_of
-from tmsopt.models.told import ON_AXIS, eigenfrequencies, structure_in_words
+from tmsopt.models.told import ON_AXIS, eigenfrequencies
 from tmsopt.records import Array
+from tmsopt.report.solution.rows import structure_line
 from tmsopt.roots import Structure
 from tmsopt.tracing import domain, trace
 
@@ -115,11 +116,12 @@ def _constraint(problem: Problem, name: str) -> dict[str, Any]:
 
 
 def _design(problem: Problem, known: Known) -> dict[str, Any]:
-    structure, model = known.structure, problem.model
+    structure = known.structure
     roots = list(_drawn(problem, structure))
     return {
         "name": known.name, "values": [float(known.parameters[n]) for n in problem.parameter_set.names],
-        "structure": structure_in_words(model, structure.name, structure.abscissa > 0) if structure.roots else "",
+        "structure": structure_line(problem, structure.name, structure.abscissa, known.meetings)
+        if structure.roots else "",
         "abscissa": max((root[0] for root in roots), default=math.nan), "roots": roots,
         "facts": list(known.facts), "proved": known.proved, **known.verdict,
     }  # fmt: skip

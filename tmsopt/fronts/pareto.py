@@ -6,7 +6,8 @@ from itertools import takewhile
 from typing import Unpack
 
 from tmsopt.design.files import Given, problem_of
-from tmsopt.design.solution import NotSolved, Solution
+from tmsopt.design.solution import Solution
+from tmsopt.design.verdict.status import NotSolved
 from tmsopt.errors import MOST_POINTS, Fault, InputError, count_faults
 from tmsopt.formulation.options import Asked, Options, options_of, taking
 from tmsopt.fronts.curve import curve

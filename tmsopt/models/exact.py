@@ -13,7 +13,7 @@ import flint
 from tmsopt.arithmetic.elementary import DIGITS, rational
 from tmsopt.errors import Fault, InputError, short, suggest, table_faults
 from tmsopt.models.expression import Expression, parse_value
-from tmsopt.models.model import ParameterSet
+from tmsopt.models.model import Model, ParameterSet
 from tmsopt.records import Table
 
 SAME = 4e-15
@@ -170,6 +170,12 @@ class Written:
                 return None
             found[name] = Tilt(value) if of[name].tangent else value
         return found
+
+    def coefficients(self, model: Model, of: ParameterSet) -> list[Any] | None:
+        """Coefficients as fractions, where these numbers make them so."""
+        numbers = self.fractions(of)
+        found = [] if numbers is None else model.coefficients(numbers, of)
+        return found if found and all(isinstance(c, flint.fmpq) for c in found) else None
 
     def text(self, name: str) -> tuple[str, str]:
         """A number as it is taken: its name, which may be ``tan(name)``, and the fraction."""

@@ -17,6 +17,9 @@ from tmsopt.proofs.system import ROUNDINGS, Chosen, Equations, choose, equations
 from tmsopt.roots import Pattern
 from tmsopt.roots.patterns.structure import nearest_unknowns
 
+EXACT = "exact factorisation"
+"""The method for a design whose coefficients are fractions."""
+
 _EXTRA = 25  # decimal digits carried beyond those asked for
 _TIMES = 3  # times that the digits carried are doubled
 _INSIDE = 1e-9  # of the width of its range: nearer to an end a parameter is taken to be there
@@ -58,17 +61,12 @@ def exactly(problem: Problem, pattern: Pattern, design: Written) -> Existing | N
     balls = design.balls()
     tangents = {n: balls[n].tan() for n in balls if problem.parameter_set[n].tangent}
     tangents |= {n: e.ball() for n, e in design.tangents.items()}
-    return Existing("exact factorisation", a, balls, tangents, {}, rational.factored(a))
+    return Existing(EXACT, a, balls, tangents, {}, rational.factored(a))
 
 
 def exact_coefficients(problem: Problem, design: Written) -> list[Any] | None:
     """Coefficients as fractions, where the numbers of the design make them so."""
-    of = problem.parameter_set
-    numbers = design.fractions(of)
-    if numbers is None:
-        return None
-    a = problem.model.coefficients(numbers, of)
-    return a if all(isinstance(c, flint.fmpq) for c in a) else None
+    return design.coefficients(problem.model, problem.parameter_set)
 
 
 def beside(problem: Problem, pattern: Pattern, design: Written, stored: Mapping[str, float], digits: int) -> Existing:

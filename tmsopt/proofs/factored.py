@@ -10,9 +10,6 @@ import flint
 from tmsopt.roots import Pattern, evaluate, lienard_chipart
 from tmsopt.roots.patterns.enclosed import Enclosed
 
-_LIKE = tuple(p**0.5 for p in (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37))
-"""Unknowns with no relation, to see which factors are the same."""
-
 Factor = Sequence[Any]
 """Monic coefficients, descending."""
 
@@ -73,9 +70,7 @@ class Factored:
 
 def of_pattern(pattern: Pattern, unknowns: Sequence[Any]) -> Factored:
     """The factors of a pattern, equal ones counted."""
-    signs = [tuple(f) for f in pattern.factors(_LIKE[: len(pattern.unknowns)])]
-    factors = pattern.factors(unknowns)
-    return Factored(tuple((factors[signs.index(s)], signs.count(s)) for s in dict.fromkeys(signs)))
+    return Factored(tuple(pattern.counted(unknowns)))
 
 
 def abscissa_formula(pattern: Pattern, unknowns: Sequence[Any]) -> Any:

@@ -11,9 +11,10 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.models import Values
 from tmsopt.models.exact import Written
-from tmsopt.proofs.existence import Existing, exact_coefficients
-from tmsopt.proofs.factored import Factored
+from tmsopt.proofs.existence import EXACT, Existing, exact_coefficients
+from tmsopt.proofs.factored import Factored, roots_of
 from tmsopt.proofs.rational import factored
+from tmsopt.roots import exact_nullity, has_one_eigenvector
 
 
 @dataclass(frozen=True)
@@ -45,11 +46,41 @@ def as_stored(problem: Problem, design: Written) -> Existing | None:
     exact = exact_coefficients(problem, design)
     a = problem.model.coefficients(balls, of) if exact is None else exact
     if exact is not None and a[0] != 0:
-        return Existing("exact factorisation", a, balls, tangents, {}, factored(a))
+        return Existing(EXACT, a, balls, tangents, {}, factored(a))
     if a[0] == 0 or flint.arb(a[0]).contains(0) or not all(flint.arb(c).is_finite() for c in a):
         return None
     whole = Factored((([c / a[0] for c in a], 1),))
     return Existing("isolated roots", a, balls, tangents, {}, whole, radius=largest_radius(list(balls.values())))
+
+
+def eigenvectors(problem: Problem, design: Written, found: Existing) -> tuple[int | None, Verdict]:
+    """The most independent eigenvectors of a multiple root, and whether all multiple roots lack some.
+
+    In fractions where the design is exact; else by minors in balls, which show that there are no more than one.
+    """
+    repeated = [factor for factor, count in found.factored.factors if count > 1]
+    pencil, of = problem.model.pencil, problem.parameter_set
+    if pencil is None:
+        return None, Verdict(None, "a system given by coefficients does not say")
+    if not repeated:
+        return None, NOTHING
+    exact = design.fractions(of) if found.method == EXACT else None
+    if exact is not None:
+        try:
+            matrices = [[[rational(x) for x in row] for row in P] for P in pencil(of.native(exact))]
+        except (TypeError, ValueError, AttributeError):  # an angle, of which the matrices take more than the tangent
+            matrices = []
+        if matrices:
+            parts = flint.fmpq_poly(list(found.coefficients)[::-1]).factor()[1]
+            found_each = [(exact_nullity(matrices, part), int(count)) for part, count in parts if count > 1]
+            most = max(nullity for nullity, _ in found_each)
+            missing = all(nullity < count for nullity, count in found_each)
+            return most, Verdict(missing, f"{most} eigenvector{'s' * (most > 1)}, in fractions")
+    at = pencil(of.native(found.parameters))
+    roots = [flint.acb(z.re, z.im) for f in repeated for z in roots_of(f) or ()]
+    one = bool(roots) and all(has_one_eigenvector(at, s) for s in roots)
+    words = "one eigenvector: a minor of the matrices is not 0, in balls" if one else "no minor tells it from 0"
+    return (1 if one else None), Verdict(True if one else None, words)
 
 
 def stability(factored: Factored, of_H: bool = False) -> Verdict:

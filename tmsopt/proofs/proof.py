@@ -12,12 +12,13 @@ from tmsopt.arithmetic.balls import Number, ProvedRoot, fraction, number
 from tmsopt.arithmetic.krawczyk import Refused
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
+from tmsopt.design.verdict.stability import CROSSING
 from tmsopt.errors import InputError, count_faults
 from tmsopt.models.exact import Written, written
 from tmsopt.models.told import name_told, pattern_of, roots_told
 from tmsopt.proofs import rational
 from tmsopt.proofs.existence import Existing, beside, exact_coefficients, exactly
-from tmsopt.proofs.facts import NOTHING, Verdict, as_stored, heavy_damping, inside, limits, stability
+from tmsopt.proofs.facts import NOTHING, Verdict, as_stored, eigenvectors, heavy_damping, inside, limits, stability
 from tmsopt.records import Shown, Table, plain
 from tmsopt.roots import PATTERNS, Pattern, Root
 from tmsopt.roots.patterns.doubled import complex_shown
@@ -67,6 +68,8 @@ class Proof(Shown):
         roots: with exact multiplicities, rightmost first; none where two cannot be told apart.
         eigenfrequencies: of a complex system ω = i s, in the order of the roots.
         abscissa: the largest real part.
+        geometric_multiplicity: most independent eigenvectors of a multiple root; None where nothing tells.
+        defective: whether every multiple root has fewer eigenvectors than its multiplicity; an exceptional point has 1.
         stable: whether all roots are left of the imaginary axis.
         heavily_damped: whether all roots are real and negative.
         inside: whether the proved design is in the problem's box.
@@ -103,6 +106,8 @@ class Proof(Shown):
     roots: tuple[ProvedRoot, ...] = ()
     eigenfrequencies: tuple[ProvedRoot, ...] = ()
     abscissa: Number | None = None
+    geometric_multiplicity: int | None = None
+    defective: Verdict = NOTHING
     stable: Verdict = NOTHING
     heavily_damped: Verdict = NOTHING
     inside: Verdict = NOTHING
@@ -118,7 +123,7 @@ class Proof(Shown):
             **plain(self, "parameters tangents unknowns moved held stated numbers"),
             **plain(self, "radius uniqueness distance explained roots"),
             **(plain(self, "eigenfrequencies") if self.eigenfrequencies else {}),
-            **plain(self, "abscissa stable heavily_damped inside limits"),
+            **plain(self, "abscissa geometric_multiplicity defective stable heavily_damped inside limits"),
             "seconds": round(self.seconds, 4),
         }
 
@@ -236,6 +241,9 @@ def _assembled(
     hidden = () if real or pattern is None else pattern.unknowns  # of the double with its carrier
     hidden = (*hidden, *(f"{pattern.name}.{n}" for n in hidden)) if pattern else ()
     roots = roots_told(problem.model, found.factored.roots or ())
+    geometric, defective = eigenvectors(problem, design, found)
+    if not reasons and geometric is not None and geometric > 1 and "EP" in name:
+        reasons = [f"{'not an EP' if defective.holds else CROSSING}: {defective.words}"]
     return Proof(
         claim=_claim(name, pattern),
         proved=not reasons,
@@ -260,6 +268,8 @@ def _assembled(
             ProvedRoot(number(-z.im, digits), number(z.re, digits), z.multiplicity) for z in (() if real else roots)
         ),
         abscissa=None if abscissa is None else number(abscissa, digits),
+        geometric_multiplicity=geometric,
+        defective=defective,
         stable=stability(found.factored, not real),
         heavily_damped=heavy_damping(found.factored) if real else NOTHING,
         inside=inside(problem, design, found),

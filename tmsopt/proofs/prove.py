@@ -5,6 +5,7 @@ from typing import Any, Unpack
 
 from tmsopt.design.files import Given
 from tmsopt.design.solution import Solution
+from tmsopt.design.verdict.stability import crossing_in_words
 from tmsopt.errors import Fault, InputError
 from tmsopt.formulation.options import AskedOfSolve, options_of, taking
 from tmsopt.progress import begin
@@ -47,7 +48,10 @@ def prove(
     found = solved(design, how)
     problem = found.problem
     if found.status != "optimal":
+        crossings = [crossing_in_words(m) for m in found.meetings if not m.exceptional]
         reason = f"the problem is not solved ({found.status}): there is no design to prove"
+        if problem.pattern and crossings:
+            reason = f"none found: where roots meet is {crossings[0]}"
         claim = f"a design of '{problem.title or 'the problem'}' exists"
         return Proof(claim, False, reason, digits=digits, problem=problem)
     begin(how.progress, f"proving to {digits} digits")

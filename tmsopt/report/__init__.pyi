@@ -11,6 +11,7 @@ from .proof import number_rows as number_rows, proof_text as proof_text
 from .solution import (
     design_parts as design_parts, design_report as design_report, lever_cells as lever_cells,
     parameter_rows as parameter_rows, quantity_rows as quantity_rows, si_parameters as si_parameters,
+    structure_line as structure_line,
     diagnosis_lines as diagnosis_lines,
     explained_lines as explained_lines, nearest_table as nearest_table, optimality_lines as optimality_lines,
     robustness_line as robustness_line, robustness_table as robustness_table, Findings as Findings,

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from tmsopt.completeness import Completeness
 from tmsopt.design import unit_at
+from tmsopt.design.verdict.stability import CROSSING
 from tmsopt.report.text import columns, number
 from tmsopt.solver.all_designs import Coverage, Every
 
@@ -71,7 +72,9 @@ def _search_lines(coverage: Coverage) -> list[str]:
         if coverage.singular
         else ""
     )
+    crossed = [f"{coverage.crossings} starts ended where roots meet in a {CROSSING}"] if coverage.crossings else []
     return [
+        *crossed,
         f"coverage of a search: {coverage.starts} starts over the box{doubt}; "
         f"{coverage.expected:.2f} solutions to be expected in all; "
         f"the chance that one more start finds another is below {coverage.chance:.2g} (95 % confidence; no proof)"

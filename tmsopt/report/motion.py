@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from tmsopt.critical_speeds.speeds import speed_of
 from tmsopt.design import unit_of
+from tmsopt.design.verdict.stability import MARGINAL, UNSTABLE, power_of_t
 from tmsopt.report.text import columns, model_lines
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def _notes(motion: "Simulation") -> Iterator[str]:
         )
         yield f"{what}: of the ideal design; motion: of the design as stored, {moved}"
     if not motion.stable and (words := _on_axis(motion)):
-        yield f"not stable: {words}; peaks are those of the time shown"
+        yield f"{words}; peaks are those of the time shown"
     elif not motion.stable:
         yield "not stable: it does not settle, and peaks are those of the time shown"
     elif not noisy and any(math.isnan(m.settling) for m in motion.measures):
@@ -129,17 +130,16 @@ def _largest(motion: "Simulation") -> float:
 
 
 def _on_axis(motion: "Simulation") -> str:
-    """What the rightmost modes do where they lie on the axis but for rounding, and are multiple or of a complex H."""
+    """The verdict, and what the rightmost modes do, where they lie on the axis but for rounding; else empty."""
     least = _NOTHING * _largest(motion)
     first = [m for m in motion.modes if abs(m.re) <= least]
     if any(m.re > least for m in motion.modes) or not first:
         return ""
     of_H = motion.problem.model.double is not None
-    longest = max(m.partial[0] for m in first)
-    if longest > 1:
-        power = "t" if longest == 2 else f"t^{longest - 1}"
-        return f"on the {'real' if of_H else 'imaginary'} axis, where modes merge, it grows as {power}"
-    return "an eigenfrequency is real, and its motion neither grows nor dies out" if of_H else ""
+    if power := power_of_t(max(m.partial[0] for m in first)):
+        return f"{UNSTABLE}: on the {'real' if of_H else 'imaginary'} axis, where modes merge, it grows as {power}"
+    root = "an eigenfrequency is real" if of_H else "a root is on the imaginary axis"
+    return f"{MARGINAL}: {root}, and its motion neither grows nor dies out"
 
 
 def _merging(mode: "ModeShape") -> str:

@@ -5,7 +5,7 @@ from fractions import Fraction
 
 from tmsopt.arithmetic.balls import Number, fraction
 from tmsopt.design.problem import Problem
-from tmsopt.proofs.facts import Verdict
+from tmsopt.proofs.facts import NOTHING, Verdict
 from tmsopt.proofs.proof import Proof
 from tmsopt.report.text import columns
 
@@ -92,7 +92,10 @@ def _place(problem: Problem, proof: Proof) -> list[str]:
 def _facts(proof: Proof) -> list[str]:
     of = " (of the design as stored)" if proof.stored and proof.reason else ""
     damped = [] if proof.eigenfrequencies else [_verdict(f"heavily damped{of}", proof.heavily_damped)]
-    facts = [_verdict(f"stable{of}", proof.stable), *damped, _verdict("in the box", proof.inside)]
+    asked = "EP" in proof.pattern and proof.defective != NOTHING
+    said = asked or proof.geometric_multiplicity is not None
+    defective = [_verdict(f"defective{of}", proof.defective)] if said else []
+    facts = [*defective, _verdict(f"stable{of}", proof.stable), *damped, _verdict("in the box", proof.inside)]
     return facts + [f"{name}: {verdict}" for name, verdict in proof.limits.items()]
 
 

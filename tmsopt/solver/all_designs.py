@@ -53,6 +53,7 @@ class Coverage:
         chance: with 95 % confidence, the chance that one more start finds another is smaller.
         singular: starts that ended at designs with the pattern where the equations are singular, and at no other: one
             of a continuum of solutions, or one where two meet. These are not counted as solutions.
+        crossings: starts that ended where roots meet without the Jordan chain of an exceptional point, and at no other.
     """
 
     starts: int
@@ -60,6 +61,7 @@ class Coverage:
     expected: float
     chance: float
     singular: int = 0
+    crossings: int = 0
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
@@ -187,7 +189,7 @@ def _search(
     found: list[Array] = []
     errors: list[dict[str, float]] = []
     hits: list[int] = []
-    done = singular = 0
+    done = singular = crossings = 0
     for design in spread(problem, work.options.seed):
         if done >= starts or _covered(done, hits):
             break
@@ -196,13 +198,14 @@ def _search(
             ended = runner.ended(design)
             ends.append((newton(system, ended.run.x) or taken(system, ended.run.x)) if ended.feasible else None)
         met: set[int] = set()
-        doubtful = False
+        doubtful = crossed = False
         for end in ends:
             point = None if end is None else _inside(problem, nlp, end.x)
             if end is None or point is None:
                 continue
             if not end.isolated:
-                doubtful = doubtful or not recheck(problem, problem.ordered(_named(problem, point))).violations
+                checked = recheck(problem, problem.ordered(_named(problem, point)))
+                doubtful, crossed = doubtful or not checked.violations, crossed or checked.crossing
                 continue
             known = next((k for k, other in enumerate(found) if _same(point, other, width)), None)
             if known is None:
@@ -216,11 +219,13 @@ def _search(
         for k in met:
             hits[k] += 1
         singular += doubtful and not met
+        crossings += crossed and not met
         done += 1
         if progress:
             progress(done, starts)
     order = np.argsort([-h for h in hits], kind="stable")
-    return [found[k] for k in order], [errors[k] for k in order], coverage_of(done, [hits[k] for k in order], singular)
+    coverage = coverage_of(done, [hits[k] for k in order], singular)
+    return [found[k] for k in order], [errors[k] for k in order], replace(coverage, crossings=crossings)
 
 
 def _off(problem: Problem, off: Array) -> dict[str, float]:

@@ -201,7 +201,7 @@ class Runner:
         return best
 
     def _from(self, x: Array, limits: NLP, start: str) -> Candidate:
-        return _candidate(self.work.part, limits, self.work.ipopt(self.nlp, start)(x, limits))
+        return self.work.chained(_candidate(self.work.part, limits, self.work.ipopt(self.nlp, start)(x, limits)))
 
 
 def _limits(nlp: NLP) -> tuple[tuple[float, ...], ...]:

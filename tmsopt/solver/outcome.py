@@ -43,6 +43,7 @@ class Finding:
 
     Attributes:
         cases: the cases that it was checked in.
+        without_best: whether the search went on to better and better ones without an end.
     """
 
     parameters: Mapping[str, float]
@@ -55,6 +56,7 @@ class Finding:
     branches: tuple[OtherBranch, ...] = ()
     notes: tuple[str, ...] = ()
     relaxation: Relaxation | None = None
+    without_best: bool = False
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 
 from tmsopt.checks.worst_case import worst_cases
 from tmsopt.design.cases import Case
+from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Starts
 from tmsopt.formulation.nlp import NLP
 from tmsopt.solver.multistart import Runner, same
@@ -25,6 +26,8 @@ _KEPT_AT_MOST = 8  # designs that were looked at and are checked closely
 _SAME_DESIGN = 1e-3  # of the box: beside a multiple root numeric ones look better by a hair
 _OPEN = 3  # designs from which a singular mass matrix is approached
 _FAR_OFF = 1e5  # ratio of the largest root to the others that makes it one near infinity
+_RUNAWAY = 1e7  # the same ratio, beyond which no optimum within the box is left that a double could tell
+_SHARE = 1e-3  # of a range, by which a parameter is moved to see whether a0 depends on it
 _SINGULAR = 1e-9  # a0 in its own unit, below which it is 0 in all but name
 _SCATTER = 2e-3  # relative, more than roots beside a 4-fold one are off in double precision
 _INSIDE = 1e-12  # a0 in its own unit, of the design that is given where the best has none
@@ -133,8 +136,37 @@ def held(work: Workspace, standing: Standing, starts: Starts, cases: Sequence[Ca
     assert standing.held is not None
     parameters = work.problem.ordered(standing.held)
     checked = work.recheck(parameters, cases)
-    status, words = "not_converged", (standing.words,)
-    return Finding(parameters, checked, status, {}, starts, standing.nlp.formulation, tuple(cases), notes=words)
+    finding = Finding(parameters, checked, "not_converged", {}, starts, standing.nlp.formulation, tuple(cases))
+    return replace(finding, notes=(standing.words,), without_best=standing.words != _KEPT)
+
+
+def endless(work: Workspace, finding: Finding) -> Finding:
+    """An optimum by the digits of the solver alone: a0 is all but 0, and no limit that binds holds it there.
+
+    The root that is far away would go on to infinity.
+    """
+    sizes = sorted(math.hypot(r.re, r.im) for r in finding.checked.structure.roots)
+    if finding.status != "optimal" or not sizes or sizes[-1] <= _RUNAWAY * sizes[(len(sizes) - 1) // 2]:
+        return finding
+    if work.problem.objective is None or _held_off(work.problem, finding):
+        return finding
+    words = f"no best design: it improves towards a singular mass matrix (a0 = 0); {mass_advice(work.problem)}"
+    return replace(finding, status="not_converged", without_best=True, notes=(*finding.notes, words))
+
+
+def _held_off(problem: Problem, finding: Finding) -> bool:
+    """Whether a limit that binds is about a parameter that a0 depends on."""
+    about: set[str] = set()
+    for name in finding.active:
+        condition = problem.conditions.get(name)
+        about |= set(condition.names) if condition else {name.rpartition(".")[0]}
+    own = float(problem.values(finding.parameters).coefficients[0])
+    for name, (low, high) in problem.free.items():
+        step = _SHARE * (high - low)
+        moved = {**finding.parameters, name: finding.parameters[name] + step}
+        if name in about and float(problem.values(moved).coefficients[0]) != own:
+            return True
+    return bool(about - set(problem.free))  # a limit on a quantity, which may depend on all of them
 
 
 def outdone(work: Workspace, finding: Finding) -> Finding:

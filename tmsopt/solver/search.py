@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice
 
 import numpy as np
 
@@ -15,14 +16,16 @@ from tmsopt.design.dependence import WORSE
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
 from tmsopt.design.solution import Starts
-from tmsopt.formulation.formulate import design_of, formulate, middle
+from tmsopt.design.verdict.meetings import nearest_crossing
+from tmsopt.formulation.formulate import design_of, formulate, matching, middle
 from tmsopt.formulation.nlp import NLP
+from tmsopt.formulation.starts import designs
 from tmsopt.progress import begin
 from tmsopt.records import Table
 from tmsopt.solver.multistart import Runner, distinct, exceptional, further, same, search
 from tmsopt.solver.needs import irreducible
 from tmsopt.solver.outcome import Finding, Trial, ahead, counted, found, mass_advice, survivor
-from tmsopt.solver.referee import held, ideal, outdone, refereed
+from tmsopt.solver.referee import endless, held, ideal, outdone, refereed
 from tmsopt.solver.relaxation import relax
 from tmsopt.solver.sample import NARROW, Sampler
 from tmsopt.solver.tolerant import climbed, promising
@@ -33,6 +36,7 @@ _ROUNDS, _FAR_ROUNDS = 12, 40
 
 _LEADERS = 3  # optima followed when cases are added: a better one may do worse between the old cases
 _STABLE = "every root left of the axis"  # the name of a constraint
+_HOPEFUL = 16  # starts for an exceptional point where the nearest one is a crossing
 _FEWER = 8  # starts for positive real roots where the others have led somewhere
 _NEARER = 1e-7  # share of the radius
 _BESIDE = 1e-6  # of the box: designs closer than that are one; what IPOPT leaves at a multiple root is farther off
@@ -72,6 +76,8 @@ def explore(work: Workspace, insist: bool = True) -> Explored:
     leads = exceptional(work) if (mixed or needles) and not work.options.near else []
     candidates = [*search(work, nlp, _FEWER if mixed and leads else None), *_from(work, nlp, leads)]
     trial = survivor(work, nlp, candidates)
+    if any(c.crossing for c in candidates) and (trial is None or trial.checked.violations):
+        nlp, candidates, trial = _elsewhere(work, nlp, candidates)
     for ratio, most in _ratios(work, nlp, trial):
         fixed = work.formulate(cases, damping_ratio=ratio)
         others = _from(work, fixed, leads) if leads and ratio == 1 else search(work, fixed, most)
@@ -91,7 +97,21 @@ def explore(work: Workspace, insist: bool = True) -> Explored:
         listed = evaluated_cases(work.problem, work.problem.ordered(standing.held))
         return Explored(work.name, tuple(candidates), held(work, standing, starts, listed))
     finding = _covered(work, nlp, candidates, trial, starts) if cases else found(work, nlp, trial, starts)
-    return Explored(work.name, tuple(candidates), outdone(work, finding) if finding else None)
+    return Explored(work.name, tuple(candidates), endless(work, outdone(work, finding)) if finding else None)
+
+
+def _elsewhere(
+    work: Workspace, nlp: NLP, candidates: list[Candidate]
+) -> tuple[NLP, list[Candidate], Trial | None]:  # fmt: skip
+    """An exceptional point nearest to another start, where roots only cross nearest to the first."""
+    part, ended = work.part, list(candidates)
+    most = _HOPEFUL if work.freedom.count > 0 else 0
+    for design in islice(designs(part, work.options.seed, work.options.starts), most):
+        near = matching(replace(part, minimize=None, maximize=None, start=design))
+        ended.append(Runner(work, near).ended(design, near=True))
+        if ended[-1].feasible and (trial := survivor(work, near, ended[-1:])):
+            return near, ended, trial
+    return nlp, ended, None
 
 
 def rarely_stable(work: Workspace) -> bool:
@@ -133,6 +153,8 @@ def without_any(work: Workspace, tried: int) -> Finding:
     """No start ended feasible: the least-violating design, and what can be reached from it if it violates nothing."""
     problem = work.problem
     nlp = formulate(problem, problem.cases)
+    if crossed := next((c for _, c in work.met if c.crossing), None):
+        return _crossing(work, work.design_at(crossed.run.x), tried, nlp)
     begin(work.options.progress, "searching for the least that limits must give", "start")
     relaxation = relax(work, partial(irreducible, reached=partial(_reached, work)))
     free = relaxation.parameters if relaxation else middle(problem)
@@ -152,6 +174,18 @@ def without_any(work: Workspace, tried: int) -> Finding:
         status, note = "not_converged", f"feasible designs exist, but {none} converged; {advice}"
     starts, notes = Starts(tried=tried), (note,)
     return Finding(parameters, checked, status, {}, starts, nlp.formulation, cases, notes=notes, relaxation=relaxation)
+
+
+def _crossing(work: Workspace, design: Mapping[str, float], tried: int, nlp: NLP) -> Finding:
+    """Roots meet, but nowhere with the Jordan chains of an exceptional point."""
+    problem = work.problem
+    parameters = problem.ordered(design)
+    if problem.pattern is not None:
+        parameters = problem.ordered(nearest_crossing(problem, problem.pattern, parameters))
+    cases = evaluated_cases(problem, parameters)
+    checked = work.recheck(parameters, cases)
+    note = f"of {tried} starts, none ended at an exceptional point: roots meet with more than one eigenvector"
+    return Finding(parameters, checked, "not_converged", {}, Starts(tried), nlp.formulation, cases, notes=(note,))
 
 
 def _reached(work: Workspace, names: Sequence[str]) -> tuple[Mapping[str, float] | None, bool]:

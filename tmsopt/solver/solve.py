@@ -15,14 +15,17 @@ from tmsopt.checks.worst_case import cover
 from tmsopt.design.files import Given, question_of
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.quantities import ANGULAR_FREQUENCY
-from tmsopt.design.solution import Bound, NotSolved, Solution, Starts
+from tmsopt.design.solution import Bound, Solution, Starts
 from tmsopt.design.unit_system import unit_at, unit_of
+from tmsopt.design.verdict.meetings import every_meeting
+from tmsopt.design.verdict.stability import stability
+from tmsopt.design.verdict.status import NotSolved
 from tmsopt.errors import Fault, InputError, is_number, short, suggest
 from tmsopt.formulation.formulate import design_of
 from tmsopt.formulation.nlp import objective_size
 from tmsopt.formulation.options import DEFAULTS, AskedOfSolve, Options, options_of, taking
-from tmsopt.margins import edges_at
-from tmsopt.models.told import beyond_axis, name_told
+from tmsopt.margins import stands_on
+from tmsopt.models.told import beyond_axis, meant, name_told
 from tmsopt.progress import Listener, begin, heard
 from tmsopt.records import Table
 from tmsopt.solver.multistart import rank, same
@@ -285,8 +288,10 @@ def _assembled(
     told = math.isclose(numbers.value, checked.objective, rel_tol=_TOLD, abs_tol=_TOLD)
     if finding.status == "optimal" and problem.free and problem.objective is not None and not told:
         finding = replace(finding, status="not_converged", notes=(*finding.notes, UNCLEAR))
-    optimal = finding.status == "optimal"
-    listed = bool(problem.variations or problem.tolerances)
+    optimal, listed = finding.status == "optimal", bool(problem.variations or problem.tolerances)
+    name, worst = name_told(problem.model, checked.structure.name), checked.worst.applied(parameters)
+    lacking = () if checked.crossing else checked.violations
+    edges, certain = stands_on(problem, worst, checked.structure, optimal)
     return Solution(
         problem=problem,
         status=finding.status,
@@ -295,7 +300,7 @@ def _assembled(
         abscissa=numbers.abscissa,
         abscissa_realised=numbers.realised,
         roots=numbers.roots,
-        structure=name_told(problem.model, checked.structure.name),
+        structure=name,
         active=Table(finding.active),
         violations=checked.amounts,
         missed=Table(lost),
@@ -309,20 +314,22 @@ def _assembled(
         branches=finding.branches,
         notes=(
             *finding.notes, *missed_note(problem, lost), *notes,
-            *_stability_note(problem, checked, finding.parameters, optimal),
+            *_stability_note(problem, checked, edges, optimal),
         ),
         worst=checked.worst if listed else None,
         least_damped=checked.least_damped if listed else None,
         fastest=checked.fastest if listed and problem.asks(ANGULAR_FREQUENCY) else None,
         sides=Table(sides),
         relaxation=finding.relaxation,
+        meetings=every_meeting(problem, worst, meant(problem.model, name, numbers.roots).roots, lacking),
+        edges=edges,
+        edge_is_exact=certain,
+        without_best=finding.without_best,
         si=numbers.si,
     )
 
 
-def _stability_note(
-    problem: Problem, checked: Checked, parameters: Mapping[str, float], optimal: bool
-) -> tuple[str, ...]:
+def _stability_note(problem: Problem, checked: Checked, edges: Sequence[str], optimal: bool) -> tuple[str, ...]:
     if "coefficients" in checked.violations:
         return ("a coefficient has no value at this design; keep away from what divides by 0, or has no root",)
     if "a0" in checked.violations:
@@ -338,5 +345,6 @@ def _stability_note(
         return unstable
     if problem.free and (problem.minimize or "").strip() == "abscissa":
         return ("no stable design was found in the box; this is the least unstable one",)
-    on_edge = beyond == 0 or edges_at(problem, parameters)  # neither decay nor growth, as the report says
-    return () if on_edge else ("the design is not stable: abscissa >= 0",)
+    largest = max((math.hypot(r.re, r.im) for r in checked.structure.roots), default=0.0)
+    found = stability((checked.structure.abscissa, checked.realised), edges, largest=largest)  # as the report says
+    return () if found.on_edge else ("the design is not stable: abscissa >= 0",)

@@ -15,6 +15,7 @@ from tmsopt.design.cases import Case
 from tmsopt.design.dependence import demands_heavy_damping, overclaims, tempts
 from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Freedom, Problem, freedom
+from tmsopt.design.verdict.meetings import is_crossing
 from tmsopt.formulation.formulate import LIMIT, design_of, formulate, middle
 from tmsopt.formulation.ipopt import Point, Run, ipopt, polisher
 from tmsopt.formulation.nlp import NLP, objective_unit, scale_of, units_of
@@ -107,13 +108,15 @@ class Candidate:
     Attributes:
         nlp: with the limits that held.
         objective: of the NLP; inf unless finite.
-        feasible: whether rows and bounds hold as IPOPT left them.
+        feasible: whether rows and bounds hold as IPOPT left them, and located roots have Jordan chains.
+        crossing: whether these chains alone are missing.
     """
 
     nlp: NLP
     run: Run
     objective: float
     feasible: bool
+    crossing: bool = False
 
 
 @dataclass(frozen=True)
@@ -137,6 +140,14 @@ class Workspace:
     beside: tuple[Mapping[str, float], ...] = ()
     blind: bool = False
     met: list[tuple[NLP, Candidate]] = field(default_factory=list, compare=False)
+
+    def chained(self, candidate: Candidate) -> Candidate:
+        """The same, not feasible where roots that a pattern makes meet have no Jordan chain."""
+        pattern = self.part.pattern
+        if pattern is None or not candidate.feasible:
+            return candidate
+        crossing = is_crossing(self.part, pattern, self.part.ordered(self.design_at(candidate.run.x)))
+        return replace(candidate, feasible=not crossing, crossing=crossing)
 
     @cached_property
     def freedom(self) -> Freedom:

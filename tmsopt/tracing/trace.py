@@ -10,6 +10,8 @@ import numpy as np
 
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem, freedom
+from tmsopt.design.verdict.meetings import is_crossing
+from tmsopt.design.verdict.stability import CROSSING
 from tmsopt.errors import (
     MOST_STARTS,
     Fault,
@@ -101,6 +103,8 @@ def _meeting(branches: Sequence[Branch], problem: Problem) -> tuple[Branch, ...]
     def said(event: Event) -> Event:
         if not any(event is e for e in ends):
             return event
+        if problem.pattern is not None and is_crossing(problem, problem.pattern, event.parameters):
+            return replace(event, detail=CROSSING)
         apart = [max(abs(event.parameters[n] - e.parameters[n]) / w for n, w in widths.items()) for e in ends]
         near = min((d for d, e in zip(apart, ends, strict=True) if e is not event), default=math.inf)
         if near > _NEAR:

@@ -20,6 +20,7 @@ _ROOM = 16
 """A carrier is kept for other ranges while no root is farther from the axis than so many times the spread."""
 
 _NOTHING = 2.0**-300  # a spread below is the rounding of intervals around 0, and its carrier no number in a polynomial
+_ROUNDED = 1e-6  # of the largest frequency: a narrower spread is not worth the digits
 _SAMPLE = 256  # designs by which frequencies are judged where intervals have no bound
 _AT_LEAST = 0.9  # of the spread: distance of the roots from the axis
 _WIDER = 2.0  # than what a sample shows
@@ -113,6 +114,7 @@ def carriers(entries: Sequence[ca.SX]) -> Callable[[Mapping[str, Interval]], tup
             own = _SEEN * max((most - least) / 2, np.abs(seen.imag).max())
             if own < spread:
                 low, high, spread = least, most, float(max(own, _LEAST_SEEN * spread))
+        spread = max(spread, _ROUNDED * max(abs(low), abs(high)))  # else equal entries have the spread of rounding
         return float(low + high) / 2, spread if spread > _NOTHING else 1.0
 
     return bounds

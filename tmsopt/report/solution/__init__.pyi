@@ -11,4 +11,4 @@ from .infeasible import infeasible_lines as infeasible_lines
 from .robustness import (
     nearest_table as nearest_table, robustness_line as robustness_line, robustness_table as robustness_table,
 )
-from .rows import parameter_rows as parameter_rows, quantity_rows as quantity_rows
+from .rows import parameter_rows as parameter_rows, quantity_rows as quantity_rows, structure_line as structure_line

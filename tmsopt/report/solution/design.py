@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 from tmsopt.checks import abscissa_as_stored
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import limit_text, show_at, unit_at, unit_of
+from tmsopt.design.verdict.status import status_in_words, verdict_in_words
 from tmsopt.explanation import Lever
 from tmsopt.models import GRAVITY, tms, to_si
-from tmsopt.models.told import structure_in_words
 from tmsopt.report.solution.explanation import diagnosis_lines, optimality_lines, rounding_line, rounding_rows
 from tmsopt.report.solution.findings import Findings
 from tmsopt.report.solution.infeasible import infeasible_lines
@@ -27,6 +27,7 @@ from tmsopt.report.solution.rows import (
     role,
     roots_line,
     speed_in,
+    structure_line,
     tidy,
 )
 from tmsopt.report.solution.screen import KEPT, Block, fitted, named, wrapped
@@ -103,8 +104,7 @@ def design_parts(
 
     More: docs/how_to/report.md
     """
-    edge = found.robustness is not None and bool(found.robustness.edges)
-    told, asked = headline(solution, edge)
+    told, asked = headline(solution)
     helps, notes = infeasible_lines(solution), [f"note: {note}" for note in solution.notes]
     if solution.status == "infeasible":
         first = [f"{told}: {helps[0]}"] if helps and ": " not in told else [told, *helps[:1]]
@@ -130,7 +130,7 @@ def design_parts(
     if explained is not None:
         yield Block("warnings", [f"warning: {text}" for text in explained.warnings])
     if found.robustness is not None:
-        yield Block("robustness", [f"robustness: {robustness_line(found.robustness)}"],
+        yield Block("robustness", [f"robustness: {robustness_line(found.robustness, solution.stability.on_edge)}"],
                    tuple(robustness_table(found.robustness).splitlines()[2:]))  # fmt: skip
     if explained is not None and explained.precision:
         yield Block("rounding", [f"rounding: {rounding_line(explained)}"], tuple(columns(rounding_rows(explained))))
@@ -140,7 +140,7 @@ def design_parts(
     yield Block("search", [], tuple(_search(solution)))
 
 
-def headline(solution: Solution, on_edge: bool = False) -> tuple[str, str]:
+def headline(solution: Solution) -> tuple[str, str]:
     """How it ended, and what was asked, in words."""
     problem = solution.problem
     text = problem.minimize or problem.maximize
@@ -148,45 +148,9 @@ def headline(solution: Solution, on_edge: bool = False) -> tuple[str, str]:
     located = f"locate {problem.locate}" if problem.locate else ""
     sense = f"{problem.sense} " if problem.free else ""  # what is given is not sought
     asked = f"{sense}{text.strip()}" + (f" = {value}" if math.isfinite(solution.value) else "") if text else ""
-    structure = structure_in_words(problem.model, solution.structure, solution.abscissa > 0)
-    silent = solution.status == "infeasible" and solution.any_stable is not False
-    stable = "" if silent else stability(solution, on_edge)
-    told = ": ".join(part for part in (_ended(solution), stable) if part)
+    told = ": ".join(part for part in (status_in_words(solution), verdict_in_words(solution)) if part)
+    structure = structure_line(problem, solution.structure, solution.abscissa, solution.meetings)
     return told, "; ".join(part for part in (located, asked, abscissa_as_stored(solution), structure) if part)
-
-
-def _ended(solution: Solution) -> str:
-    problem, bound = solution.problem, solution.bound
-    if solution.interrupted and solution.status != "optimal":
-        return "stopped before the end, the best design so far"
-    proved = ", proved" if bound.proven else ""
-    unproved = "stopped before it was proved" if solution.interrupted else "not proved"
-    words = {
-        "infeasible": f"infeasible{'' if problem.free else ' as given'}{proved}",
-        "not_converged": "not converged, so a better design may be near",
-    }
-    if solution.status in words:
-        return words[solution.status]
-    if problem.objective is None or not problem.free:
-        return "found" if problem.free else "as given"
-    return f"optimal{proved or f', the best of {solution.starts.tried} starts, {unproved}'}"
-
-
-def stability(solution: Solution, on_edge: bool = False) -> str:
-    """Whether the design is stable; of one that is not though that was looked for, whether any is."""
-    problem, known = solution.problem, solution.any_stable
-    if solution.stable is not False:
-        return "" if solution.stable is None else "stable"
-    if on_edge or solution.beyond_axis == 0:
-        return f"on the edge of stability{'' if solution.beyond_axis == 0 else ', as far as rounding tells'}"
-    if known is False:
-        limited = problem.locate or len(problem.constraints) > len(problem.asked_of_roots)
-        return f"no design in the box is stable (proved){' under its constraints' if limited else ''}"
-    if not solution.stability_sought:
-        return "not stable"
-    if known:
-        return "not stable, though there are stable designs in the box"
-    return "not stable" if solution.interrupted else "no stable design found, not proved"
 
 
 def _violated(solution: Solution) -> list[str]:
@@ -223,9 +187,8 @@ def _design(solution: Solution, si: Mapping[str, float] | None) -> list[str]:
 
 
 def _motion(solution: Solution, found: Findings) -> list[str]:
-    on_edge = found.robustness is not None and found.robustness.edges
     at = speed_in(solution, solution.worst)
-    lines = [f"{f'at {at}: ' if at else ''}{motion(solution, bool(on_edge))}"]
+    lines = [f"{f'at {at}: ' if at else ''}{motion(solution)}"]
     if found.stable is not None:
         lines.append(range_line(found.stable, solution))
     return [*lines, roots_line(solution, _DIGITS)]

@@ -31,7 +31,7 @@ def bound_lines(solution: Solution) -> list[str]:
     return lines
 
 
-def proof_line(solution: Solution) -> str:
+def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
     """Whether it is proved that none is better, in one line, and how to go on where it is not."""
     bound, problem = solution.bound, solution.problem
     text = (problem.minimize or problem.maximize or "").strip()
@@ -46,6 +46,8 @@ def proof_line(solution: Solution) -> str:
     if not problem.free:
         return "proof: nothing is free, so nothing to prove; tmsopt prove proves the roots"
     if not text:
+        if solution.status != "optimal":
+            return f"proof: none that there is no {problem.locate}"
         left = solution.freedom.count
         among = {1: "a curve", 2: "a surface"}.get(left, f"a family of {left} parameters")
         more = f"; it is one of {among} of such designs, which tmsopt trace follows" if left > 0 else ""

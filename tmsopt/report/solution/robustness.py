@@ -21,8 +21,11 @@ _OF_H = {"weave": "a real eigenfrequency"}
 _ON_EDGE = {"weave": "a pair of roots on the imaginary axis", "capsize": "a root 0", "infinity": "a root at infinity"}
 
 
-def robustness_line(found: Robustness) -> str:
+def robustness_line(found: Robustness, on_edge: bool = False) -> str:
     """In one line: how large a change ends stability, or brings it, how, and by which parameters mostly.
+
+    Args:
+        on_edge: whether the solution is on the edge of stability by more than its numbers as stored tell.
 
     Example:
         >>> print(tmsopt.report.robustness_line(tmsopt.robustness("problems/benchmark.toml")))
@@ -36,6 +39,8 @@ def robustness_line(found: Robustness) -> str:
         if found.zeros:
             return f"at its edge already: {', '.join(f'{n} = 0' for n in found.zeros)} ({on})"
         return f"none, on the edge of stability already, with {on}"
+    if on_edge:
+        return "none, on the edge of stability already, as far as rounding tells"
     limit = found.limit
     if not limit.found:
         return f"{'' if found.stable else 'not stable; '}no change that was looked at makes it {_other(found)}"

@@ -10,10 +10,12 @@ from typing import Any
 from tmsopt.checks.recheck import FEASIBLE
 from tmsopt.critical_speeds.speeds import speed_of
 from tmsopt.design.cases import Case
+from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import Unit, unit_at, unit_of
+from tmsopt.design.verdict.stability import MultipleRoot, crossing_in_words
 from tmsopt.models import INERTIAS, Model, Parameter, ParameterSet, Quantity, Values
-from tmsopt.models.told import eigenfrequencies, on_axis
+from tmsopt.models.told import eigenfrequencies, on_axis, structure_in_words
 from tmsopt.roots import Root
 from tmsopt.units import frequencies
 
@@ -122,22 +124,45 @@ def clock(solution: Solution) -> tuple[float, Unit, Unit]:
     return 1.0, Unit("√(w/g)" if natural else ""), Unit("√(g/w)" if natural else "")
 
 
-def motion(solution: Solution, on_edge: bool = False) -> str:
+def structure_line(problem: Problem, structure: str, abscissa: float, known: Sequence[MultipleRoot]) -> str:
+    """The structure of the roots in words, and what it is where eigenvectors do not meet, or nobody can tell.
+
+    Args:
+        known: what meets in each multiple root.
+
+    Example:
+        >>> design = tmsopt.solve("problems/ep4.toml")
+        >>> tmsopt.report.structure_line(design.problem, design.structure, design.abscissa, design.meetings)
+        'four roots meet in one (EP4)'
+
+    More: docs/how_to/report.md
+    """
+    words = structure_in_words(problem.model, structure, abscissa > 0)
+    about = known if problem.pattern is not None else [m for m in known if m.re == known[0].re]
+    if crossing := next((m for m in about if not m.exceptional), None):
+        return f"{words}: {crossing_in_words(crossing)}"
+    blind = problem.model.pencil is None and "EP" in f"{problem.locate or ''}{structure}"
+    return f"{words}; coefficients cannot tell whether it is defective" if blind and known else words
+
+
+def motion(solution: Solution) -> str:
     """How fast a disturbance dies out or grows, and at which frequencies it swings."""
     rate, time, hertz = clock(solution)
     abscissa = solution.abscissa * rate
     if solution.stable is None:
         return "no motion to describe: a root is at infinity"
     kind = "decay time" if abscissa < 0 else "growth time"
-    on_edge = on_edge or not abscissa or solution.beyond_axis == 0
-    lasts = "neither decay nor growth" if on_edge else f"{kind} {time.show(1 / abs(abscissa), 4)}"
+    found = solution.stability
+    on_edge, growth = found.on_edge, f"grows as {found.growth}"
+    lasts = growth if found.growth else "neither decay nor growth"
+    lasts = lasts if on_edge else f"{kind} {time.show(1 / abs(abscissa), 4)}"
     if solution.problem.model.carrier is not None:
-        found = (
-            "neither loss nor gain"
+        words = (
+            (growth if found.growth else "neither loss nor gain")
             if on_edge
             else f"{'least loss' if abscissa < 0 else 'gain'} {abs(abscissa):.4g} ({lasts})"
         )
-        return f"{found}{_real(solution) if on_edge or solution.beyond_axis else ''}"
+        return f"{words}{_real(solution) if on_edge or solution.beyond_axis else ''}"
     swings = [f for f in frequencies(solution.roots, rate) if f * 2 * math.pi > 1e-9 * rate]
     if not swings:
         return f"{lasts}; nothing swings"

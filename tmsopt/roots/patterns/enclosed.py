@@ -181,7 +181,7 @@ def _sorted(roots: Sequence[Enclosed]) -> tuple[Enclosed, ...]:
 def _start(pattern: Pattern, target: list[float], roots: Sequence[Root]) -> list[Any]:
     """The guess from the roots of a fit that rebuilds the coefficients best."""
     z = np.array([complex(r.re, r.im) for r in roots for _ in range(r.multiplicity)])
-    scale = np.abs(z).max()
+    scale = np.abs(z).max() or 1.0
 
     def error(u: list[float]) -> float:
         off: list[float] = [

@@ -21,6 +21,9 @@ Roots = NDArray[np.complex128]
 
 _NAME = "<U32"
 
+_UNRELATED = tuple(p**0.5 for p in (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37))
+"""Unknowns with no relation, to see which factors are the same."""
+
 
 @dataclass(frozen=True)
 class Pattern:
@@ -88,6 +91,12 @@ class Pattern:
     def monic(self, unknowns: Sequence[Any]) -> list[Any]:
         """Coefficients of the product of the factors, descending from 1."""
         return product(*self.factors(unknowns))
+
+    def counted(self, unknowns: Sequence[Any]) -> list[tuple[list[Any], int]]:
+        """The different factors for given unknowns, each with how often it occurs."""
+        signs = [tuple(f) for f in self.factors(_UNRELATED[: len(self.unknowns)])]
+        factors = self.factors(unknowns)
+        return [(factors[signs.index(s)], signs.count(s)) for s in dict.fromkeys(signs)]
 
     def remaining(self, unknowns: Sequence[Any]) -> list[list[Any]]:
         """The factors whose roots must lie left of the imaginary axis for the pattern to bound or keep stability."""

@@ -8,7 +8,6 @@ from typing import Any
 import flint
 import numpy as np
 
-from tmsopt.diagnosis.meeting import middle
 from tmsopt.records import Array, Complex
 
 Matrix = Sequence[Sequence[Any]]
@@ -43,7 +42,7 @@ def is_regular(matrices: Sequence[Matrix], s: Any, threshold: float) -> bool:
     return any(jordan(matrices, s + unit * flint.acb(a, b), 1, threshold).zero > threshold for a, b in _ELSEWHERE)
 
 
-def jordan(matrices: Sequence[Matrix], s: Any, multiplicity: int, threshold: float) -> Jordan:
+def jordan(matrices: Sequence[Matrix], s: Any, multiplicity: int, threshold: float, least: float = 0.0) -> Jordan:
     """Jordan structure at an eigenvalue s of L(s) = Σ Pₖ s^(d−k), of known algebraic multiplicity.
 
     The nullity of L(s) is the geometric multiplicity, and the nullities of the block Toeplitz matrices of L(s), L′(s),
@@ -53,13 +52,11 @@ def jordan(matrices: Sequence[Matrix], s: Any, multiplicity: int, threshold: flo
 
     Args:
         matrices: Pₖ in descending powers, balls; s is a ball too, so that no digit is lost where terms cancel.
+        least: unit of the eigenvalues at least, where s is small beside others.
     """
     d, n = len(matrices) - 1, len(matrices[0])
-    modulus = float(abs(s).mid())
-    unit = modulus if modulus > 0 else 1.0
-    size = sum(np.abs(_numbers(P)) * (unit ** (d - k)) for k, P in enumerate(matrices))
-    rows, columns = _equilibrated(np.asarray(size, dtype=float))
-    scale = np.outer(rows, columns)
+    unit = max(float(abs(s).mid()), least) or 1.0
+    size, scale = equilibrated([_numbers(P) for P in matrices], unit)
     blocks = [scale * unit**i * _numbers(_derivative(matrices, s, i)) for i in range(min(d, multiplicity - 1) + 1)]
     values = np.linalg.svd(blocks[0], compute_uv=False)[::-1] / np.linalg.norm(size * scale, 2)
     geometric = _nullity(values, 1, multiplicity, threshold)
@@ -106,6 +103,50 @@ def _derivative(matrices: Sequence[Matrix], s: Any, order: int) -> list[list[Any
     return [[sum((factor * P[i][j] for P, factor in terms), flint.acb(0)) for j in size] for i in size]
 
 
+def has_one_eigenvector(matrices: Sequence[Matrix], s: Any) -> bool:
+    """Whether L(s) surely has rank n − 1 at least: in balls, a minor of that order is not 0."""
+    value = _derivative(matrices, s, 0)
+    size = range(len(value))
+    minors = (
+        flint.acb_mat([[value[a][b] for b in size if b != j] for a in size if a != i]) for i in size for j in size
+    )
+    return len(value) == 1 or any(not minor.det().contains(0) for minor in minors)
+
+
+def exact_nullity(matrices: Sequence[Matrix], factor: Any) -> int:
+    """Number of independent eigenvectors at each root of an irreducible factor of det L, in fractions.
+
+    Args:
+        matrices: of fractions.
+        factor: ``fmpq_poly``.
+    """
+    power = [flint.fmpq_poly([0] * k + [1]) for k in range(len(matrices))][::-1]
+    size = range(len(matrices[0]))
+    rows = [
+        [sum((flint.fmpq_poly([P[i][j]]) * s for P, s in zip(matrices, power, strict=True)), flint.fmpq_poly()) % factor
+         for j in size]
+        for i in size
+    ]  # fmt: skip
+    left = rows
+    for j in size:
+        pivot = next((row for row in left if row[j] != 0), None)
+        if pivot is None:
+            continue
+        inverse = pivot[j].xgcd(factor)[1]
+        others = (row for row in left if row is not pivot)
+        left = [
+            [(x - row[j] * inverse * y) % factor for x, y in zip(row, pivot, strict=True)] for row in others
+        ]
+    return len(left)
+
+
+def equilibrated(matrices: Sequence[Any], unit: float) -> tuple[Array, Array]:
+    """Sizes of the terms of L at eigenvalues of a size, and factors that bring rows and columns of them near 1."""
+    d = len(matrices) - 1
+    size = np.asarray(sum(np.abs(P) * (unit ** (d - k)) for k, P in enumerate(matrices)), dtype=float)
+    return size, np.outer(*_equilibrated(size))
+
+
 def _equilibrated(size: Array) -> tuple[Array, Array]:
     """Powers of two for rows and columns that bring the largest entry of each near 1."""
     rows, columns = np.ones((2, len(size)))
@@ -119,4 +160,5 @@ def _equilibrated(size: Array) -> tuple[Array, Array]:
 
 def _numbers(matrix: Matrix) -> Complex:
     """Middles of balls as complex doubles."""
-    return np.array([[middle(flint.acb(x)) for x in row] for row in matrix])
+    balls = ([flint.acb(x) for x in row] for row in matrix)
+    return np.array([[complex(float(x.real.mid()), float(x.imag.mid())) for x in row] for row in balls])

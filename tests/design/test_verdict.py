@@ -1,0 +1,103 @@
+"""One rule for each word: what is stable, marginally stable, growing, an exceptional point."""
+
+from collections.abc import Mapping
+
+import flint
+import pytest
+
+import tmsopt
+from tmsopt.design.verdict import MultipleRoot, crossing_in_words, located_meetings, stability
+from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices
+from tmsopt.roots import exact_nullity, has_one_eigenvector
+
+
+@pytest.mark.parametrize(
+    ("ends", "edges", "verdict"),
+    [
+        ((-1.0, -0.9), (), "stable"),
+        ((1.0, 1.1), (), "not stable"),
+        ((-1e-9, 2e-9), (), "marginally stable"),  # rounding decides the sign
+        ((5e-8, 1e-7), (), "marginally stable"),  # half of the numbers' own distance
+        ((-1e-3, -4e-4), (), "stable"),  # beside a 4-fold root: as stored it is stable all the same
+        ((0.0, 0.0), ("infinity",), "on the edge of stability"),
+        ((float("nan"), 1.0), (), ""),
+    ],
+)
+def test_one_verdict(ends: tuple[float, float], edges: tuple[str, ...], verdict: str) -> None:
+    assert stability(ends, edges, largest=1.0).verdict == verdict
+
+
+def test_the_longest_chain_on_the_rightmost_line_grows() -> None:
+    met = (MultipleRoot(0.0, 1.0, 2, 2, 1), MultipleRoot(0.0, -1.0, 4, 2, 3), MultipleRoot(-1.0, 0.0, 6, 1, 6))
+    found = stability((0.0, 0.0), ("weave",), met, 1.0)
+    assert (found.verdict, found.growth, found.on_edge) == ("growing", "t^2", True)
+
+
+def test_what_is_no_exceptional_point_has_a_name() -> None:
+    assert crossing_in_words(MultipleRoot(0, 0, 2, 2, 1)) == "diabolic point (semisimple), not an EP"
+    assert "not an EP4" in crossing_in_words(MultipleRoot(0, 0, 4, 2, 2))
+    assert MultipleRoot(0, 0, 2, None, 2).exceptional  # coefficients cannot tell
+    assert MultipleRoot(0, 0, 2, None, 2).defective is None
+
+
+AXIS = [
+    (from_matrices([[1]], None, [["k"]]), {"k": 0.0}, "t"),  # a free particle
+    (
+        from_matrices([[1, 0], [0, 1]], [[0, "g"], ["-g", 0]], [[0, 0], [0, 0]]),
+        {"g": 1.0},
+        "",
+    ),  # a charge drifts nowhere
+    (from_matrices(A=[[0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], ["z", 0, 0, 0]]), {"z": 0.0}, "t^3"),
+    (from_matrices([[1, 0], [0, 1]], None, [[1, "c"], [0, 1]]), {"c": 1.0}, "t"),  # 1:1 resonance
+    (from_matrices([[1, 0], [0, 1]], None, [["k", 0], [0, "k"]]), {"k": 4.0}, ""),
+    (from_hamiltonian([["w", 1, 0], [0, "w", 1], [0, 0, "w"]]), {"w": -1.0}, "t^2"),
+    (from_hamiltonian([["w", 0], [0, "w"]]), {"w": 2.5}, ""),
+    (from_coefficients([1, 0, "2*w", 0, "w*w"]), {"w": 1.0}, "t"),  # of p(d/dt) y = 0
+]
+
+
+@pytest.mark.parametrize(("model", "fixed", "growth"), AXIS)
+def test_a_defective_root_on_the_axis_grows(
+    model: tmsopt.models.Model, fixed: Mapping[str, float], growth: str
+) -> None:
+    """By the size of the largest Jordan block; every root is exactly on the axis, and nothing doubts it."""
+    found = tmsopt.solve(tmsopt.Problem(model, fixed=fixed))
+    data, report = found.to_json(), str(found)
+    assert data["verdict"] == ("growing" if growth else "marginally stable")
+    assert data.get("growth", "") == growth
+    assert {r.get("growth", "") for r in data["roots"]} == {growth}
+    assert "as far as rounding tells" not in report
+    assert ("neither" in report) is not bool(growth)
+    assert (f"growing as {growth}" in repr(found)) is bool(growth)
+
+
+def judged(model: tmsopt.models.Model, pattern: str, at: Mapping[str, float]) -> tuple[int | None, int]:
+    problem = tmsopt.Problem(model, free=dict.fromkeys(at, (-1.0, 1.0)), locate=pattern)
+    assert problem.pattern is not None
+    met = located_meetings(problem, problem.pattern, problem.ordered(at))[0]
+    return met.geometric, met.longest
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-9, 3e-6])
+def test_a_crossing_is_seen_from_as_far_as_coefficients_accept(off: float) -> None:
+    """Real symmetric; the coefficients are those of an EP2 to off²."""
+    assert judged(from_hamiltonian([["d", "k"], ["k", "-d"]]), "EP2", {"d": off, "k": -off}) == (2, 1)
+    equal = from_matrices([[1, 0], [0, 1]], None, [["1 + x", "y"], ["y", "1 - x"]])
+    assert judged(equal, "CEP2", {"x": off, "y": off}) == (2, 1)
+
+
+def test_a_weak_coupling_still_makes_a_jordan_chain() -> None:
+    assert judged(from_hamiltonian([["d + 1j*k", 1e-6], [0, 0]]), "EP2", {"d": 0.0, "k": 0.0}) == (1, 2)
+    assert judged(from_matrices(A=[["a", 1, 0], [0, 0, 0], [0, 0, "b"]]), "EP3", {"a": 0.0, "b": 0.0}) == (2, 2)
+
+
+def test_eigenvectors_are_counted_in_fractions_and_in_balls() -> None:
+    """s² + 1 twice: apart, and with a coupling of its two oscillators."""
+    q = flint.fmpq
+    one, factor = [[q(1), q(0)], [q(0), q(1)]], flint.fmpq_poly([1, 0, 1])
+    zero = [[q(0), q(0)], [q(0), q(0)]]
+    coupled = [[q(1), q(1, 3)], [q(0), q(1)]]
+    assert exact_nullity([one, zero, one], factor) == 2
+    assert exact_nullity([one, zero, coupled], factor) == 1
+    assert has_one_eigenvector([one, zero, coupled], flint.acb(0, 1))
+    assert not has_one_eigenvector([one, zero, one], flint.acb(0, 1))

@@ -1,0 +1,9 @@
+"""Verdicts: the one place that decides which word a solution gets, from facts alone.
+
+In: facts such as an abscissa, Jordan chains, a status. Out: a word or a phrase. Open `stability` first, then `status`;
+`meetings` finds the facts about multiple roots.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

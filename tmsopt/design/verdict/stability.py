@@ -1,0 +1,152 @@
+"""Stable, marginally stable, growing or not stable: one rule, and the words for each."""
+
+import math
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from tmsopt.records import plain
+
+STABLE, MARGINAL, GROWING, EDGE, UNSTABLE = (
+    "stable",
+    "marginally stable",
+    "growing",
+    "on the edge of stability",
+    "not stable",
+)
+"""Verdicts. `EDGE` is for a root at infinity, whose sign nobody knows."""
+
+CROSSING = "diabolic point (semisimple), not an EP"
+"""Where roots meet, and as many eigenvectors remain."""
+
+_TIMES, _FAINT = 2.0, 1e-6
+"""An abscissa is 0, as far as rounding tells, up to so many times its distance from that of the numbers as stored: both
+are roots that the pattern makes one. At most so much of the largest root: beyond it, the stored numbers decide."""
+
+_LINE = 1e-12
+"""Of the largest root: real parts that differ by less are one, as far as rounding tells."""
+
+
+@dataclass(frozen=True)
+class MultipleRoot:
+    """A multiple root, or a multiple eigenfrequency, and its eigenvectors.
+
+    Attributes:
+        re, im: the root as users read it.
+        multiplicity: how many roots meet.
+        geometric: number of independent eigenvectors; None for a system given by coefficients, which cannot tell.
+        longest: length of the longest Jordan chain; for coefficients that of the equation p(d/dt) y = 0.
+    """
+
+    re: float
+    im: float
+    multiplicity: int
+    geometric: int | None
+    longest: int
+
+    @property
+    def defective(self) -> bool | None:
+        """Whether eigenvectors are missing; None where coefficients cannot tell."""
+        return None if self.geometric is None else self.geometric < self.multiplicity
+
+    @property
+    def exceptional(self) -> bool:
+        """Whether it may be called an exceptional point of its order: one eigenvector, or nobody can tell."""
+        return self.geometric in (1, None)
+
+
+def power_of_t(longest: int) -> str:
+    """The power of t beside the exponential of a Jordan chain; empty for a chain of one vector."""
+    return "" if longest < 2 else "t" if longest == 2 else f"t^{longest - 1}"
+
+
+def longest_chain(meetings: Iterable[MultipleRoot], abscissa: float, largest: float) -> int:
+    """Length of the longest Jordan chain on the rightmost line; 1 for simple roots."""
+    return max((m.longest for m in meetings if m.re >= abscissa - _LINE * largest), default=1)
+
+
+@dataclass(frozen=True)
+class StabilityVerdict:
+    """The verdict on a solution.
+
+    Attributes:
+        verdict: one of the words above; empty where a root is at infinity.
+        growth: of a solution that is `GROWING`, the power of t, such as ``t^2``; else empty.
+    """
+
+    verdict: str
+    growth: str = ""
+
+    @property
+    def on_edge(self) -> bool:
+        """Whether the rightmost roots are on the imaginary axis, or at infinity."""
+        return self.verdict in (MARGINAL, GROWING, EDGE)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for ``json.dumps``."""
+        return {"verdict": self.verdict or None, **({"growth": self.growth} if self.growth else {})}
+
+
+def stability(
+    ends: tuple[float, float], edges: Collection[str], meetings: Iterable[MultipleRoot] = (), largest: float = 0.0
+) -> StabilityVerdict:
+    """The verdict on a solution.
+
+    Args:
+        ends: the abscissa of the ideal solution and of the numbers as stored; between them rounding decides.
+        edges: boundaries of stability on which it stands, such as ``weave``.
+        meetings: its multiple roots.
+        largest: size of the largest root.
+    """
+    if not all(map(math.isfinite, ends)):
+        return StabilityVerdict("")
+    told = min(_TIMES * abs(ends[0] - ends[1]), _FAINT * largest)
+    if not edges and not min(ends) <= 0 <= max(ends) and abs(ends[0]) > told:
+        return StabilityVerdict(STABLE if max(ends) < 0 else UNSTABLE)
+    growth = power_of_t(longest_chain(meetings, ends[0], largest))
+    return StabilityVerdict(GROWING if growth else EDGE if "infinity" in edges else MARGINAL, growth)
+
+
+def joined(solution: Any) -> dict[str, Any]:
+    """What JSON says of the multiple roots: beside the solution of the first, and on the entry of each root.
+
+    Args:
+        solution: its `roots`, `eigenfrequencies`, `meetings` and `stability`.
+    """
+    growing: str = solution.stability.growth
+    found: dict[str, Any] = {}
+    top = max((m.re for m in solution.meetings if m.longest > 1), default=math.nan)
+
+    def of(m: MultipleRoot) -> dict[str, Any]:
+        grows = {"growth": power_of_t(m.longest)} if growing and m.re == top and m.longest > 1 else {}
+        return {"defective": m.defective, "geometric_multiplicity": m.geometric, **grows}
+
+    for name, each in plain(solution, "roots eigenfrequencies").items():
+        for entry, root in zip(each, solution.roots, strict=True) if each else ():
+            for meeting in (m for m in solution.meetings if (m.re, m.im) == (root.re, root.im)):
+                entry.update(of(meeting))
+        found |= {name: each} if each or name == "roots" else {}
+    first = {n: x for n, x in of(solution.meetings[0]).items() if n != "growth"} if solution.meetings else {}
+    return first | found
+
+
+def stability_in_words(found: StabilityVerdict, *, exact: bool, of_matrices: bool, of_H: bool = False) -> str:
+    """A verdict as a headline says it.
+
+    Args:
+        exact: whether the roots are exactly on the axis; else that holds as far as rounding tells.
+        of_matrices: whether Jordan chains are known; coefficients know the scalar equation alone.
+    """
+    if not found.on_edge:
+        return found.verdict
+    root = "real eigenfrequency" if of_H else "root on the imaginary axis"
+    why = f"from a defective {root}" if of_matrices else "as the solutions of p(d/dt) y = 0 do"
+    said = f"growing as {found.growth}, {why}" if found.growth else found.verdict
+    return said if exact else f"{said}, as far as rounding tells"
+
+
+def crossing_in_words(meeting: MultipleRoot) -> str:
+    """What a multiple root with more than one eigenvector is called."""
+    if meeting.defective:
+        return f"{meeting.geometric} Jordan chains, not an EP{meeting.multiplicity}"
+    return CROSSING
