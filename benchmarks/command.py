@@ -58,6 +58,7 @@ SECTIONS = (
     Section("l", "variety", f"{_DESIGNS}.varied_designs", "varied problems, judged by eigenvalues", long=True),
     Section("m", "band", f"{_DESIGNS}.bands", "bands of speeds, proved between the scenarios", long=True),
     Section("n", "conflicts", f"{_DESIGNS}.conflicts", "relaxations of infeasible problems", long=True),
+    Section("v", "remedies", f"{_DESIGNS}.remedies", "what is advised for infeasible problems, obeyed", long=True),
     Section("o", "certificates", f"{_DESIGNS}.certificates", "random designs proved globally best", long=True),
     Section("p", "proofs", "benchmarks.reports.proofs", "exceptional points of the paper, proved", long=True),
     Section("q", "references", f"{_DESIGNS}.references", "the best values of the random designs, kept", long=True),

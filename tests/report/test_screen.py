@@ -232,7 +232,7 @@ def test_a_proof_that_was_tried_in_vain_is_told_so() -> None:
     design = tmsopt.solve("problems/realistic.toml")
     assert "proof: none that this is the best; --certify proves it, or finds better" in design_report(design)
     tried = replace(design, bound=replace(design.bound, solver="SCIP", seconds=19.8))
-    assert "proof: none that this is the best in 20 s of SCIP; a longer --certify goes on" in design_report(tried)
+    assert "proof: none that this is the best in 20 s of SCIP; --certify 40 goes on" in design_report(tried)
 
 
 def test_a_pattern_that_is_missed_is_called_one_whatever_its_name() -> None:

@@ -102,14 +102,14 @@ def named(problem: tmsopt.Problem, reached):
     relaxation = tmsopt.solve(replace(problem, minimize="x"), throw=False).relaxation
     relaxation = replace(relaxation, parameters=Table(near), amounts=Table({"b": 0.6}), conflict=(), irreducible=False)
     options = import_module("tmsopt.formulation.options").DEFAULTS
-    irreducible = import_module("tmsopt.solver.needs").irreducible
+    irreducible = import_module("tmsopt.solver.remedies.needs").irreducible
     return irreducible(problem, relaxation, ("b",), problem, options, reached)
 
 
 @pytest.fixture
 def blind(monkeypatch):
     """A few starts meet nothing but what designs at hand meet."""
-    monkeypatch.setattr("tmsopt.solver.needs._met", lambda *_, **__: False)
+    monkeypatch.setattr("tmsopt.solver.remedies.needs._met", lambda *_, **__: False)
 
 
 @pytest.mark.usefixtures("blind")

@@ -12,6 +12,7 @@ from helpers.hunt import abscissa
 
 import tmsopt
 from tmsopt import laws
+from tmsopt.design import moved_limits
 from tmsopt.records import Table
 from tmsopt.report import design_report, infeasible_lines
 
@@ -278,15 +279,16 @@ def test_the_headline_names_what_is_out_of_reach_and_not_what_has_no_value_for_i
     design = tmsopt.solve(written(tmp_path, ROBOT + limits), throw=False, alone=False)
     assert set(design.relaxation.conflict) == {"far", "x_H.max"}
     for shown in (design, replace(design, abscissa=1.0, stable_elsewhere=None)):
-        assert infeasible_lines(shown)[0].startswith("no design was found that meets far (x_H >= 200 cm)")
+        assert infeasible_lines(shown)[0].startswith("far (x_H >= 200 cm) is out of reach: ")
 
 
 def test_a_limit_that_must_go_down_to_nothing_is_shown_as_0():
     """0.02 moved by 0.02 and what rounding adds to it."""
     asked = problem(constraints={"arm": "abs(nu_H) >= 0.02"})
-    amounts = Table({"arm": 0.0200000000000183})
-    design = replace(failed("two bounds"), problem=asked)
-    design = replace(design, relaxation=replace(design.relaxation, amounts=amounts, conflict=("arm",)))
+    amounts, design = Table({"arm": 0.0200000000000183}), replace(failed("two bounds"), problem=asked)
+    written = (Table(moved_limits(asked, amounts)),)
+    moved = replace(design.relaxation, amounts=amounts, conflict=("arm",), remedies=written)
+    design = replace(design, relaxation=moved)
     assert infeasible_lines(design)[-1] == "smallest change found: abs(nu_H) >= 0 instead of 0.02 (arm)"
 
 
@@ -294,7 +296,7 @@ def test_what_is_proved_of_all_limits_is_not_said_of_some():
     """A bound without a gap for a problem of three limits says nothing about two of them."""
     limits = {"decay": "abscissa <= -1", "slow": "Fr <= 1", "wide": "chi_B >= 0.5"}
     design = replace(failed("two bounds"), problem=problem(constraints=limits), bound=tmsopt.Bound(proven=True))
-    two, three = (replace(design.relaxation, amounts=Table({"decay": 0.6}), conflict=tuple(limits)[:k]) for k in (2, 3))
+    two, three = (replace(design.relaxation, remedies=(), conflict=tuple(limits)[:k]) for k in (2, 3))
     said = [infeasible_lines(replace(design, relaxation=r))[0] for r in (two, three)]
     assert said[0] == "no design was found that meets both decay (abscissa <= -1) and slow (Fr <= 1)"
     assert said[1].endswith("wide (chi_B >= 0.5) cannot all be met")

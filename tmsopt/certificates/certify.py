@@ -79,9 +79,9 @@ def certify(design: Given, *, seconds: float = SECONDS, progress: Listener | Non
             while replaced and not (problem.objective is None and feasible(found)):
                 found, replaced = (_bounded if feasible(found) else _excluded)(found, clock)
         except NotAccepted as error:
-            return _noted(found, f"branch and bound cannot take {error}, so there is no bound")
+            return _in_vain(found, f"branch and bound cannot take {error}, so there is no bound")
         except Failed as error:
-            return _noted(found, f"{SOLVER.name} failed: {error}; so there is no bound")
+            return _in_vain(found, f"{SOLVER.name} failed: {error}; so there is no bound")
         except KeyboardInterrupt:
             clock.interrupted = True
         return replace(_noted(found, "the proof was interrupted"), interrupted=True) if clock.interrupted else found
@@ -104,9 +104,9 @@ def _bounded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
         return replace(design, bound=known), False
     admitted = _question(design, -PROVEN)
     if words := doubt(admitted, _free(design)):
-        return _noted(design, f"no bound: {words}"), False
+        return _in_vain(design, f"no bound: {words}"), False
     if contradicted(admitted, _free(design), clock):
-        return _noted(design, f"no bound: {SOLVER.name}'s relaxation excludes the design that was found"), False
+        return _in_vain(design, f"no bound: {SOLVER.name}'s relaxation excludes the design that was found"), False
     proved, failed = math.inf, 0.0
     converged = design.status == "optimal"
     while (level := _next(proved, failed, converged)) is not None and clock.left > 0:
@@ -146,6 +146,8 @@ def _next(proved: float, failed: float, converged: bool) -> float | None:
 
 def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     """No design was found: the proof that there is none, or one after all."""
+    if design.bound.proven:
+        return design, False
     clock.note = "whether there is any design"
     anything = Question(design.problem, _cases(design), None, unit_of(design.of_polynomial.roots))
     answered = answer(anything, clock, 1.0, partial(confirmed, design, _cases(design)))
@@ -154,7 +156,7 @@ def _excluded(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     if answered.verdict == INFEASIBLE:
         if not recheck(design.problem, design.parameters, _cases(design)).violations:
             words = f"no proof: {SOLVER.name}'s relaxation excludes the feasible design that was found"
-            return _noted(design, words), False
+            return _in_vain(design, words), False
         none = -math.inf if design.problem.sense == "maximize" else math.inf
         bound = _searched(none, 0.0, True, clock)
         return replace(design, status="infeasible", bound=bound), False
@@ -232,6 +234,11 @@ def _cases(design: Solution) -> tuple[Case, ...]:
     listed = design.problem.cases
     worst = [case for case in (design.worst, design.least_damped) if case is not None and case not in listed]
     return (*listed, *dict.fromkeys(worst)) if listed else ()
+
+
+def _in_vain(design: Solution, words: str) -> Solution:
+    """Noted, with the solver's name beside the bound and no time: more of it would come to no more."""
+    return replace(_noted(design, words), bound=replace(design.bound, solver=SOLVER.name))
 
 
 def _noted(design: Solution, words: str) -> Solution:

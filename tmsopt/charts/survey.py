@@ -10,6 +10,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from tmsopt.charts.expressions import ArrayFunction, array_function, parsed
 from tmsopt.charts.motion import Classified, classified, engine_of
+from tmsopt.design.advice.names import example_of
 from tmsopt.design.files import Given, problem_of
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS, ROOT_NAMES
@@ -245,8 +246,10 @@ def axes_of(problem: Problem, axes: Sequence[str] | None = None) -> tuple[str, .
     free = list(problem.free)
     if len(free) not in (2, 3):
         message = f"a grid has two or three free parameters, and {len(free)} are free ({', '.join(free) or 'none'})"
-        fixed = [n for n in problem.fixed if n in ("Fr", "v")] or [*problem.fixed, "Fr"]
-        advice = "; fix the others" if len(free) > 3 else f"; write e.g. {fixed[0]} = {{ min = 0.1, max = 5 }}"
+        of = problem.parameter_set
+        fixed = [*(n for n in ("Fr", "v") if n in problem.fixed), *problem.fixed]
+        freed = f"; write e.g. {example_of(of[fixed[0]])[1]}" if fixed else ""
+        advice = "; fix the others" if len(free) > 3 else freed
         raise InputError([Fault(message + advice, ("parameters",))])
     if axes is not None and (list_faults("axes", axes, "") or sorted(map(str, axes)) != sorted(free)):
         raise InputError([Fault(f"found {axes!r}; accepted: {' and '.join(free)}", ("axes",))])

@@ -17,6 +17,10 @@ from tmsopt.models import Model, Quantity, Values
 WORSE = {"abscissa": 1.0, "damping_ratio": -1.0, ANGULAR_FREQUENCY: 1.0}
 """Direction in which a root quantity gets worse; its factors bound it from that side alone."""
 
+STABLE = "every root left of the axis"
+"""The name of a constraint that a problem does not state."""
+
+_STEADY = 0.01  # of the roots' mean size: decay of a design that is stable beyond doubt
 _DESIGNS = 32  # designs at which the direction of a root quantity is looked at
 _DECADES = 3.0  # from 1, up and down, over which values of a root quantity are drawn
 _STEP = 1e-3
@@ -47,6 +51,43 @@ def tempts(problem: Problem, name: str, worse: float = 1.0) -> bool:
     """Whether objective or constraints get better, at some design, as a quantity moves up (or down: `worse` −1)."""
     asked = [(problem.sign, problem.objective), *((c.sign, c) for c in problem.conditions.values())]
     return any(e is not None and _falls(problem, sign, e, name, worse) for sign, e in asked)
+
+
+def stability_wanted(problem: Problem, steady: float = _STEADY) -> dict[str, str]:
+    """A limit that keeps designs stable, by its name; none where limits and objective do not want that.
+
+    Limits that are met on the edge of stability are content with it.
+
+    Args:
+        steady: decay at least, of the roots' mean size.
+    """
+    roots = {"abscissa", "damping_ratio", RADIUS}
+    if problem.pattern or not any(name in roots and problem.asks(name) for name in roots):
+        return {}
+    values = problem.values(problem.ordered({n: (lo + hi) / 2 for n, (lo, hi) in problem.free.items()}))
+    a = [float(c) for c in values.coefficients]
+    size = abs(a[-1] / a[0]) ** (1 / problem.model.degree) if a[0] else 1.0
+
+    def refused(abscissa: float, ratio: float) -> bool:
+        """Whether a limit excludes such roots."""
+        found = {"abscissa": abscissa, "damping_ratio": ratio, RADIUS: 0.0, ANGULAR_FREQUENCY: size}
+        asked = (c for c in problem.conditions.values() if roots & set(c.names))
+        return any(not c.holds(_with(values, c, found)) for c in asked)
+
+    goal = problem.objective is not None and bool(roots & set(problem.objective.names))
+    if not goal and not refused(1e-6 * size, -1e-6):
+        return {}
+    edge = not goal and not refused(0.0, 0.0)
+    least = 0.0 if edge or not 0 < size < np.inf else steady * size
+    return {STABLE: f"abscissa <= {0.0 - least!r}"}
+
+
+def only_worsens(problem: Problem, name: str, worse: float) -> bool:
+    """Whether the objective gets better as a quantity gets worse, and at no design as it gets better."""
+    goal = problem.objective
+    if goal is None or name not in goal.names:
+        return False
+    return _falls(problem, problem.sign, goal, name, worse) and not _falls(problem, problem.sign, goal, name, -worse)
 
 
 def demands_heavy_damping(problem: Problem) -> bool:

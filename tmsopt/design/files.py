@@ -254,7 +254,7 @@ def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault: 
         case ("parameters", name, end) if kind == "extra_forbidden":
             return Fault(f"unknown key {short(end)} of {name}; {suggest(end, _FreeParameter.model_fields)}", key)
         case ("parameters", name, end) if kind == "missing":
-            return Fault(f"missing {end} of {name}; write e.g. {name} = {{ min = 0.5, max = 2 }}", key)
+            return Fault(f"missing {end} of {name}; write {name} = {{ min = …, max = … }}", key)
         case ("parameters", _, *_):
             accepted = "a number, a text with a unit such as '5 deg', or { min = …, max = …, start = … }"
             return Fault(f"found {short(found)}; accepted: {accepted}", key[:3])
@@ -263,7 +263,7 @@ def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault: 
         case ("scenarios", name, end, *_) if kind == "extra_forbidden":
             return Fault(f"unknown key {short(end)} of {name}; {suggest(end, _Band.model_fields)}", key)
         case ("scenarios", name, end) if kind == "missing":
-            return Fault(f"missing {end} of {name}; write e.g. {name} = {{ min = 1, max = 2, points = 7 }}", key)
+            return Fault(f"missing {end} of {name}; write {name} = {{ min = …, max = …, points = 7 }}", key)
         case ("scenarios", _, *_):
             accepted = "{ min = …, max = …, points = … }, or a list of values such as [1, 2.5]"
             return Fault(f"found {short(found)}; accepted: {accepted}", key[:2])

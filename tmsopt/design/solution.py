@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
+from tmsopt.design.advice.remedies import Need, Relaxation
 from tmsopt.design.cases import Case, Cover
 from tmsopt.design.problem import Freedom, Problem
 from tmsopt.design.quantities import ROOT_NAMES
@@ -83,58 +84,6 @@ class OtherBranch:
 
     parameters: Table[float]
     excluded_by: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Relaxation:
-    """The smallest move of limits that leaves a feasible design.
-
-    Attributes:
-        parameters: a design that is feasible once the limits are moved.
-        amounts: limit → how far it is moved, in its own units; signed for an equality, else towards what it forbids.
-        conflict: limits that no design was found to meet together in the box, and ends beyond which the others are met.
-        alone: limit → how far it must be moved if it is the only one, where that suffices.
-        irreducible: whether designs were found that meet the others without any one of the conflict, and a whole search
-            found none for it; never where limits about the roots leave a0 free to vanish, for needles hide there.
-    """
-
-    parameters: Table[float] = field(default_factory=Table)
-    amounts: Table[float] = field(default_factory=Table)
-    conflict: tuple[str, ...] = ()
-    alone: Table[float] = field(default_factory=Table)
-    irreducible: bool = False
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain data for ``json.dumps``."""
-        return plain(self, "amounts conflict irreducible alone parameters")
-
-
-@dataclass(frozen=True)
-class Need:
-    """What a parameter that is fixed, or held below or above it, would have to be for a design that meets all else.
-
-    Attributes:
-        parameter: such as the speed; everything else may move as the problem says.
-        value: the nearest at which such a design was found; nan where none was found.
-        most: whether it is a greatest value, and not a least one.
-        looked: from where to where it was looked for.
-        design: every parameter of that design; empty where none was found.
-    """
-
-    parameter: str
-    value: float
-    most: bool
-    looked: tuple[float, float]
-    design: Table[float] = field(default_factory=Table)
-
-    @property
-    def found(self) -> bool:
-        """Whether there is such a value."""
-        return math.isfinite(self.value)
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain data for ``json.dumps``; a value that was not found is None."""
-        return plain(self, "parameter value most looked design")
 
 
 @dataclass(frozen=True, repr=False)

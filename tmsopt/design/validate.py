@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from tmsopt.design.advice.names import unknown
+from tmsopt.design.advice.names import example_of, unknown
 from tmsopt.design.cases import Band, points_of
 from tmsopt.design.expression import ExpressionError, UnknownName, parse_comparison, parse_value
 from tmsopt.design.quantities import root_names, spelled_out
@@ -100,7 +100,7 @@ def _name_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
             yield Fault(f"'{name}' is both fixed and free; keep one", ("parameters", name))
     given = tables["parameters"].keys() | problem.scenarios
     if missing := [p.name for p in of.parameters if p.name not in given and p.default is None]:
-        example = f"{missing[0]} = 1.0, or {missing[0]} = {{ min = 0.5, max = 2 }}"
+        example = " or ".join(example_of(of[missing[0]]))
         meant = "".join(f"; {MEANT[name]}" for name in missing if name in MEANT)
         yield Fault(f"missing parameter {', '.join(missing)}; write e.g. {example}{meant}", ("parameters",))
     for name in problem.start:

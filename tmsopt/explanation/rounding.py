@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
@@ -79,7 +80,7 @@ def rounded(solution: Solution, choices: Sequence[tuple[Sequence[str], int]]) ->
         return ()
     problem, m = solution.problem, len(choices)
     units = {n: unit_of(problem, n) for n in problem.free}
-    written = [{n: _decimal(solution.parameters[n], units[n], digits) for n in names} for names, digits in choices]
+    written = [{n: _rounded(solution, n, units[n], digits) for n in names} for names, digits in choices]
     with flint.ctx.workdps(_WORKING):
         nominal = [{**solution.parameters, **{n: _exact(x, units[n]) for n, x in row.items()}} for row in written]
         each = [(k, case.applied(nominal[k])) for k, cases in enumerate(_cases(solution, nominal)) for case in cases]
@@ -157,13 +158,20 @@ def _violations(problem: Problem, values: Values, whose: NDArray[np.int64], coun
 def _short(solution: Solution, name: str, digits: int) -> bool:
     """Whether a parameter has no more digits than that."""
     value, unit = solution.parameters[name], unit_of(solution.problem, name)
-    there = float(_decimal(value, unit, digits)) * unit.one
+    there = float(_rounded(solution, name, unit, digits)) * unit.one
     return abs(there - value) <= _SAME * abs(value)
 
 
-def _decimal(value: float, unit: Unit, digits: int) -> str:
-    """A number in its reported unit, as a decimal of so many significant digits."""
-    return f"{value / unit.one:#.{digits}g}".removesuffix(".")
+def _rounded(solution: Solution, name: str, unit: Unit, digits: int) -> str:
+    """A parameter in its reported unit, as a decimal of so many significant digits, inwards at an end of its range."""
+    value = solution.parameters[name] / unit.one
+    low, high = (end / unit.one for end in solution.problem.free.get(name, (-math.inf, math.inf)))
+    text = f"{value:#.{digits}g}".removesuffix(".")
+    step = Decimal((0, (1,), int(Decimal(text).as_tuple().exponent)))
+    for beyond, move in ((float(text) - high, -step), (low - float(text), step)):
+        if beyond > FEASIBLE * max(1.0, abs(value)):
+            text = str(Decimal(text) + move)
+    return text
 
 
 def _exact(text: str, unit: Unit) -> flint.arb:

@@ -8,9 +8,10 @@ import numpy as np
 
 from tmsopt.checks.bound import bounded, instant_bound
 from tmsopt.checks.recheck import Checked, recheck
+from tmsopt.design.advice.remedies import Relaxation
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
-from tmsopt.design.solution import OtherBranch, Relaxation, Starts
+from tmsopt.design.solution import OtherBranch, Starts
 from tmsopt.formulation.formulate import abscissa, design_of, matching
 from tmsopt.formulation.ipopt import Point
 from tmsopt.formulation.nlp import NLP
@@ -108,7 +109,7 @@ def found(
     if counted.kind == "over-determined" and checked.violations:
         status = "infeasible"
         surplus = f"{counted.conditions} conditions for {counted.free} free parameters"
-        notes += (f"{surplus}, and they are not consistent; free {-counted.count} more, or drop a constraint",)
+        notes += (f"{surplus}, and they are not consistent{_fewer_conditions(problem, -counted.count)}",)
     active, looked = _active(problem, nlp, point), tuple(nlp.cases if cases is None else cases)
     branches: tuple[OtherBranch, ...] = ()
     if counted.kind == "square":
@@ -122,6 +123,13 @@ def converged(trial: Trial) -> bool:
     ended = trial.candidate.run.status in _CONVERGED or trial.point.stationarity <= _STATIONARY
     exact = trial.point.violation <= _EXACT or trial.point.stationarity <= _POLISHED
     return ended and exact  # its word is one on rows as it scales them
+
+
+def _fewer_conditions(problem: Problem, short: int) -> str:
+    """How there could be as many free parameters as conditions, where there is something to free or to drop."""
+    ways = [f"free {short} more"] if len(problem.fixed) >= short else []
+    ways += ["drop a constraint"] if any(c.equality for c in problem.conditions.values()) else []
+    return f"; {', or '.join(ways)}" if ways else ""
 
 
 def mass_advice(problem: Problem) -> str:

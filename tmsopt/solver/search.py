@@ -9,24 +9,25 @@ from itertools import islice
 import numpy as np
 
 from tmsopt.checks.bound import bounded
-from tmsopt.checks.recheck import FEASIBLE
+from tmsopt.checks.recheck import FEASIBLE, recheck
 from tmsopt.checks.worst_case import Worst, worst_cases
 from tmsopt.design.cases import Case
-from tmsopt.design.dependence import WORSE
+from tmsopt.design.dependence import STABLE, WORSE
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
 from tmsopt.design.solution import Starts
 from tmsopt.design.verdict.meetings import nearest_crossing
 from tmsopt.formulation.formulate import design_of, formulate, matching, middle
 from tmsopt.formulation.nlp import NLP
+from tmsopt.formulation.options import Options
 from tmsopt.formulation.starts import designs
 from tmsopt.progress import begin
 from tmsopt.records import Table
 from tmsopt.solver.multistart import Runner, distinct, exceptional, further, same, search
-from tmsopt.solver.needs import irreducible
-from tmsopt.solver.outcome import Finding, Trial, ahead, counted, found, mass_advice, survivor
+from tmsopt.solver.outcome import Finding, Trial, ahead, better, counted, found, mass_advice, survivor
 from tmsopt.solver.referee import endless, held, ideal, outdone, refereed
-from tmsopt.solver.relaxation import relax
+from tmsopt.solver.remedies.changes import relax
+from tmsopt.solver.remedies.needs import irreducible, steady
 from tmsopt.solver.sample import NARROW, Sampler
 from tmsopt.solver.tolerant import climbed, promising
 from tmsopt.solver.workspace import Candidate, Workspace, workspace
@@ -35,8 +36,8 @@ _ROUNDS, _FAR_ROUNDS = 12, 40
 """Times that cases are added; each time the worst one between them shrinks to its square, roughly."""
 
 _LEADERS = 3  # optima followed when cases are added: a better one may do worse between the old cases
-_STABLE = "every root left of the axis"  # the name of a constraint
 _HOPEFUL = 16  # starts for an exceptional point where the nearest one is a crossing
+_SETTLED = 6  # starts of a problem with limits moved
 _FEWER = 8  # starts for positive real roots where the others have led somewhere
 _NEARER = 1e-7  # share of the radius
 _BESIDE = 1e-6  # of the box: designs closer than that are one; what IPOPT leaves at a multiple root is farther off
@@ -89,8 +90,8 @@ def explore(work: Workspace, insist: bool = True) -> Explored:
     if standing.trial is not None and work.sampler and wanting and not work.never_stable:
         others = _left_of_the_axis(work, nlp, len(candidates))
         other, every = survivor(work, nlp, others), [*standing.candidates, *others]
-        better = other is not None and ahead(work, other, standing.trial)
-        standing = refereed(work, nlp, every, other) if better else replace(standing, candidates=every)
+        ahead_of = other is not None and ahead(work, other, standing.trial)
+        standing = refereed(work, nlp, every, other) if ahead_of else replace(standing, candidates=every)
     nlp, candidates, trial = standing.nlp, standing.candidates, standing.trial
     starts = counted(candidates, trial.candidate.objective if trial else math.nan)
     if standing.held is not None:
@@ -127,7 +128,7 @@ def _from(work: Workspace, nlp: NLP, designs: Sequence[Mapping[str, float]]) -> 
 
 def _left_of_the_axis(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
     """Where starts end from designs sought for their stability alone; all starts are spent where there is any such."""
-    limits = {**work.part.constraints, _STABLE: "abscissa <= 0"}
+    limits = {**work.part.constraints, STABLE: "abscissa <= 0"}
     asked = replace(work.part, minimize="abscissa", maximize=None, constraints=limits)
     seed = work.options.seed + 1
     sampler, run = Sampler(asked, seed), Runner(work, nlp)
@@ -156,7 +157,8 @@ def without_any(work: Workspace, tried: int) -> Finding:
     if crossed := next((c for _, c in work.met if c.crossing), None):
         return _crossing(work, work.design_at(crossed.run.x), tried, nlp)
     begin(work.options.progress, "searching for the least that limits must give", "start")
-    relaxation = relax(work, partial(irreducible, reached=partial(_reached, work)))
+    again = partial(answered, asked=problem)
+    relaxation = relax(work, partial(irreducible, reached=partial(_reached, work)), again)
     free = relaxation.parameters if relaxation else middle(problem)
     design = {n: min(max(free[n], lo), hi) for n, (lo, hi) in problem.free.items()}
     parameters = problem.ordered(design)
@@ -186,6 +188,27 @@ def _crossing(work: Workspace, design: Mapping[str, float], tried: int, nlp: NLP
     checked = work.recheck(parameters, cases)
     note = f"of {tried} starts, none ended at an exceptional point: roots meet with more than one eigenvector"
     return Finding(parameters, checked, "not_converged", {}, Starts(tried), nlp.formulation, cases, notes=(note,))
+
+
+def answered(problem: Problem, options: Options, asked: Problem) -> bool:
+    """Whether a problem, solved again, has an optimum: a stable one where the one that was `asked` wants that.
+
+    As many starts are enough as a search takes to settle, for none that follow make an optimum worse.
+    """
+    parts = workspace(problem, options).parts()
+    best: Finding | None = None
+    for part in parts if not all(part.sample and part.sample.far_off for part in parts) else ():
+        finding = None if problem.cases else _settled(part)
+        finding = finding if finding and finding.status == "optimal" else explore(part).finding
+        best = finding if finding and (best is None or better(problem, finding, best)) else best
+    if best is None or best.status != "optimal":
+        return False
+    return not recheck(steady(problem, asked), best.parameters, best.cases).violations
+
+
+def _settled(part: Workspace) -> Finding | None:
+    nlp = part.formulate(())
+    return found(part, nlp, survivor(part, nlp, search(part, nlp, _SETTLED)), Starts())
 
 
 def _reached(work: Workspace, names: Sequence[str]) -> tuple[Mapping[str, float] | None, bool]:

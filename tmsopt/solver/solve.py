@@ -7,11 +7,12 @@ from dataclasses import replace
 from functools import partial
 from typing import Unpack
 
-from tmsopt.checks.bound import instant_bound
 from tmsopt.checks.digits import certified
+from tmsopt.checks.exclusion import known_bound
 from tmsopt.checks.recheck import Checked, recheck
 from tmsopt.checks.stored import held, missed_note
 from tmsopt.checks.worst_case import cover
+from tmsopt.design.advice.senses import sense_notes
 from tmsopt.design.files import Given, question_of
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.quantities import ANGULAR_FREQUENCY
@@ -20,7 +21,6 @@ from tmsopt.design.unit_system import unit_at, unit_of
 from tmsopt.design.verdict.meetings import every_meeting
 from tmsopt.design.verdict.stability import stability
 from tmsopt.design.verdict.status import NotSolved
-from tmsopt.errors import Fault, InputError, is_number, short, suggest
 from tmsopt.formulation.formulate import design_of
 from tmsopt.formulation.nlp import objective_size
 from tmsopt.formulation.options import DEFAULTS, AskedOfSolve, Options, options_of, taking
@@ -29,10 +29,10 @@ from tmsopt.models.told import beyond_axis, meant, name_told
 from tmsopt.progress import Listener, begin, heard
 from tmsopt.records import Table
 from tmsopt.solver.multistart import rank, same
-from tmsopt.solver.needs import with_need
 from tmsopt.solver.outcome import UNCLEAR, Finding, better, counted, evaluated, mass_advice, survivor
-from tmsopt.solver.search import Explored, evaluated_cases, explore, without_any
-from tmsopt.solver.workspace import Family, Workspace, workspace
+from tmsopt.solver.remedies.needs import with_need
+from tmsopt.solver.search import Explored, answered, evaluated_cases, explore, without_any
+from tmsopt.solver.workspace import Family, Workspace, check_near, workspace
 
 UNSTABLE = "no stable design was found that meets the other limits; this is the least unstable one"
 """Of a design that is not stable though a limit asks for it."""
@@ -100,7 +100,7 @@ def solved(
     interrupted = False
     if problem.free:
         if options.near:
-            _check_near(problem, options.near)
+            check_near(problem, options.near)
             near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items() if n in options.near}
             options = replace(options, near=near)
         work = workspace(problem, options, family, beside, blind)
@@ -120,7 +120,7 @@ def solved(
             finding, interrupted = so_far, True
         looked = sum(part.sampler.count for part in parts if part.sampler)
         finding = replace(finding, starts=replace(finding.starts, looked=looked))
-        notes = _sides_note(problem, explored, finding)
+        notes = (*_sides_note(problem, explored, finding), *sense_notes(problem))
         values = _side_values(explored)
     else:
         finding = evaluated(problem, evaluated_cases(problem, problem.ordered({})))
@@ -129,7 +129,10 @@ def solved(
     if interrupted or not options.stability or options.near:  # which keeps to its side of the box
         return solution
     try:
-        return with_need(_with_stability(solution, options, family, began), options)
+        judged = _with_stability(solution, options, family, began)
+        needy, missed = with_need(judged, options, partial(answered, asked=problem))
+        words = "a search for the least speed found the stable design from which this one was reached"
+        return _led(needy, missed, words, options, family) if missed else needy
     except KeyboardInterrupt:
         if not options.interruptible:
             raise
@@ -204,12 +207,8 @@ def _with_stability(solution: Solution, options: Options, family: Family | None,
     begin(options.progress, "looking for a stable design", "s")
     asked = any_stable(problem, options.stability, solution.parameters, options.progress)
     if asked.design is not None:
-        few = replace(options, starts=min(options.starts, _NEAR), stability=0.0, alone=False, interruptible=False)
-        found = solved(problem, replace(few, near=asked.design), family)
-        gain = problem.sign * (solution.value - found.value)
-        if found.status == "optimal" and (solution.status != "optimal" or gain > 0):
-            words = "branch and bound found the stable design from which this one was reached"
-            solution = replace(found, notes=(*found.notes, words))
+        words = "branch and bound found the stable design from which this one was reached"
+        solution = _led(solution, asked.design, words, options, family)
     elif asked.any is False:
         solution = replace(solution, notes=(*solution.notes, f"that no design is stable is proved {asked.proof}"))
     if asked.failed:
@@ -219,13 +218,16 @@ def _with_stability(solution: Solution, options: Options, family: Family | None,
     return replace(solution, stable_elsewhere=asked.any, seconds=time.perf_counter() - began)
 
 
-def _check_near(problem: Problem, near: Mapping[str, float]) -> None:
-    names = problem.parameter_set.names
-    faults = [Fault(f"unknown parameter '{n}'; {suggest(str(n), names)}", ("near",)) for n in near if n not in names]
-    wrong = (n for n, value in near.items() if not is_number(value))
-    faults += [Fault(f"found {short(near[n])}; accepted: a finite number", ("near", n)) for n in wrong]
-    if faults:
-        raise InputError(faults)
+def _led(
+    solution: Solution, design: Mapping[str, float], words: str, options: Options, family: Family | None
+) -> Solution:  # fmt: skip
+    """Where a design leads that the search has missed, if that is better."""
+    problem = solution.problem
+    few = replace(options, starts=min(options.starts, _NEAR), stability=0.0, alone=False, interruptible=False)
+    found = solved(problem, replace(few, near=design), family)
+    gain = problem.sign * (solution.value - found.value)
+    better = found.status == "optimal" and (solution.status != "optimal" or gain > 0)
+    return replace(found, notes=(*found.notes, words)) if better else solution
 
 
 def _promising(parts: Sequence[Workspace], options: Options) -> Sequence[Workspace]:
@@ -304,7 +306,7 @@ def _assembled(
         active=Table(finding.active),
         violations=checked.amounts,
         missed=Table(lost),
-        bound=instant_bound(problem, numbers.value) if optimal and bound else Bound(),
+        bound=known_bound(problem, finding.status, numbers.value) if bound else Bound(),
         starts=finding.starts,
         seconds=time.perf_counter() - began,
         quantities=numbers.quantities,

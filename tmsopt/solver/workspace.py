@@ -16,6 +16,7 @@ from tmsopt.design.dependence import demands_heavy_damping, overclaims, tempts
 from tmsopt.design.limit import limit_of
 from tmsopt.design.problem import Freedom, Problem, freedom
 from tmsopt.design.verdict.meetings import is_crossing
+from tmsopt.errors import Fault, InputError, is_number, short, suggest
 from tmsopt.formulation.formulate import LIMIT, design_of, formulate, middle
 from tmsopt.formulation.ipopt import Point, Run, ipopt, polisher
 from tmsopt.formulation.nlp import NLP, objective_unit, scale_of, units_of
@@ -299,3 +300,17 @@ def _pieced(problem: Problem) -> list[str]:
         for name in sorted(asked):
             values[name]
     return sorted(found)
+
+
+def check_near(problem: Problem, near: Mapping[str, float]) -> None:
+    """Refuse a design to start near that names no parameters, or has no numbers.
+
+    Raises:
+        InputError: with everything that is wrong.
+    """
+    names = problem.parameter_set.names
+    faults = [Fault(f"unknown parameter '{n}'; {suggest(str(n), names)}", ("near",)) for n in near if n not in names]
+    wrong = (n for n, value in near.items() if not is_number(value))
+    faults += [Fault(f"found {short(near[n])}; accepted: a finite number", ("near", n)) for n in wrong]
+    if faults:
+        raise InputError(faults)

@@ -153,8 +153,8 @@ class _VaryReader:
                 self.faults.append(Fault(message, (*self.key, end)))
         for end in accepted[:-1]:
             if end not in spec:
-                example = f"{self.name} = {_AXIS if points else _RANGE}"
-                self.faults.append(Fault(f"missing {end} of {self.name}; write e.g. {example}", self.key))
+                ends = "min = …, max = …, points = 10" if points else "min = …, max = …"
+                self.faults.append(Fault(f"missing {end} of {self.name}; write {self.name} = {{ {ends} }}", self.key))
         low, high = (self._number(spec.get(end, 0.0), (*self.key, end)) for end in ("min", "max"))
         log, count = spec.get("log", False), spec.get("points", 2)
         if not isinstance(log, bool):

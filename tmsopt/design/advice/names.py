@@ -6,10 +6,12 @@ from operator import itemgetter
 
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, NO_RADIUS, ROOT_QUANTITIES, root_names
 from tmsopt.errors import nearest, suggest
-from tmsopt.models import Model, Parameter, ParameterSet, Quantity
+from tmsopt.models import MODELS, Model, Parameter, ParameterSet, Quantity
 from tmsopt.models.told import public_names
 
 _NEAR = 0.7  # of a misspelt word; what is less alike is looked for among the meanings first
+
+_USUAL = ((1.0, 0.5, 2.0), (-1.0, -2.0, -0.5), (0.5, 0.2, 1.0))  # a value with a range about it, the first that fits
 
 _SENSE = "minimize or maximize"
 _KEYS = {
@@ -51,6 +53,8 @@ def unknown(name: str, model: Model, of: ParameterSet, accepted: Iterable[str] |
         return model.absent[name]
     if name == "s" and accepted is None:
         return f"s is the eigenvalue: write abscissa for the largest Re s, {ANGULAR_FREQUENCY} for the largest |Im s|"
+    if meaning := _elsewhere(name, model):
+        return meaning
     known = vocabulary(model, of)
     names = list(known if accepted is None else accepted)
     if not nearest(name.lower(), [n.lower() for n in names], _NEAR):
@@ -60,6 +64,22 @@ def unknown(name: str, model: Model, of: ParameterSet, accepted: Iterable[str] |
             if len(words) > 3 and (words in meaning or words.replace(" ", "") in meaning.replace(" ", "")):
                 return f"write {n} ({known[n].meaning}); accepted: {' '.join(names)}"
     return suggest(name, names)
+
+
+def _elsewhere(name: str, model: Model) -> str:
+    """What to write for a name that another bicycle knows."""
+    for other in MODELS.values() if model.name in MODELS else ():
+        known = {p.name: p.meaning for s in other.sets for p in s.parameters}
+        known |= {q.name: q.meaning for q in (*other.quantities, *(q for s in other.sets for q in s.quantities))}
+        if other.name != model.name and name in known:
+            return f'model = "{other.name}" has it ({known[name]}), {model.name} has not'
+    return ""
+
+
+def example_of(parameter: Parameter) -> tuple[str, str]:
+    """A value of a parameter, and a range, as a file would write them: such as the parameter may have."""
+    value, low, high = next(u for u in _USUAL if all(x in parameter.range for x in u))
+    return f"{parameter.name} = {value}", f"{parameter.name} = {{ min = {low:g}, max = {high:g} }}"
 
 
 def unknown_key(key: str, accepted: Mapping[str, object], section: str = "") -> str:

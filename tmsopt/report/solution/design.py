@@ -196,9 +196,13 @@ def _motion(solution: Solution, found: Findings) -> list[str]:
 
 def _more(solution: Solution, found: Findings) -> str:
     """How to see more, and the commands that have something to say of the same file."""
-    speeds = ["speeds"] if found.stable is not None else []
-    others = ["prove", *(["compare"] if solution.problem.model is tms else []), *speeds]
-    return f"more: --full; then tmsopt {', '.join([*others, 'chart', 'trace'])} with the same file"
+    problem, solved = solution.problem, solution.status == "optimal"
+    commands = {
+        "prove": solved, "compare": problem.model is tms, "speeds": found.stable is not None,
+        "chart": len(problem.free) in (2, 3), "trace": bool(problem.locate) and solution.freedom.count == 1,
+    }  # fmt: skip
+    named = ", ".join(name for name, answers in commands.items() if answers)
+    return f"more: --full; then tmsopt {named} with the same file" if named else "more: --full"
 
 
 def _stored(solution: Solution) -> Iterator[str]:

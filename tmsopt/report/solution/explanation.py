@@ -12,8 +12,8 @@ from tmsopt.explanation.rounding import ALONE, Rounded
 from tmsopt.report.solution.rows import frequency_of
 from tmsopt.report.text import columns, number
 
-_SHARE, _LIMIT, _NIL = 0.05, 0.01, 1e-9
-"""Of decay and objective, and of the sizes of limits: what rounding may cost; what is nothing."""
+_SHARE, _NIL = 0.05, 1e-9
+"""Of decay and objective: what rounding may cost; what is nothing."""
 _MULTIPLIERS = "what it costs, per unit, to change "
 _ROUNDING, _ROUNDED = 1e-16, 1e-13
 _UNRESOLVED = (
@@ -48,7 +48,7 @@ def explained_lines(explanation: Explanation) -> list[str]:
 def rounding_line(explanation: Explanation) -> str:
     """In one line: the fewest digits that keep what was asked, what fewer cost, and the parameter that needs the most.
 
-    Kept is what is stable as the design was, within its limits to their 100th, and within 5 % in decay and objective.
+    Kept is what is stable as the design was, within all its limits, and within 5 % in decay and objective.
 
     Example:
         >>> print(tmsopt.report.rounding_line(tmsopt.explain("problems/ep4.toml")))
@@ -65,7 +65,7 @@ def rounding_line(explanation: Explanation) -> str:
     three = next((row for row in rows if row.digits == ALONE), None)
     parts = []
     if stable and three and three.realised < 0 and (enough is None or enough.digits > ALONE):
-        parts.append(f"{ALONE} digits {_lose(three, explanation)}")
+        parts.append(f"{ALONE} digits {_cost(three, explanation)}")
     if stable and three and not three.realised < 0:
         alone = explanation.rounding.get(explanation.worst)
         worst = f" ({explanation.worst} alone: {alone.written[explanation.worst]})" if alone else ""
@@ -73,17 +73,21 @@ def rounding_line(explanation: Explanation) -> str:
     if enough:
         parts.append(f"{enough.digits} digits {_keep(enough, explanation)}")
     else:
-        parts.append(f"{rows[-1].digits} digits {_lose(rows[-1], explanation)}")
+        parts.append(f"{rows[-1].digits} digits {_cost(rows[-1], explanation)}")
     told = "make it unstable" in parts[0]
     needs = f"; {explanation.worst} needs the most" if explanation.worst and not told else ""
     return f"{'; '.join(parts)}{needs}"
 
 
 def _kept(row: Rounded, explanation: Explanation) -> bool:
+    return _near(row, explanation) and not row.violations
+
+
+def _near(row: Rounded, explanation: Explanation) -> bool:
+    """Whether decay and objective are about what they were."""
     good = row.loss <= max(_SHARE * abs(explanation.abscissa), _NIL)
     off = abs(row.objective - explanation.value)  # nan where none was asked, or it takes a search
-    near = not off > max(_SHARE * abs(explanation.value), _NIL)
-    return good and near and all(v <= _LIMIT for v in row.violations.values())
+    return good and not off > max(_SHARE * abs(explanation.value), _NIL)
 
 
 def _keep(row: Rounded, explanation: Explanation) -> str:
@@ -93,16 +97,15 @@ def _keep(row: Rounded, explanation: Explanation) -> str:
     return f"keep {share} % of the decay"
 
 
-def _lose(row: Rounded, explanation: Explanation) -> str:
-    """What the most digits that were tried cost."""
+def _cost(row: Rounded, explanation: Explanation) -> str:
+    """What digits that are not enough do."""
     if explanation.abscissa < -_NIL and row.realised >= 0:
         return "make it unstable"
-    violated = [name for name, v in row.violations.items() if v > _LIMIT]
-    if violated:
-        return f"violate {', '.join(violated)}"
-    if explanation.abscissa >= -_NIL:
-        return f"move the rightmost root by {row.loss:.2g}"
-    return f"lose {100 * row.loss / -explanation.abscissa:.2g} % of the decay"
+    if _near(row, explanation) or explanation.abscissa >= -_NIL:
+        what = _keep(row, explanation)
+    else:
+        what = f"lose {100 * row.loss / -explanation.abscissa:.2g} % of the decay"
+    return f"{what} but violate {', '.join(row.violations)}" if row.violations else what
 
 
 def optimality_lines(optimality: Optimality) -> list[str]:

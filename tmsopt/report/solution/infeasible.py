@@ -2,15 +2,18 @@
 
 import math
 import re
+from collections.abc import Collection
+from dataclasses import replace
 
-from tmsopt.design import Unit, unit_of
+from tmsopt.checks.exclusion import known_bound
+from tmsopt.design import limit_of, unit_of
+from tmsopt.design.advice.remedies import Need, Relaxation
 from tmsopt.design.problem import Problem
-from tmsopt.design.solution import Need, Relaxation, Solution
-from tmsopt.design.unit_system import limit_text
+from tmsopt.design.solution import Solution
+from tmsopt.design.unit_system import dimension_of, limit_text
+from tmsopt.records import Table
 
 _SIGN = re.compile(r"<=|>=|==")
-_DIGITS = 5
-_LEFT = 1e-11  # of a limit: what rounding, also that of amounts upwards, leaves of it
 _OTHER = {"a0": "a mass matrix that is not singular (a0 = 0)", "coefficients": "coefficients that have values"}
 
 
@@ -35,12 +38,12 @@ def infeasible_lines(solution: Solution, full: bool = False) -> list[str]:
         return lines
     names = relaxation.conflict or tuple(relaxation.amounts)
     if len(names) > 1:
-        told = "" if relaxation.irreducible else ", as far as a search tells"
+        told = "" if relaxation.irreducible and _proved(solution, names) else ", as far as a search tells"
         lines.append(f"in conflict{told}: {', '.join(_limit(problem, n) for n in names)}")
-    changes = " and ".join(_changed(problem, n, amount) for n, amount in relaxation.amounts.items())
-    lines.append(f"smallest change found: {changes}")
-    single = {n: a for n, a in relaxation.alone.items() if relaxation.amounts.keys() != {n}}
-    return lines + [f"  or alone: {_changed(problem, n, amount)}" for n, amount in single.items() if full]
+    changes = [" and ".join(_changed(problem, *one) for one in found.items()) for found in relaxation.remedies]
+    if not changes:
+        return lines if need and need.found else [*lines, "no change of limits was found that helps"]
+    return [*lines, f"smallest change found: {changes[0]}", *(f"  or alone: {text}" for text in changes[1:] if full)]
 
 
 def _sentence(solution: Solution) -> str:
@@ -62,21 +65,28 @@ def _conflict(solution: Solution, relaxation: Relaxation) -> str:
     """What one limit needs that another does not allow, or how near to it a design comes."""
     problem = solution.problem
     asked = [n for n in relaxation.conflict if not _end(problem, n)] or list(solution.violations)
-    ends = {n: a for n, a in relaxation.amounts.items() if _end(problem, n)}
-    if len(ends) < len(relaxation.amounts):  # or one that would do alone
-        ends = dict([(n, a) for n, a in relaxation.alone.items() if _end(problem, n)][:1])
+    remedies = (found for found in relaxation.remedies if all(_end(problem, n) for n in found))
+    ends = next(remedies, Table[str]())
     listed = _listed([_limit(problem, n) for n in asked])
     if ends:
-        needs = _listed([_needed(problem, n, a) for n, a in ends.items()])
+        needs = _listed([_needed(problem, *one) for one in ends.items()])
         others = " with the other limits" if problem.constraints.keys() - set(asked) else ""
         return f"{listed}{others} need{'s' if len(asked) == 1 else ''} {needs}"
     roots = f" with {problem.pattern.name}" if problem.pattern and problem.pattern.name not in asked else ""
     nearest = _nearest(solution, asked[0]) if len(asked) == 1 else ""
-    if not solution.bound.proven or problem.constraints.keys() - set(asked):  # what is proved is about all limits
+    if not _proved(solution, asked):
         both = {1: "", 2: "both "}.get(len(asked), "all of ")
         return f"no design{roots} was found that meets {both}{listed}{nearest}"
     all_of_them = f"cannot {'both' if len(asked) == 2 else 'all'} be met" if len(asked) > 1 else "is out of reach"
     return f"{listed} {all_of_them}{roots}{nearest}"
+
+
+def _proved(solution: Solution, names: Collection[str]) -> bool:
+    """Whether it is proved that no design meets these limits: all there are, or some that intervals exclude."""
+    problem = solution.problem
+    kept = {name: text for name, text in problem.constraints.items() if name in names}
+    some = kept.keys() < problem.constraints.keys()
+    return solution.bound.proven and not (some and not known_bound(replace(problem, constraints=kept)).proven)
 
 
 def _speed(solution: Solution, need: Need) -> str:
@@ -94,20 +104,18 @@ def _speed(solution: Solution, need: Need) -> str:
         low, high = need.looked
         return f"{what} {exists} {at}, nor was one found for {name} from {unit.number(low)} to {unit.show(high)}"
     least = "greatest" if need.most else "least"
-    return f"{what} {exists} {at}: the {least} {name} found is {_shown(unit, need.value, not need.most)}"
+    return f"{what} {exists} {at}: the {least} {name} found is {unit.show(need.shown)}"
 
 
 def _unstable(solution: Solution) -> bool:
     return solution.stable is False and solution.any_stable is not True
 
 
-def _needed(problem: Problem, bound: str, amount: float) -> str:
+def _needed(problem: Problem, bound: str, new: str) -> str:
     """What is needed of a parameter that its range does not allow."""
     name, end = bound.rsplit(".", 1)
-    old, unit = problem.free[name][end == "max"], unit_of(problem, bound)
-    new = _shown(unit, old + (amount if end == "max" else -amount), end == "max")
     word, other = ("at least", "at most") if end == "max" else ("at most", "at least")
-    return f"{name} {word} {new} ({other} {unit.show(old)} is allowed)"
+    return f"{name} {word} {new} ({other} {unit_of(problem, bound).show(problem.free[name][end == 'max'])} is allowed)"
 
 
 def _nearest(solution: Solution, name: str) -> str:
@@ -130,23 +138,20 @@ def _nearest(solution: Solution, name: str) -> str:
     return ""
 
 
-def _changed(problem: Problem, name: str, amount: float) -> str:
-    """A limit as it would have to be, rounded so that it suffices."""
-    if not math.isfinite(amount):
-        return f"another {_limit(problem, name)}, which has no value where the search ended"
+def _changed(problem: Problem, name: str, new: str) -> str:
+    """A limit as it is to be written, and the number that it has now."""
     if _end(problem, name):
         parameter, end = name.rsplit(".", 1)
-        old, unit = problem.free[parameter][end == "max"], unit_of(problem, name)
-        needed = _shown(unit, old + (amount if end == "max" else -amount), end == "max")
-        return f"{parameter} {'up to' if end == 'max' else 'down to'} {needed} instead of {unit.number(old)}"
-    text = problem.constraints.get(name, "")
-    sides, sign = _SIGN.split(text), "".join(_SIGN.findall(text))
-    limit = _number(sides[-1]) if len(sides) == 2 else None
-    if limit is None:
-        return f"{_limit(problem, name)} missed by {_shown(unit_of(problem, name), abs(amount), True)}"
-    unit, more = unit_of(problem, name), -amount if sign == ">=" else amount
-    new = _shown(unit, limit + more, more > 0, abs(limit))
-    return f"{sides[0].strip()} {sign} {new} instead of {unit.number(limit)} ({name})"
+        old = unit_of(problem, name).number(problem.free[parameter][end == "max"])
+        return f"{parameter} {'up' if end == 'max' else 'down'} to {new} instead of {old}"
+    limit = limit_of(problem.constraints[name])
+    return f"{new}{'' if limit is None else f' instead of {limit:.5g}'} ({_in_unit(problem, name)})"
+
+
+def _in_unit(problem: Problem, name: str) -> str:
+    """The name of a constraint, with the unit that numbers in it are in: its own, whatever was typed for parameters."""
+    unit = dimension_of(problem, name).unit
+    return name if unit == "1" else f"{name}, in {unit}"
 
 
 def _limit(problem: Problem, name: str) -> str:
@@ -167,20 +172,6 @@ def _number(text: str) -> float | None:
         return float(text)
     except ValueError:
         return None
-
-
-def _shown(unit: Unit, value: float, up: bool, size: float = 0.0) -> str:
-    """A value, or 0 where it is less than what is left of numbers of a size that cancel."""
-    value = 0.0 if abs(value) <= _LEFT * size else value
-    return unit.show(_outwards(value / unit.one, up) * unit.one)
-
-
-def _outwards(x: float, up: bool) -> float:
-    """Rounded up, or down, to the digits that are shown."""
-    if not x or not math.isfinite(x):
-        return 0.0
-    step = 10.0 ** (math.floor(math.log10(abs(x))) - _DIGITS + 1)
-    return (math.ceil if up else math.floor)(round(x / step, 6)) * step
 
 
 def _listed(names: list[str]) -> str:

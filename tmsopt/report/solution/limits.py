@@ -18,15 +18,16 @@ def bound_lines(solution: Solution) -> list[str]:
     floating = f"a floating-point proof, feasibility tolerance {bound.tolerance:.0e}"
     kind = floating if bound.tolerance else "a proof without a tolerance"
     if solution.status == "infeasible":
-        return [f"proved: no design in the box satisfies all constraints ({search}); {kind}"] if bound.proven else []
+        how = f"{search}); {kind}" if bound.solver else "interval arithmetic)"
+        return [f"proved: no design in the box satisfies all constraints ({how}"] if bound.proven else []
     if not math.isfinite(bound.value):
-        return [f"bound: none found in time ({search})"] if bound.solver else []
+        return [f"bound: none found in time ({search})"] if bound.seconds else []
     side = "above" if solution.problem.sense == "maximize" else "below"
     which = f"{none_of(solution.problem)} is {side} {number(bound.value)}"
     lines = [f"bound: {which} ({bound.method}); gap {bound.gap:.1e}"]
     if bound.method == bound.solver.lower():
         lines.append(f"       {search}; {kind}")
-    elif bound.solver:
+    elif bound.seconds:
         lines.append(f"       {search} found none better in time")
     return lines
 
@@ -40,9 +41,9 @@ def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
     unjudged = f"branch and bound does not judge {' or '.join(beyond.values())}" if beyond else ""
     if solution.status == "infeasible":
         known = "that no design is stable; " if solution.any_stable is False else ""
-        looked = "a longer --certify goes on" if bound.solver else "--certify looks for one"
-        unproved = f"{known}none that no design is feasible{_tried(bound)}; {unjudged or looked}"
-        return f"proof: {'no design in the box meets all limits' if bound.proven else unproved}"
+        unproved = f"{known}none that no design is feasible{_tried(bound)}"
+        further = unjudged or _further(bound, "--certify looks for one")
+        return f"proof: {'no design in the box meets all limits' if bound.proven else _joined(unproved, further)}"
     if not problem.free:
         return "proof: nothing is free, so nothing to prove; tmsopt prove proves the roots"
     if not text:
@@ -50,7 +51,8 @@ def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
             return f"proof: none that there is no {problem.locate}"
         left = solution.freedom.count
         among = {1: "a curve", 2: "a surface"}.get(left, f"a family of {left} parameters")
-        more = f"; it is one of {among} of such designs, which tmsopt trace follows" if left > 0 else ""
+        followed = ", which tmsopt trace follows" if left == 1 else ""
+        more = f"; it is one of {among} of such designs{followed}" if left > 0 else ""
         return f"proof: tmsopt prove FILE proves, or refutes, that this design exists{more}"
     unit = unit_of_all(problem, text)
     side = "above" if problem.sense == "maximize" else "below"
@@ -65,13 +67,25 @@ def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
         return f"proof: {none_of(problem)} {better}{by} ({bound.method})"
     if math.isfinite(bound.value):
         known = f"none allowed is {side} {unit.show(bound.value, 6)} ({bound.method})"
-        return f"proof: {known}, {unit.show(bound.gap, 2)} open; {unjudged or '--certify goes on'}"
-    further = "a longer --certify goes on" if bound.solver else "--certify proves it, or finds better"
-    return f"proof: none that this is the best{_tried(bound)}; {unjudged or further}"
+        further = unjudged or _further(bound, "--certify goes on")
+        return _joined(f"proof: {known}, {unit.show(bound.gap, 2)} open{_tried(bound)}", further)
+    further = unjudged or _further(bound, "--certify proves it, or finds better")
+    return _joined(f"proof: none that this is the best{_tried(bound)}", further)
+
+
+def _joined(text: str, advice: str) -> str:
+    return f"{text}; {advice}" if advice else text
+
+
+def _further(bound: Bound, first: str) -> str:
+    """What to ask of branch and bound: twice the time where it ran out; nothing where it could not take the problem."""
+    if not bound.solver:
+        return first
+    return f"--certify {max(2 * math.ceil(bound.seconds), 1)} goes on" if bound.seconds else ""
 
 
 def _tried(bound: Bound) -> str:
-    return f" in {bound.seconds:.0f} s of {bound.solver}" if bound.solver else ""
+    return f" in {bound.seconds:.0f} s of {bound.solver}" if bound.solver and bound.seconds else ""
 
 
 def case_lines(solution: Solution) -> list[str]:

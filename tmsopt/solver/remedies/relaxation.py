@@ -1,4 +1,4 @@
-"""What stands in the way of a problem without an answer: limits in conflict, and the least that frees it."""
+"""The least by which limits of a problem without an answer must be moved for a design that meets them."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -11,9 +11,9 @@ import numpy as np
 
 from tmsopt.checks.recheck import FEASIBLE, excesses
 from tmsopt.checks.worst_case import worst_cases
+from tmsopt.design.advice.remedies import Relaxation
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
-from tmsopt.design.solution import Relaxation
 from tmsopt.formulation.formulate import design_of, formulate
 from tmsopt.formulation.nlp import NLP, Lift
 from tmsopt.formulation.options import Options
@@ -59,39 +59,30 @@ class Limit:
         return max(beyond if self.name.endswith(".max") else -beyond, 0.0)
 
 
+Answered = Callable[[Problem], bool]
+"""Whether a problem is answered where it is solved again; see `search.answered`."""
+
 Named = Callable[[Problem, Relaxation, Sequence[str], Problem, Options], Relaxation]
 """A relaxation with the limits that exclude each other; see `needs.irreducible`."""
 
 
-def relax(work: Workspace, named: Named) -> Relaxation | None:
-    """The least relaxation: of the constraints, or of the box too where these alone cannot help; None if none is found.
-
-    Amounts are added up relative to the limits as written, those of the box in its widths. One limit that can do it
-    alone for less than all together shows that the search for these was caught, and wins; so does a design that was
-    met on the way, of whose conflict no more is known than what it moves.
-    """
-    listed, options = work.problem.cases, work.options
-    problem = replace(work.problem, minimize=None, maximize=None, pareto=())  # what else is asked plays no part
-    widest = _widened(problem, problem.free)
-    for wide, limits in _stages(problem):
-        sides = [workspace(part.part, options) for part in workspace(wide, options).parts()]
-        ended = [_least_covered(side, limits, listed) for side in sides]
-        reached = [(trial, nlp) for trial, nlp in ended if trial is not None]
-        trial, nlp = min(reached, key=lambda found: found[0].point.objective, default=(None, None))
-        met = [] if listed else [found for side in sides for found in islice(_met(work, side, limits), 1)]
-        least, seen = min(met, key=lambda found: found[0], default=(np.inf, None))
-        amounts = _amounts(wide, limits, trial.parameters, nlp.cases) if trial and nlp else {}
-        if seen and (trial is None or least < _total(limits, amounts) * (1 - _TIE)):
-            return named(problem, seen, tuple(seen.amounts), widest, options)
-        if trial is None or nlp is None:
-            continue
-        relaxation = Relaxation(Table(trial.parameters), Table(amounts))
-        likely = dict.fromkeys([*amounts, *_holding(nlp, limits, trial)])
-        relaxation = named(problem, relaxation, tuple(likely), widest, options)
-        wanted = options.alone and len(relaxation.conflict) > 1
-        single = _alone(workspace(problem, options), relaxation.conflict, trial, nlp.cases) if wanted else {}
-        return replace(relaxation, alone=Table(single))
-    return None
+def least_relaxation(
+    work: Workspace, wide: Problem, limits: Sequence[Limit]
+) -> tuple[Relaxation, Trial | None, NLP | None] | tuple[None, None, None]:
+    """The least relaxation in a box, with where it ended; without, for a design that was met on the way."""
+    options, listed = work.options, work.problem.cases
+    sides = [workspace(part.part, options) for part in workspace(wide, options).parts()]
+    ended = [_least_covered(side, limits, listed) for side in sides]
+    reached = [(trial, nlp) for trial, nlp in ended if trial is not None]
+    trial, nlp = min(reached, key=lambda found: found[0].point.objective, default=(None, None))
+    met = [] if listed else [found for side in sides for found in islice(_met(work, side, limits), 1)]
+    least, seen = min(met, key=lambda found: found[0], default=(np.inf, None))
+    amounts = _amounts(wide, limits, trial.parameters, nlp.cases) if trial and nlp else {}
+    if seen and (trial is None or least < _total(limits, amounts) * (1 - _TIE)):
+        return seen, None, None
+    if trial is None or nlp is None:
+        return None, None, None
+    return Relaxation(Table(trial.parameters), Table(amounts)), trial, nlp
 
 
 def _met(work: Workspace, side: Workspace, limits: Sequence[Limit]) -> Iterator[tuple[float, Relaxation]]:
@@ -116,12 +107,12 @@ def _total(limits: Sequence[Limit], amounts: Mapping[str, float]) -> float:
     return sum(abs(amounts.get(limit.name, 0.0)) / limit.scale for limit in limits)
 
 
-def _stages(problem: Problem) -> Iterator[tuple[Problem, list[Limit]]]:
+def stages(problem: Problem) -> Iterator[tuple[Problem, list[Limit]]]:
     """The problem with limits to move: the constraints in its own box, then also the box."""
     constraints = _constraint_limits(problem)
     if constraints:
         yield problem, constraints
-    yield _widened(problem, problem.free), [*constraints, *_bound_limits(problem)]
+    yield widened(problem, problem.free), [*constraints, *_bound_limits(problem)]
 
 
 def _constraint_limits(problem: Problem) -> list[Limit]:
@@ -146,7 +137,7 @@ def _bound_limits(problem: Problem) -> list[Limit]:
     ]
 
 
-def _widened(problem: Problem, names: Collection[str]) -> Problem:
+def widened(problem: Problem, names: Collection[str]) -> Problem:
     """The problem in a larger box, inside what is physical."""
     free = dict(problem.free)
     for name in names:
@@ -162,7 +153,8 @@ def _least_covered(work: Workspace, limits: Sequence[Limit], listed: Sequence[Ca
     """The least relaxation of one part of the box, with cases added until none between them needs more."""
     trial, nlp = _least(work, limits, listed)
     movable = [limit for limit in limits if not limit.parameter]
-    if trial is not None and trial.point.objective > _NOTHING and len(movable) > 1:
+    thorough = work.options.starts >= _TRIED
+    if thorough and trial is not None and trial.point.objective > _NOTHING and len(movable) > 1:
         run, sampler = Runner(work, nlp), _sampler(work)
         leads = {tuple(d.values()): d for limit in movable for d in _leads(work, sampler, limit.name)}
         ended = [run.ended(design, near=True, hopeful=False) for design in leads.values()]
@@ -185,7 +177,7 @@ def _least(
     run = Runner(work, nlp)
     candidates = [] if before is None else [run.ended(before.parameters, near=True)]
     if not any(c.feasible for c in candidates):
-        candidates = _ends(run, _TRIED)
+        candidates = _ends(run, min(_TRIED, work.options.starts))
     trial = survivor(_unlimited(work, limits), nlp, candidates)
     return (trial if trial is not None and not trial.checked.violations else None), nlp
 
@@ -249,7 +241,7 @@ def _amounts(
     }
 
 
-def _holding(nlp: NLP, limits: Sequence[Limit], trial: Trial) -> list[str]:
+def holding(nlp: NLP, limits: Sequence[Limit], trial: Trial) -> list[str]:
     """Limits with a multiplier: were one of them not there, less would do."""
     scales = {limit.name: limit.scale for limit in limits}
     rows = zip(nlp.rows, trial.point.row_multipliers.tolist(), strict=True)
@@ -263,22 +255,22 @@ def _holding(nlp: NLP, limits: Sequence[Limit], trial: Trial) -> list[str]:
     return names
 
 
-def _alone(work: Workspace, conflict: Sequence[str], trial: Trial, cases: Sequence[Case]) -> dict[str, float]:
+def alone(work: Workspace, conflict: Sequence[str], trial: Trial, cases: Sequence[Case]) -> dict[str, float]:
     """How far each limit of a conflict must be moved if nothing else is; those that cannot do it alone are left out."""
     problem = work.problem
     limits = {limit.name: limit for limit in (*_constraint_limits(problem), *_bound_limits(problem))}
     found: dict[str, float] = {}
     for limit in (limits[name] for name in conflict):
-        wide = _widened(problem, [limit.parameter] if limit.parameter else [])
-        widened = workspace(wide, work.options)
-        sampler = _sampler(widened, limit)
-        if not (led := _leads(widened, sampler, limit.name)):
+        wide = widened(problem, [limit.parameter] if limit.parameter else [])
+        side = workspace(wide, work.options)
+        sampler = _sampler(side, limit)
+        if not (led := _leads(side, sampler, limit.name)):
             continue
         nlp = _elastic(wide, cases, [limit])
-        run = Runner(widened, nlp)
+        run = Runner(side, nlp)
         here = {n: min(max(trial.parameters[n], lo), hi) for n, (lo, hi) in wide.free.items()}
         candidates = [run.ended(design, near=True, hopeful=False) for design in (here, *led)]
-        ended = survivor(_unlimited(widened, [limit]), nlp, candidates)
+        ended = survivor(_unlimited(side, [limit]), nlp, candidates)
         if ended is not None and not ended.checked.violations:
             found |= _amounts(wide, [limit], ended.parameters, nlp.cases)
     return found

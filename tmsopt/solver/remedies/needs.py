@@ -3,60 +3,88 @@
 import math
 import time
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 from tmsopt.checks.recheck import recheck
 from tmsopt.checks.worst_case import worst_cases
+from tmsopt.design.advice.remedies import DIGITS, Need, Relaxation, rounded_outwards
+from tmsopt.design.dependence import STABLE, stability_wanted
 from tmsopt.design.problem import Problem
-from tmsopt.design.solution import Need, Relaxation, Solution
+from tmsopt.design.solution import Solution
+from tmsopt.design.unit_system import unit_of
 from tmsopt.formulation.options import Options
 from tmsopt.progress import begin
 from tmsopt.records import Table
 from tmsopt.solver.multistart import search
 from tmsopt.solver.outcome import Trial, survivor
+from tmsopt.solver.remedies.allowance import Spent, within
 from tmsopt.solver.workspace import Workspace, workspace
 
-_STABLE = "every root left of the axis"  # the name of a constraint
 _FASTEST, _TIMES = 10.0, 4.0  # speeds looked through, in √(g w); in the problem's own speed, where that is more
 _STARTS, _SECONDS = 6, 0.5  # what a search for it may cost; after which no other is begun
+_LEAST_DECAY = 1e-6  # of the roots' mean size, of a design that counts as stable
+_AT_END = 1e-6  # relative: a speed so near an end of its range is that end
 _ENDS = "min", "max"
 _ASKED = 16  # sets of limits that are searched for designs at most
 _ANEW = 3  # times that limits in conflict are sought, where whole searches meet them after all
+
+Answered = Callable[[Problem, Options], bool]
+"""Whether a problem is answered where it is solved again; see `search.answered`."""
 
 Reached = Callable[[Sequence[str]], tuple[Mapping[str, float] | None, bool]]
 """A design that meets the constraints of these names, by a search like that of a problem which asks for no others; and
 whether such a search can tell."""
 
 
-def with_need(solution: Solution, options: Options) -> Solution:
-    """The same, with the least speed that a design takes, or the greatest, where the roots stand in the way."""
+def with_need(solution: Solution, options: Options, answered: Answered) -> tuple[Solution, Mapping[str, float] | None]:
+    """The same, with the least speed that a design takes, or the greatest, where the roots stand in the way.
+
+    The problem is solved again at the speed that is shown. A design that was missed in the box comes with it.
+    """
     name, problem = _speed(solution.problem), solution.problem
-    if not name or problem.cases or not problem.free or not _asked(solution):
-        return solution
-    limits = {} if set(problem.asked_of_roots) or problem.pattern else {_STABLE: "abscissa <= 0"}
+    if not name or problem.cases or not problem.free or solution.any_stable or not _asked(solution):
+        return solution, None
+    limits = {} if set(problem.asked_of_roots) or problem.pattern else {STABLE: "abscissa <= 0"}
     few = replace(options, starts=_STARTS, stability=0.0, alone=False, progress=None, near=None)
     began, looked = time.perf_counter(), list[float]()
     begin(options.progress, f"looking for the {name} that it takes")
     for most, ends in _ranges(problem, name):
-        freed = {**problem.free, name: ends}
         asked = replace(
-            problem,
-            fixed={n: x for n, x in problem.fixed.items() if n != name},
-            free={n: freed[n] for n in problem.parameter_set.names if n in freed},
-            constraints={**problem.constraints, **limits},
-            minimize=None if most else name,
-            maximize=name if most else None,
-            start={},
-        )
+            _freed(problem, name, ends), constraints={**problem.constraints, **limits},
+            minimize=None if most else name, maximize=name if most else None,
+        )  # fmt: skip
         looked += ends
         trials = [_best(part) for part in workspace(asked, few).parts()]
         found = [t.parameters for t in trials if t and not t.checked.violations]
         if found:
             design = (max if most else min)(found, key=lambda p: p[name])
-            return replace(solution, need=Need(name, design[name], most, ends, Table(design)))
+            if name in problem.free and math.isclose(design[name], ends[most], rel_tol=_AT_END):
+                return solution, design
+            short = within(options)
+            with suppress(Spent):
+                for shown in _shown(problem, name, design[name], not most):
+                    if answered(_freed(problem, name, (shown, shown)), short):
+                        need = Need(name, design[name], most, ends, Table(design), shown)
+                        return replace(solution, need=need), None
+            return solution, None
         if time.perf_counter() - began > _SECONDS:
             break
-    return replace(solution, need=Need(name, math.nan, False, (min(looked), max(looked)))) if looked else solution
+    beyond = (min(looked), max(looked)) if looked else None
+    return (replace(solution, need=Need(name, math.nan, False, beyond)) if beyond else solution), None
+
+
+def _freed(problem: Problem, name: str, ends: tuple[float, float]) -> Problem:
+    """The problem with another range of a parameter; with a value, where both ends are that."""
+    freed = {**problem.free, name: ends}
+    free = {n: freed[n] for n in problem.parameter_set.names if n in freed}
+    return replace(problem, fixed={n: x for n, x in problem.fixed.items() if n != name}, free=free, start={})
+
+
+def _shown(problem: Problem, name: str, value: float, up: bool) -> Iterator[float]:
+    """A value as it is shown, to fewer and fewer digits, rounded to where a design is."""
+    one = unit_of(problem, name).one
+    yield from dict.fromkeys(rounded_outwards(value / one, up, digits) * one for digits in (DIGITS, 4, 2))
 
 
 def irreducible(
@@ -154,6 +182,12 @@ def _beyond(problem: Problem, wide: Problem, names: Sequence[str]) -> dict[str, 
         lower, upper = ranges[name]
         ranges[name] = (wide.free[name][0], upper) if end == "min" else (lower, wide.free[name][1])
     return {n: ends for n, ends in ranges.items() if ends != problem.free[n]}
+
+
+def steady(problem: Problem, asked: Problem) -> Problem:
+    """The limits of a problem, and that of stability where the one that was asked wants that."""
+    limits = {**problem.constraints, **stability_wanted(asked, _LEAST_DECAY)}
+    return replace(problem, constraints=limits, minimize=None, maximize=None)
 
 
 def _met(problem: Problem, known: Sequence[Mapping[str, float]], options: Options, quick: bool) -> bool | None:
