@@ -64,6 +64,7 @@ SECTIONS = (
     Section("q", "references", f"{_DESIGNS}.references", "the best values of the random designs, kept", long=True),
     Section("r", "known", f"{_SYSTEMS}.known", "the best values of the random systems, kept", long=True),
     Section("s", "hard", f"{_DESIGNS}.hard_designs", "hard problems: is optimal the best known", long=True),
+    Section("v", "narrow", f"{_DESIGNS}.narrow_optima", "narrow basins and plateaus: is optimal the best", long=True),
     Section("u", "statements", "benchmarks.reports.statements", "statements that a closed form can refute", long=True),
     Section("t", "targets", f"{_DESIGNS}.hard_references", "the best values of the hard problems, kept", long=True),
 )

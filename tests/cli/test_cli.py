@@ -65,7 +65,7 @@ def test_json_of_solve_is_the_contract():
     assert data["structure"] == "EP4"
     assert data["bound"]["proven"] is True
     assert data["bound"]["method"] == "omega0"
-    assert set(data["starts"]) == {"tried", "converged", "at_best"}
+    assert set(data["starts"]) == {"tried", "converged", "at_best", "expected_unseen"}
 
 
 def test_table_of_solve_shows_both_scales(capsys):

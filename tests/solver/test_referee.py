@@ -62,7 +62,7 @@ def stuck(monkeypatch: pytest.MonkeyPatch, at: float, feasible: bool = True) -> 
 
 @pytest.mark.parametrize("objective", ["abscissa", "x**4/4 - x**2/2 + x/10 - 1"])
 def test_a_search_in_the_wrong_basin_is_taken_up_again(objective: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(multistart, "starting", lambda work, ended=(): iter([({"x": 0.9}, True)] * 64))
+    monkeypatch.setattr(multistart, "starting", lambda work, ended=(), left=None: iter([({"x": 0.9}, True)] * 64))
     design = tmsopt.solve(problem(WELLS, WIDE, minimize=objective))
     assert design.value == pytest.approx(depth(LEFT), abs=MET)
     assert design.status == "optimal"
@@ -78,7 +78,7 @@ def test_the_neighbourhood_of_an_end_is_looked_at_too(monkeypatch: pytest.Monkey
         return replace(whole, **dict(zip(("refined", "boldest"), kept, strict=True)))
 
     monkeypatch.setattr(sampling.Sampler, "sample", half)
-    monkeypatch.setattr(multistart, "starting", lambda work, ended=(): iter([({"x": 0.9}, True)] * 64))
+    monkeypatch.setattr(multistart, "starting", lambda work, ended=(), left=None: iter([({"x": 0.9}, True)] * 64))
     design = tmsopt.solve(problem(WELLS, WIDE))
     assert design.value == pytest.approx(depth(LEFT), abs=MET)
     assert design.status == "optimal"

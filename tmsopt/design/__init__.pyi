@@ -8,7 +8,8 @@ from .files import Given as Given, load as load, problem_of as problem_of, quest
 from .limit import limit_of as limit_of, with_limit as with_limit
 from .problem import Problem as Problem, freedom as freedom
 from .quantities import NO_RADIUS as NO_RADIUS, ROOT_NAMES as ROOT_NAMES
-from .solution import Bound as Bound, Solution as Solution, Starts as Starts
+from .searches import Starts as Starts, expected_unseen as expected_unseen, is_enough as is_enough
+from .solution import Bound as Bound, Solution as Solution
 from .unit_system import (
     Unit as Unit, amounts_text as amounts_text, rate_of as rate_of, show_at as show_at, unit_at as unit_at,
     unit_of as unit_of, unit_of_all as unit_of_all, units_of as units_of,

@@ -8,6 +8,7 @@ from tmsopt.design.advice.remedies import Need, Relaxation
 from tmsopt.design.cases import Case, Cover
 from tmsopt.design.problem import Freedom, Problem
 from tmsopt.design.quantities import ROOT_NAMES
+from tmsopt.design.searches import Starts
 from tmsopt.design.unit_system import units_of
 from tmsopt.design.verdict.stability import STABLE, MultipleRoot, StabilityVerdict, joined, stability
 from tmsopt.models import inertia_margin
@@ -55,27 +56,6 @@ class Bound:
         """Plain data for ``json.dumps``."""
         search = {"seconds": round(self.seconds, 4), "nodes": self.nodes, "feasibility_tolerance": self.tolerance}
         return plain(self, "value gap proven method") | (search if self.solver else {})
-
-
-@dataclass(frozen=True)
-class Starts:
-    """How many starts were tried, converged to a feasible point, and ended at the best one.
-
-    Attributes:
-        looked: designs of the box that were looked at beside, to know where to start, and whether any is better.
-
-    Example:
-        >>> starts = tmsopt.solve("problems/ep4.toml").starts
-        >>> 1 <= starts.at_best <= starts.converged <= starts.tried
-        True
-
-    More: docs/how_to/report.md
-    """
-
-    tried: int = 0
-    converged: int = 0
-    at_best: int = 0
-    looked: int = 0
 
 
 @dataclass(frozen=True)
@@ -263,7 +243,7 @@ class Solution(Shown):
             **joined(self), **plain(self, "structure"),
             "active": plain(self.active, digits=GAIN_DIGITS), "violations": plain(self.violations, digits=GAIN_DIGITS),
             **({"missed_as_stored": plain(self.missed, digits=GAIN_DIGITS)} if self.missed else {}),
-            **plain(self, "bound"), "starts": plain(self.starts, "tried converged at_best"),
+            **plain(self, "bound"), "starts": plain(self.starts, "tried converged at_best expected_unseen"),
             "looked": self.starts.looked, "seconds": round(self.seconds, 4),
             **plain(self, "quantities dimensionless formulation"),
             "freedom": plain(self.freedom, "free conditions count kind"), **plain(self, "branches notes"),

@@ -15,7 +15,8 @@ from tmsopt.formulation.judgement import Judged
 from tmsopt.formulation.nlp import objective_size
 from tmsopt.formulation.options import DEFAULTS
 from tmsopt.records import Array, Truth
-from tmsopt.solver.sample import Looked, Remembered, Sampler, apart
+from tmsopt.solver.basins import Looked, apart
+from tmsopt.solver.sample import Remembered, Sampler
 from tmsopt.solver.solve import solved
 from tmsopt.solver.workspace import Family, workspace
 

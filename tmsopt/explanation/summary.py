@@ -67,7 +67,7 @@ def _quality(solution: Solution) -> str:
         return f"{none_of(problem)} {faster}{by} (proven)"
     if bound.proven:
         return f"{none_of(problem)} has a {'greater' if problem.sense == 'maximize' else 'lesser'} {text}{by} (proven)"
-    tried = f"the best of {solution.starts.tried} starts, not proven"
+    tried = ", ".join([*solution.starts.sureness, "not proven"])
     if math.isfinite(bound.value):
         side = "above" if problem.sense == "maximize" else "below"
         quantity = "an abscissa" if text == "abscissa" else f"a value of {text}"

@@ -14,6 +14,8 @@ from tmsopt.design.quantities import ARRAY_ROOT_QUANTITIES
 from tmsopt.models import Values
 from tmsopt.records import Array
 
+_FLAT = "damping_ratio"
+
 
 @dataclass(frozen=True)
 class Judged:
@@ -59,14 +61,28 @@ def judged(problem: Problem, columns: Mapping[str, Array]) -> Judged:
     moves = _moves(values, every).all(axis=0)
     worth = None
     if problem.objective is not None:
-        goal = problem.sign * _evaluated(problem.objective, values, every)
+        goal = _graded(problem.objective, problem.sign, values, every)
         worth = np.where(moves, goal.max(axis=0), np.nan)
     beyond = [  # an equality is one of the nominal design
-        c.sign * _evaluated(c, own, shape) if c.equality else (c.sign * _evaluated(c, values, every)).max(axis=0)
+        c.sign * _evaluated(c, own, shape) if c.equality else _graded(c, c.sign, values, every).max(axis=0)
         for c in conditions
     ]
     equal = np.array([c.equality for c in conditions], dtype=bool)
     return Judged(worth, np.where(moves, np.stack(beyond), np.nan) if beyond else np.empty((0, *shape)), equal)
+
+
+def _graded(asked: Expression, sign: float, values: Values, shape: tuple[int, ...]) -> Array:
+    """What is asked, less is better; of the damping ratio alone, where that is −1, with the abscissa added.
+
+    The ratio is −1 wherever a root is real and positive, so that nothing else tells how far a design is from better.
+    """
+    found = sign * _evaluated(asked, values, shape)
+    if asked.names != (_FLAT,):
+        return found
+    at, above = (sign * float(asked({_FLAT: ratio})) for ratio in (-1.0, -0.9))
+    if above >= at or (asked.comparison and at <= 0):
+        return found
+    return np.where(values[_FLAT] <= -1, found + values["abscissa"], found)
 
 
 def values_of(problem: Problem, parameters: Mapping[str, Any], shape: tuple[int, ...]) -> Values:

@@ -39,7 +39,7 @@ class Options:
     """How to solve.
 
     Attributes:
-        starts: starts tried at most; the search ends early when several agree or optimality is proven.
+        starts: starts tried at most; the search ends early when few better optima are expected, or at a proof.
         seed: of the quasi-random starting designs.
         linear_solver: ``mumps`` or ``spral``.
         progress: called with a `tmsopt.Progress` now and then: what is being done, how far it is.

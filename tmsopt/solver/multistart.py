@@ -3,17 +3,17 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, islice, pairwise, zip_longest
+from itertools import islice, pairwise
 
 import numpy as np
 
 from tmsopt.checks.bound import bounded, closed, instant_bound
 from tmsopt.design.problem import Problem, freedom
-from tmsopt.formulation.formulate import abscissa, design_of, matching, middle
+from tmsopt.design.searches import is_enough
+from tmsopt.formulation.formulate import abscissa, design_of, middle
 from tmsopt.formulation.ipopt import Run, ipopt
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import complete, designs, opposite, worth
-from tmsopt.models.told import full_patterns
 from tmsopt.progress import begin
 from tmsopt.records import Array
 from tmsopt.roots import roots
@@ -23,19 +23,17 @@ from tmsopt.solver.workspace import Candidate, Workspace
 _ENOUGH = 12  # starts tried before agreement counts
 _AGREE = 5  # starts at the best value that end the search
 _HOPELESS = 16  # starts without a feasible end after which the least-violating design is looked for instead
-_ENOUGH_SAMPLED, _ENOUGH_NARROW, _AGREE_SAMPLED, _HOPELESS_SAMPLED = 3, 8, 2, 8
-"""The same where the starts come from a sample of the box: so many for each optimum met, more where little is feasible.
-"""
+_ENOUGH_SAMPLED, _ENOUGH_NARROW, _HOPELESS_SAMPLED = 3, 8, 8
+"""The same where the starts come from a sample of the box, which counts; more where little is feasible."""
 
-_HOPELESS_AFAR = 3  # the same where no design of the sample comes near to meeting all limits
-_FEW = 2  # optima met, beyond which there may be many
+HOPELESS_AFAR = 3  # the same where no design of the sample comes near to meeting all limits
+_WAY = np.arange(1, 8) / 8  # from a design to where a start ended, looked at for what is worse
+_LEVEL = 1e-3  # of the difference of its ends: what may be worse on the way for numeric roots
 _MET = 1e-14  # sum of squares of coefficients at which more conditions than parameters are met
 _SAME = 1e-7  # relative difference of objectives that counts as the same
 _FEASIBLE = 1e-6  # of the rows, before polishing; the recheck has the last word
 _SCATTER = 0.01  # of the size of the roots: in double precision those beside a 4-fold one are off by 4e-4
 _RESIDUAL = 1e-11  # of the equations: an n-fold root is off by its n-th root
-_LEADS = 3  # designs with one root, and with one pair, that are started from
-_LEADLESS = 8  # starts that led to none, after which no more are tried
 _RESCUES = 4  # starts from abscissa optima, for a pattern that no start reached
 
 _AGAIN = 4  # times that a start is taken up again where it ended badly
@@ -50,6 +48,7 @@ _SUCCESS = "Solve_Succeeded"
 def search(work: Workspace, nlp: NLP, most: int | None = None) -> list[Candidate]:
     """Where every start ended that was tried, in order; a design near the optimum, where one is given, before all."""
     run, part, options = Runner(work, nlp), work.part, work.options
+    left = [*range(len(work.sample.refined))] if work.sample else []
     starts, candidates = min(options.starts, most or options.starts), list[Candidate]()
     begin(options.progress, "searching", "start")
     if options.near:
@@ -59,12 +58,16 @@ def search(work: Workspace, nlp: NLP, most: int | None = None) -> list[Candidate
     if part.start and len(candidates) < starts:  # the user's own
         candidates.append(run.ended(middle(part), near=True))
     candidates += [run.ended(design, near=True) for design in work.beside if work.holds(design)]
-    for design, near in islice(starting(work, candidates), max(starts - len(candidates), 0)):
+    from_sample = starting(work, candidates, left)
+    while len(candidates) < starts:
+        design, near = next(from_sample)
         hopeful = work.sample is None and any(c.feasible for c in candidates)
         candidates.append(_otherwise(run, design, run.ended(design, near, hopeful)))
+        if not options.exhaustive:  # which starts from every design
+            candidates += [candidates[-1]] * min(_led(work, candidates[-1], left), starts - len(candidates))
         if options.progress:
             options.progress(len(candidates), starts, _best(work, candidates))
-        if not options.exhaustive and _settled(work, candidates):
+        if not options.exhaustive and _settled(work, candidates, left):
             if work.sample is None:
                 candidates += _beside(run, candidates, starts - len(candidates))
             break
@@ -105,23 +108,43 @@ def further(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
     return found
 
 
-def starting(work: Workspace, ended: Sequence[Candidate] = ()) -> Iterator[tuple[dict[str, float], bool]]:
+def starting(
+    work: Workspace, ended: Sequence[Candidate] = (), left: list[int] | None = None
+) -> Iterator[tuple[dict[str, float], bool]]:
     """Designs to start from, and whether each may be near an optimum: those of the sample first, by turns.
 
     After the first of either kind, the one that is farthest from where starts `ended` meanwhile: those beside it would
     end there too.
+
+    Args:
+        left: rows of the refined designs that are still to be started from; taken from it.
     """
     if work.sampler and work.sample:
-        sides = [(work.sample.refined, True), (work.sample.boldest, False)]
-        left = [list(range(len(seen))) for seen, _ in sides]
-        while any(left):
-            for (seen, near), rows in zip(sides, left, strict=True):
+        refined, bold = work.sample.refined, work.sample.boldest
+        turns = [(refined, True, [*range(len(refined))] if left is None else left), (bold, False, [*range(len(bold))])]
+        while any(rows for _, _, rows in turns):
+            for seen, near, rows in turns:
                 if rows:
                     reached = [work.sampler.space.points(work.design_at(c.run.x)) for c in ended if c.feasible]
                     gaps = [min((float(np.linalg.norm(seen.u[k] - u)) for u in reached), default=0.0) for k in rows]
-                    first = len(rows) == len(seen)
+                    first = near or len(rows) == len(seen)
                     yield work.sampler.design(seen, rows.pop(0 if first else int(np.argmax(gaps)))), near
     yield from ((design, False) for design in designs(work.part, work.options.seed, work.options.starts))
+
+
+def _led(work: Workspace, end: Candidate, left: list[int]) -> int:
+    """How many refined designs a straight way leads from, never up, to where a start ended; they are left no more."""
+    if not (work.sampler and work.sample and left and end.feasible and work.part.objective):
+        return 0
+    seen, near = work.sample.refined.take(np.array(left)), _SAME * (end.nlp.size + abs(end.objective))
+    u = seen.u[:, None] + _WAY[:, None] * (work.sampler.space.points(work.design_at(end.run.x)) - seen.u[:, None])
+    way = work.sampler.look(u.reshape(-1, work.sampler.space.size))
+    worth, violation = (x.reshape(len(left), -1).max(axis=1) for x in (way.worth, way.violation))
+    gain = seen.worth - end.objective
+    down = (worth <= seen.worth + _LEVEL * np.abs(gain) + near) & (violation <= seen.violation) & (gain >= -near)
+    down |= (np.abs(gain) <= near) & (seen.violation == 0)
+    left[:] = [row for row, is_led in zip(left, down.tolist(), strict=True) if not is_led]
+    return int(down.sum())
 
 
 def _beside(run: "Runner", candidates: Sequence[Candidate], most: int) -> list[Candidate]:
@@ -201,7 +224,7 @@ class Runner:
         return best
 
     def _from(self, x: Array, limits: NLP, start: str) -> Candidate:
-        return self.work.chained(_candidate(self.work.part, limits, self.work.ipopt(self.nlp, start)(x, limits)))
+        return self.work.chained(candidate_of(self.work.part, limits, self.work.ipopt(self.nlp, start)(x, limits)))
 
 
 def _limits(nlp: NLP) -> tuple[tuple[float, ...], ...]:
@@ -227,7 +250,8 @@ def distinct(candidates: Sequence[Candidate], known: Sequence[Candidate] = ()) -
     return kept
 
 
-def _candidate(problem: Problem, nlp: NLP, run: Run) -> Candidate:
+def candidate_of(problem: Problem, nlp: NLP, run: Run) -> Candidate:
+    """What a run of IPOPT came to."""
     f, g = nlp.at(run.x)
     rows = np.array(g).ravel()
     if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(run.x)) and math.isfinite(float(f))):
@@ -252,17 +276,17 @@ def _spurious(problem: Problem, nlp: NLP, run: Run) -> bool:
     return bool(np.any(claimed < z.real.max(axis=1) - max(_SCATTER, _RESIDUAL ** (1 / problem.model.degree)) * size))
 
 
-def _settled(work: Workspace, candidates: list[Candidate]) -> bool:
+def _settled(work: Workspace, candidates: list[Candidate], left: Sequence[int] = ()) -> bool:
     """Whether more starts would be waste: the bound is reached, or enough of them agree on the best.
 
-    With w different optima seen in n starts, w (n − 1)/(n − w − 2) are expected in all (Boender and Rinnooy Kan
-    1987); the search goes on while that is more than w and a half.
+    Enough is what `is_enough` says of the optima that starts and designs of the sample led to. A refined design that is
+    `left` counts as one that leads to an optimum of its own.
     """
     problem, sampled = work.part, work.sample is not None
     feasible = [c for c in candidates if c.feasible]
     failed = len(candidates) - len(feasible)
     if not feasible:
-        afar = failed >= _HOPELESS_AFAR and (work.sample.far_off if work.sample else work.out_of_reach)
+        afar = failed >= HOPELESS_AFAR and (work.sample.far_off if work.sample else work.out_of_reach)
         return afar or failed >= (_HOPELESS_SAMPLED if sampled else _HOPELESS)
     best = min(c.objective for c in feasible)
     record = candidates[-1].feasible and all(candidates[-1].objective < c.objective for c in feasible[:-1])
@@ -272,16 +296,20 @@ def _settled(work: Workspace, candidates: list[Candidate]) -> bool:
     if problem.objective is None:  # any point of a square pattern will do, and any that meets too many conditions
         count = freedom(problem).count
         return agreeing >= (1 if count == 0 or (count < 0 and best <= _MET) else _AGREE)
-    ordered = sorted(c.objective for c in feasible)
-    n, w = len(feasible), 1 + sum(not same(a, b, feasible[0].nlp.size) for a, b in pairwise(ordered))
     if sampled and failed >= _HOPELESS:  # which takes long; the sample is the judge of what was found
         return True
+    alone = int(np.sum(work.sample.refined.violation[[*left]] == 0)) if work.sample and left else 0
+    enough = is_enough(len(feasible) + alone, optima(feasible) + alone)
     if sampled:
         wide = work.sample is not None and work.sample.met > NARROW * work.sample.size
-        each = _ENOUGH_SAMPLED if wide else _ENOUGH_NARROW if w <= _FEW else 2 * _ENOUGH_NARROW
-        return len(candidates) >= each * w and agreeing >= _AGREE_SAMPLED
-    seen = n > w + 2 and w * (n - 1) <= (w + 0.5) * (n - w - 2)
-    return len(candidates) >= _ENOUGH and agreeing >= _AGREE and seen
+        return enough and len({id(c) for c in candidates}) >= (_ENOUGH_SAMPLED if wide else _ENOUGH_NARROW)
+    return len(candidates) >= _ENOUGH and agreeing >= _AGREE and enough
+
+
+def optima(candidates: Sequence[Candidate]) -> int:
+    """Different objectives at which starts ended."""
+    ordered = sorted(c.objective for c in candidates if c.feasible)
+    return bool(ordered) + sum(not same(a, b, candidates[0].nlp.size) for a, b in pairwise(ordered))
 
 
 def _proven(problem: Problem, candidate: Candidate) -> bool:
@@ -300,41 +328,6 @@ def _coefficients(problem: Problem, nlp: NLP, run: Run) -> Array:
     varied = [c.applied(nominal) for c in nlp.cases if not c.direction] or [nominal]
     of = problem.parameter_set
     return np.array([[float(c) for c in problem.model.coefficients(p, of)] for p in varied])
-
-
-def exceptional(work: Workspace) -> list[dict[str, float]]:
-    """Designs with one root, or one pair, of full multiplicity: those of least abscissa, where enough is free for them.
-
-    The least abscissa is often at one, and where a0 may vanish it may stand in so thin a needle that no sample sees it,
-    while equations lead there.
-    """
-    part, sampler, sample, degree = work.part, work.sampler, work.sample, work.part.model.degree
-    limits = {name: text for name, text in part.constraints.items() if name not in part.asked_of_roots}
-    found: list[Candidate] = []
-    if sampler is None or sample is None or degree == 1:
-        return []
-    most = _HOPELESS_AFAR if sample.far_off else _LEADLESS
-    memory = work.family.memory(part)
-    for pattern in full_patterns(part.model):
-        asked = replace(part, locate=pattern, minimize="abscissa", maximize=None, constraints=limits)
-        asked = replace(asked, scenarios={}, tolerances={})
-        if freedom(asked).count < 0:
-            continue
-        leading = matching(asked)
-        lead, ended = ipopt(leading, work.options), list[Candidate]()
-        before = memory.leads.get(pattern, []) if memory else []
-        turns = zip_longest(*([(seen, k) for k in range(len(seen))] for seen in (sample.boldest, sample.refined)))
-        afar = (sampler.design(seen, k) for seen, k in (turn for pair in turns for turn in pair if turn))
-        for count, design in enumerate(chain(before, afar), 1):
-            ended.append(_candidate(asked, leading, lead(complete(leading, asked, design))))
-            led = any(c.feasible for c in ended)
-            enough = count >= len(before) + most and (sample.refined.out_of_reach(degree) or not led)
-            if enough or (led and count == len(before)):
-                break
-        if memory and len(ended) > len(before):
-            memory.leads[pattern] = [*before, *(work.design_at(c.run.x) for c in distinct(ended)[:_LEADS])]
-        found += distinct(ended, found)[:_LEADS]
-    return [work.design_at(c.run.x) for c in found]
 
 
 def _rescued(work: Workspace, nlp: NLP) -> list[Candidate]:

@@ -8,16 +8,18 @@ import numpy as np
 
 from tmsopt.checks.bound import bounded, instant_bound
 from tmsopt.checks.recheck import Checked, recheck
+from tmsopt.checks.worst_case import Worst, worst_cases
 from tmsopt.design.advice.remedies import Relaxation
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
-from tmsopt.design.solution import OtherBranch, Starts
+from tmsopt.design.searches import Starts
+from tmsopt.design.solution import OtherBranch
 from tmsopt.formulation.formulate import abscissa, design_of, matching
 from tmsopt.formulation.ipopt import Point
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.starts import complete, designs
 from tmsopt.records import Array, Table
-from tmsopt.solver.multistart import same
+from tmsopt.solver.multistart import optima, same
 from tmsopt.solver.newton import solutions
 from tmsopt.solver.workspace import Candidate, Workspace
 
@@ -144,6 +146,7 @@ def counted(candidates: Sequence[Candidate], at_best: float) -> Starts:
         tried=len(candidates),
         converged=sum(c.feasible for c in candidates),
         at_best=sum(c.feasible and same(c.objective, at_best, c.nlp.size) for c in candidates),
+        optima=optima(candidates),
     )
 
 
@@ -277,3 +280,13 @@ def _excluded(problem: Problem, nlp: NLP, x: Array) -> tuple[str, ...]:
         if below or above:
             names[name if k >= len(problem.free) else f"{name}.{'min' if below else 'max'}"] = None
     return tuple(names)
+
+
+def evaluated_cases(problem: Problem, parameters: Mapping[str, float]) -> tuple[Case, ...]:
+    """The listed cases of a design and the worst ones between them."""
+    return listed_cases(problem, worst_cases(problem, parameters) if problem.cases else {})
+
+
+def listed_cases(problem: Problem, worst: Mapping[str, Worst]) -> tuple[Case, ...]:
+    """The listed cases, and the worst ones that were found."""
+    return (*problem.cases, *(w.case for w in worst.values())) if problem.cases else ()

@@ -6,20 +6,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tmsopt.checks.digits import certified
 from tmsopt.checks.worst_case import worst_cases
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
-from tmsopt.design.solution import Starts
+from tmsopt.design.searches import Starts
 from tmsopt.formulation.nlp import NLP
+from tmsopt.solver.basins import Looked
 from tmsopt.solver.multistart import Runner, same
 from tmsopt.solver.outcome import Finding, Trial, ahead, converged, honest, mass_advice, survivor, unclear
-from tmsopt.solver.sample import Looked, Sample, Sampler
+from tmsopt.solver.sample import Sample, Sampler
 from tmsopt.solver.workspace import Candidate, Workspace
 
 _APPEALS, _APPEALED = 8, 2  # times that better designs are started from, and how many each time
 _LOST = 1e-7  # relative difference of the objective that makes a design better
 _HAIRS = np.geomspace(1e-15, 1e-7, 33)  # of the way to a design that meets all limits
 _TOWARDS = 30  # random designs in whose direction an end is moved
+_FLAT = "damping_ratio"
+_AT_ZERO = 1e-9  # of the largest root: one that rounding may put on either side of 0
+_EDGE = 1e-8  # relative difference of the objective that a step off an edge may cost
 _FINER = 1e-11  # the same as `_LOST`, where both were polished
 _FINEST = np.geomspace(1e-4, 1e-10, 19).tolist()  # of the box: steps that improve a design that is kept as it is
 _KEPT_AT_MOST = 8  # designs that were looked at and are checked closely
@@ -59,6 +64,8 @@ def refereed(work: Workspace, nlp: NLP, candidates: list[Candidate], trial: Tria
     if work.sampler is None or work.sample is None:
         return Standing(nlp, candidates, trial)
     standing = _appealed(work, work.sampler, work.sample, Standing(nlp, candidates, trial))
+    if standing.trial is not None and standing.held is None:
+        standing = replace(standing, trial=_off_the_edge(work, work.sampler, standing.trial))
     trial = standing.trial
     if standing.held is not None or trial is None or converged(trial) or trial.checked.violations:
         return standing
@@ -223,6 +230,25 @@ def _nudged(
             if not moved.checked.violations and honest(work, moved):
                 return moved
     return None
+
+
+def _off_the_edge(work: Workspace, sampler: Sampler, trial: Trial) -> Trial:
+    """A trial with a root at 0, where the damping ratio jumps to −1: moved a hair, until it is what it claims."""
+    problem = work.problem
+    goal, roots = problem.objective, [math.hypot(r.re, r.im) for r in trial.checked.structure.roots]
+    if goal is None or _FLAT not in goal.names or not min(roots, default=1.0) < _AT_ZERO * max(roots, default=0.0):
+        return trial
+    own, claimed = sampler.space.points(trial.parameters), problem.sign * trial.checked.objective
+    towards = sampler.rng.random((_TOWARDS, sampler.space.size))
+    seen = sampler.look((own + _HAIRS[::-1, None, None] * (towards - own)).reshape(-1, sampler.space.size))
+    close = (seen.violation == 0) & (np.abs(seen.worth - claimed) <= _EDGE * (1 + abs(claimed)))
+    for k in (-1, *np.flatnonzero(close)[:_KEPT_AT_MOST].tolist()):
+        parameters = trial.parameters if k < 0 else problem.ordered(sampler.design(seen, k))
+        checked = trial.checked if k < 0 else work.recheck(parameters, trial.candidate.nlp.cases)
+        exact = certified(problem, parameters, checked, trial.candidate.nlp.cases).value
+        if not checked.violations and math.isclose(exact, problem.sign * claimed, rel_tol=_LOST, abs_tol=_LOST):
+            return replace(trial, parameters=parameters, checked=checked)
+    return trial
 
 
 def _troubled(work: Workspace, candidates: Sequence[Candidate], trial: Trial | None) -> bool:

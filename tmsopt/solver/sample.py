@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.arithmetic.sequence import golden_steps
 from tmsopt.design.limit import opened
@@ -14,32 +13,32 @@ from tmsopt.design.problem import Problem
 from tmsopt.formulation.cube import Cube
 from tmsopt.formulation.judgement import Judged, judged
 from tmsopt.records import Array
+from tmsopt.solver.basins import REACHES, Looked, apart, basins, scattered
 
-_MOST, _LEAST = 2**13, 2**11
+_MOST, _LEAST = 3 * 2**12, 2**11
 """Designs of a sample: at most, and at least where each costs much."""
 
-_FIRST, _EACH = 2**8, 4  # designs for no parameter at all, and times as many for each
+_FIRST, _EACH = 3 * 2**7, 4  # designs for no parameter at all, and times as many for each
 _QUICK, _SLOWER = 4, 4  # degree with formulas of its own, and how many times as long those above take
 _MANY = 4  # free parameters, beyond which no more designs are drawn
 _CORNERS = 10  # free parameters up to which all corners of the box are looked at
 _FACES = 4  # one design of so many is moved to faces of the box: many optima lie there
 
-_APART = 0.15  # of the box: distance of designs that may lie in different basins
 _RANKED = 1024  # first ones of an order among which those apart are chosen
 _LEADERS, _BOLD = 8, 8  # designs to start from, of either kind
-_CELL = 0.05  # of the box
+_BASINS, _DEEPEST = 64, 24  # basins that are refined, and the best of those, to start from too
+_ROUNDS, _FEWER = (0.6, 0.3, 0.15, 0.07, 0.03, 0.01), 16
+"""Steps by which those are refined, of the way to their neighbours, and designs looked at around each of them."""
+
 _SOUGHT, _SOUGHT_AGAIN, _HALF = 256, 32, 0.5  # designs from which limits are approached; beside remembered ones
 REMEMBERED = 256  # refined ones
 _NO_ROWS = np.arange(0)
 NARROW = 0.02  # share of designs that meet all limits, below which little is feasible
 _LOCAL = 40  # designs looked at around each that is refined, in each round
-_REACHES = (0.1, 0.03, 0.008, 2e-3, 4e-4)  # of the box, round after round
 
 _SHELLS, _SHELL = 12, 64  # distances about a design, and designs at each
 _NEAR = 0.01  # of the box: distance of designs about one that count as different
 _VANISHING = 1e-2  # of its usual size: a leading coefficient that may come to 0
-_FAR_OFF = 1e-3  # of their scales, in sum: limits that refined designs violate by more exclude each other, it seems
-_OUT_OF_REACH, _SIMPLEST = 2.1, 4  # times the n-th root of the last reach, by which a sample misses an n-fold root
 _NO_LIMIT = 1e300  # a scale by which nothing that exists counts
 _MET = 1e-10  # of its scale: excess up to which a limit counts as met by numeric roots
 _STEPS, _STEPS_AFAR = 12, 4  # of Newton's method towards what violated limits allow; where all stay far away
@@ -62,46 +61,6 @@ class Met:
 
     refined: dict[Hashable, Array] = field(default_factory=dict)
     leads: dict[Hashable, Leads] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Looked:
-    """Designs as points of the unit cube, with what they are; the first ones come first where nothing else decides.
-
-    Attributes:
-        worth: larger is worse; inf where it does not exist.
-        violation: sum of the excesses, each relative to its scale; 0 where all limits are met.
-    """
-
-    u: Array
-    worth: Array
-    violation: Array
-
-    def __len__(self) -> int:
-        return len(self.u)
-
-    def take(self, rows: NDArray[np.int_]) -> "Looked":
-        """Some of them."""
-        return Looked(self.u[rows], self.worth[rows], self.violation[rows])
-
-    def joined(self, other: "Looked") -> "Looked":
-        """These and others."""
-        pairs = ((self.u, other.u), (self.worth, other.worth), (self.violation, other.violation))
-        return Looked(*(np.concatenate(pair) for pair in pairs))
-
-    @property
-    def ranked(self) -> NDArray[np.int_]:
-        """Rows by violation, then by worth."""
-        return np.lexsort((self.worth, self.violation))
-
-    @property
-    def far_off(self) -> bool:
-        """Whether limits seem to exclude each other: where they can be met, some refined design meets them."""
-        return bool(np.all(self.violation > _FAR_OFF))
-
-    def out_of_reach(self, degree: int) -> bool:
-        """The same by so much that it is not for a root of that multiplicity alone, which no sample meets."""
-        return bool(np.all(self.violation > _OUT_OF_REACH * _REACHES[-1] ** (1 / max(degree, _SIMPLEST))))
 
 
 @dataclass(frozen=True)
@@ -190,20 +149,25 @@ class Sampler:
         drawn = self.draw()
         ranked = drawn.take(drawn.ranked[:_RANKED])
         leaders = ranked.take(apart(ranked, _LEADERS))
-        if np.sum(drawn.violation == 0) < NARROW * len(drawn):
+        met = int(np.sum(drawn.violation == 0))
+        if met < NARROW * len(drawn):
             sought = self.look(self.memory.u) if self.memory and self.memory.u is not None else drawn.take(_NO_ROWS)
             if np.sum(sought.violation == 0) < _LEADERS:
-                few = _spread(ranked, _SOUGHT_AGAIN if len(sought) else _SOUGHT)
+                few = scattered(ranked, _SOUGHT_AGAIN if len(sought) else _SOUGHT)
                 sought = self.nearer(ranked.take(few), _HALF if len(sought) else 1.0).joined(sought)
             sought = sought.take(sought.ranked)
             leaders = sought.take(apart(sought, 2 * _LEADERS))
         refined = self.refined(leaders)
         if self.memory:
             self.memory.keep(refined.u)
+        if met >= NARROW * len(drawn):
+            rows, reach = basins(drawn, *self.space.even(drawn.u))
+            own = [share * reach[:_BASINS, None] for share in _ROUNDS]
+            found = self.refined(drawn.take(rows[:_BASINS]), own, _FEWER)
+            refined = refined.joined(found.take(found.ranked[:_DEEPEST]))
         bold = drawn.take(np.argsort(drawn.worth, kind="stable")[:_RANKED])
         known = drawn.worth[np.isfinite(drawn.worth)]
         spread = float(np.subtract(*np.percentile(known, [75, 25]))) if known.size else 0.0
-        met = int(np.sum(drawn.violation == 0))
         a0 = self._leading(ranked.u)
         singular = bool(a0.min() <= 0 <= a0.max() or np.abs(a0).min() < _VANISHING * np.median(np.abs(a0)))
         return Sample(refined.take(refined.ranked), bold.take(apart(bold, _BOLD)), met, len(drawn), spread, singular)
@@ -242,21 +206,29 @@ class Sampler:
         cost = max(1, len(problem.cases)) * (1 if problem.model.degree <= _QUICK else _SLOWER)
         count = max(min(_FIRST * _EACH ** min(size, _MANY), _MOST) // cost, _LEAST)
         u = (self._offset + np.arange(1, count + 1)[:, None] * golden_steps(size)) % 1.0
+        turn = np.arange(count)[:, None]
+        beside = (turn % 3 == 1) | ((turn % 3 == 2) & (turn // 3 >> np.arange(size) & 1 == 1))
+        u = np.where(beside, self.space.drawn_beside_zero(u), u)  # a third of them in all parameters, another in some
         u[::_FACES] = np.clip(3 * u[::_FACES] - 1, 0.0, 1.0)
         corners = np.array(list(product((0.0, 1.0), repeat=size))) if size <= _CORNERS else np.empty((0, size))
         u = np.concatenate([np.full((1, size), 0.5), corners, u])
         return u, judged(problem, self.space.designs(u))
 
-    def refined(self, start: Looked, reaches: Sequence[float] = _REACHES) -> Looked:
-        """Each design improved by random steps that become shorter, limits first."""
+    def refined(self, start: Looked, reaches: Sequence[float | Array] = REACHES, local: int = _LOCAL) -> Looked:
+        """Each design improved by random steps that become shorter, limits first.
+
+        Args:
+            reaches: of the box, round after round, or of each design in each direction, shape (designs, 1, size).
+            local: designs looked at around each, in each round.
+        """
         kept = start
         rows = np.arange(len(kept))
         for reach in reaches if len(kept) else ():
-            steps = self.rng.standard_normal((len(kept), _LOCAL, self.space.size))
-            steps[:, ::2] *= self.rng.random((len(kept), _LOCAL // 2, self.space.size)) < 0.5  # not in all directions
+            steps = self.rng.standard_normal((len(kept), local, self.space.size))
+            steps[:, ::2] *= self.rng.random((len(kept), local // 2, self.space.size)) < 0.5  # not in all directions
             near = self.look(np.clip(kept.u[:, None] + reach * steps, 0.0, 1.0).reshape(-1, self.space.size))
             both = kept.joined(near)
-            of = np.concatenate([rows, np.repeat(rows, _LOCAL)])
+            of = np.concatenate([rows, np.repeat(rows, local)])
             order = np.lexsort((both.worth, both.violation, of))
             kept = both.take(order[np.searchsorted(of[order], rows)])
         return kept
@@ -331,19 +303,3 @@ class Sampler:
         excess = found.excess / self.scales[:, None]
         violation = np.where(excess <= _MET, 0.0, excess).sum(axis=0)
         return Looked(u, np.where(np.isfinite(worth), worth, np.inf), violation)
-
-
-def _spread(found: Looked, most: int) -> NDArray[np.int_]:
-    """The first few rows in cells of their own: what `apart` gives for many, in a fraction of its time."""
-    cells = np.floor(found.u / _CELL) @ np.random.default_rng(0).random(found.u.shape[1])
-    return np.asarray(np.sort(np.unique(cells, return_index=True)[1])[:most])
-
-
-def apart(found: Looked, most: int, distance: float = _APART) -> NDArray[np.int_]:
-    """The first few rows that lie apart from each other."""
-    rows: list[int] = []
-    left = np.arange(len(found))
-    while left.size and len(rows) < most:
-        rows.append(int(left[0]))
-        left = left[np.abs(found.u[left] - found.u[left[0]]).max(axis=1) >= distance]
-    return np.array(rows, dtype=int)

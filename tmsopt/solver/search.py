@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import islice
 
 import numpy as np
 
@@ -15,16 +14,28 @@ from tmsopt.design.cases import Case
 from tmsopt.design.dependence import STABLE, WORSE
 from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import RADIUS
-from tmsopt.design.solution import Starts
-from tmsopt.design.verdict.meetings import nearest_crossing
-from tmsopt.formulation.formulate import design_of, formulate, matching, middle
+from tmsopt.design.searches import Starts
+from tmsopt.formulation.formulate import design_of, formulate, middle
 from tmsopt.formulation.nlp import NLP
 from tmsopt.formulation.options import Options
-from tmsopt.formulation.starts import designs
 from tmsopt.progress import begin
 from tmsopt.records import Table
-from tmsopt.solver.multistart import Runner, distinct, exceptional, further, same, search
-from tmsopt.solver.outcome import Finding, Trial, ahead, better, counted, found, mass_advice, survivor
+from tmsopt.solver.basins.crossings import crossing_finding, search_elsewhere
+from tmsopt.solver.basins.exceptional import exceptional
+from tmsopt.solver.basins.plateau import off_plateau, on_plateau
+from tmsopt.solver.multistart import Runner, distinct, further, same, search
+from tmsopt.solver.outcome import (
+    Finding,
+    Trial,
+    ahead,
+    better,
+    counted,
+    evaluated_cases,
+    found,
+    listed_cases,
+    mass_advice,
+    survivor,
+)
 from tmsopt.solver.referee import endless, held, ideal, outdone, refereed
 from tmsopt.solver.remedies.changes import relax
 from tmsopt.solver.remedies.needs import irreducible, steady
@@ -36,8 +47,8 @@ _ROUNDS, _FAR_ROUNDS = 12, 40
 """Times that cases are added; each time the worst one between them shrinks to its square, roughly."""
 
 _LEADERS = 3  # optima followed when cases are added: a better one may do worse between the old cases
-_HOPEFUL = 16  # starts for an exceptional point where the nearest one is a crossing
 _SETTLED = 6  # starts of a problem with limits moved
+_FROM = 16  # stable designs of a sample that are started from, of either kind
 _FEWER = 8  # starts for positive real roots where the others have led somewhere
 _NEARER = 1e-7  # share of the radius
 _BESIDE = 1e-6  # of the box: designs closer than that are one; what IPOPT leaves at a multiple root is farther off
@@ -78,7 +89,10 @@ def explore(work: Workspace, insist: bool = True) -> Explored:
     candidates = [*search(work, nlp, _FEWER if mixed and leads else None), *_from(work, nlp, leads)]
     trial = survivor(work, nlp, candidates)
     if any(c.crossing for c in candidates) and (trial is None or trial.checked.violations):
-        nlp, candidates, trial = _elsewhere(work, nlp, candidates)
+        nlp, candidates, trial = search_elsewhere(work, nlp, candidates)
+    if trial is None and on_plateau(work.problem):
+        candidates += _from(work, nlp, off_plateau(work, nlp, _FEWER))
+        trial = survivor(work, nlp, candidates)
     for ratio, most in _ratios(work, nlp, trial):
         fixed = work.formulate(cases, damping_ratio=ratio)
         others = _from(work, fixed, leads) if leads and ratio == 1 else search(work, fixed, most)
@@ -88,31 +102,19 @@ def explore(work: Workspace, insist: bool = True) -> Explored:
     standing = refereed(work, nlp, candidates, trial)
     wanting = insist and standing.trial is not None and _wants_stability(work.problem, standing.trial)
     if standing.trial is not None and work.sampler and wanting and not work.never_stable:
-        others = _left_of_the_axis(work, nlp, len(candidates))
+        others = _left_of_the_axis(work, nlp, len({id(c) for c in candidates}))
         other, every = survivor(work, nlp, others), [*standing.candidates, *others]
         ahead_of = other is not None and ahead(work, other, standing.trial)
         standing = refereed(work, nlp, every, other) if ahead_of else replace(standing, candidates=every)
     nlp, candidates, trial = standing.nlp, standing.candidates, standing.trial
     starts = counted(candidates, trial.candidate.objective if trial else math.nan)
+    if trial and on_plateau(work.problem, trial.checked.objective):
+        starts = replace(starts, at_best=0)
     if standing.held is not None:
         listed = evaluated_cases(work.problem, work.problem.ordered(standing.held))
         return Explored(work.name, tuple(candidates), held(work, standing, starts, listed))
     finding = _covered(work, nlp, candidates, trial, starts) if cases else found(work, nlp, trial, starts)
     return Explored(work.name, tuple(candidates), endless(work, outdone(work, finding)) if finding else None)
-
-
-def _elsewhere(
-    work: Workspace, nlp: NLP, candidates: list[Candidate]
-) -> tuple[NLP, list[Candidate], Trial | None]:  # fmt: skip
-    """An exceptional point nearest to another start, where roots only cross nearest to the first."""
-    part, ended = work.part, list(candidates)
-    most = _HOPEFUL if work.freedom.count > 0 else 0
-    for design in islice(designs(part, work.options.seed, work.options.starts), most):
-        near = matching(replace(part, minimize=None, maximize=None, start=design))
-        ended.append(Runner(work, near).ended(design, near=True))
-        if ended[-1].feasible and (trial := survivor(work, near, ended[-1:])):
-            return near, ended, trial
-    return nlp, ended, None
 
 
 def rarely_stable(work: Workspace) -> bool:
@@ -138,7 +140,7 @@ def _left_of_the_axis(work: Workspace, nlp: NLP, tried: int) -> list[Candidate]:
             return []
     sample, ended = sampler.sample(), list[Candidate]()
     for seen, near in ((sample.refined, True), (sample.boldest, False)):
-        rows = np.flatnonzero(seen.worth < 0).tolist()
+        rows = np.flatnonzero(seen.worth < 0)[:_FROM].tolist()
         ended += [run.ended(sampler.design(seen, k), near, hopeful=False) for k in rows]
     return [*ended, *further(work, nlp, tried)] if ended else ended
 
@@ -155,7 +157,7 @@ def without_any(work: Workspace, tried: int) -> Finding:
     problem = work.problem
     nlp = formulate(problem, problem.cases)
     if crossed := next((c for _, c in work.met if c.crossing), None):
-        return _crossing(work, work.design_at(crossed.run.x), tried, nlp)
+        return crossing_finding(work, work.design_at(crossed.run.x), tried, nlp)
     begin(work.options.progress, "searching for the least that limits must give", "start")
     again = partial(answered, asked=problem)
     relaxation = relax(work, partial(irreducible, reached=partial(_reached, work)), again)
@@ -176,18 +178,6 @@ def without_any(work: Workspace, tried: int) -> Finding:
         status, note = "not_converged", f"feasible designs exist, but {none} converged; {advice}"
     starts, notes = Starts(tried=tried), (note,)
     return Finding(parameters, checked, status, {}, starts, nlp.formulation, cases, notes=notes, relaxation=relaxation)
-
-
-def _crossing(work: Workspace, design: Mapping[str, float], tried: int, nlp: NLP) -> Finding:
-    """Roots meet, but nowhere with the Jordan chains of an exceptional point."""
-    problem = work.problem
-    parameters = problem.ordered(design)
-    if problem.pattern is not None:
-        parameters = problem.ordered(nearest_crossing(problem, problem.pattern, parameters))
-    cases = evaluated_cases(problem, parameters)
-    checked = work.recheck(parameters, cases)
-    note = f"of {tried} starts, none ended at an exceptional point: roots meet with more than one eigenvector"
-    return Finding(parameters, checked, "not_converged", {}, Starts(tried), nlp.formulation, cases, notes=(note,))
 
 
 def answered(problem: Problem, options: Options, asked: Problem) -> bool:
@@ -227,22 +217,13 @@ def _reached(work: Workspace, names: Sequence[str]) -> tuple[Mapping[str, float]
     return None, True
 
 
-def evaluated_cases(problem: Problem, parameters: Mapping[str, float]) -> tuple[Case, ...]:
-    """The listed cases of a design and the worst ones between them."""
-    return _listed(problem, worst_cases(problem, parameters) if problem.cases else {})
-
-
-def _listed(problem: Problem, worst: Mapping[str, Worst]) -> tuple[Case, ...]:
-    return (*problem.cases, *(w.case for w in worst.values())) if problem.cases else ()
-
-
 def _ratios(work: Workspace, nlp: NLP, trial: Trial | None) -> Iterator[tuple[float, int]]:
     """Damping ratios at which to search again, and from how many starts."""
     if {"abscissa", "damping_ratio"} <= set(nlp.variables):
         yield 1.0, _FEWER  # where real roots meet, sectors and half-planes are singular together
     if "damping_ratio" in nlp.variables and (trial is None or _unstable(work.problem, nlp, trial)):
         # A positive real root has −1, and no sector of its own.
-        yield -1.0, _FEWER if trial and nlp.touches else work.options.starts
+        yield -1.0, _FEWER if (trial and nlp.touches) or on_plateau(work.problem) else work.options.starts
 
 
 def _unstable(problem: Problem, nlp: NLP, trial: Trial) -> bool:
@@ -286,7 +267,7 @@ def _covered(
                 trial = survivor(work, nlp, candidates)
     if trial is None:
         return None
-    listed = _listed(problem, worst or worst_cases(problem, trial.parameters))
+    listed = listed_cases(problem, worst or worst_cases(problem, trial.parameters))
     others = [c for c in listed if c not in nlp.cases]
     return found(work, nlp, trial, starts, (*nlp.cases, *others))
 

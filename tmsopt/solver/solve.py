@@ -16,7 +16,8 @@ from tmsopt.design.advice.senses import sense_notes
 from tmsopt.design.files import Given, question_of
 from tmsopt.design.problem import Problem, freedom
 from tmsopt.design.quantities import ANGULAR_FREQUENCY
-from tmsopt.design.solution import Bound, Solution, Starts
+from tmsopt.design.searches import Starts
+from tmsopt.design.solution import Bound, Solution
 from tmsopt.design.unit_system import unit_at, unit_of
 from tmsopt.design.verdict.meetings import every_meeting
 from tmsopt.design.verdict.stability import stability
@@ -29,9 +30,9 @@ from tmsopt.models.told import beyond_axis, meant, name_told
 from tmsopt.progress import Listener, begin, heard
 from tmsopt.records import Table
 from tmsopt.solver.multistart import rank, same
-from tmsopt.solver.outcome import UNCLEAR, Finding, better, counted, evaluated, mass_advice, survivor
+from tmsopt.solver.outcome import UNCLEAR, Finding, better, counted, evaluated, evaluated_cases, mass_advice, survivor
 from tmsopt.solver.remedies.needs import with_need
-from tmsopt.solver.search import Explored, answered, evaluated_cases, explore, without_any
+from tmsopt.solver.search import Explored, answered, explore, without_any
 from tmsopt.solver.workspace import Family, Workspace, check_near, workspace
 
 UNSTABLE = "no stable design was found that meets the other limits; this is the least unstable one"
@@ -180,12 +181,11 @@ def _so_far(parts: Sequence[Workspace]) -> Finding | None:
         if best and time.perf_counter() > end:
             break
         trial = survivor(parts[0], nlp, [candidate])
-        free = design_of(problem, (trial.point if trial else candidate.run).x.tolist())
-        found = [*([best] if best else []), _as_it_is(problem, free)]
-        best = min(found, key=partial(_order, problem))
+        own = _as_it_is(problem, design_of(problem, (trial.point if trial else candidate.run).x.tolist()))
+        best = min([*([best] if best else []), own], key=partial(_order, problem))
     if best is None:
         return None
-    starts = counted([candidate for _, candidate in met], problem.sign * best.checked.objective)
+    starts = counted([end for _, end in met], problem.sign * best.checked.objective)
     words = f"the user stopped the search after {len(met)} starts; this is the best design so far"
     return replace(best, starts=starts, formulation=met[0][0].formulation if met else "none", notes=(words,))
 
@@ -249,7 +249,7 @@ def _winner(problem: Problem, explored: Sequence[Explored]) -> Finding | None:
     if best is None or len(explored) == 1:
         return best
     every = [c for part in explored for c in part.candidates]
-    return replace(best, starts=Starts(len(every), sum(c.feasible for c in every), best.starts.at_best))
+    return replace(best, starts=replace(counted(every, math.nan), at_best=best.starts.at_best))
 
 
 def _side_values(explored: Sequence[Explored]) -> dict[str, float]:
@@ -314,10 +314,7 @@ def _assembled(
         formulation=finding.formulation,
         freedom=freedom(problem),
         branches=finding.branches,
-        notes=(
-            *finding.notes, *missed_note(problem, lost), *notes,
-            *_stability_note(problem, checked, edges, optimal),
-        ),
+        notes=(*finding.notes, *missed_note(problem, lost), *notes, *_stability_note(problem, checked, edges, optimal)),
         worst=checked.worst if listed else None,
         least_damped=checked.least_damped if listed else None,
         fastest=checked.fastest if listed and problem.asks(ANGULAR_FREQUENCY) else None,

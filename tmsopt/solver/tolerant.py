@@ -14,9 +14,10 @@ from tmsopt.formulation.nlp import NLP
 from tmsopt.margins.nearest import Nearest, Robustness
 from tmsopt.records import Array, Table
 from tmsopt.roots import is_stable
+from tmsopt.solver.basins import apart
 from tmsopt.solver.multistart import Runner, same
 from tmsopt.solver.outcome import Trial, ahead, survivor
-from tmsopt.solver.sample import Sampler, apart
+from tmsopt.solver.sample import Sampler
 from tmsopt.solver.workspace import Candidate, Workspace
 
 _LOOKED = 512  # stable designs whose radius is estimated

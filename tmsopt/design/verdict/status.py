@@ -30,7 +30,7 @@ def status_in_words(solution: "Solution") -> str:
     if problem.objective is None or not problem.free:
         return "found" if problem.free else "as given"
     unproved = "stopped before it was proved" if solution.interrupted else "not proved"
-    return f"optimal{proved or f', the best of {solution.starts.tried} starts, {unproved}'}"
+    return ", ".join(["optimal", *(["proved"] if bound.proven else [*solution.starts.sureness, unproved])])
 
 
 def verdict_in_words(solution: "Solution") -> str:

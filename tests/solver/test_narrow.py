@@ -1,0 +1,55 @@
+"""Basins that few starts see: a triple root beside zero in a wide box, and a well a thousandth of it wide."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tmsopt
+
+TRIPLE = """[model]
+M = [[1, 0], [0, 1]]
+D = [[0.687, 0.667], [1.2108, "0.507 + k_deltadot"]]
+K = [[1.088, -0.058], ["0.895 + k_phi", -0.03792]]
+[parameters]
+k_phi = { min = -33.5, max = 40.8 }
+k_deltadot = { min = -22.5, max = 49.7 }
+[objective]
+minimize = "abscissa"
+"""
+WELL = """[model]
+coefficients = [1, "2 + x*x/4000 + 3*exp(-x*x*10000)", 9]
+[parameters]
+x = { min = -60, max = 40 }
+[objective]
+minimize = "abscissa"
+"""
+
+
+def triple_abscissa(k_phi: float, k_deltadot: float) -> float:
+    """By NumPy's eigenvalues, which scatter beside a triple root and are no better than it is."""
+    D = np.array([[0.687, 0.667], [1.2108, 0.507 + k_deltadot]])
+    K = np.array([[1.088, -0.058], [0.895 + k_phi, -0.03792]])
+    return float(np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-K, -D]])).real.max())
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_triple_root_beside_zero_is_not_overlooked(seed: int, tmp_path: Path) -> None:
+    """Three starts agree at −0.2279, far from it."""
+    path = tmp_path / "triple.toml"
+    path.write_text(TRIPLE, encoding="utf-8")
+    known = triple_abscissa(0.06957112229, 0.19888527776)  # by differential evolution
+    assert known < -0.34
+    found = tmsopt.solve(path, seed=seed)
+    assert found.value <= known + 1e-6
+    assert triple_abscissa(found.parameters["k_phi"], found.parameters["k_deltadot"]) == pytest.approx(
+        found.value, abs=1e-3
+    )
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_well_of_exponentials_beside_zero_is_found(seed: int, tmp_path: Path) -> None:
+    """s² + b s + 9 has the abscissa −b/2 for b < 6: −5/2 at x = 0, where b is 5; elsewhere b is 2.9 at most."""
+    path = tmp_path / "well.toml"
+    path.write_text(WELL, encoding="utf-8")
+    assert tmsopt.solve(path, seed=seed).value == pytest.approx(-2.5, abs=1e-9)

@@ -1,0 +1,73 @@
+"""How starts ended, and what that tells of optima that no start met."""
+
+import math
+from dataclasses import dataclass
+
+_BETTER = 0.2  # optima that are better than the best one met and not met yet, expected where a search may end
+_LIKELY = 0.5  # the same, from which one is likely
+
+
+def expected_unseen(searches: int, optima: int) -> float:
+    """Optima not met yet, expected after so many searches ended in so many different ones: w (w + 1)/(n − w − 2).
+
+    Boender and Rinnooy Kan (1987), for searches from random starts, whatever the shares of the basins. inf where the
+    searches are too few to tell.
+    """
+    rest = searches - optima - 2
+    return optima * (optima + 1) / rest if rest > 0 else math.inf
+
+
+def is_enough(searches: int, optima: int, most: float = _BETTER) -> bool:
+    """Whether few enough optima are expected that no search met and that are better than all w that were.
+
+    Where each rank is as likely as another, one of w + 1 is the best.
+    """
+    return expected_unseen(searches, optima) <= most * (optima + 1)
+
+
+@dataclass(frozen=True)
+class Starts:
+    """How many starts were tried, converged to a feasible point, and ended at the best one.
+
+    A design of a sample counts as a start, if a straight way down leads from it to where another start ended.
+
+    Attributes:
+        optima: different ones that starts ended at.
+        looked: designs of the box that were looked at beside, to know where to start, and whether any is better.
+
+    Example:
+        >>> starts = tmsopt.solve("problems/ep4.toml").starts
+        >>> 1 <= starts.at_best <= starts.converged <= starts.tried
+        True
+
+    More: docs/how_to/report.md
+    """
+
+    tried: int = 0
+    converged: int = 0
+    at_best: int = 0
+    looked: int = 0
+    optima: int = 0
+
+    @property
+    def expected_unseen(self) -> float:
+        """Optima that no start met, as estimated; inf where the starts are too few to tell."""
+        return expected_unseen(self.converged, self.optima)
+
+    @property
+    def sureness(self) -> tuple[str, ...]:
+        """How sure it is that the best one met is the best there is, in words; none where nothing was started.
+
+        Example:
+            >>> tmsopt.Starts(tried=64, converged=64, at_best=1, optima=30).sureness
+            ('found by 1 of 64 starts', 'a better one is likely')
+
+        More: docs/explanation/proofs.md
+        """
+        if not self.tried:
+            return ()
+        by = f"found by {self.at_best} of {self.tried} start{'' if self.tried == 1 else 's'}"
+        if self.at_best and is_enough(self.converged, self.optima):
+            return (by,)
+        likely = self.at_best == 1 and not is_enough(self.converged, self.optima, _LIKELY)
+        return by, f"a better one is {'likely' if likely else 'possible'}"
