@@ -66,6 +66,7 @@ SECTIONS = (
     Section("s", "hard", f"{_DESIGNS}.hard_designs", "hard problems: is optimal the best known", long=True),
     Section("v", "narrow", f"{_DESIGNS}.narrow_optima", "narrow basins and plateaus: is optimal the best", long=True),
     Section("u", "statements", "benchmarks.reports.statements", "statements that a closed form can refute", long=True),
+    Section("v", "fresh", "benchmarks.reports.fresh", "fresh random problems, judged independently", long=True),
     Section("t", "targets", f"{_DESIGNS}.hard_references", "the best values of the hard problems, kept", long=True),
 )
 """In the order in which they are run."""
