@@ -94,13 +94,14 @@ def _data(said: Mapping[str, Any]) -> dict[str, Any] | None:
 
 def _judge_design(problem: Problem, best: Reference, data: Mapping[str, Any], text: str) -> Verdict:
     false: dict[str, str] = {}
-    status, claimed = data["status"], (data.get("objective") or {}).get("value")
+    status = data["status"]
     stated = problem if len(problem.cases) != DENSE else replace(problem, cases=problem.cases[::8])
     if status == "infeasible" and best.feasible:
         false["infeasible"] = f"{dict(best.design)} is feasible"
     if data.get("any_stable") is False and best.abscissa < 0:
         false["proved"] = f"none is stable, but {dict(best.design)} is, by {best.abscissa:.3g}"
     if status == "optimal":
+        claimed = float(data["objective"]["value"])
         real = measure_exactly(stated, data["parameters"])
         bad = {n: v for n, v in real.violations.items() if v > FEASIBLE}
         if bad and not data.get("violations") and not all(any(n in t for t in data.get("notes", ())) for n in bad):

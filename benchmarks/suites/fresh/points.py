@@ -78,7 +78,7 @@ def polish(problem: Problem, start: Mapping[str, Any]) -> Point | None:
                     ]
                     for i, u in enumerate(unknown)
                 ]
-                move = mpmath.qr_solve(mpmath.matrix(columns).T, -mpmath.matrix(here))[0]
+                move = mpmath.lu_solve(mpmath.matrix(columns).T, -mpmath.matrix(here))
                 unknown = [u + m for u, m in zip(unknown, move, strict=True)]
                 if max(abs(m) for m in move) < mpmath.mpf("1e-55"):
                     break

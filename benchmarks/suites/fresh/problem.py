@@ -118,7 +118,7 @@ def state_matrix(system: System, values: Mapping[str, Any], count: int) -> npt.N
         return _stack(filled[0], count, float)
     if system.kind == "coefficients":
         row = _stack(filled[0], count, float)[:, 0, :]
-        found = np.zeros((count, row.shape[1] - 1, row.shape[1] - 1))
+        found: npt.NDArray[Any] = np.zeros((count, row.shape[1] - 1, row.shape[1] - 1))
         found[:, 0, :] = -row[:, 1:] / np.where(row[:, :1] == 0, 1e-300, row[:, :1])
         found[:, range(1, found.shape[1]), range(found.shape[1] - 1)] = 1
         return found

@@ -11,7 +11,7 @@ from typing import Any
 import mpmath
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import OptimizeWarning, differential_evolution, minimize
+import scipy.optimize
 
 from benchmarks.suites.fresh.formulas import FLOATS, evaluate, excess
 from benchmarks.suites.fresh.problem import (
@@ -23,6 +23,8 @@ from benchmarks.suites.fresh.problem import (
     measure_exactly,
     state_matrix,
 )
+
+optimize: Any = scipy.optimize
 
 FEASIBLE = 1e-9
 """Relative violation up to which a design counts as feasible."""
@@ -84,7 +86,7 @@ def _exactly(problem: Problem, x: Floats) -> Reference:
         real = measure_exactly(problem, design)
     except (ZeroDivisionError, mpmath.libmp.NoConvergence):
         return Reference(design, problem.sign * 1e30, 1e30, 1e30)
-    return Reference(design, real.value, max(real.violations.values(), default=0.0), real.abscissa)
+    return Reference(design, real.objective, max(real.violations.values(), default=0.0), real.abscissa)
 
 
 def _merit(problem: Problem) -> Callable[[Floats], Floats]:
@@ -100,7 +102,7 @@ def _merit(problem: Problem) -> Callable[[Floats], Floats]:
 def _evolve(problem: Problem, seed: int, generations: int) -> Floats:
     """The better part of the last population."""
     box, merit = problem.box, _merit(problem)
-    ended = differential_evolution(
+    ended = optimize.differential_evolution(
         lambda x: merit(x.T),
         bounds=list(map(tuple, box)),
         maxiter=generations,
@@ -128,7 +130,7 @@ def _nelder_mead(problem: Problem, x: Floats) -> Floats:
     for size in (1e-2, 1e-5):
         simplex = np.concatenate([y[None], y + size * np.eye(len(y))])
         options = {"initial_simplex": simplex, "maxiter": 150 * len(y), "xatol": 1e-13, "fatol": 1e-14}
-        y = minimize(penalty, y, method="Nelder-Mead", options=options).x
+        y = optimize.minimize(penalty, y, method="Nelder-Mead", options=options).x
     return box[:, 0] + span * np.clip(y, 0, 1)
 
 
@@ -212,11 +214,11 @@ def _lift(problem: Problem, x: Floats) -> Floats:
     if problem.limits:
         constraints.append({"type": "ineq", "fun": lambda z: both(z)[0][1 + n :], "jac": lambda z: both(z)[1][1 + n :]})
     try:
-        ended = minimize(
+        ended = optimize.minimize(
             lambda z: both(z)[0][0], start, jac=lambda z: both(z)[1][0], method="SLSQP", constraints=constraints,
             bounds=[(0, 1)] * p + [(None, None)] + [(0, None)] * n, options={"maxiter": 150, "ftol": 1e-13},
         )  # fmt: skip
-    except (np.linalg.LinAlgError, ValueError, OptimizeWarning):
+    except (np.linalg.LinAlgError, ValueError, optimize.OptimizeWarning):
         return x
     y = np.clip(ended.x[:p], 0, 1)
     return box[:, 0] + span * y if np.all(np.isfinite(y)) else x
