@@ -82,7 +82,7 @@ def made(name: str, parts: Parts, **known: Any) -> Problem:
         text += [
             f"{speed} = [{', '.join(values)}]" if listed else f"{speed} = {{ min = {low}, max = {high}, points = 5 }}"
         ]
-        dense = [f"{x:.12g}" for x in np.linspace(float(low), float(high), 33)]
+        dense = [f"{x:.12g}" for x in np.linspace(float(low), float(high), 17)]
         cases = tuple({speed: v} for v in (values if listed else dense))
     text += ["[objective]", f'{parts.sense} = "{parts.objective}"']
     if parts.limits:

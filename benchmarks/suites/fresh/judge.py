@@ -32,8 +32,8 @@ MATCHED = 1e-12
 KINDS = ("optimum", "value", "infeasible", "feasible", "proved", "complete")
 """Of false statements. *Value* is a number next to a design that is not that of the design."""
 
-DENSE = 33
-"""Cases by which a band with a range is measured; the file has every eighth."""
+DENSE = 17
+"""Cases by which a band with a range is measured; the file has every fourth."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def _data(said: Mapping[str, Any]) -> dict[str, Any] | None:
 def _judge_design(problem: Problem, best: Reference, data: Mapping[str, Any], text: str) -> Verdict:
     false: dict[str, str] = {}
     status = data["status"]
-    stated = problem if len(problem.cases) != DENSE else replace(problem, cases=problem.cases[::8])
+    stated = problem if len(problem.cases) != DENSE else replace(problem, cases=problem.cases[::4])
     if status == "infeasible" and best.feasible:
         false["infeasible"] = f"{dict(best.design)} is feasible"
     if data.get("any_stable") is False and best.abscissa < 0:

@@ -102,7 +102,7 @@ def assign(problem: Problem, design: Mapping[str, Any], case: Mapping[str, str],
 
 
 def _stack(rows: Sequence[Sequence[Any]], count: int, dtype: type) -> npt.NDArray[Any]:
-    found = np.empty((count, len(rows), len(rows[0])), dtype=dtype)
+    found: npt.NDArray[Any] = np.empty((count, len(rows), len(rows[0])), dtype=dtype)
     for i, row in enumerate(rows):
         for j, x in enumerate(row):
             found[:, i, j] = x
@@ -156,7 +156,7 @@ def measure(problem: Problem, designs: Floats) -> tuple[Floats, Floats]:
                 worst = np.maximum(worst, problem.sign * evaluate(problem.objective, values, FLOATS))
             for text in problem.limits.values():
                 over, size = excess(text, values, FLOATS)
-                missed = np.maximum(missed, over / np.maximum(size, 1e-3))
+                missed = np.maximum(missed, over / size)
     return np.where(np.isfinite(worst), worst, 1e30), np.where(np.isfinite(missed), np.maximum(missed, 0), 1e30)
 
 
@@ -242,7 +242,7 @@ def measure_exactly(problem: Problem, design: Mapping[str, float]) -> Measured:
                 worst = value if worst is None else max(worst, value)
             for name, text in problem.limits.items():
                 over, size = excess(text, values, MANY_DIGITS)
-                violations[name] = max(violations[name], float(over / max(size, mpmath.mpf("1e-3"))))
+                violations[name] = max(violations[name], float(over / size))
     for name, (low, high) in problem.free.items():
         over = max(low - design[name], design[name] - high)
         violations[name] = max(0.0, over / max(abs(low), abs(high)))
