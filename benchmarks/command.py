@@ -58,16 +58,16 @@ SECTIONS = (
     Section("l", "variety", f"{_DESIGNS}.varied_designs", "varied problems, judged by eigenvalues", long=True),
     Section("m", "band", f"{_DESIGNS}.bands", "bands of speeds, proved between the scenarios", long=True),
     Section("n", "conflicts", f"{_DESIGNS}.conflicts", "relaxations of infeasible problems", long=True),
-    Section("v", "remedies", f"{_DESIGNS}.remedies", "what is advised for infeasible problems, obeyed", long=True),
+    Section("n", "remedies", f"{_DESIGNS}.remedies", "what is advised for infeasible problems, obeyed", long=True),
     Section("o", "certificates", f"{_DESIGNS}.certificates", "random designs proved globally best", long=True),
     Section("p", "proofs", "benchmarks.reports.proofs", "exceptional points of the paper, proved", long=True),
     Section("q", "references", f"{_DESIGNS}.references", "the best values of the random designs, kept", long=True),
     Section("r", "known", f"{_SYSTEMS}.known", "the best values of the random systems, kept", long=True),
     Section("s", "hard", f"{_DESIGNS}.hard_designs", "hard problems: is optimal the best known", long=True),
-    Section("v", "narrow", f"{_DESIGNS}.narrow_optima", "narrow basins and plateaus: is optimal the best", long=True),
+    Section("s", "narrow", f"{_DESIGNS}.narrow_optima", "narrow basins and plateaus: is optimal the best", long=True),
+    Section("t", "targets", f"{_DESIGNS}.hard_references", "the best values of the hard problems, kept", long=True),
     Section("u", "statements", "benchmarks.reports.statements", "statements that a closed form can refute", long=True),
     Section("v", "fresh", "benchmarks.reports.fresh", "fresh random problems, judged independently", long=True),
-    Section("t", "targets", f"{_DESIGNS}.hard_references", "the best values of the hard problems, kept", long=True),
 )
 """In the order in which they are run."""
 

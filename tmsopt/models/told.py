@@ -98,12 +98,16 @@ def structure_in_words(model: Model, structure: str, gain: bool = False) -> str:
 
 
 def eigenfrequencies(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
-    """ω = i s of roots as they are told, parts 0 but for a carrier's rounding as 0; of a real system none."""
-    if model.carrier is None:
-        return ()
+    """ω = i s of roots as they are told; of a real system none."""
+    each = () if model.carrier is None else without_rounding(model, roots)
+    return tuple(Root(-r.im + 0.0, r.re, r.multiplicity) for r in each)
+
+
+def without_rounding(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
+    """Roots as they are told, with parts that are 0 but for a carrier's rounding as 0."""
     each = tuple(roots)
-    nothing = _NOTHING * _size(model, each)
-    own = ([x if abs(x) > nothing else 0.0 for x in (-r.im, r.re)] for r in each)
+    nothing = 0.0 if model.carrier is None else _NOTHING * _size(model, each)
+    own = ([x if abs(x) > nothing else 0.0 for x in (r.re, r.im)] for r in each)
     return tuple(Root(re, im, r.multiplicity) for (re, im), r in zip(own, each, strict=True))
 
 

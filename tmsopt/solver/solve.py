@@ -26,7 +26,7 @@ from tmsopt.formulation.formulate import design_of
 from tmsopt.formulation.nlp import objective_size
 from tmsopt.formulation.options import DEFAULTS, AskedOfSolve, Options, options_of, taking
 from tmsopt.margins import stands_on
-from tmsopt.models.told import beyond_axis, meant, name_told
+from tmsopt.models.told import beyond_axis, meant, name_told, without_rounding
 from tmsopt.progress import Listener, begin, heard
 from tmsopt.records import Table
 from tmsopt.solver.multistart import rank, same
@@ -301,7 +301,7 @@ def _assembled(
         parameters=Table(finding.parameters),
         abscissa=numbers.abscissa,
         abscissa_realised=numbers.realised,
-        roots=numbers.roots,
+        roots=without_rounding(problem.model, numbers.roots),
         structure=name,
         active=Table(finding.active),
         violations=checked.amounts,

@@ -10,7 +10,7 @@ from tqdm import tqdm
 
 from benchmarks.judges import FEASIBLE, verdict
 from benchmarks.reports.tables import Asked, median, page, share, table
-from benchmarks.suites.remedies import File, infeasible_files, toml
+from benchmarks.suites.statements.remedies import File, infeasible_files, toml
 from tmsopt import Solution, load, solve
 from tmsopt.report import infeasible_lines
 
