@@ -61,7 +61,8 @@ def test_json_of_solve_is_the_contract():
     assert data["objective"] == {"sense": "minimize", "expression": "abscissa", "value": data["abscissa"]}
     assert set(data["parameters"]) == {"Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s"}
     assert data["parameters"]["chi_B"] == pytest.approx(math.sqrt(2), abs=1e-12)  # Table 1 of the paper
-    assert data["roots"] == [{"re": data["abscissa"], "im": 0.0, "multiplicity": 4}]
+    roots = {"re": data["abscissa"], "im": 0.0, "multiplicity": 4, "defective": True, "geometric_multiplicity": 1}
+    assert data["roots"] == [roots]
     assert data["structure"] == "EP4"
     assert data["bound"]["proven"] is True
     assert data["bound"]["method"] == "omega0"

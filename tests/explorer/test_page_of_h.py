@@ -17,7 +17,7 @@ ASK = "{get: window.tmsopt.get(), texts: rootTexts(drawingOf()), verdict: verdic
 RING = [["-0.9j", "r", "l"], ["l", "-0.9j", "r"], ["r", "l", "-0.9j"]]
 CASES = (
     ([["d - 1j", "k"], ["k", "-0.2j"]], {"d": 0.0, "k": 0.4}, ["−0.6i (2-fold)"], "stable"),
-    ([["w + 1j*g", 1], [1, "w - 1j*g"]], {"w": 5.0, "g": 1.0}, ["5 (2-fold)"], "marginal"),
+    ([["w + 1j*g", 1], [1, "w - 1j*g"]], {"w": 5.0, "g": 1.0}, ["5 (2-fold)"], "growing"),
     ([["w + 1j*g", 1], [1, "w - 1j*g"]], {"w": 5.0, "g": 0.6}, ["5.8", "4.2"], "marginally stable"),
     ([["w - 0.1j", 0], [0, "2 + 0.3j"]], {"w": -200.0}, ["2 + 0.3i", "−200 − 0.1i"], "gain"),
     (RING, {"r": 1.2, "l": 0.4}, ["−0.8 − 0.20718i", "1.6 − 0.9i", "−0.8 − 1.5928i"], "stable"),
@@ -36,7 +36,8 @@ def test_it_shows_eigenfrequencies(
     for asked in (ASK, elsewhere, f"(DATA.designs = [], {ASK})"):
         said = said_by(html, asked)
         assert sorted(said["texts"]) == sorted(texts)
-        assert said["get"]["kind"] == kind
+        # Without a solved design nobody has counted eigenvectors.
+        assert said["get"]["kind"] == (kind.replace("growing", "marginal") if "DATA" in asked else kind)
         omega = np.array(said["get"]["eigenfrequencies"]) @ [1, 1j]
         assert np.allclose(-1j * omega, np.array(said["get"]["roots"]) @ [1, 1j])
     saved = tmp_path / "saved.toml"

@@ -64,7 +64,10 @@ def test_the_recheck_says_the_same_of_each_design(asked: dict[str, Any]) -> None
         amounts = rechecking.excesses(stated, parameters, stated.cases)
         assert found.worth[k] == pytest.approx(stated.sign * checked.objective, rel=SIMPLE, abs=SIMPLE)
         for name, own in zip(names, found.excess[:, k], strict=True):
-            assert own == pytest.approx(abs(amounts[name]), rel=SIMPLE, abs=SIMPLE), name
+            # Where a root is real and positive the ratio is -1, whatever the design: the abscissa tells designs apart.
+            flat = name == "sway" and amounts[name] == pytest.approx(1.3, abs=1e-12)
+            worse = checked.structure.abscissa if flat else 0.0
+            assert own == pytest.approx(abs(amounts[name]) + worse, rel=SIMPLE, abs=SIMPLE), name
 
 
 def test_root_quantities_are_the_worst_of_all_cases_and_an_equality_that_of_the_nominal_design() -> None:

@@ -67,7 +67,7 @@ def test_at_the_edge_nothing_is_proved() -> None:
     design = found(2.0)
     assert design.abscissa == pytest.approx(0, abs=1e-9)
     assert (design.stable, design.any_stable) == (False, None)
-    assert headline(design)[1] == UNKNOWN
+    assert headline(design)[1] == f"marginally stable; {UNKNOWN}"
 
 
 def test_what_is_not_asked_is_not_known() -> None:
@@ -80,7 +80,7 @@ def test_a_root_at_0_needs_no_search() -> None:
     """The product of the roots is 0, so one of them is: the instant bound says so."""
     design = found(3.0, (1, X, 1, 0), stability=0.0)
     assert (design.stable, design.any_stable) == (False, False)
-    assert headline(design)[1] == NONE
+    assert headline(design)[1] == f"marginally stable; {NONE}"
 
 
 def test_a_stable_design_is_one() -> None:

@@ -37,7 +37,16 @@ class Jordan:
 
 
 def is_regular(matrices: Sequence[Matrix], s: Any, threshold: float) -> bool:
-    """Whether det L(s) is not 0 for all s, judged at places about s that are no roots but by accident."""
+    """Whether det L(s) is not 0 for all s, judged at places about s that are no roots but by accident.
+
+    Example:
+        >>> import flint
+        >>> half = [[flint.arb(1), flint.arb(0)], [flint.arb(0), flint.arb(0)]]  # the second equation is 0 = 0
+        >>> tmsopt.roots.is_regular((half, half), flint.acb(-1), 1e-10)
+        False
+
+    More: docs/explanation/exceptional_points.md
+    """
     unit = abs(s) if abs(s) > 0 else flint.arb(1)
     return any(jordan(matrices, s + unit * flint.acb(a, b), 1, threshold).zero > threshold for a, b in _ELSEWHERE)
 
@@ -53,6 +62,15 @@ def jordan(matrices: Sequence[Matrix], s: Any, multiplicity: int, threshold: flo
     Args:
         matrices: Pₖ in descending powers, balls; s is a ball too, so that no digit is lost where terms cancel.
         least: unit of the eigenvalues at least, where s is small beside others.
+
+    Example:
+        >>> import flint
+        >>> one, zero = flint.arb(1), flint.arb(0)
+        >>> block = [[one, zero], [zero, one]], [[one, one], [zero, one]]  # s + 1 twice, with a 1 above the diagonal
+        >>> tmsopt.roots.jordan(block, flint.acb(-1), 2, 1e-10).partial
+        (2,)
+
+    More: docs/explanation/exceptional_points.md
     """
     d, n = len(matrices) - 1, len(matrices[0])
     unit = max(float(abs(s).mid()), least) or 1.0
@@ -104,7 +122,17 @@ def _derivative(matrices: Sequence[Matrix], s: Any, order: int) -> list[list[Any
 
 
 def has_one_eigenvector(matrices: Sequence[Matrix], s: Any) -> bool:
-    """Whether L(s) surely has rank n − 1 at least: in balls, a minor of that order is not 0."""
+    """Whether L(s) surely has rank n − 1 at least: in balls, a minor of that order is not 0.
+
+    Example:
+        >>> import flint
+        >>> one, zero = flint.arb(1), flint.arb(0)
+        >>> block = [[one, zero], [zero, one]], [[one, one], [zero, one]]
+        >>> tmsopt.roots.has_one_eigenvector(block, flint.acb(-1))
+        True
+
+    More: docs/explanation/exceptional_points.md
+    """
     value = _derivative(matrices, s, 0)
     size = range(len(value))
     minors = (
@@ -119,6 +147,14 @@ def exact_nullity(matrices: Sequence[Matrix], factor: Any) -> int:
     Args:
         matrices: of fractions.
         factor: ``fmpq_poly``.
+
+    Example:
+        >>> from flint import fmpq, fmpq_poly
+        >>> unit = [[fmpq(1), fmpq(0)], [fmpq(0), fmpq(1)]]
+        >>> tmsopt.roots.exact_nullity((unit, unit), fmpq_poly([1, 1]))  # s + 1 twice, with two eigenvectors
+        2
+
+    More: docs/explanation/exceptional_points.md
     """
     power = [flint.fmpq_poly([0] * k + [1]) for k in range(len(matrices))][::-1]
     size = range(len(matrices[0]))

@@ -39,19 +39,19 @@ def verdict_in_words(solution: "Solution") -> str:
     located_none = problem.sense == "locate" and solution.status == "not_converged"
     if located_none or (solution.status == "infeasible" and known is not False):
         return ""
+    limited = problem.locate or len(problem.constraints) > len(problem.asked_of_roots)
+    none = f"no design in the box is stable (proved){' under its constraints' if limited else ''}"
+    others = none if known is False else "" if solution.interrupted else "no stable design found, not proved"
+    sought = solution.stability_sought and not known
     if found.verdict != UNSTABLE:
         model = problem.model
-        return stability_in_words(
+        words = stability_in_words(
             found, exact=solution.edge_is_exact, of_matrices=model.pencil is not None, of_H=model.carrier is not None
         )
-    if known is False:
-        limited = problem.locate or len(problem.constraints) > len(problem.asked_of_roots)
-        return f"no design in the box is stable (proved){' under its constraints' if limited else ''}"
-    if not solution.stability_sought:
-        return "not stable"
+        return f"{words}; {others}" if found.on_edge and sought and others else words
     if known:
         return "not stable, though there are stable designs in the box"
-    return "not stable" if solution.interrupted else "no stable design found, not proved"
+    return others if known is False or (sought and others) else "not stable"
 
 
 class NotSolved(RuntimeError):
