@@ -183,17 +183,21 @@ def without_any(work: Workspace, tried: int) -> Finding:
 def answered(problem: Problem, options: Options, asked: Problem) -> bool:
     """Whether a problem, solved again, has an optimum: a stable one where the one that was `asked` wants that.
 
-    As many starts are enough as a search takes to settle, for none that follow make an optimum worse.
+    As many starts are enough as a search takes to settle, for none that follow make an optimum worse; where these end
+    at nothing stable, all are made.
     """
+    stable = steady(problem, asked)
     parts = workspace(problem, options).parts()
     best: Finding | None = None
     for part in parts if not all(part.sample and part.sample.far_off for part in parts) else ():
         finding = None if problem.cases else _settled(part)
-        finding = finding if finding and finding.status == "optimal" else explore(part).finding
+        settled = finding and finding.status == "optimal"
+        if not (settled and finding and not recheck(stable, finding.parameters, finding.cases).violations):
+            finding = explore(part).finding
         best = finding if finding and (best is None or better(problem, finding, best)) else best
     if best is None or best.status != "optimal":
         return False
-    return not recheck(steady(problem, asked), best.parameters, best.cases).violations
+    return not recheck(stable, best.parameters, best.cases).violations
 
 
 def _settled(part: Workspace) -> Finding | None:
