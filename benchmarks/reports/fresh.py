@@ -40,8 +40,8 @@ def report(asked: Asked) -> str:
 
 _ABOUT = (
     "The references share no code with tmsopt: eigenvalues by NumPy, SciPy's differential evolution and climbs from "
-    "many designs, polishes by Nelder–Mead and SLSQP, 50 digits by mpmath. An optimum is false where a feasible design is better by "
-    "1e-6 of it; a limit is violated from 1e-9 of it on."
+    "many designs, polishes by Nelder–Mead and SLSQP, 50 digits by mpmath. An optimum is false where a feasible design "
+    "is better by 1e-6 of it; a limit is violated from 1e-9 of it on."
 )
 
 

@@ -130,12 +130,13 @@ def _evolve(problem: Problem, seed: int, generations: int) -> Floats:
 def _place(problem: Problem, units: Floats, warped: bool) -> Floats:
     """Designs from numbers between 0 and 1."""
     low, high = problem.box.T
-    straight = low + (high - low) * units
+    straight: Floats = low + (high - low) * units
     if not warped:
         return straight
-    share = np.where(straight > 0, straight / np.maximum(high, 1e-300), straight / np.maximum(-low, 1e-300))
-    bent = np.sinh(WARP * np.clip(share, 0, 1)) / np.sinh(WARP)
-    return np.where((low <= 0) & (high >= 0), np.where(straight > 0, bent * high, bent * low), straight)
+    end = np.where(straight > 0, high, low)
+    share = np.clip(straight / np.where(end == 0, 1, end), 0, 1)
+    curved: Floats = end * np.sinh(WARP * share) / np.sinh(WARP)
+    return np.where((low <= 0) & (high >= 0), curved, straight)
 
 
 def _climb(problem: Problem) -> Floats:
