@@ -5,11 +5,13 @@ ending ``.answers.json``. A run that was stopped goes on from both. ``TMSOPT_BEF
 """
 
 import os
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 from benchmarks.reports.tables import Asked, page, table
-from benchmarks.suites.fresh import COUNT, FAMILIES, KINDS, Cache, Verdict, ask, judge, known, problems
+from benchmarks.suites.fresh import COUNT, FAMILIES, KINDS, Cache, Problem, Verdict, ask, judge, known, problems
 
 HERE = Path(__file__).parents[2]
 
@@ -27,10 +29,21 @@ def report(asked: Asked) -> str:
     with ThreadPoolExecutor(asked.workers) as pool:
         for problem, said in zip(missing, pool.map(lambda p: ask(p, checkout), missing), strict=True):
             answers.keep(problem.name, said)
-    verdicts = {p.name: judge(p, references[p.name], answers[p.name]) for p in some}
-    header = ["family", "problems", "answered", *(f"false: {kind}" for kind in KINDS), "a better one is likely"]
+    verdicts = {p.name: _verdict(p, references[p.name], answers[p.name]) for p in some}
+    header = [
+        "family",
+        "problems",
+        "answered",
+        *(f"false: {kind}" for kind in KINDS),
+        "limits missed, as it says",
+        "a better one is likely",
+    ]
     rows = [_row(family, {n: v for n, v in verdicts.items() if n.split("/")[0] == family}) for family in FAMILIES]
-    lines = [f"- {name}: {kind}: {words}" for name, v in verdicts.items() for kind, words in v.false.items()]
+    lines = [
+        f"- {name}: {kind}: {words}{'; it says that a better one is likely' * v.doubtful}"
+        for name, v in verdicts.items()
+        for kind, words in v.false.items()
+    ]
     silent = [f"- {name}: {v.answer}" for name, v in verdicts.items() if not v.answered]
     return page(
         "Fresh", asked, _ABOUT, table(header, [*rows, _row("all", verdicts)]),
@@ -45,7 +58,22 @@ _ABOUT = (
 )
 
 
+def _verdict(problem: Problem, reference: Mapping[str, Any], answer: Mapping[str, Any]) -> Verdict:
+    """Of one problem; an answer that cannot be read counts as none."""
+    try:
+        return judge(problem, reference, answer)
+    except (KeyError, TypeError, ValueError, ZeroDivisionError) as error:
+        return Verdict(f"not judged: {type(error).__name__}: {error}", False)
+
+
 def _row(name: str, verdicts: dict[str, Verdict]) -> list[object]:
     found = verdicts.values()
     false = [sum(kind in v.false for v in found) for kind in KINDS]
-    return [name, len(verdicts), sum(v.answered for v in found), *false, sum(v.doubtful for v in found)]
+    return [
+        name,
+        len(verdicts),
+        sum(v.answered for v in found),
+        *false,
+        sum(v.missed for v in found),
+        sum(v.doubtful for v in found),
+    ]

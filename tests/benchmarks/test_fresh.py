@@ -66,7 +66,9 @@ def test_a_violated_limit_must_be_told():
     answer = {"status": "optimal", "objective": {"value": real.objective}, "parameters": design}
     best = {"design": design, "value": real.objective, "violation": 1.0, "abscissa": 0.0}
     assert set(judge(problem, best, said(**answer)).false) == {"feasible"}
-    assert not judge(problem, best, said(**answer, violations=dict(real.violations))).false
+    told = judge(problem, best, said(**answer, missed_as_stored=dict(real.violations)))
+    assert told.missed
+    assert not told.false
 
 
 def test_false_infeasible_and_false_proofs():

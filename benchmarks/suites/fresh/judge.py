@@ -45,12 +45,14 @@ class Verdict:
         answered: whether it was optimal or infeasible, or said which points there are.
         false: kind → what is false.
         doubtful: whether it said that a better one is likely.
+        missed: whether the stored design misses a limit, and it said so.
     """
 
     answer: str
     answered: bool
     false: Mapping[str, str] = field(default_factory=dict)
     doubtful: bool = False
+    missed: bool = False
 
 
 def ask(problem: Problem, checkout: Path) -> dict[str, Any]:
@@ -94,7 +96,7 @@ def _data(said: Mapping[str, Any]) -> dict[str, Any] | None:
 
 def _judge_design(problem: Problem, best: Reference, data: Mapping[str, Any], text: str) -> Verdict:
     false: dict[str, str] = {}
-    status = data["status"]
+    status, bad = data["status"], {}
     stated = problem if len(problem.cases) != DENSE else replace(problem, cases=problem.cases[::4])
     if status == "infeasible" and best.feasible:
         false["infeasible"] = f"{dict(best.design)} is feasible"
@@ -104,7 +106,10 @@ def _judge_design(problem: Problem, best: Reference, data: Mapping[str, Any], te
         claimed = float(data["objective"]["value"])
         real = measure_exactly(stated, data["parameters"])
         bad = {n: v for n, v in real.violations.items() if v > FEASIBLE}
-        if bad and not data.get("violations") and not all(any(n in t for t in data.get("notes", ())) for n in bad):
+        told = " ".join(
+            [*(data.get("violations") or {}), *(data.get("missed_as_stored") or {}), *data.get("notes", ())]
+        )
+        if not all(name in told for name in bad):
             false["feasible"] = f"violated, relative: {bad}"
         upper = real.objective if stated is problem else measure_exactly(problem, data["parameters"]).objective
         scale = max(abs(claimed), 1e-3)
@@ -127,7 +132,7 @@ def _judge_design(problem: Problem, best: Reference, data: Mapping[str, Any], te
         false["proved"] = false["infeasible"]
     unseen = (data.get("starts") or {}).get("expected_unseen")
     doubtful = "likely" in text or (unseen is not None and unseen >= 0.5)
-    return Verdict(status, status in ("optimal", "infeasible"), false, doubtful)
+    return Verdict(status, status in ("optimal", "infeasible"), false, doubtful, bool(bad) and "feasible" not in false)
 
 
 def _matches(problem: Problem, data: Mapping[str, Any]) -> bool:

@@ -212,9 +212,13 @@ def matrix_exactly(system: System, values: Mapping[str, Any]) -> Any:
 
 
 def roots_exactly(coefficients: Sequence[Any]) -> list[Any]:
-    """Roots to some 50 digits, near a multiple root too."""
+    """Roots to 50 digits, near a multiple root too; one that is exactly k-fold to 72/k, as it is pulled apart first."""
     with mpmath.workdps(DIGITS):
-        return list(mpmath.polyroots(list(coefficients), maxsteps=2000, extraprec=600))
+        try:
+            return list(mpmath.polyroots(list(coefficients), maxsteps=300, extraprec=600))
+        except mpmath.libmp.NoConvergence:
+            apart = [c * (1 + k * mpmath.mpf("1e-72")) for k, c in enumerate(coefficients)]
+            return list(mpmath.polyroots(apart, maxsteps=2000, extraprec=600))
 
 
 @dataclass(frozen=True)
