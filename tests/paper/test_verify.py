@@ -278,7 +278,7 @@ def test_other_chi_H_affect_generality(by_key) -> None:
     a = oracles.polynomial_exact("2.2362", "1.9673", "1.4754", "0.95", ZB, ZH, "0.4903")
     shifted = np.poly1d([float(c / a[0]) for c in a])(np.poly1d([1, -2.4]))
     assert oracles.routh_exact([Fraction(x) for x in shifted.coeffs])
-    assert -float((ZB * ZH) ** -1) ** 0.25 > -2.4
+    assert -(float((ZB * ZH) ** -1) ** 0.25) > -2.4
     for chi_H, moves in (("1", False), ("1.02", True)):
         products = {
             b[4] / b[0] for mu in (1, 2) for b in [oracles.polynomial_exact(2, mu, "1.3", chi_H, ZB, ZH, "0.5")]

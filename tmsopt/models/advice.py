@@ -19,8 +19,14 @@ _SIGNS = {
 }  # fmt: skip
 
 _CALLS = {
-    "ln": "log(x)", "log10": "log(x)/log(10)", "cosh": "(exp(x) + exp(-x))/2", "sinh": "(exp(x) - exp(-x))/2",
-    "tanh": "1 - 2/(exp(2*x) + 1)", "fabs": "abs(x)", "pow": "x**y", "cot": "1/tan(x)",
+    "ln": "log(x)",
+    "log10": "log(x)/log(10)",
+    "cosh": "(exp(x) + exp(-x))/2",
+    "sinh": "(exp(x) - exp(-x))/2",
+    "tanh": "1 - 2/(exp(2*x) + 1)",
+    "fabs": "abs(x)",
+    "pow": "x**y",
+    "cot": "1/tan(x)",
     **{f"arc{name}": f"a{name}(x)" for name in ("sin", "cos", "tan")},
     **dict.fromkeys(("re", "Re", "real"), "abscissa for the largest real part of the roots; expressions are real"),
     **dict.fromkeys(("im", "Im", "imag"), "angular_frequency for the largest |Im s|; expressions are real"),

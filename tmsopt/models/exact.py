@@ -137,8 +137,6 @@ def _is_long(x: Any) -> bool:
     return isinstance(x, int | Fraction) and max(abs(x.numerator), x.denominator) >= 10**MOST_DIGITS
 
 
-
-
 @dataclass(frozen=True)
 class Written:
     """A design in exact numbers.

@@ -127,8 +127,14 @@ def _curves(ax: Axes, data: Growth, part: str) -> list[Name]:
         if part == "imag" and not (_of_H(data) or mode.roots.imag.any()):
             continue
         colour, style = _STYLES.get(mode.name, _OTHERS[names.index(mode.name) % len(_OTHERS)])
-        ax.plot(scale.of(mode.values), _part(data, mode, part), color=colour, linewidth=1.4, linestyle=style,
-                zorder=2 + 0.01 * names.index(mode.name))  # whole lines below dashed ones
+        ax.plot(
+            scale.of(mode.values),
+            _part(data, mode, part),
+            color=colour,
+            linewidth=1.4,
+            linestyle=style,
+            zorder=2 + 0.01 * names.index(mode.name),
+        )  # whole lines below dashed ones
     _marks(ax, data, scale, part)
     unit = "" if data.rate is None else " in 1/s" if part == "real" else " in Hz"
     symbol = rf" $\mathrm{{{'Re' if part == 'real' else 'Im'}}}\,s$" if data.rate is None else ""

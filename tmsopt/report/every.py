@@ -77,5 +77,5 @@ def _search_lines(coverage: Coverage) -> list[str]:
         *crossed,
         f"coverage of a search: {coverage.starts} starts over the box{doubt}; "
         f"{coverage.expected:.2f} solutions to be expected in all; "
-        f"the chance that one more start finds another is below {coverage.chance:.2g} (95 % confidence; no proof)"
+        f"the chance that one more start finds another is below {coverage.chance:.2g} (95 % confidence; no proof)",
     ]

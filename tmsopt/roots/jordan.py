@@ -170,9 +170,7 @@ def exact_nullity(matrices: Sequence[Matrix], factor: Any) -> int:
             continue
         inverse = pivot[j].xgcd(factor)[1]
         others = (row for row in left if row is not pivot)
-        left = [
-            [(x - row[j] * inverse * y) % factor for x, y in zip(row, pivot, strict=True)] for row in others
-        ]
+        left = [[(x - row[j] * inverse * y) % factor for x, y in zip(row, pivot, strict=True)] for row in others]
     return len(left)
 
 

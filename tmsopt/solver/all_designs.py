@@ -176,9 +176,7 @@ def _errors(solution: Solution, own: Mapping[str, float], radius: Mapping[str, f
     return Table({n: max(known.get(n, 0.0), _ROUNDING * x) for n, x in least.items()})
 
 
-def _search(
-    problem: Problem, nlp: NLP, work: Workspace
-) -> tuple[list[Array], list[dict[str, float]], Coverage]:
+def _search(problem: Problem, nlp: NLP, work: Workspace) -> tuple[list[Array], list[dict[str, float]], Coverage]:
     """Solutions that many starts lead to, those met most often first, and their errors."""
     starts, progress = work.options.starts, work.options.progress
     begin(progress, "searching", "start")

@@ -234,8 +234,9 @@ def _follow() -> Outcome:
 )  # fmt: skip
 def _numerical() -> Outcome:
     # K2 has no first column, so the determinant is linear in v²
-    (k11, k12, k22), (c12, c22) = map(q, ("-80.95", "-2.59951685249872", "-0.80329488458618")), map(
-        q, ("76.59734589573222", "2.65431523794604")
+    (k11, k12, k22), (c12, c22) = (
+        map(q, ("-80.95", "-2.59951685249872", "-0.80329488458618")),
+        map(q, ("76.59734589573222", "2.65431523794604")),
     )
     square = q("9.81") * (k12 * k12 - k11 * k22) / (k11 * c22 - k12 * c12)
     speed = flint.arb(square).sqrt()
