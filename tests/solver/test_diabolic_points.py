@@ -62,7 +62,8 @@ def test_prove_shows_a_minor_in_balls() -> None:
 def test_blocks_of_two_are_no_ep4() -> None:
     """Two equal oscillators, critically damped: −1 four times, with two eigenvectors."""
     model = from_matrices([[1, 0], [0, 1]], [["c", 0], [0, "c"]], [[1, 0], [0, 1]])
-    found = tmsopt.solve(tmsopt.Problem(model, free={"c": (0.1, 4.0)}, minimize="abscissa"))
+    problem = tmsopt.Problem(model, free={"c": (0.1, 4.0)}, minimize="abscissa")
+    found = tmsopt.solve(problem, throw=False)  # IPOPT's Jacobian is singular there: it may end unconverged
     assert found.parameters["c"] == pytest.approx(2, abs=1e-6)
     assert "not an EP" in str(found)
 
