@@ -43,6 +43,11 @@ def _method(name: str) -> Callable[[Any], Any]:
     return lambda x: getattr(elementary.as_ball(x), name)()
 
 
+def _fraction(value: Any, text: str) -> Any:
+    """A number as its digits say; a nought may have any exponent, and 10 to that power is not to be computed."""
+    return elementary.rational(Fraction(value if isinstance(value, int) or not value else text.replace("_", "")))
+
+
 BINARY: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
     ast.Pow: operator.pow,
@@ -64,7 +69,7 @@ BALLS = Arithmetic(
         "sqrt": elementary.sqrt, "abs": elementary.magnitude, "min": elementary.lesser, "max": elementary.greater,
     },
     elementary.exact, {**BINARY, ast.Div: elementary.quotient, ast.Pow: elementary.power}, flint.arb.pi,
-    lambda value, text: elementary.rational(Fraction(value if isinstance(value, int) else text.replace("_", ""))),
+    _fraction,
 )  # fmt: skip
 DEGREES = Arithmetic(
     {
