@@ -401,7 +401,8 @@ def test_the_command_says_what_it_means():
     assert "lambda_s alone  23.5 deg" in printed("--full")
     contract = ["schema", "title", "model", "status", "objective", "parameters", "abscissa", "abscissa_realised", "roots", "structure", "active", "violations", "bound", "starts", "seconds", "stable", "units"]  # fmt: skip
     data = json.loads(printed("--json"))
-    assert set(contract) <= data.keys() <= {*contract, "any_stable", "notes"}
+    more = {"any_stable", "notes", "verdict", "defective", "geometric_multiplicity"}
+    assert set(contract) <= data.keys() <= {*contract, *more}
     assert data["units"]["lambda_s"] == "rad"
 
 
@@ -436,7 +437,7 @@ def test_rounding_in_one_line_says_how_many_digits_are_enough():
     assert digits == min(n for n in kept if kept[n] >= 0.95)
     assert share == int(100 * kept[digits])
     assert told.endswith(f"digits keep {share} % of the decay; {tmsopt.explain(design).worst} needs the most")
-    assert told.startswith(f"3 digits lose {round(100 * (1 - kept[3]))} % of the decay; ")  # those of a workshop
+    assert told.startswith(f"3 digits lose {round(100 * (1 - kept[3]))} % of the decay but violate offset, ")  # a workshop's
 
 
 def test_digits_that_are_enough_by_chance_are_not_told():

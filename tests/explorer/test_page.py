@@ -112,8 +112,8 @@ def test_it_opens_without_a_fault(browser: Any, explored: Any) -> None:
     with opened(browser, path) as page:
         of = explorer.problem.parameter_set.names
         assert values_of(page) == [explorer.solution.parameters[n] for n in of]
-        way = explorer.solution.abscissa
-        assert verdict(page).startswith("✓" if way < 0 else "✗" if way > 0 else "≈ marginal")
+        way, grows = explorer.solution.abscissa, explorer.solution.stability.growth
+        assert verdict(page).startswith("✓" if way < 0 else "✗" if way > 0 or grows else "≈ marginal")
         assert page.locator(".picture canvas").count() > 0
         assert page.title() == explorer.problem.title
 
@@ -304,7 +304,7 @@ def test_close_to_a_known_design_it_says_so(browser: Any, ep4: Path) -> None:
 
 
 VERDICTS = {
-    "s^2 (s^2 + 1)": ('["1", "0", "1", "0", "k - 2"]', "≈ marginal A disturbance can grow as t: roots meet"),
+    "s^2 (s^2 + 1)": ('["1", "0", "1", "0", "k - 2"]', "✗ growing A disturbance grows as t: roots meet"),
     "undamped": ('["1", "0", "1 + k", "0", "k"]', "≈ marginally stable A disturbance neither grows nor dies out: the rightmost"),
     "(s + k)^3": ('["1", "3*k", "3*k**2", "k**3"]', "✓ stable Every disturbance dies out and nothing swings, on the edge "
                   "of heavy damping, slowest as t2 e−2 t"),

@@ -5,6 +5,7 @@ these (`flint.arb_series`), or an array of intervals (`Twofold`). A value that d
 wide to tell, is a ball nan.
 """
 
+import math
 from fractions import Fraction
 from typing import Any
 
@@ -114,8 +115,10 @@ def exact(x: Any) -> Any:
     return flint.fmpq(*x.as_integer_ratio())
 
 
-def printed(x: float) -> flint.fmpq:
-    """A double as the shortest decimal that prints it, 0.1 as 1/10."""
+def printed(x: float) -> Any:
+    """A double as the shortest decimal that prints it, 0.1 as 1/10; a ball that is nan where it is no number."""
+    if not math.isfinite(x):
+        return flint.arb("nan")
     return flint.fmpq(*Fraction(repr(float(x))).as_integer_ratio())
 
 

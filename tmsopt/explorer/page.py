@@ -18,7 +18,7 @@ from tmsopt.explorer.subject import subject
 _COMMENT = re.compile(r"^//.*$|^/\*\*[\s\S]*?\*/$", re.MULTILINE)
 _BLANKS = re.compile(r"\s*([{};,])\s*|(:)\s+")  # that mean nothing in a style
 _TEXT = re.compile(r'("(?:[^"\\]|\\.)*")')
-_AROUND = re.compile(r" ?([=!]==|=>|[<>*]=|[?:|&*]{1,2}|[-+]=|[=,;{}()\[\]]) ?| ([-+]) (?![-+])")  # in a script
+_AROUND = re.compile(r" ?([=!]==|=>|\*=|[<>]=?|[?:|&*]{1,2}|[-+]=|[=,;{}()\[\]]) ?| ([-+]) (?![-+])")  # in a script
 _PARTS = "numerics state axes chart plane growth bicycle motion controls facts api main"
 
 

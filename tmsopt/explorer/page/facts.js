@@ -22,11 +22,11 @@ function verdictOf(drawing) {
   const power = times > 1 ? `t${times > 2 ? `^${times - 1}` : ""}` : "";
   if (!kind) return ["undefined", "No verdict: of the characteristic polynomial a coefficient is no number, or the first is 0"];
   if (isOnEdge(kind, meetings, known)) {
-    const where = `on ${AXIS}, as far as can be computed`;
-    const fate = known?.growth
-      ? `grows as ${known.growth}: ${ROOTS} and their eigenvectors meet`
-      : power && !known?.verdict ? `can grow as ${power}: ${ROOTS} meet` : `neither grows nor dies out: the ${OF_H ? "least damped" : "rightmost"} ${ROOTS} are`;
-    return [edgeWord(meetings, known), `A disturbance ${fate} ${where}`];
+    const grows = known?.growth ?? (known?.verdict ? "" : power);
+    const fate = grows
+      ? `${known?.growth ? "grows" : "can grow"} as ${grows}: ${ROOTS} meet`
+      : `neither grows nor dies out: the ${OF_H ? "least damped" : "rightmost"} ${ROOTS} are`;
+    return [edgeWord(meetings, known), `A disturbance ${fate} on ${AXIS}, as far as can be computed`];
   }
   const rate = MODEL.rate(state.x);
   const unit = Number.isFinite(rate) ? "s" : TIMES[DATA.rootUnit];

@@ -43,7 +43,7 @@ def with_need(solution: Solution, options: Options, answered: Answered) -> tuple
     The problem is solved again at the speed that is shown. A design that was missed in the box comes with it.
     """
     name, problem = _speed(solution.problem), solution.problem
-    if not name or problem.cases or not problem.free or solution.any_stable or not _asked(solution):
+    if not name or problem.cases or not problem.free or not _asked(solution):
         return solution, None
     limits = {} if set(problem.asked_of_roots) or problem.pattern else {STABLE: "abscissa <= 0"}
     few = replace(options, starts=_STARTS, stability=0.0, alone=False, progress=None, near=None)
@@ -231,7 +231,7 @@ def _asked(solution: Solution) -> bool:
     about = {*problem.asked_of_roots, *([problem.pattern.name] if problem.pattern else [])}
     if solution.status == "infeasible":
         return bool(about & set(solution.violations))
-    return solution.stable is False and solution.stability_sought
+    return solution.stable is False and not solution.any_stable and solution.stability_sought
 
 
 def _speed(problem: Problem) -> str:
