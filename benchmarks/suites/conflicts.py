@@ -103,7 +103,7 @@ def _heights(rng: np.random.Generator) -> Conflict:
 
 
 def _no_damping(rng: np.random.Generator) -> Conflict:
-    """At chi_H = 1 with forward tilt, a0 > 0 and a3 = Fr (1 − chi_B) zeta_B < 0 for chi_B < 1: never stable."""
+    """At chi_H = 1 with normal rake, a0 > 0 and a3 = Fr (1 − chi_B) zeta_B < 0 for chi_B < 1: never stable."""
     most = rounded(rng.uniform(0.7, 0.97))
     wanted = str(rng.choice(["damping_ratio >= 1", "damping_ratio >= 0.3", "abscissa <= -0.05"]))
     why = f"chi_B <= {most} < 1 makes a3 negative"

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installe
 
 FIXED = {"Fr": 2.0, "mu": 0.5, "chi_B": 1.3, "chi_H": 1.0, "zeta_B": -0.6, "zeta_H": -0.3, "lambda_s": 0.5}
 CAPSIZE = {**FIXED, "chi_H": 1.2, "mu": 5.0}  # a4 < 0 for tan λ_s < 5/3: one root s > 0, so ζ = −1
-WEAVE = {**FIXED, "zeta_B": -0.1, "zeta_H": -0.1, "chi_B": 0.5}  # backward tilt: one root s > 2 at any speed below 3
+WEAVE = {**FIXED, "zeta_B": -0.1, "zeta_H": -0.1, "chi_B": 0.5}  # reversed rake: one root s > 2 at any speed below 3
 
 
 def question(free: Mapping[str, tuple[float, float]], *constraints: str, base: Any = None, **asked: str) -> Question:

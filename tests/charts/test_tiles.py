@@ -137,7 +137,7 @@ OSCILLATOR = Model(
 
 
 def test_a_constraint_that_does_not_exist_is_not_satisfied():
-    """log(lambda_s) is no number for backward tilt, whatever the other constraints say."""
+    """log(lambda_s) is no number for reversed rake, whatever the other constraints say."""
     problem = dataclasses.replace(
         PLANE, constraints={"one": "Fr <= 100", "log": "log(lambda_s) <= 5", "two": "Fr >= -100"}
     )

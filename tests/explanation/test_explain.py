@@ -437,7 +437,9 @@ def test_rounding_in_one_line_says_how_many_digits_are_enough():
     assert digits == min(n for n in kept if kept[n] >= 0.95)
     assert share == int(100 * kept[digits])
     assert told.endswith(f"digits keep {share} % of the decay; {tmsopt.explain(design).worst} needs the most")
-    assert told.startswith(f"3 digits lose {round(100 * (1 - kept[3]))} % of the decay but violate offset, ")  # a workshop's
+    assert told.startswith(
+        f"3 digits lose {round(100 * (1 - kept[3]))} % of the decay but violate offset, "
+    )  # a workshop's
 
 
 def test_digits_that_are_enough_by_chance_are_not_told():

@@ -267,19 +267,19 @@ TILTED = {"Fr": (0.01, 10), "chi_B": (1.01, 5), "lambda_s": (math.radians(-80), 
 
 
 def sides(forward, backward):
-    return SimpleNamespace(sides={"forward tilt": forward, "backward tilt": backward})
+    return SimpleNamespace(sides={"normal rake": forward, "reversed rake": backward})
 
 
 @pytest.mark.parametrize(
     ("halves", "k", "limits", "end", "out"),
     [
-        (sides(-1.0, 0.1), 1, {0: -0.3}, (0.0, 9.0), {"backward tilt"}),
+        (sides(-1.0, 0.1), 1, {0: -0.3}, (0.0, 9.0), {"reversed rake"}),
         (sides(-1.0, 0.1), 1, {0: 0.1}, (0.0, 9.0), set()),
         (sides(-1.0, 0.1), 1, {0: -2.0}, (0.0, 9.0), set()),  # no half is left
         (sides(-1.0, math.nan), 1, {0: -0.3}, (0.0, 9.0), set()),  # a half of which nothing is known
-        (sides(-1.0, 0.1), 0, {1: 1.0}, (-0.5, 0.9), {"backward tilt"}),  # an end that meets the limit is better
+        (sides(-1.0, 0.1), 0, {1: 1.0}, (-0.5, 0.9), {"reversed rake"}),  # an end that meets the limit is better
         (sides(-1.0, 0.1), 0, {1: 1.0}, (-0.5, 1.1), set()),  # an end that does not
-        (sides(-1.0, 0.1), 0, {}, (-0.5, 1.1), {"backward tilt"}),
+        (sides(-1.0, 0.1), 0, {}, (-0.5, 1.1), {"reversed rake"}),
     ],
 )
 def test_a_half_of_the_box_is_left_out_where_its_best_without_limits_is_worse(halves, k, limits, end, out):
@@ -291,8 +291,8 @@ def test_a_half_of_the_box_is_left_out_where_its_best_without_limits_is_worse(ha
 def test_a_half_that_is_left_out_is_not_searched(monkeypatch):
     searched, explore, asked = [], solve.explore, problem(free=TILTED, pareto=[], minimize="abscissa")
     monkeypatch.setattr(solve, "explore", lambda work, insist: searched.append(work.name) or explore(work, insist))
-    found = solved(asked, beside=[{"Fr": 2.2, "chi_B": 1.4, "lambda_s": 0.7}], blind=True, without=["backward tilt"])
-    assert searched == ["forward tilt"]
+    found = solved(asked, beside=[{"Fr": 2.2, "chi_B": 1.4, "lambda_s": 0.7}], blind=True, without=["reversed rake"])
+    assert searched == ["normal rake"]
     assert found.value == pytest.approx(EP4[0], abs=1e-8)
 
 

@@ -220,12 +220,11 @@ def test_what_is_to_be_built_is_on_the_screen_however_crowded_it_is() -> None:
 
 @pytest.mark.slow
 def test_how_near_a_design_comes_is_said_of_its_worst_case() -> None:
-    """The sentence and the smallest change are about one number."""
+    """The smallest change, which was solved again, asks for no less than the nearest design has."""
     asked = {**CROWDED, "constraints": {**CROWDED["constraints"], "fast": "decay_time <= 0.167"}}
     told = str(tmsopt.solve(tmsopt.Problem(**asked), throw=False)).replace("\n  ", " ")
-    near, least = re.findall(r"decay_time (?:=|<=) ([\d.]+) s (?:in its worst case|instead of 0.167)", told)
-    assert float(near) == pytest.approx(float(least), rel=2e-4)  # five digits, the change rounded upwards
-    assert float(near) > 0.167
+    near, least = re.findall(r"decay_time (?:=|<=) ([\d.]+) (?:s in its worst case|instead of 0.167)", told)
+    assert 0.167 < float(near) <= float(least)
 
 
 def test_a_proof_that_was_tried_in_vain_is_told_so() -> None:

@@ -108,7 +108,7 @@ def test_a_design_nearby_decides_on_the_side(sign: int) -> None:
     problem = load("problems/realistic.toml")
     there = {n: (lo + hi) / 2 for n, (lo, hi) in problem.free.items()} | {"lambda_s": 0.2 * sign}
     found = solve(problem, near=there, starts=8, throw=False)
-    assert sign * found.parameters["lambda_s"] >= 0  # backward tilt has no stable design: 0 is its best
+    assert sign * found.parameters["lambda_s"] >= 0  # reversed rake has no stable design: 0 is its best
     assert len(found.sides) == 1
 
 

@@ -86,12 +86,12 @@ def test_where_no_start_has_ended_the_best_that_was_looked_at_is_left(monkeypatc
 
 
 def test_a_part_of_the_box_that_was_done_counts() -> None:
-    """EP4 of the paper (Table 1) has a forward tilt; the search is stopped at the first start with a backward one."""
+    """EP4 of the paper (Table 1) has normal rake; the search is stopped at the first start with reversed."""
     ep4 = tmsopt.load("problems/ep4.toml")
     free = {**ep4.free, "lambda_s": (-1.4, 1.4)}
 
     def again(told: tmsopt.Progress) -> None:
-        if told.note.endswith("backward tilt"):
+        if told.note.endswith("reversed rake"):
             raise KeyboardInterrupt
 
     found = tmsopt.solve(replace(ep4, free=free), throw=False, progress=again)

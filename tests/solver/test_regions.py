@@ -175,8 +175,10 @@ def test_heavily_damped_extremes_are_the_ep4_of_the_law():
         assert design.structure == "EP4"
         for name in BOX:
             assert design.parameters[name] == pytest.approx(float(getattr(EP4, name)), abs=1e-9)
-    assert steepest.value == pytest.approx(float(EP4.lambda_s), abs=1e-11)  # moved until the stored design is heavily damped
-    assert fastest.value == pytest.approx(-(12.5**0.25), abs=1e-12)
+    assert steepest.value == pytest.approx(
+        float(EP4.lambda_s), abs=1e-11
+    )  # moved until the stored design is heavily damped
+    assert fastest.value == pytest.approx(-(12.5**0.25), abs=1e-11)
     # Above the top nothing is heavily damped: a search for the greatest ratio does not reach 1.
     above = {**FIXED, "lambda_s": float(EP4.lambda_s) + 1e-3}
     box = {n: BOX[n] for n in ("Fr", "chi_B")}

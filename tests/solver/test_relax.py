@@ -234,7 +234,7 @@ def test_a_bound_that_may_not_move_beyond_what_is_physical():
 
 @pytest.mark.slow
 def test_without_a_stable_design_the_least_unstable_one_is_said_to_be_that():
-    """At chi_H = 1 a forward tilt is stable only with chi_B > 1: by a grid of 60 steps each way, and a search."""
+    """At chi_H = 1 normal rake is stable only with chi_B > 1: by a grid of 60 steps each way, and a search."""
     box = {"chi_B": (0.5, 0.95)}
     design = tmsopt.solve(problem(box, minimize="abscissa"))
     assert any("no stable design was found in the box; this is the least unstable one" in n for n in design.notes)

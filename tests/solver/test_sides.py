@@ -17,7 +17,7 @@ TMS = tmsopt.models.tms
 FIXED = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}
 SWAPPED = {**FIXED, "zeta_B": -0.2, "zeta_H": -0.4}
 BOX = {"Fr": (0.1, 5.0), "chi_B": (0.3, 3.0), "lambda_s": (-1.2, 1.2)}
-FORWARD, BACKWARD = "forward tilt", "backward tilt"
+FORWARD, BACKWARD = "normal rake", "reversed rake"
 
 
 def problem(fixed=FIXED, free=BOX, **asked):
@@ -59,7 +59,7 @@ def test_the_dual_of_a_problem_has_the_dual_of_its_answer():
     forward = tmsopt.solve(problem(minimize="Fr", constraints=decay), starts=16)
     backward = tmsopt.solve(problem(SWAPPED, minimize="Fr/chi_B", constraints=decay), starts=16)
     assert forward.sides[FORWARD] == pytest.approx(backward.sides[BACKWARD], abs=1e-9)
-    assert any("backward tilt wins" in n for n in backward.notes)
+    assert any("reversed rake wins" in n for n in backward.notes)
     own = {n: forward.parameters[n] for n in ("Fr", "chi_B", "zeta_B", "zeta_H", "lambda_s")}
     dual = {n: float(v) for n, v in laws.dual(**own).items()}
     for name, value in dual.items():
@@ -72,13 +72,13 @@ def test_the_dual_of_a_problem_has_the_dual_of_its_answer():
 
 @pytest.mark.slow
 def test_a_side_without_a_design_is_said_to_have_none():
-    """With these heights no backward tilt is stable at chi_H = 1, by the law of the EP4: its dual has T > 0."""
+    """With these heights no reversed rake is stable at chi_H = 1, by the law of the EP4: its dual has T > 0."""
     design = tmsopt.solve(problem(minimize="Fr", constraints={"decay": "abscissa <= -0.5"}))
     alone = tmsopt.solve(on(FORWARD, design.problem))
     assert design.value == pytest.approx(alone.value, abs=1e-9)
     assert design.sides[FORWARD] == design.value
     assert isnan(design.sides[BACKWARD])
-    assert any("with backward tilt nothing feasible" in n for n in design.notes)
+    assert any("with reversed rake nothing feasible" in n for n in design.notes)
     assert json.loads(json.dumps(design.to_json()))["sides"][BACKWARD] is None
 
 
@@ -133,7 +133,7 @@ def test_matching_on_both_sides():
     design = tmsopt.solve(problem(SWAPPED, locate="EP4"))
     law = laws.ep4_chi_H_1(-0.2, -0.4)
     assert np.tan(design.parameters["lambda_s"]) == pytest.approx(float(law.tan_lambda_s), abs=1e-10)
-    assert any("backward tilt wins" in n for n in design.notes)
+    assert any("reversed rake wins" in n for n in design.notes)
 
 
 def test_sides_that_are_equally_good_are_said_to_be() -> None:
@@ -142,7 +142,7 @@ def test_sides_that_are_equally_good_are_said_to_be() -> None:
     fixed = {"mu": 0.1, "chi_B": 1.0, "chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2}
     design = tmsopt.solve(tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, minimize="Fr"))
     assert design.value == pytest.approx(0.6, abs=1e-12)
-    assert design.sides["forward tilt"] == pytest.approx(design.sides["backward tilt"], abs=1e-12)
+    assert design.sides["normal rake"] == pytest.approx(design.sides["reversed rake"], abs=1e-12)
     (note,) = [n for n in design.notes if "both signs" in n]
     assert "is as good as" in note
     assert "wins" not in note

@@ -94,7 +94,7 @@ class Solution(Shown):
         least_damped: likewise, the case with the least damping ratio.
         fastest: likewise, the case with the greatest angular frequency, where the problem asks for that.
         cover: what is known of every case together, proven or not.
-        sides: part of the box, such as ``forward tilt`` → its best objective, nan where it has no feasible design.
+        sides: part of the box, such as ``normal rake`` → its best objective, nan where it has no feasible design.
         relaxation: of an infeasible problem, the smallest move of its limits that leaves a feasible design.
         need: of a problem without an answer, or of a design that is not stable though that was looked for, the speed
             that it takes; None where the speed plays no part.

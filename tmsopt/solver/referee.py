@@ -192,7 +192,7 @@ def outdone(work: Workspace, finding: Finding) -> Finding:
             cases = (*cases, *(w.case for w in worst_cases(work.problem, parameters).values()))
         checked = work.recheck(parameters, cases)
         told = not checked.violations and not unclear(work.problem, checked)
-        merged = abs(checked.structure.abscissa - checked.realised)  # what counting roots as one may make it look better by
+        merged = abs(checked.structure.abscissa - checked.realised)  # what merging roots may gain
         if told and work.problem.sign * checked.objective < least - merged:
             doubted = replace(finding, parameters=parameters, checked=checked, cases=cases, status="not_converged")
             return replace(doubted, active={}, branches=(), notes=(_PASSED,))

@@ -89,7 +89,7 @@ def solved(
     Args:
         beside: designs that may be close to the optimum, to be started from.
         blind: search from these and the problem's start alone, without a look at the box; and without `covered`.
-        without: parts of the box to be left out, such as ``forward tilt``.
+        without: parts of the box to be left out, such as ``normal rake``.
         bound: whether to say how good the design is at best.
     """
     if isinstance(design, Solution):

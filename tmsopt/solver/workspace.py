@@ -126,7 +126,7 @@ class Workspace:
 
     Attributes:
         part: the problem on the part of the box that designs are drawn from, e.g. one sign of one parameter.
-        name: of the part, e.g. ``forward tilt``; empty for the whole box.
+        name: of the part, e.g. ``normal rake``; empty for the whole box.
         family: that the problem is one of.
         beside: designs that may be close to the optimum, to be started from.
         blind: whether to do without a sample.

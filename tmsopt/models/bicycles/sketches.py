@@ -4,7 +4,7 @@ CONVENTIONS = (
     "x points forward, y to the right, z down, from the contact of the rear wheel: heights are negative numbers",
     "lean phi is positive to the right, steer delta is positive to the right",
     "steer axis tilt lambda_s is positive as on ordinary bicycles, where the axis leans back at its top and its lower "
-    "end points forward (forward tilt); negative the other way (backward tilt)",
+    "end points forward (normal rake); negative the other way (reversed rake)",
 )
 """Signs, as in Meijaard et al. (2007) and Kirillov (2018)."""
 

@@ -24,7 +24,7 @@ _NOT_POSITIVE = Range(upper=0.0)
 _TILT = Range(-np.pi / 2, np.pi / 2, closed=False)
 
 LAMBDA_S = Parameter(
-    "lambda_s", "rad", "steer axis tilt", r"\lambda_s", _TILT, tangent=True, sides=("backward tilt", "forward tilt")
+    "lambda_s", "rad", "steer axis tilt", r"\lambda_s", _TILT, tangent=True, sides=("reversed rake", "normal rake")
 )
 
 
