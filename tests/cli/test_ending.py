@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterable
 from importlib import import_module
 from importlib.util import find_spec
-from itertools import pairwise
+from itertools import cycle, pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -392,10 +392,10 @@ def shell(line: str, folder: Path, **variables: str) -> tuple[int, str, str]:
 
 
 def pairs(every: Iterable[str], chosen: Iterable[str]) -> list[Any]:
-    """Cheap commands with all there is, at once; the others with what tells most, among the slow tests."""
+    """Cheap commands with all there is, at once; the others in turn with what tells most, among the slow tests."""
     rest = [name for name in WORDS if name not in CHEAP]
     return [(name, other) for name in CHEAP for other in every] + [
-        pytest.param(name, other, marks=pytest.mark.slow) for name in rest for other in chosen
+        pytest.param(name, other, marks=pytest.mark.slow) for name, other in zip(rest, cycle(chosen), strict=False)
     ]
 
 

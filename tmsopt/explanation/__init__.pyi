@@ -6,5 +6,5 @@ from .optimality import (
     Optimality as Optimality, optimality as optimality,
 )
 from .rounding import rounded as rounded, rounded_designs as rounded_designs
-from .summary import none_of as none_of
+from .summary import faster_than as faster_than, none_of as none_of
 from .steps import natural_step as natural_step, step_within as step_within

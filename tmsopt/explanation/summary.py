@@ -52,10 +52,16 @@ def none_of(problem: Problem) -> str:
     return f"no design{located} in the box{' within the limits' if problem.constraints else ''}"
 
 
+def faster_than(solution: Solution) -> str:
+    """What a design of a lesser abscissa does; of designs on the edge the abscissa alone does not tell how they grow."""
+    if solution.stability.on_edge:
+        return "has a lesser abscissa"
+    return "decays faster" if solution.abscissa < 0 else "grows more slowly"
+
+
 def _quality(solution: Solution) -> str:
     problem, bound = solution.problem, solution.bound
     text = (problem.minimize or problem.maximize or "").strip()
-    faster = "decays faster" if solution.abscissa < 0 else "grows more slowly"
     if not problem.free:
         return "the design as given, with nothing free"
     if not text:
@@ -64,7 +70,7 @@ def _quality(solution: Solution) -> str:
         return f"a design with {problem.locate}, as asked{left}"
     by = f" by more than {bound.gap:.1e}" if bound.tolerance else ""
     if bound.proven and text == "abscissa":
-        return f"{none_of(problem)} {faster}{by} (proven)"
+        return f"{none_of(problem)} {faster_than(solution)}{by} (proven)"
     if bound.proven:
         return f"{none_of(problem)} has a {'greater' if problem.sense == 'maximize' else 'lesser'} {text}{by} (proven)"
     tried = ", ".join([*solution.starts.sureness, "not proven"])

@@ -35,7 +35,7 @@ from tmsopt.solver.remedies.needs import with_need
 from tmsopt.solver.search import Explored, answered, explore, without_any
 from tmsopt.solver.workspace import Family, Workspace, check_near, workspace
 
-UNSTABLE = "no stable design was found that meets the other limits; this is the least unstable one"
+UNSTABLE = "no stable design was found that meets the other limits"
 """Of a design that is not stable though a limit asks for it."""
 
 _ASKING = replace(DEFAULTS, stability=5.0, interruptible=True)
@@ -210,7 +210,7 @@ def _with_stability(solution: Solution, options: Options, family: Family | None,
         words = "branch and bound found the stable design from which this one was reached"
         solution = _led(solution, asked.design, words, options, family)
     elif asked.any is False:
-        solution = replace(solution, notes=(*solution.notes, f"that no design is stable is proved {asked.proof}"))
+        solution = replace(solution, notes=(*solution.notes, f"that none is stable is proved {asked.proof}"))
     if asked.failed:
         solution = replace(
             solution, notes=(*solution.notes, f"whether any design is stable is not known: {asked.failed}")
@@ -342,8 +342,10 @@ def _stability_note(problem: Problem, checked: Checked, edges: Sequence[str], op
         return (f"not the edge of stability: another {another} {excess}",)
     if unstable or not optimal or checked.structure.abscissa < 0:
         return unstable
-    if problem.free and (problem.minimize or "").strip() == "abscissa":
-        return ("no stable design was found in the box; this is the least unstable one",)
     largest = max((math.hypot(r.re, r.im) for r in checked.structure.roots), default=0.0)
     found = stability((checked.structure.abscissa, checked.realised), edges, largest=largest)  # as the report says
+    if problem.free and (problem.minimize or "").strip() == "abscissa":
+        multiple = "whether designs with abscissa 0 grow depends on their multiple roots"
+        least = f"no design that decays was found in the box; {multiple}"
+        return (least if found.on_edge else "no stable design was found in the box; this is the least unstable one",)
     return () if found.on_edge else ("the design is not stable: abscissa >= 0",)

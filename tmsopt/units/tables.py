@@ -76,5 +76,7 @@ def _meant(text: object) -> str:
     if comma := re.fullmatch(r"\s*([+-]?\d+),(\d+.*)", text):
         return f'; write a decimal point: "{comma[1]}.{comma[2]}"'
     if share := re.fullmatch(r"\s*([+-]?\d+\.?\d*)\s*%\s*", text):
-        return f"; write {float(share[1]) / 100:.12g} for {share[1]} %"
+        return (
+            f"; write {float(share[1]) / 100:.12g} for a share of {share[1]} %; {share[1]} % of a value as its amount"
+        )
     return ""

@@ -102,10 +102,10 @@ def sides(text: str) -> tuple[str, str, str]:
 
 
 def excess(text: str, values: Mapping[str, Any], field: Field) -> tuple[Any, Any]:
-    """By how much a limit is violated, negative where it holds, and the size of its right side, 1 where that is 0."""
+    """By how much a limit is violated, negative where it holds, and the size of its right side, at least 1."""
     left, sign, right = sides(text)
     a, b = evaluate(left, values, field), evaluate(right, values, field)
-    return (a - b if sign == "<=" else b - a), abs(b) or 1
+    return (a - b if sign == "<=" else b - a), max(abs(b), 1)
 
 
 def names(text: str) -> set[str]:

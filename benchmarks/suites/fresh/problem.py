@@ -231,11 +231,14 @@ class Measured:
 
 
 def measure_exactly(problem: Problem, design: Mapping[str, float]) -> Measured:
-    """What a design is worth, its doubles taken as they are."""
+    """What a design is worth, all its parameters taken as the doubles that a saved file hands over."""
     worst, abscissa, violations = None, -mpmath.inf, dict.fromkeys(problem.limits, 0.0)
     with mpmath.workdps(DIGITS):
         for case in problem.cases:
-            values = assign(problem, {n: exact(design[n]) for n in problem.free}, case, MANY_DIGITS)
+            stored = {n: float(text) for n, text in {**problem.fixed, **case}.items()} | {
+                n: design[n] for n in problem.free
+            }
+            values = assign(problem, {n: exact(x) for n, x in stored.items()}, {}, MANY_DIGITS)
             roots = roots_exactly(polynomial(problem.system, values))
             values["abscissa"] = max(mpmath.re(s) for s in roots)
             values["damping_ratio"] = min(-mpmath.re(s) / abs(s) if s else mpmath.mpf(1) for s in roots)

@@ -7,7 +7,7 @@ from tmsopt.design.problem import Problem
 from tmsopt.design.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.design.solution import Bound, Solution
 from tmsopt.design.unit_system import unit_of, unit_of_all
-from tmsopt.explanation import none_of
+from tmsopt.explanation import faster_than, none_of
 from tmsopt.report.text import number
 
 
@@ -58,9 +58,8 @@ def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
     side = "above" if problem.sense == "maximize" else "below"
     if bound.proven:
         by = f" by more than {bound.gap:.1e}" if bound.tolerance else ""
-        faster = "decays faster" if solution.abscissa < 0 else "grows more slowly"
         better = (
-            faster
+            faster_than(solution)
             if text == "abscissa" and problem.sense == "minimize"
             else f"has a {'greater' if side == 'above' else 'lesser'} {text}"
         )
@@ -95,7 +94,8 @@ def case_lines(solution: Solution) -> list[str]:
     of = solution.problem
     lines = [f"worst case: {_place(of, solution.worst)}; motion and roots are those there, the rest nominal"]
     if solution.least_damped not in (None, solution.worst) and of.model.carrier is None:
-        lines.append(f"least damped case: {_place(of, solution.least_damped)}; the damping ratio is that there")
+        found = "least damped of those looked at" if solution.problem.tolerances else "least damped case"
+        lines.append(f"{found}: {_place(of, solution.least_damped)}; the damping ratio is that there")
     if solution.fastest is not None and solution.fastest != solution.worst:
         lines.append(f"fastest case: {_place(of, solution.fastest)}; limits on the frequency are on that there")
     cover = solution.cover
