@@ -53,7 +53,7 @@ def none_of(problem: Problem) -> str:
 
 
 def faster_than(solution: Solution) -> str:
-    """What a design of a lesser abscissa does; of designs on the edge the abscissa alone does not tell how they grow."""
+    """What a design of a lesser abscissa does; on the edge the abscissa does not tell how they grow."""
     if solution.stability.on_edge:
         return "has a lesser abscissa"
     return "decays faster" if solution.abscissa < 0 else "grows more slowly"
