@@ -13,6 +13,7 @@ from helpers.hunt import abscissa
 import tmsopt
 from tmsopt import laws
 from tmsopt.design import moved_limits
+from tmsopt.design.advice.remedies import with_limits
 from tmsopt.records import Table
 from tmsopt.report import design_report, infeasible_lines
 
@@ -161,6 +162,68 @@ def test_without_any_one_limit_of_a_conflict_the_others_are_met(tmp_path, limits
             free[name] = (free[name][0] - 1.5, free[name][1]) if end == "min" else (free[name][0], 21.0)
         rest = replace(asked, minimize="m_H", constraints=kept, free=free)
         assert tmsopt.solve(rest, throw=False).status == "optimal"
+
+
+# The smallest change
+
+
+DAMPED = (
+    ABSORBER.partition("mu = 0.1")[0]
+    + """mu = { min = 0.01, max = 0.1 }
+c = { min = 0, max = 2 }
+w = { min = 0.95, max = 3 }
+[objective]
+minimize = "c"
+[constraints]
+decay = "abscissa <= -0.2"
+cheap = "c <= 0.05"
+zeta = "damping_ratio >= 0.2"
+"""
+)
+SLOW_ROBOT = """
+model = "tms"
+[parameters]
+w = "70 cm"
+v = { min = "1 km/h", max = "7 km/h" }
+m_B = "15 kg"
+m_H = "3 kg"
+x_B = { min = "20 cm", max = "60 cm" }
+z_B = "-35 cm"
+x_H = { min = "60 cm", max = "80 cm" }
+z_H = { min = "-40 cm", max = "-20 cm" }
+lambda_s = { min = "0 deg", max = "25 deg" }
+[objective]
+minimize = "abscissa"
+[constraints]
+decay = "decay_time <= 0.4"
+rear = "N_R >= 20"
+"""
+
+
+def test_a_change_asks_no_more_than_what_the_nearest_design_misses(tmp_path):
+    """Where two pairs meet at w = 1/(1 + mu) = 0.95, the abscissa is -sqrt(mu/(1 + mu))/2 = -0.1118, zeta 0.1147."""
+    asked = written(tmp_path, DAMPED)
+    (change,) = tmsopt.solve(asked, throw=False).relaxation.remedies
+    assert dict(change) == {"decay": "abscissa <= -0.1118", "zeta": "damping_ratio >= 0.1147"}
+    assert tmsopt.solve(with_limits(asked, change)).status == "optimal"
+
+
+def test_no_limit_is_moved_for_nothing_nor_farther_than_a_known_design_needs(tmp_path):
+    """At v = 11.861 km/h, x_B = 61 cm, z_H = -44 cm, lambda_s = -4.5 deg a design decays within 0.4 s."""
+    asked = written(tmp_path, SLOW_ROBOT)
+    (change,) = tmsopt.solve(asked, throw=False).relaxation.remedies
+    assert not set(change) & set(asked.constraints)
+    moved = with_limits(asked, change)
+    design = tmsopt.solve(moved)
+    assert design.stable
+    known = {**asked.free, "v": (1 / 3.6, 11.861 / 3.6), "x_B": (0.2, 0.61)}
+    known |= {"z_H": (-0.44, -0.2), "lambda_s": (np.radians(-4.5), np.radians(25))}
+    assert tmsopt.solve(replace(asked, free=known)).status == "optimal"
+
+    def widths(free):
+        return sum((hi - lo) / np.subtract(*reversed(asked.free[n])) - 1 for n, (lo, hi) in free.items())
+
+    assert widths(moved.free) <= widths(known) * 1.01
 
 
 # By moving the limits and solving again

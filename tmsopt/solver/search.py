@@ -180,24 +180,23 @@ def without_any(work: Workspace, tried: int) -> Finding:
     return Finding(parameters, checked, status, {}, starts, nlp.formulation, cases, notes=notes, relaxation=relaxation)
 
 
-def answered(problem: Problem, options: Options, asked: Problem) -> bool:
-    """Whether a problem, solved again, has an optimum: a stable one where the one that was `asked` wants that.
+def answered(problem: Problem, options: Options, asked: Problem) -> Mapping[str, float] | None:
+    """The optimum of a problem that is solved again: a stable one where the one that was `asked` wants that; or None.
 
     As many starts are enough as a search takes to settle, for none that follow make an optimum worse; where these end
-    at nothing stable, all are made.
+    at nothing stable, all are made. That a sample sees nothing near ends none: what is just enough is a needle.
     """
     stable = steady(problem, asked)
-    parts = workspace(problem, options).parts()
     best: Finding | None = None
-    for part in parts if not all(part.sample and part.sample.far_off for part in parts) else ():
+    for part in workspace(problem, options).parts():
         finding = None if problem.cases else _settled(part)
         settled = finding and finding.status == "optimal"
         if not (settled and finding and not recheck(stable, finding.parameters, finding.cases).violations):
             finding = explore(part).finding
         best = finding if finding and (best is None or better(problem, finding, best)) else best
-    if best is None or best.status != "optimal":
-        return False
-    return not recheck(stable, best.parameters, best.cases).violations
+    if best is None or best.status != "optimal" or recheck(stable, best.parameters, best.cases).violations:
+        return None
+    return best.parameters
 
 
 def _settled(part: Workspace) -> Finding | None:

@@ -17,11 +17,22 @@ from tmsopt.formulation.options import Options
 from tmsopt.records import Table
 from tmsopt.solver.remedies.allowance import Spent, within
 from tmsopt.solver.remedies.needs import Answered
-from tmsopt.solver.remedies.relaxation import alone, holding, least_relaxation, stages, widened
+from tmsopt.solver.remedies.relaxation import (
+    Limit,
+    alone,
+    holding,
+    least_near,
+    least_relaxation,
+    stages,
+    total,
+    widened,
+)
 from tmsopt.solver.workspace import Workspace, workspace
 
 _ROOM = ((1.0, DIGITS), (1.2, 2))
 """Times an amount, and digits of what is written: where the design is a needle, room shows it to a search."""
+
+_LESS = 0.999  # of the sum of amounts: what is worth being solved again
 
 _FEW = 3  # starts of a relaxation that is sought besides
 
@@ -55,43 +66,64 @@ def relax(work: Workspace, named: Named, answered: Answered) -> Relaxation | Non
         if trial and nlp and len(relaxation.conflict) > 1:
             single = alone(workspace(problem, options), relaxation.conflict, trial, nlp.cases)
         short = within(options, time.process_time() - began)
-        return _tried(replace(work, options=short), replace(relaxation, alone=Table(single)), wide, answered)
+        return _tried(replace(work, options=short), replace(relaxation, alone=Table(single)), wide, limits, answered)
     return None
 
 
-def _tried(work: Workspace, relaxation: Relaxation, wide: Problem, answered: Answered) -> Relaxation:
+def _tried(
+    work: Workspace, relaxation: Relaxation, wide: Problem, limits: Sequence[Limit], answered: Answered
+) -> Relaxation:
     """A relaxation with remedies, as long as there is time to try them; alone are limits that were tried.
 
     Where the relaxed design is not stable though that is wanted, so is none of the few that are left beside it.
     """
     remedies, enough = dict[Table[str], None](), dict[str, float]()
-    stable = replace(work.problem, constraints=stability_wanted(work.problem), **_NO_GOAL)
+    wanted = stability_wanted(work.problem)
+    stable = replace(work.problem, constraints=wanted, **_NO_GOAL)
+    box = replace(wide, constraints={**wide.constraints, **wanted})
     joint = [] if recheck(stable, relaxation.parameters).violations else [relaxation.amounts]
     choices = {tuple(each): each for each in (*joint, *({n: a} for n, a in relaxation.alone.items()))}
     with suppress(Spent):
         for names, amounts in choices.items():
-            if text := _written(work, amounts, answered):
+            together = bool(joint) and names == tuple(relaxation.amounts)
+            text, design = _written(work, amounts, answered)
+            if text := _less(work, box, limits, text, design, amounts, answered) if text and together else text:
                 remedies[Table(text)] = None
-                enough |= {n: relaxation.alone[n] for n in names if len(names) == 1 and n in relaxation.alone}
+                enough |= {n: relaxation.alone[n] for n in text if len(text) == 1 and n in relaxation.alone}
         if not remedies:
             remedies |= dict.fromkeys(_steadied(work, wide, answered))
     return replace(relaxation, alone=Table(enough), remedies=tuple(remedies))
 
 
-def _written(work: Workspace, amounts: Mapping[str, float], answered: Answered) -> dict[str, str]:
-    """Limits moved by amounts, or a little further, as they may be written so that the problem is answered; or {}.
+def _less(
+    work: Workspace, box: Problem, limits: Sequence[Limit], text: dict[str, str], design: Mapping[str, float],
+    amounts: Mapping[str, float], answered: Answered,
+) -> dict[str, str]:  # fmt: skip
+    """What is written, or less where the design that answers shows that limits are moved too far, or for nothing."""
+    with suppress(Spent):
+        less = least_near(work, box, limits, design)
+        share = total(limits, less) / total(limits, amounts)
+        return _written(work, less, answered, [room for room in _ROOM if share * room[0] < _LESS])[0] or text
+    return text
+
+
+def _written(
+    work: Workspace, amounts: Mapping[str, float], answered: Answered, rooms: Sequence[tuple[float, int]] = _ROOM
+) -> tuple[dict[str, str], Mapping[str, float]]:
+    """Limits moved by amounts, or a little further, as they may be written, and the design that then answers; or {}.
 
     None that moves limits on the roots as far as to let in what is not stable.
     """
     problem, tried = work.problem, list[dict[str, str]]()
-    for more, digits in _ROOM if all(map(np.isfinite, amounts.values())) else ():
+    for more, digits in rooms if amounts and all(map(np.isfinite, amounts.values())) else ():
         text = moved_limits(problem, {n: more * amount for n, amount in amounts.items()}, digits)
         with suppress(InputError):  # no end of a range is beyond what is physical
             moved = with_limits(problem, text)
-            if text not in tried and not _unsettled(problem, moved, text) and answered(moved, work.options):
-                return text
+            fresh = text not in tried and not _unsettled(problem, moved, text)
+            if fresh and (design := answered(moved, work.options)):
+                return text, design
         tried.append(text)
-    return {}
+    return {}, {}
 
 
 def _unsettled(problem: Problem, moved: Problem, names: Collection[str]) -> bool:
@@ -119,5 +151,7 @@ def _steadied(work: Workspace, wide: Problem, answered: Answered) -> tuple[Table
     moved = [limit for limit in movable if limit.name != STABLE]
     few = replace(work, problem=asked, options=replace(work.options, starts=_FEW))
     relaxation, *_ = least_relaxation(few, box, moved)
-    text = _written(work, relaxation.amounts, answered) if relaxation else {}
-    return (Table(text),) if text else ()
+    if relaxation is None:
+        return ()
+    text, design = _written(work, relaxation.amounts, answered)
+    return (Table(_less(work, box, moved, text, design, relaxation.amounts, answered)),) if text else ()

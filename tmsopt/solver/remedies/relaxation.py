@@ -1,6 +1,6 @@
 """The least by which limits of a problem without an answer must be moved for a design that meets them."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
@@ -16,7 +16,6 @@ from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
 from tmsopt.formulation.formulate import design_of, formulate
 from tmsopt.formulation.nlp import NLP, Lift
-from tmsopt.formulation.options import Options
 from tmsopt.models import Values
 from tmsopt.records import Table
 from tmsopt.solver.multistart import Runner, same, starting
@@ -59,13 +58,6 @@ class Limit:
         return max(beyond if self.name.endswith(".max") else -beyond, 0.0)
 
 
-Answered = Callable[[Problem], bool]
-"""Whether a problem is answered where it is solved again; see `search.answered`."""
-
-Named = Callable[[Problem, Relaxation, Sequence[str], Problem, Options], Relaxation]
-"""A relaxation with the limits that exclude each other; see `needs.irreducible`."""
-
-
 def least_relaxation(
     work: Workspace, wide: Problem, limits: Sequence[Limit]
 ) -> tuple[Relaxation, Trial | None, NLP | None] | tuple[None, None, None]:
@@ -78,11 +70,19 @@ def least_relaxation(
     met = [] if listed else [found for side in sides for found in islice(_met(work, side, limits), 1)]
     least, seen = min(met, key=lambda found: found[0], default=(np.inf, None))
     amounts = _amounts(wide, limits, trial.parameters, nlp.cases) if trial and nlp else {}
-    if seen and (trial is None or least < _total(limits, amounts) * (1 - _TIE)):
+    if seen and (trial is None or least < total(limits, amounts) * (1 - _TIE)):
         return seen, None, None
     if trial is None or nlp is None:
         return None, None, None
     return Relaxation(Table(trial.parameters), Table(amounts)), trial, nlp
+
+
+def least_near(work: Workspace, box: Problem, limits: Sequence[Limit], design: Mapping[str, float]) -> dict[str, float]:
+    """How far limits must be moved for the nearest design that this one leads to; {} where it leads to none."""
+    side, nlp = workspace(box, work.options), _elastic(box, box.cases, limits)
+    trial = survivor(_unlimited(side, limits), nlp, [Runner(side, nlp).ended(design, near=True, hopeful=False)])
+    met = trial is not None and not trial.checked.violations
+    return _amounts(box, limits, trial.parameters, nlp.cases) if trial and met else {}
 
 
 def _met(work: Workspace, side: Workspace, limits: Sequence[Limit]) -> Iterator[tuple[float, Relaxation]]:
@@ -96,14 +96,15 @@ def _met(work: Workspace, side: Workspace, limits: Sequence[Limit]) -> Iterator[
         refined = side.sampler.refined(side.sample.refined.take(np.arange(1)), _FINEST)
         designs.append(side.sampler.design(refined, 0))
     needs = [(p, _amounts(side.problem, limits, p, ())) for p in map(side.problem.ordered, designs)]
-    totals = [_total(limits, amounts) for _, amounts in needs]
+    totals = [total(limits, amounts) for _, amounts in needs]
     for row in np.argsort(totals, kind="stable").tolist():
         parameters, amounts = needs[row]
         if not unlimited.recheck(parameters, ()).violations:
             yield totals[row], Relaxation(Table(parameters), Table(amounts))
 
 
-def _total(limits: Sequence[Limit], amounts: Mapping[str, float]) -> float:
+def total(limits: Sequence[Limit], amounts: Mapping[str, float]) -> float:
+    """Amounts added up, each in units of its limit."""
     return sum(abs(amounts.get(limit.name, 0.0)) / limit.scale for limit in limits)
 
 
