@@ -285,3 +285,13 @@ def test_no_problem_that_comes_along_needs_pint() -> None:
     script = "import sys, tmsopt; [tmsopt.load(f) for f in sys.argv[1:]]; print('pint' in sys.modules)"
     ended = subprocess.run([sys.executable, "-c", script, *files], capture_output=True, text=True, cwd=root, check=True)
     assert ended.stdout.split() == ["False"]
+
+
+def test_json_names_seconds_only_where_there_are_seconds() -> None:
+    """A system of one's own, as a dimensionless bicycle, is in no unit of time."""
+    own = tmsopt.models.from_matrices([[1]], [["c"]], [[1]])
+    assert tmsopt.solve(tmsopt.Problem(own, fixed={"c": 1.0})).to_json()["units"] == {}
+    problems = Path(__file__).parents[2] / "problems"
+    free, robot = (tmsopt.solve(problems / f"{n}.toml").to_json()["units"] for n in ("ep4", "point_mass_robot"))
+    assert not {"decay_rate", "decay_time", "frequency", "abscissa"} & set(free)
+    assert (robot["decay_rate"], robot["decay_time"], robot["frequency"]) == ("1/s", "s", "Hz")

@@ -8,7 +8,7 @@ import pytest
 import tmsopt
 from tmsopt.design.verdict import MultipleRoot, crossing_in_words, located_meetings, stability
 from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices
-from tmsopt.roots import exact_nullity, has_one_eigenvector
+from tmsopt.roots import exact_longest, exact_nullity, has_one_eigenvector
 
 
 @pytest.mark.parametrize(
@@ -69,6 +69,64 @@ def test_a_defective_root_on_the_axis_grows(
     assert "as far as rounding tells" not in report
     assert ("neither" in report) is not bool(growth)
     assert (f"growing as {growth}" in repr(found)) is bool(growth)
+
+
+GYROSCOPIC = from_matrices([[1, 0], [0, 1]], [[0, "g"], ["-g", 0]], [[-1, 0], [0, -1]])
+"""s⁴ + (g² − 2) s² + 1: s² = −1 twice at g = 2, two pairs on the axis beyond, a root right of it below."""
+
+ZIEGLER = from_matrices(M=[[3, 1], [1, 1]], K=[["2 - p", "p - 1"], [-1, 1]])
+"""2 s⁴ + (7 − 2 p) s² + 1: a double pair at p = 7/2 − √2."""
+
+
+@pytest.mark.parametrize(
+    ("model", "at", "growth", "exact"),
+    [
+        (GYROSCOPIC, {"g": 2.0}, "t", True),
+        (GYROSCOPIC, {"g": 2.00000000001}, "t", False),
+        (GYROSCOPIC, {"g": 1.99999999999}, "t", False),
+        (GYROSCOPIC, {"g": 2.5}, "", True),  # s² = −1/4 and −4
+        (ZIEGLER, {"p": 2.0857864376}, "t", False),
+        (ZIEGLER, {"p": "7/2-sqrt(2)"}, "t", False),  # which fractions cannot show
+        (from_matrices([[1, 0], [0, 1]], None, [[1, "c"], [0, 1]]), {"c": 1e-13}, "", False),  # grows, faintly
+        (from_matrices([[1, 0], [0, 1]], None, [["k", 0], [0, "k"]]), {"k": "1/3"}, "", True),
+    ],
+)
+def test_growth_is_hedged_unless_fractions_show_it(
+    model: tmsopt.models.Model, at: Mapping[str, float | str], growth: str, exact: bool
+) -> None:
+    found = tmsopt.solve(tmsopt.Problem(model, fixed=at))
+    data, report = found.to_json(), found.report(full=True)
+    assert (found.stability.growth, found.edge_is_exact, data["verdict_is_exact"]) == (growth, exact, exact)
+    for said in (repr(found), report):
+        lines = [line for line in said.splitlines() if "growing as t" in line or "marginally" in line]
+        assert lines
+        assert all(("as far as" in line) is not exact for line in lines)  # the short form may end there
+    moved = [line for line in report.splitlines() if line.startswith("grows as t")]
+    assert all(("as far as rounding tells" in line) is not exact for line in moved)
+
+
+@pytest.mark.parametrize(("k", "exact"), [("1/4", True), ("1/4 + 1e-13", False), ("sqrt(2)/4*sqrt(2)/2", False)])
+def test_roots_meet_as_far_as_rounding_tells(k: str, exact: bool) -> None:
+    """s² + s + k is a square at k = 1/4."""
+    found = tmsopt.solve(tmsopt.Problem(from_coefficients([1, 1, "k"]), fixed={"k": k}))
+    assert found.structure == "EP2"
+    assert found.multiple_as_rounded is not exact
+    assert ("multiplicity_is_exact" in found.to_json()) is not exact
+    assert ("as far as rounding tells" in found.report(full=True)) is not exact
+
+
+@pytest.mark.parametrize("sizes", [(1,), (3,), (2, 1), (2, 2), (3, 1), (1, 1, 1), (3, 2, 1)])
+def test_the_longest_chain_in_fractions(sizes: tuple[int, ...]) -> None:
+    """Blocks of Jordan at 1/3, seen through a change of basis."""
+    n, q = sum(sizes), flint.fmpq
+    ends = {sum(sizes[: k + 1]) - 1 for k in range(len(sizes))}
+    J = flint.fmpq_mat(n, n, [q(1, 3) * (i == j) + (j == i + 1 and i not in ends) for i in range(n) for j in range(n)])
+    P = flint.fmpq_mat(n, n, [q(1, i + j + 1) for i in range(n) for j in range(n)])
+    A = (P * J * P.inv()).tolist()
+    one = [[q(int(i == j)) for j in range(n)] for i in range(n)]
+    pencil, factor = [one, [[-x for x in row] for row in A]], flint.fmpq_poly([q(-1, 3), q(1)])
+    assert exact_longest(pencil, factor, n) == max(sizes)
+    assert exact_nullity(pencil, factor) == len(sizes)
 
 
 def judged(model: tmsopt.models.Model, pattern: str, at: Mapping[str, float]) -> tuple[int | None, int]:

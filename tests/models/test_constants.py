@@ -92,3 +92,18 @@ def test_a_proof_lists_the_numbers_that_it_takes_exactly() -> None:
     )
     assert proof.numbers == ("8/3",)
     assert "8/3" in proof.report().split("taken exactly:")[1]
+
+
+@pytest.mark.parametrize(
+    ("entry", "im", "listed"),
+    [
+        ("1j/3", Fraction(1, 3), "1/3"), ("-1j/3", Fraction(-1, 3), "1/3"), ("2.5j/3", Fraction(5, 6), "2.5/3"),
+        ("k + 1j/7", Fraction(1, 7), "1/7"),
+    ],
+)  # fmt: skip
+def test_numbers_in_complex_entries_are_listed(entry: str, im: Fraction, listed: str) -> None:
+    model = tmsopt.models.from_hamiltonian([[entry, "k"], ["k", 0]])
+    assert model.numbers == (listed,)
+    assert model.pencil is not None
+    found = model.pencil({"k": flint.fmpq(1)})[1][0][0]  # of s − A, whose first entry is −Im H
+    assert found == -flint.fmpq(im.numerator, im.denominator)

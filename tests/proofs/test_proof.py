@@ -476,6 +476,27 @@ def test_too_few_free_parameters() -> None:
     assert "free 2 more" in proof.reason
 
 
+def test_an_irrational_design_is_not_called_rounded() -> None:
+    """The double pair of 2 s⁴ + (7 − 2 p) s² + 1 at p = 7/2 − √2, which fractions cannot show."""
+    ziegler = tmsopt.models.from_matrices(M=[[3, 1], [1, 1]], K=[["2 - p", "p - 1"], [-1, 1]])
+    proof = tmsopt.prove(tmsopt.Problem(ziegler, fixed={"p": "7/2-sqrt(2)"}))
+    assert not proof.proved
+    assert all(words in proof.reason for words in ("could not be proved", "may be rounded, or irrational", "fractions"))
+
+
+def test_numbers_in_the_unit_of_the_roots_have_it() -> None:
+    """In SI the roots are per √(g/w); a dimensionless design has no such unit."""
+    design = solved("point_mass_robot")
+    proof = tmsopt.prove(design)
+    units = {row[0]: row[3] for row in tmsopt.report.number_rows(design.problem, proof)}
+    assert {units[n] for n in ("abscissa", "r")} == {"√(g/w)"}
+    assert proof.to_json()["units"]["abscissa"] == "√(g/w)"
+    r, times = float(proof.abscissa), math.sqrt(design.parameters["g"] / design.parameters["w"])
+    assert r * times == pytest.approx(-design.quantities["decay_rate"], rel=1e-9)
+    free = tmsopt.report.number_rows(solved("ep4").problem, tmsopt.prove(solved("ep4")))
+    assert {row[3] for row in free if row[0] in ("abscissa", "r")} == {""}
+
+
 def test_a_singular_mass_matrix_is_refused() -> None:
     """χ_H = 1 and λ_s = 0 make a0 = 0."""
     design = {**solved("ep4").parameters, "lambda_s": 0.0}

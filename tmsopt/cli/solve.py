@@ -36,7 +36,8 @@ _EXIT = {"optimal": DONE, "infeasible": INFEASIBLE, "not_converged": NOT_CONVERG
 
 _CONTRACT = frozenset((
     "schema", "title", "model", "status", "objective", "parameters", "units", "abscissa", "abscissa_realised",
-    "stable", "any_stable", "verdict", "growth", "defective", "geometric_multiplicity", "roots", "eigenfrequencies",
+    "stable", "any_stable", "verdict", "growth", "verdict_is_exact", "multiplicity_is_exact", "defective",
+    "geometric_multiplicity", "roots", "eigenfrequencies",
     "structure", "active", "violations", "missed_as_stored", "bound", "starts", "seconds", "inertia_margin",
     "relaxation", "worst_case", "notes", "interrupted",
 ))  # fmt: skip

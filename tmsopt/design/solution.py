@@ -103,7 +103,8 @@ class Solution(Shown):
         interrupted: whether the user ended the work before it was done.
         meetings: what meets in each multiple root: the located ones, then the others, rightmost first.
         edges: boundaries of stability that it stands on: ``weave``, ``capsize``, ``infinity``; `edge_is_exact` where
-            that is certain, and not only as far as rounding tells.
+            that and its growth are certain, and not only as far as rounding tells.
+        multiple_as_rounded: where nothing is free, whether roots are multiple only as far as rounding tells.
         without_best: whether designs get better without an end, as towards a singular mass matrix: none is the best.
         si: the design in s, Hz, mm, km/h, degrees, N and kg; empty unless the problem is written in SI.
 
@@ -147,6 +148,7 @@ class Solution(Shown):
     meetings: tuple[MultipleRoot, ...] = ()
     edges: tuple[str, ...] = ()
     edge_is_exact: bool = False
+    multiple_as_rounded: bool = False
     without_best: bool = False
     si: Table[Reading] = field(default_factory=Table)
 
@@ -240,6 +242,8 @@ class Solution(Shown):
             ),
             "parameters": plain(self.parameters), "units": self.units,
             **plain(self, "abscissa abscissa_realised stable any_stable"), **self.stability.to_json(),
+            **({"verdict_is_exact": self.edge_is_exact} if self.stability.on_edge else {}),
+            **({"multiplicity_is_exact": False} if self.multiple_as_rounded else {}),
             **joined(self), **plain(self, "structure"),
             "active": plain(self.active, digits=GAIN_DIGITS), "violations": plain(self.violations, digits=GAIN_DIGITS),
             **({"missed_as_stored": plain(self.missed, digits=GAIN_DIGITS)} if self.missed else {}),

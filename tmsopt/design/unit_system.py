@@ -112,8 +112,9 @@ def si_units(problem: Problem) -> dict[str, str]:
     """The unit in which each parameter, quantity and root quantity of a problem is computed; ``1`` without one."""
     of = problem.parameter_set
     listed: tuple[Parameter | Quantity, ...] = (*problem.model.quantities, *of.quantities, *of.parameters)
-    rates = {"abscissa": of.root_unit, "decay_rate": "1/s", "decay_time": "s", _FREQUENCY: _HERTZ}
-    rates[ANGULAR_FREQUENCY] = of.root_unit
+    rates = {"abscissa": of.root_unit, ANGULAR_FREQUENCY: of.root_unit}
+    if of.rate is not None:  # else there are no seconds
+        rates |= {"decay_rate": _PER_SECOND, "decay_time": "s", _FREQUENCY: _HERTZ}
     return dict.fromkeys(problem.vocabulary, "1") | rates | {q.name: q.unit for q in listed}
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from tmsopt.checks import abscissa_as_stored
 from tmsopt.design import Unit, amounts_text, ended, show_at, unit_of
+from tmsopt.design.verdict.stability import ROUNDED
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
@@ -40,7 +41,8 @@ def of_solution(solution: "Solution") -> Words:
     if solution.bound.proven:
         yield "proved"
     if verdict := solution.stability.verdict:
-        yield f"{verdict}{f' as {growth}' if (growth := solution.stability.growth) else ''}"
+        rounded = ROUNDED if solution.stability.on_edge and not solution.edge_is_exact else ""
+        yield f"{verdict}{f' as {growth}' if (growth := solution.stability.growth) else ''}{rounded}"
 
 
 def of_front(front: "Front") -> Words:

@@ -8,10 +8,12 @@ import flint
 import numpy as np
 
 from tmsopt.design.problem import Problem
-from tmsopt.models.exact import written
+from tmsopt.design.verdict.stability import MultipleRoot, longest_on_line
+from tmsopt.models.exact import Written, written
 from tmsopt.models.told import beyond_axis
 from tmsopt.records import Array
-from tmsopt.roots import Root, Structure, lienard_chipart, rebuilt, structure
+from tmsopt.roots import Root, Structure, exact_longest, lienard_chipart, rebuilt, structure
+from tmsopt.roots.exact import isolated_roots
 
 _ROUNDING = 64 * float(np.finfo(float).eps)  # of the terms of a coefficient: what a solver and numeric roots leave
 _FAR = 1e-3  # of the largest root: an abscissa of no edge
@@ -38,40 +40,70 @@ def edges_at(problem: Problem, parameters: Mapping[str, float]) -> tuple[str, ..
 
 
 def stands_on(
-    problem: Problem, parameters: Mapping[str, float], structure: Structure, optimal: bool
+    problem: Problem, parameters: Mapping[str, float], structure: Structure, optimal: bool, abscissa: float,
+    meetings: Sequence[MultipleRoot],
 ) -> tuple[tuple[str, ...], bool]:  # fmt: skip
-    """The boundaries of stability that a design stands on, and whether that is certain.
+    """The boundaries of stability that a design stands on, and whether that and its growth are certain.
 
-    Certain are roots that a located pattern ties to the axis, and those of coefficients that are fractions.
+    Certain are simple roots that a located pattern ties to the axis, and what fractions show.
+
+    Args:
+        abscissa, meetings: of the design, in doubles.
     """
     beyond = beyond_axis(problem.model, problem.located if optimal else (), structure.roots)
     largest = max((math.hypot(r.re, r.im) for r in structure.roots), default=0.0)
     if beyond or (abs(structure.abscissa) > _FAR * largest and largest):
         return (), False
     edges = edges_at(problem, parameters)
-    if beyond == 0:
+    longest = longest_on_line(meetings, abscissa, largest)
+    if beyond == 0 and longest is None:
         return edges or ("weave",), True
-    return edges, bool(edges) and is_exactly_on_edge(problem, parameters)
+    if beyond == 0:
+        edges = edges or ("weave",)
+    return edges, bool(edges) and longest_on_axis(problem, parameters) == (longest or 1)
 
 
-def is_exactly_on_edge(problem: Problem, parameters: Mapping[str, float]) -> bool:
-    """Whether roots are on the imaginary axis and none right of it, in fractions; False where these do not tell.
+def longest_on_axis(problem: Problem, parameters: Mapping[str, float]) -> int | None:
+    """Length of the longest Jordan chain of roots on the imaginary axis, in fractions.
 
+    None where no root is there or one is right of it, and where fractions do not tell.
     p(s) = e(s²) + s o(s²) has the roots s² = x of gcd(e, o) on the axis, mirrored in it, or in four quadrants.
     """
-    of = problem.parameter_set
-    a = written(of, parameters).coefficients(problem.model, of)
+    model, of = problem.model, problem.parameter_set
+    design = as_typed(problem, parameters)
+    a = design.coefficients(model, of)
     if a is None or a[0] == 0:
-        return False
+        return None
     zeros = next(k for k, c in enumerate(a[::-1]) if c != 0)
     ascending = a[::-1][zeros:]
     shared = flint.fmpq_poly(ascending[::2]).gcd(flint.fmpq_poly(ascending[1::2]))
     squares: Any = (shared * shared.denom()).numer().complex_roots()
     if zeros + shared.degree() < 1 or any(square[0].imag != 0 or square[0].real > 0 for square in squares):
-        return False
+        return None
     double = flint.fmpq_poly([c for x in shared.coeffs() for c in (x, flint.fmpq(0))])
     rest = (flint.fmpq_poly(ascending) / double).coeffs()[::-1]
-    return len(rest) == 1 or all(q > 0 for q in lienard_chipart([c / rest[0] for c in rest]))
+    if len(rest) > 1 and not all(q > 0 for q in lienard_chipart([c / rest[0] for c in rest])):
+        return None
+    on_axis = double * flint.fmpq_poly([0] * zeros + [1])
+    multiple = [(f, int(m)) for f, m in flint.fmpq_poly(a[::-1]).factor()[1] if m > 1 and (on_axis % f).is_zero()]
+    matrices = design.matrices(model, of) if multiple else None
+    if model.pencil is not None and multiple and matrices is None:
+        return None
+    return max((exact_longest(matrices, f, m) if matrices else m for f, m in multiple), default=1)
+
+
+def is_exactly_multiple(problem: Problem, parameters: Mapping[str, float], roots: Sequence[Root]) -> bool:
+    """Whether the multiplicities of the roots of a polynomial are those of the numbers as typed, in fractions."""
+    a = as_typed(problem, parameters).coefficients(problem.model, problem.parameter_set)
+    if a is None or a[0] == 0:
+        return False
+    return sorted(r.multiplicity for r in roots) == sorted(m for _, m in isolated_roots(a))
+
+
+def as_typed(problem: Problem, parameters: Mapping[str, float]) -> Written:
+    """A design in exact numbers: what was typed for the fixed ones, decimals for the others."""
+    typed = {n: text for n, text in problem.typed(parameters).items() if n in problem.fixed}
+    return written(problem.parameter_set, parameters, None, typed)
 
 
 def _on_axis(roots: Sequence[Root], off: Array) -> tuple[str, ...] | None:

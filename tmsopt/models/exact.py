@@ -175,6 +175,16 @@ class Written:
         found = [] if numbers is None else model.coefficients(numbers, of)
         return found if found and all(isinstance(c, flint.fmpq) for c in found) else None
 
+    def matrices(self, model: Model, of: ParameterSet) -> list[list[list[Any]]] | None:
+        """The model's matrices as fractions, where these numbers make them so."""
+        numbers = self.fractions(of)
+        if numbers is None or model.pencil is None:
+            return None
+        try:
+            return [[[rational(x) for x in row] for row in P] for P in model.pencil(of.native(numbers))]
+        except (TypeError, ValueError, AttributeError):  # an angle, of which the matrices take more than the tangent
+            return None
+
     def text(self, name: str) -> tuple[str, str]:
         """A number as it is taken: its name, which may be ``tan(name)``, and the fraction."""
         if name in self.tangents:

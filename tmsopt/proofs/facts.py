@@ -64,18 +64,13 @@ def eigenvectors(problem: Problem, design: Written, found: Existing) -> tuple[in
         return None, Verdict(None, "a system given by coefficients does not say")
     if not repeated:
         return None, NOTHING
-    exact = design.fractions(of) if found.method == EXACT else None
-    if exact is not None:
-        try:
-            matrices = [[[rational(x) for x in row] for row in P] for P in pencil(of.native(exact))]
-        except (TypeError, ValueError, AttributeError):  # an angle, of which the matrices take more than the tangent
-            matrices = []
-        if matrices:
-            parts = flint.fmpq_poly(list(found.coefficients)[::-1]).factor()[1]
-            found_each = [(exact_nullity(matrices, part), int(count)) for part, count in parts if count > 1]
-            most = max(nullity for nullity, _ in found_each)
-            missing = all(nullity < count for nullity, count in found_each)
-            return most, Verdict(missing, f"{most} eigenvector{'s' * (most > 1)}, in fractions")
+    matrices = design.matrices(problem.model, of) if found.method == EXACT else None
+    if matrices:
+        parts = flint.fmpq_poly(list(found.coefficients)[::-1]).factor()[1]
+        found_each = [(exact_nullity(matrices, part), int(count)) for part, count in parts if count > 1]
+        most = max(nullity for nullity, _ in found_each)
+        missing = all(nullity < count for nullity, count in found_each)
+        return most, Verdict(missing, f"{most} eigenvector{'s' * (most > 1)}, in fractions")
     at = pencil(of.native(found.parameters))
     roots = [flint.acb(z.re, z.im) for f in repeated for z in roots_of(f) or ()]
     one = bool(roots) and all(has_one_eigenvector(at, s) for s in roots)

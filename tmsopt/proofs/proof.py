@@ -12,6 +12,7 @@ from tmsopt.arithmetic.balls import Number, ProvedRoot, fraction, number
 from tmsopt.arithmetic.krawczyk import Refused
 from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
+from tmsopt.design.unit_system import units_of
 from tmsopt.design.verdict.stability import CROSSING
 from tmsopt.errors import InputError, count_faults
 from tmsopt.models.exact import Written, written
@@ -121,6 +122,7 @@ class Proof(Shown):
             **plain(self, "claim proved reason pattern method digits"),
             "of": "the design as stored" if self.stored or not self.proved else "the proved design",
             **plain(self, "parameters tangents unknowns moved held stated numbers"),
+            "units": units_of(self.problem) if self.problem else {},
             **plain(self, "radius uniqueness distance explained roots"),
             **(plain(self, "eigenfrequencies") if self.eigenfrequencies else {}),
             **plain(self, "abscissa geometric_multiplicity defective stable heavily_damped inside limits"),

@@ -127,8 +127,9 @@ def choose(system: Equations, at: Mapping[str, Any], among: Sequence[str]) -> Ch
     count, of = system.conditions, system.problem.parameter_set
     if len(among) < count:
         raise Refused(
-            f"{_many(count, 'condition')} and {_many(len(among), 'free parameter')}: rounded numbers meet them "
-            f"nowhere exactly; free {count - len(among)} more, or give exact numbers that have the pattern"
+            f"{_many(count, 'condition')} and {_many(len(among), 'free parameter')}: the pattern could not be proved "
+            "for these numbers; they may be rounded, or irrational, and then an equation that vanishes cannot be told "
+            f"from a small number; free {count - len(among)} more, or give fractions that have the pattern"
         )
     names = [*of.names, *system.unknowns]
     jacobian = np.array([[float(e) for e in row] for row in slopes(system, at, names).tolist()])

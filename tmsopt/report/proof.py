@@ -5,6 +5,8 @@ from fractions import Fraction
 
 from tmsopt.arithmetic.balls import Number, fraction
 from tmsopt.design.problem import Problem
+from tmsopt.design.unit_system import units_of
+from tmsopt.models.told import pattern_of
 from tmsopt.proofs.facts import NOTHING, Verdict
 from tmsopt.proofs.proof import Proof
 from tmsopt.report.text import columns
@@ -52,14 +54,17 @@ def number_rows(problem: Problem, proof: Proof) -> list[tuple[str, str, str, str
     More: docs/explanation/proofs.md
     """
     rows = []
+    units = _units(problem, proof)
+    per = units.get("abscissa", "")
     for name in proof.moved:
         unit = problem.parameter_set[name].unit
         rows.append((name, *_cells(proof.parameters[name]), "" if unit == "1" else unit))
         if name in proof.tangents:
             rows.append((f"tan({name})", *_cells(proof.tangents[name]), ""))
-    rows += [(name, *_cells(x), "") for name, x in proof.unknowns.items() if not _OF_OTHERS.fullmatch(name)]
+    own = ((name, x) for name, x in proof.unknowns.items() if not _OF_OTHERS.fullmatch(name))
+    rows += [(name, *_cells(x), units.get(name, "")) for name, x in own]
     if proof.abscissa:
-        rows.append(("abscissa", *_cells(proof.abscissa), ""))
+        rows.append(("abscissa", *_cells(proof.abscissa), per))
     if proof.eigenfrequencies:
         for omega in proof.eigenfrequencies:
             times = f" ({omega.multiplicity}-fold)" if omega.multiplicity > 1 else ""
@@ -69,10 +74,22 @@ def number_rows(problem: Problem, proof: Proof) -> list[tuple[str, str, str, str
     for root in (r for r in proof.roots if r.re.value not in told or r.im.value != "0"):
         times = f" ({root.multiplicity}-fold)" if root.multiplicity > 1 else ""
         if root.im.value == "0":
-            rows.append((f"root{times}", *_cells(root.re), ""))
+            rows.append((f"root{times}", *_cells(root.re), per))
         elif not root.im.value.startswith("-"):
-            rows += [(f"pair{times}, re", *_cells(root.re), ""), ("  im ±", *_cells(root.im), "")]
+            rows += [(f"pair{times}, re", *_cells(root.re), per), ("  im ±", *_cells(root.im), per)]
     return rows
+
+
+def _units(problem: Problem, proof: Proof) -> dict[str, str]:
+    """The unit of each number that has one: of the unknowns of a pattern, powers of that of the roots."""
+    units = units_of(problem)
+    per = units.get("abscissa", "")
+    if per and proof.unknowns:
+        pattern = pattern_of(problem.model, proof.pattern)
+        for name, power in zip(pattern.unknowns, pattern.powers, strict=True):
+            unit = per if power == 1 else f"{per}^{power}"
+            units[f"{proof.pattern}.{name}" if f"{proof.pattern}.{name}" in proof.unknowns else name] = unit
+    return units
 
 
 def _place(problem: Problem, proof: Proof) -> list[str]:

@@ -6,7 +6,7 @@ first; `patterns` says which roots meet, `quartics` takes millions at once.
 
 from tmsopt.roots.count import may_be_real, real_roots
 from tmsopt.roots.exact import exact_abscissa, exact_roots
-from tmsopt.roots.jordan import exact_nullity, has_one_eigenvector, is_regular, jordan
+from tmsopt.roots.jordan import exact_longest, exact_nullity, has_one_eigenvector, is_regular, jordan
 from tmsopt.roots.numeric import abscissa, backward_error, rebuilt, roots
 from tmsopt.roots.patterns.composed import PATTERNS, composition, pattern
 from tmsopt.roots.patterns.multiplicity import multiple_real_roots
@@ -20,8 +20,8 @@ from tmsopt.roots.stability import discriminant, hurwitz_minors, is_stable, lien
 __all__ = [
     "CLASSES", "PATTERNS", "Classes", "Factors", "Motion", "Pattern", "Root", "Structure", "abscissa",
     "abscissa_and_damping", "backward_error", "composition", "determinant", "discriminant", "evaluate",
-    "exact_abscissa", "exact_nullity", "exact_roots", "has_one_eigenvector", "hurwitz_minors", "is_regular",
-    "is_stable", "jordan", "lienard_chipart", "may_be_real",
-    "multiple_real_roots", "pattern", "pattern_distance", "product", "quadratic_pencil", "quartic_classes",
+    "exact_abscissa", "exact_longest", "exact_nullity", "exact_roots", "has_one_eigenvector", "hurwitz_minors",
+    "is_regular", "is_stable", "jordan", "lienard_chipart", "may_be_real", "multiple_real_roots",
+    "pattern", "pattern_distance", "product", "quadratic_pencil", "quartic_classes",
     "quartic_factors", "quartic_is_stable", "real_roots", "rebuilt", "roots", "routh", "shift", "structure",
 ]  # fmt: skip

@@ -156,15 +156,51 @@ def exact_nullity(matrices: Sequence[Matrix], factor: Any) -> int:
 
     More: docs/explanation/exceptional_points.md
     """
-    power = [flint.fmpq_poly([0] * k + [1]) for k in range(len(matrices))][::-1]
+    return _nullity_modulo(_polynomials(matrices), factor)
+
+
+def exact_longest(matrices: Sequence[Matrix], factor: Any, multiplicity: int) -> int:
+    """Length of the longest Jordan chain at each root of an irreducible factor of det L, in fractions.
+
+    Args:
+        matrices: of fractions.
+        factor: ``fmpq_poly``.
+        multiplicity: how often the factor occurs in det L.
+
+    Example:
+        >>> from flint import fmpq, fmpq_poly
+        >>> unit, block = [[fmpq(1), fmpq(0)], [fmpq(0), fmpq(1)]], [[fmpq(1), fmpq(1)], [fmpq(0), fmpq(1)]]
+        >>> tmsopt.roots.exact_longest((unit, block), fmpq_poly([1, 1]), 2)  # s + 1 twice, with a 1 above the diagonal
+        2
+
+    More: docs/explanation/exceptional_points.md
+    """
+    blocks = [_polynomials(matrices)]
+    size, zero = range(len(blocks[0])), flint.fmpq_poly()
+    nullity = _nullity_modulo(blocks[0], factor)
+    if nullity == 1:
+        return multiplicity
+    for length in range(1, multiplicity):
+        blocks.append([[x.derivative() / length for x in row] for row in blocks[-1]])
+        steps = range(length + 1)
+        toeplitz = [[blocks[a - b][i][j] if a >= b else zero for b in steps for j in size] for a in steps for i in size]
+        longer = _nullity_modulo(toeplitz, factor)
+        if longer == nullity:
+            return length
+        nullity = longer
+    return multiplicity
+
+
+def _polynomials(matrices: Sequence[Matrix]) -> list[list[Any]]:
+    """L(s) with polynomials for entries."""
     size = range(len(matrices[0]))
-    rows = [
-        [sum((flint.fmpq_poly([P[i][j]]) * s for P, s in zip(matrices, power, strict=True)), flint.fmpq_poly()) % factor
-         for j in size]
-        for i in size
-    ]  # fmt: skip
-    left = rows
-    for j in size:
+    return [[flint.fmpq_poly([P[i][j] for P in reversed(matrices)]) for j in size] for i in size]
+
+
+def _nullity_modulo(rows: Sequence[Sequence[Any]], factor: Any) -> int:
+    """Nullity of a square matrix of polynomials at each root of an irreducible factor."""
+    left = [[x % factor for x in row] for row in rows]
+    for j in range(len(rows)):
         pivot = next((row for row in left if row[j] != 0), None)
         if pivot is None:
             continue

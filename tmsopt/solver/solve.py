@@ -25,7 +25,7 @@ from tmsopt.design.verdict.status import NotSolved
 from tmsopt.formulation.formulate import design_of
 from tmsopt.formulation.nlp import objective_size
 from tmsopt.formulation.options import DEFAULTS, AskedOfSolve, Options, options_of, taking
-from tmsopt.margins import stands_on
+from tmsopt.margins import is_exactly_multiple, stands_on
 from tmsopt.models.told import beyond_axis, meant, name_told, without_rounding
 from tmsopt.progress import Listener, begin, heard
 from tmsopt.records import Table
@@ -292,8 +292,9 @@ def _assembled(
         finding = replace(finding, status="not_converged", notes=(*finding.notes, UNCLEAR))
     optimal, listed = finding.status == "optimal", bool(problem.variations or problem.tolerances)
     name, worst = name_told(problem.model, checked.structure.name), checked.worst.applied(parameters)
-    lacking = () if checked.crossing else checked.violations
-    edges, certain = stands_on(problem, worst, checked.structure, optimal)
+    whole = meant(problem.model, name, numbers.roots).roots
+    met = every_meeting(problem, worst, whole, () if checked.crossing else checked.violations)
+    edges, certain = stands_on(problem, worst, checked.structure, optimal, numbers.abscissa, met)
     return Solution(
         problem=problem,
         status=finding.status,
@@ -320,9 +321,10 @@ def _assembled(
         fastest=checked.fastest if listed and problem.asks(ANGULAR_FREQUENCY) else None,
         sides=Table(sides),
         relaxation=finding.relaxation,
-        meetings=every_meeting(problem, worst, meant(problem.model, name, numbers.roots).roots, lacking),
+        meetings=met,
         edges=edges,
         edge_is_exact=certain,
+        multiple_as_rounded=bool(met) and not problem.free and not is_exactly_multiple(problem, worst, whole),
         without_best=finding.without_best,
         si=numbers.si,
     )
@@ -337,9 +339,8 @@ def _stability_note(problem: Problem, checked: Checked, edges: Sequence[str], op
     unstable = (UNSTABLE,) if asked and checked.structure.abscissa >= 0 else ()
     beyond = beyond_axis(problem.model, problem.located, checked.structure.roots) if optimal else None
     if beyond:
-        excess = unit_of(problem, "abscissa").show(beyond, 2)
         another = "root has real part" if problem.model.carrier is None else "eigenfrequency has gain"
-        return (f"not the edge of stability: another {another} {excess}",)
+        return (f"not the edge of stability: another {another} {unit_of(problem, 'abscissa').show(beyond, 2)}",)
     if unstable or not optimal or checked.structure.abscissa < 0:
         return unstable
     largest = max((math.hypot(r.re, r.im) for r in checked.structure.roots), default=0.0)

@@ -19,6 +19,9 @@ STABLE, MARGINAL, GROWING, EDGE, UNSTABLE = (
 CROSSING = "diabolic point (semisimple), not an EP"
 """Where roots meet, and as many eigenvectors remain."""
 
+ROUNDED = ", as far as rounding tells"
+"""Of what holds of doubles, and is not known in fractions."""
+
 _TIMES, _FAINT = 2.0, 1e-6
 """An abscissa is 0, as far as rounding tells, up to so many times its distance from that of the numbers as stored: both
 are roots that the pattern makes one. At most so much of the largest root: beyond it, the stored numbers decide."""
@@ -62,7 +65,12 @@ def power_of_t(longest: int) -> str:
 
 def longest_chain(meetings: Iterable[MultipleRoot], abscissa: float, largest: float) -> int:
     """Length of the longest Jordan chain on the rightmost line; 1 for simple roots."""
-    return max((m.longest for m in meetings if m.re >= abscissa - _LINE * largest), default=1)
+    return longest_on_line(meetings, abscissa, largest) or 1
+
+
+def longest_on_line(meetings: Iterable[MultipleRoot], abscissa: float, largest: float) -> int | None:
+    """The same; None where no root on the rightmost line is multiple."""
+    return max((m.longest for m in meetings if m.re >= abscissa - _LINE * largest), default=None)
 
 
 @dataclass(frozen=True)
@@ -134,7 +142,7 @@ def stability_in_words(found: StabilityVerdict, *, exact: bool, of_matrices: boo
     """A verdict as a headline says it.
 
     Args:
-        exact: whether the roots are exactly on the axis; else that holds as far as rounding tells.
+        exact: whether the roots are exactly on the axis, and so are the chains; else as far as rounding tells.
         of_matrices: whether Jordan chains are known; coefficients know the scalar equation alone.
     """
     if not found.on_edge:
@@ -142,7 +150,7 @@ def stability_in_words(found: StabilityVerdict, *, exact: bool, of_matrices: boo
     root = "real eigenfrequency" if of_H else "root on the imaginary axis"
     why = f"from a defective {root}" if of_matrices else "as the solutions of p(d/dt) y = 0 do"
     said = f"growing as {found.growth}, {why}" if found.growth else found.verdict
-    return said if exact else f"{said}, as far as rounding tells"
+    return said if exact else f"{said}{ROUNDED}"
 
 
 def crossing_in_words(meeting: MultipleRoot) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 
 from tmsopt.models.arithmetics import BINARY, SYMBOLIC, Arithmetic
-from tmsopt.models.constants import number_of, number_symbol
+from tmsopt.models.constants import number_of, number_symbol, number_texts
 from tmsopt.models.names import FUNCTIONS
 from tmsopt.models.stated.degree import LARGEST_EXPONENT, Beyond
 
@@ -48,7 +48,7 @@ class Pair:
     def __truediv__(self, other: Any) -> "Pair":
         b = pair(other)
         if is_real(b):
-            return Pair(self.re / b.re, self.im if is_real(self) else self.im / b.re)
+            return Pair(_quotient(self.re, b.re), self.im if is_real(self) else _quotient(self.im, b.re))
         top, square = self * Pair(b.re, -b.im), b.re * b.re + b.im * b.im
         return Pair(top.re / square, top.im / square)
 
@@ -78,6 +78,17 @@ def pair(x: Any) -> Pair:
 def is_real(x: Pair) -> bool:
     """Whether a pair has no imaginary part whatever its parameters are."""
     return bool(x.im.is_zero()) if isinstance(x.im, ca.SX) else isinstance(x.im, int | float) and x.im == 0
+
+
+def _quotient(x: Any, y: Any) -> Any:
+    """A quotient; one of two numbers is a number too, such as 1/3, which is taken exactly."""
+    a, b = ca.SX(x), ca.SX(y)
+    if a.op() == ca.OP_NEG:
+        return -_quotient(a.dep(), b)
+    texts = [*number_texts(a), *number_texts(b)] if a.is_symbolic() and b.is_symbolic() else []
+    if len(texts) < 2:
+        return x / y
+    return number_symbol("/".join(text if text.replace(".", "").isdigit() else f"({text})" for text in texts))
 
 
 def _whole(n: Pair) -> int | None:

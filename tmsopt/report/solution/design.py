@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from tmsopt.checks import abscissa_as_stored
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import limit_text, show_at, unit_at, unit_of
+from tmsopt.design.verdict.stability import ROUNDED
 from tmsopt.design.verdict.status import status_in_words, verdict_in_words
 from tmsopt.explanation import Lever
 from tmsopt.models import GRAVITY, tms, to_si
@@ -136,7 +137,9 @@ def design_parts(
         yield Block("rounding", [f"rounding: {rounding_line(explained)}"], tuple(columns(rounding_rows(explained))))
     local = () if explained is None else optimality_lines(explained.optimality)
     yield Block("proof", [proof_line(solution)], (*bound_lines(solution), *local))
-    yield Block("roots", [], tuple(diagnosis_lines(found.diagnoses, details=True)))
+    rounded = ["roots meet as far as rounding tells; tmsopt prove tells it of the numbers as typed"]
+    diagnosed = diagnosis_lines(found.diagnoses, details=True)
+    yield Block("roots", [], (*(rounded if solution.multiple_as_rounded else []), *diagnosed))
     yield Block("search", [], tuple(_search(solution)))
 
 
@@ -150,6 +153,7 @@ def headline(solution: Solution) -> tuple[str, str]:
     asked = f"{sense}{text.strip()}" + (f" = {value}" if math.isfinite(solution.value) else "") if text else ""
     told = ": ".join(part for part in (status_in_words(solution), verdict_in_words(solution)) if part)
     structure = structure_line(problem, solution.structure, solution.abscissa, solution.meetings)
+    structure += ROUNDED if solution.multiple_as_rounded else ""
     return told, "; ".join(part for part in (located, asked, abscissa_as_stored(solution), structure) if part)
 
 

@@ -13,7 +13,7 @@ from tmsopt.design.cases import Case
 from tmsopt.design.problem import Problem
 from tmsopt.design.solution import Solution
 from tmsopt.design.unit_system import Unit, unit_at, unit_of
-from tmsopt.design.verdict.stability import MultipleRoot, crossing_in_words
+from tmsopt.design.verdict.stability import ROUNDED, MultipleRoot, crossing_in_words
 from tmsopt.models import INERTIAS, Model, Parameter, ParameterSet, Quantity, Values
 from tmsopt.models.told import eigenfrequencies, on_axis, structure_in_words
 from tmsopt.roots import Root
@@ -153,7 +153,7 @@ def motion(solution: Solution) -> str:
         return "no motion to describe: a root is at infinity"
     kind = "decay time" if abscissa < 0 else "growth time"
     found = solution.stability
-    on_edge, growth = found.on_edge, f"grows as {found.growth}"
+    on_edge, growth = found.on_edge, f"grows as {found.growth}{'' if solution.edge_is_exact else ROUNDED}"
     lasts = growth if found.growth else "neither decay nor growth"
     lasts = lasts if on_edge else f"{kind} {time.show(1 / abs(abscissa), 4)}"
     if solution.problem.model.carrier is not None:
