@@ -12,8 +12,7 @@ from helpers.hunt import abscissa
 
 import tmsopt
 from tmsopt import laws
-from tmsopt.design import moved_limits
-from tmsopt.design.advice.remedies import with_limits
+from tmsopt.design import moved_limits, with_limits
 from tmsopt.records import Table
 from tmsopt.report import design_report, infeasible_lines
 

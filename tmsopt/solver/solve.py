@@ -212,9 +212,8 @@ def _with_stability(solution: Solution, options: Options, family: Family | None,
     elif asked.any is False:
         solution = replace(solution, notes=(*solution.notes, f"that none is stable is proved {asked.proof}"))
     if asked.failed:
-        solution = replace(
-            solution, notes=(*solution.notes, f"whether any design is stable is not known: {asked.failed}")
-        )
+        words = f"whether any design is stable is not known: {asked.failed}"
+        solution = replace(solution, notes=(*solution.notes, words))
     return replace(solution, stable_elsewhere=asked.any, seconds=time.perf_counter() - began)
 
 
@@ -344,9 +343,8 @@ def _stability_note(problem: Problem, checked: Checked, edges: Sequence[str], op
     if unstable or not optimal or checked.structure.abscissa < 0:
         return unstable
     largest = max((math.hypot(r.re, r.im) for r in checked.structure.roots), default=0.0)
-    found = stability((checked.structure.abscissa, checked.realised), edges, largest=largest)  # as the report says
+    found = stability((checked.structure.abscissa, checked.realised), edges, largest=largest)
     if problem.free and (problem.minimize or "").strip() == "abscissa":
-        multiple = "whether designs with abscissa 0 grow depends on their multiple roots"
-        least = f"no design that decays was found in the box; {multiple}"
+        least = "no design that decays was found in the box; whether those of abscissa 0 grow depends on multiple roots"
         return (least if found.on_edge else "no stable design was found in the box; this is the least unstable one",)
     return () if found.on_edge else ("the design is not stable: abscissa >= 0",)
