@@ -104,6 +104,7 @@ def test_a_near_design_may_be_given_in_part() -> None:
         tmsopt.solve(EP4, near={"bogus": 1.0, "Fr": math.nan})
 
 
+@pytest.mark.slow
 def test_whole_numbers_of_numpy_are_whole_numbers(tmp_path: Path) -> None:
     assert tmsopt.solve(EP4, starts=np.int64(8), seed=np.int32(3)).structure == "EP4"
     assert tmsopt.prove(EP4, digits=np.int64(20)).proved
@@ -243,6 +244,7 @@ def test_names_are_functions_whatever_was_imported_before() -> None:
     subprocess.run([sys.executable, "-c", script], check=True, cwd=PROBLEMS.parent)
 
 
+@pytest.mark.slow
 def test_a_study_may_be_given_by_its_file(tmp_path: Path) -> None:
     file = tmp_path / "two.toml"
     file.write_text(f'problem = "{EP4}"\n[vary]\nmu = [0.1, 0.2]\n')

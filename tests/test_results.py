@@ -152,6 +152,7 @@ class Page(HTMLParser):
         self.said.append(data)
 
 
+@pytest.mark.slow
 def test_every_result_is_here() -> None:
     """Every public class that shows itself, and no writer without a class; an Explorer is a page already."""
     shown = {n for n in tmsopt.__all__ if inspect.isclass(c := getattr(tmsopt, n)) and hasattr(c, "_repr_html_")}

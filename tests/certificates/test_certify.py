@@ -533,6 +533,7 @@ def test_time_must_be_positive(slow_plane: Solution, seconds: float) -> None:
         certify(slow_plane, seconds=seconds)
 
 
+@pytest.mark.slow
 def test_that_branch_and_bound_cannot_take_a_radius_is_said() -> None:
     """Branch and bound would know nothing of the radius, and any bound without it is none."""
     asked = replace(

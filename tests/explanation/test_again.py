@@ -25,6 +25,7 @@ def searches(monkeypatch):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["realistic", pytest.param("point_mass_robot", marks=pytest.mark.slow), "heavily_damped"]
 )

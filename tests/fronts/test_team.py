@@ -99,6 +99,7 @@ def test_what_was_done_before_an_interrupt_is_kept_and_the_team_can_go_on():
         assert dict(side_by_side.each(shares.squared, ASK, [3])) == {0: (9, os.getpid())}
 
 
+@pytest.mark.slow
 def test_the_front_is_the_same_for_any_number_of_processes():
     alone, beside = (tmsopt.pareto(PROBLEM, 5, workers=n) for n in (1, 3))
     assert [p.objectives for p in alone.points] == [p.objectives for p in beside.points]

@@ -203,6 +203,7 @@ def test_no_wheel_is_no_division():
         assert all(c.is_finite() for c in a)
 
 
+@pytest.mark.slow
 def test_a_problem_of_skates_is_one_of_whipple_word_for_word():
     """What is left out is not there: the same SI names, the same EP4, in 1/s."""
     fixed = {"w": 1.0, "m_B": 10.0, "z_B": -0.4, "m_H": 1.0, "x_H": 1.0, "z_H": -0.2}

@@ -183,6 +183,7 @@ def test_at_the_capsize_speed_it_rides_a_circle() -> None:
     assert [m.steer_per_lean for m in speeds] == pytest.approx([steer / lean], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_response_is_a_simulation_and_is_pickled() -> None:
     design = tmsopt.solve(EP4)
     one, other = design.response(lean=5, seconds=3), tmsopt.simulate(design, lean=5, seconds=3)

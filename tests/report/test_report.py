@@ -241,6 +241,7 @@ def test_a_limit_without_a_value_is_named_without_an_amount() -> None:
     assert "no change of limits was found that helps" in report
 
 
+@pytest.mark.slow
 def test_a_radius_out_of_reach_says_how_near_a_design_comes() -> None:
     """What it says is the radius of the design that it shows, of another computation; 0.5 is far beyond it."""
     asked = tmsopt.load("problems/tolerant.toml")

@@ -274,6 +274,7 @@ def test_digits_of_a_curve_through_an_EP3_are_no_more_than_are_met() -> None:
                 assert abs(value - math.sqrt(2)) <= 0.5 * 10.0 ** -len(row[1].split(".")[1])
 
 
+@pytest.mark.slow
 def test_no_damping_ratio_is_told_of_the_cases_of_a_matrix() -> None:
     model = from_hamiltonian([["d - 1j*g1", "k"], ["k", "-1j*g2"]])
     asked = tmsopt.Problem(

@@ -43,6 +43,7 @@ def test_by_the_sum_of_the_roots_one_excludes_the_other() -> None:
         assert tmsopt.solve(replace(FAST, constraints=kept)).status == "optimal"
 
 
+@pytest.mark.slow
 def test_a_limit_that_a_needle_meets_is_not_out_of_reach() -> None:
     relaxation = tmsopt.solve(FAST, throw=False, alone=False, stability=0.0).relaxation
     limits = {n for n in relaxation.conflict if n in FAST.constraints}

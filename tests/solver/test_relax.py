@@ -207,6 +207,7 @@ def test_a_change_asks_no_more_than_what_the_nearest_design_misses(tmp_path):
     assert tmsopt.solve(with_limits(asked, change)).status == "optimal"
 
 
+@pytest.mark.slow
 def test_no_limit_is_moved_for_nothing_nor_farther_than_a_known_design_needs(tmp_path):
     """At v = 11.861 km/h, x_B = 61 cm, z_H = -44 cm, lambda_s = -4.5 deg a design decays within 0.4 s."""
     asked = written(tmp_path, SLOW_ROBOT)

@@ -310,6 +310,7 @@ def test_a_stable_robot_is_rare() -> None:
     assert all(lo <= KNOWN[n] <= hi for n, (lo, hi) in PARTS.items())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1, *(pytest.param(k, marks=pytest.mark.slow) for k in range(2, 8))])
 def test_the_stable_robot_is_found(seed: int) -> None:
     stated = tmsopt.Problem(tmsopt.models.tms, fixed=ROBOT, free=PARTS, constraints=HOLDS, minimize="abscissa")

@@ -74,6 +74,7 @@ STUDIES = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STUDIES)
 def test_rows_judged_at_once_are_those_of_one_by_one(name: str) -> None:
     study = STUDIES[name]()
@@ -218,6 +219,7 @@ def test_kill_9_loses_no_block_and_doubles_none(tmp_path: Path) -> None:
         np.testing.assert_array_equal(last.column(name), columns(whole)[name].values)
 
 
+@pytest.mark.slow
 def test_seeds_are_those_of_numpy() -> None:
     for seed in (0, 1, 12345, 2**40, 2**130 + 5):
         study = Study(built(2).problem, {"Fr": np.linspace(2, 2.1, 5)}, seed=seed)
@@ -275,6 +277,7 @@ def test_a_changed_study_is_refused_before_its_design_is_solved(drawn, changed, 
     assert "--fresh" in str(refused.value)
 
 
+@pytest.mark.slow
 def test_a_study_whose_design_alone_may_have_changed_is_solved_and_goes_on_where_it_has_not(drawn: Path) -> None:
     narrower = replace(DRAWN.problem, free={**DRAWN.problem.free, "chi_B": (1.5, 5.0)})
     assert run_study(DRAWN, drawn).solved == 0

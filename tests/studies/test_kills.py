@@ -13,7 +13,7 @@ import pytest
 from tmsopt.studies import alone, load_study, planned
 from tmsopt.studies.store import read_store
 
-ROWS, KILLS, SAMPLE = 4_000, 8, 25
+ROWS, KILLS, SAMPLE = 3_000, 6, 25
 PAUSE = (0.3, 2.0)
 """s of work between kills: some shorter than the second after which rows are committed, some longer."""
 

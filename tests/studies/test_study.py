@@ -72,6 +72,7 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 # Rows
 
 
+@pytest.mark.slow
 def test_every_row_obeys_the_laws_of_ep4() -> None:
     found = run_study(GRID, workers=1)
     for row in found.rows:
@@ -98,6 +99,7 @@ def test_rows_are_the_same_in_any_order_alone_and_by_processes(tmp_path: Path) -
     assert identities(run_study(GRID, tmp_path / "s.sqlite", workers=2).rows) == here
 
 
+@pytest.mark.slow
 def test_a_study_is_taken_up_where_it_was_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Interrupted after three rows; the rest is solved later, and nothing twice."""
     path = tmp_path / "s.sqlite"
@@ -257,6 +259,7 @@ def test_warm_rows_are_the_same_alone_and_by_processes() -> None:
     assert [alone(study, k).row.identity for k in (0, 11, 23)] == [here[k] for k in (0, 11, 23)]
 
 
+@pytest.mark.slow
 def test_warm_starts_find_the_optima_of_cold_ones() -> None:
     problem = replace(EP4, constraints={"trail": "nu_H >= 0.05"})
     limits = {"trail.limit": np.linspace(0.05, 0.15, 8).tolist()}

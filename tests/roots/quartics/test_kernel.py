@@ -206,6 +206,7 @@ def test_the_factors_give_the_coefficients_back(family: str, compiled: bool) -> 
     assert found.fallbacks == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_both_engines_find_the_same_factors(family: str) -> None:
     """To the last bit: the same formulas in the same order, and neither engine joins a product and a sum in one."""
