@@ -4,7 +4,7 @@ import os
 import statistics
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 
 from tqdm import tqdm
@@ -38,7 +38,7 @@ def report(asked: Asked) -> str:
     if not before:
         return page("Beside an earlier version", asked, "TMSOPT_BEFORE names no checkout.")
     ours, theirs = (_started(Path(folder)) for folder in (_HERE, before))
-    rows: list[Iterable[object]] = []
+    rows: list[Sequence[object]] = []
     for suite, count in _PROBLEMS.items():
         some = range(asked.of(count, 3))
         pairs = [(_seconds(ours, suite, k), _seconds(theirs, suite, k)) for k in tqdm(some, suite.split()[0])]
