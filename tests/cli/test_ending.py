@@ -487,7 +487,7 @@ def test_every_command_ends_soon(
     began = time.perf_counter()
     out, err = process.communicate(timeout=60)
     assert time.perf_counter() - began < 2 * SOON  # other tests run beside it
-    assert process.returncode == status
+    assert process.returncode in ([status, -number] if seconds < 1 else [status])  # before it listens it just ends
     assert "Traceback" not in err
     assert len(err.splitlines()) <= 1
     if out:
