@@ -62,6 +62,7 @@ def _space() -> tmsopt.Problem:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("what", "verb"), VERBS, ids=[f"{k}-{what}" for k, (what, _) in enumerate(VERBS)])
 def test_every_verb_tells_the_same_content(
     what: str, verb: Callable[..., Any], monkeypatch: pytest.MonkeyPatch

@@ -51,7 +51,7 @@ def test_rooms_are_small_and_have_faces() -> None:
     """
     room = Path(command.__file__).parent
     lines = {path: path.read_text(encoding="utf-8").splitlines() for path in room.rglob("*.py")}
-    assert sum(map(len, lines.values())) <= 13400
+    assert sum(map(len, lines.values())) <= 13450
     assert max(map(len, lines.values())) <= 500
     for folder in {path.parent for path in lines}:
         assert folder.name == "statements" or len(list(folder.glob("*.py"))) <= 13  # the face is one

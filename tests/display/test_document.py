@@ -174,6 +174,7 @@ def shown(cell: str, value: float, one: float = 1.0) -> bool:
     return abs(float(cell) - value / one) <= HALF * size
 
 
+@pytest.mark.slow
 @each
 def test_a_page_is_whole_and_asks_for_nothing(name: str) -> None:
     read = page(name)

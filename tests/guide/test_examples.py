@@ -14,6 +14,7 @@ from tmsopt.guide import STARTS, companions, example, examples, new_problem
 ROOT = Path(__file__).parents[2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", STARTS)
 def test_a_new_problem_solves_as_it_stands(kind: str, tmp_path: Path) -> None:
     file = tmp_path / "new.toml"

@@ -62,6 +62,7 @@ def engine(request: pytest.FixtureRequest) -> Engine:
 # The same rows
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("units", [singles(60), BLOCKS], ids=["rows", "blocks"])
 def test_rows_are_the_same_bits_as_in_this_process(engine: Engine, units: Units, tmp_path: Path) -> None:
     here = list(in_process(Fake(tmp_path), units))

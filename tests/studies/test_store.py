@@ -108,6 +108,7 @@ def writer(path: Path, task: str = "write") -> Iterator[tuple[subprocess.Popen[s
         process.stdout.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", TASKS)
 def test_no_acknowledged_row_is_lost_by_kill_9(task: str, path: Path) -> None:
     """The process prints how many rows `add` has acknowledged; whatever it printed must be there, row by row."""
