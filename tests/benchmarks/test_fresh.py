@@ -2,7 +2,9 @@
 
 import json
 import math
+from dataclasses import replace
 
+import mpmath
 import numpy as np
 import pytest
 
@@ -69,6 +71,46 @@ def test_a_violated_limit_must_be_told():
     told = judge(problem, best, said(**answer, missed_as_stored=dict(real.violations)))
     assert told.missed
     assert not told.false
+
+
+def test_fixed_parameters_are_doubles_too():
+    """Beside a triple root -0.693 and the double nearest to it are 1e-5 of the abscissa apart: the polynomial at 60 digits."""
+    problem = FAMILIES["barely"](1)
+    design = {"Fr": 1.6553436965986843, "chi_B": 1.3779074395029411, "lambda_s": 0.21701901450517716}
+
+    def abscissa(number):
+        Fr, chi_B, t = mpmath.mpf(design["Fr"]), mpmath.mpf(design["chi_B"]), mpmath.tan(design["lambda_s"])
+        B, H = map(number, ("-0.693", "-0.365"))
+        a = [
+            -H * t * B**2,
+            Fr * (B - H * chi_B) * B,
+            Fr**2 * (B - H) * B - B * (B + H) * t,
+            -Fr * (chi_B - 1) * B,
+            -B * t,
+        ]
+        return max(mpmath.re(r) for r in mpmath.polyroots(a, maxsteps=500, extraprec=500))
+
+    with mpmath.workdps(60):
+        typed, stored = abscissa(mpmath.mpf), abscissa(lambda text: mpmath.mpf(float(text)))
+    assert abs(typed - stored) > 1e-5
+    assert measure_exactly(problem, design).abscissa == pytest.approx(float(stored), abs=1e-12)
+
+
+def test_both_abscissae_of_a_multiple_root_are_told_or_it_is_false():
+    """A triple root, claimed 1e-5 away from where the doubles have theirs."""
+    problem = replace(FAMILIES["gains"](12), limits={})
+    design = {"g1": 1.9361163917467337, "g2": 0.20417357404563558, "g3": 0.1449650269857808}
+    stored = measure_exactly(problem, design).abscissa
+    answer = {"status": "optimal", "parameters": design, "roots": [{"re": 0.0507, "im": 0.0, "multiplicity": 3}]}
+    best = {"design": design, "value": stored, "violation": 0.0, "abscissa": stored}
+
+    def verdict(value, realised):
+        return set(judge(problem, best, said(**answer, objective={"value": value}, abscissa_realised=realised)).false)
+
+    assert verdict(0.99999 * stored, stored) == set()
+    assert verdict(0.99999 * stored, 1.1 * stored) == {"value"}
+    assert verdict(0.9 * stored, stored) == {"value"}
+    assert "value" in verdict(0.99999 * stored, None)
 
 
 def test_false_infeasible_and_false_proofs():

@@ -287,7 +287,7 @@ def pitching(solution: Solution, si: Mapping[str, float]) -> str:
             return f"on the verge of pitching over the {over} wheel{in_case}; the {lifted} wheel carries no load"
         if load < 0:
             return f"pitches over the {over} wheel{in_case}{_prevented(solution, si, each, lifted)}"
-    return "stands in every case listed" if listed else "stands on both wheels"
+    return "on both wheels in every case listed" if listed else "stands on both wheels"
 
 
 def _prevented(solution: Solution, si: Mapping[str, float], each: Sequence[Mapping[str, Any]], lifted: str) -> str:
