@@ -1,6 +1,7 @@
 """One rule for each word: what is stable, marginally stable, growing, an exceptional point."""
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import flint
 import pytest
@@ -159,3 +160,22 @@ def test_eigenvectors_are_counted_in_fractions_and_in_balls() -> None:
     assert exact_nullity([one, zero, coupled], factor) == 1
     assert has_one_eigenvector([one, zero, coupled], flint.acb(0, 1))
     assert not has_one_eigenvector([one, zero, one], flint.acb(0, 1))
+
+
+def test_no_design_on_the_edge_is_said_to_be_the_least_unstable() -> None:
+    """ω = ±sqrt(k² − g²) are real for all g <= 1/2; at g = 1/2 alone the motion grows, and the abscissa is 0 everywhere."""
+    system = from_hamiltonian([["1j*g", "k"], ["k", "-1j*g"]])
+    problem = tmsopt.Problem(system, fixed={"k": 0.5}, free={"g": (0.1, 1.0)}, minimize="abscissa")
+    design = tmsopt.solve(problem, throw=False)
+    told = " ".join(design.report().split())
+    assert design.abscissa == pytest.approx(0, abs=1e-12)
+    assert "whether those of abscissa 0 grow depends on multiple roots" in told
+    assert "least unstable" not in told
+    assert "grows more slowly" not in told + " ".join(design.report(full=True).split())
+
+
+def test_a_share_of_a_value_is_written_as_its_amount(tmp_path: Path) -> None:
+    """5 % of a mass of 5 kg is 0.25 kg; 0.05 would be 0.05 kg."""
+    (tmp_path / "a.toml").write_text('model = "tms"\n[tolerances]\nm_B = "5 %"\n[parameters]\nm_B = "5 kg"\n')
+    with pytest.raises(tmsopt.InputError, match="5 % of a value as its amount"):
+        tmsopt.load(tmp_path / "a.toml")
