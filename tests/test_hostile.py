@@ -1,6 +1,6 @@
 """Files and words from strangers: whatever they hold, the answer is an InputError in printable words, or a result.
 
-By default the same cases on every run; ``TMSOPT_FUZZ=2000 pytest -m slow tests/test_hostile.py`` draws 2000 new ones of
+By default the same cases on every run; ``TMSOPT_FUZZ=2000 pytest -m long tests/test_hostile.py`` draws 2000 new ones of
 each kind. A crash of the interpreter, or a reader that never ends, ends the run.
 """
 
@@ -19,7 +19,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 import tmsopt
 from tmsopt.cli import main
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 ROOT = Path(__file__).parents[1]
 FILES = sorted((ROOT / "problems").glob("*.toml"))

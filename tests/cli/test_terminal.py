@@ -74,13 +74,20 @@ COMMANDS: dict[str, tuple[str, set[str]]] = {
     "solve": ("solve {p}/realistic.toml", {"looking at designs", "searching", "looking for the nearest boundaries"}),
     "certify": ("solve {p}/realistic.toml --json --certify 2", {"searching", "bounding the optimum"}),
     "full": ("solve {p}/realistic.toml --full", {"moving limits", "splitting roots"}),
+    "plot": ("solve {p}/ep4.toml --plot growth.png", {"following the roots", "writing what --plot asks for"}),
     "report": ("solve {p}/ep4.toml --report page.html", {"writing what --report asks for", "writing the page"}),
+    "all": ("solve {p}/ep4_matching.toml --all", {"proving that no design is missed"}),
     "infeasible": ("solve infeasible.toml --starts 4", {"searching for the least that limits must give"}),
     "front": ("solve {p}/pareto.toml --points 3", {"following the front"}),
     "chart": ("chart {p}/chart.toml --points 60x50", {"charting", "tracing weave", "tracing capsize", "tracing EP2"}),
+    "trace": ("trace {p}/ep_set.toml", {"tracing 2EP2"}),
     "study": ("study study.toml", {"solving rows"}),
+    "monte carlo": ("study built.toml", {"searching", "solving rows"}),
     "figure": ("figure growth --output growth.png", {"drawing"}),
     "prove": ("prove {p}/ep4.toml", {"searching", "proving to 30 digits"}),
+    "explore": ("explore {p}/ep4.toml -o page.html", {"looking for designs worth going to", "writing the page"}),
+    "compare": ("compare {p}/ep4.toml", {"searching", "comparing"}),
+    "simulate": ("simulate {p}/realistic.toml", {"searching", "following the motion"}),
     "speeds": ("speeds {p}/realistic.toml", {"searching", "isolating speeds"}),
     "verify": ("verify --only tab1-*", {"recomputing claims"}),
 }
@@ -88,6 +95,7 @@ COMMANDS: dict[str, tuple[str, set[str]]] = {
 
 FILES = {
     "study": 'problem = "{p}/ep4.toml"\n[vary]\nmu = [0.1, 0.2, 0.3]\n',
+    "built": 'problem = "{p}/ep4.toml"\n[study]\nmethod = "monte_carlo"\nrows = 20\n[tolerances]\nmu = 0.01\n',
     "infeasible": (PROBLEMS / "ep4.toml").read_text() + '[constraints]\ndecay = "abscissa <= -100"\n',
 }
 
@@ -186,7 +194,7 @@ def test_something_is_shown_within_a_second_whatever_takes_long(tmp_path: Path) 
     assert "EP4" in seen.answer
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", COMMANDS)
 def test_long_commands_say_what_they_do_and_leave_nothing(name: str, tmp_path: Path) -> None:
     """The same is written as into pipes, but for the line that is gone in the end."""

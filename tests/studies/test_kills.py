@@ -13,7 +13,7 @@ import pytest
 from tmsopt.studies import alone, load_study, planned
 from tmsopt.studies.store import read_store
 
-ROWS, KILLS, SAMPLE = 3_000, 6, 25
+ROWS, KILLS, SAMPLE = 10_000, 20, 25
 PAUSE = (0.3, 2.0)
 """s of work between kills: some shorter than the second after which rows are committed, some longer."""
 
@@ -36,7 +36,7 @@ def workers_of(pid: int) -> list[int]:
     return [int(line.split()[0]) for line in found.stdout.splitlines() if "tmsopt.processes" in line]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="finds workers by ps --ppid")
 def test_nothing_is_lost_or_solved_twice(tmp_path: Path) -> None:
     """What the store has acknowledged stays there and is never solved again; rows have the bits of any other run."""
