@@ -43,7 +43,7 @@ DRAWN: dict[str, Callable[[Any], Any]] = {
 """Verbs about a box: nothing need be asked."""
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("verb", ASKED)
 def test_a_design_may_be_given_as_problem_file_or_solution(verb: str) -> None:
     if verb == "certify":

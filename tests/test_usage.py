@@ -74,7 +74,9 @@ def test_a_notebook_is_kept_without_answers(notebook: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("alone", [False, True], ids=["from the root", "in a folder of its own"])
+@pytest.mark.parametrize(
+    "alone", [False, pytest.param(True, marks=pytest.mark.long)], ids=["from the root", "in a folder of its own"]
+)
 @each_notebook
 def test_a_notebook_runs(notebook: Path, alone: bool, tmp_path: Path) -> None:
     """Each result that ends a cell has its page, of which the picture and the text that `print` gives are parts.

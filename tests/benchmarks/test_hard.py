@@ -78,7 +78,7 @@ def test_verdicts_say_what_is_wrong() -> None:
     assert confirmed_value(replace(DAMPED, constraints={"c": "x <= 0.5"}), {"x": 1.0}, -0.5).startswith("violates")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_infeasible_is_wrong_where_a_design_is_known() -> None:
     index = next(
         i for i in range(HARD_COUNT) if "damping_ratio >= 1.0" in " ".join(hard_problem(i).constraints.values())

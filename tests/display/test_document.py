@@ -567,7 +567,7 @@ def test_rows_are_sorted_and_filtered(browser: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", ["design", "infeasible", "chart", "study"])
 def test_the_page_is_accessible_and_fits(browser: Any, tmp_path: Path, name: str, scheme: str) -> None:
     from helpers.browser import opened

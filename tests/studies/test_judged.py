@@ -194,7 +194,7 @@ run_study(study, sys.argv[2], progress=told)
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_kill_9_loses_no_block_and_doubles_none(tmp_path: Path) -> None:
     study, path = built(600_000), tmp_path / "built.sqlite"
     whole = run_study(study).rows

@@ -90,7 +90,7 @@ def test_every_row_obeys_the_laws_of_ep4() -> None:
     assert found.solved == 6
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_rows_are_the_same_in_any_order_alone_and_by_processes(tmp_path: Path) -> None:
     here = identities(run_study(GRID, workers=1).rows)
     backwards = Solver(GRID)
@@ -419,7 +419,7 @@ def test_the_command_refuses_what_it_cannot_do(file: Path) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-@pytest.mark.parametrize("ending", [signal.SIGKILL, signal.SIGINT])
+@pytest.mark.parametrize("ending", [signal.SIGKILL, pytest.param(signal.SIGINT, marks=pytest.mark.long)])
 @pytest.mark.slow
 @pytest.mark.usefixtures("interruptible")
 def test_a_killed_command_goes_on(file: Path, ending: signal.Signals) -> None:
